@@ -1,0 +1,1 @@
+"""eigenshape hears the shape of things."""

@@ -1,0 +1,103 @@
+"""Small checks that name what they check, and freezing of arrays."""
+
+import operator
+from typing import Any, SupportsIndex, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
+
+SINGULAR = {"vertices": "vertex", "faces": "face", "points": "point", "simplices": "simplex"}
+
+ArrayT = TypeVar("ArrayT", bound=NDArray[Any])
+
+
+def frozen(array: ArrayT) -> ArrayT:
+    """Return a contiguous read-only copy that nobody else can write to."""
+    copy = np.array(array, order="C")
+    copy.flags.writeable = False
+    return copy  # type: ignore[return-value]
+
+
+def finite_rows(value: ArrayLike, name: str, columns: int) -> NDArray[np.float64]:
+    """Return `value` as an (n, columns) float64 array, refusing anything not finite by index and value."""
+    try:
+        rows = np.asarray(value)
+        rows = rows.astype(np.float64) if rows.dtype.kind in "biuf" else np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as err:
+        raise InvalidShapeError(f"{name} must be an (n, {columns}) array of real numbers; {err}.") from err
+    if rows.ndim != 2 or rows.shape[1] != columns:
+        raise InvalidShapeError(
+            f"{name} must have shape (n, {columns}); the shape is {rows.shape}.{_hint(rows.shape, columns)}"
+        )
+    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    if bad.size:
+        raise InvalidShapeError(
+            f"{name} must be finite; {SINGULAR[name]} {bad[0]} is {rows[bad[0]].tolist()} ({bad.size} such)."
+        )
+    return rows
+
+
+def index_rows(value: ArrayLike, name: str, columns: int, n_vertices: int) -> NDArray[np.int64]:
+    """Return `value` as (f, columns) int64 indices below `n_vertices`, refusing the first bad row."""
+    try:
+        rows = np.asarray(value)
+    except ValueError as err:
+        raise InvalidShapeError(f"{name} must have shape (f, {columns}); {err}.") from err
+    if rows.size and rows.dtype.kind not in "iuf":
+        raise InvalidShapeError(f"{name} must be integers; the type is {rows.dtype}.")
+    if rows.ndim != 2 or rows.shape[1] != columns:
+        raise InvalidShapeError(
+            f"{name} must have shape (f, {columns}); the shape is {rows.shape}.{_hint(rows.shape, columns)}"
+        )
+    _refuse_row(name, "be whole numbers", rows, rows != np.floor(rows) if rows.dtype.kind == "f" else None)
+    _refuse_row(name, f"index vertices 0..{n_vertices - 1}", rows, (rows < 0) | (rows >= n_vertices))
+    return rows.astype(np.int64)
+
+
+def _refuse_row(name: str, rule: str, rows: NDArray[Any], bad: NDArray[np.bool_] | None) -> None:
+    if bad is not None and bad.any():
+        row = int(np.flatnonzero(bad.any(axis=1))[0])
+        raise InvalidShapeError(f"{name} must {rule}; {SINGULAR[name]} {row} is {rows[row].tolist()}.")
+
+
+def _hint(shape: tuple[int, ...], columns: int) -> str:
+    return " Transpose it." if len(shape) == 2 and shape[0] == columns else ""
+
+
+def positive_values(value: ArrayLike, name: str) -> NDArray[np.float64]:
+    """Return `value` as a one-dimensional float64 array, refusing anything not positive and finite."""
+    values = np.atleast_1d(np.asarray(value, dtype=np.float64))
+    if values.ndim != 1 or not values.size:
+        raise InvalidParameterError(f"{name} must be a list of numbers; the shape is {values.shape}.")
+    bad = np.flatnonzero(~(np.isfinite(values) & (values > 0)))
+    if bad.size:
+        raise InvalidParameterError(
+            f"{name} must be positive and finite; entry {bad[0]} is {values[bad[0]]}."
+        )
+    return values
+
+
+def vertex_values(value: ArrayLike, name: str, n_vertices: int) -> NDArray[np.float64]:
+    """Return `value` as one finite float64 number a vertex."""
+    values = np.asarray(value, dtype=np.float64)
+    if values.shape != (n_vertices,):
+        raise InvalidParameterError(
+            f"{name} must hold one number a vertex, shape ({n_vertices},); the shape is {values.shape}."
+        )
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        raise InvalidParameterError(f"{name} must be finite; entry {bad[0]} is {values[bad[0]]}.")
+    return values
+
+
+def whole_number(value: SupportsIndex, name: str, low: int, high: int) -> int:
+    """Return `value` as an int within low..high, both included."""
+    try:
+        number = operator.index(value)
+    except TypeError as err:
+        raise InvalidParameterError(f"{name} must be a whole number; it is {value!r}.") from err
+    if not low <= number <= high:
+        raise InvalidParameterError(f"{name} must lie in {low}..{high}; it is {number}.")
+    return number

@@ -1,0 +1,1 @@
+"""Pictures of shapes and spectra, drawn without a display or a GPU."""

@@ -1,0 +1,1 @@
+"""What a shape is: meshes, their topology, repairs, samples of them, and made-up ones."""

@@ -1,0 +1,1 @@
+"""Discrete Laplace operators, all in the one form of `Laplacian`."""

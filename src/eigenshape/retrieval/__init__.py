@@ -1,0 +1,1 @@
+"""Descriptors, their scores, and the index that finds similar shapes."""

@@ -1,0 +1,1 @@
+"""Certified spectra and what is read off them."""
