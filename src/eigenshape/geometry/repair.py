@@ -1,0 +1,135 @@
+"""Repairs, each asked for by name, each saying what it did."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Int
+from scipy.spatial import cKDTree
+
+from eigenshape._errors import InvalidParameterError
+from eigenshape.geometry.measure import degenerate_faces, face_areas, unit_scaled
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.topology import submesh, unreferenced_vertices, vertex_components
+
+
+@dataclass(frozen=True, eq=False)
+class Repaired:
+    """A mesh after one or more repairs, and what they did.
+
+    Attributes
+    ----------
+    mesh : TriangleMesh
+    report : tuple of str
+        One sentence a repair, such as "drop_degenerate removed 2 faces".
+    source_vertices : (n,) int
+        For each vertex of `mesh`, the vertex of the original that it was.
+    """
+
+    mesh: TriangleMesh
+    report: tuple[str, ...]
+    source_vertices: Int[np.ndarray, " n"]
+
+
+def weld(mesh: TriangleMesh, *, tolerance: float = 0.0) -> Repaired:
+    """Make one vertex of all that lie at the same place.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    tolerance : float
+        Vertices at most this share of the bounding box' diagonal apart are the same place, chains of them too. At 0
+        coordinates must be equal.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the tolerance is not within 0..0.1.
+    """
+    if not 0 <= tolerance <= 0.1:
+        raise InvalidParameterError(f"tolerance must lie in 0..0.1 of the bounding box' diagonal; it is {tolerance}.")
+    group = _groups(mesh, tolerance)
+    _, first, renumbered = np.unique(group, return_index=True, return_inverse=True)
+    order = np.argsort(first)  # keep the vertices in the order in which they first appear
+    rank = np.argsort(order)
+    welded = TriangleMesh(mesh.vertices[first[order]], rank[renumbered[mesh.faces]])
+    report = f"weld joined {mesh.n_vertices - welded.n_vertices} vertices to others at the same place"
+    return Repaired(welded, (report,), first[order])
+
+
+def _groups(mesh: TriangleMesh, tolerance: float) -> Int[np.ndarray, " n"]:
+    # Adding 0.0 makes -0.0 equal to 0.0 also where bytes are compared.
+    _, group = np.unique(mesh.vertices + 0.0, axis=0, return_inverse=True)
+    if tolerance > 0:
+        points, _ = unit_scaled(mesh)
+        radius = tolerance * float(np.linalg.norm(np.ptp(points, axis=0)))
+        pairs = cKDTree(points).query_pairs(radius, output_type="ndarray")
+        linked = TriangleMesh(mesh.vertices, np.column_stack([pairs, pairs[:, 0]])) if len(pairs) else None
+        group = vertex_components(linked)[1] if linked else group
+    return group.ravel().astype(np.int64)
+
+
+def drop_degenerate(mesh: TriangleMesh) -> Repaired:
+    """Remove faces without area; their vertices stay."""
+    keep = np.ones(mesh.n_faces, dtype=bool)
+    keep[degenerate_faces(mesh)] = False
+    return _kept(mesh, keep, "drop_degenerate", "faces without area")
+
+
+def drop_duplicate_faces(mesh: TriangleMesh) -> Repaired:
+    """Keep the first of all faces with the same three corners, whatever their order."""
+    keep = np.zeros(mesh.n_faces, dtype=bool)
+    keep[np.unique(np.sort(mesh.faces, axis=1), axis=0, return_index=True)[1]] = True
+    return _kept(mesh, keep, "drop_duplicate_faces", "faces that repeat an earlier one")
+
+
+def _kept(mesh: TriangleMesh, keep: np.ndarray, name: str, what: str) -> Repaired:
+    kept = TriangleMesh(mesh.vertices, mesh.faces[keep])
+    return Repaired(kept, (f"{name} removed {int((~keep).sum())} {what}",), np.arange(mesh.n_vertices))
+
+
+def drop_unreferenced(mesh: TriangleMesh) -> Repaired:
+    """Remove vertices that no face uses."""
+    n_loose = len(unreferenced_vertices(mesh))
+    kept, source = submesh(mesh, np.ones(mesh.n_faces, dtype=bool))
+    return Repaired(kept, (f"drop_unreferenced removed {n_loose} vertices without a face",), source)
+
+
+def largest_component(mesh: TriangleMesh) -> Repaired:
+    """Keep the connected component with the most area; of equal ones, the one with the lowest vertex."""
+    count, labels = vertex_components(mesh)
+    of_face = labels[mesh.faces[:, 0]]
+    areas = np.bincount(of_face, weights=face_areas(mesh), minlength=count)
+    keep = of_face == np.argmax(areas)
+    kept, source = submesh(mesh, keep)
+    report = f"largest_component removed {count - 1} components with {int((~keep).sum())} faces"
+    return Repaired(kept, (report,), source)
+
+
+REPAIRS: dict[str, Callable[[TriangleMesh], Repaired]] = {
+    "weld": weld,
+    "drop_degenerate": drop_degenerate,
+    "drop_duplicate_faces": drop_duplicate_faces,
+    "drop_unreferenced": drop_unreferenced,
+    "largest_component": largest_component,
+}
+
+
+def repair(mesh: TriangleMesh, names: Sequence[str]) -> Repaired:
+    """Apply the named repairs one after the other.
+
+    Raises
+    ------
+    InvalidParameterError
+        If a name is not one of `REPAIRS`.
+    InvalidShapeError
+        If a repair leaves no face.
+    """
+    for index, name in enumerate(names):
+        if name not in REPAIRS:
+            raise InvalidParameterError(f"repairs must be among {', '.join(REPAIRS)}; name {index} is {name!r}.")
+    done = Repaired(mesh, (), np.arange(mesh.n_vertices))
+    for name in names:
+        step = REPAIRS[name](done.mesh)
+        done = Repaired(step.mesh, done.report + step.report, done.source_vertices[step.source_vertices])
+    return done

@@ -1,0 +1,161 @@
+"""How the triangles of a mesh hang together."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Bool, Int
+from scipy.sparse.csgraph import connected_components
+
+from eigenshape.geometry.mesh import TriangleMesh
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeTable:
+    """The edges of a mesh and the sides of its faces that lie on them.
+
+    Attributes
+    ----------
+    edges : (e, 2) int
+        Vertex pairs, the lower index first, in ascending order.
+    face_edges : (f, 3) int
+        Edge of each face opposite to its corner 0, 1, 2.
+    n_faces : (e,) int
+        Faces at each edge: 1 on a boundary, 2 inside, more where the mesh is not a manifold.
+    """
+
+    edges: Int[np.ndarray, "e 2"]
+    face_edges: Int[np.ndarray, "f 3"]
+    n_faces: Int[np.ndarray, " e"]
+
+
+def edge_table(mesh: TriangleMesh) -> EdgeTable:
+    """List the edges of the mesh once each, with the faces' way to them."""
+    sides = np.sort(half_edges(mesh), axis=1)
+    keys, inverse, counts = np.unique(
+        sides[:, 0] * mesh.n_vertices + sides[:, 1], return_inverse=True, return_counts=True
+    )
+    edges = np.column_stack(np.divmod(keys, mesh.n_vertices))
+    return EdgeTable(edges, inverse.reshape(3, -1).T, counts)
+
+
+def half_edges(mesh: TriangleMesh) -> Int[np.ndarray, "3*f 2"]:
+    """Return the directed sides of all faces: first those opposite to corner 0, then 1, then 2."""
+    a, b, c = mesh.faces.T
+    return np.concatenate([np.column_stack(side) for side in ((b, c), (c, a), (a, b))])
+
+
+def vertex_components(mesh: TriangleMesh) -> tuple[int, Int[np.ndarray, " n"]]:
+    """Count the connected components and number each vertex with its own; a loose vertex is one by itself."""
+    sides = half_edges(mesh)
+    graph = sp.coo_array((np.ones(len(sides), dtype=np.int8), sides.T), shape=(mesh.n_vertices,) * 2)
+    count, labels = connected_components(graph, directed=False)
+    return int(count), labels.astype(np.int64)
+
+
+def unreferenced_vertices(mesh: TriangleMesh) -> Int[np.ndarray, " k"]:
+    """Return the vertices that no face uses."""
+    used = np.zeros(mesh.n_vertices, dtype=bool)
+    used[mesh.faces] = True
+    return np.flatnonzero(~used)
+
+
+def boundary_edges(mesh: TriangleMesh) -> Int[np.ndarray, "b 2"]:
+    """Return the sides that only one face has, directed as in that face."""
+    table = edge_table(mesh)
+    lonely = table.n_faces[table.face_edges.T.ravel()] == 1
+    return half_edges(mesh)[lonely]
+
+
+def boundary_loops(mesh: TriangleMesh) -> list[Int[np.ndarray, " k"]]:
+    """Chain the boundary edges into closed loops of vertices.
+
+    A vertex where several loops touch is passed once by each of them; the loops are sorted by length, longest
+    first, then by their first vertex.
+    """
+    sides = boundary_edges(mesh)
+    leaving: dict[int, list[int]] = {}
+    for start, end in sides[::-1].tolist():
+        leaving.setdefault(start, []).append(end)
+    loops = []
+    for first in sorted(leaving):
+        while leaving[first]:
+            loops.append(np.array(_walk(leaving, first), dtype=np.int64))
+    return sorted(loops, key=lambda loop: (-len(loop), int(loop[0])))
+
+
+def _walk(leaving: dict[int, list[int]], first: int) -> list[int]:
+    loop = [first]
+    while leaving.get(loop[-1]):
+        end = leaving[loop[-1]].pop()
+        if end == first:
+            break
+        loop.append(end)
+    return loop
+
+
+def non_manifold_edges(mesh: TriangleMesh) -> Int[np.ndarray, "k 2"]:
+    """Return the edges with more than two faces."""
+    table = edge_table(mesh)
+    return table.edges[table.n_faces > 2]
+
+
+def non_manifold_vertices(mesh: TriangleMesh) -> Int[np.ndarray, " k"]:
+    """Return the vertices whose faces form more than one fan."""
+    n_fans = np.bincount(_corner_fans(mesh)[1], minlength=mesh.n_vertices)
+    return np.flatnonzero(n_fans > 1)
+
+
+def _corner_fans(mesh: TriangleMesh) -> tuple[Int[np.ndarray, " c"], Int[np.ndarray, " k"]]:
+    """Group the corners of the faces into fans: the fan of each corner, the vertex of each fan."""
+    table, f = edge_table(mesh), mesh.n_faces
+    corners = np.arange(3 * f).reshape(f, 3)
+    at_edge = table.face_edges.ravel()
+    order = np.argsort(at_edge, kind="stable")
+    neighbours = at_edge[order][1:] == at_edge[order][:-1]
+    one, two = order[:-1][neighbours], order[1:][neighbours]
+    links = []
+    for shift_one in (1, 2):
+        for shift_two in (1, 2):
+            a = corners[one // 3, (one + shift_one) % 3]
+            b = corners[two // 3, (two + shift_two) % 3]
+            same = mesh.faces.ravel()[a] == mesh.faces.ravel()[b]
+            links.append(np.stack([a[same], b[same]]))
+    pairs = np.concatenate(links, axis=1)
+    graph = sp.coo_array((np.ones(pairs.shape[1], dtype=np.int8), pairs), shape=(3 * f, 3 * f))
+    count, fan = connected_components(graph, directed=False)
+    vertex = np.empty(count, dtype=np.int64)
+    vertex[fan] = mesh.faces.ravel()
+    return fan.astype(np.int64), vertex
+
+
+def inconsistent_edges(mesh: TriangleMesh) -> Int[np.ndarray, "k 2"]:
+    """Return the edges that two faces pass in the same direction: one of the two is turned over."""
+    sides = half_edges(mesh)
+    forward = (sides[:, 0] < sides[:, 1]).astype(np.int64)
+    table = edge_table(mesh)
+    n_forward = np.bincount(table.face_edges.T.ravel(), weights=forward, minlength=len(table.edges))
+    return table.edges[(table.n_faces == 2) & (n_forward != 1)]
+
+
+def euler_characteristic(mesh: TriangleMesh) -> int:
+    """Return V - E + F, over the vertices that faces use."""
+    n_used = mesh.n_vertices - len(unreferenced_vertices(mesh))
+    return n_used - len(edge_table(mesh).edges) + mesh.n_faces
+
+
+def is_closed(mesh: TriangleMesh) -> bool:
+    """Say whether every edge has exactly two faces."""
+    return bool((edge_table(mesh).n_faces == 2).all())
+
+
+def is_manifold(mesh: TriangleMesh) -> bool:
+    """Say whether every edge has at most two faces and every vertex one fan."""
+    return not len(non_manifold_edges(mesh)) and not len(non_manifold_vertices(mesh))
+
+
+def submesh(mesh: TriangleMesh, keep_faces: Bool[np.ndarray, " f"]) -> tuple[TriangleMesh, Int[np.ndarray, " k"]]:
+    """Keep some faces and the vertices they use: the smaller mesh, and the old index of each of its vertices."""
+    faces = mesh.faces[keep_faces]
+    vertices, renumbered = np.unique(faces, return_inverse=True)
+    return TriangleMesh(mesh.vertices[vertices], renumbered.reshape(-1, 3)), vertices

@@ -1,0 +1,34 @@
+"""Heat kernel signatures: how much heat stays where it was put."""
+
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from eigenshape._arrays import positive_values
+from eigenshape.spectral.spectrum import Spectrum
+
+
+def heat_kernel_signature(spectrum: Spectrum, times: ArrayLike) -> Float[np.ndarray, "n q"]:
+    """Measure the heat left at each point after each time.
+
+    h_t(x, x) = sum_i exp(-t lambda_i) phi_i(x)^2                (thesis eq. 5.1; Sun, Ovsjanikov, Guibas 2009)
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        k eigenpairs; stopping at k leaves out at most exp(-t lambda_k) / b_x at point x.
+    times : (q,) float
+        Diffusion times, in length^2, all > 0.
+
+    Returns
+    -------
+    (n, q) float
+        Heat per unit mass, in 1/length^dim.
+
+    Raises
+    ------
+    InvalidParameterError
+        If a time is not positive and finite.
+    """
+    decay = np.exp(-np.outer(spectrum.eigenvalues, positive_values(times, "times")))
+    return np.asarray(spectrum.eigenvectors**2 @ decay)
