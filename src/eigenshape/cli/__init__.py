@@ -1,1 +1,5 @@
 """The command line, one file a verb."""
+
+from eigenshape.cli.app import app
+
+__all__ = ["app"]

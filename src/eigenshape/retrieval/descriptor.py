@@ -1,30 +1,66 @@
-"""What a shape is known by: a few feature points, each with a vector of numbers."""
+"""What a shape is known by: a few feature points, each with the heat that it keeps at several times."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from eigenshape._arrays import frozen
+
 
 @dataclass(frozen=True)
 class Recipe:
-    """How a descriptor was made; two descriptors compare only if their recipes are equal.
+    """How a descriptor is made; two descriptors compare only if their recipes are equal.
+
+    A time is a scale times `time_unit`, in units of the shape's own area or of its squared box, never of length.
+    The defaults are those of the scale-free preset.
 
     Parameters
     ----------
     name : str
-        Preset, such as "thesis" or "scale-free".
+        Of the preset.
+    unit : "area" or "box"
+        What a time of 1 means: the area of the surface, or the square of the longest side of its box.
+    time_unit : float
+        The thesis' τ.
+    feature_scale : float
+        Features are the persistent maxima of the heat at feature_scale × time_unit.
+    scales : tuple of float
+        The thesis' α, one a column of the descriptor.
+    logarithmic : bool
+        Whether vectors hold the logarithm of the heat, so that a ratio counts the same at every scale.
     n_features : int
-        Feature points m (the thesis' κ).
+        Feature points at most (the thesis' κ).
+    n_modes : int
+        Eigenpairs of the spectrum at most.
     """
 
-    name: str
+    name: str = "scale-free"
+    unit: Literal["area", "box"] = "area"
+    time_unit: float = 1e-3
+    feature_scale: float = 4.0
+    scales: tuple[float, ...] = tuple(4.0 * 1.4**step for step in range(15))
+    logarithmic: bool = True
     n_features: int = 15
+    n_modes: int = 300
 
     @property
     def key(self) -> str:
         """A string that is equal exactly where the recipes are."""
         return repr(self)
+
+
+SCALE_FREE = Recipe()
+THESIS = Recipe(
+    name="thesis",
+    unit="box",
+    time_unit=2e-4,
+    feature_scale=5.0,
+    scales=(5.0, 20.0, 40.0, 60.0, 100.0, 150.0, *(100.0 * hundred for hundred in range(2, 11))),
+    logarithmic=False,
+)
+PRESETS = {recipe.name: recipe for recipe in (SCALE_FREE, THESIS)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +70,16 @@ class ShapeDescriptor:
     Parameters
     ----------
     vectors : (m, q) float
-        One row a feature point.
+        One row a feature point, without unit. Copied, then read-only.
     vertices : (m,) int
-        The vertex at which each feature lies.
+        The vertex at which each feature lies. Copied, then read-only.
     recipe : Recipe
     """
 
     vectors: Float[np.ndarray, "m q"]
     vertices: Int[np.ndarray, " m"]
     recipe: Recipe
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vectors", frozen(self.vectors))
+        object.__setattr__(self, "vertices", frozen(self.vertices))

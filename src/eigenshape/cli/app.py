@@ -1,0 +1,21 @@
+"""The verbs, gathered."""
+
+import typer
+
+from eigenshape.cli.console import Verbs
+from eigenshape.cli.demo import demo
+from eigenshape.cli.features import features
+from eigenshape.cli.index import index
+from eigenshape.cli.info import info
+from eigenshape.cli.query import query
+from eigenshape.cli.spectrum import spectrum
+
+app = typer.Typer(
+    cls=Verbs,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Exit codes: 0 done, 1 an error named on stderr, 2 wrong usage, 3 some shapes could not be taken.",
+)
+for verb in (info, spectrum, features, index, query, demo):
+    app.command(no_args_is_help=verb is not demo)(verb)

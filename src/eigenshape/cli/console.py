@@ -1,0 +1,105 @@
+"""What every verb shares: options, tables, JSON, progress bars, and how an error reaches a person."""
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+from typer.core import TyperGroup
+
+from eigenshape._errors import EigenshapeError, InvalidParameterError
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.repair import REPAIRS, repair
+from eigenshape.io.mesh_files import read_mesh
+
+out = Console(highlight=False, soft_wrap=True)
+err = Console(stderr=True, highlight=False, soft_wrap=True)
+
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")]
+RepairOption = Annotated[
+    str,
+    typer.Option(
+        "--repair",
+        metavar="NAMES",
+        help=f"Repairs to apply in this order, separated by commas: {', '.join(REPAIRS)}. None unless asked for.",
+    ),
+]
+MeshArgument = Annotated[Path, typer.Argument(help="Mesh file: OFF, OBJ, PLY, STL or GLB.")]
+
+
+class Verbs(TyperGroup):
+    """Turn our errors and the system's into one line and exit code 1."""
+
+    def invoke(self, ctx: typer.Context) -> Any:
+        """Run the verb."""
+        try:
+            return super().invoke(ctx)
+        except (EigenshapeError, OSError) as error:
+            err.print(f"[bold red]error:[/] {escape(str(error))}")
+            raise typer.Exit(1) from error
+
+
+def load_mesh(path: Path, repairs: str) -> TriangleMesh:
+    """Read a mesh, apply the repairs that were asked for, and say on stderr what they did."""
+    done = repair(read_mesh(path), repair_names(repairs))
+    for line in done.report:
+        err.print(f"[yellow]repair:[/] {line}")
+    return done.mesh
+
+
+def repair_names(text: str) -> tuple[str, ...]:
+    """Split a comma-separated list of repairs, refusing an unknown name before any file is read."""
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    for name in names:
+        if name not in REPAIRS:
+            raise InvalidParameterError(f"--repair takes {', '.join(REPAIRS)}; it was given {name!r}.")
+    return names
+
+
+def print_json(value: Any) -> None:
+    """Print a value as JSON on stdout; numpy numbers and arrays become plain ones."""
+    typer.echo(json.dumps(value, indent=2, default=_plain, allow_nan=False))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return str(value)
+
+
+def print_table(title: str, columns: list[str], rows: list[list[str]]) -> None:
+    """Print rows under their headings, numbers to the right."""
+    table = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
+    for index, column in enumerate(columns):
+        table.add_column(column, justify="left" if index == 0 else "right", no_wrap=True)
+    for row in rows:
+        table.add_row(*(escape(cell) for cell in row))
+    out.print(table)
+
+
+@contextmanager
+def progress_bar(title: str) -> Iterator[Callable[[float, str], None]]:
+    """Show a bar on stderr while the block runs; it takes the share done and a word on what is being done."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=err, transient=True) as bar:
+        task = bar.add_task(title, total=1.0)
+        yield lambda share, what: bar.update(task, completed=share, description=f"{title}: {what}" if what else title)
+
+
+def said(path: Path) -> None:
+    """Tell on stderr that a file was written."""
+    err.print(f"wrote {escape(str(path))}")

@@ -1,0 +1,94 @@
+"""eigenshape features: the points and parts of a shape that persist."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from eigenshape._errors import InvalidParameterError
+from eigenshape.cli.console import (
+    JsonOption,
+    MeshArgument,
+    RepairOption,
+    load_mesh,
+    print_json,
+    print_table,
+    progress_bar,
+    said,
+)
+from eigenshape.features.segmentation import Segmentation, segment
+from eigenshape.figures.fields import figure_segments
+from eigenshape.figures.save import save_figure
+from eigenshape.geometry.measure import face_areas
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.retrieval.describe import describe_mesh
+from eigenshape.retrieval.descriptor import PRESETS, SCALE_FREE, Recipe
+
+
+def preset(name: str) -> Recipe:
+    """Look a recipe up by the name that a user typed."""
+    if name not in PRESETS:
+        raise InvalidParameterError(f"--preset takes {' or '.join(PRESETS)}; it was given {name!r}.")
+    return PRESETS[name]
+
+
+PresetOption = Annotated[str, typer.Option("--preset", help=f"How shapes are described: {' or '.join(PRESETS)}.")]
+
+
+def features(
+    mesh: MeshArgument,
+    *,
+    n_regions: Annotated[int, typer.Option("-n", "--n-regions", help="Number of regions at most.")] = 15,
+    persistence: Annotated[
+        float | None, typer.Option(help="Keep what persists at least so long, in units of heat; replaces the number.")
+    ] = None,
+    preset_name: PresetOption = SCALE_FREE.name,
+    repair: RepairOption = "",
+    picture: Annotated[Path | None, typer.Option(help="Draw parts and feature points (PNG, SVG or PDF).")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Find the feature points of a mesh and the parts around them, most persistent first."""
+    recipe = preset(preset_name)
+    surface = load_mesh(mesh, repair)
+    with progress_bar("features") as progress:
+        shape = describe_mesh(surface, recipe, progress=progress)
+    parts = segment(shape.tree, **({"n_regions": n_regions} if persistence is None else {"persistence": persistence}))
+    rows = _rows(shape.mesh, parts)
+    if as_json:
+        print_json({"path": str(mesh), "recipe": recipe.name, "features": rows, "face_labels": parts.labels})
+    else:
+        _print(rows)
+    if picture:
+        save_figure(figure_segments(surface, parts.labels, parts.features.vertices), picture)
+        said(picture)
+
+
+def _rows(mesh: TriangleMesh, parts: Segmentation) -> list[dict[str, Any]]:
+    areas = np.bincount(parts.labels, weights=face_areas(mesh))
+    points = parts.features
+    return [
+        {
+            "vertex": int(vertex),
+            "position": mesh.vertices[vertex].tolist(),
+            "heat": float(points.values[index]),
+            "persistence": float(points.persistence[index]) if np.isfinite(points.persistence[index]) else None,
+            "area_share": float(areas[index] / areas.sum()),
+        }
+        for index, vertex in enumerate(points.vertices)
+    ]
+
+
+def _print(rows: list[dict[str, Any]]) -> None:
+    cells = [
+        [
+            str(index),
+            str(row["vertex"]),
+            "  ".join(f"{coordinate:.4g}" for coordinate in row["position"]),
+            f"{row['heat']:.4g}",
+            "never merges" if row["persistence"] is None else f"{row['persistence']:.4g}",
+            f"{100 * row['area_share']:.1f} %",
+        ]
+        for index, row in enumerate(rows)
+    ]
+    print_table("Feature points", ["feature", "vertex", "position", "heat", "persistence", "area"], cells)
