@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 from jaxtyping import install_import_hook
 
-hook = install_import_hook("eigenshape", "beartype.beartype")
-hook.install()
+install_import_hook("eigenshape", "beartype.beartype")
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("EIGENSHAPE_DATA", ROOT.parent / "shared" / "data"))

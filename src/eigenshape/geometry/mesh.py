@@ -4,12 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
+from numpy.typing import ArrayLike
 
 from eigenshape._arrays import finite_rows, frozen, index_rows
 from eigenshape._errors import InvalidShapeError
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class TriangleMesh:
     """Points in space and the triangles between them.
 
@@ -34,15 +35,15 @@ class TriangleMesh:
     vertices: Float[np.ndarray, "n 3"]
     faces: Int[np.ndarray, "f 3"]
 
-    def __post_init__(self) -> None:
-        vertices = finite_rows(self.vertices, "vertices", 3)
-        if not len(vertices):
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
+        points = finite_rows(vertices, "vertices", 3)
+        if not len(points):
             raise InvalidShapeError("A mesh must have vertices; it has none.")
-        faces = index_rows(self.faces, "faces", 3, len(vertices))
-        if not len(faces):
-            raise InvalidShapeError(f"A mesh must have faces; it has {len(vertices)} vertices and no face.")
-        object.__setattr__(self, "vertices", frozen(vertices))
-        object.__setattr__(self, "faces", frozen(faces))
+        corners = index_rows(faces, "faces", 3, len(points))
+        if not len(corners):
+            raise InvalidShapeError(f"A mesh must have faces; it has {len(points)} vertices and no face.")
+        object.__setattr__(self, "vertices", frozen(points))
+        object.__setattr__(self, "faces", frozen(corners))
 
     @property
     def n_vertices(self) -> int:

@@ -39,7 +39,7 @@ def edge_table(mesh: TriangleMesh) -> EdgeTable:
     return EdgeTable(edges, inverse.reshape(3, -1).T, counts)
 
 
-def half_edges(mesh: TriangleMesh) -> Int[np.ndarray, "3*f 2"]:
+def half_edges(mesh: TriangleMesh) -> Int[np.ndarray, "s 2"]:
     """Return the directed sides of all faces: first those opposite to corner 0, then 1, then 2."""
     a, b, c = mesh.faces.T
     return np.concatenate([np.column_stack(side) for side in ((b, c), (c, a), (a, b))])

@@ -1,0 +1,88 @@
+"""Cut a merge tree, by number or by persistence, into parts around feature points."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from eigenshape._arrays import frozen, whole_number
+from eigenshape._errors import InvalidParameterError
+from eigenshape.features.merge_tree import MergeTree, merged_regions
+
+
+@dataclass(frozen=True, eq=False)
+class FeaturePoints:
+    """The maxima that a cut left, most persistent first, ties by height.
+
+    Attributes
+    ----------
+    vertices : (m,) int
+    values : (m,) float
+        Function at each.
+    persistence : (m,) float
+        In the function's unit; infinite for the highest of each component.
+    """
+
+    vertices: Int[np.ndarray, " m"]
+    values: Float[np.ndarray, " m"]
+    persistence: Float[np.ndarray, " m"]
+
+
+@dataclass(frozen=True, eq=False)
+class Segmentation:
+    """A part of the surface around each feature point.
+
+    Attributes
+    ----------
+    labels : (f,) int
+        For each face, the feature point in whose part it lies.
+    features : FeaturePoints
+    """
+
+    labels: Int[np.ndarray, " f"]
+    features: FeaturePoints
+
+
+def segment(tree: MergeTree, *, n_regions: int | None = None, persistence: float | None = None) -> Segmentation:
+    """Merge regions in the order of their persistence until so many are left, or all left persist so long.
+
+    Parameters
+    ----------
+    tree : MergeTree
+    n_regions : int
+        Regions to leave: fewer are left where the function has fewer maxima, more where the surface has more
+        components, which never merge.
+    persistence : float
+        Regions whose persistence is at least this are left (thesis proposition 5.2.2).
+
+    Returns
+    -------
+    Segmentation
+
+    Raises
+    ------
+    InvalidParameterError
+        If not exactly one of the two is given, or it is not positive.
+    """
+    ends = _beyond_number(tree, n_regions) if persistence is None else _below_persistence(tree, n_regions, persistence)
+    left = np.flatnonzero(~ends)
+    regions = merged_regions(np.maximum(tree.parent, 0), ends)[tree.basins]
+    features = FeaturePoints(
+        vertices=frozen(tree.maxima[left]), values=frozen(tree.values[left]), persistence=frozen(tree.persistence[left])
+    )
+    return Segmentation(frozen(np.searchsorted(left, regions)), features)
+
+
+def _beyond_number(tree: MergeTree, n_regions: int | None) -> Bool[np.ndarray, " m"]:
+    if n_regions is None:
+        raise InvalidParameterError("segment takes either n_regions or persistence; it was given neither.")
+    count = whole_number(n_regions, "n_regions", 1, len(tree.basins))
+    return (np.arange(len(tree.maxima)) >= count) & np.isfinite(tree.persistence)
+
+
+def _below_persistence(tree: MergeTree, n_regions: int | None, persistence: float) -> Bool[np.ndarray, " m"]:
+    if n_regions is not None:
+        raise InvalidParameterError("segment takes either n_regions or persistence; it was given both.")
+    if not persistence >= 0:
+        raise InvalidParameterError(f"persistence must be at least 0; it is {persistence}.")
+    return tree.persistence < persistence
