@@ -22,15 +22,10 @@ def frozen(array: ArrayT) -> ArrayT:
 
 def finite_rows(value: ArrayLike, name: str, columns: int) -> NDArray[np.float64]:
     """Return `value` as an (n, columns) float64 array, refusing anything not finite by index and value."""
-    try:
-        rows = np.asarray(value)
-        rows = rows.astype(np.float64) if rows.dtype.kind in "biuf" else np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as err:
-        raise InvalidShapeError(f"{name} must be an (n, {columns}) array of real numbers; {err}.") from err
-    if rows.ndim != 2 or rows.shape[1] != columns:
-        raise InvalidShapeError(
-            f"{name} must have shape (n, {columns}); the shape is {rows.shape}.{_hint(rows.shape, columns)}"
-        )
+    rows = _table(value, name, columns)
+    if rows.dtype.kind not in "iuf":
+        raise InvalidShapeError(f"{name} must be real numbers; the type is {rows.dtype}.")
+    rows = rows.astype(np.float64)
     bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if bad.size:
         raise InvalidShapeError(
@@ -41,29 +36,32 @@ def finite_rows(value: ArrayLike, name: str, columns: int) -> NDArray[np.float64
 
 def index_rows(value: ArrayLike, name: str, columns: int, n_vertices: int) -> NDArray[np.int64]:
     """Return `value` as (f, columns) int64 indices below `n_vertices`, refusing the first bad row."""
-    try:
-        rows = np.asarray(value)
-    except ValueError as err:
-        raise InvalidShapeError(f"{name} must have shape (f, {columns}); {err}.") from err
-    if rows.size and rows.dtype.kind not in "iuf":
+    rows = _table(value, name, columns)
+    huge = rows.dtype.kind == "O" and all(isinstance(entry, int) for entry in rows.flat)
+    if rows.dtype.kind not in "iuf" and not huge:
         raise InvalidShapeError(f"{name} must be integers; the type is {rows.dtype}.")
-    if rows.ndim != 2 or rows.shape[1] != columns:
-        raise InvalidShapeError(
-            f"{name} must have shape (f, {columns}); the shape is {rows.shape}.{_hint(rows.shape, columns)}"
-        )
     _refuse_row(name, "be whole numbers", rows, rows != np.floor(rows) if rows.dtype.kind == "f" else None)
     _refuse_row(name, f"index vertices 0..{n_vertices - 1}", rows, (rows < 0) | (rows >= n_vertices))
     return rows.astype(np.int64)
+
+
+def _table(value: ArrayLike, name: str, columns: int) -> NDArray[Any]:
+    try:
+        rows = np.asarray(value)
+    except ValueError as err:
+        raise InvalidShapeError(f"{name} must have shape (n, {columns}); the rows differ in length.") from err
+    if rows.size == 0:
+        return np.empty((0, columns), dtype=np.int64)
+    if rows.ndim != 2 or rows.shape[1] != columns:
+        hint = " Transpose it." if rows.ndim == 2 and rows.shape[0] == columns else ""
+        raise InvalidShapeError(f"{name} must have shape (n, {columns}); the shape is {rows.shape}.{hint}")
+    return rows
 
 
 def _refuse_row(name: str, rule: str, rows: NDArray[Any], bad: NDArray[np.bool_] | None) -> None:
     if bad is not None and bad.any():
         row = int(np.flatnonzero(bad.any(axis=1))[0])
         raise InvalidShapeError(f"{name} must {rule}; {SINGULAR[name]} {row} is {rows[row].tolist()}.")
-
-
-def _hint(shape: tuple[int, ...], columns: int) -> str:
-    return " Transpose it." if len(shape) == 2 and shape[0] == columns else ""
 
 
 def positive_values(value: ArrayLike, name: str) -> NDArray[np.float64]:
