@@ -1,0 +1,113 @@
+"""What is seen: a z-buffer in plain numpy, for partial scans and for pictures."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+CANDIDATES_AT_ONCE = 2_000_000
+THINNEST = 1e-12  # square pixels of a face that is seen from its edge and covers nothing
+EDGE_SLACK = 1e-9  # in barycentric coordinates, so that two faces leave no gap between them
+
+
+@dataclass(frozen=True, eq=False)
+class Raster:
+    """The nearest face at each pixel.
+
+    Attributes
+    ----------
+    face : (h, w) int
+        -1 where there is none.
+    weights : (h, w, 3) float
+        Barycentric coordinates of the pixel's middle in its face.
+    depth : (h, w) float
+        Third coordinate there; minus infinity where there is no face.
+    """
+
+    face: Int[np.ndarray, "h w"]
+    weights: Float[np.ndarray, "h w 3"]
+    depth: Float[np.ndarray, "h w"]
+
+
+def rasterize(points: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"], width: int, height: int) -> Raster:
+    """Find the nearest face at the middle of each pixel.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        Columns: pixels to the right, pixels down, and height towards the viewer. The middle of the first pixel is at
+        (0.5, 0.5).
+    faces : (f, 3) int
+    width, height : int
+        Of the picture.
+
+    Returns
+    -------
+    Raster
+        Of two faces at the same height the one with the lower index is seen.
+    """
+    depth = np.full(width * height, -np.inf)
+    face = np.full(width * height, -1, dtype=np.int64)
+    weights = np.zeros((width * height, 3))
+    corners = points[faces]
+    for candidates in _chunks(corners, width, height):
+        index, pixel, inside = _covered(corners, candidates, width)
+        height_there = np.einsum("ij,ij->i", inside, corners[index, :, 2])
+        np.maximum.at(depth, pixel, height_there)
+        # Backwards, so that of equal heights the lowest face is written last.
+        nearest = np.flatnonzero(height_there == depth[pixel])[::-1]
+        face[pixel[nearest]] = index[nearest]
+        weights[pixel[nearest]] = inside[nearest]
+    return Raster(face.reshape(height, width), weights.reshape(height, width, 3), depth.reshape(height, width))
+
+
+def _chunks(corners: Float[np.ndarray, "f 3 3"], width: int, height: int) -> Iterator[Int[np.ndarray, "k 5"]]:
+    """Yield rows of (face, left, top, columns, rows): the box of pixels whose middles a face may cover."""
+    size = np.array([width, height])
+    low = np.clip(np.ceil(corners[:, :, :2].min(axis=1) - 0.5), 0, size).astype(np.int64)
+    high = np.clip(np.floor(corners[:, :, :2].max(axis=1) - 0.5) + 1, 0, size).astype(np.int64)
+    span = np.maximum(high - low, 0)
+    seen = np.flatnonzero((span.prod(axis=1) > 0) & (np.abs(_doubled_area(corners)) > THINNEST))
+    boxes = np.column_stack([seen, low[seen], span[seen]])
+    ends = np.cumsum(boxes[:, 3] * boxes[:, 4])
+    if len(boxes):
+        yield from np.split(
+            boxes, np.unique(np.searchsorted(ends, np.arange(CANDIDATES_AT_ONCE, ends[-1], CANDIDATES_AT_ONCE)))
+        )
+
+
+def _covered(
+    corners: Float[np.ndarray, "f 3 3"], boxes: Int[np.ndarray, "k 5"], width: int
+) -> tuple[Int[np.ndarray, " c"], Int[np.ndarray, " c"], Float[np.ndarray, "c 3"]]:
+    """Return face, pixel and barycentric coordinates of every pixel middle that lies in a face of these boxes."""
+    face, left, top, columns, rows = boxes.T
+    counts = columns * rows
+    place = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    across = np.repeat(columns, counts)
+    down, right = np.divmod(place, across)
+    first, by_column, by_row = (np.repeat(part, counts, axis=0) for part in _weight_planes(corners[face], left, top))
+    weights = first + by_column * right[:, None] + by_row * down[:, None]
+    weights = np.column_stack([1 - weights.sum(axis=1), weights])
+    inside = np.flatnonzero((weights >= -EDGE_SLACK).all(axis=1))
+    pixel = np.repeat(top * width + left, counts)[inside] + down[inside] * width + right[inside]
+    return np.repeat(face, counts)[inside], pixel, weights[inside]
+
+
+def _weight_planes(
+    corners: Float[np.ndarray, "k 3 3"], left: Int[np.ndarray, " k"], top: Int[np.ndarray, " k"]
+) -> tuple[Float[np.ndarray, "k 2"], Float[np.ndarray, "k 2"], Float[np.ndarray, "k 2"]]:
+    """Return the weights of corners 1 and 2 at the first pixel, and how they change by column and by row."""
+    origin, one, two = corners[:, :, :2].transpose(1, 0, 2)
+    to_one, to_two = one - origin, two - origin
+    here = np.column_stack([left + 0.5, top + 0.5]) - origin
+    scale = 1 / _doubled_area(corners)
+    by_column = np.column_stack([to_two[:, 1] * scale, -to_one[:, 1] * scale])
+    by_row = np.column_stack([-to_two[:, 0] * scale, to_one[:, 0] * scale])
+    return by_column * here[:, :1] + by_row * here[:, 1:], by_column, by_row
+
+
+def _doubled_area(corners: Float[np.ndarray, "k 3 3"]) -> Float[np.ndarray, " k"]:
+    origin, one, two = corners[:, :, :2].transpose(1, 0, 2)
+    to_one, to_two = one - origin, two - origin
+    return to_one[:, 0] * to_two[:, 1] - to_one[:, 1] * to_two[:, 0]

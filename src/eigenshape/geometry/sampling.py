@@ -1,0 +1,158 @@
+"""Parts of a shape as the world gives them: seen from one side, or with portions missing (thesis 5.4)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy.typing import ArrayLike
+
+from eigenshape._arrays import whole_number
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape.geometry.measure import unit_scaled, vertex_normals
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.raster import rasterize
+from eigenshape.geometry.repair import largest_component
+from eigenshape.geometry.topology import submesh
+
+SLACK = 1.5  # pixels that a vertex may lie off the place where the surface was seen
+STEEPEST = 10.0  # slope up to which that may hide it behind its own surface
+
+
+@dataclass(frozen=True, eq=False)
+class MeshPart:
+    """A part of a mesh, and where its vertices were.
+
+    Attributes
+    ----------
+    mesh : TriangleMesh
+    source_vertices : (n,) int
+        For each vertex of `mesh`, its index in the whole.
+    """
+
+    mesh: TriangleMesh
+    source_vertices: Int[np.ndarray, " n"]
+
+
+def partial_scan(
+    mesh: TriangleMesh, view: ArrayLike | np.random.Generator, *, resolution: int = 1024, all_pieces: bool = False
+) -> MeshPart:
+    """Keep what is visible from far away in one direction.
+
+    A face stays if all its corners are visible in a z-buffer; surfaces seen at a grazing angle drop out, as they do in
+    a scanner.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    view : (3,) float or numpy.random.Generator
+        Direction from the shape to the viewer, or the source of a random one.
+    resolution : int
+        Pixels along the longest side of the picture, 16 to 8192.
+    all_pieces : bool
+        Keep every visible piece, and not only the one with the most area. Small islands have heat of their own that
+        has nothing to do with the shape.
+
+    Returns
+    -------
+    MeshPart
+
+    Raises
+    ------
+    InvalidParameterError
+        If the direction is zero or not finite, or the resolution is out of range.
+    InvalidShapeError
+        If no face is visible.
+    """
+    whole_number(resolution, "resolution", 16, 8192)
+    visible = _visible_vertices(mesh, _direction(view), resolution)
+    part = _kept(mesh, visible[mesh.faces].all(axis=1), "No face is visible as a whole from there.")
+    if all_pieces:
+        return part
+    piece = largest_component(part.mesh)
+    return MeshPart(piece.mesh, part.source_vertices[piece.source_vertices])
+
+
+def _direction(view: ArrayLike | np.random.Generator) -> Float[np.ndarray, "3"]:
+    vector = view.standard_normal(3) if isinstance(view, np.random.Generator) else np.asarray(view, dtype=np.float64)
+    if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
+        raise InvalidParameterError(f"view must be three finite numbers, not all zero; it is {vector.tolist()}.")
+    vector = vector / np.abs(vector).max()
+    return vector / np.linalg.norm(vector)
+
+
+def rotation_towards(view: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+    """Return a rotation whose third row is the unit vector `view`."""
+    helper = np.eye(3)[np.argmin(np.abs(view))]
+    right = np.cross(helper, view)
+    right = right / np.linalg.norm(right)
+    return np.stack([right, np.cross(view, right), view])
+
+
+def _visible_vertices(mesh: TriangleMesh, view: Float[np.ndarray, "3"], resolution: int) -> Bool[np.ndarray, " n"]:
+    points = unit_scaled(mesh)[0] @ rotation_towards(view).T
+    low = points.min(axis=0)
+    span = float((points.max(axis=0) - low)[:2].max())
+    if not span > 0:
+        raise InvalidShapeError("A shape must have a size to be scanned; all its vertices are in one line of sight.")
+    pixels = (points - low) * ((resolution - 2) / span) + 1
+    raster = rasterize(pixels, mesh.faces, resolution, resolution)
+    column, row = pixels[:, :2].astype(np.int64).T
+    towards = np.abs(vertex_normals(mesh) @ view)
+    slope = np.minimum(np.sqrt(1 - np.minimum(towards, 1) ** 2) / np.maximum(towards, 1 / STEEPEST), STEEPEST)
+    return pixels[:, 2] >= raster.depth[row, column] - SLACK * (1 + slope)
+
+
+def cut_by_planes(mesh: TriangleMesh, planes: ArrayLike) -> MeshPart:
+    """Remove the portions of a mesh that lie beyond planes.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    planes : (p, 4) float
+        Rows (a, b, c, d): a vertex with a x + b y + c z > d for any row goes, and every face that it belongs to.
+
+    Returns
+    -------
+    MeshPart
+
+    Raises
+    ------
+    InvalidParameterError
+        If a plane is not four finite numbers or has no normal.
+    InvalidShapeError
+        If nothing is left.
+    """
+    rows = np.atleast_2d(np.asarray(planes, dtype=np.float64))
+    if rows.ndim != 2 or rows.shape[1] != 4:
+        raise InvalidParameterError(f"planes must have shape (p, 4); the shape is {rows.shape}.")
+    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1) | ~rows[:, :3].any(axis=1))
+    if bad.size:
+        raise InvalidParameterError(
+            f"planes must be finite with a normal that is not zero; row {bad[0]} is {rows[bad[0]].tolist()}."
+        )
+    kept = (mesh.vertices @ rows[:, :3].T <= rows[:, 3]).all(axis=1)
+    return _kept(mesh, kept[mesh.faces].all(axis=1), "The planes leave no face.")
+
+
+def random_planes(
+    mesh: TriangleMesh, rng: np.random.Generator, *, n_planes: int = 1, share: float = 0.2
+) -> Float[np.ndarray, "p 4"]:
+    """Draw planes in random directions that each cut off a share of the vertices.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the share is not within 0..1 or there is no plane to draw.
+    """
+    whole_number(n_planes, "n_planes", 1, 100)
+    if not 0 < share < 1:
+        raise InvalidParameterError(f"share must lie between 0 and 1; it is {share}.")
+    normals = rng.standard_normal((n_planes, 3))
+    offsets = np.quantile(mesh.vertices @ normals.T, 1 - share, axis=0)
+    return np.column_stack([normals, offsets])
+
+
+def _kept(mesh: TriangleMesh, keep: Bool[np.ndarray, " f"], otherwise: str) -> MeshPart:
+    if not keep.any():
+        raise InvalidShapeError(f"A part must have a face. {otherwise}")
+    return MeshPart(*submesh(mesh, keep))
