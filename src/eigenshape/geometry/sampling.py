@@ -130,7 +130,7 @@ def cut_by_planes(mesh: TriangleMesh, planes: ArrayLike) -> MeshPart:
         raise InvalidParameterError(
             f"planes must be finite with a normal that is not zero; row {bad[0]} is {rows[bad[0]].tolist()}."
         )
-    kept = (mesh.vertices @ rows[:, :3].T <= rows[:, 3]).all(axis=1)
+    kept = np.all(mesh.vertices @ rows[:, :3].T <= rows[:, 3], axis=1)
     return _kept(mesh, kept[mesh.faces].all(axis=1), "The planes leave no face.")
 
 

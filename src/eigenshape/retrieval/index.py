@@ -1,0 +1,251 @@
+"""A collection of described shapes in a folder, and the question which of them are most alike."""
+
+import json
+import sqlite3
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, SupportsIndex
+from zlib import crc32
+
+import numpy as np
+from jaxtyping import Int
+
+from eigenshape._arrays import whole_number
+from eigenshape._errors import InvalidParameterError, StoreError
+from eigenshape.retrieval import store
+from eigenshape.retrieval.descriptor import Recipe, ShapeDescriptor
+from eigenshape.retrieval.score import match_features, matching_scores
+
+
+@dataclass(frozen=True)
+class Record:
+    """What an index knows of a shape beside its descriptors.
+
+    Attributes
+    ----------
+    name : str
+        Unique in the index.
+    label : str or None
+        Class, where it is known.
+    source : str or None
+        Where the shape came from, a path say.
+    digest : str or None
+        Hash of the content, by which a batch knows that it has the shape already.
+    recipes : tuple of Recipe
+        By which it is described.
+    """
+
+    name: str
+    label: str | None
+    source: str | None
+    digest: str | None
+    recipes: tuple[Recipe, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """A shape that answers a query.
+
+    Attributes
+    ----------
+    name, label, source : str
+        As in its `Record`.
+    score : float
+        Of `matching_score`: 0 for the same descriptor, smaller is more alike.
+    correspondences : (p, 2) int
+        Feature of the query, feature of this shape, closest pairs first.
+    vertices : (m,) int
+        The vertex at which each feature of this shape lies.
+    """
+
+    name: str
+    label: str | None
+    source: str | None
+    score: float
+    correspondences: Int[np.ndarray, "p 2"]
+    vertices: Int[np.ndarray, " m"]
+
+
+@dataclass(frozen=True)
+class ShapeIndex:
+    """A handle on a folder of descriptors: one writer at a time, any number of readers.
+
+    Every call reads or writes the folder, and nothing is kept open between calls. A writer that is killed leaves the
+    state before or the state after. Made by `ShapeIndex.create` or `ShapeIndex.open`.
+    """
+
+    folder: Path
+
+    @classmethod
+    def create(cls, folder: str | Path) -> "ShapeIndex":
+        """Make an empty index in a folder that is empty or not there yet.
+
+        Raises
+        ------
+        StoreError
+            If the folder holds anything.
+        """
+        store.create(Path(folder))
+        return cls(Path(folder))
+
+    @classmethod
+    def open(cls, folder: str | Path) -> "ShapeIndex":
+        """Open an index that is there.
+
+        Raises
+        ------
+        StoreError
+            If the folder is no index, or one of another format.
+        """
+        store.require(Path(folder))
+        return cls(Path(folder))
+
+    def __len__(self) -> int:
+        with store.reading(self.folder) as database:
+            return int(database.execute("SELECT count(*) FROM shape").fetchone()[0])
+
+    def records(self) -> list[Record]:
+        """List all shapes by name."""
+        with store.reading(self.folder) as database:
+            shapes = database.execute("SELECT id, name, label, source, digest FROM shape ORDER BY name").fetchall()
+            query = "SELECT shape, fields FROM descriptor JOIN recipe ON recipe.id = recipe ORDER BY recipe.id"
+            recipes: dict[int, list[Recipe]] = {}
+            for shape, fields in database.execute(query):
+                recipes.setdefault(shape, []).append(_recipe(fields))
+        return [Record(*known, tuple(recipes.get(shape, ()))) for shape, *known in shapes]  # type: ignore[call-arg]
+
+    def add(
+        self,
+        name: str,
+        descriptors: Sequence[ShapeDescriptor],
+        *,
+        label: str | None = None,
+        source: str | None = None,
+        digest: str | None = None,
+    ) -> None:
+        """Add a shape with one or more descriptors, each of its own recipe.
+
+        A name that is there with the same digest gains the recipes that it lacks, and keeps the others.
+
+        Raises
+        ------
+        InvalidParameterError
+            If there is no descriptor, two share a recipe, or a number is not finite.
+        StoreError
+            If the name is there with another digest, or another process is writing.
+        """
+        _require_storable(name, descriptors)
+        with store.writing(self.folder) as database:
+            shape = _shape_id(database, name, (label, source, digest))
+            for descriptor in descriptors:
+                self._put(database, shape, descriptor)
+
+    def _put(self, database: sqlite3.Connection, shape: int, descriptor: ShapeDescriptor) -> None:
+        fields = _fields(descriptor.recipe)
+        database.execute("INSERT OR IGNORE INTO recipe (fields, size) VALUES (?, 0)", (fields,))
+        recipe = store.recipe_id(database, fields) or 0
+        query = "SELECT 1 FROM descriptor WHERE shape = ? AND recipe = ?"
+        if database.execute(query, (shape, recipe)).fetchone():
+            return
+        rows = descriptor.vectors.astype(store.ROW)
+        offset = store.append_rows(self.folder, database, recipe, rows)
+        entry = (shape, recipe, offset, *rows.shape, crc32(rows.tobytes()), descriptor.vertices.astype("<i8").tobytes())
+        database.execute("INSERT INTO descriptor VALUES (?, ?, ?, ?, ?, ?, ?)", entry)
+
+    def remove(self, name: str) -> None:
+        """Remove a shape. The bytes of its rows stay in the file, so that a reader of the old state still finds them.
+
+        Raises
+        ------
+        StoreError
+            If there is no shape of that name, or another process is writing.
+        """
+        with store.writing(self.folder) as database:
+            if not database.execute("DELETE FROM shape WHERE name = ?", (name,)).rowcount:
+                raise StoreError(f"A shape must be in the index to be removed; {name!r} is not.")
+
+    def query(self, descriptor: ShapeDescriptor, *, n_matches: SupportsIndex = 5) -> list[Match]:
+        """Find the shapes whose descriptors of the same recipe have the lowest matching score.
+
+        Numbers are kept in single precision, and those of the query are rounded alike, so that a shape in the index
+        finds itself with score 0. Equal scores are sorted by name.
+
+        Raises
+        ------
+        InvalidParameterError
+            If `n_matches` is not positive.
+        StoreError
+            If no shape has a descriptor of that recipe, or a file is damaged.
+        """
+        wanted = whole_number(n_matches, "n_matches", 1, 2**31)
+        single = ShapeDescriptor(
+            descriptor.vectors.astype(store.ROW).astype(np.float64), descriptor.vertices, descriptor.recipe
+        )
+        with store.reading(self.folder) as database:
+            entries, vectors = self._rows(database, descriptor.recipe)
+        starts = np.cumsum([0, *(len(rows) for rows in vectors)])[:-1]
+        scores = matching_scores(single.vectors, np.concatenate(vectors).astype(np.float64), starts)
+        order = np.argsort(scores, kind="stable")[:wanted]
+        return [_match(single, entries[place], vectors[place], float(scores[place])) for place in order]
+
+    def _rows(self, database: sqlite3.Connection, recipe: Recipe) -> tuple[list[Any], list[np.ndarray]]:
+        number = store.recipe_id(database, _fields(recipe))
+        query = (
+            "SELECT offset, n_rows, n_columns, checksum, name, label, source, vertices "
+            "FROM descriptor JOIN shape ON shape.id = shape WHERE recipe = ? ORDER BY name"
+        )
+        entries = database.execute(query, (number,)).fetchall()
+        if not entries:
+            there = sorted(_recipe(fields).name for (fields,) in database.execute("SELECT fields FROM recipe"))
+            raise StoreError(
+                f"An index answers in the recipes it holds; {self.folder} holds {', '.join(there) or 'no shape'} and "
+                f"was asked in {recipe}."
+            )
+        path = store.rows_path(self.folder, number or 0)
+        data = memoryview(path.read_bytes() if path.exists() else b"")
+        return entries, [store.read_rows(data, entry[:4], path) for entry in entries]
+
+
+def _match(query: ShapeDescriptor, entry: Any, rows: np.ndarray, score: float) -> Match:
+    name, label, source, vertices = entry[4:]
+    found = ShapeDescriptor(rows.astype(np.float64), np.frombuffer(vertices, "<i8"), query.recipe)
+    return Match(name, label, source, score, match_features(query, found), found.vertices)
+
+
+def _fields(recipe: Recipe) -> str:
+    return json.dumps(asdict(recipe), sort_keys=True)
+
+
+def _recipe(fields: str) -> Recipe:
+    values: dict[str, Any] = json.loads(fields)
+    restored: dict[str, Any] = {
+        key: tuple(value) if isinstance(value, list) else value for key, value in values.items()
+    }
+    return Recipe(**restored)
+
+
+def _require_storable(name: str, descriptors: Sequence[ShapeDescriptor]) -> None:
+    keys = [descriptor.recipe for descriptor in descriptors]
+    if not keys or len(set(keys)) < len(keys):
+        raise InvalidParameterError(
+            f"A shape needs one descriptor a recipe; {name!r} has {len(keys)} of {len(set(keys))} recipes."
+        )
+    for descriptor in descriptors:
+        bad = np.argwhere(~np.isfinite(descriptor.vectors.astype(store.ROW)))
+        if bad.size or not descriptor.vectors.size:
+            where = f"entry {bad[0].tolist()} is {descriptor.vectors[tuple(bad[0])]}" if bad.size else "it has none"
+            raise InvalidParameterError(f"A descriptor must hold finite single-precision numbers; of {name!r} {where}.")
+
+
+def _shape_id(database: sqlite3.Connection, name: str, known: tuple[str | None, str | None, str | None]) -> int:
+    row = database.execute("SELECT id, digest FROM shape WHERE name = ?", (name,)).fetchone()
+    if row is None:
+        values = (name, *known)
+        return int(database.execute("INSERT INTO shape VALUES (NULL, ?, ?, ?, ?)", values).lastrowid or 0)
+    if row[1] is None or row[1] != known[2]:
+        raise StoreError(
+            f"A name stands for one shape; {name!r} is in the index with digest {row[1]}, not {known[2]}. "
+            "Remove it first."
+        )
+    return int(row[0])
