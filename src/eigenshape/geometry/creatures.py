@@ -17,6 +17,7 @@ CREATURES = tuple(sorted(PLANS))
 BLEND = 0.03  # width over which round cones melt into each other
 REACH = 0.3  # share of a bone's radius over which its pull on the skin fades
 VARIATION = 0.1  # of lengths and widths between individuals
+TO_Y_UP = [1, 2, 0]  # plans face x and stand along z
 CLOSE_ENOUGH = 0.04  # of the number of vertices asked for
 
 
@@ -40,7 +41,7 @@ def make_creature(kind: str, pose: int = 0, *, n_vertices: int = 2500, individua
     Returns
     -------
     TriangleMesh
-        Facing +x, upright along +z, about two units long.
+        Upright along +y and facing +z, as in glTF; about two units long.
 
     Raises
     ------
@@ -53,7 +54,8 @@ def make_creature(kind: str, pose: int = 0, *, n_vertices: int = 2500, individua
     whole_number(n_vertices, "n_vertices", 500, 100_000)
     whole_number(individual, "individual", 0, 2**32 - 1)
     rest, bones, influence = _at_rest(kind, int(n_vertices), int(individual))
-    return TriangleMesh(_posed(rest.vertices, bones, influence, _angles(kind, bones, pose)), rest.faces)
+    points = _posed(rest.vertices, bones, influence, _angles(kind, bones, pose))
+    return TriangleMesh(points[:, TO_Y_UP], rest.faces)
 
 
 @dataclass(frozen=True, eq=False)

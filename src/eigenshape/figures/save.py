@@ -1,0 +1,46 @@
+"""Figures on disk."""
+
+import os
+from pathlib import Path
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from eigenshape._errors import InvalidParameterError
+
+SUFFIXES = (".png", ".svg", ".pdf")
+
+
+def require_picture_path(path: str | Path) -> Path:
+    """Refuse a path that no picture can be written to, before any work is done.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the suffix is none of `SUFFIXES` or the folder is not there.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in SUFFIXES:
+        raise InvalidParameterError(f"A picture must end in {', '.join(SUFFIXES)}; {path} ends in {path.suffix!r}.")
+    if not path.absolute().parent.is_dir():
+        raise InvalidParameterError(f"A picture needs a folder to lie in; {path.absolute().parent} is not there.")
+    return path
+
+
+def save_figure(figure: Figure, path: str | Path) -> None:
+    """Write a figure as PNG, SVG or PDF, whole or not at all; the same figure gives the same bytes.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the suffix is unknown or the folder is not there.
+    """
+    path = require_picture_path(path)
+    FigureCanvasAgg(figure)
+    beside = path.with_name(f".{path.name}.{os.getpid()}{path.suffix}")
+    kinds = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+    try:
+        figure.savefig(beside, metadata=kinds[path.suffix.lower()], facecolor="white")
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)

@@ -1,0 +1,62 @@
+"""A contact sheet: a query and the shapes that answer it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Int
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from eigenshape.figures.camera import three_quarter_view
+from eigenshape.figures.fields import PANEL, mark, show
+from eigenshape.figures.render import draw, palette
+from eigenshape.geometry.mesh import TriangleMesh
+
+N_COLUMNS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """A shape on a contact sheet.
+
+    Attributes
+    ----------
+    mesh : TriangleMesh
+    title : str
+        One or two lines.
+    colors : (f,) int
+        Number of each face's colour: equal numbers have equal colours on all panels, negative ones are grey.
+    vertices : (m,) int
+        Vertices to mark by dots.
+    """
+
+    mesh: TriangleMesh
+    title: str
+    colors: Int[np.ndarray, " f"]
+    vertices: Int[np.ndarray, " m"]
+
+
+def figure_contact_sheet(query: Panel, matches: Sequence[Panel], *, caption: str = "") -> Figure:
+    """Draw a query, large, beside its matches in reading order (thesis fig. 5.1)."""
+    n_rows = max(-(-len(matches) // N_COLUMNS), 1)
+    size = PANEL * (1.0 if n_rows > 1 else 0.9)
+    figure = Figure(figsize=(size * (N_COLUMNS + 1.5), size * n_rows + 0.8), layout="constrained")
+    left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=[1.5, N_COLUMNS])[0]
+    left.set_facecolor("#f3f3f3")
+    _fill(left.subplots(), query)
+    grid = right.subplots(n_rows, N_COLUMNS, squeeze=False)
+    for axes in grid.flat:
+        axes.set_axis_off()
+    for axes, panel in zip(grid.flat, matches, strict=False):
+        _fill(axes, panel)
+    if caption:
+        figure.suptitle(caption, fontsize=11)
+    return figure
+
+
+def _fill(axes: Axes, panel: Panel) -> None:
+    drawing = draw(panel.mesh, three_quarter_view(panel.mesh, size=440), face_colors=palette(panel.colors))
+    show(axes, drawing)
+    mark(axes, drawing, panel.vertices[drawing.visible[panel.vertices]])
+    axes.set_title(panel.title, fontsize=10)
