@@ -1,1 +1,151 @@
-"""eigenshape hears the shape of things."""
+"""eigenshape hears the shape of things.
+
+A mesh gives a Laplacian, the Laplacian a certified spectrum, the spectrum heat, heat the features that persist, and
+features an answer to the question which shapes are alike.
+"""
+
+from eigenshape._errors import (
+    ConvergenceError,
+    EigenshapeError,
+    FileFormatError,
+    InvalidParameterError,
+    InvalidShapeError,
+    MissingExtraError,
+    StoreError,
+)
+from eigenshape.features.merge_tree import MergeTree, merge_tree
+from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment
+from eigenshape.figures.camera import Camera, three_quarter_view
+from eigenshape.figures.fields import figure_eigenfunctions, figure_field, figure_segments
+from eigenshape.figures.save import save_figure
+from eigenshape.figures.sheet import Panel, figure_contact_sheet
+from eigenshape.figures.spectra import figure_spectrum
+from eigenshape.geometry.creatures import CREATURES, make_creature
+from eigenshape.geometry.measure import (
+    edge_lengths,
+    enclosed_volume,
+    face_areas,
+    face_normals,
+    surface_area,
+    vertex_normals,
+)
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.normalize import normalize_area, normalize_box, normalize_diameter
+from eigenshape.geometry.repair import (
+    Repaired,
+    drop_degenerate,
+    drop_duplicate_faces,
+    drop_unreferenced,
+    largest_component,
+    repair,
+    weld,
+)
+from eigenshape.geometry.sampling import MeshPart, cut_by_planes, partial_scan, random_planes
+from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, subdivide, torus
+from eigenshape.geometry.topology import (
+    EdgeTable,
+    boundary_edges,
+    boundary_loops,
+    edge_table,
+    euler_characteristic,
+    is_closed,
+    is_manifold,
+    vertex_components,
+)
+from eigenshape.io.mesh_files import read_mesh, write_mesh
+from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.retrieval.batch import BatchReport, Item, Workers, build_index
+from eigenshape.retrieval.describe import DescribedShape, describe, describe_mesh
+from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDescriptor
+from eigenshape.retrieval.index import Match, Record, ShapeIndex
+from eigenshape.retrieval.score import match_features, matching_score
+from eigenshape.spectral.certify import certify
+from eigenshape.spectral.signature import heat_kernel_signature
+from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.spectral.spectrum import Certificate, Spectrum
+
+__all__ = [
+    "CREATURES",
+    "SCALE_FREE",
+    "THESIS",
+    "BatchReport",
+    "Camera",
+    "Certificate",
+    "ConvergenceError",
+    "DescribedShape",
+    "EdgeTable",
+    "EigenshapeError",
+    "FeaturePoints",
+    "FileFormatError",
+    "InvalidParameterError",
+    "InvalidShapeError",
+    "Item",
+    "Laplacian",
+    "Match",
+    "MergeTree",
+    "MeshPart",
+    "MissingExtraError",
+    "Panel",
+    "Recipe",
+    "Record",
+    "Repaired",
+    "Segmentation",
+    "ShapeDescriptor",
+    "ShapeIndex",
+    "Spectrum",
+    "StoreError",
+    "TriangleMesh",
+    "Workers",
+    "boundary_edges",
+    "boundary_loops",
+    "build_index",
+    "certify",
+    "cotangent_laplacian",
+    "cut_by_planes",
+    "describe",
+    "describe_mesh",
+    "disjoint_union",
+    "drop_degenerate",
+    "drop_duplicate_faces",
+    "drop_unreferenced",
+    "edge_lengths",
+    "edge_table",
+    "enclosed_volume",
+    "euler_characteristic",
+    "face_areas",
+    "face_normals",
+    "figure_contact_sheet",
+    "figure_eigenfunctions",
+    "figure_field",
+    "figure_segments",
+    "figure_spectrum",
+    "grid",
+    "heat_kernel_signature",
+    "icosphere",
+    "is_closed",
+    "is_manifold",
+    "largest_component",
+    "make_creature",
+    "match_features",
+    "matching_score",
+    "merge_tree",
+    "normalize_area",
+    "normalize_box",
+    "normalize_diameter",
+    "partial_scan",
+    "random_planes",
+    "read_mesh",
+    "repair",
+    "save_figure",
+    "segment",
+    "solve_spectrum",
+    "subdivide",
+    "surface_area",
+    "three_quarter_view",
+    "torus",
+    "vertex_components",
+    "vertex_normals",
+    "weld",
+    "write_mesh",
+]

@@ -71,9 +71,7 @@ def positive_values(value: ArrayLike, name: str) -> NDArray[np.float64]:
         raise InvalidParameterError(f"{name} must be a list of numbers; the shape is {values.shape}.")
     bad = np.flatnonzero(~(np.isfinite(values) & (values > 0)))
     if bad.size:
-        raise InvalidParameterError(
-            f"{name} must be positive and finite; entry {bad[0]} is {values[bad[0]]}."
-        )
+        raise InvalidParameterError(f"{name} must be positive and finite; entry {bad[0]} is {values[bad[0]]}.")
     return values
 
 

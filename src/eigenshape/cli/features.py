@@ -19,7 +19,7 @@ from eigenshape.cli.console import (
 )
 from eigenshape.features.segmentation import Segmentation, segment
 from eigenshape.figures.fields import figure_segments
-from eigenshape.figures.save import save_figure
+from eigenshape.figures.save import require_picture_path, save_figure
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.retrieval.describe import describe_mesh
@@ -50,6 +50,8 @@ def features(
 ) -> None:
     """Find the feature points of a mesh and the parts around them, most persistent first."""
     recipe = preset(preset_name)
+    if picture:
+        require_picture_path(picture)
     surface = load_mesh(mesh, repair)
     with progress_bar("features") as progress:
         shape = describe_mesh(surface, recipe, progress=progress)

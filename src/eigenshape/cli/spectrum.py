@@ -19,7 +19,7 @@ from eigenshape.cli.console import (
     said,
 )
 from eigenshape.figures.fields import figure_eigenfunctions
-from eigenshape.figures.save import save_figure
+from eigenshape.figures.save import require_picture_path, save_figure
 from eigenshape.figures.spectra import figure_spectrum
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
@@ -44,6 +44,8 @@ def spectrum(
     as_json: JsonOption = False,
 ) -> None:
     """Compute the lowest eigenvalues of a mesh and prove that none is missing."""
+    for path in filter(None, (plot, picture)):
+        require_picture_path(path)
     surface = load_mesh(mesh, repair)
     with progress_bar("spectrum") as progress:
         found = solve_spectrum(cotangent_laplacian(surface, mass), k, progress=progress)
@@ -76,7 +78,7 @@ def _write(
 ) -> None:
     if plot:
         area = surface_area(surface)
-        save_figure(figure_spectrum(found.eigenvalues, residuals=found.residuals, area=area), plot)
+        save_figure(figure_spectrum(found.eigenvalues, area=area, shift=found.certificate.shift), plot)
         said(plot)
     if picture:
         indices = range(1, min(len(found.eigenvalues), N_PICTURED + 1))

@@ -2,7 +2,12 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 import scipy.sparse as sp
+
+from eigenshape._errors import InvalidParameterError
+
+ASYMMETRY = 1e-12  # relative to the largest entry: what rounding may leave
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,12 +23,68 @@ class Laplacian:
     mass : (n, n) sparse
         B: symmetric, positive definite, in length^m; diagonal where it is lumped. Functions f and g have the
         inner product fᵀBg (thesis eq. 1.2).
+
+    Raises
+    ------
+    InvalidParameterError
+        If W and B are not sparse, square and of one size, an entry is not finite, the matrix not symmetric, or a
+        diagonal entry of B not positive. (Whether W is semidefinite and B definite, the eigensolver finds out.)
     """
 
     stiffness: sp.csr_array
     mass: sp.csr_array
 
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "mass"):
+            object.__setattr__(self, name, _checked(name, getattr(self, name)))
+        if self.stiffness.shape != self.mass.shape:
+            raise InvalidParameterError(
+                f"stiffness and mass must have one shape; the shapes are {self.stiffness.shape} and {self.mass.shape}."
+            )
+        diagonal = self.mass.diagonal()
+        bad = np.flatnonzero(diagonal <= 0)
+        if bad.size:
+            raise InvalidParameterError(
+                f"mass must be positive; the mass of point {bad[0]} is {diagonal[bad[0]]} ({bad.size} such)."
+            )
+
     @property
     def n_points(self) -> int:
         """Number of points n that the operator acts on."""
         return int(self.stiffness.shape[0])
+
+
+def _checked(name: str, value: sp.sparray) -> sp.csr_array:
+    _require_square(name, value)
+    matrix = sp.csr_array(value, dtype=np.float64)
+    _require_finite(name, matrix)
+    _require_symmetric(name, matrix)
+    return matrix
+
+
+def _require_square(name: str, matrix: sp.sparray) -> None:
+    if not sp.issparse(matrix) or matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.shape[0]:
+        raise InvalidParameterError(
+            f"{name} must be a square sparse matrix; it is a {type(matrix).__name__} of shape {np.shape(matrix)}."
+        )
+
+
+def _require_finite(name: str, matrix: sp.csr_array) -> None:
+    bad = np.flatnonzero(~np.isfinite(matrix.data))
+    if bad.size:
+        entries = matrix.tocoo()
+        row, column = entries.row[bad[0]], entries.col[bad[0]]
+        raise InvalidParameterError(
+            f"{name} must be finite; entry ({row}, {column}) is {entries.data[bad[0]]} ({bad.size} such)."
+        )
+
+
+def _require_symmetric(name: str, matrix: sp.csr_array) -> None:
+    off = abs(matrix - matrix.T).tocoo()
+    if off.nnz and off.data.max() > ASYMMETRY * np.abs(matrix.data).max():
+        worst = int(off.data.argmax())
+        row, column = off.row[worst], off.col[worst]
+        raise InvalidParameterError(
+            f"{name} must be symmetric; entry ({row}, {column}) is {matrix[row, column]} "
+            f"and entry ({column}, {row}) is {matrix[column, row]}."
+        )

@@ -1,0 +1,215 @@
+"""The proof that a spectrum has no eigenvalue missing and none too many."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from threadpoolctl import threadpool_limits
+
+from eigenshape._errors import ConvergenceError, InvalidParameterError
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.spectral.factor import Factor, factorise, rounding
+from eigenshape.spectral.pencil import Pencil, normalise, residual_norms
+from eigenshape.spectral.spectrum import Certificate
+
+RESOLUTION = 1e-6  # relative to the largest eigenvalue: what is closer counts as one cluster
+WIDEST_CLUSTER = 1e-3  # relative too: a chain of close eigenvalues longer than this proves nothing
+ORTHONORMAL = 1e-8
+LARGEST_RESIDUAL = 1e-5
+WIDENING = 3.7
+FARTHER = 10.0
+TRIALS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Eigenpairs in a pencil's units, ascending, with residual bounds."""
+
+    values: Float[np.ndarray, " k"]
+    vectors: Float[np.ndarray, "n k"]
+    residuals: Float[np.ndarray, " k"]
+
+
+def certify(
+    laplacian: Laplacian, eigenvalues: Float[np.ndarray, " k"], eigenvectors: Float[np.ndarray, "n k"]
+) -> Certificate:
+    """Prove that these are the k lowest eigenpairs, or refuse them.
+
+    Sylvester's law of inertia (Parlett 1998, section 3.3): W - σB = L D Lᵀ has as many negative entries in D as
+    there are eigenvalues below σ. σ stands just above the k-th eigenvalue, farther than the rounding of the factor
+    can move the count.
+
+    Parameters
+    ----------
+    laplacian : Laplacian
+    eigenvalues : (k,) float
+        Ascending, in 1/length².
+    eigenvectors : (n, k) float
+        B-orthonormal columns.
+
+    Returns
+    -------
+    Certificate
+
+    Raises
+    ------
+    InvalidParameterError
+        If the arrays do not fit the operator, are not finite or not ascending.
+    ConvergenceError
+        If the columns are not B-orthonormal eigenvectors, or more or fewer eigenvalues lie there.
+    """
+    values, vectors = _checked(laplacian, np.asarray(eigenvalues), np.asarray(eigenvectors))
+    with threadpool_limits(1, user_api="blas"):
+        pencil = normalise(laplacian)
+        values, vectors = np.ldexp(values, -pencil.value_exponent), np.ldexp(vectors, -pencil.vector_exponent)
+        certificate = prove(pencil, Pairs(values, vectors, residual_norms(pencil, values, vectors)))
+    certificate = in_user_units(pencil, certificate)
+    if not certificate.complete:
+        raise ConvergenceError(certificate.explain())
+    return certificate
+
+
+def prove(pencil: Pencil, pairs: Pairs) -> Certificate:
+    """Count eigenvalues above the last pair, and below its cluster where the cluster goes on.
+
+    The certificate, in the pencil's units, may be incomplete: then `count` differs from `n_found`.
+
+    Raises
+    ------
+    ConvergenceError
+        If the pairs are not B-orthonormal eigenvectors, or no factor is good enough to count by.
+    """
+    k = len(pairs.values)
+    certificate = Certificate(
+        n_pairs=k,
+        shift=np.inf,
+        count=pencil.n,
+        n_found=k,
+        gap=(float(pairs.values[-1]), np.inf),
+        resolution=max(RESOLUTION * _scale(pencil, pairs), 4 * _spread(pairs)),
+        orthonormality=_require_orthonormal(pencil, pairs.vectors),
+        max_residual=_require_eigenpairs(pencil, pairs),
+        n_split=0,
+    )
+    if k == pencil.n:
+        return certificate
+    above = _count_beside(pencil, pairs, k - 1, certificate.resolution)
+    certificate = _counted(certificate, pairs, above)
+    return certificate if above.count <= k else _below_cluster(pencil, pairs, certificate)
+
+
+def in_user_units(pencil: Pencil, certificate: Certificate) -> Certificate:
+    """Return the certificate with every value in the user's 1/length²."""
+    shift, low, high, resolution = pencil.values_out(
+        np.array([certificate.shift, *certificate.gap, certificate.resolution])
+    ).tolist()
+    return replace(certificate, shift=shift, gap=(low, high), resolution=resolution)
+
+
+def _below_cluster(pencil: Pencil, pairs: Pairs, above: Certificate) -> Certificate:
+    # Eigenvalues below the cluster are counted. The next ones lie above that count, and not above those found.
+    jumps = np.flatnonzero(np.diff(pairs.values) > 2 * above.resolution)
+    first = int(jumps[-1]) + 1 if jumps.size else 0
+    factor = _count_beside(pencil, pairs, first, -above.resolution)
+    if factor.count > first:
+        # Slack may have taken copies of the cluster below σ that are not among the pairs: once more, from farther off.
+        factor = _count_beside(pencil, pairs, first, FARTHER * (factor.shift - float(pairs.values[first])))
+    resolution = float(pairs.values[-1]) - factor.shift
+    if resolution > WIDEST_CLUSTER * _scale(pencil, pairs):
+        raise ConvergenceError(
+            f"Neighbouring eigenvalues must differ by more than rounding takes; the last {len(pairs.values) - first} "
+            f"of {len(pairs.values)} do not. Repair nearly degenerate elements."
+        )
+    return replace(_counted(above, pairs, factor), resolution=resolution, n_split=above.count - len(pairs.values))
+
+
+def _counted(certificate: Certificate, pairs: Pairs, factor: Factor) -> Certificate:
+    n_found = int(np.count_nonzero(pairs.values < factor.shift))
+    low = float(pairs.values[n_found - 1]) + _spread(pairs) if n_found else -np.inf
+    return replace(
+        certificate,
+        shift=factor.shift,
+        count=factor.count,
+        n_found=n_found,
+        gap=(low, factor.shift),
+        resolution=float(np.abs(pairs.values - factor.shift).min()),
+    )
+
+
+def _count_beside(pencil: Pencil, pairs: Pairs, index: int, step: float) -> Factor:
+    """Count at `step` from a value, or farther off where rounding would move a value found across σ.
+
+    The first factor tells how much slack a second one needs for its count to stand above rounding (`rounding`).
+    """
+    value, shape, spread = float(pairs.values[index]), pairs.vectors[:, index] ** 2, _spread(pairs)
+    slack = np.zeros(pencil.n)
+    for _ in range(TRIALS):
+        factor = factorise(pencil, value + step, slack)
+        loss = rounding(factor) if factor else np.full(pencil.n, np.inf)
+        if factor and (loss <= slack).all():
+            return factor
+        slack = np.maximum(slack, _padded(pencil, loss))
+        taken = spread + float(slack @ shape)  # from this eigenvalue, to first order
+        if not 2 * taken < np.abs(pairs.values - (value + step)).min():
+            step, slack = WIDENING * step, np.zeros(pencil.n)
+    raise ConvergenceError(
+        f"Eigenvalues can be counted only where rounding takes less than their distance to σ; near "
+        f"{np.ldexp(value, pencil.value_exponent):.6g} (1/length²) it takes "
+        f"{np.ldexp(taken, pencil.value_exponent):.1e}. Repair nearly degenerate elements."
+    )
+
+
+def _padded(pencil: Pencil, loss: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    # Rounding wanders from factor to factor, most in rows where there was little.
+    return 3 * loss + 0.1 * float(np.median(loss / pencil.mass_diagonal)) * pencil.mass_diagonal
+
+
+def _scale(pencil: Pencil, pairs: Pairs) -> float:
+    # level / n is far below the first positive eigenvalue of a surface, and serves where all that is found is 0.
+    return max(float(np.abs(pairs.values).max()), pencil.level / pencil.n)
+
+
+def _spread(pairs: Pairs) -> float:
+    """Bound of the distance of all values together to eigenvalues, one to one (Kahan 1967)."""
+    return float(np.linalg.norm(pairs.residuals))
+
+
+def _require_orthonormal(pencil: Pencil, vectors: Float[np.ndarray, "n k"]) -> float:
+    off = np.abs(vectors.T @ pencil.weigh(vectors) - np.eye(vectors.shape[1]))
+    row, column = np.unravel_index(int(off.argmax()), off.shape)
+    if not off[row, column] <= ORTHONORMAL:
+        raise ConvergenceError(
+            f"Eigenvectors must be B-orthonormal to {ORTHONORMAL:.0e}; columns {row} and {column} are off by "
+            f"{off[row, column]:.2e}."
+        )
+    return float(off[row, column])
+
+
+def _require_eigenpairs(pencil: Pencil, pairs: Pairs) -> float:
+    relative = pairs.residuals / _scale(pencil, pairs)
+    worst = int(relative.argmax())
+    if not relative[worst] <= LARGEST_RESIDUAL:
+        raise ConvergenceError(
+            f"Every pair must satisfy Wφ = λBφ to {LARGEST_RESIDUAL:.0e} of the largest eigenvalue; pair {worst} is "
+            f"off by {relative[worst]:.2e}."
+        )
+    return float(relative[worst])
+
+
+def _checked(
+    laplacian: Laplacian, values: Float[np.ndarray, " k"], vectors: Float[np.ndarray, "n k"]
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, "n k"]]:
+    fits = values.ndim == 1 and values.size and vectors.shape == (laplacian.n_points, len(values))
+    if not fits:
+        raise InvalidParameterError(
+            f"eigenvalues and eigenvectors must have shapes (k,) and ({laplacian.n_points}, k); "
+            f"the shapes are {values.shape} and {vectors.shape}."
+        )
+    if not (np.isfinite(values).all() and np.isfinite(vectors).all()):
+        raise InvalidParameterError("eigenvalues and eigenvectors must be finite; some are not.")
+    drops = np.flatnonzero(np.diff(values) < 0)
+    if drops.size:
+        raise InvalidParameterError(
+            f"eigenvalues must ascend; {drops[0] + 1} is {values[drops[0] + 1]} after {values[drops[0]]}."
+        )
+    return values, vectors

@@ -1,0 +1,193 @@
+"""The lowest eigenpairs of a Laplacian, proved complete."""
+
+from collections.abc import Callable
+from typing import SupportsIndex
+
+import numpy as np
+import scipy.linalg as sl
+from jaxtyping import Float
+from threadpoolctl import threadpool_limits
+
+from eigenshape._arrays import frozen, whole_number
+from eigenshape._errors import ConvergenceError, InvalidParameterError
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.spectral.certify import Pairs, in_user_units, prove
+from eigenshape.spectral.factor import Factor
+from eigenshape.spectral.lanczos import Wanted, block_lanczos
+from eigenshape.spectral.pencil import Pencil, normalise, rayleigh_residuals
+from eigenshape.spectral.shift import shift_inside
+from eigenshape.spectral.spectrum import Certificate, Spectrum
+
+Progress = Callable[[float, str], None]
+
+SMALL = 300  # points up to which a dense solve is the faster one
+DENSE_SHARE = 4  # and where more than one in so many pairs is wanted,
+DENSE_LIMIT = 6000  # while the matrix still fits
+BLOCK = 8
+WIDEST_BLOCK = 64
+RUNS = 40
+LOOSE = 1e-12
+POLISHED = 1e-10
+
+
+def solve_spectrum(laplacian: Laplacian, k: SupportsIndex, *, progress: Progress | None = None) -> Spectrum:
+    """Compute the k lowest eigenpairs of W φ = λ B φ, with the proof that none is missing.
+
+    Block Lanczos on (W - σB)⁻¹B with σ among the wanted eigenvalues; what a count of eigenvalues by Sylvester's law
+    of inertia finds missing (copies of a multiple eigenvalue) is searched for again with everything found deflated,
+    until the counts agree. Small operators are solved densely. Nothing depends on units: coordinates scaled by s
+    give the eigenvalues divided by s².
+
+    Parameters
+    ----------
+    laplacian : Laplacian
+        Any symmetric pencil with W positive semidefinite and B positive definite.
+    k : int
+        Number of eigenpairs, 1 to n.
+    progress : callable, optional
+        Called as progress(fraction_done, message) while the solver works.
+
+    Returns
+    -------
+    Spectrum
+        Eigenvalues in 1/length², ascending and ≥ 0: one that comes out below zero by less than its residual is
+        reported as 0. Where k cuts a multiple eigenvalue, `certificate.n_split` says how many copies are left out.
+
+    Raises
+    ------
+    InvalidParameterError
+        If k is not in 1..n, B is not positive definite or W has a negative eigenvalue.
+    ConvergenceError
+        If the proof cannot be completed; no incomplete spectrum is ever returned.
+    """
+    wanted = whole_number(k, "k", 1, laplacian.n_points)
+    report = progress or _silent
+    with threadpool_limits(1, user_api="blas"):
+        report(0.0, "scaling the operator")
+        pencil = normalise(laplacian)
+        pairs, certificate = _proved(pencil, wanted, report)
+    report(1.0, "proved complete")
+    return Spectrum(
+        eigenvalues=frozen(pencil.values_out(_without_negatives(pencil, pairs))),
+        eigenvectors=frozen(pencil.vectors_out(_with_signs(pairs.vectors))),
+        mass=laplacian.mass,
+        residuals=frozen(pencil.values_out(pairs.residuals)),
+        certificate=in_user_units(pencil, certificate),
+    )
+
+
+def _silent(fraction: float, message: str) -> None:
+    """Report to nobody."""
+
+
+def _proved(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+    if pencil.n <= SMALL or (DENSE_SHARE * k > pencil.n and pencil.n <= DENSE_LIMIT):
+        return _dense(pencil, k, report)
+    try:
+        return _sparse(pencil, k, report)
+    except ConvergenceError:
+        if pencil.n > DENSE_LIMIT:
+            raise
+        return _dense(pencil, k, report)  # nothing there can fail to converge, and the proof is the same
+
+
+def _dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+    report(0.1, f"solving {pencil.n} points densely")
+    roots = np.sqrt(pencil.mass_diagonal)
+    stiffness = pencil.stiffness.toarray() / np.outer(roots, roots)
+    mass = None if pencil.mass_floor == 1.0 else pencil.mass.toarray() / np.outer(roots, roots)
+    _, vectors = sl.eigh(stiffness, mass)
+    pairs = _lowest(pencil, vectors[:, :k] / roots[:, None], k)
+    report(0.8, "counting eigenvalues")
+    certificate = prove(pencil, pairs)
+    if not certificate.complete:
+        raise ConvergenceError(in_user_units(pencil, certificate).explain())
+    return pairs, certificate
+
+
+def _sparse(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+    report(0.02, "looking for a shift")
+    factor = shift_inside(pencil, k)
+    vectors = np.empty((pencil.n, 0))
+    wanted = Wanted(below=factor.count, above=k - factor.count)
+    for run in range(RUNS):
+        block = min(BLOCK + (wanted.below + wanted.above if run else 0), WIDEST_BLOCK)
+        found = block_lanczos(pencil, factor, wanted, locked=vectors, block=block, report=_in_run(report, run))
+        pairs = _polished(pencil, factor, _lowest(pencil, np.hstack([vectors, found]), k))
+        report(0.9, "counting eigenvalues")
+        certificate, wanted = _still_wanted(pencil, factor, pairs, k)
+        if certificate is not None and certificate.complete:
+            return pairs, certificate
+        if not found.shape[1] or wanted.below + wanted.above == 0:
+            break
+        vectors = pairs.vectors
+    raise ConvergenceError(
+        f"Every eigenvalue that inertia counts must be found; {len(pairs.values)} of {k} were found in {run + 1} runs "
+        f"and {wanted.below + wanted.above} are missing."
+    )
+
+
+def _in_run(report: Progress, run: int) -> Callable[[float], None]:
+    return lambda done: report(0.05 + 0.8 * done, f"run {run + 1} of block Lanczos")
+
+
+def _still_wanted(pencil: Pencil, factor: Factor, pairs: Pairs, k: int) -> tuple[Certificate | None, Wanted]:
+    """Return the proof as far as it goes, and what a further run has to find."""
+    certificate = prove(pencil, pairs) if len(pairs.values) == k else None
+    missing = certificate.count - certificate.n_found if certificate else k - len(pairs.values)
+    missing = min(max(missing, 0), k)
+    ceiling = certificate.shift if certificate else np.inf
+    below = min(max(factor.count - int(np.count_nonzero(pairs.values < factor.shift)), 0), missing)
+    return certificate, Wanted(below=below, above=missing - below, ceiling=ceiling)
+
+
+def _polished(pencil: Pencil, factor: Factor, pairs: Pairs) -> Pairs:
+    """Refine the pairs whose residual the rounding of the factor has kept large.
+
+    One step of (W - σB)⁻¹ on a residual gives the error of the vector outside the space of those found.
+    """
+    late = np.flatnonzero(pairs.residuals > POLISHED * np.abs(pairs.values).max(initial=0.0))
+    if not late.size:
+        return pairs
+    values, vectors, residuals = pairs.values.copy(), pairs.vectors.copy(), pairs.residuals.copy()
+    part = vectors[:, late]
+    step = factor.solve(pencil.stiffness @ part - pencil.weigh(part) * values[late])
+    vectors[:, late] -= step - vectors @ (vectors.T @ pencil.weigh(step))
+    values[late], residuals[late] = rayleigh_residuals(pencil, vectors[:, late])
+    order = np.argsort(values, kind="stable")
+    return Pairs(values[order], vectors[:, order], residuals[order])
+
+
+def _lowest(pencil: Pencil, vectors: Float[np.ndarray, "n j"], k: int) -> Pairs:
+    vectors = _orthonormal(pencil, vectors)
+    values, residuals = rayleigh_residuals(pencil, vectors)
+    order = np.argsort(values, kind="stable")[:k]
+    if not np.array_equal(order, np.arange(vectors.shape[1])):
+        vectors = vectors[:, order]
+    return Pairs(values[order], vectors, residuals[order])
+
+
+def _orthonormal(pencil: Pencil, vectors: Float[np.ndarray, "n j"]) -> Float[np.ndarray, "n j"]:
+    # One Newton step towards the nearest B-orthonormal columns: they are so up to the tolerance of the iteration.
+    gram = vectors.T @ pencil.weigh(vectors)
+    identity = np.eye(len(gram))
+    if np.abs(gram - identity).max(initial=0.0) < LOOSE:
+        return vectors
+    return vectors @ (1.5 * identity - 0.5 * gram)
+
+
+def _without_negatives(pencil: Pencil, pairs: Pairs) -> Float[np.ndarray, " k"]:
+    rounding = 4 * pairs.residuals + 1e-14 * pencil.level
+    bad = np.flatnonzero(pairs.values < -rounding)
+    if bad.size:
+        value, bound = pencil.values_out(np.array([pairs.values[bad[0]], rounding[bad[0]]]))
+        raise InvalidParameterError(
+            f"stiffness must be positive semidefinite; eigenvalue {bad[0]} is {value:.6g}, its error under {bound:.1e}."
+        )
+    return np.maximum(pairs.values, 0.0)
+
+
+def _with_signs(vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+    sizes = np.abs(vectors)
+    leading = np.argmax(sizes >= (1 - 1e-6) * sizes.max(axis=0), axis=0)
+    return vectors * np.where(vectors[leading, np.arange(vectors.shape[1])] < 0, -1.0, 1.0)
