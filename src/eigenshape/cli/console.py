@@ -37,7 +37,7 @@ MeshArgument = Annotated[Path, typer.Argument(help="Mesh file: OFF, OBJ, PLY, ST
 class Verbs(TyperGroup):
     """Turn our errors and the system's into one line and exit code 1."""
 
-    def invoke(self, ctx: typer.Context) -> Any:
+    def invoke(self, ctx: Any) -> Any:
         """Run the verb."""
         try:
             return super().invoke(ctx)

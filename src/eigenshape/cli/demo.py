@@ -18,6 +18,7 @@ from eigenshape.retrieval.batch import Item, Workers
 from eigenshape.retrieval.describe import describe_mesh
 from eigenshape.retrieval.descriptor import SCALE_FREE
 
+FOLDER = Path("eigenshape-demo")
 POSES = 4
 UNSEEN = 11
 NEXT = """

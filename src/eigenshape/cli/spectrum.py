@@ -86,8 +86,6 @@ def _write(
         said(picture)
     if save:
         np.savez_compressed(
-            save,
-            **{key: np.asarray(_facts(found)[key]) for key in ("eigenvalues", "residuals")},
-            eigenvectors=found.eigenvectors,
+            save, eigenvalues=found.eigenvalues, eigenvectors=found.eigenvectors, residuals=found.residuals
         )
         said(save)
