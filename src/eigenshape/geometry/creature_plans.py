@@ -6,7 +6,8 @@ parent ends and swings about that place.
 
 from typing import NamedTuple
 
-Vector = tuple[float, float, float]
+Number = int | float
+Vector = tuple[Number, Number, Number]
 
 
 class Bone(NamedTuple):
@@ -20,11 +21,11 @@ class Bone(NamedTuple):
     name: str
     parent: str
     to: Vector
-    radii: tuple[float, float]
-    swings: tuple[tuple[float, float, float, float, float], ...] = ()
+    radii: tuple[Number, Number]
+    swings: tuple[tuple[Number, Number, Number, Number, Number], ...] = ()
 
 
-def _chain(name: str, parent: str, steps: int, to: Vector, radii: tuple[float, float], *swings: Vector) -> list[Bone]:
+def _chain(name: str, parent: str, steps: int, to: Vector, radii: tuple[Number, Number], *swings: Vector) -> list[Bone]:
     """Return a limb of equal bones that thins out; each swing is (which axis, least, most) at every joint."""
     axes = {0: (1.0, 0.0, 0.0), 1: (0.0, 1.0, 0.0), 2: (0.0, 0.0, 1.0)}
     along = [radii[0] + (radii[1] - radii[0]) * step / steps for step in range(steps + 1)]
