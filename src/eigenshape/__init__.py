@@ -61,7 +61,8 @@ from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDes
 from eigenshape.retrieval.index import Match, Record, ShapeIndex
 from eigenshape.retrieval.score import match_features, matching_score
 from eigenshape.spectral.certify import certify
-from eigenshape.spectral.signature import heat_kernel_signature
+from eigenshape.spectral.dirichlet import solve_dirichlet
+from eigenshape.spectral.signature import heat_kernel_signature, reflection_free_signature
 from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Certificate, Spectrum
 
@@ -136,9 +137,11 @@ __all__ = [
     "partial_scan",
     "random_planes",
     "read_mesh",
+    "reflection_free_signature",
     "repair",
     "save_figure",
     "segment",
+    "solve_dirichlet",
     "solve_spectrum",
     "subdivide",
     "surface_area",

@@ -10,10 +10,12 @@ from eigenshape.features.merge_tree import MergeTree, merge_tree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_box
-from eigenshape.geometry.topology import vertex_components
+from eigenshape.geometry.topology import boundary_edges, vertex_components
 from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.laplacian import Laplacian
 from eigenshape.retrieval.descriptor import SCALE_FREE, Recipe, ShapeDescriptor
-from eigenshape.spectral.signature import heat_kernel_signature
+from eigenshape.spectral.dirichlet import solve_dirichlet
+from eigenshape.spectral.signature import heat_kernel_signature, reflection_free_signature
 from eigenshape.spectral.solver import Progress, solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
@@ -44,7 +46,9 @@ class DescribedShape:
     descriptor: ShapeDescriptor
 
 
-def describe(spectrum: Spectrum, features: FeaturePoints, recipe: Recipe = SCALE_FREE) -> ShapeDescriptor:
+def describe(
+    spectrum: Spectrum, features: FeaturePoints, recipe: Recipe = SCALE_FREE, *, dirichlet: Spectrum | None = None
+) -> ShapeDescriptor:
     """Describe feature points by the heat that they keep at the recipe's times (thesis 5.3).
 
     Parameters
@@ -54,14 +58,15 @@ def describe(spectrum: Spectrum, features: FeaturePoints, recipe: Recipe = SCALE
     features : FeaturePoints
         Of which the first `recipe.n_features`, the most persistent ones, are described.
     recipe : Recipe
+    dirichlet : Spectrum, optional
+        Of the same shape with its boundary fixed; cancels the reflections of heat at the boundary.
 
     Returns
     -------
     ShapeDescriptor
     """
     vertices = features.vertices[: recipe.n_features]
-    unit = _time_of_one(spectrum, recipe)
-    heat = unit * _heat(spectrum, recipe.scales, recipe)[vertices]
+    heat = _time_of_one(spectrum, recipe) * _heat(spectrum, dirichlet, recipe.scales, recipe)[vertices]
     return ShapeDescriptor(np.log(heat) if recipe.logarithmic else heat, vertices, recipe)
 
 
@@ -90,16 +95,34 @@ def describe_mesh(
     """
     _require_few_pieces(mesh, recipe)
     mesh = normalize_box(mesh) if recipe.unit == "box" else mesh
-    spectrum = solve_spectrum(cotangent_laplacian(mesh), min(recipe.n_modes, mesh.n_vertices), progress=progress)
-    heat = _heat(spectrum, (recipe.feature_scale,), recipe)[:, 0]
+    laplacian = cotangent_laplacian(mesh)
+    spectrum = solve_spectrum(laplacian, min(recipe.n_modes, mesh.n_vertices), progress=progress)
+    dirichlet = None if recipe.reflections else _with_boundary_fixed(mesh, laplacian, recipe, progress)
+    heat = _heat(spectrum, dirichlet, (recipe.feature_scale,), recipe)[:, 0]
     tree = merge_tree(mesh, heat)
     parts = segment(tree, n_regions=recipe.n_features)
-    return DescribedShape(mesh, spectrum, heat, tree, parts, describe(spectrum, parts.features, recipe))
+    descriptor = describe(spectrum, parts.features, recipe, dirichlet=dirichlet)
+    return DescribedShape(mesh, spectrum, heat, tree, parts, descriptor)
 
 
-def _heat(spectrum: Spectrum, scales: tuple[float, ...], recipe: Recipe) -> Float[np.ndarray, "n q"]:
+def _with_boundary_fixed(
+    mesh: TriangleMesh, laplacian: Laplacian, recipe: Recipe, progress: Progress | None
+) -> Spectrum | None:
+    """Return the Dirichlet spectrum, None where there is no boundary or nothing inside it."""
+    boundary = np.unique(boundary_edges(mesh))
+    n_free = mesh.n_vertices - len(boundary)
+    if not boundary.size or not n_free:
+        return None
+    return solve_dirichlet(laplacian, min(recipe.n_modes, n_free), boundary, progress=progress)
+
+
+def _heat(
+    spectrum: Spectrum, dirichlet: Spectrum | None, scales: tuple[float, ...], recipe: Recipe
+) -> Float[np.ndarray, "n q"]:
     times = _time_of_one(spectrum, recipe) * recipe.time_unit * np.array(scales)
-    return heat_kernel_signature(spectrum, times)
+    if dirichlet is None:
+        return heat_kernel_signature(spectrum, times)
+    return reflection_free_signature(spectrum, dirichlet, times)
 
 
 def _time_of_one(spectrum: Spectrum, recipe: Recipe) -> float:

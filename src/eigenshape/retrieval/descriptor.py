@@ -7,6 +7,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arrays import frozen
+from eigenshape._errors import InvalidParameterError
+
+EVEN = 1e-9  # steps between logarithms of scales that differ less are equal
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,11 @@ class Recipe:
         Feature points at most (the thesis' κ).
     n_modes : int
         Eigenpairs of the spectrum at most.
+    reflections : bool
+        Whether a boundary may throw heat back. Without, heat is the mean of the Neumann and the Dirichlet kernel.
+    n_shifts : int
+        Steps along the scales by which two shapes may differ in size: a part has less area than the whole. The scales
+        must then be a geometric sequence and the vectors logarithmic.
     """
 
     name: str = "scale-free"
@@ -44,11 +52,15 @@ class Recipe:
     logarithmic: bool = True
     n_features: int = 15
     n_modes: int = 300
+    reflections: bool = False
+    n_shifts: int = 5
 
-    @property
-    def key(self) -> str:
-        """A string that is equal exactly where the recipes are."""
-        return repr(self)
+    def __post_init__(self) -> None:
+        if self.n_shifts and not (self.logarithmic and np.ptp(np.diff(np.log(self.scales))) < EVEN):
+            raise InvalidParameterError(
+                f"Shifts need logarithmic vectors at scales in geometric sequence; recipe {self.name!r} has "
+                f"logarithmic {self.logarithmic} and scales {self.scales}."
+            )
 
 
 SCALE_FREE = Recipe()
@@ -59,6 +71,8 @@ THESIS = Recipe(
     feature_scale=5.0,
     scales=(5.0, 20.0, 40.0, 60.0, 100.0, 150.0, *(100.0 * hundred for hundred in range(2, 11))),
     logarithmic=False,
+    reflections=True,
+    n_shifts=0,
 )
 PRESETS = {recipe.name: recipe for recipe in (SCALE_FREE, THESIS)}
 

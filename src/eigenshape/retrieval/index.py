@@ -185,7 +185,7 @@ class ShapeIndex:
         with store.reading(self.folder) as database:
             entries, vectors = self._rows(database, descriptor.recipe)
         starts = np.cumsum([0, *(len(rows) for rows in vectors)])[:-1]
-        scores = matching_scores(single.vectors, np.concatenate(vectors).astype(np.float64), starts)
+        scores, _ = matching_scores(single.vectors, np.concatenate(vectors).astype(np.float64), starts, single.recipe)
         order = np.argsort(scores, kind="stable")[:wanted]
         return [_match(single, entries[place], vectors[place], float(scores[place])) for place in order]
 
