@@ -1,0 +1,249 @@
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from describers import RECIPE, descriptor
+from filelock import FileLock
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from eigenshape._errors import InvalidParameterError, StoreError
+from eigenshape.retrieval import store
+from eigenshape.retrieval.descriptor import Recipe, ShapeDescriptor
+from eigenshape.retrieval.index import ShapeIndex
+from eigenshape.retrieval.score import matching_score
+
+HERE = Path(__file__).parent
+OTHER = replace(RECIPE, name="other", scales=tuple(float(2**step) for step in range(40)))
+
+
+@pytest.fixture
+def index(tmp_path):
+    return ShapeIndex.create(tmp_path / "index")
+
+
+def rounded(shape):
+    return ShapeDescriptor(shape.vectors.astype("<f4").astype(float), shape.vertices, shape.recipe)
+
+
+def test_a_shape_finds_itself_first_with_score_zero(index):
+    for seed in range(12):
+        index.add(f"s{seed:02}", [descriptor(seed)], label=f"class {seed % 3}", source=f"/{seed}.ply")
+    for seed in range(12):
+        best, *others = index.query(descriptor(seed), n_matches=4)
+        assert (best.name, best.score, best.label) == (f"s{seed:02}", 0.0, f"class {seed % 3}")
+        assert best.correspondences.tolist() == [[0, 0], [1, 1]]
+        assert len(others) == 3
+        assert [m.score for m in others] == sorted(m.score for m in others)
+
+
+def test_scores_equal_brute_force(index):
+    shapes = {f"s{seed}": descriptor(seed, m=1 + seed % 3) for seed in range(20)}
+    for name, shape in shapes.items():
+        index.add(name, [shape])
+    query = descriptor(99, m=3)
+    found = {match.name: match.score for match in index.query(query, n_matches=50)}
+    assert found == pytest.approx({n: matching_score(rounded(query), rounded(s)) for n, s in shapes.items()})
+
+
+def test_equal_scores_are_sorted_by_name(index):
+    for name in ("b", "c", "a"):
+        index.add(name, [descriptor(1)])
+    assert [match.name for match in index.query(descriptor(2))] == ["a", "b", "c"]
+
+
+def test_a_record_holds_several_recipes_some_of_them_long(index):
+    index.add("one", [descriptor(1), descriptor(1, OTHER, m=500)], digest="d")
+    index.add("two", [descriptor(2)])
+    assert [record.recipes for record in index.records()] == [(RECIPE, OTHER), (RECIPE,)]
+    assert [match.name for match in index.query(descriptor(1, OTHER))] == ["one"]
+    assert index.query(descriptor(1, OTHER, m=500))[0].score == 0
+
+
+def test_the_same_digest_gains_recipes_and_keeps_the_rest(index):
+    index.add("one", [descriptor(1)], digest="d")
+    index.add("one", [descriptor(1), descriptor(3, OTHER)], digest="d")
+    assert index.records()[0].recipes == (RECIPE, OTHER)
+    with pytest.raises(StoreError, match="A name stands for one shape; 'one' is in the index with digest d, not e"):
+        index.add("one", [descriptor(2)], digest="e")
+
+
+def test_remove(index):
+    for seed in range(3):
+        index.add(f"s{seed}", [descriptor(seed)])
+    index.remove("s1")
+    assert [record.name for record in index.records()] == ["s0", "s2"]
+    assert {match.name for match in index.query(descriptor(1))} == {"s0", "s2"}
+    index.add("s1", [descriptor(7)])
+    assert index.query(descriptor(7))[0].name == "s1"
+    with pytest.raises(StoreError, match="A shape must be in the index to be removed; 'nobody' is not"):
+        index.remove("nobody")
+
+
+@settings(deadline=None, max_examples=10)
+@given(st.lists(st.tuples(st.sampled_from("abcd"), st.booleans()), max_size=12))
+def test_index_behaves_like_a_dict(tmp_path_factory, steps):
+    index, model = ShapeIndex.create(tmp_path_factory.mktemp("model") / "index"), {}
+    for number, (name, adds) in enumerate(steps):
+        if adds and name not in model:
+            index.add(name, [descriptor(number)])
+            model[name] = number
+        elif not adds and name in model:
+            index.remove(name)
+            del model[name]
+        assert [record.name for record in index.records()] == sorted(model)
+        assert len(index) == len(model)
+        assert all(index.query(descriptor(seed))[0].score == 0 for seed in model.values())
+
+
+def test_what_cannot_be_stored(index):
+    bad = descriptor(1).vectors.copy()
+    bad[1, 2] = np.nan
+    with pytest.raises(InvalidParameterError, match=r"finite single-precision numbers; of 'x' entry \[1, 2\] is nan"):
+        index.add("x", [ShapeDescriptor(bad, np.arange(2), RECIPE)])
+    with pytest.raises(InvalidParameterError, match="A shape needs one descriptor a recipe; 'x' has 0 of 0 recipes"):
+        index.add("x", [])
+    with pytest.raises(InvalidParameterError, match="'x' has 2 of 1 recipes"):
+        index.add("x", [descriptor(1), descriptor(2)])
+    assert len(index) == 0
+
+
+def test_a_query_in_a_recipe_that_is_not_there(index):
+    with pytest.raises(StoreError, match="holds no shape and was asked in"):
+        index.query(descriptor(1))
+    index.add("one", [descriptor(1)])
+    with pytest.raises(StoreError, match=r"An index answers in the recipes it holds; .* holds test and was asked in"):
+        index.query(descriptor(1, Recipe()))
+    with pytest.raises(InvalidParameterError, match=r"n_matches must lie in 1\.\."):
+        index.query(descriptor(1), n_matches=0)
+
+
+def test_folders_that_are_no_index(tmp_path, index):
+    with pytest.raises(StoreError, match=r"must be an index; it has no index.sqlite"):
+        ShapeIndex.open(tmp_path)
+    with pytest.raises(StoreError, match="must be empty to become an index"):
+        ShapeIndex.create(index.folder)
+    foreign = tmp_path / "foreign"
+    foreign.mkdir()
+    sqlite3.connect(foreign / store.DATABASE).execute("CREATE TABLE t (x)").connection.close()
+    with pytest.raises(StoreError, match="belongs to another program"):
+        ShapeIndex.open(foreign)
+    (foreign / store.DATABASE).write_bytes(b"no database at all" * 100)
+    with pytest.raises(StoreError, match="must be a readable index; file is not a database"):
+        ShapeIndex.open(foreign)
+    database = sqlite3.connect(index.folder / store.DATABASE)
+    database.execute("PRAGMA user_version = 9")
+    database.close()
+    with pytest.raises(StoreError, match="must be an index of format 1; it is of format 9"):
+        ShapeIndex.open(index.folder)
+
+
+def test_damaged_rows_are_named(index):
+    index.add("one", [descriptor(1)])
+    path = index.folder / "rows-1.f32"
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-4])
+    with pytest.raises(StoreError, match=r"rows-1.f32 must hold 24 bytes; it holds 20"):
+        index.query(descriptor(1))
+    path.write_bytes(bytes([whole[0] ^ 1]) + whole[1:])
+    with pytest.raises(StoreError, match="must hold what was written; bytes 0 to 24 differ"):
+        index.query(descriptor(1))
+    path.write_bytes(whole)
+    assert index.query(descriptor(1))[0].score == 0
+
+
+def test_a_second_writer_is_told(index, monkeypatch):
+    monkeypatch.setattr(store, "WAIT", 0.05)
+    with FileLock(index.folder / store.LOCK), pytest.raises(StoreError, match="An index has one writer; another has"):
+        index.add("one", [descriptor(1)])
+    index.add("one", [descriptor(1)])
+    assert len(index) == 1
+
+
+def test_a_database_that_cannot_be_written(index):
+    database = sqlite3.connect(index.folder / store.DATABASE)
+    database.execute("DROP TABLE shape")
+    database.close()
+    with pytest.raises(StoreError, match="must be a writable index; no such table"):
+        index.add("one", [descriptor(1)])
+
+
+def test_a_failed_add_leaves_the_state_before(index, monkeypatch):
+    index.add("one", [descriptor(1)])
+
+    def torn(folder, database, recipe, rows):
+        with store.rows_path(folder, recipe).open("ab") as file:
+            file.write(b"torn")
+        raise OSError("disk full")
+
+    monkeypatch.setattr(store, "append_rows", torn)
+    with pytest.raises(OSError, match="disk full"):
+        index.add("two", [descriptor(2)])
+    monkeypatch.undo()
+    assert [record.name for record in index.records()] == ["one"]
+    index.add("two", [descriptor(2)])
+    assert index.query(descriptor(2))[0].score == 0
+
+
+def test_readers_work_while_one_writes(index):
+    index.add("s-1", [descriptor(1000)])
+    failures, stop = [], threading.Event()
+
+    def read():
+        while not stop.is_set():
+            names = [match.name for match in index.query(descriptor(1000), n_matches=100)]
+            if names[0] != "s-1" or len(set(names)) != len(names):
+                failures.append(names)
+
+    readers = [threading.Thread(target=read) for _ in range(2)]
+    for reader in readers:
+        reader.start()
+    for seed in range(30):
+        index.add(f"s{seed}", [descriptor(seed)])
+    stop.set()
+    for reader in readers:
+        reader.join()
+    assert not failures
+    assert len(index) == 31
+
+
+def test_reading_needs_no_right_to_write(index, tmp_path):
+    index.add("one", [descriptor(1)])
+    copy = tmp_path / "frozen"
+    shutil.copytree(index.folder, copy)
+    for path in copy.iterdir():
+        path.chmod(0o444)
+    copy.chmod(0o555)
+    try:
+        assert ShapeIndex.open(copy).query(descriptor(1))[0].name == "one"
+    finally:
+        copy.chmod(0o755)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="kill -9 is a Unix thing")
+def test_a_killed_writer_leaves_the_state_before_or_after(index):
+    rng, before = np.random.default_rng(0), 0
+    for _ in range(20):
+        command = [sys.executable, HERE / "writer.py", index.folder]
+        writer = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(HERE)})
+        assert writer.stdout.readline() == "ready\n"
+        time.sleep(rng.uniform(0.0, 0.06))
+        writer.kill()
+        writer.wait()
+        writer.stdout.close()
+        names = [record.name for record in index.records()]
+        assert names == [f"shape-{number:05}" for number in range(len(names))]
+        assert len(names) >= before
+        before = len(names)
+        for number in {0, len(names) - 1} if names else ():
+            assert index.query(descriptor(number))[0].name == f"shape-{number:05}"
+    assert before > 20
