@@ -56,7 +56,7 @@ from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.retrieval.batch import BatchReport, Item, Workers, build_index
-from eigenshape.retrieval.describe import DescribedShape, describe, describe_mesh
+from eigenshape.retrieval.describe import DescribedShape, describe, describe_mesh, describe_views
 from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDescriptor
 from eigenshape.retrieval.index import Match, Record, ShapeIndex
 from eigenshape.retrieval.score import match_features, matching_score
@@ -106,6 +106,7 @@ __all__ = [
     "cut_by_planes",
     "describe",
     "describe_mesh",
+    "describe_views",
     "disjoint_union",
     "drop_degenerate",
     "drop_duplicate_faces",

@@ -9,6 +9,7 @@ from eigenshape.retrieval.index import ShapeIndex
 if __name__ == "__main__":
     index = ShapeIndex.open(sys.argv[1])
     start = len(index)
-    print("ready", flush=True)
+    sys.stdout.write("ready\n")
+    sys.stdout.flush()
     for number in range(start, start + 10_000):
         index.add(f"shape-{number:05}", [descriptor(number)], digest=str(number))

@@ -1,5 +1,6 @@
 """eigenshape demo: the whole road on made-up creatures."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -8,7 +9,7 @@ import typer
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import out, progress_bar, said
-from eigenshape.cli.index import WorkersOption, describe_all, open_or_create
+from eigenshape.cli.index import N_VIEWS, WorkersOption, describe_all, describe_file, open_or_create
 from eigenshape.cli.query import CAPTION, contact_sheet, print_matches
 from eigenshape.figures.save import save_figure
 from eigenshape.geometry.creatures import CREATURES, make_creature
@@ -44,7 +45,8 @@ def demo(
         raise InvalidParameterError(f"--kind takes {', '.join(CREATURES)}; it was given {kind!r}.")
     items = _make(folder / "creatures")
     shelf = open_or_create(folder / "index")
-    report = describe_all(shelf, items, SCALE_FREE, workers=Workers(workers))
+    describe = partial(describe_file, recipe=SCALE_FREE, repairs=(), n_views=N_VIEWS)
+    report = describe_all(shelf, items, describe, SCALE_FREE, Workers(workers))
     out.print(f"indexed {len(shelf)} shapes ({len(report.skipped)} known already)")
 
     scan_path = folder / "scan.ply"

@@ -13,8 +13,8 @@ from eigenshape.cli.console import JsonOption, RepairOption, err, out, print_jso
 from eigenshape.cli.features import PresetOption, preset
 from eigenshape.geometry.repair import repair as repaired
 from eigenshape.io.mesh_files import FORMATS, read_mesh
-from eigenshape.retrieval.batch import BatchReport, Item, Workers, build_index
-from eigenshape.retrieval.describe import describe_mesh
+from eigenshape.retrieval.batch import BatchReport, Describe, Item, Workers, build_index
+from eigenshape.retrieval.describe import describe_mesh, describe_views
 from eigenshape.retrieval.descriptor import SCALE_FREE, Recipe, ShapeDescriptor
 from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.retrieval.store import DATABASE
@@ -22,6 +22,10 @@ from eigenshape.retrieval.store import DATABASE
 SOME_FAILED = 3
 
 DbOption = Annotated[Path, typer.Option("--db", help="Folder of the index.")]
+N_VIEWS = 4
+ViewsOption = Annotated[
+    int, typer.Option(min=0, max=50, help="Sides from which each closed shape is described as well, for partial scans.")
+]
 WorkersOption = Annotated[int, typer.Option(min=1, help="Processes that describe shapes side by side.")]
 
 
@@ -30,6 +34,7 @@ def index(
     *,
     db: DbOption,
     preset_name: PresetOption = SCALE_FREE.name,
+    views: ViewsOption = N_VIEWS,
     repair: RepairOption = "",
     workers: WorkersOption = 2,
     timeout: Annotated[float, typer.Option(min=1, help="Seconds after which a file is given up.")] = 300.0,
@@ -43,7 +48,8 @@ def index(
     recipe, repairs = preset(preset_name), repair_names(repair)
     items = _items(sources)
     shelf = open_or_create(db)
-    report = describe_all(shelf, items, recipe, repairs=repairs, workers=Workers(workers, timeout))
+    describe = partial(describe_file, recipe=recipe, repairs=repairs, n_views=views)
+    report = describe_all(shelf, items, describe, recipe, Workers(workers, timeout))
     if as_json:
         print_json({"db": str(db), "shapes": len(shelf), **vars(report)})
     else:
@@ -58,7 +64,7 @@ def open_or_create(folder: Path) -> ShapeIndex:
 
 
 def describe_all(
-    shelf: ShapeIndex, items: Sequence[Item], recipe: Recipe, *, repairs: tuple[str, ...] = (), workers: Workers
+    shelf: ShapeIndex, items: Sequence[Item], describe: Describe, recipe: Recipe, workers: Workers
 ) -> BatchReport:
     """Build an index with a progress bar, naming what cannot be taken as it comes."""
     with progress_bar("index") as progress:
@@ -68,13 +74,13 @@ def describe_all(
             if error is not None:
                 err.print(f"[yellow]not taken:[/] {escape(name)}: {escape(error)}")
 
-        describe = partial(describe_file, recipe=recipe, repairs=repairs)
         return build_index(shelf, items, describe, recipes=(recipe,), workers=workers, told=told)
 
 
-def describe_file(path: Path, *, recipe: Recipe, repairs: tuple[str, ...]) -> list[ShapeDescriptor]:
-    """Read a mesh, repair it as asked, and describe it."""
-    return [describe_mesh(repaired(read_mesh(path), repairs).mesh, recipe).descriptor]
+def describe_file(path: Path, *, recipe: Recipe, repairs: tuple[str, ...], n_views: int) -> list[ShapeDescriptor]:
+    """Read a mesh, repair it as asked, and describe it, first whole and then as it is seen from some sides."""
+    mesh = repaired(read_mesh(path), repairs).mesh
+    return [describe_mesh(mesh, recipe).descriptor, *describe_views(mesh, recipe, n_views)]
 
 
 def _items(sources: Sequence[Path]) -> list[Item]:

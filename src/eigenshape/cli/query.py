@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
+from jaxtyping import Int
 from matplotlib.figure import Figure
 
 from eigenshape._errors import StoreError
@@ -24,10 +25,11 @@ from eigenshape.cli.console import (
 from eigenshape.cli.features import PresetOption, preset
 from eigenshape.figures.save import require_picture_path, save_figure
 from eigenshape.figures.sheet import Panel, figure_contact_sheet
+from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import repair as repair_mesh
 from eigenshape.io.mesh_files import read_mesh
-from eigenshape.retrieval.describe import DescribedShape, describe_mesh
-from eigenshape.retrieval.descriptor import SCALE_FREE
+from eigenshape.retrieval.describe import DescribedShape, describe_mesh, described_view
+from eigenshape.retrieval.descriptor import SCALE_FREE, Recipe
 from eigenshape.retrieval.index import Match, ShapeIndex
 
 CAPTION = "parts that correspond share a colour"
@@ -108,9 +110,19 @@ def contact_sheet(
 def _panel(query_shape: DescribedShape, match: Match, repairs: tuple[str, ...]) -> Panel:
     if match.source is None:
         raise StoreError(f"A match needs its file to be drawn; {match.name!r} was added without one.")
-    found = describe_mesh(repair_mesh(read_mesh(match.source), repairs).mesh, query_shape.descriptor.recipe)
-    colors = np.full(len(found.parts.features.vertices), -1)
+    mesh = repair_mesh(read_mesh(match.source), repairs).mesh
+    labels = _labels(mesh, query_shape.descriptor.recipe, match)
     ours, theirs = match.correspondences.T
+    colors = np.full(len(match.vertices) + 1, -1)  # the last one is for what no view of the match shows
     colors[theirs] = ours
-    title = f"{match.name}\nscore {match.score:.4g}"
-    return Panel(found.mesh, title, colors[found.parts.labels], found.parts.features.vertices[theirs])
+    return Panel(mesh, f"{match.name}\nscore {match.score:.4g}", colors[labels], match.vertices[theirs])
+
+
+def _labels(mesh: TriangleMesh, recipe: Recipe, match: Match) -> Int[np.ndarray, " f"]:
+    """Find the parts of a match again, -1 where the view that matched does not see its surface."""
+    if match.view == 0:
+        return describe_mesh(mesh, recipe).parts.labels
+    part, seen = described_view(mesh, recipe, match.view - 1)
+    labels = np.full(mesh.n_faces, -1)
+    labels[part.source_faces] = seen.parts.labels
+    return labels

@@ -8,11 +8,10 @@ from numpy.typing import ArrayLike
 
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape.geometry.measure import unit_scaled, vertex_normals
+from eigenshape.geometry.measure import face_areas, unit_scaled, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.raster import rasterize
-from eigenshape.geometry.repair import largest_component
-from eigenshape.geometry.topology import submesh
+from eigenshape.geometry.topology import submesh, vertex_components
 
 SLACK = 1.5  # pixels that a vertex may lie off the place where the surface was seen
 STEEPEST = 10.0  # slope up to which that may hide it behind its own surface
@@ -27,10 +26,13 @@ class MeshPart:
     mesh : TriangleMesh
     source_vertices : (n,) int
         For each vertex of `mesh`, its index in the whole.
+    source_faces : (f,) int
+        For each face of `mesh`, its index in the whole.
     """
 
     mesh: TriangleMesh
     source_vertices: Int[np.ndarray, " n"]
+    source_faces: Int[np.ndarray, " f"]
 
 
 def partial_scan(
@@ -65,11 +67,31 @@ def partial_scan(
     """
     whole_number(resolution, "resolution", 16, 8192)
     visible = _visible_vertices(mesh, _direction(view), resolution)
-    part = _kept(mesh, visible[mesh.faces].all(axis=1), "No face is visible as a whole from there.")
-    if all_pieces:
-        return part
-    piece = largest_component(part.mesh)
-    return MeshPart(piece.mesh, part.source_vertices[piece.source_vertices])
+    keep = visible[mesh.faces].all(axis=1)
+    if not all_pieces:
+        keep = _largest_piece(mesh, keep)
+    return _kept(mesh, keep, "No face is visible as a whole from there.")
+
+
+def _largest_piece(mesh: TriangleMesh, keep: Bool[np.ndarray, " f"]) -> Bool[np.ndarray, " f"]:
+    if not keep.any():
+        return keep
+    seen = TriangleMesh(mesh.vertices, mesh.faces[keep])
+    _, labels = vertex_components(seen)
+    piece = labels[mesh.faces[:, 0]]
+    areas = np.bincount(piece[keep], weights=face_areas(mesh)[keep])
+    return np.asarray(keep & (piece == np.argmax(areas)))
+
+
+def viewpoint(number: int) -> Float[np.ndarray, "3"]:
+    """Return a unit direction; the first few, and the first many, lie evenly around the sphere.
+
+    They come from the additive recurrence of the plastic number (Roberts 2018), so that more of them keep the first.
+    """
+    u, v = (0.5 + (number + 1) * np.array([0.7548776662466927, 0.5698402909980532])) % 1
+    height, around = 2 * u - 1, 2 * np.pi * v
+    radius = np.sqrt(1 - height**2)
+    return np.array([radius * np.cos(around), height, radius * np.sin(around)])
 
 
 def _direction(view: ArrayLike | np.random.Generator) -> Float[np.ndarray, "3"]:
@@ -155,4 +177,5 @@ def random_planes(
 def _kept(mesh: TriangleMesh, keep: Bool[np.ndarray, " f"], otherwise: str) -> MeshPart:
     if not keep.any():
         raise InvalidShapeError(f"A part must have a face. {otherwise}")
-    return MeshPart(*submesh(mesh, keep))
+    part, vertices = submesh(mesh, keep)
+    return MeshPart(part, vertices, np.flatnonzero(keep))

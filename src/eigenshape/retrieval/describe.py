@@ -1,6 +1,6 @@
 """The road from a mesh to its descriptor."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -10,7 +10,8 @@ from eigenshape.features.merge_tree import MergeTree, merge_tree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_box
-from eigenshape.geometry.topology import boundary_edges, vertex_components
+from eigenshape.geometry.sampling import MeshPart, partial_scan, viewpoint
+from eigenshape.geometry.topology import boundary_edges, is_closed, vertex_components
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.retrieval.descriptor import SCALE_FREE, Recipe, ShapeDescriptor
@@ -103,6 +104,31 @@ def describe_mesh(
     parts = segment(tree, n_regions=recipe.n_features)
     descriptor = describe(spectrum, parts.features, recipe, dirichlet=dirichlet)
     return DescribedShape(mesh, spectrum, heat, tree, parts, descriptor)
+
+
+def describe_views(mesh: TriangleMesh, recipe: Recipe, n_views: int) -> list[ShapeDescriptor]:
+    """Describe what single viewpoints see of a closed shape, as partial scans of it will be.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    recipe : Recipe
+    n_views : int
+        Viewpoints, spread evenly around the shape.
+
+    Returns
+    -------
+    list of ShapeDescriptor
+        With features at vertices of the whole shape; empty for an open one, which is a part already.
+    """
+    views = [described_view(mesh, recipe, view) for view in range(n_views if is_closed(mesh) else 0)]
+    return [replace(seen.descriptor, vertices=part.source_vertices[seen.descriptor.vertices]) for part, seen in views]
+
+
+def described_view(mesh: TriangleMesh, recipe: Recipe, view: int) -> tuple[MeshPart, DescribedShape]:
+    """Return what one of the viewpoints of `describe_views` sees, and its description."""
+    part = partial_scan(mesh, viewpoint(view))
+    return part, describe_mesh(part.mesh, recipe)
 
 
 def _with_boundary_fixed(

@@ -51,7 +51,7 @@ class Recipe:
     scales: tuple[float, ...] = tuple(4.0 * 1.4**step for step in range(15))
     logarithmic: bool = True
     n_features: int = 15
-    n_modes: int = 300
+    n_modes: int = 150
     reflections: bool = False
     n_shifts: int = 5
 
@@ -71,6 +71,7 @@ THESIS = Recipe(
     feature_scale=5.0,
     scales=(5.0, 20.0, 40.0, 60.0, 100.0, 150.0, *(100.0 * hundred for hundred in range(2, 11))),
     logarithmic=False,
+    n_modes=300,
     reflections=True,
     n_shifts=0,
 )

@@ -57,6 +57,8 @@ class Match:
         Feature of the query, feature of this shape, closest pairs first.
     vertices : (m,) int
         The vertex at which each feature of this shape lies.
+    view : int
+        Which of the shape's descriptors is meant, in the order in which they were added: 0 is the first.
     """
 
     name: str
@@ -65,6 +67,7 @@ class Match:
     score: float
     correspondences: Int[np.ndarray, "p 2"]
     vertices: Int[np.ndarray, " m"]
+    view: int
 
 
 @dataclass(frozen=True)
@@ -109,7 +112,7 @@ class ShapeIndex:
         """List all shapes by name."""
         with store.reading(self.folder) as database:
             shapes = database.execute("SELECT id, name, label, source, digest FROM shape ORDER BY name").fetchall()
-            query = "SELECT shape, fields FROM descriptor JOIN recipe ON recipe.id = recipe ORDER BY recipe.id"
+            query = "SELECT DISTINCT shape, fields FROM descriptor JOIN recipe ON recipe.id = recipe ORDER BY recipe.id"
             recipes: dict[int, list[Recipe]] = {}
             for shape, fields in database.execute(query):
                 recipes.setdefault(shape, []).append(_recipe(fields))
@@ -124,34 +127,36 @@ class ShapeIndex:
         source: str | None = None,
         digest: str | None = None,
     ) -> None:
-        """Add a shape with one or more descriptors, each of its own recipe.
+        """Add a shape with one or more descriptors.
 
-        A name that is there with the same digest gains the recipes that it lacks, and keeps the others.
+        Descriptors of one recipe are views of the shape, the whole first, say, and then what is seen of it from some
+        sides: the view with the lowest score counts. A name that is there with the same digest gains the recipes that
+        it lacks, and keeps what it has of the others.
 
         Raises
         ------
         InvalidParameterError
-            If there is no descriptor, two share a recipe, or a number is not finite.
+            If there is no descriptor, or a number is not finite.
         StoreError
             If the name is there with another digest, or another process is writing.
         """
         _require_storable(name, descriptors)
         with store.writing(self.folder) as database:
             shape = _shape_id(database, name, (label, source, digest))
-            for descriptor in descriptors:
-                self._put(database, shape, descriptor)
+            for recipe in dict.fromkeys(descriptor.recipe for descriptor in descriptors):
+                views = [descriptor for descriptor in descriptors if descriptor.recipe == recipe]
+                self._put(database, shape, _fields(recipe), views)
 
-    def _put(self, database: sqlite3.Connection, shape: int, descriptor: ShapeDescriptor) -> None:
-        fields = _fields(descriptor.recipe)
+    def _put(self, database: sqlite3.Connection, shape: int, fields: str, views: Sequence[ShapeDescriptor]) -> None:
         database.execute("INSERT OR IGNORE INTO recipe (fields, size) VALUES (?, 0)", (fields,))
         recipe = store.recipe_id(database, fields) or 0
-        query = "SELECT 1 FROM descriptor WHERE shape = ? AND recipe = ?"
-        if database.execute(query, (shape, recipe)).fetchone():
+        if database.execute("SELECT 1 FROM descriptor WHERE shape = ? AND recipe = ?", (shape, recipe)).fetchone():
             return
-        rows = descriptor.vectors.astype(store.ROW)
-        offset = store.append_rows(self.folder, database, recipe, rows)
-        entry = (shape, recipe, offset, *rows.shape, crc32(rows.tobytes()), descriptor.vertices.astype("<i8").tobytes())
-        database.execute("INSERT INTO descriptor VALUES (?, ?, ?, ?, ?, ?, ?)", entry)
+        for view, descriptor in enumerate(views):
+            rows, vertices = descriptor.vectors.astype(store.ROW), descriptor.vertices.astype("<i8").tobytes()
+            offset = store.append_rows(self.folder, database, recipe, rows)
+            entry = (shape, recipe, view, offset, *rows.shape, crc32(rows.tobytes()), vertices)
+            database.execute("INSERT INTO descriptor VALUES (?, ?, ?, ?, ?, ?, ?, ?)", entry)
 
     def remove(self, name: str) -> None:
         """Remove a shape. The bytes of its rows stay in the file, so that a reader of the old state still finds them.
@@ -166,7 +171,7 @@ class ShapeIndex:
                 raise StoreError(f"A shape must be in the index to be removed; {name!r} is not.")
 
     def query(self, descriptor: ShapeDescriptor, *, n_matches: SupportsIndex = 5) -> list[Match]:
-        """Find the shapes whose descriptors of the same recipe have the lowest matching score.
+        """Find the shapes whose descriptors of the same recipe have the lowest matching score, each shape once.
 
         Numbers are kept in single precision, and those of the query are rounded alike, so that a shape in the index
         finds itself with score 0. Equal scores are sorted by name.
@@ -186,14 +191,16 @@ class ShapeIndex:
             entries, vectors = self._rows(database, descriptor.recipe)
         starts = np.cumsum([0, *(len(rows) for rows in vectors)])[:-1]
         scores, _ = matching_scores(single.vectors, np.concatenate(vectors).astype(np.float64), starts, single.recipe)
-        order = np.argsort(scores, kind="stable")[:wanted]
-        return [_match(single, entries[place], vectors[place], float(scores[place])) for place in order]
+        order = np.argsort(scores, kind="stable")
+        _, first = np.unique([entries[place][4] for place in order], return_index=True)
+        best = order[np.sort(first)[:wanted]]
+        return [_match(single, entries[place], vectors[place], float(scores[place])) for place in best]
 
     def _rows(self, database: sqlite3.Connection, recipe: Recipe) -> tuple[list[Any], list[np.ndarray]]:
         number = store.recipe_id(database, _fields(recipe))
         query = (
-            "SELECT offset, n_rows, n_columns, checksum, name, label, source, vertices "
-            "FROM descriptor JOIN shape ON shape.id = shape WHERE recipe = ? ORDER BY name"
+            "SELECT offset, n_rows, n_columns, checksum, name, label, source, vertices, view "
+            "FROM descriptor JOIN shape ON shape.id = shape WHERE recipe = ? ORDER BY name, view"
         )
         entries = database.execute(query, (number,)).fetchall()
         if not entries:
@@ -208,9 +215,9 @@ class ShapeIndex:
 
 
 def _match(query: ShapeDescriptor, entry: Any, rows: np.ndarray, score: float) -> Match:
-    name, label, source, vertices = entry[4:]
+    name, label, source, vertices, view = entry[4:]
     found = ShapeDescriptor(rows.astype(np.float64), np.frombuffer(vertices, "<i8"), query.recipe)
-    return Match(name, label, source, score, match_features(query, found), found.vertices)
+    return Match(name, label, source, score, match_features(query, found), found.vertices, view)
 
 
 def _fields(recipe: Recipe) -> str:
@@ -226,11 +233,8 @@ def _recipe(fields: str) -> Recipe:
 
 
 def _require_storable(name: str, descriptors: Sequence[ShapeDescriptor]) -> None:
-    keys = [descriptor.recipe for descriptor in descriptors]
-    if not keys or len(set(keys)) < len(keys):
-        raise InvalidParameterError(
-            f"A shape needs one descriptor a recipe; {name!r} has {len(keys)} of {len(set(keys))} recipes."
-        )
+    if not descriptors:
+        raise InvalidParameterError(f"A shape needs a descriptor to be found by; {name!r} has none.")
     for descriptor in descriptors:
         bad = np.argwhere(~np.isfinite(descriptor.vectors.astype(store.ROW)))
         if bad.size or not descriptor.vectors.size:

@@ -32,9 +32,10 @@ CREATE TABLE shape (
 CREATE TABLE descriptor (
     shape INTEGER NOT NULL REFERENCES shape ON DELETE CASCADE,
     recipe INTEGER NOT NULL REFERENCES recipe,
+    view INTEGER NOT NULL,
     offset INTEGER NOT NULL, n_rows INTEGER NOT NULL, n_columns INTEGER NOT NULL, checksum INTEGER NOT NULL,
     vertices BLOB NOT NULL,
-    PRIMARY KEY (shape, recipe)
+    PRIMARY KEY (shape, recipe, view)
 );
 """
 
