@@ -22,6 +22,7 @@ from eigenshape.retrieval.descriptor import SCALE_FREE
 FOLDER = Path("eigenshape-demo")
 POSES = 4
 UNSEEN = 11
+N_VERTICES = 2000
 NEXT = """
 Read next:
   eigenshape features {scan} --picture parts.png      what persists on that scan, and the parts around it
@@ -50,7 +51,7 @@ def demo(
     out.print(f"indexed {len(shelf)} shapes ({len(report.skipped)} known already)")
 
     scan_path = folder / "scan.ply"
-    scan = partial_scan(make_creature(kind, UNSEEN), np.array([0.9, 0.25, 0.45])).mesh
+    scan = partial_scan(make_creature(kind, UNSEEN, n_vertices=N_VERTICES), np.array([0.9, 0.25, 0.45])).mesh
     write_mesh(scan, scan_path)
     out.print(f"scanned a {kind} from one side, in a pose that the index has not seen: {scan_path}")
     shape = describe_mesh(scan)
@@ -76,6 +77,6 @@ def _make(folder: Path) -> list[Item]:
             progress(done / len(items), item.name)
             if not item.path.exists():
                 item.path.parent.mkdir(parents=True, exist_ok=True)
-                write_mesh(make_creature(item.label or "", done % POSES), item.path)
+                write_mesh(make_creature(item.label or "", done % POSES, n_vertices=N_VERTICES), item.path)
     out.print(f"made {len(CREATURES)} kinds of creatures in {POSES} poses each: {folder}")
     return items

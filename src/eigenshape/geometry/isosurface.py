@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
@@ -20,8 +20,9 @@ PLACES = np.array([[0.5, 0.5, 0.5]]) + np.arange(12)[:, None] * np.array([[0.754
 def isosurface(field: Field, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"], spacing: float) -> TriangleMesh:
     """Mesh the zero set of a function that is negative inside, by surface nets, drawn onto the surface and evened out.
 
-    One vertex a cell cannot tell two sheets in one cell apart, so the result is checked, and another place of the grid
-    is tried where the first was not a manifold (Gibson 1998 gives the nets).
+    Each sheet in a cell has a vertex of its own (Gibson 1998 gives the nets, Nielson 2004 the sheets). Two neighbouring
+    cells can still join sheets that are apart, so the result is checked, and where it is no manifold another place of
+    the grid is tried.
 
     Raises
     ------
@@ -39,46 +40,110 @@ def _nets(field: Field, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"
     axes = [np.arange(start, stop, spacing) for start, stop in zip(low, high, strict=True)]
     lattice = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     values = field(lattice.reshape(-1, 3)).reshape(lattice.shape[:3])
-    number, points = _cell_points(values)
-    quads = np.concatenate([_quads(values, number, axis) for axis in range(3)])
+    cells = _crossed_cells(values)
+    corners = np.stack([values[tuple((cells + corner).T)] for corner in CORNERS], axis=1)
+    number, points = _sheet_points(cells, corners)
+    cell_number = np.full(np.array(values.shape) - 1, -1, dtype=np.int64)
+    cell_number[tuple(cells.T)] = np.arange(len(cells))
+    quads = np.concatenate([_quads(values, cell_number, number, axis) for axis in range(3)])
     split = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     return TriangleMesh(low + spacing * points, split)
 
 
-def _cell_points(values: Float[np.ndarray, "x y z"]) -> tuple[Int[np.ndarray, "a b c"], Float[np.ndarray, "p 3"]]:
-    """Put a point into each cell that the surface crosses: the mean of where it crosses the cell's edges."""
-    cells = np.array(values.shape) - 1
-    sums = np.zeros((*cells, 3))
-    counts = np.zeros(cells, dtype=np.int64)
-    for axis in range(3):
-        here, there = _ends(values, axis)
-        crosses = (here < 0) != (there < 0)
-        share = np.where(crosses, here / np.where(crosses, here - there, 1.0), 0.0)
-        for shift in np.ndindex(2, 2):
-            corner = np.insert(shift, axis, 0)
-            window = tuple(slice(start, start + length) for start, length in zip(corner, cells, strict=True))
-            for other in range(3):
-                sums[..., other] += crosses[window] * (share[window] if other == axis else corner[other])
-            counts += crosses[window]
-    crossed = counts > 0
-    number = np.full(cells, -1, dtype=np.int64)
-    number[crossed] = np.arange(crossed.sum())
-    return number, np.argwhere(crossed) + sums[crossed] / counts[crossed, None]
+def _edge(axis: int, corner: tuple[int, ...]) -> int:
+    """Return the number of the edge of a cell that runs along an axis from a corner: 0 to 11."""
+    one, two = (corner[other] for other in range(3) if other != axis)
+    return 4 * axis + 2 * one + two
 
 
-def _ends(values: Float[np.ndarray, "x y z"], axis: int) -> tuple[np.ndarray, np.ndarray]:
+def _corner(corner: tuple[int, ...]) -> int:
+    return 4 * corner[0] + 2 * corner[1] + corner[2]
+
+
+def _face(normal: int, side: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the edges around a face of a cell, and the corners at which each of them begins."""
+    p, q = (axis for axis in range(3) if axis != normal)
+
+    def at(on_p: int, on_q: int) -> tuple[int, ...]:
+        place = {normal: side, p: on_p, q: on_q}
+        return tuple(place[axis] for axis in range(3))
+
+    edges = (_edge(p, at(0, 0)), _edge(q, at(1, 0)), _edge(p, at(0, 1)), _edge(q, at(0, 0)))
+    return edges, tuple(_corner(corner) for corner in (at(0, 0), at(1, 0), at(1, 1), at(0, 1)))
+
+
+CORNERS = np.array(list(np.ndindex(2, 2, 2)))
+EDGES = [(axis, np.insert(shift, axis, 0)) for axis in range(3) for shift in np.ndindex(2, 2)]
+FACES = [_face(normal, side) for normal in range(3) for side in (0, 1)]
+
+
+def _crossed_cells(values: Float[np.ndarray, "x y z"]) -> Int[np.ndarray, "c 3"]:
+    shape = np.array(values.shape) - 1
+    inside = sum(
+        (values[tuple(slice(start, start + length) for start, length in zip(corner, shape, strict=True))] < 0).astype(
+            int
+        )
+        for corner in CORNERS
+    )
+    return np.argwhere((inside > 0) & (inside < 8))
+
+
+def _sheet_points(
+    cells: Int[np.ndarray, "c 3"], corners: Float[np.ndarray, "c 8"]
+) -> tuple[Int[np.ndarray, "c 12"], Float[np.ndarray, "p 3"]]:
+    """Put a point on each sheet of the surface in each cell, in the middle of where it crosses the cell's edges.
+
+    Returns the point of each edge of each cell, -1 where the surface does not cross it, and the points.
+    """
+    ends = [(_corner(tuple(start)), _corner(tuple(start + np.eye(3, dtype=int)[axis]))) for axis, start in EDGES]
+    here, there = corners[:, [one for one, _ in ends]], corners[:, [two for _, two in ends]]
+    crosses = (here < 0) != (there < 0)
+    share = np.where(crosses, here / np.where(crosses, here - there, 1.0), 0.0)
+    directions = np.eye(3)[[axis for axis, _ in EDGES]]
+    places = np.array([start for _, start in EDGES]) + share[..., None] * directions + cells[:, None, :]
+    sheets = 12 * np.arange(len(cells))[:, None] + _sheets(corners < 0, crosses)
+    _, number = np.unique(sheets[crosses], return_inverse=True)
+    counts = np.bincount(number)
+    points = np.column_stack([np.bincount(number, places[crosses][:, axis]) / counts for axis in range(3)])
+    of_edge = np.full(crosses.shape, -1, dtype=np.int64)
+    of_edge[crosses] = number
+    return of_edge, points
+
+
+def _sheets(inside: Bool[np.ndarray, "c 8"], crosses: Bool[np.ndarray, "c 12"]) -> Int[np.ndarray, "c 12"]:
+    """Label the crossings of each cell by the sheet that they lie on (Nielson 2004).
+
+    The sheet runs over each face of the cell from crossing to crossing; where all four edges of a face are crossed it
+    runs around the corners that are inside.
+    """
+    sheet = np.broadcast_to(np.arange(12), crosses.shape).copy()
+    for _ in range(6):  # a sheet has 12 crossings at most, and labels run both ways around it
+        for edges, corners in FACES:
+            plain = crosses[:, edges].sum(axis=1) == 2
+            for one in range(4):
+                for two in range(one):
+                    around = corners[one] if one - two == 1 else corners[0]
+                    joined = plain | (inside[:, around] if one - two != 2 else False)
+                    linked = joined & crosses[:, edges[one]] & crosses[:, edges[two]]
+                    least = np.minimum(sheet[:, edges[one]], sheet[:, edges[two]])
+                    sheet[linked, edges[one]] = sheet[linked, edges[two]] = least[linked]
+    return sheet
+
+
+def _quads(
+    values: Float[np.ndarray, "x y z"],
+    cell_number: Int[np.ndarray, "a b c"],
+    number: Int[np.ndarray, "k 12"],
+    axis: int,
+) -> Int[np.ndarray, "q 4"]:
+    """Join the points around each lattice edge along `axis` that the surface crosses, one from each of four cells."""
     n = values.shape[axis]
-    return values.take(np.arange(n - 1), axis), values.take(np.arange(1, n), axis)
-
-
-def _quads(values: Float[np.ndarray, "x y z"], number: Int[np.ndarray, "a b c"], axis: int) -> Int[np.ndarray, "q 4"]:
-    """Join the points of the four cells around each lattice edge along `axis` that the surface crosses."""
-    here, there = _ends(values, axis)
+    here, there = values.take(np.arange(n - 1), axis), values.take(np.arange(1, n), axis)
     edges = np.argwhere((here < 0) != (there < 0))
     leaves = here[tuple(edges.T)] < 0
     one, two = np.eye(3, dtype=np.int64)[[(axis + 1) % 3, (axis + 2) % 3]]
-    around = [edges - one - two, edges - two, edges, edges - one]
-    quads = np.column_stack([number[tuple(cell.T)] for cell in around])
+    back = (one + two, two, 0 * one, one)
+    quads = np.column_stack([number[cell_number[tuple((edges - step).T)], _edge(axis, tuple(step))] for step in back])
     return np.where(leaves[:, None], quads, quads[:, ::-1])
 
 

@@ -36,7 +36,7 @@ class MeshPart:
 
 
 def partial_scan(
-    mesh: TriangleMesh, view: ArrayLike | np.random.Generator, *, resolution: int = 1024, all_pieces: bool = False
+    mesh: TriangleMesh, view: ArrayLike | np.random.Generator, *, resolution: int = 512, all_pieces: bool = False
 ) -> MeshPart:
     """Keep what is visible from far away in one direction.
 
