@@ -1,7 +1,7 @@
 """Run every check there is: format, lint, types, layers, tests. CI runs this same file.
 
-    python check.py           all of it
-    python check.py --fast    without the tests
+python check.py           all of it
+python check.py --fast    without the tests
 """
 
 import subprocess

@@ -20,7 +20,8 @@ def main(folder: Path) -> list[es.Match]:
             spectrum = es.solve_spectrum(es.cotangent_laplacian(mesh), k=300)
             heat = es.heat_kernel_signature(spectrum, [0.004 * es.surface_area(mesh)])
             parts = es.segment(es.merge_tree(mesh, heat[:, 0]), n_regions=15)
-            index.add(f"{kind}-{pose}", [es.describe(spectrum, parts.features)], label=kind)
+            views = es.describe_views(mesh)  # what single viewpoints see, so that a scan meets its like
+            index.add(f"{kind}-{pose}", [es.describe(spectrum, parts.features), *views], label=kind)
 
     scan = es.partial_scan(es.make_creature("octopus", 7), np.random.default_rng(1)).mesh
     return index.query(es.describe_mesh(scan).descriptor, n_matches=3)

@@ -9,14 +9,14 @@ import typer
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import out, progress_bar, said
-from eigenshape.cli.index import N_VIEWS, WorkersOption, describe_all, describe_file, open_or_create
+from eigenshape.cli.index import WorkersOption, describe_all, describe_file, open_or_create
 from eigenshape.cli.query import CAPTION, contact_sheet, print_matches
 from eigenshape.figures.save import save_figure
 from eigenshape.geometry.creatures import CREATURES, make_creature
 from eigenshape.geometry.sampling import partial_scan
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.retrieval.batch import Item, Workers
-from eigenshape.retrieval.describe import describe_mesh
+from eigenshape.retrieval.describe import N_VIEWS, describe_mesh
 from eigenshape.retrieval.descriptor import SCALE_FREE
 
 FOLDER = Path("eigenshape-demo")
@@ -38,7 +38,7 @@ def demo(
     folder: Annotated[Path, typer.Option("--out", help="Folder for meshes, index and pictures.")] = Path(
         "eigenshape-demo"
     ),
-    kind: Annotated[str, typer.Option(help=f"Creature to scan: {', '.join(CREATURES)}.")] = "quadruped",
+    kind: Annotated[str, typer.Option(help=f"Creature to scan: {', '.join(CREATURES)}.")] = "biped",
     workers: WorkersOption = 2,
 ) -> None:
     """Make creatures, index them, then find the kin of a partial scan in a pose that the index never saw."""

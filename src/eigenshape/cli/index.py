@@ -14,7 +14,7 @@ from eigenshape.cli.features import PresetOption, preset
 from eigenshape.geometry.repair import repair as repaired
 from eigenshape.io.mesh_files import FORMATS, read_mesh
 from eigenshape.retrieval.batch import BatchReport, Describe, Item, Workers, build_index
-from eigenshape.retrieval.describe import describe_mesh, describe_views
+from eigenshape.retrieval.describe import N_VIEWS, describe_mesh, describe_views
 from eigenshape.retrieval.descriptor import SCALE_FREE, Recipe, ShapeDescriptor
 from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.retrieval.store import DATABASE
@@ -22,7 +22,6 @@ from eigenshape.retrieval.store import DATABASE
 SOME_FAILED = 3
 
 DbOption = Annotated[Path, typer.Option("--db", help="Folder of the index.")]
-N_VIEWS = 4
 ViewsOption = Annotated[
     int, typer.Option(min=0, max=50, help="Sides from which each closed shape is described as well, for partial scans.")
 ]
@@ -80,7 +79,7 @@ def describe_all(
 def describe_file(path: Path, *, recipe: Recipe, repairs: tuple[str, ...], n_views: int) -> list[ShapeDescriptor]:
     """Read a mesh, repair it as asked, and describe it, first whole and then as it is seen from some sides."""
     mesh = repaired(read_mesh(path), repairs).mesh
-    return [describe_mesh(mesh, recipe).descriptor, *describe_views(mesh, recipe, n_views)]
+    return [describe_mesh(mesh, recipe).descriptor, *describe_views(mesh, recipe, n_views=n_views)]
 
 
 def _items(sources: Sequence[Path]) -> list[Item]:

@@ -21,6 +21,9 @@ from eigenshape.spectral.solver import Progress, solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 
+N_VIEWS = 4
+
+
 @dataclass(frozen=True, eq=False)
 class DescribedShape:
     """A shape with all that was found on the way to its descriptor.
@@ -106,7 +109,7 @@ def describe_mesh(
     return DescribedShape(mesh, spectrum, heat, tree, parts, descriptor)
 
 
-def describe_views(mesh: TriangleMesh, recipe: Recipe, n_views: int) -> list[ShapeDescriptor]:
+def describe_views(mesh: TriangleMesh, recipe: Recipe = SCALE_FREE, *, n_views: int = N_VIEWS) -> list[ShapeDescriptor]:
     """Describe what single viewpoints see of a closed shape, as partial scans of it will be.
 
     Parameters

@@ -1,0 +1,25 @@
+import runpy
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_main_road_finds_the_octopus(tmp_path):
+    example = runpy.run_path(str(ROOT / "examples" / "main_road.py"))
+    matches = example["main"](tmp_path)
+    assert [match.label for match in matches] == ["octopus"] * 3
+    assert all(len(match.correspondences) for match in matches)
+    assert matches[0].score <= matches[1].score <= matches[2].score
+
+
+def test_readme_begins_with_exactly_two_commands():
+    blocks = (ROOT / "README.md").read_text().split("```")
+    commands = blocks[1].splitlines()[1:]
+    assert len([line for line in commands if line.strip()]) == 2
+
+
+def test_every_example_has_a_test():
+    tested = Path(__file__).read_text()
+    examples = sorted((ROOT / "examples").glob("*.py"))
+    assert examples
+    assert all(example.name in tested for example in examples)
