@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import matplotlib as mpl
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
@@ -17,6 +18,7 @@ AMBIENT = 0.42
 INK = 0.12  # brightness of lines
 LINE = 1.6  # their width, in shown pixels
 BEHIND = 0.02  # share of the picture's size that a point may lie behind what is seen and still count as seen
+GREY_PAIR = 7  # of matplotlib's tab20, left to what has no label
 
 Image = Float[np.ndarray, "h w 4"]
 
@@ -165,7 +167,7 @@ def _visible(points: Float[np.ndarray, "n 3"], raster: Raster) -> Bool[np.ndarra
     return points[:, 2] >= raster.depth[row, column] - BEHIND * len(raster.depth)
 
 
-def _shrunk(image: Image) -> Image:
+def _shrunk(image: Image) -> Float[np.ndarray, "rows columns 4"]:
     h, w = image.shape[0] // FINER, image.shape[1] // FINER
     blocks = image.reshape(h, FINER, w, FINER, 4)
     opacity = blocks[..., 3:]
@@ -175,10 +177,7 @@ def _shrunk(image: Image) -> Image:
 
 
 def palette(labels: Int[np.ndarray, " k"]) -> Float[np.ndarray, "k 3"]:
-    """Return a colour for each label: neighbours in number are far apart in hue; below 0 is grey."""
-    hue = (labels * 0.6180339887 + 0.58) % 1.0
-    tier = (labels // 3) % 3
-    value, saturation = 1.0 - 0.1 * tier, np.array([0.52, 0.75, 0.36])[tier]
-    channel = (hue[:, None] * 6 + np.array([5.0, 3.0, 1.0])) % 6
-    color = value[:, None] * (1 - saturation[:, None] * np.clip(np.minimum(channel, 4 - channel), 0, 1))
-    return np.where(labels[:, None] < 0, 0.78, color)
+    """Return a colour for each label, 18 different ones in turn; below 0 is grey."""
+    pairs = np.array(mpl.colormaps["tab20"].colors).reshape(10, 2, 3)
+    colors = np.concatenate(pairs[np.arange(10) != GREY_PAIR].transpose(1, 0, 2))
+    return np.where(labels[:, None] < 0, 0.82, colors[labels % len(colors)])

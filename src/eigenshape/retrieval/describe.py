@@ -20,7 +20,6 @@ from eigenshape.spectral.signature import heat_kernel_signature, reflection_free
 from eigenshape.spectral.solver import Progress, solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
-
 N_VIEWS = 4
 
 
