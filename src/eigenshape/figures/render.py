@@ -178,6 +178,6 @@ def _shrunk(image: Image) -> Float[np.ndarray, "rows columns 4"]:
 
 def palette(labels: Int[np.ndarray, " k"]) -> Float[np.ndarray, "k 3"]:
     """Return a colour for each label, 18 different ones in turn; below 0 is grey."""
-    pairs = np.array(mpl.colormaps["tab20"].colors).reshape(10, 2, 3)
+    pairs = mpl.colormaps["tab20"](np.arange(20))[:, :3].reshape(10, 2, 3)
     colors = np.concatenate(pairs[np.arange(10) != GREY_PAIR].transpose(1, 0, 2))
     return np.where(labels[:, None] < 0, 0.82, colors[labels % len(colors)])
