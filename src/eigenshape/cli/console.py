@@ -86,7 +86,7 @@ def print_table(title: str, columns: list[str], rows: list[list[str]]) -> None:
 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Callable[[float, str], None]]:
-    """Show a bar on stderr while the block runs; it takes the share done and a word on what is being done."""
+    """Show a bar on stderr, if that is a terminal, while the block runs; tell it the share done and what goes on."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -95,7 +95,7 @@ def progress_bar(title: str) -> Iterator[Callable[[float, str], None]]:
         TextColumn("left"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=err, transient=True) as bar:
+    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bar:
         task = bar.add_task(title, total=1.0)
         yield lambda share, what: bar.update(task, completed=share, description=f"{title}: {what}" if what else title)
 

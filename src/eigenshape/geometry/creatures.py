@@ -66,7 +66,7 @@ class _Skeleton:
     begins: Float[np.ndarray, "b 3"]
     ends: Float[np.ndarray, "b 3"]
     radii: Float[np.ndarray, "b 2"]
-    swings: tuple[Float[np.ndarray, "k 5"], ...]
+    swings: tuple[Float[np.ndarray, "_ 5"], ...]
 
 
 @lru_cache(maxsize=32)
@@ -143,7 +143,7 @@ def _influence(points: Float[np.ndarray, "n 3"], bones: _Skeleton) -> Float[np.n
     return pull
 
 
-def _angles(kind: str, bones: _Skeleton, pose: int) -> list[Float[np.ndarray, " k"]]:
+def _angles(kind: str, bones: _Skeleton, pose: int) -> list[Float[np.ndarray, " _"]]:
     rng = np.random.default_rng([pose, CREATURES.index(kind)])
     return [
         np.radians(rng.uniform(swing[:, 3], swing[:, 4])) if pose else np.zeros(len(swing)) for swing in bones.swings
@@ -154,7 +154,7 @@ def _posed(
     points: Float[np.ndarray, "n 3"],
     bones: _Skeleton,
     influence: Float[np.ndarray, "n b"],
-    angles: list[Float[np.ndarray, " k"]],
+    angles: list[Float[np.ndarray, " _"]],
 ) -> Float[np.ndarray, "n 3"]:
     """Turn each point about each joint by its share of the joint's angle, the outermost joints first."""
     for bone in range(len(bones.parent) - 1, -1, -1):

@@ -72,6 +72,7 @@ def _face(normal: int, side: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
     return edges, tuple(_corner(corner) for corner in (at(0, 0), at(1, 0), at(1, 1), at(0, 1)))
 
 
+UNIT = np.eye(3, dtype=np.int64)
 CORNERS = np.array(list(np.ndindex(2, 2, 2)))
 EDGES = [(axis, np.insert(shift, axis, 0)) for axis in range(3) for shift in np.ndindex(2, 2)]
 FACES = [_face(normal, side) for normal in range(3) for side in (0, 1)]
@@ -95,7 +96,7 @@ def _sheet_points(
 
     Returns the point of each edge of each cell, -1 where the surface does not cross it, and the points.
     """
-    ends = [(_corner(tuple(start)), _corner(tuple(start + np.eye(3, dtype=int)[axis]))) for axis, start in EDGES]
+    ends = [(_corner(tuple(start.tolist())), _corner(tuple((start + UNIT[axis]).tolist()))) for axis, start in EDGES]
     here, there = corners[:, [one for one, _ in ends]], corners[:, [two for _, two in ends]]
     crosses = (here < 0) != (there < 0)
     share = np.where(crosses, here / np.where(crosses, here - there, 1.0), 0.0)
@@ -141,9 +142,11 @@ def _quads(
     here, there = values.take(np.arange(n - 1), axis), values.take(np.arange(1, n), axis)
     edges = np.argwhere((here < 0) != (there < 0))
     leaves = here[tuple(edges.T)] < 0
-    one, two = np.eye(3, dtype=np.int64)[[(axis + 1) % 3, (axis + 2) % 3]]
+    one, two = UNIT[[(axis + 1) % 3, (axis + 2) % 3]]
     back = (one + two, two, 0 * one, one)
-    quads = np.column_stack([number[cell_number[tuple((edges - step).T)], _edge(axis, tuple(step))] for step in back])
+    quads = np.column_stack(
+        [number[cell_number[tuple((edges - step).T)], _edge(axis, tuple(step.tolist()))] for step in back]
+    )
     return np.where(leaves[:, None], quads, quads[:, ::-1])
 
 

@@ -1,0 +1,177 @@
+"""The command line as a user meets it: text, JSON, pictures, exit codes."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from eigenshape.cli import app
+from eigenshape.geometry.creatures import make_creature
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.sampling import partial_scan
+from eigenshape.geometry.surfaces import icosphere
+from eigenshape.io.mesh_files import read_mesh, write_mesh
+from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.spectral.solver import solve_spectrum
+
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def run(*arguments, code=0):
+    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    assert done.exit_code == code, done.output
+    return done
+
+
+def run_json(*arguments, code=0):
+    return json.loads(run(*arguments, "--json", code=code).stdout)
+
+
+@pytest.fixture
+def sphere(tmp_path):
+    path = tmp_path / "sphere.ply"
+    write_mesh(icosphere(2), path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def zoo(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("zoo")
+    for kind in ("fish", "snake"):
+        (folder / kind).mkdir()
+        for pose in range(2):
+            write_mesh(make_creature(kind, pose, n_vertices=800), folder / kind / f"{kind}{pose}.ply")
+    (folder / "broken.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 nan\n3 0 1 2\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def database(zoo, tmp_path_factory):
+    db = tmp_path_factory.mktemp("db") / "index"
+    done = run("index", zoo, "--db", db, "--views", 1, code=3)
+    assert "4 described, 0 known already, 1 not taken; the index holds 4 shapes" in done.stdout
+    assert "broken: " in done.output
+    assert "vertex 2 is [2.0, 0.0, nan]" in done.output
+    return db
+
+
+def test_help_names_the_verbs():
+    text = run("--help").stdout
+    for verb in ("info", "spectrum", "features", "index", "query", "demo"):
+        assert verb in text
+        assert "--help" in run(verb, "--help").stdout
+
+
+def test_info(sphere):
+    facts = run_json("info", sphere)
+    assert (facts["vertices"], facts["faces"], facts["components"], facts["closed"]) == (162, 320, 1, True)
+    assert facts["euler_characteristic"] == 2
+    assert facts["area"] == pytest.approx(4 * np.pi, rel=0.02)
+    assert facts["repairs_to_try"] == []
+    text = run("info", sphere).stdout
+    assert "faces" in text
+    assert "320" in text
+
+
+def test_info_says_which_repairs_would_help_and_they_do(tmp_path):
+    ball = icosphere(1)
+    soup = TriangleMesh(np.concatenate([ball.vertices[ball.faces].reshape(-1, 3), [[9, 9, 9]]]),
+                        [*np.arange(240).reshape(-1, 3), [0, 0, 1], [0, 1, 2]])  # fmt: skip
+    path = tmp_path / "soup.obj"
+    write_mesh(soup, path)
+    facts = run_json("info", path)
+    assert facts["repairs_to_try"] == ["weld", "drop_degenerate", "drop_duplicate_faces", "drop_unreferenced"]
+    run("spectrum", path, code=1)
+    mended = run("info", path, "--json", "--repair", ",".join(facts["repairs_to_try"]))
+    assert json.loads(mended.stdout)["vertices"] == ball.n_vertices
+    assert "repair: weld joined" in mended.stderr
+
+
+def test_spectrum(sphere, tmp_path):
+    expected = solve_spectrum(cotangent_laplacian(read_mesh(sphere), "averaged"), 9)
+    plot, picture, saved = tmp_path / "plot.png", tmp_path / "functions.png", tmp_path / "s.npz"
+    options = ("-k", 9, "--mass", "averaged", "--plot", plot, "--picture", picture, "--save", saved)
+    found = run_json("spectrum", sphere, *options)
+    assert found["eigenvalues"] == pytest.approx(expected.eigenvalues.tolist(), abs=1e-12)
+    assert found["certificate"]["count"] == 9
+    assert plot.read_bytes()[:8] == picture.read_bytes()[:8] == PNG
+    with np.load(saved) as arrays:
+        assert arrays["eigenvectors"].shape == (162, 9)
+    text = run("spectrum", sphere, "-k", 9).stdout
+    assert "none is missing" in text
+
+
+def test_features(zoo, tmp_path):
+    picture = tmp_path / "parts.png"
+    path = zoo / "fish" / "fish0.ply"
+    found = run_json("features", path, "-n", 4, "--picture", picture)
+    assert len(found["features"]) == 4
+    assert found["features"][0]["persistence"] is None
+    assert sum(row["area_share"] for row in found["features"]) == pytest.approx(1)
+    assert set(found["face_labels"]) == {0, 1, 2, 3}
+    assert picture.read_bytes()[:8] == PNG
+    few = run_json("features", path, "--persistence", found["features"][2]["persistence"])
+    assert len(few["features"]) == 3
+    assert "never merges" in run("features", path, "--preset", "thesis").stdout
+
+
+def test_index_goes_on_where_it_stopped(zoo, database):
+    again = run_json("index", zoo, "--db", database, "--views", 1, code=3)
+    assert len(again["skipped"]) == again["shapes"] == 4
+    assert again["added"] == []
+    assert [name for name, _ in again["failed"]] == ["broken"]
+
+
+def test_query_finds_the_kind_and_draws_it(zoo, database, tmp_path):
+    scan = tmp_path / "scan.ply"
+    write_mesh(partial_scan(make_creature("snake", 5, n_vertices=800), [0.2, 1.0, 0.1]).mesh, scan)
+    sheet = tmp_path / "sheet.png"
+    found = run_json("query", database, scan, "-n", 2, "--sheet", sheet)
+    assert [match["class"] for match in found["matches"]] == ["snake", "snake"]
+    assert found["matches"][0]["correspondences"]
+    assert found["seconds"]["query"] < 1
+    assert sheet.read_bytes()[:8] == PNG
+    text = run("query", database, zoo / "fish" / "fish1.ply").stdout
+    assert text.index("fish/fish1") < text.index("snake/")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("info", "nowhere.ply"), "No such file"),
+        (("info", "mesh.xyz"), "must end in .off"),
+        (("spectrum", "{sphere}", "-k", "0"), "k must lie in 1..162; it is 0"),
+        (("spectrum", "{sphere}", "-k", "163"), "k must lie in 1..162; it is 163"),
+        (("spectrum", "{sphere}", "--plot", "plot.bmp"), "A picture must end in"),
+        (("features", "{sphere}", "--preset", "best"), "--preset takes scale-free or thesis; it was given 'best'"),
+        (("info", "{sphere}", "--repair", "everything"), "--repair takes weld"),
+        (("query", "nowhere", "{sphere}"), "must be an index"),
+        (("index", "{folder}", "--db", "{folder}/db"), "There must be meshes"),
+        (("demo", "--kind", "unicorn"), "--kind takes ant"),
+    ],
+)
+def test_errors_are_one_line_and_exit_code_1(sphere, tmp_path, arguments, message):
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    done = run(*(text.format(sphere=sphere, folder=empty) for text in arguments), code=1)
+    assert done.stderr.startswith("error: ")
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_names_that_come_twice_are_refused(zoo, tmp_path):
+    path = zoo / "fish" / "fish0.ply"
+    done = run("index", path, path, "--db", tmp_path / "db", code=1)
+    assert "Names of shapes must differ; 'fish0' comes twice" in done.stderr
+
+
+def test_a_match_without_a_file_cannot_be_drawn(database, zoo, tmp_path):
+    from eigenshape.retrieval.describe import describe_mesh
+    from eigenshape.retrieval.index import ShapeIndex
+
+    path = zoo / "fish" / "fish0.ply"
+    index = ShapeIndex.create(tmp_path / "index")
+    index.add("loose", [describe_mesh(read_mesh(path)).descriptor])
+    done = run("query", index.folder, path, "--sheet", tmp_path / "sheet.png", code=1)
+    assert "A match needs its file to be drawn; 'loose' was added without one" in done.stderr
