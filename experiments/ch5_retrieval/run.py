@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from rich.progress import track
+from rich.progress import Progress, TaskID, track
 
 import eigenshape as es
 
@@ -38,9 +38,9 @@ def shapes(every: int) -> list[es.Item]:
     return [es.Item(f"{row['cls']}/{Path(row['path']).stem}", DATA / row["path"], row["cls"]) for row in kept[::every]]
 
 
-def ranking(index: es.ShapeIndex, item: es.Item, mesh: es.TriangleMesh, recipe: es.Recipe) -> list[str]:
-    """Return the classes of the first answers to a mesh, the shape itself left out."""
-    matches = index.query(es.describe_mesh(mesh, recipe).descriptor, n_matches=TOPS[-1] + 1)
+def ranking(index: es.ShapeIndex, item: es.Item, query: es.ShapeDescriptor) -> list[str]:
+    """Return the classes of the first answers, the shape itself left out."""
+    matches = index.query(query, n_matches=TOPS[-1] + 1)
     return [match.label for match in matches if match.name != item.name][: TOPS[-1]]
 
 
@@ -68,38 +68,55 @@ def table(items: list[es.Item], rankings: list[list[str]]) -> dict[str, list[flo
     }
 
 
-def partial_scans(items: list[es.Item], every: int = 3) -> list[tuple[es.Item, es.TriangleMesh]]:
-    """Scan every third shape from a random side; the sides depend on the place in the list alone."""
-    return [
-        (item, es.partial_scan(es.read_mesh(item.path), np.random.default_rng([1, place])).mesh)
-        for place, item in enumerate(items)
-        if place % every == 0
+def partial_scan(item: es.Item, place: int) -> es.TriangleMesh:
+    """Scan a shape from a random side, which depends on its place in the list alone."""
+    return es.partial_scan(es.read_mesh(item.path), np.random.default_rng([1, place])).mesh
+
+
+def measure(items: list[es.Item], recipe: es.Recipe, n_views: int, folder: Path) -> dict[str, object]:
+    """Index all shapes, ask for each of them, and for a partial scan of every third."""
+    index = es.ShapeIndex.open(folder) if folder.exists() else es.ShapeIndex.create(folder)
+    describe = partial(describe_file, recipe=recipe, n_views=n_views)
+    with Progress() as bar:
+        task = bar.add_task(recipe.name, total=len(items))
+        told = partial(tell, bar, task)
+        report = es.build_index(index, items, describe, recipes=(recipe,), told=told)
+    taken = [item for item in items if item.name not in dict(report.failed)]
+    complete = [ranking(index, item, index.descriptor(item.name, recipe)) for item in track(taken, "whole shapes")]
+    scanned = [(place, item) for place, item in enumerate(taken) if place % 3 == 0]
+    partials = [
+        ranking(index, item, es.describe_mesh(partial_scan(item, place), recipe).descriptor)
+        for place, item in track(scanned, "partial scans")
     ]
+    return {
+        "not taken": dict(report.failed),
+        "complete": table(taken, complete),
+        "partial scans": table([item for _, item in scanned], partials),
+    }
+
+
+def tell(bar: Progress, task: TaskID, n_done: int, n_items: int, name: str, error: str | None) -> None:
+    """Move the bar, and name what cannot be taken."""
+    bar.update(task, completed=n_done)
+    if error:
+        bar.print(f"not taken: {name}: {error}")
 
 
 def main() -> int:
     """Build the index, ask for everything, print and save the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="every eighth shape, no partial scans")
+    parser.add_argument("--quick", action="store_true", help="every eighth shape")
     parser.add_argument("--db", type=Path, default=Path("ch5-index"), help="folder of the indexes, kept")
     parser.add_argument("--out", type=Path, default=Path("ch5-results.json"))
     arguments = parser.parse_args()
     if not DATA.is_dir():
         sys.stderr.write(f"real shapes are absent: {DATA} is not a folder (set EIGENSHAPE_DATA)\n")
         return 1
-    items, results = shapes(8 if arguments.quick else 1), {}
-    for recipe in (es.SCALE_FREE, es.THESIS):
-        n_views = N_VIEWS if recipe is es.SCALE_FREE and not arguments.quick else 0
-        folder = arguments.db / f"{recipe.name}-{n_views}-{len(items)}"
-        index = es.ShapeIndex.open(folder) if folder.exists() else es.ShapeIndex.create(folder)
-        report = es.build_index(index, items, partial(describe_file, recipe=recipe, n_views=n_views), recipes=(recipe,))
-        results[f"{recipe.name}: not taken"] = dict(report.failed)
-        complete = [ranking(index, item, es.read_mesh(item.path), recipe) for item in track(items, recipe.name)]
-        results[f"{recipe.name}: complete"] = table(items, complete)
-        if not arguments.quick:
-            scans = partial_scans(items)
-            ranked = [ranking(index, item, mesh, recipe) for item, mesh in track(scans, "partial scans")]
-            results[f"{recipe.name}: partial scans"] = table([item for item, _ in scans], ranked)
+    items = shapes(8 if arguments.quick else 1)
+    results = {}
+    for recipe, n_views in ((es.SCALE_FREE, N_VIEWS), (es.THESIS, 0)):
+        folder = arguments.db / f"{recipe.name}-{len(items)}"
+        results[recipe.name] = measure(items, recipe, n_views, folder)
     text = json.dumps(results, indent=2)
     sys.stdout.write(text + "\n")
     arguments.out.write_text(text + "\n")

@@ -88,12 +88,14 @@ def vertex_values(value: ArrayLike, name: str, n_vertices: int) -> NDArray[np.fl
     return values
 
 
-def whole_number(value: SupportsIndex, name: str, low: int, high: int) -> int:
-    """Return `value` as an int within low..high, both included."""
+def whole_number(value: SupportsIndex, name: str, low: int, high: int | None = None) -> int:
+    """Return `value` as an int within low..high, both included; no `high` means no upper bound."""
     try:
         number = operator.index(value)
     except TypeError as err:
         raise InvalidParameterError(f"{name} must be a whole number; it is {value!r}.") from err
-    if not low <= number <= high:
+    if high is None and number < low:
+        raise InvalidParameterError(f"{name} must be at least {low}; it is {number}.")
+    if high is not None and not low <= number <= high:
         raise InvalidParameterError(f"{name} must lie in {low}..{high}; it is {number}.")
     return number

@@ -75,14 +75,45 @@ def test_pairs_equal_literal_merging(name, step):
 
 def test_two_peaks_on_a_strip():
     strip = grid(6, 1)
-    x = strip.vertices[:, 0] * 6
-    values = np.where(x < 3, 5 - np.abs(x - 1), 3 - np.abs(x - 5))
-    tree = merge_tree(strip, values)
-    assert np.isinf(tree.persistence[0])
-    assert tree.values[0] == pytest.approx(5)
-    assert tree.persistence[1] == pytest.approx(0, abs=3)
-    parts = segment(tree, n_regions=1)
-    assert set(parts.labels.tolist()) == {0}
+    column = np.round(strip.vertices[:, 0] * 6).astype(int)
+    tree = merge_tree(strip, np.array([4.0, 5, 4, 1, 2, 3, 2])[column])
+    assert tree.values.tolist() == [5, 3]
+    assert tree.persistence.tolist() == [np.inf, 2]
+    assert tree.parent.tolist() == [-1, 0]
+    assert column[tree.maxima].tolist() == [1, 5]
+    assert column[tree.saddles[1]].tolist() == [3, 3]
+    parts = segment(tree, n_regions=2)
+    assert parts.labels.tolist() == (column[strip.faces].max(axis=1) > 3).astype(int).tolist()
+    assert set(segment(tree, n_regions=1).labels.tolist()) == {0}
+    assert set(segment(tree, persistence=2.0).labels.tolist()) == {0, 1}
+    assert set(segment(tree, persistence=2.1).labels.tolist()) == {0}
+
+
+def test_number_of_regions_is_at_most_that_of_maxima_and_at_least_that_of_components():
+    mesh = disjoint_union(icosphere(1), icosphere(1))
+    tree = merge_tree(mesh, mesh.vertices[:, 2])
+    assert len(tree.maxima) == 2
+    for count in (1, 2, 10 * mesh.n_faces):
+        assert segment(tree, n_regions=count).features.vertices.tolist() == tree.maxima.tolist()
+    assert len(segment(tree, persistence=np.inf).features.vertices) == 2
+
+
+def test_results_are_int64_and_read_only():
+    tree = merge_tree(MESHES["two pieces"], wavy(MESHES["two pieces"]))
+    parts = segment(tree, n_regions=4)
+    for array in (tree.maxima, tree.saddles, tree.parent, tree.basins, parts.labels, parts.features.vertices):
+        assert array.dtype == np.int64
+    for owner in (tree, parts.features):
+        for array in vars(owner).values():
+            assert not array.flags.writeable
+    assert not parts.labels.flags.writeable
+
+
+def test_faces_that_repeat_a_vertex_or_each_other_are_merged_too():
+    mesh = TriangleMesh(np.eye(4, 3), [[0, 1, 2], [0, 1, 2], [2, 2, 1], [1, 2, 3], [3, 3, 3]])
+    parts = segment(merge_tree(mesh, [1.0, 2.0, 3.0, 4.0]), n_regions=1)
+    assert parts.labels[:4].tolist() == [parts.labels[3]] * 4
+    assert mesh.faces[parts.labels == parts.labels[4]].tolist() in ([[3, 3, 3]], mesh.faces.tolist())
 
 
 def test_three_faces_at_an_edge_are_all_neighbours():
@@ -111,5 +142,5 @@ def test_segment_wants_exactly_one_rule():
         segment(tree, n_regions=2, persistence=0.1)
     with pytest.raises(InvalidParameterError, match="persistence must be at least 0; it is -1"):
         segment(tree, persistence=-1.0)
-    with pytest.raises(InvalidParameterError, match=r"n_regions must lie in 1\.\."):
+    with pytest.raises(InvalidParameterError, match="n_regions must be at least 1; it is 0"):
         segment(tree, n_regions=0)

@@ -55,6 +55,15 @@ def test_scores_equal_brute_force(index):
     assert found == pytest.approx({n: matching_score(rounded(query), rounded(s)) for n, s in shapes.items()})
 
 
+def test_a_shape_in_the_index_can_ask_for_its_like(index):
+    index.add("one", [descriptor(1), descriptor(2)])
+    again = index.descriptor("one", RECIPE)
+    assert np.array_equal(again.vectors, rounded(descriptor(1)).vectors)
+    assert np.array_equal(again.vertices, descriptor(1).vertices)
+    with pytest.raises(StoreError, match="A shape must be described by the recipe asked for; 'two' is not described"):
+        index.descriptor("two", RECIPE)
+
+
 def test_equal_scores_are_sorted_by_name(index):
     for name in ("b", "c", "a"):
         index.add(name, [descriptor(1)])

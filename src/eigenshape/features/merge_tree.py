@@ -48,7 +48,8 @@ def merge_tree(mesh: TriangleMesh, values: ArrayLike) -> MergeTree:
 
     The order is total (simulation of simplicity): vertices by (value, index), edges by (higher, lower vertex),
     triangles by (highest, middle, lowest vertex). Boundary edges are ignored, which equals sealing each boundary loop
-    by a vertex lower than all. Faces at an edge with more than two faces are all neighbours.
+    by a vertex lower than all. Faces at an edge with more than two faces are all neighbours there, so that what hangs
+    together stays one region; the homology modulo 2 of the thesis says this of two faces only, and else differs.
 
     The merge is that of the dual graph: an edge joins the basins of its faces, highest edge first, and the basin
     with the lower maximum ends there. A face whose highest edge leads to a higher face ends at once, so only
@@ -92,17 +93,17 @@ class _Dual:
 
 def _dual_graph(mesh: TriangleMesh, height: Float[np.ndarray, " n"]) -> _Dual:
     n = mesh.n_vertices
-    vertex = np.lexsort((np.arange(n), height))
+    vertex = np.argsort(height, kind="stable")
     rank = np.argsort(vertex)
     ranks = -np.sort(-rank[mesh.faces], axis=1)
-    faces = np.lexsort((np.arange(len(ranks)), ranks[:, 2], ranks[:, 1], ranks[:, 0]))
+    faces = np.lexsort((ranks[:, 1] * n + ranks[:, 2], ranks[:, 0]))
     place = np.argsort(faces)
     # Sides in the order of edge, then face: neighbours in this list are the pairs of faces at an edge.
     table = edge_table(mesh)
     ends = -np.sort(-rank[table.edges], axis=1)
     order = np.argsort(np.argsort(ends[:, 0] * n + ends[:, 1]))
     side_edge, side_face = table.face_edges.ravel(), np.repeat(place, 3)
-    sides = np.lexsort((side_face, -order[side_edge]))
+    sides = np.argsort(side_face - order[side_edge] * len(faces))
     edge, face = side_edge[sides], side_face[sides]
     paired = np.flatnonzero(edge[1:] == edge[:-1])
     pairs = np.column_stack([face[paired], face[paired + 1]])
@@ -126,7 +127,8 @@ def _pair(dual: _Dual, climbs_to: Int[np.ndarray, " f"]) -> tuple[dict[int, int]
     """Merge the basins over falling edges: for each that ends, the pair of faces and the basin across."""
     basins = climbs_to[dual.pairs]
     open_pairs = np.flatnonzero(basins[:, 0] != basins[:, 1])
-    _, first = np.unique(np.sort(basins[open_pairs], axis=1), axis=0, return_index=True)
+    low, high = np.sort(basins[open_pairs], axis=1).T
+    _, first = np.unique(low * len(climbs_to) + high, return_index=True)
     open_pairs = open_pairs[np.sort(first)]
     highest = {root: root for root in np.unique(climbs_to).tolist()}
 

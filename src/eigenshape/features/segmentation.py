@@ -50,10 +50,11 @@ def segment(tree: MergeTree, *, n_regions: int | None = None, persistence: float
     ----------
     tree : MergeTree
     n_regions : int
-        Regions to leave: fewer are left where the function has fewer maxima, more where the surface has more
-        components, which never merge.
+        Regions to leave, at least 1: fewer are left where the function has fewer maxima, more where the surface has
+        more components, each of which keeps one.
     persistence : float
-        Regions whose persistence is at least this are left (thesis proposition 5.2.2).
+        Regions that persist at least this long are left (thesis proposition 5.2.2); at least 0, in the function's
+        unit, infinite to leave one a component.
 
     Returns
     -------
@@ -62,7 +63,7 @@ def segment(tree: MergeTree, *, n_regions: int | None = None, persistence: float
     Raises
     ------
     InvalidParameterError
-        If not exactly one of the two is given, or it is not positive.
+        If not exactly one of the two is given, or it is below its least value.
     """
     ends = _beyond_number(tree, n_regions) if persistence is None else _below_persistence(tree, n_regions, persistence)
     left = np.flatnonzero(~ends)
@@ -76,8 +77,8 @@ def segment(tree: MergeTree, *, n_regions: int | None = None, persistence: float
 def _beyond_number(tree: MergeTree, n_regions: int | None) -> Bool[np.ndarray, " m"]:
     if n_regions is None:
         raise InvalidParameterError("segment takes either n_regions or persistence; it was given neither.")
-    count = whole_number(n_regions, "n_regions", 1, len(tree.basins))
-    return (np.arange(len(tree.maxima)) >= count) & np.isfinite(tree.persistence)
+    count = whole_number(n_regions, "n_regions", 1)
+    return (np.arange(len(tree.maxima)) >= count) & (tree.parent >= 0)
 
 
 def _below_persistence(tree: MergeTree, n_regions: int | None, persistence: float) -> Bool[np.ndarray, " m"]:

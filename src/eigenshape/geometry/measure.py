@@ -18,12 +18,17 @@ def unit_scaled(mesh: TriangleMesh) -> tuple[Float[np.ndarray, "n 3"], float]:
     power of two costs no digit.
     """
     largest = float(np.abs(mesh.vertices).max())
-    scale = 2.0 ** np.frexp(largest)[1] if largest > 0 else 1.0
+    scale = _power_of_two(largest)
     points = mesh.vertices / scale
     points = points - points.mean(axis=0)
     inner = float(np.abs(points).max())
-    inner_scale = 2.0 ** np.frexp(inner)[1] if inner > 0 else 1.0
-    return points / inner_scale, float(scale * inner_scale)
+    inner_scale = _power_of_two(inner)
+    return points / inner_scale, scale * inner_scale
+
+
+def _power_of_two(size: float) -> float:
+    # One below the exponent of frexp, so that the largest of all numbers has a power too.
+    return float(2.0 ** (np.frexp(size)[1] - 1)) if size > 0 else 1.0
 
 
 def face_area_vectors(points: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"]) -> Float[np.ndarray, "f 3"]:

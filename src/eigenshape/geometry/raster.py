@@ -69,12 +69,25 @@ def _chunks(corners: Float[np.ndarray, "f 3 3"], width: int, height: int) -> Ite
     high = np.clip(np.floor(corners[:, :, :2].max(axis=1) - 0.5) + 1, 0, size).astype(np.int64)
     span = np.maximum(high - low, 0)
     seen = np.flatnonzero((span.prod(axis=1) > 0) & (np.abs(_doubled_area(corners)) > THINNEST))
-    boxes = np.column_stack([seen, low[seen], span[seen]])
+    boxes = _bands(np.column_stack([seen, low[seen], span[seen]]))
     ends = np.cumsum(boxes[:, 3] * boxes[:, 4])
     if len(boxes):
         yield from np.split(
             boxes, np.unique(np.searchsorted(ends, np.arange(CANDIDATES_AT_ONCE, ends[-1], CANDIDATES_AT_ONCE)))
         )
+
+
+def _bands(boxes: Int[np.ndarray, "k 5"]) -> Int[np.ndarray, "b 5"]:
+    """Split boxes that are too large to be looked at at once into bands of rows; leave the others as they are."""
+    columns, rows = boxes[:, 3:].T
+    rows_at_once = np.clip(CANDIDATES_AT_ONCE // columns, 1, rows)
+    counts = -(-rows // rows_at_once)
+    box = np.repeat(np.arange(len(boxes)), counts)
+    above = (np.arange(len(box)) - np.repeat(np.cumsum(counts) - counts, counts)) * rows_at_once[box]
+    bands = boxes[box]
+    bands[:, 2] += above
+    bands[:, 4] = np.minimum(rows_at_once[box], rows[box] - above)
+    return bands
 
 
 def _covered(

@@ -71,27 +71,33 @@ def boundary_loops(mesh: TriangleMesh) -> list[Int[np.ndarray, " k"]]:
     """Chain the boundary edges into closed loops of vertices.
 
     A vertex where several loops touch is passed once by each of them; the loops are sorted by length, longest
-    first, then by their first vertex.
+    first, then by their first vertex. Where neighbouring faces are turned against each other a chain stays open.
     """
     sides = boundary_edges(mesh)
     leaving: dict[int, list[int]] = {}
     for start, end in sides[::-1].tolist():
         leaving.setdefault(start, []).append(end)
-    loops = []
+    loops: list[Int[np.ndarray, " k"]] = []
     for first in sorted(leaving):
         while leaving[first]:
-            loops.append(np.array(_walk(leaving, first), dtype=np.int64))
+            loops += [np.array(loop, dtype=np.int64) for loop in _walks(leaving, first)]
     return sorted(loops, key=lambda loop: (-len(loop), int(loop[0])))
 
 
-def _walk(leaving: dict[int, list[int]], first: int) -> list[int]:
-    loop = [first]
-    while leaving.get(loop[-1]):
-        end = leaving[loop[-1]].pop()
-        if end == first:
-            break
-        loop.append(end)
-    return loop
+def _walks(leaving: dict[int, list[int]], first: int) -> list[list[int]]:
+    """Use up the sides that can be reached from a vertex, cutting a loop off wherever the way meets itself."""
+    loops, path, place = [], [first], {first: 0}
+    while leaving.get(path[-1]):
+        end = leaving[path[-1]].pop()
+        if end in place:
+            loops.append(path[place[end] :])
+            for vertex in path[place[end] + 1 :]:
+                del place[vertex]
+            del path[place[end] + 1 :]
+        else:
+            place[end] = len(path)
+            path.append(end)
+    return [*loops, path] if len(path) > 1 else loops
 
 
 def non_manifold_edges(mesh: TriangleMesh) -> Int[np.ndarray, "k 2"]:

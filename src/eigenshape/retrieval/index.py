@@ -196,6 +196,21 @@ class ShapeIndex:
         best = order[np.sort(first)[:wanted]]
         return [_match(single, entries[place], vectors[place], float(scores[place])) for place in best]
 
+    def descriptor(self, name: str, recipe: Recipe) -> ShapeDescriptor:
+        """Return the first descriptor of a shape by a recipe, in single precision, to ask for more of its like.
+
+        Raises
+        ------
+        StoreError
+            If the shape is not there or has no descriptor of that recipe, or a file is damaged.
+        """
+        with store.reading(self.folder) as database:
+            entries, vectors = self._rows(database, recipe)
+        for entry, rows in zip(entries, vectors, strict=True):
+            if entry[4] == name:
+                return _stored(entry, rows, recipe)
+        raise StoreError(f"A shape must be described by the recipe asked for; {name!r} is not described by {recipe}.")
+
     def _rows(self, database: sqlite3.Connection, recipe: Recipe) -> tuple[list[Any], list[np.ndarray]]:
         number = store.recipe_id(database, _fields(recipe))
         query = (
@@ -215,9 +230,13 @@ class ShapeIndex:
 
 
 def _match(query: ShapeDescriptor, entry: Any, rows: np.ndarray, score: float) -> Match:
-    name, label, source, vertices, view = entry[4:]
-    found = ShapeDescriptor(rows.astype(np.float64), np.frombuffer(vertices, "<i8"), query.recipe)
+    name, label, source, _, view = entry[4:]
+    found = _stored(entry, rows, query.recipe)
     return Match(name, label, source, score, match_features(query, found), found.vertices, view)
+
+
+def _stored(entry: Any, rows: np.ndarray, recipe: Recipe) -> ShapeDescriptor:
+    return ShapeDescriptor(rows.astype(np.float64), np.frombuffer(entry[7], "<i8"), recipe)
 
 
 def _fields(recipe: Recipe) -> str:

@@ -2,6 +2,7 @@
 
 import numpy as np
 from jaxtyping import Float, Int
+from scipy.spatial.distance import cdist
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.retrieval.descriptor import Recipe, ShapeDescriptor
@@ -72,7 +73,7 @@ def _sums_of_nearest(
 ) -> Float[np.ndarray, " s"]:
     sums = np.empty(len(starts))
     ends = np.append(starts[1:], len(rows))
-    budget = max(NUMBERS_AT_ONCE // query.size, 1)
+    budget = max(NUMBERS_AT_ONCE // len(query), 1)
     first = 0
     while first < len(starts):
         last = max(int(np.searchsorted(ends, starts[first] + budget, side="right")), first + 1)
@@ -85,7 +86,7 @@ def _sums_of_nearest(
 
 
 def _distances(first: Float[np.ndarray, "m c"], second: Float[np.ndarray, "r c"]) -> Float[np.ndarray, "m r"]:
-    return np.abs(first[:, None, :] - second[None, :, :]).sum(axis=2)
+    return cdist(first, second, "cityblock")
 
 
 def match_features(first: ShapeDescriptor, second: ShapeDescriptor) -> Int[np.ndarray, "p 2"]:

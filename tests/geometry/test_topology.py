@@ -1,0 +1,153 @@
+import numpy as np
+import pytest
+
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.geometry.topology import (
+    boundary_edges,
+    boundary_loops,
+    edge_table,
+    euler_characteristic,
+    half_edges,
+    inconsistent_edges,
+    is_closed,
+    is_manifold,
+    non_manifold_edges,
+    non_manifold_vertices,
+    submesh,
+    unreferenced_vertices,
+    vertex_components,
+)
+
+
+def mesh_of(*faces):
+    """Faces alone: the points lie on a parabola, no two in one place."""
+    x = np.arange(np.max(faces) + 1.0)
+    return TriangleMesh(np.column_stack([x, x**2, 0 * x]), np.array(faces))
+
+
+SQUARE = mesh_of((0, 1, 2), (2, 1, 3))
+BOW_TIE = mesh_of((3, 4, 2), (0, 1, 2))
+FINS = mesh_of((0, 1, 2), (1, 0, 3), (0, 1, 4))
+
+
+def sides_of(loops):
+    """The directed sides of chains; one more for each chain that closes."""
+    return [pair for loop in loops for pair in zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)]
+
+
+def test_edges_of_a_square():
+    table = edge_table(SQUARE)
+    assert table.edges.tolist() == [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]]
+    assert table.n_faces.tolist() == [1, 1, 2, 1, 1]
+    assert table.face_edges.tolist() == [[2, 1, 0], [3, 4, 2]]  # opposite to the corners 0, 1, 2 of each
+
+
+def test_half_edges_run_with_their_faces():
+    assert half_edges(mesh_of((0, 1, 2))).tolist() == [[1, 2], [2, 0], [0, 1]]
+
+
+def test_a_square_has_one_boundary_loop():
+    assert sorted(map(tuple, boundary_edges(SQUARE).tolist())) == [(0, 1), (1, 3), (2, 0), (3, 2)]
+    assert [loop.tolist() for loop in boundary_loops(SQUARE)] == [[0, 1, 3, 2]]
+
+
+def test_a_closed_mesh_has_no_boundary():
+    assert boundary_loops(icosphere(1)) == []
+    assert boundary_edges(icosphere(1)).shape == (0, 2)
+
+
+def test_loops_are_sorted_by_length_then_by_vertex():
+    union = disjoint_union(mesh_of((0, 1, 2)), SQUARE, mesh_of((0, 1, 2)))
+    assert [loop.tolist() for loop in boundary_loops(union)] == [[3, 4, 6, 5], [0, 1, 2], [7, 8, 9]]
+
+
+@pytest.mark.parametrize("faces", [[(3, 4, 2), (0, 1, 2)], [(0, 1, 2), (3, 4, 2)], [(2, 3, 4), (1, 2, 0)]])
+def test_loops_that_touch_in_a_vertex_stay_apart(faces):
+    assert sorted(sorted(loop.tolist()) for loop in boundary_loops(mesh_of(*faces))) == [[0, 1, 2], [2, 3, 4]]
+
+
+def test_a_chain_of_bow_ties_comes_apart_into_triangles():
+    loops = boundary_loops(mesh_of((2, 3, 4), (0, 1, 2), (4, 5, 6), (6, 7, 0), (2, 8, 9)))
+    chained = sorted(sides_of(loops))
+    assert chained == sorted(
+        [(0, 1), (1, 2), (2, 0), (2, 3), (3, 4), (4, 2), (4, 5), (5, 6), (6, 4), (6, 7), (7, 0), (0, 6)]
+        + [(2, 8), (8, 9), (9, 2)]
+    )
+    assert all(len(set(loop.tolist())) == len(loop) for loop in loops)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_loops_end_and_use_each_side_once_however_faces_are_turned(seed):
+    rng = np.random.default_rng(seed)
+    mesh = grid(4, 3)
+    faces = mesh.faces[rng.random(mesh.n_faces) < 0.7]
+    turned = rng.random(len(faces)) < 0.4
+    mixed = TriangleMesh(mesh.vertices, np.where(turned[:, None], faces[:, ::-1], faces))
+    given = sorted(map(tuple, boundary_edges(mixed).tolist()))
+    loops = boundary_loops(mixed)
+    # A chain that stays open has no side from its end to its beginning.
+    within = [pair for loop in loops for pair in zip(loop[:-1].tolist(), loop[1:].tolist(), strict=True)]
+    closing = [(int(loop[-1]), int(loop[0])) for loop in loops]
+    for pair in within:
+        given.remove(pair)
+    assert set(given) <= set(closing)
+    assert len(given) == len(set(given))
+
+
+def test_two_faces_turned_against_each_other():
+    flipped = mesh_of((0, 1, 2), (1, 2, 3))
+    assert inconsistent_edges(flipped).tolist() == [[1, 2]]
+    assert inconsistent_edges(SQUARE).shape == (0, 2)
+    within = [pair for loop in boundary_loops(flipped) for pair in sides_of([loop])[:-1]]
+    assert sorted(within) == [(0, 1), (2, 0), (2, 3), (3, 1)]
+
+
+def test_three_faces_at_an_edge_are_no_manifold():
+    assert non_manifold_edges(FINS).tolist() == [[0, 1]]
+    assert non_manifold_vertices(FINS).size == 0
+    assert not is_manifold(FINS)
+    assert not is_closed(FINS)
+
+
+def test_two_fans_at_a_vertex_are_no_manifold():
+    assert non_manifold_vertices(BOW_TIE).tolist() == [2]
+    assert non_manifold_edges(BOW_TIE).shape == (0, 2)
+    assert not is_manifold(BOW_TIE)
+
+
+def test_closed_surfaces_that_touch_in_a_vertex_are_no_manifold():
+    one = icosphere(0)
+    faces = np.concatenate([one.faces, np.where(one.faces == 0, 0, one.faces + 11)])
+    touching = TriangleMesh(np.concatenate([one.vertices, one.vertices[1:] + 3]), faces)
+    assert is_closed(touching)
+    assert non_manifold_vertices(touching).tolist() == [0]
+    assert vertex_components(touching)[0] == 1
+
+
+@pytest.mark.parametrize(
+    ("mesh", "euler", "closed"),
+    [(icosphere(0), 2, True), (icosphere(2), 2, True), (torus(6, 5), 0, True), (grid(4, 3), 1, False)],
+)
+def test_euler_characteristic(mesh, euler, closed):
+    assert euler_characteristic(mesh) == euler
+    assert is_closed(mesh) == closed
+    assert is_manifold(mesh)
+    assert euler_characteristic(disjoint_union(mesh, mesh)) == 2 * euler
+
+
+def test_loose_vertices_are_components_and_do_not_count_for_euler():
+    loose = TriangleMesh(np.arange(15.0).reshape(5, 3), [[1, 2, 4]])
+    assert unreferenced_vertices(loose).tolist() == [0, 3]
+    count, labels = vertex_components(loose)
+    assert count == 3
+    assert labels[1] == labels[2] == labels[4]
+    assert len({labels[0], labels[1], labels[3]}) == 3
+    assert euler_characteristic(loose) == 1
+
+
+def test_submesh_keeps_coordinates_and_tells_where_vertices_were():
+    part, old = submesh(SQUARE, np.array([False, True]))
+    assert old.tolist() == [1, 2, 3]
+    assert part.faces.tolist() == [[1, 0, 2]]
+    np.testing.assert_array_equal(part.vertices, SQUARE.vertices[old])
