@@ -98,6 +98,7 @@ def test_spectrum(sphere, tmp_path):
     assert plot.read_bytes()[:8] == picture.read_bytes()[:8] == PNG
     with np.load(saved) as arrays:
         assert arrays["eigenvectors"].shape == (162, 9)
+    assert run_json("spectrum", sphere, "-k", 162)["certificate"]["shift"] is None  # all there are: no upper end
     text = run("spectrum", sphere, "-k", 9).stdout
     assert "none is missing" in text
 

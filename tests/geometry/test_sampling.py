@@ -29,7 +29,8 @@ def test_half_a_sphere_is_seen(view):
     assert 0.4 < surface_area(part.mesh) / surface_area(BALL) < 0.52
     direction = np.array(view) / np.abs(view).max()
     direction /= np.linalg.norm(direction)
-    assert (part.mesh.vertices @ direction).min() > -0.05
+    # At the rim the slack is 1.5 · 11 pixels of 510 across the sphere.
+    assert (part.mesh.vertices @ direction).min() > -0.07
     seen = np.zeros(BALL.n_vertices, dtype=bool)
     seen[part.source_vertices] = True
     assert seen[BALL.vertices @ direction > 0.25].all()
@@ -84,14 +85,15 @@ def test_a_shape_in_one_line_of_sight_is_refused():
 
 
 def test_no_whole_face_visible_is_refused():
-    # A slope with two corners in front of a screen that hides the third, and a screen one corner of which lies behind.
-    slopes = TriangleMesh(
-        [[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 9], [1, 0, 9], [0, 1, 9]],
-        [[0, 1, 2], [3, 4, 5]],
-    )
-    assert partial_scan(slopes, [0, 0, 1]).source_faces.tolist() == [1]
-    needle = TriangleMesh([[0, 0, 0], [4, 4, 3], [8, 8, 0], [0, 8, 3], [4, 4, -3], [8, 0, 3]], [[0, 1, 2], [3, 4, 5]])
-    assert partial_scan(needle, [0, 0, 1], all_pieces=True).source_faces.size
+    # Three blades around the axis, each with its high base over the low tip of the one before.
+    angles = np.radians([-40, 40, 130])[None, :] + np.radians([0, 120, 240])[:, None]
+    radii, heights = np.array([2.0, 2.0, 1.35]), np.broadcast_to([1.0, 1.0, -3.0], (3, 3))
+    corners = np.stack([radii * np.cos(angles), radii * np.sin(angles), heights], axis=2)
+    blades = TriangleMesh(corners.reshape(9, 3), np.arange(9).reshape(3, 3))
+    for all_pieces in (False, True):
+        with pytest.raises(InvalidShapeError, match=r"A part must have a face\. No face is visible as a whole"):
+            partial_scan(blades, [0, 0, 1], all_pieces=all_pieces)
+    assert partial_scan(blades, [0, 0, -1], all_pieces=True).mesh.n_faces >= 1
 
 
 @pytest.mark.parametrize("number", [0, 1, 17, 1000])
@@ -107,7 +109,7 @@ def test_viewpoints_lie_evenly():
     assert np.degrees(nearest.min()) > 8  # sixty random ones come within about 2 degrees
 
 
-@pytest.mark.parametrize("view", [[1.0, 0, 0], [0, -1, 0], [0.6, 0, -0.8]])
+@pytest.mark.parametrize("view", [[1.0, 0, 0], [0.0, -1, 0], [0.6, 0, -0.8]])
 def test_a_rotation_brings_the_view_to_the_third_axis(view):
     turn = rotation_towards(np.array(view))
     np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-15)

@@ -32,6 +32,20 @@ def sealed(mesh):
     return np.array(faces)
 
 
+def in_order(faces, rank):
+    """The vertices, edges and triangles, and the place of each among all: by ranks of vertices, highest first."""
+    sides = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    lists = [np.arange(len(rank))[:, None], np.unique(sides, axis=0), faces]
+    keys = [
+        np.pad(-np.sort(-rank[some], axis=1), ((0, 0), (0, 3 - some.shape[1])), constant_values=-len(rank))
+        for some in lists
+    ]
+    order = np.lexsort(np.concatenate(keys).T[::-1])
+    places = np.argsort(order).astype(float)
+    starts = np.cumsum([len(some) for some in lists])[:-1]
+    return list(zip(lists, np.split(places, starts), strict=True))
+
+
 def pairs_by_gudhi(mesh, values):
     """Pair triangles with edges in a filtration by (highest, middle, lowest vertex), a face before what it bounds."""
     n, faces = mesh.n_vertices, sealed(mesh)
@@ -39,10 +53,8 @@ def pairs_by_gudhi(mesh, values):
     rank[np.lexsort((np.arange(n), values))] = np.arange(n)
     rank[n:] = -1 - np.arange(len(rank) - n)
     simplices = gudhi.SimplexTree()
-    simplices.insert_batch(faces.T, np.zeros(len(faces)))
-    listed = [(tuple(sorted(rank[simplex], reverse=True)), simplex) for simplex, _ in simplices.get_simplices()]
-    for place, (_, simplex) in enumerate(sorted(listed)):
-        simplices.assign_filtration(simplex, float(place))
+    for listed, place in in_order(faces, rank):
+        simplices.insert_batch(listed.T, place)
     simplices.compute_persistence(homology_coeff_field=2, persistence_dim_max=True)
     pairs = []
     for edge, triangle in simplices.persistence_pairs():

@@ -64,14 +64,20 @@ def repair_names(text: str) -> tuple[str, ...]:
 
 
 def print_json(value: Any) -> None:
-    """Print a value as JSON on stdout; numpy numbers and arrays become plain ones."""
-    typer.echo(json.dumps(value, indent=2, default=_plain, allow_nan=False))
+    """Print a value as JSON on stdout; arrays become lists, and what is not finite null."""
+    typer.echo(json.dumps(_plain(value), indent=2, allow_nan=False))
 
 
 def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
     if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    return str(value)
+        return _plain(value.tolist())
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value
 
 
 def print_table(title: str, columns: list[str], rows: list[list[str]]) -> None:

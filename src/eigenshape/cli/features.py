@@ -74,7 +74,7 @@ def _rows(mesh: TriangleMesh, parts: Segmentation) -> list[dict[str, Any]]:
             "vertex": int(vertex),
             "position": mesh.vertices[vertex].tolist(),
             "heat": float(points.values[index]),
-            "persistence": float(points.persistence[index]) if np.isfinite(points.persistence[index]) else None,
+            "persistence": float(points.persistence[index]),
             "area_share": float(areas[index] / areas.sum()),
         }
         for index, vertex in enumerate(points.vertices)
@@ -88,7 +88,7 @@ def _print(rows: list[dict[str, Any]]) -> None:
             str(row["vertex"]),
             "  ".join(f"{coordinate:.4g}" for coordinate in row["position"]),
             f"{row['heat']:.4g}",
-            "never merges" if row["persistence"] is None else f"{row['persistence']:.4g}",
+            "never merges" if np.isinf(row["persistence"]) else f"{row['persistence']:.4g}",
             f"{100 * row['area_share']:.1f} %",
         ]
         for index, row in enumerate(rows)

@@ -47,6 +47,8 @@ def make_creature(kind: str, pose: int = 0, *, n_vertices: int = 2500, individua
     ------
     InvalidParameterError
         If the kind is unknown or a number is out of range.
+    InvalidShapeError
+        If the creature has limbs too thin for so few vertices; 1500 serve every kind.
     """
     if kind not in PLANS:
         raise InvalidParameterError(f"kind must be one of {', '.join(CREATURES)}; it is {kind!r}.")
