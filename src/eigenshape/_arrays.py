@@ -40,8 +40,10 @@ def index_rows(value: ArrayLike, name: str, columns: int, n_vertices: int) -> ND
     huge = rows.dtype.kind == "O" and all(isinstance(entry, int) for entry in rows.flat)
     if rows.dtype.kind not in "iuf" and not huge:
         raise InvalidShapeError(f"{name} must be integers; the type is {rows.dtype}.")
-    _refuse_row(name, "be whole numbers", rows, rows != np.floor(rows) if rows.dtype.kind == "f" else None)
-    _refuse_row(name, f"index vertices 0..{n_vertices - 1}", rows, (rows < 0) | (rows >= n_vertices))
+    if rows.dtype.kind == "f" and (bad := (rows != np.floor(rows)).any(axis=1)).any():
+        raise InvalidShapeError(f"{name} must be whole numbers; {_first(name, rows, bad)}.")
+    if (bad := ((rows < 0) | (rows >= n_vertices)).any(axis=1)).any():
+        raise InvalidShapeError(f"{name} must index vertices 0..{n_vertices - 1}; {_first(name, rows, bad)}.")
     return rows.astype(np.int64)
 
 
@@ -58,10 +60,9 @@ def _table(value: ArrayLike, name: str, columns: int) -> NDArray[Any]:
     return rows
 
 
-def _refuse_row(name: str, rule: str, rows: NDArray[Any], bad: NDArray[np.bool_] | None) -> None:
-    if bad is not None and bad.any():
-        row = int(np.flatnonzero(bad.any(axis=1))[0])
-        raise InvalidShapeError(f"{name} must {rule}; {SINGULAR[name]} {row} is {rows[row].tolist()}.")
+def _first(name: str, rows: NDArray[Any], bad: NDArray[np.bool_]) -> str:
+    row = int(np.argmax(bad))
+    return f"{SINGULAR[name]} {row} is {rows[row].tolist()}"
 
 
 def positive_values(value: ArrayLike, name: str) -> NDArray[np.float64]:

@@ -1,6 +1,10 @@
 """The command line as a user meets it: text, JSON, pictures, exit codes."""
 
 import json
+import signal
+import subprocess
+import sys
+import time
 
 import numpy as np
 import pytest
@@ -13,6 +17,8 @@ from eigenshape.geometry.sampling import partial_scan
 from eigenshape.geometry.surfaces import icosphere
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.retrieval.describe import describe_mesh
+from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.spectral.solver import solve_spectrum
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -124,6 +130,36 @@ def test_index_goes_on_where_it_stopped(zoo, database):
     assert [name for name, _ in again["failed"]] == ["broken"]
 
 
+@pytest.mark.parametrize("how", ["SIGINT", "SIGKILL"])
+def test_a_stopped_index_goes_on_without_doing_a_shape_twice(tmp_path, how):
+    folder, db = tmp_path / "meshes", tmp_path / "db"
+    folder.mkdir()
+    for number in range(6):
+        write_mesh(make_creature("fish", number, n_vertices=800), folder / f"fish{number}.ply")
+    command = [
+        sys.executable,
+        "-c",
+        "from eigenshape.cli import app; app()",
+        "index",
+        folder,
+        "--db",
+        db,
+        "--workers",
+        "1",
+    ]
+    running = subprocess.Popen([*command, "--views", "0"], stderr=subprocess.PIPE, text=True)
+    while running.poll() is None and not (db / "rows-1.f32").exists():
+        time.sleep(0.01)
+    running.send_signal(getattr(signal, how))
+    told = running.communicate()[1]
+    assert how == "SIGKILL" or (running.returncode, "stopped" in told) == (130, True)
+    before = {record.name for record in ShapeIndex.open(db).records()}
+    report = run_json("index", folder, "--db", db, "--workers", 1, "--views", 0)
+    assert set(report["skipped"]) == before
+    assert len(before) < 6
+    assert set(report["added"]) | before == {f"fish{number}" for number in range(6)}
+
+
 def test_query_finds_the_kind_and_draws_it(zoo, database, tmp_path):
     scan = tmp_path / "scan.ply"
     write_mesh(partial_scan(make_creature("snake", 5, n_vertices=800), [0.2, 1.0, 0.1]).mesh, scan)
@@ -168,9 +204,6 @@ def test_names_that_come_twice_are_refused(zoo, tmp_path):
 
 
 def test_a_match_without_a_file_cannot_be_drawn(database, zoo, tmp_path):
-    from eigenshape.retrieval.describe import describe_mesh
-    from eigenshape.retrieval.index import ShapeIndex
-
     path = zoo / "fish" / "fish0.ply"
     index = ShapeIndex.create(tmp_path / "index")
     index.add("loose", [describe_mesh(read_mesh(path)).descriptor])

@@ -8,6 +8,7 @@ from eigenshape.features.segmentation import segment
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
 from eigenshape.geometry.topology import submesh
+from eigenshape.io.mesh_files import read_mesh
 
 
 def wavy(mesh, step=0.0):
@@ -71,6 +72,19 @@ def test_pairs_equal_literal_merging(name, step):
     finite = np.isfinite(tree.persistence)
     ours = sorted(zip(tree.maxima[finite].tolist(), *tree.saddles[finite].T.tolist(), strict=True))
     assert ours == lasting
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("step", [0.0, 0.125])
+@pytest.mark.parametrize("path", ["horse/sumner_horse-02.ply", "octopus/psb122.ply", "fish/psb222.ply"])
+def test_labels_of_real_shapes_equal_literal_merging(data, path, step):
+    mesh = read_mesh(data / "retrieval" / path)
+    values = wavy(TriangleMesh(2 * mesh.vertices / np.ptp(mesh.vertices, axis=0).max(), mesh.faces), step)
+    tree = merge_tree(mesh, values)
+    assert len(tree.maxima) > 3
+    parts = segment(tree, n_regions=3)
+    literal = LiteralMerging(mesh.faces.tolist(), values.tolist()).run(lambda n, p: n <= 3)
+    assert np.array_equal(parts.features.vertices[parts.labels], literal.labels())
 
 
 def test_two_peaks_on_a_strip():

@@ -66,5 +66,7 @@ def test_numbers_out_of_range_are_refused(options, match):
 
 
 def test_limbs_finer_than_the_grid_are_refused():
-    with pytest.raises(InvalidShapeError, match=r"must be smooth at the size of the grid; at spacing 0\.1\d* it is not"):
+    with pytest.raises(
+        InvalidShapeError, match=r"must be smooth at the size of the grid; at spacing 0\.1\d* it is not"
+    ):
         make_creature("ant", n_vertices=500)

@@ -10,7 +10,7 @@ from eigenshape.geometry.surfaces import grid, icosphere, torus
 
 ALL = [normalize_box, normalize_area, normalize_diameter]
 MOVED = torus(9, 7, outer=5.0, inner=2.0)
-MOVED = TriangleMesh(MOVED.vertices + [300.0, -20.0, 1.0], MOVED.faces)
+MOVED = TriangleMesh(MOVED.vertices + np.array([300.0, -20.0, 1.0]), MOVED.faces)
 POINT = TriangleMesh(np.full((3, 3), 4.0), [[0, 1, 2]])
 LINE = TriangleMesh([[0, 0, 0], [1, 0, 0], [4, 0, 0]], [[0, 1, 2]])
 

@@ -45,14 +45,14 @@ def test_scans_do_not_depend_on_the_unit(scale):
 
 
 def test_what_is_behind_is_hidden():
-    front = TriangleMesh(grid(8, 8).vertices + [0, 0, 1.0], grid(8, 8).faces)
+    front = TriangleMesh(grid(8, 8).vertices + np.array([0, 0, 1.0]), grid(8, 8).faces)
     both = disjoint_union(grid(8, 8), front)
     assert partial_scan(both, [0, 0, 1]).source_faces.tolist() == list(range(128, 256))
     assert partial_scan(both, [0, 0, -1]).source_faces.tolist() == list(range(128))
 
 
 def test_all_pieces_or_the_largest():
-    beside = TriangleMesh(grid(4, 4).vertices * 0.5 + [2, 0, 0], grid(4, 4).faces)
+    beside = TriangleMesh(grid(4, 4).vertices * 0.5 + np.array([2, 0, 0]), grid(4, 4).faces)
     both = disjoint_union(beside, grid(4, 4))
     assert partial_scan(both, [0, 0, 1]).source_faces.tolist() == list(range(32, 64))
     pieces = partial_scan(both, [0, 0, 1], all_pieces=True)

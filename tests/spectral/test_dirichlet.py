@@ -14,14 +14,14 @@ RIM = np.unique(boundary_edges(MESH))
 @pytest.mark.parametrize("mass", ["lumped", "consistent", "averaged"])
 def test_a_drum_of_the_unit_square(mass):
     modes = np.arange(1, 6) ** 2
-    exact = np.pi**2 * np.sort(np.add.outer(modes, modes), axis=None)[:8]  # 2, 5, 5, 8, 10, 10, 13, 13
+    exact = np.pi**2 * np.sort(np.add.outer(modes, modes), axis=None)[:6]  # 2, 5, 5, 8, 10, 10
     laplacian = cotangent_laplacian(MESH, mass)
-    found = solve_dirichlet(laplacian, 8, RIM)
+    found = solve_dirichlet(laplacian, 6, RIM)
     np.testing.assert_allclose(found.eigenvalues, exact, rtol=0.03)
     assert found.certificate.complete
     assert not found.eigenvectors[RIM].any()
     gram = found.eigenvectors.T @ (laplacian.mass @ found.eigenvectors)
-    np.testing.assert_allclose(gram, np.eye(8), atol=1e-11)
+    np.testing.assert_allclose(gram, np.eye(6), atol=1e-11)
 
 
 def test_the_lowest_mode_is_a_product_of_sines():

@@ -24,18 +24,18 @@ def test_heat_sums_to_the_trace(k):
 
 def test_at_first_all_heat_is_where_it_was_put():
     laplacian = cotangent_laplacian(torus(9, 7))
-    heat = heat_kernel_signature(solve_spectrum(laplacian, 63), 1e-12)
+    heat = heat_kernel_signature(solve_spectrum(laplacian, 63), [1e-12])
     np.testing.assert_allclose(heat[:, 0], 1 / laplacian.mass.diagonal(), rtol=1e-8)
 
 
 def test_in_the_end_heat_is_even():
     laplacian = cotangent_laplacian(torus(9, 7))
-    heat = heat_kernel_signature(solve_spectrum(laplacian, 10), 1e3)
+    heat = heat_kernel_signature(solve_spectrum(laplacian, 10), [1e3])
     np.testing.assert_allclose(heat, 1 / laplacian.mass.sum(), rtol=1e-10)
 
 
 def test_heat_only_decays():
-    heat = heat_kernel_signature(solve_spectrum(cotangent_laplacian(grid(6, 5)), 30), np.geomspace(1e-3, 10, 12))
+    heat = heat_kernel_signature(solve_spectrum(cotangent_laplacian(grid(6, 5)), 30), np.geomspace(1e-3, 1, 12))
     assert (np.diff(heat, axis=1) < 0).all()
     assert (heat > 0).all()
 
@@ -74,8 +74,11 @@ def test_a_straight_edge_leaves_no_trace_in_the_mean():
     reflected = heat_kernel_signature(neumann, [t])[middle, 0] * 4 * np.pi * t
     np.testing.assert_allclose(free, 1, atol=0.04)
     assert reflected[0] == pytest.approx(2, rel=0.04)
-    np.testing.assert_allclose(reflected, 1 + np.exp(-(np.arange(41) / 40) ** 2 / t)
-                               + np.exp(-(1 - np.arange(41) / 40) ** 2 / t), atol=0.06)
+    np.testing.assert_allclose(
+        reflected,
+        1 + np.exp(-((np.arange(41) / 40) ** 2) / t) + np.exp(-((1 - np.arange(41) / 40) ** 2) / t),
+        atol=0.06,
+    )
 
 
 def test_spectra_of_two_surfaces_are_refused():

@@ -15,7 +15,8 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
-    epilog="Exit codes: 0 done, 1 an error named on stderr, 2 wrong usage, 3 some shapes could not be taken.",
+    epilog="Exit codes: 0 done, 1 an error named on stderr, 2 wrong usage, 3 some shapes could not be taken, "
+    "130 stopped by Ctrl-C.",
 )
 for verb in (info, spectrum, features, index, query, demo):
     app.command(no_args_is_help=verb is not demo)(verb)

@@ -35,7 +35,7 @@ MeshArgument = Annotated[Path, typer.Argument(help="Mesh file: OFF, OBJ, PLY, ST
 
 
 class Verbs(TyperGroup):
-    """Turn our errors and the system's into one line and exit code 1."""
+    """Turn our errors and the system's into one line and exit code 1, and Ctrl-C into exit code 130."""
 
     def invoke(self, ctx: Any) -> Any:
         """Run the verb."""
@@ -44,6 +44,9 @@ class Verbs(TyperGroup):
         except (EigenshapeError, OSError) as error:
             err.print(f"[bold red]error:[/] {escape(str(error))}")
             raise typer.Exit(1) from error
+        except KeyboardInterrupt as error:
+            err.print("stopped; what was finished is kept")
+            raise typer.Exit(130) from error
 
 
 def load_mesh(path: Path, repairs: str) -> TriangleMesh:

@@ -54,9 +54,11 @@ def rasterize(points: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"], w
     for candidates in _chunks(corners, width, height):
         index, pixel, inside = _covered(corners, candidates, width)
         height_there = np.einsum("ij,ij->i", inside, corners[index, :, 2])
+        before = depth[pixel]
         np.maximum.at(depth, pixel, height_there)
-        # Backwards, so that of equal heights the lowest face is written last.
-        nearest = np.flatnonzero(height_there == depth[pixel])[::-1]
+        # Of equal heights the lowest face stays: those of earlier chunks are not written over, and in one chunk
+        # writing goes backwards.
+        nearest = np.flatnonzero((height_there == depth[pixel]) & (height_there > before))[::-1]
         face[pixel[nearest]] = index[nearest]
         weights[pixel[nearest]] = inside[nearest]
     return Raster(face.reshape(height, width), weights.reshape(height, width, 3), depth.reshape(height, width))
