@@ -40,10 +40,12 @@ def index_rows(value: ArrayLike, name: str, columns: int, n_vertices: int) -> ND
     huge = rows.dtype.kind == "O" and all(isinstance(entry, int) for entry in rows.flat)
     if rows.dtype.kind not in "iuf" and not huge:
         raise InvalidShapeError(f"{name} must be integers; the type is {rows.dtype}.")
-    if rows.dtype.kind == "f" and (bad := (rows != np.floor(rows)).any(axis=1)).any():
-        raise InvalidShapeError(f"{name} must be whole numbers; {_first(name, rows, bad)}.")
-    if (bad := ((rows < 0) | (rows >= n_vertices)).any(axis=1)).any():
-        raise InvalidShapeError(f"{name} must index vertices 0..{n_vertices - 1}; {_first(name, rows, bad)}.")
+    if rows.dtype.kind == "f" and (rows != np.floor(rows)).any():
+        fact = _first(name, rows, rows != np.floor(rows))
+        raise InvalidShapeError(f"{name} must be whole numbers; {fact}.")
+    outside = (rows < 0) | (rows >= n_vertices)
+    if outside.any():
+        raise InvalidShapeError(f"{name} must index vertices 0..{n_vertices - 1}; {_first(name, rows, outside)}.")
     return rows.astype(np.int64)
 
 
@@ -61,7 +63,7 @@ def _table(value: ArrayLike, name: str, columns: int) -> NDArray[Any]:
 
 
 def _first(name: str, rows: NDArray[Any], bad: NDArray[np.bool_]) -> str:
-    row = int(np.argmax(bad))
+    row = int(np.flatnonzero(bad.any(axis=1))[0])
     return f"{SINGULAR[name]} {row} is {rows[row].tolist()}"
 
 
