@@ -36,7 +36,9 @@ def shapes(quick: bool) -> list[es.Item]:
         rows = list(csv.DictReader(file))
     sizes = {row["cls"]: sum(other["cls"] == row["cls"] for other in rows) for row in rows}
     kept = [row for row in rows if sizes[row["cls"]] >= 3]
-    return [es.Item(f"{row['cls']}/{Path(row['path']).stem}", DATA / row["path"], row["cls"]) for row in kept[::every]]
+    if quick:
+        kept = [row for row in kept if row["cls"] in QUICK][::2]
+    return [es.Item(f"{row['cls']}/{Path(row['path']).stem}", DATA / row["path"], row["cls"]) for row in kept]
 
 
 def ranking(index: es.ShapeIndex, item: es.Item, query: es.ShapeDescriptor) -> list[str]:

@@ -1,6 +1,14 @@
+import multiprocessing
+import os
+import signal
+import threading
+import time
+
 import pytest
 from describers import RECIPE, by_content, descriptor
+from filelock import FileLock
 
+from eigenshape._errors import InvalidParameterError
 from eigenshape.retrieval.batch import Item, Workers, build_index, content_digest
 from eigenshape.retrieval.index import ShapeIndex
 
@@ -20,20 +28,29 @@ def build(index, todo, timeout=60.0, told=None):
     return build_index(index, todo, by_content, recipes=(RECIPE,), workers=Workers(2, timeout), told=told)
 
 
+BAD = {
+    "raise": "A face must have area; face 3 has none.",
+    "die": "it ended its process with exit code 77",
+    "hang": "it took more than 4 s",
+    "pickle badly": "PicklesBadlyError: pickle badly and more",
+    "nothing": "TypeError: 'NoneType' object is not iterable",
+    "text": "A describer must return descriptors; it returned str.",
+    "nan": "A descriptor must hold finite single-precision numbers; of 'nan' entry [0, 0] is nan.",
+    "another recipe": "A describer must follow every recipe; 'test' has no descriptor.",
+    "surprise": "ValueError: invalid literal for int() with base 10: 'surprise'",
+}
+
+
 def test_bad_shapes_are_named_and_the_others_go_on(index, tmp_path):
-    todo = items(tmp_path, a="1", b="raise", c="die", d="2", e="hang", f="surprise", g="3", h="4")
+    good = {"a": "1", "d": "2", "g": "3", "vanish": "vanish", "h": "4"}
+    todo = items(tmp_path, a="1", **{word: word for word in BAD}, d="2", g="3", vanish="vanish", h="4")
     heard = []
     report = build(index, todo, timeout=4.0, told=lambda *news: heard.append(news))
-    assert report.added == ("a", "d", "g", "h")
-    assert dict(report.failed) == {
-        "b": "A face must have area; face 3 has none.",
-        "c": "it ended its process with exit code 77",
-        "e": "it took more than 4 s",
-        "f": "KeyError: 'lost'",
-    }
-    assert [record.name for record in index.records()] == ["a", "d", "g", "h"]
-    assert [news[0] for news in heard] == list(range(1, 9))
-    assert {news[2]: news[3] for news in heard}["b"] == "A face must have area; face 3 has none."
+    assert report.added == tuple(good)
+    assert report.failed == tuple(BAD.items())
+    assert [record.name for record in index.records()] == sorted(good)
+    assert [news[0] for news in heard] == list(range(1, len(todo) + 1))
+    assert {news[2]: news[3] for news in heard} == {**dict.fromkeys(good), **BAD}
 
 
 def test_what_is_there_is_not_done_twice(index, tmp_path):
@@ -51,6 +68,14 @@ def test_a_changed_file_replaces_what_it_was(index, tmp_path):
     assert build(index, todo).added == ("a",)
     assert index.query(descriptor(5))[0].name == "a"
     assert len(index) == 2
+
+
+def test_a_file_that_changes_while_it_is_read_is_read_again(index, tmp_path):
+    todo = items(tmp_path, a="change")
+    assert build(index, todo).added == ("a",)
+    assert build(index, todo).added == ("a",)
+    assert index.query(descriptor(9))[0].score == 0
+    assert build(index, todo).skipped == ("a",)
 
 
 def test_ctrl_c_keeps_what_is_done(index, tmp_path):
@@ -72,3 +97,45 @@ def test_a_missing_file_is_named(index, tmp_path):
     report = build(index, [Item("gone", tmp_path / "gone")])
     assert report.failed[0][0] == "gone"
     assert "No such file" in report.failed[0][1]
+
+
+def test_ctrl_c_ends_workers_that_hang(index, tmp_path):
+    todo = items(tmp_path, a="1", b="hang")
+
+    def interrupt_soon():
+        wait_for(tmp_path / "b.busy")
+        while not len(index):
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=interrupt_soon).start()
+    with pytest.raises(KeyboardInterrupt):
+        build(index, todo, timeout=600)
+    with FileLock(tmp_path / "b.lock", timeout=20):  # let go by its death only
+        assert [record.name for record in index.records()] == ["a"]
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="kill -9 is a Unix thing")
+def test_workers_do_not_outlive_a_killed_batch(index, tmp_path):
+    todo = items(tmp_path, a="hang")
+    batch = multiprocessing.get_context("spawn").Process(target=build, args=(index, todo, 600.0))
+    batch.start()
+    wait_for(tmp_path / "a.busy")
+    batch.kill()
+    batch.join()
+    with FileLock(tmp_path / "a.lock", timeout=20):
+        assert len(index) == 0
+
+
+def wait_for(path):
+    while not path.exists():
+        time.sleep(0.01)
+
+
+def test_what_a_batch_cannot_begin_with(index, tmp_path):
+    with pytest.raises(InvalidParameterError, match=r"Items must have different names; 'x' is both .*a and .*b"):
+        build(index, [Item("x", tmp_path / "a"), Item("x", tmp_path / "b")])
+    with pytest.raises(InvalidParameterError, match="count must be at least 1; it is 0"):
+        Workers(count=0)
+    with pytest.raises(InvalidParameterError, match="timeout must be positive and finite"):
+        Workers(timeout=0.0)

@@ -1,9 +1,9 @@
-import os
+import json
+import multiprocessing
 import shutil
 import signal
 import sqlite3
-import subprocess
-import sys
+import tempfile
 import threading
 import time
 from dataclasses import replace
@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import writer
 from describers import RECIPE, descriptor
 from filelock import FileLock
 from hypothesis import given, settings
@@ -22,7 +23,6 @@ from eigenshape.retrieval.descriptor import Recipe, ShapeDescriptor
 from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.retrieval.score import matching_score
 
-HERE = Path(__file__).parent
 OTHER = replace(RECIPE, name="other", scales=tuple(float(2**step) for step in range(40)))
 
 
@@ -95,6 +95,16 @@ def test_the_same_digest_gains_recipes_and_keeps_the_rest(index):
         index.add("one", [descriptor(2)], digest="e")
 
 
+def test_another_digest_gives_way_where_asked(index):
+    index.add("one", [descriptor(1), descriptor(1, OTHER)], label="old")
+    index.add("one", [descriptor(2)], digest="d", replace=True)
+    index.add("one", [descriptor(3)], digest="e", label="new", replace=True)
+    assert [(record.label, record.digest, record.recipes) for record in index.records()] == [("new", "e", (RECIPE,))]
+    assert index.query(descriptor(3))[0].score == 0
+    index.add("one", [descriptor(4)], digest="e", replace=True)
+    assert index.query(descriptor(3))[0].score == 0
+
+
 def test_remove(index):
     for seed in range(3):
         index.add(f"s{seed}", [descriptor(seed)])
@@ -128,9 +138,64 @@ def test_what_cannot_be_stored(index):
     bad[1, 2] = np.nan
     with pytest.raises(InvalidParameterError, match=r"finite single-precision numbers; of 'x' entry \[1, 2\] is nan"):
         index.add("x", [ShapeDescriptor(bad, np.arange(2), RECIPE)])
+    with pytest.raises(InvalidParameterError, match=r"of 'x' entry \[0, 0\] is 1e\+300"):
+        index.add("x", [ShapeDescriptor(np.full((2, 3), 1e300), np.arange(2), RECIPE)])
     with pytest.raises(InvalidParameterError, match="A shape needs a descriptor to be found by; 'x' has none"):
         index.add("x", [])
+    with pytest.raises(InvalidParameterError, match="must name one vertex a feature; of 'x' 2 features have vertices"):
+        index.add("x", [ShapeDescriptor(np.ones((2, 3)), np.arange(2)[:, None], RECIPE)])
+    with pytest.raises(InvalidParameterError, match=r"beside numbers must be Unicode text; 'b\\udcff' is not"):
+        index.add("x", [descriptor(1)], source="b\udcff")
+    with pytest.raises(
+        InvalidParameterError, match="must have equally many numbers; of 'test' they have 3, and here 5"
+    ):
+        index.add("x", [descriptor(1), ShapeDescriptor(np.ones((2, 5)), np.arange(2), RECIPE)])
     assert len(index) == 0
+
+
+def test_rows_of_another_length_do_not_spoil_an_index(index):
+    longer = ShapeDescriptor(np.ones((2, 5)), np.arange(2), RECIPE)
+    index.add("one", [descriptor(1)])
+    with pytest.raises(InvalidParameterError, match="of 'test' they have 3, and here 5"):
+        index.add("two", [longer])
+    with pytest.raises(InvalidParameterError, match="of 'test' they have 3, and here 5"):
+        index.query(longer)
+    assert [match.name for match in index.query(descriptor(1))] == ["one"]
+
+
+def test_what_cannot_be_asked(index):
+    index.add("one", [descriptor(1)])
+    with pytest.raises(InvalidParameterError, match=r"of 'the query' entry \[0, 0\] is nan"):
+        index.query(ShapeDescriptor(np.full((2, 3), np.nan), np.arange(2), RECIPE))
+    with pytest.raises(InvalidParameterError, match="of 'the query' it has none"):
+        index.query(ShapeDescriptor(np.empty((0, 3)), np.arange(0), RECIPE))
+
+
+def test_recipes_are_equal_as_values_are(index):
+    index.add("one", [descriptor(1, replace(RECIPE, time_unit=1))])
+    index.add("two", [descriptor(2, replace(RECIPE, time_unit=1.0, n_features=np.int64(2)))])
+    assert len(index.query(descriptor(1, replace(RECIPE, time_unit=1.0)))) == 2
+
+
+def test_recipes_of_other_versions(index):
+    index.add("one", [descriptor(1, replace(RECIPE, n_modes=Recipe().n_modes))])
+    fields = edit_recipe(index, lambda fields: fields.pop("n_modes"))
+    assert "n_modes" not in fields
+    assert index.query(descriptor(1))[0].score == 0
+    edit_recipe(index, lambda fields: fields.update(colour="red"))
+    for ask in (index.records, lambda: index.query(descriptor(1)), lambda: index.add("two", [descriptor(2)])):
+        with pytest.raises(StoreError, match=r"must be known to this version of eigenshape; .* argument 'colour'"):
+            ask()
+
+
+def edit_recipe(index, edit):
+    database = sqlite3.connect(index.folder / store.DATABASE)
+    fields = json.loads(database.execute("SELECT fields FROM recipe").fetchone()[0])
+    edit(fields)
+    with database:
+        database.execute("UPDATE recipe SET fields = ?", (json.dumps(fields),))
+    database.close()
+    return fields
 
 
 def test_a_query_in_a_recipe_that_is_not_there(index):
@@ -139,6 +204,10 @@ def test_a_query_in_a_recipe_that_is_not_there(index):
     index.add("one", [descriptor(1)])
     with pytest.raises(StoreError, match=r"An index answers in the recipes it holds; .* holds test and was asked in"):
         index.query(descriptor(1, Recipe()))
+    index.remove("one")
+    with pytest.raises(StoreError, match="holds no shape and was asked in"):
+        index.query(descriptor(1))
+    index.add("one", [descriptor(1)])
     with pytest.raises(InvalidParameterError, match=r"n_matches must lie in 1\.\."):
         index.query(descriptor(1), n_matches=0)
 
@@ -148,6 +217,10 @@ def test_folders_that_are_no_index(tmp_path, index):
         ShapeIndex.open(tmp_path)
     with pytest.raises(StoreError, match="must be empty to become an index"):
         ShapeIndex.create(index.folder)
+    (tmp_path / "file").touch()
+    with pytest.raises(StoreError, match=r"An index needs a folder; .*file cannot be made: File exists"):
+        ShapeIndex.create(tmp_path / "file")
+    assert not (tmp_path / store.LOCK).exists()
     foreign = tmp_path / "foreign"
     foreign.mkdir()
     sqlite3.connect(foreign / store.DATABASE).execute("CREATE TABLE t (x)").connection.close()
@@ -161,6 +234,34 @@ def test_folders_that_are_no_index(tmp_path, index):
     database.close()
     with pytest.raises(StoreError, match="must be an index of format 1; it is of format 9"):
         ShapeIndex.open(index.folder)
+
+
+def test_a_folder_that_is_gone_does_not_come_back(index):
+    shutil.rmtree(index.folder)
+    for act in (lambda: len(index), lambda: index.add("one", [descriptor(1)]), lambda: index.remove("one")):
+        with pytest.raises(StoreError, match=r"must be an index; it has no index.sqlite"):
+            act()
+    assert not index.folder.exists()
+
+
+def test_of_several_creators_one_succeeds(tmp_path):
+    answers, barrier = [], threading.Barrier(4)
+
+    def create():
+        barrier.wait()
+        try:
+            answers.append(ShapeIndex.create(tmp_path / "index"))
+        except StoreError as err:
+            answers.append(err)
+
+    creators = [threading.Thread(target=create) for _ in range(4)]
+    for creator in creators:
+        creator.start()
+    for creator in creators:
+        creator.join()
+    assert sum(isinstance(answer, ShapeIndex) for answer in answers) == 1
+    assert sum("must be empty to become an index" in str(answer) for answer in answers) == 3
+    assert len(ShapeIndex.open(tmp_path / "index")) == 0
 
 
 def test_damaged_rows_are_named(index):
@@ -180,6 +281,8 @@ def test_damaged_rows_are_named(index):
 def test_a_second_writer_is_told(index, monkeypatch):
     monkeypatch.setattr(store, "WAIT", 0.05)
     with FileLock(index.folder / store.LOCK), pytest.raises(StoreError, match="An index has one writer; another has"):
+        index.add("one", [descriptor(1)])
+    with store.writing(index.folder), pytest.raises(StoreError, match=r"one writer; process \d+ on .* has held"):
         index.add("one", [descriptor(1)])
     index.add("one", [descriptor(1)])
     assert len(index) == 1
@@ -232,32 +335,68 @@ def test_readers_work_while_one_writes(index):
     assert len(index) == 31
 
 
-def test_reading_needs_no_right_to_write(index, tmp_path):
+@pytest.fixture
+def open_folder():
+    """Return a folder that other users can reach, as those of pytest are not."""
+    with tempfile.TemporaryDirectory() as name:
+        Path(name).chmod(0o755)
+        yield Path(name)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="rights are a Unix thing")
+def test_reading_needs_no_right_to_write(index, open_folder):
     index.add("one", [descriptor(1)])
-    copy = tmp_path / "frozen"
-    shutil.copytree(index.folder, copy)
-    for path in copy.iterdir():
+    reader = sqlite3.connect(index.folder / store.DATABASE)
+    reader.execute("SELECT count(*) FROM shape").fetchone()
+    index.add("two", [descriptor(2)])  # stays in the log as long as somebody reads
+    shutil.copytree(index.folder, open_folder / "with log", ignore=shutil.ignore_patterns("*-shm"))
+    reader.close()
+    shutil.copytree(index.folder, open_folder / "whole")
+    assert ask_as_nobody(open_folder / "whole")[0] == ["one", "two"]
+    assert "An index changes only where one may write" in ask_as_nobody(open_folder / "whole")[1]
+    assert "must be writable to be read as long as index.sqlite-wal holds" in ask_as_nobody(open_folder / "with log")[0]
+
+
+def ask_as_nobody(folder):
+    for path in folder.iterdir():
         path.chmod(0o444)
-    copy.chmod(0o555)
+    folder.chmod(0o555)
     try:
-        assert ShapeIndex.open(copy).query(descriptor(1))[0].name == "one"
+        process, answers = begin(writer.read_as_nobody, folder)
+        process.join()
+        heard = [answers.recv()]
+        return [*heard, answers.recv()] if answers.poll() else heard
     finally:
-        copy.chmod(0o755)
+        folder.chmod(0o755)
 
 
-@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="kill -9 is a Unix thing")
+def begin(work, folder):
+    """Start a process from a server that has everything imported, so that twenty take a second."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["eigenshape.retrieval.index"])
+    ours, theirs = context.Pipe()
+    process = context.Process(target=work, args=(folder, theirs))
+    process.start()
+    return process, ours
+
+
+def killed_at_random(work, folder, rng):
+    process, heard = begin(work, folder)
+    assert heard.recv() == "ready"
+    time.sleep(rng.uniform(0.0, 0.03))
+    process.kill()
+    process.join()
+    assert process.exitcode == -signal.SIGKILL
+
+
+kills = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="kill -9 is a Unix thing")
+
+
+@kills
 def test_a_killed_writer_leaves_the_state_before_or_after(index):
     rng, before = np.random.default_rng(0), 0
     for _ in range(20):
-        command = [sys.executable, HERE / "writer.py", index.folder]
-        writer = subprocess.Popen(
-            command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(HERE)}
-        )
-        assert writer.stdout.readline() == "ready\n"
-        time.sleep(rng.uniform(0.0, 0.06))
-        writer.kill()
-        writer.wait()
-        writer.stdout.close()
+        killed_at_random(writer.add_shapes, index.folder, rng)
         names = [record.name for record in index.records()]
         assert names == [f"shape-{number:05}" for number in range(len(names))]
         assert len(names) >= before
@@ -265,3 +404,29 @@ def test_a_killed_writer_leaves_the_state_before_or_after(index):
         for number in {0, len(names) - 1} if names else ():
             assert index.query(descriptor(number))[0].name == f"shape-{number:05}"
     assert before > 20
+
+
+@kills
+def test_a_killed_replacement_leaves_the_old_shape_or_the_new(index):
+    rng = np.random.default_rng(1)
+    index.add("one", [descriptor(0)], digest="0")
+    for _ in range(20):
+        killed_at_random(writer.replace_a_shape, index.folder, rng)
+        (record,) = index.records()
+        (match,) = index.query(descriptor(int(record.digest)))
+        assert match.score == 0
+    assert int(record.digest) > 20
+
+
+@kills
+def test_a_killed_creator_leaves_an_index_or_a_place_for_one(tmp_path):
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        killed_at_random(writer.create_many, tmp_path, rng)
+    folders = list(tmp_path.iterdir())
+    assert len(folders) > 20
+    for folder in folders:
+        whole = (folder / store.DATABASE).exists()
+        index = ShapeIndex.open(folder) if whole else ShapeIndex.create(folder)
+        index.add("one", [descriptor(1)])
+        assert len(index) == 1

@@ -62,7 +62,6 @@ def test_shifts_undo_a_change_of_area():
     assert shifts[0] == 3
     assert matching_score(part, whole) == pytest.approx(score.SHIFT_PRICE * 3 * 15 * 4)
     assert matching_score(part, whole) == pytest.approx(matching_score(whole, part))
-    assert match_features(part, whole).tolist() == [[0, 0], [1, 1], [2, 2], [3, 3]] or len(match_features(part, whole))
     assert {tuple(pair) for pair in match_features(part, whole).tolist()} == {(i, i) for i in range(4)}
 
 

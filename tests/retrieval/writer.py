@@ -1,15 +1,43 @@
-"""A process that adds shapes to an index for as long as it lives; the tests kill it."""
+"""What processes of the tests do with an index until they are killed."""
 
-import sys
+import itertools
+import os
 
 from describers import descriptor
 
 from eigenshape.retrieval.index import ShapeIndex
 
-if __name__ == "__main__":
-    index = ShapeIndex.open(sys.argv[1])
+NOBODY = 65534
+
+
+def add_shapes(folder, ready):
+    index = ShapeIndex.open(folder)
     start = len(index)
-    sys.stdout.write("ready\n")
-    sys.stdout.flush()
-    for number in range(start, start + 10_000):
+    ready.send("ready")
+    for number in itertools.count(start):
         index.add(f"shape-{number:05}", [descriptor(number)], digest=str(number))
+
+
+def replace_a_shape(folder, ready):
+    index = ShapeIndex.open(folder)
+    start = int(index.records()[0].digest)
+    ready.send("ready")
+    for number in itertools.count(start + 1):
+        index.add("one", [descriptor(number)], digest=str(number), replace=True)
+
+
+def create_many(folder, ready):
+    ready.send("ready")
+    for number in itertools.count(len(list(folder.iterdir()))):
+        ShapeIndex.create(folder / str(number))
+
+
+def read_as_nobody(folder, answer):
+    if os.getuid() == 0:  # root may write anywhere
+        os.setgid(NOBODY)
+        os.setuid(NOBODY)
+    try:
+        answer.send([match.name for match in ShapeIndex.open(folder).query(descriptor(1))])
+        ShapeIndex.open(folder).add("late", [descriptor(2)])
+    except RuntimeError as err:
+        answer.send(str(err))

@@ -20,7 +20,7 @@ from eigenshape.retrieval.describe import N_VIEWS, describe_mesh
 from eigenshape.retrieval.descriptor import SCALE_FREE
 
 FOLDER = Path("eigenshape-demo")
-POSES = 4
+POSES = 3
 UNSEEN = 11
 N_VERTICES = 2000
 NEXT = """

@@ -1,8 +1,8 @@
-"""Files opened with care and replaced whole."""
+"""Files read with care and replaced whole."""
 
-import os
+import secrets
+import shutil
 import stat
-import tempfile
 from pathlib import Path
 
 from eigenshape._errors import FileFormatError
@@ -18,36 +18,40 @@ def read_regular(path: Path) -> bytes:
     FileFormatError
         If the path is no regular file, or is empty.
     """
-    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-    with os.fdopen(descriptor, "rb") as file:
-        kind = os.fstat(descriptor).st_mode
-        if not stat.S_ISREG(kind):
-            raise FileFormatError(f"{path} must be a regular file; it is {_named(kind)}.")
-        data = file.read()
+    _require_regular(path)
+    data = path.read_bytes()
     if not data:
         raise FileFormatError(f"{path} must hold a mesh; it is empty.")
     return data
 
 
-def _named(mode: int) -> str:
-    kinds = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
-    return kinds.get(stat.S_IFMT(mode), "something else")
+def _require_regular(path: Path) -> None:
+    mode = path.stat().st_mode
+    if not stat.S_ISREG(mode):
+        kinds = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
+        kind = kinds.get(stat.S_IFMT(mode), "something else")
+        raise FileFormatError(f"{path} must be a regular file; it is {kind}.")
 
 
 def replace_file(path: Path, data: bytes) -> None:
-    """Write a file beside its place and move it there, so that nobody ever sees half of it."""
-    handle, beside = tempfile.mkstemp(dir=path.parent or Path(), prefix=f".{path.name}.")
+    """Write a file beside its place and move it there, so that nobody ever sees half of it.
+
+    Raises
+    ------
+    OSError
+        If the system cannot write there.
+    FileFormatError
+        If something that is no regular file stands there.
+    """
+    replaced = path.exists()
+    if replaced:
+        _require_regular(path)
+    beside = path.with_name(f".{secrets.token_hex(8)}.tmp")
     try:
-        with os.fdopen(handle, "wb") as file:
+        with beside.open("xb") as file:
             file.write(data)
-        Path(beside).chmod(0o666 & ~_umask())
-        Path(beside).replace(path)
-    except BaseException:
-        Path(beside).unlink(missing_ok=True)
-        raise
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+        if replaced:
+            shutil.copymode(path, beside)
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)

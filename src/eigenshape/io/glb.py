@@ -1,64 +1,91 @@
 """Binary glTF: all triangles of all nodes, each moved to its place; single precision by the format."""
 
-import io
 import json
 from typing import Any
 
 import numpy as np
-import trimesh
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.gltf import Gltf, decoded_buffers, placed_triangles
 from eigenshape.io.stl import single_precision
+from eigenshape.io.text import shown
 
-HEADER = 12
-CHUNK = 8
+JSON_CHUNK = b"JSON"
+BINARY_CHUNK = b"BIN\0"
+COPIES = 2**25  # so many vertices and faces may be made of copies in a small file
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Read vertices and faces of the whole scene; anything outside the file is refused, never opened."""
-    _refuse_outside(_json_chunk(data))
-    try:
-        scene = trimesh.load_scene(io.BytesIO(data), file_type="glb", process=False)
-        pieces = [piece for piece in scene.dump() if isinstance(piece, trimesh.Trimesh) and len(piece.faces)]
-    except Exception as err:  # the library raises whatever it meets
-        raise FileFormatError(f"A GLB file must be readable as glTF 2.0; {type(err).__name__}: {err}.") from err
-    if not pieces:
+    """Read vertices and faces of the scene; a buffer outside the file is refused, never opened."""
+    chunks = _chunks(data)
+    tree = _tree(chunks.get(JSON_CHUNK, b""))
+    buffers = decoded_buffers(tree, chunks.get(BINARY_CHUNK, b""))
+    vertices, faces = placed_triangles(Gltf(tree, buffers, most=max(len(data), COPIES)))
+    if not len(faces):
         raise FileFormatError("A GLB file must hold triangles; it holds none.")
-    starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])[:-1]
-    faces = [piece.faces + start for piece, start in zip(pieces, starts, strict=True)]
-    return np.concatenate([piece.vertices for piece in pieces]), np.concatenate(faces)
+    return vertices, faces
 
 
-def _json_chunk(data: bytes) -> dict[str, Any]:
-    if data[:4] != b"glTF" or len(data) < HEADER + CHUNK:
-        raise FileFormatError(f"A GLB file must begin with glTF and a header; it begins with {data[:4]!r}.")
-    version, length, n_json = (int.from_bytes(data[at : at + 4], "little") for at in (4, 8, 12))
-    if version != 2 or length != len(data):
+def _chunks(data: bytes) -> dict[bytes, bytes]:
+    version, length = (int.from_bytes(data[at : at + 4], "little") for at in (4, 8))
+    if data[:4] != b"glTF" or version != 2 or length != len(data):
         raise FileFormatError(
-            f"A GLB file must be of version 2 and as long as it says; it is of version {version}, says {length} bytes "
-            f"and has {len(data)}."
+            f"A GLB file must begin with glTF, version 2 and its length; it begins with {shown((1, data[:4]))}, "
+            f"{version} and {length}, and has {len(data)} bytes."
         )
+    chunks: dict[bytes, bytes] = {}
+    start = 12
+    while start < length:
+        end = start + 8 + int.from_bytes(data[start : start + 4], "little")
+        if start + 8 > length or end > length:
+            raise FileFormatError(f"A chunk of a GLB file must end within it; one ends at {end} of {length} bytes.")
+        chunks.setdefault(data[start + 4 : start + 8], data[start + 8 : end])
+        start = end
+    return chunks
+
+
+def _tree(text: bytes) -> dict[str, Any]:
     try:
-        tree: Any = json.loads(data[HEADER + CHUNK : HEADER + CHUNK + n_json])
-    except ValueError as err:
+        tree: Any = json.loads(text)
+    except (ValueError, RecursionError) as err:
         raise FileFormatError(f"The first chunk of a GLB file must be JSON; {err}.") from err
     if not isinstance(tree, dict):
-        raise FileFormatError(f"The first chunk of a GLB file must be a JSON object; it is a {type(tree).__name__}.")
+        raise FileFormatError(f"The JSON of a GLB file must be an object; it is a {type(tree).__name__}.")
     return tree
 
 
-def _refuse_outside(tree: dict[str, Any]) -> None:
-    for kind in ("buffers", "images"):
-        for index, entry in enumerate(tree.get(kind) or []):
-            uri = entry.get("uri", "data:") if isinstance(entry, dict) else "data:"
-            if not str(uri).startswith("data:"):
-                raise FileFormatError(
-                    f"A GLB file must hold all its data; {kind}[{index}] points outside, to {str(uri)[:80]!r}."
-                )
-
-
 def format_mesh(mesh: TriangleMesh) -> bytes:
-    """Write binary glTF in single precision."""
-    shape = trimesh.Trimesh(single_precision(mesh, "GLB"), mesh.faces, process=False)
-    return bytes(trimesh.exchange.gltf.export_glb(trimesh.Scene(shape)))
+    """Write binary glTF in single precision.
+
+    Raises
+    ------
+    FileFormatError
+        If a coordinate does not fit into single precision.
+    """
+    vertices = single_precision(mesh, "GLB")
+    positions, corners = vertices.astype("<f4").tobytes(), mesh.faces.astype("<u4").tobytes()
+    box = {"min": vertices.min(axis=0).tolist(), "max": vertices.max(axis=0).tolist()}
+    tree = {
+        "asset": {"version": "2.0", "generator": "eigenshape"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": mesh.n_vertices, "type": "VEC3", **box},
+            {"bufferView": 1, "componentType": 5125, "count": 3 * mesh.n_faces, "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 0, "byteLength": len(positions), "target": 34962},
+            {"buffer": 0, "byteOffset": len(positions), "byteLength": len(corners), "target": 34963},
+        ],
+        "buffers": [{"byteLength": len(positions) + len(corners)}],
+    }
+    text = json.dumps(tree, separators=(",", ":")).encode()
+    body = _chunk(JSON_CHUNK, text + b" " * (-len(text) % 4)) + _chunk(BINARY_CHUNK, positions + corners)
+    return b"glTF" + (2).to_bytes(4, "little") + (12 + len(body)).to_bytes(4, "little") + body
+
+
+def _chunk(kind: bytes, content: bytes) -> bytes:
+    return len(content).to_bytes(4, "little") + kind + content

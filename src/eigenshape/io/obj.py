@@ -1,39 +1,59 @@
 """Wavefront OBJ: positions and faces; texture seams, normals, groups and materials are passed over."""
 
+import re
+from collections.abc import Sequence
+
 import numpy as np
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.text import Line, coordinates, fans, lines_of, rows_text, shown, whole
+from eigenshape.io.text import Line, coordinates, fans, lines_of, rows_text, shown, whole, whole_table
+
+# A backslash joins lines only in numbers: a comment may end in one, as may a folder's name.
+CONTINUED = re.compile(rb"^[ \t]*[vf](?:[^\n\\#]|\\\r?\n|\\(?!\r?\n))*", re.MULTILINE)
+JOINT = re.compile(rb"\\\r?\n")
+AFTER_POSITION = re.compile(rb"(?<=\d)/\S*")  # a corner is position/texture/normal
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     """Read vertices and faces; polygons become fans."""
-    lines = lines_of(data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" "))
+    if JOINT.search(data):
+        data = CONTINUED.sub(lambda match: JOINT.sub(b" ", match[0]), data)
     positions: list[Line] = []
-    polygons = []
-    for line in lines:
-        if line.words[0] == "v":
-            positions.append(line)
-        elif line.words[0] == "f":
-            polygons.append(_corners(line, len(positions)))
-    vertices = coordinates(positions, skip=1)
+    polygons: list[Line] = []
+    n_so_far: list[int] = []
+    for number, text in lines_of(data):
+        keyword = text.split(None, 1)[0]
+        if keyword == b"v":
+            positions.append((number, text[1:]))
+        elif keyword == b"f":
+            polygons.append((number, AFTER_POSITION.sub(b"", text[1:])))
+            n_so_far.append(len(positions))
+    vertices = coordinates(positions)
     if not polygons:
         raise FileFormatError(f"An OBJ file must hold faces; it holds {len(vertices)} points and no face.")
-    return vertices, fans(polygons)
+    return vertices, _triangles(polygons, n_so_far)
+
+
+def _triangles(polygons: Sequence[Line], n_so_far: Sequence[int]) -> np.ndarray:
+    table = whole_table(polygons)
+    if table is not None and table.shape[1] >= 3 and (table > 0).all():
+        return fans(table - 1)
+    return fans([_corners(line, count) for line, count in zip(polygons, n_so_far, strict=True)])
 
 
 def _corners(line: Line, n_so_far: int) -> list[int]:
-    if len(line.words) < 4:
-        raise FileFormatError(f"A face must have three corners or more; line {line.number} is {shown(line.words)}.")
-    return [_index(word.partition("/")[0], line, n_so_far) for word in line.words[1:]]
+    words = line[1].split()
+    if len(words) < 3:
+        raise FileFormatError(f"A face must have three corners or more; line {line[0]} is {shown(line)}.")
+    return [_index(word, line, n_so_far) for word in words]
 
 
-def _index(word: str, line: Line, n_so_far: int) -> int:
-    index = whole(word, line.number, "A corner")
+def _index(word: bytes, line: Line, n_so_far: int) -> int:
+    index = whole(word, line, "A corner")
     if index == 0 or index < -n_so_far:
         raise FileFormatError(
-            f"A corner must count vertices from 1, or back from -1; line {line.number} is {shown(line.words)} "
+            f"A corner must count vertices from 1, or back from -1; line {line[0]} is {shown(line)} "
             f"after {n_so_far} vertices."
         )
     return index - 1 if index > 0 else n_so_far + index

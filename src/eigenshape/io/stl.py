@@ -1,14 +1,15 @@
-"""Stereolithography: triangles without shared corners, text or binary, in single precision where binary."""
+"""Stereolithography: triangles without shared corners, as text, or in binary and then in single precision."""
 
 import numpy as np
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import weld
-from eigenshape.io.text import coordinates, lines_of
+from eigenshape.io.text import coordinates, lines_of, shown
 
 HEADER = 84
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+FACET = (b"facet", b"outer", b"vertex", b"vertex", b"vertex", b"endloop", b"endfacet")
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
@@ -16,14 +17,13 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     corners = _parse_text(data) if _is_text(data) else _parse_binary(data)
     if not len(corners):
         raise FileFormatError("An STL file must hold triangles; it holds none.")
-    soup = TriangleMesh(corners, np.arange(len(corners)).reshape(-1, 3))
-    welded = weld(soup).mesh
+    welded = weld(TriangleMesh(corners, np.arange(len(corners)).reshape(-1, 3))).mesh
     return welded.vertices, welded.faces
 
 
 def _is_text(data: bytes) -> bool:
     if len(data) >= HEADER and len(data) == HEADER + RECORD.itemsize * _declared(data):
-        return False
+        return False  # many a binary file begins with solid
     return data.lstrip()[:5].lower() == b"solid" and b"\0" not in data[:HEADER]
 
 
@@ -44,39 +44,63 @@ def _parse_binary(data: bytes) -> np.ndarray:
 
 
 def _parse_text(data: bytes) -> np.ndarray:
-    lines = lines_of(data, comment="")
-    words = [line.words[0].lower() for line in lines]
-    counts = {word: words.count(word) for word in ("facet", "endfacet", "vertex", "solid", "endsolid")}
-    whole_facets = counts["facet"] == counts["endfacet"] and counts["vertex"] == 3 * counts["facet"]
-    if not whole_facets or counts["solid"] != counts["endsolid"]:
-        told = ", ".join(f"{count} {word}" for word, count in counts.items())
-        raise FileFormatError(f"A text STL file must close each facet of three vertices and each solid; it has {told}.")
-    return coordinates([line for line, word in zip(lines, words, strict=True) if word == "vertex"], skip=1)
+    lines = lines_of(data)
+    words = [text.split(None, 1)[0].lower() for _, text in lines]
+    n_open, n_closed = words.count(b"solid"), words.count(b"endsolid")
+    if n_open != n_closed:
+        raise FileFormatError(f"A text STL file must close what it opens; it has {n_open} solid, {n_closed} endsolid.")
+    rows = [pair for pair in zip(lines, words, strict=True) if pair[1] not in (b"solid", b"endsolid")]
+    for place, (line, word) in enumerate(rows):
+        if word != FACET[place % len(FACET)]:
+            raise FileFormatError(
+                f"A facet must be lines of {b' '.join(FACET).decode()}; line {line[0]} is {shown(line)}."
+            )
+    if len(rows) % len(FACET):
+        raise FileFormatError(f"A text STL file must end with a whole facet; its last line is {shown(rows[-1][0])}.")
+    return coordinates([(line[0], line[1][len(word) :]) for line, word in rows if word == b"vertex"])
 
 
-def format_mesh(mesh: TriangleMesh) -> bytes:
+def format_text(mesh: TriangleMesh) -> bytes:
+    """Write text STL in full precision."""
+    lines = ["solid mesh"]
+    for normal, corners in zip(_normals(mesh).tolist(), mesh.vertices[mesh.faces].tolist(), strict=True):
+        rows = "\n".join(f"vertex {x!r} {y!r} {z!r}" for x, y, z in corners)
+        lines.append(f"facet normal {' '.join(map(repr, normal))}\nouter loop\n{rows}\nendloop\nendfacet")
+    return ("\n".join([*lines, "endsolid mesh"]) + "\n").encode()
+
+
+def format_binary(mesh: TriangleMesh) -> bytes:
     """Write binary STL in single precision.
 
     Raises
     ------
     FileFormatError
-        If a coordinate is too large for single precision.
+        If a coordinate does not fit into single precision.
     """
     records = np.zeros(mesh.n_faces, dtype=RECORD)
-    records["corners"] = single_precision(mesh, "STL")[mesh.faces]
-    edges = np.diff(mesh.vertices[mesh.faces] / np.abs(mesh.vertices).max(initial=1e-300), axis=1)
+    records["corners"] = single_precision(mesh, "Binary STL")[mesh.faces]
+    records["normal"] = _normals(mesh)
+    return b"\0" * 80 + mesh.n_faces.to_bytes(4, "little") + records.tobytes()
+
+
+def _normals(mesh: TriangleMesh) -> np.ndarray:
+    edges = np.diff(mesh.vertices[mesh.faces] / (np.abs(mesh.vertices).max() or 1.0), axis=1)
     normals = np.cross(edges[:, 0], edges[:, 1])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    records["normal"] = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
-    return b"\0" * 80 + mesh.n_faces.to_bytes(4, "little") + records.tobytes()
+    return np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
 
 
 def single_precision(mesh: TriangleMesh, name: str) -> np.ndarray:
     """Return vertices as float32, refusing what does not fit."""
+    single = np.finfo(np.float32)
     largest = np.abs(mesh.vertices).max(axis=1)
-    bad = np.flatnonzero(largest > np.finfo(np.float32).max)
-    if bad.size:
+    bad = int(np.argmax(largest))
+    if largest[bad] > single.max:
         raise FileFormatError(
-            f"{name} holds single precision, up to 3.4e38; vertex {bad[0]} is {mesh.vertices[bad[0]].tolist()}."
+            f"{name} holds single precision, up to 3.4e38; vertex {bad} is {mesh.vertices[bad].tolist()}."
+        )
+    if 0 < largest[bad] < single.tiny:
+        raise FileFormatError(
+            f"{name} holds single precision, down to 1.2e-38; no coordinate is larger than {largest[bad]}."
         )
     return mesh.vertices.astype(np.float32)

@@ -1,72 +1,101 @@
-"""Rows of numbers in text files, with the line named when one is wrong."""
+"""Lines of numbers in text files: read all at once where they are plain, one by one where a line is to be named."""
 
+import codecs
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
 
-
-class Line(NamedTuple):
-    """The words of a line that has any, and where it stands."""
-
-    number: int
-    words: list[str]
-
-
-def lines_of(data: bytes, comment: str = "#") -> list[Line]:
-    """Split text into lines of words, without comments and blank lines; any byte is a letter (Latin-1)."""
-    lines = []
-    for number, text in enumerate(data.decode("latin-1").splitlines(), 1):
-        words = text.partition(comment)[0].split() if comment else text.split()
-        if words:
-            lines.append(Line(number, words))
-    return lines
+Line = tuple[int, bytes]  # where it stands in the file, and what it says
+PLAIN = b"+-.0123456789eE \t\n"
+PLAIN_WHOLE = b"+-0123456789 \t\n"
+EXACT = 2**53  # whole numbers below it are exact in double precision
+INT64 = 2**63
 
 
-def coordinates(lines: Sequence[Line], skip: int = 0, columns: Sequence[int] = (0, 1, 2)) -> Float[np.ndarray, "n 3"]:
-    """Read three numbers from each line, at the given places after `skip` words."""
-    places = [skip + column for column in columns]
+def lines_of(data: bytes, first: int = 1) -> list[Line]:
+    """Split text into lines without comments and blank lines; names and comments may be in any encoding."""
+    texts = data.removeprefix(codecs.BOM_UTF8).splitlines()
+    bare = ((number, text.partition(b"#")[0].strip()) for number, text in enumerate(texts, first))
+    return [line for line in bare if line[1]]
+
+
+def number_table(lines: Sequence[Line]) -> Float[np.ndarray, "n c"] | None:
+    """Read lines of equally many plain numbers at once; None where they are anything else."""
+    return _table(lines, PLAIN)
+
+
+def whole_table(lines: Sequence[Line]) -> Int[np.ndarray, "n c"] | None:
+    """Read lines of equally many plain whole numbers at once; None where they are anything else."""
+    values = _table(lines, PLAIN_WHOLE)
+    return values.astype(np.int64) if values is not None and np.abs(values).max() < EXACT else None
+
+
+def _table(lines: Sequence[Line], allowed: bytes) -> np.ndarray | None:
+    text = b"\n".join([text for _, text in lines])
+    if not text.strip() or text.translate(None, allowed):
+        return None
     try:
-        return np.array([[line.words[place] for place in places] for line in lines], dtype=np.float64).reshape(-1, 3)
-    except (IndexError, ValueError):
-        for line in lines:
-            _three_numbers(line, places)
-        raise
+        values = np.loadtxt(text.decode().split("\n"), comments=None, ndmin=2)
+    except ValueError:
+        return None
+    return values if len(values) == len(lines) else None  # it passes over lines without a word
 
 
-def _three_numbers(line: Line, places: Sequence[int]) -> None:
+def coordinates(lines: Sequence[Line]) -> Float[np.ndarray, "n 3"]:
+    """Read the first three numbers of each line."""
+    values = number_table(lines)
+    if values is not None and values.shape[1] >= 3:
+        return values[:, :3]
+    return np.array([_three_numbers(line) for line in lines], dtype=np.float64).reshape(-1, 3)
+
+
+def _three_numbers(line: Line) -> list[float]:
+    words = line[1].split()[:3]
+    if len(words) < 3:
+        raise FileFormatError(f"A vertex must have three numbers; line {line[0]} is {shown(line)}.")
+    return [number(word, line) for word in words]
+
+
+def number(word: bytes, line: Line) -> float:
+    """Read a number, naming the line where there is none."""
     try:
-        _ = [float(line.words[place]) for place in places]
-    except (IndexError, ValueError) as err:
-        raise FileFormatError(f"A vertex must have three numbers; line {line.number} is {shown(line.words)}.") from err
+        return float(word.replace(b"_", b"?"))  # Python would read 1_0 as ten
+    except ValueError as err:
+        raise FileFormatError(
+            f"A coordinate must be a number; line {line[0]} has {shown((0, word))} in {shown(line)}."
+        ) from err
 
 
-def whole(word: str, line: int, what: str) -> int:
+def whole(word: bytes, line: Line, what: str) -> int:
     """Read a whole number, naming the line where there is none."""
     try:
-        return int(word)
+        value = int(word.replace(b"_", b"?"))
     except ValueError as err:
-        raise FileFormatError(f"{what} must be a whole number; line {line} has {shown([word])}.") from err
+        raise FileFormatError(
+            f"{what} must be a whole number; line {line[0]} has {shown((0, word))} in {shown(line)}."
+        ) from err
+    if not -INT64 <= value < INT64:
+        raise FileFormatError(f"{what} must fit into 64 bits; line {line[0]} has {shown((0, word))}.")
+    return value
 
 
-def shown(words: Sequence[str]) -> str:
+def shown(line: Line) -> str:
     """Quote a line, cut short where it is long."""
-    return repr(" ".join(words)[:60])
+    return repr(line[1].strip()[:60].decode("latin-1"))
 
 
-def fans(polygons: Sequence[Sequence[int]]) -> Int[np.ndarray, "f 3"]:
+def fans(polygons: Sequence[Sequence[int]] | Int[np.ndarray, "p c"]) -> Int[np.ndarray, "f 3"]:
     """Split polygons into triangles around their first corner."""
+    if isinstance(polygons, np.ndarray):
+        first = np.broadcast_to(polygons[:, :1], polygons[:, 1:-1].shape)
+        return np.stack([first, polygons[:, 1:-1], polygons[:, 2:]], axis=2).reshape(-1, 3)
     triangles = [
         (corners[0], corners[place], corners[place + 1]) for corners in polygons for place in range(1, len(corners) - 1)
     ]
-    try:
-        return np.array(triangles, dtype=np.int64).reshape(-1, 3)
-    except OverflowError as err:
-        huge = max((index for corners in polygons for index in corners), key=abs)
-        raise FileFormatError(f"A face must index vertices; there is an index {huge}.") from err
+    return np.array(triangles, dtype=np.int64).reshape(-1, 3)
 
 
 def rows_text(prefix: str, rows: np.ndarray) -> list[str]:

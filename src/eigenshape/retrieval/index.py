@@ -1,9 +1,8 @@
 """A collection of described shapes in a folder, and the question which of them are most alike."""
 
-import json
 import sqlite3
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, SupportsIndex
 from zlib import crc32
@@ -115,7 +114,7 @@ class ShapeIndex:
             query = "SELECT DISTINCT shape, fields FROM descriptor JOIN recipe ON recipe.id = recipe ORDER BY recipe.id"
             recipes: dict[int, list[Recipe]] = {}
             for shape, fields in database.execute(query):
-                recipes.setdefault(shape, []).append(_recipe(fields))
+                recipes.setdefault(shape, []).append(store.read_recipe(fields))
         return [Record(*known, tuple(recipes.get(shape, ()))) for shape, *known in shapes]  # type: ignore[call-arg]
 
     def add(
@@ -126,30 +125,34 @@ class ShapeIndex:
         label: str | None = None,
         source: str | None = None,
         digest: str | None = None,
+        replace: bool = False,
     ) -> None:
         """Add a shape with one or more descriptors.
 
         Descriptors of one recipe are views of the shape, the whole first, say, and then what is seen of it from some
         sides: the view with the lowest score counts. A name that is there with the same digest gains the recipes that
-        it lacks, and keeps what it has of the others.
+        it lacks, and keeps what it has of the others. With `replace`, a shape that is there with another digest gives
+        way in the same step.
 
         Raises
         ------
         InvalidParameterError
-            If there is no descriptor, or a number is not finite.
+            If there is no descriptor, a number is not finite, or rows are not as long as others of the recipe.
         StoreError
-            If the name is there with another digest, or another process is writing.
+            If the name is there with another digest and is not to be replaced, or another process is writing.
         """
+        _require_text(name, label, source, digest)
         _require_storable(name, descriptors)
         with store.writing(self.folder) as database:
-            shape = _shape_id(database, name, (label, source, digest))
+            shape = _shape_id(database, (name, label, source, digest), replace=replace)
             for recipe in dict.fromkeys(descriptor.recipe for descriptor in descriptors):
                 views = [descriptor for descriptor in descriptors if descriptor.recipe == recipe]
-                self._put(database, shape, _fields(recipe), views)
+                self._put(database, shape, store.keep_recipe(database, recipe), views)
 
-    def _put(self, database: sqlite3.Connection, shape: int, fields: str, views: Sequence[ShapeDescriptor]) -> None:
-        database.execute("INSERT OR IGNORE INTO recipe (fields, size) VALUES (?, 0)", (fields,))
-        recipe = store.recipe_id(database, fields) or 0
+    def _put(self, database: sqlite3.Connection, shape: int, recipe: int, views: Sequence[ShapeDescriptor]) -> None:
+        other = database.execute("SELECT n_columns FROM descriptor WHERE recipe = ? LIMIT 1", (recipe,)).fetchone()
+        for descriptor in views:
+            _require_columns(descriptor, other[0] if other else views[0].vectors.shape[1])
         if database.execute("SELECT 1 FROM descriptor WHERE shape = ? AND recipe = ?", (shape, recipe)).fetchone():
             return
         for view, descriptor in enumerate(views):
@@ -179,16 +182,18 @@ class ShapeIndex:
         Raises
         ------
         InvalidParameterError
-            If `n_matches` is not positive.
+            If `n_matches` is not positive, or the descriptor could not stand in the index.
         StoreError
             If no shape has a descriptor of that recipe, or a file is damaged.
         """
         wanted = whole_number(n_matches, "n_matches", 1, 2**31)
+        _require_storable("the query", [descriptor])
         single = ShapeDescriptor(
             descriptor.vectors.astype(store.ROW).astype(np.float64), descriptor.vertices, descriptor.recipe
         )
         with store.reading(self.folder) as database:
             entries, vectors = self._rows(database, descriptor.recipe)
+        _require_columns(descriptor, vectors[0].shape[1])
         starts = np.cumsum([0, *(len(rows) for rows in vectors)])[:-1]
         scores, _ = matching_scores(single.vectors, np.concatenate(vectors).astype(np.float64), starts, single.recipe)
         order = np.argsort(scores, kind="stable")
@@ -212,14 +217,15 @@ class ShapeIndex:
         raise StoreError(f"A shape must be described by the recipe asked for; {name!r} is not described by {recipe}.")
 
     def _rows(self, database: sqlite3.Connection, recipe: Recipe) -> tuple[list[Any], list[np.ndarray]]:
-        number = store.recipe_id(database, _fields(recipe))
+        number = store.recipe_id(database, recipe)
         query = (
             "SELECT offset, n_rows, n_columns, checksum, name, label, source, vertices, view "
             "FROM descriptor JOIN shape ON shape.id = shape WHERE recipe = ? ORDER BY name, view"
         )
         entries = database.execute(query, (number,)).fetchall()
         if not entries:
-            there = sorted(_recipe(fields).name for (fields,) in database.execute("SELECT fields FROM recipe"))
+            held = database.execute("SELECT fields FROM recipe WHERE id IN (SELECT recipe FROM descriptor)")
+            there = sorted(store.read_recipe(fields).name for (fields,) in held)
             raise StoreError(
                 f"An index answers in the recipes it holds; {self.folder} holds {', '.join(there) or 'no shape'} and "
                 f"was asked in {recipe}."
@@ -239,36 +245,48 @@ def _stored(entry: Any, rows: np.ndarray, recipe: Recipe) -> ShapeDescriptor:
     return ShapeDescriptor(rows.astype(np.float64), np.frombuffer(entry[7], "<i8"), recipe)
 
 
-def _fields(recipe: Recipe) -> str:
-    return json.dumps(asdict(recipe), sort_keys=True)
-
-
-def _recipe(fields: str) -> Recipe:
-    values: dict[str, Any] = json.loads(fields)
-    restored: dict[str, Any] = {
-        key: tuple(value) if isinstance(value, list) else value for key, value in values.items()
-    }
-    return Recipe(**restored)
+def _require_text(name: str, *others: str | None) -> None:
+    for text in (name, *others):
+        if text is not None and (not isinstance(text, str) or text != text.encode(errors="replace").decode()):
+            raise InvalidParameterError(f"What an index keeps beside numbers must be Unicode text; {text!r} is not.")
 
 
 def _require_storable(name: str, descriptors: Sequence[ShapeDescriptor]) -> None:
     if not descriptors:
         raise InvalidParameterError(f"A shape needs a descriptor to be found by; {name!r} has none.")
     for descriptor in descriptors:
-        bad = np.argwhere(~np.isfinite(descriptor.vectors.astype(store.ROW)))
-        if bad.size or not descriptor.vectors.size:
-            where = f"entry {bad[0].tolist()} is {descriptor.vectors[tuple(bad[0])]}" if bad.size else "it has none"
+        rows = descriptor.vectors
+        with np.errstate(over="ignore"):
+            bad = np.argwhere(~np.isfinite(rows.astype(store.ROW)))
+        if bad.size or not rows.size:
+            where = f"entry {bad[0].tolist()} is {rows[tuple(bad[0])]}" if bad.size else "it has none"
             raise InvalidParameterError(f"A descriptor must hold finite single-precision numbers; of {name!r} {where}.")
+        if descriptor.vertices.shape != rows.shape[:1]:
+            raise InvalidParameterError(
+                f"A descriptor must name one vertex a feature; of {name!r} {len(rows)} features have vertices of shape "
+                f"{descriptor.vertices.shape}."
+            )
 
 
-def _shape_id(database: sqlite3.Connection, name: str, known: tuple[str | None, str | None, str | None]) -> int:
-    row = database.execute("SELECT id, digest FROM shape WHERE name = ?", (name,)).fetchone()
-    if row is None:
-        values = (name, *known)
-        return int(database.execute("INSERT INTO shape VALUES (NULL, ?, ?, ?, ?)", values).lastrowid or 0)
-    if row[1] is None or row[1] != known[2]:
-        raise StoreError(
-            f"A name stands for one shape; {name!r} is in the index with digest {row[1]}, not {known[2]}. "
-            "Remove it first."
+def _require_columns(descriptor: ShapeDescriptor, n_columns: int) -> None:
+    if descriptor.vectors.shape[1] != n_columns:
+        raise InvalidParameterError(
+            f"Features of one recipe must have equally many numbers; of {descriptor.recipe.name!r} they have "
+            f"{n_columns}, and here {descriptor.vectors.shape[1]}."
         )
-    return int(row[0])
+
+
+def _shape_id(
+    database: sqlite3.Connection, known: tuple[str, str | None, str | None, str | None], *, replace: bool
+) -> int:
+    name, digest = known[0], known[-1]
+    row = database.execute("SELECT id, digest FROM shape WHERE name = ?", (name,)).fetchone()
+    if row is not None and row[1] is not None and row[1] == digest:
+        return int(row[0])
+    if row is not None and not replace:
+        raise StoreError(
+            f"A name stands for one shape; {name!r} is in the index with digest {row[1]}, not {digest}. "
+            "Remove it first, or add it with replace=True."
+        )
+    database.execute("DELETE FROM shape WHERE name = ?", (name,))
+    return int(database.execute("INSERT INTO shape VALUES (NULL, ?, ?, ?, ?)", known).lastrowid or 0)

@@ -5,11 +5,15 @@ transaction. A writer that dies before the commit leaves bytes that nobody owns;
 Readers see what is committed and never wait.
 """
 
+import json
+import os
+import socket
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from os import fsync
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 from zlib import crc32
 
 import numpy as np
@@ -17,9 +21,12 @@ from filelock import FileLock, Timeout
 from jaxtyping import Float32
 
 from eigenshape._errors import StoreError
+from eigenshape.retrieval.descriptor import Recipe
 
 DATABASE = "index.sqlite"
+DRAFT = "draft.sqlite"
 LOCK = "writer.lock"
+HOLDER = "writer.txt"
 APPLICATION = 0x65696773  # "eigs"
 FORMAT = 1
 WAIT = 5.0  # seconds for another writer
@@ -41,21 +48,42 @@ CREATE TABLE descriptor (
 
 
 def create(folder: Path) -> None:
-    """Make an empty store.
+    """Make an empty store; whoever dies on the way leaves a folder in which it can be made.
 
     Raises
     ------
     StoreError
-        If there is one already, or the folder holds something else.
+        If there is one already, or the folder holds something else or cannot be made.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    if any(entry.name != LOCK for entry in folder.iterdir()):
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as err:
+        raise StoreError(f"An index needs a folder; {folder} cannot be made: {err.strerror}.") from err
+    _require_empty(folder)  # before the lock leaves its file in a folder that is not ours
+    with _lock(folder):
+        _require_empty(folder)
+        for left in folder.glob(f"{DRAFT}*"):
+            left.unlink()
+        with closing(sqlite3.connect(folder / DRAFT, isolation_level=None)) as database:
+            database.executescript(
+                f"BEGIN; {SCHEMA} PRAGMA application_id = {APPLICATION}; PRAGMA user_version = {FORMAT}; COMMIT;"
+                "PRAGMA journal_mode = WAL;"
+            )
+        (folder / DRAFT).replace(folder / DATABASE)
+        _sync(folder)
+
+
+def _require_empty(folder: Path) -> None:
+    if any(entry.name not in (LOCK, HOLDER) and not entry.name.startswith(DRAFT) for entry in folder.iterdir()):
         raise StoreError(f"{folder} must be empty to become an index; it is not. Open it, or choose another folder.")
-    with _lock(folder), closing(sqlite3.connect(folder / DATABASE, isolation_level=None)) as database:
-        database.execute("PRAGMA journal_mode = WAL")
-        database.executescript(
-            f"BEGIN IMMEDIATE; {SCHEMA} PRAGMA application_id = {APPLICATION}; PRAGMA user_version = {FORMAT}; COMMIT;"
-        )
+
+
+def _sync(folder: Path) -> None:
+    """Force the names of new files to disk, where a folder can be opened for that."""
+    if os.name == "posix":
+        handle = os.open(folder, os.O_RDONLY)
+        os.fsync(handle)
+        os.close(handle)
 
 
 def require(folder: Path) -> None:
@@ -66,8 +94,6 @@ def require(folder: Path) -> None:
     StoreError
         Saying what is there instead.
     """
-    if not (folder / DATABASE).is_file():
-        raise StoreError(f"{folder} must be an index; it has no {DATABASE}.")
     with reading(folder) as database:
         application = database.execute("PRAGMA application_id").fetchone()[0]
         version = database.execute("PRAGMA user_version").fetchone()[0]
@@ -80,9 +106,15 @@ def require(folder: Path) -> None:
         )
 
 
+def _require_database(folder: Path) -> None:
+    if not (folder / DATABASE).is_file():
+        raise StoreError(f"{folder} must be an index; it has no {DATABASE}.")
+
+
 @contextmanager
 def reading(folder: Path) -> Iterator[sqlite3.Connection]:
     """Open the database to read one consistent state, also where the folder cannot be written."""
+    _require_database(folder)
     try:
         with closing(_connect_to_read(folder)) as database:
             database.execute("BEGIN")
@@ -92,21 +124,34 @@ def reading(folder: Path) -> Iterator[sqlite3.Connection]:
 
 
 def _connect_to_read(folder: Path) -> sqlite3.Connection:
-    uri = (folder / DATABASE).absolute().as_uri()
-    database = sqlite3.connect(f"{uri}?mode=ro", uri=True, isolation_level=None)
+    database = _connect(folder, "mode=ro")
     try:
         database.execute("SELECT count(*) FROM sqlite_master")
-    except sqlite3.OperationalError:  # nobody may write here, so nobody does
+    except sqlite3.OperationalError as err:
         database.close()
-        database = sqlite3.connect(f"{uri}?mode=ro&immutable=1", uri=True, isolation_level=None)
+        if os.access(folder, os.W_OK):
+            raise
+        log = folder / f"{DATABASE}-wal"
+        if log.exists() and log.stat().st_size:
+            raise StoreError(
+                f"{folder} must be writable to be read as long as {log.name} holds changes. "
+                "Read it once from where it can be written, or copy it to such a place."
+            ) from err
+        database = _connect(folder, "mode=ro&immutable=1")
     return database
+
+
+def _connect(folder: Path, mode: str) -> sqlite3.Connection:
+    uri = f"{(folder / DATABASE).absolute().as_uri()}?{mode}"
+    return sqlite3.connect(uri, uri=True, isolation_level=None)
 
 
 @contextmanager
 def writing(folder: Path) -> Iterator[sqlite3.Connection]:
     """Open the database as its one writer; what the block did is committed whole at its end, or not at all."""
+    _require_database(folder)
     try:
-        with _lock(folder), closing(sqlite3.connect(folder / DATABASE, isolation_level=None)) as database:
+        with _lock(folder), closing(_connect(folder, "mode=rw")) as database:
             database.execute("PRAGMA foreign_keys = ON")
             database.execute("PRAGMA synchronous = FULL")
             database.execute("BEGIN IMMEDIATE")
@@ -122,19 +167,62 @@ def writing(folder: Path) -> Iterator[sqlite3.Connection]:
 
 @contextmanager
 def _lock(folder: Path) -> Iterator[None]:
+    lock = FileLock(folder / LOCK, timeout=WAIT)
+    holder = folder / HOLDER
     try:
-        with FileLock(folder / LOCK, timeout=WAIT):
-            yield
+        lock.acquire()
     except Timeout as err:
+        who = holder.read_text() if holder.exists() else "another process"
         raise StoreError(
-            f"An index has one writer; another has held {folder / LOCK} for more than {WAIT:g} s. Wait for it to end."
+            f"An index has one writer; {who} has held {folder / LOCK} for more than {WAIT:g} s. Wait for it to end."
+        ) from err
+    except OSError as err:
+        raise StoreError(f"An index changes only where one may write; of {folder}: {err.strerror}.") from err
+    try:
+        holder.write_text(f"process {os.getpid()} on {socket.gethostname()}")
+        yield
+    finally:
+        holder.unlink(missing_ok=True)
+        lock.release()
+
+
+def recipe_id(database: sqlite3.Connection, recipe: Recipe) -> int | None:
+    """Return the number of a recipe, None where no descriptor was made by it.
+
+    A field that a stored recipe lacks, since it is younger, counts as its default.
+    """
+    rows = database.execute("SELECT id, fields FROM recipe ORDER BY id")
+    return next((int(number) for number, fields in rows if read_recipe(fields) == recipe), None)
+
+
+def keep_recipe(database: sqlite3.Connection, recipe: Recipe) -> int:
+    """Return the number of a recipe, a new one where it is new."""
+    number = recipe_id(database, recipe)
+    if number is not None:
+        return number
+    fields = json.dumps(asdict(recipe), sort_keys=True, default=np.generic.item)
+    return int(database.execute("INSERT INTO recipe (fields, size) VALUES (?, 0)", (fields,)).lastrowid or 0)
+
+
+def read_recipe(fields: str) -> Recipe:
+    """Return a recipe from its stored fields.
+
+    Raises
+    ------
+    StoreError
+        If this version of eigenshape knows no such recipe.
+    """
+    try:
+        return Recipe(**{key: _tuples(value) for key, value in json.loads(fields).items()})
+    except (TypeError, ValueError) as err:
+        raise StoreError(
+            f"Recipes of an index must be known to this version of eigenshape; {fields} is not: {err}. "
+            "Use the version that wrote it, or index the shapes again."
         ) from err
 
 
-def recipe_id(database: sqlite3.Connection, fields: str) -> int | None:
-    """Return the number of a recipe, None where no descriptor was made by it."""
-    row = database.execute("SELECT id FROM recipe WHERE fields = ?", (fields,)).fetchone()
-    return None if row is None else int(row[0])
+def _tuples(value: Any) -> Any:
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
 
 
 def rows_path(folder: Path, recipe: int) -> Path:
@@ -147,13 +235,15 @@ def append_rows(folder: Path, database: sqlite3.Connection, recipe: int, rows: F
     offset = int(database.execute("SELECT size FROM recipe WHERE id = ?", (recipe,)).fetchone()[0])
     data = rows.astype(ROW).tobytes()
     path = rows_path(folder, recipe)
-    path.touch()
+    if not path.exists():
+        path.touch()
+        _sync(folder)
     with path.open("r+b") as file:
         file.seek(offset)
         file.write(data)
         file.truncate()
         file.flush()
-        fsync(file.fileno())
+        os.fsync(file.fileno())
     database.execute("UPDATE recipe SET size = ? WHERE id = ?", (offset + len(data), recipe))
     return offset
 

@@ -1,0 +1,231 @@
+"""The scene of a glTF file: nodes that place meshes, and accessors that find numbers in buffers."""
+
+import base64
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from eigenshape._errors import FileFormatError
+
+KINDS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+WIDTHS = {"SCALAR": 1, "VEC3": 3}
+TRIANGLES, STRIP, FAN = 4, 5, 6
+LARGEST = sys.float_info.max
+NO_FACES = np.empty((0, 3), dtype=np.int64)
+# Extensions that change what a surface looks like, not where it is, or that ask nothing of the reader.
+HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_mesh_quantization")
+Piece = tuple[np.ndarray, np.ndarray]  # vertices and faces
+
+
+@dataclass(frozen=True)
+class Gltf:
+    """The JSON tree of a file and its buffers, and how many vertices and faces may come out of it.
+
+    The bound is there because a small file can place one mesh any number of times.
+    """
+
+    tree: dict[str, Any]
+    buffers: Sequence[bytes]
+    most: int
+
+    def entry(self, kind: str, index: Any) -> dict[str, Any]:
+        """Return one entry of a list of the tree."""
+        entries = _list(self.tree, kind)
+        known = type(index) is int and 0 <= index < len(entries)
+        if not known or not isinstance(entries[index], dict):
+            raise FileFormatError(f"A GLB file must hold what it names; it names {kind}[{index}] and holds none.")
+        return entries[index]
+
+
+def decoded_buffers(tree: dict[str, Any], binary: bytes) -> list[bytes]:
+    """Return the buffers: the chunk beside the tree, and those in data URIs; any other is refused, never opened."""
+    return [_decoded(index, entry, binary) for index, entry in enumerate(_list(tree, "buffers"))]
+
+
+def _decoded(index: int, entry: Any, binary: bytes) -> bytes:
+    uri = entry.get("uri") if isinstance(entry, dict) else None
+    if uri is None:
+        return binary if index == 0 else b""
+    scheme, _, content = str(uri).partition(",")
+    if not (scheme.startswith("data:") and scheme.endswith(";base64")):
+        raise FileFormatError(
+            f"A GLB file must hold all its data; buffers[{index}] points outside, to {str(uri)[:80]!r}."
+        )
+    try:
+        return base64.b64decode(content, validate=True)
+    except ValueError as err:
+        raise FileFormatError(f"A data URI must be in base64; buffers[{index}] is not.") from err
+
+
+def placed_triangles(gltf: Gltf) -> Piece:
+    """Gather the triangles of all nodes, in world coordinates."""
+    _refuse_extensions(gltf)
+    shapes: dict[int, Piece] = {}
+    placed: list[Piece] = []
+    total = 0
+    for index, matrix in _placed_meshes(gltf):
+        mesh = gltf.entry("meshes", index)
+        if index not in shapes:
+            shapes[index] = _mesh(gltf, mesh)
+        total += sum(map(len, shapes[index]))
+        _require_few(total, gltf)
+        placed.append(_moved(shapes[index], matrix))
+    return _merged(placed)
+
+
+def _require_few(total: int, gltf: Gltf) -> None:
+    if total > gltf.most:
+        raise FileFormatError(f"A GLB file must stay within {gltf.most} vertices and faces; its copies make more.")
+
+
+def _merged(pieces: Sequence[Piece]) -> Piece:
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])[:-1]
+    vertices = [np.empty((0, 3)), *(vertices for vertices, _ in pieces)]
+    faces = [corners + start for (_, corners), start in zip(pieces, starts, strict=True)]
+    return np.concatenate(vertices), np.concatenate([NO_FACES, *faces])
+
+
+def _refuse_extensions(gltf: Gltf) -> None:
+    for name in _list(gltf.tree, "extensionsRequired"):
+        if not str(name).startswith(HARMLESS):
+            raise FileFormatError(f"A GLB file must be plain glTF 2.0; it requires the extension {str(name)[:60]!r}.")
+
+
+def _placed_meshes(gltf: Gltf) -> Iterator[tuple[Any, np.ndarray]]:
+    waiting = [(index, np.eye(4)) for index in reversed(_roots(gltf))]
+    seen = set()
+    while waiting:
+        index, above = waiting.pop()
+        node = gltf.entry("nodes", index)
+        if index in seen:
+            raise FileFormatError(f"The nodes of a GLB file must form trees; node {index} is met twice.")
+        seen.add(index)
+        matrix = above @ _local_matrix(node)
+        if "mesh" in node:
+            yield node["mesh"], matrix
+        waiting.extend((child, matrix) for child in reversed(_list(node, "children")))
+
+
+def _roots(gltf: Gltf) -> list[Any]:
+    if "scenes" in gltf.tree:
+        return _list(gltf.entry("scenes", gltf.tree.get("scene", 0)), "nodes")
+    everyone = range(len(_list(gltf.tree, "nodes")))
+    children = [child for index in everyone for child in _list(gltf.entry("nodes", index), "children")]
+    below = {child for child in children if isinstance(child, int)}
+    return [index for index in everyone if index not in below]
+
+
+def _local_matrix(node: dict[str, Any]) -> np.ndarray:
+    if "matrix" in node:
+        return _numbers(node, "matrix", [0.0] * 16).reshape(4, 4).T  # stored by columns
+    turn = _numbers(node, "rotation", [0.0, 0.0, 0.0, 1.0])
+    if not turn.any():
+        raise FileFormatError("A rotation must be a quaternion other than zero; a node has [0, 0, 0, 0].")
+    matrix = np.eye(4)
+    matrix[:3, :3] = Rotation.from_quat(turn / np.abs(turn).max()).as_matrix() * _numbers(
+        node, "scale", [1.0, 1.0, 1.0]
+    )
+    matrix[:3, 3] = _numbers(node, "translation", [0.0, 0.0, 0.0])
+    return matrix
+
+
+def _moved(piece: Piece, matrix: np.ndarray) -> Piece:
+    vertices, faces = piece
+    # A mirror turns triangles inside out; the format asks to turn them back.
+    flipped = faces[:, ::-1] if np.linalg.slogdet(matrix[:3, :3])[0] < 0 else faces
+    return vertices @ matrix[:3, :3].T + matrix[:3, 3], flipped
+
+
+def _mesh(gltf: Gltf, mesh: dict[str, Any]) -> Piece:
+    """Read one mesh; parts that differ in material only share their vertices, as the file does."""
+    parts: dict[int, list[dict[str, Any]]] = {}
+    for part in _list(mesh, "primitives"):
+        if _whole(part, "mode", TRIANGLES) in (TRIANGLES, STRIP, FAN):
+            parts.setdefault(_whole(part.get("attributes"), "POSITION"), []).append(part)
+    pieces = []
+    total = 0
+    for position, sharing in parts.items():
+        vertices = _accessor(gltf, position, 3)
+        faces = [NO_FACES]
+        total += len(vertices)
+        for part in sharing:
+            faces.append(_faces(gltf, part, len(vertices)))
+            total += 1 + len(faces[-1])
+            _require_few(total, gltf)
+        pieces.append((vertices, np.concatenate(faces)))
+    return _merged(pieces)
+
+
+def _faces(gltf: Gltf, part: dict[str, Any], n_vertices: int) -> np.ndarray:
+    mode = _whole(part, "mode", TRIANGLES)
+    if "indices" not in part:
+        return _split(np.arange(n_vertices), mode)
+    corners = _accessor(gltf, part["indices"], 1)[:, 0].astype(np.int64)
+    bad = np.flatnonzero((corners < 0) | (corners >= n_vertices))
+    if bad.size:
+        raise FileFormatError(
+            f"Indices of a primitive must be within 0..{n_vertices - 1}; index {bad[0]} is {corners[bad[0]]}."
+        )
+    return _split(corners, mode)
+
+
+def _split(corners: np.ndarray, mode: int) -> np.ndarray:
+    if mode == TRIANGLES:
+        if len(corners) % 3:
+            raise FileFormatError(f"Triangles must have three corners each; a primitive has {len(corners)} in all.")
+        return corners.reshape(-1, 3)
+    if mode == FAN:
+        return np.column_stack([corners[1:-1], corners[2:], np.broadcast_to(corners[:1], max(len(corners) - 2, 0))])
+    odd = np.arange(max(len(corners) - 2, 0)) % 2
+    place = np.arange(len(odd))
+    return np.column_stack([corners[place], corners[place + 1 + odd], corners[place + 2 - odd]])
+
+
+def _accessor(gltf: Gltf, index: Any, width: int) -> np.ndarray:
+    accessor = gltf.entry("accessors", index)
+    kind = np.dtype(KINDS.get(_whole(accessor, "componentType"), "V0"))
+    if not kind.itemsize or WIDTHS.get(str(accessor.get("type"))) != width or "sparse" in accessor:
+        raise FileFormatError(f"accessors[{index}] must be a plain list of {width} numbers each; it is not.")
+    data, step = _view(gltf, accessor.get("bufferView"))
+    row = kind.itemsize * width
+    step = step or row
+    count, start = _whole(accessor, "count"), _whole(accessor, "byteOffset", 0)
+    if step < row or start + (count - 1) * step + row > len(data):
+        raise FileFormatError(f"accessors[{index}] must lie in its buffer; {count} rows do not fit {len(data)} bytes.")
+    rows = np.ndarray((count, width), kind, data, start, (step, kind.itemsize)).astype(np.float64)
+    if accessor.get("normalized") is True and kind.kind in "iu":
+        return np.maximum(rows / np.iinfo(kind).max, -1.0)
+    return rows
+
+
+def _view(gltf: Gltf, index: Any) -> tuple[memoryview, int]:
+    view = gltf.entry("bufferViews", index)
+    place = _whole(view, "buffer")
+    data = memoryview(gltf.buffers[place] if place < len(gltf.buffers) else b"")
+    return data[_whole(view, "byteOffset", 0) :][: _whole(view, "byteLength")], _whole(view, "byteStride", 0)
+
+
+def _list(entry: Any, key: str) -> list[Any]:
+    value = entry.get(key, []) if isinstance(entry, dict) else None
+    if not isinstance(value, list):
+        raise FileFormatError(f"{key} of a GLB file must be a list; it is {str(value)[:60]!r}.")
+    return value
+
+
+def _whole(entry: Any, key: str, default: int | None = None) -> int:
+    value = entry.get(key, default) if isinstance(entry, dict) else None
+    if type(value) is not int or value < 0:
+        raise FileFormatError(f"{key} in a GLB file must be a whole number from 0; it is {str(value)[:60]!r}.")
+    return value
+
+
+def _numbers(entry: dict[str, Any], key: str, default: list[float]) -> np.ndarray:
+    value = entry.get(key, default)
+    known = isinstance(value, list) and len(value) == len(default)
+    if not known or not all(type(part) in (int, float) and abs(part) <= LARGEST for part in value):
+        raise FileFormatError(f"{key} of a node must be {len(default)} finite numbers; it is {str(value)[:60]!r}.")
+    return np.array(value, dtype=np.float64)
