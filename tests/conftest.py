@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from jaxtyping import install_import_hook
 
-install_import_hook("eigenshape", "beartype.beartype")
+install_import_hook("eigenshape", "runtime_types.checked")
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("EIGENSHAPE_DATA", ROOT.parent / "shared" / "data"))

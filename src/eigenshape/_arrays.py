@@ -25,7 +25,8 @@ def finite_rows(value: ArrayLike, name: str, columns: int) -> NDArray[np.float64
     rows = _table(value, name, columns)
     if rows.dtype.kind not in "iuf":
         raise InvalidShapeError(f"{name} must be real numbers; the type is {rows.dtype}.")
-    rows = rows.astype(np.float64)
+    with np.errstate(over="ignore"):  # what long doubles hold and floats do not is refused below
+        rows = rows.astype(np.float64)
     bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if bad.size:
         raise InvalidShapeError(
@@ -37,7 +38,7 @@ def finite_rows(value: ArrayLike, name: str, columns: int) -> NDArray[np.float64
 def index_rows(value: ArrayLike, name: str, columns: int, n_vertices: int) -> NDArray[np.int64]:
     """Return `value` as (f, columns) int64 indices below `n_vertices`, refusing the first bad row."""
     rows = _table(value, name, columns)
-    huge = rows.dtype.kind == "O" and all(isinstance(entry, int) for entry in rows.flat)
+    huge = rows.dtype.kind == "O" and all(isinstance(entry, int | np.integer) for entry in rows.flat)
     if rows.dtype.kind not in "iuf" and not huge:
         raise InvalidShapeError(f"{name} must be integers; the type is {rows.dtype}.")
     if rows.dtype.kind == "f" and (rows != np.floor(rows)).any():
@@ -69,7 +70,7 @@ def _first(name: str, rows: NDArray[Any], bad: NDArray[np.bool_]) -> str:
 
 def positive_values(value: ArrayLike, name: str) -> NDArray[np.float64]:
     """Return `value` as a one-dimensional float64 array, refusing anything not positive and finite."""
-    values = np.atleast_1d(np.asarray(value, dtype=np.float64))
+    values = np.atleast_1d(_numbers(value, name))
     if values.ndim != 1 or not values.size:
         raise InvalidParameterError(f"{name} must be a list of numbers; the shape is {values.shape}.")
     bad = np.flatnonzero(~(np.isfinite(values) & (values > 0)))
@@ -80,7 +81,7 @@ def positive_values(value: ArrayLike, name: str) -> NDArray[np.float64]:
 
 def vertex_values(value: ArrayLike, name: str, n_vertices: int) -> NDArray[np.float64]:
     """Return `value` as one finite float64 number a vertex."""
-    values = np.asarray(value, dtype=np.float64)
+    values = _numbers(value, name)
     if values.shape != (n_vertices,):
         raise InvalidParameterError(
             f"{name} must hold one number a vertex, shape ({n_vertices},); the shape is {values.shape}."
@@ -89,6 +90,16 @@ def vertex_values(value: ArrayLike, name: str, n_vertices: int) -> NDArray[np.fl
     if bad.size:
         raise InvalidParameterError(f"{name} must be finite; entry {bad[0]} is {values[bad[0]]}.")
     return values
+
+
+def _numbers(value: ArrayLike, name: str) -> NDArray[np.float64]:
+    try:
+        numbers = np.asarray(value)
+    except ValueError as err:
+        raise InvalidParameterError(f"{name} must be a list of numbers; its entries differ in length.") from err
+    if numbers.dtype.kind not in "biuf":
+        raise InvalidParameterError(f"{name} must be real numbers; the type is {numbers.dtype}.")
+    return numbers.astype(np.float64)
 
 
 def whole_number(value: SupportsIndex, name: str, low: int, high: int | None = None) -> int:

@@ -152,7 +152,8 @@ def test_a_stopped_index_goes_on_without_doing_a_shape_twice(tmp_path, how):
         time.sleep(0.01)
     running.send_signal(getattr(signal, how))
     told = running.communicate()[1]
-    assert how == "SIGKILL" or (running.returncode, "stopped" in told) == (130, True)
+    if how == "SIGINT":
+        assert (running.returncode, told) == (130, "stopped; what was finished is kept\n")
     before = {record.name for record in ShapeIndex.open(db).records()}
     report = run_json("index", folder, "--db", db, "--workers", 1, "--views", 0)
     assert set(report["skipped"]) == before
@@ -177,7 +178,7 @@ def test_query_finds_the_kind_and_draws_it(zoo, database, tmp_path):
     ("arguments", "message"),
     [
         (("info", "nowhere.ply"), "No such file"),
-        (("info", "mesh.xyz"), "must end in .off"),
+        (("info", "mesh.xyz"), "mesh.xyz must be of a"),
         (("spectrum", "{sphere}", "-k", "0"), "k must lie in 1..162; it is 0"),
         (("spectrum", "{sphere}", "-k", "163"), "k must lie in 1..162; it is 163"),
         (("spectrum", "{sphere}", "--plot", "plot.bmp"), "A picture must end in"),

@@ -35,3 +35,19 @@ def test_vertex_values_are_one_finite_number_a_vertex():
         vertex_values([1, 2], "field", 3)
     with pytest.raises(InvalidParameterError, match="field must be finite; entry 1 is nan"):
         vertex_values([1, np.nan], "field", 2)
+
+
+@pytest.mark.parametrize(
+    ("value", "fact"),
+    [
+        (["1.5"], "must be real numbers; the type is <U3"),
+        ([1j], "must be real numbers; the type is complex128"),
+        ([None], "must be real numbers; the type is object"),
+        ([[1.0], [1.0, 2.0]], "must be a list of numbers; its entries differ in length"),
+    ],
+)
+def test_what_is_no_number_is_refused(value, fact):
+    with pytest.raises(InvalidParameterError, match=f"times {fact}"):
+        positive_values(value, "times")
+    with pytest.raises(InvalidParameterError, match=f"field {fact}"):
+        vertex_values(value, "field", 1)

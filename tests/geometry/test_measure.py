@@ -118,3 +118,40 @@ def test_a_mesh_without_any_area_is_refused(points):
 
 def test_a_thin_face_still_has_area():
     assert degenerate_faces(TriangleMesh([[0, 0, 0], [1, 0, 0], [0.5, 1e-13, 0]], [[0, 1, 2]])).size == 0
+
+
+@pytest.mark.parametrize("size", [1e300, 1e160, 1e-160, 1e-300])
+def test_areas_and_volumes_that_floats_cannot_hold_are_refused(size):
+    cube = scaled(CUBE, size)
+    with pytest.raises(
+        InvalidShapeError, match=r"areas the largest coordinate must lie within 1e-150\.\.1e150; it is about [79]e[+-]"
+    ):
+        face_areas(cube)
+    with pytest.raises(InvalidShapeError, match=r"volumes .* must lie within 1e-100\.\.1e100; it is about [79]e[+-]"):
+        enclosed_volume(cube)
+    np.testing.assert_allclose(edge_lengths(cube).min(), size, rtol=1e-14)
+    np.testing.assert_array_equal(face_normals(cube), face_normals(CUBE))
+    assert degenerate_faces(cube).size == 0
+
+
+def test_lengths_that_floats_cannot_hold_are_refused():
+    wide = TriangleMesh([[1.7e308, 0, 0], [-1.7e308, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    with pytest.raises(InvalidShapeError, match=r"To measure lengths .* 1e-301\.\.1e301; it is about 9e\+307\. Choose"):
+        edge_lengths(wide)
+
+
+def test_a_face_is_measured_by_its_corners_alone():
+    rng = np.random.default_rng(0)
+    points = rng.random((9, 3))
+    alone = TriangleMesh(points[:3], [[0, 1, 2]])
+    among = TriangleMesh(np.concatenate([points, [[1e300, 0, 0]]]), [[6, 7, 8], [0, 1, 2], [3, 4, 5]])
+    np.testing.assert_array_equal(face_areas(among)[1], face_areas(alone)[0])
+    np.testing.assert_array_equal(face_normals(among)[1], face_normals(alone)[0])
+
+
+def test_small_faces_on_a_slanted_line_are_found_in_a_large_mesh():
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        corners, step = rng.integers(-500, 500, (4, 3)), rng.integers(1, 4, 3)
+        mesh = TriangleMesh([*corners, corners[3] + step, corners[3] + 3 * step], [[0, 1, 2], [3, 4, 5]])
+        assert degenerate_faces(scaled(mesh, 0.1)).tolist() == [1]

@@ -109,3 +109,19 @@ def test_other_shapes_are_refused(name, value, fact):
 def test_other_types_are_refused(value, kind):
     refused(rf"vertices must be real numbers; the type is {kind}", vertices=value)
     refused(rf"faces must be integers; the type is {kind}", faces=value)
+
+
+def test_coordinates_beyond_floats_are_refused():
+    vertices = np.array(CORNERS, dtype=np.longdouble)
+    vertices[2, 0] = np.longdouble("1e400")
+    refused(r"vertices must be finite; vertex 2 is \[inf, 1\.0, 0\.0\] \(1 such\)", vertices)
+
+
+def test_whole_numbers_of_mixed_types_are_refused_by_value():
+    huge = np.array([[np.int64(0), 1, 2**70]], dtype=object)
+    refused(rf"faces must index vertices 0\.\.3; face 0 is \[.*, {2**70}\]", faces=huge)
+
+
+@pytest.mark.parametrize("size", [1e300, 1e-300, 5e-324])
+def test_any_finite_size_is_a_mesh(size):
+    np.testing.assert_array_equal(TriangleMesh(np.array(CORNERS) * size, FACE).vertices, np.array(CORNERS) * size)

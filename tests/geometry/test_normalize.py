@@ -1,3 +1,5 @@
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.spatial.distance import pdist
@@ -57,3 +59,28 @@ def test_a_line_has_length_and_no_area():
     assert np.ptp(normalize_diameter(LINE).vertices[:, 0]) == 1
     with pytest.raises(InvalidShapeError, match="a size to be normalised"):
         normalize_area(LINE)
+
+
+def test_a_slanted_line_has_no_area():
+    along = np.cumsum(np.random.default_rng(1).random(30))
+    slanted = TriangleMesh(np.outer(along, [0.345, 0.822, 0.331]), [[i, i + 1, i + 2] for i in range(28)])
+    with pytest.raises(InvalidShapeError, match=r"its 30 vertices span 0\.0 of it"):
+        normalize_area(slanted)
+    assert pdist(normalize_diameter(slanted).vertices).max() == pytest.approx(1, rel=1e-14)
+
+
+def test_the_diameter_of_a_slanted_sheet():
+    axes = np.linalg.qr(np.random.default_rng(2).standard_normal((3, 3)))[0]
+    sheet = grid(9, 7, width=3.0)
+    slanted = TriangleMesh(sheet.vertices @ axes + 5, sheet.faces)
+    assert pdist(normalize_diameter(slanted).vertices).max() == pytest.approx(1, rel=1e-14)
+
+
+@pytest.mark.parametrize("mesh", [icosphere(5), grid(200, 200)])  # 10k on the hull, 40k in a plane
+def test_the_diameter_of_many_points_needs_little_memory(mesh):
+    tracemalloc.start()
+    size = np.ptp(normalize_diameter(mesh).vertices, axis=0)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert size.max() <= 1
+    assert peak < 200e6

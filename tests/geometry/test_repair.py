@@ -144,3 +144,20 @@ def test_a_sound_mesh_is_left_as_it_is(name):
     done = REPAIRS[name](mesh).mesh
     np.testing.assert_array_equal(done.vertices, mesh.vertices)
     np.testing.assert_array_equal(done.faces, mesh.faces)
+
+
+@pytest.mark.parametrize("scale", [1e300, 1e-300])
+def test_the_largest_component_is_found_where_areas_leave_the_range_of_floats(scale):
+    union = disjoint_union(icosphere(0), grid(1, 1, width=30.0))
+    mesh = TriangleMesh(np.concatenate([[[0.0, 0, 0]], scale * union.vertices]), union.faces + 1)
+    assert largest_component(mesh).source_vertices.tolist() == [13, 14, 15, 16]
+
+
+def test_a_loose_vertex_is_no_component_of_a_mesh_without_area():
+    mesh = TriangleMesh([[9, 9, 9], [0, 0, 0], [0, 0, 0], [0, 0, 0]], [[1, 2, 3]])
+    assert largest_component(mesh).source_vertices.tolist() == [1, 2, 3]
+
+
+def test_a_tolerance_that_reaches_nobody_joins_only_what_is_equal():
+    points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0]]
+    assert weld(TriangleMesh(points, [[0, 1, 2], [0, 3, 2]]), tolerance=1e-9).source_vertices.tolist() == [0, 1, 2]

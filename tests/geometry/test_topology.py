@@ -1,3 +1,5 @@
+from collections import Counter
+
 import numpy as np
 import pytest
 
@@ -149,3 +151,38 @@ def test_submesh_keeps_coordinates_and_tells_where_vertices_were():
     assert old.tolist() == [1, 2, 3]
     assert part.faces.tolist() == [[1, 0, 2]]
     np.testing.assert_array_equal(part.vertices, SQUARE.vertices[old])
+
+
+def has_several_fans(faces, vertex):
+    """Grow one fan over shared neighbours, and see whether a face is left."""
+    rims = [set(face) - {vertex} for face in faces if vertex in face]
+    reached = rims[0] if rims else set()
+    for _ in rims:
+        reached = reached.union(*(rim for rim in rims if rim & reached))
+    return any(not rim & reached for rim in rims)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_fans_and_loops_of_any_faces(seed):
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(3, 9))
+    mesh = TriangleMesh(rng.random((n, 3)), [rng.choice(n, 3, replace=False) for _ in range(rng.integers(1, 12))])
+    faces = mesh.faces.tolist()
+    assert non_manifold_vertices(mesh).tolist() == [v for v in range(n) if has_several_fans(faces, v)]
+    counts = Counter(tuple(sorted(side)) for side in half_edges(mesh).tolist())
+    assert dict(zip(map(tuple, edge_table(mesh).edges.tolist()), edge_table(mesh).n_faces, strict=True)) == counts
+    alone = [tuple(side) for side in half_edges(mesh).tolist() if counts[tuple(sorted(side))] == 1]
+    loops = boundary_loops(mesh)
+    assert all(len(set(loop.tolist())) == len(loop) for loop in loops)
+    within = [pair for loop in loops for pair in sides_of([loop])[:-1]]
+    assert len(set(within)) == len(within)
+    assert set(within) <= set(alone) <= set(sides_of(loops))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_faces_that_repeat_a_corner_stop_nothing(seed):
+    rng = np.random.default_rng(seed)
+    mesh = TriangleMesh(rng.random((5, 3)), rng.integers(0, 5, (9, 3)))
+    assert edge_table(mesh).n_faces.sum() == 27
+    assert sum(len(loop) for loop in boundary_loops(mesh)) <= 27 + len(boundary_loops(mesh))
+    assert set(non_manifold_vertices(mesh)) <= set(mesh.faces.ravel())

@@ -16,10 +16,23 @@ few = settings(deadline=None, max_examples=15)
 
 
 def shape(seed: int) -> TriangleMesh:
-    """A bumpy torus, sphere or sheet without symmetry."""
+    """A bumpy torus, sphere or sheet without symmetry, or faces thrown together at random."""
     rng = np.random.default_rng(seed)
-    mesh = (torus(9, 6), icosphere(1), grid(5, 4))[seed % 3]
+    if seed % 4 == 3:
+        return soup(rng)
+    mesh = (torus(9, 6), icosphere(1), grid(5, 4))[seed % 4]
     return TriangleMesh(mesh.vertices + 0.05 * rng.standard_normal(mesh.vertices.shape), mesh.faces)
+
+
+def soup(rng: np.random.Generator) -> TriangleMesh:
+    """Faces over random points, most edges and vertices no manifold; none thinner than a needle, none loose."""
+    points = rng.standard_normal((9, 3))
+    rows = np.array([rng.choice(9, 3, replace=False) for _ in range(25)])
+    a, b, c = points[rows].transpose(1, 0, 2)
+    longest = np.max([np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c)], axis=0)
+    kept = rows[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 0.02 * longest**2]
+    used, faces = np.unique(kept, return_inverse=True)
+    return TriangleMesh(points[used], faces.reshape(-1, 3))
 
 
 def dense(mesh: TriangleMesh, mass: str) -> tuple[np.ndarray, np.ndarray]:

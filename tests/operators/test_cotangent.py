@@ -82,3 +82,14 @@ def test_a_vertex_without_face_is_refused():
 def test_an_unknown_mass_is_refused():
     with pytest.raises(InvalidParameterError, match=r"mass must be 'lumped', 'consistent' or 'averaged'; it is 'full'"):
         cotangent_laplacian.__wrapped__(RIGHT, "full")  # past the check of types, which only tests have
+
+
+@pytest.mark.parametrize("scale", [1e300, 1e160, 1e-160, 1e-300])
+def test_areas_that_floats_cannot_hold_are_refused(scale):
+    with pytest.raises(InvalidShapeError, match=r"To measure areas .* within 1e-150\.\.1e150; .* normalize_box"):
+        cotangent_laplacian(TriangleMesh(RIGHT.vertices * scale, RIGHT.faces))
+
+
+def test_a_far_vertex_without_face_is_named_as_such():
+    with pytest.raises(InvalidShapeError, match=r"vertex 3 at \[1e\+300, 0\.0, 0\.0\] has none"):
+        cotangent_laplacian(TriangleMesh([*RIGHT.vertices, [1e300, 0, 0]], RIGHT.faces))

@@ -1,11 +1,13 @@
 import json
 import multiprocessing
+import os
 import shutil
 import signal
 import sqlite3
 import tempfile
 import threading
 import time
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -133,6 +135,12 @@ def test_index_behaves_like_a_dict(tmp_path_factory, steps):
         assert all(index.query(descriptor(seed))[0].score == 0 for seed in model.values())
 
 
+def with_vertices(shape, vertices):
+    """Bypass what the constructor's types would catch in tests alone."""
+    object.__setattr__(shape, "vertices", vertices)
+    return shape
+
+
 def test_what_cannot_be_stored(index):
     bad = descriptor(1).vectors.copy()
     bad[1, 2] = np.nan
@@ -143,7 +151,7 @@ def test_what_cannot_be_stored(index):
     with pytest.raises(InvalidParameterError, match="A shape needs a descriptor to be found by; 'x' has none"):
         index.add("x", [])
     with pytest.raises(InvalidParameterError, match="must name one vertex a feature; of 'x' 2 features have vertices"):
-        index.add("x", [ShapeDescriptor(np.ones((2, 3)), np.arange(2)[:, None], RECIPE)])
+        index.add("x", [with_vertices(descriptor(1), np.arange(2)[:, None])])
     with pytest.raises(InvalidParameterError, match=r"beside numbers must be Unicode text; 'b\\udcff' is not"):
         index.add("x", [descriptor(1)], source="b\udcff")
     with pytest.raises(
@@ -173,7 +181,7 @@ def test_what_cannot_be_asked(index):
 
 def test_recipes_are_equal_as_values_are(index):
     index.add("one", [descriptor(1, replace(RECIPE, time_unit=1))])
-    index.add("two", [descriptor(2, replace(RECIPE, time_unit=1.0, n_features=np.int64(2)))])
+    index.add("two", [descriptor(2, replace(RECIPE, time_unit=1.0))])
     assert len(index.query(descriptor(1, replace(RECIPE, time_unit=1.0)))) == 2
 
 
@@ -280,7 +288,10 @@ def test_damaged_rows_are_named(index):
 
 def test_a_second_writer_is_told(index, monkeypatch):
     monkeypatch.setattr(store, "WAIT", 0.05)
-    with FileLock(index.folder / store.LOCK), pytest.raises(StoreError, match="An index has one writer; another has"):
+    with (
+        FileLock(index.folder / store.LOCK),
+        pytest.raises(StoreError, match="An index has one writer; another process"),
+    ):
         index.add("one", [descriptor(1)])
     with store.writing(index.folder), pytest.raises(StoreError, match=r"one writer; process \d+ on .* has held"):
         index.add("one", [descriptor(1)])
@@ -344,6 +355,7 @@ def open_folder():
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="rights are a Unix thing")
+@pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may write everywhere")
 def test_reading_needs_no_right_to_write(index, open_folder):
     index.add("one", [descriptor(1)])
     reader = sqlite3.connect(index.folder / store.DATABASE)
@@ -352,20 +364,24 @@ def test_reading_needs_no_right_to_write(index, open_folder):
     shutil.copytree(index.folder, open_folder / "with log", ignore=shutil.ignore_patterns("*-shm"))
     reader.close()
     shutil.copytree(index.folder, open_folder / "whole")
-    assert ask_as_nobody(open_folder / "whole")[0] == ["one", "two"]
-    assert "An index changes only where one may write" in ask_as_nobody(open_folder / "whole")[1]
-    assert "must be writable to be read as long as index.sqlite-wal holds" in ask_as_nobody(open_folder / "with log")[0]
+    with read_only(open_folder / "whole") as folder:
+        assert {match.name for match in ShapeIndex.open(folder).query(descriptor(1))} == {"one", "two"}
+        with pytest.raises(StoreError, match="An index changes only where one may write"):
+            ShapeIndex.open(folder).remove("one")
+    with (
+        read_only(open_folder / "with log") as folder,
+        pytest.raises(StoreError, match=r"must be writable to be read as long as index\.sqlite-wal holds"),
+    ):
+        ShapeIndex.open(folder)
 
 
-def ask_as_nobody(folder):
+@contextmanager
+def read_only(folder):
     for path in folder.iterdir():
         path.chmod(0o444)
     folder.chmod(0o555)
     try:
-        process, answers = begin(writer.read_as_nobody, folder)
-        process.join()
-        heard = [answers.recv()]
-        return [*heard, answers.recv()] if answers.poll() else heard
+        yield folder
     finally:
         folder.chmod(0o755)
 

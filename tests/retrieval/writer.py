@@ -1,13 +1,10 @@
 """What processes of the tests do with an index until they are killed."""
 
 import itertools
-import os
 
 from describers import descriptor
 
 from eigenshape.retrieval.index import ShapeIndex
-
-NOBODY = 65534
 
 
 def add_shapes(folder, ready):
@@ -30,14 +27,3 @@ def create_many(folder, ready):
     ready.send("ready")
     for number in itertools.count(len(list(folder.iterdir()))):
         ShapeIndex.create(folder / str(number))
-
-
-def read_as_nobody(folder, answer):
-    if os.getuid() == 0:  # root may write anywhere
-        os.setgid(NOBODY)
-        os.setuid(NOBODY)
-    try:
-        answer.send([match.name for match in ShapeIndex.open(folder).query(descriptor(1))])
-        ShapeIndex.open(folder).add("late", [descriptor(2)])
-    except RuntimeError as err:
-        answer.send(str(err))

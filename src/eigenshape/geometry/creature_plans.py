@@ -1,216 +1,268 @@
 """Body plans of the made-up creatures, as tables.
 
-A creature faces +x, stands upright along +z, and its left is +y. A plan is a list of bones. Each begins where its
-parent ends and swings about that place.
+A creature faces +x, stands upright along +z, and its left is +y. A plan is a list of limbs.
 """
 
+from math import cos, pi, sin
 from typing import NamedTuple
 
 Number = int | float
-Vector = tuple[Number, Number, Number]
+Node = tuple[Number, Number, Number, Number]
+Swing = tuple[int, tuple[Number, Number, Number], Number, Number]
+
+X, Y, Z = (1, 0, 0), (0, 1, 0), (0, 0, 1)
 
 
-class Bone(NamedTuple):
-    """A round cone, and how far it may swing with all that hangs on it.
+class Limb(NamedTuple):
+    """A smooth tube through nodes, and how it bends at some of them.
 
-    name: a trailing * makes a mirrored pair, left and right; parent: name of the bone at whose end it begins, "" for
-    the root at the origin; to: its end, seen from its beginning; radii: at both ends; swings: axis and least and most
-    angle in degrees, as in (0, 1, 0, -30, 45). Turning about +y leans what points up towards +x.
+    name: a trailing * makes a mirrored pair, left and right; limbs with the same first word vary together.
+    nodes: x, y, z and radius; parent: the limb and its node that this one hangs on, "" for the first.
+    swings: node, axis, least and most angle in degrees; what lies beyond the node, seen from the hub, turns with it.
+    Turning about +y leans what points up towards +x. squash: thickness along x, y and z as a share of the radius.
+    power: 2 for round cross-sections, more for boxes. hub: the node that stays where it is.
     """
 
     name: str
     parent: str
-    to: Vector
-    radii: tuple[Number, Number]
-    swings: tuple[tuple[Number, Number, Number, Number, Number], ...] = ()
-
-
-def _chain(name: str, parent: str, steps: int, to: Vector, radii: tuple[Number, Number], *swings: Vector) -> list[Bone]:
-    """Return a limb of equal bones that thins out; each swing is (which axis, least, most) at every joint."""
-    axes = {0: (1.0, 0.0, 0.0), 1: (0.0, 1.0, 0.0), 2: (0.0, 0.0, 1.0)}
-    along = [radii[0] + (radii[1] - radii[0]) * step / steps for step in range(steps + 1)]
-    paired = "*" if name.endswith("*") else ""
-    names = [f"{name.rstrip('*')}{step}{paired}" for step in range(steps)]
-    turns = tuple((*axes[int(axis)], low, high) for axis, low, high in swings)
-    return [
-        Bone(names[step], names[step - 1] if step else parent, to, (along[step], along[step + 1]), turns)
-        for step in range(steps)
-    ]
-
-
-def _legs(height: float, radius: float, foot: float = 0.12) -> list[Bone]:
-    """Return the four legs of a beast between the bones `shoulders` and `hips`."""
-    bones = []
-    for name, parent, bend in (("fore", "shoulders", 1.0), ("hind", "hips", -1.0)):
-        bones += [
-            Bone(f"{name} root*", parent, (0, 0.14, -0.05), (0.9 * radius + 0.03, 1.3 * radius)),
-            Bone(
-                f"{name} upper*", f"{name} root*", (0, 0.03, -0.5 * height), (1.3 * radius, radius),
-                ((0, 1, 0, -32, 32),),
-            ),
-            Bone(
-                f"{name} lower*", f"{name} upper*", (0, 0, -0.45 * height), (radius, 0.75 * radius),
-                ((0, 1, 0, 0, 45) if bend > 0 else (0, 1, 0, -45, 0),),
-            ),
-            Bone(f"{name} foot*", f"{name} lower*", (foot, 0, -0.02), (0.8 * radius, 0.7 * radius)),
-        ]  # fmt: skip
-    return bones
+    nodes: tuple[Node, ...]
+    swings: tuple[Swing, ...] = ()
+    squash: tuple[Number, Number, Number] = (1, 1, 1)
+    power: Number = 2
+    hub: int = 0
 
 
 BIPED = [
-    Bone("pelvis", "", (0, 0, 0.12), (0.15, 0.14)),
-    Bone("chest", "pelvis", (0, 0, 0.38), (0.14, 0.17), ((0, 1, 0, -10, 30), (0, 0, 1, -25, 25))),
-    Bone("neck", "chest", (0, 0, 0.2), (0.08, 0.07)),
-    Bone("head", "neck", (0.02, 0, 0.16), (0.11, 0.13), ((0, 1, 0, -15, 25), (0, 0, 1, -30, 30))),
-    Bone("shoulder*", "chest", (0, 0.21, 0.02), (0.1, 0.08)),
-    Bone("arm*", "shoulder*", (0, 0.26, -0.13), (0.075, 0.06), ((1, 0, 0, -25, 45), (0, 1, 0, -50, 50))),
-    Bone("forearm*", "arm*", (0, 0.24, -0.12), (0.06, 0.048), ((0, 0, 1, 0, 70),)),
-    Bone("palm*", "forearm*", (0, 0.1, -0.05), (0.055, 0.045)),
-    Bone("hip*", "pelvis", (0, 0.12, -0.16), (0.13, 0.11)),
-    Bone("thigh*", "hip*", (0, 0.04, -0.4), (0.11, 0.075), ((0, 1, 0, -55, 20), (1, 0, 0, -5, 22))),
-    Bone("shin*", "thigh*", (0, 0.02, -0.4), (0.075, 0.052), ((0, 1, 0, 0, 65),)),
-    Bone("foot*", "shin*", (0.17, 0.01, -0.03), (0.055, 0.045)),
-]
+    Limb("torso", "",
+        ((0, 0, 0.02, 0.16), (0, 0, 0.2, 0.145), (0, 0, 0.38, 0.17), (0, 0, 0.5, 0.165)),
+        ((1, Y, -4, 9), (1, Z, -8, 8), (2, Z, -8, 8)), squash=(0.75, 1, 1)),
+    Limb("head", "torso 3",
+        ((0, 0, 0.55, 0.08), (0.01, 0, 0.72, 0.068), (0.03, 0, 0.88, 0.13), (0.03, 0, 0.96, 0.12)),
+        ((1, Z, -30, 30), (1, Y, -10, 14))),
+    Limb("arm*", "torso 3", (
+            (0, 0.1, 0.54, 0.085), (0, 0.2, 0.53, 0.08), (0, 0.45, 0.43, 0.06), (0.02, 0.68, 0.33, 0.046),
+            (0.03, 0.78, 0.28, 0.058), (0.04, 0.87, 0.24, 0.042),
+        ),
+        ((1, X, -24, 36), (1, Z, -34, 16), (2, Z, -48, 0))),
+    Limb("leg*", "torso 0", (
+            (0, 0.08, -0.02, 0.12), (0, 0.1, -0.14, 0.11), (0.01, 0.12, -0.46, 0.072), (-0.01, 0.125, -0.62, 0.07),
+            (-0.02, 0.13, -0.88, 0.046),
+        ),
+        ((1, Y, -32, 18), (1, X, -2, 12), (2, Y, 0, 42))),
+    Limb("foot*", "leg* 4", ((-0.04, 0.13, -0.91, 0.05), (0.05, 0.14, -0.925, 0.052), (0.15, 0.15, -0.935, 0.044))),
+]  # fmt: skip
 
 QUADRUPED = [
-    Bone("hips", "", (-0.3, 0, 0.02), (0.19, 0.2)),
-    Bone("shoulders", "", (0.32, 0, 0.02), (0.19, 0.19), ((0, 0, 1, -12, 12),)),
-    Bone("neck", "shoulders", (0.24, 0, 0.3), (0.14, 0.1), ((0, 1, 0, -25, 45), (0, 0, 1, -30, 30))),
-    Bone("head", "neck", (0.26, 0, -0.06), (0.1, 0.06), ((0, 1, 0, -15, 25),)),
-    Bone("ear*", "neck", (-0.04, 0.1, 0.14), (0.055, 0.045)),
-    *_legs(0.75, 0.075),
-    *_chain("tail", "hips", 3, (-0.13, 0, -0.1), (0.065, 0.05), (1, -25, 10), (2, -20, 20)),
-]
+    Limb("body", "",
+        ((-0.42, 0, 0.02, 0.2), (-0.15, 0, -0.02, 0.19), (0.12, 0, -0.02, 0.19), (0.36, 0, 0.03, 0.19)),
+        ((1, Z, -10, 10),), squash=(1, 0.85, 1), hub=1),
+    Limb("neck", "body 3",
+        ((0.38, 0, 0.12, 0.15), (0.5, 0, 0.28, 0.12), (0.62, 0, 0.46, 0.1), (0.7, 0, 0.6, 0.095)),
+        ((1, Y, -20, 22), (1, Z, -18, 18), (2, Y, -12, 20), (2, Z, -14, 14)), squash=(1, 0.75, 1)),
+    Limb("head", "neck 3",
+        ((0.7, 0, 0.6, 0.1), (0.83, 0, 0.52, 0.085), (0.96, 0, 0.42, 0.062), (1.01, 0, 0.38, 0.06)),
+        squash=(1, 0.8, 1)),
+    Limb("ear*", "neck 3", ((0.66, 0.05, 0.64, 0.05), (0.63, 0.085, 0.78, 0.042))),
+    Limb("tail", "body 0",
+        ((-0.56, 0, 0.12, 0.07), (-0.7, 0, 0.08, 0.06), (-0.78, 0, -0.1, 0.07), (-0.81, 0, -0.36, 0.045)),
+        ((1, X, -30, 30), (1, Y, -10, 30))),
+    Limb("leg fore*", "body 3", (
+            (0.36, 0.1, -0.06, 0.12), (0.36, 0.13, -0.2, 0.09), (0.37, 0.135, -0.5, 0.06), (0.36, 0.135, -0.76, 0.046),
+            (0.38, 0.135, -0.87, 0.062),
+        ),
+        ((1, Y, -32, 22), (2, Y, 0, 42))),
+    Limb("leg hind*", "body 0", (
+            (-0.44, 0.09, -0.04, 0.14), (-0.43, 0.13, -0.2, 0.105), (-0.4, 0.135, -0.44, 0.07),
+            (-0.5, 0.135, -0.62, 0.054), (-0.48, 0.135, -0.78, 0.046), (-0.45, 0.135, -0.87, 0.062),
+        ),
+        ((1, Y, -22, 28), (3, Y, -26, 15))),
+]  # fmt: skip
 
 GIRAFFE = [
-    Bone("hips", "", (-0.22, 0, -0.05), (0.17, 0.16)),
-    Bone("shoulders", "", (0.22, 0, 0.06), (0.17, 0.17)),
-    *_chain("neck", "shoulders", 4, (0.09, 0, 0.22), (0.11, 0.065), (1, -8, 16), (2, -10, 10), (0, -9, 9)),
-    Bone("head", "neck3", (0.19, 0, -0.06), (0.075, 0.05), ((0, 1, 0, -15, 25),)),
-    Bone("horn*", "neck3", (-0.03, 0.1, 0.13), (0.05, 0.045)),
-    *_legs(1.05, 0.07, foot=0.08),
-    *_chain("tail", "hips", 2, (-0.13, 0, -0.16), (0.055, 0.05), (1, -30, 5)),
-]
+    Limb("body", "", ((-0.26, 0, -0.04, 0.15), (0, 0, 0.0, 0.16), (0.22, 0, 0.08, 0.17)), squash=(1, 0.85, 1), hub=1),
+    Limb("neck", "body 2", (
+            (0.24, 0, 0.14, 0.13), (0.33, 0, 0.34, 0.1), (0.4, 0, 0.56, 0.08), (0.46, 0, 0.78, 0.07),
+            (0.52, 0, 1.0, 0.068),
+        ),
+        (
+            (1, Y, -12, 18), (1, X, -14, 14), (2, Y, -12, 18), (2, X, -14, 14), (3, Y, -10, 18), (3, X, -12, 12),
+            (3, Z, -30, 30),
+        )),
+    Limb("head", "neck 4", ((0.52, 0, 1.03, 0.085), (0.64, 0, 0.98, 0.07), (0.76, 0, 0.9, 0.055))),
+    Limb("horn*", "neck 4", ((0.5, 0.04, 1.08, 0.042), (0.47, 0.07, 1.2, 0.04))),
+    Limb("ear*", "neck 4", ((0.5, 0.06, 1.03, 0.042), (0.46, 0.18, 1.03, 0.036))),
+    Limb("tail", "body 0",
+        ((-0.38, 0, 0.02, 0.05), (-0.47, 0, -0.06, 0.045), (-0.51, 0, -0.24, 0.042), (-0.52, 0, -0.38, 0.052)),
+        ((1, X, -30, 30), (1, Y, -10, 30))),
+    Limb("leg fore*", "body 2", (
+            (0.22, 0.09, -0.02, 0.1), (0.23, 0.12, -0.16, 0.075), (0.24, 0.125, -0.52, 0.056),
+            (0.24, 0.125, -0.86, 0.046), (0.26, 0.125, -0.97, 0.056),
+        ),
+        ((1, Y, -28, 15), (2, Y, 0, 36))),
+    Limb("leg hind*", "body 0", (
+            (-0.28, 0.08, -0.06, 0.11), (-0.27, 0.12, -0.2, 0.08), (-0.25, 0.125, -0.48, 0.058),
+            (-0.31, 0.125, -0.66, 0.05), (-0.29, 0.125, -0.88, 0.046), (-0.26, 0.125, -0.97, 0.056),
+        ),
+        ((1, Y, -14, 28), (3, Y, -20, 10))),
+]  # fmt: skip
+
+
+def _tentacle(name: str, turn: float) -> Limb:
+    """Return an arm of the octopus that leaves its body at an angle from the front."""
+    outward = (cos(turn), sin(turn))
+    across = (-sin(turn), cos(turn), 0)
+    profile = (
+        (0.1, 0.02, 0.11), (0.27, -0.07, 0.1), (0.47, -0.13, 0.085), (0.67, -0.15, 0.07), (0.87, -0.13, 0.058),
+        (1.05, -0.06, 0.045),
+    )  # fmt: skip
+    nodes = tuple((far * outward[0], far * outward[1], height, radius) for far, height, radius in profile)
+    bends: list[Swing] = [(1, Z, -9, 9), (1, across, -14, 9)]
+    for node, sideways, upwards in ((2, 14, 10), (3, 18, 14), (4, 22, 18)):
+        bends += [(node, Z, -sideways, sideways), (node, across, -upwards, upwards)]
+    return Limb(name, "mantle 0", nodes, tuple(bends))
+
 
 OCTOPUS = [
-    Bone("mantle", "", (-0.03, 0, 0.42), (0.24, 0.27), ((1, 0, 0, -12, 12), (0, 1, 0, -15, 15))),
-    *(
-        bone
-        for arm, (x, y) in enumerate(((0.3, 0.125), (0.125, 0.3), (-0.125, 0.3), (-0.3, 0.125)))
-        for bone in _chain(
-            f"arm {arm} *", "", 5, (0.75 * x, 0.75 * y, -0.03), (0.085, 0.045), (0, -20, 20), (1, -20, 20), (2, -26, 26)
-        )
-    ),
-]
+    Limb("mantle", "",
+        ((0, 0, 0.02, 0.19), (-0.01, 0, 0.2, 0.2), (-0.04, 0, 0.44, 0.27), (-0.07, 0, 0.58, 0.25)),
+        ((1, X, -8, 8), (1, Y, -9, 9))),
+    Limb("eye*", "mantle 1", ((0.12, 0.1, 0.21, 0.075), (0.16, 0.13, 0.22, 0.07))),
+    *(_tentacle(f"arm {arm}*", pi * (2 * arm + 1) / 8) for arm in range(4)),
+]  # fmt: skip
 
 HAND = [
-    Bone("wrist", "", (0, 0, -0.3), (0.17, 0.16), ((0, 1, 0, -25, 25),)),
-    Bone("palm", "", (0, 0, 0.26), (0.18, 0.2)),
-    Bone("palm side*", "", (0, 0.16, 0.26), (0.13, 0.13)),
+    Limb("palm", "",
+        ((0, 0, -0.66, 0.15), (0, 0, -0.4, 0.15), (0, 0, -0.12, 0.2), (0, 0, 0.1, 0.27), (0, 0, 0.16, 0.27)),
+        ((1, Y, -16, 16),), squash=(0.6, 1, 1), hub=3),
     *(
-        bone
+        Limb(f"finger {name}", "palm 4",
+            tuple(
+                (0, y + lean * rise, 0.3 + length * rise, radius)
+                for rise, radius in ((0, 0.075), (0.25, 0.07), (0.55, 0.064), (0.8, 0.058), (1, 0.052))
+            ),
+            ((1, Y, -6, 34), (2, Y, 0, 36), (3, Y, 0, 24)),
+        )
         for name, y, lean, length in (
-            ("index", 0.25, 0.05, 0.15), ("middle", 0.085, 0.015, 0.17), ("ring", -0.085, -0.015, 0.16),
-            ("little", -0.25, -0.05, 0.12),
-        )
-        for bone in (
-            Bone(f"{name} root", "palm", (0, y, 0.1), (0.09, 0.075)),
-            *_chain(name, f"{name} root", 3, (0, lean, length), (0.072, 0.055), (1, -5, 42)),
-        )
-    ),
-    Bone("thumb root", "", (0.05, 0.26, 0.05), (0.12, 0.09)),
-    *_chain("thumb", "thumb root", 2, (0.02, 0.15, 0.12), (0.085, 0.065), (0, -10, 28), (2, -15, 30)),
+            ("index", 0.205, 0.11, 0.6), ("middle", 0.07, 0.04, 0.68), ("ring", -0.07, -0.04, 0.63),
+            ("little", -0.2, -0.12, 0.5),
+        )),
+    Limb("thumb", "palm 3",
+        ((0.02, 0.12, -0.08, 0.12), (0.04, 0.26, 0.02, 0.095), (0.06, 0.39, 0.14, 0.08), (0.07, 0.48, 0.3, 0.062)),
+        ((1, X, -8, 20), (1, Z, -14, 24), (2, X, 0, 22))),
 ]  # fmt: skip
 
 BIRD = [
-    Bone("rump", "", (-0.26, 0, -0.02), (0.19, 0.11)),
-    Bone("breast", "", (0.2, 0, 0.06), (0.19, 0.15)),
-    Bone("neck", "breast", (0.16, 0, 0.12), (0.09, 0.075), ((0, 1, 0, -20, 20), (0, 0, 1, -30, 30))),
-    Bone("head", "neck", (0.06, 0, 0.03), (0.1, 0.09)),
-    Bone("beak", "head", (0.19, 0, -0.03), (0.06, 0.045)),
-    Bone("wing root*", "", (0.06, 0.24, 0.09), (0.09, 0.075), ((1, 0, 0, -25, 35),)),
-    Bone("wing*", "wing root*", (-0.02, 0.36, 0.03), (0.075, 0.06), ((1, 0, 0, -30, 35), (0, 0, 1, -20, 20))),
-    Bone("wing tip*", "wing*", (-0.12, 0.36, 0.0), (0.06, 0.035), ((1, 0, 0, -35, 35), (0, 0, 1, -35, 10))),
-    Bone("feathers*", "wing root*", (-0.24, 0.1, 0.0), (0.06, 0.04)),
-    Bone("far feathers*", "wing*", (-0.24, 0.02, 0.0), (0.05, 0.035)),
-    Bone("tail", "rump", (-0.3, 0, 0.02), (0.08, 0.05), ((0, 1, 0, -20, 20), (0, 0, 1, -20, 20))),
-    Bone("tail fan*", "rump", (-0.27, 0.13, 0.02), (0.06, 0.04), ((0, 1, 0, -20, 20),)),
-    Bone("leg*", "", (-0.04, 0.1, -0.32), (0.07, 0.04), ((0, 1, 0, -35, 35),)),
-    Bone("claw*", "leg*", (0.13, 0.01, -0.02), (0.042, 0.034)),
-]
+    Limb("body", "", (
+            (-0.36, 0, 0, 0.09), (-0.16, 0, -0.02, 0.15), (0.08, 0, -0.02, 0.18), (0.28, 0, 0.04, 0.13),
+            (0.4, 0, 0.12, 0.1), (0.5, 0, 0.16, 0.11),
+        ),
+        ((3, Z, -28, 28), (3, Y, -12, 18)), hub=2),
+    Limb("beak", "body 5", ((0.55, 0, 0.15, 0.055), (0.66, 0, 0.12, 0.045), (0.74, 0, 0.09, 0.036))),
+    Limb("wing*", "body 2", (
+            (0.06, 0.04, 0.06, 0.17), (0.05, 0.22, 0.09, 0.18), (0.07, 0.5, 0.14, 0.19), (0.04, 0.78, 0.15, 0.16),
+            (-0.06, 1.02, 0.14, 0.13), (-0.17, 1.16, 0.13, 0.1),
+        ),
+        ((1, X, -32, 36), (2, X, -26, 22), (3, X, -26, 16), (3, Z, -8, 12)), squash=(1, 1, 0.3)),
+    Limb("tail", "body 0",
+        ((-0.34, 0, 0.01, 0.09), (-0.5, 0, 0.02, 0.11), (-0.68, 0, 0.03, 0.16)),
+        ((1, Y, -20, 20),), squash=(1, 1, 0.35)),
+    Limb("leg*", "body 1",
+        ((-0.08, 0.07, -0.1, 0.06), (-0.12, 0.08, -0.22, 0.045), (-0.2, 0.08, -0.32, 0.042), (-0.1, 0.09, -0.36, 0.04)),
+        ((1, Y, -25, 25),)),
+]  # fmt: skip
 
 FISH = [
-    Bone("head", "", (0.32, 0, 0), (0.2, 0.1)),
-    Bone("belly", "", (0.1, 0, -0.08), (0.17, 0.14)),
-    *_chain("back", "", 4, (-0.19, 0, 0), (0.2, 0.065), (2, -22, 22)),
-    Bone("upper tail", "back3", (-0.2, 0, 0.26), (0.055, 0.04), ((0, 0, 1, -25, 25),)),
-    Bone("lower tail", "back3", (-0.2, 0, -0.24), (0.055, 0.04), ((0, 0, 1, -25, 25),)),
-    Bone("back fin", "", (-0.2, 0, 0.33), (0.1, 0.04), ((1, 0, 0, -20, 20),)),
-    Bone("side fin*", "", (-0.12, 0.32, -0.1), (0.07, 0.04), ((1, 0, 0, -30, 30), (0, 0, 1, -25, 25))),
-]
+    Limb("body", "", (
+            (0.66, 0, -0.01, 0.07), (0.5, 0, 0, 0.16), (0.2, 0, 0, 0.25), (-0.1, 0, 0, 0.22), (-0.36, 0, 0, 0.14),
+            (-0.58, 0, 0, 0.08), (-0.72, 0, 0, 0.08),
+        ),
+        ((2, Z, -15, 15), (3, Z, -19, 19), (4, Z, -24, 24), (5, Z, -28, 28)), squash=(1, 0.55, 1), hub=1),
+    *(
+        Limb(f"tail {name}", "body 6",
+            ((-0.7, 0, 0.02 * up, 0.08), (-0.84, 0, 0.15 * up, 0.09), (-0.97, 0, 0.3 * up, 0.075)),
+            squash=(1, 0.45, 1),
+        )
+        for name, up in (("upper", 1), ("lower", -1))),
+    Limb("fin back", "body 3",
+        ((0.06, 0, 0.16, 0.14), (-0.04, 0, 0.3, 0.11), (-0.16, 0, 0.42, 0.075)),
+        ((1, X, -18, 18),), squash=(1, 0.4, 1)),
+    Limb("fin belly", "body 3", ((-0.1, 0, -0.14, 0.1), (-0.22, 0, -0.28, 0.07)), squash=(1, 0.5, 1)),
+    Limb("fin side*", "body 2",
+        ((0.22, 0.1, -0.08, 0.08), (0.12, 0.24, -0.14, 0.09), (0.0, 0.37, -0.19, 0.07)),
+        ((1, X, -28, 28), (1, Z, -24, 24)), squash=(1, 1, 0.5)),
+    Limb("eye*", "body 1", ((0.48, 0.06, 0.05, 0.05), (0.48, 0.08, 0.05, 0.05))),
+]  # fmt: skip
 
+# A wave that dies out towards the head, so that it looks ahead.
 SNAKE = [
-    *_chain("front", "", 7, (0.17, 0, 0), (0.085, 0.07), (2, -34, 34), (1, -10, 5)),
-    Bone("head", "front6", (0.15, 0, 0.02), (0.085, 0.06), ((0, 1, 0, -20, 10),)),
-    *_chain("back", "", 8, (-0.17, 0, 0), (0.085, 0.045), (2, -34, 34)),
-]
+    Limb("body", "",
+        tuple(
+            (0.95 - 0.175 * node, 0.2 * sin(0.95 * node) * min(node / 3, 1), height, radius)
+            for node, (height, radius) in enumerate(
+                (
+                    (0.13, 0.055), (0.14, 0.085), (0.1, 0.055), (0.03, 0.058), (0, 0.062), (0, 0.064), (0, 0.064),
+                    (0, 0.062), (0, 0.06), (0, 0.056), (0, 0.05), (0, 0.044), (0, 0.038),
+                )
+            )
+        ),
+        ((2, Z, -24, 24), (2, Y, -16, 12), *((node, Z, -30, 30) for node in (3, 4, 6, 8, 10))), hub=5),
+]  # fmt: skip
 
 LIZARD = [
-    Bone("hips", "", (-0.28, 0, 0), (0.13, 0.11), ((0, 0, 1, -18, 18),)),
-    Bone("shoulders", "", (0.26, 0, 0), (0.13, 0.1), ((0, 0, 1, -18, 18),)),
-    Bone("neck", "shoulders", (0.13, 0, 0.02), (0.085, 0.09), ((0, 0, 1, -25, 25), (0, 1, 0, -20, 10))),
-    Bone("snout", "neck", (0.19, 0, -0.01), (0.09, 0.045)),
-    *_chain("tail", "hips", 6, (-0.17, 0, -0.01), (0.1, 0.045), (2, -25, 25)),
+    Limb("spine", "", (
+            (0.78, 0, 0.01, 0.05), (0.66, 0, 0.03, 0.085), (0.54, 0, 0.04, 0.1), (0.4, 0, 0.02, 0.085),
+            (0.22, 0, 0, 0.115), (0, 0, 0, 0.135), (-0.22, 0, 0, 0.11), (-0.42, 0, -0.01, 0.085),
+            (-0.62, 0, -0.03, 0.07), (-0.82, 0, -0.04, 0.058), (-1.02, 0, -0.05, 0.048), (-1.2, 0, -0.04, 0.038),
+        ),
+        (
+            (3, Z, -24, 24), (4, Z, -9, 9), (6, Z, -11, 11), (7, Z, -17, 17), (8, Z, -21, 21), (9, Z, -24, 24),
+            (10, Z, -26, 26),
+        ),
+        squash=(1, 1, 0.85), hub=5),
     *(
-        bone
-        for name, parent, back in (("fore", "shoulders", 0.05), ("hind", "hips", -0.05))
-        for bone in (
-            Bone(f"{name} upper*", parent, (back, 0.24, 0.02), (0.065, 0.05), ((0, 0, 1, -32, 32),)),
-            Bone(
-                f"{name} lower*",
-                f"{name} upper*",
-                (back, 0.13, -0.17),
-                (0.05, 0.042),
-                ((0, 0, 1, -35, 35), (1, 0, 0, -20, 20)),
+        Limb(f"leg {name}*", f"spine {node}", (
+                (x, 0.05, -0.01, 0.075), (x + 0.1 * way, 0.15, 0.0, 0.068), (x + 0.34 * way, 0.3, 0.03, 0.058),
+                (x + 0.36 * way, 0.37, -0.1, 0.048), (x + 0.36 * way + 0.04, 0.39, -0.17, 0.048),
+                (x + 0.36 * way + 0.15, 0.43, -0.2, 0.052),
             ),
-            Bone(f"{name} foot*", f"{name} lower*", (0.11, 0.03, -0.02), (0.042, 0.036)),
+            ((1, Z, -26, 26), (1, X, -8, 12), (2, Z, -22, 22)),
         )
-    ),
-]
+        for name, node, x, way in (("fore", 3, 0.22, 0.3), ("hind", 7, -0.24, -0.3))),
+]  # fmt: skip
 
 ANT = [
-    Bone("waist", "", (-0.26, 0, 0.04), (0.13, 0.09)),
-    Bone("abdomen", "waist", (-0.3, 0, 0.06), (0.17, 0.2), ((0, 1, 0, -20, 20), (0, 0, 1, -20, 20))),
-    Bone("neck", "", (0.24, 0, 0.02), (0.13, 0.09)),
-    Bone("head", "neck", (0.13, 0, 0.02), (0.15, 0.14), ((0, 1, 0, -15, 15), (0, 0, 1, -20, 20))),
-    Bone("feeler*", "head", (0.12, 0.17, 0.16), (0.055, 0.045), ((0, 0, 1, -20, 20),)),
-    Bone("far feeler*", "feeler*", (0.22, 0.03, -0.03), (0.048, 0.045), ((0, 1, 0, -25, 25),)),
+    Limb("body", "", (
+            (0.66, 0, 0.05, 0.1), (0.54, 0, 0.07, 0.155), (0.36, 0, 0.05, 0.085), (0.14, 0, 0.04, 0.125),
+            (-0.12, 0, 0.04, 0.1), (-0.3, 0, 0.06, 0.068), (-0.52, 0, 0.1, 0.18), (-0.74, 0, 0.11, 0.2),
+            (-0.96, 0, 0.08, 0.1),
+        ),
+        ((2, Z, -22, 22), (2, Y, -10, 14), (5, Y, -14, 20), (5, Z, -20, 20)), hub=3),
+    Limb("feeler*", "body 1",
+        ((0.6, 0.07, 0.15, 0.05), (0.66, 0.15, 0.28, 0.046), (0.8, 0.2, 0.34, 0.044), (0.98, 0.24, 0.28, 0.044)),
+        ((1, Z, -18, 22), (2, Y, -20, 20))),
     *(
-        bone
-        for leg, (x, y) in enumerate(((0.28, 0.2), (0.0, 0.34), (-0.28, 0.2)))
-        for bone in (
-            Bone(f"coxa {leg}*", "", (0.6 * x, 0.5 * y, 0.0), (0.06, 0.055)),
-            Bone(
-                f"femur {leg}*", f"coxa {leg}*", (x, y, 0.22), (0.055, 0.05), ((0, 0, 1, -14, 14), (1, 0, 0, -22, 22))
+        Limb(f"leg {name}*", "body 3", (
+                (x, 0.05, 0.02, 0.06), (x + 0.1 * way, 0.18, 0.06, 0.054), (x + 0.36 * way, 0.42, 0.26, 0.05),
+                (x + 0.6 * way, 0.62, 0.02, 0.047), (x + 0.74 * way, 0.74, -0.26, 0.045),
+                (x + 0.82 * way, 0.83, -0.3, 0.045),
             ),
-            Bone(f"tibia {leg}*", f"femur {leg}*", (0.9 * x, 0.9 * y, -0.28), (0.05, 0.048), ((1, 0, 0, -25, 25),)),
-            Bone(f"tarsus {leg}*", f"tibia {leg}*", (0.4 * x, 0.4 * y, -0.26), (0.048, 0.045), ((1, 0, 0, -25, 25),)),
+            ((1, Z, -18, 18), (1, X, -10, 24), (2, X, -18, 22)),
         )
-    ),
-]
+        for name, x, way in (("fore", 0.24, 0.75), ("middle", 0.08, -0.08), ("hind", -0.1, -0.85))),
+]  # fmt: skip
 
-# Seat and back are spines with ribs so near that they close to boards.
 CHAIR = [
-    Bone("seat rib*", "", (0, 0.24, 0), (0.06, 0.06)),
-    *_chain("front", "", 3, (0.09, 0, 0), (0.06, 0.06)),
-    *(Bone(f"front rib {step}*", f"front{step}", (0, 0.24, 0), (0.06, 0.06)) for step in range(3)),
-    *_chain("rear", "", 3, (-0.09, 0, 0), (0.06, 0.06)),
-    *(Bone(f"rear rib {step}*", f"rear{step}", (0, 0.24, 0), (0.06, 0.06)) for step in range(3)),
-    Bone("front leg*", "front rib 2*", (0, 0, -0.6), (0.05, 0.042), ((0, 1, 0, -12, 12), (1, 0, 0, -6, 10))),
-    Bone("back leg*", "rear rib 2*", (-0.03, 0, -0.6), (0.05, 0.042), ((0, 1, 0, -12, 12), (1, 0, 0, -6, 10))),
-    *_chain("rest", "rear2", 6, (-0.015, 0, 0.1), (0.055, 0.055), (1, -7, 4)),
-    *(Bone(f"rest rib {step}*", f"rest{step}", (0, 0.23, 0), (0.055, 0.05)) for step in range(6)),
-]
+    Limb("seat", "", ((-0.03, 0, 0, 0.33), (0.03, 0, 0, 0.33)), squash=(1, 1, 0.2), power=5),
+    Limb("back", "seat 0",
+        ((-0.3, 0, 0.12, 0.31), (-0.34, 0, 0.34, 0.31), (-0.4, 0, 0.62, 0.31)),
+        ((0, Y, -16, 8), (1, Z, -10, 10)), squash=(0.2, 1, 1), power=5),
+    *(
+        Limb(f"leg {name}*", "seat 0",
+            ((0.24 * way, 0.24, 0, 0.062), (0.25 * way, 0.25, -0.14, 0.06), (0.31 * way, 0.3, -0.74, 0.046)),
+            ((1, Y, -22, 22), (1, X, -12, 22)),
+        )
+        for name, way in (("front", 1), ("rear", -1))),
+]  # fmt: skip
 
 PLANS = {
     "ant": ANT,

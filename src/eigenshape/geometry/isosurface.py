@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
+import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._errors import InvalidShapeError
@@ -11,14 +12,18 @@ from eigenshape.geometry.topology import edge_table, is_closed, is_manifold, ver
 
 Field = Callable[[Float[np.ndarray, "p 3"]], Float[np.ndarray, " p"]]
 
-ROUNDS = 12  # of smoothing along the surface
+STAGES, ROUNDS = 3, 5  # of choosing diagonals, and of smoothing along the surface before each
+BLOCK = 3  # lattice points along a block that is left out where the surface is far
+STEEP = 1.3  # most slope of a field that is about a distance
+CHUNK = 1 << 16  # points at a time
+CLOSE_ENOUGH = 0.04  # of the number of vertices asked for
 # Places of the grid against the surface, in cells, none a symmetric one: sheets that meet in a cell at one place of it
 # are apart at another.
 PLACES = np.array([[0.5, 0.5, 0.5]]) + np.arange(12)[:, None] * np.array([[0.7548777, 0.5698403, 0.3247180]])
 
 
 def isosurface(field: Field, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"], spacing: float) -> TriangleMesh:
-    """Mesh the zero set of a function that is negative inside, by surface nets, drawn onto the surface and evened out.
+    """Mesh the zero set of about a signed distance, negative inside, by surface nets that are drawn onto it and evened.
 
     Each sheet in a cell has a vertex of its own (Gibson 1998 gives the nets, Nielson 2004 the sheets). Two neighbouring
     cells can still join sheets that are apart, so the result is checked, and where it is no manifold another place of
@@ -30,24 +35,60 @@ def isosurface(field: Field, low: Float[np.ndarray, "3"], high: Float[np.ndarray
         If no place of the grid gives a closed connected manifold: the surface has details finer than the grid.
     """
     for place in PLACES % 1:
-        mesh = _nets(field, low - spacing * (1 + place), high + 2 * spacing, spacing)
-        if is_closed(mesh) and is_manifold(mesh) and vertex_components(mesh)[0] == 1:
-            return _evened(field, mesh, spacing)
+        points, quads = _nets(field, low - spacing * (1 + place), high + 2 * spacing, spacing)
+        if _is_sound(TriangleMesh(points, _split(points, quads))):
+            mesh = _evened(field, points, quads, spacing)
+            if _is_sound(mesh):
+                return mesh
     raise InvalidShapeError(f"A surface must be smooth at the size of the grid; at spacing {spacing:.3g} it is not.")
 
 
-def _nets(field: Field, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"], spacing: float) -> TriangleMesh:
-    axes = [np.arange(start, stop, spacing) for start, stop in zip(low, high, strict=True)]
-    lattice = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    values = field(lattice.reshape(-1, 3)).reshape(lattice.shape[:3])
+def spacing_for(field: Field, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"], n_vertices: int) -> float:
+    """Find the spacing at which surface nets have about so many vertices: they go with 1 / spacing^2."""
+    spacing = float((high - low).max()) / 30
+    for _ in range(4):
+        ratio = len(_nets(field, low - 1.5 * spacing, high + 2 * spacing, spacing)[0]) / n_vertices
+        if abs(ratio - 1) < CLOSE_ENOUGH:
+            break
+        spacing *= float(np.sqrt(ratio))
+    return spacing
+
+
+def _is_sound(mesh: TriangleMesh) -> bool:
+    return is_closed(mesh) and is_manifold(mesh) and vertex_components(mesh)[0] == 1
+
+
+def _nets(
+    field: Field, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"], spacing: float
+) -> tuple[Float[np.ndarray, "p 3"], Int[np.ndarray, "q 4"]]:
+    values = _lattice_values(field, low, np.ceil((high - low) / spacing).astype(int), spacing)
     cells = _crossed_cells(values)
     corners = np.stack([values[tuple((cells + corner).T)] for corner in CORNERS], axis=1)
     number, points = _sheet_points(cells, corners)
     cell_number = np.full(np.array(values.shape) - 1, -1, dtype=np.int64)
     cell_number[tuple(cells.T)] = np.arange(len(cells))
     quads = np.concatenate([_quads(values, cell_number, number, axis) for axis in range(3)])
-    split = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    return TriangleMesh(low + spacing * points, split)
+    return low + spacing * points, quads
+
+
+def _lattice_values(
+    field: Field, low: Float[np.ndarray, "3"], shape: Int[np.ndarray, "3"], spacing: float
+) -> Float[np.ndarray, "x y z"]:
+    """Evaluate a field where its surface may pass; in a block that is far from it, its middle stands for all."""
+    blocks = tuple(-(-shape // BLOCK))
+    middles = BLOCK * np.indices(blocks).reshape(3, -1).T + (BLOCK - 1) / 2
+    coarse = _in_chunks(field, low + spacing * middles).reshape(blocks)
+    reach = STEEP * spacing * np.sqrt(3) * (BLOCK + 1) / 2
+    values, near = coarse, np.abs(coarse) < reach
+    for axis in range(3):
+        values, near = values.repeat(BLOCK, axis), near.repeat(BLOCK, axis)
+    places = np.argwhere(near)
+    values[near] = _in_chunks(field, low + spacing * places)
+    return values
+
+
+def _in_chunks(field: Field, points: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, " p"]:
+    return np.concatenate([field(points[start : start + CHUNK]) for start in range(0, len(points), CHUNK)])
 
 
 def _edge(axis: int, corner: tuple[int, ...]) -> int:
@@ -79,13 +120,10 @@ FACES = [_face(normal, side) for normal in range(3) for side in (0, 1)]
 
 
 def _crossed_cells(values: Float[np.ndarray, "x y z"]) -> Int[np.ndarray, "c 3"]:
-    shape = np.array(values.shape) - 1
-    inside = sum(
-        (values[tuple(slice(start, start + length) for start, length in zip(corner, shape, strict=True))] < 0).astype(
-            int
-        )
-        for corner in CORNERS
-    )
+    inside = (values < 0).astype(np.int8)
+    for axis in range(3):  # counts over pairs, squares, then cubes of lattice points
+        here, there = (inside.take(np.arange(s, inside.shape[axis] - 1 + s), axis) for s in (0, 1))
+        inside = here + there
     return np.argwhere((inside > 0) & (inside < 8))
 
 
@@ -150,33 +188,51 @@ def _quads(
     return np.where(leaves[:, None], quads, quads[:, ::-1])
 
 
-def _evened(field: Field, mesh: TriangleMesh, spacing: float) -> TriangleMesh:
+def _split(points: Float[np.ndarray, "p 3"], quads: Int[np.ndarray, "q 4"]) -> Int[np.ndarray, "f 3"]:
+    """Cut each quad along the diagonal with the lesser angles opposite to it (Delaunay)."""
+    a, b, c, d = points[quads].transpose(1, 0, 2)
+    turn = np.where((_cotangent(b, a, c) + _cotangent(d, a, c) < 0)[:, None], np.roll(quads, -1, axis=1), quads)
+    return np.concatenate([turn[:, [0, 1, 2]], turn[:, [0, 2, 3]]])
+
+
+def _cotangent(
+    apex: Float[np.ndarray, "q 3"], one: Float[np.ndarray, "q 3"], two: Float[np.ndarray, "q 3"]
+) -> Float[np.ndarray, " q"]:
+    one, two = one - apex, two - apex
+    twice_area = np.linalg.norm(np.cross(one, two), axis=1)
+    return np.einsum("ij,ij->i", one, two) / np.maximum(twice_area, np.finfo(np.float64).tiny)
+
+
+def _evened(
+    field: Field, points: Float[np.ndarray, "p 3"], quads: Int[np.ndarray, "q 4"], spacing: float
+) -> TriangleMesh:
+    points = _drawn(field, points, spacing)[0]
+    for _ in range(STAGES):
+        points = relaxed(field, TriangleMesh(points, _split(points, quads)), spacing).vertices
+    return TriangleMesh(points, _split(points, quads))
+
+
+def relaxed(field: Field, mesh: TriangleMesh, spacing: float) -> TriangleMesh:
+    """Move vertices along the surface towards the middle of their neighbours."""
     one, two = edge_table(mesh).edges.T
-    degree = np.bincount(np.concatenate([one, two]), minlength=mesh.n_vertices)
-    points = _drawn(field, mesh.vertices, spacing)
+    links = sp.coo_array((np.ones(len(one)), (one, two)), shape=(mesh.n_vertices,) * 2)
+    links = (links + links.T).tocsr()
+    degree = links.sum(axis=1)[:, None]
+    points, normals = _drawn(field, mesh.vertices, spacing)
     for _ in range(ROUNDS):
-        sums = [
-            np.bincount(one, points[two, axis], mesh.n_vertices) + np.bincount(two, points[one, axis], mesh.n_vertices)
-            for axis in range(3)
-        ]
-        pull = np.column_stack(sums) / degree[:, None] - points
-        normal = _gradient(field, points, spacing)
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        pull -= np.einsum("ij,ij->i", pull, normal)[:, None] * normal
-        points = _drawn(field, points + 0.6 * pull, spacing, steps=1)
+        pull = links @ points / degree - points
+        pull -= np.einsum("ij,ij->i", pull, normals)[:, None] * normals
+        points, normals = _drawn(field, points + 0.6 * pull, spacing)
     return TriangleMesh(points, mesh.faces)
 
 
-def _drawn(field: Field, points: Float[np.ndarray, "p 3"], spacing: float, steps: int = 3) -> Float[np.ndarray, "p 3"]:
-    """Move points onto the zero set by Newton's steps along the gradient, none longer than half a cell."""
-    for _ in range(steps):
-        gradient = _gradient(field, points, spacing)
-        step = field(points) / np.einsum("ij,ij->i", gradient, gradient)
-        points = points - np.clip(step, -0.5 * spacing, 0.5 * spacing)[:, None] * gradient
-    return points
-
-
-def _gradient(field: Field, points: Float[np.ndarray, "p 3"], spacing: float) -> Float[np.ndarray, "p 3"]:
+def _drawn(
+    field: Field, points: Float[np.ndarray, "p 3"], spacing: float
+) -> tuple[Float[np.ndarray, "p 3"], Float[np.ndarray, "p 3"]]:
+    """Move points onto the zero set by one Newton step, not longer than half a cell; return also the normals."""
     width = 1e-3 * spacing
-    moves = width * np.eye(3)
-    return np.column_stack([(field(points + move) - field(points - move)) / (2 * width) for move in moves])
+    values = field(points)
+    slopes = np.column_stack([(field(points + move) - values) / width for move in width * np.eye(3)])
+    slope = np.linalg.norm(slopes, axis=1, keepdims=True)
+    step = np.clip(values[:, None] / slope, -0.5 * spacing, 0.5 * spacing)
+    return points - step * slopes / slope, slopes / slope

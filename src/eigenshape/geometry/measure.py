@@ -9,6 +9,8 @@ from eigenshape.geometry.topology import edge_table
 
 # A triangle thinner than this, height over longest side, has no normal that rounding leaves standing.
 THINNEST = 1e-14
+# Powers of two up to which areas and volumes are handed out: beyond, sums overflow or small faces lose digits.
+LARGEST_EXPONENT = 1000
 
 
 def unit_scaled(mesh: TriangleMesh) -> tuple[Float[np.ndarray, "n 3"], float]:
@@ -17,30 +19,59 @@ def unit_scaled(mesh: TriangleMesh) -> tuple[Float[np.ndarray, "n 3"], float]:
     Squares and cubes of these neither overflow nor underflow, whatever the unit of the mesh, and dividing by a
     power of two costs no digit.
     """
-    largest = float(np.abs(mesh.vertices).max())
-    scale = _power_of_two(largest)
-    points = mesh.vertices / scale
-    points = points - points.mean(axis=0)
-    inner = float(np.abs(points).max())
-    inner_scale = _power_of_two(inner)
-    return points / inner_scale, scale * inner_scale
+    points, scale = _size_one(mesh.vertices)
+    points, inner_scale = _size_one(points - points.mean(axis=0))
+    return points, scale * inner_scale
 
 
-def _power_of_two(size: float) -> float:
+def scaled_corners(mesh: TriangleMesh) -> tuple[Float[np.ndarray, "f 3 3"], float]:
+    """Return the corners of each face, divided by a power of two that brings them to size 1, and that power.
+
+    Nothing is moved: what is measured between corners depends on them alone, to the last digit, and not on the order
+    of the vertices, nor on those that no face uses.
+    """
+    return _size_one(mesh.vertices[mesh.faces])
+
+
+def _size_one(coordinates: Float[np.ndarray, "..."]) -> tuple[Float[np.ndarray, "..."], float]:
+    largest = np.abs(coordinates).max()
     # One below the exponent of frexp, so that the largest of all numbers has a power too.
-    return float(2.0 ** (np.frexp(size)[1] - 1)) if size > 0 else 1.0
+    scale = float(2.0 ** (np.frexp(largest)[1] - 1)) if largest > 0 else 1.0
+    return coordinates / scale, scale
+
+
+def in_length(values: Float[np.ndarray, "..."], scale: float, power: int) -> Float[np.ndarray, "..."]:
+    """Return values times scale to the power of 1, 2 or 3; `scale` is a power of two.
+
+    Raises
+    ------
+    InvalidShapeError
+        If floats cannot hold lengths to that power.
+    """
+    exponent = power * (int(np.frexp(scale)[1]) - 1)
+    if abs(exponent) > LARGEST_EXPONENT:
+        raise InvalidShapeError(
+            f"To measure {('lengths', 'areas', 'volumes')[power - 1]} the largest coordinate must lie within "
+            f"1e-{301 // power}..1e{301 // power}; it is about {scale:.0e}. Choose another unit, or normalize_box."
+        )
+    return np.ldexp(values, exponent)
 
 
 def face_area_vectors(points: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"]) -> Float[np.ndarray, "f 3"]:
     """Return for each face its normal times its area, in the unit of `points` squared."""
-    a, b, c = points[faces].transpose(1, 0, 2)
+    return area_vectors(points[faces])
+
+
+def area_vectors(corners: Float[np.ndarray, "f 3 3"]) -> Float[np.ndarray, "f 3"]:
+    """Return for each triple of corners their normal times their area."""
+    a, b, c = corners.transpose(1, 0, 2)
     return 0.5 * np.cross(b - a, c - a)
 
 
 def face_areas(mesh: TriangleMesh) -> Float[np.ndarray, " f"]:
     """Return the area of each face, in length^2."""
-    points, scale = unit_scaled(mesh)
-    return np.linalg.norm(face_area_vectors(points, mesh.faces), axis=1) * scale**2
+    corners, scale = scaled_corners(mesh)
+    return in_length(np.linalg.norm(area_vectors(corners), axis=1), scale, 2)
 
 
 def surface_area(mesh: TriangleMesh) -> float:
@@ -50,19 +81,19 @@ def surface_area(mesh: TriangleMesh) -> float:
 
 def enclosed_volume(mesh: TriangleMesh) -> float:
     """Return the signed volume under the surface, in length^3: positive for a closed mesh that faces outward."""
-    points, scale = unit_scaled(mesh)
-    a, b, c = points[mesh.faces].transpose(1, 0, 2)
-    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6) * scale**3
+    corners, scale = scaled_corners(mesh)
+    a, b, c = (corners - corners.mean(axis=(0, 1))).transpose(1, 0, 2)
+    return float(in_length(np.einsum("ij,ij->i", a, np.cross(b, c)) / 6, scale, 3).sum())
 
 
 def face_normals(mesh: TriangleMesh) -> Float[np.ndarray, "f 3"]:
     """Return the unit normal of each face; zero where the face has no area."""
-    return _unit(face_area_vectors(unit_scaled(mesh)[0], mesh.faces))
+    return _unit(area_vectors(scaled_corners(mesh)[0]))
 
 
 def vertex_normals(mesh: TriangleMesh) -> Float[np.ndarray, "n 3"]:
     """Return at each vertex the unit mean of its faces' normals, weighted by area; zero where there is none."""
-    vectors = face_area_vectors(unit_scaled(mesh)[0], mesh.faces)
+    vectors = area_vectors(scaled_corners(mesh)[0])
     sums = [
         np.bincount(mesh.faces.ravel(), weights=np.repeat(vectors[:, axis], 3), minlength=mesh.n_vertices)
         for axis in range(3)
@@ -77,9 +108,8 @@ def _unit(vectors: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
 
 def edge_lengths(mesh: TriangleMesh) -> Float[np.ndarray, " e"]:
     """Return the length of each edge of `edge_table`."""
-    points, scale = unit_scaled(mesh)
-    one, two = edge_table(mesh).edges.T
-    return np.linalg.norm(points[one] - points[two], axis=1) * scale
+    ends, scale = _size_one(mesh.vertices[edge_table(mesh).edges])
+    return in_length(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1), scale, 1)
 
 
 def bounding_box(mesh: TriangleMesh) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
@@ -89,10 +119,9 @@ def bounding_box(mesh: TriangleMesh) -> tuple[Float[np.ndarray, "3"], Float[np.n
 
 def degenerate_faces(mesh: TriangleMesh) -> Int[np.ndarray, " k"]:
     """Return the faces without area: height at most 1e-14 of the longest side."""
-    points, _ = unit_scaled(mesh)
-    corners = points[mesh.faces]
+    corners, _ = scaled_corners(mesh)
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    doubled = 2 * np.linalg.norm(face_area_vectors(points, mesh.faces), axis=1)
+    doubled = 2 * np.linalg.norm(area_vectors(corners), axis=1)
     return np.flatnonzero(doubled <= THINNEST * longest**2)
 
 

@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
-from scipy.spatial.distance import pdist
+from scipy.spatial.distance import cdist
 
 from eigenshape._errors import InvalidShapeError
-from eigenshape.geometry.measure import face_area_vectors, unit_scaled
+from eigenshape.geometry.measure import degenerate_faces, face_area_vectors, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
 
 Points = Float[np.ndarray, "n 3"]
@@ -33,9 +33,8 @@ def normalize_area(mesh: TriangleMesh) -> TriangleMesh:
     InvalidShapeError
         If no face has area.
     """
-    return _resized(
-        mesh, lambda points: float(np.linalg.norm(face_area_vectors(points, mesh.faces), axis=1).sum()) ** 0.5
-    )
+    sound = np.delete(mesh.faces, degenerate_faces(mesh), axis=0)
+    return _resized(mesh, lambda points: float(np.linalg.norm(face_area_vectors(points, sound), axis=1).sum()) ** 0.5)
 
 
 def normalize_diameter(mesh: TriangleMesh) -> TriangleMesh:
@@ -60,8 +59,17 @@ def _resized(mesh: TriangleMesh, size_of: Callable[[Points], float]) -> Triangle
 
 
 def _diameter(points: Points) -> float:
-    try:
-        candidates = points[ConvexHull(points).vertices]
-    except QhullError:  # flat or straight: no hull with volume
-        candidates = np.unique(points, axis=0)
-    return float(pdist(candidates).max(initial=0.0))
+    corners = _hull(points)
+    # A sphere has all its points on its hull: their distances come a thousand rows at a time.
+    return max(float(cdist(rows, corners).max()) for rows in np.split(corners, range(1000, len(corners), 1000)))
+
+
+def _hull(points: Points) -> Float[np.ndarray, "h 3"]:
+    axes = np.linalg.svd(points, full_matrices=False)[2]
+    for dimension in (3, 2):
+        try:
+            return points[ConvexHull(points @ axes[:dimension].T).vertices]
+        except QhullError:  # flat or straight: no hull with volume, or with area
+            continue
+    along = points @ axes[0]
+    return points[[np.argmin(along), np.argmax(along)]]

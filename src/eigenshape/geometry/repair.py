@@ -4,11 +4,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 from jaxtyping import Int
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.geometry.measure import degenerate_faces, face_areas, unit_scaled
+from eigenshape.geometry.measure import area_vectors, degenerate_faces, scaled_corners, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import submesh, unreferenced_vertices, vertex_components
 
@@ -64,8 +66,8 @@ def _groups(mesh: TriangleMesh, tolerance: float) -> Int[np.ndarray, " n"]:
         points, _ = unit_scaled(mesh)
         radius = tolerance * float(np.linalg.norm(np.ptp(points, axis=0)))
         pairs = cKDTree(points).query_pairs(radius, output_type="ndarray")
-        linked = TriangleMesh(mesh.vertices, np.column_stack([pairs, pairs[:, 0]])) if len(pairs) else None
-        group = vertex_components(linked)[1] if linked else group
+        graph = sp.coo_array((np.ones(len(pairs), dtype=np.int8), pairs.T), shape=(mesh.n_vertices,) * 2)
+        group = connected_components(graph, directed=False)[1]
     return group.ravel().astype(np.int64)
 
 
@@ -98,9 +100,9 @@ def drop_unreferenced(mesh: TriangleMesh) -> Repaired:
 def largest_component(mesh: TriangleMesh) -> Repaired:
     """Keep the connected component with the most area; of equal ones, the one with the lowest vertex."""
     count, labels = vertex_components(mesh)
-    of_face = labels[mesh.faces[:, 0]]
-    areas = np.bincount(of_face, weights=face_areas(mesh), minlength=count)
-    keep = of_face == np.argmax(areas)
+    of_face = np.unique(labels[mesh.faces[:, 0]], return_inverse=True)[1]
+    areas = np.linalg.norm(area_vectors(scaled_corners(mesh)[0]), axis=1)
+    keep = of_face == np.argmax(np.bincount(of_face, weights=areas))
     kept, source = submesh(mesh, keep)
     report = f"largest_component removed {count - 1} components with {int((~keep).sum())} faces"
     return Repaired(kept, (report,), source)

@@ -3,7 +3,8 @@
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._arrays import whole_number
+from eigenshape._arrays import positive_values, whole_number
+from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
 
@@ -60,6 +61,7 @@ def torus(n_around: int = 48, n_across: int = 24, *, outer: float = 1.0, inner: 
     """Sweep a circle of radius `inner` around the z axis at distance `outer`, on a regular grid."""
     whole_number(n_around, "n_around", 3, 10**6)
     whole_number(n_across, "n_across", 3, 10**6)
+    positive_values([outer, inner], "outer and inner")
     u = 2 * np.pi * np.arange(n_around)[:, None] / n_around
     v = 2 * np.pi * np.arange(n_across)[None, :] / n_across
     rim = outer + inner * np.cos(v)
@@ -78,6 +80,7 @@ def grid(n_x: int = 20, n_y: int = 20, *, width: float = 1.0, height: float = 1.
     """Triangulate a flat rectangle with n_x by n_y squares; its Neumann eigenvalues are π²(p²/w² + q²/h²)."""
     whole_number(n_x, "n_x", 1, 10**6)
     whole_number(n_y, "n_y", 1, 10**6)
+    positive_values([width, height], "width and height")
     x, y = np.meshgrid(np.linspace(0, width, n_x + 1), np.linspace(0, height, n_y + 1), indexing="ij")
     points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
     i, j = (index.ravel() for index in np.indices((n_x, n_y)))
@@ -89,6 +92,8 @@ def grid(n_x: int = 20, n_y: int = 20, *, width: float = 1.0, height: float = 1.
 
 def disjoint_union(*meshes: TriangleMesh) -> TriangleMesh:
     """Put meshes into one, as separate components with their coordinates unchanged."""
+    if not meshes:
+        raise InvalidParameterError("disjoint_union must be given a mesh; it was given none.")
     starts = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])[:-1]
     faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]
     return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))

@@ -71,7 +71,8 @@ def boundary_loops(mesh: TriangleMesh) -> list[Int[np.ndarray, " k"]]:
     """Chain the boundary edges into closed loops of vertices.
 
     A vertex where several loops touch is passed once by each of them; the loops are sorted by length, longest
-    first, then by their first vertex. Where neighbouring faces are turned against each other a chain stays open.
+    first, then by their first vertex. Where neighbouring faces are turned against each other, or more than two share
+    an edge, a chain may stay open.
     """
     sides = boundary_edges(mesh)
     leaving: dict[int, list[int]] = {}

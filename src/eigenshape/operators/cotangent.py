@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape.geometry.measure import face_area_vectors, require_areas, unit_scaled
+from eigenshape.geometry.measure import area_vectors, in_length, require_areas, scaled_corners
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import unreferenced_vertices
 from eigenshape.operators.laplacian import Laplacian
@@ -38,20 +38,19 @@ def cotangent_laplacian(mesh: TriangleMesh, mass: Mass = "lumped") -> Laplacian:
     Raises
     ------
     InvalidShapeError
-        If a face has no area or a vertex has no face.
+        If a face has no area, a vertex has no face, or coordinates are beyond 1e±150.
     InvalidParameterError
         If `mass` is none of the three.
     """
     _require_mass(mass)
     require_areas(mesh)
     _require_faces_everywhere(mesh)
-    points, scale = unit_scaled(mesh)
-    areas = np.linalg.norm(face_area_vectors(points, mesh.faces), axis=1)
-    return Laplacian(_stiffness(mesh, points, areas), _mass(mesh, areas * scale**2, mass))
+    corners, scale = scaled_corners(mesh)
+    areas = np.linalg.norm(area_vectors(corners), axis=1)
+    return Laplacian(_stiffness(mesh, corners, areas), _mass(mesh, in_length(areas, scale, 2), mass))
 
 
-def _stiffness(mesh: TriangleMesh, points: Float[np.ndarray, "n 3"], areas: Float[np.ndarray, " f"]) -> sp.csr_array:
-    corners = points[mesh.faces]
+def _stiffness(mesh: TriangleMesh, corners: Float[np.ndarray, "f 3 3"], areas: Float[np.ndarray, " f"]) -> sp.csr_array:
     to_next = np.roll(corners, -1, axis=1) - corners
     to_last = np.roll(corners, 1, axis=1) - corners
     cotangents = np.einsum("fij,fij->fi", to_next, to_last) / (2 * areas[:, None])

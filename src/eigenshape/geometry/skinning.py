@@ -1,0 +1,72 @@
+"""Skin that bends smoothly around joints."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float
+from scipy.sparse.linalg import splu
+
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.topology import edge_table
+
+STEPS = 3  # of diffusion for the narrowest bend
+
+
+@dataclass(frozen=True, eq=False)
+class Joints:
+    """Where skin turns, the outermost joints first.
+
+    Attributes
+    ----------
+    pivots, axes : (j, 3) float
+    limits : (j, 2) float
+        Least and most angle, in radians.
+    follows : (n, j) float
+        Share of the angle by which each vertex turns: 1 beyond the joint, 0 before it.
+    """
+
+    pivots: Float[np.ndarray, "j 3"]
+    axes: Float[np.ndarray, "j 3"]
+    limits: Float[np.ndarray, "j 2"]
+    follows: Float[np.ndarray, "n j"]
+
+
+def diffused(
+    mesh: TriangleMesh, values: Float[np.ndarray, "n j"], widths: Float[np.ndarray, " j"]
+) -> Float[np.ndarray, "n j"]:
+    """Spread functions over a mesh of even triangles, as heat does, until a point has a given standard deviation.
+
+    Heat stays on the skin, so nothing leaks from one limb to another that is only near in space.
+    """
+    edges = edge_table(mesh).edges
+    ends = mesh.vertices[edges]
+    length2 = np.square(ends[:, 0] - ends[:, 1]).sum(axis=1).mean()
+    one, two = edges.T
+    links = sp.coo_array((np.ones(len(edges)), (one, two)), shape=(mesh.n_vertices,) * 2)
+    links = links + links.T
+    step = widths.min() ** 2 / STEPS
+    # Over six neighbours at one length, differences add up to 3/2 length² times the Laplacian; variance is twice time.
+    pencil = sp.eye_array(mesh.n_vertices) + step / (3 * length2) * (sp.diags_array(links.sum(axis=1)) - links)
+    solve = splu(pencil.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve
+    spread, n_steps = values.copy(), np.rint(widths**2 / step)
+    for done in range(int(n_steps.max())):
+        going = n_steps > done
+        spread[:, going] = solve(spread[:, going])
+    return spread
+
+
+def turned(
+    points: Float[np.ndarray, "n 3"], joints: Joints, angles: Float[np.ndarray, " j"]
+) -> Float[np.ndarray, "n 3"]:
+    """Turn each point about each joint by its share of the joint's angle (Rodrigues)."""
+    for pivot, axis, angle, share in zip(joints.pivots, joints.axes, angles, joints.follows.T, strict=True):
+        arm = points - pivot
+        cosine, sine = np.cos(angle * share)[:, None], np.sin(angle * share)[:, None]
+        points = (
+            pivot
+            + cosine * arm
+            + sine * np.cross(axis, arm)
+            + (1 - cosine) * np.einsum("ni,i->n", arm, axis)[:, None] * axis
+        )
+    return points

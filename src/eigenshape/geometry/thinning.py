@@ -1,0 +1,72 @@
+"""Fewer vertices on a closed mesh of the same topology."""
+
+import heapq
+import math
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.topology import edge_table
+
+FEWEST, MOST = 4, 8  # neighbours that a collapse may leave a vertex with
+
+
+def thinned(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh:
+    """Collapse the shortest edges of a closed manifold into their middles until it has as many vertices as asked for.
+
+    An edge collapses only if its ends have two neighbours in common, so that the surface stays a manifold of the same
+    genus (the link condition: Dey, Edelsbrunner, Guha, Nekhayev 1999), and no vertex gets too few or too many
+    neighbours. Where no edge may collapse, vertices are left over.
+    """
+    points, edges = mesh.vertices.tolist(), edge_table(mesh).edges.tolist()
+    around: list[set[int]] = [set() for _ in points]
+    for one, two in edges:
+        around[one].add(two)
+        around[two].add(one)
+    shortest = [(math.dist(points[one], points[two]), one, two) for one, two in edges]
+    heapq.heapify(shortest)
+    target = list(range(mesh.n_vertices))
+    surplus = mesh.n_vertices - n_vertices
+    while surplus > 0 and shortest:
+        length, kept, gone = heapq.heappop(shortest)
+        out_of_date = gone not in around[kept] or length != math.dist(points[kept], points[gone])
+        if out_of_date or not _may_collapse(around, kept, gone):
+            continue
+        points[kept] = [(x + y) / 2 for x, y in zip(points[kept], points[gone], strict=True)]
+        target[gone] = kept
+        _join(around, kept, gone)
+        for other in sorted(around[kept]):
+            heapq.heappush(shortest, (math.dist(points[kept], points[other]), kept, other))
+        surplus -= 1
+    return _relabelled(np.array(points), mesh.faces, np.array(target))
+
+
+def _may_collapse(around: list[set[int]], kept: int, gone: int) -> bool:
+    common = around[kept] & around[gone]
+    return (
+        len(common) == 2
+        and FEWEST <= len(around[kept]) + len(around[gone]) - 4 <= MOST
+        and all(len(around[other]) > FEWEST for other in common)
+    )
+
+
+def _join(around: list[set[int]], kept: int, gone: int) -> None:
+    for other in around[gone]:
+        around[other].remove(gone)
+        if other != kept:
+            around[other].add(kept)
+            around[kept].add(other)
+    around[gone] = set()
+
+
+def _relabelled(
+    points: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"], target: Int[np.ndarray, " n"]
+) -> TriangleMesh:
+    """Let faces use what their corners have collapsed to, and drop those that have collapsed."""
+    while (target[target] != target).any():
+        target = target[target]
+    stays, number = np.unique(target, return_inverse=True)
+    corners = number[faces]
+    alive = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    return TriangleMesh(points[stays], corners[alive])
