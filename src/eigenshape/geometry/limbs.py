@@ -173,7 +173,7 @@ def _nearest_piece(
 
 
 def _products(one: Float[np.ndarray, "p 3"], two: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "p s"]:
-    # Not by a matrix product: the last digits of those depend on the number of threads.
+    # Not by a matrix product: nothing promises that its last digits are free of the number of threads.
     return np.einsum("pi,si->ps", one, two)
 
 
