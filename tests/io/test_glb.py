@@ -167,7 +167,7 @@ CASES = {
     "nothing": (packed({}), "A GLB file must hold triangles; it holds none"),
     "points": (packed(*primitive(0, 6)), "A GLB file must hold triangles; it holds none"),
     "five corners": (packed(*primitive(4, 5)), "Triangles must have three corners each; a primitive has 5 in all"),
-    "corner": (packed(*primitive(4, 6, [0, 1, 6, 0, 1, 2])), r"must be within 0\.\.5; index 2 is 6"),
+    "corner": (packed(*primitive(4, 6, [0, 1, 6, 0, 1, 2])), r"must be whole and within 0\.\.5; index 2 is 6"),
     "outside": (changed("buffers", 0, "uri", to="/etc/passwd"), r"buffers\[0\] points outside, to '/etc/passwd'"),
     "far": (changed("buffers", 0, "uri", to="http://x/y"), r"buffers\[0\] points outside, to 'http://x/y'"),
     "base64": (changed("buffers", 0, "uri", to="data:a;base64,?"), r"must be in base64; buffers\[0\] is not"),

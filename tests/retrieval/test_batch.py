@@ -103,12 +103,11 @@ def test_ctrl_c_ends_workers_that_hang(index, tmp_path):
     todo = items(tmp_path, a="1", b="hang")
 
     def interrupt_soon():
-        wait_for(tmp_path / "b.busy")
-        while not len(index):
-            time.sleep(0.01)
+        wait_until((tmp_path / "b.busy").exists)
+        wait_until(lambda: len(index))
         os.kill(os.getpid(), signal.SIGINT)
 
-    threading.Thread(target=interrupt_soon).start()
+    threading.Thread(target=interrupt_soon, daemon=True).start()
     with pytest.raises(KeyboardInterrupt):
         build(index, todo, timeout=600)
     with FileLock(tmp_path / "b.lock", timeout=20):  # let go by its death only
@@ -120,15 +119,17 @@ def test_workers_do_not_outlive_a_killed_batch(index, tmp_path):
     todo = items(tmp_path, a="hang")
     batch = multiprocessing.get_context("spawn").Process(target=build, args=(index, todo, 600.0))
     batch.start()
-    wait_for(tmp_path / "a.busy")
+    wait_until((tmp_path / "a.busy").exists)
     batch.kill()
     batch.join()
     with FileLock(tmp_path / "a.lock", timeout=20):
         assert len(index) == 0
 
 
-def wait_for(path):
-    while not path.exists():
+def wait_until(happens):
+    deadline = time.monotonic() + 120
+    while not happens():
+        assert time.monotonic() < deadline
         time.sleep(0.01)
 
 

@@ -1,4 +1,4 @@
-"""What processes of the tests do with an index until they are killed."""
+"""What processes of the tests do with an index until they are killed, telling the number of each step that is done."""
 
 import itertools
 
@@ -7,23 +7,26 @@ from describers import descriptor
 from eigenshape.retrieval.index import ShapeIndex
 
 
-def add_shapes(folder, ready):
+def add_shapes(folder, done):
     index = ShapeIndex.open(folder)
     start = len(index)
-    ready.send("ready")
+    done.send(start - 1)
     for number in itertools.count(start):
         index.add(f"shape-{number:05}", [descriptor(number)], digest=str(number))
+        done.send(number)
 
 
-def replace_a_shape(folder, ready):
+def replace_a_shape(folder, done):
     index = ShapeIndex.open(folder)
     start = int(index.records()[0].digest)
-    ready.send("ready")
+    done.send(start)
     for number in itertools.count(start + 1):
         index.add("one", [descriptor(number)], digest=str(number), replace=True)
+        done.send(number)
 
 
-def create_many(folder, ready):
-    ready.send("ready")
+def create_many(folder, done):
+    done.send(-1)  # of the folders that are there, the last may be another's half
     for number in itertools.count(len(list(folder.iterdir()))):
         ShapeIndex.create(folder / str(number))
+        done.send(number)

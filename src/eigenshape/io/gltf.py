@@ -37,7 +37,9 @@ class Gltf:
         entries = _list(self.tree, kind)
         known = type(index) is int and 0 <= index < len(entries)
         if not known or not isinstance(entries[index], dict):
-            raise FileFormatError(f"A GLB file must hold what it names; it names {kind}[{index}] and holds none.")
+            raise FileFormatError(
+                f"A GLB file must hold what it names; it names {kind}[{ascii(index)[:60]}] and holds none."
+            )
         return entries[index]
 
 
@@ -164,13 +166,14 @@ def _faces(gltf: Gltf, part: dict[str, Any], n_vertices: int) -> np.ndarray:
     mode = _whole(part, "mode", TRIANGLES)
     if "indices" not in part:
         return _split(np.arange(n_vertices), mode)
-    corners = _accessor(gltf, part["indices"], 1)[:, 0].astype(np.int64)
-    bad = np.flatnonzero((corners < 0) | (corners >= n_vertices))
+    corners = _accessor(gltf, part["indices"], 1)[:, 0]
+    bad = np.flatnonzero(~((corners >= 0) & (corners < n_vertices) & (corners == np.floor(corners))))
     if bad.size:
         raise FileFormatError(
-            f"Indices of a primitive must be within 0..{n_vertices - 1}; index {bad[0]} is {corners[bad[0]]}."
+            f"Indices of a primitive must be whole and within 0..{n_vertices - 1}; index {bad[0]} is "
+            f"{corners[bad[0]]:.10g}."
         )
-    return _split(corners, mode)
+    return _split(corners.astype(np.int64), mode)
 
 
 def _split(corners: np.ndarray, mode: int) -> np.ndarray:
@@ -192,8 +195,8 @@ def _accessor(gltf: Gltf, index: Any, width: int) -> np.ndarray:
         raise FileFormatError(f"accessors[{index}] must be a plain list of {width} numbers each; it is not.")
     data, step = _view(gltf, accessor.get("bufferView"))
     row = kind.itemsize * width
-    step = step or row
     count, start = _whole(accessor, "count"), _whole(accessor, "byteOffset", 0)
+    step = step if step and count > 1 else row  # no step is taken between fewer than two rows
     if step < row or start + (count - 1) * step + row > len(data):
         raise FileFormatError(f"accessors[{index}] must lie in its buffer; {count} rows do not fit {len(data)} bytes.")
     rows = np.ndarray((count, width), kind, data, start, (step, kind.itemsize)).astype(np.float64)

@@ -18,7 +18,7 @@ AFTER_POSITION = re.compile(rb"(?<=\d)/\S*")  # a corner is position/texture/nor
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     """Read vertices and faces; polygons become fans."""
     if JOINT.search(data):
-        data = CONTINUED.sub(lambda match: JOINT.sub(b" ", match[0]), data)
+        data = CONTINUED.sub(_joined, data)
     positions: list[Line] = []
     polygons: list[Line] = []
     n_so_far: list[int] = []
@@ -33,6 +33,11 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     if not polygons:
         raise FileFormatError(f"An OBJ file must hold faces; it holds {len(vertices)} points and no face.")
     return vertices, _triangles(polygons, n_so_far)
+
+
+def _joined(match: re.Match[bytes]) -> bytes:
+    text, n_joints = JOINT.subn(b" ", match[0])
+    return text + b"\n" * n_joints  # lines that follow keep their numbers
 
 
 def _triangles(polygons: Sequence[Line], n_so_far: Sequence[int]) -> np.ndarray:

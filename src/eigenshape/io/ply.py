@@ -79,7 +79,7 @@ def _plain_table(rows: Sequence[Line], element: Element) -> Table | None:
         return None
     table, place = {}, 0
     for column in element.columns:
-        if place == values.shape[1]:
+        if place >= values.shape[1]:
             return None
         length = int(values[0, place]) if column.length_kind else 1
         if column.length_kind and (length < 0 or (values[:, place] != length).any()):

@@ -1,7 +1,8 @@
 """The header of a PLY file: which tables follow, and of which columns."""
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -75,7 +76,7 @@ def parse_header(data: bytes) -> Header:
 
 
 def _declarations(lines: list[bytes]) -> tuple[str, tuple[Element, ...]]:
-    order, elements = "", list[Element]()
+    order, last, counts, columns = "", "", dict[str, int](), dict[str, dict[str, Column]]()
     for number, line in enumerate(lines, 1):
         words = line.decode("latin-1").split() or ["comment"]
         try:
@@ -83,32 +84,40 @@ def _declarations(lines: list[bytes]) -> tuple[str, tuple[Element, ...]]:
                 case "format":
                     order = ORDERS[words[1]]
                 case "element":
-                    elements.append(_element(words, elements))
+                    last = words[1]
+                    _put_new(counts, last, _count(words[2]))
+                    columns[last] = {}
                 case "property":
-                    elements[-1] = _with_column(elements[-1], words)
+                    column = _column(words)
+                    _put_new(columns[last], column.name, column)
                 case other:
                     REMARKS.index(other)
         except (IndexError, KeyError, ValueError) as err:
             raise FileFormatError(
                 f"A PLY header must declare format, elements and properties; line {number} is {shown((number, line))}."
             ) from err
-    return order, tuple(elements)
+    return order, tuple(Element(name, count, tuple(columns[name].values())) for name, count in counts.items())
 
 
-def _element(words: list[str], before: list[Element]) -> Element:
-    if not words[2].isdecimal() or len(words[2]) > MOST_DIGITS or words[1] in (element.name for element in before):
+def _put_new(table: dict[str, Any], name: str, value: Any) -> None:
+    if name in table:
+        raise ValueError(name)
+    table[name] = value
+
+
+def _count(word: str) -> int:
+    if not word.isdecimal() or len(word) > MOST_DIGITS:
+        raise ValueError(word)
+    return int(word)
+
+
+def _column(words: list[str]) -> Column:
+    if words[1] != "list":
+        return Column(words[2], TYPES[words[1]])
+    column = Column(words[4], TYPES[words[3]], TYPES[words[2]])
+    if column.length_kind in ("f", "d"):
         raise ValueError(words)
-    return Element(words[1], int(words[2]))
-
-
-def _with_column(element: Element, words: list[str]) -> Element:
-    if words[1] == "list":
-        column = Column(words[4], TYPES[words[3]], TYPES[words[2]])
-    else:
-        column = Column(words[2], TYPES[words[1]])
-    if column.length_kind in ("f", "d") or column.name in (other.name for other in element.columns):
-        raise ValueError(words)
-    return replace(element, columns=(*element.columns, column))
+    return column
 
 
 def _require_room(elements: tuple[Element, ...], order: str, n_bytes: int) -> None:
