@@ -51,7 +51,8 @@ class Verbs(TyperGroup):
 
 def load_mesh(path: Path, repairs: str) -> TriangleMesh:
     """Read a mesh, apply the repairs that were asked for, and say on stderr what they did."""
-    done = repair(read_mesh(path), repair_names(repairs))
+    names = repair_names(repairs)
+    done = repair(read_mesh(path), names)
     for line in done.report:
         err.print(f"[yellow]repair:[/] {line}")
     return done.mesh

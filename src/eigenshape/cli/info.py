@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from rich.markup import escape
 
 from eigenshape.cli.console import JsonOption, MeshArgument, RepairOption, load_mesh, out, print_json
 from eigenshape.geometry.measure import bounding_box, degenerate_faces, edge_lengths, enclosed_volume, surface_area
@@ -25,7 +26,7 @@ def info(mesh: MeshArgument, *, repair: RepairOption = "", as_json: JsonOption =
     if as_json:
         print_json({"path": str(mesh), **facts})
         return
-    out.print(f"[bold]{mesh}[/]")
+    out.print(f"[bold]{escape(str(mesh))}[/]")
     for name, value in facts.items():
         out.print(f"  {name.replace('_', ' '):<24}{_shown(value)}")
 

@@ -81,7 +81,8 @@ def _write(
         save_figure(figure_spectrum(found.eigenvalues, area=area, shift=found.certificate.shift), plot)
         said(plot)
     if picture:
-        indices = range(1, min(len(found.eigenvalues), N_PICTURED + 1))
+        k = len(found.eigenvalues)
+        indices = range(min(1, k - 1), min(k, N_PICTURED + 1))
         save_figure(figure_eigenfunctions(surface, found, indices), picture)
         said(picture)
     if save:

@@ -1,0 +1,102 @@
+"""What every verb of the command line does with a bad file or a bad option."""
+
+import json
+import re
+
+import pytest
+from typer.testing import CliRunner
+
+from eigenshape.cli import app
+from eigenshape.geometry.creatures import make_creature
+from eigenshape.geometry.surfaces import icosphere
+from eigenshape.io.mesh_files import write_mesh
+
+VERBS = ["info", "spectrum", "features", "index", "query", "demo"]
+BROKEN = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n"
+
+
+def run(*arguments, code):
+    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    assert done.exit_code == code, done.output
+    return done
+
+
+@pytest.fixture(scope="module")
+def fish(tmp_path_factory):
+    path = tmp_path_factory.mktemp("fish") / "fish.off"
+    write_mesh(make_creature("fish", n_vertices=800), path)
+    return path
+
+
+@pytest.mark.parametrize("flag", ["--help", "-h"])
+@pytest.mark.parametrize("verb", VERBS)
+def test_help_of_every_verb_says_what_it_takes(verb, flag):
+    text = run(verb, flag, code=0).stdout
+    assert re.search(rf"Usage: .*{verb}", text)
+
+
+@pytest.mark.parametrize("verb", ["info", "spectrum", "features"])
+def test_a_broken_file_is_named_with_what_is_wrong_in_it(tmp_path, verb):
+    path = tmp_path / "broken.off"
+    path.write_text(BROKEN)
+    done = run(verb, path, "--json", code=1)
+    assert done.stdout == ""
+    assert done.stderr.startswith(f"error: {path}: faces must index vertices 0..2; face 0 is [0, 1, 7]")
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("spectrum", "{missing}", "--plot", "{folder}/a.bmp"), "A picture must end in .png, .svg, .pdf"),
+        (("spectrum", "{missing}", "--picture", "{folder}/a"), "A picture must end in .png, .svg, .pdf"),
+        (("spectrum", "{missing}", "--plot", "{missing}/a.png"), "A picture needs a folder to lie in"),
+        (("features", "{missing}", "--picture", "{folder}/a.bmp"), "A picture must end in .png, .svg, .pdf"),
+        (("features", "{missing}", "--preset", "best"), "--preset takes scale-free or thesis; it was given 'best'"),
+        (("query", "{missing}", "{missing}", "--sheet", "{folder}/a.bmp"), "A picture must end in .png, .svg, .pdf"),
+        (("index", "{missing}", "--db", "{folder}/db", "--preset", "best"), "--preset takes scale-free or thesis"),
+        (("index", "{missing}", "--db", "{folder}/db", "--repair", "all"), "it was given 'all'"),
+    ],
+)
+def test_a_bad_option_is_refused_before_any_file_is_looked_at(tmp_path, arguments, message):
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    done = run(*(text.format(missing=tmp_path / "missing.ply", folder=folder) for text in arguments), code=1)
+    assert done.stderr.startswith("error: ")
+    assert message in done.stderr
+    assert list(folder.iterdir()) == []
+
+
+@pytest.mark.parametrize(("suffix", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
+def test_pictures_of_every_kind_are_more_than_a_frame(fish, tmp_path, suffix, magic):
+    plot = tmp_path / f"plot.{suffix}"
+    done = run("spectrum", fish, "-k", 5, "--plot", plot, "--json", code=0)
+    assert plot.read_bytes().startswith(magic)
+    assert plot.stat().st_size > 5000
+    assert "wrote " in done.stderr
+    assert len(json.loads(done.stdout)["eigenvalues"]) == 5  # stdout stays JSON alone
+
+
+def test_index_names_the_broken_file_takes_the_rest_and_knows_it_again(fish, tmp_path):
+    folder = tmp_path / "shapes"
+    folder.mkdir()
+    write_mesh(icosphere(2), folder / "ball.ply")
+    (folder / "broken.off").write_text(BROKEN)
+    command = ("index", folder, fish, "--db", tmp_path / "db", "--workers", 1, "--views", 0)
+    first = run(*command, code=3)
+    assert "2 described, 0 known already, 1 not taken; the index holds 2 shapes" in first.stdout
+    assert "broken.off: faces must index vertices 0..2" in first.stdout
+    again = json.loads(run(*command, "--json", code=3).stdout)
+    assert (again["shapes"], again["added"], sorted(again["skipped"])) == (2, [], ["ball", "fish"])
+    (folder / "broken.off").unlink()
+    assert json.loads(run(*command, "--json", code=0).stdout)["failed"] == []
+    best = json.loads(run("query", tmp_path / "db", fish, "-n", 1, "--json", code=0).stdout)["matches"]
+    assert [match["name"] for match in best] == ["fish"]
+    done = run("query", tmp_path / "db", tmp_path / "none.ply", code=1)
+    assert done.stderr.startswith("error: ")
+    assert "none.ply" in done.stderr
+
+
+@pytest.mark.parametrize("verb", VERBS[:-1])
+def test_an_unknown_option_is_wrong_usage(verb):
+    assert "No such option" in run(verb, "--colour", code=2).output
