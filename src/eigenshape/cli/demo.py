@@ -35,9 +35,7 @@ Read next:
 
 def demo(
     *,
-    folder: Annotated[Path, typer.Option("--out", help="Folder for meshes, index and pictures.")] = Path(
-        "eigenshape-demo"
-    ),
+    folder: Annotated[Path, typer.Option("--out", help="Folder for meshes, index and pictures.")] = FOLDER,
     kind: Annotated[str, typer.Option(help=f"Creature to scan: {', '.join(CREATURES)}.")] = "biped",
     workers: WorkersOption = 2,
 ) -> None:

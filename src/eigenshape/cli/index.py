@@ -1,5 +1,6 @@
 """eigenshape index: describe folders of meshes and keep what they are known by."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -84,8 +85,7 @@ def describe_file(path: Path, *, recipe: Recipe, repairs: tuple[str, ...], n_vie
 
 def _items(sources: Sequence[Path]) -> list[Item]:
     items = [item for source in sources for item in _items_of(source)]
-    names = [item.name for item in items]
-    double = next((name for place, name in enumerate(names) if name in names[:place]), None)
+    double = next((name for name, count in Counter(item.name for item in items).items() if count > 1), None)
     if double is not None:
         raise InvalidParameterError(f"Names of shapes must differ; {double!r} comes twice. Give one common folder.")
     if not items:

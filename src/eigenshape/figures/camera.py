@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape.geometry.measure import face_area_vectors, unit_scaled
+from eigenshape.geometry.measure import area_vectors, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
 
 Up = Literal["auto", "x", "y", "z"]
@@ -53,7 +53,7 @@ def three_quarter_view(mesh: TriangleMesh, *, up: Up = "y", size: int = 600) -> 
 
 def _standing_axis(mesh: TriangleMesh) -> Literal["y", "z"]:
     points = unit_scaled(mesh)[0]
-    areas = np.linalg.norm(face_area_vectors(points, mesh.faces), axis=1)
+    areas = np.linalg.norm(area_vectors(points[mesh.faces]), axis=1)
     weights = areas / max(areas.sum(), np.finfo(np.float64).tiny)
     centre = weights @ points[mesh.faces].mean(axis=1)
     return "z" if _stands(points - centre, 2) and not _stands(points - centre, 1) else "y"
@@ -70,7 +70,7 @@ def _stands(points: Float[np.ndarray, "n 3"], axis: int) -> bool:
 
 def _facing(mesh: TriangleMesh) -> Float[np.ndarray, "3"] | None:
     """Return the mean normal of an open surface that mostly faces one way."""
-    vectors = face_area_vectors(unit_scaled(mesh)[0], mesh.faces)
+    vectors = area_vectors(unit_scaled(mesh)[0][mesh.faces])
     mean = vectors.sum(axis=0) / max(np.linalg.norm(vectors, axis=1).sum(), np.finfo(np.float64).tiny)
     return mean if np.linalg.norm(mean) > ONE_WAY else None
 

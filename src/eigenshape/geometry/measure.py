@@ -57,11 +57,6 @@ def in_length(values: Float[np.ndarray, "..."], scale: float, power: int) -> Flo
     return np.ldexp(values, exponent)
 
 
-def face_area_vectors(points: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"]) -> Float[np.ndarray, "f 3"]:
-    """Return for each face its normal times its area, in the unit of `points` squared."""
-    return area_vectors(points[faces])
-
-
 def area_vectors(corners: Float[np.ndarray, "f 3 3"]) -> Float[np.ndarray, "f 3"]:
     """Return for each triple of corners their normal times their area."""
     a, b, c = corners.transpose(1, 0, 2)

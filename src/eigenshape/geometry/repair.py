@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Int
+from jaxtyping import Bool, Int
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
@@ -99,13 +99,19 @@ def drop_unreferenced(mesh: TriangleMesh) -> Repaired:
 
 def largest_component(mesh: TriangleMesh) -> Repaired:
     """Keep the connected component with the most area; of equal ones, the one with the lowest vertex."""
-    count, labels = vertex_components(mesh)
-    of_face = np.unique(labels[mesh.faces[:, 0]], return_inverse=True)[1]
-    areas = np.linalg.norm(area_vectors(scaled_corners(mesh)[0]), axis=1)
-    keep = of_face == np.argmax(np.bincount(of_face, weights=areas))
+    count, _ = vertex_components(mesh)
+    keep = faces_of_largest(mesh)
     kept, source = submesh(mesh, keep)
     report = f"largest_component removed {count - 1} components with {int((~keep).sum())} faces"
     return Repaired(kept, (report,), source)
+
+
+def faces_of_largest(mesh: TriangleMesh) -> Bool[np.ndarray, " f"]:
+    """Mark the faces of the component that `largest_component` keeps."""
+    _, labels = vertex_components(mesh)
+    of_face = np.unique(labels[mesh.faces[:, 0]], return_inverse=True)[1]
+    areas = np.linalg.norm(area_vectors(scaled_corners(mesh)[0]), axis=1)
+    return np.asarray(of_face == np.argmax(np.bincount(of_face, weights=areas)))
 
 
 REPAIRS: dict[str, Callable[[TriangleMesh], Repaired]] = {

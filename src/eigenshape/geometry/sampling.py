@@ -8,10 +8,11 @@ from numpy.typing import ArrayLike
 
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape.geometry.measure import face_areas, unit_scaled, vertex_normals
+from eigenshape.geometry.measure import unit_scaled, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.raster import rasterize
-from eigenshape.geometry.topology import submesh, vertex_components
+from eigenshape.geometry.repair import faces_of_largest
+from eigenshape.geometry.topology import submesh
 
 SLACK = 1.5  # pixels that a vertex may lie off the place where the surface was seen
 STEEPEST = 10.0  # slope up to which that may hide it behind its own surface
@@ -68,19 +69,9 @@ def partial_scan(
     whole_number(resolution, "resolution", 16, 8192)
     visible = _visible_vertices(mesh, _direction(view), resolution)
     keep = visible[mesh.faces].all(axis=1)
-    if not all_pieces:
-        keep = _largest_piece(mesh, keep)
+    if keep.any() and not all_pieces:
+        keep[keep] = faces_of_largest(TriangleMesh(mesh.vertices, mesh.faces[keep]))
     return _kept(mesh, keep, "No face is visible as a whole from there.")
-
-
-def _largest_piece(mesh: TriangleMesh, keep: Bool[np.ndarray, " f"]) -> Bool[np.ndarray, " f"]:
-    if not keep.any():
-        return keep
-    seen = TriangleMesh(mesh.vertices, mesh.faces[keep])
-    _, labels = vertex_components(seen)
-    piece = labels[mesh.faces[:, 0]]
-    areas = np.bincount(piece[keep], weights=face_areas(mesh)[keep])
-    return np.asarray(keep & (piece == np.argmax(areas)))
 
 
 def viewpoint(number: int) -> Float[np.ndarray, "3"]:
