@@ -155,12 +155,8 @@ def writing(folder: Path) -> Iterator[sqlite3.Connection]:
             database.execute("PRAGMA foreign_keys = ON")
             database.execute("PRAGMA synchronous = FULL")
             database.execute("BEGIN IMMEDIATE")
-            try:
-                yield database
-                database.execute("COMMIT")
-            except BaseException:
-                database.execute("ROLLBACK")
-                raise
+            yield database
+            database.execute("COMMIT")  # whatever ends the block before, closing rolls back
     except sqlite3.Error as err:
         raise StoreError(f"{folder / DATABASE} must be a writable index; {err}.") from err
 
