@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 
 SINGULAR = {"vertices": "vertex", "faces": "face", "points": "point", "simplices": "simplex"}
+INDEXED = {"faces": "vertices", "simplices": "points"}
 
 ArrayT = TypeVar("ArrayT", bound=NDArray[Any])
 
@@ -20,8 +21,11 @@ def frozen(array: ArrayT) -> ArrayT:
     return copy  # type: ignore[return-value]
 
 
-def finite_rows(value: ArrayLike, name: str, columns: int) -> NDArray[np.float64]:
-    """Return `value` as an (n, columns) float64 array, refusing anything not finite by index and value."""
+def finite_rows(value: ArrayLike, name: str, columns: int | None = None) -> NDArray[np.float64]:
+    """Return `value` as an (n, columns) float64 array, refusing anything not finite by index and value.
+
+    Any number of columns serves where none is given.
+    """
     rows = _table(value, name, columns)
     if rows.dtype.kind not in "iuf":
         raise InvalidShapeError(f"{name} must be real numbers; the type is {rows.dtype}.")
@@ -35,7 +39,7 @@ def finite_rows(value: ArrayLike, name: str, columns: int) -> NDArray[np.float64
     return rows
 
 
-def index_rows(value: ArrayLike, name: str, columns: int, n_vertices: int) -> NDArray[np.int64]:
+def index_rows(value: ArrayLike, name: str, columns: int | None, n_vertices: int) -> NDArray[np.int64]:
     """Return `value` as (f, columns) int64 indices below `n_vertices`, refusing the first bad row."""
     rows = _table(value, name, columns)
     huge = rows.dtype.kind == "O" and all(isinstance(entry, int | np.integer) for entry in rows.flat)
@@ -46,20 +50,22 @@ def index_rows(value: ArrayLike, name: str, columns: int, n_vertices: int) -> ND
         raise InvalidShapeError(f"{name} must be whole numbers; {fact}.")
     outside = (rows < 0) | (rows >= n_vertices)
     if outside.any():
-        raise InvalidShapeError(f"{name} must index vertices 0..{n_vertices - 1}; {_first(name, rows, outside)}.")
+        indexed = INDEXED[name]
+        raise InvalidShapeError(f"{name} must index {indexed} 0..{n_vertices - 1}; {_first(name, rows, outside)}.")
     return rows.astype(np.int64)
 
 
-def _table(value: ArrayLike, name: str, columns: int) -> NDArray[Any]:
+def _table(value: ArrayLike, name: str, columns: int | None) -> NDArray[Any]:
+    wanted = f"(n, {columns or 'd'})"
     try:
         rows = np.asarray(value)
     except ValueError as err:
-        raise InvalidShapeError(f"{name} must have shape (n, {columns}); the rows differ in length.") from err
+        raise InvalidShapeError(f"{name} must have shape {wanted}; the rows differ in length.") from err
     if rows.size == 0:
-        return np.empty((0, columns), dtype=np.int64)
-    if rows.ndim != 2 or rows.shape[1] != columns:
+        return np.empty((0, columns or 0), dtype=np.int64)
+    if rows.ndim != 2 or columns not in (None, rows.shape[1]):
         hint = " Transpose it." if rows.ndim == 2 and rows.shape[0] == columns else ""
-        raise InvalidShapeError(f"{name} must have shape (n, {columns}); the shape is {rows.shape}.{hint}")
+        raise InvalidShapeError(f"{name} must have shape {wanted}; the shape is {rows.shape}.{hint}")
     return rows
 
 

@@ -5,7 +5,8 @@ from threadpoolctl import threadpool_limits
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry import creatures
 from eigenshape.geometry.creatures import CREATURES, make_creature
-from eigenshape.geometry.measure import degenerate_faces, edge_lengths, enclosed_volume
+from eigenshape.geometry.measure import edge_lengths, enclosed_volume
+from eigenshape.geometry.simplices import degenerate_simplices
 from eigenshape.geometry.topology import (
     euler_characteristic,
     inconsistent_edges,
@@ -63,7 +64,7 @@ def test_the_skin_is_one_closed_sphere_that_faces_outward(kind, n_vertices, indi
 @each_kind
 def test_triangles_are_even(kind):
     mesh = make_creature(kind, n_vertices=N)
-    assert degenerate_faces(mesh).size == 0
+    assert degenerate_simplices(mesh).size == 0
     assert np.percentile(least_angles(mesh), 1) > 20
     low, high = np.percentile(edge_lengths(mesh) / edge_lengths(mesh).mean(), [1, 99])
     assert low > 0.4

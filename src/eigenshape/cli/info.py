@@ -6,8 +6,9 @@ import numpy as np
 from rich.markup import escape
 
 from eigenshape.cli.console import JsonOption, MeshArgument, RepairOption, load_mesh, out, print_json
-from eigenshape.geometry.measure import bounding_box, degenerate_faces, edge_lengths, enclosed_volume, surface_area
+from eigenshape.geometry.measure import bounding_box, edge_lengths, enclosed_volume, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import degenerate_simplices
 from eigenshape.geometry.topology import (
     boundary_loops,
     euler_characteristic,
@@ -56,7 +57,7 @@ def _faults(mesh: TriangleMesh) -> dict[str, Any]:
     n_distinct = len(np.unique(np.sort(mesh.faces, axis=1), axis=0))
     n_places = len(np.unique(mesh.vertices + 0.0, axis=0))
     faults = {
-        "faces_without_area": len(degenerate_faces(mesh)),
+        "faces_without_area": len(degenerate_simplices(mesh)),
         "duplicate_faces": mesh.n_faces - n_distinct,
         "loose_vertices": len(unreferenced_vertices(mesh)),
         "coinciding_vertices": mesh.n_vertices - n_places,

@@ -55,5 +55,25 @@ class TriangleMesh:
         """Number of triangles, f."""
         return len(self.faces)
 
+    @property
+    def points(self) -> Float[np.ndarray, "n 3"]:
+        """The vertices, by the name that they have in meshes of any dimension."""
+        return self.vertices
+
+    @property
+    def simplices(self) -> Int[np.ndarray, "f 3"]:
+        """The faces, by the name that they have in meshes of any dimension."""
+        return self.faces
+
+    @property
+    def n_points(self) -> int:
+        """Number of vertices, n."""
+        return len(self.vertices)
+
+    @property
+    def dim(self) -> int:
+        """Dimension of a surface, 2."""
+        return 2
+
     def __repr__(self) -> str:
         return f"TriangleMesh({self.n_vertices} vertices, {self.n_faces} faces)"

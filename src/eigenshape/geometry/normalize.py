@@ -8,8 +8,9 @@ from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.distance import cdist
 
 from eigenshape._errors import InvalidShapeError
-from eigenshape.geometry.measure import area_vectors, degenerate_faces, unit_scaled
+from eigenshape.geometry.measure import area_vectors, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import degenerate_simplices
 
 Points = Float[np.ndarray, "n 3"]
 
@@ -33,7 +34,7 @@ def normalize_area(mesh: TriangleMesh) -> TriangleMesh:
     InvalidShapeError
         If no face has area.
     """
-    sound = np.delete(mesh.faces, degenerate_faces(mesh), axis=0)
+    sound = np.delete(mesh.faces, degenerate_simplices(mesh), axis=0)
     return _resized(mesh, lambda points: float(np.linalg.norm(area_vectors(points[sound]), axis=1).sum()) ** 0.5)
 
 

@@ -10,8 +10,9 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.geometry.measure import area_vectors, degenerate_faces, scaled_corners, unit_scaled
+from eigenshape.geometry.measure import area_vectors, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import degenerate_simplices, scaled_corners
 from eigenshape.geometry.topology import submesh, unreferenced_vertices, vertex_components
 
 
@@ -74,7 +75,7 @@ def _groups(mesh: TriangleMesh, tolerance: float) -> Int[np.ndarray, " n"]:
 def drop_degenerate(mesh: TriangleMesh) -> Repaired:
     """Remove faces without area; their vertices stay."""
     keep = np.ones(mesh.n_faces, dtype=bool)
-    keep[degenerate_faces(mesh)] = False
+    keep[degenerate_simplices(mesh)] = False
     return _kept(mesh, keep, "drop_degenerate", "faces without area")
 
 

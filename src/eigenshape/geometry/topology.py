@@ -8,6 +8,7 @@ from jaxtyping import Bool, Int
 from scipy.sparse.csgraph import connected_components
 
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplicial import Mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,19 +46,28 @@ def half_edges(mesh: TriangleMesh) -> Int[np.ndarray, "s 2"]:
     return np.concatenate([np.column_stack(side) for side in ((b, c), (c, a), (a, b))])
 
 
-def vertex_components(mesh: TriangleMesh) -> tuple[int, Int[np.ndarray, " n"]]:
-    """Count the connected components and number each vertex with its own; a loose vertex is one by itself."""
-    sides = half_edges(mesh)
-    graph = sp.coo_array((np.ones(len(sides), dtype=np.int8), sides.T), shape=(mesh.n_vertices,) * 2)
+def vertex_components(mesh: Mesh) -> tuple[int, Int[np.ndarray, " n"]]:
+    """Count the connected components and number each point with its own; a loose point is one by itself."""
+    corners = mesh.simplices
+    ends = np.column_stack([np.repeat(corners[:, 0], mesh.dim), corners[:, 1:].ravel()])
+    graph = sp.coo_array((np.ones(len(ends), dtype=np.int8), ends.T), shape=(mesh.n_points,) * 2)
     count, labels = connected_components(graph, directed=False)
     return int(count), labels.astype(np.int64)
 
 
-def unreferenced_vertices(mesh: TriangleMesh) -> Int[np.ndarray, " k"]:
-    """Return the vertices that no face uses."""
-    used = np.zeros(mesh.n_vertices, dtype=bool)
-    used[mesh.faces] = True
+def unreferenced_vertices(mesh: Mesh) -> Int[np.ndarray, " k"]:
+    """Return the points that no simplex uses."""
+    used = np.zeros(mesh.n_points, dtype=bool)
+    used[mesh.simplices] = True
     return np.flatnonzero(~used)
+
+
+def boundary_vertices(mesh: Mesh) -> Int[np.ndarray, " k"]:
+    """Return the points on the boundary: the corners of facets that one simplex alone has, in ascending order."""
+    corners = range(mesh.dim + 1)
+    facets = np.concatenate([np.delete(mesh.simplices, corner, axis=1) for corner in corners])
+    once, counts = np.unique(np.sort(facets, axis=1), axis=0, return_counts=True)
+    return np.unique(once[counts == 1])
 
 
 def boundary_edges(mesh: TriangleMesh) -> Int[np.ndarray, "b 2"]:

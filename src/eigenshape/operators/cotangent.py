@@ -7,8 +7,9 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape.geometry.measure import area_vectors, in_length, require_areas, scaled_corners
+from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import in_length, require_volumes, scaled_corners
 from eigenshape.geometry.topology import unreferenced_vertices
 from eigenshape.operators.laplacian import Laplacian
 
@@ -43,7 +44,7 @@ def cotangent_laplacian(mesh: TriangleMesh, mass: Mass = "lumped") -> Laplacian:
         If `mass` is none of the three.
     """
     _require_mass(mass)
-    require_areas(mesh)
+    require_volumes(mesh)
     _require_faces_everywhere(mesh)
     corners, scale = scaled_corners(mesh)
     areas = np.linalg.norm(area_vectors(corners), axis=1)

@@ -10,6 +10,32 @@ from eigenshape._errors import InvalidParameterError
 ASYMMETRY = 1e-12  # relative to the largest entry: what rounding may leave
 
 
+@dataclass(frozen=True)
+class GaussianKernel:
+    """The Gaussian kernel exp(-|x - y|²/4t) / (4πt)^{m/2} that an operator was built with.
+
+    Such an operator stands for (1 - e^{-tΔ})/t, exactly so on flat space: its eigenvalue for λ is (1 - e^{-tλ})/t.
+
+    Attributes
+    ----------
+    t : float
+        Heat time, in length².
+    edge_factor : float
+        h / e: the width h = 2√t over the mean edge length e, on points the mean distance of nearest neighbours.
+    corrected : bool
+        Whether solvers report λ = -log(1 - t μ)/t for an eigenvalue μ of the pencil, which takes that bias away.
+    """
+
+    t: float
+    edge_factor: float
+    corrected: bool
+
+    @property
+    def width(self) -> float:
+        """H = 2√t, in length."""
+        return 2 * self.t**0.5
+
+
 @dataclass(frozen=True, eq=False)
 class Laplacian:
     """A discrete Laplace operator L = B⁻¹W, positive, as the pencil (W, B).
@@ -23,6 +49,8 @@ class Laplacian:
     mass : (n, n) sparse
         B: symmetric, positive definite, in length^m; diagonal where it is lumped. Functions f and g have the
         inner product fᵀBg (thesis eq. 1.2).
+    kernel : GaussianKernel, optional
+        What operators made from a Gaussian kernel keep of it.
 
     Raises
     ------
@@ -33,6 +61,7 @@ class Laplacian:
 
     stiffness: sp.csr_array
     mass: sp.csr_array
+    kernel: GaussianKernel | None = None
 
     def __post_init__(self) -> None:
         for name in ("stiffness", "mass"):

@@ -1,0 +1,53 @@
+"""A point cloud is a value: points of a hidden manifold whose dimension is known."""
+
+from dataclasses import dataclass
+from typing import SupportsIndex, TypeAlias
+
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from eigenshape._arrays import finite_rows, frozen, whole_number
+from eigenshape._errors import InvalidShapeError
+from eigenshape.geometry.simplicial import Mesh
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class PointCloud:
+    """Points in R^d that sample a manifold of dimension m.
+
+    Parameters
+    ----------
+    points : (n, d) float
+        Coordinates, in any length unit. Copied, then read-only.
+    dim : int
+        m, 1 to d; 2 for the scan of a surface.
+
+    Raises
+    ------
+    InvalidShapeError
+        If there is no point, or a coordinate is not finite.
+    InvalidParameterError
+        If `dim` is not in 1..d.
+    """
+
+    points: Float[np.ndarray, "n d"]
+    dim: int
+
+    def __init__(self, points: ArrayLike, dim: SupportsIndex = 2) -> None:
+        coordinates = finite_rows(points, "points")
+        if not coordinates.size:
+            raise InvalidShapeError("A point cloud must have points; it has none.")
+        object.__setattr__(self, "dim", whole_number(dim, "dim", 1, coordinates.shape[1]))
+        object.__setattr__(self, "points", frozen(coordinates))
+
+    @property
+    def n_points(self) -> int:
+        """Number of points, n."""
+        return len(self.points)
+
+    def __repr__(self) -> str:
+        return f"PointCloud({self.n_points} points in R^{self.points.shape[1]}, dim={self.dim})"
+
+
+Shape: TypeAlias = Mesh | PointCloud

@@ -1,0 +1,127 @@
+"""Volumes of simplices in any dimension and codimension, right at any scale of the coordinates."""
+
+from math import factorial
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from eigenshape._errors import InvalidShapeError
+from eigenshape.geometry.simplicial import Mesh
+
+# A simplex thinner than this, volume over that of a cube on its longest side, is flat as far as rounding can tell.
+THINNEST = 1e-14
+# Powers of two up to which areas and volumes are handed out: beyond, sums overflow or small simplices lose digits.
+LARGEST_EXPONENT = 1000
+MEASURES = {
+    1: ("Segments", "segment", "length"),
+    2: ("Faces", "face", "area"),
+    3: ("Tetrahedra", "tetrahedron", "volume"),
+}
+
+
+def scaled_corners(mesh: Mesh) -> tuple[Float[np.ndarray, "s corners d"], float]:
+    """Return the corners of each simplex, divided by a power of two that brings them to size 1, and that power.
+
+    Nothing is moved: what is measured between corners depends on them alone, to the last digit, and not on the order
+    of the vertices, nor on those that no simplex uses.
+    """
+    return size_one(mesh.points[mesh.simplices])
+
+
+def size_one(coordinates: Float[np.ndarray, "..."]) -> tuple[Float[np.ndarray, "..."], float]:
+    """Return coordinates divided by a power of two that brings the largest to size 1, and that power."""
+    largest = np.abs(coordinates).max()
+    # One below the exponent of frexp, so that the largest of all numbers has a power too.
+    scale = float(2.0 ** (np.frexp(largest)[1] - 1)) if largest > 0 else 1.0
+    return coordinates / scale, scale
+
+
+def in_length(values: Float[np.ndarray, "..."], scale: float, power: int) -> Float[np.ndarray, "..."]:
+    """Return values times scale to a power ≥ 1; `scale` is a power of two.
+
+    Raises
+    ------
+    InvalidShapeError
+        If floats cannot hold lengths to that power.
+    """
+    exponent = power * (int(np.frexp(scale)[1]) - 1)
+    if abs(exponent) > LARGEST_EXPONENT:
+        noun = {1: "lengths", 2: "areas", 3: "volumes"}.get(power, f"{power}-volumes")
+        raise InvalidShapeError(
+            f"To measure {noun} the largest coordinate must lie within "
+            f"1e-{301 // power}..1e{301 // power}; it is about {scale:.0e}. Choose another unit, or normalize_box."
+        )
+    return np.ldexp(values, exponent)
+
+
+def triangular_sides(corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndarray, "s m m"]:
+    """Return the sides from corner 0 of each simplex in an orthonormal basis of its own, upper triangular.
+
+    Column i is the side to corner i + 1. RᵀR is the Gram matrix of the sides; the factor keeps the digits that
+    forming that matrix would lose.
+    """
+    sides = corners[:, 1:] - corners[:, :1]
+    triangles: Float[np.ndarray, "s m m"] = np.linalg.qr(sides.transpose(0, 2, 1), mode="r")
+    return triangles
+
+
+def volumes(corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndarray, " s"]:
+    """Return the m-volume of each simplex, √det(Gram matrix of its sides) / m!."""
+    triangles = triangular_sides(corners)
+    return np.abs(np.einsum("sii->si", triangles)).prod(axis=1) / factorial(triangles.shape[1])
+
+
+def simplex_volumes(mesh: Mesh) -> Float[np.ndarray, " s"]:
+    """Return the m-volume of each simplex, in length^m."""
+    corners, scale = scaled_corners(mesh)
+    return in_length(volumes(corners), scale, mesh.dim)
+
+
+def dual_volumes(mesh: Mesh) -> Float[np.ndarray, " n"]:
+    """Return A_j = 1/(m+1) of the volume of the simplices at each point, in length^m (thesis 2.1)."""
+    return at_points(mesh, simplex_volumes(mesh) / (mesh.dim + 1))
+
+
+def at_points(mesh: Mesh, values: Float[np.ndarray, " s"]) -> Float[np.ndarray, " n"]:
+    """Sum at each point a number of each of its simplices."""
+    corners = mesh.simplices.shape[1]
+    return np.bincount(mesh.simplices.ravel(), weights=np.repeat(values, corners), minlength=mesh.n_points)
+
+
+def mean_side_length(mesh: Mesh) -> float:
+    """Return e, the mean length of the sides of all simplices: a side that two share counts twice, in length."""
+    corners, scale = scaled_corners(mesh)
+    first, second = np.triu_indices(corners.shape[1], 1)
+    lengths = np.linalg.norm(corners[:, first] - corners[:, second], axis=2)
+    return float(in_length(lengths.mean(keepdims=True), scale, 1)[0, 0])
+
+
+def degenerate_simplices(mesh: Mesh) -> Int[np.ndarray, " k"]:
+    """Return the simplices without volume: at most 1e-14 of the cube on their longest side."""
+    corners, _ = scaled_corners(mesh)
+    first, second = np.triu_indices(corners.shape[1], 1)
+    longest = np.linalg.norm(corners[:, first] - corners[:, second], axis=2).max(axis=1)
+    return np.flatnonzero(factorial(mesh.dim) * volumes(corners) <= THINNEST * longest**mesh.dim)
+
+
+def require_volumes(mesh: Mesh) -> None:
+    """Refuse a mesh with a simplex that has no volume, naming the first.
+
+    Raises
+    ------
+    InvalidShapeError
+        With the index, corners and number of such simplices.
+    """
+    flat = degenerate_simplices(mesh)
+    all_of, one, measure = MEASURES.get(mesh.dim, ("Simplices", "simplex", "volume"))
+    if flat.size == len(mesh.simplices):
+        raise InvalidShapeError(
+            f"{all_of} must have {measure}; all {flat.size} have none: their points are equal or "
+            f"{'on a line' if mesh.dim == 2 else 'in a flat of lower dimension'}."
+        )
+    if flat.size:
+        corners = mesh.simplices[flat[0]]
+        raise InvalidShapeError(
+            f"{all_of} must have {measure}; {one} {flat[0]} is {corners.tolist()} with corners "
+            f"{mesh.points[corners].tolist()} ({flat.size} such). Repair with drop_degenerate."
+        )

@@ -1,0 +1,75 @@
+"""A simplicial mesh of any dimension is a value: checked once, then read-only."""
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy.typing import ArrayLike
+
+from eigenshape._arrays import finite_rows, frozen, index_rows
+from eigenshape._errors import InvalidShapeError
+from eigenshape.geometry.mesh import TriangleMesh
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class SimplicialMesh:
+    """Points in R^d and the m-simplices between them: segments, triangles, tetrahedra and so on, of any codimension.
+
+    What is checked here is structure, as in `TriangleMesh`; whether each simplex has volume is asked by whoever
+    needs it.
+
+    Parameters
+    ----------
+    points : (n, d) float
+        Coordinates, in any length unit, d ≥ 1. Copied, then read-only.
+    simplices : (s, m+1) int
+        Corners of each simplex, 1 ≤ m ≤ d. Copied, then read-only.
+
+    Raises
+    ------
+    InvalidShapeError
+        If an array has the wrong shape or is empty, m is not in 1..d, a coordinate is not finite, or a simplex does
+        not index `points`; the message names the first row at fault.
+    """
+
+    points: Float[np.ndarray, "n d"]
+    simplices: Int[np.ndarray, "s corners"]
+
+    def __init__(self, points: ArrayLike, simplices: ArrayLike) -> None:
+        coordinates = finite_rows(points, "points")
+        if not coordinates.size:
+            raise InvalidShapeError("A mesh must have points; it has none.")
+        corners = index_rows(simplices, "simplices", None, len(coordinates))
+        if not corners.size:
+            raise InvalidShapeError(f"A mesh must have simplices; it has {len(coordinates)} points and no simplex.")
+        dim, ambient = corners.shape[1] - 1, coordinates.shape[1]
+        if not 1 <= dim <= ambient:
+            raise InvalidShapeError(
+                f"Simplices in R^{ambient} must have dimension 1..{ambient}; these have {dim + 1} corners, which is "
+                f"dimension {dim}."
+            )
+        object.__setattr__(self, "points", frozen(coordinates))
+        object.__setattr__(self, "simplices", frozen(corners))
+
+    @property
+    def n_points(self) -> int:
+        """Number of points, n."""
+        return len(self.points)
+
+    @property
+    def n_simplices(self) -> int:
+        """Number of simplices, s."""
+        return len(self.simplices)
+
+    @property
+    def dim(self) -> int:
+        """Dimension m of the simplices."""
+        return int(self.simplices.shape[1]) - 1
+
+    def __repr__(self) -> str:
+        where = f"{self.n_points} points in R^{self.points.shape[1]}"
+        return f"SimplicialMesh({where}, {self.n_simplices} simplices of dimension {self.dim})"
+
+
+Mesh: TypeAlias = TriangleMesh | SimplicialMesh
