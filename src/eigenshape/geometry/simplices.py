@@ -61,7 +61,7 @@ def triangular_sides(corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndar
     forming that matrix would lose.
     """
     sides = corners[:, 1:] - corners[:, :1]
-    triangles: Float[np.ndarray, "s m m"] = np.linalg.qr(sides.transpose(0, 2, 1), mode="r")
+    triangles: Float[np.ndarray, "s m m"] = np.linalg.qr(sides.transpose(0, 2, 1), mode="r")  # type: ignore[assignment]
     return triangles
 
 
