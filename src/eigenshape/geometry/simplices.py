@@ -37,7 +37,7 @@ def size_one(coordinates: Float[np.ndarray, "..."]) -> tuple[Float[np.ndarray, "
 
 
 def in_length(values: Float[np.ndarray, "..."], scale: float, power: int) -> Float[np.ndarray, "..."]:
-    """Return values times scale to a power ≥ 1; `scale` is a power of two.
+    """Return values times scale to a whole power; `scale` is a power of two.
 
     Raises
     ------
@@ -47,9 +47,10 @@ def in_length(values: Float[np.ndarray, "..."], scale: float, power: int) -> Flo
     exponent = power * (int(np.frexp(scale)[1]) - 1)
     if abs(exponent) > LARGEST_EXPONENT:
         noun = {1: "lengths", 2: "areas", 3: "volumes"}.get(power, f"{power}-volumes")
+        most = 301 // abs(power)
         raise InvalidShapeError(
-            f"To measure {noun} the largest coordinate must lie within "
-            f"1e-{301 // power}..1e{301 // power}; it is about {scale:.0e}. Choose another unit, or normalize_box."
+            f"To measure {noun} the largest coordinate must lie within 1e-{most}..1e{most}; it is about {scale:.0e}. "
+            "Choose another unit, or normalize_box."
         )
     return np.ldexp(values, exponent)
 

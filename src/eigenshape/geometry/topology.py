@@ -7,6 +7,7 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Int
 from scipy.sparse.csgraph import connected_components
 
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
 
@@ -60,6 +61,23 @@ def unreferenced_vertices(mesh: Mesh) -> Int[np.ndarray, " k"]:
     used = np.zeros(mesh.n_points, dtype=bool)
     used[mesh.simplices] = True
     return np.flatnonzero(~used)
+
+
+def require_simplices_everywhere(mesh: Mesh) -> None:
+    """Refuse a mesh with a point that no simplex uses, naming the first.
+
+    Raises
+    ------
+    InvalidShapeError
+        With the index, coordinates and number of such points.
+    """
+    loose = unreferenced_vertices(mesh)
+    if loose.size:
+        point, simplex = ("vertex", "face") if mesh.dim == 2 else ("point", "simplex")
+        raise InvalidShapeError(
+            f"Every {point} must belong to a {simplex}; {point} {loose[0]} at {mesh.points[loose[0]].tolist()} has "
+            f"none ({loose.size} such). Repair with drop_unreferenced."
+        )
 
 
 def boundary_vertices(mesh: Mesh) -> Int[np.ndarray, " k"]:

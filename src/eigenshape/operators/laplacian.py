@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from eigenshape._errors import InvalidParameterError
+from eigenshape.operators.csr_loops import worst_asymmetry
 
 ASYMMETRY = 1e-12  # relative to the largest entry: what rounding may leave
 
@@ -21,14 +22,20 @@ class GaussianKernel:
     t : float
         Heat time, in length².
     edge_factor : float
-        h / e: the width h = 2√t over the mean edge length e, on points the mean distance of nearest neighbours.
+        h / e: the width h = 2√t over the mean edge length e, on points the mean distance to near neighbours.
     corrected : bool
         Whether solvers report λ = -log(1 - t μ)/t for an eigenvalue μ of the pencil, which takes that bias away.
+    form : "literal" or "random-walk"
+        Whether the mass of a point is its own measure, or what the kernel sees of the measure there.
+    cutoff : float
+        Distance, in widths h, beyond which the kernel is taken for zero.
     """
 
     t: float
     edge_factor: float
-    corrected: bool
+    corrected: bool = False
+    form: str = "literal"
+    cutoff: float = 4.0
 
     @property
     def width(self) -> float:
@@ -109,10 +116,9 @@ def _require_finite(name: str, matrix: sp.csr_array) -> None:
 
 
 def _require_symmetric(name: str, matrix: sp.csr_array) -> None:
-    off = abs(matrix - matrix.T).tocoo()
-    if off.nnz and off.data.max() > ASYMMETRY * np.abs(matrix.data).max():
-        worst = int(off.data.argmax())
-        row, column = off.row[worst], off.col[worst]
+    matrix.sum_duplicates()
+    worst, row, column = worst_asymmetry(matrix.indptr, matrix.indices, matrix.data)
+    if worst > ASYMMETRY * max(matrix.data.max(initial=0.0), -matrix.data.min(initial=0.0)):
         raise InvalidParameterError(
             f"{name} must be symmetric; entry ({row}, {column}) is {matrix[row, column]} "
             f"and entry ({column}, {row}) is {matrix[column, row]}."

@@ -9,6 +9,7 @@ from threadpoolctl import threadpool_limits
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.factor import Factor, factorise, rounding
+from eigenshape.spectral.kernel_values import reported, to_pencil
 from eigenshape.spectral.pencil import Pencil, normalise, residual_norms
 from eigenshape.spectral.spectrum import Certificate
 
@@ -59,11 +60,13 @@ def certify(
         If the columns are not B-orthonormal eigenvectors, or more or fewer eigenvalues lie there.
     """
     values, vectors = _checked(laplacian, np.asarray(eigenvalues), np.asarray(eigenvectors))
+    values = to_pencil(laplacian.kernel, values)
     with threadpool_limits(1, user_api="blas"):
         pencil = normalise(laplacian)
         values, vectors = np.ldexp(values, -pencil.value_exponent), np.ldexp(vectors, -pencil.vector_exponent)
         certificate = prove(pencil, Pairs(values, vectors, residual_norms(pencil, values, vectors)))
-    certificate = in_user_units(pencil, certificate)
+    last = float(np.ldexp(values[-1], pencil.value_exponent))
+    certificate = reported(laplacian.kernel, in_user_units(pencil, certificate), last)
     if not certificate.complete:
         raise ConvergenceError(certificate.explain())
     return certificate

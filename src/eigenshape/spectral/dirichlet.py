@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Int
 
 from eigenshape._arrays import frozen
-from eigenshape._errors import InvalidParameterError
+from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.solver import Progress, solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
@@ -43,15 +43,7 @@ def solve_dirichlet(
     ConvergenceError
         If the proof of completeness fails.
     """
-    bad = np.flatnonzero((fixed < 0) | (fixed >= laplacian.n_points))
-    if bad.size:
-        raise InvalidParameterError(
-            f"fixed must hold points 0..{laplacian.n_points - 1}; entry {bad[0]} is {fixed[bad[0]]}."
-        )
-    free = np.setdiff1d(np.arange(laplacian.n_points), fixed)
-    if not free.size:
-        raise InvalidParameterError(f"Some point must be free; all {laplacian.n_points} are fixed.")
-    inner = Laplacian(laplacian.stiffness[free][:, free], laplacian.mass[free][:, free])
+    inner, free = dirichlet_laplacian(laplacian, fixed)
     found = solve_spectrum(inner, k, progress=progress)
     vectors = np.zeros((laplacian.n_points, found.eigenvectors.shape[1]))
     vectors[free] = found.eigenvectors

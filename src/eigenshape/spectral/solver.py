@@ -13,6 +13,7 @@ from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.certify import Pairs, in_user_units, prove
 from eigenshape.spectral.factor import Factor
+from eigenshape.spectral.kernel_values import from_pencil, reported, require_readable, widened
 from eigenshape.spectral.lanczos import Wanted, block_lanczos
 from eigenshape.spectral.pencil import Pencil, normalise, rayleigh_residuals
 from eigenshape.spectral.shift import shift_inside
@@ -52,13 +53,21 @@ def solve_spectrum(laplacian: Laplacian, k: SupportsIndex, *, progress: Progress
     Spectrum
         Eigenvalues in 1/length², ascending and ≥ 0: one that comes out below zero by less than its residual is
         reported as 0. Where k cuts a multiple eigenvalue, `certificate.n_split` says how many copies are left out.
+        Where the operator's kernel is corrected, λ = -log(1 - t μ)/t stands for the eigenvalue μ of the pencil, in the
+        residuals and the certificate too.
 
     Raises
     ------
     InvalidParameterError
-        If k is not in 1..n, B is not positive definite or W has a negative eigenvalue.
+        If k is not in 1..n, B is not positive definite, W has a negative eigenvalue, or one to be corrected is 1/t
+        or more.
     ConvergenceError
         If the proof cannot be completed; no incomplete spectrum is ever returned.
+
+    Warns
+    -----
+    UserWarning
+        If eigenvalues of a kernel lie too near to 1/t to tell those of the shape.
     """
     wanted = whole_number(k, "k", 1, laplacian.n_points)
     report = progress or _silent
@@ -67,12 +76,14 @@ def solve_spectrum(laplacian: Laplacian, k: SupportsIndex, *, progress: Progress
         pencil = normalise(laplacian)
         pairs, certificate = _proved(pencil, wanted, report)
     report(1.0, "proved complete")
+    values, residuals = pencil.values_out(_without_negatives(pencil, pairs)), pencil.values_out(pairs.residuals)
+    require_readable(laplacian.kernel, values)
     return Spectrum(
-        eigenvalues=frozen(pencil.values_out(_without_negatives(pencil, pairs))),
+        eigenvalues=frozen(from_pencil(laplacian.kernel, values)),
         eigenvectors=frozen(pencil.vectors_out(_with_signs(pairs.vectors))),
         mass=laplacian.mass,
-        residuals=frozen(pencil.values_out(pairs.residuals)),
-        certificate=in_user_units(pencil, certificate),
+        residuals=frozen(widened(laplacian.kernel, values, residuals)),
+        certificate=reported(laplacian.kernel, in_user_units(pencil, certificate), float(values[-1])),
     )
 
 

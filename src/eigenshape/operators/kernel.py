@@ -1,0 +1,213 @@
+"""The matrix of a Gaussian kernel on weighted points, its scale, and the Laplacian that it makes.
+
+W_ij = -w_i w_j G(x_i, x_j) / t with G(x, y) = exp(-|x - y|²/4t) / (4πt)^{m/2}: one formula, whatever the weights are.
+"""
+
+import os
+import warnings
+from dataclasses import dataclass
+from math import gamma, pi
+from typing import Literal
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float
+from scipy.spatial import cKDTree
+
+from eigenshape._arrays import positive_values
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape.geometry.quadrature import Quadrature
+from eigenshape.geometry.simplices import LARGEST_EXPONENT, size_one
+from eigenshape.operators.cells import CellGrid, cell_grid, count_partners, gaussian_rows
+from eigenshape.operators.csr_loops import component_labels
+from eigenshape.operators.laplacian import GaussianKernel, Laplacian
+
+Correction = Literal["log"]
+Form = Literal["literal", "random-walk"]
+
+EDGE_FACTOR = 2.0  # h / e
+NARROWEST = 1.0  # half of it loses half of every eigenvalue even on the most regular points
+NARROW = 1.5  # irregular points lose 5 % there
+FEWEST_PAIRS = 10
+LAST = 2.9  # t λ up to which the correction can still tell one eigenvalue from the next
+SAMPLED_ROWS = 512
+PEAK = 30  # bytes an entry while the matrix is built and checked
+
+
+@dataclass(frozen=True)
+class KernelOptions:
+    """What a caller said of a kernel, as in `mesh_laplacian`."""
+
+    t: float | None
+    h: float | None
+    edge_factor: float | None
+    correct: Correction | None
+    form: Form
+    cutoff: float
+
+
+def choose_kernel(options: KernelOptions, edge: float) -> GaussianKernel:
+    """Return the kernel of a heat time t, of a width h = 2√t, or of a width in mean edge lengths e; by default 2e.
+
+    Raises
+    ------
+    InvalidParameterError
+        If more than one is given, one is not positive, another option is unknown, or the kernel is narrower than the
+        points lie.
+    """
+    _require_options(options)
+    width = options.h or (options.edge_factor or EDGE_FACTOR) * edge
+    t = options.t or width**2 / 4
+    factor = 2 * t**0.5 / edge
+    if factor < NARROWEST:
+        raise InvalidParameterError(
+            f"A kernel must reach the neighbours, h ≥ e; h = 2√t is {factor:.3g} of the mean edge length "
+            f"e = {edge:.4g}, t = {t:.4g}. Choose t ≥ {edge**2 / 4:.4g}; t = e² is the default."
+        )
+    if factor < NARROW:
+        warnings.warn(
+            f"A kernel of width h = {factor:.3g} e serves regular points only; on irregular ones eigenvalues come out "
+            "5 to 20 % low. h = 2e is the default.",
+            stacklevel=3,
+        )
+    return GaussianKernel(t, factor, corrected=options.correct == "log", form=options.form, cutoff=options.cutoff)
+
+
+def _require_options(options: KernelOptions) -> None:
+    given = {name: value for name in ("t", "h", "edge_factor") if (value := getattr(options, name)) is not None}
+    if len(given) > 1:
+        raise InvalidParameterError(f"One of t, h and edge_factor sets the scale; given are {given}.")
+    for name, value in {**given, "cutoff": options.cutoff}.items():
+        positive_values(value, name)
+    if options.correct not in (None, "log"):
+        raise InvalidParameterError(f"correct must be None or 'log'; it is {options.correct!r}.")
+    if options.form not in ("literal", "random-walk"):
+        raise InvalidParameterError(f"form must be 'literal' or 'random-walk'; it is {options.form!r}.")
+
+
+def neighbor_distance(points: Float[np.ndarray, "n d"], dim: int) -> float:
+    """Return the mean distance to the m(m+1) nearest points: as many as touch a point of the lattice A_m.
+
+    Raises
+    ------
+    InvalidShapeError
+        If there are not so many points, or all are equal.
+    """
+    near = dim * (dim + 1)
+    if len(points) <= near:
+        raise InvalidShapeError(f"A sample of dimension {dim} must have over {near} points; it has {len(points)}.")
+    scaled, scale = size_one(points)
+    distance = float(cKDTree(scaled).query(scaled, near + 1)[0][:, 1:].mean() * scale)
+    if not distance > 0:
+        raise InvalidShapeError(f"The points of a sample must differ; all {len(points)} are {points[0].tolist()}.")
+    return distance
+
+
+def kernel_laplacian(measure: Quadrature, kernel: GaussianKernel) -> Laplacian:
+    """Build the Laplacian of the kernel on weighted points.
+
+    Raises
+    ------
+    InvalidShapeError
+        If the matrix would not fit into memory or its entries into floats, or a point has no partner.
+    """
+    points, scale = size_one(measure.points)
+    weights, unit = size_one(measure.weights)
+    t = kernel.t / scale / scale
+    grid = cell_grid(points, kernel.cutoff * 2 * t**0.5)
+    _require_room(grid)
+    counts = count_partners(grid)
+    _require_partners(measure, counts, kernel)
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    columns, values = gaussian_rows(grid, weights, t, starts)
+    matrix = sp.csr_array((values, columns, starts), shape=(measure.n_points,) * 2)
+    return assemble(measure, kernel, matrix, exponents=(_exponent(unit), _exponent(scale)))
+
+
+def assemble(
+    measure: Quadrature, kernel: GaussianKernel, matrix: sp.csr_array, exponents: tuple[int, int] = (0, 0)
+) -> Laplacian:
+    """Make W and B of the matrix w_i w_j exp(-d_ij²/4t), in whose place W is written.
+
+    `exponents` are the powers of two that weights and coordinates were divided by.
+    """
+    of_weight, of_length = exponents
+    t = float(np.ldexp(kernel.t, -2 * of_length))
+    matrix.data /= (4 * pi * t) ** (measure.dim / 2)
+    exponent = 2 * of_weight - measure.dim * of_length
+    mass = _raised(matrix.sum(axis=1), exponent) if kernel.form == "random-walk" else measure.weights
+    matrix.setdiag(0)
+    matrix.data /= -t
+    matrix.setdiag(-matrix.sum(axis=1))
+    matrix.data = _raised(matrix.data, exponent - 2 * of_length)
+    return Laplacian(matrix, sp.diags_array(mass).tocsr(), kernel)
+
+
+def _exponent(power_of_two: float) -> int:
+    return int(np.frexp(power_of_two)[1]) - 1
+
+
+def _raised(values: Float[np.ndarray, " z"], exponent: int) -> Float[np.ndarray, " z"]:
+    if abs(exponent) > LARGEST_EXPONENT:
+        raise InvalidShapeError(
+            f"Entries of a kernel matrix must be floats; theirs are about 2^{exponent}. Choose another unit."
+        )
+    if exponent:
+        values *= 2.0**exponent
+    return values
+
+
+def _require_partners(measure: Quadrature, counts: np.ndarray, kernel: GaussianKernel) -> None:
+    alone = np.flatnonzero(counts == 1)
+    if alone.size:
+        raise InvalidShapeError(
+            f"A kernel must hold its points together; within {kernel.cutoff * kernel.width:.4g} of point {alone[0]} at "
+            f"{measure.points[alone[0]].tolist()} there is no other ({alone.size} such). Choose a larger t than "
+            f"{kernel.t:.4g}, or drop such points."
+        )
+
+
+def require_whole(laplacian: Laplacian, labels: np.ndarray, kernel: GaussianKernel) -> None:
+    """Refuse a kernel graph that falls apart where the shape does not; `labels` number the shape's components."""
+    parts = component_labels(laplacian.stiffness.indptr, laplacian.stiffness.indices)
+    pairs = np.unique(np.column_stack([labels, parts]), axis=0)
+    torn = np.flatnonzero(np.bincount(pairs[:, 0]) > 1)
+    if torn.size:
+        raise InvalidShapeError(
+            f"A kernel must hold a shape together; at t = {kernel.t:.4g} component {torn[0]} falls into "
+            f"{np.count_nonzero(pairs[:, 0] == torn[0])} parts ({parts.max() + 1} in all). Choose a larger t."
+        )
+
+
+def warn_of_few(measure: Quadrature, kernel: GaussianKernel) -> None:
+    """Warn where t leaves fewer than ten eigenvalues that can be told apart, by Weyl's law."""
+    ball = pi ** (measure.dim / 2) / gamma(measure.dim / 2 + 1)
+    length = (measure.weights / kernel.t ** (measure.dim / 2)).sum()
+    n_pairs = int(length * ball * (LAST / (4 * pi**2)) ** (measure.dim / 2))
+    if n_pairs < FEWEST_PAIRS:
+        warnings.warn(
+            f"A heat time of t = {kernel.t:.4g} leaves about {n_pairs} eigenvalues that can be told (t λ < {LAST}); "
+            f"on a surface k takes n > 5 k t/e² points, and 21 k t/e² uncorrected. Choose a smaller t.",
+            stacklevel=3,
+        )
+
+
+def _require_room(grid: CellGrid) -> None:
+    """Estimate the matrix from some of its rows and refuse what would not fit."""
+    n = len(grid.order)
+    sample = np.unique(np.linspace(0, n - 1, min(n, SAMPLED_ROWS)).astype(np.int64))
+    entries = count_partners(grid, sample)[sample].mean() * n
+    room = _memory() / 2
+    if entries * PEAK > room:
+        raise InvalidShapeError(
+            f"A kernel matrix must fit into half of the memory, {room / 2**30:.1f} GiB; for {entries:.2g} entries, "
+            f"{entries / n:.0f} a row, it takes {entries * PEAK / 2**30:.1f} GiB. Choose a smaller t, or "
+            "functional_laplacian, which stores none."
+        )
+
+
+def _memory() -> float:
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, ValueError, OSError):  # not every system tells
+        return 8 * 2.0**30
