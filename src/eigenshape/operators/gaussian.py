@@ -19,6 +19,7 @@ from eigenshape.operators.kernel import (
     Form,
     KernelOptions,
     choose_kernel,
+    geodesic_laplacian,
     kernel_laplacian,
     neighbor_distance,
     require_whole,
@@ -87,7 +88,9 @@ def mesh_laplacian(  # noqa: PLR0913 - one keyword for each choice that the meth
     measure = mesh_quadrature(shape)
     kernel = choose_kernel(KernelOptions(t, h, edge_factor, correct, form, cutoff), mean_side_length(shape))
     warn_of_few(measure, kernel)
-    laplacian = kernel_laplacian(measure, kernel)
+    laplacian = (
+        geodesic_laplacian(shape, measure, kernel) if distance == "geodesic" else kernel_laplacian(measure, kernel)
+    )
     require_whole(laplacian, vertex_components(shape)[1], kernel)
     return laplacian
 

@@ -16,8 +16,10 @@ from scipy.spatial import cKDTree
 
 from eigenshape._arrays import positive_values
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape.geometry.geodesic import geodesic_balls
 from eigenshape.geometry.quadrature import Quadrature
 from eigenshape.geometry.simplices import LARGEST_EXPONENT, size_one
+from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.cells import CellGrid, cell_grid, count_partners, gaussian_rows
 from eigenshape.operators.csr_loops import component_labels
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
@@ -117,21 +119,40 @@ def kernel_laplacian(measure: Quadrature, kernel: GaussianKernel) -> Laplacian:
     grid = cell_grid(points, kernel.cutoff * 2 * t**0.5)
     _require_room(grid)
     counts = count_partners(grid)
-    _require_partners(measure, counts, kernel)
+    _require_partners(measure, counts - 1, kernel)
     starts = np.concatenate([[0], np.cumsum(counts)])
     columns, values = gaussian_rows(grid, weights, t, starts)
     matrix = sp.csr_array((values, columns, starts), shape=(measure.n_points,) * 2)
-    return assemble(measure, kernel, matrix, exponents=(_exponent(unit), _exponent(scale)))
+    return _assembled(measure, kernel, matrix, (unit, scale))
 
 
-def assemble(
-    measure: Quadrature, kernel: GaussianKernel, matrix: sp.csr_array, exponents: tuple[int, int] = (0, 0)
+def geodesic_laplacian(mesh: Mesh, measure: Quadrature, kernel: GaussianKernel) -> Laplacian:
+    """Build the Laplacian of the kernel with distances along the surface.
+
+    Raises
+    ------
+    InvalidShapeError
+        As `kernel_laplacian`, and if the mesh is no surface.
+    """
+    points, scale = size_one(measure.points)
+    weights, unit = size_one(measure.weights)
+    radius = kernel.cutoff * kernel.width
+    _require_room(cell_grid(points, radius / scale))  # no ball along the surface holds more than one through space
+    matrix = geodesic_balls(mesh, radius)
+    _require_partners(measure, np.diff(matrix.indptr), kernel)
+    rows = np.repeat(np.arange(measure.n_points), np.diff(matrix.indptr))
+    matrix.data = weights[rows] * weights[matrix.indices] * np.exp(-((matrix.data / kernel.width) ** 2))
+    return _assembled(measure, kernel, (matrix + sp.diags_array(weights**2)).tocsr(), (unit, scale))
+
+
+def _assembled(
+    measure: Quadrature, kernel: GaussianKernel, matrix: sp.csr_array, units: tuple[float, float]
 ) -> Laplacian:
     """Make W and B of the matrix w_i w_j exp(-d_ij²/4t), in whose place W is written.
 
-    `exponents` are the powers of two that weights and coordinates were divided by.
+    `units` are the powers of two that weights and coordinates were divided by.
     """
-    of_weight, of_length = exponents
+    of_weight, of_length = (int(np.frexp(unit)[1]) - 1 for unit in units)
     t = float(np.ldexp(kernel.t, -2 * of_length))
     matrix.data /= (4 * pi * t) ** (measure.dim / 2)
     exponent = 2 * of_weight - measure.dim * of_length
@@ -141,10 +162,6 @@ def assemble(
     matrix.setdiag(-matrix.sum(axis=1))
     matrix.data = _raised(matrix.data, exponent - 2 * of_length)
     return Laplacian(matrix, sp.diags_array(mass).tocsr(), kernel)
-
-
-def _exponent(power_of_two: float) -> int:
-    return int(np.frexp(power_of_two)[1]) - 1
 
 
 def _raised(values: Float[np.ndarray, " z"], exponent: int) -> Float[np.ndarray, " z"]:
@@ -157,8 +174,8 @@ def _raised(values: Float[np.ndarray, " z"], exponent: int) -> Float[np.ndarray,
     return values
 
 
-def _require_partners(measure: Quadrature, counts: np.ndarray, kernel: GaussianKernel) -> None:
-    alone = np.flatnonzero(counts == 1)
+def _require_partners(measure: Quadrature, n_partners: np.ndarray, kernel: GaussianKernel) -> None:
+    alone = np.flatnonzero(n_partners == 0)
     if alone.size:
         raise InvalidShapeError(
             f"A kernel must hold its points together; within {kernel.cutoff * kernel.width:.4g} of point {alone[0]} at "

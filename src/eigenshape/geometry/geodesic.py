@@ -1,0 +1,76 @@
+"""Geodesic distances between all vertices that lie near each other on a triangle mesh."""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+
+from eigenshape._arrays import positive_values
+from eigenshape._errors import InvalidShapeError
+from eigenshape.geometry.geodesic_loops import balls
+from eigenshape.geometry.simplices import in_length, scaled_corners
+from eigenshape.geometry.simplicial import Mesh
+
+SOURCES = 256  # a task
+
+
+def geodesic_balls(mesh: Mesh, radius: float) -> sp.csr_array:
+    """Measure along the surface from each vertex to all vertices within a radius.
+
+    Waves leave each vertex as in Dijkstra's algorithm, and cross each triangle as if what lies behind were flat: the
+    source is laid into the triangle's plane by the distances of two corners (Novotni and Klein 2002). Exact on flat
+    regions; the shorter of the two directions counts, so that the result is symmetric.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh or SimplicialMesh
+        Of dimension 2, in any R^d.
+    radius : float
+        In length.
+
+    Returns
+    -------
+    (n, n) sparse
+        Distances, in length, between different vertices; symmetric, columns ascending.
+
+    Raises
+    ------
+    InvalidShapeError
+        If the mesh is no surface.
+    InvalidParameterError
+        If the radius is not positive.
+    """
+    if mesh.dim != 2:
+        raise InvalidShapeError(f"Geodesic distances are measured on surfaces; this mesh has dimension {mesh.dim}.")
+    positive_values(radius, "radius")
+    corners, scale = scaled_corners(mesh)
+    starts, others, sides = _fans(mesh, corners)
+    firsts = range(0, mesh.n_points, SOURCES)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        lasts = (min(first + SOURCES, mesh.n_points) for first in firsts)
+        waves = pool.map(lambda first, last: balls(starts, *others, sides, radius / scale, first, last), firsts, lasts)
+        counts, columns, values = (np.concatenate(parts) for parts in zip(*waves, strict=True))
+    rows = np.concatenate([[0], np.cumsum(counts)])
+    found = sp.csr_array((in_length(values, scale, 1), columns, rows), shape=(mesh.n_points,) * 2)
+    found.sort_indices()
+    return found.minimum(found.T)  # what one direction alone reached counts as out of reach
+
+
+def _fans(
+    mesh: Mesh, corners: Float[np.ndarray, "f 3 d"]
+) -> tuple[Int[np.ndarray, " n1"], tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]], Float[np.ndarray, "k 3"]]:
+    """List at each vertex its triangles by their other two corners, with the lengths to these and between them."""
+    turns = [np.roll(np.arange(3), -turn) for turn in range(3)]
+    triples = np.concatenate([mesh.simplices[:, turn] for turn in turns])
+    lengths = np.concatenate([_lengths(corners[:, turn]) for turn in turns])
+    order = np.argsort(triples[:, 0], kind="stable")
+    starts = np.searchsorted(triples[order, 0], np.arange(mesh.n_points + 1))
+    one, two = (np.ascontiguousarray(triples[order, place]) for place in (1, 2))
+    return starts, (one, two), lengths[order]
+
+
+def _lengths(corners: Float[np.ndarray, "f 3 d"]) -> Float[np.ndarray, "f 3"]:
+    a, b, c = corners.transpose(1, 0, 2)
+    return np.column_stack([np.linalg.norm(side, axis=1) for side in (b - a, c - a, c - b)])

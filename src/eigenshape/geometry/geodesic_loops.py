@@ -1,0 +1,123 @@
+"""Compiled loops of `geodesic`: a wave that leaves one vertex and crosses triangles laid flat."""
+
+from typing import no_type_check
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def through_edge(near, far, length, left, right):
+    """Return the distance of a triangle's third corner from a source seen through the opposite edge, or infinity.
+
+    `near` and `far` are the distances of the edge's ends; the source is laid flat beyond the edge. `left` and `right`
+    are the third corner's distances from the same ends. Infinity where the straight line misses the edge.
+    """
+    x = (near * near - far * far + length * length) / (2 * length)
+    y = np.sqrt(max(near * near - x * x, 0.0))
+    corner_x = (left * left - right * right + length * length) / (2 * length)
+    corner_y = np.sqrt(max(left * left - corner_x * corner_x, 0.0))
+    depth = y + corner_y
+    if depth == 0.0:
+        return np.inf
+    crossing = x + (corner_x - x) * y / depth
+    if crossing < 0.0 or crossing > length:
+        return np.inf
+    return np.hypot(corner_x - x, depth)
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def balls(starts, first_corner, second_corner, sides, radius, first, last):
+    """Return for each source from `first` to `last` how many vertices lie within `radius`, which, and how far.
+
+    Entry k of `starts[v]` to `starts[v + 1]` is a triangle at vertex v with its other two corners; `sides[k]` are the
+    lengths from v to each of them, and between them.
+    """
+    n = len(starts) - 1
+    distance = np.full(n, np.inf)
+    settled = np.zeros(n, dtype=np.bool_)
+    counts = np.zeros(last - first, dtype=np.int64)
+    columns, values = np.empty(1024, dtype=np.int64), np.empty(1024)
+    heap_keys, heap_ids = np.empty(1024), np.empty(1024, dtype=np.int64)
+    touched = np.empty(n, dtype=np.int64)
+    total = 0
+    for source in range(first, last):
+        before = total
+        distance[source] = 0.0
+        touched[0] = source
+        n_touched = 1
+        heap_keys[0], heap_ids[0] = 0.0, source
+        height = 1
+        while height:
+            key, vertex = heap_keys[0], heap_ids[0]
+            height -= 1
+            _sink(heap_keys, heap_ids, height)
+            if settled[vertex]:
+                continue
+            if key > radius:
+                break
+            settled[vertex] = True
+            if total == len(columns):
+                columns, values = np.append(columns, np.empty_like(columns)), np.append(values, np.empty_like(values))
+            columns[total], values[total] = vertex, key
+            total += 1
+            for entry in range(starts[vertex], starts[vertex + 1]):
+                if height + 2 > len(heap_keys):
+                    heap_keys = np.append(heap_keys, np.empty_like(heap_keys))
+                    heap_ids = np.append(heap_ids, np.empty_like(heap_ids))
+                for turn in range(2):
+                    corner, other = first_corner[entry], second_corner[entry]
+                    to_corner, to_other = sides[entry, 0], sides[entry, 1]
+                    if turn:
+                        corner, other, to_corner, to_other = other, corner, to_other, to_corner
+                    if settled[corner]:
+                        continue
+                    reached = key + to_corner
+                    if settled[other]:
+                        flat = through_edge(key, distance[other], to_other, to_corner, sides[entry, 2])
+                        reached = min(reached, flat)
+                    if reached < distance[corner]:
+                        if distance[corner] == np.inf:
+                            touched[n_touched] = corner
+                            n_touched += 1
+                        distance[corner] = reached
+                        _rise(heap_keys, heap_ids, height, reached, corner)
+                        height += 1
+        counts[source - first] = total - before
+        for place in range(n_touched):
+            distance[touched[place]] = np.inf
+            settled[touched[place]] = False
+    return counts, columns[:total].copy(), values[:total].copy()
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def _rise(keys, ids, height, key, vertex):
+    place = height
+    while place:
+        above = (place - 1) // 2
+        if keys[above] <= key:
+            break
+        keys[place], ids[place] = keys[above], ids[above]
+        place = above
+    keys[place], ids[place] = key, vertex
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def _sink(keys, ids, height):
+    key, vertex = keys[height], ids[height]
+    place = 0
+    while True:
+        below = 2 * place + 1
+        if below >= height:
+            break
+        if below + 1 < height and keys[below + 1] < keys[below]:
+            below += 1
+        if keys[below] >= key:
+            break
+        keys[place], ids[place] = keys[below], ids[below]
+        place = below
+    keys[place], ids[place] = key, vertex

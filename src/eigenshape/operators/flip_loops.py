@@ -1,0 +1,123 @@
+# mypy: allow-untyped-defs, allow-untyped-decorators, no-check-untyped-defs
+"""Compiled loops over the sides of an intrinsic triangulation.
+
+Triangle f has the sides 3f, 3f + 1, 3f + 2, one after the other around it. Side h starts at the vertex `tails[h]`, is
+`lengths[h]` long, and lies on side `twins[h]` of another triangle, or of the same.
+"""
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def next_side(side):
+    return side - 2 if side % 3 == 2 else side + 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def area_of(a, b, c):
+    # Kahan's order of Heron's formula: every digit right, needles too.
+    low, high = min(a, b), max(a, b)
+    small, middle, large = min(low, c), max(low, min(high, c)), max(high, c)
+    product = (large + (middle + small)) * (small - (large - middle))
+    product *= (small + (large - middle)) * (large + (middle - small))
+    return 0.25 * np.sqrt(max(product, 0.0))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def areas(lengths):
+    found = np.empty(len(lengths) // 3)
+    for f in range(len(found)):
+        found[f] = area_of(lengths[3 * f], lengths[3 * f + 1], lengths[3 * f + 2])
+    return found
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def cotangent(lengths, side):
+    """Return the cotangent opposite to a side, and the size of the terms in it."""
+    a = lengths[side]
+    b = lengths[next_side(side)]
+    c = lengths[next_side(next_side(side))]
+    four_areas = 4 * area_of(a, b, c)
+    return (b * b + c * c - a * a) / four_areas, (a * a + b * b + c * c) / four_areas
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def cotangents(lengths):
+    found = np.empty(len(lengths))
+    for side in range(len(lengths)):
+        found[side] = cotangent(lengths, side)[0]
+    return found
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def needs_flip(twins, lengths, side, tolerance):
+    one, size_one = cotangent(lengths, side)
+    two, size_two = cotangent(lengths, twins[side])
+    return one + two < -tolerance * (size_one + size_two)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _apex(lengths, side):
+    """Return where the corner opposite to a side lies, along the side and beside it."""
+    a = lengths[side]
+    b = lengths[next_side(side)]
+    c = lengths[next_side(next_side(side))]
+    return (a * a + c * c - b * b) / (2 * a), 2 * area_of(a, b, c) / a
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _crossing(lengths, side, twin):
+    """Return the length of the other diagonal of the two triangles at a side, laid out in the plane."""
+    along, above = _apex(lengths, side)
+    back, below = _apex(lengths, twin)
+    return np.hypot(lengths[side] - along - back, above + below)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _flip(tails, twins, lengths, side):
+    # Triangles (u, v, w) and (v, u, x) become (x, w, u) and (w, x, v): each outer side moves one place on.
+    twin = twins[side]
+    crossing = _crossing(lengths, side, twin)
+    new = np.array([next_side(side), next_side(next_side(side)), next_side(twin), next_side(next_side(twin))])
+    old = np.array([new[1], new[2], new[3], new[0]])
+    from_old, of_old, old_lengths = tails[old], twins[old], lengths[old]
+    for k in range(4):
+        other = of_old[k]
+        for j in range(4):
+            if other == old[j]:
+                other = new[j]
+                break
+        tails[new[k]], lengths[new[k]] = from_old[k], old_lengths[k]
+        twins[new[k]] = other
+        twins[other] = new[k]
+    tails[side], tails[twin] = tails[new[3]], tails[new[1]]
+    tails[side], tails[twin] = tails[next_side(new[2])], tails[next_side(new[0])]
+    lengths[side] = lengths[twin] = crossing
+    return new
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def flip_to_delaunay(tails, twins, lengths, tolerance, most):
+    """Flip until no edge needs it, in place, first come first served; return the number of flips, -1 beyond `most`."""
+    n = len(tails)
+    queue, waiting = np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
+    first, length, flips = 0, 0, 0
+    for side in range(n):
+        if side < twins[side]:
+            queue[length], waiting[side] = side, True
+            length += 1
+    while length:
+        side = queue[first]
+        first, length = (first + 1) % n, length - 1
+        waiting[side] = False
+        if not needs_flip(twins, lengths, side, tolerance):
+            continue
+        flips += 1
+        if flips > most:
+            return -1
+        for outer in _flip(tails, twins, lengths, side):
+            if not (waiting[outer] or waiting[twins[outer]]):
+                queue[(first + length) % n], waiting[outer] = outer, True
+                length += 1
+    return flips

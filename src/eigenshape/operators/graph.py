@@ -1,0 +1,262 @@
+"""Graph Laplacians, and the graphs that meshes and points make (thesis 1.1.2)."""
+
+from typing import Literal, SupportsIndex
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
+
+from eigenshape._arrays import finite_rows, positive_values, whole_number
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import in_length, size_one
+from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
+from eigenshape.operators.laplacian import Laplacian
+
+Kind = Literal["combinatorial", "weighted", "normalized"]
+EdgeWeights = Literal["unit", "inverse_length"]
+
+ASYMMETRY = 1e-12  # of a pair of weights, relative to the larger: what rounding may leave
+SPARE = 8  # neighbours asked for beyond those wanted, so that most ties are seen whole
+
+
+def graph_laplacian(graph: sp.sparray | sp.spmatrix | Mesh, kind: Kind = "combinatorial") -> Laplacian:
+    """Build the Laplacian of a graph: W = D - A with D the row sums of A (thesis 1.1.2).
+
+    Parameters
+    ----------
+    graph : (n, n) sparse, or Mesh
+        Symmetric adjacency matrix, entry (i, j) the weight of the edge, > 0; explicit zeros are no edges. Or a mesh
+        of any dimension, whose graph has the sides of all its simplices.
+    kind : "combinatorial", "weighted" or "normalized"
+        combinatorial: every edge weighs 1, B = I (the Kirchhoff operator). weighted: the weights of the matrix, on
+        a mesh 1 / length, and B = I. normalized: the weights of the matrix, on a mesh 1, and B = D; the eigenvalues
+        are those of I - D^{-1/2} A D^{-1/2}, in [0, 2].
+
+    Returns
+    -------
+    Laplacian
+        W in the unit of the weights. B without unit, but normalized in that of the weights.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the matrix is not sparse, square and symmetric, a weight is negative or not finite, a point is its own
+        neighbour, `kind` is none of the three, or a point has no edge and `kind` is normalized.
+    InvalidShapeError
+        If a simplex has a corner twice, or an edge of a mesh no length where `kind` is weighted.
+    """
+    if kind not in ("combinatorial", "weighted", "normalized"):
+        raise InvalidParameterError(f"kind must be 'combinatorial', 'weighted' or 'normalized'; it is {kind!r}.")
+    if isinstance(graph, TriangleMesh | SimplicialMesh):
+        adjacency = edge_graph(graph, "inverse_length" if kind == "weighted" else "unit")
+    else:
+        adjacency = _checked_adjacency(graph)
+    if kind == "combinatorial":
+        adjacency.data[:] = 1.0
+    degrees = sp.diags_array(adjacency.sum(axis=1)).tocsr()
+    if kind == "normalized":
+        _require_neighbors(adjacency)
+        return Laplacian((degrees - adjacency).tocsr(), degrees)
+    return Laplacian((degrees - adjacency).tocsr(), sp.eye_array(adjacency.shape[0], format="csr"))
+
+
+def _checked_adjacency(graph: sp.sparray | sp.spmatrix) -> sp.csr_array:
+    if not sp.issparse(graph) or graph.ndim != 2 or graph.shape[0] != graph.shape[1] or not graph.shape[0]:
+        raise InvalidParameterError(
+            "A graph must be a mesh or a square sparse matrix; it is a "
+            f"{type(graph).__name__} of shape {np.shape(graph)}."
+        )
+    if graph.dtype.kind not in "biuf":
+        raise InvalidParameterError(f"Weights of edges must be real numbers; the type is {graph.dtype}.")
+    adjacency = sp.csr_array(graph, dtype=np.float64, copy=True)
+    adjacency.sum_duplicates()
+    _require_weights(adjacency)
+    adjacency.eliminate_zeros()
+    _require_no_loops(adjacency)
+    _require_symmetric(adjacency)
+    return adjacency
+
+
+def _require_weights(adjacency: sp.csr_array) -> None:
+    bad = np.flatnonzero(~(np.isfinite(adjacency.data) & (adjacency.data >= 0)))
+    if bad.size:
+        entries = adjacency.tocoo()
+        raise InvalidParameterError(
+            f"Weights of edges must be finite and not negative; entry ({entries.row[bad[0]]}, {entries.col[bad[0]]}) "
+            f"is {entries.data[bad[0]]} ({bad.size} such)."
+        )
+
+
+def _require_no_loops(adjacency: sp.csr_array) -> None:
+    loops = np.flatnonzero(adjacency.diagonal())
+    if loops.size:
+        raise InvalidParameterError(
+            f"A point must not be its own neighbour; entry ({loops[0]}, {loops[0]}) is "
+            f"{adjacency.diagonal()[loops[0]]} ({loops.size} such). Loops cancel in D - A: set the diagonal to zero."
+        )
+
+
+def _require_symmetric(adjacency: sp.csr_array) -> None:
+    off = (abs(adjacency - adjacency.T) - ASYMMETRY * adjacency.maximum(adjacency.T)).tocoo()
+    bad = np.flatnonzero(off.data > 0)
+    if bad.size:
+        row, column = off.row[bad[0]], off.col[bad[0]]
+        raise InvalidParameterError(
+            f"A graph must be symmetric; entry ({row}, {column}) is {adjacency[row, column]} and entry "
+            f"({column}, {row}) is {adjacency[column, row]}."
+        )
+
+
+def _require_neighbors(adjacency: sp.csr_array) -> None:
+    alone = np.flatnonzero(np.diff(adjacency.indptr) == 0)
+    if alone.size:
+        raise InvalidParameterError(
+            f"For a normalized Laplacian every point must have an edge; point {alone[0]} has none "
+            f"({alone.size} such). Choose combinatorial or weighted, or drop such points."
+        )
+
+
+def edge_graph(mesh: Mesh, weights: EdgeWeights = "unit") -> sp.csr_array:
+    """Return the adjacency matrix of the edges of a mesh: the sides of all its simplices, in any dimension.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    weights : "unit" or "inverse_length"
+        1, or 1 / length of the edge, in 1/length.
+
+    Returns
+    -------
+    (n, n) sparse
+        Symmetric, without diagonal; a point that no simplex uses has an empty row.
+
+    Raises
+    ------
+    InvalidShapeError
+        If a simplex has a corner twice, or an edge has no length and `weights` needs it.
+    InvalidParameterError
+        If `weights` is neither of the two.
+    """
+    if weights not in ("unit", "inverse_length"):
+        raise InvalidParameterError(f"weights must be 'unit' or 'inverse_length'; it is {weights!r}.")
+    require_distinct_corners(mesh)
+    edges = _edges(mesh)
+    values = np.ones(len(edges)) if weights == "unit" else 1 / _lengths(mesh, edges)
+    return _symmetric(edges, values, mesh.n_points)
+
+
+def require_distinct_corners(mesh: Mesh) -> None:
+    """Refuse a mesh with a simplex that has a corner twice, naming the first.
+
+    Raises
+    ------
+    InvalidShapeError
+        With the index, corners and number of such simplices.
+    """
+    ordered = np.sort(mesh.simplices, axis=1)
+    bad = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
+    if bad.size:
+        plural, singular = ("Faces", "face") if mesh.dim == 2 else ("Simplices", "simplex")
+        raise InvalidShapeError(
+            f"{plural} must have distinct corners; {singular} {bad[0]} is {mesh.simplices[bad[0]].tolist()} "
+            f"({bad.size} such). Repair with drop_degenerate."
+        )
+
+
+def _edges(mesh: Mesh) -> Int[np.ndarray, "e 2"]:
+    first, second = np.triu_indices(mesh.simplices.shape[1], 1)
+    ends = np.stack([mesh.simplices[:, first].ravel(), mesh.simplices[:, second].ravel()])
+    keys = np.unique(ends.min(axis=0) * mesh.n_points + ends.max(axis=0))
+    return np.column_stack(np.divmod(keys, mesh.n_points))
+
+
+def _lengths(mesh: Mesh, edges: Int[np.ndarray, "e 2"]) -> Float[np.ndarray, " e"]:
+    ends, scale = size_one(mesh.points[edges])
+    lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
+    bad = np.flatnonzero(lengths == 0)
+    if bad.size:
+        one, two = edges[bad[0]]
+        raise InvalidShapeError(
+            f"Edges must have length; edge ({one}, {two}) is from {mesh.points[one].tolist()} to "
+            f"{mesh.points[two].tolist()} ({bad.size} such). Repair with weld."
+        )
+    return in_length(lengths, scale, 1)
+
+
+def _symmetric(edges: Int[np.ndarray, "e 2"], values: Float[np.ndarray, " e"], n: int) -> sp.csr_array:
+    one, two = edges.T
+    ends = (np.concatenate([one, two]), np.concatenate([two, one]))
+    return sp.coo_array((np.tile(values, 2), ends), shape=(n, n)).tocsr()
+
+
+def neighbor_graph(points: ArrayLike, n_neighbors: SupportsIndex, *, t: float | None = None) -> sp.csr_array:
+    """Join each point to its nearest ones: two are joined where either is among the nearest of the other.
+
+    Weights are exp(-|x - y|²/4t) (Belkin and Niyogi 2003; thesis reference 5), or 1 where no t is given. Of points
+    equally far that with the lower index is the nearer; a point's equals are neighbours at distance 0.
+
+    Parameters
+    ----------
+    points : (n, d) float
+    n_neighbors : int
+        1 to n - 1.
+    t : float, optional
+        Heat time, in length².
+
+    Returns
+    -------
+    (n, n) sparse
+        Symmetric adjacency matrix without diagonal.
+
+    Raises
+    ------
+    InvalidShapeError
+        If a coordinate is not finite.
+    InvalidParameterError
+        If `n_neighbors` is not in 1..n - 1, t is not positive, or so small that the weight of an edge is no float.
+    """
+    rows = finite_rows(points, "points")
+    wanted = whole_number(n_neighbors, "n_neighbors", 1, len(rows) - 1)
+    scaled, scale = size_one(rows)
+    near = _nearest(scaled, wanted)
+    ends = np.stack([np.repeat(np.arange(len(rows)), wanted), near.ravel()])
+    keys = np.unique(ends.min(axis=0) * len(rows) + ends.max(axis=0))
+    edges = np.column_stack(np.divmod(keys, len(rows)))
+    weights = np.ones(len(edges)) if t is None else _gaussian(scaled, edges, scale, t)
+    return _symmetric(edges, weights, len(rows))
+
+
+def _nearest(points: Float[np.ndarray, "n d"], wanted: int) -> Int[np.ndarray, "n k"]:
+    """Return the nearest others of each point, of equals the lower index first."""
+    tree, n = cKDTree(points), len(points)
+    nearest = np.empty((n, wanted), dtype=np.int64)
+    left, asked = np.arange(n), min(wanted + 1 + SPARE, n)
+    while left.size:
+        distance, found = tree.query(points[left], asked)
+        distance[found == left[:, None]] = -1.0  # itself goes first
+        order = np.lexsort((found, distance), axis=1)[:, 1 : wanted + 1]
+        nearest[left] = np.take_along_axis(found, order, axis=1)
+        # Where the last found is no farther than the last wanted, nearer indices may lie beyond.
+        cut = distance.max(axis=1) <= np.take_along_axis(distance, order[:, -1:], axis=1)[:, 0]
+        left = left[cut] if asked < n else left[:0]
+        asked = min(2 * asked, n)
+    return nearest
+
+
+def _gaussian(
+    points: Float[np.ndarray, "n d"], edges: Int[np.ndarray, "e 2"], scale: float, t: float
+) -> Float[np.ndarray, " e"]:
+    time = float(positive_values([t], "t")[0])
+    squares = ((points[edges[:, 0]] - points[edges[:, 1]]) ** 2).sum(axis=1)
+    with np.errstate(over="ignore"):  # what overflows here is a weight of 0, refused below
+        weights = np.exp(-squares / 4 * scale / time * scale)
+    bad = np.flatnonzero(weights == 0)
+    if bad.size:
+        raise InvalidParameterError(
+            f"t must let every edge have weight; at t = {time:.4g} edge {tuple(edges[bad[0]].tolist())} of length "
+            f"{squares[bad[0]] ** 0.5 * scale:.4g} has exp(-|x - y|²/4t) = 0 ({bad.size} such). Choose a larger t."
+        )
+    return weights
