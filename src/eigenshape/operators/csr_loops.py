@@ -41,7 +41,7 @@ def worst_asymmetry(starts, columns, values):
 @njit(cache=True, nogil=True)
 @no_type_check
 def component_labels(starts, columns):
-    """Number each row with its connected component, in the order of their first rows."""
+    """Return for each row the number of its connected component, counted in the order of their first rows."""
     n = len(starts) - 1
     labels = np.full(n, -1)
     stack = np.empty(n, dtype=np.int64)

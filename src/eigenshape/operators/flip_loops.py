@@ -91,8 +91,7 @@ def _flip(tails, twins, lengths, side):
         tails[new[k]], lengths[new[k]] = from_old[k], old_lengths[k]
         twins[new[k]] = other
         twins[other] = new[k]
-    tails[side], tails[twin] = tails[new[3]], tails[new[1]]
-    tails[side], tails[twin] = tails[next_side(new[2])], tails[next_side(new[0])]
+    tails[side], tails[twin] = tails[new[2]], tails[new[0]]
     lengths[side] = lengths[twin] = crossing
     return new
 

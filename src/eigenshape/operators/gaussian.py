@@ -3,7 +3,6 @@
 from typing import Literal, SupportsIndex
 
 import numpy as np
-from jaxtyping import Float
 from numpy.typing import ArrayLike
 from scipy.sparse.linalg import LinearOperator
 
@@ -202,8 +201,8 @@ def functional_laplacian(measure: Quadrature, t: float, *, cutoff: float = 6.0) 
     weights, unit = size_one(measure.weights)
     factor = (unit / scale**measure.dim) / (4 * np.pi * time) ** (measure.dim / 2) / t
 
-    def product(values: Float[np.ndarray, "n b"]) -> Float[np.ndarray, "n b"]:
-        columns = np.asarray(values, dtype=np.float64).reshape(len(weights), -1)
+    def product(values: np.ndarray) -> np.ndarray:
+        columns = values.astype(np.float64).reshape(len(weights), -1)
         return factor * gaussian_differences(grid, weights, time, columns) / weights[:, None]
 
     return LinearOperator(

@@ -57,7 +57,7 @@ def require_readable(kernel: GaussianKernel | None, values: Float[np.ndarray, " 
         )
 
 
-def from_pencil(kernel: GaussianKernel | None, values: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+def from_pencil(kernel: GaussianKernel | None, values: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
     """Return what is reported for eigenvalues μ of the pencil: λ where the kernel is corrected, μ itself elsewhere."""
     return -np.log1p(-kernel.t * values) / kernel.t if kernel is not None and kernel.corrected else values
 
@@ -87,6 +87,6 @@ def reported(kernel: GaussianKernel | None, certificate: Certificate, last: floa
         shift = shift if shift < top else (max(low, last) + top) / 2
         high = min(high, (shift + top) / 2)
     low, shift, high = (
-        float(from_pencil(kernel, np.array(end))) if np.isfinite(end) else end for end in (low, shift, high)
+        float(from_pencil(kernel, np.array([end]))[0]) if np.isfinite(end) else end for end in (low, shift, high)
     )
     return replace(certificate, shift=shift, gap=(low, high), resolution=resolution)

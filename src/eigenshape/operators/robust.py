@@ -1,0 +1,94 @@
+"""The robust Laplacian: weights ≥ 0 on any triangles, manifold or not."""
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float
+
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import in_length, require_volumes, size_one
+from eigenshape.geometry.topology import require_simplices_everywhere
+from eigenshape.operators import flip_loops
+from eigenshape.operators.graph import require_distinct_corners
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.tufted import Triangulation, edge_keys, flipped_to_delaunay, mollified, tufted_cover
+
+
+def robust_laplacian(mesh: TriangleMesh, *, mollify: float = 1e-5) -> Laplacian:
+    """Build the Laplacian of Sharp and Crane, "A Laplacian for Nonmanifold Triangle Meshes" (2020).
+
+    Edge lengths are mollified, each face gets a front and a back that are glued into the tufted cover, edges are
+    flipped until they are Delaunay, and the cotangent Laplacian of the cover is halved. So no weight is negative:
+    there is a maximum principle. On a mesh that is Delaunay, with no obtuse angle opposite to a boundary edge, this is
+    `cotangent_laplacian(mesh, "lumped")`. Entries of W join the ends of intrinsic edges, which need not be edges of
+    the mesh.
+
+    Edges may have any number of faces and faces may be turned any way (a Möbius strip, a soup); faces may lie on each
+    other and have no area.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    mollify : float
+        ε ≥ 0, a multiple of the mean edge length: all edges grow by the least length that leaves every triangle
+        a + b ≥ c + ε, by none where that holds. At 0, faces without area are refused.
+
+    Returns
+    -------
+    Laplacian
+        W without unit, off the diagonal ≤ 0; B diagonal, in length².
+
+    Raises
+    ------
+    InvalidShapeError
+        If a face has a corner twice, a vertex no face, all vertices are equal, or a face has no area and `mollify`
+        gives it none that rounding spares; or if coordinates are beyond 1e±150.
+    InvalidParameterError
+        If `mollify` is negative or not finite.
+    """
+    if not 0 <= mollify < np.inf:
+        raise InvalidParameterError(f"mollify must be finite and not negative; it is {mollify}.")
+    require_distinct_corners(mesh)
+    require_simplices_everywhere(mesh)
+    if not mollify:
+        require_volumes(mesh)
+    cover, scale = _cover(mesh, mollify)
+    delaunay = flipped_to_delaunay(cover)
+    areas = in_length(_areas(delaunay, mesh.n_points), scale, 2)
+    return Laplacian(_stiffness(delaunay, mesh.n_points), sp.diags_array(areas).tocsr())
+
+
+def _cover(mesh: TriangleMesh, mollify: float) -> tuple[Triangulation, float]:
+    points, scale = size_one(mesh.vertices)
+    lengths = np.linalg.norm(points[mesh.faces] - points[np.roll(mesh.faces, -1, axis=1)], axis=2).ravel()
+    if not lengths.any():
+        raise InvalidShapeError(
+            f"The vertices of a mesh must differ; all {mesh.n_vertices} are {mesh.vertices[0].tolist()}."
+        )
+    lengths = mollified(lengths, edge_keys(mesh.faces, mesh.n_vertices), mollify)
+    flat = np.flatnonzero(flip_loops.areas(lengths) == 0)
+    if flat.size:
+        raise InvalidShapeError(
+            f"Mollified faces must have area; face {flat[0]} has sides {(lengths.reshape(-1, 3)[flat[0]] * scale).tolist()} "
+            f"({flat.size} such). Choose a larger mollify than {mollify}."
+        )
+    return tufted_cover(points, mesh.faces, lengths), scale
+
+
+def _stiffness(cover: Triangulation, n: int) -> sp.csr_array:
+    cotangents = flip_loops.cotangents(cover.lengths)
+    # What rounding leaves below zero is zero. The cover counts the surface twice: a quarter of each edge's sum, not half.
+    once = np.flatnonzero(np.arange(len(cover.twins)) < cover.twins)
+    twins = cover.twins[once]
+    weights = np.maximum(cotangents[once] + cotangents[twins], 0.0) / 4
+    ends = (cover.tails[once], cover.tails[twins])
+    half = sp.coo_array((weights, ends), shape=(n, n)).tocsr()
+    whole = (half + half.T).tocsr()
+    whole.setdiag(0)  # an edge from a vertex to itself joins nothing
+    whole.eliminate_zeros()
+    return (sp.diags_array(whole.sum(axis=1)) - whole).tocsr()
+
+
+def _areas(cover: Triangulation, n: int) -> Float[np.ndarray, " n"]:
+    thirds = np.repeat(flip_loops.areas(cover.lengths) / 3, 3)
+    return np.bincount(cover.tails, weights=thirds, minlength=n) / 2

@@ -1,0 +1,134 @@
+"""Intrinsic triangulations: edge lengths made fit to live with, the tufted cover, Delaunay flips."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from eigenshape._errors import ConvergenceError
+from eigenshape.operators import flip_loops
+
+TOLERANCE = 1e-12  # a pair of cotangents that sums to less below zero is cocircular, relative to the terms in it
+MOST_FLIPS = 1000  # a side: far more than any shape takes, which is about one
+
+
+@dataclass(frozen=True, eq=False)
+class Triangulation:
+    """Triangles that know lengths only, glued along whole sides into a surface without boundary.
+
+    Triangle f has the sides 3f, 3f + 1, 3f + 2 in turn. Two corners of a triangle may be one vertex, and two of its
+    sides one edge.
+
+    Attributes
+    ----------
+    tails : (h,) int
+        Vertex at which each side starts.
+    twins : (h,) int
+        Side that each lies on, run the other way.
+    lengths : (h,) float
+        Length of each side.
+    """
+
+    tails: Int[np.ndarray, " h"]
+    twins: Int[np.ndarray, " h"]
+    lengths: Float[np.ndarray, " h"]
+
+
+def mollified(lengths: Float[np.ndarray, " h"], edges: Int[np.ndarray, " h"], factor: float) -> Float[np.ndarray, " h"]:
+    """Lengthen all sides by one amount, the least that leaves every triangle inequality a margin.
+
+    The margin is `factor` times the mean edge length (Sharp and Crane 2020, section 4.5); sides are left as they are
+    where every triangle has it. `edges` numbers the edge of each side.
+    """
+    _, firsts = np.unique(edges, return_index=True)
+    margin = factor * lengths[firsts].mean()
+    a, b, c = lengths.reshape(-1, 3).T
+    slack = np.minimum(np.minimum(a + b - c, b + c - a), c + a - b)
+    return lengths + max(0.0, float((margin - slack).max()))
+
+
+def tufted_cover(
+    points: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"], lengths: Float[np.ndarray, " h"]
+) -> Triangulation:
+    """Give each face a front and a back and glue these around each edge (Sharp and Crane 2020, section 3.2).
+
+    Around an edge the front of one face meets what it faces: the back or front of the next face by angle. So any
+    number of faces at an edge, turned any way, make a surface that is a manifold but for its vertices.
+    """
+    n_sides = 3 * len(faces)
+    heads = np.roll(faces, -1, axis=1).ravel()
+    fronts = np.arange(n_sides)
+    # The back of (a, b, c) is (b, a, c): its sides are those of the front in the order 0, 2, 1.
+    backs = n_sides + (fronts.reshape(-1, 3)[:, [0, 2, 1]]).ravel()
+    tails = np.concatenate([faces.ravel(), faces[:, [1, 0, 2]].ravel()])
+    of_back = lengths.reshape(-1, 3)[:, [0, 2, 1]].ravel()
+
+    forward = faces.ravel() < heads
+    up, down = np.where(forward, fronts, backs), np.where(forward, backs, fronts)
+    order, following = _around_edges(points, faces)
+    twins = np.empty(2 * n_sides, dtype=np.int64)
+    twins[up[order]] = down[following]
+    twins[down[following]] = up[order]
+    return Triangulation(tails, twins, np.concatenate([lengths, of_back]))
+
+
+def edge_keys(faces: Int[np.ndarray, "f 3"], n: int) -> Int[np.ndarray, " h"]:
+    """Return for each side, the first from corner 0 to corner 1, a number that sides with the same ends share."""
+    tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    return np.minimum(tails, heads) * n + np.maximum(tails, heads)
+
+
+def _around_edges(
+    points: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"]
+) -> tuple[Int[np.ndarray, " h"], Int[np.ndarray, " h"]]:
+    """Sort the sides by edge and angle around it, and return with each the next around its edge."""
+    keys = edge_keys(faces, len(points))
+    order = np.argsort(keys, kind="stable")
+    starts = np.flatnonzero(np.diff(keys[order], prepend=-1))
+    counts = np.diff(np.append(starts, len(order)))
+    crowded = np.repeat(counts > 2, counts)  # the order around any other edge does not matter
+    if crowded.any():
+        sides = order[crowded]
+        angles, ties = _angles(points, faces, sides, np.repeat(starts, counts)[crowded])
+        order[crowded] = sides[np.lexsort((ties, angles, keys[sides]))]
+    place = np.arange(len(order)) + 1
+    place[starts + counts - 1] = starts
+    return order, order[place]
+
+
+def _angles(
+    points: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"], sides: Int[np.ndarray, " c"], edges: np.ndarray
+) -> tuple[Float[np.ndarray, " c"], Int[np.ndarray, " c"]]:
+    """Return the angle at which the face of each side stands around its edge, and what orders faces at one angle."""
+    face, corner = np.divmod(sides, 3)
+    tail, head, apex = (faces[face, (corner + step) % 3] for step in range(3))
+    low, high = np.minimum(tail, head), np.maximum(tail, head)
+    along = points[high] - points[low]
+    lengths = np.linalg.norm(along, axis=1, keepdims=True)
+    along = np.divide(along, lengths, out=np.zeros_like(along), where=lengths > 0)
+    out = points[apex] - points[low]
+    out -= np.einsum("ij,ij->i", out, along)[:, None] * along
+    # Angles start from the face whose apex is farthest from the edge, which rounding has blurred least.
+    best = np.lexsort((sides, -np.linalg.norm(out, axis=1), edges))
+    groups, inverse = np.unique(edges, return_inverse=True)
+    zero = out[best[np.searchsorted(edges[best], groups)]][inverse]
+    quarter = np.cross(along, zero)
+    angles = np.arctan2(np.einsum("ij,ij->i", out, quarter), np.einsum("ij,ij->i", out, zero))
+    # Faces with the same corners lie in one order seen from any of their sides: seen against it, from the last.
+    between = (low < apex) & (apex < high)
+    return angles, np.where(between, -face, face)
+
+
+def flipped_to_delaunay(cover: Triangulation, tolerance: float = TOLERANCE) -> Triangulation:
+    """Flip edges until the two angles opposite to each sum to 180° at most (Sharp and Crane 2020, section 3.3).
+
+    Raises
+    ------
+    ConvergenceError
+        If flips do not end, which for lengths of triangles they do.
+    """
+    tails, twins, lengths = cover.tails.copy(), cover.twins.copy(), cover.lengths.copy()
+    most = MOST_FLIPS * len(tails)
+    if flip_loops.flip_to_delaunay(tails, twins, lengths, tolerance, most) < 0:
+        raise ConvergenceError(f"Flips to Delaunay must end; {most} flips of {len(tails) // 2} edges did not.")
+    return Triangulation(tails, twins, lengths)
