@@ -20,7 +20,9 @@ from eigenshape.figures.fields import figure_eigenfunctions, figure_field, figur
 from eigenshape.figures.save import save_figure
 from eigenshape.figures.sheet import Panel, figure_contact_sheet
 from eigenshape.figures.spectra import figure_spectrum
+from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.creatures import CREATURES, make_creature
+from eigenshape.geometry.geodesic import geodesic_balls
 from eigenshape.geometry.measure import (
     edge_lengths,
     enclosed_volume,
@@ -31,6 +33,13 @@ from eigenshape.geometry.measure import (
 )
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_area, normalize_box, normalize_diameter
+from eigenshape.geometry.quadrature import (
+    Quadrature,
+    mesh_quadrature,
+    sphere_quadrature,
+    torus_quadrature,
+    uniform_quadrature,
+)
 from eigenshape.geometry.repair import (
     Repaired,
     drop_degenerate,
@@ -41,11 +50,14 @@ from eigenshape.geometry.repair import (
     weld,
 )
 from eigenshape.geometry.sampling import MeshPart, cut_by_planes, partial_scan, random_planes
+from eigenshape.geometry.simplices import dual_volumes, mean_side_length, simplex_volumes
+from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, subdivide, torus
 from eigenshape.geometry.topology import (
     EdgeTable,
     boundary_edges,
     boundary_loops,
+    boundary_vertices,
     edge_table,
     euler_characteristic,
     is_closed,
@@ -53,8 +65,15 @@ from eigenshape.geometry.topology import (
     vertex_components,
 )
 from eigenshape.io.mesh_files import read_mesh, write_mesh
+from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.gaussian import (
+    functional_laplacian,
+    gaussian_laplacian,
+    mesh_laplacian,
+    quadrature_laplacian,
+)
+from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 from eigenshape.retrieval.batch import BatchReport, Item, Workers, build_index
 from eigenshape.retrieval.describe import DescribedShape, describe, describe_mesh, describe_views
 from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDescriptor
@@ -79,6 +98,7 @@ __all__ = [
     "EigenshapeError",
     "FeaturePoints",
     "FileFormatError",
+    "GaussianKernel",
     "InvalidParameterError",
     "InvalidShapeError",
     "Item",
@@ -88,18 +108,22 @@ __all__ = [
     "MeshPart",
     "MissingExtraError",
     "Panel",
+    "PointCloud",
+    "Quadrature",
     "Recipe",
     "Record",
     "Repaired",
     "Segmentation",
     "ShapeDescriptor",
     "ShapeIndex",
+    "SimplicialMesh",
     "Spectrum",
     "StoreError",
     "TriangleMesh",
     "Workers",
     "boundary_edges",
     "boundary_loops",
+    "boundary_vertices",
     "build_index",
     "certify",
     "cotangent_laplacian",
@@ -107,10 +131,12 @@ __all__ = [
     "describe",
     "describe_mesh",
     "describe_views",
+    "dirichlet_laplacian",
     "disjoint_union",
     "drop_degenerate",
     "drop_duplicate_faces",
     "drop_unreferenced",
+    "dual_volumes",
     "edge_lengths",
     "edge_table",
     "enclosed_volume",
@@ -122,6 +148,9 @@ __all__ = [
     "figure_field",
     "figure_segments",
     "figure_spectrum",
+    "functional_laplacian",
+    "gaussian_laplacian",
+    "geodesic_balls",
     "grid",
     "heat_kernel_signature",
     "icosphere",
@@ -131,23 +160,31 @@ __all__ = [
     "make_creature",
     "match_features",
     "matching_score",
+    "mean_side_length",
     "merge_tree",
+    "mesh_laplacian",
+    "mesh_quadrature",
     "normalize_area",
     "normalize_box",
     "normalize_diameter",
     "partial_scan",
+    "quadrature_laplacian",
     "random_planes",
     "read_mesh",
     "reflection_free_signature",
     "repair",
     "save_figure",
     "segment",
+    "simplex_volumes",
     "solve_dirichlet",
     "solve_spectrum",
+    "sphere_quadrature",
     "subdivide",
     "surface_area",
     "three_quarter_view",
     "torus",
+    "torus_quadrature",
+    "uniform_quadrature",
     "vertex_components",
     "vertex_normals",
     "weld",

@@ -98,9 +98,7 @@ def gaussian_rows(
     """
     kind = np.int32 if max(len(weights), starts[-1]) < 2**31 else np.int64
     columns, values = np.empty(starts[-1], dtype=kind), np.empty(starts[-1])
-    back = np.empty_like(grid.order)
-    back[grid.order] = np.arange(len(back))
-    fill = partial(pair_loops.fill, grid.points, grid.order, back, grid.cells, grid.runs, grid.reach**2)
+    fill = partial(pair_loops.fill, grid.points, grid.order, grid.cells, grid.runs, grid.reach**2)
     _each_cell(grid, partial(fill, weights, 1 / (4 * t), starts, columns, values))
     return columns, values
 

@@ -2,16 +2,19 @@
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Bool, Complex, Float, Int
+from jaxtyping import Bool, Complex, Float
 
 from eigenshape._errors import InvalidShapeError
-from eigenshape.geometry.measure import vertex_normals
+from eigenshape.geometry.measure import face_areas, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.cotangent import Mass, cotangent_laplacian
-from eigenshape.operators.directions import Directions, next_sides, vertex_directions
+from eigenshape.operators.directions import corner_products, vertex_directions
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.tufted import edge_keys
+
+MASS_SHARES = {"lumped": 0.0, "consistent": 1 / 12, "averaged": 1 / 24}  # of a face's area, for two of its corners
+COCIRCULAR = 1e-14  # a sum of cotangents that rounding may leave below zero
 
 
 def connection_laplacian(mesh: TriangleMesh, mass: Mass = "lumped") -> Laplacian:
@@ -54,12 +57,11 @@ def connection_laplacian(mesh: TriangleMesh, mass: Mass = "lumped") -> Laplacian
     sides = vertex_directions(mesh)
     turns = np.exp(1j * (sides.at_head + np.pi - sides.at_tail))
     flat_turns = turns * np.repeat(np.exp(-1j * np.angle(turns.reshape(-1, 3).prod(axis=1)) / 3), 3)
-    weights = sides.cotangents / 2
+    weights = _weights(mesh)
     flat = np.repeat(_faces_to_flatten(mesh, weights), 3)
-    off_diagonal = -_carried(mesh, weights * np.where(flat, flat_turns, turns))
-    diagonal = cotangent_laplacian(mesh).stiffness.diagonal()
-    stiffness = (sp.diags_array(diagonal.astype(complex)) + off_diagonal).tocsr()
-    return Laplacian(_real(stiffness), _real(_carried_mass(mesh, scalar.mass, flat_turns)))
+    stiffness = _carried(mesh, scalar.stiffness.diagonal(), -weights * np.where(flat, flat_turns, turns))
+    shares = np.repeat(MASS_SHARES[mass] * face_areas(mesh), 3)
+    return Laplacian(_real(stiffness), _real(_carried(mesh, scalar.mass.diagonal(), shares * flat_turns)))
 
 
 def tangent_frames(mesh: TriangleMesh) -> Float[np.ndarray, "n 2 3"]:
@@ -91,6 +93,12 @@ def tangent_frames(mesh: TriangleMesh) -> Float[np.ndarray, "n 2 3"]:
     return np.stack([first, np.cross(normals, first)], axis=1)
 
 
+def _weights(mesh: TriangleMesh) -> Float[np.ndarray, " h"]:
+    """Return half of the cotangent opposite to each side."""
+    cosines, sines = corner_products(mesh)
+    return np.roll((cosines / sines).reshape(-1, 3), 1, axis=1).ravel() / 2
+
+
 def _faces_to_flatten(mesh: TriangleMesh, weights: Float[np.ndarray, " h"]) -> Bool[np.ndarray, " f"]:
     """Choose faces so that the weights of all others sum to 0 or more at every edge.
 
@@ -100,26 +108,20 @@ def _faces_to_flatten(mesh: TriangleMesh, weights: Float[np.ndarray, " h"]) -> B
     flat = np.zeros(mesh.n_faces, dtype=bool)
     while True:
         kept = np.where(np.repeat(flat, 3), 0.0, weights)
-        short = np.bincount(edges, weights=kept)[edges] < 0
+        short = np.bincount(edges, weights=kept)[edges] < -COCIRCULAR
         more = (short & (kept < 0)).reshape(-1, 3).any(axis=1)
         if not more.any():
             return flat
         flat |= more
 
 
-def _carried(mesh: TriangleMesh, entries: Complex[np.ndarray, " h"]) -> sp.csr_array:
-    """Put the entry of each side where it acts on its tail and counts at its head; and the conjugate the other way."""
+def _carried(
+    mesh: TriangleMesh, diagonal: Float[np.ndarray, " n"], entries: Complex[np.ndarray, " h"]
+) -> sp.csr_array:
+    """Put the entry of each side where it acts on its tail and counts at its head, and the conjugate the other way."""
     tails, heads = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     half = sp.coo_array((entries, (heads, tails)), shape=(mesh.n_vertices,) * 2).tocsr()
-    return (half + half.conj().T).tocsr()
-
-
-def _carried_mass(mesh: TriangleMesh, mass: sp.csr_array, flat_turns: Complex[np.ndarray, " h"]) -> sp.csr_array:
-    """Carry the entries of a scalar mass matrix: a twelfth of the area of each face, more or less, for each side."""
-    diagonal = sp.diags_array(mass.diagonal().astype(complex)).tocsr()
-    if mass.nnz == mesh.n_vertices:
-        return diagonal
-    raise NotImplementedError
+    return (sp.diags_array(diagonal.astype(complex)) + half + half.conj().T).tocsr()
 
 
 def _real(matrix: sp.csr_array) -> sp.csr_array:

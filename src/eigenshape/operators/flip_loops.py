@@ -5,16 +5,20 @@ Triangle f has the sides 3f, 3f + 1, 3f + 2, one after the other around it. Side
 `lengths[h]` long, and lies on side `twins[h]` of another triangle, or of the same.
 """
 
+from typing import no_type_check
+
 import numpy as np
 from numba import njit
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+@no_type_check
 def next_side(side):
     return side - 2 if side % 3 == 2 else side + 1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+@no_type_check
 def area_of(a, b, c):
     # Kahan's order of Heron's formula: every digit right, needles too.
     low, high = min(a, b), max(a, b)
@@ -25,6 +29,7 @@ def area_of(a, b, c):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+@no_type_check
 def areas(lengths):
     found = np.empty(len(lengths) // 3)
     for f in range(len(found)):
@@ -33,6 +38,7 @@ def areas(lengths):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+@no_type_check
 def cotangent(lengths, side):
     """Return the cotangent opposite to a side, and the size of the terms in it."""
     a = lengths[side]
@@ -43,6 +49,7 @@ def cotangent(lengths, side):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+@no_type_check
 def cotangents(lengths):
     found = np.empty(len(lengths))
     for side in range(len(lengths)):
@@ -51,6 +58,7 @@ def cotangents(lengths):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+@no_type_check
 def needs_flip(twins, lengths, side, tolerance):
     one, size_one = cotangent(lengths, side)
     two, size_two = cotangent(lengths, twins[side])
@@ -58,6 +66,7 @@ def needs_flip(twins, lengths, side, tolerance):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+@no_type_check
 def _apex(lengths, side):
     """Return where the corner opposite to a side lies, along the side and beside it."""
     a = lengths[side]
@@ -67,6 +76,7 @@ def _apex(lengths, side):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+@no_type_check
 def _crossing(lengths, side, twin):
     """Return the length of the other diagonal of the two triangles at a side, laid out in the plane."""
     along, above = _apex(lengths, side)
@@ -75,6 +85,7 @@ def _crossing(lengths, side, twin):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+@no_type_check
 def _flip(tails, twins, lengths, side):
     # Triangles (u, v, w) and (v, u, x) become (x, w, u) and (w, x, v): each outer side moves one place on.
     twin = twins[side]
@@ -97,6 +108,7 @@ def _flip(tails, twins, lengths, side):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+@no_type_check
 def flip_to_delaunay(tails, twins, lengths, tolerance, most):
     """Flip until no edge needs it, in place, first come first served; return the number of flips, -1 beyond `most`."""
     n = len(tails)

@@ -36,20 +36,40 @@ def count(points, order, cells, runs, farthest, wanted, counts, first, last):
 
 @njit(cache=True, nogil=True)
 @no_type_check
-def fill(points, order, back, cells, runs, farthest, weights, rate, starts, columns, values, first, last):
+def _candidates(points, order, runs, cell):
+    """Return what may lie within reach of a cell, by its number before sorting, ascending, and its coordinates."""
+    total = 0
+    for run in range(runs.shape[1]):
+        total += runs[cell, run, 1] - runs[cell, run, 0]
+    places = np.empty(total, dtype=np.int64)
+    total = 0
+    for run in range(runs.shape[1]):
+        for j in range(runs[cell, run, 0], runs[cell, run, 1]):
+            places[total] = j
+            total += 1
+    numbers = order[places]
+    ascending = np.argsort(numbers)
+    return numbers[ascending], points[places[ascending]]
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def fill(points, order, cells, runs, farthest, weights, rate, starts, columns, values, first, last):
     for cell in range(first, last):
+        numbers, near = _candidates(points, order, runs, cell)
         for i in range(cells[cell], cells[cell + 1]):
             row = order[i]
             place = starts[row]
-            for run in range(runs.shape[1]):
-                for j in range(runs[cell, run, 0], runs[cell, run, 1]):
-                    if _square(points, i, j) <= farthest:
-                        columns[place] = order[j]
-                        place += 1
-            columns[starts[row] : place].sort()
-            for entry in range(starts[row], place):
-                other = columns[entry]
-                values[entry] = weights[row] * weights[other] * np.exp(-rate * _square(points, i, back[other]))
+            for candidate in range(len(numbers)):
+                square = 0.0
+                for axis in range(points.shape[1]):
+                    step = points[i, axis] - near[candidate, axis]
+                    square += step * step
+                if square <= farthest:
+                    other = numbers[candidate]
+                    columns[place] = other
+                    values[place] = weights[row] * weights[other] * np.exp(-rate * square)
+                    place += 1
 
 
 @njit(cache=True, nogil=True)

@@ -67,7 +67,7 @@ def _turned_over(simplices: Int[np.ndarray, "s corners"]) -> Int[np.ndarray, "s 
 
 
 def renumbered(subject: Subject, old_of_new: Int[np.ndarray, " n"]) -> Subject:
-    """Number the points otherwise: new point i is point old_of_new[i]."""
+    """Give the points new numbers: new point i is point old_of_new[i]."""
     if isinstance(subject, sp.csr_array):
         return subject[old_of_new][:, old_of_new]
     if isinstance(subject, PointCloud):

@@ -6,38 +6,34 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Int
 
 from eigenshape._errors import EigenshapeError, InvalidParameterError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral import changes
 from eigenshape.spectral.changes import Subject
+from eigenshape.spectral.comparison import distance, matrices, permuted, same_entries, same_spectrum
+from eigenshape.spectral.laplacian_laws import check_laplacian
 from eigenshape.spectral.laws import (
     USUAL,
     Law,
     NotJudged,
     OperatorReport,
+    Outcome,
     Promise,
-    check_laplacian,
     gathered,
     judged,
     judgements,
     known_promises,
-    sizes_of,
 )
-from eigenshape.spectral.solver import solve_spectrum
-from eigenshape.spectral.spectrum import Spectrum
 
 Build: TypeAlias = Callable[[Any], Laplacian]
-Outcome: TypeAlias = Law | NotJudged
 
 # Powers of two near 1e±100, 1e±50 and 1e±20, which round no coordinate; length^m stays a float up to this m.
 DOUBLINGS = ((332, 2), (166, 5), (66, 14))
 ROUNDING = 1e-12  # of √(W_ii W_jj), whatever the shape
 HEADROOM = 30  # over what one jiggle of the coordinates by their rounding changes
 MOST_ROUNDING = 1e-4
-N_EIGENVALUES = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +74,7 @@ def check_operator(
 
     The matrices are judged as in `check_laplacian`; then the operator is built again of the same shape told otherwise,
     and compared entry by entry, relative to √(W_ii W_jj) and √(B_ii B_jj). Where rows are not points (elements of
-    higher order, a boundary condition), renumbering is judged by the 20 lowest eigenvalues.
+    higher order, a boundary condition, vectors), the 20 lowest eigenvalues are compared.
 
     Rounding moves entries where simplices are thin: allowed is 30 times what changes when the coordinates are jiggled
     by their rounding, 1e-12 at least and 1e-4 at most.
@@ -139,7 +135,7 @@ def _attempt(name: str, law: Callable[[Trial], Outcome], trial: Trial) -> Outcom
     try:
         return law(trial)
     except (EigenshapeError, ValueError, ArithmeticError) as err:
-        return Law(name, False, np.inf, trial.allowed, f"told otherwise, the same shape is refused: {err}")
+        return Law(name, False, np.inf, trial.allowed, f"told otherwise, the shape or its spectrum is refused: {err}")
 
 
 def _allowed(build: Build, subject: Subject, laplacian: Laplacian, rng: np.random.Generator) -> float:
@@ -151,7 +147,7 @@ def _allowed(build: Build, subject: Subject, laplacian: Laplacian, rng: np.rando
         return ROUNDING  # the laws that change coordinates will find the refusal
     if other.n_points != laplacian.n_points:
         return ROUNDING
-    return min(max(ROUNDING, HEADROOM * _distance(laplacian, other)[0]), MOST_ROUNDING)
+    return min(max(ROUNDING, HEADROOM * distance(laplacian, other)[0]), MOST_ROUNDING)
 
 
 def _repetition(trial: Trial) -> Outcome:
@@ -165,8 +161,8 @@ def _point_order(trial: Trial) -> Outcome:
     old_of_new = trial.rng.permutation(_n_points(trial.subject))
     other = trial.build(changes.renumbered(trial.subject, old_of_new))
     if not trial.by_points:
-        return _same_spectrum("point order", trial, other, trial.laplacian)
-    return _same_entries("point order", trial, other, _permuted(trial.laplacian, old_of_new))
+        return same_spectrum("point order", other, trial.laplacian, trial.allowed)
+    return same_entries("point order", other, permuted(trial.laplacian, old_of_new), trial.allowed)
 
 
 def _simplex_order(trial: Trial) -> Outcome:
@@ -184,8 +180,7 @@ def _orientation(trial: Trial) -> Outcome:
 def _rigid_motion(trial: Trial) -> Outcome:
     if isinstance(trial.subject, sp.csr_array):
         return NotJudged("rigid motion", "a graph lies nowhere")
-    other = trial.build(changes.moved(trial.subject, trial.rng))
-    return _same_entries("rigid motion", trial, other, trial.laplacian)
+    return _same("rigid motion", trial, changes.moved(trial.subject, trial.rng))
 
 
 def _reflection(trial: Trial) -> Outcome:
@@ -209,7 +204,7 @@ def _scaled(trial: Trial, power: int) -> Law:
     """Compare W and B after division by their traces, and the ratio of the traces with 1/length²."""
     other = trial.build(changes.rescaled(trial.subject, 2.0**power))
     here, there = _unit_traces(trial.laplacian), _unit_traces(other)
-    law = _same_entries("scaling", trial, Laplacian(there[0], there[1]), Laplacian(here[0], here[1]))
+    law = same_entries("scaling", Laplacian(there[0], there[1]), Laplacian(here[0], here[1]), trial.allowed)
     unit = f"in a unit 2^{power} (1e{power * np.log10(2):+.0f}) times as large,"
     if not law.holds or isinstance(trial.subject, sp.csr_array):
         return judged("scaling", law.measured, law.allowed, f"{unit} {law.says}")
@@ -226,81 +221,17 @@ def _unit_traces(laplacian: Laplacian) -> tuple[sp.csr_array, sp.csr_array, floa
 
 def _union(trial: Trial) -> Outcome:
     other = trial.build(changes.doubled(trial.subject))
-    twice = Laplacian(*(sp.csr_array(sp.block_diag([matrix, matrix])) for matrix in _matrices(trial.laplacian)))
+    twice = Laplacian(*(sp.csr_array(sp.block_diag([matrix, matrix])) for matrix in matrices(trial.laplacian)))
     # A copy that far away has coordinates that many times coarser.
     allowed = min(changes.APART * trial.allowed, MOST_ROUNDING)
-    far = Trial(trial.build, trial.subject, trial.laplacian, trial.rng, allowed)
-    if not trial.by_points:
-        return _same_spectrum("union", far, other, twice)
-    return _same_entries("union", far, other, twice)
+    compare = same_entries if trial.by_points else same_spectrum
+    return compare("union", other, twice, allowed)
 
 
 def _same(name: str, trial: Trial, subject: Subject) -> Law:
-    """Compare the operators of two meshes with the same points, whose rows may differ where rows are not points."""
-    compare = _same_entries if trial.by_points else _same_spectrum
-    return compare(name, trial, trial.build(subject), trial.laplacian)
-
-
-def _same_entries(name: str, trial: Trial, found: Laplacian, expected: Laplacian) -> Law:
-    if found.n_points != expected.n_points:
-        says = f"the operator has {found.n_points} rows where {expected.n_points} are expected."
-        return judged(name, np.inf, trial.allowed, says)
-    measured, says = _distance(expected, found)
-    return judged(name, measured, trial.allowed, f"{says}; rounding takes up to {trial.allowed:.1e}.")
-
-
-def _distance(expected: Laplacian, found: Laplacian) -> tuple[float, str]:
-    """Return the largest change of an entry, relative to √(W_ii W_jj) or √(B_ii B_jj), and say where it is."""
-    sized = zip("WB", _matrices(expected), _matrices(found), strict=True)
-    return max((_largest_change(*each) for each in sized), key=lambda change: change[0])
-
-
-def _largest_change(name: str, expected: sp.csr_array, found: sp.csr_array) -> tuple[float, str]:
-    change = (found - expected).tocoo()
-    roots = sizes_of(expected)
-    relative = np.abs(change.data) / np.maximum(roots[change.row] * roots[change.col], np.finfo(float).tiny)
-    if not relative.any():
-        return 0.0, f"no entry of {name} changes"
-    worst = int(relative.argmax())
-    i, j = int(change.row[worst]), int(change.col[worst])
-    where = f"the largest change is that of {name}_ij at ({i}, {j}), from {expected[i, j]:.6g} to {found[i, j]:.6g}"
-    return float(relative[worst]), f"{where}, {relative[worst]:.1e} of √({name}_ii {name}_jj)"
-
-
-def _same_spectrum(name: str, trial: Trial, found: Laplacian, expected: Laplacian) -> Law:
-    if found.n_points != expected.n_points:
-        return _same_entries(name, trial, found, expected)
-    one, two = _spectrum(expected), _spectrum(found)
-    last = float(one.eigenvalues[-1]) or 1.0
-    change = np.abs(two.eigenvalues - one.eigenvalues) / last
-    worst = int(change.argmax())
-    allowed = (
-        _spectral_rounding(trial.allowed, expected) / last + float(one.residuals.max() + two.residuals.max()) / last
-    )
-    says = (
-        f"of the {len(change)} lowest eigenvalues, {worst} changes most, from {one.eigenvalues[worst]:.6g} to "
-        f"{two.eigenvalues[worst]:.6g}, {change[worst]:.1e} of the last; rounding takes up to {allowed:.1e}."
-    )
-    return judged(name, float(change[worst]), allowed, says)
-
-
-def _spectral_rounding(share: float, laplacian: Laplacian) -> float:
-    """Bound what changes by a share of √(W_ii W_jj) do to an eigenvalue whose vector is spread over the shape."""
-    traces = [float(matrix.diagonal().sum()) for matrix in _matrices(laplacian)]
-    return share * laplacian.stiffness.nnz / laplacian.n_points * abs(traces[0]) / traces[1]
-
-
-def _spectrum(laplacian: Laplacian) -> Spectrum:
-    bare = Laplacian(laplacian.stiffness, laplacian.mass)  # of the pencil itself, not corrected
-    return solve_spectrum(bare, min(N_EIGENVALUES, laplacian.n_points))
-
-
-def _permuted(laplacian: Laplacian, old_of_new: Int[np.ndarray, " n"]) -> Laplacian:
-    return Laplacian(*(matrix[old_of_new][:, old_of_new] for matrix in _matrices(laplacian)))
-
-
-def _matrices(laplacian: Laplacian) -> tuple[sp.csr_array, sp.csr_array]:
-    return laplacian.stiffness, laplacian.mass
+    """Compare with the operator of the same points; rows that are not points may have changed places, or frames."""
+    compare = same_entries if trial.by_points else same_spectrum
+    return compare(name, trial.build(subject), trial.laplacian, trial.allowed)
 
 
 def _n_points(subject: Subject) -> int:

@@ -1,0 +1,109 @@
+"""Operators by name, with what each takes."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import scipy.sparse as sp
+
+from eigenshape._errors import InvalidParameterError
+from eigenshape.geometry.cloud import PointCloud, Shape
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplicial import SimplicialMesh
+from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.fem import fem_laplacian
+from eigenshape.operators.gaussian import mesh_laplacian, point_cloud_laplacian
+from eigenshape.operators.graph import graph_laplacian
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.robust import robust_laplacian
+
+MESHES = (TriangleMesh, SimplicialMesh)
+GRAPHS = (*MESHES, sp.sparray)
+KERNEL = ("t", "h", "edge_factor", "correct", "form", "cutoff")
+
+
+@dataclass(frozen=True)
+class Operator:
+    """An operator that can be asked for by name.
+
+    Attributes
+    ----------
+    build : callable
+        From a shape and options to a Laplacian.
+    takes : tuple of types
+        Shapes that it is for.
+    options : tuple of str
+        Names of the options that it knows.
+    says : str
+        What it is, in a line.
+    """
+
+    build: Callable[..., Laplacian]
+    takes: tuple[type, ...]
+    options: tuple[str, ...]
+    says: str
+
+
+OPERATORS = {
+    "cotangent": Operator(cotangent_laplacian, MESHES, ("mass",), "linear finite elements"),
+    "p2": Operator(partial(fem_laplacian, order=2), MESHES, (), "quadratic finite elements, nodes on edges too"),
+    "p3": Operator(partial(fem_laplacian, order=3), MESHES, (), "cubic finite elements, nodes inside triangles too"),
+    "robust": Operator(robust_laplacian, (TriangleMesh,), ("mollify",), "linear elements on intrinsic Delaunay triangles"),
+    "mesh": Operator(mesh_laplacian, MESHES, (*KERNEL, "distance"), "Gaussian kernel, weighed by volumes"),
+    "point-cloud": Operator(point_cloud_laplacian, (PointCloud,), KERNEL, "Gaussian kernel, weighed by local triangles"),
+    "combinatorial": Operator(partial(graph_laplacian, kind="combinatorial"), GRAPHS, (), "edges of weight 1"),
+    "weighted": Operator(partial(graph_laplacian, kind="weighted"), GRAPHS, (), "edges of their weight or inverse length"),
+    "normalized": Operator(partial(graph_laplacian, kind="normalized"), GRAPHS, (), "eigenvalues in 0..2"),
+}
+
+
+def build_laplacian(shape: Shape | sp.sparray, operator: str | None = None, **options: Any) -> Laplacian:
+    """Build the operator of a name on a shape.
+
+    Parameters
+    ----------
+    shape : TriangleMesh, SimplicialMesh, PointCloud or (n, n) sparse adjacency matrix
+    operator : str, optional
+        A name in `OPERATORS`; by default "cotangent" on meshes, "point-cloud" on points and "weighted" on graphs.
+    **options
+        Handed to the operator.
+
+    Returns
+    -------
+    Laplacian
+
+    Raises
+    ------
+    InvalidParameterError
+        If there is no such operator, it is not for such a shape, or does not know an option.
+    InvalidShapeError
+        As the operator says.
+    """
+    name = operator or default_operator(shape)
+    if name not in OPERATORS:
+        raise InvalidParameterError(f"operator must be one of {', '.join(OPERATORS)}; it is {name!r}.")
+    entry = OPERATORS[name]
+    if not isinstance(shape, entry.takes):
+        raise InvalidParameterError(
+            f"The {name} operator takes {' or '.join(kind.__name__ for kind in entry.takes)}; the shape is a "
+            f"{type(shape).__name__}. {_instead(shape)}"
+        )
+    unknown = [option for option in options if option not in entry.options]
+    if unknown:
+        raise InvalidParameterError(
+            f"The {name} operator takes {', '.join(entry.options) or 'no option'}; it was given {unknown[0]}."
+        )
+    return entry.build(shape, **options)
+
+
+def default_operator(shape: Shape | sp.sparray) -> str:
+    """Name the operator that serves a kind of shape best in general."""
+    if isinstance(shape, PointCloud):
+        return "point-cloud"
+    return "cotangent" if isinstance(shape, MESHES) else "weighted"
+
+
+def _instead(shape: object) -> str:
+    names = [name for name, entry in OPERATORS.items() if isinstance(shape, entry.takes)]
+    return f"It is for {', '.join(names)}." if names else "No operator is for that."

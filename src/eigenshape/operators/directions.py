@@ -1,0 +1,127 @@
+"""Directions of edges in the tangent planes of their ends."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from eigenshape._errors import InvalidShapeError
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import require_volumes, scaled_corners
+from eigenshape.geometry.topology import (
+    inconsistent_edges,
+    non_manifold_edges,
+    non_manifold_vertices,
+    require_simplices_everywhere,
+)
+from eigenshape.operators.tufted import edge_keys
+
+
+@dataclass(frozen=True, eq=False)
+class Directions:
+    """The directions of the sides of all faces; side 3f + s runs from corner s of face f to the next.
+
+    Attributes
+    ----------
+    at_tail : (3f,) float
+        Angle of the side in the tangent plane of its start, counter-clockwise from the first side there; those around
+        an inner vertex are scaled to 2π.
+    at_head : (3f,) float
+        Angle at which its start is seen from its end, likewise.
+    first : (n,) int
+        The first side that leaves each vertex: on a boundary that with nothing on its right, else that of the lowest
+        number.
+    """
+
+    at_tail: Float[np.ndarray, " h"]
+    at_head: Float[np.ndarray, " h"]
+    first: Int[np.ndarray, " n"]
+
+
+def vertex_directions(mesh: TriangleMesh) -> Directions:
+    """Measure the directions of edges around each vertex (Sharp, Soliman, Crane 2019, section 5.2).
+
+    Raises
+    ------
+    InvalidShapeError
+        If the mesh is no manifold, two neighbouring faces are turned against each other, a face has no area or a
+        vertex no face; the message names the first.
+    """
+    require_volumes(mesh)
+    require_simplices_everywhere(mesh)
+    _require_oriented_manifold(mesh)
+    twins = _twins(mesh)
+    first, inner = _first_sides(mesh, twins)
+    cosines, sines = corner_products(mesh)
+    at_tail, at_head, around = _turned(mesh, first, twins, np.arctan2(sines, cosines))
+    scale = np.where(inner, 2 * np.pi / around, 1.0)
+    tails, heads = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+    return Directions(at_tail * scale[tails], at_head * scale[heads], first)
+
+
+def corner_products(mesh: TriangleMesh) -> tuple[Float[np.ndarray, " h"], Float[np.ndarray, " h"]]:
+    """Return the scalar product of the sides at each corner and the size of their vector product, up to one unit."""
+    corners, _ = scaled_corners(mesh)
+    to_next = np.roll(corners, -1, axis=1) - corners
+    to_last = np.roll(corners, 1, axis=1) - corners
+    sines = np.linalg.norm(np.cross(to_next, to_last), axis=2)
+    return np.einsum("fij,fij->fi", to_next, to_last).ravel(), sines.ravel()
+
+
+def _twins(mesh: TriangleMesh) -> Int[np.ndarray, " h"]:
+    """Return the side that lies on each, -1 on a boundary."""
+    keys = edge_keys(mesh.faces, mesh.n_vertices)
+    order = np.argsort(keys, kind="stable")
+    same = keys[order][1:] == keys[order][:-1]
+    one, two = order[:-1][same], order[1:][same]
+    twins = np.full(len(keys), -1)
+    twins[one], twins[two] = two, one
+    return twins
+
+
+def _first_sides(mesh: TriangleMesh, twins: Int[np.ndarray, " h"]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the first side of each vertex, and whether it lies inside."""
+    tails = mesh.faces.ravel()
+    _, first = np.unique(tails, return_index=True)
+    boundary = np.flatnonzero(twins < 0)
+    first[tails[boundary]] = boundary
+    inner = np.ones(mesh.n_vertices, dtype=bool)
+    inner[tails[boundary]] = False
+    return first, inner
+
+
+def _turned(
+    mesh: TriangleMesh, first: Int[np.ndarray, " n"], twins: Int[np.ndarray, " h"], angles: Float[np.ndarray, " h"]
+) -> tuple[Float[np.ndarray, " h"], Float[np.ndarray, " h"], Float[np.ndarray, " n"]]:
+    """Walk around all vertices at once, from side to side of a corner, and sum up the angles."""
+    at_tail, at_head = np.empty(len(angles)), np.empty(len(angles))
+    around = np.zeros(mesh.n_vertices)
+    walking, side = np.arange(mesh.n_vertices), first
+    while walking.size:
+        at_tail[side] = around[walking]
+        around[walking] += angles[side]
+        last = side - side % 3 + (side + 2) % 3
+        at_head[last] = around[walking]
+        side = twins[last]
+        on = (side >= 0) & (side != first[walking])
+        walking, side = walking[on], side[on]
+    return at_tail, at_head, around
+
+
+def _require_oriented_manifold(mesh: TriangleMesh) -> None:
+    edges, vertices, turned = non_manifold_edges(mesh), non_manifold_vertices(mesh), inconsistent_edges(mesh)
+    if len(edges):
+        raise InvalidShapeError(
+            "Tangent planes need a manifold; more than two faces share edge "
+            f"({edges[0, 0]}, {edges[0, 1]}) ({len(edges)} such)."
+        )
+    if vertices.size:
+        raise InvalidShapeError(
+            f"Tangent planes need a manifold; the faces at vertex {vertices[0]} at "
+            f"{mesh.vertices[vertices[0]].tolist()} form more than one fan ({vertices.size} such)."
+        )
+    if len(turned):
+        raise InvalidShapeError(
+            "Tangent planes need faces turned one way; the two at edge "
+            f"({turned[0, 0]}, {turned[0, 1]}) are turned against each other ({len(turned)} such)."
+        )

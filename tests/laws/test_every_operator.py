@@ -1,0 +1,226 @@
+"""Every operator on every kind of shape, under every boundary condition, against every law that it promises.
+
+One line of `TABLE` adds an operator.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, partial
+from itertools import permutations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.creatures import make_creature
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplicial import SimplicialMesh
+from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.geometry.topology import boundary_vertices
+from eigenshape.operators.boundary import dirichlet_laplacian
+from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.gaussian import gaussian_laplacian, mesh_laplacian
+from eigenshape.operators.graph import graph_laplacian
+from eigenshape.operators.kernel import neighbor_distance
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.robust import robust_laplacian
+from eigenshape.spectral.changes import random_rotation
+from eigenshape.spectral.laws import USUAL
+from eigenshape.spectral.operator_laws import check_operator
+
+seeds = st.integers(0, 2**32 - 1)
+few = settings(deadline=None, max_examples=8)
+many = settings(deadline=None, max_examples=150)
+
+
+def turned(points, rng, noise):
+    """Shake points, move them off the origin and turn them."""
+    shaken = points + noise * rng.standard_normal(points.shape) + rng.standard_normal(points.shape[1])
+    return shaken @ random_rotation(points.shape[1], rng)
+
+
+def surface(rng):
+    mesh = (icosphere(1), torus(10, 7), grid(6, 5), creature(), pair())[rng.integers(5)]
+    return TriangleMesh(turned(mesh.vertices, rng, 0.02), mesh.faces)
+
+
+@cache
+def creature():
+    return make_creature("cat", n_vertices=200)
+
+
+def pair():
+    far = TriangleMesh(torus(9, 6).vertices + [20, 0, 0], torus(9, 6).faces)
+    return disjoint_union(icosphere(1), far)
+
+
+def slivers(rng):
+    """A surface with vertices that nearly lie on the opposite edge of a face, or nearly on each other."""
+    mesh = surface(rng)
+    points = mesh.vertices.copy()
+    for a, b, c in mesh.faces[rng.choice(mesh.n_faces, 2, replace=False)]:
+        share = rng.choice([rng.uniform(0.2, 0.8), 1e-4])
+        goal = share * points[a] + (1 - share) * points[b]
+        points[c] = goal + 10 ** rng.uniform(-6, -2) * (points[c] - goal)
+    return TriangleMesh(points, mesh.faces)
+
+
+def soup(rng):
+    """Faces over random points, with edges and vertices that are no manifold."""
+    points = rng.standard_normal((9, 3))
+    used, faces = np.unique([rng.choice(9, 3, replace=False) for _ in range(20)], return_inverse=True)
+    return TriangleMesh(points[used], faces.reshape(-1, 3))
+
+
+def sheet(rng):
+    """A surface with boundary."""
+    mesh = grid(7, 6)
+    return TriangleMesh(turned(mesh.vertices, rng, 0.02), mesh.faces)
+
+
+def solid(rng, codimension=None):
+    """A shaken box of simplices of dimension 1 to 4, turned in as many dimensions or in one or two more."""
+    dim = int(rng.integers(1, 5))
+    more = int(rng.integers(0, 3)) if codimension is None else codimension
+    mesh = box((12, 5, 3, 2)[dim - 1], dim)
+    flat = np.pad(mesh.points, ((0, 0), (0, more)))
+    return SimplicialMesh(turned(flat, rng, 0.02 / len(flat) ** (1 / dim)), mesh.simplices)
+
+
+@cache
+def box(n, dim):
+    """Cut the cubes of a box along their diagonals (Kuhn): simplex by simplex from corner to opposite corner."""
+    corners = np.stack(np.meshgrid(*[np.arange(n + 1)] * dim, indexing="ij"), axis=-1).reshape(-1, dim)
+    strides = (n + 1) ** np.arange(dim)[::-1]
+    first = corners[(corners < n).all(axis=1)] @ strides
+    steps = [np.cumsum([0, *strides[list(order)]]) for order in permutations(range(dim))]
+    return SimplicialMesh(corners / n, np.concatenate([first[:, None] + step for step in steps]))
+
+
+def curve(rng):
+    """A closed curve in the plane, in space or beyond."""
+    n, d = 40, int(rng.integers(2, 5))
+    angles = 2 * np.pi * (np.arange(n) + rng.uniform(-0.3, 0.3, n)) / n
+    points = np.pad(np.column_stack([np.cos(angles), np.sin(angles)]), ((0, 0), (0, d - 2)))
+    return SimplicialMesh(turned(points, rng, 0.01), np.column_stack([np.arange(n), (np.arange(n) + 1) % n]))
+
+
+def cloud(rng):
+    """Points on a shaken sphere, or on a shaken circle in four dimensions."""
+    if rng.random() < 0.5:
+        points = rng.standard_normal((150, 3))
+        return PointCloud(turned(points / np.linalg.norm(points, axis=1, keepdims=True), rng, 0.01), 2)
+    angles = 2 * np.pi * (np.arange(60) + rng.uniform(-0.3, 0.3, 60)) / 60
+    points = np.column_stack([np.cos(angles), np.sin(angles), np.zeros((60, 2))])
+    return PointCloud(turned(points, rng, 0.005), 1)
+
+
+def graph(rng):
+    """One or two rings with chords, weights over four decades."""
+    ends = [(start + i, start + (i + 1) % 12) for start in (0, 12)[: rng.integers(1, 3)] for i in range(12)]
+    ends += [tuple(rng.choice(12, 2, replace=False)) for _ in range(8)]
+    ends = np.unique(np.sort(ends, axis=1), axis=0)
+    upper = sp.coo_array((10 ** rng.uniform(-2, 2, len(ends)), ends.T), shape=(ends.max() + 1,) * 2)
+    return sp.csr_array(upper + upper.T)
+
+
+@dataclass(frozen=True)
+class Row:
+    """An operator, the shapes it takes, and what it promises of them."""
+
+    name: str
+    build: Callable[..., Laplacian]
+    shapes: tuple[Callable, ...]
+    promises: frozenset
+    boundary: Callable | None = None  # of shapes with one: rows to hold at zero
+
+
+def gaussian(cloud, form):
+    t = neighbor_distance(cloud.points, cloud.dim) ** 2
+    return gaussian_laplacian(cloud.points, 4 * t, cloud.dim, form=form)
+
+
+SURFACES = (surface, slivers, soup)
+FLAT = USUAL | {"volume"}
+MONOTONE = FLAT | {"nonnegative_weights"}
+GRAPH = (USUAL - {"scaling"}) | {"nonnegative_weights"}
+
+TABLE = [
+    Row("cotangent", cotangent_laplacian, SURFACES, FLAT, boundary_vertices),
+    Row("cotangent consistent", partial(cotangent_laplacian, mass="consistent"), SURFACES, FLAT, boundary_vertices),
+    Row("cotangent averaged", partial(cotangent_laplacian, mass="averaged"), SURFACES, FLAT, boundary_vertices),
+    Row("robust", robust_laplacian, SURFACES, MONOTONE - {"volume"}, boundary_vertices),
+    Row("robust, not mollified", partial(robust_laplacian, mollify=0.0), (surface, soup), MONOTONE),
+    Row("mesh", mesh_laplacian, (surface, solid, curve), MONOTONE, boundary_vertices),
+    Row("mesh, random walk", partial(mesh_laplacian, form="random-walk"), (surface, solid), MONOTONE - {"volume"}),
+    Row("mesh, geodesic", partial(mesh_laplacian, distance="geodesic"), (surface,), MONOTONE),
+    Row("gaussian", partial(gaussian, form="literal"), (cloud,), USUAL - {"scaling", "union"}),
+    Row("gaussian, random walk", partial(gaussian, form="random-walk"), (cloud,), USUAL - {"union"}),
+    Row("combinatorial", graph_laplacian, (surface, solid, curve), GRAPH, boundary_vertices),
+    Row("inverse length", partial(graph_laplacian, kind="weighted"), (surface, solid, curve), GRAPH),
+    *[
+        Row(f"{kind} of a graph", partial(graph_laplacian, kind=kind), (graph,), USUAL | {"nonnegative_weights"})
+        for kind in ("combinatorial", "weighted", "normalized")
+    ],
+]
+BOUNDED = {surface: sheet, solid: partial(solid, codimension=0)}
+
+
+def judge(build, draw, promises, seed):
+    rng = np.random.default_rng(seed)
+    shape = draw(rng)
+    report = check_operator(build, shape, promises=promises, rng=rng)
+    assert report.passed, f"{shape}\n{report.explain()}"
+
+
+def judge_free(row, seed):
+    judge(row.build, row.shapes[seed % len(row.shapes)], row.promises, seed)
+
+
+def judge_held(row, seed):
+    """Hold the boundary at zero: no constants any more, and not the whole volume."""
+    draws = [BOUNDED[draw] for draw in row.shapes if draw in BOUNDED]
+    promises = (row.promises - {"constants", "volume"}) | {"definite"}
+    judge(partial(held, row), draws[seed % len(draws)], promises, seed)
+
+
+def held(row, shape):
+    return dirichlet_laplacian(row.build(shape), row.boundary(shape))[0]
+
+
+pytestmark = pytest.mark.filterwarnings("ignore:A heat time of t", "ignore:A kernel of width")
+every = pytest.mark.parametrize("row", TABLE, ids=lambda row: row.name)
+with_boundary = pytest.mark.parametrize("row", [row for row in TABLE if row.boundary], ids=lambda row: row.name)
+
+
+@every
+@few
+@given(seed=seeds)
+def test_a_free_operator_keeps_what_it_promises(row, seed):
+    judge_free(row, seed)
+
+
+@with_boundary
+@few
+@given(seed=seeds)
+def test_a_held_operator_keeps_what_it_promises(row, seed):
+    judge_held(row, seed)
+
+
+@pytest.mark.slow
+@every
+@many
+@given(seed=seeds)
+def test_a_free_operator_keeps_what_it_promises_on_many_shapes(row, seed):
+    judge_free(row, seed)
+
+
+@pytest.mark.slow
+@with_boundary
+@many
+@given(seed=seeds)
+def test_a_held_operator_keeps_what_it_promises_on_many_shapes(row, seed):
+    judge_held(row, seed)
