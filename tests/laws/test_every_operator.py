@@ -49,11 +49,11 @@ def surface(rng):
 
 @cache
 def creature():
-    return make_creature("cat", n_vertices=200)
+    return make_creature("quadruped", n_vertices=500)
 
 
 def pair():
-    far = TriangleMesh(torus(9, 6).vertices + [20, 0, 0], torus(9, 6).faces)
+    far = TriangleMesh(torus(9, 6).vertices + np.array([20.0, 0, 0]), torus(9, 6).faces)
     return disjoint_union(icosphere(1), far)
 
 

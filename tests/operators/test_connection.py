@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.measure import surface_area, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
@@ -57,25 +57,55 @@ def test_matrices_are_symmetric_and_definite_on_any_mesh(seed, mass, size):
 @pytest.mark.parametrize(("mass", "order"), [("lumped", 2), ("consistent", 2), ("averaged", 2)])
 def test_the_sphere_has_vector_harmonics(mass, order):
     # Gradients and turned gradients of the harmonics of degree l: l(l+1) - 1, each 2(2l+1) times.
-    exact = np.repeat([1.0, 5.0, 11.0, 19.0], [6, 10, 14, 18])
-    errors = []
-    for level in (2, 3, 4):
-        found = solve_spectrum(connection_laplacian(icosphere(level), mass), 48).eigenvalues
-        errors.append(np.abs(found / exact - 1).max())
-    np.testing.assert_allclose(np.log2(errors[-2] / errors[-1]), order, atol=0.15)
-    assert errors[-1] < 0.01
+    assert sphere_order([icosphere(level) for level in (2, 3, 4)], mass) == pytest.approx(order, abs=0.15)
 
 
-def test_a_far_from_delaunay_sphere_has_them_too():
+def test_a_sphere_that_is_not_delaunay_has_them_too():
+    meshes = [jittered_sphere(level) for level in (2, 3, 4)]
+    assert (cotangent_laplacian(meshes[-1]).stiffness.tocoo().data > 1e-3).sum() > 10
+    assert sphere_order(meshes, "lumped") > 1.85
+
+
+def sphere_order(meshes, mass):
     exact = np.repeat([1.0, 5.0, 11.0], [6, 10, 14])
-    errors = []
-    for level in (2, 3, 4):
-        mesh = icosphere(level)
-        moved = mesh.vertices + 0.25 * 2.0**-level * np.random.default_rng(7).standard_normal(mesh.vertices.shape)
-        points = moved / np.linalg.norm(moved, axis=1, keepdims=True)
-        found = solve_spectrum(connection_laplacian(TriangleMesh(points, mesh.faces)), 30).eigenvalues
-        errors.append(np.abs(found / exact - 1).max())
-    assert np.log2(errors[0] / errors[2]) / 2 > 1.5
+    found = [solve_spectrum(connection_laplacian(mesh, mass), 30).eigenvalues for mesh in meshes]
+    errors = [np.abs(values / exact - 1).max() for values in found]
+    assert errors[-1] < 0.006
+    return np.log2(errors[-2] / errors[-1])
+
+
+def jittered_sphere(level: int) -> TriangleMesh:
+    mesh = icosphere(level)
+    moved = mesh.vertices + 0.15 * 2.0**-level * np.random.default_rng(0).standard_normal(mesh.vertices.shape)
+    return TriangleMesh(moved / np.linalg.norm(moved, axis=1, keepdims=True), mesh.faces)
+
+
+def test_a_weight_below_zero_is_outweighed_where_the_published_form_fails():
+    # Folds leave angles far from 360° at single vertices: there w_ij r_ij alone gives fields an energy below zero.
+    mesh = noisy(15, 0.3)
+    published, ours = by_the_book(mesh), connection_laplacian(mesh).stiffness.toarray()
+    lowest, *_, highest = np.linalg.eigvalsh(published)
+    assert lowest < -0.03 * highest
+    assert np.linalg.eigvalsh(ours)[0] > 1e-3 * highest
+    np.testing.assert_allclose(np.diag(ours), np.diag(published), rtol=1e-10)
+
+
+@pytest.mark.parametrize("mesh", [icosphere(2), TETRAHEDRON, torus(30, 10)])
+def test_on_a_delaunay_mesh_it_is_the_published_form(mesh):
+    np.testing.assert_allclose(connection_laplacian(mesh).stiffness.toarray(), by_the_book(mesh), atol=1e-12)
+
+
+def by_the_book(mesh: TriangleMesh) -> np.ndarray:
+    """Cotangent weights times rotations, edge by edge."""
+    scalar = cotangent_laplacian(mesh).stiffness.toarray()
+    found = vertex_directions(mesh)
+    matrix = np.kron(np.diag(np.diag(scalar)), np.eye(2))
+    tails, heads = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+    for i, j, at_i, at_j in zip(tails, heads, found.at_tail, found.at_head, strict=True):
+        turn = Rotation.from_euler("z", at_j + np.pi - at_i).as_matrix()[:2, :2]
+        matrix[2 * j : 2 * j + 2, 2 * i : 2 * i + 2] = scalar[i, j] * turn
+        matrix[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] = scalar[i, j] * turn.T
+    return matrix
 
 
 @pytest.mark.parametrize("mass", ["lumped", "consistent", "averaged"])
@@ -124,14 +154,14 @@ def test_the_regular_tetrahedron_by_hand():
 
 
 def test_directions_around_a_vertex_by_hand():
-    # Three squares around the middle of an L: 270° at the inner corner, a boundary vertex, unscaled.
+    # Six triangles around the middle of an L: 270° at the inner corner, a boundary vertex, unscaled.
     points = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [-1, 1, 0], [-1, 0, 0], [-1, -1, 0], [0, -1, 0]]
     faces = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5], [0, 5, 6], [0, 6, 7]]
     found = vertex_directions(TriangleMesh(points, faces))
     np.testing.assert_allclose(np.degrees(found.at_tail[::3]), np.arange(0, 270, 45))
     np.testing.assert_allclose(np.degrees(found.at_head[2::3]), np.arange(45, 271, 45))
     assert found.first[0] == 0
-    np.testing.assert_array_equal(found.first[[2, 7]], [3 * 0 + 2, 3 * 5 + 2][:0] or found.first[[2, 7]])
+    assert found.first[7] == 3 * 5 + 2  # the side back to the middle, with nothing on its right
 
 
 def test_around_an_inner_vertex_angles_are_scaled_to_a_full_turn():
@@ -227,8 +257,6 @@ def test_the_rest_of_what_is_refused():
         tangent_frames(TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]))
     with pytest.raises(InvalidShapeError, match=r"Every vertex must belong to a face; vertex 3"):
         tangent_frames(TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5]], [[0, 1, 2]]))
-    with pytest.raises(InvalidParameterError, match=r"mass must be 'lumped', 'consistent' or 'averaged'; it is 'full'"):
-        connection_laplacian.__wrapped__(TETRAHEDRON, "full")
 
 
 def test_a_vertex_without_tangent_plane_has_no_frame_and_yet_a_laplacian():
@@ -247,7 +275,7 @@ def test_parts_do_not_feel_each_other():
 
 
 @pytest.mark.data
-@pytest.mark.parametrize("name", ["eight.off", "bunny.off", "horse.ply"])
+@pytest.mark.parametrize("name", ["eight.off", "bunny.off"])
 def test_real_surfaces_have_fields_of_little_energy(data, name):
     laplacian = connection_laplacian(read_mesh(data / "classics" / name))
     values = solve_spectrum(laplacian, 6).eigenvalues

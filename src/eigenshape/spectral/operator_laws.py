@@ -29,10 +29,11 @@ from eigenshape.spectral.laws import (
 
 Build: TypeAlias = Callable[[Any], Laplacian]
 
-# Powers of two near 1e±100, 1e±50 and 1e±20, which round no coordinate; length^m stays a float up to this m.
-DOUBLINGS = ((332, 2), (166, 5), (66, 14))
+# Powers of two near 1e±100, 1e±50 and 1e±20, which round no coordinate; the first for which W and B stay floats serves.
+DOUBLINGS = (332, 166, 66)
+LARGEST_EXPONENT = 900
 ROUNDING = 1e-12  # of √(W_ii W_jj), whatever the shape
-HEADROOM = 30  # over what one jiggle of the coordinates by their rounding changes
+HEADROOM = 8  # over what one jiggle of the coordinates by their rounding changes
 MOST_ROUNDING = 1e-4
 
 
@@ -76,7 +77,7 @@ def check_operator(
     and compared entry by entry, relative to √(W_ii W_jj) and √(B_ii B_jj). Where rows are not points (elements of
     higher order, a boundary condition, vectors), the 20 lowest eigenvalues are compared.
 
-    Rounding moves entries where simplices are thin: allowed is 30 times what changes when the coordinates are jiggled
+    Rounding moves entries where simplices are thin: allowed is 8 times what changes when the coordinates are jiggled
     by their rounding, 1e-12 at least and 1e-4 at most.
 
     Parameters
@@ -190,14 +191,17 @@ def _reflection(trial: Trial) -> Outcome:
 
 
 def _scaling(trial: Trial) -> Outcome:
-    doublings = _doublings(trial.subject)
+    doublings = _doublings(trial)
     laws = [_scaled(trial, power) for power in (doublings, -doublings)]
     return next((law for law in laws if not law.holds), max(laws, key=lambda law: law.measured))
 
 
-def _doublings(subject: Subject) -> int:
-    dim = 1 if isinstance(subject, sp.csr_array) else subject.dim
-    return next((power for power, largest in DOUBLINGS if dim <= largest), 20)
+def _doublings(trial: Trial) -> int:
+    """Measure how W and B grow with the shape, and say how far it may."""
+    few = 20
+    traces = [_unit_traces(trial.build(changes.rescaled(trial.subject, 2.0**power)))[2:] for power in (0, few)]
+    growth = max(np.abs(np.log2(traces[1]) - np.log2(traces[0]))) / few
+    return next((power for power in DOUBLINGS if growth * power <= LARGEST_EXPONENT), few)
 
 
 def _scaled(trial: Trial, power: int) -> Law:
