@@ -1,4 +1,4 @@
-"""How far do the eigenvalues of one cat change from pose to pose, by the operator that hears them? (thesis 3.4)
+"""How far do the eigenvalues of one cat change from pose to pose, by the operator that hears them? (thesis 3.4).
 
 Eleven poses of one cat, each remeshed by itself. For each two of them the first 100 eigenvalues, times the area, are
 compared one by one.
@@ -7,7 +7,6 @@ compared one by one.
 import argparse
 import json
 import os
-import sys
 import warnings
 from itertools import combinations
 from pathlib import Path
@@ -84,7 +83,6 @@ def main() -> None:
         es.save_figure(
             es.figure_field(mesh, leaks(mesh), "share of the kernel out of reach", camera=camera), arguments.picture
         )
-    sys.exit(0)
 
 
 if __name__ == "__main__":

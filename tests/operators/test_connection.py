@@ -236,13 +236,13 @@ def test_an_edge_with_three_faces_is_refused():
     points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]]
     mesh = TriangleMesh(points, [[0, 1, 2], [1, 0, 3], [0, 1, 4]])
     for build in (connection_laplacian, tangent_frames):
-        with pytest.raises(InvalidShapeError, match=r"need a manifold; more than two faces share edge \(0, 1\) \(1 such\)"):
+        with pytest.raises(InvalidShapeError, match=r"manifold; more than two faces share edge \(0, 1\) \(1 such\)"):
             build(mesh)
 
 
 def test_two_fans_at_a_vertex_are_refused():
     points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]]
-    with pytest.raises(InvalidShapeError, match=r"the faces at vertex 0 at \[0\.0, 0\.0, 0\.0\] form more than one fan"):
+    with pytest.raises(InvalidShapeError, match=r"the faces at vertex 0 at \[0\.0, .* form more than one fan"):
         connection_laplacian(TriangleMesh(points, [[0, 1, 2], [0, 3, 4]]))
 
 
@@ -262,7 +262,7 @@ def test_the_rest_of_what_is_refused():
 def test_a_vertex_without_tangent_plane_has_no_frame_and_yet_a_laplacian():
     # A triangle and its back: the normals cancel at all three corners.
     pillow = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 1]])
-    with pytest.raises(InvalidShapeError, match=r"must have a tangent plane; at vertex 0 at \[0\.0, 0\.0, 0\.0\] the norm"):
+    with pytest.raises(InvalidShapeError, match=r"must have a tangent plane; at vertex 0 at \[0\.0, .* cancel"):
         tangent_frames(pillow)
     assert np.linalg.eigvalsh(connection_laplacian(pillow).stiffness.toarray())[0] > -1e-15
 

@@ -18,7 +18,6 @@ COCIRCULAR = {
     "dodecahedron_poly.obj", "platonic_shelf.obj", "angle_block.STL", "cube_compressed.obj", "cylinder.stl",
     "large_block_obb.STL", "mirror.ply",
 }  # fmt: skip
-WITH_A_CORNER_TWICE = {"cube-minimal-degenerated.obj"}
 NASTY = (
     "geometrycentral/bob_small.ply", "geometrycentral/cat_head.obj", "geometrycentral/dodecahedron_poly.obj",
     "geometrycentral/fan3.obj", "geometrycentral/fox.ply", "geometrycentral/hourglass_ico.obj",

@@ -86,8 +86,8 @@ def tangent_frames(mesh: TriangleMesh) -> Float[np.ndarray, "n 2 3"]:
     bad = np.flatnonzero((left <= 1e-12 * lengths) | (np.linalg.norm(normals, axis=1) == 0))
     if bad.size:
         raise InvalidShapeError(
-            f"A vertex must have a tangent plane; at vertex {bad[0]} at {mesh.vertices[bad[0]].tolist()} the normals of "
-            f"its faces cancel, or lie along its first edge ({bad.size} such)."
+            f"A vertex must have a tangent plane; at vertex {bad[0]} at {mesh.vertices[bad[0]].tolist()} the normals "
+            f"of its faces cancel, or lie along its first edge ({bad.size} such)."
         )
     first = along / left[:, None]
     return np.stack([first, np.cross(normals, first)], axis=1)

@@ -68,16 +68,16 @@ def _cover(mesh: TriangleMesh, mollify: float) -> tuple[Triangulation, float]:
     lengths = mollified(lengths, edge_keys(mesh.faces, mesh.n_vertices), mollify)
     flat = np.flatnonzero(flip_loops.areas(lengths) == 0)
     if flat.size:
+        sides = lengths.reshape(-1, 3)[flat[0]] * scale
         raise InvalidShapeError(
-            f"Mollified faces must have area; face {flat[0]} has sides {(lengths.reshape(-1, 3)[flat[0]] * scale).tolist()} "
-            f"({flat.size} such). Choose a larger mollify than {mollify}."
+            f"Mollified faces must have area; face {flat[0]} has sides {sides.tolist()} ({flat.size} such). Choose a larger mollify than {mollify}."
         )
     return tufted_cover(points, mesh.faces, lengths), scale
 
 
 def _stiffness(cover: Triangulation, n: int) -> sp.csr_array:
     cotangents = flip_loops.cotangents(cover.lengths)
-    # What rounding leaves below zero is zero. The cover counts the surface twice: a quarter of each edge's sum, not half.
+    # What rounding leaves below zero is zero. The cover counts the surface twice: a quarter of each sum, not half.
     once = np.flatnonzero(np.arange(len(cover.twins)) < cover.twins)
     twins = cover.twins[once]
     weights = np.maximum(cotangents[once] + cotangents[twins], 0.0) / 4
