@@ -21,6 +21,7 @@ from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators.boundary import dirichlet_laplacian
+from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.gaussian import gaussian_laplacian, mesh_laplacian
 from eigenshape.operators.graph import graph_laplacian
@@ -64,7 +65,7 @@ def slivers(rng):
     for a, b, c in mesh.faces[rng.choice(mesh.n_faces, 2, replace=False)]:
         share = rng.choice([rng.uniform(0.2, 0.8), 1e-4])
         goal = share * points[a] + (1 - share) * points[b]
-        points[c] = goal + 10 ** rng.uniform(-6, -2) * (points[c] - goal)
+        points[c] = goal + 10 ** rng.uniform(-9, -2) * (points[c] - goal)
     return TriangleMesh(points, mesh.faces)
 
 
@@ -147,6 +148,7 @@ SURFACES = (surface, slivers, soup)
 FLAT = USUAL | {"volume"}
 MONOTONE = FLAT | {"nonnegative_weights"}
 GRAPH = (USUAL - {"scaling"}) | {"nonnegative_weights"}
+VECTORS = frozenset({"rigid_motion", "reflection", "scaling", "union"})  # whose faces are all turned one way
 
 TABLE = [
     Row("cotangent", cotangent_laplacian, SURFACES, FLAT, boundary_vertices),
@@ -159,6 +161,8 @@ TABLE = [
     Row("mesh, geodesic", partial(mesh_laplacian, distance="geodesic"), (surface,), MONOTONE),
     Row("gaussian", partial(gaussian, form="literal"), (cloud,), USUAL - {"scaling", "union"}),
     Row("gaussian, random walk", partial(gaussian, form="random-walk"), (cloud,), USUAL - {"union"}),
+    Row("connection", connection_laplacian, (surface,), VECTORS),
+    Row("connection consistent", partial(connection_laplacian, mass="consistent"), (surface,), VECTORS),
     Row("combinatorial", graph_laplacian, (surface, solid, curve), GRAPH, boundary_vertices),
     Row("inverse length", partial(graph_laplacian, kind="weighted"), (surface, solid, curve), GRAPH),
     *[

@@ -10,7 +10,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.io.mesh_files import read_mesh
-from eigenshape.operators.connection import connection_laplacian, tangent_frames
+from eigenshape.operators.connection import connection_laplacian, flattened, tangent_frames
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.directions import vertex_directions
 from eigenshape.spectral.solver import solve_spectrum
@@ -88,6 +88,14 @@ def test_a_weight_below_zero_is_outweighed_where_the_published_form_fails():
     assert lowest < -0.03 * highest
     assert np.linalg.eigvalsh(ours)[0] > 1e-3 * highest
     np.testing.assert_allclose(np.diag(ours), np.diag(published), rtol=1e-10)
+
+
+def test_around_a_flattened_face_a_vector_comes_back():
+    angles = np.random.default_rng(0).uniform(-1, 1, 12)
+    turns = flattened(np.exp(1j * angles))
+    np.testing.assert_allclose(turns.reshape(-1, 3).prod(axis=1), 1, rtol=1e-14)
+    share = angles.reshape(-1, 3).sum(axis=1) / 3
+    np.testing.assert_allclose(np.angle(turns) + np.repeat(share, 3), angles, atol=1e-14)
 
 
 @pytest.mark.parametrize("mesh", [icosphere(2), TETRAHEDRON, torus(30, 10)])

@@ -161,6 +161,20 @@ def test_powers_of_two_scale_bit_for_bit(seed, power):
     np.testing.assert_array_equal(far[1], mass * scale * scale)
 
 
+@pytest.mark.parametrize("order", [[4, 0, 1, 2, 3], [0, 1, 2, 3, 4], [2, 4, 0, 3, 1]])
+def test_a_face_without_area_does_not_hide_the_order_of_the_others(order):
+    # Low roofs over the edge 0-1 at 0°, 80°, 200° and 290°, listed out of turn; flips carry edges over to their
+    # neighbours. The flat face has no angle; it lies before or behind the highest roof, where angles start.
+    angles, heights = np.radians([200, 0, 290, 80]), np.array([0.2, 0.4, 0.25, 0.3])
+    roofs = np.column_stack([np.full(4, 0.5), heights * np.cos(angles), heights * np.sin(angles)])
+    points = np.concatenate([[[0, 0, 0], [1, 0, 0]], roofs, [[0.5, 0, 0]]])
+    faces = np.array([[0, 1, 2], [0, 1, 3], [1, 0, 4], [0, 1, 5], [0, 1, 6]])
+    stiffness, _ = dense(TriangleMesh(points, faces[order]))
+    joined = {frozenset(pair) for pair in np.argwhere(stiffness < 0).tolist()}
+    assert {frozenset(pair) for pair in ([5, 2], [2, 4])} <= joined
+    assert not {frozenset(pair) for pair in ([3, 2], [5, 4])} & joined
+
+
 def test_faces_on_each_other_lie_in_one_order_from_every_side():
     # Three sheets, each glued to the next along all three of its sides: six sheets of three pillows, none between.
     points, faces = np.array(CORNERS[:3], dtype=float), np.array([[0, 1, 2], [2, 0, 1], [1, 0, 2]])

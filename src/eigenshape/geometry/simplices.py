@@ -55,21 +55,37 @@ def in_length(values: Float[np.ndarray, "..."], scale: float, power: int) -> Flo
     return np.ldexp(values, exponent)
 
 
-def triangular_sides(corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndarray, "s m m"]:
-    """Return the sides from corner 0 of each simplex in an orthonormal basis of its own, upper triangular.
+def triangular_sides(
+    corners: Float[np.ndarray, "s corners d"],
+) -> tuple[Float[np.ndarray, "s d m"], Float[np.ndarray, "s m m"]]:
+    """Write the sides from corner 0 of each simplex in an orthonormal basis of its own, as an upper triangle R.
 
-    Column i is the side to corner i + 1. RᵀR is the Gram matrix of the sides; the factor keeps the digits that
-    forming that matrix would lose.
+    Column i of R is the side to corner i + 1. RᵀR is the Gram matrix of the sides; the factor keeps the digits that
+    forming that matrix would lose. Gram-Schmidt (modified), all simplices at once; a simplex without volume has zeros
+    on the diagonal, and in the basis.
     """
-    sides = corners[:, 1:] - corners[:, :1]
-    triangles: Float[np.ndarray, "s m m"] = np.linalg.qr(sides.transpose(0, 2, 1), mode="r")  # type: ignore[assignment]
-    return triangles
+    basis = (corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1).copy()
+    n, _, dim = basis.shape
+    triangles = np.zeros((n, dim, dim))
+    for i in range(dim):
+        length = np.sqrt(np.einsum("sa,sa->s", basis[:, :, i], basis[:, :, i]))
+        triangles[:, i, i] = length
+        basis[:, :, i] /= np.where(length > 0, length, 1.0)[:, None]
+        for j in range(i + 1, dim):
+            triangles[:, i, j] = np.einsum("sa,sa->s", basis[:, :, i], basis[:, :, j])
+            basis[:, :, j] -= triangles[:, i, j, None] * basis[:, :, i]
+    return basis, triangles
 
 
 def volumes(corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndarray, " s"]:
     """Return the m-volume of each simplex, √det(Gram matrix of its sides) / m!."""
-    triangles = triangular_sides(corners)
-    return np.abs(np.einsum("sii->si", triangles)).prod(axis=1) / factorial(triangles.shape[1])
+    _, triangles = triangular_sides(corners)
+    return volumes_of(triangles)
+
+
+def volumes_of(triangles: Float[np.ndarray, "s m m"]) -> Float[np.ndarray, " s"]:
+    """Return the m-volume of each simplex from its triangle of sides."""
+    return np.einsum("sii->si", triangles).prod(axis=1) / factorial(triangles.shape[1])
 
 
 def simplex_volumes(mesh: Mesh) -> Float[np.ndarray, " s"]:

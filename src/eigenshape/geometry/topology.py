@@ -80,12 +80,16 @@ def require_simplices_everywhere(mesh: Mesh) -> None:
         )
 
 
-def boundary_vertices(mesh: Mesh) -> Int[np.ndarray, " k"]:
-    """Return the points on the boundary: the corners of facets that one simplex alone has, in ascending order."""
-    corners = range(mesh.dim + 1)
-    facets = np.concatenate([np.delete(mesh.simplices, corner, axis=1) for corner in corners])
+def boundary_facets(mesh: Mesh) -> Int[np.ndarray, "b m"]:
+    """Return the sides of simplices that one simplex alone has, by their corners, ascending."""
+    facets = np.concatenate([np.delete(mesh.simplices, corner, axis=1) for corner in range(mesh.dim + 1)])
     once, counts = np.unique(np.sort(facets, axis=1), axis=0, return_counts=True)
-    return np.unique(once[counts == 1])
+    return once[counts == 1]
+
+
+def boundary_vertices(mesh: Mesh) -> Int[np.ndarray, " k"]:
+    """Return the points on the boundary, ascending: the corners of `boundary_facets`."""
+    return np.unique(boundary_facets(mesh))
 
 
 def boundary_edges(mesh: TriangleMesh) -> Int[np.ndarray, "b 2"]:

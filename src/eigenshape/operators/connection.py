@@ -24,10 +24,11 @@ def connection_laplacian(mesh: TriangleMesh, mass: Mass = "lumped") -> Laplacian
     along the edge from vertex i to vertex j (Knöppel, Crane, Pinkall, Schröder 2013; Sharp, Soliman, Crane 2019). The
     angles around an inner vertex are scaled to 2π, those at a boundary vertex left as they are; the boundary is free.
 
-    W is positive semidefinite on any mesh. Where w_ij ≥ 0, as on a Delaunay mesh, each term says so. Elsewhere a weight
-    below zero must be outweighed within its face, and is once the face is flat: in such faces, few on a good mesh, the
-    three r_ij are turned by a third of the face's curvature each, so that the way around it leads back to the same
-    vector. What is turned is of the order of the squared edge length times curvature.
+    W is positive semidefinite on any mesh. Where w_ij ≥ 0, as on a Delaunay mesh, each term says so, and W is the
+    published one. Elsewhere the published sum may give a field an energy below zero. A weight below zero is outweighed
+    within its face once the face is flat: in such faces, few on a good mesh, the three r_ij are turned by a third of
+    the face's curvature each, so that the way around it leads back to the same vector. What is turned is of the order
+    of curvature times squared edge length, as is the error of the whole.
 
     Unlike in a scalar Laplacian the rows of W do not sum to 0: only parallel fields have no energy, and a curved
     surface has none.
@@ -56,7 +57,7 @@ def connection_laplacian(mesh: TriangleMesh, mass: Mass = "lumped") -> Laplacian
     scalar = cotangent_laplacian(mesh, mass)
     sides = vertex_directions(mesh)
     turns = np.exp(1j * (sides.at_head + np.pi - sides.at_tail))
-    flat_turns = turns * np.repeat(np.exp(-1j * np.angle(turns.reshape(-1, 3).prod(axis=1)) / 3), 3)
+    flat_turns = flattened(turns)
     weights = _weights(mesh)
     flat = np.repeat(_faces_to_flatten(mesh, weights), 3)
     stiffness = _carried(mesh, scalar.stiffness.diagonal(), -weights * np.where(flat, flat_turns, turns))
@@ -99,6 +100,12 @@ def _weights(mesh: TriangleMesh) -> Float[np.ndarray, " h"]:
     return np.roll((cosines / sines).reshape(-1, 3), 1, axis=1).ravel() / 2
 
 
+def flattened(turns: Complex[np.ndarray, " h"]) -> Complex[np.ndarray, " h"]:
+    """Turn the three of each face by a third of its curvature each, so that they lead back to the same vector."""
+    around = turns.reshape(-1, 3).prod(axis=1)
+    return turns * np.repeat(np.exp(-1j * np.angle(around) / 3), 3)
+
+
 def _faces_to_flatten(mesh: TriangleMesh, weights: Float[np.ndarray, " h"]) -> Bool[np.ndarray, " f"]:
     """Choose faces so that the weights of all others sum to 0 or more at every edge.
 
@@ -115,9 +122,7 @@ def _faces_to_flatten(mesh: TriangleMesh, weights: Float[np.ndarray, " h"]) -> B
         flat |= more
 
 
-def _carried(
-    mesh: TriangleMesh, diagonal: Float[np.ndarray, " n"], entries: Complex[np.ndarray, " h"]
-) -> sp.csr_array:
+def _carried(mesh: TriangleMesh, diagonal: Float[np.ndarray, " n"], entries: Complex[np.ndarray, " h"]) -> sp.csr_array:
     """Put the entry of each side where it acts on its tail and counts at its head, and the conjugate the other way."""
     tails, heads = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     half = sp.coo_array((entries, (heads, tails)), shape=(mesh.n_vertices,) * 2).tocsr()

@@ -39,7 +39,7 @@ class Directions:
 
 
 def vertex_directions(mesh: TriangleMesh) -> Directions:
-    """Measure the directions of edges around each vertex (Sharp, Soliman, Crane 2019, section 5.2).
+    """Measure the directions of edges around each vertex (Sharp, Soliman, Crane 2019).
 
     Raises
     ------

@@ -24,7 +24,9 @@ def robust_laplacian(mesh: TriangleMesh, *, mollify: float = 1e-5) -> Laplacian:
     the mesh.
 
     Edges may have any number of faces and faces may be turned any way (a Möbius strip, a soup); faces may lie on each
-    other and have no area.
+    other and have no area. A face without area has no angle around its edges: where more than two meet, its place
+    among them is that of its number. Of two diagonals that are both Delaunay, as in a square, that of the mesh stays;
+    B depends on which it is, W does not.
 
     Parameters
     ----------
@@ -70,7 +72,8 @@ def _cover(mesh: TriangleMesh, mollify: float) -> tuple[Triangulation, float]:
     if flat.size:
         sides = lengths.reshape(-1, 3)[flat[0]] * scale
         raise InvalidShapeError(
-            f"Mollified faces must have area; face {flat[0]} has sides {sides.tolist()} ({flat.size} such). Choose a larger mollify than {mollify}."
+            f"Mollified faces must have area; face {flat[0]} has sides {sides.tolist()} ({flat.size} such). Choose "
+            f"a larger mollify than {mollify}."
         )
     return tufted_cover(points, mesh.faces, lengths), scale
 
@@ -84,9 +87,8 @@ def _stiffness(cover: Triangulation, n: int) -> sp.csr_array:
     ends = (cover.tails[once], cover.tails[twins])
     half = sp.coo_array((weights, ends), shape=(n, n)).tocsr()
     whole = (half + half.T).tocsr()
-    whole.setdiag(0)  # an edge from a vertex to itself joins nothing
     whole.eliminate_zeros()
-    return (sp.diags_array(whole.sum(axis=1)) - whole).tocsr()
+    return (sp.diags_array(whole.sum(axis=1)) - whole).tocsr()  # an edge from a vertex to itself cancels here
 
 
 def _areas(cover: Triangulation, n: int) -> Float[np.ndarray, " n"]:

@@ -37,7 +37,7 @@ class Triangulation:
 def mollified(lengths: Float[np.ndarray, " h"], edges: Int[np.ndarray, " h"], factor: float) -> Float[np.ndarray, " h"]:
     """Lengthen all sides by one amount, the least that leaves every triangle inequality a margin.
 
-    The margin is `factor` times the mean edge length (Sharp and Crane 2020, section 4.5); sides are left as they are
+    The margin is `factor` times the mean edge length (Sharp and Crane 2020); sides are left as they are
     where every triangle has it. `edges` numbers the edge of each side.
     """
     _, firsts = np.unique(edges, return_index=True)
@@ -50,7 +50,7 @@ def mollified(lengths: Float[np.ndarray, " h"], edges: Int[np.ndarray, " h"], fa
 def tufted_cover(
     points: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"], lengths: Float[np.ndarray, " h"]
 ) -> Triangulation:
-    """Give each face a front and a back and glue these around each edge (Sharp and Crane 2020, section 3.2).
+    """Give each face a front and a back and glue these around each edge (Sharp and Crane 2020).
 
     Around an edge the front of one face meets what it faces: the back or front of the next face by angle. So any
     number of faces at an edge, turned any way, make a surface that is a manifold but for its vertices.
@@ -120,7 +120,7 @@ def _angles(
 
 
 def flipped_to_delaunay(cover: Triangulation, tolerance: float = TOLERANCE) -> Triangulation:
-    """Flip edges until the two angles opposite to each sum to 180° at most (Sharp and Crane 2020, section 3.3).
+    """Flip edges until the two angles opposite to each sum to 180° at most (Sharp and Crane 2020).
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """The same shape, told otherwise: moved, mirrored, renumbered, turned over, in another unit, twice."""
 
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -10,8 +10,14 @@ from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.simplicial import Mesh
 
 Subject: TypeAlias = Shape | sp.csr_array
+SubjectT = TypeVar("SubjectT", Shape, Shape | None)
 
 APART = 16  # diameters between a shape and its copy
+
+
+def as_subject(shape: SubjectT | sp.sparray) -> SubjectT | sp.csr_array:
+    """Return the shape, an adjacency matrix in the one sparse form that all functions here know."""
+    return sp.csr_array(shape) if isinstance(shape, sp.sparray) else shape
 
 
 def with_points(shape: Shape, points: Float[np.ndarray, "n d"]) -> Shape:

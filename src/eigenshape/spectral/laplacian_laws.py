@@ -12,7 +12,7 @@ from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.laplacian import ASYMMETRY, Laplacian
-from eigenshape.spectral.changes import Subject
+from eigenshape.spectral.changes import Subject, as_subject
 from eigenshape.spectral.comparison import sizes_of
 from eigenshape.spectral.factor import Factor, factorise, rounding
 from eigenshape.spectral.laws import (
@@ -35,12 +35,13 @@ VOLUME = 1e-11
 NEGATIVE = 1e-9  # of trace W / trace B
 # Shifts in trace W / trace B, from what rounding leaves of a zero upwards.
 LADDER = 10.0 ** np.arange(-12, 4)
-LARGEST_ZERO = 1e-6  # up to which the energy of constants, where it is not zero, moves the line between zero and not
+FIRST_LINE = 1e-14  # in the same unit: between zero and not zero
+LARGEST_ZERO = 1e-6  # up to where rounding, or constants that are not annihilated, may move that line
 NUDGES = (1.0, 1.07, 0.93, 1.15)
 
 
 def check_laplacian(
-    laplacian: Laplacian, shape: Subject | None = None, *, promises: Iterable[Promise] = USUAL
+    laplacian: Laplacian, shape: Subject | sp.sparray | None = None, *, promises: Iterable[Promise] = USUAL
 ) -> OperatorReport:
     """Judge the laws that can be read off the two matrices.
 
@@ -68,13 +69,13 @@ def check_laplacian(
     InvalidParameterError
         If a promise is unknown.
     """
-    promised = known_promises(promises)
+    promised, subject = known_promises(promises), as_subject(shape)
     mass, pencil = _mass(laplacian)
     optional: dict[Promise, Callable[[], list[Outcome]]] = {
         "constants": lambda: [_row_sums(laplacian), _kernel(laplacian, pencil)],
-        "components": lambda: [_components(laplacian, shape)],
+        "components": lambda: [_components(laplacian, subject)],
         "definite": lambda: [_definite(pencil)],
-        "volume": lambda: [_volume(laplacian, shape)],
+        "volume": lambda: [_volume(laplacian, subject)],
         "nonnegative_weights": lambda: [_weights(laplacian)],
     }
     found: list[Outcome] = [
@@ -159,13 +160,17 @@ def _kernel(laplacian: Laplacian, pencil: Pencil) -> Law:
     energies = np.abs(np.bincount(labels, weights=pencil.stiffness.sum(axis=1)))
     masses = np.bincount(labels, weights=pencil.mass.sum(axis=1))
     energy = float((energies / np.maximum(np.abs(masses), np.finfo(float).tiny)).max()) / pencil.level
-    line = min(max(float(LADDER[0]), 4 * energy), LARGEST_ZERO)
-    below, negative = _count(pencil, line), _count(pencil, -line)
-    if below is None or negative is None:
-        return judged("kernel", np.inf, 0, "no factor near zero has its pivots on the diagonal.")
-    zeros = below - negative
+    line = min(max(FIRST_LINE, 4 * energy), LARGEST_ZERO)
+    while (zeros := _zeros(pencil, line)) < n_parts and line < LARGEST_ZERO:
+        line *= 10  # what rounding makes of a zero may lie farther out; a larger interval holds no fewer
     says = f"within {line:.0e} trace W / trace B of zero lie {zeros} of the eigenvalues; components of W: {n_parts}."
     return judged("kernel", abs(zeros - n_parts), 0, says)
+
+
+def _zeros(pencil: Pencil, line: float) -> int:
+    """Count the eigenvalues on either side of zero; none where no factor serves."""
+    below, negative = _count(pencil, line), _count(pencil, -line)
+    return 0 if below is None or negative is None else below - negative
 
 
 def _graph_parts(matrix: sp.csr_array) -> tuple[int, Int[np.ndarray, " n"]]:
@@ -185,10 +190,8 @@ def _components(laplacian: Laplacian, shape: Subject | None) -> Outcome:
     for name, matrix in (("W", laplacian.stiffness), ("B", laplacian.mass)):
         size, place = _largest_link(matrix, labels)
         if size > worst:
-            worst, says = (
-                size,
-                f"entry {place} of {name} joins two of them: it is {size:.1e} of √({name}_ii {name}_jj).",
-            )
+            worst = size
+            says = f"entry {place} of {name} joins two of them: it is {size:.1e} of √({name}_ii {name}_jj)."
     return judged("components", worst, LINK, f"the shape has {n_parts}; {says}")
 
 

@@ -48,15 +48,20 @@ class Trial:
     laplacian : Laplacian
         What `build` makes of `subject`.
     rng : Generator
-    allowed : float
-        Of √(W_ii W_jj), for laws that round the coordinates anew.
+    rounding : float
+        What it may change, of √(W_ii W_jj).
     """
 
     build: Build
     subject: Subject
     laplacian: Laplacian
     rng: np.random.Generator
-    allowed: float
+    rounding: float
+
+    @property
+    def allowed(self) -> float:
+        """What laws may change that leave the coordinates as they are."""
+        return min(self.rounding, MOST_ROUNDING)
 
     @property
     def by_points(self) -> bool:
@@ -66,7 +71,7 @@ class Trial:
 
 def check_operator(
     build: Build,
-    shape: Subject,
+    shape: Subject | sp.sparray,
     *,
     promises: Iterable[Promise] = USUAL,
     rng: np.random.Generator | None = None,
@@ -78,7 +83,7 @@ def check_operator(
     higher order, a boundary condition, vectors), the 20 lowest eigenvalues are compared.
 
     Rounding moves entries where simplices are thin: allowed is 8 times what changes when the coordinates are jiggled
-    by their rounding, 1e-12 at least and 1e-4 at most.
+    by their rounding, and 1e-12 at least. Where that is more than 1e-4, laws that round them anew are not judged.
 
     Parameters
     ----------
@@ -106,12 +111,12 @@ def check_operator(
     """
     promised = known_promises(promises)
     random = rng or np.random.default_rng(0)
-    subject = sp.csr_array(shape) if sp.issparse(shape) else shape
+    subject = changes.as_subject(shape)
     laplacian = build(subject)
     if not isinstance(laplacian, Laplacian):
         raise InvalidParameterError(f"build must return a Laplacian; it returned a {type(laplacian).__name__}.")
     report = check_laplacian(laplacian, subject, promises=promised)
-    trial = Trial(build, subject, laplacian, random, _allowed(build, subject, laplacian, random))
+    trial = Trial(build, subject, laplacian, random, _rounding(build, subject, laplacian, random))
     return gathered([*judgements(report), *_rebuilt(trial, promised)])
 
 
@@ -139,7 +144,7 @@ def _attempt(name: str, law: Callable[[Trial], Outcome], trial: Trial) -> Outcom
         return Law(name, False, np.inf, trial.allowed, f"told otherwise, the shape or its spectrum is refused: {err}")
 
 
-def _allowed(build: Build, subject: Subject, laplacian: Laplacian, rng: np.random.Generator) -> float:
+def _rounding(build: Build, subject: Subject, laplacian: Laplacian, rng: np.random.Generator) -> float:
     if isinstance(subject, sp.csr_array):
         return ROUNDING
     try:
@@ -148,7 +153,7 @@ def _allowed(build: Build, subject: Subject, laplacian: Laplacian, rng: np.rando
         return ROUNDING  # the laws that change coordinates will find the refusal
     if other.n_points != laplacian.n_points:
         return ROUNDING
-    return min(max(ROUNDING, HEADROOM * distance(laplacian, other)[0]), MOST_ROUNDING)
+    return max(ROUNDING, HEADROOM * distance(laplacian, other)[0])
 
 
 def _repetition(trial: Trial) -> Outcome:
@@ -181,6 +186,8 @@ def _orientation(trial: Trial) -> Outcome:
 def _rigid_motion(trial: Trial) -> Outcome:
     if isinstance(trial.subject, sp.csr_array):
         return NotJudged("rigid motion", "a graph lies nowhere")
+    if trial.rounding > MOST_ROUNDING:
+        return _drowned("rigid motion", trial.rounding)
     return _same("rigid motion", trial, changes.moved(trial.subject, trial.rng))
 
 
@@ -226,10 +233,19 @@ def _unit_traces(laplacian: Laplacian) -> tuple[sp.csr_array, sp.csr_array, floa
 def _union(trial: Trial) -> Outcome:
     other = trial.build(changes.doubled(trial.subject))
     twice = Laplacian(*(sp.csr_array(sp.block_diag([matrix, matrix])) for matrix in matrices(trial.laplacian)))
-    # A copy that far away has coordinates that many times coarser.
-    allowed = min(changes.APART * trial.allowed, MOST_ROUNDING)
+    rounding = trial.rounding
+    if not isinstance(trial.subject, sp.csr_array):
+        rounding *= changes.APART  # the coordinates of a copy that far away are so many times coarser
+    if rounding > MOST_ROUNDING:
+        return _drowned("union", rounding)
     compare = same_entries if trial.by_points else same_spectrum
-    return compare("union", other, twice, allowed)
+    return compare("union", other, twice, rounding)
+
+
+def _drowned(name: str, rounding: float) -> NotJudged:
+    return NotJudged(
+        name, f"rounding of coordinates may change W by {rounding:.0e}: simplices are thin, or the operator is unstable"
+    )
 
 
 def _same(name: str, trial: Trial, subject: Subject) -> Law:

@@ -1,0 +1,112 @@
+"""Diffusion that is quicker in some directions."""
+
+import numpy as np
+from jaxtyping import Float
+
+from eigenshape._errors import InvalidParameterError
+from eigenshape.geometry.measure import surface_area, vertex_normals
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import require_volumes, scaled_corners, triangular_sides
+from eigenshape.geometry.simplicial import Mesh
+from eigenshape.geometry.topology import require_simplices_everywhere
+from eigenshape.operators import elements
+from eigenshape.operators.cotangent import Mass, linear_mass, require_mass
+from eigenshape.operators.laplacian import Laplacian
+
+ROUNDING = 1e-12  # of the largest entry of a tensor: what may be asymmetric, or lie below zero
+
+
+def anisotropic_laplacian(mesh: Mesh, tensors: Float[np.ndarray, "s d d"], mass: Mass = "lumped") -> Laplacian:
+    """Build the Laplacian -div(D grad) of linear elements, with one conductivity tensor a simplex.
+
+    W has the energy Σ V ∇fᵀD∇f. With the identity everywhere it is the cotangent Laplacian.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh or SimplicialMesh
+    tensors : (s, d, d) float
+        Symmetric, positive semidefinite, without unit; only the part along the simplex counts.
+    mass : "lumped", "consistent" or "averaged"
+        As in `cotangent_laplacian`.
+
+    Returns
+    -------
+    Laplacian
+
+    Raises
+    ------
+    InvalidParameterError
+        If a tensor is not finite, not symmetric or has a negative eigenvalue, or there is not one a simplex.
+    InvalidShapeError
+        As `cotangent_laplacian`.
+    """
+    require_mass(mass)
+    _require_tensors(mesh, tensors)
+    require_volumes(mesh)
+    require_simplices_everywhere(mesh)
+    products = elements.gradient_products(mesh, tensors)
+    return Laplacian(elements.stiffness(mesh.simplices, products, 1), linear_mass(mesh, mass))
+
+
+def _require_tensors(mesh: Mesh, tensors: np.ndarray) -> None:
+    wanted = (len(mesh.simplices), *(mesh.points.shape[1],) * 2)
+    if tensors.shape != wanted:
+        raise InvalidParameterError(f"tensors must have shape {wanted}; the shape is {tensors.shape}.")
+    noun = "face" if mesh.dim == 2 else "simplex"
+    bad = np.flatnonzero(~np.isfinite(tensors).all(axis=(1, 2)))
+    if bad.size:
+        raise InvalidParameterError(
+            f"tensors must be finite; that of {noun} {bad[0]} is {tensors[bad[0]].tolist()} ({bad.size} such)."
+        )
+    allowed = ROUNDING * np.abs(tensors).max(axis=(1, 2))
+    bad = np.flatnonzero(np.abs(tensors - tensors.transpose(0, 2, 1)).max(axis=(1, 2)) > allowed)
+    if bad.size:
+        raise InvalidParameterError(
+            f"tensors must be symmetric; that of {noun} {bad[0]} is {tensors[bad[0]].tolist()} ({bad.size} such)."
+        )
+    lowest = np.linalg.eigvalsh(tensors)[:, 0]
+    bad = np.flatnonzero(lowest < -allowed)
+    if bad.size:
+        raise InvalidParameterError(
+            f"tensors must be positive semidefinite; that of {noun} {bad[0]} has the eigenvalue {lowest[bad[0]]:.6g} "
+            f"({bad.size} such)."
+        )
+
+
+def curvature_tensors(mesh: TriangleMesh, alpha: float) -> Float[np.ndarray, "f 3 3"]:
+    """Return tensors that slow diffusion down across bends (Andreux, Rodolà, Aubry, Cremers 2014).
+
+    Along each principal direction of a face the conductivity is 1 / (1 + α |κ| √area), with κ the principal curvature
+    from the vertex normals and the area that of the whole surface: without unit. At α = 0 it is 1.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        Its faces turned one way.
+    alpha : float
+        At least 0.
+
+    Returns
+    -------
+    (f, 3, 3) float
+        Symmetric, positive semidefinite, zero along the face's normal.
+
+    Raises
+    ------
+    InvalidParameterError
+        If alpha is negative or not finite.
+    InvalidShapeError
+        If a face has no area.
+    """
+    if not 0 <= alpha < np.inf:
+        raise InvalidParameterError(f"alpha must be finite and not negative; it is {alpha}.")
+    require_volumes(mesh)
+    corners, scale = scaled_corners(mesh)
+    basis, triangles = triangular_sides(corners)
+    normals = vertex_normals(mesh)[mesh.faces]
+    turned = basis.transpose(0, 2, 1) @ (normals[:, 1:] - normals[:, :1]).transpose(0, 2, 1)
+    bending = turned @ np.linalg.inv(triangles)
+    curvatures, directions = np.linalg.eigh((bending + bending.transpose(0, 2, 1)) / 2)
+    conductivity = 1 / (1 + alpha * np.abs(curvatures) * (surface_area(mesh) ** 0.5 / scale))
+    directions = basis @ directions
+    return (directions * conductivity[:, None]) @ directions.transpose(0, 2, 1)

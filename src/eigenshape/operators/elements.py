@@ -1,0 +1,124 @@
+"""Lagrange elements of any order on simplices of any dimension.
+
+A node of order p is the mean of p corners, each any number of times: (a, a, a) is the corner a itself, (a, a, b)
+a third of the way from a to b. So a node is named by its corners in ascending order, also across elements.
+"""
+
+from functools import lru_cache
+from itertools import combinations_with_replacement
+from math import factorial
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+
+from eigenshape.geometry.simplices import in_length, scaled_corners, simplex_volumes, triangular_sides, volumes_of
+from eigenshape.geometry.simplicial import Mesh
+
+
+def gradient_products(
+    mesh: Mesh, tensors: Float[np.ndarray, "s d d"] | None = None
+) -> Float[np.ndarray, "s corners corners"]:
+    """Return V ∇λ_a·D∇λ_b of the barycentric coordinates of each simplex, in length^(m-2).
+
+    D is the identity, or a tensor a simplex. The gradients come from the triangular factor of the sides, not from their
+    Gram matrix, whose condition is the square.
+    """
+    corners, scale = scaled_corners(mesh)
+    basis, triangles = triangular_sides(corners)
+    inner = np.linalg.inv(triangles)
+    gradients = np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
+    conducted = gradients if tensors is None else gradients @ (basis.transpose(0, 2, 1) @ tensors @ basis)
+    products = (conducted @ gradients.transpose(0, 2, 1)) * volumes_of(triangles)[:, None, None]
+    return in_length(products, scale, mesh.dim - 2)
+
+
+def stiffness(
+    nodes: Int[np.ndarray, "s nodes"], products: Float[np.ndarray, "s corners corners"], order: int
+) -> sp.csr_array:
+    """Assemble ∫ ∇N_i·D∇N_j; the diagonal is what makes the rows sum to zero."""
+    dim = products.shape[1] - 1
+    local = np.einsum("sab,abij->sij", products, reference_stiffness(dim, order), optimize=True)
+    weights = _assembled(nodes, local)
+    return (weights - sp.diags_array(weights.sum(axis=1))).tocsr()
+
+
+def mass(mesh: Mesh, nodes: Int[np.ndarray, "s nodes"], order: int) -> sp.csr_array:
+    """Assemble ∫ N_i N_j, in length^m."""
+    reference = reference_mass(mesh.dim, order)
+    measure = simplex_volumes(mesh)
+    diagonal = np.bincount(nodes.ravel(), weights=np.outer(measure, np.diag(reference)).ravel())
+    return (sp.diags_array(diagonal) + _assembled(nodes, measure[:, None, None] * reference)).tocsr()
+
+
+def _assembled(nodes: Int[np.ndarray, "s nodes"], local: Float[np.ndarray, "s nodes nodes"]) -> sp.csr_array:
+    """Sum up what lies off the diagonal, each pair once and then mirrored."""
+    i, j = np.triu_indices(nodes.shape[1], 1)
+    ends = (nodes[:, i].ravel(), nodes[:, j].ravel())
+    n = int(nodes.max()) + 1
+    half = sp.coo_array((local[:, i, j].ravel(), ends), shape=(n, n)).tocsr()
+    return (half + half.T).tocsr()
+
+
+@lru_cache
+def local_nodes(dim: int, order: int) -> Int[np.ndarray, "nodes order"]:
+    """Name the nodes of one simplex by its corners."""
+    return np.array(list(combinations_with_replacement(range(dim + 1), order)))
+
+
+def number_nodes(simplices: Int[np.ndarray, "s corners"], order: int) -> tuple[np.ndarray, Int[np.ndarray, "s nodes"]]:
+    """Return the nodes of a mesh by their corners, (n_nodes, order), and those of each simplex by number.
+
+    The points of the mesh come first, in their own order; then the nodes between two of them, between three, and so on.
+    """
+    named = np.sort(simplices[:, local_nodes(simplices.shape[1] - 1, order)], axis=2)
+    n_corners = 1 + np.count_nonzero(np.diff(named, axis=2), axis=2)
+    _, firsts, numbers = np.unique(_keys(n_corners, named), return_index=True, return_inverse=True)
+    return named.reshape(-1, order)[firsts], numbers.reshape(n_corners.shape)
+
+
+def _keys(n_corners: Int[np.ndarray, "s nodes"], named: Int[np.ndarray, "s nodes order"]) -> np.ndarray:
+    """Return a key for each node, in whose order nodes are numbered: one whole number where it fits."""
+    base, order = int(named.max()) + 1, named.shape[2]
+    if (order + 1) * base**order < 2**63:
+        return (n_corners * base**order + named @ base ** np.arange(order)[::-1]).ravel()
+    fields = [n_corners, *np.moveaxis(named, 2, 0)]
+    return np.rec.fromarrays([field.ravel() for field in fields])
+
+
+@lru_cache
+def reference_mass(dim: int, order: int) -> Float[np.ndarray, "nodes nodes"]:
+    """Return ∫ N_i N_j over a simplex of volume 1."""
+    exponents, coefficients = _basis(dim, order)
+    return coefficients.T @ _integrals(exponents[:, None] + exponents) @ coefficients
+
+
+@lru_cache
+def reference_stiffness(dim: int, order: int) -> Float[np.ndarray, "corners corners nodes nodes"]:
+    """Return ∫ ∂_a N_i ∂_b N_j over a simplex of volume 1, the derivatives with respect to barycentric coordinates."""
+    exponents, coefficients = _basis(dim, order)
+    units = np.eye(dim + 1, dtype=np.int64)
+    pairs = np.zeros((dim + 1, dim + 1, len(exponents), len(exponents)))
+    for a in range(dim + 1):
+        for b in range(dim + 1):
+            factors = np.outer(exponents[:, a], exponents[:, b])
+            sums = np.maximum((exponents - units[a])[:, None] + (exponents - units[b]), 0)
+            pairs[a, b] = coefficients.T @ (factors * _integrals(sums)) @ coefficients
+    return pairs
+
+
+@lru_cache
+def _basis(dim: int, order: int) -> tuple[Int[np.ndarray, "nodes corners"], Float[np.ndarray, "nodes nodes"]]:
+    """Return monomials λ^α with |α| = order, and each basis function's coefficients as a column."""
+    names = local_nodes(dim, order)
+    exponents = (names[:, :, None] == np.arange(dim + 1)).sum(axis=1)
+    places = exponents / order
+    return exponents, np.linalg.inv(np.prod(places[:, None] ** exponents, axis=2))
+
+
+def _integrals(exponents: Int[np.ndarray, "i j corners"]) -> Float[np.ndarray, "i j"]:
+    """Return ∫ λ^α over a simplex of volume 1: m! α! / (m + |α|)!."""
+    factorials = np.array([float(factorial(value)) for value in range(int(exponents.max()) + 1)])
+    dim = exponents.shape[2] - 1
+    below = np.vectorize(lambda degree: float(factorial(dim + degree)), otypes=[float])(exponents.sum(axis=2))
+    return factorial(dim) * factorials[exponents].prod(axis=2) / below

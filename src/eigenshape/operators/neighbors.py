@@ -1,0 +1,86 @@
+"""Graphs of points and their nearest neighbours."""
+
+from typing import SupportsIndex
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
+
+from eigenshape._arrays import finite_rows, positive_values, whole_number
+from eigenshape._errors import InvalidParameterError
+from eigenshape.geometry.simplices import size_one
+from eigenshape.operators.graph import adjacency_matrix
+
+SPARE = 8  # neighbours asked for beyond those wanted, so that most ties are seen whole
+
+
+def neighbor_graph(points: ArrayLike, n_neighbors: SupportsIndex, *, t: float | None = None) -> sp.csr_array:
+    """Join each point to its nearest ones: two are joined where either is among the nearest of the other.
+
+    Weights are exp(-|x - y|²/4t) (Belkin and Niyogi 2003; thesis reference 5), or 1 where no t is given. Of points
+    equally far that with the lower index is the nearer; a point's equals are neighbours at distance 0.
+
+    Parameters
+    ----------
+    points : (n, d) float
+    n_neighbors : int
+        1 to n - 1.
+    t : float, optional
+        Heat time, in length².
+
+    Returns
+    -------
+    (n, n) sparse
+        Symmetric adjacency matrix without diagonal.
+
+    Raises
+    ------
+    InvalidShapeError
+        If a coordinate is not finite.
+    InvalidParameterError
+        If `n_neighbors` is not in 1..n - 1, t is not positive, or so small that the weight of an edge is no float.
+    """
+    rows = finite_rows(points, "points")
+    wanted = whole_number(n_neighbors, "n_neighbors", 1, len(rows) - 1)
+    scaled, scale = size_one(rows)
+    near = _nearest(scaled, wanted)
+    ends = np.stack([np.repeat(np.arange(len(rows)), wanted), near.ravel()])
+    keys = np.unique(ends.min(axis=0) * len(rows) + ends.max(axis=0))
+    edges = np.column_stack(np.divmod(keys, len(rows)))
+    weights = np.ones(len(edges)) if t is None else _gaussian(scaled, edges, scale, t)
+    return adjacency_matrix(edges, weights, len(rows))
+
+
+def _nearest(points: Float[np.ndarray, "n d"], wanted: int) -> Int[np.ndarray, "n k"]:
+    """Return the nearest others of each point, of equals the lower index first."""
+    tree, n = cKDTree(points), len(points)
+    nearest = np.empty((n, wanted), dtype=np.int64)
+    left, asked = np.arange(n), min(wanted + 1 + SPARE, n)
+    while left.size:
+        distance, found = tree.query(points[left], asked)
+        distance[found == left[:, None]] = -1.0  # itself goes first
+        order = np.lexsort((found, distance), axis=1)[:, 1 : wanted + 1]
+        nearest[left] = np.take_along_axis(found, order, axis=1)
+        # Where the last found is no farther than the last wanted, nearer indices may lie beyond.
+        cut = distance.max(axis=1) <= np.take_along_axis(distance, order[:, -1:], axis=1)[:, 0]
+        left = left[cut] if asked < n else left[:0]
+        asked = min(2 * asked, n)
+    return nearest
+
+
+def _gaussian(
+    points: Float[np.ndarray, "n d"], edges: Int[np.ndarray, "e 2"], scale: float, t: float
+) -> Float[np.ndarray, " e"]:
+    time = float(positive_values([t], "t")[0])
+    squares = ((points[edges[:, 0]] - points[edges[:, 1]]) ** 2).sum(axis=1)
+    with np.errstate(over="ignore"):  # what overflows here is a weight of 0, refused below
+        weights = np.exp(-squares / 4 * scale / time * scale)
+    bad = np.flatnonzero(weights == 0)
+    if bad.size:
+        raise InvalidParameterError(
+            f"t must let every edge have weight; at t = {time:.4g} edge {tuple(edges[bad[0]].tolist())} of length "
+            f"{squares[bad[0]] ** 0.5 * scale:.4g} has exp(-|x - y|²/4t) = 0 ({bad.size} such). Choose a larger t."
+        )
+    return weights
