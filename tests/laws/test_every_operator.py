@@ -20,9 +20,11 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
 from eigenshape.geometry.topology import boundary_vertices
+from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
 from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
 from eigenshape.operators.gaussian import gaussian_laplacian, mesh_laplacian
 from eigenshape.operators.graph import graph_laplacian
 from eigenshape.operators.kernel import neighbor_distance
@@ -144,16 +146,27 @@ def gaussian(cloud, form):
     return gaussian_laplacian(cloud.points, 4 * t, cloud.dim, form=form)
 
 
+def anisotropic(mesh):
+    return anisotropic_laplacian(mesh, curvature_tensors(mesh, 5.0), "averaged")
+
+
 SURFACES = (surface, slivers, soup)
+MESHES = (*SURFACES, solid, curve)
 FLAT = USUAL | {"volume"}
 MONOTONE = FLAT | {"nonnegative_weights"}
 GRAPH = (USUAL - {"scaling"}) | {"nonnegative_weights"}
 VECTORS = frozenset({"rigid_motion", "reflection", "scaling", "union"})  # whose faces are all turned one way
 
 TABLE = [
-    Row("cotangent", cotangent_laplacian, SURFACES, FLAT, boundary_vertices),
-    Row("cotangent consistent", partial(cotangent_laplacian, mass="consistent"), SURFACES, FLAT, boundary_vertices),
-    Row("cotangent averaged", partial(cotangent_laplacian, mass="averaged"), SURFACES, FLAT, boundary_vertices),
+    *[
+        Row(f"cotangent {mass}", partial(cotangent_laplacian, mass=mass), MESHES, FLAT, boundary_vertices)
+        for mass in ("lumped", "consistent", "averaged")
+    ],
+    *[
+        Row(f"P{p}", partial(fem_laplacian, order=p), MESHES, FLAT, partial(fem_boundary_nodes, order=p))
+        for p in (2, 3)
+    ],
+    Row("anisotropic", anisotropic, (surface, slivers), FLAT - {"orientation"}, boundary_vertices),
     Row("robust", robust_laplacian, SURFACES, MONOTONE - {"volume"}, boundary_vertices),
     Row("robust, not mollified", partial(robust_laplacian, mollify=0.0), (surface, soup), MONOTONE),
     Row("mesh", mesh_laplacian, (surface, solid, curve), MONOTONE, boundary_vertices),

@@ -189,7 +189,7 @@ def test_scales_that_cannot_be_are_refused(options, match):
     ],
 )
 def test_unknown_options_are_refused(option, match):
-    options = kernel.KernelOptions(t=None, h=None, edge_factor=None, correct=None, form="literal", cutoff=4.0)
+    options = kernel.KernelOptions()
     with pytest.raises(InvalidParameterError, match=match):
         kernel.choose_kernel(_unchecked(options, option), 1.0)
 

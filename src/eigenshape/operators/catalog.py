@@ -49,11 +49,13 @@ OPERATORS = {
     "cotangent": Operator(cotangent_laplacian, MESHES, ("mass",), "linear finite elements"),
     "p2": Operator(partial(fem_laplacian, order=2), MESHES, (), "quadratic finite elements, nodes on edges too"),
     "p3": Operator(partial(fem_laplacian, order=3), MESHES, (), "cubic finite elements, nodes inside triangles too"),
-    "robust": Operator(robust_laplacian, (TriangleMesh,), ("mollify",), "linear elements on intrinsic Delaunay triangles"),
+    "robust": Operator(robust_laplacian, (TriangleMesh,), ("mollify",), "linear elements on intrinsic triangles"),
     "mesh": Operator(mesh_laplacian, MESHES, (*KERNEL, "distance"), "Gaussian kernel, weighed by volumes"),
-    "point-cloud": Operator(point_cloud_laplacian, (PointCloud,), KERNEL, "Gaussian kernel, weighed by local triangles"),
+    "point-cloud": Operator(point_cloud_laplacian, (PointCloud,), KERNEL, "Gaussian kernel, weighed in tangent planes"),
     "combinatorial": Operator(partial(graph_laplacian, kind="combinatorial"), GRAPHS, (), "edges of weight 1"),
-    "weighted": Operator(partial(graph_laplacian, kind="weighted"), GRAPHS, (), "edges of their weight or inverse length"),
+    "weighted": Operator(
+        partial(graph_laplacian, kind="weighted"), GRAPHS, (), "edges weigh what they do, or 1/length"
+    ),
     "normalized": Operator(partial(graph_laplacian, kind="normalized"), GRAPHS, (), "eigenvalues in 0..2"),
 }
 

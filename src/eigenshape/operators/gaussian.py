@@ -1,13 +1,16 @@
 """Laplacians made from a Gaussian kernel: on meshes of any dimension, on samples, on surfaces that are known."""
 
-from typing import Literal, SupportsIndex
+from typing import Literal, SupportsIndex, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import LinearOperator
 
 from eigenshape._arrays import positive_values
 from eigenshape._errors import InvalidParameterError
+from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.cloud_measure import cloud_quadrature
 from eigenshape.geometry.quadrature import Quadrature, mesh_quadrature, uniform_quadrature
 from eigenshape.geometry.simplices import mean_side_length, size_one
 from eigenshape.geometry.simplicial import Mesh
@@ -25,8 +28,17 @@ from eigenshape.operators.kernel import (
     warn_of_few,
 )
 from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.neighbors import neighbor_graph
 
 Distance = Literal["euclidean", "geodesic"]
+
+
+class KernelChoice(TypedDict, total=False):
+    """What else there is to choose of a kernel."""
+
+    correct: Correction | None
+    form: Form
+    cutoff: float
 
 
 def mesh_laplacian(  # noqa: PLR0913 - one keyword for each choice that the method leaves open
@@ -164,8 +176,58 @@ def quadrature_laplacian(
         As `mesh_laplacian` and `gaussian_laplacian`.
     """
     edge = neighbor_distance(measure.points, measure.dim)
-    kernel = choose_kernel(KernelOptions(t, None, None, correct, form, cutoff), edge)
+    kernel = choose_kernel(KernelOptions(t=t, correct=correct, form=form, cutoff=cutoff), edge)
     return kernel_laplacian(measure, kernel)
+
+
+def point_cloud_laplacian(
+    cloud: PointCloud,
+    *,
+    t: float | None = None,
+    h: float | None = None,
+    edge_factor: float | None = None,
+    **options: Unpack[KernelChoice],
+) -> Laplacian:
+    """Build the Laplacian of points that sample a manifold, evenly or not.
+
+    That of `mesh_laplacian` with the volume around each point taken from the triangles in its tangent plane
+    (`cloud_quadrature`; Belkin, Sun, Wang 2009).
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    t, h, edge_factor : float, optional
+        As in `mesh_laplacian`; e is the mean distance of a point to its m(m+1) nearest.
+    **options
+        `correct`, `form` and `cutoff` as in `mesh_laplacian`.
+
+    Returns
+    -------
+    Laplacian
+        W in length^(m-2), B in length^m.
+
+    Raises
+    ------
+    InvalidParameterError
+        If more than one scale is given, one is not positive, or h < e.
+    InvalidShapeError
+        If two points are equal, the neighbours of a point do not span m dimensions, the kernel tears apart what
+        nearest neighbours join, or the matrix would not fit into half of the memory.
+
+    Warns
+    -----
+    UserWarning
+        As `mesh_laplacian`.
+    """
+    measure = cloud_quadrature(cloud)
+    near = cloud.dim * (cloud.dim + 1)
+    chosen = KernelOptions(t=t, h=h, edge_factor=edge_factor, **options)
+    kernel = choose_kernel(chosen, neighbor_distance(cloud.points, cloud.dim))
+    warn_of_few(measure, kernel)
+    laplacian = kernel_laplacian(measure, kernel)
+    joined = neighbor_graph(cloud.points, min(near, cloud.n_points - 1))
+    require_whole(laplacian, connected_components(joined, directed=False)[1], kernel)
+    return laplacian
 
 
 def functional_laplacian(measure: Quadrature, t: float, *, cutoff: float = 6.0) -> LinearOperator:

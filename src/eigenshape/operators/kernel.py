@@ -40,12 +40,12 @@ PEAK = 30  # bytes an entry while the matrix is built and checked
 class KernelOptions:
     """What a caller said of a kernel, as in `mesh_laplacian`."""
 
-    t: float | None
-    h: float | None
-    edge_factor: float | None
-    correct: Correction | None
-    form: Form
-    cutoff: float
+    t: float | None = None
+    h: float | None = None
+    edge_factor: float | None = None
+    correct: Correction | None = None
+    form: Form = "literal"
+    cutoff: float = 4.0
 
 
 def choose_kernel(options: KernelOptions, edge: float) -> GaussianKernel:

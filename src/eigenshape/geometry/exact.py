@@ -1,0 +1,106 @@
+"""Eigenvalues of Δ that are known exactly, ascending, each as often as its multiplicity says, in 1/length²."""
+
+from collections.abc import Callable
+from typing import Literal, SupportsIndex
+
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq
+from scipy.special import comb, jn_zeros, jnp_zeros, spherical_jn
+
+from eigenshape._arrays import positive_values, whole_number
+from eigenshape._errors import InvalidParameterError
+
+Condition = Literal["neumann", "dirichlet"]
+
+
+def sphere_eigenvalues(k: SupportsIndex, dim: SupportsIndex = 2) -> Float[np.ndarray, " k"]:
+    """Return l(l + m - 1) of the unit m-sphere, for l = 0, 1, ...; on the 2-sphere each 2l + 1 times.
+
+    The multiplicity is that of harmonic polynomials of degree l in m + 1 variables (Chavel 1984, II.4).
+    """
+    count, m = whole_number(k, "k", 1, None), whole_number(dim, "dim", 1, 20)
+    values: list[float] = []
+    degree = 0
+    while len(values) < count:
+        copies = comb(m + degree, m, exact=True) - (comb(m + degree - 2, m, exact=True) if degree > 1 else 0)
+        values += [float(degree * (degree + m - 1))] * copies
+        degree += 1
+    return np.array(values[:count])
+
+
+def projective_plane_eigenvalues(k: SupportsIndex) -> Float[np.ndarray, " k"]:
+    """Return l(l + 1) for even l, each 2l + 1 times: the unit sphere with antipodes made one."""
+    count = whole_number(k, "k", 1, None)
+    degrees = 2 * np.arange(count)
+    return np.repeat(degrees * (degrees + 1.0), 2 * degrees + 1)[:count]
+
+
+def box_eigenvalues(
+    k: SupportsIndex, sides: ArrayLike = (1.0, 1.0), condition: Condition = "neumann"
+) -> Float[np.ndarray, " k"]:
+    """Return π² Σ (p_i / a_i)² of a box with sides a_i: an interval, a rectangle, and so on.
+
+    p_i = 0, 1, ... with the Neumann condition, and 1, 2, ... with Dirichlet's.
+    """
+    count, lengths = whole_number(k, "k", 1, None), positive_values(sides, "sides")
+    first = int(_require_condition(condition) == "dirichlet")
+    frequencies = [(np.arange(first, first + count) / length) ** 2 for length in lengths]
+    sums = frequencies[0]
+    for others in frequencies[1:]:
+        sums = np.sort(np.add.outer(sums, others), axis=None)[:count]
+    return np.pi**2 * np.sort(sums)[:count]
+
+
+def flat_torus_eigenvalues(k: SupportsIndex, periods: ArrayLike) -> Float[np.ndarray, " k"]:
+    """Return 4π² |ξ|² over the frequencies ξ that are whole on both periods, the rows of a 2 x 2 matrix."""
+    count = whole_number(k, "k", 1, None)
+    lattice = np.linalg.inv(np.asarray(periods, dtype=np.float64)).T
+    reach = int(np.ceil(np.sqrt(count) * np.linalg.cond(lattice))) + 1
+    steps = np.arange(-reach, reach + 1)
+    modes = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    return 4 * np.pi**2 * np.sort(((modes @ lattice) ** 2).sum(axis=1))[:count]
+
+
+def disc_eigenvalues(k: SupportsIndex, condition: Condition = "neumann") -> Float[np.ndarray, " k"]:
+    """Return the squared zeros of Bessel functions J_p, or of their derivatives, twice where p > 0: the unit disc."""
+    count = whole_number(k, "k", 1, 10_000)
+    zeros = jn_zeros if _require_condition(condition) == "dirichlet" else jnp_zeros
+    values = [0.0] if condition == "neumann" else []
+    order, radial = 0, int(count**0.5) + 4  # more zeros of one order than lie so low
+    while True:
+        found = zeros(order, radial) ** 2
+        values = sorted([*values, *np.repeat(found, 2 if order else 1)])[: count + 1]
+        order += 1
+        # The least zero grows with the order from p = 1 on; J_0' alone starts beyond J_1'.
+        if order > 2 and len(values) > count and found[0] > values[count]:
+            return np.array(values[:count])
+
+
+def ball_eigenvalues(k: SupportsIndex, condition: Condition = "neumann") -> Float[np.ndarray, " k"]:
+    """Return the squared zeros of spherical Bessel functions j_l, or of their derivatives, each 2l + 1 times."""
+    count = whole_number(k, "k", 1, 2_000)
+    derivative = _require_condition(condition) == "neumann"
+    values = [0.0] if derivative else []
+    degree = 0
+    while True:
+        found = _zeros(lambda x, n=degree: spherical_jn(n, x, derivative), degree, count) ** 2
+        values = sorted([*values, *np.repeat(found, 2 * degree + 1)])[: count + 1]
+        degree += 1
+        if degree > 2 and len(values) > count and found[0] > values[count]:
+            return np.array(values[:count])
+
+
+def _zeros(function: Callable[[float], float], start: int, count: int) -> Float[np.ndarray, " z"]:
+    """Return positive zeros of an oscillation whose zeros lie about π apart, beyond the place where it sets in."""
+    grid = np.arange(max(0.5, 0.5 * start), start + np.pi * (count ** (1 / 2) + 4) * 2, 0.1)
+    signs = np.sign([function(x) for x in grid])
+    changes = np.flatnonzero(signs[1:] * signs[:-1] < 0)
+    return np.array([brentq(function, grid[place], grid[place + 1], xtol=1e-14) for place in changes])
+
+
+def _require_condition(condition: str) -> str:
+    if condition not in ("neumann", "dirichlet"):
+        raise InvalidParameterError(f"condition must be 'neumann' or 'dirichlet'; it is {condition!r}.")
+    return condition
