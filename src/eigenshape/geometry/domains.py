@@ -1,10 +1,10 @@
 """Made-up flat domains of dimension 1 to 3, whose spectra are known (`geometry.exact`)."""
 
+from collections.abc import Sequence
 from itertools import permutations
 from typing import SupportsIndex
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.spatial import Delaunay
 
 from eigenshape._arrays import positive_values, whole_number
@@ -85,11 +85,11 @@ def irregular_grid(
 
 
 def box(
-    n_x: SupportsIndex = 6, n_y: SupportsIndex = 6, n_z: SupportsIndex = 6, *, sides: ArrayLike = (1.0, 1.0, 1.0)
+    n_x: SupportsIndex = 6, n_y: SupportsIndex = 6, n_z: SupportsIndex = 6, *, sides: Sequence[float] = (1.0, 1.0, 1.0)
 ) -> SimplicialMesh:
     """Fill a box with tetrahedra, six to a cell; eigenvalues are `box_eigenvalues(k, sides)`."""
     counts = tuple(whole_number(n, name, 1, 500) for n, name in ((n_x, "n_x"), (n_y, "n_y"), (n_z, "n_z")))
-    lengths = positive_values(sides, "sides")
+    lengths = positive_values(list(sides), "sides")
     if len(lengths) != 3:
         raise InvalidParameterError(f"sides must be three lengths; they are {len(lengths)}.")
     points = np.stack(np.meshgrid(*(np.arange(count + 1) for count in counts), indexing="ij"), axis=-1).reshape(-1, 3)
@@ -99,7 +99,7 @@ def box(
 def _kuhn(counts: tuple[int, ...]) -> np.ndarray:
     """Cut each cell into six tetrahedra along its main diagonal, all cells alike, so that neighbours match."""
     strides = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])
-    cells = np.stack(np.indices(counts), axis=-1).reshape(-1, 3) @ strides
+    cells = np.moveaxis(np.indices(counts), 0, -1).reshape(-1, 3) @ strides
     ways = [np.cumsum([0, *(strides[axis] for axis in order)]) for order in permutations(range(3))]
     return np.concatenate([cells[:, None] + way for way in ways])
 

@@ -1,6 +1,7 @@
 """Eigenvalues of Δ that are known exactly, ascending, each as often as its multiplicity says, in 1/length²."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Literal, SupportsIndex
 
 import numpy as np
@@ -38,13 +39,13 @@ def projective_plane_eigenvalues(k: SupportsIndex) -> Float[np.ndarray, " k"]:
 
 
 def box_eigenvalues(
-    k: SupportsIndex, sides: ArrayLike = (1.0, 1.0), condition: Condition = "neumann"
+    k: SupportsIndex, sides: Sequence[float] = (1.0, 1.0), condition: Condition = "neumann"
 ) -> Float[np.ndarray, " k"]:
     """Return π² Σ (p_i / a_i)² of a box with sides a_i: an interval, a rectangle, and so on.
 
     p_i = 0, 1, ... with the Neumann condition, and 1, 2, ... with Dirichlet's.
     """
-    count, lengths = whole_number(k, "k", 1, None), positive_values(sides, "sides")
+    count, lengths = whole_number(k, "k", 1, None), positive_values(list(sides), "sides")
     first = int(_require_condition(condition) == "dirichlet")
     frequencies = [(np.arange(first, first + count) / length) ** 2 for length in lengths]
     sums = frequencies[0]
@@ -85,7 +86,7 @@ def ball_eigenvalues(k: SupportsIndex, condition: Condition = "neumann") -> Floa
     values = [0.0] if derivative else []
     degree = 0
     while True:
-        found = _zeros(lambda x, n=degree: spherical_jn(n, x, derivative), degree, count) ** 2
+        found = _zeros(partial(spherical_jn, degree, derivative=derivative), degree, count) ** 2
         values = sorted([*values, *np.repeat(found, 2 * degree + 1)])[: count + 1]
         degree += 1
         if degree > 2 and len(values) > count and found[0] > values[count]:
