@@ -12,7 +12,16 @@ from eigenshape.geometry.cloud import PointCloud
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral import changes
 from eigenshape.spectral.changes import Subject
-from eigenshape.spectral.comparison import distance, matrices, permuted, same_entries, same_spectrum
+from eigenshape.spectral.comparison import (
+    MOST_ROUNDING,
+    distance,
+    lowest_eigenvalues,
+    matrices,
+    permuted,
+    same_eigenvalues,
+    same_entries,
+    spectral_distance,
+)
 from eigenshape.spectral.laplacian_laws import check_laplacian
 from eigenshape.spectral.laws import (
     USUAL,
@@ -26,6 +35,7 @@ from eigenshape.spectral.laws import (
     judgements,
     known_promises,
 )
+from eigenshape.spectral.spectrum import Spectrum
 
 Build: TypeAlias = Callable[[Any], Laplacian]
 
@@ -33,8 +43,8 @@ Build: TypeAlias = Callable[[Any], Laplacian]
 DOUBLINGS = (332, 166, 66)
 LARGEST_EXPONENT = 900
 ROUNDING = 1e-12  # of √(W_ii W_jj), whatever the shape
-HEADROOM = 8  # over what one jiggle of the coordinates by their rounding changes
-MOST_ROUNDING = 1e-4
+JIGGLES = 3
+HEADROOM = 8  # over what jiggles of the coordinates by their rounding change
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,14 +58,20 @@ class Trial:
     laplacian : Laplacian
         What `build` makes of `subject`.
     rng : Generator
+    spectrum : Spectrum, optional
+        Its lowest eigenvalues, where rows are not points and are compared by these.
+    by_points : bool
+        Whether row i is point i.
     rounding : float
-        What it may change, of √(W_ii W_jj).
+        What rounding may change, of √(W_ii W_jj) or of the last of the lowest eigenvalues.
     """
 
     build: Build
     subject: Subject
     laplacian: Laplacian
     rng: np.random.Generator
+    spectrum: Spectrum | None
+    by_points: bool
     rounding: float
 
     @property
@@ -63,17 +79,13 @@ class Trial:
         """What laws may change that leave the coordinates as they are."""
         return min(self.rounding, MOST_ROUNDING)
 
-    @property
-    def by_points(self) -> bool:
-        """Whether each row is a point, so that it is known where it goes."""
-        return self.laplacian.n_points == _n_points(self.subject)
-
 
 def check_operator(
     build: Build,
     shape: Subject | sp.sparray,
     *,
     promises: Iterable[Promise] = USUAL,
+    by_points: bool | None = None,
     rng: np.random.Generator | None = None,
 ) -> OperatorReport:
     """Judge the laws that a Laplace operator of a shape must obey, by the operator that is handed over.
@@ -82,8 +94,8 @@ def check_operator(
     and compared entry by entry, relative to √(W_ii W_jj) and √(B_ii B_jj). Where rows are not points (elements of
     higher order, a boundary condition, vectors), the 20 lowest eigenvalues are compared.
 
-    Rounding moves entries where simplices are thin: allowed is 8 times what changes when the coordinates are jiggled
-    by their rounding, and 1e-12 at least. Where that is more than 1e-4, laws that round them anew are not judged.
+    Rounding moves entries where simplices are thin: allowed is 8 times what changes most in three jiggles of
+    the coordinates by their rounding, and 1e-12 at least. Where that is more than 1e-4, laws that round them anew are not judged.
 
     Parameters
     ----------
@@ -97,6 +109,8 @@ def check_operator(
         any factor on a graph, whose weights are scaled). "union": a shape and its copy far away have the operator of
         the shape twice, as blocks. That building twice gives the same bits, and that the order of points and simplices
         does not matter, is always judged.
+    by_points : bool, optional
+        Whether row i of the operator is point i of the shape; by default where there are as many.
     rng : Generator, optional
         What is random about the changes; by default the same at each call.
 
@@ -116,8 +130,18 @@ def check_operator(
     if not isinstance(laplacian, Laplacian):
         raise InvalidParameterError(f"build must return a Laplacian; it returned a {type(laplacian).__name__}.")
     report = check_laplacian(laplacian, subject, promises=promised)
-    trial = Trial(build, subject, laplacian, random, _rounding(build, subject, laplacian, random))
+    rows_are_points = laplacian.n_points == _n_points(subject) if by_points is None else by_points
+    spectrum = None if rows_are_points else _spectrum(laplacian)
+    rounding = _rounding(build, subject, spectrum or laplacian, random)
+    trial = Trial(build, subject, laplacian, random, spectrum, rows_are_points, rounding)
     return gathered([*judgements(report), *_rebuilt(trial, promised)])
+
+
+def _spectrum(laplacian: Laplacian) -> Spectrum | None:
+    try:
+        return lowest_eigenvalues(laplacian)
+    except EigenshapeError:  # laws that need it are not judged, and say so
+        return None
 
 
 def _rebuilt(trial: Trial, promised: frozenset[Promise]) -> Iterator[Outcome]:
@@ -144,16 +168,21 @@ def _attempt(name: str, law: Callable[[Trial], Outcome], trial: Trial) -> Outcom
         return Law(name, False, np.inf, trial.allowed, f"told otherwise, the shape or its spectrum is refused: {err}")
 
 
-def _rounding(build: Build, subject: Subject, laplacian: Laplacian, rng: np.random.Generator) -> float:
+def _rounding(build: Build, subject: Subject, expected: Laplacian | Spectrum, rng: np.random.Generator) -> float:
     if isinstance(subject, sp.csr_array):
         return ROUNDING
     try:
-        other = build(changes.jiggled(subject, rng))
+        others = [build(changes.jiggled(subject, rng)) for _ in range(JIGGLES)]
+        return max(ROUNDING, HEADROOM * max(_jiggle(expected, other) for other in others))
     except (EigenshapeError, ValueError, ArithmeticError):
         return ROUNDING  # the laws that change coordinates will find the refusal
-    if other.n_points != laplacian.n_points:
-        return ROUNDING
-    return max(ROUNDING, HEADROOM * distance(laplacian, other)[0])
+
+
+def _jiggle(expected: Laplacian | Spectrum, other: Laplacian) -> float:
+    if isinstance(expected, Laplacian):
+        return distance(expected, other)[0] if expected.n_points == other.n_points else 0.0
+    k = len(expected.eigenvalues)
+    return spectral_distance(expected.eigenvalues, lowest_eigenvalues(other, k).eigenvalues)[0]
 
 
 def _repetition(trial: Trial) -> Outcome:
@@ -166,9 +195,7 @@ def _repetition(trial: Trial) -> Outcome:
 def _point_order(trial: Trial) -> Outcome:
     old_of_new = trial.rng.permutation(_n_points(trial.subject))
     other = trial.build(changes.renumbered(trial.subject, old_of_new))
-    if not trial.by_points:
-        return same_spectrum("point order", other, trial.laplacian, trial.allowed)
-    return same_entries("point order", other, permuted(trial.laplacian, old_of_new), trial.allowed)
+    return _agree("point order", trial, other, permuted(trial.laplacian, old_of_new) if trial.by_points else None)
 
 
 def _simplex_order(trial: Trial) -> Outcome:
@@ -232,14 +259,18 @@ def _unit_traces(laplacian: Laplacian) -> tuple[sp.csr_array, sp.csr_array, floa
 
 def _union(trial: Trial) -> Outcome:
     other = trial.build(changes.doubled(trial.subject))
-    twice = Laplacian(*(sp.csr_array(sp.block_diag([matrix, matrix])) for matrix in matrices(trial.laplacian)))
     rounding = trial.rounding
     if not isinstance(trial.subject, sp.csr_array):
         rounding *= changes.APART  # the coordinates of a copy that far away are so many times coarser
     if rounding > MOST_ROUNDING:
         return _drowned("union", rounding)
-    compare = same_entries if trial.by_points else same_spectrum
-    return compare("union", other, twice, rounding)
+    if trial.by_points:
+        twice = Laplacian(*(sp.csr_array(sp.block_diag([matrix, matrix])) for matrix in matrices(trial.laplacian)))
+        return same_entries("union", other, twice, rounding)
+    if trial.spectrum is None:
+        return _unsolved("union")
+    values = np.repeat(trial.spectrum.eigenvalues, 2)[: len(trial.spectrum.eigenvalues)]
+    return same_eigenvalues("union", other, values, float(trial.spectrum.residuals.max()), rounding)
 
 
 def _drowned(name: str, rounding: float) -> NotJudged:
@@ -248,10 +279,22 @@ def _drowned(name: str, rounding: float) -> NotJudged:
     )
 
 
-def _same(name: str, trial: Trial, subject: Subject) -> Law:
+def _unsolved(name: str) -> NotJudged:
+    return NotJudged(name, "rows are no points, and the lowest eigenvalues cannot be proved: elements are thin")
+
+
+def _same(name: str, trial: Trial, subject: Subject) -> Outcome:
     """Compare with the operator of the same points; rows that are not points may have changed places, or frames."""
-    compare = same_entries if trial.by_points else same_spectrum
-    return compare(name, trial.build(subject), trial.laplacian, trial.allowed)
+    return _agree(name, trial, trial.build(subject), trial.laplacian)
+
+
+def _agree(name: str, trial: Trial, found: Laplacian, expected: Laplacian | None) -> Outcome:
+    if trial.by_points and expected is not None:
+        return same_entries(name, found, expected, trial.allowed)
+    if trial.spectrum is None:
+        return _unsolved(name)
+    error = float(trial.spectrum.residuals.max())
+    return same_eigenvalues(name, found, trial.spectrum.eigenvalues, error, trial.allowed)
 
 
 def _n_points(subject: Subject) -> int:
