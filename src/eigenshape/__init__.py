@@ -21,7 +21,17 @@ from eigenshape.figures.save import save_figure
 from eigenshape.figures.sheet import Panel, figure_contact_sheet
 from eigenshape.figures.spectra import figure_spectrum
 from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.cloud_measure import cloud_quadrature
 from eigenshape.geometry.creatures import CREATURES, make_creature
+from eigenshape.geometry.domains import ball, box, circle, disc, interval, irregular_grid
+from eigenshape.geometry.exact import (
+    ball_eigenvalues,
+    box_eigenvalues,
+    disc_eigenvalues,
+    flat_torus_eigenvalues,
+    projective_plane_eigenvalues,
+    sphere_eigenvalues,
+)
 from eigenshape.geometry.geodesic import geodesic_balls
 from eigenshape.geometry.measure import (
     edge_lengths,
@@ -52,6 +62,14 @@ from eigenshape.geometry.repair import (
 from eigenshape.geometry.sampling import MeshPart, cut_by_planes, partial_scan, random_planes
 from eigenshape.geometry.simplices import dual_volumes, mean_side_length, simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
+from eigenshape.geometry.spheres import (
+    fibonacci_sphere,
+    graded_sphere,
+    projective_plane,
+    random_sphere,
+    sphere_hull,
+    three_sphere,
+)
 from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, subdivide, torus
 from eigenshape.geometry.topology import (
     EdgeTable,
@@ -65,15 +83,23 @@ from eigenshape.geometry.topology import (
     vertex_components,
 )
 from eigenshape.io.mesh_files import read_mesh, write_mesh
+from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
 from eigenshape.operators.boundary import dirichlet_laplacian
+from eigenshape.operators.catalog import OPERATORS, Operator, build_laplacian
+from eigenshape.operators.connection import connection_laplacian, tangent_frames
 from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian, fem_nodes
 from eigenshape.operators.gaussian import (
     functional_laplacian,
     gaussian_laplacian,
     mesh_laplacian,
+    point_cloud_laplacian,
     quadrature_laplacian,
 )
+from eigenshape.operators.graph import edge_graph, graph_laplacian
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
+from eigenshape.operators.neighbors import neighbor_graph
+from eigenshape.operators.robust import robust_laplacian
 from eigenshape.retrieval.batch import BatchReport, Item, Workers, build_index
 from eigenshape.retrieval.describe import DescribedShape, describe, describe_mesh, describe_views
 from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDescriptor
@@ -87,6 +113,7 @@ from eigenshape.spectral.spectrum import Certificate, Spectrum
 
 __all__ = [
     "CREATURES",
+    "OPERATORS",
     "SCALE_FREE",
     "THESIS",
     "BatchReport",
@@ -107,6 +134,7 @@ __all__ = [
     "MergeTree",
     "MeshPart",
     "MissingExtraError",
+    "Operator",
     "Panel",
     "PointCloud",
     "Quadrature",
@@ -121,39 +149,61 @@ __all__ = [
     "StoreError",
     "TriangleMesh",
     "Workers",
+    "anisotropic_laplacian",
+    "ball",
+    "ball_eigenvalues",
     "boundary_edges",
     "boundary_loops",
     "boundary_vertices",
+    "box",
+    "box_eigenvalues",
     "build_index",
+    "build_laplacian",
     "certify",
+    "circle",
+    "cloud_quadrature",
+    "connection_laplacian",
     "cotangent_laplacian",
+    "curvature_tensors",
     "cut_by_planes",
     "describe",
     "describe_mesh",
     "describe_views",
     "dirichlet_laplacian",
+    "disc",
+    "disc_eigenvalues",
     "disjoint_union",
     "drop_degenerate",
     "drop_duplicate_faces",
     "drop_unreferenced",
     "dual_volumes",
+    "edge_graph",
     "edge_lengths",
     "edge_table",
     "enclosed_volume",
     "euler_characteristic",
     "face_areas",
     "face_normals",
+    "fem_boundary_nodes",
+    "fem_laplacian",
+    "fem_nodes",
+    "fibonacci_sphere",
     "figure_contact_sheet",
     "figure_eigenfunctions",
     "figure_field",
     "figure_segments",
     "figure_spectrum",
+    "flat_torus_eigenvalues",
     "functional_laplacian",
     "gaussian_laplacian",
     "geodesic_balls",
+    "graded_sphere",
+    "graph_laplacian",
     "grid",
     "heat_kernel_signature",
     "icosphere",
+    "interval",
+    "irregular_grid",
     "is_closed",
     "is_manifold",
     "largest_component",
@@ -164,24 +214,34 @@ __all__ = [
     "merge_tree",
     "mesh_laplacian",
     "mesh_quadrature",
+    "neighbor_graph",
     "normalize_area",
     "normalize_box",
     "normalize_diameter",
     "partial_scan",
+    "point_cloud_laplacian",
+    "projective_plane",
+    "projective_plane_eigenvalues",
     "quadrature_laplacian",
     "random_planes",
+    "random_sphere",
     "read_mesh",
     "reflection_free_signature",
     "repair",
+    "robust_laplacian",
     "save_figure",
     "segment",
     "simplex_volumes",
     "solve_dirichlet",
     "solve_spectrum",
+    "sphere_eigenvalues",
+    "sphere_hull",
     "sphere_quadrature",
     "subdivide",
     "surface_area",
+    "tangent_frames",
     "three_quarter_view",
+    "three_sphere",
     "torus",
     "torus_quadrature",
     "uniform_quadrature",

@@ -25,7 +25,7 @@ from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
-from eigenshape.operators.gaussian import gaussian_laplacian, mesh_laplacian
+from eigenshape.operators.gaussian import gaussian_laplacian, mesh_laplacian, point_cloud_laplacian
 from eigenshape.operators.graph import graph_laplacian
 from eigenshape.operators.kernel import neighbor_distance
 from eigenshape.operators.laplacian import Laplacian
@@ -84,11 +84,11 @@ def sheet(rng):
     return TriangleMesh(turned(mesh.vertices, rng, 0.02), mesh.faces)
 
 
-def solid(rng, codimension=None):
+def solid(rng, codimension=None, sizes=(12, 5, 3, 2)):
     """A shaken box of simplices of dimension 1 to 4, turned in as many dimensions or in one or two more."""
     dim = int(rng.integers(1, 5))
     more = int(rng.integers(0, 3)) if codimension is None else codimension
-    mesh = box((12, 5, 3, 2)[dim - 1], dim)
+    mesh = box(sizes[dim - 1], dim)
     flat = np.pad(mesh.points, ((0, 0), (0, more)))
     return SimplicialMesh(turned(flat, rng, 0.02 / len(flat) ** (1 / dim)), mesh.simplices)
 
@@ -152,7 +152,8 @@ def anisotropic(mesh):
 
 SURFACES = (surface, slivers, soup)
 MESHES = (*SURFACES, solid, curve)
-SMALL = (partial(surface, small=True), partial(slivers, small=True, thinnest=1e-4), soup, solid, curve)
+LITTLE = partial(solid, sizes=(8, 3, 2, 1))
+SMALL = (partial(surface, small=True), partial(slivers, small=True, thinnest=1e-4), soup, LITTLE, curve)
 FLAT = USUAL | {"volume"}
 MONOTONE = FLAT | {"nonnegative_weights"}
 GRAPH = (USUAL - {"scaling"}) | {"nonnegative_weights"}
@@ -172,6 +173,7 @@ TABLE = [
     Row("mesh, geodesic", partial(mesh_laplacian, distance="geodesic"), (surface,), MONOTONE),
     Row("gaussian", partial(gaussian, form="literal"), (cloud,), USUAL - {"scaling", "union"}),
     Row("gaussian, random walk", partial(gaussian, form="random-walk"), (cloud,), USUAL - {"union"}),
+    Row("point cloud", point_cloud_laplacian, (cloud,), USUAL | {"nonnegative_weights"}),
     Row("connection", connection_laplacian, (surface,), VECTORS),
     Row("connection consistent", partial(connection_laplacian, mass="consistent"), (surface,), VECTORS),
     Row("combinatorial", graph_laplacian, (surface, solid, curve), GRAPH, boundary_vertices),
@@ -181,7 +183,12 @@ TABLE = [
         for kind in ("combinatorial", "weighted", "normalized")
     ],
 ]
-BOUNDED = {surface: sheet, SMALL[0]: sheet, solid: partial(solid, codimension=0)}
+BOUNDED = {
+    surface: sheet,
+    SMALL[0]: sheet,
+    solid: partial(solid, codimension=0),
+    LITTLE: partial(LITTLE, codimension=0),
+}
 
 
 def judge(build, draw, promises, seed, by_points=None):

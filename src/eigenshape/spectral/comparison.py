@@ -24,10 +24,13 @@ def sizes_of(matrix: sp.csr_array) -> Float[np.ndarray, " n"]:
 def same_entries(name: str, found: Laplacian, expected: Laplacian, allowed: float) -> Law:
     """Compare entry by entry."""
     if found.n_points != expected.n_points:
-        says = f"the operator has {found.n_points} rows where {expected.n_points} are expected."
-        return judged(name, np.inf, allowed, says)
+        return judged(name, np.inf, allowed, _other_rows(found.n_points, expected.n_points))
     measured, says = distance(expected, found)
     return judged(name, measured, allowed, f"{says}; rounding takes up to {allowed:.1e}.")
+
+
+def _other_rows(found: int, expected: int) -> str:
+    return f"the operator has {found} rows where {expected} are expected."
 
 
 def distance(expected: Laplacian, found: Laplacian) -> tuple[float, str]:
@@ -48,19 +51,18 @@ def _largest_change(name: str, expected: sp.csr_array, found: sp.csr_array) -> t
     return float(relative[worst]), f"{where}, {relative[worst]:.1e} of √({name}_ii {name}_jj)"
 
 
-def same_eigenvalues(
-    name: str, found: Laplacian, expected: Float[np.ndarray, " k"], error: float, allowed: float
-) -> Outcome:
-    """Compare the lowest eigenvalues, whatever the order of the rows; `error` bounds that of the expected ones."""
-    if found.n_points < len(expected):
-        says = f"the operator has {found.n_points} rows where {len(expected)} eigenvalues are expected."
-        return judged(name, np.inf, allowed, says)
+def same_eigenvalues(name: str, found: Laplacian, spectrum: Spectrum, allowed: float, *, copies: int = 1) -> Outcome:
+    """Compare the lowest eigenvalues, whatever the order of the rows, with those of so many copies of an operator."""
+    n_rows, k = copies * len(spectrum.eigenvectors), len(spectrum.eigenvalues)
+    if found.n_points != n_rows:
+        return judged(name, np.inf, allowed, _other_rows(found.n_points, n_rows))
     try:
-        lowest = lowest_eigenvalues(found, len(expected))
+        lowest = lowest_eigenvalues(found, k)
     except ConvergenceError as err:
         return NotJudged(name, str(err))
+    expected = np.repeat(spectrum.eigenvalues, copies)[:k]
     change, worst = spectral_distance(expected, lowest.eigenvalues)
-    allowed += (error + float(lowest.residuals.max())) / (float(expected[-1]) or 1.0)
+    allowed += float(spectrum.residuals.max() + lowest.residuals.max()) / (float(expected[-1]) or 1.0)
     if allowed > MOST_ROUNDING:
         return NotJudged(name, f"rounding may change eigenvalues by {allowed:.0e} of the last: elements are thin")
     says = (

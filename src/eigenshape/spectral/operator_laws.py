@@ -95,7 +95,8 @@ def check_operator(
     higher order, a boundary condition, vectors), the 20 lowest eigenvalues are compared.
 
     Rounding moves entries where simplices are thin: allowed is 8 times what changes most in three jiggles of
-    the coordinates by their rounding, and 1e-12 at least. Where that is more than 1e-4, laws that round them anew are not judged.
+    the coordinates by their rounding, and 1e-12 at least. Where that is more than 1e-4, laws that round them anew are
+    not judged.
 
     Parameters
     ----------
@@ -269,8 +270,7 @@ def _union(trial: Trial) -> Outcome:
         return same_entries("union", other, twice, rounding)
     if trial.spectrum is None:
         return _unsolved("union")
-    values = np.repeat(trial.spectrum.eigenvalues, 2)[: len(trial.spectrum.eigenvalues)]
-    return same_eigenvalues("union", other, values, float(trial.spectrum.residuals.max()), rounding)
+    return same_eigenvalues("union", other, trial.spectrum, rounding, copies=2)
 
 
 def _drowned(name: str, rounding: float) -> NotJudged:
@@ -293,8 +293,7 @@ def _agree(name: str, trial: Trial, found: Laplacian, expected: Laplacian | None
         return same_entries(name, found, expected, trial.allowed)
     if trial.spectrum is None:
         return _unsolved(name)
-    error = float(trial.spectrum.residuals.max())
-    return same_eigenvalues(name, found, trial.spectrum.eigenvalues, error, trial.allowed)
+    return same_eigenvalues(name, found, trial.spectrum, trial.allowed)
 
 
 def _n_points(subject: Subject) -> int:

@@ -1,0 +1,205 @@
+"""How near does each operator come to eigenvalues that are known, and how quickly with more points? (thesis 3.4).
+
+Every operator on every domain that it takes, at three resolutions: the median and the worst relative error of the first
+eigenvalues above zero, the order fitted to the medians (error ~ n^(-order/m)), and the seconds to build and to solve at
+the finest.
+"""
+
+import argparse
+import json
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+from rich.progress import track
+
+import eigenshape as es
+
+HERE = Path(__file__).resolve().parent
+SIZES = {"full": (1000, 2500, 6250), "quick": (300, 600, 1200)}
+K = 36
+Build = Callable[[es.TriangleMesh | es.SimplicialMesh], es.Laplacian]
+
+LINEAR: dict[str, Build] = {
+    "cotangent, lumped": es.cotangent_laplacian,
+    "cotangent, consistent": lambda mesh: es.cotangent_laplacian(mesh, "consistent"),
+    "cotangent, averaged": lambda mesh: es.cotangent_laplacian(mesh, "averaged"),
+}
+HIGHER: dict[str, Build] = {"P2": es.fem_laplacian, "P3": lambda mesh: es.fem_laplacian(mesh, 3)}
+KERNELS: dict[str, Build] = {
+    "mesh, literal": es.mesh_laplacian,
+    "mesh, corrected": lambda mesh: es.mesh_laplacian(mesh, correct="log"),
+    "mesh, random-walk": lambda mesh: es.mesh_laplacian(mesh, correct="log", form="random-walk"),
+}
+SURFACES: dict[str, Build] = {
+    "robust": es.robust_laplacian,
+    "mesh, geodesic": lambda mesh: es.mesh_laplacian(mesh, correct="log", distance="geodesic"),
+}
+POINTS: dict[str, Build] = {
+    "point cloud": lambda mesh: es.point_cloud_laplacian(es.PointCloud(mesh.points, mesh.dim), correct="log"),
+}
+CLOSED = LINEAR | {"P2": es.fem_laplacian} | SURFACES | KERNELS | POINTS
+FLAT = LINEAR | HIGHER | {"mesh, corrected": KERNELS["mesh, corrected"]} | POINTS
+
+
+def icosphere(n: int) -> es.TriangleMesh:
+    """Return the icosphere with about n vertices."""
+    return es.icosphere(max(1, round(float(np.log(n / 10) / np.log(4)))))
+
+
+def flat_torus(n: int) -> es.SimplicialMesh:
+    """Return the product of two circles in R⁴, its vertices moved about at random in the flat plane."""
+    side = int(n**0.5)
+    sheet = es.irregular_grid(side, side, rng=np.random.default_rng(0))
+    u, v = 2 * np.pi * sheet.vertices[:, :2].T
+    points = np.column_stack([np.cos(u), np.sin(u), np.cos(v), np.sin(v)])
+    _, first, names = np.unique(np.round(points, 9), axis=0, return_index=True, return_inverse=True)
+    return es.SimplicialMesh(points[first], names.ravel()[sheet.faces])
+
+
+def random_sphere(n: int) -> es.TriangleMesh:
+    """Return random points on the sphere, the same at every run."""
+    return es.random_sphere(n, rng=np.random.default_rng(1))
+
+
+def square(n: int) -> es.TriangleMesh:
+    """Return the unit square in irregular triangles."""
+    side = int(n**0.5)
+    return es.irregular_grid(side, side, rng=np.random.default_rng(0))
+
+
+Case = tuple[
+    Callable[[int], "es.TriangleMesh | es.SimplicialMesh"], Callable[[int], np.ndarray], dict[str, Build], bool
+]
+CASES: dict[str, Case] = {
+    "sphere, Fibonacci": (es.fibonacci_sphere, es.sphere_eigenvalues, CLOSED, False),
+    "sphere, icosphere": (icosphere, es.sphere_eigenvalues, CLOSED, False),
+    "sphere, 4:1 density": (es.graded_sphere, es.sphere_eigenvalues, CLOSED, False),
+    "sphere, random": (random_sphere, es.sphere_eigenvalues, CLOSED, False),
+    "flat torus in R⁴": (
+        flat_torus,
+        lambda k: es.flat_torus_eigenvalues(k, 2 * np.pi * np.eye(2)),
+        LINEAR | KERNELS | POINTS,
+        False,
+    ),
+    "3-sphere in R⁴": (es.three_sphere, lambda k: es.sphere_eigenvalues(k, 3), LINEAR | KERNELS | POINTS, False),
+    "projective plane in R⁵": (
+        lambda n: es.projective_plane(max(1, round(float(np.log(n / 5) / np.log(4))))),
+        es.projective_plane_eigenvalues,
+        LINEAR | KERNELS,
+        False,
+    ),
+    "interval": (lambda n: es.interval(n // 10), lambda k: es.box_eigenvalues(k, [1.0]), FLAT, False),
+    "square": (square, es.box_eigenvalues, FLAT | SURFACES, False),
+    "disc": (lambda n: es.disc(int((n / 3) ** 0.5)), es.disc_eigenvalues, FLAT | SURFACES, False),
+    "box": (lambda n: es.box(*[int(n ** (1 / 3))] * 3), lambda k: es.box_eigenvalues(k, (1, 1, 1)), FLAT, False),
+    "ball": (lambda n: es.ball(int(n ** (1 / 3))), es.ball_eigenvalues, FLAT, False),
+    "square, Dirichlet": (square, lambda k: es.box_eigenvalues(k, (1, 1), "dirichlet"), LINEAR | HIGHER, True),
+    "disc, Dirichlet": (
+        lambda n: es.disc(int((n / 3) ** 0.5)),
+        lambda k: es.disc_eigenvalues(k, "dirichlet"),
+        LINEAR | HIGHER,
+        True,
+    ),
+    "box, Dirichlet": (
+        lambda n: es.box(*[int(n ** (1 / 3))] * 3),
+        lambda k: es.box_eigenvalues(k, (1, 1, 1), "dirichlet"),
+        LINEAR | HIGHER,
+        True,
+    ),
+    "ball, Dirichlet": (
+        lambda n: es.ball(int(n ** (1 / 3))),
+        lambda k: es.ball_eigenvalues(k, "dirichlet"),
+        LINEAR | HIGHER,
+        True,
+    ),
+}
+ORDERS = {"P2": 2, "P3": 3}
+
+
+def solved(mesh: es.TriangleMesh | es.SimplicialMesh, name: str, build: Build, k: int, held: bool) -> dict[str, object]:
+    """Build and solve, and return eigenvalues, size and seconds."""
+    start = time.perf_counter()
+    laplacian = build(mesh)
+    built = time.perf_counter()
+    if held:
+        values = es.solve_dirichlet(laplacian, k, es.fem_boundary_nodes(mesh, ORDERS.get(name, 1))).eigenvalues
+    else:
+        values = es.solve_spectrum(laplacian, k).eigenvalues
+    return {
+        "values": values,
+        "n": laplacian.n_points,
+        "row": laplacian.stiffness.nnz / laplacian.n_points,
+        "seconds": (built - start, time.perf_counter() - built),
+    }
+
+
+def measured(case: Case, name: str, sizes: tuple[int, ...]) -> dict[str, object]:
+    """Return errors, order and cost of one operator on one domain."""
+    make, eigenvalues, operators, held = case
+    medians, worsts, counts = [], [], []
+    for size in sizes:
+        mesh = make(size)
+        k = min(K, mesh.n_points // 4)
+        found, exact = solved(mesh, name, operators[name], k, held), eigenvalues(k)
+        errors = np.abs(found["values"][exact > 0] / exact[exact > 0] - 1)
+        medians.append(float(np.median(errors)))
+        worsts.append(float(errors.max()))
+        counts.append(int(found["n"]))
+    slope = np.polyfit(np.log(counts), np.log(medians), 1)[0]
+    return {
+        "n": counts,
+        "median": medians,
+        "worst": worsts,
+        "order": float(-slope * mesh.dim),
+        "row": round(float(found["row"]), 1),
+        "seconds": [round(second, 3) for second in found["seconds"]],
+    }
+
+
+def draw(path: Path, n: int) -> None:
+    """Draw the error of each of 300 eigenvalues on the unit sphere, an operator a line."""
+    mesh, exact = es.fibonacci_sphere(n), es.sphere_eigenvalues(300)
+    operators = {name: build for name, build in CLOSED.items() if name not in ("robust", "mesh, random-walk")}
+    figure = Figure(figsize=(9, 5.2), layout="constrained")
+    axes = figure.subplots()
+    colors = mpl.colormaps["tab10"].colors
+    for color, (name, build) in zip(colors, track(operators.items(), description="picture"), strict=False):
+        values = solved(mesh, name, build, 300, held=False)["values"]
+        axes.semilogy(np.arange(1, 300), np.abs(values[1:] / exact[1:] - 1), color=color, lw=1.4, label=name)
+    axes.set(xlabel="number of the eigenvalue", ylabel="relative error", title=f"The unit sphere heard by {n} points")
+    axes.set_ylim(1e-5, 1)
+    axes.grid(alpha=0.3)
+    figure.legend(loc="outside right upper", frameon=False)
+    figure.savefig(path, dpi=130)
+
+
+def main() -> None:
+    """Measure, print, and write what was asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="smaller meshes")
+    parser.add_argument("--out", type=Path, help="write the figures as JSON")
+    parser.add_argument("--picture", type=Path, help="draw errors on the sphere (PNG)")
+    arguments = parser.parse_args()
+    warnings.simplefilter("ignore")
+    sizes = SIZES["quick" if arguments.quick else "full"]
+    tasks = [(case, name) for case, (_, _, operators, _) in CASES.items() for name in operators]
+    table: dict[str, dict[str, object]] = {}
+    for case, name in track(tasks, description="cases"):
+        row = table.setdefault(case, {})[name] = measured(CASES[case], name, sizes)
+        print(
+            f"{case:<24} {name:<22} n {row['n'][-1]:>6}  median {row['median'][-1]:.5f}  worst {row['worst'][-1]:.5f}"
+            f"  order {row['order']:5.2f}  entries a row {row['row']:6.1f}  seconds {row['seconds']}"
+        )
+    if arguments.out:
+        arguments.out.write_text(json.dumps(table, indent=2, ensure_ascii=False) + "\n")
+    if arguments.picture:
+        draw(arguments.picture, 1000 if arguments.quick else 4000)
+
+
+if __name__ == "__main__":
+    main()
