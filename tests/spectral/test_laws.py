@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
@@ -20,8 +21,9 @@ from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
 from eigenshape.geometry.topology import boundary_vertices, edge_table, vertex_components
 from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.spectral import changes, laplacian_laws
+from eigenshape.spectral import changes, comparison, laplacian_laws, operator_laws
 from eigenshape.spectral.laplacian_laws import check_laplacian
 from eigenshape.spectral.laws import USUAL, Law, NotJudged, OperatorReport, known_promises
 from eigenshape.spectral.operator_laws import check_operator
@@ -345,6 +347,60 @@ def test_what_drowns_in_rounding_is_not_judged():
     silent = [law for law in report.not_judged if law.reason != "not promised"]
     assert {law.name for law in silent} == {"rigid motion", "union"}
     assert "simplices are thin, or the operator is unstable" in report.explain()
+
+
+def not_judged_for(report: OperatorReport, reason: str) -> set[str]:
+    return {law.name for law in report.not_judged if reason in law.reason}
+
+
+BY_SPECTRUM = {"point order", "simplex order", "reflection", "orientation"}
+
+
+def test_eigenvalues_that_drown_in_rounding_are_not_judged():
+    points = bumpy(icosphere(1)).vertices.copy()
+    a, b, c = icosphere(1).faces[7]
+    points[c] = (points[a] + points[b]) / 2 + 1e-10 * (points[c] - (points[a] + points[b]) / 2)
+    report = check_operator(fem_laplacian, TriangleMesh(points, icosphere(1).faces))
+    assert report.passed, report.explain()
+    assert law(report, "scaling").measured == 0
+    by_eigenvalues = not_judged_for(report, "rounding may change eigenvalues by")
+    assert by_eigenvalues >= BY_SPECTRUM
+    assert by_eigenvalues | not_judged_for(report, "rounding of coord") == BY_SPECTRUM | {"rigid motion", "union"}
+
+
+@pytest.mark.parametrize("module", [comparison, operator_laws])
+def test_eigenvalues_without_proof_are_not_compared(monkeypatch, module):
+    def unproved(*_):
+        message = "no proof of this"
+        raise ConvergenceError(message)
+
+    monkeypatch.setattr(module, "lowest_eigenvalues", unproved)
+    report = check_operator(fem_laplacian, bumpy(icosphere(1)))
+    reason = "no proof of this" if module is comparison else "the lowest eigenvalues cannot be proved"
+    assert report.passed, report.explain()
+    assert not_judged_for(report, reason) == BY_SPECTRUM | {"rigid motion", "union"}
+
+
+def test_as_many_rows_as_points_may_still_be_no_points():
+    # On 2 by 2 by 2 by 2 cubes P2 has 5^4 nodes, of which 3^4 are inside; and there are 3^4 points.
+    mesh = box(2, 4)
+
+    def held(shape):
+        return dirichlet_laplacian(fem_laplacian(shape), fem_boundary_nodes(shape))[0]
+
+    assert held(mesh).n_points == mesh.n_points
+    assert "point order" in broken(check_operator(held, mesh, promises=DEFINITE))
+    report = check_operator(held, mesh, promises=DEFINITE, by_points=False)
+    assert report.passed, report.explain()
+
+
+def box(n: int, dim: int) -> SimplicialMesh:
+    """Cut cubes along their diagonals (Kuhn)."""
+    corners = np.stack(np.meshgrid(*[np.arange(n + 1)] * dim, indexing="ij"), axis=-1).reshape(-1, dim)
+    strides = (n + 1) ** np.arange(dim)[::-1]
+    first = corners[(corners < n).all(axis=1)] @ strides
+    steps = [np.cumsum([0, *strides[list(order)]]) for order in permutations(range(dim))]
+    return SimplicialMesh(corners / n, np.concatenate([first[:, None] + step for step in steps]))
 
 
 def test_a_graph_has_no_place_and_a_cloud_no_simplices():

@@ -17,6 +17,14 @@ AFTER_POSITION = re.compile(rb"(?<=\d)/\S*")  # a corner is position/texture/nor
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     """Read vertices and faces; polygons become fans."""
+    vertices, faces = parse_points(data)
+    if not len(faces):
+        raise FileFormatError(f"An OBJ file must hold faces; it holds {len(vertices)} points and no face.")
+    return vertices, faces
+
+
+def parse_points(data: bytes) -> tuple[np.ndarray, np.ndarray]:
+    """Read vertices, and the faces if there are any."""
     if JOINT.search(data):
         data = CONTINUED.sub(_joined, data)
     positions: list[Line] = []
@@ -30,9 +38,7 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
             polygons.append((number, AFTER_POSITION.sub(b"", text[1:])))
             n_so_far.append(len(positions))
     vertices = coordinates(positions)
-    if not polygons:
-        raise FileFormatError(f"An OBJ file must hold faces; it holds {len(vertices)} points and no face.")
-    return vertices, _triangles(polygons, n_so_far)
+    return vertices, _triangles(polygons, n_so_far) if polygons else np.empty((0, 3), dtype=np.int64)
 
 
 def _joined(match: re.Match[bytes]) -> bytes:

@@ -19,6 +19,15 @@ Table = dict[str, Any]  # the values of each column, by name
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     """Read vertices and faces; polygons become fans, all other elements and properties are passed over."""
+    vertices, faces, strips = parse_points(data)
+    if not len(faces):
+        hint = " It has triangle strips, which are not read." if strips else ""
+        raise FileFormatError(f"A PLY file must hold faces; it holds {len(vertices)} points and no face.{hint}")
+    return vertices, faces
+
+
+def parse_points(data: bytes) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Read vertices, the faces if there are any, and whether there are triangle strips, which are not read."""
     header = parse_header(data)
     elements = [element for element in header.elements if element.columns]
     _require_mesh(elements)
@@ -29,10 +38,8 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
         tables = _binary_tables(body, elements, header.order)
     vertices = np.column_stack([np.asarray(tables["vertex"][axis], dtype=np.float64) for axis in AXES])
     polygons = next((tables["face"][name] for name in CORNERS if name in tables.get("face", {})), ())
-    if not len(polygons):
-        strips = " It has triangle strips, which are not read." if "tristrips" in tables else ""
-        raise FileFormatError(f"A PLY file must hold faces; it holds {len(vertices)} points and no face.{strips}")
-    return vertices, _triangles(polygons)
+    faces = _triangles(polygons) if len(polygons) else np.empty((0, 3), dtype=np.int64)
+    return vertices, faces, "tristrips" in tables
 
 
 def _require_mesh(elements: Sequence[Element]) -> None:

@@ -280,7 +280,7 @@ def _drowned(name: str, rounding: float) -> NotJudged:
 
 
 def _unsolved(name: str) -> NotJudged:
-    return NotJudged(name, "rows are no points, and the lowest eigenvalues cannot be proved: elements are thin")
+    return NotJudged(name, "rows are no points, and the lowest eigenvalues cannot be proved")
 
 
 def _same(name: str, trial: Trial, subject: Subject) -> Outcome:

@@ -1,0 +1,144 @@
+"""Bridges to plain arrays, trimesh and PyVista."""
+
+from importlib import import_module
+from types import ModuleType
+from typing import Any, SupportsIndex
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from eigenshape._errors import InvalidShapeError, MissingExtraError
+from eigenshape.geometry.cloud import PointCloud, Shape
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplicial import SimplicialMesh
+
+VTK_CELLS = {1: 3, 2: 5, 3: 10}  # VTK's numbers for segment, triangle and tetrahedron
+
+
+def from_arrays(points: ArrayLike, simplices: ArrayLike | None = None, *, dim: SupportsIndex = 2) -> Shape:
+    """Return the shape that arrays describe: a TriangleMesh where they can be one.
+
+    Parameters
+    ----------
+    points : (n, d) float
+    simplices : (s, m+1) int, optional
+        Without them the points are a cloud of dimension `dim`.
+    dim : int
+
+    Raises
+    ------
+    InvalidShapeError, InvalidParameterError
+        As the three classes.
+    """
+    if simplices is None:
+        return PointCloud(points, dim)
+    shapes = np.shape(points), np.shape(simplices)
+    if shapes[0][1:] == (3,) and shapes[1][1:] == (3,):
+        return TriangleMesh(points, simplices)
+    return SimplicialMesh(points, simplices)
+
+
+def to_arrays(shape: Shape) -> tuple[np.ndarray, np.ndarray | None]:
+    """Return copies of points (n, d) and simplices (s, m+1) that may be written to; None for a cloud's simplices."""
+    return shape.points.copy(), None if isinstance(shape, PointCloud) else shape.simplices.copy()
+
+
+def from_trimesh(mesh: Any, *, dim: SupportsIndex = 2) -> TriangleMesh | PointCloud:
+    """Take over a trimesh.Trimesh, or a trimesh.PointCloud of dimension `dim`, vertex by vertex.
+
+    Raises
+    ------
+    InvalidShapeError
+        If it is neither, or not a valid mesh.
+    MissingExtraError
+        If trimesh is not installed.
+    """
+    trimesh = _extra("trimesh")
+    if isinstance(mesh, trimesh.PointCloud):
+        return PointCloud(np.asarray(mesh.vertices), dim)
+    if not isinstance(mesh, trimesh.Trimesh):
+        raise InvalidShapeError(f"A Trimesh or PointCloud of trimesh is taken; this is a {type(mesh).__name__}.")
+    return TriangleMesh(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+
+
+def to_trimesh(shape: Shape) -> Any:
+    """Return a trimesh.Trimesh or trimesh.PointCloud with the same points in the same order; nothing is merged.
+
+    Raises
+    ------
+    InvalidShapeError
+        If the shape is neither a triangle mesh nor a cloud in R³.
+    MissingExtraError
+        If trimesh is not installed.
+    """
+    trimesh = _extra("trimesh")
+    if isinstance(shape, PointCloud) and shape.points.shape[1] == 3:
+        return trimesh.PointCloud(shape.points.copy())
+    if not isinstance(shape, TriangleMesh):
+        raise InvalidShapeError(f"Only triangle meshes and clouds in R^3 fit into trimesh; this is {shape!r}.")
+    return trimesh.Trimesh(shape.vertices.copy(), shape.faces.copy(), process=False)
+
+
+def from_pyvista(dataset: Any, *, dim: SupportsIndex = 2) -> Shape:
+    """Take over a PyVista PolyData or UnstructuredGrid: its simplices of the highest dimension, or its points.
+
+    Raises
+    ------
+    InvalidShapeError
+        If it is neither, or has cells that are no simplices.
+    MissingExtraError
+        If PyVista is not installed.
+    """
+    pyvista = _extra("pyvista")
+    if not isinstance(dataset, pyvista.PolyData | pyvista.UnstructuredGrid):
+        raise InvalidShapeError(f"A PolyData or UnstructuredGrid is taken; this is a {type(dataset).__name__}.")
+    grid = dataset.cast_to_unstructured_grid()
+    points = np.asarray(grid.points, dtype=np.float64)
+    cells = {int(kind): np.asarray(rows) for kind, rows in grid.cells_dict.items()}
+    for corners in (4, 3, 2):
+        if VTK_CELLS[corners - 1] in cells:
+            _require_simplices(cells)
+            return from_arrays(points, cells[VTK_CELLS[corners - 1]])
+    _require_simplices(cells)
+    return PointCloud(points, dim)
+
+
+def _require_simplices(cells: dict[int, np.ndarray]) -> None:
+    others = sorted(set(cells) - {1, *VTK_CELLS.values()})  # 1: single points
+    if others:
+        raise InvalidShapeError(
+            f"Cells must be simplices; {len(cells[others[0]])} are of VTK's type {others[0]}. Triangulate them first."
+        )
+
+
+def to_pyvista(shape: Shape) -> Any:
+    """Return a PolyData of a surface or a cloud, or an UnstructuredGrid of segments or tetrahedra, in R³.
+
+    Points of R¹ and R² get zeros for what they lack.
+
+    Raises
+    ------
+    InvalidShapeError
+        If the shape lies beyond R³.
+    MissingExtraError
+        If PyVista is not installed.
+    """
+    pyvista = _extra("pyvista")
+    ambient = shape.points.shape[1]
+    if ambient > 3:
+        raise InvalidShapeError(f"Only shapes in R^3 fit into PyVista; this one lies in R^{ambient}.")
+    points = np.pad(shape.points, ((0, 0), (0, 3 - ambient)))
+    if isinstance(shape, PointCloud):
+        return pyvista.PolyData(points)
+    if shape.dim == 2:
+        return pyvista.PolyData.from_regular_faces(points, shape.simplices)
+    return pyvista.UnstructuredGrid({VTK_CELLS[shape.dim]: shape.simplices}, points)
+
+
+def _extra(name: str) -> ModuleType:
+    try:
+        return import_module(name)
+    except ImportError as err:
+        raise MissingExtraError(
+            f"{name} must be installed; it is not. pip install 'eigenshape[bridges]' does it."
+        ) from err

@@ -1,0 +1,60 @@
+"""Tables of points: plain text, and the binary point sets that some scanners' programs write under the same suffix."""
+
+import numpy as np
+from jaxtyping import Float
+
+from eigenshape._errors import FileFormatError
+from eigenshape.io.text import coordinates, lines_of, shown, whole
+
+EXPE = b"[Expe/PointSet/Binary/"
+
+
+def parse(data: bytes) -> Float[np.ndarray, "n 3"]:
+    """Read the first three numbers of each line; a first line with one number alone declares how many follow."""
+    if data.startswith(EXPE):
+        return _parse_binary(data)
+    lines = lines_of(data)
+    if lines and len(lines[0][1].split()) == 1:
+        declared = whole(lines[0][1], lines[0], "A number of points")
+        lines = lines[1:]
+        if declared != len(lines):
+            raise FileFormatError(
+                f"A file of points must hold as many as it declares; it declares {declared} and holds {len(lines)}."
+            )
+    if not lines:
+        raise FileFormatError("A file of points must hold points; it holds none.")
+    return coordinates(lines)
+
+
+def _parse_binary(data: bytes) -> Float[np.ndarray, "n 3"]:
+    """Read records of 32-bit numbers whose header names each property with its size in bytes, as `position 12`."""
+    head, mark, body = data.partition(b"\ndata\n")
+    if not mark:
+        raise FileFormatError("A binary point set must have a line 'data'; it has none.")
+    sizes: dict[bytes, int] = {}
+    declared = -1
+    for line in lines_of(head)[1:]:
+        words = line[1].split()
+        if words[0] == b"property" and len(words) == 3:
+            sizes[words[1]] = whole(words[2], line, "The size of a property")
+        elif words[0] == b"nofpoints" and len(words) == 2:
+            declared = whole(words[1], line, "A number of points")
+        else:
+            raise FileFormatError(f"A binary point set must declare properties; line {line[0]} is {shown(line)}.")
+    if sizes.get(b"position") != 12 or min(sizes.values()) < 1:
+        raise FileFormatError(f"A binary point set must have a position of 12 bytes; it has {sizes}.")
+    record = sum(sizes.values())
+    if declared < 1 or len(body) < declared * record:
+        raise FileFormatError(
+            f"A binary point set must hold the points it declares; it declares {declared} of {record} bytes each and "
+            f"holds {len(body)} bytes."
+        )
+    before = sum(size for name, size in list(sizes.items())[: list(sizes).index(b"position")])
+    rows = np.frombuffer(body, np.uint8, declared * record).reshape(declared, record)[:, before : before + 12]
+    return np.ascontiguousarray(rows).view("<f4").astype(np.float64)
+
+
+def format_text(points: Float[np.ndarray, "n 3"], *, count: bool = False) -> bytes:
+    """Write points so that they read back exactly, with their number before them where it is asked for."""
+    lines = [" ".join(map(repr, row)) for row in points.tolist()]
+    return ("\n".join([str(len(lines)), *lines] if count else lines) + "\n").encode()
