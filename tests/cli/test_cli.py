@@ -64,7 +64,7 @@ def database(zoo, tmp_path_factory):
 
 def test_help_names_the_verbs():
     text = run("--help").stdout
-    for verb in ("info", "spectrum", "features", "index", "query", "demo"):
+    for verb in ("info", "spectrum", "operators", "features", "index", "query", "demo"):
         assert verb in text
         assert "--help" in run(verb, "--help").stdout
 
@@ -178,7 +178,7 @@ def test_query_finds_the_kind_and_draws_it(zoo, database, tmp_path):
     ("arguments", "message"),
     [
         (("info", "nowhere.ply"), "No such file"),
-        (("info", "mesh.xyz"), "mesh.xyz must be of a"),
+        (("info", "mesh.abc"), "mesh.abc must be of a"),
         (("spectrum", "{sphere}", "-k", "0"), "k must lie in 1..162; it is 0"),
         (("spectrum", "{sphere}", "-k", "163"), "k must lie in 1..162; it is 163"),
         (("spectrum", "{sphere}", "--plot", "plot.bmp"), "A picture must end in"),

@@ -15,9 +15,11 @@ from rich.table import Table
 from typer.core import TyperGroup
 
 from eigenshape._errors import EigenshapeError, InvalidParameterError
+from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import REPAIRS, repair
 from eigenshape.io.mesh_files import read_mesh
+from eigenshape.io.shape_files import read_shape
 
 out = Console(highlight=False, soft_wrap=True)
 err = Console(stderr=True, highlight=False, soft_wrap=True)
@@ -32,6 +34,11 @@ RepairOption = Annotated[
     ),
 ]
 MeshArgument = Annotated[Path, typer.Argument(help="Mesh file: OFF, OBJ, PLY, STL or GLB.")]
+ShapeArgument = Annotated[
+    Path,
+    typer.Argument(help="OFF, OBJ, PLY, STL, GLB; .mesh, .msh, .vtk, .vtu; points as .pts, .xyz, .pcd or PLY."),
+]
+DimOption = Annotated[int, typer.Option(help="Dimension of what a cloud of points samples.")]
 
 
 class Verbs(TyperGroup):
@@ -51,8 +58,22 @@ class Verbs(TyperGroup):
 
 def load_mesh(path: Path, repairs: str) -> TriangleMesh:
     """Read a mesh, apply the repairs that were asked for, and say on stderr what they did."""
+    return _repaired(read_mesh(path), repair_names(repairs))
+
+
+def load_shape(path: Path, repairs: str, dim: int) -> Shape:
+    """Read a shape of any kind and apply repairs, which are for triangle meshes."""
     names = repair_names(repairs)
-    done = repair(read_mesh(path), names)
+    shape = read_shape(path, dim=dim)
+    if not names:
+        return shape
+    if not isinstance(shape, TriangleMesh):
+        raise InvalidParameterError(f"--repair is for triangle meshes; {path} holds a {shape!r}.")
+    return _repaired(shape, names)
+
+
+def _repaired(mesh: TriangleMesh, names: tuple[str, ...]) -> TriangleMesh:
+    done = repair(mesh, names)
     for line in done.report:
         err.print(f"[yellow]repair:[/] {line}")
     return done.mesh

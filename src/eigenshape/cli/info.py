@@ -5,12 +5,15 @@ from typing import Any
 import numpy as np
 from rich.markup import escape
 
-from eigenshape.cli.console import JsonOption, MeshArgument, RepairOption, load_mesh, out, print_json
+from eigenshape.cli.console import DimOption, JsonOption, RepairOption, ShapeArgument, load_shape, out, print_json
+from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.measure import bounding_box, edge_lengths, enclosed_volume, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import degenerate_simplices
+from eigenshape.geometry.simplices import degenerate_simplices, mean_side_length, simplex_volumes
+from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import (
     boundary_loops,
+    boundary_vertices,
     euler_characteristic,
     inconsistent_edges,
     is_closed,
@@ -19,17 +22,60 @@ from eigenshape.geometry.topology import (
     unreferenced_vertices,
     vertex_components,
 )
+from eigenshape.operators.kernel import neighbor_distance
 
 
-def info(mesh: MeshArgument, *, repair: RepairOption = "", as_json: JsonOption = False) -> None:
-    """Show size, topology and health of a mesh, and which repairs it would need."""
-    facts = mesh_facts(load_mesh(mesh, repair))
+def info(shape: ShapeArgument, *, repair: RepairOption = "", dim: DimOption = 2, as_json: JsonOption = False) -> None:
+    """Show size, topology and health of a shape, and which repairs a mesh would need."""
+    facts = shape_facts(load_shape(shape, repair, dim))
     if as_json:
-        print_json({"path": str(mesh), **facts})
+        print_json({"path": str(shape), **facts})
         return
-    out.print(f"[bold]{escape(str(mesh))}[/]")
+    out.print(f"[bold]{escape(str(shape))}[/]")
     for name, value in facts.items():
         out.print(f"  {name.replace('_', ' '):<24}{_shown(value)}")
+
+
+def shape_facts(shape: Shape) -> dict[str, Any]:
+    """Gather what there is to say about a shape, in its own length unit."""
+    if isinstance(shape, TriangleMesh):
+        return mesh_facts(shape)
+    return cloud_facts(shape) if isinstance(shape, PointCloud) else simplicial_facts(shape)
+
+
+def cloud_facts(cloud: PointCloud) -> dict[str, Any]:
+    """Gather what there is to say about a cloud."""
+    low, high = bounding_box(cloud)
+    return {
+        "kind": "point cloud",
+        "points": cloud.n_points,
+        "dimension": cloud.dim,
+        "coordinates": cloud.points.shape[1],
+        "coinciding_points": cloud.n_points - len(np.unique(cloud.points + 0.0, axis=0)),
+        "mean_near_distance": neighbor_distance(cloud.points, cloud.dim),
+        "box_low": low.tolist(),
+        "box_high": high.tolist(),
+    }
+
+
+def simplicial_facts(mesh: SimplicialMesh) -> dict[str, Any]:
+    """Gather what there is to say about a mesh of any dimension."""
+    low, high = bounding_box(mesh)
+    return {
+        "kind": {1: "curve", 2: "surface", 3: "tetrahedral mesh"}.get(mesh.dim, "simplicial mesh"),
+        "points": mesh.n_points,
+        "simplices": mesh.n_simplices,
+        "dimension": mesh.dim,
+        "coordinates": mesh.points.shape[1],
+        "components": vertex_components(mesh)[0],
+        "boundary_points": len(boundary_vertices(mesh)),
+        "volume": float(simplex_volumes(mesh).sum()),
+        "mean_side_length": mean_side_length(mesh),
+        "without_volume": len(degenerate_simplices(mesh)),
+        "loose_points": len(unreferenced_vertices(mesh)),
+        "box_low": low.tolist(),
+        "box_high": high.tolist(),
+    }
 
 
 def mesh_facts(mesh: TriangleMesh) -> dict[str, Any]:

@@ -1,17 +1,19 @@
-"""eigenshape spectrum: the lowest eigenvalues of a mesh, with their proof."""
+"""eigenshape spectrum: the lowest eigenvalues of a shape by any operator, with their proof."""
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import typer
 
+from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import (
+    DimOption,
     JsonOption,
-    MeshArgument,
     RepairOption,
-    load_mesh,
+    ShapeArgument,
+    load_shape,
     out,
     print_json,
     print_table,
@@ -21,20 +23,45 @@ from eigenshape.cli.console import (
 from eigenshape.figures.fields import figure_eigenfunctions
 from eigenshape.figures.save import require_picture_path, save_figure
 from eigenshape.figures.spectra import figure_spectrum
+from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.operators.cotangent import Mass, cotangent_laplacian
-from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.operators.catalog import OPERATORS, build_laplacian, default_operator
+from eigenshape.operators.cotangent import Mass
+from eigenshape.operators.fem import fem_boundary_nodes
+from eigenshape.operators.gaussian import Distance
+from eigenshape.operators.kernel import Correction, Form
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.spectral.dirichlet import solve_dirichlet
+from eigenshape.spectral.solver import Progress, solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 N_PICTURED = 8
+Condition = Literal["neumann", "dirichlet"]
+ORDERS = {"p2": 2, "p3": 3}
 
 
 def spectrum(
-    mesh: MeshArgument,
+    shape: ShapeArgument,
     *,
     k: Annotated[int, typer.Option("-k", help="Number of eigenpairs.")] = 20,
-    mass: Annotated[Mass, typer.Option(help="Mass matrix of the cotangent Laplacian.")] = "lumped",
+    operator: Annotated[
+        str | None,
+        typer.Option(
+            "--operator", "-o", help=f"{', '.join(OPERATORS)}; by default cotangent on meshes, point-cloud on points."
+        ),
+    ] = None,
+    boundary: Annotated[Condition, typer.Option(help="Condition on the boundary of a mesh.")] = "neumann",
+    mass: Annotated[Mass | None, typer.Option(help="Mass matrix of the cotangent operator.")] = None,
+    t: Annotated[float | None, typer.Option(help="Heat time of a kernel, in length².")] = None,
+    h: Annotated[float | None, typer.Option(help="Width of a kernel, 2√t, in length.")] = None,
+    edge_factor: Annotated[float | None, typer.Option(help="Width of a kernel in mean edge lengths.")] = None,
+    correct: Annotated[Correction | None, typer.Option(help="Take a kernel's bias away.")] = None,
+    form: Annotated[Form | None, typer.Option(help="Mass of a kernel's points.")] = None,
+    distance: Annotated[Distance | None, typer.Option(help="Distance in the kernel of the mesh operator.")] = None,
+    cutoff: Annotated[float | None, typer.Option(help="Where a kernel is cut off, in widths.")] = None,
+    mollify: Annotated[float | None, typer.Option(help="Mollification of the robust operator.")] = None,
+    dim: DimOption = 2,
     repair: RepairOption = "",
     plot: Annotated[Path | None, typer.Option(help="Draw the eigenvalues (PNG, SVG or PDF).")] = None,
     picture: Annotated[
@@ -43,20 +70,45 @@ def spectrum(
     save: Annotated[Path | None, typer.Option(help="Write eigenvalues and eigenvectors (NumPy .npz).")] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Compute the lowest eigenvalues of a mesh and prove that none is missing."""
+    """Compute the lowest eigenvalues of a shape and prove that none is missing."""
     for path in filter(None, (plot, picture)):
         require_picture_path(path)
-    surface = load_mesh(mesh, repair)
+    scale = {"t": t, "h": h, "edge_factor": edge_factor, "cutoff": cutoff}
+    asked = {"mass": mass, "mollify": mollify, **scale, "correct": correct, "form": form, "distance": distance}
+    options = {name: value for name, value in asked.items() if value is not None}
+    found = load_shape(shape, repair, dim)
+    _require_drawable(found, picture)
+    name = operator or default_operator(found)
     with progress_bar("spectrum") as progress:
-        found = solve_spectrum(cotangent_laplacian(surface, mass), k, progress=progress)
+        progress(0.0, "building the operator")
+        laplacian = build_laplacian(found, name, **options)
+        solved = _solved(found, laplacian, k, ORDERS.get(name, 1), held=boundary == "dirichlet", progress=progress)
     if as_json:
-        print_json({"path": str(mesh), "mass": mass, **_facts(found)})
+        print_json({"path": str(shape), "operator": name, "boundary": boundary, **options, **_facts(solved)})
     else:
-        _print(found)
-    _write(surface, found, plot=plot, picture=picture, save=save)
+        _print(solved)
+    _write(found, solved, plot=plot, picture=picture, save=save)
 
 
-def _facts(found: Spectrum) -> dict[str, object]:
+def _require_drawable(shape: Shape, picture: Path | None) -> None:
+    if picture and not isinstance(shape, TriangleMesh):
+        raise InvalidParameterError(
+            f"--picture draws triangle meshes; the shape is {shape!r}. --plot draws any spectrum."
+        )
+
+
+def _solved(shape: Shape, laplacian: Laplacian, k: int, order: int, *, held: bool, progress: Progress) -> Spectrum:
+    if not held:
+        return solve_spectrum(laplacian, k, progress=progress)
+    if isinstance(shape, PointCloud):
+        raise InvalidParameterError("--boundary dirichlet is for meshes; a cloud of points has no boundary to hold.")
+    nodes = fem_boundary_nodes(shape, order)
+    if not nodes.size:
+        raise InvalidParameterError(f"--boundary dirichlet needs a boundary; {shape!r} is closed.")
+    return solve_dirichlet(laplacian, k, nodes, progress=progress)
+
+
+def _facts(found: Spectrum) -> dict[str, Any]:
     return {
         "eigenvalues": found.eigenvalues,
         "residuals": found.residuals,
@@ -73,17 +125,15 @@ def _print(found: Spectrum) -> None:
     out.print(found.certificate.explain())
 
 
-def _write(
-    surface: TriangleMesh, found: Spectrum, *, plot: Path | None, picture: Path | None, save: Path | None
-) -> None:
+def _write(shape: Shape, found: Spectrum, *, plot: Path | None, picture: Path | None, save: Path | None) -> None:
     if plot:
-        area = surface_area(surface)
+        area = surface_area(shape) if isinstance(shape, TriangleMesh) else None
         save_figure(figure_spectrum(found.eigenvalues, area=area, shift=found.certificate.shift), plot)
         said(plot)
-    if picture:
+    if picture and isinstance(shape, TriangleMesh):
         k = len(found.eigenvalues)
         indices = range(min(1, k - 1), min(k, N_PICTURED + 1))
-        save_figure(figure_eigenfunctions(surface, found, indices), picture)
+        save_figure(figure_eigenfunctions(shape, found, indices), picture)
         said(picture)
     if save:
         np.savez_compressed(

@@ -3,6 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import in_length, scaled_corners, size_one
 from eigenshape.geometry.topology import edge_table
@@ -69,6 +70,6 @@ def edge_lengths(mesh: TriangleMesh) -> Float[np.ndarray, " e"]:
     return in_length(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1), scale, 1)
 
 
-def bounding_box(mesh: TriangleMesh) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
-    """Return the lowest and the highest corner of the box around all vertices."""
-    return mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+def bounding_box(shape: Shape) -> tuple[Float[np.ndarray, " d"], Float[np.ndarray, " d"]]:
+    """Return the lowest and the highest corner of the box around all points."""
+    return shape.points.min(axis=0), shape.points.max(axis=0)

@@ -35,7 +35,7 @@ def parse(data: bytes) -> Float[np.ndarray, "n 3"]:
     lines, kind, body = _split(data)
     header = _header(lines)
     if kind == b"ascii":
-        return _parse_text(header, body, first=len(lines) + 2)
+        return _parse_text(header, body, first=data[: len(data) - len(body)].count(b"\n") + 1)
     if kind == b"binary":
         return _records(header, body)
     if kind == b"binary_compressed":

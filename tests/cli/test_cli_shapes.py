@@ -1,0 +1,109 @@
+"""The verbs on shapes that are no triangle meshes, and operators by name."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from eigenshape.cli import app
+from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.domains import box, disc
+from eigenshape.geometry.exact import box_eigenvalues, disc_eigenvalues
+from eigenshape.geometry.spheres import fibonacci_sphere
+from eigenshape.io.mesh_files import write_mesh
+from eigenshape.io.shape_files import write_points
+from eigenshape.operators.catalog import OPERATORS
+
+
+def run(*arguments, code=0):
+    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    assert done.exit_code == code, done.output + done.stderr
+    return done
+
+
+def run_json(*arguments):
+    return json.loads(run(*arguments, "--json").stdout)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("shapes")
+    cube = box(4, 4, 4)
+    rows = "\n".join(" ".join(map(repr, row)) + " 0" for row in cube.points.tolist())
+    cells = "\n".join(" ".join(map(str, row)) + " 0" for row in (cube.simplices + 1).tolist())
+    (folder / "cube.mesh").write_text(
+        f"MeshVersionFormatted 1\nDimension 3\nVertices\n{cube.n_points}\n{rows}\n"
+        f"Tetrahedra\n{cube.n_simplices}\n{cells}\nEnd\n"
+    )
+    write_points(PointCloud(fibonacci_sphere(400).vertices), folder / "sphere.xyz")
+    write_mesh(disc(8), folder / "disc.off")
+    return folder
+
+
+def test_info_of_a_tetrahedral_mesh(folder):
+    facts = run_json("info", folder / "cube.mesh")
+    assert facts["kind"] == "tetrahedral mesh"
+    assert (facts["points"], facts["simplices"], facts["boundary_points"], facts["components"]) == (125, 384, 98, 1)
+    assert facts["volume"] == pytest.approx(1)
+    assert "tetrahedral mesh" in run("info", folder / "cube.mesh").stdout
+
+
+def test_info_of_points(folder):
+    facts = run_json("info", folder / "sphere.xyz", "--dim", 2)
+    assert (facts["kind"], facts["points"], facts["coinciding_points"]) == ("point cloud", 400, 0)
+    assert facts["mean_near_distance"] == pytest.approx(0.18, rel=0.1)
+
+
+def test_spectra_by_other_operators(folder):
+    found = run_json("spectrum", folder / "cube.mesh", "-k", 4, "--operator", "p2", "--boundary", "dirichlet")
+    np.testing.assert_allclose(found["eigenvalues"], box_eigenvalues(4, (1, 1, 1), "dirichlet"), rtol=0.04)
+    assert (found["operator"], found["boundary"]) == ("p2", "dirichlet")
+    drum = run_json("spectrum", folder / "disc.off", "-k", 4, "-o", "p3", "--boundary", "dirichlet")
+    np.testing.assert_allclose(drum["eigenvalues"], disc_eigenvalues(4, "dirichlet"), rtol=0.01)
+    points = run_json("spectrum", folder / "sphere.xyz", "-k", 4, "--correct", "log", "--edge-factor", 1.8)
+    np.testing.assert_allclose(points["eigenvalues"], [0, 2, 2, 2], rtol=0.03, atol=1e-9)
+    assert points["operator"] == "point-cloud"
+    assert points["edge_factor"] == 1.8
+
+
+def test_a_plot_of_any_spectrum(folder, tmp_path):
+    run("spectrum", folder / "cube.mesh", "-k", 4, "--plot", tmp_path / "a.png", "--save", tmp_path / "a.npz")
+    assert (tmp_path / "a.png").stat().st_size > 1000
+
+
+def test_operators_are_listed():
+    assert run_json("operators").keys() == OPERATORS.keys()
+    text = run("operators").stdout
+    assert "Gaussian kernel, weighed by volumes" in text
+    assert "of triangles; --mollify" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (
+            ("spectrum", "sphere.xyz", "-o", "robust"),
+            "robust operator takes TriangleMesh; the shape is a PointCloud",
+        ),
+        (("spectrum", "disc.off", "-o", "best"), "operator must be one of cotangent, p2"),
+        (
+            ("spectrum", "disc.off", "-o", "p2", "--mass", "lumped"),
+            "p2 operator takes no option; it was given mass",
+        ),
+        (("spectrum", "sphere.xyz", "--boundary", "dirichlet"), "--boundary dirichlet is for meshes; a cloud"),
+        (("spectrum", "sphere.xyz", "--picture", "a.png"), "--picture draws triangle meshes; the shape is PointCloud"),
+        (("info", "sphere.xyz", "--repair", "weld"), "--repair is for triangle meshes"),
+        (("features", "sphere.xyz"), "must be of a known format, .off, .obj"),
+        (("info", "sphere.xyz", "--dim", "4"), "dim must lie in 1..3; it is 4"),
+    ],
+)
+def test_refusals(folder, arguments, said):
+    verb, name, *rest = arguments
+    assert said in run(verb, folder / name, *rest, code=1).stderr
+
+
+def test_a_closed_mesh_has_no_boundary_to_hold(folder, tmp_path):
+    write_mesh(fibonacci_sphere(50), tmp_path / "closed.off")
+    said = run("spectrum", tmp_path / "closed.off", "--boundary", "dirichlet", code=1).stderr
+    assert "--boundary dirichlet needs a boundary; TriangleMesh(50 vertices, 96 faces) is closed" in said

@@ -1,0 +1,70 @@
+import sys
+
+import numpy as np
+import pytest
+import pyvista
+import trimesh
+
+from eigenshape._errors import InvalidShapeError, MissingExtraError
+from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.domains import box, circle, interval
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplicial import SimplicialMesh
+from eigenshape.geometry.spheres import projective_plane
+from eigenshape.geometry.surfaces import icosphere
+from eigenshape.io.bridges import from_arrays, from_pyvista, from_trimesh, to_arrays, to_pyvista, to_trimesh
+
+
+def same(one, two):
+    assert type(one) is type(two)
+    np.testing.assert_array_equal(one.points, two.points)
+    if not isinstance(one, PointCloud):
+        np.testing.assert_array_equal(one.simplices, two.simplices)
+
+
+@pytest.mark.parametrize(
+    "shape", [icosphere(1), box(1, 2, 1), interval(4), projective_plane(1), PointCloud(icosphere(1).vertices)]
+)
+def test_arrays_there_and_back(shape):
+    points, simplices = to_arrays(shape)
+    same(from_arrays(points, simplices), shape)
+    points[0] = 7
+    assert shape.points[0, 0] != 7
+
+
+def test_trimesh_there_and_back():
+    seam = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0], [5, 5, 5]], [[0, 1, 2], [3, 1, 2]])
+    for shape in (icosphere(1), seam, PointCloud(icosphere(1).vertices)):
+        same(from_trimesh(to_trimesh(shape)), shape)  # nothing is merged or dropped
+    assert isinstance(to_trimesh(seam), trimesh.Trimesh)
+
+
+@pytest.mark.parametrize("shape", [icosphere(1), box(1, 2, 1), PointCloud(icosphere(1).vertices)])
+def test_pyvista_there_and_back(shape):
+    same(from_pyvista(to_pyvista(shape)), shape)
+
+
+def test_curves_and_flat_shapes_in_pyvista():
+    found = from_pyvista(to_pyvista(circle(5)))
+    assert isinstance(found, SimplicialMesh)
+    assert (found.dim, found.points.shape) == (1, (5, 3))
+    assert not found.points[:, 2].any()
+
+
+def test_what_does_not_fit_is_refused():
+    with pytest.raises(InvalidShapeError, match=r"Only triangle meshes and clouds in R\^3 fit into trimesh"):
+        to_trimesh(box(1, 1, 1))
+    with pytest.raises(InvalidShapeError, match=r"Only shapes in R\^3 fit into PyVista; this one lies in R\^5"):
+        to_pyvista(projective_plane(1))
+    with pytest.raises(InvalidShapeError, match="A Trimesh or PointCloud of trimesh is taken; this is a list"):
+        from_trimesh([])
+    with pytest.raises(InvalidShapeError, match="A PolyData or UnstructuredGrid is taken; this is a list"):
+        from_pyvista([])
+    with pytest.raises(InvalidShapeError, match=r"Cells must be simplices; 1 are of VTK's type 1[12]\. Triangulate"):
+        from_pyvista(pyvista.ImageData(dimensions=(2, 2, 2)).cast_to_unstructured_grid())
+
+
+def test_a_missing_package_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    with pytest.raises(MissingExtraError, match=r"trimesh must be installed; .* pip install 'eigenshape\[bridges\]"):
+        to_trimesh(icosphere(1))

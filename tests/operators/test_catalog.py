@@ -1,0 +1,48 @@
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from eigenshape._errors import InvalidParameterError
+from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.domains import box, interval
+from eigenshape.geometry.surfaces import icosphere
+from eigenshape.operators.catalog import OPERATORS, build_laplacian
+from eigenshape.operators.cotangent import cotangent_laplacian
+
+SHAPES = {
+    "triangles": icosphere(2),
+    "tetrahedra": box(4, 4, 4),
+    "curve": interval(60),
+    "points": PointCloud(icosphere(2).vertices),
+    "graph": sp.csr_array(np.ones((5, 5)) - np.eye(5)),
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("name", OPERATORS)
+@pytest.mark.filterwarnings("ignore:A heat time")
+def test_each_takes_what_it_says_and_refuses_the_rest(shape, name):
+    takes = isinstance(SHAPES[shape], OPERATORS[name].takes)
+    if takes:
+        laplacian = build_laplacian(SHAPES[shape], name)
+        ones = np.ones(laplacian.n_points)
+        assert np.abs(laplacian.stiffness @ ones).max() < 1e-11 * laplacian.stiffness.max()
+    else:
+        with pytest.raises(InvalidParameterError, match=rf"The {name} operator takes .*; the shape is a .* It is for"):
+            build_laplacian(SHAPES[shape], name)
+
+
+def test_without_a_name_the_shape_decides():
+    one, two = build_laplacian(SHAPES["tetrahedra"]), cotangent_laplacian(SHAPES["tetrahedra"])
+    assert (one.stiffness != two.stiffness).nnz == 0
+    assert build_laplacian(SHAPES["points"]).kernel is not None
+    assert build_laplacian(SHAPES["graph"]).n_points == 5
+
+
+def test_unknown_names_and_options_are_refused():
+    with pytest.raises(InvalidParameterError, match=r"operator must be one of cotangent, p2, .*; it is 'heat'"):
+        build_laplacian(SHAPES["triangles"], "heat")
+    with pytest.raises(InvalidParameterError, match="The cotangent operator takes mass; it was given t"):
+        build_laplacian(SHAPES["triangles"], "cotangent", t=1.0)
+    with pytest.raises(InvalidParameterError, match="The p2 operator takes no option; it was given mass"):
+        build_laplacian(SHAPES["triangles"], "p2", mass="lumped")
