@@ -44,6 +44,7 @@ POINTS: dict[str, Build] = {
 }
 CLOSED = LINEAR | {"P2": es.fem_laplacian} | SURFACES | KERNELS | POINTS
 FLAT = LINEAR | HIGHER | {"mesh, corrected": KERNELS["mesh, corrected"]} | POINTS
+SOLID = LINEAR | {"P2": es.fem_laplacian, "mesh, corrected": KERNELS["mesh, corrected"]} | POINTS
 
 
 def icosphere(n: int) -> es.TriangleMesh:
@@ -93,11 +94,11 @@ CASES: dict[str, Case] = {
         LINEAR | KERNELS,
         False,
     ),
-    "interval": (lambda n: es.interval(n // 10), lambda k: es.box_eigenvalues(k, [1.0]), FLAT, False),
+    "interval": (lambda n: es.interval(n // 4), lambda k: es.box_eigenvalues(k, [1.0]), FLAT, False),
     "square": (square, es.box_eigenvalues, FLAT | SURFACES, False),
     "disc": (lambda n: es.disc(int((n / 3) ** 0.5)), es.disc_eigenvalues, FLAT | SURFACES, False),
-    "box": (lambda n: es.box(*[int(n ** (1 / 3))] * 3), lambda k: es.box_eigenvalues(k, (1, 1, 1)), FLAT, False),
-    "ball": (lambda n: es.ball(int(n ** (1 / 3))), es.ball_eigenvalues, FLAT, False),
+    "box": (lambda n: es.box(*[int((n / 4) ** (1 / 3))] * 3), lambda k: es.box_eigenvalues(k, (1, 1, 1)), SOLID, False),
+    "ball": (lambda n: es.ball(int((n / 4) ** (1 / 3))), es.ball_eigenvalues, SOLID, False),
     "square, Dirichlet": (square, lambda k: es.box_eigenvalues(k, (1, 1), "dirichlet"), LINEAR | HIGHER, True),
     "disc, Dirichlet": (
         lambda n: es.disc(int((n / 3) ** 0.5)),
@@ -106,15 +107,15 @@ CASES: dict[str, Case] = {
         True,
     ),
     "box, Dirichlet": (
-        lambda n: es.box(*[int(n ** (1 / 3))] * 3),
+        lambda n: es.box(*[int((n / 4) ** (1 / 3))] * 3),
         lambda k: es.box_eigenvalues(k, (1, 1, 1), "dirichlet"),
-        LINEAR | HIGHER,
+        LINEAR | {"P2": es.fem_laplacian},
         True,
     ),
     "ball, Dirichlet": (
-        lambda n: es.ball(int(n ** (1 / 3))),
+        lambda n: es.ball(int((n / 4) ** (1 / 3))),
         lambda k: es.ball_eigenvalues(k, "dirichlet"),
-        LINEAR | HIGHER,
+        LINEAR | {"P2": es.fem_laplacian},
         True,
     ),
 }

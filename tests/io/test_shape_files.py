@@ -113,6 +113,25 @@ def test_binary_polydata_that_ends_early(tmp_path):
         read_shape(tmp_path / "a.vtk")
 
 
+def test_files_that_lack_cells_or_their_end_are_named(tmp_path):
+    path = written(tmp_path / "a.vtk", CUBE.points, [("tetra", CUBE.simplices)])
+    path.write_bytes(path.read_bytes().replace(b"CELLS 13", b"CELLS 23"))
+    with pytest.raises(FileFormatError, match=r"a\.vtk must be "):
+        read_shape(path)
+    path = written(tmp_path / "a.msh", CUBE.points, [("tetra", CUBE.simplices)])
+    path.write_bytes(path.read_bytes().replace(b"$EndElements", b"$EndElement"))
+    with pytest.raises(FileFormatError, match=r"a\.msh must be whole; it has no \$EndElements"):
+        read_shape(path)
+    path = written(tmp_path / "a.mesh", DISC.vertices, [("triangle", DISC.faces)])
+    path.write_bytes(path.read_bytes().replace(b"End", b""))
+    with pytest.raises(FileFormatError, match=r"a\.mesh must be whole; it has no End"):
+        read_shape(path)
+    path = written(tmp_path / "b.vtk", CUBE.points, [("tetra", CUBE.simplices)], binary=False)
+    path.write_bytes(path.read_bytes().rstrip())
+    with pytest.raises(FileFormatError, match=r"b\.vtk must be whole; its last number has no line break"):
+        read_shape(path)
+
+
 @pytest.mark.parametrize("suffix", [".mesh", ".meshb", ".msh", ".vtk", ".vtu"])
 @pytest.mark.parametrize("content", [b"nonsense", b"\x00\xff\xfe" * 50, b"5\n1 2 3\n", b"\n"])
 def test_what_meshio_cannot_read_is_named_and_nothing_is_printed(tmp_path, capfd, suffix, content):
@@ -123,17 +142,24 @@ def test_what_meshio_cannot_read_is_named_and_nothing_is_printed(tmp_path, capfd
     assert capfd.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize("suffix", [".mesh", ".msh", ".vtk", ".vtu"])
-def test_truncated_files_are_refused_or_read_whole(tmp_path, capfd, suffix):
-    whole = written(tmp_path / f"whole{suffix}", CUBE.points, [("tetra", CUBE.simplices)]).read_bytes()
-    for share in range(1, 20):
-        path = tmp_path / f"a{suffix}"
-        path.write_bytes(whole[: len(whole) * share // 20])
+@pytest.mark.parametrize("kind", ["medit", "gmsh", "gmsh22", "gmsh text", "vtk", "vtk text", "vtu", "vtu text"])
+def test_truncated_files_are_refused_or_whole(tmp_path, capfd, kind):
+    name, _, text = kind.partition(" ")
+    suffix = {"medit": ".mesh", "gmsh": ".msh", "gmsh22": ".msh"}.get(name, f".{name}")
+    path = tmp_path / f"whole{suffix}"
+    options = {"binary": False} if text else {}
+    meshio.write_points_cells(path, CUBE.points, [("tetra", CUBE.simplices)], file_format=name, **options)
+    capfd.readouterr()
+    whole, n_refused = path.read_bytes(), 0
+    for end in range(1, len(whole)):
+        path.write_bytes(whole[:end])
         try:
             found = read_shape(path)
         except EigenshapeError:
+            n_refused += 1
             continue
-        assert isinstance(found, PointCloud | SimplicialMesh)
+        np.testing.assert_array_equal(found.simplices, CUBE.simplices)
+    assert n_refused > len(whole) / 2
     assert capfd.readouterr() == ("", "")
 
 
@@ -170,7 +196,10 @@ def test_a_binary_point_set(tmp_path):
             read_points(tmp_path / "b.pts")
 
 
-PCD = b"# .PCD v.7\nVERSION .7\nFIELDS rgb x y z\nSIZE 4 4 4 4\nTYPE U F F F\nCOUNT 1 1 1 1\nWIDTH 3\nHEIGHT 1\nPOINTS 3\n"
+PCD = (
+    b"# .PCD v.7\nVERSION .7\nFIELDS rgb x y z\nSIZE 4 4 4 4\nTYPE U F F F\nCOUNT 1 1 1 1\n"
+    b"WIDTH 3\nHEIGHT 1\nPOINTS 3\n"
+)
 FIELDS = np.column_stack([np.array([7, 8, 9], np.float32), np.array(EXPECTED, np.float32)])
 
 

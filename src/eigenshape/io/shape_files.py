@@ -80,7 +80,7 @@ def _parse(path: Path, suffix: str, data: bytes) -> tuple[np.ndarray, np.ndarray
         return mesh_files.FORMATS[suffix](data)
     if suffix == ".vtk" and vtk_polydata.is_polydata(data):
         return vtk_polydata.parse(data)
-    return unstructured.read(path, suffix)
+    return unstructured.read(path, suffix, data)
 
 
 def _finite(coordinates: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "m d"]:
