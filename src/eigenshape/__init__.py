@@ -1,7 +1,7 @@
 """eigenshape hears the shape of things.
 
-A mesh gives a Laplacian, the Laplacian a certified spectrum, the spectrum heat, heat the features that persist, and
-features an answer to the question which shapes are alike.
+A shape of any dimension gives a Laplacian, the Laplacian a certified spectrum, the spectrum heat, heat the features
+that persist, and features an answer to the question which shapes are alike.
 """
 
 from eigenshape._errors import (
@@ -82,7 +82,9 @@ from eigenshape.geometry.topology import (
     is_manifold,
     vertex_components,
 )
+from eigenshape.io.bridges import from_arrays, from_pyvista, from_trimesh, to_arrays, to_pyvista, to_trimesh
 from eigenshape.io.mesh_files import read_mesh, write_mesh
+from eigenshape.io.shape_files import read_points, read_shape, write_points
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
 from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.catalog import OPERATORS, Operator, build_laplacian
@@ -107,6 +109,9 @@ from eigenshape.retrieval.index import Match, Record, ShapeIndex
 from eigenshape.retrieval.score import match_features, matching_score
 from eigenshape.spectral.certify import certify
 from eigenshape.spectral.dirichlet import solve_dirichlet
+from eigenshape.spectral.laplacian_laws import check_laplacian
+from eigenshape.spectral.laws import USUAL, Law, NotJudged, OperatorReport
+from eigenshape.spectral.operator_laws import check_operator
 from eigenshape.spectral.signature import heat_kernel_signature, reflection_free_signature
 from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Certificate, Spectrum
@@ -116,6 +121,7 @@ __all__ = [
     "OPERATORS",
     "SCALE_FREE",
     "THESIS",
+    "USUAL",
     "BatchReport",
     "Camera",
     "Certificate",
@@ -130,11 +136,14 @@ __all__ = [
     "InvalidShapeError",
     "Item",
     "Laplacian",
+    "Law",
     "Match",
     "MergeTree",
     "MeshPart",
     "MissingExtraError",
+    "NotJudged",
     "Operator",
+    "OperatorReport",
     "Panel",
     "PointCloud",
     "Quadrature",
@@ -160,6 +169,8 @@ __all__ = [
     "build_index",
     "build_laplacian",
     "certify",
+    "check_laplacian",
+    "check_operator",
     "circle",
     "cloud_quadrature",
     "connection_laplacian",
@@ -194,6 +205,9 @@ __all__ = [
     "figure_segments",
     "figure_spectrum",
     "flat_torus_eigenvalues",
+    "from_arrays",
+    "from_pyvista",
+    "from_trimesh",
     "functional_laplacian",
     "gaussian_laplacian",
     "geodesic_balls",
@@ -226,6 +240,8 @@ __all__ = [
     "random_planes",
     "random_sphere",
     "read_mesh",
+    "read_points",
+    "read_shape",
     "reflection_free_signature",
     "repair",
     "robust_laplacian",
@@ -242,6 +258,9 @@ __all__ = [
     "tangent_frames",
     "three_quarter_view",
     "three_sphere",
+    "to_arrays",
+    "to_pyvista",
+    "to_trimesh",
     "torus",
     "torus_quadrature",
     "uniform_quadrature",
@@ -249,4 +268,5 @@ __all__ = [
     "vertex_normals",
     "weld",
     "write_mesh",
+    "write_points",
 ]

@@ -1,6 +1,8 @@
 import runpy
 from pathlib import Path
 
+import numpy as np
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -10,6 +12,14 @@ def test_main_road_finds_the_octopus(tmp_path):
     assert [match.label for match in matches] == ["octopus"] * 3
     assert all(len(match.correspondences) for match in matches)
     assert matches[0].score <= matches[1].score <= matches[2].score
+
+
+def test_any_shape_has_its_spectrum(capsys):
+    spectra = runpy.run_path(str(ROOT / "examples" / "any_shape.py"))["main"]()
+    np.testing.assert_allclose(spectra["sphere"], [0, 2, 2, 2], atol=0.02)
+    np.testing.assert_allclose(spectra["points"], [0, 2, 2, 2], atol=0.05)
+    np.testing.assert_allclose(spectra["interval"], [0, np.pi**2, 4 * np.pi**2, 9 * np.pi**2], rtol=0.002, atol=1e-9)
+    assert "All 11 laws hold." in capsys.readouterr().out
 
 
 def test_readme_begins_with_exactly_two_commands():
