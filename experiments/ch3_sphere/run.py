@@ -1,7 +1,7 @@
-"""The first 300 eigenvalues of the unit sphere by the mesh Laplacian at t = e², as printed and corrected (thesis 3.4).
+"""The first 300 eigenvalues of the unit sphere by the mesh Laplacian at t = e², printed and corrected (thesis 3.4).
 
-Fibonacci points, more and more of them, as in Figure 3.2; then noise along the radius, half an edge length strong, as in
-Figure 3.3, heard by both forms of the operator and by linear elements.
+Fibonacci points, more and more of them, as in Figure 3.2; then noise along the radius, half an edge length strong, as
+in Figure 3.3, heard by both forms of the operator and by linear elements.
 """
 
 import argparse
