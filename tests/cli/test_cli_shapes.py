@@ -103,6 +103,13 @@ def test_refusals(folder, arguments, said):
     assert said in run(verb, folder / name, *rest, code=1).stderr
 
 
+def test_a_warning_is_one_line_and_no_error(folder):
+    done = run("spectrum", folder / "sphere.xyz", "-k", 3, "--edge-factor", 1.2, "--json")
+    assert done.stderr.startswith("warning: A kernel of width h = 1.2 e serves regular points only")
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert len(json.loads(done.stdout)["eigenvalues"]) == 3
+
+
 def test_a_closed_mesh_has_no_boundary_to_hold(folder, tmp_path):
     write_mesh(fibonacci_sphere(50), tmp_path / "closed.off")
     said = run("spectrum", tmp_path / "closed.off", "--boundary", "dirichlet", code=1).stderr

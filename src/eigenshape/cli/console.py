@@ -1,6 +1,7 @@
 """What every verb shares: options, tables, JSON, progress bars, and how an error reaches a person."""
 
 import json
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -42,18 +43,25 @@ DimOption = Annotated[int, typer.Option(help="Dimension of what a cloud of point
 
 
 class Verbs(TyperGroup):
-    """Turn our errors and the system's into one line and exit code 1, and Ctrl-C into exit code 130."""
+    """Turn errors, ours and the system's, into a line and exit code 1, Ctrl-C into 130, warnings into lines."""
 
     def invoke(self, ctx: Any) -> Any:
         """Run the verb."""
         try:
-            return super().invoke(ctx)
+            with warnings.catch_warnings():
+                warnings.simplefilter("always", UserWarning)
+                warnings.showwarning = _say_warning
+                return super().invoke(ctx)
         except (EigenshapeError, OSError) as error:
             err.print(f"[bold red]error:[/] {escape(str(error))}")
             raise typer.Exit(1) from error
         except KeyboardInterrupt as error:
             err.print("stopped; what was finished is kept")
             raise typer.Exit(130) from error
+
+
+def _say_warning(message: Warning | str, *_: object, **__: object) -> None:
+    err.print(f"[yellow]warning:[/] {escape(str(message))}")
 
 
 def load_mesh(path: Path, repairs: str) -> TriangleMesh:
