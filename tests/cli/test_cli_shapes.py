@@ -103,6 +103,12 @@ def test_refusals(folder, arguments, said):
     assert said in run(verb, folder / name, *rest, code=1).stderr
 
 
+def test_missing_points_are_left_out_when_asked(tmp_path):
+    (tmp_path / "a.xyz").write_text("0 0 0\n1 0 0\nnan 0 0\n0 1 0\n1 1 0\n2 0 0\n2 1 0\n0 2 0\n")
+    assert "--drop-missing, leaves it out" in run("info", tmp_path / "a.xyz", code=1).stderr
+    assert run_json("info", tmp_path / "a.xyz", "--drop-missing")["points"] == 7
+
+
 def test_a_warning_is_one_line_and_no_error(folder):
     done = run("spectrum", folder / "sphere.xyz", "-k", 3, "--edge-factor", 1.2, "--json")
     assert done.stderr.startswith("warning: A kernel of width h = 1.2 e serves regular points only")

@@ -39,6 +39,9 @@ ShapeArgument = Annotated[
     Path,
     typer.Argument(help="OFF, OBJ, PLY, STL, GLB; .mesh, .msh, .vtk, .vtu; points as .pts, .xyz, .pcd or PLY."),
 ]
+DropMissingOption = Annotated[
+    bool, typer.Option("--drop-missing", help="Leave out points of a cloud that are not finite.")
+]
 DimOption = Annotated[int, typer.Option(help="Dimension of what a cloud of points samples.")]
 
 
@@ -69,10 +72,10 @@ def load_mesh(path: Path, repairs: str) -> TriangleMesh:
     return _repaired(read_mesh(path), repair_names(repairs))
 
 
-def load_shape(path: Path, repairs: str, dim: int) -> Shape:
+def load_shape(path: Path, repairs: str, dim: int, *, drop_missing: bool) -> Shape:
     """Read a shape of any kind and apply repairs, which are for triangle meshes."""
     names = repair_names(repairs)
-    shape = read_shape(path, dim=dim)
+    shape = read_shape(path, dim=dim, drop_missing=drop_missing)
     if not names:
         return shape
     if not isinstance(shape, TriangleMesh):

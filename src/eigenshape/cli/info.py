@@ -5,7 +5,16 @@ from typing import Any
 import numpy as np
 from rich.markup import escape
 
-from eigenshape.cli.console import DimOption, JsonOption, RepairOption, ShapeArgument, load_shape, out, print_json
+from eigenshape.cli.console import (
+    DimOption,
+    DropMissingOption,
+    JsonOption,
+    RepairOption,
+    ShapeArgument,
+    load_shape,
+    out,
+    print_json,
+)
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.measure import bounding_box, edge_lengths, enclosed_volume, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
@@ -25,9 +34,16 @@ from eigenshape.geometry.topology import (
 from eigenshape.operators.kernel import neighbor_distance
 
 
-def info(shape: ShapeArgument, *, repair: RepairOption = "", dim: DimOption = 2, as_json: JsonOption = False) -> None:
+def info(
+    shape: ShapeArgument,
+    *,
+    repair: RepairOption = "",
+    dim: DimOption = 2,
+    drop_missing: DropMissingOption = False,
+    as_json: JsonOption = False,
+) -> None:
     """Show size, topology and health of a shape, and which repairs a mesh would need."""
-    facts = shape_facts(load_shape(shape, repair, dim))
+    facts = shape_facts(load_shape(shape, repair, dim, drop_missing=drop_missing))
     if as_json:
         print_json({"path": str(shape), **facts})
         return

@@ -10,6 +10,7 @@ import typer
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import (
     DimOption,
+    DropMissingOption,
     JsonOption,
     RepairOption,
     ShapeArgument,
@@ -62,6 +63,7 @@ def spectrum(
     cutoff: Annotated[float | None, typer.Option(help="Where a kernel is cut off, in widths.")] = None,
     mollify: Annotated[float | None, typer.Option(help="Mollification of the robust operator.")] = None,
     dim: DimOption = 2,
+    drop_missing: DropMissingOption = False,
     repair: RepairOption = "",
     plot: Annotated[Path | None, typer.Option(help="Draw the eigenvalues (PNG, SVG or PDF).")] = None,
     picture: Annotated[
@@ -76,7 +78,7 @@ def spectrum(
     scale = {"t": t, "h": h, "edge_factor": edge_factor, "cutoff": cutoff}
     asked = {"mass": mass, "mollify": mollify, **scale, "correct": correct, "form": form, "distance": distance}
     options = {name: value for name, value in asked.items() if value is not None}
-    found = load_shape(shape, repair, dim)
+    found = load_shape(shape, repair, dim, drop_missing=drop_missing)
     _require_drawable(found, picture)
     name = operator or default_operator(found)
     with progress_bar("spectrum") as progress:

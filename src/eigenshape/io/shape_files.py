@@ -62,7 +62,7 @@ def read_shape(
         with np.errstate(all="ignore"):  # what overflows is found by the check of the shape
             coordinates, simplices = _parse(path, suffix, data)
             if not simplices.size:
-                return PointCloud(_finite(coordinates) if drop_missing else coordinates, dim)
+                return PointCloud(_finite(coordinates, drop_missing), dim)
             if simplices.shape[1] == 3 and coordinates.shape[1] == 3:
                 return TriangleMesh(coordinates, simplices)
             return SimplicialMesh(coordinates, simplices)
@@ -83,8 +83,15 @@ def _parse(path: Path, suffix: str, data: bytes) -> tuple[np.ndarray, np.ndarray
     return unstructured.read(path, suffix, data)
 
 
-def _finite(coordinates: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "m d"]:
-    return coordinates[np.isfinite(coordinates).all(axis=1)]
+def _finite(coordinates: Float[np.ndarray, "n d"], drop_missing: bool) -> Float[np.ndarray, "m d"]:
+    finite = np.isfinite(coordinates).all(axis=1)
+    if drop_missing or finite.all():
+        return coordinates[finite]
+    first = int(np.argmin(finite))
+    raise InvalidShapeError(
+        f"points must be finite; point {first} is {coordinates[first].tolist()} ({np.count_nonzero(~finite)} such). "
+        "Scanners mark so what they missed: drop_missing=True, or --drop-missing, leaves it out."
+    )
 
 
 def read_points(
