@@ -55,6 +55,16 @@ def test_info_of_points(folder):
     assert facts["mean_near_distance"] == pytest.approx(0.18, rel=0.1)
 
 
+def test_info_of_a_curve_and_of_few_points(tmp_path):
+    (tmp_path / "curve.obj").write_text("v 0 0 0\nv 3 4 0\nv 3 4 2\nl 1 2 3\n")
+    facts = run_json("info", tmp_path / "curve.obj")
+    assert (facts["kind"], facts["simplices"], facts["boundary_points"], facts["length"]) == ("curve", 2, 2, 7)
+    assert "volume" not in facts
+    (tmp_path / "few.xyz").write_text("0 0 0\n1 2 3\n")
+    facts = run_json("info", tmp_path / "few.xyz")
+    assert (facts["points"], facts["mean_near_distance"], facts["box_high"]) == (2, None, [1, 2, 3])
+
+
 def test_spectra_by_other_operators(folder):
     found = run_json("spectrum", folder / "cube.mesh", "-k", 4, "--operator", "p2", "--boundary", "dirichlet")
     np.testing.assert_allclose(found["eigenvalues"], box_eigenvalues(4, (1, 1, 1), "dirichlet"), rtol=0.04)

@@ -4,7 +4,7 @@ import pytest
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry import exact
 from eigenshape.geometry.domains import ball, box, circle, disc, interval, irregular_grid
-from eigenshape.geometry.measure import face_normals
+from eigenshape.geometry.measure import enclosed_volume, face_normals
 from eigenshape.geometry.simplices import require_volumes, simplex_volumes
 from eigenshape.geometry.spheres import (
     fibonacci_sphere,
@@ -14,12 +14,14 @@ from eigenshape.geometry.spheres import (
     sphere_hull,
     three_sphere,
 )
+from eigenshape.geometry.surfaces import icosphere
 from eigenshape.geometry.topology import boundary_vertices, is_closed, is_manifold, unreferenced_vertices
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.spectral.dirichlet import solve_dirichlet
 from eigenshape.spectral.solver import solve_spectrum
 
 RNG = np.random.default_rng
+QUALITY = 0.2
 DOMAINS = {
     "interval": (lambda: interval(40, 2.0), 2.0, 0, exact.box_eigenvalues(8, [2.0])),
     "circle": (lambda: circle(60), 2 * np.pi, 1e-3, exact.sphere_eigenvalues(9, 1)),
@@ -86,6 +88,29 @@ def test_the_boundary_of_a_solid_is_closed(mesh):
         assert np.linalg.norm(np.delete(mesh.points, outside, axis=0), axis=1).max() < 0.99
 
 
+@pytest.mark.parametrize("n", [2, 3, 8, 9, 20])
+def test_no_tetrahedron_of_a_ball_is_flat_however_fine(n):
+    mesh = ball(n)
+    first, second = np.triu_indices(4, 1)
+    corners = mesh.points[mesh.simplices]
+    sides = ((corners[:, first] - corners[:, second]) ** 2).sum(axis=(1, 2))
+    quality = 12 * (3 * simplex_volumes(mesh)) ** (2 / 3) / sides  # 1 where all sides are equal, 0 where flat
+    assert quality.min() > QUALITY
+    facets = np.isin(np.sort(np.delete(mesh.simplices, 0, axis=1), axis=1), boundary_vertices(mesh)).all(axis=1)
+    assert facets.any()
+    on_boundary = np.isin(mesh.simplices, boundary_vertices(mesh)).sum(axis=1)
+    assert on_boundary.max() == 3  # one side of it at most
+
+
+def test_a_hull_that_leaves_the_origin_out_faces_outward():
+    mesh = random_sphere(20, rng=RNG(4176))  # a seed whose points all lie on one side of the origin
+    assert is_closed(mesh)
+    assert enclosed_volume(mesh) > 0
+    outward = mesh.vertices[mesh.faces] - mesh.vertices.mean(axis=0)
+    assert np.linalg.det(outward).min() > 0
+    assert np.linalg.det(mesh.vertices[mesh.faces]).min() < 0
+
+
 def test_the_density_of_a_graded_sphere_falls_as_told():
     heights = graded_sphere(20_000, ratio=4.0).vertices[:, 2]
     bands, _ = np.histogram(heights, np.linspace(-1, 1, 11))
@@ -94,13 +119,19 @@ def test_the_density_of_a_graded_sphere_falls_as_told():
 
 
 def test_antipodes_become_one_and_no_length_changes():
-    mesh = projective_plane(2)
-    assert mesh.points.shape == (81, 5)
-    sphere = fibonacci_sphere(20).vertices
+    mesh, sphere = projective_plane(4), icosphere(4)
+    assert mesh.points.shape == (1281, 5)
     assert exact.projective_plane_eigenvalues(7).tolist() == [0, 6, 6, 6, 6, 6, 20]
     lengths = np.linalg.norm(mesh.points, axis=1)
     np.testing.assert_allclose(lengths, lengths[0], rtol=1e-12)  # it lies on a sphere of R⁵
-    assert sphere.shape == (20, 3)
+    # A chord is shorter than its arc by a share that falls with its square; so are the sides of both meshes.
+    np.testing.assert_allclose(np.sort(sides(mesh))[::2], np.sort(sides(sphere))[::4], rtol=2e-3)
+
+
+def sides(mesh):
+    first, second = np.triu_indices(3, 1)
+    corners = mesh.points[mesh.simplices]
+    return np.linalg.norm(corners[:, first] - corners[:, second], axis=2).ravel()
 
 
 def test_what_cannot_be_is_refused():

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from scipy.special import jn_zeros
 
+from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry import exact
 
 
@@ -34,6 +35,40 @@ def test_weyl_counts_them(condition):
     assert disc / 4 + sign * np.sqrt(disc) / 2 == pytest.approx(k, rel=0.03)
     ball = exact.ball_eigenvalues(k, condition)[-1]
     assert 2 / (9 * np.pi) * ball**1.5 + sign * ball / 4 == pytest.approx(k, rel=0.06)
+
+
+def test_long_lists_need_little_memory():
+    k = 50_000
+    # Weyl's two terms, λ A / 4π + √λ L / 4π, on the unit square; on the projective plane the l-th cluster ends a list.
+    square = exact.box_eigenvalues(k)[-1]
+    assert square / (4 * np.pi) + 4 * np.sqrt(square) / (4 * np.pi) == pytest.approx(k, rel=1e-3)
+    degrees = np.arange(0, 400, 2)
+    assert len(exact.projective_plane_eigenvalues(k)) == k
+    n = int((2 * degrees + 1).sum())
+    assert exact.projective_plane_eigenvalues(n)[-1] == 398 * 399
+    assert exact.projective_plane_eigenvalues(n + 1)[-1] == 400 * 401
+
+
+@pytest.mark.parametrize("condition", ["neumann", "dirichlet"])
+@pytest.mark.parametrize("sides", [(1.0, 1.0), (1.0, 0.1), (1.0, 2.0, 0.3)])
+def test_of_a_box_the_lowest_sums_are_taken(sides, condition):
+    modes = np.arange(40) + (condition == "dirichlet")
+    sums = sum(np.ix_(*[(modes / side) ** 2 for side in sides]))
+    np.testing.assert_allclose(
+        exact.box_eigenvalues(40, sides, condition), np.pi**2 * np.sort(sums, axis=None)[:40], rtol=1e-14
+    )
+
+
+@pytest.mark.parametrize("periods", [[[1.0, 0.0]], [[1.0, np.nan], [0.0, 1.0]], np.eye(3)])
+def test_periods_are_two_in_a_plane(periods):
+    with pytest.raises(InvalidParameterError, match=r"periods must be a finite 2 x 2 matrix; they are \[\[1\.0, "):
+        exact.flat_torus_eigenvalues(3, periods)
+
+
+@pytest.mark.parametrize("periods", [[[1.0, 0.0], [2.0, 0.0]], [[1e-3, 0.0], [0.0, 1e3]]])
+def test_periods_that_span_next_to_nothing_are_refused(periods):
+    with pytest.raises(InvalidParameterError, match=r"must span a plane and not be too slim for k; 3 eigenvalues of \["):
+        exact.flat_torus_eigenvalues(3, periods)
 
 
 def test_none_is_left_out():

@@ -68,3 +68,16 @@ def test_a_missing_package_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
     with pytest.raises(MissingExtraError, match=r"trimesh must be installed; .* pip install 'eigenshape\[bridges\]"):
         to_trimesh(icosphere(1))
+
+
+def test_polylines_of_pyvista_become_segments():
+    found = from_pyvista(pyvista.Line(resolution=3))
+    assert isinstance(found, SimplicialMesh)
+    assert found.simplices.tolist() == [[0, 1], [1, 2], [2, 3]]
+    two = from_pyvista(pyvista.PolyData(np.eye(3), lines=[2, 2, 0, 3, 0, 1, 2]))
+    assert two.simplices.tolist() == [[2, 0], [0, 1], [1, 2]]
+
+
+def test_strips_of_pyvista_are_refused():
+    with pytest.raises(InvalidShapeError, match=r"are of VTK's type 6\. Triangulate them first"):
+        from_pyvista(pyvista.Sphere().strip())

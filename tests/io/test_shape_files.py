@@ -241,7 +241,11 @@ def test_lzf_repeats_what_it_points_back_to():
         ("binary", (b"TYPE U F F F", b"TYPE U F F U"), "must be floats of 4 or 8 bytes; z is not"),
         ("binary", (b"POINTS 3", b"POINTS 0"), "A PCD file must hold points; it declares 0"),
         ("binary", (b"TYPE U F F F\n", b""), "A PCD file must have a line TYPE; it has none"),
-        ("ascii", (b"7.0 0.0 0.0 0.0", b"7.0 0.0 0.0"), "A point must have all fields; line 11 is '7.0 0.0 0.0'"),
+        (
+            "ascii",
+            (b"7.0 0.0 0.0 0.0", b"7.0 0.0 0.0"),
+            "A point must have all fields and no more; line 11 is '7.0 0.0 0.0'",
+        ),
     ],
 )
 def test_broken_point_cloud_data_is_named(tmp_path, kind, change, match):
@@ -282,10 +286,10 @@ def test_broken_tables_are_named(tmp_path, content, match):
 
 def test_points_are_written_exactly(tmp_path):
     cloud = PointCloud(np.random.default_rng(0).normal(size=(20, 3)) * 1e-7)
-    for name in ("a.xyz", "a.pts"):
+    for name in ("a.xyz", "a.pts", "a.ply"):
         write_points(cloud, tmp_path / name)
         np.testing.assert_array_equal(read_points(tmp_path / name).points, cloud.points)
-    with pytest.raises(FileFormatError, match=r"a\.csv must end in \.xyz or \.pts to hold points"):
+    with pytest.raises(FileFormatError, match=r"a\.csv must end in \.xyz, \.pts, \.ply to hold points"):
         write_points(cloud, tmp_path / "a.csv")
     with pytest.raises(InvalidShapeError, match="Files of points hold three coordinates; these points have 2"):
         write_points(PointCloud(np.eye(2)), tmp_path / "a.xyz")

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from rich.markup import escape
 
+from eigenshape._errors import InvalidShapeError
 from eigenshape.cli.console import (
     DimOption,
     DropMissingOption,
@@ -32,6 +33,8 @@ from eigenshape.geometry.topology import (
     vertex_components,
 )
 from eigenshape.operators.kernel import neighbor_distance
+
+MEASURES = {1: "length", 2: "area"}
 
 
 def info(
@@ -68,10 +71,17 @@ def cloud_facts(cloud: PointCloud) -> dict[str, Any]:
         "dimension": cloud.dim,
         "coordinates": cloud.points.shape[1],
         "coinciding_points": cloud.n_points - len(np.unique(cloud.points + 0.0, axis=0)),
-        "mean_near_distance": neighbor_distance(cloud.points, cloud.dim),
+        "mean_near_distance": _near_distance(cloud),
         "box_low": low.tolist(),
         "box_high": high.tolist(),
     }
+
+
+def _near_distance(cloud: PointCloud) -> float | None:
+    try:
+        return neighbor_distance(cloud.points, cloud.dim)
+    except InvalidShapeError:  # too few points to have one; the other facts stand
+        return None
 
 
 def simplicial_facts(mesh: SimplicialMesh) -> dict[str, Any]:
@@ -85,7 +95,7 @@ def simplicial_facts(mesh: SimplicialMesh) -> dict[str, Any]:
         "coordinates": mesh.points.shape[1],
         "components": vertex_components(mesh)[0],
         "boundary_points": len(boundary_vertices(mesh)),
-        "volume": float(simplex_volumes(mesh).sum()),
+        MEASURES.get(mesh.dim, "volume"): float(simplex_volumes(mesh).sum()),
         "mean_side_length": mean_side_length(mesh),
         "without_volume": len(degenerate_simplices(mesh)),
         "loose_points": len(unreferenced_vertices(mesh)),

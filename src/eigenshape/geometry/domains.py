@@ -96,18 +96,25 @@ def box(
     return SimplicialMesh(points / np.array(counts) * lengths, _kuhn(counts))
 
 
-def _kuhn(counts: tuple[int, ...]) -> np.ndarray:
-    """Cut each cell into six tetrahedra along its main diagonal, all cells alike, so that neighbours match."""
+def _kuhn(counts: tuple[int, ...], turned: int = 0) -> np.ndarray:
+    """Cut each cell into six tetrahedra along a main diagonal.
+
+    The diagonal points forward along an axis, but backward in the first `turned` layers. Neighbours match all the
+    same: the cut of the side between them depends on the other two axes, on which they have one place.
+    """
     strides = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])
-    cells = np.moveaxis(np.indices(counts), 0, -1).reshape(-1, 3) @ strides
-    ways = [np.cumsum([0, *(strides[axis] for axis in order)]) for order in permutations(range(3))]
-    return np.concatenate([cells[:, None] + way for way in ways])
+    cells = np.moveaxis(np.indices(counts), 0, -1).reshape(-1, 3)
+    steps = np.where(cells < turned, -strides, strides)
+    starts = cells @ strides + np.maximum(-steps, 0).sum(axis=1)
+    walks = [np.cumsum(np.column_stack([starts, steps[:, order]]), axis=1) for order in permutations(range(3))]
+    return np.concatenate(walks)
 
 
 def ball(n: SupportsIndex = 8) -> SimplicialMesh:
     """Fill the unit ball with tetrahedra: a grid of n³ cubes blown up along its rays, its boundary on the sphere.
 
-    Eigenvalues are `ball_eigenvalues(k)`.
+    Every cube is cut along the diagonal that points outward, so that no tetrahedron has two sides on the boundary:
+    where the edge of the cube becomes smooth, those would be flat. Eigenvalues are `ball_eigenvalues(k)`.
     """
     count = whole_number(n, "n", 2, 200)
     cube = box(count, count, count)
@@ -115,4 +122,4 @@ def ball(n: SupportsIndex = 8) -> SimplicialMesh:
     largest = np.abs(points).max(axis=1, keepdims=True)
     length = np.linalg.norm(points, axis=1, keepdims=True)
     blown = np.divide(largest, length, out=np.ones_like(length), where=length > 0)
-    return SimplicialMesh(points * blown, cube.simplices)
+    return SimplicialMesh(points * blown, _kuhn((count,) * 3, turned=count // 2))

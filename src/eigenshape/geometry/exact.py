@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from math import isqrt
 from typing import Literal, SupportsIndex
 
 import numpy as np
@@ -14,6 +15,7 @@ from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 
 Condition = Literal["neumann", "dirichlet"]
+HIGHEST = 1000  # frequency along a period: (2 · 1000 + 1)² of them are looked at, 64 MB of numbers
 
 
 def sphere_eigenvalues(k: SupportsIndex, dim: SupportsIndex = 2) -> Float[np.ndarray, " k"]:
@@ -34,7 +36,7 @@ def sphere_eigenvalues(k: SupportsIndex, dim: SupportsIndex = 2) -> Float[np.nda
 def projective_plane_eigenvalues(k: SupportsIndex) -> Float[np.ndarray, " k"]:
     """Return l(l + 1) for even l, each 2l + 1 times: the unit sphere with antipodes made one."""
     count = whole_number(k, "k", 1, None)
-    degrees = 2 * np.arange(count)
+    degrees = 2 * np.arange(isqrt(count) + 1)  # up to even l there are (l + 1)(l + 2) / 2
     return np.repeat(degrees * (degrees + 1.0), 2 * degrees + 1)[:count]
 
 
@@ -50,15 +52,32 @@ def box_eigenvalues(
     frequencies = [(np.arange(first, first + count) / length) ** 2 for length in lengths]
     sums = frequencies[0]
     for others in frequencies[1:]:
-        sums = np.sort(np.add.outer(sums, others), axis=None)[:count]
-    return np.pi**2 * np.sort(sums)[:count]
+        sums = _lowest_sums(sums, others)
+    return np.pi**2 * sums
+
+
+def _lowest_sums(one: Float[np.ndarray, " k"], two: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+    """Return the k lowest sums of one number of each of two ascending lists of k.
+
+    The sum of the i-th and the j-th has i·j sums that are no higher, itself among them: where that is over k, it need
+    not be formed.
+    """
+    count = len(one)
+    return np.sort(np.concatenate([one[: count // j] + two[j - 1] for j in range(1, count + 1)]))[:count]
 
 
 def flat_torus_eigenvalues(k: SupportsIndex, periods: ArrayLike) -> Float[np.ndarray, " k"]:
     """Return 4π² |ξ|² over the frequencies ξ that are whole on both periods, the rows of a 2 x 2 matrix."""
-    count = whole_number(k, "k", 1, None)
-    lattice = np.linalg.inv(np.asarray(periods, dtype=np.float64)).T
-    reach = int(np.ceil(np.sqrt(count) * np.linalg.cond(lattice))) + 1
+    count, rows = whole_number(k, "k", 1, None), np.asarray(periods, dtype=np.float64)
+    if rows.shape != (2, 2) or not np.isfinite(rows).all():
+        raise InvalidParameterError(f"periods must be a finite 2 x 2 matrix; they are {rows.tolist()}.")
+    reach = np.ceil(np.sqrt(count) * np.linalg.cond(rows)) + 1
+    if not reach <= HIGHEST:
+        raise InvalidParameterError(
+            f"periods must span a plane and not be too slim for k; {count} eigenvalues of {rows.tolist()} ask for "
+            f"frequencies up to {reach:.0e}, over {HIGHEST}."
+        )
+    lattice = np.linalg.inv(rows).T
     steps = np.arange(-reach, reach + 1)
     modes = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     return 4 * np.pi**2 * np.sort(((modes @ lattice) ** 2).sum(axis=1))[:count]

@@ -51,8 +51,8 @@ def _spiral(heights: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
 
 def _outward(points: Float[np.ndarray, "n 3"]) -> TriangleMesh:
     faces = sphere_hull(points).simplices.copy()
-    corners = points[faces]
-    inward = np.linalg.det(corners) < 0
+    inside = points.mean(axis=0)  # the hull of few points may leave the origin out
+    inward = np.linalg.det(points[faces] - inside) < 0
     faces[inward] = faces[inward][:, ::-1]
     return TriangleMesh(points, faces)
 

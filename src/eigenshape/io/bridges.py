@@ -13,6 +13,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 
 VTK_CELLS = {1: 3, 2: 5, 3: 10}  # VTK's numbers for segment, triangle and tetrahedron
+POINTS, LINES = (1, 2), (3, 4)  # those of a point and of several, of a segment and of a polyline
 
 
 def from_arrays(points: ArrayLike, simplices: ArrayLike | None = None, *, dim: SupportsIndex = 2) -> Shape:
@@ -82,6 +83,8 @@ def to_trimesh(shape: Shape) -> Any:
 def from_pyvista(dataset: Any, *, dim: SupportsIndex = 2) -> Shape:
     """Take over a PyVista PolyData or UnstructuredGrid: its simplices of the highest dimension, or its points.
 
+    Polylines become segments.
+
     Raises
     ------
     InvalidShapeError
@@ -94,20 +97,31 @@ def from_pyvista(dataset: Any, *, dim: SupportsIndex = 2) -> Shape:
         raise InvalidShapeError(f"A PolyData or UnstructuredGrid is taken; this is a {type(dataset).__name__}.")
     grid = dataset.cast_to_unstructured_grid()
     points = np.asarray(grid.points, dtype=np.float64)
-    cells = {int(kind): np.asarray(rows) for kind, rows in grid.cells_dict.items()}
-    for corners in (4, 3, 2):
-        if VTK_CELLS[corners - 1] in cells:
-            _require_simplices(cells)
-            return from_arrays(points, cells[VTK_CELLS[corners - 1]])
-    _require_simplices(cells)
-    return PointCloud(points, dim)
+    kinds = np.asarray(grid.celltypes)
+    starts = np.asarray(pyvista.convert_array(grid.GetCells().GetOffsetsArray()), dtype=np.int64)
+    corners = np.asarray(grid.cell_connectivity, dtype=np.int64)
+    _require_simplices(kinds)
+    for dim_of_cells in (3, 2):
+        at = starts[:-1][kinds == VTK_CELLS[dim_of_cells]]
+        if at.size:
+            return from_arrays(points, corners[at[:, None] + np.arange(dim_of_cells + 1)])
+    segments = _segments(kinds, np.diff(starts), corners)
+    return from_arrays(points, segments if segments.size else None, dim=dim)
 
 
-def _require_simplices(cells: dict[int, np.ndarray]) -> None:
-    others = sorted(set(cells) - {1, *VTK_CELLS.values()})  # 1: single points
-    if others:
+def _segments(kinds: np.ndarray, sizes: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Return the pairs of points that follow each other in segments and polylines."""
+    cell = np.repeat(np.arange(len(sizes)), sizes)
+    chained = (cell[1:] == cell[:-1]) & np.isin(kinds, LINES)[cell[1:]]
+    return np.column_stack([corners[:-1][chained], corners[1:][chained]])
+
+
+def _require_simplices(kinds: np.ndarray) -> None:
+    others = np.setdiff1d(kinds, [*POINTS, *LINES, *VTK_CELLS.values()])
+    if others.size:
+        count = np.count_nonzero(kinds == others[0])
         raise InvalidShapeError(
-            f"Cells must be simplices; {len(cells[others[0]])} are of VTK's type {others[0]}. Triangulate them first."
+            f"Cells must be simplices; {count} are of VTK's type {others[0]}. Triangulate them first."
         )
 
 

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -10,35 +11,39 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.text import Line, coordinates, fans, lines_of, rows_text, shown, whole, whole_table
 
 # A backslash joins lines only in numbers: a comment may end in one, as may a folder's name.
-CONTINUED = re.compile(rb"^[ \t]*[vf](?:[^\n\\#]|\\\r?\n|\\(?!\r?\n))*", re.MULTILINE)
+CONTINUED = re.compile(rb"^[ \t]*[vfl](?:[^\n\\#]|\\\r?\n|\\(?!\r?\n))*", re.MULTILINE)
 JOINT = re.compile(rb"\\\r?\n")
 AFTER_POSITION = re.compile(rb"(?<=\d)/\S*")  # a corner is position/texture/normal
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     """Read vertices and faces; polygons become fans."""
-    vertices, faces = parse_points(data)
-    if not len(faces):
+    vertices, faces = parse_any(data)
+    if faces.shape[1] != 3:
         raise FileFormatError(f"An OBJ file must hold faces; it holds {len(vertices)} points and no face.")
     return vertices, faces
 
 
-def parse_points(data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Read vertices, and the faces if there are any."""
+def parse_any(data: bytes) -> tuple[np.ndarray, np.ndarray]:
+    """Read vertices, and the faces, or else the segments of lines, or else none, of shape (0, 2)."""
     if JOINT.search(data):
         data = CONTINUED.sub(_joined, data)
     positions: list[Line] = []
     polygons: list[Line] = []
-    n_so_far: list[int] = []
+    polylines: list[Line] = []
+    n_so_far: dict[bytes, list[int]] = {b"f": [], b"l": []}
     for number, text in lines_of(data):
         keyword = text.split(None, 1)[0]
         if keyword == b"v":
             positions.append((number, text[1:]))
         elif keyword == b"f":
             polygons.append((number, AFTER_POSITION.sub(b"", text[1:])))
-            n_so_far.append(len(positions))
+            n_so_far[keyword].append(len(positions))
+        elif keyword == b"l":
+            polylines.append((number, AFTER_POSITION.sub(b"", text[1:])))
+            n_so_far[keyword].append(len(positions))
     vertices = coordinates(positions)
-    return vertices, _triangles(polygons, n_so_far) if polygons else np.empty((0, 3), dtype=np.int64)
+    return vertices, _triangles(polygons, n_so_far[b"f"]) if polygons else _segments(polylines, n_so_far[b"l"])
 
 
 def _joined(match: re.Match[bytes]) -> bytes:
@@ -58,6 +63,16 @@ def _corners(line: Line, n_so_far: int) -> list[int]:
     if len(words) < 3:
         raise FileFormatError(f"A face must have three corners or more; line {line[0]} is {shown(line)}.")
     return [_index(word, line, n_so_far) for word in words]
+
+
+def _segments(polylines: Sequence[Line], n_so_far: Sequence[int]) -> np.ndarray:
+    pairs: list[tuple[int, int]] = []
+    for line, count in zip(polylines, n_so_far, strict=True):
+        places = [_index(word, line, count) for word in line[1].split()]
+        if len(places) < 2:
+            raise FileFormatError(f"A polyline must have two points or more; line {line[0]} is {shown(line)}.")
+        pairs += pairwise(places)
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
 
 def _index(word: bytes, line: Line, n_so_far: int) -> int:

@@ -8,11 +8,11 @@ from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
 from eigenshape.io.lzf_loops import decompress
-from eigenshape.io.text import Line, coordinates, lines_of, shown, whole
+from eigenshape.io.text import Line, coordinates, lines_of, number_table, shown, whole
 
 AXES = (b"x", b"y", b"z")
 KINDS = {(b"F", 4): "<f4", (b"F", 8): "<f8"}
-MOST_TIMES = 4096  # a byte cannot be unpacked to more
+MOST_TIMES = 88  # three bytes stand for 264 at most
 
 
 @dataclass(frozen=True)
@@ -21,6 +21,7 @@ class Header:
 
     names: tuple[bytes, ...]
     sizes: tuple[int, ...]  # bytes of all values of the field
+    counts: tuple[int, ...]  # values of the field
     kinds: tuple[str | None, ...]
     n_points: int
 
@@ -74,7 +75,8 @@ def _header(lines: list[Line]) -> Header:
     (n_points,) = _numbers(rows[b"POINTS"], "A number of points")[:1] or (0,)
     if n_points < 1:
         raise FileFormatError(f"A PCD file must hold points; it declares {n_points}.")
-    return Header(names, tuple(size * count for size, count in zip(sizes, counts, strict=True)), types, n_points)
+    fields = tuple(size * count for size, count in zip(sizes, counts, strict=True))
+    return Header(names, fields, counts, types, n_points)
 
 
 def _numbers(line: Line, what: str) -> tuple[int, ...]:
@@ -87,16 +89,18 @@ def _parse_text(header: Header, body: bytes, first: int) -> Float[np.ndarray, "n
         raise FileFormatError(
             f"A PCD file must hold the points it declares; it declares {header.n_points} and holds {len(lines)}."
         )
-    places = [header.names.index(axis) for axis in AXES]
-    if len(set(header.sizes)) > 1 or places != [0, 1, 2]:
-        return coordinates([(number, b" ".join(_chosen(number, text, places))) for number, text in lines])
-    return coordinates(lines)
+    n_words = sum(header.counts)
+    places = [sum(header.counts[:field]) for field in _axes(header)]
+    table = number_table(lines)
+    if table is not None and table.shape[1] == n_words:
+        return table[:, places]
+    return coordinates([(number, b" ".join(_chosen(number, text, places, n_words))) for number, text in lines])
 
 
-def _chosen(number: int, text: bytes, places: list[int]) -> list[bytes]:
+def _chosen(number: int, text: bytes, places: list[int], n_words: int) -> list[bytes]:
     words = text.split()
-    if len(words) <= max(places):
-        raise FileFormatError(f"A point must have all fields; line {number} is {shown((number, text))}.")
+    if len(words) != n_words:
+        raise FileFormatError(f"A point must have all fields and no more; line {number} is {shown((number, text))}.")
     return [words[place] for place in places]
 
 

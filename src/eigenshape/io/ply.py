@@ -42,6 +42,14 @@ def parse_points(data: bytes) -> tuple[np.ndarray, np.ndarray, bool]:
     return vertices, faces, "tristrips" in tables
 
 
+def parse_any(data: bytes) -> tuple[np.ndarray, np.ndarray]:
+    """Read vertices, and the faces if there are any; strips of triangles are refused rather than left out."""
+    vertices, faces, strips = parse_points(data)
+    if strips:
+        raise FileFormatError("Triangle strips of a PLY file are not read; convert them to faces.")
+    return vertices, faces
+
+
 def _require_mesh(elements: Sequence[Element]) -> None:
     columns = {(element.name, column.name): column for element in elements for column in element.columns}
     axes = [columns.get(("vertex", axis)) for axis in AXES]
@@ -197,6 +205,15 @@ def format_binary(mesh: TriangleMesh, colors: np.ndarray | None = None) -> bytes
     faces = np.zeros(mesh.n_faces, dtype=[("n", "u1"), ("corners", "<i4", 3)])
     faces["n"], faces["corners"] = 3, mesh.faces
     return _header_text(mesh, "binary_little_endian", colors) + vertices.tobytes() + faces.tobytes()
+
+
+def format_points(points: np.ndarray) -> bytes:
+    """Write points alone, in binary."""
+    lines = [
+        "ply", "format binary_little_endian 1.0",
+        f"element vertex {len(points)}", *(f"property double {axis}" for axis in AXES), "end_header",
+    ]  # fmt: skip
+    return ("\n".join(lines) + "\n").encode() + points.astype("<f8").tobytes()
 
 
 def _header_text(mesh: TriangleMesh, order: str, colors: np.ndarray | None) -> bytes:

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.text import coordinates, lines_of, shown, whole
+from eigenshape.io.text import coordinates, lines_of, rows_text, shown, whole
 
 EXPE = b"[Expe/PointSet/Binary/"
 
@@ -54,7 +54,11 @@ def _parse_binary(data: bytes) -> Float[np.ndarray, "n 3"]:
     return np.ascontiguousarray(rows).view("<f4").astype(np.float64)
 
 
-def format_text(points: Float[np.ndarray, "n 3"], *, count: bool = False) -> bytes:
-    """Write points so that they read back exactly, with their number before them where it is asked for."""
-    lines = [" ".join(map(repr, row)) for row in points.tolist()]
-    return ("\n".join([str(len(lines)), *lines] if count else lines) + "\n").encode()
+def format_text(points: Float[np.ndarray, "n 3"]) -> bytes:
+    """Write points so that they read back exactly."""
+    return ("\n".join(rows_text("", points)) + "\n").encode()
+
+
+def format_counted(points: Float[np.ndarray, "n 3"]) -> bytes:
+    """Write points with their number before them."""
+    return f"{len(points)}\n".encode() + format_text(points)

@@ -14,7 +14,8 @@ from eigenshape.io import mesh_files, obj, pcd, ply, points, unstructured, vtk_p
 from eigenshape.io.files import read_regular, replace_file
 
 POINTS = {".pts": points.parse, ".xyz": points.parse, ".pcd": pcd.parse}
-EITHER = {".ply": lambda data: ply.parse_points(data)[:2], ".obj": obj.parse_points}
+EITHER = {".ply": ply.parse_any, ".obj": obj.parse_any}
+WRITERS = {".xyz": points.format_text, ".pts": points.format_counted, ".ply": ply.format_points}
 FORMATS = (*mesh_files.FORMATS, *unstructured.READERS, *POINTS)
 
 
@@ -26,6 +27,7 @@ def read_shape(
     Triangles in space become a TriangleMesh, tetrahedra, segments and flat triangles a SimplicialMesh, points without
     anything between them a PointCloud. Where a file holds simplices of several dimensions the highest count: the
     boundary triangles of a tetrahedral mesh are passed over. Points keep their order, those that nothing uses too.
+    Polylines become segments, in OBJ and in VTK's POLYDATA.
 
     Parameters
     ----------
@@ -118,7 +120,7 @@ def read_points(
 
 
 def write_points(cloud: PointCloud, path: str | Path) -> None:
-    """Write the points of a cloud in space to an XYZ or PTS file, which reads back exactly.
+    """Write the points of a cloud in space to an XYZ, PTS or binary PLY file, which reads back exactly.
 
     Raises
     ------
@@ -130,11 +132,12 @@ def write_points(cloud: PointCloud, path: str | Path) -> None:
         If the system cannot write there.
     """
     path = Path(path)
-    if path.suffix.lower() not in (".xyz", ".pts"):
-        raise FileFormatError(f"{path} must end in .xyz or .pts to hold points; it ends in {path.suffix!r}.")
+    suffix = path.suffix.lower()
+    if suffix not in WRITERS:
+        raise FileFormatError(f"{path} must end in {', '.join(WRITERS)} to hold points; it ends in {path.suffix!r}.")
     if cloud.points.shape[1] != 3:
         raise InvalidShapeError(f"Files of points hold three coordinates; these points have {cloud.points.shape[1]}.")
-    replace_file(path, points.format_text(cloud.points, count=path.suffix.lower() == ".pts"))
+    replace_file(path, WRITERS[suffix](cloud.points))
 
 
 def _suffix(path: Path, file_format: str | None) -> str:

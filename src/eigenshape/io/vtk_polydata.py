@@ -10,7 +10,8 @@ from eigenshape._errors import FileFormatError
 from eigenshape.io.text import fans
 
 KINDS = {b"float": ">f4", b"double": ">f8", b"int": ">i4", b"vtktypeint64": ">i8", b"long": ">i8"}
-CELLS = (b"VERTICES", b"LINES", b"POLYGONS", b"TRIANGLE_STRIPS")
+CELLS = {b"VERTICES": 1, b"LINES": 2, b"POLYGONS": 3}  # fewest points of each
+EXACT = 2**53  # whole numbers below it are exact in double precision
 
 
 class _Cursor:
@@ -47,13 +48,23 @@ class _Cursor:
             return found
         words = self.data[self.place :].split(None, count)
         try:
-            found = np.array([float(word) for word in words[:count]])
+            # Python would read 1_0 as ten.
+            found = np.array([float(word.replace(b"_", b"?")) for word in words[:count]])
         except ValueError as err:
             raise FileFormatError(f"A VTK file must hold {count} numbers at byte {self.place}; it does not.") from err
         if len(found) < count:
             raise FileFormatError(f"A VTK file must hold what it declares; it ends within {count} numbers.")
         self.place = len(self.data) - len(words[count]) if len(words) > count else len(self.data)
         return found
+
+    def wholes(self, count: int, kind: bytes) -> Int[np.ndarray, " k"]:
+        """Return the next numbers, all of them whole."""
+        found = self.numbers(count, kind)
+        odd = (found != np.floor(found)) | (np.abs(found.astype(np.float64)) >= EXACT)
+        bad = np.flatnonzero(odd)
+        if bad.size:
+            raise FileFormatError(f"Cells of a VTK file must be whole numbers; number {bad[0]} is {found[bad[0]]}.")
+        return found.astype(np.int64)
 
 
 def is_polydata(data: bytes) -> bool:
@@ -66,16 +77,23 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "s cor
     cursor = _Cursor(data)
     cursor.line()  # DATASET POLYDATA
     points, cells = np.empty((0, 3)), {}
+    seen: set[bytes] = set()
     while text := cursor.line():
         words = text.split()
-        if words[0].upper() == b"POINTS" and len(words) == 3:
-            points = cursor.numbers(3 * _count(words[1]), words[2].lower()).reshape(-1, 3).astype(np.float64)
-        elif words[0].upper() in CELLS and len(words) == 3:
-            cells[words[0].upper()] = _cells(cursor, _count(words[1]), _count(words[2]))
-        elif words[0].upper() in (b"POINT_DATA", b"CELL_DATA"):
+        name = words[0].upper()
+        if name in (b"POINT_DATA", b"CELL_DATA"):
             break
-    if b"TRIANGLE_STRIPS" in cells:
-        raise FileFormatError("Triangle strips of a VTK file are not read; convert them to POLYGONS.")
+        if len(words) != 3 or name not in (b"POINTS", b"TRIANGLE_STRIPS", *CELLS):
+            continue
+        if name == b"TRIANGLE_STRIPS":
+            raise FileFormatError("Triangle strips of a VTK file are not read; convert them to POLYGONS.")
+        if name in seen:
+            raise FileFormatError(f"A VTK file must have one section {name.decode()}; it has two.")
+        seen.add(name)
+        if name == b"POINTS":
+            points = cursor.numbers(3 * _count(words[1]), words[2].lower()).reshape(-1, 3).astype(np.float64)
+        else:
+            cells[name] = _cells(cursor, name, _count(words[1]), _count(words[2]))
     if cells.get(b"POLYGONS"):
         return points, fans(cells[b"POLYGONS"])
     return points, _segments(cells.get(b"LINES", []))
@@ -88,18 +106,38 @@ def _count(word: bytes) -> int:
         raise FileFormatError(f"A VTK file must count its cells by whole numbers; it says {word[:30]!r}.") from err
 
 
-def _cells(cursor: _Cursor, count: int, size: int) -> list[list[int]]:
+def _cells(cursor: _Cursor, name: bytes, count: int, size: int) -> list[list[int]]:
     """Read cells as lists of points; version 5 has offsets and connectivity instead of counts before each cell."""
     start = cursor.place
     words = cursor.line().split()
     if words and words[0].upper() == b"OFFSETS":
-        offsets = cursor.numbers(count, words[1].lower()).astype(np.int64)
-        flat = cursor.numbers(size, (cursor.line().split() + [b""] * 2)[1].lower()).astype(np.int64)
-        return [flat[a:b].tolist() for a, b in pairwise(offsets)]
-    cursor.place = start
-    flat = cursor.numbers(size, b"int").astype(np.int64)
+        cells = _cells_by_offsets(cursor, words, count, size)
+    else:
+        cursor.place = start
+        cells = _cells_by_counts(cursor.wholes(size, b"int"), count)
+    for index, cell in enumerate(cells):
+        if len(cell) < CELLS[name]:
+            raise FileFormatError(
+                f"A cell of {name.decode()} must have {CELLS[name]} points or more; cell {index} is {cell}."
+            )
+    return cells
+
+
+def _cells_by_offsets(cursor: _Cursor, words: Sequence[bytes], count: int, size: int) -> list[list[int]]:
+    offsets = cursor.wholes(count, _kind(words))
+    flat = cursor.wholes(size, _kind(cursor.line().split()))
+    if not count or offsets[0] != 0 or offsets[-1] != size or (np.diff(offsets) < 0).any():
+        raise FileFormatError(f"Offsets of a VTK file must rise from 0 to {size}; they are {offsets[:9].tolist()}.")
+    return [flat[a:b].tolist() for a, b in pairwise(offsets)]
+
+
+def _kind(words: Sequence[bytes]) -> bytes:
+    return words[1].lower() if len(words) > 1 else b""
+
+
+def _cells_by_counts(flat: Int[np.ndarray, " k"], count: int) -> list[list[int]]:
     cells: list[list[int]] = []
-    place = 0
+    place, size = 0, len(flat)
     for _ in range(count):
         if place >= size or not 0 <= flat[place] < size - place:
             raise FileFormatError(
@@ -107,6 +145,8 @@ def _cells(cursor: _Cursor, count: int, size: int) -> list[list[int]]:
             )
         cells.append(flat[place + 1 : place + 1 + flat[place]].tolist())
         place += 1 + int(flat[place])
+    if place != size:
+        raise FileFormatError(f"Cells of a VTK file must fill {size} numbers; {count} cells fill {place}.")
     return cells
 
 
