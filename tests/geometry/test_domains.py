@@ -21,7 +21,7 @@ from eigenshape.spectral.dirichlet import solve_dirichlet
 from eigenshape.spectral.solver import solve_spectrum
 
 RNG = np.random.default_rng
-QUALITY = 0.2
+QUALITY = 0.45  # of the worst tetrahedron of a ball; it falls to 0.50 as n grows, 0.51 at n = 40
 DOMAINS = {
     "interval": (lambda: interval(40, 2.0), 2.0, 0, exact.box_eigenvalues(8, [2.0])),
     "circle": (lambda: circle(60), 2 * np.pi, 1e-3, exact.sphere_eigenvalues(9, 1)),
@@ -96,8 +96,6 @@ def test_no_tetrahedron_of_a_ball_is_flat_however_fine(n):
     sides = ((corners[:, first] - corners[:, second]) ** 2).sum(axis=(1, 2))
     quality = 12 * (3 * simplex_volumes(mesh)) ** (2 / 3) / sides  # 1 where all sides are equal, 0 where flat
     assert quality.min() > QUALITY
-    facets = np.isin(np.sort(np.delete(mesh.simplices, 0, axis=1), axis=1), boundary_vertices(mesh)).all(axis=1)
-    assert facets.any()
     on_boundary = np.isin(mesh.simplices, boundary_vertices(mesh)).sum(axis=1)
     assert on_boundary.max() == 3  # one side of it at most
 

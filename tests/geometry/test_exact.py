@@ -67,7 +67,9 @@ def test_periods_are_two_in_a_plane(periods):
 
 @pytest.mark.parametrize("periods", [[[1.0, 0.0], [2.0, 0.0]], [[1e-3, 0.0], [0.0, 1e3]]])
 def test_periods_that_span_next_to_nothing_are_refused(periods):
-    with pytest.raises(InvalidParameterError, match=r"must span a plane and not be too slim for k; 3 eigenvalues of \["):
+    with pytest.raises(
+        InvalidParameterError, match=r"must span a plane and not be too slim for k; 3 eigenvalues of \["
+    ):
         exact.flat_torus_eigenvalues(3, periods)
 
 

@@ -44,9 +44,7 @@ DOUBLINGS = (332, 166, 66)
 LARGEST_EXPONENT = 900
 ROUNDING = 1e-12  # of √(W_ii W_jj), whatever the shape
 JIGGLES = 3
-# Over what jiggles of the coordinates by their rounding change: to build an entry takes some ten roundings more, all of
-# which may go one way.
-HEADROOM = 32
+HEADROOM = 32  # over what jiggles by rounding change: an entry takes ten roundings or more, that may all go one way
 
 
 @dataclass(frozen=True, eq=False)
