@@ -42,7 +42,7 @@ def test_every_file_gives_a_sound_operator_or_a_named_error(data, name):
             continue
         assert laplacian.n_points == 1 or keeps_the_laws(laplacian), path.name
         built.append(path.name)
-    expected = 6 if name == "point-cloud" else 40
+    expected = 7 if name == "point-cloud" else 40
     assert len(built) >= expected, (len(built), refused)
     assert all(len(message) > 40 for message in refused)  # a sentence, not a word
 

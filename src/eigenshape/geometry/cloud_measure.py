@@ -1,20 +1,19 @@
 """How much of the hidden manifold each point of a cloud stands for."""
 
-from math import factorial
 from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial import Delaunay, cKDTree
+from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError, cKDTree
 
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidShapeError
+from eigenshape.geometry.cell_loops import cell_areas
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.quadrature import Quadrature
 from eigenshape.geometry.simplices import in_length, size_one
-from eigenshape.geometry.star_loops import star_areas
 
-NEIGHBORS = {1: 12, 2: 30, 3: 60}  # enough to surround a random point; beyond, 20 m²
+NEIGHBORS = {1: 20, 2: 30, 3: 60}  # enough to surround a random point; beyond, 20 m²
 FLATTEST = 1e-7  # m-th over first singular value of a neighbourhood
 ROWS = 4096  # points at once
 
@@ -22,18 +21,17 @@ ROWS = 4096  # points at once
 def cloud_quadrature(cloud: PointCloud, *, n_neighbors: SupportsIndex | None = None) -> Quadrature:
     """Weigh each point of a cloud with its share of the manifold, also where the density varies.
 
-    The neighbours of a point are laid into the tangent plane that fits them best and triangulated there (Delaunay);
-    the point's weight is 1/(m+1) of the volume of its own simplices (Belkin, Sun, Wang 2009). On a curve that is half
-    of the way between the points before and behind.
-
-    Each point triangulates for itself: where four neighbours lie on a circle, as on a regular lattice, neighbours may
-    choose different diagonals and the weights do not add up, however fine the sample (a torus grid: 9 % too much).
+    The neighbours of a point are laid into the tangent plane that fits them best, each at its true distance. The
+    point's weight is the volume of its Voronoi cell there, the dual of the Delaunay simplices of Belkin, Sun and Wang
+    (2009); at a boundary the cell ends at the convex hull of the neighbours. On a curve that is half of the way
+    between the points before and behind. Cells, unlike simplices, do not jump where neighbours lie on a circle, so
+    regular lattices are weighed right, too.
 
     Parameters
     ----------
     cloud : PointCloud
     n_neighbors : int, optional
-        Neighbours that are looked at; by default 12, 30 or 60 in dimension 1, 2 or 3.
+        Neighbours that are looked at; by default 20, 30 or 60 in dimension 1, 2 or 3.
 
     Returns
     -------
@@ -43,8 +41,7 @@ def cloud_quadrature(cloud: PointCloud, *, n_neighbors: SupportsIndex | None = N
     Raises
     ------
     InvalidShapeError
-        If two points are equal, there are too few, or the neighbours of a point do not span m dimensions or lie all on
-        one side of it and make no simplex.
+        If two points are equal, there are too few, or the neighbours of a point do not span m dimensions.
     InvalidParameterError
         If `n_neighbors` is less than m + 1 or not less than the number of points.
     """
@@ -59,12 +56,12 @@ def cloud_quadrature(cloud: PointCloud, *, n_neighbors: SupportsIndex | None = N
     weights = np.empty(cloud.n_points)
     for first in range(0, cloud.n_points, ROWS):
         rows = slice(first, first + ROWS)
-        weights[rows] = _star_volumes(_flattened(cloud, points, neighbors[rows], first)) / (dim + 1)
-    alone = np.flatnonzero(weights <= 0)
-    if alone.size:
+        weights[rows] = _cell_volumes(_flattened(points, neighbors[rows], distances[rows], dim))
+    flat = np.flatnonzero(~(weights > 0))
+    if flat.size:
         raise InvalidShapeError(
-            f"Every point must have simplices; point {alone[0]} at {cloud.points[alone[0]].tolist()} has none among "
-            f"its {near} neighbours ({alone.size} such). Drop such points, or look at more neighbours."
+            f"The neighbours of a point must span {dim} dimensions; those of point {flat[0]} at "
+            f"{cloud.points[flat[0]].tolist()} do not ({flat.size} such). Is dim = {dim} right?"
         )
     return Quadrature(cloud.points, in_length(weights, scale, dim), dim)
 
@@ -80,39 +77,47 @@ def _require_different(cloud: PointCloud, distances: np.ndarray, neighbors: np.n
 
 
 def _flattened(
-    cloud: PointCloud, points: Float[np.ndarray, "n d"], neighbors: np.ndarray, first: int
+    points: Float[np.ndarray, "n d"], neighbors: np.ndarray, distances: np.ndarray, dim: int
 ) -> Float[np.ndarray, "r k m"]:
-    """Return the neighbours of some points in their tangent spaces, nearest first, the point at the origin."""
-    around = points[neighbors[:, 1:]] - points[neighbors[:, :1]]
-    size = np.linalg.norm(around[:, -1], axis=1)
-    centred = around / size[:, None, None]
-    centred = centred - centred.mean(axis=1, keepdims=True)
+    """Return the neighbours of some points in their tangent spaces, nearest first; zeros where they span too little.
+
+    They keep their distances: the shadow of a curved neighbourhood is too small.
+    """
+    around = (points[neighbors[:, 1:]] - points[neighbors[:, :1]]) / distances[:, -1:, None]
+    centred = around - around.mean(axis=1, keepdims=True)
     _, spreads, axes = np.linalg.svd(centred, full_matrices=False)
-    flat = np.flatnonzero(spreads[:, cloud.dim - 1] <= FLATTEST * spreads[:, 0])
-    if flat.size:
-        raise InvalidShapeError(
-            f"The neighbours of a point must span {cloud.dim} dimensions; those of point {first + flat[0]} at "
-            f"{cloud.points[first + flat[0]].tolist()} do not ({flat.size} such). Is dim = {cloud.dim} right?"
-        )
-    return around @ axes[:, : cloud.dim].transpose(0, 2, 1)
+    shadows = around @ axes[:, :dim].transpose(0, 2, 1)
+    lengths = np.linalg.norm(shadows, axis=2)
+    shadows[lengths == 0, 0] = lengths[lengths == 0] = 1  # right above the point: any direction serves
+    shadows[spreads[:, dim - 1] <= FLATTEST * spreads[:, 0]] = 0
+    return shadows * (distances[:, 1:] / lengths)[..., None]
 
 
-def _star_volumes(neighbors: Float[np.ndarray, "r k m"]) -> Float[np.ndarray, " r"]:
+def _cell_volumes(neighbors: Float[np.ndarray, "r k m"]) -> Float[np.ndarray, " r"]:
     dim = neighbors.shape[2]
     if dim == 1:
         places = neighbors[:, :, 0]
         ahead = np.min(np.where(places > 0, places, np.inf), axis=1)
         behind = np.min(np.where(places < 0, -places, np.inf), axis=1)
-        return np.where(np.isfinite(ahead), ahead, 0) + np.where(np.isfinite(behind), behind, 0)
+        return (np.where(np.isfinite(ahead), ahead, 0) + np.where(np.isfinite(behind), behind, 0)) / 2
     if dim == 2:
-        return star_areas(np.ascontiguousarray(neighbors))
-    return np.array([_star_volume(row) for row in neighbors])
+        places = np.concatenate([neighbors, np.zeros_like(neighbors[:, :1])], axis=1)
+        by_x = np.lexsort((places[:, :, 1], places[:, :, 0]))
+        return cell_areas(np.take_along_axis(places, by_x[:, :, None], axis=1))
+    return np.array([_cell_volume(row) for row in neighbors])
 
 
-def _star_volume(neighbors: Float[np.ndarray, "k m"]) -> float:
-    dim = neighbors.shape[1]
-    corners = np.vstack([np.zeros(dim), neighbors])
-    simplices = Delaunay(corners, qhull_options="Qbb Qc Qz Q12 QJ" if dim > 4 else "Qbb Qc Qz Q12").simplices
-    star = simplices[(simplices == 0).any(axis=1)]
-    sides = corners[star][:, 1:] - corners[star][:, :1]
-    return float(np.abs(np.linalg.det(sides)).sum() / factorial(dim))
+def _cell_volume(neighbors: Float[np.ndarray, "k m"]) -> float:
+    """Return the volume of the origin's Voronoi cell inside the convex hull; zero where there is none to be had."""
+    distances = np.linalg.norm(neighbors, axis=1)
+    bisectors = np.column_stack([neighbors, -(distances**2) / 2])
+    middle = neighbors.mean(axis=0)
+    away = np.linalg.norm(middle)
+    inside = middle * min(1, distances.min() / 4 / away) if away else middle  # the origin may lie on the hull
+    try:
+        hull = ConvexHull(np.vstack([neighbors, np.zeros_like(middle)]))
+        cell = HalfspaceIntersection(np.vstack([bisectors, hull.equations]), inside)
+        joggled = "QJ" if len(middle) > 4 else None  # beyond, merging facets fails now and then
+        return float(ConvexHull(cell.intersections, qhull_options=joggled).volume)
+    except QhullError:
+        return 0.0

@@ -190,8 +190,8 @@ def point_cloud_laplacian(
 ) -> Laplacian:
     """Build the Laplacian of points that sample a manifold, evenly or not.
 
-    That of `mesh_laplacian` with the volume around each point taken from the triangles in its tangent plane
-    (`cloud_quadrature`; Belkin, Sun, Wang 2009).
+    That of `mesh_laplacian` with the volume around each point taken from its Voronoi cell in the tangent plane
+    (`cloud_quadrature`; after Belkin, Sun, Wang 2009).
 
     Parameters
     ----------
