@@ -36,7 +36,7 @@ def folder(tmp_path_factory):
         f"MeshVersionFormatted 1\nDimension 3\nVertices\n{cube.n_points}\n{rows}\n"
         f"Tetrahedra\n{cube.n_simplices}\n{cells}\nEnd\n"
     )
-    write_points(PointCloud(fibonacci_sphere(400).vertices), folder / "sphere.xyz")
+    write_points(PointCloud(fibonacci_sphere(800).vertices), folder / "sphere.xyz")
     write_mesh(disc(8), folder / "disc.off")
     return folder
 
@@ -51,8 +51,8 @@ def test_info_of_a_tetrahedral_mesh(folder):
 
 def test_info_of_points(folder):
     facts = run_json("info", folder / "sphere.xyz", "--dim", 2)
-    assert (facts["kind"], facts["points"], facts["coinciding_points"]) == ("point cloud", 400, 0)
-    assert facts["mean_near_distance"] == pytest.approx(0.18, rel=0.1)
+    assert (facts["kind"], facts["points"], facts["coinciding_points"]) == ("point cloud", 800, 0)
+    assert facts["mean_near_distance"] == pytest.approx(0.127, rel=0.1)
 
 
 def test_info_of_a_curve_and_of_few_points(tmp_path):
