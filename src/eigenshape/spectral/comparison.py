@@ -6,7 +6,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import ConvergenceError
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.spectral.factor import EPS
+from eigenshape.sparse.elimination import EPS
 from eigenshape.spectral.laws import Law, NotJudged, Outcome, judged
 from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum

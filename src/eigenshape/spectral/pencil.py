@@ -1,17 +1,37 @@
 """The operator in units of its own, so that a solve never sees the user's."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float
-from scipy.sparse.linalg import splu
+from jaxtyping import Float, Int
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.operators.laplacian import Laplacian
+from eigenshape.sparse.elimination import Elimination, analyse, factorise
 
-SYMMETRIC_MODE = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
 COLUMNS_AT_ONCE = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Shifted:
+    """What W - σB has entries of, ready to be factored at any σ.
+
+    Attributes
+    ----------
+    elimination : Elimination
+        Of the union of both patterns.
+    stiffness, mass : (e,) float
+        The entries of W and B in it, zeros among them.
+    diagonal : (n,) int
+        Where those of the diagonal are.
+    """
+
+    elimination: Elimination
+    stiffness: Float[np.ndarray, " e"]
+    mass: Float[np.ndarray, " e"]
+    diagonal: Int[np.ndarray, " n"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +64,11 @@ class Pencil:
     def n(self) -> int:
         """Number of points."""
         return len(self.mass_diagonal)
+
+    @cached_property
+    def shifted(self) -> Shifted:
+        """W and B in one pattern, analysed once for the factors at all shifts."""
+        return _shifted(self.stiffness, self.mass)
 
     def weigh(self, vectors: Float[np.ndarray, "n b"]) -> Float[np.ndarray, "n b"]:
         """Multiply by B."""
@@ -97,25 +122,46 @@ def _scaled(matrix: sp.csr_array, exponent: int) -> sp.csc_array:
     return scaled
 
 
+def _shifted(stiffness: sp.csc_array, mass: sp.csc_array) -> Shifted:
+    parts = [_ones(stiffness), _ones(mass), sp.eye_array(stiffness.shape[0], format="csc")]
+    union = sp.csc_array(parts[0] + parts[1] + parts[2])
+    union.sort_indices()
+    keys = _keys(union)
+    diagonal = np.searchsorted(keys, np.arange(union.shape[1]) * (union.shape[1] + 1))
+    return Shifted(analyse(union), _spread(stiffness, keys), _spread(mass, keys), diagonal)
+
+
+def _spread(matrix: sp.csc_array, keys: Int[np.ndarray, " e"]) -> Float[np.ndarray, " e"]:
+    if matrix.nnz == len(keys):
+        return matrix.data
+    data = np.zeros(len(keys))
+    data[np.searchsorted(keys, _keys(matrix))] = matrix.data
+    return data
+
+
+def _ones(matrix: sp.csc_array) -> sp.csc_array:
+    return sp.csc_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
+
+
+def _keys(matrix: sp.csc_array) -> Int[np.ndarray, " e"]:
+    """Return the place of each entry in a full matrix; they ascend where indices are sorted."""
+    n = matrix.shape[1]
+    return np.repeat(np.arange(n) * n, np.diff(matrix.indptr)) + matrix.indices
+
+
 def _mass_floor(mass: sp.csc_array, diagonal: Float[np.ndarray, " n"]) -> float:
     # B - cD is positive definite exactly when all its pivots are positive. Linear elements have c = 1/2.
     if (mass - sp.diags_array(diagonal)).count_nonzero() == 0:
         return 1.0
+    shifted = _shifted(mass, sp.csc_array(sp.diags_array(diagonal)))
     for halvings in range(12):
         floor = 0.49 * 0.5**halvings
-        if _positive_definite(mass - floor * sp.diags_array(diagonal)):
+        lower = factorise(shifted.elimination, shifted.stiffness - floor * shifted.mass)
+        if lower and (lower.pivots > 0).all():
             return floor
     raise InvalidParameterError(
         f"mass must be positive definite; B - {floor:.1e} diag(B) has a pivot that is not positive."
     )
-
-
-def _positive_definite(matrix: sp.sparray) -> bool:
-    try:
-        factor = splu(sp.csc_array(matrix), **SYMMETRIC_MODE)
-    except RuntimeError:  # SuperLU's word for a pivot of exactly zero
-        return False
-    return bool(np.array_equal(factor.perm_r, factor.perm_c) and (factor.U.diagonal() > 0).all())
 
 
 def rayleigh_residuals(

@@ -1,0 +1,1 @@
+"""Sparse symmetric matrices: an order of elimination, factors, solves."""

@@ -1,0 +1,131 @@
+"""Symmetric matrices of one pattern: an order of elimination, and factors L D Lᵀ with pivots on the diagonal."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+
+from eigenshape.sparse import front_loops as fronts
+from eigenshape.sparse import symbolic_loops as symbolic
+from eigenshape.sparse.dissection_loops import dissect
+
+EPS = float(np.finfo(np.float64).eps)
+
+Indices = Int[np.ndarray, " ..."]
+
+
+@dataclass(frozen=True, eq=False)
+class Elimination:
+    """An order of elimination of a symmetric pattern, and the fronts of its factors (Liu 1992).
+
+    Attributes
+    ----------
+    order : (n,) int
+        The row that is eliminated at each step.
+    first : (s+1,) int
+        First column of each front, in the order of elimination.
+    begins : (s+1,) int
+    rows : (r,) int
+        The rows of front i are rows[begins[i]:begins[i+1]], ascending; its own columns come first.
+    above : (s,) int
+        The parent of each front; -1 at a root.
+    places : (s+1,) int
+        Where the entries of each front begin among those of L.
+    room : (int, int)
+        Numbers that wait on the stack at most, and the rows of the largest front.
+    lower_ptr, lower_rows, source : int
+        The lower triangle by columns, in the order of elimination, and the place of each entry in the data of the
+        matrix that was analysed.
+    """
+
+    order: Indices
+    first: Indices
+    begins: Indices
+    rows: Indices
+    above: Indices
+    places: Indices
+    room: tuple[int, int]
+    lower_ptr: Indices
+    lower_rows: Indices
+    source: Indices
+
+    @property
+    def n_entries(self) -> int:
+        """Entries of L that are stored."""
+        return int(self.places[-1])
+
+
+@dataclass(frozen=True, eq=False)
+class SymmetricFactor:
+    """A = L D Lᵀ in an order of elimination: L unit lower triangular in panels, D diagonal."""
+
+    elimination: Elimination
+    panels: Float[np.ndarray, " e"]
+    pivots: Float[np.ndarray, " n"]
+
+    def solve(self, right: Float[np.ndarray, "n b"]) -> Float[np.ndarray, "n b"]:
+        """Solve A x = right."""
+        e, width = self.elimination, right.shape[1]
+        solution = np.empty((width, len(right))).T
+        lanes = np.zeros((len(right), fronts.LANES))
+        for start in range(0, width, fronts.LANES):
+            part = right[:, start : start + fronts.LANES]
+            lanes[:, : part.shape[1]] = part[e.order]
+            fronts.solve_fronts(e.first, e.begins, e.rows, e.places, self.panels, self.pivots, lanes)
+            solution[e.order, start : start + fronts.LANES] = lanes[:, : part.shape[1]]
+        return solution
+
+    def rounding(self) -> Float[np.ndarray, " n"]:
+        """Bound what rounding has put between A and L D Lᵀ, row by row.
+
+        Their difference E has |E_ij| ≤ m eps (|L||D||L|ᵀ)_ij with m terms in the sum, in whatever order they are
+        added (Higham 2002, section 10.1; four more terms for forming A and for what is formed here). A symmetric
+        matrix lies, as a quadratic form, between plus and minus the diagonal one of the row sums of its sizes:
+        |xᵀEx| ≤ Σ r_i x_i², and r is returned.
+        """
+        e = self.elimination
+        weights, sizes, terms = np.empty_like(self.pivots), np.empty_like(self.pivots), np.empty(len(e.order), np.int64)
+        fronts.column_sizes(e.first, e.begins, e.places, self.panels, weights)
+        weights *= np.abs(self.pivots)
+        fronts.row_sizes(e.first, e.begins, e.rows, e.places, self.panels, weights, sizes, terms)
+        bounds = np.empty_like(sizes)
+        bounds[e.order] = EPS * (terms + 4) * sizes
+        return bounds
+
+
+def analyse(pattern: sp.csc_array) -> Elimination:
+    """Order the elimination of a symmetric matrix, given by all its entries, and find the fronts of its factor."""
+    indptr, indices = pattern.indptr.astype(np.int64), pattern.indices.astype(np.int64)
+    order = dissect(indptr, indices)
+    parent = symbolic.elimination_tree(indptr, indices, order)
+    post = symbolic.postordered(parent)
+    order, renamed = order[post], np.empty_like(post)
+    renamed[post] = np.arange(len(post))
+    parent = np.where(parent[post] >= 0, renamed[parent[post]], -1)
+    first = symbolic.supernodes(parent, symbolic.column_counts(indptr, indices, order, parent))
+    begins, rows, above = symbolic.front_rows(indptr, indices, order, parent, first)
+    lower_ptr, lower_rows, source = _lower(indptr, indices, order)
+    places = fronts.panel_places(first, begins)
+    room = fronts.stack_size(first, begins, above)
+    return Elimination(order, first, begins, rows, above, places, room, lower_ptr, lower_rows, source)
+
+
+def _lower(indptr: Indices, indices: Indices, order: Indices) -> tuple[Indices, Indices, Indices]:
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    columns, rows = np.repeat(place, np.diff(indptr)), place[indices]
+    kept = np.flatnonzero(rows >= columns)
+    kept = kept[np.argsort(columns[kept], kind="stable")]
+    pointers = np.concatenate([[0], np.cumsum(np.bincount(columns[kept], minlength=len(order)))])
+    return pointers, rows[kept], kept
+
+
+def factorise(elimination: Elimination, data: Float[np.ndarray, " e"]) -> SymmetricFactor | None:
+    """Factor the matrix with these entries; None where a pivot is zero or not finite."""
+    e = elimination
+    panels, pivots = np.empty(e.n_entries), np.empty(len(e.order))
+    sound = fronts.factor_fronts(
+        e.lower_ptr, e.lower_rows, data[e.source], e.first, e.begins, e.rows, e.above, e.places, panels, pivots, e.room
+    )
+    return SymmetricFactor(e, panels, pivots) if sound else None
