@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 from eigenshape.sparse import front_loops as fronts
 from eigenshape.sparse import symbolic_loops as symbolic
 from eigenshape.sparse.dissection_loops import dissect
+from eigenshape.sparse.lane_loops import LANES
 
 EPS = float(np.finfo(np.float64).eps)
 
@@ -66,14 +67,18 @@ class SymmetricFactor:
 
     def solve(self, right: Float[np.ndarray, "n b"]) -> Float[np.ndarray, "n b"]:
         """Solve A x = right."""
-        e, width = self.elimination, right.shape[1]
-        solution = np.empty((width, len(right))).T
-        lanes = np.zeros((len(right), fronts.LANES))
-        for start in range(0, width, fronts.LANES):
-            part = right[:, start : start + fronts.LANES]
-            lanes[:, : part.shape[1]] = part[e.order]
-            fronts.solve_fronts(e.first, e.begins, e.rows, e.places, self.panels, self.pivots, lanes)
-            solution[e.order, start : start + fronts.LANES] = lanes[:, : part.shape[1]]
+        width = right.shape[1]
+        solution, lanes = np.empty((len(right), width)), np.zeros((len(right), LANES))
+        for start in range(0, width, LANES):
+            stop = min(start + LANES, width)
+            lanes[:, : stop - start] = right[:, start:stop]
+            solution[:, start:stop] = self.solve_lanes(lanes)[:, : stop - start]
+        return solution
+
+    def solve_lanes(self, right: Float[np.ndarray, "n 8"]) -> Float[np.ndarray, "n 8"]:
+        """Solve A x = right for eight right-hand sides, an array in C order, at once."""
+        e, solution = self.elimination, np.empty_like(right)
+        fronts.solve_fronts(e.order, e.first, e.begins, e.rows, e.places, self.panels, self.pivots, right, solution)
         return solution
 
     def rounding(self) -> Float[np.ndarray, " n"]:

@@ -5,10 +5,11 @@ from typing import no_type_check
 import numpy as np
 from numba import njit
 
+from eigenshape.sparse.lane_loops import LANES, subtract_four_sums, subtract_sum
+
 WIDE = 64  # columns eliminated at once
 SMALL = 40  # rows of a front up to which plain loops are the faster ones
 TALL = 96  # rows of an update at once
-LANES = 8  # right-hand sides at once
 
 
 @njit(cache=True, nogil=True)
@@ -175,20 +176,24 @@ def _eliminate_blocked(front, width, pivots):
 
 @njit(cache=True, nogil=True)
 @no_type_check
-def solve_fronts(first, begins, rows, places, panels, pivots, right):
-    """Turn right-hand sides (n, LANES), rows in the order of elimination, into solutions."""
-    size = len(first) - 1
+def solve_fronts(order, first, begins, rows, places, panels, pivots, right, solution):
+    """Solve for LANES right-hand sides (n, LANES)."""
+    n, size = len(pivots), len(first) - 1
+    lanes = np.empty((n, LANES))
+    gathered = np.empty((len(right), LANES))
+    for i in range(n):
+        for lane in range(LANES):
+            lanes[i, lane] = right[order[i], lane]
     for s in range(size):
         at, start, height = places[s], begins[s], begins[s + 1] - begins[s]
         width = first[s + 1] - first[s]
         for block in range(0, width, WIDE):
             columns = min(WIDE, width - block)
-            mine = right[first[s] + block : first[s] + block + columns]
-            _forward(panels[at : at + (height - block) * columns], mine, rows[start + block : start + height], right)
+            _forward(panels, at, columns, rows[start + block : start + height], lanes, gathered)
             at += (height - block) * columns
-    for i in range(len(pivots)):
+    for i in range(n):
         for lane in range(LANES):
-            right[i, lane] /= pivots[i]
+            lanes[i, lane] /= pivots[i]
     for s in range(size - 1, -1, -1):
         start, height = begins[s], begins[s + 1] - begins[s]
         width = first[s + 1] - first[s]
@@ -196,42 +201,50 @@ def solve_fronts(first, begins, rows, places, panels, pivots, right):
         for block in range((width - 1) // WIDE * WIDE, -1, -WIDE):
             columns = min(WIDE, width - block)
             at -= (height - block) * columns
-            mine = right[first[s] + block : first[s] + block + columns]
-            _backward(panels[at : at + (height - block) * columns], mine, rows[start + block : start + height], right)
+            _backward(panels, at, columns, rows[start + block : start + height], lanes, gathered)
+    for i in range(n):
+        for lane in range(LANES):
+            solution[order[i], lane] = lanes[i, lane]
 
 
 @njit(cache=True, nogil=True)
 @no_type_check
-def _forward(panel, mine, rows, right):
-    columns = len(mine)
+def _forward(panels, at, columns, rows, lanes, gathered):
+    mine, height = rows[0], len(rows)
     for i in range(1, columns):
-        for j in range(i):
-            share = panel[i * columns + j]
-            for lane in range(LANES):
-                mine[i, lane] -= share * mine[j, lane]
-    for i in range(columns, len(rows)):
-        row = right[rows[i]]
-        for j in range(columns):
-            share = panel[i * columns + j]
-            for lane in range(LANES):
-                row[lane] -= share * mine[j, lane]
+        subtract_sum(panels, at + i * columns, 1, 0, lanes, mine, i, lanes, mine + i)
+    rest = height - columns
+    gathered[:rest] = 0.0
+    four = rest // 4 * 4
+    for i in range(0, four, 4):
+        subtract_four_sums(panels, at + (columns + i) * columns, 1, columns, lanes, mine, columns, gathered, i)
+    for i in range(four, rest):
+        subtract_sum(panels, at + (columns + i) * columns, 1, 0, lanes, mine, columns, gathered, i)
+    for i in range(rest):
+        row = rows[columns + i]
+        for lane in range(LANES):
+            lanes[row, lane] += gathered[i, lane]
 
 
 @njit(cache=True, nogil=True)
 @no_type_check
-def _backward(panel, mine, rows, right):
-    columns = len(mine)
-    for i in range(columns, len(rows)):
-        row = right[rows[i]]
-        for j in range(columns):
-            share = panel[i * columns + j]
-            for lane in range(LANES):
-                mine[j, lane] -= share * row[lane]
-    for i in range(columns - 1, 0, -1):
-        for j in range(i):
-            share = panel[i * columns + j]
-            for lane in range(LANES):
-                mine[j, lane] -= share * mine[i, lane]
+def _backward(panels, at, columns, rows, lanes, gathered):
+    mine, height = rows[0], len(rows)
+    rest = height - columns
+    for i in range(rest):
+        row = rows[columns + i]
+        for lane in range(LANES):
+            gathered[i, lane] = lanes[row, lane]
+    below = at + columns * columns
+    four = columns // 4 * 4
+    for j in range(0, four, 4):
+        subtract_four_sums(panels, below + j, columns, 1, gathered, 0, rest, lanes, mine + j)
+    for j in range(four, columns):
+        subtract_sum(panels, below + j, columns, 0, gathered, 0, rest, lanes, mine + j)
+    for j in range(columns - 2, -1, -1):
+        subtract_sum(
+            panels, at + (j + 1) * columns + j, columns, 0, lanes, mine + j + 1, columns - 1 - j, lanes, mine + j
+        )
 
 
 @njit(cache=True, nogil=True)

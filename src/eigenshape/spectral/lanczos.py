@@ -8,6 +8,8 @@ import scipy.linalg as sl
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._errors import ConvergenceError
+from eigenshape.sparse.basis import Block, Slots, combined, packed, products, subtract
+from eigenshape.sparse.lane_loops import LANES
 from eigenshape.spectral.factor import Factor
 from eigenshape.spectral.pencil import Pencil
 
@@ -16,16 +18,16 @@ FLOOR = 32 * float(np.finfo(np.float64).eps)  # of a residual, relative to the l
 SHRUNK = 1e-2  # a column that projection shortened this much is projected once more
 REPEATS = 5
 NEGLIGIBLE = 1e-13  # a column this short against what it was is rounding: the space is invariant
-
-Columns = Float[np.ndarray, "n b"]
+ALIKE = 1e-4  # a pivot of a Gram matrix this small, in lengths: too many digits are lost in its square
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a run is to find: so many eigenvalues below the shift, so many above it in order, none past `ceiling`."""
+    """What a run is to find: so many eigenvalues on either side of the shift, the nearest ones, all within bounds."""
 
     below: int
     above: int
+    floor: float = -np.inf
     ceiling: float = np.inf
 
 
@@ -36,9 +38,8 @@ class Krylov:
     (W - σB)⁻¹B V = V T + fresh C Eᵀ, with E the last columns of the identity.
     """
 
-    vectors: Float[np.ndarray, "n m"]
+    space: Slots
     projected: Float[np.ndarray, "m m"]
-    fresh: Columns
     coupling: Float[np.ndarray, "b b"]
 
 
@@ -58,35 +59,37 @@ def block_lanczos(
     wanted: Wanted,
     *,
     locked: Float[np.ndarray, "n l"],
-    block: int,
+    groups: int = 1,
     report: Callable[[float], None],
 ) -> Float[np.ndarray, "n j"]:
     """Return B-orthonormal eigenvectors around the shift, orthogonal to the B-orthonormal `locked`.
 
-    Unrestarted block Lanczos on (W - σB)⁻¹B in the inner product of B (Grimes, Lewis and Simon 1994), every block
-    orthogonalised against all before it. It stops when what the space has seen of `wanted` has converged; copies
-    of an eigenvalue beyond the width of the block may be missing, which an inertia count tells afterwards.
+    Unrestarted block Lanczos on (W - σB)⁻¹B in the inner product of B (Grimes, Lewis and Simon 1994), in blocks of
+    `groups` times eight columns, every block orthogonalised against all before it. It stops when what the space has
+    seen of `wanted` has converged; copies of an eigenvalue beyond the width of the block may be missing, which an
+    inertia count tells afterwards.
 
     Raises
     ------
     ConvergenceError
         If the space has grown to four times what is wanted, or to all there is.
     """
-    rng, first = np.random.default_rng(0), locked.shape[1]
-    capacity = _capacity(pencil, wanted, first, block)
-    basis = np.empty((pencil.n, first + capacity + block), order="F")  # pages are touched only as the space grows
-    basis[:, :first] = locked
+    rng, first, block = np.random.default_rng(0), -(-locked.shape[1] // LANES), groups * LANES
+    capacity = _capacity(pencil, wanted, locked.shape[1], block)
+    space = np.empty((first + capacity // LANES + groups, pencil.n, LANES))  # pages are touched only as it grows
+    space[:first] = packed(locked)
     projected = np.zeros((capacity, capacity))
-    fresh, _, _ = _orthonormalise(pencil, basis[:, :first], rng.standard_normal((pencil.n, block)), rng)
+    fresh, _, _ = _orthonormalise(pencil, space[:first], rng.standard_normal((groups, pencil.n, LANES)), rng)
     check = min(wanted.below + wanted.above, capacity // 4) + 2 * block
     for size in range(block, capacity + 1, block):
-        filled = first + size
-        basis[:, filled - block : filled] = fresh
-        image = factor.solve(pencil.weigh(fresh))
-        fresh, along, coupling = _orthonormalise(pencil, basis[:, :filled], image, rng)
-        projected[:size, size - block : size] = along[first:]
+        filled = first + size // LANES
+        space[filled - groups : filled] = fresh
+        image = np.stack([factor.lower.solve_lanes(pencil.weigh(slot)) for slot in fresh])
+        fresh, along, coupling = _orthonormalise(pencil, space[:filled], image, rng)
+        projected[:size, size - block : size] = along[first * LANES :]
         if size >= check:
-            krylov = Krylov(basis[:, first:filled], projected[:size, :size], fresh, coupling)
+            space[filled : filled + groups] = fresh
+            krylov = Krylov(space[first : filled + groups], projected[:size, :size], coupling)
             ritz = _ritz(krylov, factor.shift)
             chosen, missing = _choose(ritz, wanted)
             if not missing:
@@ -99,50 +102,71 @@ def block_lanczos(
     )
 
 
-def _capacity(pencil: Pencil, wanted: Wanted, first: int, block: int) -> int:
-    room = pencil.n - first - block
+def _capacity(pencil: Pencil, wanted: Wanted, n_locked: int, block: int) -> int:
+    room = pencil.n - n_locked - block
     most = 4 * (wanted.below + wanted.above) + 40 * block
     return max(min(room, most) // block, 1) * block
 
 
 def _orthonormalise(
-    pencil: Pencil, basis: Float[np.ndarray, "n m"], columns: Columns, rng: np.random.Generator
-) -> tuple[Columns, Float[np.ndarray, "m b"], Float[np.ndarray, "b b"]]:
-    """Split columns = basis @ along + fresh @ upper, with [basis, fresh] B-orthonormal.
+    pencil: Pencil, space: Slots, columns: Block, rng: np.random.Generator
+) -> tuple[Block, Float[np.ndarray, "m b"], Float[np.ndarray, "b b"]]:
+    """Split columns = space along + fresh upper, with [space, fresh] B-orthonormal; the columns are used up.
 
     The recent blocks, which take most of a Lanczos image away, are projected out first, then all of them.
     """
-    width = columns.shape[1]
-    along = np.zeros((basis.shape[1], width))
-    lengths = _lengths(columns, pencil.weigh(columns))
-    recent = max(basis.shape[1] - 2 * width, 0)
-    columns = _project(pencil, basis[:, recent:], columns, along[recent:])
-    columns = _project(pencil, basis, columns, along)
+    block = len(columns) * LANES
+    along = np.zeros((len(space) * LANES, block))
+    lengths = np.concatenate([np.sqrt(np.einsum("ij,ij->j", slot, pencil.weigh(slot))) for slot in columns])
+    recent = max(len(space) - 2 * len(columns), 0)
+    along[recent * LANES :] += _project(pencil, space[recent:], columns)
+    along += _project(pencil, space, columns)
     fresh, upper, short = _gram_schmidt(pencil, columns, lengths, rng)
     for _ in range(REPEATS):
         if not short:
             break
-        again = np.zeros_like(along)
-        fresh = _project(pencil, basis, fresh, again)
-        fresh, second, short = _gram_schmidt(pencil, fresh, np.ones(width), rng)
+        again = _project(pencil, space, fresh)
+        fresh, second, short = _gram_schmidt(pencil, fresh, np.ones(block), rng)
         along += again @ upper
         upper = second @ upper
     return fresh, along, upper
 
 
-def _project(
-    pencil: Pencil, basis: Float[np.ndarray, "n m"], columns: Columns, along: Float[np.ndarray, "m b"]
-) -> Columns:
-    part = basis.T @ pencil.weigh(columns)
-    along += part
-    return columns - basis @ part
+def _project(pencil: Pencil, space: Slots, columns: Block) -> Float[np.ndarray, "m b"]:
+    part = products(space, np.stack([pencil.weigh(slot) for slot in columns]))
+    subtract(space, part, columns)
+    return part
 
 
 def _gram_schmidt(
-    pencil: Pencil, columns: Columns, lengths: Float[np.ndarray, " b"], rng: np.random.Generator
-) -> tuple[Columns, Float[np.ndarray, "b b"], bool]:
+    pencil: Pencil, columns: Block, lengths: Float[np.ndarray, " b"], rng: np.random.Generator
+) -> tuple[Block, Float[np.ndarray, "b b"], bool]:
+    """B-orthonormalise a block; tell whether a column became short against what it was.
+
+    Twice by the Cholesky factor of the Gram matrix (Yamamoto and others 2015), column by column where that fails.
+    """
+    upper = np.eye(len(lengths))
+    fresh = columns
+    for _ in range(2):
+        gram = products(fresh, np.stack([pencil.weigh(slot) for slot in fresh]))
+        sizes = np.sqrt(np.diag(gram))
+        try:
+            triangle = sl.cholesky(gram / np.outer(sizes, sizes)) if sizes.all() else np.zeros((1, 1))
+        except np.linalg.LinAlgError:
+            triangle = np.zeros((1, 1))
+        if np.diag(triangle).min() < ALIKE:
+            return _one_by_one(pencil, columns, lengths, rng)
+        triangle = triangle * sizes
+        fresh = packed(combined(fresh, sl.solve_triangular(triangle, np.eye(len(triangle)))))
+        upper = triangle @ upper
+    return fresh, upper, bool((np.diag(upper) < SHRUNK * lengths).any())
+
+
+def _one_by_one(
+    pencil: Pencil, slots: Block, lengths: Float[np.ndarray, " b"], rng: np.random.Generator
+) -> tuple[Block, Float[np.ndarray, "b b"], bool]:
     """B-orthonormalise a block; a negligible column is replaced by a random one that the triangle R leaves out."""
-    columns, width = np.array(columns, order="F"), columns.shape[1]
+    columns, width = np.asfortranarray(np.concatenate(list(slots), axis=1)), len(lengths)
     upper, short = np.zeros((width, width)), False
     for i in range(width):
         for _ in range(2):
@@ -157,18 +181,16 @@ def _gram_schmidt(
         else:
             columns[:, i] /= length
             upper[i, i] = length
-    return columns, upper, short
+    return packed(columns), upper, short
 
 
-def _random_unit(pencil: Pencil, against: Columns, rng: np.random.Generator) -> Float[np.ndarray, " n"]:
+def _random_unit(
+    pencil: Pencil, against: Float[np.ndarray, "n b"], rng: np.random.Generator
+) -> Float[np.ndarray, " n"]:
     column = rng.standard_normal((pencil.n, 1))
     for _ in range(2):
         column -= against @ (against.T @ pencil.weigh(column))
     return np.asarray(column[:, 0] / np.sqrt(column[:, 0] @ pencil.weigh(column)[:, 0]))
-
-
-def _lengths(columns: Columns, weighed: Columns) -> Float[np.ndarray, " b"]:
-    return np.sqrt(np.einsum("ij,ij->j", columns, weighed))
 
 
 def _ritz(krylov: Krylov, shift: float) -> Ritz:
@@ -182,22 +204,27 @@ def _ritz(krylov: Krylov, shift: float) -> Ritz:
 
 
 def _choose(ritz: Ritz, wanted: Wanted) -> tuple[Int[np.ndarray, " j"], int]:
-    """Return the converged pairs of the window, and how many are still to converge."""
-    above = np.flatnonzero(ritz.thetas > 0)[::-1]
-    run = int(np.argmin(np.append(ritz.converged[above], False)))  # leading converged ones: nothing seen lies between
-    passed = run > 0 and ritz.values[above[run - 1]] > wanted.ceiling
-    late_above = 0 if passed else max(wanted.above - run, 0)
-    seen = np.flatnonzero(ritz.thetas < 0)
-    below = seen[ritz.converged[seen]][: wanted.below]
+    """Return the converged pairs of the window, and how many are still to converge.
+
+    On either side only those count that no unconverged one is nearer than: nothing seen lies between.
+    """
+    above, below = np.flatnonzero(ritz.thetas > 0)[::-1], np.flatnonzero(ritz.thetas < 0)
+    n_above, n_below = (int(np.argmin(np.append(ritz.converged[side], False))) for side in (above, below))
+    past_ceiling = n_above > 0 and ritz.values[above[n_above - 1]] > wanted.ceiling
+    past_floor = n_below > 0 and ritz.values[below[n_below - 1]] < wanted.floor
+    late_above = 0 if past_ceiling else max(wanted.above - n_above, 0)
     # Copies that the space cannot see are left to a later run; one converged value above proves it has looked.
-    goal = len(seen) if run else wanted.below
-    late_below = max(min(goal, wanted.below) - len(below), 0)
-    above = above[: min(run, wanted.above)]
-    return np.concatenate([below, above[ritz.values[above] <= wanted.ceiling]]), late_above + late_below
+    goal = min(len(below), wanted.below) if n_above else wanted.below
+    late_below = 0 if past_floor else max(goal - n_below, 0)
+    above, below = above[: min(n_above, wanted.above)], below[: min(n_below, wanted.below)]
+    chosen = np.concatenate([below, above])
+    return chosen[
+        (ritz.values[chosen] > wanted.floor) & (ritz.values[chosen] <= wanted.ceiling)
+    ], late_above + late_below
 
 
 def _vectors(krylov: Krylov, ritz: Ritz, chosen: Int[np.ndarray, " j"]) -> Float[np.ndarray, "n j"]:
     # One step of the operator takes the residual out of a Ritz vector y: A y / θ = y + fresh C s / θ, known already.
     weights = ritz.coefficients[:, chosen]
-    block = len(krylov.coupling)
-    return krylov.vectors @ weights + krylov.fresh @ (krylov.coupling @ weights[-block:] / ritz.thetas[chosen])
+    step = krylov.coupling @ weights[-len(krylov.coupling) :] / ritz.thetas[chosen]
+    return combined(krylov.space, np.concatenate([weights, step]))

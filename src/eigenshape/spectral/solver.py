@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from eigenshape._arrays import frozen, whole_number
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.laplacian import Laplacian
+from eigenshape.sparse.lane_loops import LANES
 from eigenshape.spectral.certify import Pairs, in_user_units, prove
 from eigenshape.spectral.factor import Factor
 from eigenshape.spectral.kernel_values import from_pencil, reported, require_readable, widened
@@ -24,11 +25,10 @@ Progress = Callable[[float, str], None]
 SMALL = 300  # points up to which a dense solve is the faster one
 DENSE_SHARE = 4  # and where more than one in so many pairs is wanted,
 DENSE_LIMIT = 6000  # while the matrix still fits
-BLOCK = 8
-WIDEST_BLOCK = 64
+WIDEST = 8  # groups of eight columns to a block
 RUNS = 40
 LOOSE = 1e-12
-POLISHED = 1e-10
+POLISHED = 2e-9
 
 
 def solve_spectrum(laplacian: Laplacian, k: SupportsIndex, *, progress: Progress | None = None) -> Spectrum:
@@ -122,8 +122,8 @@ def _sparse(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificat
     vectors = np.empty((pencil.n, 0))
     wanted = Wanted(below=factor.count, above=k - factor.count)
     for run in range(RUNS):
-        block = min(BLOCK + (wanted.below + wanted.above if run else 0), WIDEST_BLOCK)
-        found = block_lanczos(pencil, factor, wanted, locked=vectors, block=block, report=_in_run(report, run))
+        groups = min(1 + -(-(wanted.below + wanted.above) // LANES), WIDEST) if run else 1
+        found = block_lanczos(pencil, factor, wanted, locked=vectors, groups=groups, report=_in_run(report, run))
         pairs = _polished(pencil, factor, _lowest(pencil, np.hstack([vectors, found]), k))
         report(0.9, "counting eigenvalues")
         certificate, wanted = _still_wanted(pencil, factor, pairs, k)

@@ -1,0 +1,46 @@
+"""Tall columns in slots of eight, (s, n, 8): what a core reads of them at once lies together."""
+
+import numpy as np
+from jaxtyping import Float
+
+from eigenshape.sparse.basis_loops import add_products, gather_rows, subtract_combination
+from eigenshape.sparse.lane_loops import LANES
+
+ROWS = 512  # of a combination at once
+
+Slots = Float[np.ndarray, "s n 8"]
+Block = Float[np.ndarray, "g n 8"]
+
+
+def packed(columns: Float[np.ndarray, "n k"]) -> Slots:
+    """Return columns in slots, the last one filled up with zeros."""
+    n, k = columns.shape
+    slots = np.zeros((-(-k // LANES), n, LANES))
+    for slot, start in zip(slots, range(0, k, LANES), strict=True):
+        part = columns[:, start : start + LANES]
+        slot[:, : part.shape[1]] = part
+    return slots
+
+
+def products(space: Slots, columns: Block) -> Float[np.ndarray, "m b"]:
+    """Return spaceᵀ columns."""
+    parts = np.zeros((len(columns), len(space) * LANES, LANES))
+    add_products(space, columns, parts)
+    return np.concatenate(list(parts), axis=1)
+
+
+def subtract(space: Slots, weights: Float[np.ndarray, "m b"], columns: Block) -> None:
+    """Take space weights from the columns, in place."""
+    parts = np.ascontiguousarray(weights.reshape(len(weights), len(columns), LANES).transpose(1, 0, 2))
+    subtract_combination(space, parts, columns)
+
+
+def combined(space: Slots, weights: Float[np.ndarray, "m k"]) -> Float[np.ndarray, "n k"]:
+    """Return space weights, as columns of one matrix."""
+    n = space.shape[1]
+    result, flat = np.empty((n, weights.shape[1])), np.empty((ROWS, len(weights)))
+    for start in range(0, n, ROWS):
+        stop = min(start + ROWS, n)
+        gather_rows(space, start, stop, flat)
+        np.matmul(flat[: stop - start], weights, out=result[start:stop])
+    return result

@@ -1,0 +1,61 @@
+"""Compiled loops of `basis`: columns in slots of eight, against one another."""
+
+from typing import no_type_check
+
+from numba import njit
+
+from eigenshape.sparse.lane_loops import LANES, add_eight_sums, subtract_four_sums, subtract_sum
+
+CHUNK = 1024  # rows that stay in the second cache
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def add_products(space, columns, parts):
+    """Add spaceᵀ columns: slots (s, n, LANES) and (g, n, LANES) to parts (g, s LANES, LANES)."""
+    slots, n, _ = space.shape
+    groups = len(columns)
+    for start in range(0, n, CHUNK):
+        count = min(CHUNK, n - start)
+        for slot in range(slots):
+            for group in range(groups):
+                add_eight_sums(
+                    space,
+                    (slot * n + start) * LANES,
+                    LANES,
+                    1,
+                    columns,
+                    group * n + start,
+                    count,
+                    parts,
+                    (group * slots + slot) * LANES,
+                )
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def subtract_combination(space, parts, columns):
+    """Take space parts from the columns, shapes as in `add_products`."""
+    slots, n, _ = space.shape
+    groups = len(columns)
+    for start in range(0, n, CHUNK):
+        stop = min(start + CHUNK, n)
+        four = start + (stop - start) // 4 * 4
+        for slot in range(slots):
+            for group in range(groups):
+                given, to = (group * slots + slot) * LANES, group * n
+                for row in range(start, four, 4):
+                    place = (slot * n + row) * LANES
+                    subtract_four_sums(space, place, 1, LANES, parts, given, LANES, columns, to + row)
+                for row in range(four, stop):
+                    subtract_sum(space, (slot * n + row) * LANES, 1, 0, parts, given, LANES, columns, to + row)
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def gather_rows(space, start, stop, flat):
+    """Write rows of all slots as rows of one matrix (rows, slots LANES)."""
+    for slot in range(len(space)):
+        for row in range(start, stop):
+            for lane in range(LANES):
+                flat[row - start, slot * LANES + lane] = space[slot, row, lane]
