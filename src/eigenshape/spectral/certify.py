@@ -72,10 +72,11 @@ def certify(
     return certificate
 
 
-def prove(pencil: Pencil, pairs: Pairs) -> Certificate:
+def prove(pencil: Pencil, pairs: Pairs, near: Factor | None = None) -> Certificate:
     """Count eigenvalues above the last pair, and below its cluster where the cluster goes on.
 
-    The certificate, in the pencil's units, may be incomplete: then `count` differs from `n_found`.
+    The certificate, in the pencil's units, may be incomplete: then `count` differs from `n_found`. A factor at hand
+    saves one.
 
     Raises
     ------
@@ -96,9 +97,9 @@ def prove(pencil: Pencil, pairs: Pairs) -> Certificate:
     )
     if k == pencil.n:
         return certificate
-    above = _count_beside(pencil, pairs, k - 1, certificate.resolution)
+    above = _count_beside(pencil, pairs, k - 1, certificate.resolution, near)
     certificate = _counted(certificate, pairs, above)
-    return certificate if above.count <= k else _below_cluster(pencil, pairs, certificate)
+    return certificate if above.count <= k else _below_cluster(pencil, pairs, certificate, above)
 
 
 def in_user_units(pencil: Pencil, certificate: Certificate) -> Certificate:
@@ -109,14 +110,15 @@ def in_user_units(pencil: Pencil, certificate: Certificate) -> Certificate:
     return replace(certificate, shift=shift, gap=(low, high), resolution=resolution)
 
 
-def _below_cluster(pencil: Pencil, pairs: Pairs, above: Certificate) -> Certificate:
+def _below_cluster(pencil: Pencil, pairs: Pairs, above: Certificate, near: Factor) -> Certificate:
     # Eigenvalues below the cluster are counted. The next ones lie above that count, and not above those found.
     jumps = np.flatnonzero(np.diff(pairs.values) > 2 * above.resolution)
     first = int(jumps[-1]) + 1 if jumps.size else 0
-    factor = _count_beside(pencil, pairs, first, -above.resolution)
+    factor = _count_beside(pencil, pairs, first, -above.resolution, near)
     if factor.count > first:
         # Slack may have taken copies of the cluster below σ that are not among the pairs: once more, from farther off.
-        factor = _count_beside(pencil, pairs, first, FARTHER * (factor.shift - float(pairs.values[first])))
+        farther = FARTHER * (factor.shift - float(pairs.values[first]))
+        factor = _count_beside(pencil, pairs, first, farther, factor)
     resolution = float(pairs.values[-1]) - factor.shift
     if resolution > WIDEST_CLUSTER * _scale(pencil, pairs):
         raise ConvergenceError(
@@ -139,26 +141,35 @@ def _counted(certificate: Certificate, pairs: Pairs, factor: Factor) -> Certific
     )
 
 
-def _count_beside(pencil: Pencil, pairs: Pairs, index: int, step: float) -> Factor:
+def _count_beside(pencil: Pencil, pairs: Pairs, index: int, step: float, near: Factor | None) -> Factor:
     """Count at `step` from a value, or farther off where rounding would move a value found across σ.
 
-    The first factor tells how much slack a second one needs for its count to stand above rounding (`rounding`).
+    A factor tells how much slack the next one needs for its count to stand above rounding (`rounding`): one that is
+    there already, near σ, or a first one.
     """
     value, shape, spread = float(pairs.values[index]), pairs.vectors[:, index] ** 2, _spread(pairs)
-    slack = np.zeros(pencil.n)
+
+    def taken(slack: Float[np.ndarray, " n"]) -> float:
+        return spread + float(slack @ shape)  # from this eigenvalue, to first order
+
+    def too_much(slack: Float[np.ndarray, " n"]) -> bool:
+        return not 2 * taken(slack) < np.abs(pairs.values - (value + step)).min()
+
+    none = np.zeros(pencil.n)
+    slack = _padded(pencil, rounding(near)) if near else none
+    slack = none if too_much(slack) else slack
     for _ in range(TRIALS):
         factor = factorise(pencil, value + step, slack)
         loss = rounding(factor) if factor else np.full(pencil.n, np.inf)
         if factor and (loss <= slack).all():
             return factor
-        slack = np.maximum(slack, _padded(pencil, loss))
-        taken = spread + float(slack @ shape)  # from this eigenvalue, to first order
-        if not 2 * taken < np.abs(pairs.values - (value + step)).min():
-            step, slack = WIDENING * step, np.zeros(pencil.n)
+        slack = wanted = np.maximum(slack, _padded(pencil, loss))
+        if too_much(slack):
+            step, slack = WIDENING * step, none
     raise ConvergenceError(
         f"Eigenvalues can be counted only where rounding takes less than their distance to σ; near "
         f"{np.ldexp(value, pencil.value_exponent):.6g} (1/length²) it takes "
-        f"{np.ldexp(taken, pencil.value_exponent):.1e}. Repair nearly degenerate elements."
+        f"{np.ldexp(taken(wanted), pencil.value_exponent):.1e}. Repair nearly degenerate elements."
     )
 
 

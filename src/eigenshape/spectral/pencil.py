@@ -168,12 +168,7 @@ def rayleigh_residuals(
     pencil: Pencil, vectors: Float[np.ndarray, "n k"]
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return Rayleigh quotients of the columns, and the bounds that `residual_norms` has for them."""
-    values = np.empty(vectors.shape[1])
-    for columns in _column_chunks(vectors.shape[1]):
-        part = vectors[:, columns]
-        weighed = pencil.weigh(part)
-        values[columns] = _column_dots(part, pencil.stiffness @ part) / _column_dots(part, weighed)
-    return values, residual_norms(pencil, values, vectors)
+    return _residuals(pencil, vectors, None)
 
 
 def residual_norms(
@@ -183,14 +178,22 @@ def residual_norms(
 
     |λ - eigenvalue| ≤ ‖Wφ - λBφ‖ / ‖φ‖ with the norms of B⁻¹ and B (Parlett 1998, theorem 15.9.1); B⁻¹ ≤ (cD)⁻¹.
     """
-    norms = np.empty(len(values))
-    for columns in _column_chunks(len(values)):
-        part = vectors[:, columns]
-        weighed = pencil.weigh(part)
-        rest = pencil.stiffness @ part - weighed * values[columns]
-        squares = _column_dots(rest, rest / pencil.mass_diagonal[:, None]) / pencil.mass_floor
-        norms[columns] = np.sqrt(squares / _column_dots(part, weighed))
-    return norms
+    return _residuals(pencil, vectors, values)[1]
+
+
+def _residuals(
+    pencil: Pencil, vectors: Float[np.ndarray, "n k"], given: Float[np.ndarray, " k"] | None
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
+    values, norms = np.empty(vectors.shape[1]), np.empty(vectors.shape[1])
+    for columns in _column_chunks(vectors.shape[1]):
+        part = np.ascontiguousarray(vectors[:, columns])
+        weighed, rest = pencil.weigh(part), pencil.stiffness @ part
+        sizes = _column_dots(part, weighed)
+        values[columns] = _column_dots(part, rest) / sizes if given is None else given[columns]
+        rest -= weighed * values[columns]
+        rest *= rest
+        norms[columns] = np.sqrt((1 / pencil.mass_diagonal @ rest) / pencil.mass_floor / sizes)
+    return values, norms
 
 
 def _column_chunks(k: int) -> list[slice]:
