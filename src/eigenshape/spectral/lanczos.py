@@ -19,6 +19,45 @@ SHRUNK = 1e-2  # a column that projection shortened this much is projected once 
 REPEATS = 5
 NEGLIGIBLE = 1e-13  # a column this short against what it was is rounding: the space is invariant
 ALIKE = 1e-4  # a pivot of a Gram matrix this small, in lengths: too many digits are lost in its square
+UNLIKE = 0.1  # and this large: none are
+
+
+@dataclass(frozen=True, eq=False)
+class Operator:
+    """(W - σB)⁻¹B in an inner product in which it is symmetric.
+
+    Where B is diagonal that is B^½ (W - σB)⁻¹ B^½ in the plain one, on u = B^½ φ, and nothing is weighed.
+    """
+
+    pencil: Pencil
+    factor: Factor
+    roots: Float[np.ndarray, "n 1"] | None
+
+    def image(self, block: Block) -> Block:
+        """Return the operator's image of each slot."""
+        if self.roots is None:
+            return np.stack([self.factor.lower.solve_lanes(self.pencil.weigh(slot)) for slot in block])
+        images = [self.factor.lower.solve_lanes(self.roots * slot) for slot in block]
+        return np.stack([np.multiply(image, self.roots, out=image) for image in images])
+
+    def weigh(self, block: Float[np.ndarray, "g n b"]) -> Float[np.ndarray, "g n b"]:
+        """Return what the plain product with columns is the inner product with."""
+        return block if self.roots is not None else np.stack([self.pencil.weigh(slot) for slot in block])
+
+    def enter(self, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+        """Return u for φ."""
+        return vectors if self.roots is None else vectors * self.roots
+
+    def leave(self, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+        """Return φ for u, in its place."""
+        if self.roots is not None:
+            vectors /= self.roots
+        return vectors
+
+
+def operator(pencil: Pencil, factor: Factor) -> Operator:
+    """Choose the inner product."""
+    return Operator(pencil, factor, np.sqrt(pencil.mass_diagonal)[:, None] if pencil.mass_floor == 1.0 else None)
 
 
 @dataclass(frozen=True)
@@ -74,18 +113,18 @@ def block_lanczos(
     ConvergenceError
         If the space has grown to four times what is wanted, or to all there is.
     """
+    inner = operator(pencil, factor)
     rng, first, block = np.random.default_rng(0), -(-locked.shape[1] // LANES), groups * LANES
     capacity = _capacity(pencil, wanted, locked.shape[1], block)
     space = np.empty((first + capacity // LANES + groups, pencil.n, LANES))  # pages are touched only as it grows
-    space[:first] = packed(locked)
+    space[:first] = packed(inner.enter(locked))
     projected = np.zeros((capacity, capacity))
-    fresh, _, _ = _orthonormalise(pencil, space[:first], rng.standard_normal((groups, pencil.n, LANES)), rng)
+    fresh, _, _ = _orthonormalise(inner, space[:first], rng.standard_normal((groups, pencil.n, LANES)), rng)
     check = min(wanted.below + wanted.above, capacity // 4) + 2 * block
     for size in range(block, capacity + 1, block):
         filled = first + size // LANES
         space[filled - groups : filled] = fresh
-        image = np.stack([factor.lower.solve_lanes(pencil.weigh(slot)) for slot in fresh])
-        fresh, along, coupling = _orthonormalise(pencil, space[:filled], image, rng)
+        fresh, along, coupling = _orthonormalise(inner, space[:filled], inner.image(fresh), rng)
         projected[:size, size - block : size] = along[first * LANES :]
         if size >= check:
             space[filled : filled + groups] = fresh
@@ -93,7 +132,7 @@ def block_lanczos(
             ritz = _ritz(krylov, factor.shift)
             chosen, missing = _choose(ritz, wanted)
             if not missing:
-                return _vectors(krylov, ritz, chosen)
+                return inner.leave(_vectors(krylov, ritz, chosen))
             check = size + min(max(missing // 2, size // 20, block), max(size // 4, block))
         report(size / (size + 0.6 * (wanted.below + wanted.above) + block))
     raise ConvergenceError(
@@ -109,75 +148,83 @@ def _capacity(pencil: Pencil, wanted: Wanted, n_locked: int, block: int) -> int:
 
 
 def _orthonormalise(
-    pencil: Pencil, space: Slots, columns: Block, rng: np.random.Generator
+    inner: Operator, space: Slots, columns: Block, rng: np.random.Generator
 ) -> tuple[Block, Float[np.ndarray, "m b"], Float[np.ndarray, "b b"]]:
-    """Split columns = space along + fresh upper, with [space, fresh] B-orthonormal; the columns are used up.
+    """Split columns = space along + fresh upper, with [space, fresh] orthonormal; the columns are used up.
 
     The recent blocks, which take most of a Lanczos image away, are projected out first, then all of them.
     """
     block = len(columns) * LANES
     along = np.zeros((len(space) * LANES, block))
-    lengths = np.concatenate([np.sqrt(np.einsum("ij,ij->j", slot, pencil.weigh(slot))) for slot in columns])
+    lengths = np.sqrt(np.einsum("gij,gij->gj", columns, inner.weigh(columns))).ravel()
     recent = max(len(space) - 2 * len(columns), 0)
-    along[recent * LANES :] += _project(pencil, space[recent:], columns)
-    along += _project(pencil, space, columns)
-    fresh, upper, short = _gram_schmidt(pencil, columns, lengths, rng)
+    along[recent * LANES :] += _project(inner, space[recent:], columns)
+    along += _project(inner, space, columns)
+    fresh, upper, short = _gram_schmidt(inner, columns, lengths, rng)
     for _ in range(REPEATS):
         if not short:
             break
-        again = _project(pencil, space, fresh)
-        fresh, second, short = _gram_schmidt(pencil, fresh, np.ones(block), rng)
+        again = _project(inner, space, fresh)
+        fresh, second, short = _gram_schmidt(inner, fresh, np.ones(block), rng)
         along += again @ upper
         upper = second @ upper
     return fresh, along, upper
 
 
-def _project(pencil: Pencil, space: Slots, columns: Block) -> Float[np.ndarray, "m b"]:
-    part = products(space, np.stack([pencil.weigh(slot) for slot in columns]))
+def _project(inner: Operator, space: Slots, columns: Block) -> Float[np.ndarray, "m b"]:
+    part = products(space, inner.weigh(columns))
     subtract(space, part, columns)
     return part
 
 
 def _gram_schmidt(
-    pencil: Pencil, columns: Block, lengths: Float[np.ndarray, " b"], rng: np.random.Generator
+    inner: Operator, columns: Block, lengths: Float[np.ndarray, " b"], rng: np.random.Generator
 ) -> tuple[Block, Float[np.ndarray, "b b"], bool]:
-    """B-orthonormalise a block; tell whether a column became short against what it was.
+    """Orthonormalise a block; tell whether a column became short against what it was.
 
-    Twice by the Cholesky factor of the Gram matrix (Yamamoto and others 2015), column by column where that fails.
+    By the Cholesky factor of the Gram matrix, twice where the first leaves digits to be gained (Yamamoto and others
+    2015), and column by column where it fails.
     """
-    upper = np.eye(len(lengths))
-    fresh = columns
+    upper, fresh = np.eye(len(lengths)), columns
     for _ in range(2):
-        gram = products(fresh, np.stack([pencil.weigh(slot) for slot in fresh]))
-        sizes = np.sqrt(np.diag(gram))
-        try:
-            triangle = sl.cholesky(gram / np.outer(sizes, sizes)) if sizes.all() else np.zeros((1, 1))
-        except np.linalg.LinAlgError:
-            triangle = np.zeros((1, 1))
-        if np.diag(triangle).min() < ALIKE:
-            return _one_by_one(pencil, columns, lengths, rng)
-        triangle = triangle * sizes
-        fresh = packed(combined(fresh, sl.solve_triangular(triangle, np.eye(len(triangle)))))
+        triangle = _cholesky(products(fresh, inner.weigh(fresh)))
+        if triangle is None:
+            return _one_by_one(inner, columns, lengths, rng)
+        source, fresh = fresh, np.zeros_like(fresh)
+        subtract(source, -sl.solve_triangular(triangle, np.eye(len(triangle))), fresh)
         upper = triangle @ upper
+        if np.diag(triangle).min() > UNLIKE * np.linalg.norm(triangle, axis=0).max():
+            break
     return fresh, upper, bool((np.diag(upper) < SHRUNK * lengths).any())
 
 
+def _cholesky(gram: Float[np.ndarray, "b b"]) -> Float[np.ndarray, "b b"] | None:
+    """Return the triangle R with RᵀR = gram, or None where the columns are too much alike."""
+    sizes = np.sqrt(np.maximum(np.diag(gram), 0))
+    if not sizes.all():
+        return None
+    try:
+        triangle = sl.cholesky(gram / np.outer(sizes, sizes))
+    except np.linalg.LinAlgError:
+        return None
+    return triangle * sizes if np.diag(triangle).min() > ALIKE else None
+
+
 def _one_by_one(
-    pencil: Pencil, slots: Block, lengths: Float[np.ndarray, " b"], rng: np.random.Generator
+    inner: Operator, block: Block, lengths: Float[np.ndarray, " b"], rng: np.random.Generator
 ) -> tuple[Block, Float[np.ndarray, "b b"], bool]:
-    """B-orthonormalise a block; a negligible column is replaced by a random one that the triangle R leaves out."""
-    columns, width = np.asfortranarray(np.concatenate(list(slots), axis=1)), len(lengths)
+    """Orthonormalise a block; a negligible column is replaced by a random one that the triangle R leaves out."""
+    columns, width = np.concatenate(list(block), axis=1), len(lengths)
     upper, short = np.zeros((width, width)), False
     for i in range(width):
         for _ in range(2):
-            weighed = pencil.weigh(columns[:, i : i + 1])
-            part = columns[:, :i].T @ weighed
-            columns[:, i : i + 1] -= columns[:, :i] @ part
-            upper[:i, i] += part[:, 0]
-        length = float(np.sqrt(columns[:, i] @ pencil.weigh(columns[:, i : i + 1])[:, 0]))
+            part = columns[:, :i].T @ _weighed(inner, columns[:, i])
+            columns[:, i] -= columns[:, :i] @ part
+            upper[:i, i] += part
+        length = float(np.sqrt(columns[:, i] @ _weighed(inner, columns[:, i])))
         short |= bool(length < SHRUNK * lengths[i])
         if length <= NEGLIGIBLE * lengths[i]:
-            columns[:, i] = _random_unit(pencil, columns[:, :i], rng)
+            columns[:, i] = _random_unit(inner, columns[:, :i], rng)
         else:
             columns[:, i] /= length
             upper[i, i] = length
@@ -185,12 +232,16 @@ def _one_by_one(
 
 
 def _random_unit(
-    pencil: Pencil, against: Float[np.ndarray, "n b"], rng: np.random.Generator
+    inner: Operator, against: Float[np.ndarray, "n b"], rng: np.random.Generator
 ) -> Float[np.ndarray, " n"]:
-    column = rng.standard_normal((pencil.n, 1))
+    column = rng.standard_normal(len(against))
     for _ in range(2):
-        column -= against @ (against.T @ pencil.weigh(column))
-    return np.asarray(column[:, 0] / np.sqrt(column[:, 0] @ pencil.weigh(column)[:, 0]))
+        column -= against @ (against.T @ _weighed(inner, column))
+    return np.asarray(column / np.sqrt(column @ _weighed(inner, column)))
+
+
+def _weighed(inner: Operator, column: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    return inner.weigh(column[None, :, None])[0, :, 0]
 
 
 def _ritz(krylov: Krylov, shift: float) -> Ritz:
