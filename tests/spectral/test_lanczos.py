@@ -12,7 +12,7 @@ from eigenshape.spectral.pencil import normalise, rayleigh_residuals
 
 def run(pencil, factor, wanted, locked=None):
     locked = np.empty((pencil.n, 0)) if locked is None else locked
-    return block_lanczos(pencil, factor, wanted, locked=locked, report=lambda done: None)
+    return block_lanczos(pencil, factor, wanted, locked=locked, report=lambda done: None)[1]
 
 
 def test_finds_both_sides_of_the_shift_orthonormal():

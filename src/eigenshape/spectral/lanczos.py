@@ -100,8 +100,8 @@ def block_lanczos(
     locked: Float[np.ndarray, "n l"],
     groups: int = 1,
     report: Callable[[float], None],
-) -> Float[np.ndarray, "n j"]:
-    """Return B-orthonormal eigenvectors around the shift, orthogonal to the B-orthonormal `locked`.
+) -> tuple[Float[np.ndarray, " j"], Float[np.ndarray, "n j"]]:
+    """Return eigenvalues around the shift, and B-orthonormal eigenvectors, orthogonal to the B-orthonormal `locked`.
 
     Unrestarted block Lanczos on (W - σB)⁻¹B in the inner product of B (Grimes, Lewis and Simon 1994), in blocks of
     `groups` times eight columns, every block orthogonalised against all before it. It stops when what the space has
@@ -132,7 +132,7 @@ def block_lanczos(
             ritz = _ritz(krylov, factor.shift)
             chosen, missing = _choose(ritz, wanted)
             if not missing:
-                return inner.leave(_vectors(krylov, ritz, chosen))
+                return ritz.values[chosen], inner.leave(_vectors(krylov, ritz, chosen))
             check = size + min(max(missing // 2, size // 20, block), max(size // 4, block))
         report(size / (size + 0.6 * (wanted.below + wanted.above) + block))
     raise ConvergenceError(

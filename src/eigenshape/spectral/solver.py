@@ -1,6 +1,8 @@
 """The lowest eigenpairs of a Laplacian, proved complete."""
 
 from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
 from typing import SupportsIndex
 
 import numpy as np
@@ -18,16 +20,21 @@ from eigenshape.spectral.kernel_values import from_pencil, reported, require_rea
 from eigenshape.spectral.lanczos import Wanted, block_lanczos
 from eigenshape.spectral.pencil import Pencil, normalise, rayleigh_residuals
 from eigenshape.spectral.shift import shift_inside
+from eigenshape.spectral.slices import walk
 from eigenshape.spectral.spectrum import Certificate, Spectrum
 
 Progress = Callable[[float, str], None]
+Start = Callable[[Pencil, int, Callable[[float], None]], tuple[np.ndarray, Factor]]
+Road = Callable[[Pencil, int, Progress], tuple[Pairs, Certificate]]
 
 SMALL = 300  # points up to which a dense solve is the faster one
 DENSE_SHARE = 4  # and where more than one in so many pairs is wanted,
 DENSE_LIMIT = 6000  # while the matrix still fits
+WHOLE = 400  # pairs up to which one shift serves
 WIDEST = 8  # groups of eight columns to a block
 RUNS = 40
 LOOSE = 1e-12
+SKEW = 1e-5
 POLISHED = 2e-9
 
 
@@ -94,12 +101,13 @@ def _silent(fraction: float, message: str) -> None:
 def _proved(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
     if pencil.n <= SMALL or (DENSE_SHARE * k > pencil.n and pencil.n <= DENSE_LIMIT):
         return _dense(pencil, k, report)
-    try:
-        return _sparse(pencil, k, report)
-    except ConvergenceError:
-        if pencil.n > DENSE_LIMIT:
-            raise
-        return _dense(pencil, k, report)  # nothing there can fail to converge, and the proof is the same
+    roads: list[Road] = [partial(_sparse, start=walk)] if k > WHOLE else []
+    roads += [partial(_sparse, start=_at_once)]
+    roads += [_dense] if pencil.n <= DENSE_LIMIT else []  # nothing there can fail to converge
+    for road in roads[:-1]:
+        with suppress(ConvergenceError):
+            return road(pencil, k, report)
+    return roads[-1](pencil, k, report)
 
 
 def _dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
@@ -116,26 +124,33 @@ def _dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate
     return pairs, certificate
 
 
-def _sparse(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+def _sparse(pencil: Pencil, k: int, report: Progress, *, start: Start) -> tuple[Pairs, Certificate]:
     report(0.02, "looking for a shift")
-    factor = shift_inside(pencil, k)
-    vectors = np.empty((pencil.n, 0))
-    wanted = Wanted(below=factor.count, above=k - factor.count)
-    for run in range(RUNS):
-        groups = min(1 + -(-(wanted.below + wanted.above) // LANES), WIDEST) if run else 1
-        found = block_lanczos(pencil, factor, wanted, locked=vectors, groups=groups, report=_in_run(report, run))
-        pairs = _polished(pencil, factor, _lowest(pencil, np.hstack([vectors, found]), k))
+    vectors, factor = start(pencil, k, _in_run(report, 0))
+    for run in range(1, RUNS + 1):
+        pairs = _polished(pencil, factor, _lowest(pencil, vectors, k))
         report(0.9, "counting eigenvalues")
         certificate, wanted = _still_wanted(pencil, factor, pairs, k)
+        missing = wanted.below + wanted.above
         if certificate is not None and certificate.complete:
             return pairs, certificate
-        if not found.shape[1] or wanted.below + wanted.above == 0:
+        if missing == 0 or run == RUNS:
             break
-        vectors = pairs.vectors
+        groups, more = min(1 + -(-missing // LANES), WIDEST), _in_run(report, run)
+        _, found = block_lanczos(pencil, factor, wanted, locked=pairs.vectors, groups=groups, report=more)
+        if not found.shape[1]:
+            break
+        vectors = np.hstack([pairs.vectors, found])
     raise ConvergenceError(
-        f"Every eigenvalue that inertia counts must be found; {len(pairs.values)} of {k} were found in {run + 1} runs "
-        f"and {wanted.below + wanted.above} are missing."
+        f"Every eigenvalue that inertia counts must be found; {len(pairs.values)} of {k} were found in {run} runs "
+        f"and {missing} are missing."
     )
+
+
+def _at_once(pencil: Pencil, k: int, report: Callable[[float], None]) -> tuple[Float[np.ndarray, "n j"], Factor]:
+    factor = shift_inside(pencil, k)
+    wanted = Wanted(below=factor.count, above=k - factor.count)
+    return block_lanczos(pencil, factor, wanted, locked=np.empty((pencil.n, 0)), report=report)[1], factor
 
 
 def _in_run(report: Progress, run: int) -> Callable[[float], None]:
@@ -182,8 +197,11 @@ def _orthonormal(pencil: Pencil, vectors: Float[np.ndarray, "n j"]) -> Float[np.
     # One Newton step towards the nearest B-orthonormal columns: they are so up to the tolerance of the iteration.
     gram = vectors.T @ pencil.weigh(vectors)
     identity = np.eye(len(gram))
-    if np.abs(gram - identity).max(initial=0.0) < LOOSE:
+    off = np.abs(gram - identity).max(initial=0.0)
+    if off < LOOSE:
         return vectors
+    if off > SKEW:
+        raise ConvergenceError(f"Vectors of different runs must be B-orthogonal; two are off by {off:.1e}.")
     return vectors @ (1.5 * identity - 0.5 * gram)
 
 

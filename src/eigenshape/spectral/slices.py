@@ -1,0 +1,82 @@
+"""Many eigenvalues a slice at a time: spaces stay small, and so does the cost of keeping them orthogonal."""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float
+
+from eigenshape._errors import ConvergenceError
+from eigenshape.spectral.factor import Factor
+from eigenshape.spectral.lanczos import Wanted, block_lanczos
+from eigenshape.spectral.pencil import Pencil
+from eigenshape.spectral.shift import factorise_near, shift_inside
+
+SLICE = 250  # eigenvalues to a slice: more make the space dear, fewer the factors
+OVERLAP = 12  # eigenvalues past the end of a slice, among which it is cut
+CLEAR_GAP = 1e-5  # of the last eigenvalue: over a gap this wide two slices come out orthogonal
+TRIALS = 5
+FAIR = (0.2, 0.9)  # share of a slice that may lie below its shift
+
+
+def walk(pencil: Pencil, k: int, report: Callable[[float], None]) -> tuple[Float[np.ndarray, "n j"], Factor]:
+    """Return the lowest k eigenvectors as far as they were seen, and the factor at the last shift.
+
+    A slice ends in a clear gap. Where its shift stands above one of n eigenvalues in all, the next shift is placed by
+    the spacing of the last ones found, and the count of its factor tells how many lie between. What a slice does not
+    see, copies of a multiple eigenvalue beyond the width of its block, is left out.
+
+    Raises
+    ------
+    ConvergenceError
+        If a slice does not converge, or has no gap to end in.
+    """
+    parts: list[Float[np.ndarray, "n j"]] = []
+    factor, known, floor = shift_inside(pencil, _next_slice(k, 0)), 0, -np.inf
+    while True:
+        target = _next_slice(k, known)
+        last = known + target >= k
+        above = max(known + target - factor.count, 1 if not last else 0) + (0 if last else OVERLAP)
+        wanted = Wanted(below=factor.count - known, above=above, floor=floor)
+        values, vectors = block_lanczos(
+            pencil, factor, wanted, locked=np.empty((pencil.n, 0)), report=_within(report, known / k, target / k)
+        )
+        if last:
+            return np.hstack([*parts, vectors]), factor
+        kept, following = _cut(values, factor.shift)
+        parts.append(vectors[:, values < following])
+        known = factor.count + kept
+        spacing = (following - float(np.sort(values)[len(values) // 2])) / (len(values) / 2)
+        floor = following
+        factor = _factor_beyond(pencil, floor, spacing, known, _next_slice(k, known))
+
+
+def _next_slice(k: int, known: int) -> int:
+    left = k - known
+    return -(-left // max(-(-left // SLICE), 1))
+
+
+def _within(report: Callable[[float], None], start: float, share: float) -> Callable[[float], None]:
+    return lambda done: report(start + share * done)
+
+
+def _cut(values: Float[np.ndarray, " j"], shift: float) -> tuple[int, float]:
+    """Return how many eigenvalues above the shift the slice keeps, and the middle of the gap it ends in."""
+    above = np.sort(values[values > shift])
+    gaps = np.diff(above[-(OVERLAP + 1) :])
+    widest = int(gaps.argmax()) if gaps.size else 0
+    if not gaps.size or gaps[widest] < CLEAR_GAP * above[-1]:
+        raise ConvergenceError("A slice must end in a clear gap; there is none among the last eigenvalues seen.")
+    kept = len(above) - len(gaps) + widest
+    return kept, float(above[kept - 1] + above[kept]) / 2
+
+
+def _factor_beyond(pencil: Pencil, floor: float, spacing: float, known: int, target: int) -> Factor:
+    """Factor at a shift with about half of the next slice between `floor` and it."""
+    step = spacing * target / 2
+    for _ in range(TRIALS):
+        factor = factorise_near(pencil, floor + step)
+        between = factor.count - known
+        if FAIR[0] * target <= between <= FAIR[1] * target:
+            break
+        step *= min(max(target / 2 / max(between, 0.5), 0.25), 4.0)
+    return factor
