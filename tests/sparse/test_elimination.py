@@ -1,0 +1,87 @@
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from eigenshape.geometry.domains import box
+from eigenshape.geometry.spheres import fibonacci_sphere
+from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.sparse.elimination import analyse, factorise
+
+
+def random_symmetric(n, density, seed):
+    rng = np.random.default_rng(seed)
+    half = sp.random_array((n, n), density=density, rng=rng, data_sampler=lambda size: rng.normal(size=size))
+    matrix = sp.csc_array(half + half.T + sp.diags_array(rng.normal(size=n) + 3 * np.sign(rng.normal(size=n))))
+    matrix.sort_indices()
+    return matrix
+
+
+def solved(matrix, width=3):
+    factor = factorise(analyse(matrix), matrix.data)
+    right = np.random.default_rng(0).normal(size=(matrix.shape[0], width))
+    return factor, right, factor.solve(right)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(1, 400), st.floats(0, 0.06), st.integers(0, 10**6))
+def test_any_pattern_is_factored_counted_and_solved(n, density, seed):
+    matrix = random_symmetric(n, density, seed)
+    factor, right, found = solved(matrix)
+    assert sorted(factor.elimination.order) == list(range(n))
+    dense = matrix.toarray()
+    growth = np.abs(factor.pivots).max() / np.abs(dense).max() + np.abs(dense).max() / np.abs(factor.pivots).min()
+    if growth < 1e5:  # without pivoting, growth is bad luck
+        assert np.count_nonzero(factor.pivots < 0) == np.count_nonzero(np.linalg.eigvalsh(dense) < 0)
+        np.testing.assert_allclose(dense @ found, right, atol=1e-7 * np.abs(found).max() * np.abs(dense).max())
+
+
+@pytest.mark.parametrize("mesh", [fibonacci_sphere(5000), box(9, 9, 9)])
+def test_meshes_below_zero_and_among_their_eigenvalues(mesh):
+    stiffness = sp.csc_array(cotangent_laplacian(mesh).stiffness)
+    elimination = analyse(stiffness)
+    for shift, negative in ((-0.1, 0), (0.1 * stiffness.diagonal().mean(), None)):
+        matrix = sp.csc_array(stiffness - shift * sp.eye_array(mesh.n_points))
+        factor = factorise(elimination, matrix.data)
+        right = np.random.default_rng(1).normal(size=(mesh.n_points, 11))
+        np.testing.assert_allclose(matrix @ factor.solve(right), right, atol=1e-8)
+        count = np.count_nonzero(factor.pivots < 0)
+        assert count == negative if negative is not None else 0 < count < mesh.n_points
+
+
+def test_what_is_full_and_what_falls_apart():
+    full = np.random.default_rng(0).normal(size=(300, 300))
+    for matrix in (full @ full.T + 300 * np.eye(300), np.diag(np.arange(1.0, 400.0))):
+        _, right, found = solved(sp.csc_array(matrix))
+        np.testing.assert_allclose(matrix @ found, right, atol=1e-9)
+
+
+def test_ten_thousand_components():
+    ring = sp.csc_array(sp.block_diag([np.full((3, 3), -1.0) + 3.5 * np.eye(3)] * 10_000))
+    factor, right, found = solved(ring, 1)
+    np.testing.assert_allclose(ring @ found, right, atol=1e-12)
+    assert factor.elimination.n_entries < 5 * 30_000
+
+
+def test_an_arrow_is_eliminated_from_its_feathers():
+    n = 3000
+    arrow = sp.lil_array((n, n))
+    arrow[0, :] = arrow[:, 0] = -1.0
+    arrow.setdiag(float(n))
+    factor, _, _ = solved(sp.csc_array(arrow))
+    assert factor.elimination.n_entries < 6 * n
+
+
+@pytest.mark.parametrize("bad", [0.0, np.nan, np.inf])
+def test_a_pivot_that_is_none(bad):
+    chain = sp.csc_array(sp.diags_array([-np.ones(9), np.full(10, 2.0), -np.ones(9)], offsets=[-1, 0, 1]))
+    assert factorise(analyse(chain), chain.data) is not None
+    alone = sp.csc_array(sp.eye_array(4))
+    assert factorise(analyse(alone), np.array([1.0, bad, 1.0, 1.0])) is None
+
+
+def test_nothing_depends_on_the_run():
+    matrix = sp.csc_array(cotangent_laplacian(fibonacci_sphere(2000)).stiffness + 0.1 * sp.eye_array(2000))
+    one, two = (factorise(analyse(matrix), matrix.data) for _ in range(2))
+    np.testing.assert_array_equal(one.panels, two.panels)
