@@ -107,6 +107,7 @@ from eigenshape.retrieval.describe import DescribedShape, describe, describe_mes
 from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDescriptor
 from eigenshape.retrieval.index import Match, Record, ShapeIndex
 from eigenshape.retrieval.score import match_features, matching_score
+from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.certify import certify
 from eigenshape.spectral.dirichlet import solve_dirichlet
 from eigenshape.spectral.laplacian_laws import check_laplacian
@@ -114,7 +115,7 @@ from eigenshape.spectral.laws import USUAL, Law, NotJudged, OperatorReport
 from eigenshape.spectral.operator_laws import check_operator
 from eigenshape.spectral.signature import heat_kernel_signature, reflection_free_signature
 from eigenshape.spectral.solver import solve_spectrum
-from eigenshape.spectral.spectrum import Certificate, Spectrum
+from eigenshape.spectral.spectrum import Spectrum
 
 __all__ = [
     "CREATURES",

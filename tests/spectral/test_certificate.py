@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from eigenshape.spectral.spectrum import Certificate
+from eigenshape.spectral.certificate import Certificate
 
 WHOLE = Certificate(
     n_pairs=30,

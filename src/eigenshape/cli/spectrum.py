@@ -4,7 +4,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
 import typer
 
 from eigenshape._errors import InvalidParameterError
@@ -69,7 +68,9 @@ def spectrum(
     picture: Annotated[
         Path | None, typer.Option(help="Draw the first eigenfunctions with their nodal lines (PNG, SVG or PDF).")
     ] = None,
-    save: Annotated[Path | None, typer.Option(help="Write eigenvalues and eigenvectors (NumPy .npz).")] = None,
+    save: Annotated[
+        Path | None, typer.Option(help="Write the spectrum with its proof (.npz; Spectrum.load reads it).")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Compute the lowest eigenvalues of a shape and prove that none is missing."""
@@ -138,7 +139,5 @@ def _write(shape: Shape, found: Spectrum, *, plot: Path | None, picture: Path | 
         save_figure(figure_eigenfunctions(shape, found, indices), picture)
         said(picture)
     if save:
-        np.savez_compressed(
-            save, eigenvalues=found.eigenvalues, eigenvectors=found.eigenvectors, residuals=found.residuals
-        )
+        found.save(save)
         said(save)

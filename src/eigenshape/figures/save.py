@@ -1,12 +1,12 @@
 """Figures on disk."""
 
-import os
 from pathlib import Path
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from eigenshape._errors import InvalidParameterError
+from eigenshape._files import replacing
 
 SUFFIXES = (".png", ".svg", ".pdf")
 
@@ -37,10 +37,7 @@ def save_figure(figure: Figure, path: str | Path) -> None:
     """
     path = require_picture_path(path)
     FigureCanvasAgg(figure)
-    beside = path.with_name(f".{path.name}.{os.getpid()}{path.suffix}")
-    kinds = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-    try:
-        figure.savefig(beside, metadata=kinds[path.suffix.lower()], facecolor="white")
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
+    kind = path.suffix.lower()
+    metadata = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[kind]
+    with replacing(path) as file:
+        figure.savefig(file, format=kind[1:], metadata=metadata, facecolor="white")

@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import UInt8
 
 from eigenshape._errors import FileFormatError, InvalidParameterError, InvalidShapeError
+from eigenshape._files import read_regular, replace_file
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io import glb, obj, off, ply, stl
-from eigenshape.io.files import read_regular, replace_file
 
 FORMATS = {".off": off.parse, ".obj": obj.parse, ".ply": ply.parse, ".stl": stl.parse, ".glb": glb.parse}
 TEXT = {".off": off.format_mesh, ".obj": obj.format_mesh, ".ply": ply.format_text, ".stl": stl.format_text}

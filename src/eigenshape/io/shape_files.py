@@ -7,11 +7,11 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError, InvalidShapeError
+from eigenshape._files import read_regular, replace_file
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.io import mesh_files, obj, pcd, ply, points, unstructured, vtk_polydata
-from eigenshape.io.files import read_regular, replace_file
 
 POINTS = {".pts": points.parse, ".xyz": points.parse, ".pcd": pcd.parse}
 EITHER = {".ply": ply.parse_any, ".obj": obj.parse_any}

@@ -8,10 +8,10 @@ from threadpoolctl import threadpool_limits
 
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.laplacian import Laplacian
+from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.factor import Factor, factorise, rounding
 from eigenshape.spectral.kernel_values import reported, to_pencil
 from eigenshape.spectral.pencil import Pencil, normalise, residual_norms
-from eigenshape.spectral.spectrum import Certificate
 
 RESOLUTION = 1e-6  # relative to the largest eigenvalue: what is closer counts as one cluster
 WIDEST_CLUSTER = 1e-3  # relative too: a chain of close eigenvalues longer than this proves nothing
@@ -95,6 +95,7 @@ def prove(pencil: Pencil, pairs: Pairs, near: Factor | None = None) -> Certifica
         max_residual=_require_eigenpairs(pencil, pairs),
         n_split=0,
     )
+    certificate = replace(certificate, clusters=_clusters(pairs.values, certificate.resolution))
     if k == pencil.n:
         return certificate
     above = _count_beside(pencil, pairs, k - 1, certificate.resolution, near)
@@ -176,6 +177,11 @@ def _count_beside(pencil: Pencil, pairs: Pairs, index: int, step: float, near: F
 def _padded(pencil: Pencil, loss: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     # Rounding wanders from factor to factor, most in rows where there was little.
     return 3 * loss + 0.1 * float(np.median(loss / pencil.mass_diagonal)) * pencil.mass_diagonal
+
+
+def _clusters(values: Float[np.ndarray, " k"], resolution: float) -> tuple[int, ...]:
+    ends = np.flatnonzero(np.append(np.diff(values) > resolution, True))
+    return tuple(np.diff(ends, prepend=-1).tolist())
 
 
 def _scale(pencil: Pencil, pairs: Pairs) -> float:

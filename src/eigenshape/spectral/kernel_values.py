@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.operators.laplacian import GaussianKernel
-from eigenshape.spectral.spectrum import Certificate
+from eigenshape.spectral.certificate import Certificate
 
 LAST_CORRECTED = 0.945  # t μ at t λ = 2.9: of a surface with n = 5 k t/e² points the k-th eigenvalue
 ESSENTIAL = 0.5  # t μ from which the literal form's eigenvalues say nothing of λ; n = 21 k t/e²

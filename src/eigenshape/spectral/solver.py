@@ -14,6 +14,7 @@ from eigenshape._arrays import frozen, whole_number
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.sparse.lane_loops import LANES
+from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.certify import Pairs, in_user_units, prove
 from eigenshape.spectral.factor import Factor
 from eigenshape.spectral.kernel_values import from_pencil, reported, require_readable, widened
@@ -21,7 +22,7 @@ from eigenshape.spectral.lanczos import Wanted, block_lanczos
 from eigenshape.spectral.pencil import Pencil, normalise, rayleigh_residuals
 from eigenshape.spectral.shift import shift_inside
 from eigenshape.spectral.slices import walk
-from eigenshape.spectral.spectrum import Certificate, Spectrum
+from eigenshape.spectral.spectrum import Spectrum
 
 Progress = Callable[[float, str], None]
 Start = Callable[[Pencil, int, Callable[[float], None]], tuple[np.ndarray, Factor]]

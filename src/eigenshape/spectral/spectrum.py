@@ -1,96 +1,15 @@
 """A spectrum and the proof that nothing is missing from it."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-
-@dataclass(frozen=True)
-class Certificate:
-    """Why these are the lowest eigenvalues, with none missing and none extra.
-
-    Sylvester's law of inertia: the factor of W - σB has as many negative pivots as there are eigenvalues below σ.
-    With as many B-orthonormal eigenvectors found, whose error intervals end below σ, none is missing and none is
-    extra. Where the last of the k eigenvalues has equals (to `resolution`) beyond the k, σ stands below all of
-    these equals, and those found at the level of the last eigenvalue are the rest of the k.
-
-    Attributes
-    ----------
-    n_pairs : int
-        Eigenpairs k that are certified.
-    shift : float
-        σ, in 1/length²; infinite where all n eigenvalues were computed.
-    count : int
-        Eigenvalues below σ by inertia.
-    n_found : int
-        Eigenpairs found below σ; equal to `count`, or the spectrum is refused.
-    gap : (float, float)
-        An interval around σ, in 1/length², that is free of eigenvalues up to its upper end by the count and above
-        its lower end by the error intervals of what was found.
-    resolution : float
-        Eigenvalues closer than this, in 1/length², are taken for one: the rounding of the factor and of the
-        eigenvectors, or 1e-6 of the largest eigenvalue where that is more.
-    orthonormality : float
-        Largest entry of |ΦᵀBΦ - I|.
-    max_residual : float
-        Largest of `Spectrum.residuals`, relative to the largest eigenvalue found.
-    n_split : int
-        Eigenvalues equal to the k-th (to `resolution`) that were not asked for. Where it is not 0, the k-th
-        eigenvector is one choice among many inside an eigenspace that was cut.
-    """
-
-    n_pairs: int
-    shift: float
-    count: int
-    n_found: int
-    gap: tuple[float, float]
-    resolution: float
-    orthonormality: float
-    max_residual: float
-    n_split: int
-
-    @property
-    def complete(self) -> bool:
-        """Whether what was found is what there is."""
-        return self.count == self.n_found
-
-    def explain(self) -> str:
-        """Say in plain words what is proved and how."""
-        if not self.complete:
-            return (
-                f"This set of {self.n_pairs} eigenvalues is not proved: {self.count} lie below "
-                f"{self.shift:.6g} (1/length²), and {self.n_found} were found there."
-            )
-        what = f"These are the {self.n_pairs} lowest eigenvalues of the operator: none is missing and none is extra."
-        return " ".join([what, self._how(), self._split()]).strip()
-
-    def _how(self) -> str:
-        quality = (
-            f"The eigenvectors are orthonormal to {self.orthonormality:.1e}, and each eigenvalue is off by at most "
-            f"{self.max_residual:.1e} of the largest."
-        )
-        if np.isinf(self.shift):
-            return f"They are all that a matrix with {self.count} rows has. {quality}"
-        return (
-            f"A factor of W - σB at σ = {self.shift:.6g} (1/length²) has {self.count} negative pivots, so "
-            f"{self.count} eigenvalues lie below σ, and {self.n_found} were found there. {quality}"
-        )
-
-    def _split(self) -> str:
-        if self.n_split == 0:
-            return ""
-        whole = self.n_found, self.n_pairs + self.n_split
-        return (
-            f"The last {self.n_pairs - self.n_found} belong to a cluster of {whole[1] - whole[0]} eigenvalues "
-            f"(equal to {self.resolution:.1e}, 1/length²) of which {self.n_split} were not asked for, so their "
-            f"eigenvectors are one choice among many; {_whole_clusters(*whole)} keeps it whole."
-        )
-
-
-def _whole_clusters(before: int, after: int) -> str:
-    return f"k = {before} or k = {after}" if before else f"k = {after}"
+from eigenshape._arrays import frozen
+from eigenshape.spectral.archive import read_archive, write_archive
+from eigenshape.spectral.certificate import Certificate
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,3 +35,29 @@ class Spectrum:
     mass: sp.csr_array
     residuals: Float[np.ndarray, " k"]
     certificate: Certificate
+
+    def save(self, path: str | Path) -> None:
+        """Write the spectrum to a .npz file, whole or not at all; `load` reads it again to the last digit.
+
+        Raises
+        ------
+        OSError
+            If the system cannot write there.
+        """
+        arrays = {"eigenvalues": self.eigenvalues, "eigenvectors": self.eigenvectors, "residuals": self.residuals}
+        write_archive(path, arrays, self.mass, self.certificate)
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Spectrum":
+        """Read a spectrum that `save` wrote; no code in a file is ever run.
+
+        Raises
+        ------
+        OSError
+            If the system cannot read it.
+        FileFormatError
+            If it is no such file, is cut off, or its parts do not fit one another.
+        """
+        parts = read_archive(path)
+        arrays = {name: frozen(parts[name]) for name in ("eigenvalues", "eigenvectors", "residuals")}
+        return cls(**arrays, mass=parts["mass"], certificate=parts["certificate"])

@@ -3,7 +3,10 @@
 import secrets
 import shutil
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 from eigenshape._errors import FileFormatError
 
@@ -33,8 +36,9 @@ def _require_regular(path: Path) -> None:
         raise FileFormatError(f"{path} must be a regular file; it is {kind}.")
 
 
-def replace_file(path: Path, data: bytes) -> None:
-    """Write a file beside its place and move it there, so that nobody ever sees half of it.
+@contextmanager
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """Open a file beside its place and move it there in the end, so that nobody ever sees half of it.
 
     Raises
     ------
@@ -49,9 +53,15 @@ def replace_file(path: Path, data: bytes) -> None:
     beside = path.with_name(f".{secrets.token_hex(8)}.tmp")
     try:
         with beside.open("xb") as file:
-            file.write(data)
+            yield file
         if replaced:
             shutil.copymode(path, beside)
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)
+
+
+def replace_file(path: Path, data: bytes) -> None:
+    """Write these bytes to a file, as `replacing` does."""
+    with replacing(path) as file:
+        file.write(data)

@@ -1,0 +1,101 @@
+"""The proof that nothing is missing from a spectrum."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Why these are the lowest eigenvalues, with none missing and none extra.
+
+    Sylvester's law of inertia: the factor of W - σB has as many negative pivots as there are eigenvalues below σ.
+    With as many B-orthonormal eigenvectors found, whose error intervals end below σ, none is missing and none is
+    extra. Where the last of the k eigenvalues has equals (to `resolution`) beyond the k, σ stands below all of
+    these equals, and those found at the level of the last eigenvalue are the rest of the k.
+
+    Attributes
+    ----------
+    n_pairs : int
+        Eigenpairs k that are certified.
+    shift : float
+        σ, in 1/length²; infinite where all n eigenvalues were computed.
+    count : int
+        Eigenvalues below σ by inertia.
+    n_found : int
+        Eigenpairs found below σ; equal to `count`, or the spectrum is refused.
+    gap : (float, float)
+        An interval around σ, in 1/length², that is free of eigenvalues up to its upper end by the count and above
+        its lower end by the error intervals of what was found.
+    resolution : float
+        Eigenvalues closer than this, in 1/length², are taken for one: the rounding of the factor and of the
+        eigenvectors, or 1e-6 of the largest eigenvalue where that is more.
+    orthonormality : float
+        Largest entry of |ΦᵀBΦ - I|.
+    max_residual : float
+        Largest of `Spectrum.residuals`, relative to the largest eigenvalue found.
+    n_split : int
+        Eigenvalues equal to the k-th (to `resolution`) that were not asked for. Where it is not 0, the k-th
+        eigenvector is one choice among many inside an eigenspace that was cut.
+    clusters : tuple of int
+        Sizes of the clusters that the eigenvalues fall into, ascending: within one, neighbours are equal to 1e-6 of
+        the largest eigenvalue, or to the rounding of the vectors where that is more.
+    """
+
+    n_pairs: int
+    shift: float
+    count: int
+    n_found: int
+    gap: tuple[float, float]
+    resolution: float
+    orthonormality: float
+    max_residual: float
+    n_split: int
+    clusters: tuple[int, ...] = ()
+
+    @property
+    def complete(self) -> bool:
+        """Whether what was found is what there is."""
+        return self.count == self.n_found
+
+    def explain(self) -> str:
+        """Say in plain words what is proved and how."""
+        if not self.complete:
+            return (
+                f"This set of {self.n_pairs} eigenvalues is not proved: {self.count} lie below "
+                f"{self.shift:.6g} (1/length²), and {self.n_found} were found there."
+            )
+        what = f"These are the {self.n_pairs} lowest eigenvalues of the operator: none is missing and none is extra."
+        return " ".join([what, self._how(), self._split()]).strip()
+
+    def _how(self) -> str:
+        quality = (
+            f"The eigenvectors are orthonormal to {self.orthonormality:.1e}, and each eigenvalue is off by at most "
+            f"{self.max_residual:.1e} of the largest."
+        )
+        if np.isinf(self.shift):
+            return f"They are all that a matrix with {self.count} rows has. {quality}{self._clusters()}"
+        return (
+            f"A factor of W - σB at σ = {self.shift:.6g} (1/length²) has {self.count} negative pivots, so "
+            f"{self.count} eigenvalues lie below σ, and {self.n_found} were found there. {quality}{self._clusters()}"
+        )
+
+    def _clusters(self) -> str:
+        largest = max(self.clusters, default=1)
+        if largest == 1:
+            return ""
+        return f" Some are equal: there are {len(self.clusters)} different ones, and the largest cluster has {largest}."
+
+    def _split(self) -> str:
+        if self.n_split == 0:
+            return ""
+        whole = self.n_found, self.n_pairs + self.n_split
+        return (
+            f"The last {self.n_pairs - self.n_found} belong to a cluster of {whole[1] - whole[0]} eigenvalues "
+            f"(equal to {self.resolution:.1e}, 1/length²) of which {self.n_split} were not asked for, so their "
+            f"eigenvectors are one choice among many; {_whole_clusters(*whole)} keeps it whole."
+        )
+
+
+def _whole_clusters(before: int, after: int) -> str:
+    return f"k = {before} or k = {after}" if before else f"k = {after}"
