@@ -9,8 +9,8 @@ from jaxtyping import Float, Int
 from eigenshape._arrays import frozen, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.facets import FacetTable, facet_components, facet_table, without_pinches
-from eigenshape.geometry.simplices import require_volumes
-from eigenshape.geometry.simplicial import Mesh
+from eigenshape.geometry.simplices import in_length, require_volumes, size_one
+from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices, require_simplices_everywhere
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import interpolation_constants, longest_edges
@@ -112,7 +112,7 @@ def bracket_eigenvalues(
     Raises
     ------
     InvalidShapeError
-        If a simplex has no volume, a point no simplex, or floats cannot hold lengths to the powers needed.
+        If a simplex has no volume, a point no simplex, or floats cannot hold 1/length².
     InvalidParameterError
         If `boundary` is neither of the two, or "dirichlet" on a mesh without boundary or without points inside; or k
         is not in range.
@@ -122,19 +122,23 @@ def bracket_eigenvalues(
     _require_condition(boundary)
     require_volumes(mesh)
     require_simplices_everywhere(mesh)
-    table = facet_table(mesh)
+    points, scale = size_one(mesh.points)
+    unit = SimplicialMesh(points, mesh.simplices)
+    table = facet_table(unit)
     held = table.boundary if boundary == "dirichlet" else NOTHING
-    upper, rounding = _upper_bounds(mesh, k, boundary, progress)
-    lower = lower_bounds(mesh, table, len(upper), held, progress)
+    upper, rounding = _upper_bounds(unit, k, boundary, progress)
+    lower = lower_bounds(unit, table, len(upper), held, progress)
     n_zero = min(_n_zero(table, held), len(upper))
     lower[:n_zero] = upper[:n_zero] = 0.0
+    if progress:
+        progress(1.0, "bracketed")
     return Brackets(
-        lower=frozen(lower),
-        upper=frozen(upper),
+        lower=frozen(in_length(lower, scale, -2)),
+        upper=frozen(in_length(upper, scale, -2)),
         boundary=boundary,
         n_zero=n_zero,
-        longest_edge=float(longest_edges(mesh).max()),
-        constant=float(interpolation_constants(mesh).max()),
+        longest_edge=scale * float(longest_edges(unit).max()),
+        constant=scale * float(interpolation_constants(unit).max()),
         rounding=rounding,
     )
 

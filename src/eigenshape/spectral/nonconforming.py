@@ -45,7 +45,7 @@ def lower_bounds(
     done = 0.6
     for weight in _weights(values, mean, largest):
         n_served = min(int(np.count_nonzero(best <= weight)) + 1, k)
-        after = done + 0.4 / STEP * (n_served / k)
+        after = min(done + 0.4 / STEP * (n_served / k), 1.0)
         found = solve(measure / (1 - weight * squares), n_served, partly(progress, done, after))
         bounds = found / (1 + largest * np.maximum(found - weight, 0.0))
         best[:n_served] = np.maximum(best[:n_served], bounds)
