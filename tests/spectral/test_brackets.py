@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from pencils import TETRAHEDRON
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
 from eigenshape.geometry import exact
 from eigenshape.geometry.domains import ball, box, circle, disc, interval, irregular_grid
 from eigenshape.geometry.mesh import TriangleMesh
@@ -187,6 +187,24 @@ def test_uneven_edges_are_bracketed_and_the_weights_pay(condition, monkeypatch):
     np.testing.assert_array_equal(unweighed.upper, found.upper)
     gaps = [1 - ends.lower[ends.n_zero :] / known[ends.n_zero :] for ends in (found, unweighed)]
     assert np.median(gaps[0]) < 0.75 * np.median(gaps[1])
+
+
+def test_a_weight_that_cannot_be_solved_is_left_out(monkeypatch):
+    mesh, solves = graded(12), []
+
+    def solve_once(laplacian, k, held, progress):
+        solves.append(k)
+        if len(solves) > 1:
+            raise ConvergenceError("Every eigenvalue that inertia counts must be found; some are not.")
+        return solve_spectrum(laplacian, k)
+
+    monkeypatch.setattr("eigenshape.spectral.nonconforming.solve_free", solve_once)
+    found = bracket_eigenvalues(mesh, 10)
+    assert len(solves) > 2
+    assert solves == sorted(solves, reverse=True)
+    monkeypatch.undo()
+    monkeypatch.setattr("eigenshape.spectral.nonconforming.EVEN", np.inf)
+    np.testing.assert_array_equal(found.lower, bracket_eigenvalues(mesh, 10).lower)
 
 
 def test_one_long_edge_spoils_little():

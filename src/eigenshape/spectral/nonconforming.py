@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float, Int
 
+from eigenshape._errors import ConvergenceError
 from eigenshape.geometry.facets import FacetTable
 from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import Mesh
@@ -46,10 +47,13 @@ def lower_bounds(
     for weight in _weights(values, mean, largest):
         n_served = min(int(np.count_nonzero(best <= weight)) + 1, k)
         after = min(done + 0.4 / STEP * (n_served / k), 1.0)
-        found = solve(measure / (1 - weight * squares), n_served, partly(progress, done, after))
+        report, done = partly(progress, done, after), after
+        try:
+            found = solve(measure / (1 - weight * squares), n_served, report)
+        except ConvergenceError:
+            continue  # a weight may only better the bounds, which stand without
         bounds = found / (1 + largest * np.maximum(found - weight, 0.0))
         best[:n_served] = np.maximum(best[:n_served], bounds)
-        done = after
     return np.maximum.accumulate(best)
 
 
