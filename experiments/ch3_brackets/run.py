@@ -26,13 +26,15 @@ Mesh = es.TriangleMesh | es.SimplicialMesh
 class Case:
     """A shape, with what is known of it.
 
-    `bracketed` and `refined` are the times that its triangles are split for the brackets and for the truth; `edge` is
-    that of a tetrahedron, `period` of a torus, `sides` of a box.
+    `bracketed`, `refined` and `followed` are the times that its simplices are split for the brackets, for the truth and
+    for the first of three meshes that show the order; `edge` is that of a tetrahedron, `period` of a torus, `sides`
+    of a box.
     """
 
     mesh: Mesh
     bracketed: int = 0
     refined: int = 1
+    followed: int = 0
     sides: tuple[float, ...] = ()
     period: float = 0.0
     edge: float = 0.0
@@ -64,11 +66,11 @@ def made() -> dict[str, Case]:
     rng = np.random.default_rng(0)
     return {
         "square, irregular": Case(es.irregular_grid(20, 20, rng=rng), sides=(1.0, 1.0)),
-        "polygon of 24 sides": Case(es.disc(4), bracketed=2, refined=3),
+        "polygon of 24 sides": Case(es.disc(4), bracketed=2, refined=3, followed=2),
         "flat torus in R⁴": flat_torus(20),
-        "tetrahedron": Case(tetrahedron(), bracketed=4, edge=1.0),
-        "cube": Case(skin(es.box(2, 2, 2)), bracketed=3, refined=4),
-        "polyhedron of 80 faces": Case(es.icosphere(1), bracketed=2, refined=3),
+        "tetrahedron": Case(tetrahedron(), bracketed=4, followed=4, edge=1.0),
+        "cube": Case(skin(es.box(2, 2, 2)), bracketed=3, refined=4, followed=3),
+        "polyhedron of 80 faces": Case(es.icosphere(1), bracketed=2, refined=3, followed=3),
         "box of tetrahedra": Case(es.box(4, 4, 4), bracketed=1, sides=(1.0, 1.0, 1.0)),
     }
 
@@ -76,11 +78,15 @@ def made() -> dict[str, Case]:
 def real() -> dict[str, Case]:
     """Return the shapes that are read, where they are there."""
     files = {
-        "eight": (DATA / "classics" / "eight.off", 2),
-        "fox": (DATA / "nasty" / "geometrycentral" / "fox.ply", 3),
-        "glasses": (DATA / "retrieval" / "glasses" / "psb52.ply", 1),
+        "eight": (DATA / "classics" / "eight.off", 2, 0),
+        "fox": (DATA / "nasty" / "geometrycentral" / "fox.ply", 3, 1),
+        "glasses": (DATA / "retrieval" / "glasses" / "psb52.ply", 1, 0),
     }
-    return {name: Case(es.read_shape(path), refined=times) for name, (path, times) in files.items() if path.exists()}
+    return {
+        name: Case(es.read_shape(path), refined=refined, followed=followed)
+        for name, (path, refined, followed) in files.items()
+        if path.exists()
+    }
 
 
 def finer(mesh: Mesh, times: int) -> Mesh:
@@ -120,8 +126,7 @@ def widths(mesh: Mesh, k: int, condition: str) -> np.ndarray:
 
 def order(case: Case, condition: str) -> list[float]:
     """Return the least and the largest order at which brackets narrow over three meshes."""
-    start = max(case.bracketed - (case.mesh.dim == 3), 0)
-    meshes = [finer(case.mesh, start + times) for times in range(3)]
+    meshes = [finer(case.mesh, case.followed + times) for times in range(3)]
     rows = np.array([widths(mesh, FEW, condition) for mesh in meshes])
     slopes = -np.polyfit(np.arange(3) * np.log(2), np.log(rows), 1)[0]
     return [round(float(slopes.min()), 3), round(float(slopes.max()), 3)]

@@ -8,10 +8,14 @@ from pencils import TETRAHEDRON
 from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
 from eigenshape.geometry import exact
 from eigenshape.geometry.domains import ball, box, circle, disc, interval, irregular_grid
+from eigenshape.geometry.facets import without_pinches
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.repair import repair
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, subdivide, torus
 from eigenshape.geometry.topology import boundary_facets
+from eigenshape.io.mesh_files import read_mesh
+from eigenshape.io.shape_files import read_shape
 from eigenshape.operators.crouzeix_raviart import interpolation_constants
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
 from eigenshape.spectral.brackets import bracket_eigenvalues
@@ -320,3 +324,25 @@ def test_flat_faces_and_loose_vertices_are_refused():
         bracket_eigenvalues(flat, 1)
     with pytest.raises(InvalidShapeError, match="Every vertex must belong to a face; vertex 3"):
         bracket_eigenvalues(TriangleMesh([*grid(1, 1).vertices[:3], [9, 9, 9]], [[0, 1, 2]]), 1)
+
+
+@pytest.mark.data
+def test_a_real_solid(data):
+    mesh = read_shape(data / "tets" / "octopus-low.mesh")
+    found = bracket_eigenvalues(mesh, 12)
+    assert_around(found, np.maximum(solve_spectrum(fem_laplacian(mesh, 3), 12).eigenvalues, 0) * (np.arange(12) > 0))
+
+
+@pytest.mark.data
+@pytest.mark.parametrize(
+    "name", ["trimesh/teapot.stl", "geometrycentral/triple_vierbein.obj", "geometrycentral/fan3.obj"]
+)
+def test_real_surfaces_that_are_no_manifolds(data, name):
+    mesh = repair(read_mesh(data / "nasty" / name), ("weld", "drop_degenerate", "drop_unreferenced")).mesh
+    k = min(30, mesh.n_vertices)
+    found = bracket_eigenvalues(mesh, k)
+    fine = without_pinches(finer(mesh, 1))
+    known = solve_spectrum(fem_laplacian(fine, 3), k).eigenvalues.copy()
+    assert (known[: found.n_zero] < 1e-9 * known[-1]).all()
+    known[: found.n_zero] = 0
+    assert_around(found, known)

@@ -56,8 +56,8 @@ class Brackets:
         """Say in plain words what is bounded, and by what."""
         how = (
             f"Each of the {len(self.upper)} lowest eigenvalues of this shape, its simplices taken as flat "
-            f"({self.boundary} condition), lies in its bracket. Linear elements bound it from above, Crouzeix-Raviart "
-            f"elements from below with the interpolation constant {self.constant:.4g}, "
+            f"({self.boundary.capitalize()} condition), lies in its bracket. Linear elements bound it from above, "
+            f"Crouzeix-Raviart elements from below with the interpolation constant {self.constant:.4g}, "
             f"{self.constant / self.longest_edge:.4f} of the longest edge; rounding and residuals are counted in, "
             f"{self.rounding:.1e} at the last."
         )
