@@ -1,42 +1,22 @@
 from dataclasses import FrozenInstanceError
-from itertools import pairwise
 
 import numpy as np
 import pytest
+from intervals import assert_around, finer
 from pencils import TETRAHEDRON
 
-from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry import exact
 from eigenshape.geometry.domains import ball, box, circle, disc, interval, irregular_grid
-from eigenshape.geometry.facets import without_pinches
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import repair
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, subdivide, torus
+from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
 from eigenshape.geometry.topology import boundary_facets
-from eigenshape.io.mesh_files import read_mesh
-from eigenshape.io.shape_files import read_shape
 from eigenshape.operators.crouzeix_raviart import interpolation_constants
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
 from eigenshape.spectral.brackets import bracket_eigenvalues
 from eigenshape.spectral.dirichlet import solve_dirichlet
 from eigenshape.spectral.solver import solve_spectrum
-
-
-def finer(mesh, times):
-    for _ in range(times):
-        mesh = subdivide(mesh)
-    return mesh
-
-
-def assert_around(found, known):
-    assert (found.lower <= known).all()
-    assert (known <= found.upper).all()
-    assert (np.diff(found.lower) >= 0).all()
-    positive = known > 0
-    assert (found.lower[positive] > 0).all()
-    assert (found.lower[~positive] == 0).all()
-    assert (found.upper[~positive] == 0).all()
 
 
 def flat_torus(n):
@@ -170,103 +150,6 @@ def test_names_and_turns_change_nothing():
     np.testing.assert_allclose(one.upper, two.upper, rtol=1e-9)
 
 
-def graded(n):
-    """Return the unit square with columns that grow by 15 % each."""
-    mesh = grid(n, n)
-    places = np.r_[0, np.cumsum(1.15 ** np.arange(n))]
-    points = mesh.vertices.copy()
-    points[:, 0] = (places / places[-1])[np.round(points[:, 0] * n).astype(int)]
-    return TriangleMesh(points, mesh.faces)
-
-
-@pytest.mark.parametrize("condition", ["neumann", "dirichlet"])
-def test_uneven_edges_are_bracketed_and_the_weights_pay(condition, monkeypatch):
-    mesh, known = graded(24), exact.box_eigenvalues(20, (1, 1), condition)
-    found = bracket_eigenvalues(mesh, 20, boundary=condition)
-    assert_around(found, known)
-    monkeypatch.setattr("eigenshape.spectral.nonconforming.EVEN", np.inf)
-    unweighed = bracket_eigenvalues(mesh, 20, boundary=condition)
-    assert_around(unweighed, known)
-    assert (unweighed.lower <= found.lower).all()
-    np.testing.assert_array_equal(unweighed.upper, found.upper)
-    gaps = [1 - ends.lower[ends.n_zero :] / known[ends.n_zero :] for ends in (found, unweighed)]
-    assert np.median(gaps[0]) < 0.75 * np.median(gaps[1])
-
-
-def test_a_weight_that_cannot_be_solved_is_left_out(monkeypatch):
-    mesh, solves = graded(12), []
-
-    def solve_once(laplacian, k, held, progress):
-        solves.append(k)
-        if len(solves) > 1:
-            raise ConvergenceError("Every eigenvalue that inertia counts must be found; some are not.")
-        return solve_spectrum(laplacian, k)
-
-    monkeypatch.setattr("eigenshape.spectral.nonconforming.solve_free", solve_once)
-    found = bracket_eigenvalues(mesh, 10)
-    assert len(solves) > 2
-    assert solves == sorted(solves, reverse=True)
-    monkeypatch.undo()
-    monkeypatch.setattr("eigenshape.spectral.nonconforming.EVEN", np.inf)
-    np.testing.assert_array_equal(found.lower, bracket_eigenvalues(mesh, 10).lower)
-
-
-def test_one_long_edge_spoils_little():
-    # A square cut in fine triangles but for one coarse corner.
-    fine = grid(24, 24)
-    middles = fine.vertices[fine.faces].mean(axis=1)
-    corner = (middles[:, :2] > 2 / 3).all(axis=1)
-    rim = np.array([[2 / 3, y] for y in np.linspace(2 / 3, 1, 9)] + [[x, 2 / 3] for x in np.linspace(2 / 3, 1, 9)[1:]])
-    points = np.concatenate([fine.vertices, [[1, 1, 0]]])
-    places = {tuple(np.round(point[:2] * 24).astype(int)): name for name, point in enumerate(fine.vertices)}
-    names = [places[tuple(np.round(point * 24).astype(int))] for point in rim]
-    chain = [*names[8::-1], *names[9:]]  # down the left side, then along the bottom
-    apex = len(fine.vertices)
-    patch = [[a, b, apex] for a, b in pairwise(chain)]
-    used, faces = np.unique(np.concatenate([fine.faces[~corner], patch]), return_inverse=True)
-    mesh = TriangleMesh(points[used], faces.reshape(-1, 3))
-    known = exact.box_eigenvalues(40)
-    found = bracket_eigenvalues(mesh, 40)
-    assert_around(found, known)
-    unweighed = 1 / (1 + found.constant**2 * known[1:])
-    assert (found.lower[1:] / known[1:] > unweighed).mean() > 0.9
-
-
-def test_parts_that_touch_in_a_point_are_apart():
-    front, back = grid(8, 8), grid(8, 8)
-    points = np.concatenate([front.vertices, back.vertices - [1, 1, 0]])
-    names = np.arange(2 * front.n_vertices)
-    names[2 * front.n_vertices - 1] = 0  # the corner (1, 1) of one is (0, 0) of the other
-    mesh = TriangleMesh(points[:-1], names[np.concatenate([front.faces, back.faces + front.n_vertices])])
-    found = bracket_eigenvalues(mesh, 20)
-    assert found.n_zero == 2
-    assert_around(found, np.repeat(exact.box_eigenvalues(10), 2))
-
-
-def test_three_pages_at_an_edge():
-    # Functions on three unit squares sewn along one side: their mean is Neumann's there, two differences Dirichlet's.
-    page = grid(10, 10)
-    rim = page.vertices[:, 0] == 0
-    points, faces, n = [page.vertices], [page.faces], page.n_vertices
-    for angle in (2.0, 4.0):
-        names = np.where(rim, np.arange(n), np.arange(n) + len(np.concatenate(points)))
-        turned = page.vertices @ [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [0, 0, 1]]
-        points.append(turned)
-        faces.append(names[page.faces])
-    used, corners = np.unique(np.concatenate(faces), return_inverse=True)
-    mesh = TriangleMesh(np.concatenate(points)[used], corners.reshape(-1, 3))
-    modes = np.arange(30)
-    mixed = np.sort(np.add.outer((modes + 0.5) ** 2, modes**2), axis=None) * np.pi**2
-    known = np.sort(np.concatenate([exact.box_eigenvalues(30), np.repeat(mixed[:30], 2)]))[:30]
-    assert_around(bracket_eigenvalues(mesh, 30), known)
-
-
-def test_a_closed_part_stays_free_where_another_is_held():
-    found = bracket_eigenvalues(disjoint_union(icosphere(1), grid(6, 6)), 8, boundary="dirichlet")
-    assert found.n_zero == 1
-    assert found.lower[0] == found.upper[0] == 0 < found.lower[1]
-
-
 def test_values_are_kept_and_explained():
     found = bracket_eigenvalues(grid(8, 8), 5)
     assert found.longest_edge == pytest.approx(2**0.5 / 8)
@@ -281,14 +164,6 @@ def test_values_are_kept_and_explained():
     assert "The first is 0. The brackets are" in text
     assert "The first 2 are 0." in bracket_eigenvalues(disjoint_union(grid(1, 1), grid(1, 1)), 2).explain()
     assert "of their upper ends wide" in bracket_eigenvalues(grid(8, 8), 3, boundary="dirichlet").explain()
-
-
-def test_progress_runs_from_0_to_1():
-    shares = []
-    bracket_eigenvalues(graded(12), 10, progress=lambda share, message: shares.append(share))
-    assert shares[0] == 0
-    assert shares == sorted(shares)
-    assert shares[-1] == pytest.approx(1)
 
 
 @pytest.mark.parametrize("k", [0, 26])
@@ -324,25 +199,3 @@ def test_flat_faces_and_loose_vertices_are_refused():
         bracket_eigenvalues(flat, 1)
     with pytest.raises(InvalidShapeError, match="Every vertex must belong to a face; vertex 3"):
         bracket_eigenvalues(TriangleMesh([*grid(1, 1).vertices[:3], [9, 9, 9]], [[0, 1, 2]]), 1)
-
-
-@pytest.mark.data
-def test_a_real_solid(data):
-    mesh = read_shape(data / "tets" / "octopus-low.mesh")
-    found = bracket_eigenvalues(mesh, 12)
-    assert_around(found, np.maximum(solve_spectrum(fem_laplacian(mesh, 3), 12).eigenvalues, 0) * (np.arange(12) > 0))
-
-
-@pytest.mark.data
-@pytest.mark.parametrize(
-    "name", ["trimesh/teapot.stl", "geometrycentral/triple_vierbein.obj", "geometrycentral/fan3.obj"]
-)
-def test_real_surfaces_that_are_no_manifolds(data, name):
-    mesh = repair(read_mesh(data / "nasty" / name), ("weld", "drop_degenerate", "drop_unreferenced")).mesh
-    k = min(30, mesh.n_vertices)
-    found = bracket_eigenvalues(mesh, k)
-    fine = without_pinches(finer(mesh, 1))
-    known = solve_spectrum(fem_laplacian(fine, 3), k).eigenvalues.copy()
-    assert (known[: found.n_zero] < 1e-9 * known[-1]).all()
-    known[: found.n_zero] = 0
-    assert_around(found, known)

@@ -73,7 +73,7 @@ def interpolation_constants(mesh: Mesh) -> Float[np.ndarray, " s"]:
     the centroid c, and differs from it by h/π at most (Payne and Weinberger 1960; Bebendorf 2003), which is 0.3311 h
     where all edges are h (Carstensen and Puttkammer 2024, κ). A tetrahedron is also the image of a regular one under a
     linear map A, and C ≤ |A| times the constant of that one, 0.147 of its edge: linear maps keep facet means, and
-    ‖∇w‖ shrinks by |A| at most. The smaller of both is taken.
+    ∇(w∘A) is at most |A| times as long as ∇w. The smaller of both is taken.
     """
     corners, scale = scaled_corners(mesh)
     lengths = _edge_lengths(corners)
