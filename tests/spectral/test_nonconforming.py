@@ -6,10 +6,24 @@ from intervals import assert_around
 
 from eigenshape._errors import ConvergenceError
 from eigenshape.geometry import exact
+from eigenshape.geometry.domains import irregular_grid
+from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.surfaces import grid
+from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian
 from eigenshape.spectral.brackets import bracket_eigenvalues
+from eigenshape.spectral.nonconforming import lower_bounds
 from eigenshape.spectral.solver import solve_spectrum
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_on_coarse_triangles_the_elements_alone_are_no_bound(seed):
+    mesh = irregular_grid(4, 4, jitter=0.45, rng=np.random.default_rng(seed))
+    table, free = facet_table(mesh), np.empty(0, dtype=np.int64)
+    known = exact.box_eigenvalues(len(table.facets))
+    assert (lower_bounds(mesh, table, len(known), free, None) <= known).all()
+    alone = solve_spectrum(crouzeix_raviart_laplacian(mesh), len(known)).eigenvalues
+    assert (alone > 1.2 * known).any()
 
 
 def graded(n):
