@@ -32,6 +32,7 @@ from eigenshape.geometry.exact import (
     projective_plane_eigenvalues,
     sphere_eigenvalues,
 )
+from eigenshape.geometry.facets import FacetTable, facet_table
 from eigenshape.geometry.geodesic import geodesic_balls
 from eigenshape.geometry.measure import (
     edge_lengths,
@@ -90,6 +91,7 @@ from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.catalog import OPERATORS, Operator, build_laplacian
 from eigenshape.operators.connection import connection_laplacian, tangent_frames
 from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian, fem_nodes
 from eigenshape.operators.gaussian import (
     functional_laplacian,
@@ -107,6 +109,7 @@ from eigenshape.retrieval.describe import DescribedShape, describe, describe_mes
 from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDescriptor
 from eigenshape.retrieval.index import Match, Record, ShapeIndex
 from eigenshape.retrieval.score import match_features, matching_score
+from eigenshape.spectral.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.certify import certify
 from eigenshape.spectral.dirichlet import solve_dirichlet
@@ -124,12 +127,14 @@ __all__ = [
     "THESIS",
     "USUAL",
     "BatchReport",
+    "Brackets",
     "Camera",
     "Certificate",
     "ConvergenceError",
     "DescribedShape",
     "EdgeTable",
     "EigenshapeError",
+    "FacetTable",
     "FeaturePoints",
     "FileFormatError",
     "GaussianKernel",
@@ -167,6 +172,7 @@ __all__ = [
     "boundary_vertices",
     "box",
     "box_eigenvalues",
+    "bracket_eigenvalues",
     "build_index",
     "build_laplacian",
     "certify",
@@ -176,6 +182,7 @@ __all__ = [
     "cloud_quadrature",
     "connection_laplacian",
     "cotangent_laplacian",
+    "crouzeix_raviart_laplacian",
     "curvature_tensors",
     "cut_by_planes",
     "describe",
@@ -196,6 +203,7 @@ __all__ = [
     "euler_characteristic",
     "face_areas",
     "face_normals",
+    "facet_table",
     "fem_boundary_nodes",
     "fem_laplacian",
     "fem_nodes",

@@ -77,6 +77,18 @@ def test_spectra_by_other_operators(folder):
     assert points["edge_factor"] == 1.8
 
 
+def test_brackets(folder):
+    known = box_eigenvalues(6, (1, 1, 1), "dirichlet")
+    found = run_json("spectrum", folder / "cube.mesh", "-k", 6, "--brackets", "--boundary", "dirichlet")["brackets"]
+    assert (np.array(found["lower"]) <= known).all()
+    assert (known <= np.array(found["upper"])).all()
+    assert (found["boundary"], found["n_zero"]) == ("dirichlet", 0)
+    text = run("spectrum", folder / "disc.off", "-k", 4, "--brackets").stdout
+    assert "lower" in text.splitlines()[2]
+    assert "Each of the 4 lowest eigenvalues" in " ".join(text.split())
+    assert "brackets" not in run_json("spectrum", folder / "disc.off", "-k", 4)
+
+
 def test_a_plot_of_any_spectrum(folder, tmp_path):
     run("spectrum", folder / "cube.mesh", "-k", 4, "--plot", tmp_path / "a.png", "--save", tmp_path / "a.npz")
     assert (tmp_path / "a.png").stat().st_size > 1000
@@ -102,6 +114,7 @@ def test_operators_are_listed():
             "p2 operator takes no option; it was given mass",
         ),
         (("spectrum", "sphere.xyz", "--boundary", "dirichlet"), "--boundary dirichlet is for meshes; a cloud"),
+        (("spectrum", "sphere.xyz", "--brackets"), "--brackets is for meshes; a cloud of points has no flat pieces"),
         (("spectrum", "sphere.xyz", "--picture", "a.png"), "--picture draws triangle meshes; the shape is PointCloud"),
         (("info", "sphere.xyz", "--repair", "weld"), "--repair is for triangle meshes"),
         (("features", "sphere.xyz"), "must be of a known format, .off, .obj"),

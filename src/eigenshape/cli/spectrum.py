@@ -26,12 +26,14 @@ from eigenshape.figures.spectra import figure_spectrum
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.catalog import OPERATORS, build_laplacian, default_operator
 from eigenshape.operators.cotangent import Mass
 from eigenshape.operators.fem import fem_boundary_nodes
 from eigenshape.operators.gaussian import Distance
 from eigenshape.operators.kernel import Correction, Form
 from eigenshape.operators.laplacian import Laplacian
+from eigenshape.spectral.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.dirichlet import solve_dirichlet
 from eigenshape.spectral.solver import Progress, solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
@@ -52,6 +54,9 @@ def spectrum(
         ),
     ] = None,
     boundary: Annotated[Condition, typer.Option(help="Condition on the boundary of a mesh.")] = "neumann",
+    brackets: Annotated[
+        bool, typer.Option("--brackets", help="Bound each eigenvalue of the mesh itself from both sides.")
+    ] = False,
     mass: Annotated[Mass | None, typer.Option(help="Mass matrix of the cotangent operator.")] = None,
     t: Annotated[float | None, typer.Option(help="Heat time of a kernel, in length².")] = None,
     h: Annotated[float | None, typer.Option(help="Width of a kernel, 2√t, in length.")] = None,
@@ -81,15 +86,17 @@ def spectrum(
     options = {name: value for name, value in asked.items() if value is not None}
     found = load_shape(shape, repair, dim, drop_missing=drop_missing)
     _require_drawable(found, picture)
+    bounded = _require_mesh(found) if brackets else None
     name = operator or default_operator(found)
     with progress_bar("spectrum") as progress:
         progress(0.0, "building the operator")
         laplacian = build_laplacian(found, name, **options)
         solved = _solved(found, laplacian, k, ORDERS.get(name, 1), held=boundary == "dirichlet", progress=progress)
+        bounds = bracket_eigenvalues(bounded, k, boundary=boundary, progress=progress) if bounded else None
     if as_json:
-        print_json({"path": str(shape), "operator": name, "boundary": boundary, **options, **_facts(solved)})
+        print_json({"path": str(shape), "operator": name, "boundary": boundary, **options, **_facts(solved, bounds)})
     else:
-        _print(solved)
+        _print(solved, bounds)
     _write(found, solved, plot=plot, picture=picture, save=save)
 
 
@@ -98,6 +105,12 @@ def _require_drawable(shape: Shape, picture: Path | None) -> None:
         raise InvalidParameterError(
             f"--picture draws triangle meshes; the shape is {shape!r}. --plot draws any spectrum."
         )
+
+
+def _require_mesh(shape: Shape) -> Mesh:
+    if isinstance(shape, PointCloud):
+        raise InvalidParameterError("--brackets is for meshes; a cloud of points has no flat pieces to be bounded on.")
+    return shape
 
 
 def _solved(shape: Shape, laplacian: Laplacian, k: int, order: int, *, held: bool, progress: Progress) -> Spectrum:
@@ -111,21 +124,29 @@ def _solved(shape: Shape, laplacian: Laplacian, k: int, order: int, *, held: boo
     return solve_dirichlet(laplacian, k, nodes, progress=progress)
 
 
-def _facts(found: Spectrum) -> dict[str, Any]:
-    return {
+def _facts(found: Spectrum, bounds: Brackets | None) -> dict[str, Any]:
+    facts = {
         "eigenvalues": found.eigenvalues,
         "residuals": found.residuals,
         "certificate": asdict(found.certificate),
     }
+    return facts if bounds is None else {**facts, "brackets": asdict(bounds)}
 
 
-def _print(found: Spectrum) -> None:
+def _print(found: Spectrum, bounds: Brackets | None) -> None:
+    columns = ["i", "λ", "error at most"]
     rows = [
         [str(index), f"{value:.10g}", f"{residual:.1e}"]
         for index, (value, residual) in enumerate(zip(found.eigenvalues, found.residuals, strict=True))
     ]
-    print_table("Eigenvalues, in 1/length²", ["i", "λ", "error at most"], rows)
+    if bounds:
+        columns += ["lower", "upper"]
+        ends = zip(bounds.lower, bounds.upper, strict=True)
+        rows = [[*row, f"{low:.6g}", f"{high:.6g}"] for row, (low, high) in zip(rows, ends, strict=True)]
+    print_table("Eigenvalues, in 1/length²", columns, rows)
     out.print(found.certificate.explain())
+    if bounds:
+        out.print(bounds.explain())
 
 
 def _write(shape: Shape, found: Spectrum, *, plot: Path | None, picture: Path | None, save: Path | None) -> None:

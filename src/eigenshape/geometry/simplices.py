@@ -46,7 +46,7 @@ def in_length(values: Float[np.ndarray, "..."], scale: float, power: int) -> Flo
     """
     exponent = power * (int(np.frexp(scale)[1]) - 1)
     if abs(exponent) > LARGEST_EXPONENT:
-        noun = {1: "lengths", 2: "areas", 3: "volumes"}.get(power, f"{power}-volumes")
+        noun = {-2: "eigenvalues", 1: "lengths", 2: "areas", 3: "volumes"}.get(power, f"{power}-volumes")
         most = 301 // abs(power)
         raise InvalidShapeError(
             f"To measure {noun} the largest coordinate must lie within 1e-{most}..1e{most}; it is about {scale:.0e}. "

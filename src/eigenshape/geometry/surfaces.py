@@ -1,11 +1,15 @@
 """Made-up surfaces whose spectra are known."""
 
+from typing import overload
+
 import numpy as np
 from jaxtyping import Int
 
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
+from eigenshape.geometry.subdivision import halve_simplices
 from eigenshape.geometry.topology import edge_table
 
 
@@ -46,8 +50,21 @@ def _faces_around_origin(points: np.ndarray) -> Int[np.ndarray, "f 3"]:
     return np.array(outward, dtype=np.int64)
 
 
-def subdivide(mesh: TriangleMesh) -> TriangleMesh:
-    """Split each face in four at the middles of its edges."""
+@overload
+def subdivide(mesh: TriangleMesh) -> TriangleMesh: ...
+@overload
+def subdivide(mesh: SimplicialMesh) -> SimplicialMesh: ...
+def subdivide(mesh: Mesh) -> Mesh:
+    """Split each simplex at the middles of its edges: a triangle in four, which face as it does, in general in 2^m.
+
+    Nothing moves: it is the same shape with finer simplices.
+    """
+    if isinstance(mesh, TriangleMesh):
+        return _quartered(mesh)
+    return halve_simplices(mesh)
+
+
+def _quartered(mesh: TriangleMesh) -> TriangleMesh:
     table = edge_table(mesh)
     middles = mesh.vertices[table.edges].mean(axis=1)
     a, b, c = mesh.faces.T

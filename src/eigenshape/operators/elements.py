@@ -45,8 +45,13 @@ def stiffness(
 
 def mass(mesh: Mesh, nodes: Int[np.ndarray, "s nodes"], order: int) -> sp.csr_array:
     """Assemble ∫ N_i N_j, in length^m."""
-    reference = reference_mass(mesh.dim, order)
-    measure = simplex_volumes(mesh)
+    return weighed_mass(simplex_volumes(mesh), nodes, reference_mass(mesh.dim, order))
+
+
+def weighed_mass(
+    measure: Float[np.ndarray, " s"], nodes: Int[np.ndarray, "s nodes"], reference: Float[np.ndarray, "nodes nodes"]
+) -> sp.csr_array:
+    """Assemble a measure of each simplex times one matrix for all."""
     diagonal = np.bincount(nodes.ravel(), weights=np.outer(measure, np.diag(reference)).ravel())
     return (sp.diags_array(diagonal) + _assembled(nodes, measure[:, None, None] * reference)).tocsr()
 

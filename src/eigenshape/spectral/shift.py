@@ -13,6 +13,7 @@ ACCEPTED = (0.45, 0.78)
 TRIALS = 12
 UNIFORM_MESH = 3.6  # λ_k ≈ 3.6 (k/n) trace W / trace B on a surface of equilateral triangles
 LOWEST = 1e-6  # of the first guess: where more eigenvalues than wanted lie lower still, they form a cluster at 0
+LOWER = (1.0, 0.7, 0.4, 0.2)
 NUDGES = (1.0, 1.01, 0.985, 1.03, 0.96)
 BACKWARD_ERROR = 1e-8  # of a solve, entry by entry; a poor pivot shows here
 CLEAR = 1e-5  # relative distance of the shift to an eigenvalue, below which rounding shows in the others
@@ -28,15 +29,25 @@ def shift_inside(pencil: Pencil, k: int) -> Factor:
     guess = SHARE * UNIFORM_MESH * pencil.level * k / pencil.n
     low: Factor | None = None
     high: Factor | None = None
-    factor = factorise_near(pencil, guess)
+    factor = _near_or_below(pencil, guess)
     for _ in range(TRIALS):
         if ACCEPTED[0] * k - 3 <= factor.count <= ACCEPTED[1] * k + 1:
             return factor
         low, high = (factor, high) if factor.count < SHARE * k else (low, factor)
         if high and high.shift < (1.02 * low.shift if low else LOWEST * guess):
             break
-        factor = factorise_near(pencil, _next_shift(factor, low, high, SHARE * k))
+        factor = _near_or_below(pencil, _next_shift(factor, low, high, SHARE * k))
     return low or factorise_near(pencil, -guess)
+
+
+def _near_or_below(pencil: Pencil, shift: float) -> Factor:
+    # Solids and uneven masses may put a guess far up among their eigenvalues, where pivots are poorest.
+    for share in LOWER:
+        try:
+            return factorise_near(pencil, share * shift)
+        except ConvergenceError:
+            continue
+    return factorise_near(pencil, shift)
 
 
 def factorise_near(pencil: Pencil, shift: float) -> Factor:

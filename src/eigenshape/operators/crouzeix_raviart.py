@@ -1,0 +1,106 @@
+"""Crouzeix-Raviart elements: linear on each simplex, and equal in the mean over each facet between two.
+
+Such functions jump across facets, so their eigenvalues are no upper bounds; with the constants here they become lower
+bounds (`spectral.brackets`).
+"""
+
+from math import pi
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float
+
+from eigenshape.geometry.facets import FacetTable, facet_table
+from eigenshape.geometry.simplices import in_length, require_volumes, scaled_corners, simplex_volumes, triangular_sides
+from eigenshape.geometry.simplicial import Mesh
+from eigenshape.geometry.topology import require_simplices_everywhere
+from eigenshape.operators import elements
+from eigenshape.operators.laplacian import Laplacian
+
+TRIANGLE = 0.1893  # of the longest edge
+REGULAR_TETRAHEDRON = 0.147  # of its edge
+
+
+def crouzeix_raviart_laplacian(mesh: Mesh) -> Laplacian:
+    """Build the Laplacian of nonconforming linear elements, whose unknowns are means over facets.
+
+    The function of a facet is ψ_a = 1 - m λ_a on a simplex where corner a lies opposite: 1 on that facet, 0 in the mean
+    on the others. So W sums up m² V ∇λ_a·∇λ_b, and B sums up V (m² - m + 2) / ((m+1)(m+2)) on the diagonal and
+    V (2 - m) / ((m+1)(m+2)) beside it: V/3 and 0 on triangles, 2V/5 and -V/20 on tetrahedra (Crouzeix and Raviart
+    1973). A facet may lie on any number of simplices, which then share one mean; what touches in less than a
+    facet is apart. On segments, where facets are points, these are the linear elements themselves.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh or SimplicialMesh
+
+    Returns
+    -------
+    Laplacian
+        On the facets, in the order of `facet_table(mesh).facets`; its `boundary` is what to hold for the Dirichlet
+        condition. W in length^(m-2), B, the exact mass, in length^m.
+
+    Raises
+    ------
+    InvalidShapeError
+        If a simplex has no volume, a point no simplex, or floats cannot hold lengths to these powers.
+    """
+    require_volumes(mesh)
+    require_simplices_everywhere(mesh)
+    table = facet_table(mesh)
+    weights = elements.stiffness(table.simplex_facets, mesh.dim**2 * elements.gradient_products(mesh), 1)
+    return Laplacian(weights, facet_mass(table, simplex_volumes(mesh)))
+
+
+def facet_mass(table: FacetTable, measure: Float[np.ndarray, " s"]) -> sp.csr_array:
+    """Assemble ∫ ψ_a ψ_b for a measure of each simplex."""
+    m = table.facets.shape[1]
+    reference = (m * m * np.eye(m + 1) + 2 - m) / ((m + 1) * (m + 2))
+    return elements.weighed_mass(measure, table.simplex_facets, reference)
+
+
+def mass_floor(dim: int) -> float:
+    """Return the largest c with B ≥ c diag(B) on one simplex: 1/2 on segments, 1 on triangles, 5/8 on tetrahedra."""
+    return min(dim * dim, dim + 2) / (dim * dim - dim + 2)
+
+
+def interpolation_constants(mesh: Mesh) -> Float[np.ndarray, " s"]:
+    """Bound C with ‖u - Πu‖ ≤ C ‖∇(u - Πu)‖ on each simplex, in length.
+
+    Πu is the linear function with the same mean as u on every facet. On a segment of length h, C = h/π. On a triangle
+    with longest edge h, C = 0.1893 h (Liu 2015; equilateral ones need 0.1891). In any dimension
+    C² = h²/π² + Σ |e|² / (m²(m+1)²(m+2)) over the edges e: w = u - Πu has the mean -(1/mV) ∫ (x - c)·∇w about
+    the centroid c, and differs from it by h/π at most (Payne and Weinberger 1960; Bebendorf 2003), which is 0.3311 h
+    where all edges are h (Carstensen and Puttkammer 2024, κ). A tetrahedron is also the image of a regular one under a
+    linear map A, and C ≤ |A| times the constant of that one, 0.147 of its edge: linear maps keep facet means, and
+    ∇(w∘A) is at most |A| times as long as ∇w. The smaller of both is taken.
+    """
+    corners, scale = scaled_corners(mesh)
+    lengths = _edge_lengths(corners)
+    longest, m = lengths.max(axis=1), mesh.dim
+    if m == 1:
+        bounds = longest / pi
+    elif m == 2:
+        bounds = TRIANGLE * longest
+    else:
+        bounds = np.sqrt((longest / pi) ** 2 + (lengths**2).sum(axis=1) / (m**2 * (m + 1) ** 2 * (m + 2)))
+    if m == 3:
+        bounds = np.minimum(bounds, REGULAR_TETRAHEDRON * _stretch(corners))
+    return in_length(bounds, scale, 1)
+
+
+def longest_edges(mesh: Mesh) -> Float[np.ndarray, " s"]:
+    """Return the length of the longest edge of each simplex."""
+    corners, scale = scaled_corners(mesh)
+    return in_length(_edge_lengths(corners).max(axis=1), scale, 1)
+
+
+def _edge_lengths(corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndarray, "s edges"]:
+    first, second = np.triu_indices(corners.shape[1], 1)
+    return np.linalg.norm(corners[:, first] - corners[:, second], axis=2)
+
+
+def _stretch(corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndarray, " s"]:
+    """Return |A| of the linear map to each tetrahedron from the regular one with edges of length 1."""
+    regular = np.linalg.cholesky((np.eye(3) + 1) / 2).T
+    return np.linalg.norm(triangular_sides(corners)[1] @ np.linalg.inv(regular), 2, axis=(1, 2))

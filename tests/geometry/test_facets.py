@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+
+from eigenshape.geometry.domains import ball, box, interval
+from eigenshape.geometry.facets import facet_components, facet_table, without_pinches
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplicial import SimplicialMesh
+from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere
+from eigenshape.geometry.topology import boundary_facets, edge_table
+
+BOWTIE = TriangleMesh([[0, 0, 0], [1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]], [[0, 1, 2], [4, 3, 0]])
+
+
+def test_two_triangles_by_hand():
+    table = facet_table(TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [3, 0, 2]]))
+    assert table.facets.tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [2, 3]]
+    assert table.simplex_facets.tolist() == [[3, 1, 0], [1, 4, 2]]
+    assert table.n_simplices.tolist() == [1, 2, 1, 1, 1]
+    assert table.boundary.tolist() == [0, 2, 3, 4]
+
+
+def test_on_triangles_it_is_the_edge_table():
+    mesh = icosphere(1)
+    table, edges = facet_table(mesh), edge_table(mesh)
+    np.testing.assert_array_equal(table.facets, edges.edges)
+    np.testing.assert_array_equal(table.simplex_facets, edges.face_edges)
+    np.testing.assert_array_equal(table.n_simplices, edges.n_faces)
+    assert not table.boundary.size
+
+
+@pytest.mark.parametrize("mesh", [interval(4), grid(3, 2), box(2, 2, 2)])
+def test_a_facet_lies_opposite_to_its_corner(mesh):
+    table = facet_table(mesh)
+    for simplex, facets in zip(mesh.simplices, table.simplex_facets, strict=True):
+        for corner, facet in zip(simplex, facets, strict=True):
+            assert {corner, *table.facets[facet]} == set(simplex)
+    np.testing.assert_array_equal(table.facets[table.boundary], boundary_facets(mesh))
+
+
+def test_three_triangles_may_share_a_facet():
+    book = TriangleMesh([[0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0]], [[0, 1, 2], [0, 1, 3], [0, 1, 4]])
+    table = facet_table(book)
+    assert table.n_simplices.tolist() == [3, 1, 1, 1, 1, 1, 1]
+    assert facet_components(table)[0] == 1
+    np.testing.assert_array_equal(without_pinches(book).simplices, book.faces)
+
+
+def test_what_touches_in_a_point_is_apart():
+    assert facet_components(facet_table(BOWTIE)) == (2, pytest.approx([0, 1]))
+    opened = without_pinches(BOWTIE)
+    assert opened.simplices.tolist() == [[0, 2, 3], [5, 4, 1]]
+    np.testing.assert_array_equal(opened.points[opened.simplices], BOWTIE.vertices[BOWTIE.faces])
+
+
+def test_what_touches_in_an_edge_of_tetrahedra_is_apart():
+    points = [[0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]]
+    mesh = SimplicialMesh(points, [[0, 1, 2, 3], [0, 1, 4, 5]])
+    assert facet_components(facet_table(mesh))[0] == 2
+    assert without_pinches(mesh).n_points == 8
+
+
+@pytest.mark.parametrize("mesh", [interval(4), icosphere(1), ball(4), disjoint_union(grid(2, 2), icosphere(0))])
+def test_sound_meshes_keep_their_points(mesh):
+    opened = without_pinches(mesh)
+    np.testing.assert_array_equal(opened.points, mesh.points)
+    np.testing.assert_array_equal(opened.simplices, mesh.simplices)
+
+
+def test_two_parts_are_numbered():
+    count, labels = facet_components(facet_table(disjoint_union(grid(1, 1), grid(1, 1))))
+    assert count == 2
+    assert labels.tolist() == [0, 0, 1, 1]
