@@ -25,7 +25,7 @@ from machine import describe
 from rich.console import Console
 from spectrum_cases import FULL, QUICK, Case
 from spectrum_libraries import LIBRARIES, OURS
-from spectrum_tables import markdown, printed
+from spectrum_tables import markdown, printed, put
 
 import eigenshape as es
 
@@ -48,7 +48,11 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument(
         "--json", type=Path, help="write all figures; cases that the file has and this run not are kept"
     )
-    parser.add_argument("--markdown", type=Path, help="write the table of the JSON, or of this run")
+    parser.add_argument(
+        "--markdown",
+        type=Path,
+        help="write the table of this run, with the cases that the JSON keeps; into a page between its two marks",
+    )
     return parser.parse_args(argv)
 
 
@@ -155,7 +159,7 @@ def main(argv: list[str] | None = None) -> None:
         if options.json:
             options.json.write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n")
     if options.markdown:
-        options.markdown.write_text(markdown(report))
+        put(options.markdown, markdown(report))
 
 
 if __name__ == "__main__":

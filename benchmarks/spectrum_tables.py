@@ -1,8 +1,11 @@
 """The figures of `bench_spectrum.py` as tables for a terminal and for a page."""
 
+from pathlib import Path
+
 from rich.table import Table
 
 TIE = 1.4
+BEGIN, END = "<!-- bench_spectrum.py --markdown -->\n", "<!-- end -->\n"
 HEADER = ("library", "CPU s", "ratio", "wall s", "MiB", "worst residual", "wrong", "missing")
 
 
@@ -40,7 +43,10 @@ def printed(rows: list[dict[str, object]]) -> Table:
 
 
 def _title(row: dict[str, object]) -> str:
-    return f"{row['title']}, n = {row['n']:,}, k = {row['k']}"
+    runs = len(row.get("cpu_runs", ()))
+    return f"{row['title']}, n = {row['n']:,}, k = {row['k']}" + (
+        f" ({runs} run{'s' * (runs > 1)})" if runs != 3 else ""
+    )
 
 
 def measured_on(report: dict[str, object]) -> str:
@@ -50,7 +56,7 @@ def measured_on(report: dict[str, object]) -> str:
     return (
         f"Measured {report['date']} on one of {machine['cores']} cores, {machine['cpu']}, {machine['memory_gib']} GiB, "
         f"load {machine['load'][0]} at the start; {machine['system']}, Python {machine['python']}; "
-        f"{', '.join([*versions, *machine['blas']])}. Medians of {report['settings']['repeats']}."
+        f"{', '.join([*versions, *machine['blas']])}. Medians of three unless the table says so."
     )
 
 
@@ -67,3 +73,12 @@ def markdown(report: dict[str, object]) -> str:
         lines.append(f"| {_title(row) if row['case'] != before else ''} | {' | '.join(cells(row))} |")
         before = row["case"]
     return "\n".join(lines) + "\n"
+
+
+def put(path: Path, text: str) -> None:
+    """Write a section to a file; where the file has the two marks, between them."""
+    page = path.read_text() if path.exists() else ""
+    if BEGIN in page and END in page.split(BEGIN)[1]:
+        before, rest = page.split(BEGIN)
+        text = before + BEGIN + "\n" + text + "\n" + END + rest.split(END, 1)[1]
+    path.write_text(text)

@@ -64,7 +64,7 @@ def test_the_script_runs_and_its_json_has_what_it_should(tmp_path):
         assert row["residual"] < 1e-9
         assert row["wrong"] == row["missing"] == row["missing_by_inertia"] == 0
     assert found["rows"][0]["ratio"] == 1.0
-    assert "| torus, n = 864, k = 12 | eigenshape |" in page.read_text()
+    assert "| torus, n = 864, k = 12 (2 runs) | eigenshape |" in page.read_text()
     assert "|  | LaPy, lumped |" in page.read_text()
 
 
@@ -148,3 +148,13 @@ def test_a_graph_comes_back_from_its_file(modules, tmp_path):
     adjacency = modules["worker"].load(tmp_path / "graph.npz")["adjacency"]
     assert (adjacency != es.neighbor_graph(case.make(), case.neighbors)).nnz == 0
     assert n == adjacency.shape[0] == 800
+
+
+def test_a_section_goes_between_the_marks_of_a_page(modules, tmp_path):
+    tables, page = modules["tables"], tmp_path / "page.md"
+    page.write_text(f"before\n{tables.BEGIN}old\n{tables.END}after\n")
+    tables.put(page, "new\n")
+    tables.put(page, "newer\n")
+    assert page.read_text() == f"before\n{tables.BEGIN}\nnewer\n\n{tables.END}after\n"
+    tables.put(tmp_path / "fresh.md", "new\n")
+    assert (tmp_path / "fresh.md").read_text() == "new\n"
