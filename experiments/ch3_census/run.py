@@ -1,4 +1,4 @@
-"""How often does a sparse eigensolver return a wrong set? (thesis 2.3: every later chapter stands on the spectrum).
+"""How often does a sparse eigensolver return a wrong set? (thesis 3.4 and all that stands on spectra).
 
 Thousands of solves on shapes with multiple eigenvalues, each beside a dense solve of the same matrices. One is wrong
 where one of its k eigenvalues is off by more than 1e-8 of the largest of them, or where it ends in an exception.
