@@ -22,6 +22,7 @@ from threadpoolctl import threadpool_limits
 import eigenshape as es
 
 WRONG = 1e-6  # of the largest eigenvalue in the list
+CLEAR = 1e-4  # of the same: a gap that a factor's rounding does not cross
 
 
 def load(path: Path) -> Shape:
@@ -106,12 +107,12 @@ def missing(values: np.ndarray, expected: np.ndarray) -> int:
 
 
 def missing_by_inertia(values: np.ndarray, matrices: Matrices) -> int | None:
-    """Count what lies below the widest gap in the list's upper half and is not in the list (Sylvester's law).
+    """Count what lies below the last clear gap of the list and is not in the list (Sylvester's law).
 
     A factor by SuperLU alone, without a line of our solver; None where SuperLU had to exchange rows.
     """
-    half = len(values) // 2
-    last = half + int(np.argmax(np.diff(values[half:])))
+    gaps = np.diff(values)
+    last = int(np.flatnonzero(gaps >= min(CLEAR * np.abs(values).max(), gaps.max()))[-1])
     shift = (values[last] + values[last + 1]) / 2
     factor = splu(
         sp.csc_matrix(matrices[0] - shift * matrices[1]),
