@@ -66,6 +66,9 @@ def test_the_script_runs_and_its_json_has_what_it_should(tmp_path):
     assert found["rows"][0]["ratio"] == 1.0
     assert "| torus, n = 864, k = 12 (2 runs) | eigenshape |" in page.read_text()
     assert "|  | LaPy, lumped |" in page.read_text()
+    again = tmp_path / "again.md"
+    subprocess.run([*command[:2], "--no-run", "--json", report, "--markdown", again], check=True)
+    assert again.read_text() == page.read_text()
 
 
 def test_every_library_solves_the_pencil_that_it_says(modules):
@@ -129,6 +132,8 @@ def test_cases_of_an_earlier_run_are_kept(modules, tmp_path):
     path.write_text(json.dumps({"rows": [{"case": "torus"}, {"case": "dragon"}]}))
     assert modules["bench"].kept(path, {"torus": None}) == [{"case": "dragon"}]
     assert modules["bench"].kept(tmp_path / "absent.json", {}) == []
+    rows = [{"case": name} for name in ("own.off", "dragon", "sphere-10k")]
+    assert modules["bench"].in_order(rows) == rows[::-1]
 
 
 def test_cases_by_name_and_meshes_of_ones_own(modules, tmp_path):
