@@ -1,73 +1,179 @@
-"""CPU time of `solve_spectrum` beside ARPACK in shift-invert mode, in one run on one core.
+"""Time, memory, residuals and missed eigenvalues of `solve_spectrum` beside other libraries, in one run on one core.
 
-    python benchmarks/bench_spectrum.py                      icospheres
-    python benchmarks/bench_spectrum.py a.off b.ply -k 300   meshes of your own
+    python benchmarks/bench_spectrum.py                              everything; an hour or two
+    python benchmarks/bench_spectrum.py --quick                      three small shapes, a minute
+    python benchmarks/bench_spectrum.py --cases dragon --libraries eigenshape,LaPy
+    python benchmarks/bench_spectrum.py a.off b.ply -k 300           meshes of your own
 
-ARPACK is called as libraries call it (scipy.sparse.linalg.eigsh, a small negative shift, its default tolerance) and
-proves nothing; our time includes the proof. Each figure is the median of three. A ratio under 1.4 is a tie.
+Every library is called as its documentation does (`spectrum_libraries.py`), each time in a new process with one thread,
+and they take turns: A B C, A B C, A B C. A figure is the median of its repetitions; a ratio to ours under 1.4 is a tie.
+Ours includes the proof that nothing is missing, theirs prove nothing; so what they return is compared with the
+certified eigenvalues of their own matrices.
 """
 
 import argparse
+import datetime
+import json
+import os
 import statistics
+import subprocess
 import sys
-import time
-from collections.abc import Callable
+import tempfile
 from pathlib import Path
 
-import numpy as np
-import scipy.sparse.linalg as spl
-from threadpoolctl import threadpool_limits
+from machine import describe
+from rich.console import Console
+from spectrum_cases import FULL, QUICK, Case
+from spectrum_libraries import LIBRARIES, OURS
+from spectrum_tables import markdown, printed, put
 
-from eigenshape import Laplacian, cotangent_laplacian, icosphere, read_mesh, solve_spectrum
+import eigenshape as es
 
-REPEATS = 3
-
-
-def arpack(laplacian: Laplacian, k: int) -> np.ndarray:
-    """Shift-invert ARPACK, the shift being a hundredth of the first eigenvalue's size."""
-    level = laplacian.stiffness.trace() / laplacian.mass.trace()
-    shift = -0.01 * level / laplacian.n_points
-    return spl.eigsh(laplacian.stiffness.tocsc(), k, M=laplacian.mass.tocsc(), sigma=shift, return_eigenvectors=True)[0]
+WORKER = Path(__file__).with_name("spectrum_worker.py")
+MEDIANS = ("cpu", "wall", "cpu_build", "memory", "memory_peak", "residual")
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "IGL_NUM_THREADS")
+ALSO = ["numpy", "scipy", "numba", "threadpoolctl"]
 
 
-def median_seconds(run: Callable[[], object]) -> float:
-    """Median CPU time of a few runs."""
-    times = []
-    for _ in range(REPEATS):
-        start = time.process_time()
-        run()
-        times.append(time.process_time() - start)
-    return statistics.median(times)
-
-
-def row(name: str, laplacian: Laplacian, k: int) -> str:
-    """One line of the table: sizes, times, ratio and the largest difference of eigenvalues."""
-    ours = median_seconds(lambda: solve_spectrum(laplacian, k))
-    theirs = median_seconds(lambda: arpack(laplacian, k))
-    spectrum = solve_spectrum(laplacian, k)
-    difference = np.abs(spectrum.eigenvalues - np.sort(arpack(laplacian, k))).max() / spectrum.eigenvalues[-1]
-    residual = spectrum.certificate.max_residual
-    return (
-        f"{name:<20} {laplacian.n_points:>7} {k:>5} {ours:>8.2f} {theirs:>8.2f} {theirs / ours:>7.2f} "
-        f"{residual:>10.1e} {difference:>11.1e}"
-    )
-
-
-def main() -> None:
-    """Print the table."""
+def arguments(argv: list[str] | None = None) -> argparse.Namespace:
+    """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("meshes", nargs="*", type=Path)
-    parser.add_argument("-k", type=int, nargs="+", default=[50, 300])
-    arguments = parser.parse_args()
-    shapes = [(path.name, read_mesh(path)) for path in arguments.meshes]
-    shapes = shapes or [(f"icosphere({level})", icosphere(level)) for level in (4, 5)]
-    header = ("n", 7), ("k", 5), ("ours", 8), ("ARPACK", 8), ("ratio", 7), ("residual", 10), ("difference", 11)
-    sys.stdout.write(f"{'mesh':<20} " + " ".join(f"{title:>{width}}" for title, width in header) + "\n")
-    with threadpool_limits(1, user_api="blas"):
-        for name, mesh in shapes:
-            for k in arguments.k:
-                sys.stdout.write(row(name, cotangent_laplacian(mesh), k) + "\n")
-                sys.stdout.flush()
+    parser.add_argument("meshes", nargs="*", type=Path, help="mesh files, instead of the cases")
+    parser.add_argument("--quick", action="store_true", help="small shapes")
+    parser.add_argument("--cases", help=f"of {', '.join(FULL)}; with --quick of {', '.join(QUICK)}")
+    parser.add_argument("--libraries", help="parts of names, separated by commas; ours is always there")
+    parser.add_argument("-k", type=int, help="eigenpairs, instead of what the case has")
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--limit", type=float, default=900.0, help="seconds after which a process is stopped")
+    parser.add_argument(
+        "--json", type=Path, help="write all figures; cases that the file has and this run not are kept"
+    )
+    parser.add_argument("--no-run", action="store_true", help="measure nothing, write the table of the JSON")
+    parser.add_argument(
+        "--markdown",
+        type=Path,
+        help="write the table of this run, with the cases that the JSON keeps; into a page between its two marks",
+    )
+    return parser.parse_args(argv)
+
+
+def chosen_cases(options: argparse.Namespace) -> dict[str, Case]:
+    """Return the cases to run."""
+    if options.meshes:
+        return {
+            path.name: Case(path.name, lambda path=path: es.read_mesh(path), options.k or 300)
+            for path in options.meshes
+        }
+    cases = QUICK if options.quick else FULL
+    names = options.cases.split(",") if options.cases else list(cases)
+    unknown = [name for name in names if name not in cases]
+    if unknown:
+        sys.exit(f"Cases must be of {', '.join(cases)}; {unknown[0]!r} is not.")
+    return {name: cases[name] for name in names}
+
+
+def chosen_libraries(options: argparse.Namespace, takes: str) -> list[str]:
+    """Return ours first, then the others that take such a shape."""
+    parts = options.libraries.lower().split(",") if options.libraries else [""]
+    fitting = [name for name, library in LIBRARIES.items() if library.takes == takes and name != OURS[takes]]
+    return [OURS[takes], *(name for name in fitting if any(part in name.lower() for part in parts))]
+
+
+def run_worker(task: dict[str, object], limit: float) -> dict[str, object]:
+    """Measure once in a new process; what goes wrong there is the result."""
+    environment = os.environ | dict.fromkeys(THREADS, "1")
+    command = [sys.executable, str(WORKER), json.dumps(task)]
+    try:
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=limit, check=False)
+    except subprocess.TimeoutExpired:
+        return {"status": "over the limit", "reason": f"stopped after {limit:g} s"}
+    if done.returncode:
+        last = (done.stderr.strip().splitlines() or [""])[-1]
+        return {"status": "failed", "reason": f"process ended with {done.returncode}: {last}"[:200]}
+    return json.loads(done.stdout.strip().splitlines()[-1])
+
+
+def summary(runs: list[dict[str, object]]) -> dict[str, object]:
+    """Return medians of the runs, and the checks of the first; or why there is none."""
+    bad = next((run for run in runs if run["status"] != "ok"), None)
+    if bad:
+        return bad
+    medians = {key: statistics.median(run[key] for run in runs) for key in MEDIANS}
+    return runs[0] | medians | {"cpu_runs": [run["cpu"] for run in runs]}
+
+
+def run_case(name: str, case: Case, options: argparse.Namespace, console: Console) -> list[dict[str, object]]:
+    """Measure every library on one case, taking turns, and return a row each."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "shape.npz"
+        n = case.save(path)
+        k = min(options.k or case.k, n - 1)
+        runs: dict[str, list[dict[str, object]]] = {library: [] for library in chosen_libraries(options, case.takes)}
+        core = max(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 0
+        for repeat in range(options.repeats):
+            for library, done in runs.items():
+                if done and done[-1]["status"] != "ok":
+                    continue
+                with console.status(f"{name}: {library}, {repeat + 1} of {options.repeats}"):
+                    task = {"shape": str(path), "library": library, "k": k, "core": core, "check": repeat == 0}
+                    done.append(run_worker(task, options.limit))
+    rows = [
+        {"case": name, "title": case.title, "n": n, "k": k, "library": library} | summary(done)
+        for library, done in runs.items()
+    ]
+    return with_ratios(rows)
+
+
+def with_ratios(rows: list[dict[str, object]]) -> list[dict[str, object]]:
+    """Add CPU seconds and memory over ours, which is the first row."""
+    ours = rows[0]
+    for row in rows:
+        if row["status"] == ours["status"] == "ok":
+            row["ratio"] = row["cpu"] / ours["cpu"]
+            row["memory_ratio"] = row["memory"] / ours["memory"] if ours["memory"] > 0 else None
+    return rows
+
+
+def kept(path: Path | None, cases: dict[str, Case]) -> list[dict[str, object]]:
+    """Return the rows of an earlier run that this one does not measure again."""
+    if path is None or not path.exists():
+        return []
+    return [row for row in json.loads(path.read_text())["rows"] if row["case"] not in cases]
+
+
+def in_order(rows: list[dict[str, object]]) -> list[dict[str, object]]:
+    """Return rows in the order of the cases, those of meshes of one's own at the end."""
+    places = {name: place for place, name in enumerate([*FULL, *QUICK])}
+    return sorted(rows, key=lambda row: places.get(row["case"], len(places)))
+
+
+def measure(options: argparse.Namespace) -> dict[str, object]:
+    """Run all chosen cases, print each when it is done, and return the report."""
+    console, cases = Console(), chosen_cases(options)
+    packages = sorted({library.package for library in LIBRARIES.values()})
+    report = {
+        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+        "machine": describe([*packages, *ALSO]),
+        "settings": {"repeats": options.repeats, "limit": options.limit},
+        "calls": {name: library.call for name, library in LIBRARIES.items()},
+        "rows": kept(options.json, cases),
+    }
+    for name, case in cases.items():
+        rows = run_case(name, case, options, console)
+        console.print(printed(rows))
+        report["rows"] = in_order(report["rows"] + rows)
+        if options.json:
+            options.json.write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n")
+    return report
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Measure, print, and write what was asked for."""
+    options = arguments(argv)
+    report = json.loads(options.json.read_text()) if options.no_run else measure(options)
+    report["rows"] = in_order(report["rows"])
+    if options.markdown:
+        put(options.markdown, markdown(report))
 
 
 if __name__ == "__main__":

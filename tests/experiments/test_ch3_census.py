@@ -1,0 +1,90 @@
+"""The census of wrong spectra: the folder says what its run counted, ours is never wrong, and what is wrong is seen."""
+
+import json
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import eigenshape as es
+
+FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch3_census"
+EXPECTED = json.loads((FOLDER / "expected.json").read_text())
+
+
+@pytest.fixture
+def census(monkeypatch):
+    monkeypatch.syspath_prepend(FOLDER)
+    yield runpy.run_path(str(FOLDER / "run.py"))
+    for name in ("census_shapes", "census_solvers"):
+        sys.modules.pop(name, None)
+
+
+def total(result, solver, what):
+    return sum(row[what] for row in result["table"][solver].values())
+
+
+def test_the_readme_shows_the_census(census):
+    text = (FOLDER / "README.md").read_text()
+    assert census["markdown"](EXPECTED) in text
+    solves = total(EXPECTED, "eigenshape", "solves")
+    assert f"{solves:,} solves of {EXPECTED['operators']} operators" in " ".join(text.split())
+
+
+def test_ours_is_never_wrong_and_peers_are():
+    assert total(EXPECTED, "eigenshape", "wrong") == 0
+    assert EXPECTED["failures of ours"] == []
+    assert total(EXPECTED, "eigenshape", "solves") - EXPECTED["dense"] >= 2000
+    assert total(EXPECTED, "ARPACK, σ = -0.01", "absent") > 0
+
+
+def test_a_missing_copy_is_counted(census):
+    case = census["Case"]("one", "one", es.cotangent_laplacian(es.torus(12, 8)))
+    values = census["dense"](case)
+    right = es.solve_spectrum(case.laplacian, 9).eigenvalues
+    longer = es.solve_spectrum(case.laplacian, 10).eigenvalues
+
+    def verdict(found):
+        return census["verdict"](lambda *_: found, case, 9, 0, values)[0]
+
+    assert verdict(right) == verdict(right[::-1]) == "right"
+    assert verdict(right + 1e-7 * right[-1]) == "wrong"
+    assert verdict(np.delete(longer, 1)) == "absent"
+    assert verdict(np.full(9, np.nan)) == "absent"
+    assert census["verdict"](lambda *_: 1 / 0, case, 9, 0, values)[0] == "refused: ZeroDivisionError"
+
+
+def test_numbers_k_cut_clusters_and_keep_them(census):
+    copies = np.repeat([0.0, 1.0, 2.0, 3.0], [1, 3, 5, 91])
+    assert census["sizes"](copies, (4,)) == [4, 6]  # whole at 4; 9 is the next, and 6 cuts it
+    assert census["sizes"](copies, (1,)) == [2]  # one alone is no spectrum
+    assert census["sizes"](np.arange(100.0), (3, 6, 30)) == [3, 6]
+    assert census["sizes"](np.repeat([0.0, 1.0], [1, 99]), (3, 50)) == [24]
+
+
+def test_the_sparse_road_is_taken_where_the_solver_has_switches(census, monkeypatch):
+    solver = sys.modules["eigenshape.spectral.solver"]
+    switches = census["always_sparse"].__globals__["DENSE_SWITCHES"]
+    for name in switches:
+        monkeypatch.setattr(solver, name, getattr(solver, name, None), raising=False)
+    census["always_sparse"]()
+    ours = type(census["SOLVERS"]["eigenshape"])()
+    case = census["Case"]("one", "one", es.cotangent_laplacian(es.icosphere(2)))
+    ours(case, 9, 0)
+    assert ours.dense == 0
+
+
+@pytest.mark.slow
+@pytest.mark.data
+def test_the_quick_census_finds_ours_right(tmp_path):
+    out = tmp_path / "results.json"
+    command = [sys.executable, FOLDER / "run.py", "--quick", "--out", out]
+    subprocess.run(command, check=True, capture_output=True)
+    found = json.loads(out.read_text())
+    assert found["failures of ours"] == []
+    assert total(found, "eigenshape", "wrong") == 0
+    assert total(found, "eigenshape", "solves") > 200
+    assert found["table"].keys() == EXPECTED["table"].keys()
