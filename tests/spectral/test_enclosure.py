@@ -10,8 +10,8 @@ from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.surfaces import grid, icosphere
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian, mass_floor
+from eigenshape.sparse.elimination import EPS
 from eigenshape.spectral.enclosure import enclose, relative_rounding
-from eigenshape.spectral.factor import EPS
 from eigenshape.spectral.solver import solve_spectrum
 
 EQUILATERAL = TriangleMesh([[0, 0, 0], [1, 0, 0], [0.5, 0.75**0.5, 0]], [[0, 1, 2]])
