@@ -72,11 +72,10 @@ def certify(
     return certificate
 
 
-def prove(pencil: Pencil, pairs: Pairs, near: Factor | None = None) -> Certificate:
+def prove(pencil: Pencil, pairs: Pairs) -> Certificate:
     """Count eigenvalues above the last pair, and below its cluster where the cluster goes on.
 
-    The certificate, in the pencil's units, may be incomplete: then `count` differs from `n_found`. A factor at hand
-    saves one.
+    The certificate, in the pencil's units, may be incomplete: then `count` differs from `n_found`.
 
     Raises
     ------
@@ -98,7 +97,7 @@ def prove(pencil: Pencil, pairs: Pairs, near: Factor | None = None) -> Certifica
     certificate = replace(certificate, clusters=_clusters(pairs.values, certificate.resolution))
     if k == pencil.n:
         return certificate
-    above = _count_beside(pencil, pairs, k - 1, certificate.resolution, near)
+    above = _count_beside(pencil, pairs, k - 1, certificate.resolution)
     certificate = _counted(certificate, pairs, above)
     return certificate if above.count <= k else _below_cluster(pencil, pairs, certificate, above)
 
@@ -111,11 +110,11 @@ def in_user_units(pencil: Pencil, certificate: Certificate) -> Certificate:
     return replace(certificate, shift=shift, gap=(low, high), resolution=resolution)
 
 
-def _below_cluster(pencil: Pencil, pairs: Pairs, above: Certificate, near: Factor) -> Certificate:
+def _below_cluster(pencil: Pencil, pairs: Pairs, above: Certificate, beside: Factor) -> Certificate:
     # Eigenvalues below the cluster are counted. The next ones lie above that count, and not above those found.
     jumps = np.flatnonzero(np.diff(pairs.values) > 2 * above.resolution)
     first = int(jumps[-1]) + 1 if jumps.size else 0
-    factor = _count_beside(pencil, pairs, first, -above.resolution, near)
+    factor = _count_beside(pencil, pairs, first, -above.resolution, beside)
     if factor.count > first:
         # Slack may have taken copies of the cluster below σ that are not among the pairs: once more, from farther off.
         farther = FARTHER * (factor.shift - float(pairs.values[first]))
@@ -142,11 +141,11 @@ def _counted(certificate: Certificate, pairs: Pairs, factor: Factor) -> Certific
     )
 
 
-def _count_beside(pencil: Pencil, pairs: Pairs, index: int, step: float, near: Factor | None) -> Factor:
+def _count_beside(pencil: Pencil, pairs: Pairs, index: int, step: float, beside: Factor | None = None) -> Factor:
     """Count at `step` from a value, or farther off where rounding would move a value found across σ.
 
-    A factor tells how much slack the next one needs for its count to stand above rounding (`rounding`): one that is
-    there already, near σ, or a first one.
+    A factor tells how much slack the next one needs for its count to stand above rounding (`rounding`). One that has
+    counted right beside had enough.
     """
     value, shape, spread = float(pairs.values[index]), pairs.vectors[:, index] ** 2, _spread(pairs)
 
@@ -157,8 +156,7 @@ def _count_beside(pencil: Pencil, pairs: Pairs, index: int, step: float, near: F
         return not 2 * taken(slack) < np.abs(pairs.values - (value + step)).min()
 
     none = np.zeros(pencil.n)
-    slack = _padded(pencil, rounding(near)) if near else none
-    slack = none if too_much(slack) else slack
+    slack = none if beside is None or too_much(beside.slack) else beside.slack
     for _ in range(TRIALS):
         factor = factorise(pencil, value + step, slack)
         loss = rounding(factor) if factor else np.full(pencil.n, np.inf)

@@ -160,7 +160,7 @@ def _in_run(report: Progress, run: int) -> Callable[[float], None]:
 
 def _still_wanted(pencil: Pencil, factor: Factor, pairs: Pairs, k: int) -> tuple[Certificate | None, Wanted]:
     """Return the proof as far as it goes, and what a further run has to find."""
-    certificate = prove(pencil, pairs, factor) if len(pairs.values) == k else None
+    certificate = prove(pencil, pairs) if len(pairs.values) == k else None
     missing = certificate.count - certificate.n_found if certificate else k - len(pairs.values)
     missing = min(max(missing, 0), k)
     ceiling = certificate.shift if certificate else np.inf
