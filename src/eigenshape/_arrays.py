@@ -1,6 +1,7 @@
-"""Small checks that name what they check, and freezing of arrays."""
+"""Small checks that name what they check, freezing of arrays, and how much memory there is."""
 
 import operator
+import os
 from typing import Any, SupportsIndex, TypeVar
 
 import numpy as np
@@ -119,3 +120,11 @@ def whole_number(value: SupportsIndex, name: str, low: int, high: int | None = N
     if high is not None and not low <= number <= high:
         raise InvalidParameterError(f"{name} must lie in {low}..{high}; it is {number}.")
     return number
+
+
+def machine_memory() -> float:
+    """Return the bytes of memory of this machine; 8 GiB where it does not tell."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, ValueError, OSError):
+        return 8 * 2.0**30

@@ -4,7 +4,9 @@ import scipy.sparse as sp
 from pencils import cycle, dense_eigenvalues, graph, hypercube, path, tetrahedra, wild
 
 from eigenshape._errors import ConvergenceError, InvalidParameterError
+from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.surfaces import disjoint_union, icosphere, torus
+from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral import solver
@@ -208,3 +210,46 @@ def test_lanczos_that_fails_gives_way_to_a_dense_solve(monkeypatch):
     monkeypatch.setattr(solver, "DENSE_LIMIT", 0)
     with pytest.raises(ConvergenceError, match=r"no"):
         solve_spectrum(laplacian, 20)
+
+
+@pytest.mark.parametrize("mesh", [icosphere(2), icosphere(4)])
+def test_all_below_a_value(mesh):
+    laplacian = cotangent_laplacian(mesh)
+    longer = solve_spectrum(laplacian, 40)
+    for below in (1e-6, 5.0, 11.0, 16.0):
+        found = solve_spectrum(laplacian, below=below)
+        assert len(found.eigenvalues) == np.count_nonzero(longer.eigenvalues < below)
+        assert found.certificate.n_pairs == len(found.eigenvalues) == sum(found.certificate.clusters)
+        assert found.certificate.complete
+        np.testing.assert_allclose(found.eigenvalues, longer.eigenvalues[: len(found.eigenvalues)], atol=1e-11)
+    assert solve_spectrum(laplacian, below=5.0).certificate.clusters == (1, 3)
+    everything = solve_spectrum(cotangent_laplacian(icosphere(1)), below=1e9)
+    assert len(everything.eigenvalues) == 42
+
+
+def test_below_scales_as_eigenvalues_do():
+    small = TriangleMesh(1e-100 * icosphere(2).vertices, icosphere(2).faces)
+    assert len(solve_spectrum(cotangent_laplacian(small), below=5e200).eigenvalues) == 4
+
+
+def test_one_of_k_and_below_is_asked_for():
+    laplacian = cotangent_laplacian(icosphere(1))
+    with pytest.raises(InvalidParameterError, match="One of k and below says which pairs to compute; k is None"):
+        solve_spectrum(laplacian)
+    with pytest.raises(InvalidParameterError, match=r"k is 3 and below is 1\.0"):
+        solve_spectrum(laplacian, 3, below=1.0)
+    with pytest.raises(InvalidParameterError, match="below must"):
+        solve_spectrum(laplacian, below=-1.0)
+    disc_inside = dirichlet_laplacian(laplacian, np.array([0]))[0]
+    with pytest.raises(InvalidParameterError, match=r"below must exceed the lowest eigenvalue, 0\.\d+; it is 1e-09"):
+        solve_spectrum(disc_inside, below=1e-9)
+
+
+@pytest.mark.parametrize(("level", "words"), [(2, "factors of their operator 0.0 GiB"), (4, "20 pairs of 2562 points")])
+def test_what_does_not_fit_is_refused_with_numbers(monkeypatch, level, words):
+    monkeypatch.setattr(solver, "machine_memory", lambda: 1e5)
+    with pytest.raises(
+        InvalidParameterError, match=r"A spectrum must fit into memory, 0\.0 GiB; 20 pairs of .*"
+    ) as error:
+        solve_spectrum(cotangent_laplacian(icosphere(level)), 20)
+    assert words in str(error.value)

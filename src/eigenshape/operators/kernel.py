@@ -3,7 +3,6 @@
 W_ij = -w_i w_j G(x_i, x_j) / t with G(x, y) = exp(-|x - y|²/4t) / (4πt)^{m/2}: one formula, whatever the weights are.
 """
 
-import os
 import warnings
 from dataclasses import dataclass
 from math import gamma, pi
@@ -14,7 +13,7 @@ import scipy.sparse as sp
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
-from eigenshape._arrays import positive_values
+from eigenshape._arrays import machine_memory, positive_values
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.geodesic import geodesic_balls
 from eigenshape.geometry.quadrature import Quadrature
@@ -214,17 +213,10 @@ def _require_room(grid: CellGrid) -> None:
     n = len(grid.order)
     sample = np.unique(np.linspace(0, n - 1, min(n, SAMPLED_ROWS)).astype(np.int64))
     entries = count_partners(grid, sample)[sample].mean() * n
-    room = _memory() / 2
+    room = machine_memory() / 2
     if entries * PEAK > room:
         raise InvalidShapeError(
             f"A kernel matrix must fit into half of the memory, {room / 2**30:.1f} GiB; for {entries:.2g} entries, "
             f"{entries / n:.0f} a row, it takes {entries * PEAK / 2**30:.1f} GiB. Choose a smaller t, or "
             "functional_laplacian, which stores none."
         )
-
-
-def _memory() -> float:
-    try:
-        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, ValueError, OSError):  # not every system tells
-        return 8 * 2.0**30

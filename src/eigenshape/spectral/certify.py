@@ -110,6 +110,20 @@ def in_user_units(pencil: Pencil, certificate: Certificate) -> Certificate:
     return replace(certificate, shift=shift, gap=(low, high), resolution=resolution)
 
 
+def shortened(pencil: Pencil, pairs: Pairs, certificate: Certificate, count: int) -> tuple[Pairs, Certificate]:
+    """Return the lowest so many of the pairs; what proves them all proves these."""
+    resolution = RESOLUTION * _scale(pencil, pairs)
+    rest = pairs.values[count:] - pairs.values[count - 1]
+    equal = int(np.count_nonzero(rest <= resolution))
+    fewer = Pairs(pairs.values[:count], pairs.vectors[:, :count], pairs.residuals[:count])
+    return fewer, replace(
+        certificate,
+        n_pairs=count,
+        n_split=equal + (certificate.n_split if equal == len(rest) else 0),
+        clusters=_clusters(fewer.values, resolution),
+    )
+
+
 def _below_cluster(pencil: Pencil, pairs: Pairs, above: Certificate, beside: Factor) -> Certificate:
     # Eigenvalues below the cluster are counted. The next ones lie above that count, and not above those found.
     jumps = np.flatnonzero(np.diff(pairs.values) > 2 * above.resolution)

@@ -29,19 +29,19 @@ def shift_inside(pencil: Pencil, k: int) -> Factor:
     guess = SHARE * UNIFORM_MESH * pencil.level * k / pencil.n
     low: Factor | None = None
     high: Factor | None = None
-    factor = _near_or_below(pencil, guess)
+    factor = factor_below(pencil, guess)
     for _ in range(TRIALS):
         if ACCEPTED[0] * k - 3 <= factor.count <= ACCEPTED[1] * k + 1:
             return factor
         low, high = (factor, high) if factor.count < SHARE * k else (low, factor)
         if high and high.shift < (1.02 * low.shift if low else LOWEST * guess):
             break
-        factor = _near_or_below(pencil, _next_shift(factor, low, high, SHARE * k))
+        factor = factor_below(pencil, _next_shift(factor, low, high, SHARE * k))
     return low or factorise_near(pencil, -guess)
 
 
-def _near_or_below(pencil: Pencil, shift: float) -> Factor:
-    # Solids and uneven masses may put a guess far up among their eigenvalues, where pivots are poorest.
+def factor_below(pencil: Pencil, shift: float) -> Factor:
+    """Factor near `shift`, or at a share of it: solids and uneven masses may put a guess far up among eigenvalues."""
     for share in LOWER:
         try:
             return factorise_near(pencil, share * shift)

@@ -10,17 +10,17 @@ import scipy.linalg as sl
 from jaxtyping import Float
 from threadpoolctl import threadpool_limits
 
-from eigenshape._arrays import frozen, whole_number
+from eigenshape._arrays import frozen, machine_memory, positive_values, whole_number
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.sparse.lane_loops import LANES
 from eigenshape.spectral.certificate import Certificate
-from eigenshape.spectral.certify import Pairs, in_user_units, prove
+from eigenshape.spectral.certify import Pairs, in_user_units, prove, shortened
 from eigenshape.spectral.factor import Factor
-from eigenshape.spectral.kernel_values import from_pencil, reported, require_readable, widened
+from eigenshape.spectral.kernel_values import from_pencil, reported, require_readable, to_pencil, widened
 from eigenshape.spectral.lanczos import Wanted, block_lanczos
 from eigenshape.spectral.pencil import Pencil, normalise, rayleigh_residuals
-from eigenshape.spectral.shift import shift_inside
+from eigenshape.spectral.shift import factor_below, shift_inside
 from eigenshape.spectral.slices import walk
 from eigenshape.spectral.spectrum import Spectrum
 
@@ -30,8 +30,11 @@ Road = Callable[[Pencil, int, Progress], tuple[Pairs, Certificate]]
 
 SMALL = 300  # points up to which a dense solve is the faster one
 DENSE_SHARE = 4  # and where more than one in so many pairs is wanted,
+MORE = 8  # pairs that are added where a guess was too low
 DENSE_LIMIT = 6000  # while the matrix still fits
 WHOLE = 400  # pairs up to which one shift serves
+SHARE_OF_MEMORY = 0.9
+FEWEST_VECTORS = 150  # of a space, however few pairs are wanted
 WIDEST = 8  # groups of eight columns to a block
 RUNS = 40
 LOOSE = 1e-12
@@ -39,8 +42,14 @@ SKEW = 1e-5
 POLISHED = 2e-9
 
 
-def solve_spectrum(laplacian: Laplacian, k: SupportsIndex, *, progress: Progress | None = None) -> Spectrum:
-    """Compute the k lowest eigenpairs of W φ = λ B φ, with the proof that none is missing.
+def solve_spectrum(
+    laplacian: Laplacian,
+    k: SupportsIndex | None = None,
+    *,
+    below: float | None = None,
+    progress: Progress | None = None,
+) -> Spectrum:
+    """Compute the k lowest eigenpairs of W φ = λ B φ, or all below a value, with the proof that none is missing.
 
     Block Lanczos on (W - σB)⁻¹B with σ among the wanted eigenvalues; what a count of eigenvalues by Sylvester's law
     of inertia finds missing (copies of a multiple eigenvalue) is searched for again with everything found deflated,
@@ -51,8 +60,10 @@ def solve_spectrum(laplacian: Laplacian, k: SupportsIndex, *, progress: Progress
     ----------
     laplacian : Laplacian
         Any symmetric pencil with W positive semidefinite and B positive definite.
-    k : int
+    k : int, optional
         Number of eigenpairs, 1 to n.
+    below : float, optional
+        Instead of k: all pairs with λ < below, in 1/length².
     progress : callable, optional
         Called as progress(fraction_done, message) while the solver works.
 
@@ -67,8 +78,8 @@ def solve_spectrum(laplacian: Laplacian, k: SupportsIndex, *, progress: Progress
     Raises
     ------
     InvalidParameterError
-        If k is not in 1..n, B is not positive definite, W has a negative eigenvalue, or one to be corrected is 1/t
-        or more.
+        If not one of k and below is given, k is not in 1..n, nothing lies below `below`, B is not positive definite, W
+        has a negative eigenvalue, or one to be corrected is 1/t or more.
     ConvergenceError
         If the proof cannot be completed; no incomplete spectrum is ever returned.
 
@@ -77,12 +88,18 @@ def solve_spectrum(laplacian: Laplacian, k: SupportsIndex, *, progress: Progress
     UserWarning
         If eigenvalues of a kernel lie too near to 1/t to tell those of the shape.
     """
-    wanted = whole_number(k, "k", 1, laplacian.n_points)
+    if (k is None) == (below is None):
+        raise InvalidParameterError(f"One of k and below says which pairs to compute; k is {k} and below is {below}.")
+    wanted = whole_number(k, "k", 1, laplacian.n_points) if k is not None else 0
+    limit = to_pencil(laplacian.kernel, positive_values([below], "below")) if below is not None else np.zeros(1)
     report = progress or _silent
     with threadpool_limits(1, user_api="blas"):
         report(0.0, "scaling the operator")
         pencil = normalise(laplacian)
-        pairs, certificate = _proved(pencil, wanted, report)
+        if wanted:
+            pairs, certificate = _proved(pencil, wanted, report)
+        else:
+            pairs, certificate = _proved_below(pencil, float(np.ldexp(limit[0], -pencil.value_exponent)), report)
     report(1.0, "proved complete")
     values, residuals = pencil.values_out(_without_negatives(pencil, pairs)), pencil.values_out(pairs.residuals)
     require_readable(laplacian.kernel, values)
@@ -111,7 +128,24 @@ def _proved(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificat
     return roads[-1](pencil, k, report)
 
 
+def _proved_below(pencil: Pencil, limit: float, report: Progress) -> tuple[Pairs, Certificate]:
+    """Prove one pair more than lie below the limit: then none of them is missing."""
+    report(0.01, "counting eigenvalues")
+    k = min(factor_below(pencil, limit).count + 1, pencil.n)
+    while True:
+        pairs, certificate = _proved(pencil, k, report)
+        count = int(np.count_nonzero(pairs.values < limit))
+        if count < k or k == pencil.n:
+            break
+        k = min(k + max(k // 10, MORE), pencil.n)
+    if not count:
+        lowest, asked = pencil.values_out(np.array([pairs.values[0], limit]))
+        raise InvalidParameterError(f"below must exceed the lowest eigenvalue, {lowest:.6g}; it is {asked:.6g}.")
+    return shortened(pencil, pairs, certificate, count)
+
+
 def _dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+    _require_room(pencil, k, 32 * pencil.n**2)
     report(0.1, f"solving {pencil.n} points densely")
     roots = np.sqrt(pencil.mass_diagonal)
     stiffness = pencil.stiffness.toarray() / np.outer(roots, roots)
@@ -126,6 +160,7 @@ def _dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate
 
 
 def _sparse(pencil: Pencil, k: int, report: Progress, *, start: Start) -> tuple[Pairs, Certificate]:
+    _require_room(pencil, k, 24 * pencil.shifted.elimination.n_entries)  # two factors at once, and their making
     report(0.02, "looking for a shift")
     vectors, factor = start(pencil, k, _in_run(report, 0))
     for run in range(1, RUNS + 1):
@@ -146,6 +181,17 @@ def _sparse(pencil: Pencil, k: int, report: Progress, *, start: Start) -> tuple[
         f"Every eigenvalue that inertia counts must be found; {len(pairs.values)} of {k} were found in {run} runs "
         f"and {missing} are missing."
     )
+
+
+def _require_room(pencil: Pencil, k: int, factors: int) -> None:
+    """Estimate the memory of a solve and refuse what the machine has not got."""
+    bases = 8 * pencil.n * (3 * k + FEWEST_VECTORS + 2 * min(k, WHOLE))  # a space of twice the pairs, results, a copy
+    room = SHARE_OF_MEMORY * machine_memory()
+    if bases + factors > room:
+        raise InvalidParameterError(
+            f"A spectrum must fit into memory, {room / 2**30:.1f} GiB; {k} pairs of {pencil.n} points take about "
+            f"{bases / 2**30:.1f} GiB, factors of their operator {factors / 2**30:.1f} GiB. Ask for fewer pairs."
+        )
 
 
 def _at_once(pencil: Pencil, k: int, report: Callable[[float], None]) -> tuple[Float[np.ndarray, "n j"], Factor]:
