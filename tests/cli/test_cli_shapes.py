@@ -89,6 +89,15 @@ def test_brackets(folder):
     assert "brackets" not in run_json("spectrum", folder / "disc.off", "-k", 4)
 
 
+def test_all_below_a_value(folder):
+    found = run_json("spectrum", folder / "cube.mesh", "--below", 25.0)
+    assert len(found["eigenvalues"]) == sum(found["certificate"]["clusters"]) == 7  # 0, three π², three 2π²
+    held = run_json("spectrum", folder / "disc.off", "--below", 15, "--boundary", "dirichlet")
+    assert len(held["eigenvalues"]) == 3
+    wrong = run("spectrum", folder / "disc.off", "--below", 15, "-k", 3, code=1)
+    assert "One of k and below says which pairs to compute" in wrong.stderr
+
+
 def test_a_plot_of_any_spectrum(folder, tmp_path):
     run("spectrum", folder / "cube.mesh", "-k", 4, "--plot", tmp_path / "a.png", "--save", tmp_path / "a.npz")
     assert (tmp_path / "a.png").stat().st_size > 1000

@@ -4,7 +4,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 import typer
+from jaxtyping import Int
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import (
@@ -32,13 +34,13 @@ from eigenshape.operators.cotangent import Mass
 from eigenshape.operators.fem import fem_boundary_nodes
 from eigenshape.operators.gaussian import Distance
 from eigenshape.operators.kernel import Correction, Form
-from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.dirichlet import solve_dirichlet
-from eigenshape.spectral.solver import Progress, solve_spectrum
+from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 N_PICTURED = 8
+USUAL = 20  # pairs
 Condition = Literal["neumann", "dirichlet"]
 ORDERS = {"p2": 2, "p3": 3}
 
@@ -46,7 +48,10 @@ ORDERS = {"p2": 2, "p3": 3}
 def spectrum(
     shape: ShapeArgument,
     *,
-    k: Annotated[int, typer.Option("-k", help="Number of eigenpairs.")] = 20,
+    k: Annotated[
+        int | None, typer.Option("-k", help=f"Number of eigenpairs; {USUAL} where --below is not given.")
+    ] = None,
+    below: Annotated[float | None, typer.Option(help="Instead of -k: all pairs below this, in 1/length².")] = None,
     operator: Annotated[
         str | None,
         typer.Option(
@@ -91,8 +96,14 @@ def spectrum(
     with progress_bar("spectrum") as progress:
         progress(0.0, "building the operator")
         laplacian = build_laplacian(found, name, **options)
-        solved = _solved(found, laplacian, k, ORDERS.get(name, 1), held=boundary == "dirichlet", progress=progress)
-        bounds = bracket_eigenvalues(bounded, k, boundary=boundary, progress=progress) if bounded else None
+        asked_k = USUAL if k is None and below is None else k
+        if boundary == "dirichlet":
+            nodes = _held(found, ORDERS.get(name, 1))
+            solved = solve_dirichlet(laplacian, asked_k, nodes, below=below, progress=progress)
+        else:
+            solved = solve_spectrum(laplacian, asked_k, below=below, progress=progress)
+        count = len(solved.eigenvalues)
+        bounds = bracket_eigenvalues(bounded, count, boundary=boundary, progress=progress) if bounded else None
     if as_json:
         print_json({"path": str(shape), "operator": name, "boundary": boundary, **options, **_facts(solved, bounds)})
     else:
@@ -113,15 +124,13 @@ def _require_mesh(shape: Shape) -> Mesh:
     return shape
 
 
-def _solved(shape: Shape, laplacian: Laplacian, k: int, order: int, *, held: bool, progress: Progress) -> Spectrum:
-    if not held:
-        return solve_spectrum(laplacian, k, progress=progress)
+def _held(shape: Shape, order: int) -> Int[np.ndarray, " c"]:
     if isinstance(shape, PointCloud):
         raise InvalidParameterError("--boundary dirichlet is for meshes; a cloud of points has no boundary to hold.")
     nodes = fem_boundary_nodes(shape, order)
     if not nodes.size:
         raise InvalidParameterError(f"--boundary dirichlet needs a boundary; {shape!r} is closed.")
-    return solve_dirichlet(laplacian, k, nodes, progress=progress)
+    return nodes
 
 
 def _facts(found: Spectrum, bounds: Brackets | None) -> dict[str, Any]:

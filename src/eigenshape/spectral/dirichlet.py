@@ -14,9 +14,14 @@ from eigenshape.spectral.spectrum import Spectrum
 
 
 def solve_dirichlet(
-    laplacian: Laplacian, k: SupportsIndex, fixed: Int[np.ndarray, " c"], *, progress: Progress | None = None
+    laplacian: Laplacian,
+    k: SupportsIndex | None,
+    fixed: Int[np.ndarray, " c"],
+    *,
+    below: float | None = None,
+    progress: Progress | None = None,
 ) -> Spectrum:
-    """Compute the k lowest eigenpairs among functions that are zero at the fixed points.
+    """Compute the k lowest eigenpairs, or all below a value, among functions that are zero at the fixed points.
 
     The pencil is cut down to the other points; its eigenvectors are 0 at the fixed ones. With the boundary of a surface
     fixed this is the Dirichlet condition, where the operator itself has the Neumann condition.
@@ -24,11 +29,11 @@ def solve_dirichlet(
     Parameters
     ----------
     laplacian : Laplacian
-    k : int
+    k : int or None
         Number of eigenpairs, 1 to the number of free points.
     fixed : (c,) int
         Points, each once or more.
-    progress : callable, optional
+    below, progress : optional
         As in `solve_spectrum`.
 
     Returns
@@ -44,7 +49,7 @@ def solve_dirichlet(
         If the proof of completeness fails.
     """
     inner, free = dirichlet_laplacian(laplacian, fixed)
-    found = solve_spectrum(inner, k, progress=progress)
+    found = solve_spectrum(inner, k, below=below, progress=progress)
     vectors = np.zeros((laplacian.n_points, found.eigenvectors.shape[1]))
     vectors[free] = found.eigenvectors
     return replace(found, eigenvectors=frozen(vectors), mass=laplacian.mass)
