@@ -65,7 +65,10 @@ class Certificate:
                 f"This set of {self.n_pairs} eigenvalues is not proved: {self.count} lie below "
                 f"{self.shift:.6g} (1/length²), and {self.n_found} were found there."
             )
-        what = f"These are the {self.n_pairs} lowest eigenvalues of the operator: none is missing and none is extra."
+        these = (
+            "This is the lowest eigenvalue" if self.n_pairs == 1 else f"These are the {self.n_pairs} lowest eigenvalues"
+        )
+        what = f"{these} of the operator: none is missing and none is extra."
         return " ".join([what, self._how(), self._split()]).strip()
 
     def _how(self) -> str:
