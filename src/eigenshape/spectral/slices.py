@@ -42,11 +42,11 @@ def walk(pencil: Pencil, k: int, report: Callable[[float], None]) -> tuple[Float
         )
         if last:
             return np.hstack([*parts, vectors]), factor
-        kept, following = _cut(values, factor.shift)
-        parts.append(vectors[:, values < following])
+        kept, floor = _cut(values, factor.shift)
+        parts.append(vectors[:, values < floor])
         known = factor.count + kept
-        spacing = (following - float(np.sort(values)[len(values) // 2])) / (len(values) / 2)
-        floor = following
+        upper_half = np.sort(values[values < floor])[parts[-1].shape[1] // 2 :]
+        spacing = (floor - float(upper_half[0])) / len(upper_half)
         factor = _factor_beyond(pencil, floor, spacing, known, _next_slice(k, known))
 
 
@@ -79,4 +79,8 @@ def _factor_beyond(pencil: Pencil, floor: float, spacing: float, known: int, tar
         if FAIR[0] * target <= between <= FAIR[1] * target:
             break
         step *= min(max(target / 2 / max(between, 0.5), 0.25), 4.0)
+    if factor.shift <= floor or between < 0:
+        raise ConvergenceError(
+            f"The shift of a slice must lie beyond the one before; {between} eigenvalues lie between."
+        )
     return factor
