@@ -80,6 +80,14 @@ def _lapy(lump: bool) -> Callable[[Shape], Any]:
     return build
 
 
+def _lapy_solve(solver: Any, k: int) -> Any:
+    return solver.eigs(k)
+
+
+def _lapy_matrices(solver: Any) -> Any:
+    return solver.stiffness, solver.mass
+
+
 def _robust(shape: Shape) -> tuple[sp.sparray, sp.sparray]:
     import robust_laplacian
 
@@ -133,21 +141,9 @@ LIBRARIES = {
         _our_mesh, _our_solve, _our_matrices, "mesh", "eigenshape", "solve_spectrum(cotangent_laplacian(mesh), k)"
     ),
     "scipy ARPACK": Library(_our_mesh, _arpack, _our_matrices, "mesh", "scipy", "eigsh(W, k, B, sigma=-0.01)"),
-    "LaPy": Library(
-        _lapy(lump=False),
-        lambda solver, k: solver.eigs(k),
-        lambda solver: (solver.stiffness, solver.mass),
-        "mesh",
-        "lapy",
-        "Solver(TriaMesh(v, f)).eigs(k)",
-    ),
+    "LaPy": Library(_lapy(lump=False), _lapy_solve, _lapy_matrices, "mesh", "lapy", "Solver(TriaMesh(v, f)).eigs(k)"),
     "LaPy, lumped": Library(
-        _lapy(lump=True),
-        lambda solver, k: solver.eigs(k),
-        lambda solver: (solver.stiffness, solver.mass),
-        "mesh",
-        "lapy",
-        "Solver(TriaMesh(v, f), lump=True).eigs(k)",
+        _lapy(lump=True), _lapy_solve, _lapy_matrices, "mesh", "lapy", "Solver(TriaMesh(v, f), lump=True).eigs(k)"
     ),
     "robust_laplacian": Library(
         _robust,

@@ -2,7 +2,7 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -26,6 +26,7 @@ from eigenshape.figures.fields import figure_eigenfunctions
 from eigenshape.figures.save import require_picture_path, save_figure
 from eigenshape.figures.spectra import figure_spectrum
 from eigenshape.geometry.cloud import PointCloud, Shape
+from eigenshape.geometry.exact import Condition
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
@@ -41,7 +42,6 @@ from eigenshape.spectral.spectrum import Spectrum
 
 N_PICTURED = 8
 USUAL = 20  # pairs
-Condition = Literal["neumann", "dirichlet"]
 ORDERS = {"p2": 2, "p3": 3}
 
 

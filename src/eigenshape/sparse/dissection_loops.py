@@ -1,4 +1,4 @@
-"""Compiled loops of `ordering`: nested dissection of a graph, minimum degree at its leaves."""
+"""Compiled loops of `elimination`: nested dissection of a graph, minimum degree at its leaves."""
 
 from typing import no_type_check
 
@@ -37,58 +37,21 @@ def dissect(indptr, indices):
             _eliminate(indptr, indices, nodes, start, stop, owner, place)
             continue
         if not connected:
-            first = name
-            reached = 0
-            for i in range(start, stop):
-                if owner[nodes[i]] == first:
-                    found = _breadth_first(indptr, indices, nodes[i], owner, first, one, queue[reached:])
-                    name += 1
-                    for j in range(reached, reached + found):
-                        owner[queue[j]] = name
-                    starts.append(start + reached)
-                    stops.append(start + reached + found)
-                    whole.append(True)
-                    reached += found
-            for i in range(reached):
-                nodes[start + i], place[queue[i]] = queue[i], start + i
+            pieces = _pieces(indptr, indices, nodes, start, stop, owner, name, place, one, queue)
+            for i in range(len(pieces) - 1):
+                starts.append(pieces[i])
+                stops.append(pieces[i + 1])
+                whole.append(True)
+            name += len(pieces) - 1
             continue
         reached = _breadth_first(indptr, indices, nodes[start], owner, name, one, queue)
         far = queue[reached - 1]
         _breadth_first(indptr, indices, far, owner, name, one, queue)
         far = queue[reached - 1]
         _breadth_first(indptr, indices, far, owner, name, two, queue)
-        for i in range(start, stop):
-            key[nodes[i]] = FINE * (one[nodes[i]] - two[nodes[i]])
-        for _ in range(SMOOTHINGS):  # a ragged cut is a long one
-            for i in range(start, stop):
-                node = nodes[i]
-                total, degree = 0, 0
-                for at in range(indptr[node], indptr[node + 1]):
-                    if owner[indices[at]] == name:
-                        total += key[indices[at]]
-                        degree += 1
-                one[node] = (key[node] + total // degree) // 2
-            for i in range(start, stop):
-                key[nodes[i]] = one[nodes[i]]
+        _tell_apart(indptr, indices, nodes, start, stop, owner, name, one, two, key)
         level, above = _cheapest_cut(indptr, indices, nodes, start, stop, owner, name, key)
-        n_first = n_cut = 0
-        for i in range(start, stop):
-            node = nodes[i]
-            side[node] = 0 if key[node] < level else 1
-        for i in range(start, stop):
-            node = nodes[i]
-            on_cut = False
-            if (side[node] == 1) == above:
-                for at in range(indptr[node], indptr[node + 1]):
-                    other = indices[at]
-                    if owner[other] == name and (key[other] < level) == above:
-                        on_cut = True
-                        break
-            if on_cut:
-                side[node] = 2
-                n_cut += 1
-            elif side[node] == 0:
-                n_first += 1
+        n_first, n_cut = _take_sides(indptr, indices, nodes, start, stop, owner, name, key, level, above, side)
         if n_cut == stop - start or n_cut == 0:  # a clique, or nothing left to cut
             for i in range(start, stop):
                 owner[nodes[i]] = -1
@@ -112,6 +75,64 @@ def dissect(indptr, indices):
             stops.append(stop - n_cut)
             whole.append(False)
     return nodes
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def _pieces(indptr, indices, nodes, start, stop, owner, name, place, distance, queue):
+    """Put the connected pieces of a segment one after the other, named name + 1 on, and return where each begins."""
+    begins = [start]
+    total = 0
+    for i in range(start, stop):
+        if owner[nodes[i]] == name:
+            found = _breadth_first(indptr, indices, nodes[i], owner, name, distance, queue[total:])
+            for j in range(total, total + found):
+                owner[queue[j]] = name + len(begins)
+            total += found
+            begins.append(start + total)
+    for i in range(total):
+        nodes[start + i], place[queue[i]] = queue[i], start + i
+    return begins
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def _tell_apart(indptr, indices, nodes, start, stop, owner, name, one, two, key):
+    """Fill `key` with the difference of two distances, smoothed: a ragged cut is a long one. The first is used up."""
+    for i in range(start, stop):
+        key[nodes[i]] = FINE * (one[nodes[i]] - two[nodes[i]])
+    for _ in range(SMOOTHINGS):
+        for i in range(start, stop):
+            node = nodes[i]
+            total, degree = 0, 0
+            for at in range(indptr[node], indptr[node + 1]):
+                if owner[indices[at]] == name:
+                    total += key[indices[at]]
+                    degree += 1
+            one[node] = (key[node] + total // degree) // 2
+        for i in range(start, stop):
+            key[nodes[i]] = one[nodes[i]]
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def _take_sides(indptr, indices, nodes, start, stop, owner, name, key, level, above, side):
+    """Fill `side` with 0 below the level, 1 above, 2 on the cut; return how many are 0, and how many 2."""
+    n_first = n_cut = 0
+    for i in range(start, stop):
+        node = nodes[i]
+        side[node] = 0 if key[node] < level else 1
+        if (side[node] == 1) == above:
+            for at in range(indptr[node], indptr[node + 1]):
+                other = indices[at]
+                if owner[other] == name and (key[other] < level) == above:
+                    side[node] = 2
+                    break
+        if side[node] == 2:
+            n_cut += 1
+        elif side[node] == 0:
+            n_first += 1
+    return n_first, n_cut
 
 
 @njit(cache=True, nogil=True)

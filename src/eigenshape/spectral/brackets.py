@@ -1,13 +1,14 @@
 """Two bounds for each eigenvalue of a shape itself, not of a matrix."""
 
 from dataclasses import dataclass
-from typing import Literal, SupportsIndex
+from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arrays import frozen, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape.geometry.exact import Condition
 from eigenshape.geometry.facets import FacetTable, facet_components, facet_table, without_pinches
 from eigenshape.geometry.simplices import in_length, require_volumes, size_one
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
@@ -18,7 +19,6 @@ from eigenshape.spectral.enclosure import enclose, relative_rounding
 from eigenshape.spectral.nonconforming import lower_bounds, partly, solve_free
 from eigenshape.spectral.solver import Progress
 
-Condition = Literal["neumann", "dirichlet"]
 LINEAR_FLOOR = 0.5  # consistent mass of linear elements over its diagonal, in any dimension
 NOTHING = np.empty(0, dtype=np.int64)
 
