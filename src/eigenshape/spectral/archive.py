@@ -50,6 +50,8 @@ def read_archive(path: str | Path) -> dict[str, Any]:
         n = len(arrays["eigenvectors"])
         mass = sp.csr_array(parts, shape=(n, n))
         mass.check_format()
+    except FileFormatError:
+        raise
     except (KeyError, TypeError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise FileFormatError(f"{path} must hold a spectrum that eigenshape saved; {error}.") from error
     k = len(arrays["eigenvalues"])
