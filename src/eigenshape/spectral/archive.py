@@ -38,12 +38,7 @@ def read_archive(path: str | Path) -> dict[str, Any]:
     """
     try:
         with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            head = json.loads(str(archive["head"]))
-            if head["eigenshape_spectrum"] != FORMAT:
-                raise FileFormatError(
-                    f"{path} must hold a spectrum in format {FORMAT}; it is in format {head['eigenshape_spectrum']}."
-                )
-            facts = head["certificate"]
+            facts = _facts(path, json.loads(str(archive["head"])))
             certificate = Certificate(**{**facts, "gap": tuple(facts["gap"]), "clusters": tuple(facts["clusters"])})
             arrays = {name: archive[name] for name in ARRAYS}
             parts = tuple(archive[f"mass_{name}"] for name in MASS)
@@ -62,3 +57,11 @@ def read_archive(path: str | Path) -> dict[str, Any]:
             f"are certified."
         )
     return {**arrays, "mass": mass, "certificate": certificate}
+
+
+def _facts(path: str | Path, head: dict[str, Any]) -> dict[str, Any]:
+    if head["eigenshape_spectrum"] != FORMAT:
+        raise FileFormatError(
+            f"{path} must hold a spectrum in format {FORMAT}; it is in format {head['eigenshape_spectrum']}."
+        )
+    return head["certificate"]
