@@ -1,6 +1,7 @@
 """Symmetric matrices of one pattern: an order of elimination, and factors L D Lᵀ with pivots on the diagonal."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -8,6 +9,7 @@ from jaxtyping import Float, Int
 
 from eigenshape.sparse import front_loops as fronts
 from eigenshape.sparse import symbolic_loops as symbolic
+from eigenshape.sparse.blas_loops import addresses
 from eigenshape.sparse.dissection_loops import dissect
 from eigenshape.sparse.lane_loops import LANES
 
@@ -51,6 +53,12 @@ class Elimination:
     lower_rows: Indices
     source: Indices
 
+    @cached_property
+    def workspace(self) -> tuple[Float[np.ndarray, " w"], Float[np.ndarray, " r"], Float[np.ndarray, " r"]]:
+        """Room for waiting updates and for two fronts: every fresh page costs, so factors share it one by one."""
+        waiting, tallest = self.room
+        return np.empty(waiting), np.empty(tallest**2), np.empty(tallest**2)
+
     @property
     def n_entries(self) -> int:
         """Entries of L that are stored."""
@@ -84,18 +92,21 @@ class SymmetricFactor:
     def rounding(self) -> Float[np.ndarray, " n"]:
         """Bound what rounding has put between A and L D Lᵀ, row by row.
 
-        Their difference E has |E_ij| ≤ m eps (|L||D||L|ᵀ)_ij with m terms in the sum, in whatever order they are
-        added (Higham 2002, section 10.1; four more terms for forming A and for what is formed here). A symmetric
-        matrix lies, as a quadratic form, between plus and minus the diagonal one of the row sums of its sizes:
-        |xᵀEx| ≤ Σ r_i x_i², and r is returned.
+        Their difference E has |E_ij| ≤ m eps (|L||D||L|ᵀ)_ij where each of the products that make up an entry is
+        rounded m times or fewer: once for every other term in whatever order they are added, or, since sums are made in
+        parts, as `sum_lengths` tells (Higham 2002, sections 4.2 and 10.1; four more for forming A and for what is
+        formed here). A symmetric matrix lies, as a quadratic form, between plus and minus the diagonal one of the row
+        sums of its sizes: |xᵀEx| ≤ Σ r_i x_i², and r is returned.
         """
         e = self.elimination
         weights, sizes, terms = np.empty_like(self.pivots), np.empty_like(self.pivots), np.empty(len(e.order), np.int64)
         fronts.column_sizes(e.first, e.begins, e.places, self.panels, weights)
         weights *= np.abs(self.pivots)
         fronts.row_sizes(e.first, e.begins, e.rows, e.places, self.panels, weights, sizes, terms)
+        lengths = np.empty(len(e.above), dtype=np.int64)
+        fronts.sum_lengths(e.first, e.begins, e.above, lengths)
         bounds = np.empty_like(sizes)
-        bounds[e.order] = EPS * (terms + 4) * sizes
+        bounds[e.order] = EPS * (np.minimum(terms, np.repeat(lengths, np.diff(e.first))) + 4) * sizes
         return bounds
 
 
@@ -130,7 +141,7 @@ def factorise(elimination: Elimination, data: Float[np.ndarray, " e"]) -> Symmet
     """Factor the matrix with these entries; None where a pivot is zero or not finite."""
     e = elimination
     panels, pivots = np.empty(e.n_entries), np.empty(len(e.order))
-    sound = fronts.factor_fronts(
-        e.lower_ptr, e.lower_rows, data[e.source], e.first, e.begins, e.rows, e.above, e.places, panels, pivots, e.room
-    )
+    lower = e.lower_ptr, e.lower_rows, data[e.source]
+    tree = e.first, e.begins, e.rows, e.above, e.places
+    sound = fronts.factor_fronts(*lower, *tree, panels, pivots, e.workspace, addresses())
     return SymmetricFactor(e, panels, pivots) if sound else None

@@ -5,11 +5,15 @@ from typing import no_type_check
 import numpy as np
 from numba import njit
 
+from eigenshape.sparse.blas_loops import solve_triangle, subtract_product
 from eigenshape.sparse.lane_loops import LANES, subtract_four_sums, subtract_sum
 
-WIDE = 64  # columns eliminated at once
+WIDE = 64  # columns to a panel of L
+NARROW = 16  # columns that are eliminated one by one
 SMALL = 40  # rows of a front up to which plain loops are the faster ones
 TALL = 96  # rows of an update at once
+NEAR = 32  # rows of a panel that stay in the nearest cache
+LONG = 256  # terms of a sum in one product: shorter sums round less
 
 
 @njit(cache=True, nogil=True)
@@ -48,15 +52,36 @@ def stack_size(first, begins, above):
 
 @njit(cache=True, nogil=True)
 @no_type_check
-def factor_fronts(lower_ptr, lower_rows, values, first, begins, rows, above, places, panels, pivots, room):
+def sum_lengths(first, begins, above, lengths):
+    """Fill how many roundings a product may see in each front, on its way from below: at most LONG in its own sum.
+
+    A front adds what each child left; then halves of its columns update others, LONG terms at a time.
+    """
+    children = np.zeros(len(lengths), dtype=np.int64)
+    lengths[:] = LONG
+    for s in range(len(lengths)):
+        height, width = begins[s + 1] - begins[s], first[s + 1] - first[s]
+        own = width
+        if height > SMALL:
+            own, span = width // LONG + 2, NARROW
+            while span < width:
+                own, span = own + 1, 2 * span
+        lengths[s] += own + children[s]
+        if above[s] >= 0:
+            children[above[s]] += 1
+            lengths[above[s]] = max(lengths[above[s]], lengths[s])
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def factor_fronts(lower_ptr, lower_rows, values, first, begins, rows, above, places, panels, pivots, room, blas):
     """Fill panels and pivots with L and D of a matrix whose lower triangle is given by columns; tell if it could be.
 
     Multifrontal (Duff and Reid 1983), pivots in their order: a front gathers the entries of its columns and what its
     children left, eliminates its columns, and leaves the rest to its parent.
     """
     size = len(first) - 1
-    stack = np.empty(room[0])
-    space = np.empty(room[1] * room[1])
+    stack, space, times = room
     local = np.empty(len(pivots), dtype=np.int64)
     n_children = np.zeros(size, dtype=np.int64)
     for s in range(size):
@@ -86,7 +111,9 @@ def factor_fronts(lower_ptr, lower_rows, values, first, begins, rows, above, pla
         if height <= SMALL:
             sound = _eliminate_plain(front, width, pivots[low:high])
         else:
-            sound = _eliminate_blocked(front, width, pivots[low:high])
+            sound = _eliminate_blocked(
+                front, width, pivots[low:high], times[: height * width].reshape(height, width), blas
+            )
         if not sound:
             return False
         at = places[s]
@@ -129,49 +156,64 @@ def _eliminate_plain(front, width, pivots):
 
 @njit(cache=True, nogil=True)
 @no_type_check
-def _eliminate_blocked(front, width, pivots):
+def _eliminate_blocked(front, width, pivots, times, blas):
+    """Eliminate by halves: products of matrices take the left half of some columns out of the right half.
+
+    After every NARROW columns those of the largest power of two that has just been filled update as many that follow,
+    which is the order of the recursion. L D goes into `times`.
+    """
     height = len(front)
-    for block in range(0, width, WIDE):
-        end = min(block + WIDE, width)
-        columns = end - block
-        panel = np.empty((height - block, columns))
-        for i in range(height - block):
-            for j in range(columns):
-                panel[i, j] = front[block + i, block + j]
-        for j in range(columns):
-            pivot = panel[j, j]
-            if pivot == 0 or not np.isfinite(pivot):
-                return False
-            pivots[block + j] = pivot
-            for i in range(j + 1, columns):
-                times_pivot = panel[i, j]
-                panel[i, j] /= pivot
-                for k in range(j + 1, i + 1):
-                    panel[i, k] -= times_pivot * panel[k, j]
-        # Row i of the rest: L_i = A_i L⁻ᵀ D⁻¹, the products L_ij D_j being kept until all are known.
-        for i in range(columns, height - block):
-            for j in range(columns):
-                known = panel[i, j]
-                for k in range(j):
-                    known -= panel[i, k] * panel[j, k]
-                panel[i, j] = known
-        times = panel[columns:].copy()
-        for i in range(columns, height - block):
-            for j in range(columns):
-                panel[i, j] /= pivots[block + j]
-        for i in range(height - block):
-            for j in range(min(i, columns)):
-                front[block + i, block + j] = panel[i, j]
-            if i < columns:
-                front[block + i, block + i] = 1.0
-        rest = panel[columns:]
-        for start in range(0, len(rest), TALL):
-            stop = min(start + TALL, len(rest))
-            update = np.dot(rest[start:stop], times[:stop].T)
-            for i in range(start, stop):
-                for j in range(i + 1):
-                    front[end + i, end + j] -= update[i - start, j]
+    for start in range(0, width, NARROW):
+        end = min(start + NARROW, width)
+        if not _eliminate_narrow(front, start, end, pivots, times, blas[1]):
+            return False
+        done = (end + NARROW - 1) // NARROW
+        span = (done & -done) * NARROW
+        if end < width:
+            _update(front, times, max(end - span, 0), end, min(end + span, width), blas[0])
+    if width < height:
+        _update(front, times, 0, width, height, blas[0])
     return True
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def _eliminate_narrow(front, start, end, pivots, times, trsm):
+    """Eliminate a few columns, all rows; those to the right are left as they are."""
+    height = len(front)
+    for j in range(start, end):
+        pivot = front[j, j]
+        if pivot == 0 or not np.isfinite(pivot):
+            return False
+        pivots[j] = pivot
+        front[j, j] = 1.0
+        for i in range(j + 1, end):
+            times[i, j] = front[i, j]
+            front[i, j] /= pivot
+            for k in range(j + 1, i + 1):
+                front[i, k] -= times[i, j] * front[k, j]
+    for i in range(end, height):
+        for j in range(start, end):
+            times[i, j] = front[i, j]
+    rest, wide = height - end, times.shape[1]
+    solve_triangle(trsm, (rest, end - start), front, start * height + start, times, end * wide + start)
+    for i in range(end, height):
+        for j in range(start, end):
+            front[i, j] = times[i, j] / pivots[j]
+    return True
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def _update(front, times, start, end, stop, gemm):
+    """Take what the columns from start to end contribute out of those from end to stop, on and below the diagonal."""
+    height, wide = len(front), times.shape[1]
+    for low in range(end, height, TALL):
+        high = min(low + TALL, height)
+        for term in range(start, end, LONG):
+            size = (high - low, min(high, stop) - end, min(term + LONG, end) - term)
+            left, right = low * wide + term, end * height + term
+            subtract_product(gemm, size, times, left, front, right, front, low * height + end)
 
 
 @njit(cache=True, nogil=True)
@@ -180,7 +222,7 @@ def solve_fronts(order, first, begins, rows, places, panels, pivots, right, solu
     """Solve for LANES right-hand sides (n, LANES)."""
     n, size = len(pivots), len(first) - 1
     lanes = np.empty((n, LANES))
-    gathered = np.empty((len(right), LANES))
+    gathered, near = np.empty((len(right), LANES)), np.empty(NEAR * WIDE)
     for i in range(n):
         for lane in range(LANES):
             lanes[i, lane] = right[order[i], lane]
@@ -201,7 +243,7 @@ def solve_fronts(order, first, begins, rows, places, panels, pivots, right, solu
         for block in range((width - 1) // WIDE * WIDE, -1, -WIDE):
             columns = min(WIDE, width - block)
             at -= (height - block) * columns
-            _backward(panels, at, columns, rows[start + block : start + height], lanes, gathered)
+            _backward(panels, at, columns, rows[start + block : start + height], lanes, gathered, near)
     for i in range(n):
         for lane in range(LANES):
             solution[order[i], lane] = lanes[i, lane]
@@ -228,19 +270,22 @@ def _forward(panels, at, columns, rows, lanes, gathered):
 
 @njit(cache=True, nogil=True)
 @no_type_check
-def _backward(panels, at, columns, rows, lanes, gathered):
+def _backward(panels, at, columns, rows, lanes, gathered, near):
     mine, height = rows[0], len(rows)
     rest = height - columns
     for i in range(rest):
         row = rows[columns + i]
         for lane in range(LANES):
             gathered[i, lane] = lanes[row, lane]
-    below = at + columns * columns
-    four = columns // 4 * 4
-    for j in range(0, four, 4):
-        subtract_four_sums(panels, below + j, columns, 1, gathered, 0, rest, lanes, mine + j)
-    for j in range(four, columns):
-        subtract_sum(panels, below + j, columns, 0, gathered, 0, rest, lanes, mine + j)
+    below, four = at + columns * columns, columns // 4 * 4
+    for low in range(0, rest, NEAR):
+        count, corner = min(NEAR, rest - low), below + low * columns
+        for i in range(count * columns):
+            near[i] = panels[corner + i]
+        for j in range(0, four, 4):
+            subtract_four_sums(near, j, columns, 1, gathered, low, count, lanes, mine + j)
+        for j in range(four, columns):
+            subtract_sum(near, j, columns, 0, gathered, low, count, lanes, mine + j)
     for j in range(columns - 2, -1, -1):
         subtract_sum(
             panels, at + (j + 1) * columns + j, columns, 0, lanes, mine + j + 1, columns - 1 - j, lanes, mine + j

@@ -166,19 +166,22 @@ def _count_beside(pencil: Pencil, pairs: Pairs, index: int, step: float, beside:
     def taken(slack: Float[np.ndarray, " n"]) -> float:
         return spread + float(slack @ shape)  # from this eigenvalue, to first order
 
-    def too_much(slack: Float[np.ndarray, " n"]) -> bool:
-        return not 2 * taken(slack) < np.abs(pairs.values - (value + step)).min()
+    def too_much(loss: float, shift: float) -> bool:
+        return not 2 * loss < np.abs(pairs.values - shift).min()
 
-    none = np.zeros(pencil.n)
-    slack = none if beside is None or too_much(beside.slack) else beside.slack
+    none, sigma = np.zeros(pencil.n), value + step
+    slack = none if beside is None or too_much(taken(beside.slack), sigma) else beside.slack
     for _ in range(TRIALS):
-        factor = factorise(pencil, value + step, slack)
+        factor = factorise(pencil, sigma, slack)
         loss = rounding(factor) if factor else np.full(pencil.n, np.inf)
-        if factor and (loss <= slack).all():
-            return factor
+        # What is above the slack moves σ: W - σB - S + E ≤ W - (σ - ρ)B where no row has more than ρ c D of it.
+        over = float(((loss - slack) / pencil.mass_diagonal).max(initial=0.0)) / pencil.mass_floor
+        if factor and not too_much(taken(slack) + over, sigma - over):
+            return replace(factor, shift=sigma - over)
         slack = wanted = np.maximum(slack, _padded(pencil, loss))
-        if too_much(slack):
+        if too_much(taken(slack), sigma):
             step, slack = WIDENING * step, none
+            sigma = value + step
     raise ConvergenceError(
         f"Eigenvalues can be counted only where rounding takes less than their distance to σ; near "
         f"{np.ldexp(value, pencil.value_exponent):.6g} (1/length²) it takes "

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 from eigenshape.sparse.elimination import Elimination, analyse, factorise
 
 COLUMNS_AT_ONCE = 64
@@ -50,6 +50,8 @@ class Pencil:
         trace W / trace B: the mean of the eigenvalues up to the shape of B, and the unit for every tolerance.
     value_exponent, vector_exponent : int
         An eigenvalue is 2**value_exponent times larger in the user's units, a vector 2**vector_exponent times.
+    kernel : GaussianKernel or None
+        What W was built with, in the user's units.
     """
 
     stiffness: sp.csc_array
@@ -59,6 +61,7 @@ class Pencil:
     level: float
     value_exponent: int
     vector_exponent: int
+    kernel: GaussianKernel | None = None
 
     @property
     def n(self) -> int:
@@ -107,6 +110,7 @@ def normalise(laplacian: Laplacian) -> Pencil:
         level=trace / float(diagonal.sum()) if trace > 0 else 1.0,
         value_exponent=up_w - up_b,
         vector_exponent=-(up_b // 2),
+        kernel=laplacian.kernel,
     )
 
 

@@ -26,7 +26,7 @@ def shift_inside(pencil: Pencil, k: int) -> Factor:
     counts, whatever the dimension of the shape. Where a cluster leaves no such shift (k smaller than the number of
     components, say), the highest shift with fewer than k eigenvalues below it serves, or one below zero.
     """
-    guess = SHARE * UNIFORM_MESH * pencil.level * k / pencil.n
+    guess = _expected(pencil, SHARE * k)
     low: Factor | None = None
     high: Factor | None = None
     factor = factor_below(pencil, guess)
@@ -38,6 +38,14 @@ def shift_inside(pencil: Pencil, k: int) -> Factor:
             break
         factor = factor_below(pencil, _next_shift(factor, low, high, SHARE * k))
     return low or factorise_near(pencil, -guess)
+
+
+def _expected(pencil: Pencil, k: float) -> float:
+    """Return λ_k of a surface by Weyl's law, as its operator would have it."""
+    share = UNIFORM_MESH * k / pencil.n
+    if pencil.kernel is None:
+        return pencil.level * share
+    return -pencil.level * float(np.expm1(-share * pencil.kernel.edge_factor**2))  # (1 - e^{-tλ})/t, where level is 1/t
 
 
 def factor_below(pencil: Pencil, shift: float) -> Factor:

@@ -1,0 +1,82 @@
+"""Two routines of SciPy's BLAS, callable from compiled loops on parts of arrays, in place.
+
+np.dot in a compiled loop copies what is not contiguous, and its product has to be subtracted in another pass.
+"""
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import get_cython_function_address, intrinsic
+
+CHARACTER, WHOLE, REAL = ir.IntType(8), ir.IntType(32), ir.DoubleType()
+MODULE = "scipy.linalg.cython_blas"
+
+
+def addresses() -> tuple[int, int]:
+    """Return where dgemm and dtrsm are in this process; compiled code that is kept on disk takes them as numbers."""
+    return get_cython_function_address(MODULE, "dgemm"), get_cython_function_address(MODULE, "dtrsm")
+
+
+@intrinsic
+def subtract_product(
+    context: Any, address: Any, size: Any, left: Any, left_at: Any, right: Any, right_at: Any, taken: Any, taken_at: Any
+) -> Any:
+    """Take A Bᵀ from C: parts of matrices in C order that begin at flat places, size = (rows, columns, terms)."""
+    whole, place = types.int64, types.int64
+    signature = types.void(whole, size, left, place, right, place, taken, place)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        address, size = arguments[:2]
+        rows, columns, terms = (_kept(builder, builder.extract_value(size, i)) for i in range(3))
+        left, right, taken = (_part(context, builder, signature, arguments, i) for i in (2, 4, 6))
+        minus, one = (_kept_real(builder, value) for value in (-1.0, 1.0))
+        # In Fortran's order every matrix is transposed: Cᵀ = Cᵀ - B Aᵀ.
+        flags = [_letter(builder, letter) for letter in "TN"]
+        given = [*flags, columns, rows, terms, minus, *right, *left, one, *taken]
+        _call(builder, address, given)
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+@intrinsic
+def solve_triangle(context: Any, address: Any, size: Any, triangle: Any, triangle_at: Any, right: Any, at: Any) -> Any:
+    """Replace X by X L⁻ᵀ, L unit lower triangular, parts of matrices in C order; size = (rows of X, columns)."""
+    whole, place = types.int64, types.int64
+    signature = types.void(whole, size, triangle, place, right, place)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        address, size = arguments[:2]
+        rows, columns = (_kept(builder, builder.extract_value(size, i)) for i in range(2))
+        triangle, right = (_part(context, builder, signature, arguments, i) for i in (2, 4))
+        flags = [_letter(builder, letter) for letter in "LUTU"]
+        given = [*flags, columns, rows, _kept_real(builder, 1.0), *triangle, *right]
+        _call(builder, address, given)
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+def _kept(builder: Any, number: Any) -> Any:
+    return cgutils.alloca_once_value(builder, builder.trunc(number, WHOLE))
+
+
+def _kept_real(builder: Any, value: float) -> Any:
+    return cgutils.alloca_once_value(builder, ir.Constant(REAL, value))
+
+
+def _letter(builder: Any, letter: str) -> Any:
+    return cgutils.alloca_once_value(builder, ir.Constant(CHARACTER, ord(letter)))
+
+
+def _part(context: Any, builder: Any, signature: Any, arguments: Any, i: int) -> tuple[Any, Any]:
+    """Return the first number of a part, and the numbers from one row to the next."""
+    array = context.make_array(signature.args[i])(context, builder, arguments[i])
+    return builder.gep(array.data, [arguments[i + 1]]), _kept(builder, builder.extract_value(array.shape, 1))
+
+
+def _call(builder: Any, address: Any, given: list[Any]) -> None:
+    kind = ir.FunctionType(ir.VoidType(), [pointer.type for pointer in given])
+    builder.call(builder.inttoptr(address, kind.as_pointer()), given)
