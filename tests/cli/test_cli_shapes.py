@@ -89,6 +89,18 @@ def test_brackets(folder):
     assert "brackets" not in run_json("spectrum", folder / "disc.off", "-k", 4)
 
 
+def test_an_interval(folder):
+    found = run_json("spectrum", folder / "cube.mesh", "--above", 5.0, "--below", 25.0, "--brackets")
+    first, count = found["certificate"]["first"], len(found["eigenvalues"])
+    assert first == 1
+    assert 5 <= found["eigenvalues"][0] <= found["eigenvalues"][-1] < 25
+    assert len(found["brackets"]["upper"]) == first + count
+    text = run("spectrum", folder / "cube.mesh", "--above", 5.0, "--below", 25.0, "--brackets").stdout
+    assert f"eigenvalues from number 1 to {count}" in " ".join(text.split())
+    wrong = run("spectrum", folder / "cube.mesh", "--above", 5.0, code=1)
+    assert "above needs below" in wrong.stderr
+
+
 def test_all_below_a_value(folder):
     found = run_json("spectrum", folder / "cube.mesh", "--below", 25.0)
     assert len(found["eigenvalues"]) == sum(found["certificate"]["clusters"]) == 7  # 0, three π², three 2π²

@@ -12,6 +12,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.sampling import partial_scan
 from eigenshape.geometry.surfaces import grid, icosphere, torus
 from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.spectral.brackets import bracket_eigenvalues
 from eigenshape.spectral.solver import solve_spectrum
 
 SPHERE = icosphere(3)
@@ -113,10 +114,10 @@ def test_figures_are_labelled(tmp_path):
     assert "eigenfunction" in functions.axes[-1].get_ylabel()
     field = figure_field(mesh, mesh.vertices[:, 0], "x, in metres")
     assert field.axes[-1].get_ylabel() == "x, in metres"
-    curve = figure_spectrum(found.eigenvalues, area=12.5, shift=found.certificate.shift)
+    curve = figure_spectrum(found, area=12.5, brackets=bracket_eigenvalues(mesh, 12))
     (axes,) = curve.axes
     assert "λ" in axes.get_ylabel()
-    assert len(axes.get_legend().get_texts()) == 3
+    assert len(axes.get_legend().get_texts()) == 4
     labels = np.arange(mesh.n_faces) % 3
     parts = figure_segments(mesh, labels, np.array([0, 5, 9]))
     assert "3 parts" in parts.axes[0].get_title()
@@ -128,8 +129,17 @@ def test_figures_are_labelled(tmp_path):
         assert (tmp_path / f"{number}.png").stat().st_size > 4000
 
 
+def test_a_part_of_a_spectrum_is_numbered_from_its_first():
+    mesh = icosphere(2)
+    found = solve_spectrum(cotangent_laplacian(mesh), above=5.0, below=15.0)
+    (axes,) = figure_spectrum(found, brackets=bracket_eigenvalues(mesh, 16)).axes
+    numbers = axes.lines[0].get_xdata()
+    assert (numbers[0], numbers[-1]) == (4, 15)
+    assert figure_eigenfunctions(mesh, found, range(2)).axes[0].get_title().startswith("φ$_{4}$")
+
+
 def test_files_are_whole_repeatable_and_of_a_known_kind(tmp_path):
-    figure = figure_spectrum(np.arange(5.0))
+    figure = figure_spectrum(solve_spectrum(cotangent_laplacian(icosphere(1)), 5))
     for suffix in (".png", ".svg", ".pdf"):
         save_figure(figure, tmp_path / f"one{suffix}")
         assert (tmp_path / f"one{suffix}").stat().st_size > 1000

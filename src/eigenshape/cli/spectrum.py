@@ -52,6 +52,7 @@ def spectrum(
         int | None, typer.Option("-k", help=f"Number of eigenpairs; {USUAL} where --below is not given.")
     ] = None,
     below: Annotated[float | None, typer.Option(help="Instead of -k: all pairs below this, in 1/length².")] = None,
+    above: Annotated[float | None, typer.Option(help="With --below: all pairs from this on, in 1/length².")] = None,
     operator: Annotated[
         str | None,
         typer.Option(
@@ -97,18 +98,25 @@ def spectrum(
         progress(0.0, "building the operator")
         laplacian = build_laplacian(found, name, **options)
         asked_k = USUAL if k is None and below is None else k
+        within = {"above": above, "below": below}
         if boundary == "dirichlet":
             nodes = _held(found, ORDERS.get(name, 1))
-            solved = solve_dirichlet(laplacian, asked_k, nodes, below=below, progress=progress)
+            solved = solve_dirichlet(laplacian, asked_k, nodes, **within, progress=progress)
         else:
-            solved = solve_spectrum(laplacian, asked_k, below=below, progress=progress)
-        count = len(solved.eigenvalues)
+            solved = solve_spectrum(laplacian, asked_k, **within, progress=progress)
+        count = solved.certificate.first + len(solved.eigenvalues)
         bounds = bracket_eigenvalues(bounded, count, boundary=boundary, progress=progress) if bounded else None
     if as_json:
         print_json({"path": str(shape), "operator": name, "boundary": boundary, **options, **_facts(solved, bounds)})
     else:
         _print(solved, bounds)
-    _write(found, solved, plot=plot, picture=picture, save=save)
+    if plot:
+        _plot(found, solved, bounds, plot)
+    if picture and isinstance(found, TriangleMesh):
+        _picture(found, solved, picture)
+    if save:
+        solved.save(save)
+        said(save)
 
 
 def _require_drawable(shape: Shape, picture: Path | None) -> None:
@@ -143,14 +151,14 @@ def _facts(found: Spectrum, bounds: Brackets | None) -> dict[str, Any]:
 
 
 def _print(found: Spectrum, bounds: Brackets | None) -> None:
-    columns = ["i", "λ", "error at most"]
+    columns, first = ["i", "λ", "error at most"], found.certificate.first
     rows = [
         [str(index), f"{value:.10g}", f"{residual:.1e}"]
-        for index, (value, residual) in enumerate(zip(found.eigenvalues, found.residuals, strict=True))
+        for index, (value, residual) in enumerate(zip(found.eigenvalues, found.residuals, strict=True), first)
     ]
     if bounds:
         columns += ["lower", "upper"]
-        ends = zip(bounds.lower, bounds.upper, strict=True)
+        ends = zip(bounds.lower[first:], bounds.upper[first:], strict=True)
         rows = [[*row, f"{low:.6g}", f"{high:.6g}"] for row, (low, high) in zip(rows, ends, strict=True)]
     print_table("Eigenvalues, in 1/length²", columns, rows)
     out.print(found.certificate.explain())
@@ -158,16 +166,14 @@ def _print(found: Spectrum, bounds: Brackets | None) -> None:
         out.print(bounds.explain())
 
 
-def _write(shape: Shape, found: Spectrum, *, plot: Path | None, picture: Path | None, save: Path | None) -> None:
-    if plot:
-        area = surface_area(shape) if isinstance(shape, TriangleMesh) else None
-        save_figure(figure_spectrum(found.eigenvalues, area=area, shift=found.certificate.shift), plot)
-        said(plot)
-    if picture and isinstance(shape, TriangleMesh):
-        k = len(found.eigenvalues)
-        indices = range(min(1, k - 1), min(k, N_PICTURED + 1))
-        save_figure(figure_eigenfunctions(shape, found, indices), picture)
-        said(picture)
-    if save:
-        found.save(save)
-        said(save)
+def _plot(shape: Shape, found: Spectrum, bounds: Brackets | None, path: Path) -> None:
+    area = surface_area(shape) if isinstance(shape, TriangleMesh) else None
+    save_figure(figure_spectrum(found, area=area, brackets=bounds), path)
+    said(path)
+
+
+def _picture(mesh: TriangleMesh, found: Spectrum, path: Path) -> None:
+    first, k = found.certificate.first, len(found.eigenvalues)
+    start = min(1, k - 1) if first == 0 else 0  # the lowest is constant
+    save_figure(figure_eigenfunctions(mesh, found, range(start, min(k, start + N_PICTURED))), path)
+    said(path)

@@ -33,7 +33,8 @@ def figure_eigenfunctions(
         function = spectrum.eigenvectors[:, index]
         shown = function / np.abs(function).max()
         show(axes, draw(mesh, camera, vertex_colors=colors(scale(shown))[:, :3], zero_set_of=_constant_as_one(shown)))
-        axes.set_title(f"φ$_{{{index}}}$,  λ = {spectrum.eigenvalues[index]:.4g}")
+        number = spectrum.certificate.first + index
+        axes.set_title(f"φ$_{{{number}}}$,  λ = {spectrum.eigenvalues[index]:.4g}")
     for axes in grid.flat[len(indices) :]:
         axes.set_axis_off()
     bar = figure.colorbar(ScalarMappable(scale, colors), ax=grid, shrink=0.7)

@@ -7,23 +7,28 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Certificate:
-    """Why these are the lowest eigenvalues, with none missing and none extra.
+    """Why these are the lowest eigenvalues, or all in an interval, with none missing and none extra.
 
     Sylvester's law of inertia: the factor of W - σB has as many negative pivots as there are eigenvalues below σ.
     With as many B-orthonormal eigenvectors found, whose error intervals end below σ, none is missing and none is
     extra. Where the last of the k eigenvalues has equals (to `resolution`) beyond the k, σ stands below all of
-    these equals, and those found at the level of the last eigenvalue are the rest of the k.
+    these equals, and those found at the level of the last eigenvalue are the rest of the k. In an interval far up a
+    second factor counts below its lower end, and the difference of the counts is what must be found.
 
     Attributes
     ----------
     n_pairs : int
         Eigenpairs k that are certified.
+    first : int
+        Number of the first of them among all, 0 for the lowest: so many eigenvalues lie below it.
+    floor : float
+        Where the count of an interval begins, in 1/length²; -inf where it begins below all eigenvalues.
     shift : float
         σ, in 1/length²; infinite where all n eigenvalues were computed.
     count : int
-        Eigenvalues below σ by inertia.
+        Eigenvalues below σ, and above `floor`, by inertia.
     n_found : int
-        Eigenpairs found below σ; equal to `count`, or the spectrum is refused.
+        Eigenpairs found there; equal to `count`, or the spectrum is refused.
     gap : (float, float)
         An interval around σ, in 1/length², that is free of eigenvalues up to its upper end by the count and above
         its lower end by the error intervals of what was found.
@@ -52,6 +57,8 @@ class Certificate:
     max_residual: float
     n_split: int
     clusters: tuple[int, ...] = ()
+    first: int = 0
+    floor: float = -np.inf
 
     @property
     def complete(self) -> bool:
@@ -65,11 +72,15 @@ class Certificate:
                 f"This set of {self.n_pairs} eigenvalues is not proved: {self.count} lie below "
                 f"{self.shift:.6g} (1/length²), and {self.n_found} were found there."
             )
-        these = (
+        what = f"{self._these()} of the operator: none is missing and none is extra."
+        return " ".join([what, self._how(), self._split()]).strip()
+
+    def _these(self) -> str:
+        if self.first:
+            return f"These are the eigenvalues from number {self.first} to {self.first + self.n_pairs - 1}"
+        return (
             "This is the lowest eigenvalue" if self.n_pairs == 1 else f"These are the {self.n_pairs} lowest eigenvalues"
         )
-        what = f"{these} of the operator: none is missing and none is extra."
-        return " ".join([what, self._how(), self._split()]).strip()
 
     def _how(self) -> str:
         quality = (
@@ -78,6 +89,12 @@ class Certificate:
         )
         if np.isinf(self.shift):
             return f"They are all that a matrix with {self.count} rows has. {quality}{self._clusters()}"
+        if np.isfinite(self.floor):
+            return (
+                f"Factors of W - σB at σ = {self.floor:.6g} and {self.shift:.6g} (1/length²) differ by {self.count} in "
+                f"their negative pivots, so {self.count} eigenvalues lie between, and {self.n_found} were found there. "
+                f"{quality}{self._clusters()}"
+            )
         return (
             f"A factor of W - σB at σ = {self.shift:.6g} (1/length²) has {self.count} negative pivots, so "
             f"{self.count} eigenvalues lie below σ, and {self.n_found} were found there. {quality}{self._clusters()}"
@@ -93,10 +110,12 @@ class Certificate:
         if self.n_split == 0:
             return ""
         whole = self.n_found, self.n_pairs + self.n_split
+        cut = self.n_pairs - self.n_found
+        last = "The last one belongs" if cut == 1 else f"The last {cut} belong"
         return (
-            f"The last {self.n_pairs - self.n_found} belong to a cluster of {whole[1] - whole[0]} eigenvalues "
-            f"(equal to {self.resolution:.1e}, 1/length²) of which {self.n_split} were not asked for, so their "
-            f"eigenvectors are one choice among many; {_whole_clusters(*whole)} keeps it whole."
+            f"{last} to a cluster of {whole[1] - whole[0]} eigenvalues "
+            f"(equal to {self.resolution:.1e}, 1/length²) of which {self.n_split} were not asked for, so which "
+            f"eigenvectors stand for it is one choice among many; {_whole_clusters(*whole)} keeps it whole."
         )
 
 

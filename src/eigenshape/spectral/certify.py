@@ -1,6 +1,6 @@
 """The proof that a spectrum has no eigenvalue missing and none too many."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
@@ -9,26 +9,17 @@ from threadpoolctl import threadpool_limits
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.certificate import Certificate
-from eigenshape.spectral.factor import Factor, factorise, rounding
+from eigenshape.spectral.count import count_beside
+from eigenshape.spectral.factor import Factor
 from eigenshape.spectral.kernel_values import reported, to_pencil
+from eigenshape.spectral.pairs import Pairs, spread
 from eigenshape.spectral.pencil import Pencil, normalise, residual_norms
 
 RESOLUTION = 1e-6  # relative to the largest eigenvalue: what is closer counts as one cluster
 WIDEST_CLUSTER = 1e-3  # relative too: a chain of close eigenvalues longer than this proves nothing
 ORTHONORMAL = 1e-8
 LARGEST_RESIDUAL = 1e-5
-WIDENING = 3.7
 FARTHER = 10.0
-TRIALS = 12
-
-
-@dataclass(frozen=True, eq=False)
-class Pairs:
-    """Eigenpairs in a pencil's units, ascending, with residual bounds."""
-
-    values: Float[np.ndarray, " k"]
-    vectors: Float[np.ndarray, "n k"]
-    residuals: Float[np.ndarray, " k"]
 
 
 def certify(
@@ -82,43 +73,55 @@ def prove(pencil: Pencil, pairs: Pairs) -> Certificate:
     ConvergenceError
         If the pairs are not B-orthonormal eigenvectors, or no factor is good enough to count by.
     """
-    k = len(pairs.values)
-    certificate = Certificate(
-        n_pairs=k,
-        shift=np.inf,
-        count=pencil.n,
-        n_found=k,
-        gap=(float(pairs.values[-1]), np.inf),
-        resolution=max(RESOLUTION * _scale(pencil, pairs), 4 * _spread(pairs)),
-        orthonormality=_require_orthonormal(pencil, pairs.vectors),
-        max_residual=_require_eigenpairs(pencil, pairs),
-        n_split=0,
-    )
-    certificate = replace(certificate, clusters=_clusters(pairs.values, certificate.resolution))
+    k, certificate = len(pairs.values), quality(pencil, pairs)
     if k == pencil.n:
         return certificate
-    above = _count_beside(pencil, pairs, k - 1, certificate.resolution)
+    above = count_beside(pencil, pairs, k - 1, certificate.resolution)
     certificate = _counted(certificate, pairs, above)
     return certificate if above.count <= k else _below_cluster(pencil, pairs, certificate, above)
 
 
+def quality(pencil: Pencil, pairs: Pairs) -> Certificate:
+    """Return what can be said of pairs without a count, in the pencil's units; it stands if these are all n.
+
+    Raises
+    ------
+    ConvergenceError
+        If the pairs are not B-orthonormal eigenvectors.
+    """
+    resolution = max(RESOLUTION * _scale(pencil, pairs), 4 * spread(pairs))
+    return Certificate(
+        n_pairs=len(pairs.values),
+        shift=np.inf,
+        count=pencil.n,
+        n_found=len(pairs.values),
+        gap=(float(pairs.values[-1]), np.inf),
+        resolution=resolution,
+        orthonormality=_require_orthonormal(pencil, pairs.vectors),
+        max_residual=_require_eigenpairs(pencil, pairs),
+        n_split=0,
+        clusters=_clusters(pairs.values, resolution),
+    )
+
+
 def in_user_units(pencil: Pencil, certificate: Certificate) -> Certificate:
     """Return the certificate with every value in the user's 1/length²."""
-    shift, low, high, resolution = pencil.values_out(
-        np.array([certificate.shift, *certificate.gap, certificate.resolution])
+    shift, floor, low, high, resolution = pencil.values_out(
+        np.array([certificate.shift, certificate.floor, *certificate.gap, certificate.resolution])
     ).tolist()
-    return replace(certificate, shift=shift, gap=(low, high), resolution=resolution)
+    return replace(certificate, shift=shift, floor=floor, gap=(low, high), resolution=resolution)
 
 
-def shortened(pencil: Pencil, pairs: Pairs, certificate: Certificate, count: int) -> tuple[Pairs, Certificate]:
-    """Return the lowest so many of the pairs; what proves them all proves these."""
+def part(pencil: Pencil, pairs: Pairs, certificate: Certificate, start: int, stop: int) -> tuple[Pairs, Certificate]:
+    """Return the pairs from one number to another; what proves them all proves these."""
     resolution = RESOLUTION * _scale(pencil, pairs)
-    rest = pairs.values[count:] - pairs.values[count - 1]
+    rest = pairs.values[stop:] - pairs.values[stop - 1]
     equal = int(np.count_nonzero(rest <= resolution))
-    fewer = Pairs(pairs.values[:count], pairs.vectors[:, :count], pairs.residuals[:count])
+    fewer = Pairs(pairs.values[start:stop], pairs.vectors[:, start:stop], pairs.residuals[start:stop])
     return fewer, replace(
         certificate,
-        n_pairs=count,
+        first=certificate.first + start,
+        n_pairs=stop - start,
         n_split=equal + (certificate.n_split if equal == len(rest) else 0),
         clusters=_clusters(fewer.values, resolution),
     )
@@ -128,11 +131,11 @@ def _below_cluster(pencil: Pencil, pairs: Pairs, above: Certificate, beside: Fac
     # Eigenvalues below the cluster are counted. The next ones lie above that count, and not above those found.
     jumps = np.flatnonzero(np.diff(pairs.values) > 2 * above.resolution)
     first = int(jumps[-1]) + 1 if jumps.size else 0
-    factor = _count_beside(pencil, pairs, first, -above.resolution, beside)
+    factor = count_beside(pencil, pairs, first, -above.resolution, beside)
     if factor.count > first:
         # Slack may have taken copies of the cluster below σ that are not among the pairs: once more, from farther off.
         farther = FARTHER * (factor.shift - float(pairs.values[first]))
-        factor = _count_beside(pencil, pairs, first, farther, factor)
+        factor = count_beside(pencil, pairs, first, farther, factor)
     resolution = float(pairs.values[-1]) - factor.shift
     if resolution > WIDEST_CLUSTER * _scale(pencil, pairs):
         raise ConvergenceError(
@@ -144,7 +147,7 @@ def _below_cluster(pencil: Pencil, pairs: Pairs, above: Certificate, beside: Fac
 
 def _counted(certificate: Certificate, pairs: Pairs, factor: Factor) -> Certificate:
     n_found = int(np.count_nonzero(pairs.values < factor.shift))
-    low = float(pairs.values[n_found - 1]) + _spread(pairs) if n_found else -np.inf
+    low = float(pairs.values[n_found - 1]) + spread(pairs) if n_found else -np.inf
     return replace(
         certificate,
         shift=factor.shift,
@@ -155,45 +158,6 @@ def _counted(certificate: Certificate, pairs: Pairs, factor: Factor) -> Certific
     )
 
 
-def _count_beside(pencil: Pencil, pairs: Pairs, index: int, step: float, beside: Factor | None = None) -> Factor:
-    """Count at `step` from a value, or farther off where rounding would move a value found across σ.
-
-    A factor tells how much slack the next one needs for its count to stand above rounding (`rounding`). One that has
-    counted right beside had enough.
-    """
-    value, shape, spread = float(pairs.values[index]), pairs.vectors[:, index] ** 2, _spread(pairs)
-
-    def taken(slack: Float[np.ndarray, " n"]) -> float:
-        return spread + float(slack @ shape)  # from this eigenvalue, to first order
-
-    def too_much(loss: float, shift: float) -> bool:
-        return not 2 * loss < np.abs(pairs.values - shift).min()
-
-    none, sigma = np.zeros(pencil.n), value + step
-    slack = none if beside is None or too_much(taken(beside.slack), sigma) else beside.slack
-    for _ in range(TRIALS):
-        factor = factorise(pencil, sigma, slack)
-        loss = rounding(factor) if factor else np.full(pencil.n, np.inf)
-        # What is above the slack moves σ: W - σB - S + E ≤ W - (σ - ρ)B where no row has more than ρ c D of it.
-        over = float(((loss - slack) / pencil.mass_diagonal).max(initial=0.0)) / pencil.mass_floor
-        if factor and not too_much(taken(slack) + over, sigma - over):
-            return replace(factor, shift=sigma - over)
-        slack = wanted = np.maximum(slack, _padded(pencil, loss))
-        if too_much(taken(slack), sigma):
-            step, slack = WIDENING * step, none
-            sigma = value + step
-    raise ConvergenceError(
-        f"Eigenvalues can be counted only where rounding takes less than their distance to σ; near "
-        f"{np.ldexp(value, pencil.value_exponent):.6g} (1/length²) it takes "
-        f"{np.ldexp(taken(wanted), pencil.value_exponent):.1e}. Repair nearly degenerate elements."
-    )
-
-
-def _padded(pencil: Pencil, loss: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    # Rounding wanders from factor to factor, most in rows where there was little.
-    return 3 * loss + 0.1 * float(np.median(loss / pencil.mass_diagonal)) * pencil.mass_diagonal
-
-
 def _clusters(values: Float[np.ndarray, " k"], resolution: float) -> tuple[int, ...]:
     ends = np.flatnonzero(np.append(np.diff(values) > resolution, True))
     return tuple(np.diff(ends, prepend=-1).tolist())
@@ -202,11 +166,6 @@ def _clusters(values: Float[np.ndarray, " k"], resolution: float) -> tuple[int, 
 def _scale(pencil: Pencil, pairs: Pairs) -> float:
     # level / n is far below the first positive eigenvalue of a surface, and serves where all that is found is 0.
     return max(float(np.abs(pairs.values).max()), pencil.level / pencil.n)
-
-
-def _spread(pairs: Pairs) -> float:
-    """Bound of the distance of all values together to eigenvalues, one to one (Kahan 1967)."""
-    return float(np.linalg.norm(pairs.residuals))
 
 
 def _require_orthonormal(pencil: Pencil, vectors: Float[np.ndarray, "n k"]) -> float:

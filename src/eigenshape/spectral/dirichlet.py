@@ -18,6 +18,7 @@ def solve_dirichlet(
     k: SupportsIndex | None,
     fixed: Int[np.ndarray, " c"],
     *,
+    above: float | None = None,
     below: float | None = None,
     progress: Progress | None = None,
 ) -> Spectrum:
@@ -33,7 +34,7 @@ def solve_dirichlet(
         Number of eigenpairs, 1 to the number of free points.
     fixed : (c,) int
         Points, each once or more.
-    below, progress : optional
+    above, below, progress : optional
         As in `solve_spectrum`.
 
     Returns
@@ -49,7 +50,7 @@ def solve_dirichlet(
         If the proof of completeness fails.
     """
     inner, free = dirichlet_laplacian(laplacian, fixed)
-    found = solve_spectrum(inner, k, below=below, progress=progress)
+    found = solve_spectrum(inner, k, above=above, below=below, progress=progress)
     vectors = np.zeros((laplacian.n_points, found.eigenvectors.shape[1]))
     vectors[free] = found.eigenvectors
     return replace(found, eigenvectors=frozen(vectors), mass=laplacian.mass)

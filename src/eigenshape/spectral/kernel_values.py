@@ -86,7 +86,8 @@ def reported(kernel: GaussianKernel | None, certificate: Certificate, last: floa
     if np.isfinite(shift):
         shift = shift if shift < top else (max(low, last) + top) / 2
         high = min(high, (shift + top) / 2)
-    low, shift, high = (
-        float(from_pencil(kernel, np.array([end]))[0]) if np.isfinite(end) else end for end in (low, shift, high)
+    floor, low, shift, high = (
+        float(from_pencil(kernel, np.array([end]))[0]) if np.isfinite(end) else end
+        for end in (certificate.floor, low, shift, high)
     )
-    return replace(certificate, shift=shift, gap=(low, high), resolution=resolution)
+    return replace(certificate, floor=floor, shift=shift, gap=(low, high), resolution=resolution)

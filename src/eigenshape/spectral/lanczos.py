@@ -120,7 +120,8 @@ def block_lanczos(
     space[:first] = packed(inner.enter(locked))
     projected = np.zeros((capacity, capacity))
     fresh, _, _ = _orthonormalise(inner, space[:first], rng.standard_normal((groups, pencil.n, LANES)), rng)
-    check = min(wanted.below + wanted.above, capacity // 4) + 2 * block
+    missing = wanted.below + wanted.above
+    check = min(min(missing, capacity // 4) + 2 * block, capacity)
     for size in range(block, capacity + 1, block):
         filled = first + size // LANES
         space[filled - groups : filled] = fresh

@@ -29,8 +29,12 @@ def heat_kernel_signature(spectrum: Spectrum, times: ArrayLike) -> Float[np.ndar
     Raises
     ------
     InvalidParameterError
-        If a time is not positive and finite.
+        If a time is not positive and finite, or the spectrum is of an interval.
     """
+    if spectrum.certificate.first:
+        raise InvalidParameterError(
+            f"spectrum must begin with the lowest eigenvalue; it begins with number {spectrum.certificate.first}."
+        )
     decay = np.exp(-np.outer(spectrum.eigenvalues, positive_values(times, "times")))
     return np.asarray(spectrum.eigenvectors**2 @ decay)
 

@@ -11,6 +11,8 @@ from eigenshape.spectral.lanczos import Wanted, block_lanczos
 from eigenshape.spectral.pencil import Pencil
 from eigenshape.spectral.shift import factorise_near, shift_inside
 
+Report = Callable[[float], None]
+
 SLICE = 250  # eigenvalues to a slice: more make the space dear, fewer the factors
 OVERLAP = 12  # eigenvalues past the end of a slice, among which it is cut
 CLEAR_GAP = 1e-5  # of the last eigenvalue: over a gap this wide two slices come out orthogonal
@@ -18,12 +20,25 @@ TRIALS = 5
 FAIR = (0.2, 0.9)  # share of a slice that may lie below its shift
 
 
-def walk(pencil: Pencil, k: int, report: Callable[[float], None]) -> tuple[Float[np.ndarray, "n j"], Factor]:
+def walk(pencil: Pencil, k: int, report: Report) -> tuple[Float[np.ndarray, "n j"], Factor]:
     """Return the lowest k eigenvectors as far as they were seen, and the factor at the last shift.
 
-    A slice ends in a clear gap. Where its shift stands above one of n eigenvalues in all, the next shift is placed by
-    the spacing of the last ones found, and the count of its factor tells how many lie between. What a slice does not
-    see, copies of a multiple eigenvalue beyond the width of its block, is left out.
+    Raises
+    ------
+    ConvergenceError
+        If a slice does not converge, or has no gap to end in.
+    """
+    return walk_on(pencil, shift_inside(pencil, next_slice(k, 0)), 0, k, report)
+
+
+def walk_on(
+    pencil: Pencil, factor: Factor, known: int, k: int, report: Report
+) -> tuple[Float[np.ndarray, "n j"], Factor]:
+    """Return the eigenvectors from number `known` to k as far as they were seen, and the factor at the last shift.
+
+    The first factor stands in the first slice. A slice ends in a clear gap. The next shift is placed by the spacing of
+    the last eigenvalues found, and the count of its factor tells how many lie between. What a slice does not see,
+    copies of a multiple eigenvalue beyond the width of its block, is left out.
 
     Raises
     ------
@@ -31,15 +46,15 @@ def walk(pencil: Pencil, k: int, report: Callable[[float], None]) -> tuple[Float
         If a slice does not converge, or has no gap to end in.
     """
     parts: list[Float[np.ndarray, "n j"]] = []
-    factor, known, floor = shift_inside(pencil, _next_slice(k, 0)), 0, -np.inf
+    begin, floor = known, -np.inf
     while True:
-        target = _next_slice(k, known)
+        target = next_slice(k, known)
         last = known + target >= k
         above = max(known + target - factor.count, 1 if not last else 0) + (0 if last else OVERLAP)
+        share = (known - begin) / (k - begin), target / (k - begin)
         wanted = Wanted(below=factor.count - known, above=above, floor=floor)
-        values, vectors = block_lanczos(
-            pencil, factor, wanted, locked=np.empty((pencil.n, 0)), report=_within(report, known / k, target / k)
-        )
+        none = np.empty((pencil.n, 0))
+        values, vectors = block_lanczos(pencil, factor, wanted, locked=none, report=_within(report, *share))
         if last:
             return np.hstack([*parts, vectors]), factor
         kept, floor = _cut(values, factor.shift)
@@ -47,15 +62,16 @@ def walk(pencil: Pencil, k: int, report: Callable[[float], None]) -> tuple[Float
         known = factor.count + kept
         upper_half = np.sort(values[values < floor])[parts[-1].shape[1] // 2 :]
         spacing = (floor - float(upper_half[0])) / len(upper_half)
-        factor = _factor_beyond(pencil, floor, spacing, known, _next_slice(k, known))
+        factor = factor_beyond(pencil, floor, spacing, known, next_slice(k, known))
 
 
-def _next_slice(k: int, known: int) -> int:
+def next_slice(k: int, known: int) -> int:
+    """Return how many eigenvalues the next slice takes."""
     left = k - known
     return -(-left // max(-(-left // SLICE), 1))
 
 
-def _within(report: Callable[[float], None], start: float, share: float) -> Callable[[float], None]:
+def _within(report: Report, start: float, share: float) -> Report:
     return lambda done: report(start + share * done)
 
 
@@ -70,8 +86,14 @@ def _cut(values: Float[np.ndarray, " j"], shift: float) -> tuple[int, float]:
     return kept, float(above[kept - 1] + above[kept]) / 2
 
 
-def _factor_beyond(pencil: Pencil, floor: float, spacing: float, known: int, target: int) -> Factor:
-    """Factor at a shift with about half of the next slice between `floor` and it."""
+def factor_beyond(pencil: Pencil, floor: float, spacing: float, known: int, target: int) -> Factor:
+    """Factor at a shift with about half of the next slice between `floor` and it.
+
+    Raises
+    ------
+    ConvergenceError
+        If none is found beyond `floor`.
+    """
     step = spacing * target / 2
     for _ in range(TRIALS):
         factor = factorise_near(pencil, floor + step)

@@ -15,11 +15,13 @@ from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.sparse.lane_loops import LANES
 from eigenshape.spectral.certificate import Certificate
-from eigenshape.spectral.certify import Pairs, in_user_units, prove, shortened
+from eigenshape.spectral.certify import in_user_units, part, prove
 from eigenshape.spectral.factor import Factor
+from eigenshape.spectral.interval import count_interval, solve_interval
 from eigenshape.spectral.kernel_values import from_pencil, reported, require_readable, to_pencil, widened
 from eigenshape.spectral.lanczos import Wanted, block_lanczos
-from eigenshape.spectral.pencil import Pencil, normalise, rayleigh_residuals
+from eigenshape.spectral.pairs import Pairs, lowest, polished
+from eigenshape.spectral.pencil import Pencil, normalise
 from eigenshape.spectral.shift import factor_below, shift_inside
 from eigenshape.spectral.slices import walk
 from eigenshape.spectral.spectrum import Spectrum
@@ -32,24 +34,23 @@ SMALL = 300  # points up to which a dense solve is the faster one
 DENSE_SHARE = 4  # and where more than one in so many pairs is wanted,
 MORE = 8  # pairs that are added where a guess was too low
 DENSE_LIMIT = 6000  # while the matrix still fits
+FEW = 50  # eigenvalues below an interval that are not worth a second count
 WHOLE = 400  # pairs up to which one shift serves
 SHARE_OF_MEMORY = 0.9
 FEWEST_VECTORS = 150  # of a space, however few pairs are wanted
 WIDEST = 8  # groups of eight columns to a block
 RUNS = 40
-LOOSE = 1e-12
-SKEW = 1e-5
-POLISHED = 2e-9
 
 
 def solve_spectrum(
     laplacian: Laplacian,
     k: SupportsIndex | None = None,
     *,
+    above: float | None = None,
     below: float | None = None,
     progress: Progress | None = None,
 ) -> Spectrum:
-    """Compute the k lowest eigenpairs of W φ = λ B φ, or all below a value, with the proof that none is missing.
+    """Compute the k lowest eigenpairs of W φ = λ B φ, or all in an interval, with the proof that none is missing.
 
     Block Lanczos on (W - σB)⁻¹B with σ among the wanted eigenvalues; what a count of eigenvalues by Sylvester's law
     of inertia finds missing (copies of a multiple eigenvalue) is searched for again with everything found deflated,
@@ -64,6 +65,8 @@ def solve_spectrum(
         Number of eigenpairs, 1 to n.
     below : float, optional
         Instead of k: all pairs with λ < below, in 1/length².
+    above : float, optional
+        With `below`: all pairs with above ≤ λ < below. `certificate.first` says how many eigenvalues lie lower.
     progress : callable, optional
         Called as progress(fraction_done, message) while the solver works.
 
@@ -78,8 +81,8 @@ def solve_spectrum(
     Raises
     ------
     InvalidParameterError
-        If not one of k and below is given, k is not in 1..n, nothing lies below `below`, B is not positive definite, W
-        has a negative eigenvalue, or one to be corrected is 1/t or more.
+        If not one of k and below is given, k is not in 1..n, no eigenvalue lies below `below` or in the interval, B is
+        not positive definite, W has a negative eigenvalue, or one to be corrected is 1/t or more.
     ConvergenceError
         If the proof cannot be completed; no incomplete spectrum is ever returned.
 
@@ -88,10 +91,7 @@ def solve_spectrum(
     UserWarning
         If eigenvalues of a kernel lie too near to 1/t to tell those of the shape.
     """
-    if (k is None) == (below is None):
-        raise InvalidParameterError(f"One of k and below says which pairs to compute; k is {k} and below is {below}.")
-    wanted = whole_number(k, "k", 1, laplacian.n_points) if k is not None else 0
-    limit = to_pencil(laplacian.kernel, positive_values([below], "below")) if below is not None else np.zeros(1)
+    wanted, limits = _asked(laplacian, k, above, below)
     report = progress or _silent
     with threadpool_limits(1, user_api="blas"):
         report(0.0, "scaling the operator")
@@ -99,7 +99,8 @@ def solve_spectrum(
         if wanted:
             pairs, certificate = _proved(pencil, wanted, report)
         else:
-            pairs, certificate = _proved_below(pencil, float(np.ldexp(limit[0], -pencil.value_exponent)), report)
+            low, high = np.ldexp(limits, -pencil.value_exponent).tolist()
+            pairs, certificate = _proved_between(pencil, low, high, report)
     report(1.0, "proved complete")
     values, residuals = pencil.values_out(_without_negatives(pencil, pairs)), pencil.values_out(pairs.residuals)
     require_readable(laplacian.kernel, values)
@@ -110,6 +111,23 @@ def solve_spectrum(
         residuals=frozen(widened(laplacian.kernel, values, residuals)),
         certificate=reported(laplacian.kernel, in_user_units(pencil, certificate), float(values[-1])),
     )
+
+
+def _asked(
+    laplacian: Laplacian, k: SupportsIndex | None, above: float | None, below: float | None
+) -> tuple[int, Float[np.ndarray, " 2"]]:
+    """Return k, or 0 and the ends of an interval of the pencil's eigenvalues."""
+    if (k is None) == (below is None):
+        raise InvalidParameterError(f"One of k and below says which pairs to compute; k is {k} and below is {below}.")
+    if below is None and above is not None:
+        raise InvalidParameterError(f"above needs below, the other end of an interval; above is {above}.")
+    if below is None:
+        return whole_number(k or 0, "k", 1, laplacian.n_points), np.zeros(2)
+    high = float(positive_values([below], "below")[0])
+    low = -np.inf if above is None or above == 0 else float(positive_values([above], "above")[0])
+    if low >= high:
+        raise InvalidParameterError(f"above must be less than below; above is {above} and below is {below}.")
+    return 0, to_pencil(laplacian.kernel, np.array([low, high]))
 
 
 def _silent(fraction: float, message: str) -> None:
@@ -128,20 +146,52 @@ def _proved(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificat
     return roads[-1](pencil, k, report)
 
 
-def _proved_below(pencil: Pencil, limit: float, report: Progress) -> tuple[Pairs, Certificate]:
-    """Prove one pair more than lie below the limit: then none of them is missing."""
+def _proved_between(pencil: Pencil, low: float, high: float, report: Progress) -> tuple[Pairs, Certificate]:
     report(0.01, "counting eigenvalues")
+    pairs, certificate = _far_up(pencil, low, high, report) or _lowest_below(pencil, high, report)
+    start, stop = np.searchsorted(pairs.values, [low, high]).tolist()
+    if start == stop:
+        raise InvalidParameterError(_nothing(pencil, pairs, certificate.first + start, low, high))
+    return part(pencil, pairs, certificate, start, stop)
+
+
+def _far_up(pencil: Pencil, low: float, high: float, report: Progress) -> tuple[Pairs, Certificate] | None:
+    """Solve for an interval by itself where it is less work than all eigenvalues below its upper end."""
+    if pencil.n <= SMALL or low <= 0:
+        return None
+    interval = count_interval(pencil, low, high)
+    within = interval.below_high - interval.below_low
+    if interval.below_low < max(within, FEW) or (
+        DENSE_SHARE * interval.below_high > pencil.n and pencil.n <= DENSE_LIMIT
+    ):
+        return None
+    _require_room(pencil, within, 24 * pencil.shifted.elimination.n_entries)
+    with suppress(ConvergenceError):
+        return solve_interval(pencil, interval, lambda done: report(0.05 + 0.9 * done, "slices of the interval"))
+    return None
+
+
+def _lowest_below(pencil: Pencil, limit: float, report: Progress) -> tuple[Pairs, Certificate]:
+    """Prove one pair more than lie below the limit: then none of them is missing."""
     k = min(factor_below(pencil, limit).count + 1, pencil.n)
     while True:
         pairs, certificate = _proved(pencil, k, report)
         count = int(np.count_nonzero(pairs.values < limit))
         if count < k or k == pencil.n:
-            break
+            return pairs, certificate
         k = min(k + max(k // 10, MORE), pencil.n)
-    if not count:
-        lowest, asked = pencil.values_out(np.array([pairs.values[0], limit]))
-        raise InvalidParameterError(f"below must exceed the lowest eigenvalue, {lowest:.6g}; it is {asked:.6g}.")
-    return shortened(pencil, pairs, certificate, count)
+
+
+def _nothing(pencil: Pencil, pairs: Pairs, number: int, low: float, high: float) -> str:
+    below, above = pencil.values_out(np.array([high, low])).tolist()
+    if number == 0:
+        return (
+            f"below must exceed the lowest eigenvalue, {pencil.values_out(pairs.values[:1])[0]:.6g}; it is {below:.6g}."
+        )
+    return (
+        f"above and below must have eigenvalues between them; {number} lie below {above:.6g} and none from there to "
+        f"{below:.6g}."
+    )
 
 
 def _dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
@@ -151,7 +201,7 @@ def _dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate
     stiffness = pencil.stiffness.toarray() / np.outer(roots, roots)
     mass = None if pencil.mass_floor == 1.0 else pencil.mass.toarray() / np.outer(roots, roots)
     _, vectors = sl.eigh(stiffness, mass)
-    pairs = _lowest(pencil, vectors[:, :k] / roots[:, None], k)
+    pairs = lowest(pencil, vectors[:, :k] / roots[:, None], k)
     report(0.8, "counting eigenvalues")
     certificate = prove(pencil, pairs)
     if not certificate.complete:
@@ -164,7 +214,7 @@ def _sparse(pencil: Pencil, k: int, report: Progress, *, start: Start) -> tuple[
     report(0.02, "looking for a shift")
     vectors, factor = start(pencil, k, _in_run(report, 0))
     for run in range(1, RUNS + 1):
-        pairs = _polished(pencil, factor, _lowest(pencil, vectors, k))
+        pairs = polished(pencil, factor, lowest(pencil, vectors, k))
         report(0.9, "counting eigenvalues")
         certificate, wanted = _still_wanted(pencil, factor, pairs, k)
         missing = wanted.below + wanted.above
@@ -212,44 +262,6 @@ def _still_wanted(pencil: Pencil, factor: Factor, pairs: Pairs, k: int) -> tuple
     ceiling = certificate.shift if certificate else np.inf
     below = min(max(factor.count - int(np.count_nonzero(pairs.values < factor.shift)), 0), missing)
     return certificate, Wanted(below=below, above=missing - below, ceiling=ceiling)
-
-
-def _polished(pencil: Pencil, factor: Factor, pairs: Pairs) -> Pairs:
-    """Refine the pairs whose residual the rounding of the factor has kept large.
-
-    One step of (W - σB)⁻¹ on a residual gives the error of the vector outside the space of those found.
-    """
-    late = np.flatnonzero(pairs.residuals > POLISHED * np.abs(pairs.values).max(initial=0.0))
-    if not late.size:
-        return pairs
-    values, vectors, residuals = pairs.values.copy(), pairs.vectors.copy(), pairs.residuals.copy()
-    part = vectors[:, late]
-    step = factor.solve(pencil.stiffness @ part - pencil.weigh(part) * values[late])
-    vectors[:, late] -= step - vectors @ (vectors.T @ pencil.weigh(step))
-    values[late], residuals[late] = rayleigh_residuals(pencil, vectors[:, late])
-    order = np.argsort(values, kind="stable")
-    return Pairs(values[order], vectors[:, order], residuals[order])
-
-
-def _lowest(pencil: Pencil, vectors: Float[np.ndarray, "n j"], k: int) -> Pairs:
-    vectors = _orthonormal(pencil, vectors)
-    values, residuals = rayleigh_residuals(pencil, vectors)
-    order = np.argsort(values, kind="stable")[:k]
-    if not np.array_equal(order, np.arange(vectors.shape[1])):
-        vectors = vectors[:, order]
-    return Pairs(values[order], vectors, residuals[order])
-
-
-def _orthonormal(pencil: Pencil, vectors: Float[np.ndarray, "n j"]) -> Float[np.ndarray, "n j"]:
-    # One Newton step towards the nearest B-orthonormal columns: they are so up to the tolerance of the iteration.
-    gram = vectors.T @ pencil.weigh(vectors)
-    identity = np.eye(len(gram))
-    off = np.abs(gram - identity).max(initial=0.0)
-    if off < LOOSE:
-        return vectors
-    if off > SKEW:
-        raise ConvergenceError(f"Vectors of different runs must be B-orthogonal; two are off by {off:.1e}.")
-    return vectors @ (1.5 * identity - 0.5 * gram)
 
 
 def _without_negatives(pencil: Pencil, pairs: Pairs) -> Float[np.ndarray, " k"]:

@@ -14,7 +14,7 @@ from eigenshape.spectral.certificate import Certificate
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """The k lowest eigenpairs of a Laplacian, with their proof.
+    """The k lowest eigenpairs of a Laplacian, or those of an interval, with their proof.
 
     Attributes
     ----------
