@@ -59,6 +59,11 @@ class Elimination:
         waiting, tallest = self.room
         return np.empty(waiting), np.empty(tallest**2), np.empty(tallest**2)
 
+    @cached_property
+    def lanes(self) -> tuple[Float[np.ndarray, "n 8"], Float[np.ndarray, "t 8"]]:
+        """Room for right-hand sides in the order of elimination, and for those of one front."""
+        return np.empty((len(self.order), LANES)), np.empty((self.room[1], LANES))
+
     @property
     def n_entries(self) -> int:
         """Entries of L that are stored."""
@@ -80,14 +85,15 @@ class SymmetricFactor:
         for start in range(0, width, LANES):
             stop = min(start + LANES, width)
             lanes[:, : stop - start] = right[:, start:stop]
-            solution[:, start:stop] = self.solve_lanes(lanes)[:, : stop - start]
+            self.solve_lanes(lanes, lanes)
+            solution[:, start:stop] = lanes[:, : stop - start]
         return solution
 
-    def solve_lanes(self, right: Float[np.ndarray, "n 8"]) -> Float[np.ndarray, "n 8"]:
-        """Solve A x = right for eight right-hand sides, an array in C order, at once."""
-        e, solution = self.elimination, np.empty_like(right)
-        fronts.solve_fronts(e.order, e.first, e.begins, e.rows, e.places, self.panels, self.pivots, right, solution)
-        return solution
+    def solve_lanes(self, right: Float[np.ndarray, "n 8"], out: Float[np.ndarray, "n 8"]) -> None:
+        """Solve A x = right for eight right-hand sides, arrays in C order, at once; `out` may be `right` itself."""
+        e = self.elimination
+        tree = e.order, e.first, e.begins, e.rows, e.places
+        fronts.solve_fronts(*tree, self.panels, self.pivots, right, out, e.lanes)
 
     def rounding(self) -> Float[np.ndarray, " n"]:
         """Bound what rounding has put between A and L D Lᵀ, row by row.

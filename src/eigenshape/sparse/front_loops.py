@@ -218,11 +218,11 @@ def _update(front, times, start, end, stop, gemm):
 
 @njit(cache=True, nogil=True)
 @no_type_check
-def solve_fronts(order, first, begins, rows, places, panels, pivots, right, solution):
-    """Solve for LANES right-hand sides (n, LANES)."""
+def solve_fronts(order, first, begins, rows, places, panels, pivots, right, solution, room):
+    """Solve for LANES right-hand sides (n, LANES); the solution may take the place of the right-hand sides."""
     n, size = len(pivots), len(first) - 1
-    lanes = np.empty((n, LANES))
-    gathered, near = np.empty((len(right), LANES)), np.empty(NEAR * WIDE)
+    lanes, gathered = room
+    near = np.empty(NEAR * WIDE)
     for i in range(n):
         for lane in range(LANES):
             lanes[i, lane] = right[order[i], lane]

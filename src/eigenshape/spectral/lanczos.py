@@ -35,10 +35,15 @@ class Operator:
 
     def image(self, block: Block) -> Block:
         """Return the operator's image of each slot."""
-        if self.roots is None:
-            return np.stack([self.factor.lower.solve_lanes(self.pencil.weigh(slot)) for slot in block])
-        images = [self.factor.lower.solve_lanes(self.roots * slot) for slot in block]
-        return np.stack([np.multiply(image, self.roots, out=image) for image in images])
+        images = np.empty_like(block)
+        for slot, image in zip(block, images, strict=True):
+            if self.roots is None:
+                self.factor.lower.solve_lanes(self.pencil.weigh(slot), image)
+            else:
+                np.multiply(slot, self.roots, out=image)
+                self.factor.lower.solve_lanes(image, image)
+                np.multiply(image, self.roots, out=image)
+        return images
 
     def weigh(self, block: Float[np.ndarray, "g n b"]) -> Float[np.ndarray, "g n b"]:
         """Return what the plain product with columns is the inner product with."""
@@ -119,16 +124,15 @@ def block_lanczos(
     space = np.empty((first + capacity // LANES + groups, pencil.n, LANES))  # pages are touched only as it grows
     space[:first] = packed(inner.enter(locked))
     projected = np.zeros((capacity, capacity))
-    fresh, _, _ = _orthonormalise(inner, space[:first], rng.standard_normal((groups, pencil.n, LANES)), rng)
+    _orthonormalise(inner, space[: first + groups], rng.standard_normal((groups, pencil.n, LANES)), rng)
     missing = wanted.below + wanted.above
     check = min(min(missing, capacity // 4) + 2 * block, capacity)
     for size in range(block, capacity + 1, block):
         filled = first + size // LANES
-        space[filled - groups : filled] = fresh
-        fresh, along, coupling = _orthonormalise(inner, space[:filled], inner.image(fresh), rng)
+        image = inner.image(space[filled - groups : filled])
+        along, coupling = _orthonormalise(inner, space[: filled + groups], image, rng)
         projected[:size, size - block : size] = along[first * LANES :]
         if size >= check:
-            space[filled : filled + groups] = fresh
             krylov = Krylov(space[first : filled + groups], projected[:size, :size], coupling)
             ritz = _ritz(krylov, factor.shift)
             chosen, missing = _choose(ritz, wanted)
@@ -150,26 +154,29 @@ def _capacity(pencil: Pencil, wanted: Wanted, n_locked: int, block: int) -> int:
 
 def _orthonormalise(
     inner: Operator, space: Slots, columns: Block, rng: np.random.Generator
-) -> tuple[Block, Float[np.ndarray, "m b"], Float[np.ndarray, "b b"]]:
-    """Split columns = space along + fresh upper, with [space, fresh] orthonormal; the columns are used up.
+) -> tuple[Float[np.ndarray, "m b"], Float[np.ndarray, "b b"]]:
+    """Split columns = known along + fresh upper, with [known, fresh] = space orthonormal; return along and upper.
 
-    The recent blocks, which take most of a Lanczos image away, are projected out first, then all of them.
+    The last slots of `space` are filled with what is fresh; the columns are used up. The recent blocks, which take most
+    of a Lanczos image away, are projected out first, then all of them.
     """
-    block = len(columns) * LANES
-    along = np.zeros((len(space) * LANES, block))
+    groups, block = len(columns), len(columns) * LANES
+    known, fresh = space[:-groups], space[-groups:]
+    along = np.zeros((len(known) * LANES, block))
     lengths = np.sqrt(np.einsum("gij,gij->gj", columns, inner.weigh(columns))).ravel()
-    recent = max(len(space) - 2 * len(columns), 0)
-    along[recent * LANES :] += _project(inner, space[recent:], columns)
-    along += _project(inner, space, columns)
-    fresh, upper, short = _gram_schmidt(inner, columns, lengths, rng)
+    recent = max(len(known) - 2 * groups, 0)
+    along[recent * LANES :] += _project(inner, known[recent:], columns)
+    along += _project(inner, known, columns)
+    upper, short = _gram_schmidt(inner, columns, fresh, lengths, rng)
     for _ in range(REPEATS):
         if not short:
             break
-        again = _project(inner, space, fresh)
-        fresh, second, short = _gram_schmidt(inner, fresh, np.ones(block), rng)
+        columns[:] = fresh
+        again = _project(inner, known, columns)
+        second, short = _gram_schmidt(inner, columns, fresh, np.ones(block), rng)
         along += again @ upper
         upper = second @ upper
-    return fresh, along, upper
+    return along, upper
 
 
 def _project(inner: Operator, space: Slots, columns: Block) -> Float[np.ndarray, "m b"]:
@@ -179,24 +186,31 @@ def _project(inner: Operator, space: Slots, columns: Block) -> Float[np.ndarray,
 
 
 def _gram_schmidt(
-    inner: Operator, columns: Block, lengths: Float[np.ndarray, " b"], rng: np.random.Generator
-) -> tuple[Block, Float[np.ndarray, "b b"], bool]:
-    """Orthonormalise a block; tell whether a column became short against what it was.
+    inner: Operator, columns: Block, fresh: Block, lengths: Float[np.ndarray, " b"], rng: np.random.Generator
+) -> tuple[Float[np.ndarray, "b b"], bool]:
+    """Orthonormalise a block into `fresh`; return the triangle, and whether a column became short against what it was.
 
     By the Cholesky factor of the Gram matrix, twice where the first leaves digits to be gained (Yamamoto and others
-    2015), and column by column where it fails.
+    2015), and column by column where it fails. The columns are used up.
     """
-    upper, fresh = np.eye(len(lengths)), columns
-    for _ in range(2):
-        triangle = _cholesky(products(fresh, inner.weigh(fresh)))
-        if triangle is None:
-            return _one_by_one(inner, columns, lengths, rng)
-        source, fresh = fresh, np.zeros_like(fresh)
-        subtract(source, -sl.solve_triangular(triangle, np.eye(len(triangle))), fresh)
-        upper = triangle @ upper
-        if np.diag(triangle).min() > UNLIKE * np.linalg.norm(triangle, axis=0).max():
-            break
-    return fresh, upper, bool((np.diag(upper) < SHRUNK * lengths).any())
+    upper = _by_cholesky(inner, columns, fresh)
+    if upper is None:
+        return _one_by_one(inner, columns, fresh, lengths, rng)
+    if np.diag(upper).min() <= UNLIKE * np.linalg.norm(upper, axis=0).max():
+        columns[:] = fresh
+        second = _by_cholesky(inner, columns, fresh)
+        if second is None:
+            second, _ = _one_by_one(inner, columns, fresh, np.ones(len(lengths)), rng)
+        upper = second @ upper
+    return upper, bool((np.diag(upper) < SHRUNK * lengths).any())
+
+
+def _by_cholesky(inner: Operator, columns: Block, fresh: Block) -> Float[np.ndarray, "b b"] | None:
+    triangle = _cholesky(products(columns, inner.weigh(columns)))
+    if triangle is not None:
+        fresh[:] = 0.0
+        subtract(columns, -sl.solve_triangular(triangle, np.eye(len(triangle))), fresh)
+    return triangle
 
 
 def _cholesky(gram: Float[np.ndarray, "b b"]) -> Float[np.ndarray, "b b"] | None:
@@ -212,8 +226,8 @@ def _cholesky(gram: Float[np.ndarray, "b b"]) -> Float[np.ndarray, "b b"] | None
 
 
 def _one_by_one(
-    inner: Operator, block: Block, lengths: Float[np.ndarray, " b"], rng: np.random.Generator
-) -> tuple[Block, Float[np.ndarray, "b b"], bool]:
+    inner: Operator, block: Block, fresh: Block, lengths: Float[np.ndarray, " b"], rng: np.random.Generator
+) -> tuple[Float[np.ndarray, "b b"], bool]:
     """Orthonormalise a block; a negligible column is replaced by a random one that the triangle R leaves out."""
     columns, width = np.concatenate(list(block), axis=1), len(lengths)
     upper, short = np.zeros((width, width)), False
@@ -229,7 +243,8 @@ def _one_by_one(
         else:
             columns[:, i] /= length
             upper[i, i] = length
-    return packed(columns), upper, short
+    fresh[:] = packed(columns)
+    return upper, short
 
 
 def _random_unit(
