@@ -123,6 +123,41 @@ def test_results_are_int64_and_read_only():
     assert not parts.labels.flags.writeable
 
 
+def fan(n_spokes, apex):
+    """Triangles around one vertex, which has more sides than are sorted by insertion."""
+    angles = 2 * np.pi * np.arange(n_spokes) / n_spokes
+    rim = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(n_spokes)])
+    ring = np.arange(n_spokes)
+    faces = np.column_stack([ring, np.roll(ring, -1), np.full(n_spokes, n_spokes)])
+    return TriangleMesh(np.vstack([rim, [0, 0, apex]]), faces)
+
+
+@pytest.mark.parametrize("apex", [-2.0, 0.1, 2.0])
+@pytest.mark.parametrize("step", [0.0, 0.5])
+def test_labels_around_a_vertex_of_many_faces_equal_literal_merging(step, apex):
+    mesh = fan(90, apex)
+    values = wavy(mesh, step) + mesh.vertices[:, 2]
+    tree = merge_tree(mesh, values)
+    for count in range(1, len(tree.maxima) + 1):
+        parts = segment(tree, n_regions=count)
+        literal = LiteralMerging(mesh.faces.tolist(), values.tolist()).run(
+            lambda n, p, count=count: n <= count or np.isinf(p)
+        )
+        assert np.array_equal(parts.features.vertices[parts.labels], literal.labels())
+
+
+def test_pages_of_a_book_are_all_neighbours_at_its_spine():
+    # 60 faces at one edge, more than are sorted by insertion: page i ends at the spine, the next higher page beyond it.
+    heights = np.random.default_rng(0).permutation(60) + 1.0
+    points = np.column_stack([np.cos(heights), np.sin(heights), np.zeros(60)])
+    faces = [[60, 61, page] for page in range(60)]
+    mesh = TriangleMesh(np.vstack([points, [[0, 0, 0], [0, 0, 1]]]), faces)
+    tree = merge_tree(mesh, [*heights, 0.0, 0.0])
+    assert tree.values.tolist() == list(range(60, 0, -1))
+    assert tree.parent.tolist() == list(range(-1, 59))
+    assert tree.persistence.tolist() == [np.inf, *range(59, 0, -1)]
+
+
 def test_faces_that_repeat_a_vertex_or_each_other_are_merged_too():
     mesh = TriangleMesh(np.eye(4, 3), [[0, 1, 2], [0, 1, 2], [2, 2, 1], [1, 2, 3], [3, 3, 3]])
     parts = segment(merge_tree(mesh, [1.0, 2.0, 3.0, 4.0]), n_regions=1)
