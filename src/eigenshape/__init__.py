@@ -13,6 +13,8 @@ from eigenshape._errors import (
     MissingExtraError,
     StoreError,
 )
+from eigenshape.features.bottleneck import bottleneck_distance
+from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs, persistence_diagram
 from eigenshape.features.merge_tree import MergeTree, merge_tree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment
 from eigenshape.figures.camera import Camera, three_quarter_view
@@ -151,6 +153,8 @@ __all__ = [
     "Operator",
     "OperatorReport",
     "Panel",
+    "PersistenceDiagram",
+    "PersistencePairs",
     "PointCloud",
     "Quadrature",
     "Recipe",
@@ -167,6 +171,7 @@ __all__ = [
     "anisotropic_laplacian",
     "ball",
     "ball_eigenvalues",
+    "bottleneck_distance",
     "boundary_edges",
     "boundary_loops",
     "boundary_vertices",
@@ -242,6 +247,7 @@ __all__ = [
     "normalize_box",
     "normalize_diameter",
     "partial_scan",
+    "persistence_diagram",
     "point_cloud_laplacian",
     "projective_plane",
     "projective_plane_eigenvalues",
