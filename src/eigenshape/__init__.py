@@ -19,6 +19,7 @@ from eigenshape.features.merge_tree import MergeTree, merge_tree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment
 from eigenshape.figures.camera import Camera, three_quarter_view
 from eigenshape.figures.fields import figure_eigenfunctions, figure_field, figure_segments
+from eigenshape.figures.persistence import figure_diagram, figure_merge_tree
 from eigenshape.figures.save import save_figure
 from eigenshape.figures.sheet import Panel, figure_contact_sheet
 from eigenshape.figures.spectra import figure_spectrum
@@ -226,8 +227,10 @@ __all__ = [
     "fem_nodes",
     "fibonacci_sphere",
     "figure_contact_sheet",
+    "figure_diagram",
     "figure_eigenfunctions",
     "figure_field",
+    "figure_merge_tree",
     "figure_segments",
     "figure_spectrum",
     "flat_torus_eigenvalues",
