@@ -13,7 +13,7 @@ from eigenshape.features.matching_loops import covers_rows
 
 Points = Float[np.ndarray, "_ 2"]
 Reach = Float[np.ndarray, " _"]
-FINE = 1e-7  # of the distance: an interval so short holds few candidates
+FINE = 1e-4  # of the distance: an interval so short holds few candidates
 
 
 def bottleneck_distance(one: PersistenceDiagram, two: PersistenceDiagram) -> float:
@@ -104,7 +104,7 @@ def _covers(some: Points, others: Points, distance: float) -> bool:
     if not len(some) or len(some) > len(others):
         return not len(some)
     near = _near(some, others, distance)
-    if len(np.unique(near["i"])) < len(some):
+    if not np.bincount(near["i"], minlength=len(some)).all():
         return False
     graph = sp.csr_array((np.ones(len(near), dtype=np.int8), (near["i"], near["j"])), shape=(len(some), len(others)))
     return bool(covers_rows(graph.indptr, graph.indices, len(others)))
