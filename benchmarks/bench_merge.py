@@ -1,6 +1,6 @@
 """Time and memory of `merge_tree` beside GUDHI on wavy and on random functions, in one run on one core.
 
-    python benchmarks/bench_merge.py                        15,000, 100,000 and a million vertices; a quarter of an hour
+    python benchmarks/bench_merge.py                        15,000, 100,000 and a million vertices; a few minutes
     python benchmarks/bench_merge.py --quick                600 vertices, seconds
     python benchmarks/bench_merge.py --json merge.json --markdown docs/benchmarks.md
 
