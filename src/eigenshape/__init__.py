@@ -13,16 +13,21 @@ from eigenshape._errors import (
     MissingExtraError,
     StoreError,
 )
+from eigenshape.features.bottleneck import bottleneck_distance
+from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs, persistence_diagram
 from eigenshape.features.merge_tree import MergeTree, merge_tree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment
 from eigenshape.figures.camera import Camera, three_quarter_view
 from eigenshape.figures.fields import figure_eigenfunctions, figure_field, figure_segments
+from eigenshape.figures.persistence import figure_diagram, figure_merge_tree
 from eigenshape.figures.save import save_figure
 from eigenshape.figures.sheet import Panel, figure_contact_sheet
 from eigenshape.figures.spectra import figure_spectrum
+from eigenshape.geometry.average_distance import average_geodesic_distance
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.cloud_measure import cloud_quadrature
 from eigenshape.geometry.creatures import CREATURES, make_creature
+from eigenshape.geometry.curvature import gaussian_curvature
 from eigenshape.geometry.domains import ball, box, circle, disc, interval, irregular_grid
 from eigenshape.geometry.exact import (
     ball_eigenvalues,
@@ -33,7 +38,7 @@ from eigenshape.geometry.exact import (
     sphere_eigenvalues,
 )
 from eigenshape.geometry.facets import FacetTable, facet_table
-from eigenshape.geometry.geodesic import geodesic_balls
+from eigenshape.geometry.geodesic import geodesic_balls, geodesic_distances
 from eigenshape.geometry.measure import (
     edge_lengths,
     enclosed_volume,
@@ -92,6 +97,7 @@ from eigenshape.operators.catalog import OPERATORS, Operator, build_laplacian
 from eigenshape.operators.connection import connection_laplacian, tangent_frames
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian
+from eigenshape.operators.curvature import mean_curvature
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian, fem_nodes
 from eigenshape.operators.gaussian import (
     functional_laplacian,
@@ -116,9 +122,15 @@ from eigenshape.spectral.dirichlet import solve_dirichlet
 from eigenshape.spectral.laplacian_laws import check_laplacian
 from eigenshape.spectral.laws import USUAL, Law, NotJudged, OperatorReport
 from eigenshape.spectral.operator_laws import check_operator
-from eigenshape.spectral.signature import heat_kernel_signature, reflection_free_signature
+from eigenshape.spectral.signature import (
+    default_times,
+    heat_kernel_signature,
+    reflection_free_signature,
+    scale_invariant_heat_kernel_signature,
+)
 from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
+from eigenshape.spectral.wave import default_energies, wave_kernel_signature
 
 __all__ = [
     "CREATURES",
@@ -151,6 +163,8 @@ __all__ = [
     "Operator",
     "OperatorReport",
     "Panel",
+    "PersistenceDiagram",
+    "PersistencePairs",
     "PointCloud",
     "Quadrature",
     "Recipe",
@@ -165,8 +179,10 @@ __all__ = [
     "TriangleMesh",
     "Workers",
     "anisotropic_laplacian",
+    "average_geodesic_distance",
     "ball",
     "ball_eigenvalues",
+    "bottleneck_distance",
     "boundary_edges",
     "boundary_loops",
     "boundary_vertices",
@@ -185,6 +201,8 @@ __all__ = [
     "crouzeix_raviart_laplacian",
     "curvature_tensors",
     "cut_by_planes",
+    "default_energies",
+    "default_times",
     "describe",
     "describe_mesh",
     "describe_views",
@@ -209,8 +227,10 @@ __all__ = [
     "fem_nodes",
     "fibonacci_sphere",
     "figure_contact_sheet",
+    "figure_diagram",
     "figure_eigenfunctions",
     "figure_field",
+    "figure_merge_tree",
     "figure_segments",
     "figure_spectrum",
     "flat_torus_eigenvalues",
@@ -218,8 +238,10 @@ __all__ = [
     "from_pyvista",
     "from_trimesh",
     "functional_laplacian",
+    "gaussian_curvature",
     "gaussian_laplacian",
     "geodesic_balls",
+    "geodesic_distances",
     "graded_sphere",
     "graph_laplacian",
     "grid",
@@ -233,6 +255,7 @@ __all__ = [
     "make_creature",
     "match_features",
     "matching_score",
+    "mean_curvature",
     "mean_side_length",
     "merge_tree",
     "mesh_laplacian",
@@ -242,6 +265,7 @@ __all__ = [
     "normalize_box",
     "normalize_diameter",
     "partial_scan",
+    "persistence_diagram",
     "point_cloud_laplacian",
     "projective_plane",
     "projective_plane_eigenvalues",
@@ -255,6 +279,7 @@ __all__ = [
     "repair",
     "robust_laplacian",
     "save_figure",
+    "scale_invariant_heat_kernel_signature",
     "segment",
     "simplex_volumes",
     "solve_dirichlet",
@@ -275,6 +300,7 @@ __all__ = [
     "uniform_quadrature",
     "vertex_components",
     "vertex_normals",
+    "wave_kernel_signature",
     "weld",
     "write_mesh",
     "write_points",

@@ -86,6 +86,15 @@ def positive_values(value: ArrayLike, name: str) -> NDArray[np.float64]:
     return values
 
 
+def finite_values(value: ArrayLike, name: str) -> NDArray[np.float64]:
+    """Return `value` as a one-dimensional float64 array, refusing anything not finite."""
+    values = np.atleast_1d(_numbers(value, name))
+    if values.ndim != 1 or not values.size:
+        raise InvalidParameterError(f"{name} must be a list of numbers; the shape is {values.shape}.")
+    _require_finite(values, name)
+    return values
+
+
 def vertex_values(value: ArrayLike, name: str, n_vertices: int) -> NDArray[np.float64]:
     """Return `value` as one finite float64 number a vertex."""
     values = _numbers(value, name)
@@ -93,10 +102,14 @@ def vertex_values(value: ArrayLike, name: str, n_vertices: int) -> NDArray[np.fl
         raise InvalidParameterError(
             f"{name} must hold one number a vertex, shape ({n_vertices},); the shape is {values.shape}."
         )
+    _require_finite(values, name)
+    return values
+
+
+def _require_finite(values: NDArray[np.float64], name: str) -> None:
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:
         raise InvalidParameterError(f"{name} must be finite; entry {bad[0]} is {values[bad[0]]}.")
-    return values
 
 
 def _numbers(value: ArrayLike, name: str) -> NDArray[np.float64]:

@@ -121,6 +121,11 @@ def test_features(zoo, tmp_path):
     few = run_json("features", path, "--persistence", found["features"][2]["persistence"])
     assert len(few["features"]) == 3
     assert "never merges" in run("features", path, "--preset", "thesis").stdout
+    lengths = [row["persistence"] for row in run_json("features", path, "-n", 999)["features"][1:]]
+    widest = int(np.argmax(np.subtract(lengths, [*lengths[1:], 0])))
+    assert len(run_json("features", path, "--largest-gap")["features"]) == widest + 2
+    refused = run("features", path, "--largest-gap", "--persistence", 1, code=1)
+    assert "exactly one of n_regions, persistence and largest_gap" in " ".join(refused.stderr.split())
 
 
 def test_index_goes_on_where_it_stopped(zoo, database):

@@ -7,7 +7,7 @@ from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.segmentation import segment
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
-from eigenshape.geometry.topology import submesh
+from eigenshape.geometry.topology import non_manifold_vertices, submesh
 from eigenshape.io.mesh_files import read_mesh
 
 
@@ -123,6 +123,41 @@ def test_results_are_int64_and_read_only():
     assert not parts.labels.flags.writeable
 
 
+def fan(n_spokes, apex):
+    """Triangles around one vertex, which has more sides than are sorted by insertion."""
+    angles = 2 * np.pi * np.arange(n_spokes) / n_spokes
+    rim = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(n_spokes)])
+    ring = np.arange(n_spokes)
+    faces = np.column_stack([ring, np.roll(ring, -1), np.full(n_spokes, n_spokes)])
+    return TriangleMesh(np.vstack([rim, [0, 0, apex]]), faces)
+
+
+@pytest.mark.parametrize("apex", [-2.0, 0.1, 2.0])
+@pytest.mark.parametrize("step", [0.0, 0.5])
+def test_labels_around_a_vertex_of_many_faces_equal_literal_merging(step, apex):
+    mesh = fan(90, apex)
+    values = wavy(mesh, step) + mesh.vertices[:, 2]
+    tree = merge_tree(mesh, values)
+    for count in range(1, len(tree.maxima) + 1):
+        parts = segment(tree, n_regions=count)
+        literal = LiteralMerging(mesh.faces.tolist(), values.tolist()).run(
+            lambda n, p, count=count: n <= count or np.isinf(p)
+        )
+        assert np.array_equal(parts.features.vertices[parts.labels], literal.labels())
+
+
+def test_pages_of_a_book_are_all_neighbours_at_its_spine():
+    # 60 faces at one edge, more than are sorted by insertion: page i ends at the spine, the next higher page beyond it.
+    heights = np.random.default_rng(0).permutation(60) + 1.0
+    points = np.column_stack([np.cos(heights), np.sin(heights), np.zeros(60)])
+    faces = [[60, 61, page] for page in range(60)]
+    mesh = TriangleMesh(np.vstack([points, [[0, 0, 0], [0, 0, 1]]]), faces)
+    tree = merge_tree(mesh, [*heights, 0.0, 0.0])
+    assert tree.values.tolist() == list(range(60, 0, -1))
+    assert tree.parent.tolist() == list(range(-1, 59))
+    assert tree.persistence.tolist() == [np.inf, *range(59, 0, -1)]
+
+
 def test_faces_that_repeat_a_vertex_or_each_other_are_merged_too():
     mesh = TriangleMesh(np.eye(4, 3), [[0, 1, 2], [0, 1, 2], [2, 2, 1], [1, 2, 3], [3, 3, 3]])
     parts = segment(merge_tree(mesh, [1.0, 2.0, 3.0, 4.0]), n_regions=1)
@@ -150,11 +185,74 @@ def test_bad_values_are_named(values, message):
 
 def test_segment_wants_exactly_one_rule():
     tree = merge_tree(grid(3, 3), np.arange(16.0))
-    with pytest.raises(InvalidParameterError, match="it was given neither"):
+    with pytest.raises(InvalidParameterError, match="it was given none"):
         segment(tree)
-    with pytest.raises(InvalidParameterError, match="it was given both"):
+    with pytest.raises(InvalidParameterError, match="it was given n_regions and persistence"):
         segment(tree, n_regions=2, persistence=0.1)
     with pytest.raises(InvalidParameterError, match="persistence must be at least 0; it is -1"):
         segment(tree, persistence=-1.0)
     with pytest.raises(InvalidParameterError, match="n_regions must be at least 1; it is 0"):
         segment(tree, n_regions=0)
+    with pytest.raises(InvalidParameterError, match="exactly one of n_regions, persistence and largest_gap"):
+        segment(tree, persistence=1.0, largest_gap=True)
+
+
+def peaks(*heights):
+    """A strip with a peak of each height, and a valley at 0 between any two."""
+    levels = np.array([level for height in heights for level in (0.0, height)] + [0.0])
+    strip = grid(len(levels) - 1, 1)
+    return strip, levels[np.round(strip.vertices[:, 0] * (len(levels) - 1)).astype(int)]
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e100, 1e-100])
+@pytest.mark.parametrize(
+    ("heights", "left"),
+    [
+        ((9, 10, 8.5, 1, 0.5), [10, 9, 8.5]),  # the gap from 8.5 to 1
+        ((10, 1, 0.9, 0.8), [10, 1, 0.9, 0.8]),  # from .8 to 0: the one that never ends does not count
+        ((10, 6, 3), [10, 6]),  # two equal gaps, the first is taken
+        ((10,), [10]),
+        ((5, 5, 2), [5, 5]),
+    ],
+)
+def test_the_largest_gap_of_persistence(heights, left, unit):
+    mesh, values = peaks(*heights)
+    parts = segment(merge_tree(mesh, unit * values), largest_gap=True)
+    assert parts.features.values.tolist() == [unit * value for value in left]
+    assert set(parts.labels.tolist()) == set(range(len(left)))
+
+
+@pytest.mark.parametrize("rule", [{"n_regions": 1}, {"n_regions": 99}, {"persistence": 0.0}, {"largest_gap": True}])
+def test_a_constant_function_has_one_region_a_component(rule):
+    mesh = disjoint_union(icosphere(1), torus(9, 7), grid(3, 2))
+    parts = segment(merge_tree(mesh, np.full(mesh.n_vertices, -2.5)), **rule)
+    assert np.isinf(parts.features.persistence).tolist() == [True] * 3
+    assert [len(set(part.tolist())) for part in np.split(parts.labels, [80, 80 + 126])] == [1, 1, 1]
+
+
+def test_a_bow_tie_is_two_regions_that_no_edge_joins():
+    # Two squares that share their one corner, the highest vertex of both: faces meet over edges alone.
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 1, 0], [2, 2, 0], [1, 2, 0]], dtype=float)
+    mesh = TriangleMesh(corners, [[0, 1, 2], [0, 2, 3], [2, 4, 5], [2, 5, 6]])
+    parts = segment(merge_tree(mesh, [0.0, 1, 9, 2, 3, 4, 5]), n_regions=1)
+    assert parts.labels.tolist() == [1, 1, 0, 0]
+    assert parts.features.vertices.tolist() == [2, 2]
+    assert np.isinf(parts.features.persistence).all()
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_a_boundary_that_passes_a_vertex_twice(step):
+    sheet = grid(8, 8)
+    centre = sheet.vertices[sheet.faces].mean(axis=1) - [0.5, 0.5, 0.0]
+    around = np.flatnonzero((sheet.vertices[sheet.faces] == [0.5, 0.5, 0.0]).all(axis=2).any(axis=1))
+    around = around[np.argsort(np.arctan2(centre[around, 1], centre[around, 0]))]
+    mesh = submesh(sheet, ~np.isin(np.arange(sheet.n_faces), around[[0, 3]]))[0]
+    assert len(non_manifold_vertices(mesh)) == 1
+    values = wavy(mesh, step)
+    tree = merge_tree(mesh, values)
+    for count in range(1, len(tree.maxima) + 1):
+        parts = segment(tree, n_regions=count)
+        literal = LiteralMerging(mesh.faces.tolist(), values.tolist()).run(
+            lambda n, p, count=count: n <= count or np.isinf(p)
+        )
+        assert np.array_equal(parts.features.vertices[parts.labels], literal.labels())

@@ -2,11 +2,17 @@ import numpy as np
 import pytest
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.geometry.surfaces import grid, icosphere, torus
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
 from eigenshape.geometry.topology import boundary_edges
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.spectral.dirichlet import solve_dirichlet
-from eigenshape.spectral.signature import heat_kernel_signature, reflection_free_signature
+from eigenshape.spectral.signature import (
+    default_times,
+    heat_kernel_signature,
+    reflection_free_signature,
+    scale_invariant_heat_kernel_signature,
+)
 from eigenshape.spectral.solver import solve_spectrum
 
 TIMES = [0.01, 0.1, 1.0]
@@ -85,3 +91,59 @@ def test_spectra_of_two_surfaces_are_refused():
     one, two = (solve_spectrum(cotangent_laplacian(icosphere(level)), 3) for level in (0, 1))
     with pytest.raises(InvalidParameterError, match="must be of one surface; they have 12 and 42 points"):
         reflection_free_signature(one, two, [1.0])
+
+
+def test_default_times_span_what_the_spectrum_tells():
+    spectrum = solve_spectrum(cotangent_laplacian(torus(12, 9)), 30)
+    times = default_times(spectrum, 20)
+    assert len(times) == 20
+    np.testing.assert_allclose(np.exp(-times[0] * spectrum.eigenvalues[-1]), 1e-4)
+    np.testing.assert_allclose(np.exp(-times[-1] * spectrum.eigenvalues[1]), 1e-4)
+    assert np.ptp(np.diff(np.log(times))) < 1e-12
+    pieces = solve_spectrum(cotangent_laplacian(disjoint_union(icosphere(1), torus(9, 7))), 10)
+    assert default_times(pieces, 2)[-1] == pytest.approx(4 * np.log(10) / pieces.eigenvalues[2])
+    with pytest.raises(InvalidParameterError, match="must have an eigenvalue above 0; its 2 are"):
+        default_times(solve_spectrum(cotangent_laplacian(disjoint_union(icosphere(1), torus(9, 7))), 2))
+
+
+@pytest.mark.parametrize("scale", [1e-100, 1e100, 3.0])
+def test_size_leaves_no_trace_in_the_scale_invariant_signature(scale):
+    mesh = torus(24, 12)
+    one, two = (
+        solve_spectrum(cotangent_laplacian(TriangleMesh(mesh.vertices * size, mesh.faces)), 60) for size in (1.0, scale)
+    )
+    found = scale_invariant_heat_kernel_signature(one)
+    assert found.shape == (288, 6)
+    np.testing.assert_allclose(scale_invariant_heat_kernel_signature(two), found, rtol=1e-7)
+    assert found.std(axis=0).max() > 0.01  # and points differ
+
+
+def test_with_the_same_times_size_leaves_little_trace():
+    # As Bronstein and Kokkinos do, with times at whose ends all heat is where it was put, or even.
+    mesh = torus(24, 12)
+    one, two = (
+        solve_spectrum(cotangent_laplacian(TriangleMesh(mesh.vertices * size, mesh.faces)), 288) for size in (1.0, 2.0)
+    )
+    times = np.geomspace(default_times(one)[0] / 1e6, default_times(two)[-1] * 100, 400)
+    found = [scale_invariant_heat_kernel_signature(spectrum, times) for spectrum in (one, two)]
+    plain = [heat_kernel_signature(spectrum, times) for spectrum in (one, two)]
+    assert np.abs(found[1] / found[0] - 1).max() < 1e-3
+    assert np.abs(plain[1] / plain[0] - 1).max() > 0.7
+
+
+def test_the_first_frequency_is_the_whole_fall():
+    spectrum = solve_spectrum(cotangent_laplacian(torus(12, 9)), 30)
+    times = default_times(spectrum)
+    heat = heat_kernel_signature(spectrum, times)
+    found = scale_invariant_heat_kernel_signature(spectrum, times, n_frequencies=1)
+    np.testing.assert_allclose(found[:, 0], np.log(heat[:, 0] / heat[:, -1]), rtol=1e-12)
+
+
+def test_times_of_the_scale_invariant_signature_are_a_geometric_sequence():
+    spectrum = solve_spectrum(cotangent_laplacian(icosphere(1)), 9)
+    with pytest.raises(InvalidParameterError, match="times must be a geometric sequence of at least 3; there are 3"):
+        scale_invariant_heat_kernel_signature(spectrum, [1.0, 2.0, 3.0])
+    with pytest.raises(InvalidParameterError, match="there are 1, with ratios of neighbours from 1 to 1"):
+        scale_invariant_heat_kernel_signature(spectrum, [1.0])
+    with pytest.raises(InvalidParameterError, match=r"n_frequencies must lie in 1\.\.2; it is 3"):
+        scale_invariant_heat_kernel_signature(spectrum, [1.0, 2.0, 4.0, 8.0], n_frequencies=3)

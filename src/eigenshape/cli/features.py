@@ -43,6 +43,9 @@ def features(
     persistence: Annotated[
         float | None, typer.Option(help="Keep what persists at least so long, in units of heat; replaces the number.")
     ] = None,
+    largest_gap: Annotated[
+        bool, typer.Option("--largest-gap", help="Cut where persistence falls most; replaces the number.")
+    ] = False,
     preset_name: PresetOption = SCALE_FREE.name,
     repair: RepairOption = "",
     picture: Annotated[Path | None, typer.Option(help="Draw parts and feature points (PNG, SVG or PDF).")] = None,
@@ -55,7 +58,8 @@ def features(
     surface = load_mesh(mesh, repair)
     with progress_bar("features") as progress:
         shape = describe_mesh(surface, recipe, progress=progress)
-    parts = segment(shape.tree, **({"n_regions": n_regions} if persistence is None else {"persistence": persistence}))
+    by_number = n_regions if persistence is None and not largest_gap else None
+    parts = segment(shape.tree, n_regions=by_number, persistence=persistence, largest_gap=largest_gap)
     rows = _rows(shape.mesh, parts)
     if as_json:
         print_json({"path": str(mesh), "recipe": recipe.name, "features": rows, "face_labels": parts.labels})

@@ -43,7 +43,9 @@ class Segmentation:
     features: FeaturePoints
 
 
-def segment(tree: MergeTree, *, n_regions: int | None = None, persistence: float | None = None) -> Segmentation:
+def segment(
+    tree: MergeTree, *, n_regions: int | None = None, persistence: float | None = None, largest_gap: bool = False
+) -> Segmentation:
     """Merge regions in the order of their persistence until so many are left, or all left persist so long.
 
     Parameters
@@ -55,6 +57,10 @@ def segment(tree: MergeTree, *, n_regions: int | None = None, persistence: float
     persistence : float
         Regions that persist at least this long are left (thesis proposition 5.2.2); at least 0, in the function's
         unit, infinite to leave one a component.
+    largest_gap : bool
+        Cut where persistence, sorted and ending in 0, falls most from one region to the next, as is done by eye in a
+        persistence diagram (Chazal, Guibas, Oudot and Skraba 2013); of equal gaps at the more persistent. Regions
+        that persist for ever are left and do not count.
 
     Returns
     -------
@@ -63,9 +69,21 @@ def segment(tree: MergeTree, *, n_regions: int | None = None, persistence: float
     Raises
     ------
     InvalidParameterError
-        If not exactly one of the two is given, or it is below its least value.
+        If not exactly one of the three is given, or it is below its least value.
     """
-    ends = _beyond_number(tree, n_regions) if persistence is None else _below_persistence(tree, n_regions, persistence)
+    rules = {"n_regions": n_regions, "persistence": persistence, "largest_gap": largest_gap or None}
+    given = [name for name, value in rules.items() if value is not None]
+    if len(given) != 1:
+        raise InvalidParameterError(
+            "segment takes exactly one of n_regions, persistence and largest_gap; it was given "
+            f"{' and '.join(given) or 'none'}."
+        )
+    if n_regions is not None:
+        return _cut(tree, _beyond_number(tree, n_regions))
+    return _cut(tree, _below(tree, _above_largest_gap(tree) if persistence is None else persistence))
+
+
+def _cut(tree: MergeTree, ends: Bool[np.ndarray, " m"]) -> Segmentation:
     left = np.flatnonzero(~ends)
     regions = merged_regions(np.maximum(tree.parent, 0), ends)[tree.basins]
     features = FeaturePoints(
@@ -74,16 +92,20 @@ def segment(tree: MergeTree, *, n_regions: int | None = None, persistence: float
     return Segmentation(frozen(np.searchsorted(left, regions)), features)
 
 
-def _beyond_number(tree: MergeTree, n_regions: int | None) -> Bool[np.ndarray, " m"]:
-    if n_regions is None:
-        raise InvalidParameterError("segment takes either n_regions or persistence; it was given neither.")
+def _beyond_number(tree: MergeTree, n_regions: int) -> Bool[np.ndarray, " m"]:
     count = whole_number(n_regions, "n_regions", 1)
     return (np.arange(len(tree.maxima)) >= count) & (tree.parent >= 0)
 
 
-def _below_persistence(tree: MergeTree, n_regions: int | None, persistence: float) -> Bool[np.ndarray, " m"]:
-    if n_regions is not None:
-        raise InvalidParameterError("segment takes either n_regions or persistence; it was given both.")
+def _below(tree: MergeTree, persistence: float) -> Bool[np.ndarray, " m"]:
     if not persistence >= 0:
         raise InvalidParameterError(f"persistence must be at least 0; it is {persistence}.")
     return tree.persistence < persistence
+
+
+def _above_largest_gap(tree: MergeTree) -> float:
+    """Return the persistence above the largest gap, infinite where nothing ends."""
+    finite = tree.persistence[tree.parent >= 0]
+    if not len(finite):
+        return float(np.inf)
+    return float(finite[np.argmax(finite - np.append(finite[1:], 0.0))])

@@ -1,13 +1,15 @@
 """Geodesic distances between all vertices that lie near each other on a triangle mesh."""
 
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
+from numpy.typing import ArrayLike
 
-from eigenshape._arrays import positive_values
+from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.geodesic_loops import balls
 from eigenshape.geometry.simplices import in_length, scaled_corners
@@ -42,8 +44,7 @@ def geodesic_balls(mesh: Mesh, radius: float) -> sp.csr_array:
     InvalidParameterError
         If the radius is not positive.
     """
-    if mesh.dim != 2:
-        raise InvalidShapeError(f"Geodesic distances are measured on surfaces; this mesh has dimension {mesh.dim}.")
+    _require_surface(mesh)
     positive_values(radius, "radius")
     corners, scale = scaled_corners(mesh)
     starts, others, sides = _fans(mesh, corners)
@@ -56,6 +57,55 @@ def geodesic_balls(mesh: Mesh, radius: float) -> sp.csr_array:
     found = sp.csr_array((in_length(values, scale, 1), columns, rows), shape=(mesh.n_points,) * 2)
     found.sort_indices()
     return found.minimum(found.T)  # what one direction alone reached counts as out of reach
+
+
+def geodesic_distances(mesh: Mesh, sources: ArrayLike) -> Float[np.ndarray, "k n"]:
+    """Measure along the surface from some vertices to all others.
+
+    As `geodesic_balls`, without limit, and in one direction: from the sources.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh or SimplicialMesh
+        Of dimension 2, in any R^d.
+    sources : (k,) int
+        Vertices.
+
+    Returns
+    -------
+    (k, n) float
+        In length; infinite from one component to another.
+
+    Raises
+    ------
+    InvalidShapeError
+        If the mesh is no surface.
+    InvalidParameterError
+        If a source is no vertex.
+    """
+    wave = waves_on(mesh)
+    wanted = [whole_number(source, "A source", 0, mesh.n_points - 1) for source in np.atleast_1d(sources)]
+    return np.array([wave(source) for source in wanted]).reshape(-1, mesh.n_points)
+
+
+def waves_on(mesh: Mesh) -> Callable[[int], Float[np.ndarray, " n"]]:
+    """Return a function from a vertex to the distances of all vertices from it, prepared once for many."""
+    _require_surface(mesh)
+    corners, scale = scaled_corners(mesh)
+    starts, others, sides = _fans(mesh, corners)
+
+    def wave(source: int) -> Float[np.ndarray, " n"]:
+        found = np.full(mesh.n_points, np.inf)
+        _, reached, values = balls(starts, *others, sides, np.inf, source, source + 1)
+        found[reached] = in_length(values, scale, 1)
+        return found
+
+    return wave
+
+
+def _require_surface(mesh: Mesh) -> None:
+    if mesh.dim != 2:
+        raise InvalidShapeError(f"Geodesic distances are measured on surfaces; this mesh has dimension {mesh.dim}.")
 
 
 def _fans(

@@ -1,0 +1,81 @@
+"""Compiled loops of the matching of two diagrams (Hopcroft and Karp 1973)."""
+
+from typing import no_type_check
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def covers_rows(starts, columns, n_columns):
+    """Say whether each row can have a column for itself; entries `starts[i]` to `starts[i + 1]` are those of row i."""
+    n = len(starts) - 1
+    row_of, column_of = np.full(n_columns, -1), np.full(n, -1)
+    depth, following = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    queue, path = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    n_matched = 0
+    while n_matched < n:
+        if not _layer(starts, columns, row_of, column_of, depth, queue):
+            return False
+        following[:] = starts[:-1]
+        for row in range(n):
+            if column_of[row] < 0 and _augment(row, columns, starts, row_of, column_of, depth, following, path):
+                n_matched += 1
+    return True
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def _layer(starts, columns, row_of, column_of, depth, queue):
+    """Count for each row the steps from a free one along alternating paths; whether a free column is reached."""
+    height = 0
+    for row in range(len(depth)):
+        depth[row] = -1
+        if column_of[row] < 0:
+            depth[row] = 0
+            queue[height] = row
+            height += 1
+    place, last = 0, -1
+    while place < height:
+        row = queue[place]
+        place += 1
+        if depth[row] == last:
+            break
+        for entry in range(starts[row], starts[row + 1]):
+            other = row_of[columns[entry]]
+            if other < 0:
+                last = depth[row] + 1
+            elif depth[other] < 0:
+                depth[other] = depth[row] + 1
+                queue[height] = other
+                height += 1
+    return last >= 0
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def _augment(free, columns, starts, row_of, column_of, depth, following, path):
+    """Walk down the layers from a free row to a free column, and turn the path over."""
+    height = 1
+    path[0] = free
+    while height:
+        row = path[height - 1]
+        if following[row] == starts[row + 1]:
+            height -= 1
+            if height:
+                following[path[height - 1]] += 1
+            continue
+        other = row_of[columns[following[row]]]
+        if other < 0:
+            for step in range(height - 1, -1, -1):
+                column = columns[following[path[step]]]
+                row_of[column], column_of[path[step]] = path[step], column
+                following[path[step]] += 1
+            return True
+        if depth[other] == depth[row] + 1:
+            path[height] = other
+            height += 1
+        else:
+            following[row] += 1
+    return False

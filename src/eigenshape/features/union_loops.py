@@ -1,0 +1,61 @@
+"""Compiled loops that join what is connected, in a given order."""
+
+from typing import no_type_check
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def join_points(starts, neighbours, order):
+    """Let points enter in order and join each to the neighbours before it.
+
+    Returns for each point the first one of its component, and for each component that ends on the way its first point
+    and the point that joined it to an earlier one.
+    """
+    n = len(order)
+    place = np.empty(n, dtype=np.int64)
+    place[order] = np.arange(n)
+    root = np.arange(n)
+    ended = np.empty((n, 2), dtype=np.int64)
+    n_ended = 0
+    for point in order:
+        for entry in range(starts[point], starts[point + 1]):
+            if place[neighbours[entry]] >= place[point]:
+                continue
+            one, two = _root(root, point), _root(root, neighbours[entry])
+            if one == two:
+                continue
+            if place[one] < place[two]:
+                one, two = two, one
+            root[one] = two
+            if one != point:
+                ended[n_ended, 0], ended[n_ended, 1] = one, point
+                n_ended += 1
+    for point in order:
+        root[point] = root[root[point]]
+    return root, ended[:n_ended].copy()
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def spanning_forest(ends, order, n):
+    """Say of each edge whether it joins two components where edges enter in order."""
+    root = np.arange(n)
+    joins = np.zeros(len(ends), dtype=np.bool_)
+    for edge in order:
+        one, two = _root(root, ends[edge, 0]), _root(root, ends[edge, 1])
+        if one != two:
+            root[max(one, two)] = min(one, two)
+            joins[edge] = True
+    return joins
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def _root(root, point):
+    while root[point] != point:
+        root[point] = root[root[point]]
+        point = root[point]
+    return point
