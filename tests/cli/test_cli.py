@@ -222,11 +222,11 @@ def test_features_of_large_meshes_say_how_far_heat_is_off(tmp_path, monkeypatch)
     monkeypatch.setattr("eigenshape.spectral.large_signature.LEAST_COARSE", 700)
     monkeypatch.setattr("eigenshape.spectral.large_signature.PER_PAIR", 4)
     path = tmp_path / "large.ply"
-    es.write_mesh(es.make_creature("hand", n_vertices=2500), path)
+    write_mesh(make_creature("hand", n_vertices=2500), path)
     assert "2,500 vertices: their heat is approximate, off by about" in run("features", path).stderr
     found = run_json("features", path)
     assert len(found["features"]) == 15
     assert 0 < found["heat_error"] < 0.2
     small = tmp_path / "small.ply"
-    es.write_mesh(es.make_creature("hand", n_vertices=900), small)
+    write_mesh(make_creature("hand", n_vertices=900), small)
     assert run_json("features", small)["heat_error"] is None
