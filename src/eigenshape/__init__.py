@@ -14,9 +14,13 @@ from eigenshape._errors import (
     StoreError,
 )
 from eigenshape.features.bottleneck import bottleneck_distance
+from eigenshape.features.boundaries import smooth_boundaries
 from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs, persistence_diagram
 from eigenshape.features.merge_tree import MergeTree, merge_tree
-from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment
+from eigenshape.features.part_merging import part_tree
+from eigenshape.features.part_tree import PartTree
+from eigenshape.features.parts import CONTRAST, FoundParts, find_parts, part_spectrum
+from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment, touching_parts
 from eigenshape.figures.camera import Camera, three_quarter_view
 from eigenshape.figures.fields import figure_eigenfunctions, figure_field, figure_segments
 from eigenshape.figures.persistence import figure_diagram, figure_merge_tree
@@ -133,6 +137,7 @@ from eigenshape.spectral.spectrum import Spectrum
 from eigenshape.spectral.wave import default_energies, wave_kernel_signature
 
 __all__ = [
+    "CONTRAST",
     "CREATURES",
     "OPERATORS",
     "SCALE_FREE",
@@ -149,6 +154,7 @@ __all__ = [
     "FacetTable",
     "FeaturePoints",
     "FileFormatError",
+    "FoundParts",
     "GaussianKernel",
     "InvalidParameterError",
     "InvalidShapeError",
@@ -163,6 +169,7 @@ __all__ = [
     "Operator",
     "OperatorReport",
     "Panel",
+    "PartTree",
     "PersistenceDiagram",
     "PersistencePairs",
     "PointCloud",
@@ -233,6 +240,7 @@ __all__ = [
     "figure_merge_tree",
     "figure_segments",
     "figure_spectrum",
+    "find_parts",
     "flat_torus_eigenvalues",
     "from_arrays",
     "from_pyvista",
@@ -264,6 +272,8 @@ __all__ = [
     "normalize_area",
     "normalize_box",
     "normalize_diameter",
+    "part_spectrum",
+    "part_tree",
     "partial_scan",
     "persistence_diagram",
     "point_cloud_laplacian",
@@ -282,6 +292,7 @@ __all__ = [
     "scale_invariant_heat_kernel_signature",
     "segment",
     "simplex_volumes",
+    "smooth_boundaries",
     "solve_dirichlet",
     "solve_spectrum",
     "sphere_eigenvalues",
@@ -297,6 +308,7 @@ __all__ = [
     "to_trimesh",
     "torus",
     "torus_quadrature",
+    "touching_parts",
     "uniform_quadrature",
     "vertex_components",
     "vertex_normals",
