@@ -20,9 +20,15 @@ from eigenshape.features.merge_tree import MergeTree, merge_tree
 from eigenshape.features.part_merging import part_tree
 from eigenshape.features.part_tree import PartTree
 from eigenshape.features.parts import CONTRAST, FoundParts, find_parts, part_spectrum
-from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment, touching_parts
+from eigenshape.features.segmentation import FeaturePoints, Segmentation, merge_targets, segment, touching_parts
 from eigenshape.figures.camera import Camera, three_quarter_view
-from eigenshape.figures.fields import figure_eigenfunctions, figure_field, figure_segments
+from eigenshape.figures.fields import (
+    figure_eigenfunctions,
+    figure_field,
+    figure_segments,
+    part_colors,
+    value_colors,
+)
 from eigenshape.figures.persistence import figure_diagram, figure_merge_tree
 from eigenshape.figures.save import save_figure
 from eigenshape.figures.sheet import Panel, figure_contact_sheet
@@ -265,6 +271,7 @@ __all__ = [
     "matching_score",
     "mean_curvature",
     "mean_side_length",
+    "merge_targets",
     "merge_tree",
     "mesh_laplacian",
     "mesh_quadrature",
@@ -272,6 +279,7 @@ __all__ = [
     "normalize_area",
     "normalize_box",
     "normalize_diameter",
+    "part_colors",
     "part_spectrum",
     "part_tree",
     "partial_scan",
@@ -310,6 +318,7 @@ __all__ = [
     "torus_quadrature",
     "touching_parts",
     "uniform_quadrature",
+    "value_colors",
     "vertex_components",
     "vertex_normals",
     "wave_kernel_signature",

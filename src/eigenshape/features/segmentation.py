@@ -121,3 +121,16 @@ def touching_parts(mesh: TriangleMesh, labels: Int[np.ndarray, " f"]) -> Int[np.
     faces, _ = face_pairs(edge_table(mesh))
     pairs = np.sort(labels[faces], axis=1)
     return np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0)
+
+
+def merge_targets(tree: Tree) -> Int[np.ndarray, " m"]:
+    """Return for each maximum that in whose region it ends up when it merges, or splits from; -1 where it never does.
+
+    The neighbour across the saddle may have merged before; then it is whoever took that one over, and so on. Maxima
+    that stand earlier persist longer, so the first earlier one on the way is it.
+    """
+    target = tree.parent.copy()
+    for number in range(len(target)):
+        while target[number] > number:
+            target[number] = tree.parent[target[number]]
+    return target
