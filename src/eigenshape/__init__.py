@@ -31,7 +31,7 @@ from eigenshape.figures.fields import (
 )
 from eigenshape.figures.persistence import figure_diagram, figure_merge_tree
 from eigenshape.figures.save import save_figure
-from eigenshape.figures.sheet import Panel, figure_contact_sheet
+from eigenshape.figures.sheet import Panel, figure_contact_sheet, figure_label_transfer
 from eigenshape.figures.spectra import figure_spectrum
 from eigenshape.geometry.average_distance import average_geodesic_distance
 from eigenshape.geometry.cloud import PointCloud
@@ -125,6 +125,7 @@ from eigenshape.retrieval.describe import DescribedShape, describe, describe_mes
 from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDescriptor
 from eigenshape.retrieval.index import Match, Record, ShapeIndex
 from eigenshape.retrieval.score import match_features, matching_score
+from eigenshape.retrieval.transfer import LabelTransfer, transfer_labels
 from eigenshape.spectral.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.certify import certify
@@ -165,6 +166,7 @@ __all__ = [
     "InvalidParameterError",
     "InvalidShapeError",
     "Item",
+    "LabelTransfer",
     "Laplacian",
     "Law",
     "Match",
@@ -243,6 +245,7 @@ __all__ = [
     "figure_diagram",
     "figure_eigenfunctions",
     "figure_field",
+    "figure_label_transfer",
     "figure_merge_tree",
     "figure_segments",
     "figure_spectrum",
@@ -317,6 +320,7 @@ __all__ = [
     "torus",
     "torus_quadrature",
     "touching_parts",
+    "transfer_labels",
     "uniform_quadrature",
     "value_colors",
     "vertex_components",
