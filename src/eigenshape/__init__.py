@@ -19,7 +19,7 @@ from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs, pe
 from eigenshape.features.merge_tree import MergeTree, merge_tree
 from eigenshape.features.part_merging import part_tree
 from eigenshape.features.part_tree import PartTree
-from eigenshape.features.parts import CONTRAST, FoundParts, find_parts, part_spectrum
+from eigenshape.features.parts import PART_CONTRAST, FoundParts, find_parts, part_spectrum
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, merge_targets, segment, touching_parts
 from eigenshape.figures.camera import Camera, three_quarter_view
 from eigenshape.figures.fields import (
@@ -144,9 +144,9 @@ from eigenshape.spectral.spectrum import Spectrum
 from eigenshape.spectral.wave import default_energies, wave_kernel_signature
 
 __all__ = [
-    "CONTRAST",
     "CREATURES",
     "OPERATORS",
+    "PART_CONTRAST",
     "SCALE_FREE",
     "THESIS",
     "USUAL",

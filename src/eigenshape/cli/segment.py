@@ -20,7 +20,7 @@ from eigenshape.cli.console import (
 )
 from eigenshape.features import segmentation
 from eigenshape.features.boundaries import smooth_boundaries
-from eigenshape.features.parts import CONTRAST, facing_outward, find_parts
+from eigenshape.features.parts import PART_CONTRAST, facing_outward, find_parts
 from eigenshape.features.segmentation import Segmentation, Tree, merge_targets
 from eigenshape.figures.fields import figure_segments, part_colors
 from eigenshape.figures.save import require_picture_path, save_figure
@@ -47,7 +47,7 @@ def segment(
     n_regions: Annotated[int | None, typer.Option("-n", "--n-regions", help="Number of parts at most.")] = None,
     persistence: Annotated[
         float | None,
-        typer.Option(help=f"Keep what persists at least so long: a share, {CONTRAST} by default; of a recipe, heat."),
+        typer.Option(help=f"Keep what persists so long: a share, {PART_CONTRAST} by default; of a recipe, heat."),
     ] = None,
     largest_gap: Annotated[bool, typer.Option("--largest-gap", help="Cut where persistence falls most.")] = False,
     smooth: Annotated[
@@ -92,7 +92,7 @@ def _tree(surface: TriangleMesh, method: str, progress: Progress) -> Tree:
 
 
 def _usual(method: str) -> dict[str, Any]:
-    return {"persistence": CONTRAST} if method == PARTS else {"n_regions": PRESETS[method].n_features}
+    return {"persistence": PART_CONTRAST} if method == PARTS else {"n_regions": PRESETS[method].n_features}
 
 
 def _report(path: Path, method: str, surface: TriangleMesh, tree: Tree, parts: Segmentation, as_json: bool) -> None:

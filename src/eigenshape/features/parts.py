@@ -19,7 +19,7 @@ from eigenshape.spectral.solver import Progress, solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 N_MODES = 25  # beside one for each component
-CONTRAST = 0.3  # parts between which more is left of a difference are two
+PART_CONTRAST = 0.3  # parts between which more is left of a difference are two
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ def find_parts(mesh: TriangleMesh, *, n_modes: int = N_MODES, progress: Progress
     spectrum = part_spectrum(outward, n_modes=n_modes, progress=progress)
     tree = part_tree(outward, spectrum)
     heat = heat_kernel_signature(spectrum, [SEED_TIME * float(spectrum.mass.sum())])[:, 0]
-    parts = smooth_boundaries(outward, segment(tree, persistence=CONTRAST))
+    parts = smooth_boundaries(outward, segment(tree, persistence=PART_CONTRAST))
     return FoundParts(outward, spectrum, frozen(heat), tree, parts)
 
 
