@@ -16,10 +16,12 @@ from eigenshape.operators.laplacian import Laplacian
 from eigenshape.sparse.lane_loops import LANES
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.certify import Pairs, in_user_units, prove, shortened
+from eigenshape.spectral.components import Parts, connected_parts, pairs_of_parts
+from eigenshape.spectral.diagnosis import require_solvable
 from eigenshape.spectral.factor import Factor
 from eigenshape.spectral.kernel_values import from_pencil, reported, require_readable, to_pencil, widened
 from eigenshape.spectral.lanczos import Wanted, block_lanczos
-from eigenshape.spectral.pencil import Pencil, normalise, rayleigh_residuals
+from eigenshape.spectral.pencil import Pencil, column_chunks, normalise, rayleigh_residuals
 from eigenshape.spectral.shift import factor_below, shift_inside
 from eigenshape.spectral.slices import walk
 from eigenshape.spectral.spectrum import Spectrum
@@ -96,16 +98,20 @@ def solve_spectrum(
     with threadpool_limits(1, user_api="blas"):
         report(0.0, "scaling the operator")
         pencil = normalise(laplacian)
-        if wanted:
-            pairs, certificate = _proved(pencil, wanted, report)
-        else:
-            pairs, certificate = _proved_below(pencil, float(np.ldexp(limit[0], -pencil.value_exponent)), report)
+        try:
+            if wanted:
+                pairs, certificate = _proved(pencil, wanted, report)
+            else:
+                pairs, certificate = _proved_below(pencil, float(np.ldexp(limit[0], -pencil.value_exponent)), report)
+        except ConvergenceError as error:
+            require_solvable(pencil, error)
+            raise
     report(1.0, "proved complete")
     values, residuals = pencil.values_out(_without_negatives(pencil, pairs)), pencil.values_out(pairs.residuals)
     require_readable(laplacian.kernel, values)
     return Spectrum(
         eigenvalues=frozen(from_pencil(laplacian.kernel, values)),
-        eigenvectors=frozen(pencil.vectors_out(_with_signs(pairs.vectors))),
+        eigenvectors=_finished(pencil, pairs.vectors),
         mass=laplacian.mass,
         residuals=frozen(widened(laplacian.kernel, values, residuals)),
         certificate=reported(laplacian.kernel, in_user_units(pencil, certificate), float(values[-1])),
@@ -117,6 +123,9 @@ def _silent(fraction: float, message: str) -> None:
 
 
 def _proved(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+    parts = connected_parts(pencil)
+    if len(parts.sizes) > 1 and parts.sizes.max() <= SMALL:
+        return _in_parts(pencil, parts, k, report)
     if pencil.n <= SMALL or (DENSE_SHARE * k > pencil.n and pencil.n <= DENSE_LIMIT):
         return _dense(pencil, k, report)
     roads: list[Road] = [partial(_sparse, start=walk)] if k > WHOLE else []
@@ -153,6 +162,18 @@ def _dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate
     _, vectors = sl.eigh(stiffness, mass)
     pairs = _lowest(pencil, vectors[:, :k] / roots[:, None], k)
     report(0.8, "counting eigenvalues")
+    return _complete(pencil, pairs)
+
+
+def _in_parts(pencil: Pencil, parts: Parts, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+    _require_room(pencil, k, 24 * int((parts.sizes**2).sum()))
+    report(0.1, f"solving {len(parts.sizes)} parts densely")
+    pairs = pairs_of_parts(pencil, parts, k)
+    report(0.8, "counting eigenvalues")
+    return _complete(pencil, pairs)
+
+
+def _complete(pencil: Pencil, pairs: Pairs) -> tuple[Pairs, Certificate]:
     certificate = prove(pencil, pairs)
     if not certificate.complete:
         raise ConvergenceError(in_user_units(pencil, certificate).explain())
@@ -263,7 +284,15 @@ def _without_negatives(pencil: Pencil, pairs: Pairs) -> Float[np.ndarray, " k"]:
     return np.maximum(pairs.values, 0.0)
 
 
-def _with_signs(vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
-    sizes = np.abs(vectors)
-    leading = np.argmax(sizes >= (1 - 1e-6) * sizes.max(axis=0), axis=0)
-    return vectors * np.where(vectors[leading, np.arange(vectors.shape[1])] < 0, -1.0, 1.0)
+def _finished(pencil: Pencil, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+    """Return the vectors in the user's units, with the sign that `Spectrum` promises, read-only and in their place."""
+    vectors = np.ascontiguousarray(vectors)
+    signs = np.ones(vectors.shape[1])
+    for columns in column_chunks(vectors.shape[1]):
+        part = vectors[:, columns]
+        sizes = np.abs(part)
+        leading = np.argmax(sizes >= (1 - 1e-6) * sizes.max(axis=0), axis=0)
+        signs[columns] = np.where(part[leading, np.arange(part.shape[1])] < 0, -1.0, 1.0)
+    vectors *= pencil.vectors_out(signs[None])
+    vectors.flags.writeable = False
+    return vectors
