@@ -1,6 +1,6 @@
 """Do eigenvalues stay when nothing has changed? Units, place, numbering, threads (thesis 3.1).
 
-Fifty eigenvalues of four shapes by four operators: after scaling by 1e-100 to 1e100, after a shift by a million diameters,
+Fifty eigenvalues of four shapes by four operators: scaled by 1e-100 to 1e100, shifted by a million diameters,
 with vertices and faces in another order, and with one thread and two.
 """
 

@@ -230,3 +230,17 @@ def column_chunks(k: int) -> list[slice]:
 
 def _column_dots(left: Float[np.ndarray, "n b"], right: Float[np.ndarray, "n b"]) -> Float[np.ndarray, " b"]:
     return np.einsum("ij,ij->j", left, right)
+
+
+def finished(pencil: Pencil, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+    """Return the vectors in the user's units, with the sign that `Spectrum` promises, read-only and in their place."""
+    vectors = np.ascontiguousarray(vectors)
+    signs = np.ones(vectors.shape[1])
+    for columns in column_chunks(vectors.shape[1]):
+        part = vectors[:, columns]
+        sizes = np.abs(part)
+        leading = np.argmax(sizes >= (1 - 1e-6) * sizes.max(axis=0), axis=0)
+        signs[columns] = np.where(part[leading, np.arange(part.shape[1])] < 0, -1.0, 1.0)
+    vectors *= pencil.vectors_out(signs[None])
+    vectors.flags.writeable = False
+    return vectors

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
+from pathlib import Path
 from typing import SupportsIndex
 
 import numpy as np
@@ -14,6 +15,7 @@ from eigenshape._arrays import frozen, machine_memory, positive_values, whole_nu
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.sparse.lane_loops import LANES
+from eigenshape.spectral.cache import content_key, remembered
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.certify import Pairs, in_user_units, prove, shortened
 from eigenshape.spectral.components import Parts, connected_parts, pairs_of_parts
@@ -21,7 +23,7 @@ from eigenshape.spectral.diagnosis import require_solvable
 from eigenshape.spectral.factor import Factor
 from eigenshape.spectral.kernel_values import from_pencil, reported, require_readable, to_pencil, widened
 from eigenshape.spectral.lanczos import Wanted, block_lanczos
-from eigenshape.spectral.pencil import Pencil, column_chunks, normalise, rayleigh_residuals
+from eigenshape.spectral.pencil import Pencil, finished, normalise, rayleigh_residuals
 from eigenshape.spectral.shift import factor_below, shift_inside
 from eigenshape.spectral.slices import walk
 from eigenshape.spectral.spectrum import Spectrum
@@ -50,6 +52,7 @@ def solve_spectrum(
     *,
     below: float | None = None,
     progress: Progress | None = None,
+    cache: str | Path | None = None,
 ) -> Spectrum:
     """Compute the k lowest eigenpairs of W φ = λ B φ, or all below a value, with the proof that none is missing.
 
@@ -68,6 +71,9 @@ def solve_spectrum(
         Instead of k: all pairs with λ < below, in 1/length².
     progress : callable, optional
         Called as progress(fraction_done, message) while the solver works.
+    cache : path, optional
+        A folder, made when missing, in which spectra are kept under a hash of W, B and what is asked; what it has is
+        loaded, without a word of progress. Nothing in it is ever deleted.
 
     Returns
     -------
@@ -81,18 +87,22 @@ def solve_spectrum(
     ------
     InvalidParameterError
         If not one of k and below is given, k is not in 1..n, nothing lies below `below`, B is not positive definite, W
-        has a negative eigenvalue, or one to be corrected is 1/t or more.
+        has a negative eigenvalue, or one to be corrected is 1/t or more; or W_ii/B_ii spans more digits than floats
+        have and no proof can be had; or the folder `cache` cannot be written to.
     ConvergenceError
         If the proof cannot be completed; no incomplete spectrum is ever returned.
 
     Warns
     -----
     UserWarning
-        If eigenvalues of a kernel lie too near to 1/t to tell those of the shape.
+        If eigenvalues of a kernel lie too near to 1/t to tell those of the shape, or a file in `cache` is damaged.
     """
     if (k is None) == (below is None):
         raise InvalidParameterError(f"One of k and below says which pairs to compute; k is {k} and below is {below}.")
     wanted = whole_number(k, "k", 1, laplacian.n_points) if k is not None else 0
+    if cache is not None:
+        key = content_key(laplacian, ("lowest", wanted) if wanted else ("below", float(below or 0)))
+        return remembered(cache, key, partial(solve_spectrum, laplacian, k, below=below, progress=progress))
     limit = to_pencil(laplacian.kernel, positive_values([below], "below")) if below is not None else np.zeros(1)
     report = progress or _silent
     with threadpool_limits(1, user_api="blas"):
@@ -111,7 +121,7 @@ def solve_spectrum(
     require_readable(laplacian.kernel, values)
     return Spectrum(
         eigenvalues=frozen(from_pencil(laplacian.kernel, values)),
-        eigenvectors=_finished(pencil, pairs.vectors),
+        eigenvectors=finished(pencil, pairs.vectors),
         mass=laplacian.mass,
         residuals=frozen(widened(laplacian.kernel, values, residuals)),
         certificate=reported(laplacian.kernel, in_user_units(pencil, certificate), float(values[-1])),
@@ -282,17 +292,3 @@ def _without_negatives(pencil: Pencil, pairs: Pairs) -> Float[np.ndarray, " k"]:
             f"stiffness must be positive semidefinite; eigenvalue {bad[0]} is {value:.6g}, its error under {bound:.1e}."
         )
     return np.maximum(pairs.values, 0.0)
-
-
-def _finished(pencil: Pencil, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
-    """Return the vectors in the user's units, with the sign that `Spectrum` promises, read-only and in their place."""
-    vectors = np.ascontiguousarray(vectors)
-    signs = np.ones(vectors.shape[1])
-    for columns in column_chunks(vectors.shape[1]):
-        part = vectors[:, columns]
-        sizes = np.abs(part)
-        leading = np.argmax(sizes >= (1 - 1e-6) * sizes.max(axis=0), axis=0)
-        signs[columns] = np.where(part[leading, np.arange(part.shape[1])] < 0, -1.0, 1.0)
-    vectors *= pencil.vectors_out(signs[None])
-    vectors.flags.writeable = False
-    return vectors
