@@ -75,10 +75,10 @@ def markdown(report: dict[str, object]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def put(path: Path, text: str) -> None:
+def put(path: Path, text: str, begin: str = BEGIN) -> None:
     """Write a section to a file; where the file has the two marks, between them."""
     page = path.read_text() if path.exists() else ""
-    if BEGIN in page and END in page.split(BEGIN)[1]:
-        before, rest = page.split(BEGIN)
-        text = before + BEGIN + "\n" + text + "\n" + END + rest.split(END, 1)[1]
+    if begin in page and END in page.split(begin)[1]:
+        before, rest = page.split(begin)
+        text = before + begin + "\n" + text + "\n" + END + rest.split(END, 1)[1]
     path.write_text(text)
