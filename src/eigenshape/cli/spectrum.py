@@ -82,6 +82,9 @@ def spectrum(
     save: Annotated[
         Path | None, typer.Option(help="Write the spectrum with its proof (.npz; Spectrum.load reads it).")
     ] = None,
+    cache: Annotated[
+        Path | None, typer.Option(help="Folder in which spectra are kept, and looked for before one is computed.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Compute the lowest eigenvalues of a shape and prove that none is missing."""
@@ -98,12 +101,11 @@ def spectrum(
         progress(0.0, "building the operator")
         laplacian = build_laplacian(found, name, **options)
         asked_k = USUAL if k is None and below is None else k
-        within = {"above": above, "below": below}
         if boundary == "dirichlet":
             nodes = _held(found, ORDERS.get(name, 1))
-            solved = solve_dirichlet(laplacian, asked_k, nodes, **within, progress=progress)
+            solved = solve_dirichlet(laplacian, asked_k, nodes, above=above, below=below, progress=progress)
         else:
-            solved = solve_spectrum(laplacian, asked_k, **within, progress=progress)
+            solved = solve_spectrum(laplacian, asked_k, above=above, below=below, progress=progress, cache=cache)
         count = solved.certificate.first + len(solved.eigenvalues)
         bounds = bracket_eigenvalues(bounded, count, boundary=boundary, progress=progress) if bounded else None
     if as_json:

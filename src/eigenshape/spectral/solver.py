@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
+from pathlib import Path
 from typing import SupportsIndex
 
 import numpy as np
@@ -14,14 +15,17 @@ from eigenshape._arrays import frozen, machine_memory, positive_values, whole_nu
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.sparse.lane_loops import LANES
+from eigenshape.spectral.cache import content_key, remembered
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.certify import in_user_units, part, prove
+from eigenshape.spectral.components import Parts, connected_parts, pairs_of_parts
+from eigenshape.spectral.diagnosis import require_solvable
 from eigenshape.spectral.factor import Factor
 from eigenshape.spectral.interval import count_interval, solve_interval
 from eigenshape.spectral.kernel_values import from_pencil, reported, require_readable, to_pencil, widened
 from eigenshape.spectral.lanczos import Wanted, block_lanczos
 from eigenshape.spectral.pairs import Pairs, lowest, polished
-from eigenshape.spectral.pencil import Pencil, normalise
+from eigenshape.spectral.pencil import Pencil, finished, normalise
 from eigenshape.spectral.shift import factor_below, shift_inside
 from eigenshape.spectral.slices import walk
 from eigenshape.spectral.spectrum import Spectrum
@@ -49,6 +53,7 @@ def solve_spectrum(
     above: float | None = None,
     below: float | None = None,
     progress: Progress | None = None,
+    cache: str | Path | None = None,
 ) -> Spectrum:
     """Compute the k lowest eigenpairs of W φ = λ B φ, or all in an interval, with the proof that none is missing.
 
@@ -69,6 +74,9 @@ def solve_spectrum(
         With `below`: all pairs with above ≤ λ < below. `certificate.first` says how many eigenvalues lie lower.
     progress : callable, optional
         Called as progress(fraction_done, message) while the solver works.
+    cache : path, optional
+        A folder, made when missing, in which spectra are kept under a hash of W, B and what is asked; what it has is
+        loaded, without a word of progress. Nothing in it is ever deleted.
 
     Returns
     -------
@@ -82,31 +90,39 @@ def solve_spectrum(
     ------
     InvalidParameterError
         If not one of k and below is given, k is not in 1..n, no eigenvalue lies below `below` or in the interval, B is
-        not positive definite, W has a negative eigenvalue, or one to be corrected is 1/t or more.
+        not positive definite, W has a negative eigenvalue, or one to be corrected is 1/t or more; or W_ii/B_ii spans
+        more digits than floats have and no proof can be had; or the folder `cache` cannot be written to.
     ConvergenceError
         If the proof cannot be completed; no incomplete spectrum is ever returned.
 
     Warns
     -----
     UserWarning
-        If eigenvalues of a kernel lie too near to 1/t to tell those of the shape.
+        If eigenvalues of a kernel lie too near to 1/t to tell those of the shape, or a file in `cache` is damaged.
     """
     wanted, limits = _asked(laplacian, k, above, below)
+    if cache is not None:
+        compute = partial(solve_spectrum, laplacian, k, above=above, below=below, progress=progress)
+        return remembered(cache, content_key(laplacian, (wanted, *limits.tolist())), compute)
     report = progress or _silent
     with threadpool_limits(1, user_api="blas"):
         report(0.0, "scaling the operator")
         pencil = normalise(laplacian)
-        if wanted:
-            pairs, certificate = _proved(pencil, wanted, report)
-        else:
-            low, high = np.ldexp(limits, -pencil.value_exponent).tolist()
-            pairs, certificate = _proved_between(pencil, low, high, report)
+        try:
+            if wanted:
+                pairs, certificate = _proved(pencil, wanted, report)
+            else:
+                low, high = np.ldexp(limits, -pencil.value_exponent).tolist()
+                pairs, certificate = _proved_between(pencil, low, high, report)
+        except ConvergenceError as error:
+            require_solvable(pencil, error)
+            raise
     report(1.0, "proved complete")
     values, residuals = pencil.values_out(_without_negatives(pencil, pairs)), pencil.values_out(pairs.residuals)
     require_readable(laplacian.kernel, values)
     return Spectrum(
         eigenvalues=frozen(from_pencil(laplacian.kernel, values)),
-        eigenvectors=frozen(pencil.vectors_out(_with_signs(pairs.vectors))),
+        eigenvectors=finished(pencil, pairs.vectors),
         mass=laplacian.mass,
         residuals=frozen(widened(laplacian.kernel, values, residuals)),
         certificate=reported(laplacian.kernel, in_user_units(pencil, certificate), float(values[-1])),
@@ -121,9 +137,9 @@ def _asked(
         raise InvalidParameterError(f"One of k and below says which pairs to compute; k is {k} and below is {below}.")
     if below is None and above is not None:
         raise InvalidParameterError(f"above needs below, the other end of an interval; above is {above}.")
-    if below is None:
-        return whole_number(k or 0, "k", 1, laplacian.n_points), np.zeros(2)
-    high = float(positive_values([below], "below")[0])
+    if k is not None:
+        return whole_number(k, "k", 1, laplacian.n_points), np.zeros(2)
+    high = float(positive_values(np.array([below], dtype=float), "below")[0])
     low = -np.inf if above is None or above == 0 else float(positive_values([above], "above")[0])
     if low >= high:
         raise InvalidParameterError(f"above must be less than below; above is {above} and below is {below}.")
@@ -135,6 +151,9 @@ def _silent(fraction: float, message: str) -> None:
 
 
 def _proved(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+    parts = connected_parts(pencil)
+    if len(parts.sizes) > 1 and parts.sizes.max() <= SMALL:
+        return _in_parts(pencil, parts, k, report)
     if pencil.n <= SMALL or (DENSE_SHARE * k > pencil.n and pencil.n <= DENSE_LIMIT):
         return _dense(pencil, k, report)
     roads: list[Road] = [partial(_sparse, start=walk)] if k > WHOLE else []
@@ -203,6 +222,18 @@ def _dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate
     _, vectors = sl.eigh(stiffness, mass)
     pairs = lowest(pencil, vectors[:, :k] / roots[:, None], k)
     report(0.8, "counting eigenvalues")
+    return _complete(pencil, pairs)
+
+
+def _in_parts(pencil: Pencil, parts: Parts, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+    _require_room(pencil, k, 24 * int((parts.sizes**2).sum()))
+    report(0.1, f"solving {len(parts.sizes)} parts densely")
+    pairs = pairs_of_parts(pencil, parts, k)
+    report(0.8, "counting eigenvalues")
+    return _complete(pencil, pairs)
+
+
+def _complete(pencil: Pencil, pairs: Pairs) -> tuple[Pairs, Certificate]:
     certificate = prove(pencil, pairs)
     if not certificate.complete:
         raise ConvergenceError(in_user_units(pencil, certificate).explain())
@@ -273,9 +304,3 @@ def _without_negatives(pencil: Pencil, pairs: Pairs) -> Float[np.ndarray, " k"]:
             f"stiffness must be positive semidefinite; eigenvalue {bad[0]} is {value:.6g}, its error under {bound:.1e}."
         )
     return np.maximum(pairs.values, 0.0)
-
-
-def _with_signs(vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
-    sizes = np.abs(vectors)
-    leading = np.argmax(sizes >= (1 - 1e-6) * sizes.max(axis=0), axis=0)
-    return vectors * np.where(vectors[leading, np.arange(vectors.shape[1])] < 0, -1.0, 1.0)
