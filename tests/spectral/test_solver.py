@@ -9,7 +9,7 @@ from eigenshape.geometry.surfaces import disjoint_union, icosphere, torus
 from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.spectral import solver
+from eigenshape.spectral import outcome, solver
 from eigenshape.spectral.certify import certify
 from eigenshape.spectral.solver import solve_spectrum
 
@@ -247,7 +247,7 @@ def test_one_of_k_and_below_is_asked_for():
 
 @pytest.mark.parametrize(("level", "words"), [(2, "factors of their operator 0.0 GiB"), (4, "20 pairs of 2562 points")])
 def test_what_does_not_fit_is_refused_with_numbers(monkeypatch, level, words):
-    monkeypatch.setattr(solver, "machine_memory", lambda: 1e5)
+    monkeypatch.setattr(outcome, "machine_memory", lambda: 1e5)
     with pytest.raises(
         InvalidParameterError, match=r"A spectrum must fit into memory, 0\.0 GiB; 20 pairs of .*"
     ) as error:

@@ -97,6 +97,21 @@ def normalise(laplacian: Laplacian) -> Pencil:
     up_b -= up_b % 2  # an even power, so that its square root is a power of two as well
     stiffness = _scaled(laplacian.stiffness, -up_w)
     mass = _scaled(laplacian.mass, -up_b)
+    return _pencil(stiffness, mass, up_w - up_b, -(up_b // 2))
+
+
+def as_pencil(stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
+    """Take a pencil as it is, whose entries are of moderate size already.
+
+    Raises
+    ------
+    InvalidParameterError
+        If B is not positive definite.
+    """
+    return _pencil(_scaled(stiffness, 0), _scaled(mass, 0), 0, 0)
+
+
+def _pencil(stiffness: sp.csc_array, mass: sp.csc_array, value_exponent: int, vector_exponent: int) -> Pencil:
     diagonal = mass.diagonal()
     trace = float(stiffness.diagonal().sum())
     return Pencil(
@@ -105,8 +120,8 @@ def normalise(laplacian: Laplacian) -> Pencil:
         mass_diagonal=diagonal,
         mass_floor=_mass_floor(mass, diagonal),
         level=trace / float(diagonal.sum()) if trace > 0 else 1.0,
-        value_exponent=up_w - up_b,
-        vector_exponent=-(up_b // 2),
+        value_exponent=value_exponent,
+        vector_exponent=vector_exponent,
     )
 
 
@@ -115,7 +130,7 @@ def _exponent(matrix: sp.csr_array) -> int:
     return int(np.frexp(largest)[1]) - 1 if largest > 0 else 0
 
 
-def _scaled(matrix: sp.csr_array, exponent: int) -> sp.csc_array:
+def _scaled(matrix: sp.sparray, exponent: int) -> sp.csc_array:
     scaled = sp.csc_array(matrix, dtype=np.float64, copy=True)
     scaled.data = np.ldexp(scaled.data, exponent)
     scaled.sum_duplicates()

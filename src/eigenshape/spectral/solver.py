@@ -10,21 +10,21 @@ import scipy.linalg as sl
 from jaxtyping import Float
 from threadpoolctl import threadpool_limits
 
-from eigenshape._arrays import frozen, machine_memory, positive_values, whole_number
+from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.sparse.lane_loops import LANES
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.certify import Pairs, in_user_units, prove, shortened
 from eigenshape.spectral.factor import Factor
-from eigenshape.spectral.kernel_values import from_pencil, reported, require_readable, to_pencil, widened
+from eigenshape.spectral.kernel_values import to_pencil
 from eigenshape.spectral.lanczos import Wanted, block_lanczos
+from eigenshape.spectral.outcome import Progress, require_room, silent, spectrum_of
 from eigenshape.spectral.pencil import Pencil, normalise, rayleigh_residuals
 from eigenshape.spectral.shift import factor_below, shift_inside
 from eigenshape.spectral.slices import walk
 from eigenshape.spectral.spectrum import Spectrum
 
-Progress = Callable[[float, str], None]
 Start = Callable[[Pencil, int, Callable[[float], None]], tuple[np.ndarray, Factor]]
 Road = Callable[[Pencil, int, Progress], tuple[Pairs, Certificate]]
 
@@ -33,7 +33,6 @@ DENSE_SHARE = 4  # and where more than one in so many pairs is wanted,
 MORE = 8  # pairs that are added where a guess was too low
 DENSE_LIMIT = 6000  # while the matrix still fits
 WHOLE = 400  # pairs up to which one shift serves
-SHARE_OF_MEMORY = 0.9
 FEWEST_VECTORS = 150  # of a space, however few pairs are wanted
 WIDEST = 8  # groups of eight columns to a block
 RUNS = 40
@@ -92,31 +91,20 @@ def solve_spectrum(
         raise InvalidParameterError(f"One of k and below says which pairs to compute; k is {k} and below is {below}.")
     wanted = whole_number(k, "k", 1, laplacian.n_points) if k is not None else 0
     limit = to_pencil(laplacian.kernel, positive_values([below], "below")) if below is not None else np.zeros(1)
-    report = progress or _silent
+    report = progress or silent
     with threadpool_limits(1, user_api="blas"):
         report(0.0, "scaling the operator")
         pencil = normalise(laplacian)
         if wanted:
-            pairs, certificate = _proved(pencil, wanted, report)
+            pairs, certificate = proved(pencil, wanted, report)
         else:
             pairs, certificate = _proved_below(pencil, float(np.ldexp(limit[0], -pencil.value_exponent)), report)
     report(1.0, "proved complete")
-    values, residuals = pencil.values_out(_without_negatives(pencil, pairs)), pencil.values_out(pairs.residuals)
-    require_readable(laplacian.kernel, values)
-    return Spectrum(
-        eigenvalues=frozen(from_pencil(laplacian.kernel, values)),
-        eigenvectors=frozen(pencil.vectors_out(_with_signs(pairs.vectors))),
-        mass=laplacian.mass,
-        residuals=frozen(widened(laplacian.kernel, values, residuals)),
-        certificate=reported(laplacian.kernel, in_user_units(pencil, certificate), float(values[-1])),
-    )
+    return spectrum_of(laplacian, pencil, pairs, certificate)
 
 
-def _silent(fraction: float, message: str) -> None:
-    """Report to nobody."""
-
-
-def _proved(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+def proved(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+    """Return the k lowest pairs of a pencil and their proof, by the quickest road that reaches it."""
     if pencil.n <= SMALL or (DENSE_SHARE * k > pencil.n and pencil.n <= DENSE_LIMIT):
         return _dense(pencil, k, report)
     roads: list[Road] = [partial(_sparse, start=walk)] if k > WHOLE else []
@@ -133,7 +121,7 @@ def _proved_below(pencil: Pencil, limit: float, report: Progress) -> tuple[Pairs
     report(0.01, "counting eigenvalues")
     k = min(factor_below(pencil, limit).count + 1, pencil.n)
     while True:
-        pairs, certificate = _proved(pencil, k, report)
+        pairs, certificate = proved(pencil, k, report)
         count = int(np.count_nonzero(pairs.values < limit))
         if count < k or k == pencil.n:
             break
@@ -184,14 +172,9 @@ def _sparse(pencil: Pencil, k: int, report: Progress, *, start: Start) -> tuple[
 
 
 def _require_room(pencil: Pencil, k: int, factors: int) -> None:
-    """Estimate the memory of a solve and refuse what the machine has not got."""
     bases = 8 * pencil.n * (3 * k + FEWEST_VECTORS + 2 * min(k, WHOLE))  # a space of twice the pairs, results, a copy
-    room = SHARE_OF_MEMORY * machine_memory()
-    if bases + factors > room:
-        raise InvalidParameterError(
-            f"A spectrum must fit into memory, {room / 2**30:.1f} GiB; {k} pairs of {pencil.n} points take about "
-            f"{bases / 2**30:.1f} GiB, factors of their operator {factors / 2**30:.1f} GiB. Ask for fewer pairs."
-        )
+    advice = "Ask for fewer pairs, or for approximate_spectrum, which needs no factor"
+    require_room(f"{k} pairs of {pencil.n} points", {"bases": bases, "factors of their operator": factors}, advice)
 
 
 def _at_once(pencil: Pencil, k: int, report: Callable[[float], None]) -> tuple[Float[np.ndarray, "n j"], Factor]:
@@ -207,7 +190,7 @@ def _in_run(report: Progress, run: int) -> Callable[[float], None]:
 def _still_wanted(pencil: Pencil, factor: Factor, pairs: Pairs, k: int) -> tuple[Certificate | None, Wanted]:
     """Return the proof as far as it goes, and what a further run has to find."""
     certificate = prove(pencil, pairs) if len(pairs.values) == k else None
-    missing = certificate.count - certificate.n_found if certificate else k - len(pairs.values)
+    missing = certificate.n_missing if certificate else k - len(pairs.values)
     missing = min(max(missing, 0), k)
     ceiling = certificate.shift if certificate else np.inf
     below = min(max(factor.count - int(np.count_nonzero(pairs.values < factor.shift)), 0), missing)
@@ -250,20 +233,3 @@ def _orthonormal(pencil: Pencil, vectors: Float[np.ndarray, "n j"]) -> Float[np.
     if off > SKEW:
         raise ConvergenceError(f"Vectors of different runs must be B-orthogonal; two are off by {off:.1e}.")
     return vectors @ (1.5 * identity - 0.5 * gram)
-
-
-def _without_negatives(pencil: Pencil, pairs: Pairs) -> Float[np.ndarray, " k"]:
-    rounding = 4 * pairs.residuals + 1e-14 * pencil.level
-    bad = np.flatnonzero(pairs.values < -rounding)
-    if bad.size:
-        value, bound = pencil.values_out(np.array([pairs.values[bad[0]], rounding[bad[0]]]))
-        raise InvalidParameterError(
-            f"stiffness must be positive semidefinite; eigenvalue {bad[0]} is {value:.6g}, its error under {bound:.1e}."
-        )
-    return np.maximum(pairs.values, 0.0)
-
-
-def _with_signs(vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
-    sizes = np.abs(vectors)
-    leading = np.argmax(sizes >= (1 - 1e-6) * sizes.max(axis=0), axis=0)
-    return vectors * np.where(vectors[leading, np.arange(vectors.shape[1])] < 0, -1.0, 1.0)
