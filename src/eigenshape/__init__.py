@@ -115,6 +115,7 @@ from eigenshape.retrieval.describe import DescribedShape, describe, describe_mes
 from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDescriptor
 from eigenshape.retrieval.index import Match, Record, ShapeIndex
 from eigenshape.retrieval.score import match_features, matching_score
+from eigenshape.spectral.approximate import approximate_spectrum
 from eigenshape.spectral.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.certify import certify
@@ -179,6 +180,7 @@ __all__ = [
     "TriangleMesh",
     "Workers",
     "anisotropic_laplacian",
+    "approximate_spectrum",
     "average_geodesic_distance",
     "ball",
     "ball_eigenvalues",

@@ -11,7 +11,7 @@ from eigenshape.geometry.surfaces import disjoint_union, icosphere
 from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.spectral import solver
+from eigenshape.spectral import outcome
 from eigenshape.spectral.diagnosis import require_solvable
 from eigenshape.spectral.pencil import normalise
 from eigenshape.spectral.solver import solve_spectrum
@@ -249,9 +249,10 @@ def test_ten_thousand_triangles_and_more_pairs_than_these():
 
 
 def test_more_pairs_than_memory_are_refused_with_numbers(monkeypatch):
-    monkeypatch.setattr(solver, "machine_memory", lambda: 2.0**32)
+    monkeypatch.setattr(outcome, "machine_memory", lambda: 2.0**32)
     with pytest.raises(
-        InvalidParameterError, match=r"must fit into memory, 3\.6 GiB; 10050 pairs of 30000 points take about 7\.0 GiB"
+        InvalidParameterError,
+        match=r"must fit into memory, 3\.6 GiB; 10050 pairs of 30000 points take about bases 7\.0 GiB",
     ):
         solve_spectrum(copies(TRIANGLE, 10_000), 10_050)
 

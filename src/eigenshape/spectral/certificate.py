@@ -1,4 +1,4 @@
-"""The proof that nothing is missing from a spectrum."""
+"""The proof that nothing is missing from a spectrum, or the word that there is none."""
 
 from dataclasses import dataclass
 
@@ -24,9 +24,9 @@ class Certificate:
     floor : float
         Where the count of an interval begins, in 1/length²; -inf where it begins below all eigenvalues.
     shift : float
-        σ, in 1/length²; infinite where all n eigenvalues were computed.
-    count : int
-        Eigenvalues below σ, and above `floor`, by inertia.
+        σ, in 1/length²; infinite where all n eigenvalues were computed, or nothing was counted.
+    count : int or None
+        Eigenvalues below σ, and above `floor`, by inertia; None where they were not counted (`approximate_spectrum`).
     n_found : int
         Eigenpairs found there; equal to `count`, or the spectrum is refused.
     gap : (float, float)
@@ -49,7 +49,7 @@ class Certificate:
 
     n_pairs: int
     shift: float
-    count: int
+    count: int | None
     n_found: int
     gap: tuple[float, float]
     resolution: float
@@ -65,8 +65,19 @@ class Certificate:
         """Whether what was found is what there is."""
         return self.count == self.n_found
 
+    @property
+    def n_missing(self) -> int:
+        """Eigenvalues counted below σ that were not found there; 0 where nothing was counted."""
+        return 0 if self.count is None else self.count - self.n_found
+
     def explain(self) -> str:
         """Say in plain words what is proved and how."""
+        if self.count is None:
+            return (
+                f"These are approximations, {self.n_pairs} of them: each is within {self.max_residual:.1e} of the "
+                f"largest of an eigenvalue, and the eigenvectors are orthonormal to {self.orthonormality:.1e}. Whether "
+                f"one is missing was not counted; solve_spectrum proves it."
+            )
         if not self.complete:
             return (
                 f"This set of {self.n_pairs} eigenvalues is not proved: {self.count} lie below "

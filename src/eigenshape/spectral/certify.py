@@ -142,7 +142,7 @@ def _below_cluster(pencil: Pencil, pairs: Pairs, above: Certificate, beside: Fac
             f"Neighbouring eigenvalues must differ by more than rounding takes; the last {len(pairs.values) - first} "
             f"of {len(pairs.values)} do not. Repair nearly degenerate elements."
         )
-    return replace(_counted(above, pairs, factor), resolution=resolution, n_split=above.count - len(pairs.values))
+    return replace(_counted(above, pairs, factor), resolution=resolution, n_split=beside.count - len(pairs.values))
 
 
 def _counted(certificate: Certificate, pairs: Pairs, factor: Factor) -> Certificate:

@@ -105,6 +105,23 @@ def normalise(laplacian: Laplacian) -> Pencil:
     up_b -= up_b % 2  # an even power, so that its square root is a power of two as well
     stiffness = _scaled(laplacian.stiffness, -up_w)
     mass = _scaled(laplacian.mass, -up_b)
+    return _pencil(stiffness, mass, (up_w - up_b, -(up_b // 2)), laplacian.kernel)
+
+
+def as_pencil(stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
+    """Take a pencil as it is, whose entries are of moderate size already.
+
+    Raises
+    ------
+    InvalidParameterError
+        If B is not positive definite.
+    """
+    return _pencil(_scaled(stiffness, 0), _scaled(mass, 0), (0, 0), None)
+
+
+def _pencil(
+    stiffness: sp.csc_array, mass: sp.csc_array, exponents: tuple[int, int], kernel: GaussianKernel | None
+) -> Pencil:
     diagonal = mass.diagonal()
     return Pencil(
         stiffness=stiffness,
@@ -112,9 +129,9 @@ def normalise(laplacian: Laplacian) -> Pencil:
         mass_diagonal=diagonal,
         mass_floor=_mass_floor(mass, diagonal),
         level=_level(stiffness.diagonal(), diagonal),
-        value_exponent=up_w - up_b,
-        vector_exponent=-(up_b // 2),
-        kernel=laplacian.kernel,
+        value_exponent=exponents[0],
+        vector_exponent=exponents[1],
+        kernel=kernel,
     )
 
 
@@ -144,7 +161,7 @@ def _exponent(matrix: sp.csr_array) -> int:
     return int(np.frexp(largest)[1]) - 1 if largest > 0 else 0
 
 
-def _scaled(matrix: sp.csr_array, exponent: int) -> sp.csc_array:
+def _scaled(matrix: sp.sparray, exponent: int) -> sp.csc_array:
     scaled = sp.csc_array(matrix, dtype=np.float64, copy=True)
     scaled.data = np.ldexp(scaled.data, exponent)
     scaled.sum_duplicates()

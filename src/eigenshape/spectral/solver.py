@@ -1,49 +1,32 @@
 """The lowest eigenpairs of a Laplacian, proved complete."""
 
-from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import SupportsIndex
 
 import numpy as np
-import scipy.linalg as sl
 from jaxtyping import Float
 from threadpoolctl import threadpool_limits
 
-from eigenshape._arrays import frozen, machine_memory, positive_values, whole_number
+from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.sparse.lane_loops import LANES
 from eigenshape.spectral.cache import content_key, remembered
 from eigenshape.spectral.certificate import Certificate
-from eigenshape.spectral.certify import in_user_units, part, prove
-from eigenshape.spectral.components import Parts, connected_parts, pairs_of_parts
+from eigenshape.spectral.certify import part
 from eigenshape.spectral.diagnosis import require_solvable
-from eigenshape.spectral.factor import Factor
 from eigenshape.spectral.interval import count_interval, solve_interval
-from eigenshape.spectral.kernel_values import from_pencil, reported, require_readable, to_pencil, widened
-from eigenshape.spectral.lanczos import Wanted, block_lanczos
-from eigenshape.spectral.pairs import Pairs, lowest, polished
-from eigenshape.spectral.pencil import Pencil, finished, normalise
-from eigenshape.spectral.shift import factor_below, shift_inside
-from eigenshape.spectral.slices import walk
+from eigenshape.spectral.kernel_values import to_pencil
+from eigenshape.spectral.outcome import Progress, silent, spectrum_of
+from eigenshape.spectral.pairs import Pairs
+from eigenshape.spectral.pencil import Pencil, normalise
+from eigenshape.spectral.roads import dense_serves, proved, require_memory
+from eigenshape.spectral.shift import factor_below
 from eigenshape.spectral.spectrum import Spectrum
 
-Progress = Callable[[float, str], None]
-Start = Callable[[Pencil, int, Callable[[float], None]], tuple[np.ndarray, Factor]]
-Road = Callable[[Pencil, int, Progress], tuple[Pairs, Certificate]]
-
-SMALL = 300  # points up to which a dense solve is the faster one
-DENSE_SHARE = 4  # and where more than one in so many pairs is wanted,
 MORE = 8  # pairs that are added where a guess was too low
-DENSE_LIMIT = 6000  # while the matrix still fits
 FEW = 50  # eigenvalues below an interval that are not worth a second count
-WHOLE = 400  # pairs up to which one shift serves
-SHARE_OF_MEMORY = 0.9
-FEWEST_VECTORS = 150  # of a space, however few pairs are wanted
-WIDEST = 8  # groups of eight columns to a block
-RUNS = 40
 
 
 def solve_spectrum(
@@ -104,13 +87,13 @@ def solve_spectrum(
     if cache is not None:
         compute = partial(solve_spectrum, laplacian, k, above=above, below=below, progress=progress)
         return remembered(cache, content_key(laplacian, (wanted, *limits.tolist())), compute)
-    report = progress or _silent
+    report = progress or silent
     with threadpool_limits(1, user_api="blas"):
         report(0.0, "scaling the operator")
         pencil = normalise(laplacian)
         try:
             if wanted:
-                pairs, certificate = _proved(pencil, wanted, report)
+                pairs, certificate = proved(pencil, wanted, report)
             else:
                 low, high = np.ldexp(limits, -pencil.value_exponent).tolist()
                 pairs, certificate = _proved_between(pencil, low, high, report)
@@ -118,15 +101,7 @@ def solve_spectrum(
             require_solvable(pencil, error)
             raise
     report(1.0, "proved complete")
-    values, residuals = pencil.values_out(_without_negatives(pencil, pairs)), pencil.values_out(pairs.residuals)
-    require_readable(laplacian.kernel, values)
-    return Spectrum(
-        eigenvalues=frozen(from_pencil(laplacian.kernel, values)),
-        eigenvectors=finished(pencil, pairs.vectors),
-        mass=laplacian.mass,
-        residuals=frozen(widened(laplacian.kernel, values, residuals)),
-        certificate=reported(laplacian.kernel, in_user_units(pencil, certificate), float(values[-1])),
-    )
+    return spectrum_of(laplacian, pencil, pairs, certificate)
 
 
 def _asked(
@@ -146,25 +121,6 @@ def _asked(
     return 0, to_pencil(laplacian.kernel, np.array([low, high]))
 
 
-def _silent(fraction: float, message: str) -> None:
-    """Report to nobody."""
-
-
-def _proved(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
-    parts = connected_parts(pencil)
-    if len(parts.sizes) > 1 and parts.sizes.max() <= SMALL:
-        return _in_parts(pencil, parts, k, report)
-    if pencil.n <= SMALL or (DENSE_SHARE * k > pencil.n and pencil.n <= DENSE_LIMIT):
-        return _dense(pencil, k, report)
-    roads: list[Road] = [partial(_sparse, start=walk)] if k > WHOLE else []
-    roads += [partial(_sparse, start=_at_once)]
-    roads += [_dense] if pencil.n <= DENSE_LIMIT else []  # nothing there can fail to converge
-    for road in roads[:-1]:
-        with suppress(ConvergenceError):
-            return road(pencil, k, report)
-    return roads[-1](pencil, k, report)
-
-
 def _proved_between(pencil: Pencil, low: float, high: float, report: Progress) -> tuple[Pairs, Certificate]:
     report(0.01, "counting eigenvalues")
     pairs, certificate = _far_up(pencil, low, high, report) or _lowest_below(pencil, high, report)
@@ -176,15 +132,13 @@ def _proved_between(pencil: Pencil, low: float, high: float, report: Progress) -
 
 def _far_up(pencil: Pencil, low: float, high: float, report: Progress) -> tuple[Pairs, Certificate] | None:
     """Solve for an interval by itself where it is less work than all eigenvalues below its upper end."""
-    if pencil.n <= SMALL or low <= 0:
+    if low <= 0 or dense_serves(pencil, 1):
         return None
     interval = count_interval(pencil, low, high)
     within = interval.below_high - interval.below_low
-    if interval.below_low < max(within, FEW) or (
-        DENSE_SHARE * interval.below_high > pencil.n and pencil.n <= DENSE_LIMIT
-    ):
+    if interval.below_low < max(within, FEW) or dense_serves(pencil, interval.below_high):
         return None
-    _require_room(pencil, within, 24 * pencil.shifted.elimination.n_entries)
+    require_memory(pencil, within)
     with suppress(ConvergenceError):
         return solve_interval(pencil, interval, lambda done: report(0.05 + 0.9 * done, "slices of the interval"))
     return None
@@ -194,7 +148,7 @@ def _lowest_below(pencil: Pencil, limit: float, report: Progress) -> tuple[Pairs
     """Prove one pair more than lie below the limit: then none of them is missing."""
     k = min(factor_below(pencil, limit).count + 1, pencil.n)
     while True:
-        pairs, certificate = _proved(pencil, k, report)
+        pairs, certificate = proved(pencil, k, report)
         count = int(np.count_nonzero(pairs.values < limit))
         if count < k or k == pencil.n:
             return pairs, certificate
@@ -211,96 +165,3 @@ def _nothing(pencil: Pencil, pairs: Pairs, number: int, low: float, high: float)
         f"above and below must have eigenvalues between them; {number} lie below {above:.6g} and none from there to "
         f"{below:.6g}."
     )
-
-
-def _dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
-    _require_room(pencil, k, 32 * pencil.n**2)
-    report(0.1, f"solving {pencil.n} points densely")
-    roots = np.sqrt(pencil.mass_diagonal)
-    stiffness = pencil.stiffness.toarray() / np.outer(roots, roots)
-    mass = None if pencil.mass_floor == 1.0 else pencil.mass.toarray() / np.outer(roots, roots)
-    _, vectors = sl.eigh(stiffness, mass)
-    pairs = lowest(pencil, vectors[:, :k] / roots[:, None], k)
-    report(0.8, "counting eigenvalues")
-    return _complete(pencil, pairs)
-
-
-def _in_parts(pencil: Pencil, parts: Parts, k: int, report: Progress) -> tuple[Pairs, Certificate]:
-    _require_room(pencil, k, 24 * int((parts.sizes**2).sum()))
-    report(0.1, f"solving {len(parts.sizes)} parts densely")
-    pairs = pairs_of_parts(pencil, parts, k)
-    report(0.8, "counting eigenvalues")
-    return _complete(pencil, pairs)
-
-
-def _complete(pencil: Pencil, pairs: Pairs) -> tuple[Pairs, Certificate]:
-    certificate = prove(pencil, pairs)
-    if not certificate.complete:
-        raise ConvergenceError(in_user_units(pencil, certificate).explain())
-    return pairs, certificate
-
-
-def _sparse(pencil: Pencil, k: int, report: Progress, *, start: Start) -> tuple[Pairs, Certificate]:
-    _require_room(pencil, k, 24 * pencil.shifted.elimination.n_entries)  # two factors at once, and their making
-    report(0.02, "looking for a shift")
-    vectors, factor = start(pencil, k, _in_run(report, 0))
-    for run in range(1, RUNS + 1):
-        pairs = polished(pencil, factor, lowest(pencil, vectors, k))
-        report(0.9, "counting eigenvalues")
-        certificate, wanted = _still_wanted(pencil, factor, pairs, k)
-        missing = wanted.below + wanted.above
-        if certificate is not None and certificate.complete:
-            return pairs, certificate
-        if missing == 0 or run == RUNS:
-            break
-        groups, more = min(1 + -(-missing // LANES), WIDEST), _in_run(report, run)
-        _, found = block_lanczos(pencil, factor, wanted, locked=pairs.vectors, groups=groups, report=more)
-        if not found.shape[1]:
-            break
-        vectors = np.hstack([pairs.vectors, found])
-    raise ConvergenceError(
-        f"Every eigenvalue that inertia counts must be found; {len(pairs.values)} of {k} were found in {run} runs "
-        f"and {missing} are missing."
-    )
-
-
-def _require_room(pencil: Pencil, k: int, factors: int) -> None:
-    """Estimate the memory of a solve and refuse what the machine has not got."""
-    bases = 8 * pencil.n * (3 * k + FEWEST_VECTORS + 2 * min(k, WHOLE))  # a space of twice the pairs, results, a copy
-    room = SHARE_OF_MEMORY * machine_memory()
-    if bases + factors > room:
-        raise InvalidParameterError(
-            f"A spectrum must fit into memory, {room / 2**30:.1f} GiB; {k} pairs of {pencil.n} points take about "
-            f"{bases / 2**30:.1f} GiB, factors of their operator {factors / 2**30:.1f} GiB. Ask for fewer pairs."
-        )
-
-
-def _at_once(pencil: Pencil, k: int, report: Callable[[float], None]) -> tuple[Float[np.ndarray, "n j"], Factor]:
-    factor = shift_inside(pencil, k)
-    wanted = Wanted(below=factor.count, above=k - factor.count)
-    return block_lanczos(pencil, factor, wanted, locked=np.empty((pencil.n, 0)), report=report)[1], factor
-
-
-def _in_run(report: Progress, run: int) -> Callable[[float], None]:
-    return lambda done: report(0.05 + 0.8 * done, f"run {run + 1} of block Lanczos")
-
-
-def _still_wanted(pencil: Pencil, factor: Factor, pairs: Pairs, k: int) -> tuple[Certificate | None, Wanted]:
-    """Return the proof as far as it goes, and what a further run has to find."""
-    certificate = prove(pencil, pairs) if len(pairs.values) == k else None
-    missing = certificate.count - certificate.n_found if certificate else k - len(pairs.values)
-    missing = min(max(missing, 0), k)
-    ceiling = certificate.shift if certificate else np.inf
-    below = min(max(factor.count - int(np.count_nonzero(pairs.values < factor.shift)), 0), missing)
-    return certificate, Wanted(below=below, above=missing - below, ceiling=ceiling)
-
-
-def _without_negatives(pencil: Pencil, pairs: Pairs) -> Float[np.ndarray, " k"]:
-    rounding = 4 * pairs.residuals + 1e-14 * pencil.level
-    bad = np.flatnonzero(pairs.values < -rounding)
-    if bad.size:
-        value, bound = pencil.values_out(np.array([pairs.values[bad[0]], rounding[bad[0]]]))
-        raise InvalidParameterError(
-            f"stiffness must be positive semidefinite; eigenvalue {bad[0]} is {value:.6g}, its error under {bound:.1e}."
-        )
-    return np.maximum(pairs.values, 0.0)
