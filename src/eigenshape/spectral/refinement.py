@@ -73,7 +73,7 @@ def refine(
         worst = float(state.residuals[: goal.k].max())
         first = first or worst
         if worst <= bound and not looked:
-            values = _look_again(tower, space, values, goal.k, bound)
+            values = _look_again(tower, space, state, goal.k, bound, done)
             looked = values is state.values
             if not looked:
                 continue
@@ -133,15 +133,16 @@ def _add_corrections(tower: Tower, space: Space, state: Ritz, late: np.ndarray, 
     multiply(device, level.stiffness, added, space.images[:, m : m + len(late)])
 
 
-def _look_again(tower: Tower, space: Space, values: np.ndarray, k: int, bound: float) -> np.ndarray:
+def _look_again(tower: Tower, space: Space, state: Ritz, k: int, bound: float, seed: int) -> Float[np.ndarray, " m"]:
     """Look for eigenvectors that the coarser levels cannot see, with columns that know nothing of them.
 
     Some steps of inverse iteration on random columns. Where they lower one of the first k values by half the bound
-    or more, they are taken in; else everything stays as it is.
+    or more, they are taken in, and the new values returned; else everything stays as it is.
     """
+    values = state.values
     level, device, m = tower.levels[0], tower.device, len(values)
     some, shifts = slice(m, m + PROBES), np.zeros(PROBES, dtype=np.float32)
-    block = put(device, np.random.default_rng(0).standard_normal((level.n, PROBES)).astype(np.float32))
+    block = put(device, np.random.default_rng(seed).standard_normal((level.n, PROBES)).astype(np.float32))
     for _ in range(PROBE_STEPS):
         block *= level.rough_scales[0]
         block = correct(tower, block / device.arrays.abs(block).max(axis=0), shifts, STEPS[0])
