@@ -74,9 +74,10 @@ class Certificate:
         """Say in plain words what is proved and how."""
         if self.count is None:
             return (
-                f"These are approximations, {self.n_pairs} of them: each is within {self.max_residual:.1e} of the "
-                f"largest of an eigenvalue, and the eigenvectors are orthonormal to {self.orthonormality:.1e}. Whether "
-                f"one is missing was not counted; solve_spectrum proves it."
+                f"These are approximations, {self.n_pairs} of them: each is off an eigenvalue by at most "
+                f"{self.max_residual:.1e} of the largest, and the eigenvectors are orthonormal to "
+                f"{self.orthonormality:.1e}. Whether one is missing was not counted; solve_spectrum proves that none "
+                f"is."
             )
         if not self.complete:
             return (
@@ -106,10 +107,14 @@ class Certificate:
                 f"their negative pivots, so {self.count} eigenvalues lie between, and {self.n_found} were found there. "
                 f"{quality}{self._clusters()}"
             )
-        return (
-            f"A factor of W - σB at σ = {self.shift:.6g} (1/length²) has {self.count} negative pivots, so "
-            f"{self.count} eigenvalues lie below σ, and {self.n_found} were found there. {quality}{self._clusters()}"
+        counted = (
+            "1 negative pivot, so 1 eigenvalue lies below σ, and 1 was found there"
+            if self.n_found == 1
+            else f"{self.count} negative pivots, so {self.count} eigenvalues lie below σ, and {self.n_found} were found "
+            f"there"
         )
+        factor = f"A factor of W - σB at σ = {self.shift:.6g} (1/length²)"
+        return f"{factor} has {counted}. {quality}{self._clusters()}"
 
     def _clusters(self) -> str:
         largest = max(self.clusters, default=1)
