@@ -107,11 +107,11 @@ class Certificate:
                 f"their negative pivots, so {self.count} eigenvalues lie between, and {self.n_found} were found there. "
                 f"{quality}{self._clusters()}"
             )
+        n = self.count
         counted = (
             "1 negative pivot, so 1 eigenvalue lies below σ, and 1 was found there"
-            if self.n_found == 1
-            else f"{self.count} negative pivots, so {self.count} eigenvalues lie below σ, and {self.n_found} were found "
-            f"there"
+            if n == 1
+            else f"{n} negative pivots, so {n} eigenvalues lie below σ, and {self.n_found} were found there"
         )
         factor = f"A factor of W - σB at σ = {self.shift:.6g} (1/length²)"
         return f"{factor} has {counted}. {quality}{self._clusters()}"
