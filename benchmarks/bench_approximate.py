@@ -1,6 +1,6 @@
 """Approximate spectra beside exact ones: CPU seconds, memory, what is promised and what is true.
 
-    python benchmarks/bench_approximate.py                        all cases (about ten minutes)
+    python benchmarks/bench_approximate.py                        all cases (a quarter of an hour)
     python benchmarks/bench_approximate.py --cases sphere-160k --accuracies 0.1 1e-6
     python benchmarks/bench_approximate.py --quick                a small one
     python benchmarks/bench_approximate.py --json approximate.json
