@@ -44,6 +44,7 @@ def approximate_spectrum(
     k: SupportsIndex,
     *,
     accuracy: float = 1e-3,
+    bound: float | None = None,
     device: str = "cpu",
     progress: Progress | None = None,
 ) -> Spectrum:
@@ -62,8 +63,11 @@ def approximate_spectrum(
     k : int
         Number of eigenpairs, 1 to n.
     accuracy : float
-        Bound of every residual, relative to the k-th eigenvalue; 1e-10 to 0.1. Eigenvalues are far nearer than that:
-        their errors go with its square.
+        Error of the eigenvalues relative to the k-th, judged by how far the last round of refinement lowered them;
+        1e-10 to 0.1. It is told in `certificate.estimate`.
+    bound : float, optional
+        Go on until every residual, relative to the k-th eigenvalue, is at most this too. It bounds the error for
+        certain, and is far larger than the error: that goes with its square.
     device : "cpu" or "gpu"
         Where the largest products are computed. "gpu" takes CuPy (`pip install eigenshape[gpu]`).
     progress : callable, optional
@@ -90,14 +94,16 @@ def approximate_spectrum(
         If there is no GPU to be used, or eigenvalues of a kernel lie too near to 1/t to tell those of the shape.
     """
     wanted = whole_number(k, "k", 1, laplacian.n_points)
-    if not ACCURACIES[0] <= accuracy <= ACCURACIES[1]:
-        raise InvalidParameterError(f"accuracy must lie in {ACCURACIES[0]}..{ACCURACIES[1]}; it is {accuracy}.")
+    for name, value in (("accuracy", accuracy), ("bound", ACCURACIES[1] if bound is None else bound)):
+        if not ACCURACIES[0] <= value <= ACCURACIES[1]:
+            raise InvalidParameterError(f"{name} must lie in {ACCURACIES[0]}..{ACCURACIES[1]}; it is {value}.")
     place, report = open_device(device), progress or silent
     _require_lumped(laplacian)
     with threadpool_limits(1, user_api="blas"):
         report(0.0, "scaling the operator")
         pencil = normalise(laplacian)
-        goal = Goal(wanted, float(accuracy), pencil.level / pencil.n, ROUNDS, strict=True)
+        limits = float(accuracy), np.inf if bound is None else float(bound)
+        goal = Goal(wanted, *limits, pencil.level / pencil.n, ROUNDS, strict=True)
         pairs, certificate = _approximated(pencil, goal, place, report)
     report(1.0, "proved complete" if certificate.complete else "accurate enough")
     return spectrum_of(laplacian, pencil, pairs, certificate)
@@ -125,8 +131,9 @@ def _approximated(pencil: Pencil, goal: Goal, device: Device, report: Progress) 
     if start is None:  # no two points are coupled
         return proved(pencil, goal.k, report)
     vectors = np.empty((n, goal.k))
-    vectors[order] = _climbed(*start, goal, device, report)
-    return _as_pairs(pencil, vectors)
+    vectors[order], change = _climbed(*start, goal, device, report)
+    pairs, certificate = _as_pairs(pencil, vectors)
+    return pairs, replace(certificate, estimate=max(change, 0.0))
 
 
 def _require_room(pencil: Pencil, k: int, m: int) -> None:
@@ -156,15 +163,16 @@ def _climbed(
     goal: Goal,
     device: Device,
     report: Progress,
-) -> Float[np.ndarray, "n k"]:
-    """Return the lowest eigenvectors of the first level, from those of the last."""
+) -> tuple[Float[np.ndarray, "n k"], float]:
+    """Return the lowest eigenvectors of the first level, from those of the last, and what the last round changed."""
     loaded = [load(device, level, lumped=place == 0) for place, level in enumerate(levels[:-1])]
-    found = put(device, coarsest.vectors), values
+    vectors, change = put(device, coarsest.vectors), np.inf
     for place in reversed(range(len(loaded))):
         tower = Tower(device, tuple(loaded[place:]), coarsest)
-        inner = replace(goal, accuracy=INNER_ACCURACY, rounds=INNER_ROUNDS, strict=False)
-        found = refine(tower, found, inner if place else goal, _in_level(report, place, len(loaded)))
-    return fetch(device, found[0][:, : goal.k])
+        inner = replace(goal, accuracy=np.inf, bound=INNER_ACCURACY, rounds=INNER_ROUNDS, strict=False)
+        here, report_here = inner if place else goal, _in_level(report, place, len(loaded))
+        vectors, values, change = refine(tower, (vectors, values), here, report_here)
+    return fetch(device, vectors[:, : goal.k]), change
 
 
 def _in_level(report: Progress, place: int, n_levels: int) -> Callable[[float], None]:

@@ -45,6 +45,8 @@ class Certificate:
     clusters : tuple of int
         Sizes of the clusters that the eigenvalues fall into, ascending: within one, neighbours are equal to 1e-6 of
         the largest eigenvalue, or to the rounding of the vectors where that is more.
+    estimate : float or None
+        Of approximations: how far the last round of refinement lowered an eigenvalue, relative to the largest.
     """
 
     n_pairs: int
@@ -59,6 +61,7 @@ class Certificate:
     clusters: tuple[int, ...] = ()
     first: int = 0
     floor: float = -np.inf
+    estimate: float | None = None
 
     @property
     def complete(self) -> bool:
@@ -74,10 +77,10 @@ class Certificate:
         """Say in plain words what is proved and how."""
         if self.count is None:
             return (
-                f"These are approximations, {self.n_pairs} of them: each is off an eigenvalue by at most "
-                f"{self.max_residual:.1e} of the largest, and the eigenvectors are orthonormal to "
-                f"{self.orthonormality:.1e}. Whether one is missing was not counted; solve_spectrum proves that none "
-                f"is."
+                f"These are approximations, {self.n_pairs} of them: by what the last round of refinement changed, each "
+                f"is off an eigenvalue by about {self.estimate or 0.0:.1e} of the largest, and for certain by at most "
+                f"{self.max_residual:.1e}. The eigenvectors are orthonormal to {self.orthonormality:.1e}. Whether one "
+                f"is missing was not counted; solve_spectrum proves that none is."
             )
         if not self.complete:
             return (

@@ -38,13 +38,15 @@ class Ritz:
 
 @dataclass(frozen=True)
 class Goal:
-    """Residuals of the first k pairs at or below accuracy times the k-th eigenvalue, after so many rounds at most.
+    """What the first k pairs are to reach, in shares of the k-th eigenvalue, after so many rounds at most.
 
-    `least` stands for that eigenvalue where it is smaller: all may be 0.
+    The last round lowers no value by more than `accuracy`, and no residual is above `bound`. `least` stands for the
+    eigenvalue where it is smaller: all may be 0.
     """
 
     k: int
     accuracy: float
+    bound: float
     least: float
     rounds: int
     strict: bool
@@ -52,8 +54,8 @@ class Goal:
 
 def refine(
     tower: Tower, below: tuple[Array, np.ndarray], goal: Goal, report: Callable[[float], None]
-) -> tuple[Array, np.ndarray]:
-    """Return M-orthonormal Ritz vectors and their values, from those of the level below, refined until the goal.
+) -> tuple[Array, np.ndarray, float]:
+    """Return M-orthonormal Ritz vectors, their values and what the last round lowered these by, refined until the goal.
 
     Each round adds to the columns their corrections (`correct`), and keeps the best of both together
     (Davidson 1975; block form with one block of memory).
@@ -64,28 +66,32 @@ def refine(
         If a strict goal is not reached in its rounds.
     """
     vectors, values = below
-    space, m, first = _prolonged(tower, vectors), len(values), 0.0
+    space, m, first, change = _prolonged(tower, vectors), len(values), 0.0, np.inf
     looked = not goal.strict
     for done in range(goal.rounds + 1):
         weighed = _weighed(tower, space.columns[:, :m])
         state = Ritz(values, _residuals(tower, space, values, weighed), weighed)
-        bound = goal.accuracy * max(float(values[goal.k - 1]), goal.least)
-        worst = float(state.residuals[: goal.k].max())
+        scale = max(float(values[goal.k - 1]), goal.least)
+        bound, worst = min(goal.bound, np.sqrt(goal.accuracy)) * scale, float(state.residuals[: goal.k].max())
+        reached = change <= goal.accuracy and worst <= goal.bound * scale
         first = first or worst
-        if worst <= bound and not looked:
-            values = _look_again(tower, space, state, goal.k, bound, done)
+        if reached and not looked:
+            values = _look_again(tower, space, state, goal.k, min(goal.accuracy, goal.bound) * scale, done)
             looked = values is state.values
             if not looked:
                 continue
-        if worst <= bound or (done == goal.rounds and not goal.strict):
-            return space.columns[:, :m], values
-        report(float(np.log(first / worst) / np.log(first / bound)) if first > worst else 0.0)
-        late = np.flatnonzero(state.residuals > EARLY * bound)
-        _add_corrections(tower, space, state, late, worst / bound)
-        values = _ritz(tower, space, values, m + len(late))
+        if reached or (done == goal.rounds and not goal.strict):
+            return space.columns[:, :m], values, change
+        report(min(float(np.log(first / worst) / np.log(first / bound)), 0.95) if first > worst > bound else 0.0)
+        # Where no residual tells when a pair is good enough, the change tells, and of every pair.
+        late = np.flatnonzero(state.residuals > (EARLY * bound if np.isfinite(goal.bound) else 0.0))
+        _add_corrections(tower, space, state, late, max(worst / bound, 1.0))
+        before, values = values, _ritz(tower, space, values, m + len(late))
+        change = float((before - values)[: goal.k].max()) / scale
     raise ConvergenceError(
-        f"Residuals must come down to {goal.accuracy:.1e} of the last eigenvalue; after {goal.rounds} rounds one "
-        f"is {worst / bound * goal.accuracy:.1e}. Ask for less accuracy, or take solve_spectrum."
+        f"A round must lower no eigenvalue by more than {goal.accuracy:.1e} of the last, and no residual be above "
+        f"{goal.bound:.1e}; after {goal.rounds} rounds these are {change:.1e} and {worst / scale:.1e}. Ask for less "
+        f"accuracy, or take solve_spectrum."
     )
 
 
