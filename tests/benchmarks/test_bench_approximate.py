@@ -21,5 +21,6 @@ def test_the_quick_case_has_an_exact_row_and_one_for_each_accuracy(tmp_path):
     assert [row["accuracy"] for row in rough] == [0.1, 1e-4]
     for row in rough:
         assert not row["complete"]
-        assert row["true"] <= row["promised"] <= 1.01 * row["accuracy"]
+        assert row["true"] <= row["estimated"] <= row["accuracy"]
+        assert row["true"] <= row["bound"]
         assert row["cpu"] > 0
