@@ -126,6 +126,7 @@ from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDes
 from eigenshape.retrieval.index import Match, Record, ShapeIndex
 from eigenshape.retrieval.score import match_features, matching_score
 from eigenshape.retrieval.transfer import LabelTransfer, transfer_labels
+from eigenshape.spectral.approximate import approximate_spectrum
 from eigenshape.spectral.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.certify import certify
@@ -194,6 +195,7 @@ __all__ = [
     "TriangleMesh",
     "Workers",
     "anisotropic_laplacian",
+    "approximate_spectrum",
     "average_geodesic_distance",
     "ball",
     "ball_eigenvalues",
