@@ -29,7 +29,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.retrieval.describe import describe_mesh
 from eigenshape.retrieval.descriptor import PRESETS
-from eigenshape.spectral.solver import Progress
+from eigenshape.spectral.outcome import Progress
 
 PARTS = "parts"
 METHODS = (PARTS, *PRESETS)
