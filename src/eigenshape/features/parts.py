@@ -14,8 +14,8 @@ from eigenshape.geometry.measure import enclosed_volume
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import is_closed, vertex_components
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
-from eigenshape.spectral.signature import heat_kernel_signature
 from eigenshape.spectral.outcome import Progress
+from eigenshape.spectral.signature import heat_kernel_signature
 from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
