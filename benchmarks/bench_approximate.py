@@ -120,7 +120,8 @@ def main() -> None:
     given = parser.parse_args()
     names = given.cases or list(QUICK if given.quick else CASES)
     machine = describe(["numpy", "scipy", "numba"])
-    print("| operator | solve | CPU s | times as quick | MiB | estimated | bound | true |\n|---|---|---|---|---|---|---|---|")
+    heads = ["operator", "solve", "CPU s", "times as quick", "MiB", "estimated", "bound", "true"]
+    print(f"| {' | '.join(heads)} |\n|{'---|' * len(heads)}")
     rows = [row for name in names for row in rows_of(name, given.accuracies)]
     if given.json:
         given.json.write_text(json.dumps({"machine": machine, "rows": rows}, indent=1))
