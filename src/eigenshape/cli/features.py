@@ -15,13 +15,15 @@ from eigenshape.cli.console import (
     print_json,
     print_table,
     progress_bar,
+    require_color_path,
     said,
 )
 from eigenshape.features.segmentation import Segmentation, segment
-from eigenshape.figures.fields import figure_segments
+from eigenshape.figures.fields import figure_segments, value_colors
 from eigenshape.figures.save import require_picture_path, save_figure
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.mesh_files import write_mesh
 from eigenshape.retrieval.describe import describe_mesh
 from eigenshape.retrieval.descriptor import PRESETS, SCALE_FREE, Recipe
 
@@ -49,12 +51,15 @@ def features(
     preset_name: PresetOption = SCALE_FREE.name,
     repair: RepairOption = "",
     picture: Annotated[Path | None, typer.Option(help="Draw parts and feature points (PNG, SVG or PDF).")] = None,
+    ply: Annotated[Path | None, typer.Option(help="Write the mesh with the heat as colours (PLY).")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Find the feature points of a mesh and the parts around them, most persistent first."""
     recipe = preset(preset_name)
     if picture:
         require_picture_path(picture)
+    if ply:
+        require_color_path(ply)
     surface = load_mesh(mesh, repair)
     with progress_bar("features") as progress:
         shape = describe_mesh(surface, recipe, progress=progress)
@@ -68,6 +73,9 @@ def features(
     if picture:
         save_figure(figure_segments(surface, parts.labels, parts.features.vertices), picture)
         said(picture)
+    if ply:
+        write_mesh(surface, ply, colors=value_colors(np.log(np.maximum(shape.heat, np.finfo(np.float64).tiny))))
+        said(ply)
 
 
 def _rows(mesh: TriangleMesh, parts: Segmentation) -> list[dict[str, Any]]:
