@@ -19,15 +19,15 @@ TAKES_RNG = "rng" in inspect.signature(spl.eigsh).parameters
 
 
 def always_sparse() -> None:
-    """Turn off the switches by which `solve_spectrum` solves small operators densely, where it still has them.
+    """Turn off the switches by which `solve_spectrum` solves small operators densely.
 
-    They are no public names, and may go. So no more than one case in ten may lean on this: most are large enough to
+    They are no public names. So no more than one case in ten may lean on this: most are large enough to
     be solved sparsely anyway, and `Ours` counts the solves that were dense all the same.
     """
-    solver = import_module("eigenshape.spectral.solver")
+    roads = import_module("eigenshape.spectral.roads")
     for name, value in DENSE_SWITCHES.items():
-        if hasattr(solver, name):
-            setattr(solver, name, value)
+        getattr(roads, name)  # renamed, it would be set in vain
+        setattr(roads, name, value)
 
 
 class Ours:

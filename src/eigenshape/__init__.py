@@ -14,14 +14,24 @@ from eigenshape._errors import (
     StoreError,
 )
 from eigenshape.features.bottleneck import bottleneck_distance
+from eigenshape.features.boundaries import smooth_boundaries
 from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs, persistence_diagram
 from eigenshape.features.merge_tree import MergeTree, merge_tree
-from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment
+from eigenshape.features.part_merging import part_tree
+from eigenshape.features.part_tree import PartTree
+from eigenshape.features.parts import PART_CONTRAST, FoundParts, find_parts, part_spectrum
+from eigenshape.features.segmentation import FeaturePoints, Segmentation, merge_targets, segment, touching_parts
 from eigenshape.figures.camera import Camera, three_quarter_view
-from eigenshape.figures.fields import figure_eigenfunctions, figure_field, figure_segments
+from eigenshape.figures.fields import (
+    figure_eigenfunctions,
+    figure_field,
+    figure_segments,
+    part_colors,
+    value_colors,
+)
 from eigenshape.figures.persistence import figure_diagram, figure_merge_tree
 from eigenshape.figures.save import save_figure
-from eigenshape.figures.sheet import Panel, figure_contact_sheet
+from eigenshape.figures.sheet import Panel, figure_contact_sheet, figure_label_transfer
 from eigenshape.figures.spectra import figure_spectrum
 from eigenshape.geometry.average_distance import average_geodesic_distance
 from eigenshape.geometry.cloud import PointCloud
@@ -116,6 +126,8 @@ from eigenshape.retrieval.describe_large import DescribedLargeShape, describe_la
 from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDescriptor
 from eigenshape.retrieval.index import Match, Record, ShapeIndex
 from eigenshape.retrieval.score import match_features, matching_score
+from eigenshape.retrieval.transfer import LabelTransfer, transfer_labels
+from eigenshape.spectral.approximate import approximate_spectrum
 from eigenshape.spectral.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.certify import certify
@@ -137,6 +149,7 @@ from eigenshape.spectral.wave import default_energies, wave_kernel_signature
 __all__ = [
     "CREATURES",
     "OPERATORS",
+    "PART_CONTRAST",
     "SCALE_FREE",
     "THESIS",
     "USUAL",
@@ -153,10 +166,12 @@ __all__ = [
     "FacetTable",
     "FeaturePoints",
     "FileFormatError",
+    "FoundParts",
     "GaussianKernel",
     "InvalidParameterError",
     "InvalidShapeError",
     "Item",
+    "LabelTransfer",
     "Laplacian",
     "Law",
     "Match",
@@ -167,6 +182,7 @@ __all__ = [
     "Operator",
     "OperatorReport",
     "Panel",
+    "PartTree",
     "PersistenceDiagram",
     "PersistencePairs",
     "PointCloud",
@@ -184,6 +200,7 @@ __all__ = [
     "Workers",
     "anisotropic_laplacian",
     "approximate_heat_kernel_signature",
+    "approximate_spectrum",
     "average_geodesic_distance",
     "ball",
     "ball_eigenvalues",
@@ -236,9 +253,11 @@ __all__ = [
     "figure_diagram",
     "figure_eigenfunctions",
     "figure_field",
+    "figure_label_transfer",
     "figure_merge_tree",
     "figure_segments",
     "figure_spectrum",
+    "find_parts",
     "flat_torus_eigenvalues",
     "from_arrays",
     "from_pyvista",
@@ -263,6 +282,7 @@ __all__ = [
     "matching_score",
     "mean_curvature",
     "mean_side_length",
+    "merge_targets",
     "merge_tree",
     "mesh_laplacian",
     "mesh_quadrature",
@@ -270,6 +290,9 @@ __all__ = [
     "normalize_area",
     "normalize_box",
     "normalize_diameter",
+    "part_colors",
+    "part_spectrum",
+    "part_tree",
     "partial_scan",
     "persistence_diagram",
     "point_cloud_laplacian",
@@ -288,6 +311,7 @@ __all__ = [
     "scale_invariant_heat_kernel_signature",
     "segment",
     "simplex_volumes",
+    "smooth_boundaries",
     "solve_dirichlet",
     "solve_spectrum",
     "sphere_eigenvalues",
@@ -303,7 +327,10 @@ __all__ = [
     "to_trimesh",
     "torus",
     "torus_quadrature",
+    "touching_parts",
+    "transfer_labels",
     "uniform_quadrature",
+    "value_colors",
     "vertex_components",
     "vertex_normals",
     "wave_kernel_signature",

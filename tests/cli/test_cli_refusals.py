@@ -11,7 +11,7 @@ from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.surfaces import icosphere
 from eigenshape.io.mesh_files import write_mesh
 
-VERBS = ["info", "spectrum", "features", "index", "query", "demo"]
+VERBS = ["info", "spectrum", "features", "segment", "index", "query", "demo"]
 BROKEN = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n"
 
 
@@ -35,7 +35,7 @@ def test_help_of_every_verb_says_what_it_takes(verb, flag):
     assert re.search(rf"Usage: .*{verb}", text)
 
 
-@pytest.mark.parametrize("verb", ["info", "spectrum", "features"])
+@pytest.mark.parametrize("verb", ["info", "spectrum", "features", "segment"])
 def test_a_broken_file_is_named_with_what_is_wrong_in_it(tmp_path, verb):
     path = tmp_path / "broken.off"
     path.write_text(BROKEN)

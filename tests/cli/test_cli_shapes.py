@@ -11,6 +11,7 @@ from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.domains import box, disc
 from eigenshape.geometry.exact import box_eigenvalues, disc_eigenvalues
 from eigenshape.geometry.spheres import fibonacci_sphere
+from eigenshape.geometry.surfaces import icosphere
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.io.shape_files import write_points
 from eigenshape.operators.catalog import OPERATORS
@@ -164,3 +165,21 @@ def test_a_closed_mesh_has_no_boundary_to_hold(folder, tmp_path):
     write_mesh(fibonacci_sphere(50), tmp_path / "closed.off")
     said = run("spectrum", tmp_path / "closed.off", "--boundary", "dirichlet", code=1).stderr
     assert "--boundary dirichlet needs a boundary; TriangleMesh(50 vertices, 96 faces) is closed" in said
+
+
+def test_roughly_and_kept(folder):
+    write_mesh(icosphere(4), folder / "ball.off")
+    rough = run("spectrum", folder / "ball.off", "-k", 9, "--accuracy", 1e-3).stdout
+    assert "Whether one is missing was not counted" in " ".join(rough.split())
+    found = run_json("spectrum", folder / "ball.off", "-k", 9, "--accuracy", 1e-3)
+    assert found["certificate"]["count"] is None
+    np.testing.assert_allclose(found["eigenvalues"][1:], [2] * 3 + [6] * 5, rtol=0.01)
+    kept = folder / "kept"
+    first = run("spectrum", folder / "disc.off", "-k", 4, "--cache", kept).stdout
+    assert len(list(kept.glob("*.npz"))) == 1
+    assert run("spectrum", folder / "disc.off", "-k", 4, "--cache", kept).stdout == first
+    for wrong in (("--below", 15), ("--boundary", "dirichlet"), ("--cache", kept)):
+        refused = run("spectrum", folder / "disc.off", "--accuracy", 1e-3, *wrong, code=1)
+        assert "--accuracy goes with -k alone" in refused.stderr
+    refused = run("spectrum", folder / "disc.off", "--boundary", "dirichlet", "--cache", kept, code=1)
+    assert "--cache goes with the Neumann condition" in refused.stderr

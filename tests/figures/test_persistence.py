@@ -3,8 +3,8 @@ import pytest
 
 import eigenshape as es
 from eigenshape._errors import InvalidParameterError
-from eigenshape.features.segmentation import segment
-from eigenshape.figures.persistence import KINDS, leaf_places, merge_targets
+from eigenshape.features.segmentation import merge_targets, segment
+from eigenshape.figures.persistence import KINDS, leaf_places
 from eigenshape.figures.render import palette
 
 MESH = es.torus(30, 16)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.surfaces import disjoint_union, icosphere, torus
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.spectral import solver
+from eigenshape.spectral import roads
 from eigenshape.spectral.solver import solve_spectrum
 
 seeds = st.integers(0, 2**32 - 1)
@@ -28,7 +28,7 @@ def shape(seed: int) -> TriangleMesh:
 def lanczos_for_all():
     """Take the road of large operators, which is the one with something to lose."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(solver, "SMALL", 0)
+        patch.setattr(roads, "SMALL", 0)
         yield
 
 

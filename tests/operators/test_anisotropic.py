@@ -80,3 +80,11 @@ def test_bad_tensors_are_refused(change, match):
 def test_a_negative_alpha_is_refused():
     with pytest.raises(InvalidParameterError, match=r"alpha must be finite and not negative; it is -1\.0"):
         curvature_tensors(icosphere(1), -1.0)
+
+
+def test_concave_bends_alone_slow_diffusion_down_where_only_they_count():
+    ball = icosphere(2)
+    inside_out = TriangleMesh(ball.vertices, ball.faces[:, ::-1])
+    free, slow = curvature_tensors(ball, 5.0, concave=True), curvature_tensors(inside_out, 5.0, concave=True)
+    np.testing.assert_allclose(free, curvature_tensors(ball, 0.0), atol=1e-12)
+    np.testing.assert_allclose(slow, curvature_tensors(ball, 5.0), atol=1e-12)

@@ -103,9 +103,11 @@ def test_ctrl_c_ends_workers_that_hang(index, tmp_path):
     todo = items(tmp_path, a="1", b="hang")
 
     def interrupt_soon():
-        wait_until((tmp_path / "b.busy").exists)
-        wait_until(lambda: len(index))
-        os.kill(os.getpid(), signal.SIGINT)
+        try:
+            wait_until((tmp_path / "b.busy").exists)
+            wait_until(lambda: len(index))
+        finally:  # without it the build would hang as long as its worker
+            os.kill(os.getpid(), signal.SIGINT)
 
     threading.Thread(target=interrupt_soon, daemon=True).start()
     with pytest.raises(KeyboardInterrupt):

@@ -9,7 +9,7 @@ from eigenshape.geometry.spheres import fibonacci_sphere
 from eigenshape.geometry.surfaces import icosphere, torus
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.gaussian import mesh_laplacian
-from eigenshape.spectral import interval, slices, solver
+from eigenshape.spectral import interval, roads, slices, solver
 from eigenshape.spectral.dirichlet import solve_dirichlet
 from eigenshape.spectral.signature import heat_kernel_signature
 from eigenshape.spectral.solver import solve_spectrum
@@ -21,10 +21,10 @@ def thin(monkeypatch):
     """Send small operators the sparse road, in slices."""
     for module, name, value in (
         (slices, "SLICE", 14),
-        (solver, "WHOLE", 20),
-        (solver, "SMALL", 0),
+        (roads, "WHOLE", 20),
+        (roads, "SMALL", 0),
         (solver, "FEW", 0),
-        (solver, "DENSE_SHARE", 0),
+        (roads, "DENSE_SHARE", 0),
     ):
         monkeypatch.setattr(module, name, value)
 

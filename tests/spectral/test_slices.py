@@ -6,7 +6,7 @@ from eigenshape._errors import ConvergenceError
 from eigenshape.geometry.domains import irregular_grid
 from eigenshape.geometry.surfaces import icosphere, torus
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.spectral import slices, solver
+from eigenshape.spectral import roads, slices
 from eigenshape.spectral.pencil import normalise, rayleigh_residuals
 from eigenshape.spectral.slices import walk
 from eigenshape.spectral.solver import solve_spectrum
@@ -15,8 +15,8 @@ from eigenshape.spectral.solver import solve_spectrum
 @pytest.fixture
 def thin(monkeypatch):
     monkeypatch.setattr(slices, "SLICE", 14)
-    monkeypatch.setattr(solver, "WHOLE", 20)
-    monkeypatch.setattr(solver, "SMALL", 0)
+    monkeypatch.setattr(roads, "WHOLE", 20)
+    monkeypatch.setattr(roads, "SMALL", 0)
 
 
 def irregular(n):
@@ -61,18 +61,18 @@ def test_a_slice_needs_a_gap_to_end_in():
 
 
 def test_slices_that_lean_on_each_other_are_not_taken(thin, monkeypatch):
-    honest = solver.walk
+    honest = roads.walk
 
     def leaning(*arguments):
         vectors, factor = honest(*arguments)
         vectors[:, 1] = vectors[:, 0]
         return vectors, factor
 
-    monkeypatch.setattr(solver, "walk", leaning)
+    monkeypatch.setattr(roads, "walk", leaning)
     laplacian = cotangent_laplacian(irregular(24))
     np.testing.assert_allclose(solve_spectrum(laplacian, 60).eigenvalues, dense_eigenvalues(laplacian)[:60], atol=1e-9)
-    monkeypatch.setattr(solver, "_at_once", leaning)
-    monkeypatch.setattr(solver, "DENSE_LIMIT", 0)
+    monkeypatch.setattr(roads, "_at_once", leaning)
+    monkeypatch.setattr(roads, "DENSE_LIMIT", 0)
     with pytest.raises(ConvergenceError, match=r"Vectors of different runs must be B-orthogonal; two are off by 1\.0"):
         solve_spectrum(laplacian, 60)
 

@@ -9,7 +9,7 @@ from eigenshape.geometry.surfaces import disjoint_union, icosphere, torus
 from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.spectral import solver
+from eigenshape.spectral import outcome, roads, solver
 from eigenshape.spectral.certify import certify
 from eigenshape.spectral.solver import solve_spectrum
 
@@ -17,8 +17,8 @@ from eigenshape.spectral.solver import solve_spectrum
 @pytest.fixture
 def always_lanczos(monkeypatch):
     """Take the road of large operators, also for small ones."""
-    monkeypatch.setattr(solver, "SMALL", 0)
-    monkeypatch.setattr(solver, "DENSE_SHARE", 2.5)
+    monkeypatch.setattr(roads, "SMALL", 0)
+    monkeypatch.setattr(roads, "DENSE_SHARE", 2.5)
 
 
 def require_lowest(laplacian, ks):
@@ -99,7 +99,7 @@ def test_a_shift_on_an_eigenvalue_moves_away(monkeypatch):
     on_it = float(np.ldexp(expected.eigenvalues[25], -pencil.value_exponent))
     from eigenshape.spectral.shift import factorise_near
 
-    monkeypatch.setattr(solver, "shift_inside", lambda pencil, k: factorise_near(pencil, on_it * (1 + 1e-12)))
+    monkeypatch.setattr(roads, "shift_inside", lambda pencil, k: factorise_near(pencil, on_it * (1 + 1e-12)))
     found = solve_spectrum(laplacian, 40)
     np.testing.assert_allclose(found.eigenvalues, expected.eigenvalues, rtol=1e-12, atol=1e-12)
     assert found.certificate.max_residual < 1e-10
@@ -173,27 +173,27 @@ def test_an_indefinite_mass_is_refused():
 
 
 def test_a_dense_solve_that_loses_a_pair_is_refused(monkeypatch):
-    honest = solver.sl.eigh
+    honest = roads.sl.eigh
 
     def lossy(stiffness, mass):
         values, vectors = honest(stiffness, mass)
         return values[1:], vectors[:, 1:]
 
-    monkeypatch.setattr(solver.sl, "eigh", lossy)
+    monkeypatch.setattr(roads.sl, "eigh", lossy)
     with pytest.raises(ConvergenceError, match=r"not proved: 4 lie below .* 3 were found there"):
         solve_spectrum(cotangent_laplacian(icosphere(1)), 5)
 
 
 def test_lanczos_that_never_finds_a_pair_is_refused(monkeypatch, always_lanczos):
-    monkeypatch.setattr(solver, "DENSE_LIMIT", 0)
-    honest = solver.block_lanczos
+    monkeypatch.setattr(roads, "DENSE_LIMIT", 0)
+    honest = roads.block_lanczos
 
     def lossy(*args, **options):
         values, vectors = honest(*args, **options)
         return values[1:], vectors[:, 1:]
 
-    monkeypatch.setattr(solver, "block_lanczos", lossy)
-    monkeypatch.setattr(solver, "RUNS", 1)
+    monkeypatch.setattr(roads, "block_lanczos", lossy)
+    monkeypatch.setattr(roads, "RUNS", 1)
     with pytest.raises(ConvergenceError, match=r"19 of 20 were found in 1 runs and 1 are missing"):
         solve_spectrum(cotangent_laplacian(icosphere(3)), 20)
 
@@ -205,9 +205,9 @@ def test_lanczos_that_fails_gives_way_to_a_dense_solve(monkeypatch):
     def fail(*args, **options):
         raise ConvergenceError("no")
 
-    monkeypatch.setattr(solver, "block_lanczos", fail)
+    monkeypatch.setattr(roads, "block_lanczos", fail)
     np.testing.assert_allclose(solve_spectrum(laplacian, 20).eigenvalues, expected.eigenvalues, atol=1e-11)
-    monkeypatch.setattr(solver, "DENSE_LIMIT", 0)
+    monkeypatch.setattr(roads, "DENSE_LIMIT", 0)
     with pytest.raises(ConvergenceError, match=r"no"):
         solve_spectrum(laplacian, 20)
 
@@ -247,7 +247,7 @@ def test_one_of_k_and_below_is_asked_for():
 
 @pytest.mark.parametrize(("level", "words"), [(2, "factors of their operator 0.0 GiB"), (4, "20 pairs of 2562 points")])
 def test_what_does_not_fit_is_refused_with_numbers(monkeypatch, level, words):
-    monkeypatch.setattr(solver, "machine_memory", lambda: 1e5)
+    monkeypatch.setattr(outcome, "machine_memory", lambda: 1e5)
     with pytest.raises(
         InvalidParameterError, match=r"A spectrum must fit into memory, 0\.0 GiB; 20 pairs of .*"
     ) as error:

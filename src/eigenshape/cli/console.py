@@ -99,6 +99,14 @@ def repair_names(text: str) -> tuple[str, ...]:
     return names
 
 
+def require_color_path(path: Path) -> None:
+    """Refuse a path that no coloured mesh can be written to, before any work is done."""
+    if path.suffix.lower() != ".ply":
+        raise InvalidParameterError(f"Colours go to a .ply file; {path} ends in {path.suffix!r}.")
+    if not path.absolute().parent.is_dir():
+        raise InvalidParameterError(f"A mesh needs a folder to lie in; {path.absolute().parent} is not there.")
+
+
 def print_json(value: Any) -> None:
     """Print a value as JSON on stdout; arrays become lists, and what is not finite null."""
     typer.echo(json.dumps(_plain(value), indent=2, allow_nan=False))

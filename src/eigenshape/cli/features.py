@@ -16,18 +16,20 @@ from eigenshape.cli.console import (
     print_json,
     print_table,
     progress_bar,
+    require_color_path,
     said,
 )
 from eigenshape.features.segmentation import Segmentation, segment
-from eigenshape.figures.fields import figure_segments
+from eigenshape.figures.fields import figure_segments, value_colors
 from eigenshape.figures.save import require_picture_path, save_figure
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.mesh_files import write_mesh
 from eigenshape.retrieval.describe import DescribedShape, describe_mesh
 from eigenshape.retrieval.describe_large import DescribedLargeShape, describe_large_mesh
 from eigenshape.retrieval.descriptor import PRESETS, SCALE_FREE, Recipe
 from eigenshape.spectral.large_signature import LARGE
-from eigenshape.spectral.solver import Progress
+from eigenshape.spectral.outcome import Progress
 
 
 def preset(name: str) -> Recipe:
@@ -53,6 +55,7 @@ def features(
     preset_name: PresetOption = SCALE_FREE.name,
     repair: RepairOption = "",
     picture: Annotated[Path | None, typer.Option(help="Draw parts and feature points (PNG, SVG or PDF).")] = None,
+    ply: Annotated[Path | None, typer.Option(help="Write the mesh with the heat as colours (PLY).")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Find the feature points of a mesh and the parts around them, most persistent first.
@@ -62,6 +65,8 @@ def features(
     recipe = preset(preset_name)
     if picture:
         require_picture_path(picture)
+    if ply:
+        require_color_path(ply)
     surface = load_mesh(mesh, repair)
     with progress_bar("features") as progress:
         shape = _described(surface, recipe, progress)
@@ -79,6 +84,9 @@ def features(
     if picture:
         save_figure(figure_segments(surface, parts.labels, parts.features.vertices), picture)
         said(picture)
+    if ply:
+        write_mesh(surface, ply, colors=value_colors(np.log(np.maximum(shape.heat, np.finfo(np.float64).tiny))))
+        said(ply)
 
 
 def _described(surface: TriangleMesh, recipe: Recipe, progress: Progress) -> DescribedShape | DescribedLargeShape:

@@ -1,8 +1,8 @@
 """eigenshape spectrum: the lowest eigenvalues of a shape by any operator, with their proof."""
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import typer
@@ -35,13 +35,17 @@ from eigenshape.operators.cotangent import Mass
 from eigenshape.operators.fem import fem_boundary_nodes
 from eigenshape.operators.gaussian import Distance
 from eigenshape.operators.kernel import Correction, Form
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.spectral.approximate import approximate_spectrum
 from eigenshape.spectral.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.dirichlet import solve_dirichlet
+from eigenshape.spectral.outcome import Progress
 from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 N_PICTURED = 8
 USUAL = 20  # pairs
+Device = Literal["cpu", "gpu"]
 ORDERS = {"p2": 2, "p3": 3}
 
 
@@ -59,6 +63,11 @@ def spectrum(
             "--operator", "-o", help=f"{', '.join(OPERATORS)}; by default cotangent on meshes, point-cloud on points."
         ),
     ] = None,
+    accuracy: Annotated[
+        float | None,
+        typer.Option(help="Roughly but at once, without proof: errors of at most this share of the last, 1e-3 say."),
+    ] = None,
+    device: Annotated[Device, typer.Option(help="Where --accuracy computes; gpu takes eigenshape[gpu].")] = "cpu",
     boundary: Annotated[Condition, typer.Option(help="Condition on the boundary of a mesh.")] = "neumann",
     brackets: Annotated[
         bool, typer.Option("--brackets", help="Bound each eigenvalue of the mesh itself from both sides.")
@@ -82,6 +91,9 @@ def spectrum(
     save: Annotated[
         Path | None, typer.Option(help="Write the spectrum with its proof (.npz; Spectrum.load reads it).")
     ] = None,
+    cache: Annotated[
+        Path | None, typer.Option(help="Folder in which spectra are kept, and looked for before one is computed.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Compute the lowest eigenvalues of a shape and prove that none is missing."""
@@ -94,16 +106,12 @@ def spectrum(
     _require_drawable(found, picture)
     bounded = _require_mesh(found) if brackets else None
     name = operator or default_operator(found)
+    held = _held(found, ORDERS.get(name, 1)) if boundary == "dirichlet" else None
+    wanted = _Wanted(USUAL if k is None and below is None else k, above, below, held, accuracy, device, cache)
     with progress_bar("spectrum") as progress:
         progress(0.0, "building the operator")
         laplacian = build_laplacian(found, name, **options)
-        asked_k = USUAL if k is None and below is None else k
-        within = {"above": above, "below": below}
-        if boundary == "dirichlet":
-            nodes = _held(found, ORDERS.get(name, 1))
-            solved = solve_dirichlet(laplacian, asked_k, nodes, **within, progress=progress)
-        else:
-            solved = solve_spectrum(laplacian, asked_k, **within, progress=progress)
+        solved = _solved(laplacian, wanted, progress)
         count = solved.certificate.first + len(solved.eigenvalues)
         bounds = bracket_eigenvalues(bounded, count, boundary=boundary, progress=progress) if bounded else None
     if as_json:
@@ -117,6 +125,36 @@ def spectrum(
     if save:
         solved.save(save)
         said(save)
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    k: int | None
+    above: float | None
+    below: float | None
+    held: Int[np.ndarray, " c"] | None
+    accuracy: float | None
+    device: str
+    cache: Path | None
+
+
+def _solved(laplacian: Laplacian, wanted: _Wanted, progress: Progress) -> Spectrum:
+    if wanted.accuracy is not None:
+        if wanted.k is None or wanted.held is not None or wanted.cache:
+            raise InvalidParameterError(
+                "--accuracy goes with -k alone; --below, --boundary dirichlet and --cache are of the exact solver."
+            )
+        return approximate_spectrum(
+            laplacian, wanted.k, accuracy=wanted.accuracy, device=wanted.device, progress=progress
+        )
+    k, above, below = wanted.k, wanted.above, wanted.below
+    if wanted.held is not None:
+        if wanted.cache:
+            raise InvalidParameterError(
+                "--cache goes with the Neumann condition; spectra with points held are not kept."
+            )
+        return solve_dirichlet(laplacian, k, wanted.held, above=above, below=below, progress=progress)
+    return solve_spectrum(laplacian, k, above=above, below=below, progress=progress, cache=wanted.cache)
 
 
 def _require_drawable(shape: Shape, picture: Path | None) -> None:

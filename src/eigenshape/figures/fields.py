@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import matplotlib as mpl
 import numpy as np
-from jaxtyping import Float, Int
+import scipy.sparse as sp
+from jaxtyping import Float, Int, UInt8
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, Normalize
@@ -12,6 +13,7 @@ from matplotlib.figure import Figure
 
 from eigenshape.figures.camera import Camera, three_quarter_view
 from eigenshape.figures.render import Drawing, draw, palette
+from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.spectral.spectrum import Spectrum
 
@@ -79,6 +81,26 @@ def figure_segments(
     mark(axes, drawing, vertices, numbers=True)
     axes.set_title(f"{len(vertices)} parts around their feature points (hollow: on the far side)", fontsize=10)
     return figure
+
+
+def part_colors(mesh: TriangleMesh, labels: Int[np.ndarray, " f"]) -> UInt8[np.ndarray, "n 3"]:
+    """Return red, green and blue of each vertex for `write_mesh`: those of the part with most area around it.
+
+    Parts have the colours that `figure_segments` gives them; what has no label, below 0, is grey.
+    """
+    corners, areas = mesh.faces.ravel(), np.repeat(face_areas(mesh), 3)
+    shape = (mesh.n_vertices, int(labels.max(initial=-1)) + 2)
+    around = sp.coo_array((areas / (areas.max() or 1.0), (corners, np.repeat(labels, 3) + 1)), shape=shape).tocsr()
+    return _bytes(palette(np.asarray(around.argmax(axis=1)).ravel() - 1))
+
+
+def value_colors(values: Float[np.ndarray, " n"], color_map: str = "viridis") -> UInt8[np.ndarray, "n 3"]:
+    """Return red, green and blue of each vertex for `write_mesh`: a function from its lowest to its highest value."""
+    return _bytes(_mapped(values, Normalize(float(values.min()), float(values.max())), mpl.colormaps[color_map]))
+
+
+def _bytes(colors: Float[np.ndarray, "n 3"]) -> UInt8[np.ndarray, "n 3"]:
+    return np.round(255 * colors).astype(np.uint8)
 
 
 def show(axes: Axes, drawing: Drawing) -> None:

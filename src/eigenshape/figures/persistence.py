@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from eigenshape._arrays import whole_number
 from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs
-from eigenshape.features.merge_tree import MergeTree
+from eigenshape.features.segmentation import Tree, merge_targets
 from eigenshape.figures.render import palette
 
 KINDS = {  # colour, marker and text of each kind of pair
@@ -56,7 +56,7 @@ def _limits(diagram: PersistenceDiagram) -> tuple[float, float]:
 
 
 def figure_merge_tree(
-    tree: MergeTree, *, persistence: float | None = None, n_maxima: int = 40, label: str = "function"
+    tree: Tree, *, persistence: float | None = None, n_maxima: int = 40, label: str = "function"
 ) -> Figure:
     """Draw which maximum's region merges into which, and after what persistence; a cut is a level line.
 
@@ -65,7 +65,7 @@ def figure_merge_tree(
 
     Parameters
     ----------
-    tree : MergeTree
+    tree : MergeTree or PartTree
     persistence : float, optional
         Where to cut, in the function's unit.
     n_maxima : int
@@ -99,22 +99,9 @@ def figure_merge_tree(
     return figure
 
 
-def _left_out(tree: MergeTree, shown: int) -> str:
+def _left_out(tree: Tree, shown: int) -> str:
     more = len(tree.maxima) - shown
     return f" ({more:,} more merge by {tree.persistence[shown - 1]:.3g})" if more else ""
-
-
-def merge_targets(tree: MergeTree) -> Int[np.ndarray, " m"]:
-    """Return for each maximum that in whose region it ends up when it merges; -1 where it never does.
-
-    The neighbour across the saddle may have merged before; then it is whoever took that one over, and so on. Maxima
-    that stand earlier persist longer, so the first earlier one on the way is it.
-    """
-    target = tree.parent.copy()
-    for number in range(len(target)):
-        while target[number] > number:
-            target[number] = tree.parent[target[number]]
-    return target
 
 
 def leaf_places(into: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
@@ -133,7 +120,7 @@ def leaf_places(into: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
     return np.argsort(order)
 
 
-def _colors(tree: MergeTree, shown: int, persistence: float | None) -> Float[np.ndarray, "m 3"]:
+def _colors(tree: Tree, shown: int, persistence: float | None) -> Float[np.ndarray, "m 3"]:
     """Return the colour of each region that a cut leaves, grey for the others."""
     left = tree.persistence[:shown] >= (persistence or 0.0)
     return palette(np.where(left, np.cumsum(left) - 1, -1))

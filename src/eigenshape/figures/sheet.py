@@ -12,6 +12,7 @@ from eigenshape.figures.camera import three_quarter_view
 from eigenshape.figures.fields import PANEL, mark, show
 from eigenshape.figures.render import draw, palette
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.retrieval.transfer import LabelTransfer
 
 N_COLUMNS = 3
 
@@ -60,3 +61,21 @@ def _fill(axes: Axes, panel: Panel) -> None:
     show(axes, drawing)
     mark(axes, drawing, panel.vertices[drawing.visible[panel.vertices]])
     axes.set_title(panel.title, fontsize=10)
+
+
+def figure_label_transfer(source: TriangleMesh, target: TriangleMesh, transfer: LabelTransfer) -> Figure:
+    """Draw two shapes side by side: matched parts in one colour, and how sure each label is, at its feature."""
+    figure = Figure(figsize=(4.4 * PANEL, 2.2 * PANEL), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    _fill(left, Panel(source, "labelled", transfer.source.labels, transfer.source.features.vertices))
+    colors = transfer.matches[transfer.target.labels]
+    drawing = draw(target, three_quarter_view(target), face_colors=palette(colors))
+    show(right, drawing)
+    vertices = transfer.target.features.vertices
+    mark(right, drawing, vertices)
+    for vertex, label, sure in zip(vertices, transfer.part_labels, transfer.confidence, strict=True):
+        if drawing.visible[vertex]:
+            text = f"label {label}, {100 * sure:.0f} %"
+            right.annotate(text, drawing.places[vertex], (6, 6), textcoords="offset points", fontsize=8)
+    right.set_title("labels given, with their confidence", fontsize=10)
+    return figure

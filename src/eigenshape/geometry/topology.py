@@ -41,6 +41,14 @@ def edge_table(mesh: TriangleMesh) -> EdgeTable:
     return EdgeTable(edges, inverse.reshape(3, -1).T, counts)
 
 
+def face_pairs(table: EdgeTable) -> tuple[Int[np.ndarray, "p 2"], Int[np.ndarray, " p"]]:
+    """Return the pairs of faces that share an edge, and that edge; more than two at one edge are chained."""
+    at_edge = table.face_edges.ravel()
+    order = np.argsort(at_edge, kind="stable")
+    first = np.flatnonzero(at_edge[order][1:] == at_edge[order][:-1])
+    return np.column_stack([order[first], order[first + 1]]) // 3, at_edge[order[first]]
+
+
 def half_edges(mesh: TriangleMesh) -> Int[np.ndarray, "s 2"]:
     """Return the directed sides of all faces: first those opposite to corner 0, then 1, then 2."""
     a, b, c = mesh.faces.T

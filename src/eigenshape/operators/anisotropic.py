@@ -73,7 +73,7 @@ def _require_tensors(mesh: Mesh, tensors: np.ndarray) -> None:
         )
 
 
-def curvature_tensors(mesh: TriangleMesh, alpha: float) -> Float[np.ndarray, "f 3 3"]:
+def curvature_tensors(mesh: TriangleMesh, alpha: float, *, concave: bool = False) -> Float[np.ndarray, "f 3 3"]:
     """Return tensors that slow diffusion down across bends (Andreux, Rodolà, Aubry, Cremers 2014).
 
     Along each principal direction of a face the conductivity is 1 / (1 + α |κ| √area), with κ the principal curvature
@@ -85,6 +85,9 @@ def curvature_tensors(mesh: TriangleMesh, alpha: float) -> Float[np.ndarray, "f 
         Its faces turned one way.
     alpha : float
         At least 0.
+    concave : bool
+        Whether only bends inward count, on a surface whose faces are seen from outside counter-clockwise: along such
+        creases people divide things into parts (the minima rule of Hoffman and Richards 1984).
 
     Returns
     -------
@@ -107,6 +110,7 @@ def curvature_tensors(mesh: TriangleMesh, alpha: float) -> Float[np.ndarray, "f 
     turned = basis.transpose(0, 2, 1) @ (normals[:, 1:] - normals[:, :1]).transpose(0, 2, 1)
     bending = turned @ np.linalg.inv(triangles)
     curvatures, directions = np.linalg.eigh((bending + bending.transpose(0, 2, 1)) / 2)
-    conductivity = 1 / (1 + alpha * np.abs(curvatures) * (surface_area(mesh) ** 0.5 / scale))
+    bends = np.maximum(-curvatures, 0) if concave else np.abs(curvatures)
+    conductivity = 1 / (1 + alpha * bends * (surface_area(mesh) ** 0.5 / scale))
     directions = basis @ directions
     return (directions * conductivity[:, None]) @ directions.transpose(0, 2, 1)

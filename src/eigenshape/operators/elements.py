@@ -11,6 +11,7 @@ from math import factorial
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
+from threadpoolctl import threadpool_limits
 
 from eigenshape.geometry.simplices import in_length, scaled_corners, simplex_volumes, triangular_sides, volumes_of
 from eigenshape.geometry.simplicial import Mesh
@@ -38,7 +39,8 @@ def stiffness(
 ) -> sp.csr_array:
     """Assemble ∫ ∇N_i·D∇N_j; the diagonal is what makes the rows sum to zero."""
     dim = products.shape[1] - 1
-    local = np.einsum("sab,abij->sij", products, reference_stiffness(dim, order), optimize=True)
+    with threadpool_limits(1, user_api="blas"):  # threads would cut the product where they like, and change last digits
+        local = np.einsum("sab,abij->sij", products, reference_stiffness(dim, order), optimize=True)
     weights = _assembled(nodes, local)
     return (weights - sp.diags_array(weights.sum(axis=1))).tocsr()
 

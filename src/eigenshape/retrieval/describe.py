@@ -16,8 +16,9 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.retrieval.descriptor import SCALE_FREE, Recipe, ShapeDescriptor
 from eigenshape.spectral.dirichlet import solve_dirichlet
+from eigenshape.spectral.outcome import Progress
 from eigenshape.spectral.signature import heat_kernel_signature, reflection_free_signature
-from eigenshape.spectral.solver import Progress, solve_spectrum
+from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 N_VIEWS = 4

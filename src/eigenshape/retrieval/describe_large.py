@@ -16,7 +16,7 @@ from eigenshape.operators.laplacian import Laplacian
 from eigenshape.retrieval.describe import require_few_pieces
 from eigenshape.retrieval.descriptor import SCALE_FREE, Recipe, ShapeDescriptor
 from eigenshape.spectral.large_signature import approximate_heat_kernel_signature
-from eigenshape.spectral.solver import Progress
+from eigenshape.spectral.outcome import Progress
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import interpolation_constants, longest_edges
 from eigenshape.spectral.enclosure import enclose, relative_rounding
 from eigenshape.spectral.nonconforming import lower_bounds, partly, solve_free
-from eigenshape.spectral.solver import Progress
+from eigenshape.spectral.outcome import Progress
 
 LINEAR_FLOOR = 0.5  # consistent mass of linear elements over its diagonal, in any dimension
 NOTHING = np.empty(0, dtype=np.int64)

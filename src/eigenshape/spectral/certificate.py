@@ -1,4 +1,4 @@
-"""The proof that nothing is missing from a spectrum."""
+"""The proof that nothing is missing from a spectrum, or the word that there is none."""
 
 from dataclasses import dataclass
 
@@ -24,9 +24,9 @@ class Certificate:
     floor : float
         Where the count of an interval begins, in 1/length²; -inf where it begins below all eigenvalues.
     shift : float
-        σ, in 1/length²; infinite where all n eigenvalues were computed.
-    count : int
-        Eigenvalues below σ, and above `floor`, by inertia.
+        σ, in 1/length²; infinite where all n eigenvalues were computed, or nothing was counted.
+    count : int or None
+        Eigenvalues below σ, and above `floor`, by inertia; None where they were not counted (`approximate_spectrum`).
     n_found : int
         Eigenpairs found there; equal to `count`, or the spectrum is refused.
     gap : (float, float)
@@ -45,11 +45,13 @@ class Certificate:
     clusters : tuple of int
         Sizes of the clusters that the eigenvalues fall into, ascending: within one, neighbours are equal to 1e-6 of
         the largest eigenvalue, or to the rounding of the vectors where that is more.
+    estimate : float or None
+        Of approximations: how far the last round of refinement lowered an eigenvalue, relative to the largest.
     """
 
     n_pairs: int
     shift: float
-    count: int
+    count: int | None
     n_found: int
     gap: tuple[float, float]
     resolution: float
@@ -59,14 +61,27 @@ class Certificate:
     clusters: tuple[int, ...] = ()
     first: int = 0
     floor: float = -np.inf
+    estimate: float | None = None
 
     @property
     def complete(self) -> bool:
         """Whether what was found is what there is."""
         return self.count == self.n_found
 
+    @property
+    def n_missing(self) -> int:
+        """Eigenvalues counted below σ that were not found there; 0 where nothing was counted."""
+        return 0 if self.count is None else self.count - self.n_found
+
     def explain(self) -> str:
         """Say in plain words what is proved and how."""
+        if self.count is None:
+            return (
+                f"These are approximations, {self.n_pairs} of them: by what the last round of refinement changed, each "
+                f"is off an eigenvalue by about {self.estimate or 0.0:.1e} of the largest, and for certain by at most "
+                f"{self.max_residual:.1e}. The eigenvectors are orthonormal to {self.orthonormality:.1e}. Whether one "
+                f"is missing was not counted; solve_spectrum proves that none is."
+            )
         if not self.complete:
             return (
                 f"This set of {self.n_pairs} eigenvalues is not proved: {self.count} lie below "
@@ -95,10 +110,14 @@ class Certificate:
                 f"their negative pivots, so {self.count} eigenvalues lie between, and {self.n_found} were found there. "
                 f"{quality}{self._clusters()}"
             )
-        return (
-            f"A factor of W - σB at σ = {self.shift:.6g} (1/length²) has {self.count} negative pivots, so "
-            f"{self.count} eigenvalues lie below σ, and {self.n_found} were found there. {quality}{self._clusters()}"
+        n = self.count
+        counted = (
+            "1 negative pivot, so 1 eigenvalue lies below σ, and 1 was found there"
+            if n == 1
+            else f"{n} negative pivots, so {n} eigenvalues lie below σ, and {self.n_found} were found there"
         )
+        factor = f"A factor of W - σB at σ = {self.shift:.6g} (1/length²)"
+        return f"{factor} has {counted}. {quality}{self._clusters()}"
 
     def _clusters(self) -> str:
         largest = max(self.clusters, default=1)

@@ -9,7 +9,8 @@ from jaxtyping import Int
 from eigenshape._arrays import frozen
 from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.spectral.solver import Progress, solve_spectrum
+from eigenshape.spectral.outcome import Progress
+from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 

@@ -74,7 +74,7 @@ def _completed(
         if gaps is None:
             return None
         inner, certificate = _between(pencil, pairs, *gaps)
-        missing = certificate.count - certificate.n_found
+        missing = certificate.n_missing
         if missing == 0:
             return inner, certificate
         if missing < 0:

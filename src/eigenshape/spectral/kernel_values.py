@@ -24,7 +24,7 @@ def to_pencil(kernel: GaussianKernel | None, values: Float[np.ndarray, " k"]) ->
     return -np.expm1(-kernel.t * values) / kernel.t if kernel is not None and kernel.corrected else values
 
 
-def require_readable(kernel: GaussianKernel | None, values: Float[np.ndarray, " k"]) -> None:
+def require_readable(kernel: GaussianKernel | None, values: Float[np.ndarray, " k"], *, stacklevel: int = 3) -> None:
     """Refuse corrected eigenvalues at 1/t or beyond, and warn of those that are hard to tell or far too low.
 
     Raises
@@ -53,7 +53,7 @@ def require_readable(kernel: GaussianKernel | None, values: Float[np.ndarray, " 
         warnings.warn(
             f"Eigenvalues from number {late} on lie too near to 1/t = {1 / kernel.t:.4g} to tell those of the shape: "
             f"{advice}. Choose a smaller t, or more points.",
-            stacklevel=3,
+            stacklevel=stacklevel,
         )
 
 

@@ -26,9 +26,10 @@ from eigenshape.spectral.coarse_refinement import (
 )
 from eigenshape.spectral.coarse_space import CoarseSpace, coarse_space
 from eigenshape.spectral.kernel_values import from_pencil, require_readable
+from eigenshape.spectral.outcome import Progress
 from eigenshape.spectral.pencil import Pencil, normalise
 from eigenshape.spectral.signature import heat_kernel_signature
-from eigenshape.spectral.solver import Progress, solve_spectrum
+from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 LARGE = 25_000  # points beyond which the command line takes approximate signatures, as the thesis does (5.4)

@@ -18,7 +18,8 @@ from eigenshape.operators.crouzeix_raviart import (
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.dirichlet import solve_dirichlet
 from eigenshape.spectral.enclosure import enclose, relative_rounding
-from eigenshape.spectral.solver import Progress, solve_spectrum
+from eigenshape.spectral.outcome import Progress
+from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 EVEN = 1.5  # largest over mean C² up to which one constant serves all simplices

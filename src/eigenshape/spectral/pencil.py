@@ -12,6 +12,8 @@ from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 from eigenshape.sparse.elimination import Elimination, analyse, factorise
 
 COLUMNS_AT_ONCE = 64
+WIDEST = 1e140  # of two entries on a diagonal: squares of vectors must fit into floats
+ALIKE = 1e11
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +49,8 @@ class Pencil:
     mass_floor : float
         A proven c in (0, 1] with B ≥ c D as quadratic forms; 1 where B is diagonal.
     level : float
-        trace W / trace B: the mean of the eigenvalues up to the shape of B, and the unit for every tolerance.
+        trace W / trace B: the mean of the eigenvalues up to the shape of B, and the unit for every tolerance. Where a
+        few points make it far larger than W_ii/B_ii is in the median, that median.
     value_exponent, vector_exponent : int
         An eigenvalue is 2**value_exponent times larger in the user's units, a vector 2**vector_exponent times.
     kernel : GaussianKernel or None
@@ -94,24 +97,63 @@ def normalise(laplacian: Laplacian) -> Pencil:
     Raises
     ------
     InvalidParameterError
-        If B is not positive definite.
+        If B is not positive definite, or entries on a diagonal lie too far apart for floats.
     """
+    _require_range("stiffness", laplacian.stiffness.diagonal())
+    _require_range("mass", laplacian.mass.diagonal())
     up_w, up_b = _exponent(laplacian.stiffness), _exponent(laplacian.mass)
     up_b -= up_b % 2  # an even power, so that its square root is a power of two as well
     stiffness = _scaled(laplacian.stiffness, -up_w)
     mass = _scaled(laplacian.mass, -up_b)
+    return _pencil(stiffness, mass, (up_w - up_b, -(up_b // 2)), laplacian.kernel)
+
+
+def as_pencil(stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
+    """Take a pencil as it is, whose entries are of moderate size already.
+
+    Raises
+    ------
+    InvalidParameterError
+        If B is not positive definite.
+    """
+    return _pencil(_scaled(stiffness, 0), _scaled(mass, 0), (0, 0), None)
+
+
+def _pencil(
+    stiffness: sp.csc_array, mass: sp.csc_array, exponents: tuple[int, int], kernel: GaussianKernel | None
+) -> Pencil:
     diagonal = mass.diagonal()
-    trace = float(stiffness.diagonal().sum())
     return Pencil(
         stiffness=stiffness,
         mass=mass,
         mass_diagonal=diagonal,
         mass_floor=_mass_floor(mass, diagonal),
-        level=trace / float(diagonal.sum()) if trace > 0 else 1.0,
-        value_exponent=up_w - up_b,
-        vector_exponent=-(up_b // 2),
-        kernel=laplacian.kernel,
+        level=_level(stiffness.diagonal(), diagonal),
+        value_exponent=exponents[0],
+        vector_exponent=exponents[1],
+        kernel=kernel,
     )
+
+
+def _require_range(name: str, diagonal: Float[np.ndarray, " n"]) -> None:
+    sizes = np.where(diagonal == 0, np.nan, np.abs(diagonal))
+    if np.isnan(sizes).all():
+        return
+    low, high = int(np.nanargmin(sizes)), int(np.nanargmax(sizes))
+    if sizes[high] / WIDEST > sizes[low]:
+        raise InvalidParameterError(
+            f"Entries on the diagonal of {name} must lie within a factor of {WIDEST:.0e}; entry {high} is "
+            f"{diagonal[high]:.3g} and entry {low} is {diagonal[low]:.3g}."
+        )
+
+
+def _level(stiffness: Float[np.ndarray, " n"], mass: Float[np.ndarray, " n"]) -> float:
+    mean = float(stiffness.sum() / mass.sum())
+    ratios = (stiffness / mass)[stiffness > 0]
+    if mean <= 0 or not ratios.size:
+        return 1.0
+    median = float(np.median(ratios))
+    return mean if mean < median * ALIKE else median
 
 
 def _exponent(matrix: sp.csr_array) -> int:
@@ -119,7 +161,7 @@ def _exponent(matrix: sp.csr_array) -> int:
     return int(np.frexp(largest)[1]) - 1 if largest > 0 else 0
 
 
-def _scaled(matrix: sp.csr_array, exponent: int) -> sp.csc_array:
+def _scaled(matrix: sp.sparray, exponent: int) -> sp.csc_array:
     scaled = sp.csc_array(matrix, dtype=np.float64, copy=True)
     scaled.data = np.ldexp(scaled.data, exponent)
     scaled.sum_duplicates()
@@ -163,8 +205,10 @@ def _mass_floor(mass: sp.csc_array, diagonal: Float[np.ndarray, " n"]) -> float:
         lower = factorise(shifted.elimination, shifted.stiffness - floor * shifted.mass)
         if lower and (lower.pivots > 0).all():
             return floor
+    place = int(np.argmax(lower.pivots <= 0)) if lower else 0
+    where = f", {lower.pivots[place]:.3g} at point {shifted.elimination.order[place]}" if lower else ""
     raise InvalidParameterError(
-        f"mass must be positive definite; B - {floor:.1e} diag(B) has a pivot that is not positive."
+        f"mass must be positive definite; B - {floor:.1e} diag(B) has a pivot that is not positive{where}."
     )
 
 
@@ -189,7 +233,7 @@ def _residuals(
     pencil: Pencil, vectors: Float[np.ndarray, "n k"], given: Float[np.ndarray, " k"] | None
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     values, norms = np.empty(vectors.shape[1]), np.empty(vectors.shape[1])
-    for columns in _column_chunks(vectors.shape[1]):
+    for columns in column_chunks(vectors.shape[1]):
         part = np.ascontiguousarray(vectors[:, columns])
         weighed, rest = pencil.weigh(part), pencil.stiffness @ part
         sizes = _column_dots(part, weighed)
@@ -200,9 +244,24 @@ def _residuals(
     return values, norms
 
 
-def _column_chunks(k: int) -> list[slice]:
+def column_chunks(k: int) -> list[slice]:
+    """Cut k columns into slices of few enough that what is computed of them stays small."""
     return [slice(start, min(start + COLUMNS_AT_ONCE, k)) for start in range(0, k, COLUMNS_AT_ONCE)]
 
 
 def _column_dots(left: Float[np.ndarray, "n b"], right: Float[np.ndarray, "n b"]) -> Float[np.ndarray, " b"]:
     return np.einsum("ij,ij->j", left, right)
+
+
+def finished(pencil: Pencil, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+    """Return the vectors in the user's units, with the sign that `Spectrum` promises, read-only and in their place."""
+    vectors = np.ascontiguousarray(vectors)
+    signs = np.ones(vectors.shape[1])
+    for columns in column_chunks(vectors.shape[1]):
+        part = vectors[:, columns]
+        sizes = np.abs(part)
+        leading = np.argmax(sizes >= (1 - 1e-6) * sizes.max(axis=0), axis=0)
+        signs[columns] = np.where(part[leading, np.arange(part.shape[1])] < 0, -1.0, 1.0)
+    vectors *= pencil.vectors_out(signs[None])
+    vectors.flags.writeable = False
+    return vectors

@@ -24,8 +24,8 @@ def positive_eigenvalues(spectrum: Spectrum) -> Float[np.ndarray, " k"]:
         If there is none.
     """
     values = spectrum.eigenvalues
-    positive = values[values > NULL * values[-1]]
-    if not positive.size or values[-1] <= 0:
+    positive = values[values > np.maximum(NULL * values[-1], 4 * spectrum.residuals)]
+    if not positive.size:
         raise InvalidParameterError(
             f"A spectrum must have an eigenvalue above 0; its {len(values)} are one for each component. Solve for more."
         )

@@ -1,0 +1,231 @@
+"""Where the time of one certified solve goes, each part beside what it cannot be faster than on this machine.
+
+    python benchmarks/bench_parts.py                 two shapes, some minutes
+    python benchmarks/bench_parts.py --quick         a small one, seconds
+
+Functions of the solver are wrapped, from here, to count CPU seconds (less those of other parts called inside), bytes
+that must move, and floating-point operations. The bound of a part is the longer of two times: bytes at the bandwidth of
+a triad, operations at the rate of a large dgemm, both measured in the same run, on one core.
+"""
+
+import argparse
+import datetime
+import json
+import os
+import statistics
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+from machine import describe
+from numba import njit
+from spectrum_tables import put
+from threadpoolctl import threadpool_limits
+
+import eigenshape as es
+from eigenshape.sparse.elimination import SymmetricFactor
+from eigenshape.spectral import count, factor, lanczos, pairs, pencil, roads
+
+BEGIN = "<!-- bench_parts.py --markdown -->\n"
+REAL = 8  # bytes
+CASES: dict[str, tuple[Callable[[], es.TriangleMesh], int]] = {
+    "icosphere": (lambda: es.icosphere(6), 300),
+    "Fibonacci sphere": (lambda: es.fibonacci_sphere(160_000), 50),
+}
+QUICK: dict[str, tuple[Callable[[], es.TriangleMesh], int]] = {"icosphere": (lambda: es.icosphere(4), 40)}
+Work = tuple[float, float]  # bytes that must move, floating-point operations
+
+
+def _analysis(pattern: Any, **_: object) -> Work:
+    return REAL * 3.0 * pattern.nnz, 0.0  # the pattern read, its triangle and the places of its entries written
+
+
+def _factor(elimination: Any, _: object) -> Work:
+    widths, heights = np.diff(elimination.first), np.diff(elimination.begins)
+    columns = np.repeat(heights + elimination.first[:-1], widths) - np.arange(len(elimination.order))
+    return REAL * float(elimination.n_entries), float((columns.astype(float) ** 2).sum())
+
+
+def _solve(mine: SymmetricFactor, right: np.ndarray, _: object) -> Work:
+    entries = mine.elimination.n_entries
+    return REAL * (2.0 * entries + 6.0 * right.size), 4.0 * entries * right.shape[1]  # L there and back
+
+
+def _orthogonal(_inner: object, space: np.ndarray, columns: np.ndarray, _rng: object) -> Work:
+    width = columns.shape[0] * columns.shape[2]  # what is known is read to project on it, and again to take that away
+    space = space[: -len(columns)]
+    return 2.0 * space.nbytes, 4.0 * (space.size / columns.shape[1]) * columns.shape[1] * width
+
+
+def _eigh(krylov: Any, _shift: float) -> Work:
+    return 0.0, 10 / 3 * float(len(krylov.projected)) ** 3  # to a tridiagonal matrix and back; in between it is cheap
+
+
+def _combine(krylov: Any, _ritz: object, chosen: np.ndarray) -> Work:
+    n, m, j = krylov.space.shape[1], krylov.space.shape[0] * krylov.space.shape[2], len(chosen)
+    return REAL * float(n) * (m + j), 2.0 * n * m * j
+
+
+def _residuals(of: Any, vectors: np.ndarray) -> Work:
+    chunks = len(pencil.column_chunks(vectors.shape[1]))
+    return float(vectors.nbytes + chunks * 12 * of.stiffness.nnz), 0.0
+
+
+def _proof(_pencil: object, of: Any) -> Work:
+    return float(of.vectors.nbytes), 2.0 * len(of.vectors) * of.vectors.shape[1] ** 2  # ΦᵀBΦ
+
+
+def _rounding(of: Any) -> Work:
+    return REAL * 2.0 * of.lower.elimination.n_entries, 0.0
+
+
+PARTS: tuple[tuple[str, object, str, Callable[..., Work]], ...] = (
+    ("order and analysis", pencil, "analyse", _analysis),
+    ("factors", pencil, "factorise", _factor),
+    ("factors", factor, "factorise_symmetric", _factor),
+    ("solves", SymmetricFactor, "solve_lanes", _solve),
+    ("orthogonalisation", lanczos, "_orthonormalise", _orthogonal),
+    ("Ritz values", lanczos, "_ritz", _eigh),
+    ("Ritz vectors", lanczos, "_vectors", _combine),
+    ("residuals", pairs, "rayleigh_residuals", _residuals),
+    ("proof", roads, "prove", _proof),
+    ("proof", count, "rounding", _rounding),
+)
+
+
+@contextmanager
+def counted() -> Iterator[dict[str, list[float]]]:
+    """Count seconds, bytes and operations of each part within."""
+    totals: dict[str, list[float]] = {name: [0.0, 0.0, 0.0, 0.0] for name, *_ in PARTS}
+    inside = [0.0]
+
+    def wrapped(name: str, function: Callable[..., Any], work: Callable[..., Work]) -> Callable[..., Any]:
+        def call(*args: object, **options: object) -> object:
+            moved, operations = work(*args, **options)
+            inside.append(0.0)
+            start = time.process_time()
+            try:
+                return function(*args, **options)
+            finally:
+                took, others = time.process_time() - start, inside.pop()
+                inside[-1] += took
+                for place, amount in enumerate((took - others, moved, operations, 1.0)):
+                    totals[name][place] += amount
+
+        return call
+
+    with ExitStack() as stack:
+        for name, home, attribute, work in PARTS:
+            stack.enter_context(patch.object(home, attribute, wrapped(name, getattr(home, attribute), work)))
+        yield totals
+
+
+@njit
+def _triad(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> None:
+    for i in range(len(a)):
+        a[i] = b[i] + 3.0 * c[i]
+
+
+def rates(size: int) -> dict[str, float]:
+    """Measure bytes a second of a triad, operations a second of a dgemm; the best of ten."""
+    a, b, c = (np.ones(size) for _ in range(3))
+    square = np.ones((1200, 1200))
+    triad, product = [], []
+    for _ in range(11):
+        start = time.perf_counter()
+        _triad(a, b, c)
+        triad.append(time.perf_counter() - start)
+        start = time.perf_counter()
+        square @ square
+        product.append(time.perf_counter() - start)
+    return {"bandwidth": 4 * REAL * size / min(triad), "dgemm": 2 * 1200**3 / min(product)}  # a line written is read
+
+
+def measured(mesh: es.TriangleMesh, k: int, repeats: int, speed: dict[str, float]) -> list[dict[str, object]]:
+    """Return a row for each part, and one for what is in none."""
+    laplacian, runs, whole = es.cotangent_laplacian(mesh), [], []
+    for _ in range(repeats):
+        with counted() as totals:
+            start = time.process_time()
+            es.solve_spectrum(laplacian, k)
+            whole.append(time.process_time() - start)
+        runs.append(totals)
+    rows = []
+    for name, (_, moved, operations, calls) in runs[0].items():
+        seconds = statistics.median(run[name][0] for run in runs)
+        bytes_bound, flop_bound = moved / speed["bandwidth"], operations / speed["dgemm"]
+        bound = max(bytes_bound, flop_bound)
+        by = "bytes" if bytes_bound >= flop_bound else "operations"
+        rows.append({"part": name, "calls": int(calls), "seconds": seconds, "bound": bound, "by": by})
+    rest = statistics.median(
+        total - sum(part[0] for part in run.values()) for total, run in zip(whole, runs, strict=True)
+    )
+    rows.append({"part": "the rest", "calls": 0, "seconds": rest, "bound": None, "by": ""})
+    total = statistics.median(whole)
+    return [row | {"share": row["seconds"] / total} for row in rows]
+
+
+def cells(row: dict[str, object]) -> list[str]:
+    """Return the texts of a row."""
+    texts = [str(row["part"]), str(row["calls"] or ""), f"{row['seconds']:.3f}", f"{100 * row['share']:.0f} %"]
+    if row["bound"] is None:
+        return [*texts, "", "", ""]
+    ratio = f"{row['seconds'] / row['bound']:.1f}" if row["bound"] else ""
+    return [*texts, f"{row['bound']:.3f}", str(row["by"]), ratio]
+
+
+def markdown(report: dict[str, Any]) -> str:
+    """Return the table of a report for a page."""
+    machine, speed = report["machine"], report["rates"]
+    head = ("part", "calls", "CPU s", "share", "bound s", "set by", "times the bound")
+    lines = [
+        f"Measured {report['date']} on one of {machine['cores']} cores, {machine['cpu']}, load {machine['load'][0]} at "
+        f"the start: triad {speed['bandwidth'] / 1e9:.1f} GB/s, dgemm {speed['dgemm'] / 1e9:.0f} GF/s. Medians of "
+        f"{report['repeats']}.",
+        "",
+        f"| shape | {' | '.join(head)} |",
+        "|" + "---|" * (len(head) + 1),
+    ]
+    for title, rows in report["cases"].items():
+        for place, row in enumerate(rows):
+            lines.append(f"| {'' if place else title} | {' | '.join(cells(row))} |")
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Measure, print, and write what was asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="one small sphere")
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--json", type=Path, help="write all figures")
+    parser.add_argument("--markdown", type=Path, help="write the table; into a page between its two marks")
+    options = parser.parse_args()
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    with threadpool_limits(1):
+        es.solve_spectrum(es.cotangent_laplacian(es.icosphere(4)), 20)  # loads and compiles
+        report: dict[str, Any] = {
+            "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+            "machine": describe(["eigenshape", "numpy", "scipy", "numba"]),
+            "repeats": options.repeats,
+            "rates": rates(2**20 if options.quick else 2**25),
+            "cases": {},
+        }
+        for name, (make, k) in (QUICK if options.quick else CASES).items():
+            mesh = make()
+            rows = measured(mesh, k, options.repeats, report["rates"])
+            report["cases"][f"{name}, n = {mesh.n_points:,}, k = {k}"] = rows
+            for row in rows:
+                print(*cells(row), sep="  ", flush=True)
+    if options.json:
+        options.json.write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n")
+    if options.markdown:
+        put(options.markdown, markdown(report), BEGIN)
+
+
+if __name__ == "__main__":
+    main()

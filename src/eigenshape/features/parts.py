@@ -1,0 +1,100 @@
+"""The road from a mesh to its parts: limbs, head, torso."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from eigenshape._arrays import frozen, whole_number
+from eigenshape.features.boundaries import CONCAVITY, smooth_boundaries
+from eigenshape.features.part_merging import SEED_TIME, part_tree
+from eigenshape.features.part_tree import PartTree
+from eigenshape.features.segmentation import Segmentation, segment
+from eigenshape.geometry.measure import enclosed_volume
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.topology import is_closed, vertex_components
+from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
+from eigenshape.spectral.outcome import Progress
+from eigenshape.spectral.signature import heat_kernel_signature
+from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.spectral.spectrum import Spectrum
+
+N_MODES = 25  # beside one for each component
+PART_CONTRAST = 0.3  # parts between which more is left of a difference are two
+
+
+@dataclass(frozen=True, eq=False)
+class FoundParts:
+    """The parts of a shape with all that was found on the way to them.
+
+    Attributes
+    ----------
+    mesh : TriangleMesh
+        As it was given, or turned to face outward.
+    spectrum : Spectrum
+        Of a Laplacian that conducts badly across concave creases.
+    heat : (n,) float
+        What seeds are the maxima of, in 1/length².
+    tree : PartTree
+        Which part splits from which; it can be cut elsewhere without computing anything again.
+    parts : Segmentation
+    """
+
+    mesh: TriangleMesh
+    spectrum: Spectrum
+    heat: Float[np.ndarray, " n"]
+    tree: PartTree
+    parts: Segmentation
+
+
+def find_parts(mesh: TriangleMesh, *, n_modes: int = N_MODES, progress: Progress | None = None) -> FoundParts:
+    """Find the parts of a surface: rooms between which heat flows badly, cut along concave creases.
+
+    Heat flows slowly across concave creases (`curvature_tensors`, α = 10); regions around the maxima of early heat are
+    merged in the order in which heat evens them out (`part_tree`); those are parts of which more than 0.3 of a
+    difference is left, and their boundaries are moved to the least cut (`smooth_boundaries`). All times are shares of
+    the area, so no unit counts.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        A closed surface is turned outward; of an open one the faces are seen from outside counter-clockwise.
+    n_modes : int
+        Eigenpairs, at least 2, to which one a component is added.
+    progress : callable, optional
+        Told of the eigensolver's progress.
+
+    Returns
+    -------
+    FoundParts
+
+    Raises
+    ------
+    InvalidParameterError
+        If there are fewer than 2 modes.
+    InvalidShapeError
+        If the mesh has a face without area or a vertex without face.
+    """
+    outward = facing_outward(mesh)
+    spectrum = part_spectrum(outward, n_modes=n_modes, progress=progress)
+    tree = part_tree(outward, spectrum)
+    heat = heat_kernel_signature(spectrum, [SEED_TIME * float(spectrum.mass.sum())])[:, 0]
+    parts = smooth_boundaries(outward, segment(tree, persistence=PART_CONTRAST))
+    return FoundParts(outward, spectrum, frozen(heat), tree, parts)
+
+
+def part_spectrum(mesh: TriangleMesh, *, n_modes: int = N_MODES, progress: Progress | None = None) -> Spectrum:
+    """Solve for the lowest modes of a Laplacian that conducts badly across concave creases.
+
+    Parameters and errors are those of `find_parts`, the faces of the mesh being turned outward.
+    """
+    wanted = whole_number(n_modes, "n_modes", 2) + vertex_components(mesh)[0]
+    laplacian = anisotropic_laplacian(mesh, curvature_tensors(mesh, CONCAVITY, concave=True))
+    return solve_spectrum(laplacian, min(wanted, mesh.n_vertices), progress=progress)
+
+
+def facing_outward(mesh: TriangleMesh) -> TriangleMesh:
+    """Return a closed mesh with its faces seen from outside counter-clockwise; an open one as it is."""
+    if not is_closed(mesh) or enclosed_volume(mesh) >= 0:
+        return mesh
+    return TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])

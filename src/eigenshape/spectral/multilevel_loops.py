@@ -1,0 +1,107 @@
+"""Compiled loops of `hierarchy` and `device`: points grown into aggregates, and sparse matrices times blocks."""
+
+from typing import no_type_check
+
+import numpy as np
+from numba import njit
+
+STRONG = 0.25  # of a row's strongest coupling, below which points are not neighbours
+FRAGMENT = 0.25  # of the size aimed at, below which an aggregate is given away
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def grow_aggregates(starts, columns, values, size):
+    """Label points by aggregates of about `size`, grown along strong negative couplings; count them."""
+    n = len(starts) - 1
+    labels, strongest = np.full(n, -1, dtype=np.int32), np.zeros(n)
+    for i in range(n):
+        for entry in range(starts[i], starts[i + 1]):
+            if columns[entry] != i and -values[entry] > strongest[i]:
+                strongest[i] = -values[entry]
+    members, counts = np.empty(size, dtype=np.int64), np.zeros(n, dtype=np.int64)
+    n_aggregates = 0
+    for first in range(n):
+        if labels[first] >= 0:
+            continue
+        labels[first] = n_aggregates
+        members[0] = first
+        height, at = 1, 0
+        while at < height < size:
+            i = members[at]
+            best, chosen = STRONG * strongest[i], -1
+            for entry in range(starts[i], starts[i + 1]):
+                if labels[columns[entry]] < 0 and -values[entry] > best:
+                    best, chosen = -values[entry], columns[entry]
+            if chosen < 0:
+                at += 1
+                continue
+            labels[chosen] = n_aggregates
+            members[height] = chosen
+            height += 1
+        counts[n_aggregates] = height
+        n_aggregates += 1
+    return _joined(starts, columns, values, labels, counts[:n_aggregates], FRAGMENT * size)
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def _joined(starts, columns, values, labels, counts, least):
+    """Give each point of a fragment to the aggregate it is coupled with most, and number what is left."""
+    for i in range(len(labels)):
+        if counts[labels[i]] >= least:
+            continue
+        best, chosen = 0.0, -1
+        for entry in range(starts[i], starts[i + 1]):
+            other = labels[columns[entry]]
+            if counts[other] >= least and -values[entry] > best:
+                best, chosen = -values[entry], other
+        if chosen >= 0:
+            labels[i] = chosen
+    numbers = np.full(len(counts), -1, dtype=np.int32)
+    n_left = 0
+    for i in range(len(labels)):
+        if numbers[labels[i]] < 0:
+            numbers[labels[i]] = n_left
+            n_left += 1
+        labels[i] = numbers[labels[i]]
+    return labels, n_left
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def multiply(starts, columns, values, block, product):
+    """Write a sparse matrix times a block of columns."""
+    width = block.shape[1]
+    for i in range(len(starts) - 1):
+        for c in range(width):
+            product[i, c] = 0
+        for entry in range(starts[i], starts[i + 1]):
+            value, j = values[entry], columns[entry]
+            for c in range(width):
+                product[i, c] += value * block[j, c]
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def smoothing_step(matrix, scales, terms, block, step, moved, old, new):
+    """Write the next Chebyshev step, in place of the last, and where it leads from `block`.
+
+    step = old step + new D⁻¹ (r - (A - θ M) block) and moved = block + step, with the diagonals M and D⁻¹ in `scales`.
+    """
+    starts, columns, values = matrix
+    weights, inverse = scales
+    right, shifts = terms
+    width = block.shape[1]
+    for i in range(len(starts) - 1):
+        for c in range(width):
+            moved[i, c] = 0
+        for entry in range(starts[i], starts[i + 1]):
+            value, j = values[entry], columns[entry]
+            for c in range(width):
+                moved[i, c] += value * block[j, c]
+        weight, factor = weights[i, 0], inverse[i, 0] * new
+        for c in range(width):
+            rest = (right[i, c] - moved[i, c]) + (weight * shifts[c]) * block[i, c]
+            step[i, c] = old * step[i, c] + factor * rest
+            moved[i, c] = block[i, c] + step[i, c]

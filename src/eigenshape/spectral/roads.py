@@ -1,0 +1,148 @@
+"""The roads to the lowest pairs of a pencil, and their proof: part by part, densely, at once, in slices."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+
+import numpy as np
+import scipy.linalg as sl
+from jaxtyping import Float
+
+from eigenshape._errors import ConvergenceError
+from eigenshape.sparse.lane_loops import LANES
+from eigenshape.spectral.certificate import Certificate
+from eigenshape.spectral.certify import in_user_units, prove
+from eigenshape.spectral.components import Parts, connected_parts, pairs_of_parts
+from eigenshape.spectral.factor import Factor
+from eigenshape.spectral.lanczos import Wanted, block_lanczos
+from eigenshape.spectral.outcome import Progress, require_room
+from eigenshape.spectral.pairs import Pairs, lowest, polished
+from eigenshape.spectral.pencil import Pencil
+from eigenshape.spectral.shift import shift_inside
+from eigenshape.spectral.slices import walk
+
+Start = Callable[[Pencil, int, Callable[[float], None]], tuple[np.ndarray, Factor]]
+Road = Callable[[Pencil, int, Progress], tuple[Pairs, Certificate]]
+
+SMALL = 300  # points up to which a dense solve is the faster one
+DENSE_SHARE = 4  # and where more than one in so many pairs is wanted,
+DENSE_LIMIT = 6000  # while the matrix still fits
+WHOLE = 400  # pairs up to which one shift serves
+FEWEST_VECTORS = 150  # of a space, however few pairs are wanted
+WIDEST = 8  # groups of eight columns to a block
+RUNS = 40
+
+
+def proved(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+    """Return the k lowest pairs of a pencil and their proof, by the quickest road that reaches it.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the memory is too small.
+    ConvergenceError
+        If none does.
+    """
+    parts = connected_parts(pencil)
+    if len(parts.sizes) > 1 and parts.sizes.max() <= SMALL:
+        return _in_parts(pencil, parts, k, report)
+    if dense_serves(pencil, k):
+        return _dense(pencil, k, report)
+    roads: list[Road] = [partial(_sparse, start=walk)] if k > WHOLE else []
+    roads += [partial(_sparse, start=_at_once)]
+    roads += [_dense] if pencil.n <= DENSE_LIMIT else []  # nothing there can fail to converge
+    for road in roads[:-1]:
+        with suppress(ConvergenceError):
+            return road(pencil, k, report)
+    return roads[-1](pencil, k, report)
+
+
+def dense_serves(pencil: Pencil, k: int) -> bool:
+    """Tell whether a dense solve finds k pairs sooner than a sparse one."""
+    return pencil.n <= SMALL or (DENSE_SHARE * k > pencil.n and pencil.n <= DENSE_LIMIT)
+
+
+def _dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+    require_memory(pencil, k, 32 * pencil.n**2)
+    report(0.1, f"solving {pencil.n} points densely")
+    roots = np.sqrt(pencil.mass_diagonal)
+    stiffness = pencil.stiffness.toarray() / np.outer(roots, roots)
+    mass = None if pencil.mass_floor == 1.0 else pencil.mass.toarray() / np.outer(roots, roots)
+    _, vectors = sl.eigh(stiffness, mass)
+    pairs = lowest(pencil, vectors[:, :k] / roots[:, None], k)
+    report(0.8, "counting eigenvalues")
+    return _complete(pencil, pairs)
+
+
+def _in_parts(pencil: Pencil, parts: Parts, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+    require_memory(pencil, k, 24 * int((parts.sizes**2).sum()))
+    report(0.1, f"solving {len(parts.sizes)} parts densely")
+    pairs = pairs_of_parts(pencil, parts, k)
+    report(0.8, "counting eigenvalues")
+    return _complete(pencil, pairs)
+
+
+def _complete(pencil: Pencil, pairs: Pairs) -> tuple[Pairs, Certificate]:
+    certificate = prove(pencil, pairs)
+    if not certificate.complete:
+        raise ConvergenceError(in_user_units(pencil, certificate).explain())
+    return pairs, certificate
+
+
+def _sparse(pencil: Pencil, k: int, report: Progress, *, start: Start) -> tuple[Pairs, Certificate]:
+    require_memory(pencil, k)
+    report(0.02, "looking for a shift")
+    vectors, factor = start(pencil, k, _in_run(report, 0))
+    for run in range(1, RUNS + 1):
+        pairs = polished(pencil, factor, lowest(pencil, vectors, k))
+        report(0.9, "counting eigenvalues")
+        certificate, wanted = _still_wanted(pencil, factor, pairs, k)
+        missing = wanted.below + wanted.above
+        if certificate is not None and certificate.complete:
+            return pairs, certificate
+        if missing == 0 or run == RUNS:
+            break
+        groups, more = min(1 + -(-missing // LANES), WIDEST), _in_run(report, run)
+        _, found = block_lanczos(pencil, factor, wanted, locked=pairs.vectors, groups=groups, report=more)
+        if not found.shape[1]:
+            break
+        vectors = np.hstack([pairs.vectors, found])
+    raise ConvergenceError(
+        f"Every eigenvalue that inertia counts must be found; {len(pairs.values)} of {k} were found in {run} runs "
+        f"and {missing} are missing."
+    )
+
+
+def require_memory(pencil: Pencil, k: int, factors: int | None = None) -> None:
+    """Refuse a solve for so many pairs that would not fit, given the bytes of its factors.
+
+    Raises
+    ------
+    InvalidParameterError
+        With the estimated sizes.
+    """
+    if factors is None:
+        factors = 24 * pencil.shifted.elimination.n_entries  # two at once, and their making
+    bases = 8 * pencil.n * (3 * k + FEWEST_VECTORS + 2 * min(k, WHOLE))  # a space of twice the pairs, results, a copy
+    advice = "Ask for fewer pairs, or for approximate_spectrum, which needs no factor"
+    require_room(f"{k} pairs of {pencil.n} points", {"bases": bases, "factors of their operator": factors}, advice)
+
+
+def _at_once(pencil: Pencil, k: int, report: Callable[[float], None]) -> tuple[Float[np.ndarray, "n j"], Factor]:
+    factor = shift_inside(pencil, k)
+    wanted = Wanted(below=factor.count, above=k - factor.count)
+    return block_lanczos(pencil, factor, wanted, locked=np.empty((pencil.n, 0)), report=report)[1], factor
+
+
+def _in_run(report: Progress, run: int) -> Callable[[float], None]:
+    return lambda done: report(0.05 + 0.8 * done, f"run {run + 1} of block Lanczos")
+
+
+def _still_wanted(pencil: Pencil, factor: Factor, pairs: Pairs, k: int) -> tuple[Certificate | None, Wanted]:
+    """Return the proof as far as it goes, and what a further run has to find."""
+    certificate = prove(pencil, pairs) if len(pairs.values) == k else None
+    missing = certificate.n_missing if certificate else k - len(pairs.values)
+    missing = min(max(missing, 0), k)
+    ceiling = certificate.shift if certificate else np.inf
+    below = min(max(factor.count - int(np.count_nonzero(pairs.values < factor.shift)), 0), missing)
+    return certificate, Wanted(below=below, above=missing - below, ceiling=ceiling)

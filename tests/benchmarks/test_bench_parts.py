@@ -1,0 +1,76 @@
+"""The benchmarks of factors and of the parts of a solve run, and their tables go where they belong."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import eigenshape as es
+
+BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
+PAGE = "before\n<!-- {0}.py --markdown -->\nold\n<!-- end -->\nbetween\n<!-- other -->\n<!-- end -->\nafter\n"
+
+
+def run(script, folder, *options):
+    report, page = folder / "report.json", folder / "page.md"
+    page.write_text(PAGE.format(script))
+    command = [sys.executable, BENCHMARKS / f"{script}.py", "--quick", "--repeats", "1", *options]
+    subprocess.run([*command, "--json", report, "--markdown", page], check=True, capture_output=True)
+    text = page.read_text()
+    assert "old" not in text
+    assert text.startswith("before\n")
+    assert text.endswith("<!-- end -->\nbetween\n<!-- other -->\n<!-- end -->\nafter\n")
+    return json.loads(report.read_text()), text
+
+
+def test_factors_are_measured_and_what_is_not_installed_is_shown(tmp_path):
+    report, text = run("bench_factor", tmp_path)
+    (rows,) = report["sizes"]
+    assert [row["method"] for row in rows[:2]] == ["eigenshape, LDLᵀ", "SuperLU, LU"]
+    for row in rows:
+        assert row["status"] in ("ok", "absent")
+        if row["status"] == "ok":
+            assert row["n"] == 642
+            assert row["error"] < 1e-10
+            assert row["factor"] > 0
+    assert rows[0]["status"] == rows[1]["status"] == "ok"
+    assert rows[0]["entries"] > 642
+    assert rows[0]["flops"] > rows[0]["entries"]
+    assert "| icosphere, 642 | eigenshape, LDLᵀ |" in text
+    assert text.count("| absent |") == sum(row["status"] == "absent" for row in rows)
+
+
+def test_parts_sum_to_the_whole_and_none_beats_its_bound(tmp_path):
+    report, text = run("bench_parts", tmp_path)
+    (rows,) = report["cases"].values()
+    assert sum(row["share"] for row in rows) == pytest.approx(1.0, abs=1e-6)
+    calls = {row["part"]: row["calls"] for row in rows}
+    assert calls["order and analysis"] == calls["Ritz vectors"] == 1
+    assert calls["solves"] > calls["orthogonalisation"] / 2 > 1
+    assert calls["factors"] >= 2
+    for row in rows:
+        assert row["bound"] is None or row["seconds"] > 0.2 * row["bound"], row["part"]  # caches are faster than memory
+    assert f"| icosphere, n = 2,562, k = 40 | {rows[0]['part']} |" in text
+
+
+def test_the_operations_of_a_factor_are_counted_by_columns():
+    sys.path.insert(0, str(BENCHMARKS))
+    try:
+        import bench_parts
+    finally:
+        sys.path.remove(str(BENCHMARKS))
+    from eigenshape.spectral.pencil import normalise
+
+    pencil = normalise(es.cotangent_laplacian(es.icosphere(0)))
+    moved, operations = bench_parts._factor(pencil.shifted.elimination, None)
+    entries = np.zeros((12, 12))
+    e = pencil.shifted.elimination
+    for front in range(len(e.first) - 1):
+        rows = e.rows[e.begins[front] : e.begins[front + 1]]
+        for column in range(e.first[front], e.first[front + 1]):
+            entries[rows[rows >= column], column] = 1
+    assert operations == (entries.sum(axis=0) ** 2).sum()
+    assert moved == 8 * e.n_entries

@@ -1,0 +1,240 @@
+import numpy as np
+import pytest
+
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape.features import boundaries
+from eigenshape.features.boundaries import smooth_boundaries
+from eigenshape.features.merge_tree import merge_tree
+from eigenshape.features.part_merging import SEED_TIME, part_tree
+from eigenshape.features.parts import find_parts, part_spectrum
+from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment, touching_parts
+from eigenshape.geometry.creatures import make_creature
+from eigenshape.geometry.facets import facet_components, facet_table
+from eigenshape.geometry.measure import face_areas
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere
+from eigenshape.geometry.topology import edge_table, face_pairs, submesh
+from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.spectral.signature import heat_kernel_signature
+from eigenshape.spectral.solver import solve_spectrum
+
+
+def dumbbell(neck=0.25):
+    """Return two balls joined by a neck: a sphere squeezed around its middle."""
+    ball = icosphere(4)
+    x, y, z = ball.vertices.T
+    width = neck + (1 - neck) * np.minimum(np.abs(x) / 0.5, 1)
+    return TriangleMesh(np.column_stack([1.5 * x, y * width, z * width]), ball.faces)
+
+
+@pytest.fixture(scope="module")
+def human():
+    return find_parts(make_creature("biped", n_vertices=2000))
+
+
+def n_pieces(mesh, keep):
+    return facet_components(facet_table(submesh(mesh, keep)[0]))[0]
+
+
+def test_a_dumbbell_has_two_parts_and_the_cut_is_at_the_neck():
+    mesh = dumbbell()
+    found = find_parts(mesh)
+    assert len(found.parts.features.vertices) == 2
+    centres = mesh.vertices[mesh.faces].mean(axis=1)[:, 0]
+    one = np.mean(centres[found.parts.labels == 0]) > 0
+    agree = (centres > 0) == ((found.parts.labels == 0) == one)
+    assert agree[np.abs(centres) > 0.15].all()
+
+
+def test_a_ball_is_one_part():
+    assert len(find_parts(icosphere(3)).parts.features.vertices) == 1
+
+
+def test_persistence_is_what_is_left_of_a_difference_between_two_parts():
+    mesh = dumbbell()
+    spectrum = part_spectrum(mesh)
+    tree = part_tree(mesh, spectrum, time=0.2)
+    labels = segment(tree, n_regions=2).labels
+    areas = face_areas(mesh)
+    share = np.array([areas[labels == part].sum() for part in (0, 1)])
+    level = np.where(labels == 0, 1 / share[0], -1 / share[1]) / np.sqrt((1 / share).sum())
+    means = spectrum.eigenvectors[mesh.faces].mean(axis=1)
+    left = np.exp(-0.2 * areas.sum() * spectrum.eigenvalues) * ((areas * level) @ means)
+    assert tree.persistence[1] == pytest.approx((left**2).sum(), rel=1e-9)
+
+
+def brute_force_merging(mesh, spectrum, time):
+    """Merge the cheapest pair of touching regions again and again, all prices computed anew from the faces."""
+    areas = face_areas(mesh)
+    area = areas.sum()
+    heat = heat_kernel_signature(spectrum, [SEED_TIME * spectrum.mass.sum()])[:, 0]
+    labels = segment(merge_tree(mesh, heat), n_regions=150).labels.copy()
+    decay = np.exp(-time * area * spectrum.eigenvalues)
+    faces = (spectrum.eigenvectors * decay)[mesh.faces].mean(axis=1)
+    prices = []
+    while len(touching := touching_parts(mesh, labels)):
+
+        def price(pair):
+            one, two = (labels == part for part in pair)
+            a, b = areas[one].sum(), areas[two].sum()
+            gap = areas[one] @ faces[one] / a - areas[two] @ faces[two] / b
+            return a * b / (a + b) * (gap @ gap)
+
+        cheapest = min(touching.tolist(), key=price)
+        prices.append(price(cheapest))
+        labels[labels == cheapest[1]] = cheapest[0]
+    return np.maximum.accumulate(prices)
+
+
+def test_part_tree_merges_the_cheapest_pair_each_time():
+    mesh = make_creature("fish", n_vertices=600)
+    spectrum = part_spectrum(mesh)
+    tree = part_tree(mesh, spectrum)
+    expected = brute_force_merging(mesh, spectrum, 0.1)
+    np.testing.assert_allclose(tree.persistence[1:], expected[::-1], rtol=1e-9)
+
+
+def test_a_part_splits_from_one_that_stands_before_it_and_is_higher(human):
+    tree = human.tree
+    number = np.arange(len(tree.maxima))
+    ends = tree.parent >= 0
+    assert (tree.parent[ends] < number[ends]).all()
+    assert (tree.values[tree.parent[ends]] >= tree.values[ends]).all()
+    assert (np.diff(tree.persistence) <= 0).all()
+    assert ((tree.persistence[ends] >= 0) & (tree.persistence[ends] <= 1)).all()
+
+
+def test_cuts_are_nested_and_take_away_one_part_at_a_time(human):
+    finer = segment(human.tree, n_regions=9).labels
+    for count in range(8, 0, -1):
+        labels = segment(human.tree, n_regions=count).labels
+        assert labels.max() == count - 1
+        assert all(len(np.unique(labels[finer == part])) == 1 for part in range(count + 1))
+        finer = labels
+
+
+def test_a_human_has_a_head_four_limbs_and_a_torso(human):
+    mesh, labels = human.mesh, human.parts.labels
+    shares = np.bincount(labels, weights=face_areas(mesh)) / face_areas(mesh).sum()
+    assert shares.max() < 0.5
+    x, y, _ = mesh.vertices.T
+    ends = [int(np.argmax(y)), int(np.argmax(x)), int(np.argmin(x))]
+    ends += [int(np.argmin(np.where(side * x > 0, y, np.inf))) for side in (1, -1)]
+    own = [labels[np.flatnonzero((mesh.faces == end).any(axis=1))[0]] for end in ends]
+    assert len(set(own)) == 5, "head, hands and feet lie in parts of their own"
+    assert len(np.unique(labels)) > 5, "the torso belongs to none of them"
+
+
+@pytest.mark.parametrize(("kind", "count"), [("biped", 7), ("quadruped", 6)])
+def test_as_many_parts_are_the_same_ones_in_another_pose(kind, count):
+    found = [find_parts(make_creature(kind, pose, n_vertices=2000)) for pose in (0, 3)]
+    one, two = (smooth_boundaries(each.mesh, segment(each.tree, n_regions=count)).labels for each in found)
+    assert disagreement(one, two) < 0.05
+
+
+def disagreement(one, two):
+    """Return 1 - Rand index."""
+    table = np.zeros((one.max() + 1, two.max() + 1))
+    np.add.at(table, (one, two), 1)
+    pairs = sum((counts * (counts - 1)).sum() for counts in (table.sum(axis=0), table.sum(axis=1)))
+    return (pairs - 2 * (table * (table - 1)).sum()) / (len(one) * (len(one) - 1))
+
+
+@pytest.mark.parametrize("scale", [1e-100, 1e100])
+def test_parts_know_no_unit(scale):
+    mesh = make_creature("quadruped", n_vertices=800)
+    found, far = find_parts(mesh), find_parts(TriangleMesh(mesh.vertices * scale, mesh.faces))
+    assert np.array_equal(found.parts.labels, far.parts.labels)
+    np.testing.assert_allclose(found.tree.persistence, far.tree.persistence, rtol=1e-6)
+
+
+def test_a_closed_mesh_is_turned_outward():
+    mesh = make_creature("quadruped", n_vertices=800)
+    turned = find_parts(TriangleMesh(mesh.vertices, mesh.faces[:, ::-1]))
+    assert disagreement(turned.parts.labels, find_parts(mesh).parts.labels) == 0
+
+
+def test_each_component_is_a_part_at_least():
+    apart = TriangleMesh(0.3 * icosphere(2).vertices + 9, icosphere(2).faces)
+    found = find_parts(disjoint_union(dumbbell(), apart))
+    assert np.isinf(found.parts.features.persistence).sum() == 2
+    assert len(found.parts.features.vertices) == 3
+
+
+def cut_length(mesh, labels):
+    table = edge_table(mesh)
+    pairs, edges = face_pairs(table)
+    ends = mesh.vertices[table.edges[edges[labels[pairs[:, 0]] != labels[pairs[:, 1]]]]]
+    return np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum()
+
+
+def two_halves(mesh, ragged):
+    centres = mesh.vertices[mesh.faces].mean(axis=1)
+    labels = (centres[:, 0] > ragged * np.sin(5 * np.arctan2(centres[:, 2], centres[:, 1]))).astype(np.int64)
+    tips = np.array([mesh.vertices[:, 0].argmin(), mesh.vertices[:, 0].argmax()])
+    return Segmentation(labels, FeaturePoints(tips, np.ones(2), np.array([np.inf, 0.5])))
+
+
+def test_a_ragged_boundary_becomes_straight():
+    mesh = dumbbell()
+    ragged = two_halves(mesh, 0.25)
+    smooth = smooth_boundaries(mesh, ragged)
+    neck = cut_length(mesh, two_halves(mesh, 0.0).labels)
+    assert cut_length(mesh, ragged.labels) > 2 * neck
+    assert cut_length(mesh, smooth.labels) < 1.05 * neck
+    assert smooth.features is ragged.features
+
+
+def test_no_cut_in_the_band_costs_less():
+    mesh = dumbbell()
+    before = two_halves(mesh, 0.25)
+    after = smooth_boundaries(mesh, before).labels
+    network = boundaries._network(mesh)
+
+    def cost(labels):
+        return network.costs[labels[network.pairs[:, 0]] != labels[network.pairs[:, 1]]].sum()
+
+    moved = np.flatnonzero(np.abs(mesh.vertices[mesh.faces].mean(axis=1)[:, 0]) < 0.3)
+    rng = np.random.default_rng(4)
+    for face in rng.choice(moved, 200, replace=False):
+        other = after.copy()
+        other[face] = 1 - other[face]
+        assert cost(other) >= cost(after) * (1 - 1e-6)
+    assert cost(after) < cost(before.labels)
+
+
+def test_smooth_parts_stay_whole_and_keep_their_feature_points(human):
+    raw = segment(human.tree, n_regions=12)
+    smooth = smooth_boundaries(human.mesh, raw)
+    for part in range(12):
+        assert n_pieces(human.mesh, smooth.labels == part) == n_pieces(human.mesh, raw.labels == part) == 1
+        around = (human.mesh.faces == smooth.features.vertices[part]).any(axis=1)
+        assert (smooth.labels[around & (raw.labels == part)] == part).all()
+
+
+def test_touching_parts_of_a_strip():
+    mesh = grid(7, 2)
+    labels = np.minimum((mesh.vertices[mesh.faces].mean(axis=1)[:, 0] * 3.0001 / np.ptp(mesh.vertices[:, 0])), 2)
+    assert touching_parts(mesh, labels.astype(np.int64)).tolist() == [[0, 1], [1, 2]]
+
+
+def test_a_spectrum_of_another_shape_is_refused():
+    spectrum = solve_spectrum(cotangent_laplacian(icosphere(1)), 5)
+    with pytest.raises(InvalidParameterError, match=r"spectrum must be of the mesh; it has 42 points for 162 vertices"):
+        part_tree(icosphere(2), spectrum)
+
+
+def test_times_widths_and_modes_must_be_positive():
+    mesh = icosphere(1)
+    with pytest.raises(InvalidParameterError, match="time must be positive"):
+        part_tree(mesh, solve_spectrum(cotangent_laplacian(mesh), 5), time=0)
+    with pytest.raises(InvalidParameterError, match="width must be positive"):
+        smooth_boundaries(mesh, two_halves(mesh, 0.0), width=-1.0)
+    with pytest.raises(InvalidParameterError, match="n_modes must be at least 2"):
+        find_parts(mesh, n_modes=1)
+
+
+def test_a_face_without_area_is_refused():
+    flat = TriangleMesh(np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 1, 3]]))
+    with pytest.raises(InvalidShapeError, match="area"):
+        find_parts(flat)
