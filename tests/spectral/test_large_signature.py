@@ -175,6 +175,17 @@ def test_what_is_refused():
         es.approximate_heat_kernel_signature(full, 10, TIMES)
 
 
+def test_eigenvectors_that_run_together_are_refused(monkeypatch):
+    _, laplacian = creature(3000)
+
+    def all_alike(fine, columns, values, report):
+        columns[:] = columns[:, :1]
+
+    monkeypatch.setattr("eigenshape.spectral.large_signature.smooth", all_alike)
+    with pytest.raises(es.ConvergenceError, match="Smoothed eigenvectors must stay independent"):
+        es.approximate_heat_kernel_signature(laplacian, 10, TIMES, n_coarse=400)
+
+
 @pytest.mark.data
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["dragon", "armadillo"])

@@ -8,6 +8,7 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
+from eigenshape._errors import ConvergenceError
 from eigenshape.spectral.coarse_space import CoarseSpace, inverse_diagonal
 from eigenshape.spectral.coarse_space_loops import apply_rows, multiply_rows, smoothing_step
 
@@ -99,7 +100,13 @@ def _smoothed(fine: FineOperator, columns: Columns, values: Float[np.ndarray, " 
 
 
 def rayleigh_ritz(fine: FineOperator, columns: Columns) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, "m m"]]:
-    """Return Ritz values of the columns' span, ascending, and the coefficients of M-orthonormal Ritz vectors."""
+    """Return Ritz values of the columns' span, ascending, and the coefficients of M-orthonormal Ritz vectors.
+
+    Raises
+    ------
+    ConvergenceError
+        If the columns are dependent.
+    """
     m = columns.shape[1]
     gram, projected = np.zeros((m, m)), np.zeros((m, m))
     for first in range(0, len(columns), ROWS):
@@ -109,7 +116,13 @@ def rayleigh_ritz(fine: FineOperator, columns: Columns) -> tuple[Float[np.ndarra
         part = part.astype(np.float64)
         gram += part.T @ (fine.mass[first : first + ROWS, None] * part)
         projected += part.T @ image.astype(np.float64)
-    values, weights = sl.eigh((projected + projected.T) / 2, gram)
+    try:
+        values, weights = sl.eigh((projected + projected.T) / 2, gram)
+    except (ValueError, np.linalg.LinAlgError) as err:  # not finite, or not definite
+        raise ConvergenceError(
+            "Smoothed eigenvectors must stay independent; their Gram matrix is not positive definite. Take "
+            "solve_spectrum and heat_kernel_signature."
+        ) from err
     return values, weights
 
 

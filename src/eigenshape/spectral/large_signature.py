@@ -120,7 +120,7 @@ def approximate_heat_kernel_signature(
     InvalidParameterError
         If k is not in 1..n, a time not positive and finite, the mass not diagonal, or what `solve_spectrum` refuses.
     ConvergenceError
-        If the small operator cannot be solved.
+        If the small operator cannot be solved, or its eigenvectors become dependent on the way up.
     """
     coarse = 1 if n_coarse is None else whole_number(n_coarse, "n_coarse", 1)
     pairs = whole_number(k, "k", 1, laplacian.n_points)
