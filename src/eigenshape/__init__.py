@@ -122,6 +122,7 @@ from eigenshape.operators.neighbors import neighbor_graph
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.retrieval.batch import BatchReport, Item, Workers, build_index
 from eigenshape.retrieval.describe import DescribedShape, describe, describe_mesh, describe_views
+from eigenshape.retrieval.describe_large import DescribedLargeShape, describe_large_mesh
 from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDescriptor
 from eigenshape.retrieval.index import Match, Record, ShapeIndex
 from eigenshape.retrieval.score import match_features, matching_score
@@ -132,6 +133,7 @@ from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.certify import certify
 from eigenshape.spectral.dirichlet import solve_dirichlet
 from eigenshape.spectral.laplacian_laws import check_laplacian
+from eigenshape.spectral.large_signature import ApproximateSignature, approximate_heat_kernel_signature
 from eigenshape.spectral.laws import USUAL, Law, NotJudged, OperatorReport
 from eigenshape.spectral.operator_laws import check_operator
 from eigenshape.spectral.signature import (
@@ -151,11 +153,13 @@ __all__ = [
     "SCALE_FREE",
     "THESIS",
     "USUAL",
+    "ApproximateSignature",
     "BatchReport",
     "Brackets",
     "Camera",
     "Certificate",
     "ConvergenceError",
+    "DescribedLargeShape",
     "DescribedShape",
     "EdgeTable",
     "EigenshapeError",
@@ -195,6 +199,7 @@ __all__ = [
     "TriangleMesh",
     "Workers",
     "anisotropic_laplacian",
+    "approximate_heat_kernel_signature",
     "approximate_spectrum",
     "average_geodesic_distance",
     "ball",
@@ -221,6 +226,7 @@ __all__ = [
     "default_energies",
     "default_times",
     "describe",
+    "describe_large_mesh",
     "describe_mesh",
     "describe_views",
     "dirichlet_laplacian",

@@ -215,3 +215,18 @@ def test_a_match_without_a_file_cannot_be_drawn(database, zoo, tmp_path):
     index.add("loose", [describe_mesh(read_mesh(path)).descriptor])
     done = run("query", index.folder, path, "--sheet", tmp_path / "sheet.png", code=1)
     assert "A match needs its file to be drawn; 'loose' was added without one" in done.stderr
+
+
+def test_features_of_large_meshes_say_how_far_heat_is_off(tmp_path, monkeypatch):
+    monkeypatch.setattr("eigenshape.cli.features.LARGE", 1000)
+    monkeypatch.setattr("eigenshape.spectral.large_signature.LEAST_COARSE", 700)
+    monkeypatch.setattr("eigenshape.spectral.large_signature.PER_PAIR", 4)
+    path = tmp_path / "large.ply"
+    write_mesh(make_creature("hand", n_vertices=2500), path)
+    assert "2,500 vertices: their heat is approximate, off by about" in run("features", path).stderr
+    found = run_json("features", path)
+    assert len(found["features"]) == 15
+    assert 0 < found["heat_error"] < 0.2
+    small = tmp_path / "small.ply"
+    write_mesh(make_creature("hand", n_vertices=900), small)
+    assert run_json("features", small)["heat_error"] is None

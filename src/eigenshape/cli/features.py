@@ -11,6 +11,7 @@ from eigenshape.cli.console import (
     JsonOption,
     MeshArgument,
     RepairOption,
+    err,
     load_mesh,
     print_json,
     print_table,
@@ -24,8 +25,11 @@ from eigenshape.figures.save import require_picture_path, save_figure
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.mesh_files import write_mesh
-from eigenshape.retrieval.describe import describe_mesh
+from eigenshape.retrieval.describe import DescribedShape, describe_mesh
+from eigenshape.retrieval.describe_large import DescribedLargeShape, describe_large_mesh
 from eigenshape.retrieval.descriptor import PRESETS, SCALE_FREE, Recipe
+from eigenshape.spectral.large_signature import LARGE
+from eigenshape.spectral.outcome import Progress
 
 
 def preset(name: str) -> Recipe:
@@ -54,7 +58,10 @@ def features(
     ply: Annotated[Path | None, typer.Option(help="Write the mesh with the heat as colours (PLY).")] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Find the feature points of a mesh and the parts around them, most persistent first."""
+    """Find the feature points of a mesh and the parts around them, most persistent first.
+
+    Beyond 25,000 vertices heat is approximate, and its error is said.
+    """
     recipe = preset(preset_name)
     if picture:
         require_picture_path(picture)
@@ -62,12 +69,16 @@ def features(
         require_color_path(ply)
     surface = load_mesh(mesh, repair)
     with progress_bar("features") as progress:
-        shape = describe_mesh(surface, recipe, progress=progress)
+        shape = _described(surface, recipe, progress)
+    error = shape.error if isinstance(shape, DescribedLargeShape) else None
+    if error is not None:
+        err.print(f"{surface.n_vertices:,} vertices: their heat is approximate, off by about {100 * error:.2g} %")
     by_number = n_regions if persistence is None and not largest_gap else None
     parts = segment(shape.tree, n_regions=by_number, persistence=persistence, largest_gap=largest_gap)
     rows = _rows(shape.mesh, parts)
     if as_json:
-        print_json({"path": str(mesh), "recipe": recipe.name, "features": rows, "face_labels": parts.labels})
+        found = {"path": str(mesh), "recipe": recipe.name, "features": rows, "heat_error": error}
+        print_json(found | {"face_labels": parts.labels})
     else:
         _print(rows)
     if picture:
@@ -76,6 +87,13 @@ def features(
     if ply:
         write_mesh(surface, ply, colors=value_colors(np.log(np.maximum(shape.heat, np.finfo(np.float64).tiny))))
         said(ply)
+
+
+def _described(surface: TriangleMesh, recipe: Recipe, progress: Progress) -> DescribedShape | DescribedLargeShape:
+    """Take a spectrum as far as the thesis does, and approximate heat beyond."""
+    if surface.n_vertices <= LARGE:
+        return describe_mesh(surface, recipe, progress=progress)
+    return describe_large_mesh(surface, recipe, progress=progress)
 
 
 def _rows(mesh: TriangleMesh, parts: Segmentation) -> list[dict[str, Any]]:

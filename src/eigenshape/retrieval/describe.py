@@ -97,7 +97,7 @@ def describe_mesh(
         If the mesh falls into more pieces than the recipe has features, or has a face without area or a vertex
         without face.
     """
-    _require_few_pieces(mesh, recipe)
+    require_few_pieces(mesh, recipe)
     mesh = normalize_box(mesh) if recipe.unit == "box" else mesh
     laplacian = cotangent_laplacian(mesh)
     spectrum = solve_spectrum(laplacian, min(recipe.n_modes, mesh.n_vertices), progress=progress)
@@ -158,7 +158,14 @@ def _time_of_one(spectrum: Spectrum, recipe: Recipe) -> float:
     return float(spectrum.mass.sum()) if recipe.unit == "area" else 1.0
 
 
-def _require_few_pieces(mesh: TriangleMesh, recipe: Recipe) -> None:
+def require_few_pieces(mesh: TriangleMesh, recipe: Recipe) -> None:
+    """Refuse a mesh of more components than features.
+
+    Raises
+    ------
+    InvalidShapeError
+        With their number.
+    """
     count, _ = vertex_components(mesh)
     if count > recipe.n_features:
         raise InvalidShapeError(

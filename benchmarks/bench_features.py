@@ -1,0 +1,209 @@
+"""From a mesh to fifteen feature points with their heat at fifteen times, beside libraries put together for it.
+
+    python benchmarks/bench_features.py                        15,000 to 1.5 million vertices; half an hour
+    python benchmarks/bench_features.py --quick                2,500 vertices, seconds
+    python benchmarks/bench_features.py --json features.json --markdown docs/benchmarks.md
+
+The thesis preset: 300 pairs, heat at fifteen times, the most persistent maxima of the first (thesis 5.4, table 5.3).
+Others have no such call: pyFM's and LaPy's eigenpairs, the sum of the signature (pyFM's own, NumPy's for LaPy), and
+ToMATo of GUDHI on the graph of edges. A library is left out where its last time or memory, in proportion to vertices,
+goes beyond ten minutes or 10 GiB. Each call has a process of its own, after a small one that loads and compiles.
+"""
+
+import argparse
+import datetime
+import json
+import multiprocessing
+import os
+import statistics
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+from gudhi.clustering.tomato import Tomato
+from machine import describe, memory_now, peak_memory
+from spectrum_tables import measured_on, put
+
+import eigenshape as es
+
+FULL = ((15_000, 0), (25_000, 1), (62_500, 2), (93_750, 2))  # vertices of a creature, and how often faces are split
+QUICK = ((2_500, 0),)
+LIMIT, MEMORY = 600.0, 10_000  # seconds and MiB
+ONCE = 20.0  # seconds, from which one run is enough
+K, N_FEATURES = 300, 15
+BEGIN = "<!-- bench_features.py --markdown -->\n"
+HEADER = ("vertices", "method", "CPU s", "wall s", "MiB", "true error", "stated error", "features off")
+
+
+def surface(base: int, splits: int) -> es.TriangleMesh:
+    """Return a giraffe in a unit box, each face split in four so often."""
+    mesh = es.make_creature("giraffe", 1, n_vertices=base)
+    for _ in range(splits):
+        table = es.edge_table(mesh)
+        a, b, c = mesh.faces.T
+        x, y, z = (mesh.n_vertices + table.face_edges).T
+        corners = [(a, z, y), (z, b, x), (y, x, c), (x, y, z)]
+        points = np.concatenate([mesh.vertices, mesh.vertices[table.edges].mean(axis=1)])
+        mesh = es.TriangleMesh(points, np.concatenate([np.column_stack(face) for face in corners]))
+    return es.normalize_box(mesh)
+
+
+def times() -> np.ndarray:
+    """Return the thesis' times."""
+    return es.THESIS.time_unit * np.array(es.THESIS.scales)
+
+
+def ours(mesh: es.TriangleMesh) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return the heat at the first time, the features, and the stated error, as `eigenshape features` does."""
+    if mesh.n_vertices <= 25_000:
+        return exact(mesh)
+    found = es.describe_large_mesh(mesh, es.THESIS)
+    return found.heat, found.descriptor.vertices, found.error
+
+
+def exact(mesh: es.TriangleMesh) -> tuple[np.ndarray, np.ndarray, float]:
+    """Take the certified spectrum."""
+    found = es.describe_mesh(mesh, es.THESIS)
+    return found.heat, found.descriptor.vertices, 0.0
+
+
+def pyfm(mesh: es.TriangleMesh) -> tuple[np.ndarray, np.ndarray, float]:
+    """Take pyFM's spectrum and signature."""
+    from pyFM.mesh import TriMesh
+    from pyFM.signatures.HKS_functions import HKS
+
+    theirs = TriMesh(np.array(mesh.vertices), np.array(mesh.faces)).process(k=K, intrinsic=False)
+    heat = HKS(theirs.eigenvalues, theirs.eigenvectors, times())
+    return heat[:, 0], tomato(mesh, heat[:, 0]), 0.0
+
+
+def lapy(mesh: es.TriangleMesh) -> tuple[np.ndarray, np.ndarray, float]:
+    """Take LaPy's spectrum, of the consistent mass, and sum the signature."""
+    from lapy import Solver, TriaMesh
+
+    values, vectors = Solver(TriaMesh(mesh.vertices, mesh.faces)).eigs(K)
+    heat = vectors**2 @ np.exp(-np.outer(values, times()))
+    return heat[:, 0], tomato(mesh, heat[:, 0]), 0.0
+
+
+def tomato(mesh: es.TriangleMesh, heat: np.ndarray) -> np.ndarray:
+    """Return the vertices of the most persistent maxima, highest first in each of ToMATo's clusters."""
+    graph = sp.csr_array(es.edge_graph(mesh))
+    neighbours = np.split(graph.indices, graph.indptr[1:-1])
+    found = Tomato(graph_type="manual", density_type="manual", n_clusters=N_FEATURES).fit(neighbours, weights=heat)
+    order = np.lexsort((-heat, found.labels_))
+    return order[np.unique(found.labels_[order], return_index=True)[1]]
+
+
+METHODS: dict[str, Callable[[es.TriangleMesh], tuple[np.ndarray, np.ndarray, float]]] = {
+    "eigenshape, certified": exact,
+    "eigenshape": ours,
+    "pyFM and ToMATo": pyfm,
+    "LaPy, NumPy and ToMATo": lapy,
+}
+
+
+def measured(method: str, saved: str, reference: str) -> dict[str, float]:
+    """Return seconds and MiB of one call, and how far it is from the certified one; run in a process of its own."""
+    warnings.simplefilter("ignore")
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    METHODS[method](es.make_creature("hand", n_vertices=1500))
+    if method == "eigenshape":
+        es.approximate_heat_kernel_signature(es.cotangent_laplacian(es.torus(60, 40)), 9, [0.1], n_coarse=300)
+    with np.load(saved) as arrays:
+        mesh = es.TriangleMesh(arrays["vertices"], arrays["faces"])
+    before, wall, cpu = memory_now(), time.perf_counter(), time.process_time()
+    heat, features, stated = METHODS[method](mesh)
+    row = {"wall": time.perf_counter() - wall, "cpu": time.process_time() - cpu, "memory": peak_memory() - before}
+    if method == "eigenshape, certified":
+        np.savez(reference, heat=heat, features=features)
+    return row | {"stated": stated} | compared(mesh, heat, features, reference)
+
+
+def compared(mesh: es.TriangleMesh, heat: np.ndarray, features: np.ndarray, reference: str) -> dict[str, float]:
+    """Return the relative error of the heat, and how many features lie beyond 2 % of √area from the certified ones."""
+    if not Path(reference).exists():
+        return {}
+    with np.load(reference) as arrays:
+        known, points = arrays["heat"], arrays["features"]
+    mass = es.dual_volumes(mesh)
+    apart = np.linalg.norm(mesh.vertices[features][:, None] - mesh.vertices[points], axis=2).min(axis=1)
+    off = apart > 0.02 * np.sqrt(es.surface_area(mesh))
+    return {"true": float(np.sqrt(mass @ (heat - known) ** 2 / (mass @ known**2))), "features_off": int(off.sum())}
+
+
+def rows_of(base: int, splits: int, repeats: int, last: dict[str, np.ndarray]) -> list[dict[str, object]]:
+    """Measure all methods that the limit allows on one surface; the median of each."""
+    mesh, rows = surface(base, splits), []
+    with tempfile.TemporaryDirectory() as folder:
+        saved, reference = str(Path(folder) / "mesh.npz"), str(Path(folder) / "known.npz")
+        np.savez(saved, vertices=mesh.vertices, faces=mesh.faces)
+        for method in METHODS:
+            expected = last.get(method, np.zeros(2)) * mesh.n_vertices
+            row: dict[str, object] = {"n": mesh.n_vertices, "method": method, "expected": expected.tolist()}
+            if method == "eigenshape" or (expected <= [LIMIT, MEMORY]).all():
+                row |= median_of(method, saved, reference, repeats)
+                last[method] = np.array([row["cpu"], row["memory"]]) / mesh.n_vertices
+            rows.append(row)
+            sys.stdout.write(f"{'  '.join(cells(row))}\n")
+            sys.stdout.flush()
+    return rows
+
+
+def median_of(method: str, saved: str, reference: str, repeats: int) -> dict[str, object]:
+    """Return the medians of runs, of one where it is long."""
+    runs: list[dict[str, float]] = []
+    context = multiprocessing.get_context("spawn")
+    while len(runs) < repeats and not (runs and runs[0]["cpu"] > ONCE):
+        with context.Pool(1) as pool:
+            runs.append(pool.apply(measured, (method, saved, reference)))
+    medians = {key: statistics.median(run[key] for run in runs) for key in ("cpu", "wall", "memory")}
+    return {"runs": len(runs)} | runs[0] | medians
+
+
+def cells(row: dict[str, object]) -> list[str]:
+    """Return the texts of one row."""
+    name = [f"{row['n']:,}", str(row["method"])]
+    seconds, mebibytes = row["expected"]
+    if "cpu" not in row:
+        return [*name, f"not run: {seconds:.0f} or more", "", f"{mebibytes:.0f} or more", *[""] * 3]
+    runs = "" if row["runs"] >= 3 else f" ({row['runs']} run{'s' * (row['runs'] > 1)})"
+    true = f"{row['true']:.1e}" if "true" in row else "not known"
+    off = str(row.get("features_off", "not known"))
+    stated = f"{row['stated']:.1e}" if row["stated"] else ""
+    return [*name, f"{row['cpu']:.1f}{runs}", f"{row['wall']:.1f}", f"{row['memory']:.0f}", true, stated, off]
+
+
+def markdown(report: dict[str, object]) -> str:
+    """Return the report as a page's section."""
+    lines = [measured_on(report), "", f"| {' | '.join(HEADER)} |", "|" + "---|" * len(HEADER)]
+    return "\n".join([*lines, *(f"| {' | '.join(cells(row))} |" for row in report["rows"])]) + "\n"
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Measure, print, and write what was asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="a small surface")
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--json", type=Path, help="write all figures")
+    parser.add_argument("--markdown", type=Path, help="write the table; into a page between its two marks")
+    options = parser.parse_args(argv)
+    today = datetime.datetime.now(datetime.UTC).date().isoformat()
+    packages = ["eigenshape", "pyfmaps", "lapy", "gudhi", "numpy", "scipy", "numba"]
+    report, last = {"date": today, "machine": describe(packages), "rows": []}, {}
+    for base, splits in QUICK if options.quick else FULL:
+        report["rows"] += rows_of(base, splits, options.repeats, last)
+    if options.json:
+        options.json.write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n")
+    if options.markdown:
+        put(options.markdown, markdown(report), BEGIN)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,51 @@
+"""The road without a spectrum gives the descriptor of the road with one, nearly."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import eigenshape as es
+
+SMALL_RECIPE = replace(es.SCALE_FREE, n_modes=40)
+COARSE = "eigenshape.spectral.large_signature.LEAST_COARSE"
+
+
+def features_off(mesh, one, two):
+    """Return how far each feature of one description is from the nearest of the other."""
+    apart = mesh.vertices[one.descriptor.vertices][:, None] - mesh.vertices[two.descriptor.vertices]
+    return np.linalg.norm(apart, axis=2).min(axis=1) / np.sqrt(es.surface_area(mesh))
+
+
+@pytest.mark.parametrize("recipe", [SMALL_RECIPE, replace(es.THESIS, n_modes=40)])
+@pytest.mark.parametrize("cut", [False, True])
+def test_the_descriptor_is_nearly_that_of_a_spectrum(monkeypatch, recipe, cut):
+    monkeypatch.setattr(COARSE, 1600)
+    mesh = es.make_creature("quadruped", 2, n_vertices=5500)
+    mesh = es.cut_by_planes(mesh, [[0, 0, 1, 0.3]]).mesh if cut else mesh
+    exact, found = es.describe_mesh(mesh, recipe), es.describe_large_mesh(mesh, recipe)
+    mass = es.dual_volumes(exact.mesh)
+    off = np.sqrt(mass @ (found.heat - exact.heat) ** 2 / (mass @ exact.heat**2))
+    assert 0 < off < 0.01
+    assert off < 1.5 * found.error
+    assert np.array_equal(found.mesh.faces, mesh.faces)
+    near = features_off(exact.mesh, found, exact) < 0.02
+    assert near.sum() >= len(near) - 1
+    assert es.matching_score(found.descriptor, exact.descriptor) < 0.15 * es.matching_score(
+        found.descriptor, es.describe_mesh(es.make_creature("octopus", 0), recipe).descriptor
+    )
+
+
+def test_small_meshes_are_described_as_ever():
+    mesh = es.make_creature("hand", 1, n_vertices=1000)
+    exact, found = es.describe_mesh(mesh, SMALL_RECIPE), es.describe_large_mesh(mesh, SMALL_RECIPE)
+    assert found.descriptor.vectors == pytest.approx(exact.descriptor.vectors, rel=1e-6)
+    assert np.array_equal(found.descriptor.vertices, exact.descriptor.vertices)
+
+
+def test_too_many_pieces_are_refused():
+    ball = es.icosphere(1)
+    many = [ball.vertices + 3 * place for place in range(16)]
+    faces = [ball.faces + ball.n_vertices * place for place in range(16)]
+    with pytest.raises(es.InvalidShapeError, match="at most 15 connected components"):
+        es.describe_large_mesh(es.TriangleMesh(np.concatenate(many), np.concatenate(faces)))
