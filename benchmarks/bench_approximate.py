@@ -3,28 +3,27 @@
     python benchmarks/bench_approximate.py                        all cases (a quarter of an hour)
     python benchmarks/bench_approximate.py --cases sphere-160k --accuracies 0.1 1e-6
     python benchmarks/bench_approximate.py --quick                a small one
-    python benchmarks/bench_approximate.py --json approximate.json
+    python benchmarks/bench_approximate.py --json approximate.json --markdown docs/spectra.md
 
 Each solve runs in a process of its own, on one core, after a small one that loads and compiles; the operator is built
 before the clock starts. MiB: the most that the process held during the solve, beyond what it held before. promised:
 largest residual over the last eigenvalue. true: largest difference to the certified eigenvalues, over the last one.
 """
 
-import argparse
-import json
-import multiprocessing
+import statistics
 import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-from machine import describe, memory_now, peak_memory
+from machine import memory_now, peak_memory
+from report import Report, Row, in_process, options_of
 from spectrum_cases import DATA
-from threadpoolctl import threadpool_limits
 
 import eigenshape as es
+
+COLUMNS = ("operator", "solve", "CPU s", "times as quick", "MiB", "estimated", "bound", "true")
 
 
 @dataclass(frozen=True)
@@ -60,17 +59,16 @@ def solve(laplacian: es.Laplacian, k: int, accuracy: float | None) -> es.Spectru
     )
 
 
-def measured(name: str, accuracy: float | None) -> dict[str, object]:
+def measured(name: str, accuracy: float | None) -> Row:
     """Return what one solve took and found; run in a process of its own."""
     warnings.simplefilter("ignore")
-    with threadpool_limits(1):
-        solve(es.cotangent_laplacian(es.icosphere(5)), 10, accuracy)
-        case = EVERY[name]
-        laplacian = case.make()
-        level = memory_now()
-        cpu, wall = time.process_time(), time.perf_counter()
-        found = solve(laplacian, case.k, accuracy)
-        took = {"cpu": time.process_time() - cpu, "wall": time.perf_counter() - wall, "memory": peak_memory() - level}
+    solve(es.cotangent_laplacian(es.icosphere(5)), 10, accuracy)
+    case = EVERY[name]
+    laplacian = case.make()
+    level = memory_now()
+    cpu, wall = time.process_time(), time.perf_counter()
+    found = solve(laplacian, case.k, accuracy)
+    took = {"cpu": time.process_time() - cpu, "wall": time.perf_counter() - wall, "memory": peak_memory() - level}
     last = float(found.eigenvalues[-1])
     return took | {
         "case": name,
@@ -86,45 +84,43 @@ def measured(name: str, accuracy: float | None) -> dict[str, object]:
     }
 
 
-def rows_of(name: str, accuracies: list[float]) -> list[dict[str, object]]:
-    """Measure a case exactly and at each accuracy."""
-    rows, context = [], multiprocessing.get_context("spawn")
-    for accuracy in (None, *accuracies):
-        with context.Pool(1) as pool:
-            row = pool.apply(measured, (name, accuracy))
+def measure(name: str, report: Report) -> None:
+    """Measure a case exactly and at each accuracy; the median of each."""
+    options = report.options
+    for accuracy in (None, *options.accuracies):
+        runs = [in_process(measured, name, accuracy) for _ in range(options.repeats)]
+        row = runs[0] | {key: statistics.median(run[key] for run in runs) for key in ("cpu", "wall", "memory")}
         values = np.array(row.pop("values"))
-        expected = values if accuracy is None else expected
-        row |= {"true": float(np.abs(values - expected).max() / expected[-1])}
-        rows.append(row)
-        print(line(row, rows[0]["cpu"]), flush=True)
-    return rows
+        exact, known = (row["cpu"], values) if accuracy is None else (exact, known)
+        true = float(np.abs(values - known).max() / known[-1])
+        report.add(row | {"true": true, "times_as_quick": exact / row["cpu"]})
 
 
-def line(row: dict[str, object], exact: float) -> str:
-    """Return a row of the table."""
-    how = "exact" if row["accuracy"] is None else f"to {row['accuracy']:g}"
-    estimated = "" if row["estimated"] is None else f"{row['estimated']:.0e}"
-    return (
-        f"| {row['title']}, n = {row['n']:,}, k = {row['k']} | {how} | {row['cpu']:.1f} | {exact / row['cpu']:.1f} | "
-        f"{row['memory']:.0f} | {estimated} | {row['bound']:.0e} | {row['true']:.0e} |"
-    )
+def cells(row: Row) -> list[str]:
+    """Return the texts of one row."""
+    return [
+        f"{row['title']}, n = {row['n']:,}, k = {row['k']}",
+        "exact" if row["accuracy"] is None else f"to {row['accuracy']:g}",
+        f"{row['cpu']:.1f}",
+        f"{row['times_as_quick']:.1f}",
+        f"{row['memory']:.0f}",
+        "" if row["estimated"] is None else f"{row['estimated']:.0e}",
+        f"{row['bound']:.0e}",
+        "" if row["accuracy"] is None else f"{row['true']:.0e}",
+    ]
 
 
 def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cases", nargs="+", choices=list(EVERY), default=None)
+    """Measure, print, and write what was asked for."""
+    parser = options_of(__doc__)
+    parser.add_argument("--cases", nargs="+", choices=list(EVERY), help="of these, instead of all")
     parser.add_argument("--accuracies", nargs="+", type=float, default=[1e-3])
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--json", type=Path)
-    given = parser.parse_args()
-    names = given.cases or list(QUICK if given.quick else CASES)
-    machine = describe(["numpy", "scipy", "numba"])
-    heads = ["operator", "solve", "CPU s", "times as quick", "MiB", "estimated", "bound", "true"]
-    print(f"| {' | '.join(heads)} |\n|{'---|' * len(heads)}")
-    rows = [row for name in names for row in rows_of(name, given.accuracies)]
-    if given.json:
-        given.json.write_text(json.dumps({"machine": machine, "rows": rows}, indent=1))
+    parser.set_defaults(repeats=1)
+    options = parser.parse_args()
+    report = Report(__file__, ["eigenshape", "numpy", "scipy", "numba"], options, COLUMNS, cells)
+    for name in options.cases or (QUICK if options.quick else CASES):
+        measure(name, report)
+    report.write()
 
 
 if __name__ == "__main__":

@@ -10,30 +10,34 @@ CPU seconds, median; a ratio under 1.4 is a tie. Peers that are not installed ar
 scikit-sparse (CHOLMOD), pypardiso (PARDISO of the MKL).
 """
 
-import argparse
-import datetime
-import json
-import multiprocessing
-import os
 import statistics
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
-from machine import describe, memory_now, peak_memory
+from machine import memory_now, peak_memory
+from report import Report, Row, in_process, options_of
 from scipy.sparse.linalg import splu
-from spectrum_tables import put
 
 import eigenshape as es
 from eigenshape.sparse.elimination import analyse, factorise
 
-BEGIN = "<!-- bench_factor.py --markdown -->\n"
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 PACKAGES = ["eigenshape", "scipy", "cholespy", "scikit-sparse", "pypardiso", "mkl", "numpy", "numba"]
 RIGHT = 8
 LEVELS = 10
+COLUMNS = (
+    "shape, n",
+    "method",
+    "analysis s",
+    "factor s",
+    "8 solves s",
+    "first factor / ours",
+    "solves / ours",
+    "10⁶ entries of L",
+    "GF/s",
+    "MiB",
+)
 Timed = tuple[float | None, float, float]  # seconds of analysis (None where it is part of the factor), factor, solve
 Method = Callable[[sp.csc_array, np.ndarray], tuple[Timed, np.ndarray, dict[str, float]]]
 
@@ -115,26 +119,27 @@ def pardiso(kind: int, a: sp.csc_array, right: np.ndarray) -> tuple[Timed, np.nd
     return (seconds[0], seconds[1], seconds[2]), solution, counts
 
 
-METHODS: dict[str, tuple[str, Method]] = {
-    "eigenshape, LDLᵀ": ("eigenshape", ours),
-    "SuperLU, LU": ("scipy", superlu),
-    "cholespy (CHOLMOD), LLᵀ": ("cholespy", cholespy),
-    "scikit-sparse (CHOLMOD), LLᵀ": ("scikit-sparse", scikit_sparse),
-    "PARDISO, LLᵀ": ("pypardiso", lambda a, right: pardiso(2, a, right)),
-    "PARDISO, LDLᵀ": ("pypardiso", lambda a, right: pardiso(-2, a, right)),
+METHODS: dict[str, Method] = {
+    "eigenshape, LDLᵀ": ours,
+    "SuperLU, LU": superlu,
+    "cholespy (CHOLMOD), LLᵀ": cholespy,
+    "scikit-sparse (CHOLMOD), LLᵀ": scikit_sparse,
+    "PARDISO, LLᵀ": lambda a, right: pardiso(2, a, right),
+    "PARDISO, LDLᵀ": lambda a, right: pardiso(-2, a, right),
 }
 
 
-def measured(name: str, size: int, repeats: int) -> dict[str, object]:
+def measured(name: str, size: int, repeats: int) -> Row:
     """Measure one method on one matrix; run in a process of its own."""
-    method = METHODS[name][1]
+    method, shape = METHODS[name], "icosphere" if size < LEVELS else "Fibonacci sphere"
+    a = matrix(size)
+    of = {"method": name, "shape": shape, "n": a.shape[0]}
     rng = np.random.default_rng(0)
     try:
         small = matrix(2)
         method(small, rng.standard_normal((small.shape[0], RIGHT)))
     except ImportError as error:
-        return {"status": "absent", "reason": str(error)}
-    a = matrix(size)
+        return of | {"status": "absent", "reason": str(error)}
     right = rng.standard_normal((a.shape[0], RIGHT))
     runs, before = [], memory_now()
     for _ in range(repeats):
@@ -142,10 +147,8 @@ def measured(name: str, size: int, repeats: int) -> dict[str, object]:
         runs.append(timed)
         error = np.abs(a @ solution - right).max() / np.abs(right).max()
     analysis, factor, solve = zip(*runs, strict=True)
-    return {
+    return of | {
         "status": "ok",
-        "shape": "icosphere" if size < LEVELS else "Fibonacci sphere",
-        "n": a.shape[0],
         "analysis": statistics.median(analysis) if analysis[0] is not None else None,
         "factor": statistics.median(factor),
         "solve": statistics.median(solve),
@@ -155,78 +158,43 @@ def measured(name: str, size: int, repeats: int) -> dict[str, object]:
     }
 
 
-def in_process(name: str, size: int, repeats: int) -> dict[str, object]:
-    """Measure in a new process with one thread."""
-    os.environ |= dict.fromkeys(THREADS, "1")
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
-        return {"method": name, **pool.apply(measured, (name, size, repeats))}
-
-
-def cells(row: dict[str, object], base: dict[str, object]) -> list[str]:
+def cells(row: Row) -> list[str]:
     """Return the texts of a row."""
+    name = [f"{row['shape']}, {row['n']:,}", row["method"]]
     if row["status"] != "ok":
-        return [row["method"], "absent", *[""] * 7]
-    analysis = "in the factor" if row["analysis"] is None else f"{row['analysis']:.3f}"
-    first, mine = ((r["analysis"] or 0) + r["factor"] for r in (row, base))
-    entries = f"{row['entries'] / 1e6:.2f}" if "entries" in row else ""
-    rate = f"{row['flops'] / row['factor'] / 1e9:.1f}" if "flops" in row else ""
+        return [*name, "absent", *[""] * 7]
     return [
-        row["method"],
-        analysis,
+        *name,
+        "in the factor" if row["analysis"] is None else f"{row['analysis']:.3f}",
         f"{row['factor']:.3f}",
         f"{row['solve']:.4f}",
-        f"{first / mine:.2f}",
-        f"{row['solve'] / base['solve']:.2f}",
-        entries,
-        rate,
+        f"{row['first_ratio']:.2f}",
+        f"{row['solve_ratio']:.2f}",
+        f"{row['entries'] / 1e6:.2f}" if "entries" in row else "",
+        f"{row['flops'] / row['factor'] / 1e9:.1f}" if "flops" in row else "",
         f"{row['memory']:.0f}",
     ]
 
 
-def markdown(report: dict[str, object]) -> str:
-    """Return the table of a report for a page."""
-    machine = report["machine"]
-    versions = ", ".join(f"{name} {number}" for name, number in machine["versions"].items() if number)
-    head = ("method", "analysis s", "factor s", "8 solves s", "first factor / ours", "solves / ours")
-    head = (*head, "10⁶ entries of L", "GF/s", "MiB")
-    lines = [
-        f"Measured {report['date']} on one of {machine['cores']} cores, {machine['cpu']}, load {machine['load'][0]} at "
-        f"the start; {versions}. Medians of {report['repeats']}.",
-        "",
-        f"| shape, n | {' | '.join(head)} |",
-        "|" + "---|" * (len(head) + 1),
-    ]
-    for rows in report["sizes"]:
-        size = f"{rows[0]['shape']}, {rows[0]['n']:,}"
-        for place, row in enumerate(rows):
-            lines.append(f"| {size if not place else ''} | {' | '.join(cells(row, rows[0]))} |")
-    return "\n".join(lines) + "\n"
+def with_ratios(row: Row, mine: Row) -> Row:
+    """Add seconds to a first factor and of solves, over ours."""
+    if row["status"] != "ok":
+        return row
+    first, ours_first = ((r["analysis"] or 0) + r["factor"] for r in (row, mine))
+    return row | {"first_ratio": first / ours_first, "solve_ratio": row["solve"] / mine["solve"]}
 
 
 def main() -> None:
     """Measure, print, and write what was asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="one small sphere")
+    parser = options_of(__doc__)
     parser.add_argument("--sizes", type=int, nargs="+", default=[5, 6, 7, 160_000], help="levels of icospheres, points")
-    parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--json", type=Path, help="write all figures")
-    parser.add_argument("--markdown", type=Path, help="write the table; into a page between its two marks")
     options = parser.parse_args()
-    report = {
-        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-        "machine": describe(PACKAGES),
-        "repeats": options.repeats,
-        "sizes": [],
-    }
+    report = Report(__file__, PACKAGES, options, COLUMNS, cells)
     for size in [3] if options.quick else options.sizes:
-        rows = [in_process(name, size, options.repeats) for name in METHODS]
-        report["sizes"].append(rows)
+        rows = [in_process(measured, name, size, options.repeats) for name in METHODS]
         for row in rows:
-            print(rows[0]["n"], *cells(row, rows[0]), f"error {row.get('error', 0):.0e}", sep="  ", flush=True)
-    if options.json:
-        options.json.write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n")
-    if options.markdown:
-        put(options.markdown, markdown(report), BEGIN)
+            report.add(with_ratios(row, rows[0]))
+    report.write()
 
 
 if __name__ == "__main__":

@@ -10,13 +10,7 @@ ToMATo of GUDHI on the graph of edges. A library is left out where its last time
 goes beyond ten minutes or 10 GiB. Each call has a process of its own, after a small one that loads and compiles.
 """
 
-import argparse
-import datetime
-import json
-import multiprocessing
-import os
 import statistics
-import sys
 import tempfile
 import time
 import warnings
@@ -26,8 +20,8 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 from gudhi.clustering.tomato import Tomato
-from machine import describe, memory_now, peak_memory
-from spectrum_tables import measured_on, put
+from machine import memory_now, peak_memory
+from report import Report, Row, in_process, options_of
 
 import eigenshape as es
 
@@ -36,8 +30,8 @@ QUICK = ((2_500, 0),)
 LIMIT, MEMORY = 600.0, 10_000  # seconds and MiB
 ONCE = 20.0  # seconds, from which one run is enough
 K, N_FEATURES = 300, 15
-BEGIN = "<!-- bench_features.py --markdown -->\n"
-HEADER = ("vertices", "method", "CPU s", "wall s", "MiB", "true error", "stated error", "features off")
+PACKAGES = ["eigenshape", "pyfmaps", "lapy", "gudhi", "numpy", "scipy", "numba"]
+COLUMNS = ("vertices", "method", "CPU s", "wall s", "MiB", "true error", "stated error", "features off")
 
 
 def surface(base: int, splits: int) -> es.TriangleMesh:
@@ -108,11 +102,9 @@ METHODS: dict[str, Callable[[es.TriangleMesh], tuple[np.ndarray, np.ndarray, flo
 }
 
 
-def measured(method: str, saved: str, reference: str) -> dict[str, float]:
+def measured(method: str, saved: str, reference: str) -> Row:
     """Return seconds and MiB of one call, and how far it is from the certified one; run in a process of its own."""
     warnings.simplefilter("ignore")
-    if hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     METHODS[method](es.make_creature("hand", n_vertices=1500))
     if method == "eigenshape":
         es.approximate_heat_kernel_signature(es.cotangent_laplacian(es.torus(60, 40)), 9, [0.1], n_coarse=300)
@@ -126,7 +118,7 @@ def measured(method: str, saved: str, reference: str) -> dict[str, float]:
     return row | {"stated": stated} | compared(mesh, heat, features, reference)
 
 
-def compared(mesh: es.TriangleMesh, heat: np.ndarray, features: np.ndarray, reference: str) -> dict[str, float]:
+def compared(mesh: es.TriangleMesh, heat: np.ndarray, features: np.ndarray, reference: str) -> Row:
     """Return the relative error of the heat, and how many features lie beyond 2 % of √area from the certified ones."""
     if not Path(reference).exists():
         return {}
@@ -138,38 +130,33 @@ def compared(mesh: es.TriangleMesh, heat: np.ndarray, features: np.ndarray, refe
     return {"true": float(np.sqrt(mass @ (heat - known) ** 2 / (mass @ known**2))), "features_off": int(off.sum())}
 
 
-def rows_of(base: int, splits: int, repeats: int, last: dict[str, np.ndarray]) -> list[dict[str, object]]:
+def measure(base: int, splits: int, last: dict[str, np.ndarray], report: Report) -> None:
     """Measure all methods that the limit allows on one surface; the median of each."""
-    mesh, rows = surface(base, splits), []
+    mesh = surface(base, splits)
     with tempfile.TemporaryDirectory() as folder:
         saved, reference = str(Path(folder) / "mesh.npz"), str(Path(folder) / "known.npz")
         np.savez(saved, vertices=mesh.vertices, faces=mesh.faces)
         for method in METHODS:
             expected = last.get(method, np.zeros(2)) * mesh.n_vertices
-            row: dict[str, object] = {"n": mesh.n_vertices, "method": method, "expected": expected.tolist()}
+            row: Row = {"n": mesh.n_vertices, "method": method, "expected": expected.tolist()}
             if method == "eigenshape" or (expected <= [LIMIT, MEMORY]).all():
-                row |= median_of(method, saved, reference, repeats)
+                row |= median_of(method, saved, reference, report.options.repeats)
                 last[method] = np.array([row["cpu"], row["memory"]]) / mesh.n_vertices
-            rows.append(row)
-            sys.stdout.write(f"{'  '.join(cells(row))}\n")
-            sys.stdout.flush()
-    return rows
+            report.add(row)
 
 
-def median_of(method: str, saved: str, reference: str, repeats: int) -> dict[str, object]:
+def median_of(method: str, saved: str, reference: str, repeats: int) -> Row:
     """Return the medians of runs, of one where it is long."""
-    runs: list[dict[str, float]] = []
-    context = multiprocessing.get_context("spawn")
+    runs: list[Row] = []
     while len(runs) < repeats and not (runs and runs[0]["cpu"] > ONCE):
-        with context.Pool(1) as pool:
-            runs.append(pool.apply(measured, (method, saved, reference)))
+        runs.append(in_process(measured, method, saved, reference))
     medians = {key: statistics.median(run[key] for run in runs) for key in ("cpu", "wall", "memory")}
     return {"runs": len(runs)} | runs[0] | medians
 
 
-def cells(row: dict[str, object]) -> list[str]:
+def cells(row: Row) -> list[str]:
     """Return the texts of one row."""
-    name = [f"{row['n']:,}", str(row["method"])]
+    name = [f"{row['n']:,}", row["method"]]
     seconds, mebibytes = row["expected"]
     if "cpu" not in row:
         return [*name, f"not run: {seconds:.0f} or more", "", f"{mebibytes:.0f} or more", *[""] * 3]
@@ -180,29 +167,13 @@ def cells(row: dict[str, object]) -> list[str]:
     return [*name, f"{row['cpu']:.1f}{runs}", f"{row['wall']:.1f}", f"{row['memory']:.0f}", true, stated, off]
 
 
-def markdown(report: dict[str, object]) -> str:
-    """Return the report as a page's section."""
-    lines = [measured_on(report), "", f"| {' | '.join(HEADER)} |", "|" + "---|" * len(HEADER)]
-    return "\n".join([*lines, *(f"| {' | '.join(cells(row))} |" for row in report["rows"])]) + "\n"
-
-
-def main(argv: list[str] | None = None) -> None:
+def main() -> None:
     """Measure, print, and write what was asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="a small surface")
-    parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--json", type=Path, help="write all figures")
-    parser.add_argument("--markdown", type=Path, help="write the table; into a page between its two marks")
-    options = parser.parse_args(argv)
-    today = datetime.datetime.now(datetime.UTC).date().isoformat()
-    packages = ["eigenshape", "pyfmaps", "lapy", "gudhi", "numpy", "scipy", "numba"]
-    report, last = {"date": today, "machine": describe(packages), "rows": []}, {}
+    options, last = options_of(__doc__).parse_args(), {}
+    report = Report(__file__, PACKAGES, options, COLUMNS, cells)
     for base, splits in QUICK if options.quick else FULL:
-        report["rows"] += rows_of(base, splits, options.repeats, last)
-    if options.json:
-        options.json.write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n")
-    if options.markdown:
-        put(options.markdown, markdown(report), BEGIN)
+        measure(base, splits, last, report)
+    report.write()
 
 
 if __name__ == "__main__":

@@ -10,30 +10,22 @@ graph, which returns a label a vertex as we do a label a face. Its complexes are
 documentation advises. Each call has a process of its own, after a small one that loads and compiles.
 """
 
-import argparse
-import datetime
-import json
-import multiprocessing
-import os
 import statistics
-import sys
 import time
 import warnings
 from collections.abc import Callable
-from pathlib import Path
 
 import gudhi
 import numpy as np
 import scipy.sparse as sp
 from gudhi.clustering.tomato import Tomato
-from machine import describe, memory_now, peak_memory
-from spectrum_tables import TIE, measured_on, put
+from machine import memory_now, peak_memory
+from report import Report, Row, in_process, options_of, ratio_text
 
 import eigenshape as es
 
 FULL, QUICK = (15_000, 100_000, 1_000_000), (600,)
-BEGIN = "<!-- bench_merge.py --markdown -->\n"
-HEADER = ("vertices", "function", "method", "CPU s", "ratio", "wall s", "MiB", "maxima")
+COLUMNS = ("vertices, function", "method", "CPU s", "ratio", "wall s", "MiB", "maxima")
 
 
 def surface(n: int) -> es.TriangleMesh:
@@ -98,11 +90,9 @@ METHODS: dict[str, Callable[[es.TriangleMesh, np.ndarray], np.ndarray]] = {
 }
 
 
-def measured(method: str, n: int, function: str) -> dict[str, float]:
+def measured(method: str, n: int, function: str) -> Row:
     """Return seconds and MiB of one call, and what it found; run in a process of its own."""
     warnings.simplefilter("ignore")
-    if hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     small = surface(200)
     METHODS[method](small, values(small, function))
     mesh = surface(n)
@@ -114,14 +104,12 @@ def measured(method: str, n: int, function: str) -> dict[str, float]:
     return found | {"n": mesh.n_vertices, "maxima": len(persistence), "equals_ours": bool(equal)}
 
 
-def rows_of(n: int, function: str, repeats: int) -> list[dict[str, object]]:
+def rows_of(n: int, function: str, repeats: int) -> list[Row]:
     """Measure all methods on one function, taking turns; the median of each."""
-    runs: dict[str, list[dict[str, float]]] = {method: [] for method in METHODS}
-    context = multiprocessing.get_context("spawn")
+    runs: dict[str, list[Row]] = {method: [] for method in METHODS}
     for _ in range(repeats):
         for method, done in runs.items():
-            with context.Pool(1) as pool:
-                done.append(pool.apply(measured, (method, n, function)))
+            done.append(in_process(measured, method, n, function))
     rows = []
     for method, done in runs.items():
         medians = {key: statistics.median(run[key] for run in done) for key in ("cpu", "wall", "memory")}
@@ -129,47 +117,28 @@ def rows_of(n: int, function: str, repeats: int) -> list[dict[str, object]]:
     return [row | {"ratio": row["cpu"] / rows[0]["cpu"]} for row in rows]
 
 
-def cells(row: dict[str, object]) -> list[str]:
+def cells(row: Row) -> list[str]:
     """Return the texts of one row."""
-    tie = " (tie)" if 1 / TIE < row["ratio"] < TIE and row["ratio"] != 1 else ""
     return [
-        f"{row['n']:,}",
-        str(row["function"]),
-        str(row["method"]) + (" (same pairs)" if row["equals_ours"] else ""),
+        f"{row['n']:,}, {row['function']}",
+        row["method"] + (" (same pairs)" if row["equals_ours"] else ""),
         f"{row['cpu']:.3f}",
-        f"{row['ratio']:.1f}{tie}",
+        ratio_text(row["ratio"]),
         f"{row['wall']:.3f}",
         f"{row['memory']:.0f}",
         f"{row['maxima']:,}",
     ]
 
 
-def markdown(report: dict[str, object]) -> str:
-    """Return the report as a page's section."""
-    lines = [measured_on(report), "", f"| {' | '.join(HEADER)} |", "|" + "---|" * len(HEADER)]
-    return "\n".join([*lines, *(f"| {' | '.join(cells(row))} |" for row in report["rows"])]) + "\n"
-
-
-def main(argv: list[str] | None = None) -> None:
+def main() -> None:
     """Measure, print, and write what was asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="a small surface")
-    parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--json", type=Path, help="write all figures")
-    parser.add_argument("--markdown", type=Path, help="write the table; into a page between its two marks")
-    options = parser.parse_args(argv)
-    today = datetime.datetime.now(datetime.UTC).date().isoformat()
-    report = {"date": today, "machine": describe(["eigenshape", "gudhi", "numpy", "scipy", "numba"]), "rows": []}
+    options = options_of(__doc__).parse_args()
+    report = Report(__file__, ["eigenshape", "gudhi", "numpy", "scipy", "numba"], options, COLUMNS, cells)
     for n in QUICK if options.quick else FULL:
         for function in ("waves", "noise"):
-            rows = rows_of(n, function, options.repeats)
-            report["rows"] += rows
-            sys.stdout.write("".join(f"{'  '.join(cells(row))}\n" for row in rows))
-            sys.stdout.flush()
-    if options.json:
-        options.json.write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n")
-    if options.markdown:
-        put(options.markdown, markdown(report), BEGIN)
+            for row in rows_of(n, function, options.repeats):
+                report.add(row)
+    report.write()
 
 
 if __name__ == "__main__":

@@ -8,29 +8,23 @@ that must move, and floating-point operations. The bound of a part is the longer
 a triad, operations at the rate of a large dgemm, both measured in the same run, on one core.
 """
 
-import argparse
-import datetime
-import json
-import os
 import statistics
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from machine import describe
 from numba import njit
-from spectrum_tables import put
+from report import Report, Row, one_core, options_of
 from threadpoolctl import threadpool_limits
 
 import eigenshape as es
 from eigenshape.sparse.elimination import SymmetricFactor
 from eigenshape.spectral import count, factor, lanczos, pairs, pencil, roads
 
-BEGIN = "<!-- bench_parts.py --markdown -->\n"
+COLUMNS = ("shape", "part", "calls", "CPU s", "share", "bound s", "set by", "times the bound")
 REAL = 8  # bytes
 CASES: dict[str, tuple[Callable[[], es.TriangleMesh], int]] = {
     "icosphere": (lambda: es.icosphere(6), 300),
@@ -145,7 +139,7 @@ def rates(size: int) -> dict[str, float]:
     return {"bandwidth": 4 * REAL * size / min(triad), "dgemm": 2 * 1200**3 / min(product)}  # a line written is read
 
 
-def measured(mesh: es.TriangleMesh, k: int, repeats: int, speed: dict[str, float]) -> list[dict[str, object]]:
+def measured(mesh: es.TriangleMesh, k: int, repeats: int, speed: dict[str, float]) -> list[Row]:
     """Return a row for each part, and one for what is in none."""
     laplacian, runs, whole = es.cotangent_laplacian(mesh), [], []
     for _ in range(repeats):
@@ -169,62 +163,30 @@ def measured(mesh: es.TriangleMesh, k: int, repeats: int, speed: dict[str, float
     return [row | {"share": row["seconds"] / total} for row in rows]
 
 
-def cells(row: dict[str, object]) -> list[str]:
+def cells(row: Row) -> list[str]:
     """Return the texts of a row."""
-    texts = [str(row["part"]), str(row["calls"] or ""), f"{row['seconds']:.3f}", f"{100 * row['share']:.0f} %"]
+    texts = [row["case"], row["part"], str(row["calls"] or ""), f"{row['seconds']:.3f}", f"{100 * row['share']:.0f} %"]
     if row["bound"] is None:
         return [*texts, "", "", ""]
     ratio = f"{row['seconds'] / row['bound']:.1f}" if row["bound"] else ""
-    return [*texts, f"{row['bound']:.3f}", str(row["by"]), ratio]
-
-
-def markdown(report: dict[str, Any]) -> str:
-    """Return the table of a report for a page."""
-    machine, speed = report["machine"], report["rates"]
-    head = ("part", "calls", "CPU s", "share", "bound s", "set by", "times the bound")
-    lines = [
-        f"Measured {report['date']} on one of {machine['cores']} cores, {machine['cpu']}, load {machine['load'][0]} at "
-        f"the start: triad {speed['bandwidth'] / 1e9:.1f} GB/s, dgemm {speed['dgemm'] / 1e9:.0f} GF/s. Medians of "
-        f"{report['repeats']}.",
-        "",
-        f"| shape | {' | '.join(head)} |",
-        "|" + "---|" * (len(head) + 1),
-    ]
-    for title, rows in report["cases"].items():
-        for place, row in enumerate(rows):
-            lines.append(f"| {'' if place else title} | {' | '.join(cells(row))} |")
-    return "\n".join(lines) + "\n"
+    return [*texts, f"{row['bound']:.3f}", row["by"], ratio]
 
 
 def main() -> None:
     """Measure, print, and write what was asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="one small sphere")
-    parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--json", type=Path, help="write all figures")
-    parser.add_argument("--markdown", type=Path, help="write the table; into a page between its two marks")
-    options = parser.parse_args()
-    if hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    options = options_of(__doc__).parse_args()
+    one_core()
     with threadpool_limits(1):
         es.solve_spectrum(es.cotangent_laplacian(es.icosphere(4)), 20)  # loads and compiles
-        report: dict[str, Any] = {
-            "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-            "machine": describe(["eigenshape", "numpy", "scipy", "numba"]),
-            "repeats": options.repeats,
-            "rates": rates(2**20 if options.quick else 2**25),
-            "cases": {},
-        }
+        report = Report(__file__, ["eigenshape", "numpy", "scipy", "numba"], options, COLUMNS, cells)
+        speed = rates(2**20 if options.quick else 2**25)
+        told = f"triad {speed['bandwidth'] / 1e9:.1f} GB/s, dgemm {speed['dgemm'] / 1e9:.0f} GF/s"
+        report.figures["settings"] |= {"speed": told, "rates": speed}
         for name, (make, k) in (QUICK if options.quick else CASES).items():
             mesh = make()
-            rows = measured(mesh, k, options.repeats, report["rates"])
-            report["cases"][f"{name}, n = {mesh.n_points:,}, k = {k}"] = rows
-            for row in rows:
-                print(*cells(row), sep="  ", flush=True)
-    if options.json:
-        options.json.write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n")
-    if options.markdown:
-        put(options.markdown, markdown(report), BEGIN)
+            for row in measured(mesh, k, options.repeats, speed):
+                report.add({"case": f"{name}, n = {mesh.n_points:,}, k = {k}"} | row)
+    report.write()
 
 
 if __name__ == "__main__":

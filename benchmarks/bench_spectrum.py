@@ -7,12 +7,12 @@
 
 Every library is called as its documentation does (`spectrum_libraries.py`), each time in a new process with one thread,
 and they take turns: A B C, A B C, A B C. A figure is the median of its repetitions; a ratio to ours under 1.4 is a tie.
+Cases that the JSON file has from an earlier run, and this one has not, are kept there and in the table.
 Ours includes the proof that nothing is missing, theirs prove nothing; so what they return is compared with the
 certified eigenvalues of their own matrices.
 """
 
 import argparse
-import datetime
 import json
 import os
 import statistics
@@ -21,39 +21,28 @@ import sys
 import tempfile
 from pathlib import Path
 
-from machine import describe
+from report import THREADS, Row, dump, new_figures, options_of, put
 from rich.console import Console
 from spectrum_cases import FULL, QUICK, Case
 from spectrum_libraries import LIBRARIES, OURS
-from spectrum_tables import markdown, printed, put
+from spectrum_tables import markdown, printed
 
 import eigenshape as es
 
 WORKER = Path(__file__).with_name("spectrum_worker.py")
 MEDIANS = ("cpu", "wall", "cpu_build", "memory", "memory_peak", "residual")
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "IGL_NUM_THREADS")
 ALSO = ["numpy", "scipy", "numba", "threadpoolctl"]
 
 
 def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     """Read the command line."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = options_of(__doc__)
     parser.add_argument("meshes", nargs="*", type=Path, help="mesh files, instead of the cases")
-    parser.add_argument("--quick", action="store_true", help="small shapes")
     parser.add_argument("--cases", help=f"of {', '.join(FULL)}; with --quick of {', '.join(QUICK)}")
     parser.add_argument("--libraries", help="parts of names, separated by commas; ours is always there")
     parser.add_argument("-k", type=int, help="eigenpairs, instead of what the case has")
-    parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--limit", type=float, default=900.0, help="seconds after which a process is stopped")
-    parser.add_argument(
-        "--json", type=Path, help="write all figures; cases that the file has and this run not are kept"
-    )
     parser.add_argument("--no-run", action="store_true", help="measure nothing, write the table of the JSON")
-    parser.add_argument(
-        "--markdown",
-        type=Path,
-        help="write the table of this run, with the cases that the JSON keeps; into a page between its two marks",
-    )
     return parser.parse_args(argv)
 
 
@@ -79,7 +68,7 @@ def chosen_libraries(options: argparse.Namespace, takes: str) -> list[str]:
     return [OURS[takes], *(name for name in fitting if any(part in name.lower() for part in parts))]
 
 
-def run_worker(task: dict[str, object], limit: float) -> dict[str, object]:
+def run_worker(task: Row, limit: float) -> Row:
     """Measure once in a new process; what goes wrong there is the result."""
     environment = os.environ | dict.fromkeys(THREADS, "1")
     command = [sys.executable, str(WORKER), json.dumps(task)]
@@ -93,7 +82,7 @@ def run_worker(task: dict[str, object], limit: float) -> dict[str, object]:
     return json.loads(done.stdout.strip().splitlines()[-1])
 
 
-def summary(runs: list[dict[str, object]]) -> dict[str, object]:
+def summary(runs: list[Row]) -> Row:
     """Return medians of the runs, and the checks of the first; or why there is none."""
     bad = next((run for run in runs if run["status"] != "ok"), None)
     if bad:
@@ -102,13 +91,13 @@ def summary(runs: list[dict[str, object]]) -> dict[str, object]:
     return runs[0] | medians | {"cpu_runs": [run["cpu"] for run in runs]}
 
 
-def run_case(name: str, case: Case, options: argparse.Namespace, console: Console) -> list[dict[str, object]]:
+def run_case(name: str, case: Case, options: argparse.Namespace, console: Console) -> list[Row]:
     """Measure every library on one case, taking turns, and return a row each."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "shape.npz"
         n = case.save(path)
         k = min(options.k or case.k, n - 1)
-        runs: dict[str, list[dict[str, object]]] = {library: [] for library in chosen_libraries(options, case.takes)}
+        runs: dict[str, list[Row]] = {library: [] for library in chosen_libraries(options, case.takes)}
         core = max(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 0
         for repeat in range(options.repeats):
             for library, done in runs.items():
@@ -124,7 +113,7 @@ def run_case(name: str, case: Case, options: argparse.Namespace, console: Consol
     return with_ratios(rows)
 
 
-def with_ratios(rows: list[dict[str, object]]) -> list[dict[str, object]]:
+def with_ratios(rows: list[Row]) -> list[Row]:
     """Add CPU seconds and memory over ours, which is the first row."""
     ours = rows[0]
     for row in rows:
@@ -134,36 +123,31 @@ def with_ratios(rows: list[dict[str, object]]) -> list[dict[str, object]]:
     return rows
 
 
-def kept(path: Path | None, cases: dict[str, Case]) -> list[dict[str, object]]:
+def kept(path: Path | None, cases: dict[str, Case]) -> list[Row]:
     """Return the rows of an earlier run that this one does not measure again."""
     if path is None or not path.exists():
         return []
     return [row for row in json.loads(path.read_text())["rows"] if row["case"] not in cases]
 
 
-def in_order(rows: list[dict[str, object]]) -> list[dict[str, object]]:
+def in_order(rows: list[Row]) -> list[Row]:
     """Return rows in the order of the cases, those of meshes of one's own at the end."""
     places = {name: place for place, name in enumerate([*FULL, *QUICK])}
     return sorted(rows, key=lambda row: places.get(row["case"], len(places)))
 
 
-def measure(options: argparse.Namespace) -> dict[str, object]:
+def measure(options: argparse.Namespace) -> Row:
     """Run all chosen cases, print each when it is done, and return the report."""
     console, cases = Console(), chosen_cases(options)
     packages = sorted({library.package for library in LIBRARIES.values()})
-    report = {
-        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-        "machine": describe([*packages, *ALSO]),
-        "settings": {"repeats": options.repeats, "limit": options.limit},
-        "calls": {name: library.call for name, library in LIBRARIES.items()},
-        "rows": kept(options.json, cases),
-    }
+    report = new_figures([*packages, *ALSO], repeats=options.repeats, limit=options.limit)
+    report |= {"calls": {name: library.call for name, library in LIBRARIES.items()}, "rows": kept(options.json, cases)}
     for name, case in cases.items():
         rows = run_case(name, case, options, console)
         console.print(printed(rows))
         report["rows"] = in_order(report["rows"] + rows)
         if options.json:
-            options.json.write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n")
+            dump(options.json, report)
     return report
 
 
@@ -173,7 +157,7 @@ def main(argv: list[str] | None = None) -> None:
     report = json.loads(options.json.read_text()) if options.no_run else measure(options)
     report["rows"] = in_order(report["rows"])
     if options.markdown:
-        put(options.markdown, markdown(report))
+        put(options.markdown, markdown(report), Path(__file__).name)
 
 
 if __name__ == "__main__":

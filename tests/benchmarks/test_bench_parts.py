@@ -1,7 +1,5 @@
 """The benchmarks of factors and of the parts of a solve run, and their tables go where they belong."""
 
-import json
-import subprocess
 import sys
 from pathlib import Path
 
@@ -11,24 +9,10 @@ import pytest
 import eigenshape as es
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
-PAGE = "before\n<!-- {0}.py --markdown -->\nold\n<!-- end -->\nbetween\n<!-- other -->\n<!-- end -->\nafter\n"
 
 
-def run(script, folder, *options):
-    report, page = folder / "report.json", folder / "page.md"
-    page.write_text(PAGE.format(script))
-    command = [sys.executable, BENCHMARKS / f"{script}.py", "--quick", "--repeats", "1", *options]
-    subprocess.run([*command, "--json", report, "--markdown", page], check=True, capture_output=True)
-    text = page.read_text()
-    assert "old" not in text
-    assert text.startswith("before\n")
-    assert text.endswith("<!-- end -->\nbetween\n<!-- other -->\n<!-- end -->\nafter\n")
-    return json.loads(report.read_text()), text
-
-
-def test_factors_are_measured_and_what_is_not_installed_is_shown(tmp_path):
-    report, text = run("bench_factor", tmp_path)
-    (rows,) = report["sizes"]
+def test_factors_are_measured_and_what_is_not_installed_is_shown(run_quick):
+    rows, _, text = run_quick("bench_factor.py")
     assert [row["method"] for row in rows[:2]] == ["eigenshape, LDLᵀ", "SuperLU, LU"]
     for row in rows:
         assert row["status"] in ("ok", "absent")
@@ -43,9 +27,8 @@ def test_factors_are_measured_and_what_is_not_installed_is_shown(tmp_path):
     assert text.count("| absent |") == sum(row["status"] == "absent" for row in rows)
 
 
-def test_parts_sum_to_the_whole_and_none_beats_its_bound(tmp_path):
-    report, text = run("bench_parts", tmp_path)
-    (rows,) = report["cases"].values()
+def test_parts_sum_to_the_whole_and_none_beats_its_bound(run_quick):
+    rows, _, text = run_quick("bench_parts.py")
     assert sum(row["share"] for row in rows) == pytest.approx(1.0, abs=1e-6)
     calls = {row["part"]: row["calls"] for row in rows}
     assert calls["order and analysis"] == calls["Ritz vectors"] == 1

@@ -20,6 +20,7 @@ def modules():
     try:
         import bench_spectrum
         import machine
+        import report
         import spectrum_cases
         import spectrum_libraries
         import spectrum_tables
@@ -30,6 +31,7 @@ def modules():
             "cases": spectrum_cases,
             "libraries": spectrum_libraries,
             "machine": machine,
+            "report": report,
             "tables": spectrum_tables,
             "worker": spectrum_worker,
         }
@@ -64,7 +66,7 @@ def test_the_script_runs_and_its_json_has_what_it_should(tmp_path):
         assert row["residual"] < 1e-9
         assert row["wrong"] == row["missing"] == row["missing_by_inertia"] == 0
     assert found["rows"][0]["ratio"] == 1.0
-    assert "| torus, n = 864, k = 12 (2 runs) | eigenshape |" in page.read_text()
+    assert "| torus, n = 864, k = 12, 2 runs | eigenshape |" in page.read_text()
     assert "|  | LaPy, lumped |" in page.read_text()
     again = tmp_path / "again.md"
     subprocess.run([*command[:2], "--no-run", "--json", report, "--markdown", again], check=True)
@@ -156,10 +158,11 @@ def test_a_graph_comes_back_from_its_file(modules, tmp_path):
 
 
 def test_a_section_goes_between_the_marks_of_a_page(modules, tmp_path):
-    tables, page = modules["tables"], tmp_path / "page.md"
-    page.write_text(f"before\n{tables.BEGIN}old\n{tables.END}after\n")
-    tables.put(page, "new\n")
-    tables.put(page, "newer\n")
-    assert page.read_text() == f"before\n{tables.BEGIN}\nnewer\n\n{tables.END}after\n"
-    tables.put(tmp_path / "fresh.md", "new\n")
+    report, page = modules["report"], tmp_path / "page.md"
+    marks = "<!-- x.py --markdown -->\n", "<!-- end -->\n"
+    page.write_text(f"before\n{marks[0]}old\n{marks[1]}after\n")
+    report.put(page, "new\n", "x.py")
+    report.put(page, "newer\n", "x.py")
+    assert page.read_text() == f"before\n{marks[0]}\nnewer\n\n{marks[1]}after\n"
+    report.put(tmp_path / "fresh.md", "new\n", "x.py")
     assert (tmp_path / "fresh.md").read_text() == "new\n"
