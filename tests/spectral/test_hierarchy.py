@@ -67,7 +67,7 @@ def test_coarse_eigenvalues_are_near_and_above():
     coarse = build_levels(laplacian.stiffness, laplacian.mass, 200)[-1]
     exact, found = dense_eigenvalues(laplacian)[:16], dense_eigenvalues(Laplacian(coarse.stiffness, coarse.mass))[:16]
     assert (found > exact - 1e-9).all()  # Rayleigh and Ritz
-    np.testing.assert_allclose(found[1:], exact[1:], rtol=0.01)
+    np.testing.assert_allclose(found[1:], exact[1:], rtol=0.02)
 
 
 def test_the_top_is_a_bound():

@@ -15,13 +15,14 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.certificate import Certificate
+from eigenshape.spectral.certify import require_orthonormal
 from eigenshape.spectral.correction import Coarsest, Tower
 from eigenshape.spectral.device import Device, fetch, open_device, put
 from eigenshape.spectral.hierarchy import Level, build_levels, load
 from eigenshape.spectral.outcome import Progress, require_room, silent, spectrum_of
 from eigenshape.spectral.pairs import Pairs
-from eigenshape.spectral.pencil import Pencil, as_pencil, normalise, rayleigh_residuals
-from eigenshape.spectral.refinement import WIDTH, Goal, refine
+from eigenshape.spectral.pencil import Pencil, as_pencil, normalise, residual_norms
+from eigenshape.spectral.refinement import WIDTH, Goal, refine, settled
 from eigenshape.spectral.roads import proved
 from eigenshape.spectral.shift import factorise_near
 from eigenshape.spectral.spectrum import Spectrum
@@ -35,6 +36,7 @@ COARSEST_PER_PAIR = 30
 COARSENED = 8  # times, at least
 SHIFTS = (0.2, 0.5, 0.75, 0.93)  # of the k-th eigenvalue
 ROUNDS = 100
+SINGLE = 1e-4  # accuracy from which vectors are kept in single precision while they are refined
 INNER_ACCURACY = 0.03  # on levels between, within so many rounds
 INNER_ROUNDS = 3
 
@@ -131,9 +133,9 @@ def _approximated(pencil: Pencil, goal: Goal, device: Device, report: Progress) 
     if start is None:  # no two points are coupled
         return proved(pencil, goal.k, report)
     vectors = np.empty((n, goal.k))
-    vectors[order], change = _climbed(*start, goal, device, report)
-    pairs, certificate = _as_pairs(pencil, vectors)
-    return pairs, replace(certificate, estimate=max(change, 0.0))
+    vectors[order], values, estimate = _climbed(*start, goal, device, report)
+    pairs = Pairs(values, vectors, residual_norms(pencil, values, vectors))
+    return pairs, replace(_uncounted(pencil, pairs), estimate=estimate)
 
 
 def _require_room(pencil: Pencil, k: int, m: int) -> None:
@@ -163,16 +165,18 @@ def _climbed(
     goal: Goal,
     device: Device,
     report: Progress,
-) -> tuple[Float[np.ndarray, "n k"], float]:
-    """Return the lowest eigenvectors of the first level, from those of the last, and what the last round changed."""
-    loaded = [load(device, level, lumped=place == 0) for place, level in enumerate(levels[:-1])]
-    vectors, change = put(device, coarsest.vectors), np.inf
+) -> tuple[Float[np.ndarray, "n k"], Float[np.ndarray, " k"], float]:
+    """Return the lowest eigenvectors of the first level, their values, and an estimate of these' error."""
+    dtype = np.float32 if goal.accuracy >= SINGLE and np.isinf(goal.bound) else np.float64
+    loaded = [load(device, level, dtype, lumped=place == 0) for place, level in enumerate(levels[:-1])]
+    vectors, estimate = put(device, coarsest.vectors), np.inf
     for place in reversed(range(len(loaded))):
         tower = Tower(device, tuple(loaded[place:]), coarsest)
         inner = replace(goal, accuracy=np.inf, bound=INNER_ACCURACY, rounds=INNER_ROUNDS, strict=False)
         here, report_here = inner if place else goal, _in_level(report, place, len(loaded))
-        vectors, values, change = refine(tower, (vectors, values), here, report_here)
-    return fetch(device, vectors[:, : goal.k]), change
+        vectors, values, estimate = refine(tower, (vectors, values), here, report_here)
+    vectors, values = settled(tower, vectors[:, : goal.k], values[: goal.k])
+    return fetch(device, vectors), values, estimate
 
 
 def _in_level(report: Progress, place: int, n_levels: int) -> Callable[[float], None]:
@@ -188,21 +192,15 @@ def _solved_coarsest(level: Level, k: int, m: int) -> tuple[Coarsest, Float[np.n
     return Coarsest(pencil, pairs.vectors, factors), pairs.values
 
 
-def _as_pairs(pencil: Pencil, vectors: Float[np.ndarray, "n k"]) -> tuple[Pairs, Certificate]:
-    values, residuals = rayleigh_residuals(pencil, vectors)
-    order = np.argsort(values, kind="stable")
-    if not np.array_equal(order, np.arange(len(order))):
-        values, vectors, residuals = values[order], vectors[:, order], residuals[order]
-    off = vectors.T @ pencil.weigh(vectors) - np.eye(len(values))
-    certificate = Certificate(
-        n_pairs=len(values),
+def _uncounted(pencil: Pencil, pairs: Pairs) -> Certificate:
+    return Certificate(
+        n_pairs=len(pairs.values),
         shift=np.inf,
         count=None,
-        n_found=len(values),
-        gap=(float(values[-1]), np.inf),
-        resolution=float(residuals.max()),
-        orthonormality=float(np.abs(off).max()),
-        max_residual=float(residuals.max() / max(float(np.abs(values).max()), pencil.level / pencil.n)),
+        n_found=len(pairs.values),
+        gap=(float(pairs.values[-1]), np.inf),
+        resolution=float(pairs.residuals.max()),
+        orthonormality=require_orthonormal(pencil, pairs.vectors),
+        max_residual=float(pairs.residuals.max() / max(float(np.abs(pairs.values).max()), pencil.level / pencil.n)),
         n_split=0,
     )
-    return Pairs(values, vectors, residuals), certificate

@@ -97,7 +97,7 @@ def quality(pencil: Pencil, pairs: Pairs) -> Certificate:
         n_found=len(pairs.values),
         gap=(float(pairs.values[-1]), np.inf),
         resolution=resolution,
-        orthonormality=_require_orthonormal(pencil, pairs.vectors),
+        orthonormality=require_orthonormal(pencil, pairs.vectors),
         max_residual=_require_eigenpairs(pencil, pairs),
         n_split=0,
         clusters=_clusters(pairs.values, resolution),
@@ -168,7 +168,8 @@ def _scale(pencil: Pencil, pairs: Pairs) -> float:
     return max(float(np.abs(pairs.values).max()), pencil.level / pencil.n)
 
 
-def _require_orthonormal(pencil: Pencil, vectors: Float[np.ndarray, "n k"]) -> float:
+def require_orthonormal(pencil: Pencil, vectors: Float[np.ndarray, "n k"]) -> float:
+    """Return the largest entry of ΦᵀBΦ - I; raise a ConvergenceError where it is not small."""
     worst = 0.0
     for columns in column_chunks(vectors.shape[1]):
         weighed = pencil.weigh(vectors[:, columns])

@@ -51,6 +51,13 @@ def correct(tower: Tower, residual: Array, shifts: Float[np.ndarray, " b"], step
     return _smoothed(device, level, (residual, put(device, shifts)), start, steps)
 
 
+def smooth(tower: Tower, residual: Array, shifts: Float[np.ndarray, " b"], steps: int) -> Array:
+    """Return what `correct` does where coarser levels have nothing to add."""
+    level, device = tower.levels[0], tower.device
+    terms = residual, put(device, shifts)
+    return _smoothed(device, level, terms, device.arrays.zeros_like(residual), steps)
+
+
 def _smoothed(device: Device, level: Loaded, terms: tuple[Array, Array], start: Array, steps: int) -> Array:
     """Chebyshev iteration for the eigenvalues from top / spread to top (Saad 2003, algorithm 12.1)."""
     middle, half = (level.top + level.top / level.spread) / 2, (level.top - level.top / level.spread) / 2

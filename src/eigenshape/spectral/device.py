@@ -12,6 +12,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.spectral import multilevel_loops as loops
 
 NAMES = ("cpu", "gpu")
+CPU_ROWS, GPU_ROWS = 4096, 2**20
 
 Array = Any  # of numpy or of CuPy
 
@@ -27,14 +28,17 @@ class Device:
         numpy, or CuPy.
     sparse : module
         scipy.sparse, or cupyx.scipy.sparse.
+    rows : int
+        How many rows of tall products to form at once: as many as its cache holds, or as keep it busy.
     """
 
     name: str
     arrays: Any
     sparse: Any
+    rows: int
 
 
-CPU = Device("cpu", np, sp)
+CPU = Device("cpu", np, sp, CPU_ROWS)
 
 
 def open_device(name: str) -> Device:
@@ -57,7 +61,9 @@ def open_device(name: str) -> Device:
     except Exception as error:  # noqa: BLE001  (the driver's errors are CuPy's own classes)
         return _without_gpu(f"CuPy finds no GPU that it can use ({error}). Install the driver of a CUDA GPU")
     return (
-        Device("gpu", arrays, sparse) if count else _without_gpu("CuPy finds no GPU. Install the driver of a CUDA GPU")
+        Device("gpu", arrays, sparse, 2**20)
+        if count
+        else _without_gpu("CuPy finds no GPU. Install the driver of a CUDA GPU")
     )
 
 
@@ -80,16 +86,21 @@ def put_matrix(device: Device, matrix: sp.sparray, dtype: type) -> Array:
     """Return a sparse matrix by rows on the device, in the precision given."""
     rows = sp.csr_array(matrix)
     rows.sort_indices()
-    parts = (rows.data.astype(dtype), rows.indices.astype(np.int32), rows.indptr.astype(np.int32))
+    parts = (
+        rows.data.astype(dtype, copy=False),
+        rows.indices.astype(np.int32, copy=False),
+        rows.indptr.astype(np.int32, copy=False),
+    )
     return device.sparse.csr_matrix(tuple(put(device, part) for part in parts), shape=rows.shape)
 
 
-def multiply(device: Device, matrix: Array, block: Array, product: Array) -> Array:
-    """Write matrix times block to `product`, and return it."""
+def multiply(device: Device, matrix: Array, block: Array, product: Array, rows: slice | None = None) -> Array:
+    """Write matrix times block, or these rows of it, to `product`, and return it."""
+    some = slice(0, matrix.shape[0]) if rows is None else rows
     if device is CPU:
-        loops.multiply(matrix.indptr, matrix.indices, matrix.data, block, product)
+        loops.multiply(matrix.indptr[some.start : some.stop + 1], matrix.indices, matrix.data, block, product)
     else:
-        product[...] = matrix @ block
+        product[...] = (matrix if rows is None else matrix[some]) @ block
     return product
 
 

@@ -8,11 +8,11 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from eigenshape.spectral.device import Array, Device, put, put_matrix
-from eigenshape.spectral.multilevel_loops import grow_aggregates
+from eigenshape.spectral.multilevel_loops import grow_aggregates, smooth_columns
 
 LARGEST = 64  # points to an aggregate
 TOO_LITTLE = 1.5  # times fewer points, under which another level is not worth its cost
-DEGREE = 1.4  # steps of smoothing per edge that an aggregate is across
+DEGREE = 1.0  # steps of smoothing per edge that an aggregate is across
 MESH_ROW = 7.0  # entries in a row of a triangle mesh, whose steps reach one edge far
 PASSED = 4.0  # points of an aggregate to the wavelength from which functions are kept
 LEAST_RATIO = 2.5  # of the top to the least of these zeros' interval
@@ -49,7 +49,7 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A level on a device: A and M as they are, and A, P and Pᵀ in single precision for corrections."""
+    """A level on a device: A and M as they are, P as vectors are kept, and A, P and Pᵀ in single for corrections."""
 
     stiffness: Array
     mass: Array | None
@@ -88,8 +88,9 @@ def build_levels(stiffness: sp.csr_array, mass: sp.csr_array, n_coarsest: int, *
         stiffness, mass = _projected(up, stiffness, down), _projected(up, mass, down)
 
 
-def load(device: Device, level: Level, *, lumped: bool) -> Loaded:
-    """Put a level that has a way down on a device; `lumped` says that its mass is diagonal."""
+def load(device: Device, level: Level, dtype: type, *, lumped: bool) -> Loaded:
+    """Put a level with a way down on a device; `lumped` says that M is diagonal, `dtype` how vectors are kept."""
+    rough = put_matrix(device, level.down, np.float32)
     diagonal = level.mass.diagonal()[:, None]
     scales = diagonal, 1 / _positive(level.stiffness.diagonal())[:, None]
     return Loaded(
@@ -98,8 +99,8 @@ def load(device: Device, level: Level, *, lumped: bool) -> Loaded:
         weights=put(device, diagonal),
         rough=put_matrix(device, level.stiffness, np.float32),
         rough_scales=(put(device, scales[0].astype(np.float32)), put(device, scales[1].astype(np.float32))),
-        prolong=put_matrix(device, level.down, np.float64),
-        rough_prolong=put_matrix(device, level.down, np.float32),
+        prolong=rough if dtype is np.float32 else put_matrix(device, level.down, dtype),
+        rough_prolong=rough,
         rough_restrict=put_matrix(device, level.up, np.float32),
         top=level.top,
         spread=level.spread,
@@ -124,11 +125,13 @@ def _smoothed(stiffness: sp.csr_array, top: float, columns: sp.csr_array) -> sp.
     size = columns.shape[0] / columns.shape[1]
     row = stiffness.nnz / stiffness.shape[0]
     degree = max(round(DEGREE * np.sqrt(size * MESH_ROW / row)), 1)
-    scaled = sp.csr_array(sp.diags_array(1 / _positive(stiffness.diagonal())) @ stiffness)
     low = top / max(size / PASSED, LEAST_RATIO)
+    matrix, inverse = (stiffness.indptr, stiffness.indices, stiffness.data), 1 / _positive(stiffness.diagonal())
+    rows = columns.indptr, columns.indices, columns.data
     for node in np.cos(np.pi * (2 * np.arange(degree) + 1) / (2 * degree)):
-        columns = columns - scaled @ columns * (2 / (top + low + (top - low) * node))
-    return _by_rows(columns)
+        step = 2 / (top + low + (top - low) * node)
+        rows = smooth_columns(matrix, step * inverse, rows, columns.shape[1])
+    return _by_rows(sp.csr_array((rows[2], rows[1], rows[0]), shape=columns.shape))
 
 
 def _projected(up: sp.csr_array, matrix: sp.csr_array, down: sp.csr_array) -> sp.csr_array:

@@ -1,4 +1,4 @@
-"""Compiled loops of `hierarchy` and `device`: points grown into aggregates, and sparse matrices times blocks."""
+"""Compiled loops of `hierarchy` and `device`: aggregates of points, their smoothed indicators, and products."""
 
 from typing import no_type_check
 
@@ -70,16 +70,69 @@ def _joined(starts, columns, values, labels, counts, least):
 
 @njit(cache=True, nogil=True)
 @no_type_check
+def smooth_columns(matrix, factors, sparse, n_columns):
+    """Return P - diag(factors) A P, both sparse by rows; rows of the result are not sorted."""
+    (starts, columns, values), (old_starts, old_columns, old_values) = matrix, sparse
+    n = len(starts) - 1
+    new_starts = np.zeros(n + 1, dtype=np.int32)
+    new_columns, new_values = np.empty(2 * len(old_values), dtype=np.int32), np.empty(2 * len(old_values))
+    places, height = np.full(n_columns, -1, dtype=np.int64), 0
+    for i in range(n):
+        first = height
+        if height + n_columns > len(new_values):
+            room = _row_bound(starts, columns, old_starts, i)
+            if height + room > len(new_values):
+                new_columns, new_values = _doubled(new_columns, room), _doubled(new_values, room)
+        for entry in range(starts[i] - 1, starts[i + 1]):
+            itself = entry < starts[i]
+            j = i if itself else columns[entry]
+            share = 1.0 if itself else -factors[i] * values[entry]
+            for old in range(old_starts[j], old_starts[j + 1]):
+                c = old_columns[old]
+                if places[c] < first:
+                    places[c] = height
+                    new_columns[height], new_values[height] = c, 0.0
+                    height += 1
+                new_values[places[c]] += share * old_values[old]
+        new_starts[i + 1] = height
+    return new_starts, new_columns[:height].copy(), new_values[:height].copy()
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def _row_bound(starts, columns, old_starts, i):
+    bound = old_starts[i + 1] - old_starts[i]
+    for entry in range(starts[i], starts[i + 1]):
+        bound += old_starts[columns[entry] + 1] - old_starts[columns[entry]]
+    return bound
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def _doubled(array, more):
+    longer = np.empty(2 * len(array) + more, dtype=array.dtype)
+    longer[: len(array)] = array
+    return longer
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
 def multiply(starts, columns, values, block, product):
-    """Write a sparse matrix times a block of columns."""
-    width = block.shape[1]
+    """Write a sparse matrix times a block of columns; `starts` may be that of some rows only."""
     for i in range(len(starts) - 1):
+        _row_product(starts, columns, values, block, i, product)
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def _row_product(starts, columns, values, block, i, product):
+    width = block.shape[1]
+    for c in range(width):
+        product[i, c] = 0
+    for entry in range(starts[i], starts[i + 1]):
+        value, j = values[entry], columns[entry]
         for c in range(width):
-            product[i, c] = 0
-        for entry in range(starts[i], starts[i + 1]):
-            value, j = values[entry], columns[entry]
-            for c in range(width):
-                product[i, c] += value * block[j, c]
+            product[i, c] += value * block[j, c]
 
 
 @njit(cache=True, nogil=True)
@@ -94,12 +147,7 @@ def smoothing_step(matrix, scales, terms, block, step, moved, old, new):
     right, shifts = terms
     width = block.shape[1]
     for i in range(len(starts) - 1):
-        for c in range(width):
-            moved[i, c] = 0
-        for entry in range(starts[i], starts[i + 1]):
-            value, j = values[entry], columns[entry]
-            for c in range(width):
-                moved[i, c] += value * block[j, c]
+        _row_product(starts, columns, values, block, i, moved)
         weight, factor = weights[i, 0], inverse[i, 0] * new
         for c in range(width):
             rest = (right[i, c] - moved[i, c]) + (weight * shifts[c]) * block[i, c]

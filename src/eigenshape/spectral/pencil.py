@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 from eigenshape._errors import InvalidParameterError
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 from eigenshape.sparse.elimination import Elimination, analyse, factorise
+from eigenshape.spectral.residual_loops import quotient_sums, residual_sums
 
 COLUMNS_AT_ONCE = 64
 WIDEST = 1e140  # of two entries on a diagonal: squares of vectors must fit into floats
@@ -233,24 +234,24 @@ def _residuals(
     pencil: Pencil, vectors: Float[np.ndarray, "n k"], given: Float[np.ndarray, " k"] | None
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     values, norms = np.empty(vectors.shape[1]), np.empty(vectors.shape[1])
+    matrices = tuple((part.indptr, part.indices, part.data) for part in (pencil.stiffness, pencil.mass))
     for columns in column_chunks(vectors.shape[1]):
         part = np.ascontiguousarray(vectors[:, columns])
-        weighed, rest = pencil.weigh(part), pencil.stiffness @ part
-        sizes = _column_dots(part, weighed)
-        values[columns] = _column_dots(part, rest) / sizes if given is None else given[columns]
-        rest -= weighed * values[columns]
-        rest *= rest
-        norms[columns] = np.sqrt((1 / pencil.mass_diagonal @ rest) / pencil.mass_floor / sizes)
+        if given is None:
+            products, sizes = sums = np.zeros((2, part.shape[1]))
+            quotient_sums(*matrices, part, sums)
+            values[columns] = products / sizes
+        else:
+            values[columns] = given[columns]
+        squares, sizes = sums = np.zeros((2, part.shape[1]))
+        residual_sums(*matrices, part, values[columns], pencil.mass_diagonal, sums)
+        norms[columns] = np.sqrt(squares / pencil.mass_floor / sizes)
     return values, norms
 
 
 def column_chunks(k: int) -> list[slice]:
     """Cut k columns into slices of few enough that what is computed of them stays small."""
     return [slice(start, min(start + COLUMNS_AT_ONCE, k)) for start in range(0, k, COLUMNS_AT_ONCE)]
-
-
-def _column_dots(left: Float[np.ndarray, "n b"], right: Float[np.ndarray, "n b"]) -> Float[np.ndarray, " b"]:
-    return np.einsum("ij,ij->j", left, right)
 
 
 def finished(pencil: Pencil, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:

@@ -1,4 +1,4 @@
-"""Block Davidson: Rayleigh-Ritz among approximate eigenvectors and their corrections, until residuals are small."""
+"""Block Davidson: Rayleigh-Ritz among approximate eigenvectors and their corrections, until what is left is small."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -7,41 +7,35 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._errors import ConvergenceError
-from eigenshape.spectral.correction import Tower, correct
+from eigenshape.spectral.correction import Tower, correct, smooth
 from eigenshape.spectral.device import Array, fetch, multiply, put
 
 WIDTH = 32  # columns that are corrected at once
-ROWS = 4096  # of a product of tall columns at once
 STEPS = (8, 30)  # of smoothing, fewest and most
-DEPENDENT = 1e-13  # of the largest eigenvalue of a Gram matrix of unit columns
+FIRST_STEPS = 2.0  # of smoothing alone, times the root of what is to be smoothed
+DEPENDENT = {4: 1e-6, 8: 1e-13}  # of the largest eigenvalue of a Gram matrix of unit columns, by their bytes
 PROBES = 8  # random columns of a last look
 PROBE_STEPS = 4
-EARLY = 0.5  # of the bound, under which a pair is left as it is
+MOST_LEFT = 10.0  # times what a round has lowered
+EARLY = 0.5  # of the bound, or:
+EXACT = 0.01  # of the accuracy, under which a residual is left as it is
+UNSEEN = 3.0  # times what is estimated, where only smoothing has been at work
 
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Columns S and their images A S; the first m are the approximate eigenvectors."""
+    """Columns S of approximate eigenvectors, and room for as many that are added to them."""
 
     columns: Array
-    images: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Ritz:
-    """Ritz values of the first columns, the norms of their residuals, and M times the columns where M is full."""
-
-    values: Float[np.ndarray, " m"]
-    residuals: Float[np.ndarray, " m"]
-    weighed: Array | None
+    added: Array
 
 
 @dataclass(frozen=True)
 class Goal:
     """What the first k pairs are to reach, in shares of the k-th eigenvalue, after so many rounds at most.
 
-    The last round lowers no value by more than `accuracy`, and no residual is above `bound`. `least` stands for the
-    eigenvalue where it is smaller: all may be 0.
+    What is left of the values' errors is estimated at no more than `accuracy`, and no residual is above `bound`.
+    `least` stands for the eigenvalue where it is smaller: all may be 0.
     """
 
     k: int
@@ -52,160 +46,240 @@ class Goal:
     strict: bool
 
 
+@dataclass(frozen=True)
+class Standing:
+    """How near the vectors are: the k-th value, the largest residual, and an estimate of the error, in its shares."""
+
+    scale: float
+    worst: float
+    left: float
+
+
 def refine(
     tower: Tower, below: tuple[Array, np.ndarray], goal: Goal, report: Callable[[float], None]
 ) -> tuple[Array, np.ndarray, float]:
-    """Return M-orthonormal Ritz vectors, their values and what the last round lowered these by, refined until the goal.
+    """Return M-orthonormal Ritz vectors, their values and an estimate of these' error, refined until the goal.
 
-    Each round adds to the columns their corrections (`correct`), and keeps the best of both together
-    (Davidson 1975; block form with one block of memory).
+    The vectors come from the next coarser level, which has no more to say about them, so they are smoothed first, and
+    the Ritz vectors of what that leaves taken. Each round then adds to the columns their corrections through all
+    levels (`correct`), and keeps the best of both together (Davidson 1975; block form with one block of memory).
 
     Raises
     ------
     ConvergenceError
         If a strict goal is not reached in its rounds.
     """
-    vectors, values = below
-    space, m, first, change = _prolonged(tower, vectors), len(values), 0.0, np.inf
-    looked = not goal.strict
+    report(0.0)
+    values, m = below[1], len(below[1])
+    space = _prolonged(tower, below[0])
+    standing = _standing(goal, values, _smooth_all(tower, space, values), np.inf, np.inf)
+    before, values = values, _ritz(tower, space, values, slice(0, m))
+    first, looked = standing.worst, not goal.strict
     for done in range(goal.rounds + 1):
-        weighed = _weighed(tower, space.columns[:, :m])
-        state = Ritz(values, _residuals(tower, space, values, weighed), weighed)
-        scale = max(float(values[goal.k - 1]), goal.least)
-        bound, worst = min(goal.bound, np.sqrt(goal.accuracy)) * scale, float(state.residuals[: goal.k].max())
-        reached = change <= goal.accuracy and worst <= goal.bound * scale
-        first = first or worst
+        residuals = _residuals(tower, space, values)
+        lowered = float(np.abs(before - values)[: goal.k].max())
+        standing = _standing(goal, values, residuals, standing.worst, lowered if done else UNSEEN * lowered)
+        bound, worst = min(goal.bound, np.sqrt(goal.accuracy)), standing.worst
+        reached = standing.left <= goal.accuracy and worst <= goal.bound
         if reached and not looked:
-            values = _look_again(tower, space, state, goal.k, min(goal.accuracy, goal.bound) * scale, done)
-            looked = values is state.values
+            least = min(goal.accuracy, goal.bound) * standing.scale
+            before, values = values, _look_again(tower, space, values, goal.k, least, done)
+            looked = values is before
             if not looked:
                 continue
         if reached or (done == goal.rounds and not goal.strict):
-            return space.columns[:, :m], values, change
+            return space.columns, values, standing.left
         report(min(float(np.log(first / worst) / np.log(first / bound)), 0.95) if first > worst > bound else 0.0)
-        # Where no residual tells when a pair is good enough, the change tells, and of every pair.
-        late = np.flatnonzero(state.residuals > (EARLY * bound if np.isfinite(goal.bound) else 0.0))
-        _add_corrections(tower, space, state, late, max(worst / bound, 1.0))
-        before, values = values, _ritz(tower, space, values, m + len(late))
-        change = float((before - values)[: goal.k].max()) / scale
+        enough = EARLY * goal.bound if np.isfinite(goal.bound) else EXACT * goal.accuracy
+        late = np.flatnonzero(residuals > enough * standing.scale)
+        _add_corrections(tower, space, (values, residuals), late, max(worst / bound, 1.0))
+        before, values = values, _ritz(tower, space, values, slice(m, m + len(late)))
     raise ConvergenceError(
-        f"A round must lower no eigenvalue by more than {goal.accuracy:.1e} of the last, and no residual be above "
-        f"{goal.bound:.1e}; after {goal.rounds} rounds these are {change:.1e} and {worst / scale:.1e}. Ask for less "
-        f"accuracy, or take solve_spectrum."
+        f"The error must be estimated at no more than {goal.accuracy:.1e} of the last eigenvalue, and no residual be "
+        f"above {goal.bound:.1e}; after {goal.rounds} rounds these are {standing.left:.1e} and {standing.worst:.1e}. "
+        f"Ask for less accuracy, or take solve_spectrum."
     )
+
+
+def settled(tower: Tower, columns: Array, values: np.ndarray) -> tuple[Array, np.ndarray]:
+    """Return Ritz vectors and values of the columns in double precision."""
+    columns = columns.astype(np.float64)
+    return columns, _ritz(tower, Space(columns, columns[:, :0]), values, slice(0, len(values)))
+
+
+def _standing(goal: Goal, values: np.ndarray, residuals: np.ndarray, before: float, lowered: float) -> Standing:
+    """Judge a round by what it did to the values and to the largest residual.
+
+    Errors go with the squares of residuals. If they fell only as much as those did, by a factor q, then of what the
+    round lowered q / (1 - q) is left; no more than ten times is taken to be left, lest rounding in residuals decides.
+    """
+    scale = max(float(values[goal.k - 1]), goal.least)
+    worst = float(residuals[: goal.k].max()) / scale
+    factor = worst / before if np.isfinite(before) and before > 0 else 1.0
+    return Standing(scale, worst, lowered / scale * min(factor / max(1 - factor, 0.01), MOST_LEFT))
 
 
 def _prolonged(tower: Tower, vectors: Array) -> Space:
     # M and A of the level below are PᵀMP and PᵀAP: P keeps orthonormality and Ritz values.
-    level, device, m = tower.levels[0], tower.device, vectors.shape[1]
-    space = Space(*(device.arrays.empty((level.n, 2 * m)) for _ in range(2)))
-    multiply(device, level.prolong, vectors, space.columns[:, :m])
-    multiply(device, level.stiffness, space.columns[:, :m], space.images[:, :m])
-    return space
+    level, shape = tower.levels[0], (tower.levels[0].n, vectors.shape[1])
+    columns, added = (tower.device.arrays.empty(shape, dtype=level.prolong.dtype) for _ in range(2))
+    return Space(multiply(tower.device, level.prolong, vectors.astype(columns.dtype), columns), added)
 
 
-def _residual_rows(tower: Tower, space: Space, values: Array, weighed: Array | None) -> Iterator[tuple[slice, Array]]:
-    """Give A S - M S θ some rows at a time; `weighed` is M S where M is not diagonal."""
-    m, weights = len(values), tower.levels[0].weights
-    for rows in _row_chunks(tower.levels[0].n):
-        part = space.columns[rows, :m] * weights[rows] if weighed is None else weighed[rows]
-        yield rows, space.images[rows, :m] - part * values
+def _row_chunks(tower: Tower) -> list[slice]:
+    n, rows = tower.levels[0].n, tower.device.rows
+    return [slice(start, min(start + rows, n)) for start in range(0, n, rows)]
 
 
-def _residuals(tower: Tower, space: Space, values: np.ndarray, weighed: Array | None) -> np.ndarray:
-    device, squares = tower.device, tower.device.arrays.zeros(len(values))
-    for rows, rest in _residual_rows(tower, space, put(device, values), weighed):
-        squares += (rest * rest / tower.levels[0].weights[rows]).sum(axis=0)
-    return np.sqrt(fetch(device, squares))
+def _images(tower: Tower, columns: Array) -> Iterator[tuple[slice, Array, Array]]:
+    """Give A and M times columns some rows at a time, in double precision."""
+    level, device = tower.levels[0], tower.device
+    width, arrays = columns.shape[1], device.arrays
+    room = [arrays.empty((min(device.rows, level.n), width)) for _ in range(2)]
+    for rows in _row_chunks(tower):
+        image, weighed = (part[: rows.stop - rows.start] for part in room)
+        multiply(device, level.stiffness, columns, image, rows)
+        if level.mass is None:
+            arrays.multiply(columns[rows], level.weights[rows], out=weighed)
+        else:
+            multiply(device, level.mass, columns, weighed, rows)
+        yield rows, image, weighed
 
 
-def _weighed(tower: Tower, columns: Array) -> Array | None:
-    mass, device = tower.levels[0].mass, tower.device
-    return None if mass is None else multiply(device, mass, columns, device.arrays.empty(columns.shape))
+def _residual_rows(tower: Tower, columns: Array, values: np.ndarray) -> Iterator[tuple[slice, Array]]:
+    """Give A S - M S θ some rows at a time."""
+    known = put(tower.device, values)
+    for rows, image, weighed in _images(tower, columns):
+        tower.device.arrays.multiply(weighed, known, out=weighed)
+        yield rows, tower.device.arrays.subtract(image, weighed, out=image)
 
 
-def _add_corrections(tower: Tower, space: Space, state: Ritz, late: np.ndarray, excess: float) -> None:
-    """Append the corrections of late columns, and their images."""
-    level, device, m = tower.levels[0], tower.device, len(state.values)
-    steps = int(np.clip(np.ceil(0.5 * np.sqrt(level.spread) * np.log(8 * excess)), *STEPS))
-    values, scales = put(device, state.values), put(device, 1 / state.residuals[late])
-    added = space.columns[:, m : m + len(late)]
-    for rows, rest in _residual_rows(tower, space, values, state.weighed):
-        added[rows] = rest[:, late] * scales
+def _residuals(tower: Tower, space: Space, values: np.ndarray) -> Float[np.ndarray, " m"]:
+    """Return the norms of the columns' residuals, in the inverse of M or of its diagonal."""
+    squares = tower.device.arrays.zeros(len(values))
+    for rows, rest in _residual_rows(tower, space.columns, values):
+        squares += _squares(tower, rows, rest)
+    return np.sqrt(fetch(tower.device, squares))
+
+
+def _squares(tower: Tower, rows: slice, rest: Array) -> Array:
+    rest *= rest
+    rest /= tower.levels[0].weights[rows]
+    return rest.sum(axis=0)
+
+
+def _residual_block(
+    tower: Tower, space: Space, some: np.ndarray, values: np.ndarray, scales: np.ndarray
+) -> tuple[Array, Float[np.ndarray, " b"]]:
+    """Return scaled residuals of some columns in single precision, and their norms."""
+    arrays, device = tower.device.arrays, tower.device
+    picked = arrays.empty((len(space.columns), len(some)), dtype=space.columns.dtype)
+    places, factors, squares = put(device, some), put(device, scales), arrays.zeros(len(some))
+    for rows in _row_chunks(tower):
+        picked[rows] = arrays.take(space.columns[rows], places, axis=1)
+    block = arrays.empty(picked.shape, dtype=np.float32)
+    for rows, rest in _residual_rows(tower, picked, values):
+        block[rows] = rest * factors
+        squares += _squares(tower, rows, rest)
+    return block, np.sqrt(fetch(device, squares))
+
+
+def _smooth_all(tower: Tower, space: Space, values: np.ndarray) -> Float[np.ndarray, " m"]:
+    """Smooth the columns, and return the norms of the residuals that they had."""
+    steps, norms = int(np.ceil(FIRST_STEPS * np.sqrt(tower.levels[0].spread))), np.empty(len(values))
+    for start in range(0, len(values), WIDTH):
+        some = np.arange(start, min(start + WIDTH, len(values)))
+        block, norms[some] = _residual_block(tower, space, some, values[some], np.ones(len(some)))
+        corrections = smooth(tower, block, values[some].astype(np.float32), steps)
+        for rows in _row_chunks(tower):
+            space.columns[rows, start : start + len(some)] -= corrections[rows]
+    return norms
+
+
+def _add_corrections(
+    tower: Tower, space: Space, state: tuple[np.ndarray, np.ndarray], late: np.ndarray, excess: float
+) -> None:
+    """Add the corrections of late columns, which have these values and residuals."""
+    steps = int(np.clip(np.ceil(0.5 * np.sqrt(tower.levels[0].spread) * np.log(8 * excess)), *STEPS))
+    values, residuals = state
     for start in range(0, len(late), WIDTH):
-        some = slice(start, min(start + WIDTH, len(late)))
-        shifts = state.values[late[some]].astype(np.float32)
-        added[:, some] = correct(tower, added[:, some].astype(np.float32), shifts, steps)
-    multiply(device, level.stiffness, added, space.images[:, m : m + len(late)])
+        some = late[start : start + WIDTH]
+        block, _ = _residual_block(tower, space, some, values[some], 1 / residuals[some])
+        corrections = correct(tower, block, values[some].astype(np.float32), steps)
+        for rows in _row_chunks(tower):
+            space.added[rows, start : start + len(some)] = corrections[rows]
 
 
-def _look_again(tower: Tower, space: Space, state: Ritz, k: int, bound: float, seed: int) -> Float[np.ndarray, " m"]:
+def _look_again(
+    tower: Tower, space: Space, values: np.ndarray, k: int, bound: float, seed: int
+) -> Float[np.ndarray, " m"]:
     """Look for eigenvectors that the coarser levels cannot see, with columns that know nothing of them.
 
     Some steps of inverse iteration on random columns. Where they lower one of the first k values by half the bound
     or more, they are taken in, and the new values returned; else everything stays as it is.
     """
-    values = state.values
     level, device, m = tower.levels[0], tower.device, len(values)
-    some, shifts = slice(m, m + PROBES), np.zeros(PROBES, dtype=np.float32)
-    block = put(device, np.random.default_rng(seed).standard_normal((level.n, PROBES)).astype(np.float32))
+    shifts = np.zeros(PROBES, dtype=np.float32)
+    block = put(device, np.random.default_rng(seed).standard_normal((level.n, PROBES), dtype=np.float32))
     for _ in range(PROBE_STEPS):
-        block *= level.rough_scales[0]
-        block = correct(tower, block / device.arrays.abs(block).max(axis=0), shifts, STEPS[0])
-    space.columns[:, some] = block
-    multiply(device, level.stiffness, space.columns[:, some], space.images[:, some])
-    lower, weights = _combination(tower, space, values, m + PROBES)
+        block *= level.rough_scales[0] / device.arrays.abs(block).max(axis=0)
+        block = correct(tower, block, shifts, STEPS[0])
+    space = Space(space.columns, block)
+    lower, weights = _combination(tower, space, values, slice(m, m + PROBES))
     if (values[:k] - lower[:k] < 0.5 * bound).all():
         return values
-    _combine(space, weights)
+    _combine(tower, space, weights)
     return lower
 
 
-def _ritz(tower: Tower, space: Space, values: np.ndarray, size: int) -> np.ndarray:
-    """Put the lowest Ritz vectors of so many columns in place of the first, and return their values.
+def _ritz(tower: Tower, space: Space, values: np.ndarray, fresh: slice) -> np.ndarray:
+    """Put the lowest Ritz vectors of all columns, those added up to the last fresh one, in place; return their values.
 
-    The first columns are Ritz vectors already, with the values given.
+    Columns before the fresh ones are Ritz vectors already, with the values given.
     """
-    values, weights = _combination(tower, space, values, size)
-    _combine(space, weights)
+    values, weights = _combination(tower, space, values, fresh)
+    _combine(tower, space, weights)
     return values
 
 
-def _combine(space: Space, weights: Array) -> None:
-    size, known = weights.shape
-    for block in (space.columns, space.images):
-        for rows in _row_chunks(len(block)):
-            block[rows, :known] = block[rows, :size] @ weights
+def _combine(tower: Tower, space: Space, weights: Array) -> None:
+    m, weights = space.columns.shape[1], weights.astype(space.columns.dtype)
+    late = len(weights) - m
+    for rows in _row_chunks(tower):
+        part = space.columns[rows] @ weights[:m]
+        if late:
+            part += space.added[rows, :late].astype(part.dtype) @ weights[m:]
+        space.columns[rows] = part
 
 
-def _combination(tower: Tower, space: Space, values: np.ndarray, size: int) -> tuple[np.ndarray, Array]:
-    """Return the lowest Ritz values of so many columns, as many as are known, and their vectors' coefficients."""
-    arrays, known = tower.device.arrays, len(values)
-    gram, projected = _grams(tower, space, slice(known, size))
+def _combination(tower: Tower, space: Space, values: np.ndarray, fresh: slice) -> tuple[np.ndarray, Array]:
+    """Return the lowest Ritz values of the columns up to the last fresh ones, and their vectors' coefficients."""
+    arrays, known = tower.device.arrays, fresh.start
+    gram, projected = _grams(tower, space, fresh)
     gram[:known, :known] = arrays.eye(known)
-    projected[:known, :known] = arrays.diag(put(tower.device, values))
+    projected[:known, :known] = arrays.diag(put(tower.device, values[:known]))
     scales = 1 / arrays.sqrt(arrays.diagonal(gram))
     sizes, axes = arrays.linalg.eigh(gram * scales * scales[:, None])
-    kept = sizes > DEPENDENT * sizes[-1]
+    kept = sizes > DEPENDENT[space.columns.dtype.itemsize] * sizes[-1]
     axes = (scales[:, None] * axes[:, kept]) / arrays.sqrt(sizes[kept])
     found, weights = arrays.linalg.eigh(axes.T @ projected @ axes)
-    return np.array(fetch(tower.device, found[:known])), axes @ weights[:, :known]
+    m = len(values)
+    return np.array(fetch(tower.device, found[:m])), axes @ weights[:, :m]
 
 
 def _grams(tower: Tower, space: Space, fresh: slice) -> tuple[Array, Array]:
     """Return SᵀMS and SᵀAS, without the block of the columns before the fresh ones."""
-    level, arrays, size = tower.levels[0], tower.device.arrays, fresh.stop
-    weighed = _weighed(tower, space.columns[:, fresh])
+    arrays, size, m = tower.device.arrays, fresh.stop, space.columns.shape[1]
     gram, projected = arrays.zeros((size, size)), arrays.zeros((size, size))
-    for rows in _row_chunks(level.n):
-        part = space.columns[rows, :size]
-        gram[:, fresh] += part.T @ (part[:, fresh] * level.weights[rows] if weighed is None else weighed[rows])
-        projected[:, fresh] += part.T @ space.images[rows, fresh]
+    of = space.columns if fresh.start == 0 else space.added[:, : size - m]
+    for rows, image, weighed in _images(tower, of):
+        for block, start in ((space.columns, 0), (space.added, m)):
+            if start < size:
+                part = block[rows, : size - start].astype(np.float64)
+                places = slice(start, start + part.shape[1])
+                gram[places, fresh] += part.T @ weighed
+                projected[places, fresh] += part.T @ image
     for square in (gram, projected):
         square[fresh, : fresh.start] = square[: fresh.start, fresh].T
         square[fresh, fresh] = (square[fresh, fresh] + square[fresh, fresh].T) / 2
     return gram, projected
-
-
-def _row_chunks(n: int) -> list[slice]:
-    return [slice(start, min(start + ROWS, n)) for start in range(0, n, ROWS)]
