@@ -19,19 +19,22 @@ SHOWN: dict[str, Callable[[Any], str]] = {
     "position": lambda place: "  ".join(f"{coordinate:.4g}" for coordinate in place),
     "heat": lambda heat: f"{heat:.4g}",
     "area_share": lambda share: f"{100 * share:.1f} %",
+    "confidence": lambda share: f"{100 * share:.0f} %",
     "splits_from": lambda part: "none" if part is None else str(part),
     "persistence": lambda persistence: "never merges" if np.isinf(persistence) else f"{persistence:.4g}",
 }
 
 
-def require_paths(picture: Path | None, colored: Path | None) -> None:
-    """Refuse a path that no picture, or no mesh in colours, can be written to, before any work is done."""
+def require_paths(picture: Path | None, colored: Path | None, labels: Path | None = None) -> None:
+    """Refuse a path that no picture, mesh in colours or labels can be written to, before any work is done."""
     if picture:
         require_picture_path(picture)
     if colored and colored.suffix.lower() != ".ply":
         raise InvalidParameterError(f"Colours go to a .ply file; {colored} ends in {colored.suffix!r}.")
     if colored and not colored.absolute().parent.is_dir():
         raise InvalidParameterError(f"A mesh needs a folder to lie in; {colored.absolute().parent} is not there.")
+    if labels and not labels.absolute().parent.is_dir():
+        raise InvalidParameterError(f"Labels need a folder to lie in; {labels.absolute().parent} is not there.")
 
 
 def save_colors(mesh: TriangleMesh, colors: UInt8[np.ndarray, "n 3"], path: Path) -> None:
