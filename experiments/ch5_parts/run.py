@@ -4,9 +4,7 @@ What is done is kept in a folder, so that a stopped run goes on where it was.
 """
 
 import argparse
-import csv
 import json
-import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -20,8 +18,9 @@ from sklearn.manifold import spectral_embedding
 
 import eigenshape as es
 
-HERE = Path(__file__).resolve().parent
-DATA = Path(os.environ.get("EIGENSHAPE_DATA", HERE.parents[2] / "shared" / "data"))
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+from real_shapes import DATA, give_out, manifest, require_data
+
 QUICK = ("ant", "armadillo", "human", "table", "teddy")
 N_TUNED = 5  # first members of each class: constants were chosen on them
 COUNTS = (4, 6, 8, 10)  # clusters tried for the baselines, of which the best on the tuning half is shown
@@ -33,9 +32,7 @@ Labels = np.ndarray
 
 def shapes(quick: bool) -> list[tuple[str, str, Path]]:
     """List name, class and file of the labelled shapes by class and number, or two of each of some classes."""
-    with (DATA / "retrieval" / "manifest.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    found = [(row["cls"], Path(row["path"])) for row in rows]
+    found = [(row["cls"], Path(row["path"])) for row in manifest()]
     labelled = [(cls, path) for cls, path in found if (DATA / "parts" / f"{cls}-{path.stem}.npy").exists()]
     labelled.sort(key=lambda one: (one[0], int(one[1].stem.removeprefix("psb"))))
     if quick:
@@ -180,24 +177,19 @@ def summary(rows: dict[str, dict[str, dict[str, float]]], tuning: set[str]) -> d
     }
 
 
-def main() -> int:
+def main() -> None:
     """Measure every shape, print and save the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help=f"two members of the classes {', '.join(QUICK)}")
     parser.add_argument("--db", type=Path, default=Path("ch5-parts"), help="folder of what is done, kept")
     parser.add_argument("--out", type=Path, default=Path("ch5-parts.json"))
     arguments = parser.parse_args()
-    if not DATA.is_dir():
-        sys.stderr.write(f"real shapes are absent: {DATA} is not a folder (set EIGENSHAPE_DATA)\n")
-        return 1
+    require_data()
     arguments.db.mkdir(parents=True, exist_ok=True)
     wanted = shapes(arguments.quick)
     rows = {name: kept(arguments.db, name, path) for name, _, path in track(wanted, "shapes")}
-    text = json.dumps(summary(rows, tuning_names()), indent=2)
-    sys.stdout.write(text + "\n")
-    arguments.out.write_text(text + "\n")
-    return 0
+    give_out(summary(rows, tuning_names()), arguments.out)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

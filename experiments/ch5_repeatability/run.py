@@ -5,8 +5,6 @@ itself, functional maps stand in.
 """
 
 import argparse
-import json
-import os
 import sys
 from collections import defaultdict
 from dataclasses import dataclass
@@ -19,8 +17,9 @@ from rich.progress import track
 
 import eigenshape as es
 
-HERE = Path(__file__).resolve().parent
-DATA = Path(os.environ.get("EIGENSHAPE_DATA", HERE.parents[2] / "shared" / "data"))
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+from real_shapes import DATA, give_out, require_data
+
 NEAR, N_FEATURES = 0.05, 15
 KINDS, REAL = ("biped", "giraffe", "hand", "quadruped"), ("human/tosca_david", "human/tosca_victoria", "cat/tosca_cat")
 N_POSES, N_VERTICES = 4, 3000
@@ -178,16 +177,15 @@ def panel(mesh: es.TriangleMesh, title: str, to: np.ndarray, reference: tuple[es
     return es.Panel(mesh, f"{title}: {near.sum()} of {len(near)}", colors[parts.labels], parts.features.vertices)
 
 
-def main() -> int:
+def main() -> None:
     """Measure, print and save the tables, and draw."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="two poses of two small creatures")
     parser.add_argument("--out", type=Path, help="write the figures as JSON")
     parser.add_argument("--pictures", type=Path, help="folder for figures 5.2 and 5.3 redrawn")
     arguments = parser.parse_args()
-    if not arguments.quick and not DATA.is_dir():
-        sys.stderr.write(f"real shapes are absent: {DATA} is not a folder (set EIGENSHAPE_DATA)\n")
-        return 1
+    if not arguments.quick:
+        require_data()
     kinds, size = (("biped", "quadruped"), (2, 1500)) if arguments.quick else (KINDS, (N_POSES, N_VERTICES))
     results = {"made": table([measured(*made(kind, *size)) for kind in track(kinds, "made creatures")])}
     if not arguments.quick:
@@ -195,12 +193,8 @@ def main() -> int:
         results["maps"] = {kind: quality_of_maps(kind, N_VERTICES) for kind in KINDS}
     for name, (stem, n_poses) in PICTURES.items() if arguments.pictures else ():
         es.save_figure(picture(stem, n_poses), arguments.pictures / f"{name}.png")
-    text = json.dumps(results, indent=2)
-    sys.stdout.write(text + "\n")
-    if arguments.out:
-        arguments.out.write_text(text + "\n")
-    return 0
+    give_out(results, arguments.out)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -4,9 +4,6 @@ The index is kept in a folder, so that a second run measures without describing 
 """
 
 import argparse
-import csv
-import json
-import os
 import sys
 from functools import partial
 from pathlib import Path
@@ -16,8 +13,9 @@ from rich.progress import Progress, TaskID, track
 
 import eigenshape as es
 
-HERE = Path(__file__).resolve().parent
-DATA = Path(os.environ.get("EIGENSHAPE_DATA", HERE.parents[2] / "shared" / "data"))
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+from real_shapes import DATA, give_out, manifest, require_data
+
 FOUR_LEGGED = frozenset({"fourleg", "horse", "dog", "cat", "wolf", "lion"})
 QUICK = ("ant", "chair", "fish", "glasses", "hand", "octopus", "teddy")
 TOPS = (1, 3, 5)
@@ -32,8 +30,7 @@ def describe_file(path: Path, recipe: es.Recipe, n_views: int) -> list[es.ShapeD
 
 def shapes(quick: bool) -> list[es.Item]:
     """List the shapes of all classes with at least three members, or half of a few classes."""
-    with (DATA / "retrieval" / "manifest.csv").open() as file:
-        rows = list(csv.DictReader(file))
+    rows = manifest()
     sizes = {row["cls"]: sum(other["cls"] == row["cls"] for other in rows) for row in rows}
     kept = [row for row in rows if sizes[row["cls"]] >= 3]
     if quick:
@@ -105,26 +102,21 @@ def tell(bar: Progress, task: TaskID, n_done: int, n_items: int, name: str, erro
         bar.print(f"not taken: {name}: {error}")
 
 
-def main() -> int:
+def main() -> None:
     """Build the index, ask for everything, print and save the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help=f"half of the classes {', '.join(QUICK)}")
     parser.add_argument("--db", type=Path, default=Path("ch5-index"), help="folder of the indexes, kept")
     parser.add_argument("--out", type=Path, default=Path("ch5-results.json"))
     arguments = parser.parse_args()
-    if not DATA.is_dir():
-        sys.stderr.write(f"real shapes are absent: {DATA} is not a folder (set EIGENSHAPE_DATA)\n")
-        return 1
+    require_data()
     items = shapes(arguments.quick)
     results = {}
     for recipe, n_views in ((es.SCALE_FREE, N_VIEWS), (es.THESIS, 0)):
         folder = arguments.db / f"{recipe.name}-{len(items)}"
         results[recipe.name] = measure(items, recipe, n_views, folder)
-    text = json.dumps(results, indent=2)
-    sys.stdout.write(text + "\n")
-    arguments.out.write_text(text + "\n")
-    return 0
+    give_out(results, arguments.out)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

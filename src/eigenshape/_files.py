@@ -11,7 +11,7 @@ from typing import BinaryIO
 from eigenshape._errors import FileFormatError
 
 
-def read_regular(path: Path) -> bytes:
+def read_regular(path: Path, what: str = "a mesh") -> bytes:
     """Read a whole file, refusing what is not one: a folder, a pipe or a device could hang or never end.
 
     Raises
@@ -24,7 +24,7 @@ def read_regular(path: Path) -> bytes:
     _require_regular(path)
     data = path.read_bytes()
     if not data:
-        raise FileFormatError(f"{path} must hold a mesh; it is empty.")
+        raise FileFormatError(f"{path} must hold {what}; it is empty.")
     return data
 
 

@@ -64,7 +64,7 @@ def database(zoo, tmp_path_factory):
 
 def test_help_names_the_verbs():
     text = run("--help").stdout
-    for verb in ("info", "spectrum", "operators", "features", "segment", "index", "query", "demo"):
+    for verb in ("info", "spectrum", "operators", "features", "segment", "label", "index", "query", "demo"):
         assert verb in text
         assert "--help" in run(verb, "--help").stdout
 

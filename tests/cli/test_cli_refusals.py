@@ -11,7 +11,7 @@ from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.surfaces import icosphere
 from eigenshape.io.mesh_files import write_mesh
 
-VERBS = ["info", "spectrum", "features", "segment", "index", "query", "demo"]
+VERBS = ["info", "spectrum", "features", "segment", "label", "index", "query", "demo"]
 BROKEN = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n"
 
 

@@ -7,6 +7,7 @@ from eigenshape.cli.demo import demo
 from eigenshape.cli.features import features
 from eigenshape.cli.index import index
 from eigenshape.cli.info import info
+from eigenshape.cli.label import label
 from eigenshape.cli.operators import operators
 from eigenshape.cli.query import query
 from eigenshape.cli.segment import segment
@@ -20,5 +21,5 @@ app = typer.Typer(
     epilog="Exit codes: 0 done, 1 an error named on stderr, 2 wrong usage, 3 some shapes could not be taken, "
     "130 stopped by Ctrl-C.",
 )
-for verb in (info, spectrum, operators, features, segment, index, query, demo):
+for verb in (info, spectrum, operators, features, segment, label, index, query, demo):
     app.command(no_args_is_help=verb not in (demo, operators))(verb)

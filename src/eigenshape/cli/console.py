@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -16,6 +17,7 @@ from rich.table import Table
 from typer.core import TyperGroup
 
 from eigenshape._errors import EigenshapeError, InvalidParameterError
+from eigenshape.figures.save import save_figure
 from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import REPAIRS, repair
@@ -99,14 +101,6 @@ def repair_names(text: str) -> tuple[str, ...]:
     return names
 
 
-def require_color_path(path: Path) -> None:
-    """Refuse a path that no coloured mesh can be written to, before any work is done."""
-    if path.suffix.lower() != ".ply":
-        raise InvalidParameterError(f"Colours go to a .ply file; {path} ends in {path.suffix!r}.")
-    if not path.absolute().parent.is_dir():
-        raise InvalidParameterError(f"A mesh needs a folder to lie in; {path.absolute().parent} is not there.")
-
-
 def print_json(value: Any) -> None:
     """Print a value as JSON on stdout; arrays become lists, and what is not finite null."""
     typer.echo(json.dumps(_plain(value), indent=2, allow_nan=False))
@@ -153,3 +147,9 @@ def progress_bar(title: str) -> Iterator[Callable[[float, str], None]]:
 def said(path: Path) -> None:
     """Tell on stderr that a file was written."""
     err.print(f"wrote {escape(str(path))}")
+
+
+def save_picture(figure: Figure, path: Path) -> None:
+    """Write a figure, and tell so."""
+    save_figure(figure, path)
+    said(path)

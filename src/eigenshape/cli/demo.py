@@ -8,10 +8,9 @@ import numpy as np
 import typer
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import out, progress_bar, said
+from eigenshape.cli.console import out, progress_bar, save_picture
 from eigenshape.cli.index import WorkersOption, describe_all, describe_file, open_or_create
 from eigenshape.cli.query import CAPTION, contact_sheet, print_matches
-from eigenshape.figures.save import save_figure
 from eigenshape.geometry.creatures import CREATURES, make_creature
 from eigenshape.geometry.sampling import partial_scan
 from eigenshape.io.mesh_files import write_mesh
@@ -58,8 +57,7 @@ def demo(
 
     sheet = folder / "sheet.png"
     caption = f"A partial scan of a {kind} in a new pose, and the most similar shapes: {CAPTION}"
-    save_figure(contact_sheet(shape, "partial scan", matches, caption=caption), sheet)
-    said(sheet)
+    save_picture(contact_sheet(shape, "partial scan", matches, caption=caption), sheet)
     out.print(NEXT.format(scan=scan_path))
 
 

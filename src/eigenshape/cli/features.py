@@ -1,7 +1,7 @@
 """eigenshape features: the points and parts of a shape that persist."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -14,22 +14,27 @@ from eigenshape.cli.console import (
     err,
     load_mesh,
     print_json,
-    print_table,
     progress_bar,
-    require_color_path,
-    said,
+    save_picture,
 )
-from eigenshape.features.segmentation import Segmentation, segment
+from eigenshape.cli.parts import part_rows, print_rows, require_paths, save_colors
+from eigenshape.features.segmentation import segment
 from eigenshape.figures.fields import figure_segments, value_colors
-from eigenshape.figures.save import require_picture_path, save_figure
-from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.mesh_files import write_mesh
 from eigenshape.retrieval.describe import DescribedShape, describe_mesh
 from eigenshape.retrieval.describe_large import DescribedLargeShape, describe_large_mesh
 from eigenshape.retrieval.descriptor import PRESETS, SCALE_FREE, Recipe
 from eigenshape.spectral.large_signature import LARGE
 from eigenshape.spectral.outcome import Progress
+
+COLUMNS = {
+    "feature": "feature",
+    "vertex": "vertex",
+    "position": "position",
+    "heat": "heat",
+    "persistence": "persistence",
+    "area": "area_share",
+}
 
 
 def preset(name: str) -> Recipe:
@@ -63,10 +68,7 @@ def features(
     Beyond 25,000 vertices heat is approximate, and its error is said.
     """
     recipe = preset(preset_name)
-    if picture:
-        require_picture_path(picture)
-    if ply:
-        require_color_path(ply)
+    require_paths(picture, ply)
     surface = load_mesh(mesh, repair)
     with progress_bar("features") as progress:
         shape = _described(surface, recipe, progress)
@@ -75,18 +77,16 @@ def features(
         err.print(f"{surface.n_vertices:,} vertices: their heat is approximate, off by about {100 * error:.2g} %")
     by_number = n_regions if persistence is None and not largest_gap else None
     parts = segment(shape.tree, n_regions=by_number, persistence=persistence, largest_gap=largest_gap)
-    rows = _rows(shape.mesh, parts)
+    rows = [row | {"heat": float(parts.features.values[i])} for i, row in enumerate(part_rows(shape.mesh, parts))]
     if as_json:
         found = {"path": str(mesh), "recipe": recipe.name, "features": rows, "heat_error": error}
         print_json(found | {"face_labels": parts.labels})
     else:
-        _print(rows)
+        print_rows("Feature points", COLUMNS, [row | {"feature": i} for i, row in enumerate(rows)])
     if picture:
-        save_figure(figure_segments(surface, parts.labels, parts.features.vertices), picture)
-        said(picture)
+        save_picture(figure_segments(surface, parts.labels, parts.features.vertices), picture)
     if ply:
-        write_mesh(surface, ply, colors=value_colors(np.log(np.maximum(shape.heat, np.finfo(np.float64).tiny))))
-        said(ply)
+        save_colors(surface, value_colors(np.log(np.maximum(shape.heat, np.finfo(np.float64).tiny))), ply)
 
 
 def _described(surface: TriangleMesh, recipe: Recipe, progress: Progress) -> DescribedShape | DescribedLargeShape:
@@ -94,33 +94,3 @@ def _described(surface: TriangleMesh, recipe: Recipe, progress: Progress) -> Des
     if surface.n_vertices <= LARGE:
         return describe_mesh(surface, recipe, progress=progress)
     return describe_large_mesh(surface, recipe, progress=progress)
-
-
-def _rows(mesh: TriangleMesh, parts: Segmentation) -> list[dict[str, Any]]:
-    areas = np.bincount(parts.labels, weights=face_areas(mesh))
-    points = parts.features
-    return [
-        {
-            "vertex": int(vertex),
-            "position": mesh.vertices[vertex].tolist(),
-            "heat": float(points.values[index]),
-            "persistence": float(points.persistence[index]),
-            "area_share": float(areas[index] / areas.sum()),
-        }
-        for index, vertex in enumerate(points.vertices)
-    ]
-
-
-def _print(rows: list[dict[str, Any]]) -> None:
-    cells = [
-        [
-            str(index),
-            str(row["vertex"]),
-            "  ".join(f"{coordinate:.4g}" for coordinate in row["position"]),
-            f"{row['heat']:.4g}",
-            "never merges" if np.isinf(row["persistence"]) else f"{row['persistence']:.4g}",
-            f"{100 * row['area_share']:.1f} %",
-        ]
-        for index, row in enumerate(rows)
-    ]
-    print_table("Feature points", ["feature", "vertex", "position", "heat", "persistence", "area"], cells)

@@ -20,10 +20,10 @@ from eigenshape.cli.console import (
     print_table,
     progress_bar,
     repair_names,
-    said,
+    save_picture,
 )
 from eigenshape.cli.features import PresetOption, preset
-from eigenshape.figures.save import require_picture_path, save_figure
+from eigenshape.figures.save import require_picture_path
 from eigenshape.figures.sheet import Panel, figure_contact_sheet
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import repair as repair_mesh
@@ -66,8 +66,7 @@ def query(
         out.print(f"described in {described - began:.2f} s, answered in {1000 * (answered - described):.0f} ms")
     if sheet:
         caption = f"{scan.name} and the {len(matches)} most similar shapes in {db.name}: {CAPTION}"
-        save_figure(contact_sheet(shape, scan.stem, matches, repairs=repair_names(repair), caption=caption), sheet)
-        said(sheet)
+        save_picture(contact_sheet(shape, scan.stem, matches, repairs=repair_names(repair), caption=caption), sheet)
 
 
 def _facts(shape: DescribedShape, match: Match) -> dict[str, Any]:

@@ -21,9 +21,10 @@ from eigenshape.cli.console import (
     print_table,
     progress_bar,
     said,
+    save_picture,
 )
 from eigenshape.figures.fields import figure_eigenfunctions
-from eigenshape.figures.save import require_picture_path, save_figure
+from eigenshape.figures.save import require_picture_path
 from eigenshape.figures.spectra import figure_spectrum
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.exact import Condition
@@ -206,12 +207,10 @@ def _print(found: Spectrum, bounds: Brackets | None) -> None:
 
 def _plot(shape: Shape, found: Spectrum, bounds: Brackets | None, path: Path) -> None:
     area = surface_area(shape) if isinstance(shape, TriangleMesh) else None
-    save_figure(figure_spectrum(found, area=area, brackets=bounds), path)
-    said(path)
+    save_picture(figure_spectrum(found, area=area, brackets=bounds), path)
 
 
 def _picture(mesh: TriangleMesh, found: Spectrum, path: Path) -> None:
     first, k = found.certificate.first, len(found.eigenvalues)
     start = min(1, k - 1) if first == 0 else 0  # the lowest is constant
-    save_figure(figure_eigenfunctions(mesh, found, range(start, min(k, start + N_PICTURED))), path)
-    said(path)
+    save_picture(figure_eigenfunctions(mesh, found, range(start, min(k, start + N_PICTURED))), path)

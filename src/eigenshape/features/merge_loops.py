@@ -9,6 +9,8 @@ from typing import no_type_check
 import numpy as np
 from numba import njit
 
+from eigenshape.features.union_loops import find_root
+
 FEW = 48  # sides of a vertex that insertion sorts faster than the general sort
 
 
@@ -78,7 +80,7 @@ def join_faces(corners, starts, lower, owner):
                     climbs_to[face] = climbs_to[owner[side + 1]]
             for side in range(first, last):
                 one, two = climbs_to[owner[side]], climbs_to[owner[side + 1]]
-                root_one, root_two = _top(highest, one), _top(highest, two)
+                root_one, root_two = find_root(highest, one), find_root(highest, two)
                 if root_one != root_two:
                     if _is_lower(corners, root_two, root_one):
                         root_one, root_two, one, two = root_two, root_one, two, one
@@ -88,15 +90,6 @@ def join_faces(corners, starts, lower, owner):
                     n_ended += 1
             first = last + 1
     return climbs_to, ended[:n_ended].copy()
-
-
-@njit(cache=True, nogil=True)
-@no_type_check
-def _top(highest, basin):
-    while highest[basin] != basin:
-        highest[basin] = highest[highest[basin]]
-        basin = highest[basin]
-    return basin
 
 
 @njit(cache=True, nogil=True)

@@ -24,7 +24,7 @@ def join_points(starts, neighbours, order):
         for entry in range(starts[point], starts[point + 1]):
             if place[neighbours[entry]] >= place[point]:
                 continue
-            one, two = _root(root, point), _root(root, neighbours[entry])
+            one, two = find_root(root, point), find_root(root, neighbours[entry])
             if one == two:
                 continue
             if place[one] < place[two]:
@@ -45,7 +45,7 @@ def spanning_forest(ends, order, n):
     root = np.arange(n)
     joins = np.zeros(len(ends), dtype=np.bool_)
     for edge in order:
-        one, two = _root(root, ends[edge, 0]), _root(root, ends[edge, 1])
+        one, two = find_root(root, ends[edge, 0]), find_root(root, ends[edge, 1])
         if one != two:
             root[max(one, two)] = min(one, two)
             joins[edge] = True
@@ -54,7 +54,8 @@ def spanning_forest(ends, order, n):
 
 @njit(cache=True, nogil=True)
 @no_type_check
-def _root(root, point):
+def find_root(root, point):
+    """Return the root of a tree that a point is in, halving the way there (Tarjan and van Leeuwen 1984)."""
     while root[point] != point:
         root[point] = root[root[point]]
         point = root[point]

@@ -3,7 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+import scipy.sparse as sp
+from jaxtyping import Float, Int
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape.features.merge_tree import MergeTree, merge_tree
@@ -69,9 +70,8 @@ def describe(
     -------
     ShapeDescriptor
     """
-    vertices = features.vertices[: recipe.n_features]
-    heat = _time_of_one(spectrum, recipe) * _heat(spectrum, dirichlet, recipe.scales, recipe)[vertices]
-    return ShapeDescriptor(np.log(heat) if recipe.logarithmic else heat, vertices, recipe)
+    unit, times = clock(spectrum.mass, recipe)
+    return _descriptor(_heat(spectrum, dirichlet, times[1:]), features, recipe, unit)
 
 
 def describe_mesh(
@@ -97,16 +97,13 @@ def describe_mesh(
         If the mesh falls into more pieces than the recipe has features, or has a face without area or a vertex
         without face.
     """
-    require_few_pieces(mesh, recipe)
-    mesh = normalize_box(mesh) if recipe.unit == "box" else mesh
-    laplacian = cotangent_laplacian(mesh)
+    mesh, laplacian, held = prepared(mesh, recipe)
     spectrum = solve_spectrum(laplacian, min(recipe.n_modes, mesh.n_vertices), progress=progress)
-    dirichlet = None if recipe.reflections else _with_boundary_fixed(mesh, laplacian, recipe, progress)
-    heat = _heat(spectrum, dirichlet, (recipe.feature_scale,), recipe)[:, 0]
-    tree = merge_tree(mesh, heat)
-    parts = segment(tree, n_regions=recipe.n_features)
-    descriptor = describe(spectrum, parts.features, recipe, dirichlet=dirichlet)
-    return DescribedShape(mesh, spectrum, heat, tree, parts, descriptor)
+    n_free = mesh.n_vertices - len(held)
+    fixed = solve_dirichlet(laplacian, min(recipe.n_modes, n_free), held, progress=progress) if len(held) else None
+    unit, times = clock(laplacian.mass, recipe)
+    heat, later = _heat(spectrum, fixed, times[:1])[:, 0], _heat(spectrum, fixed, times[1:])
+    return DescribedShape(mesh, spectrum, heat, *parts_and_descriptor(mesh, heat, later, recipe, unit))
 
 
 def describe_views(mesh: TriangleMesh, recipe: Recipe = SCALE_FREE, *, n_views: int = N_VIEWS) -> list[ShapeDescriptor]:
@@ -134,37 +131,21 @@ def described_view(mesh: TriangleMesh, recipe: Recipe, view: int) -> tuple[MeshP
     return part, describe_mesh(part.mesh, recipe)
 
 
-def _with_boundary_fixed(
-    mesh: TriangleMesh, laplacian: Laplacian, recipe: Recipe, progress: Progress | None
-) -> Spectrum | None:
-    """Return the Dirichlet spectrum, None where there is no boundary or nothing inside it."""
-    boundary = np.unique(boundary_edges(mesh))
-    n_free = mesh.n_vertices - len(boundary)
-    if not boundary.size or not n_free:
-        return None
-    return solve_dirichlet(laplacian, min(recipe.n_modes, n_free), boundary, progress=progress)
-
-
-def _heat(
-    spectrum: Spectrum, dirichlet: Spectrum | None, scales: tuple[float, ...], recipe: Recipe
-) -> Float[np.ndarray, "n q"]:
-    times = _time_of_one(spectrum, recipe) * recipe.time_unit * np.array(scales)
+def _heat(spectrum: Spectrum, dirichlet: Spectrum | None, times: Float[np.ndarray, " q"]) -> Float[np.ndarray, "n q"]:
     if dirichlet is None:
         return heat_kernel_signature(spectrum, times)
     return reflection_free_signature(spectrum, dirichlet, times)
 
 
-def _time_of_one(spectrum: Spectrum, recipe: Recipe) -> float:
-    return float(spectrum.mass.sum()) if recipe.unit == "area" else 1.0
+def prepared(mesh: TriangleMesh, recipe: Recipe) -> tuple[TriangleMesh, Laplacian, Int[np.ndarray, " c"]]:
+    """Return a mesh as the recipe takes it, its operator, and the boundary of whose reflections to free heat.
 
-
-def require_few_pieces(mesh: TriangleMesh, recipe: Recipe) -> None:
-    """Refuse a mesh of more components than features.
+    There is none where the recipe lets it throw heat back, or where nothing lies inside.
 
     Raises
     ------
     InvalidShapeError
-        With their number.
+        If there are more components than features, with their number.
     """
     count, _ = vertex_components(mesh)
     if count > recipe.n_features:
@@ -172,3 +153,33 @@ def require_few_pieces(mesh: TriangleMesh, recipe: Recipe) -> None:
             f"A shape must have at most {recipe.n_features} connected components to be described; it has {count}. "
             "Repair with weld where they touch, or with largest_component."
         )
+    mesh = normalize_box(mesh) if recipe.unit == "box" else mesh
+    boundary = np.unique(boundary_edges(mesh))
+    loose = recipe.reflections or len(boundary) == mesh.n_vertices
+    return mesh, cotangent_laplacian(mesh), boundary[:0] if loose else boundary
+
+
+def clock(mass: sp.csr_array, recipe: Recipe) -> tuple[float, Float[np.ndarray, " q"]]:
+    """Return what a time of 1 means, and the time of the heat that finds features before those that describe them.
+
+    All in length².
+    """
+    unit = float(mass.sum()) if recipe.unit == "area" else 1.0
+    return unit, unit * recipe.time_unit * np.array([recipe.feature_scale, *recipe.scales])
+
+
+def parts_and_descriptor(
+    mesh: TriangleMesh, heat: Float[np.ndarray, " n"], later: Float[np.ndarray, "n q"], recipe: Recipe, unit: float
+) -> tuple[MergeTree, Segmentation, ShapeDescriptor]:
+    """Cut a shape around the maxima of heat, and describe them by what they keep later."""
+    tree = merge_tree(mesh, heat)
+    parts = segment(tree, n_regions=recipe.n_features)
+    return tree, parts, _descriptor(later, parts.features, recipe, unit)
+
+
+def _descriptor(
+    heat: Float[np.ndarray, "n q"], features: FeaturePoints, recipe: Recipe, unit: float
+) -> ShapeDescriptor:
+    vertices = features.vertices[: recipe.n_features]
+    kept = unit * heat[vertices]
+    return ShapeDescriptor(np.log(kept) if recipe.logarithmic else kept, vertices, recipe)

@@ -19,6 +19,8 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.retrieval.describe import describe
 from eigenshape.retrieval.descriptor import SCALE_FREE
 from eigenshape.retrieval.score import matching_scores, shifted
+from eigenshape.spectral.nonconforming import partly
+from eigenshape.spectral.outcome import Progress
 from eigenshape.spectral.signature import positive_eigenvalues
 from eigenshape.spectral.solver import solve_spectrum
 
@@ -53,7 +55,12 @@ class LabelTransfer:
 
 
 def transfer_labels(
-    source: TriangleMesh, labels: Int[np.ndarray, " f"], target: TriangleMesh, *, n_parts: int | None = None
+    source: TriangleMesh,
+    labels: Int[np.ndarray, " f"],
+    target: TriangleMesh,
+    *,
+    n_parts: int | None = None,
+    progress: Progress | None = None,
 ) -> LabelTransfer:
     """Give the parts of a shape the labels of the parts of another that they match.
 
@@ -73,6 +80,8 @@ def transfer_labels(
     target : TriangleMesh
     n_parts : int, optional
         Parts to cut both shapes into, at most; by default as many as `find_parts` finds on the source.
+    progress : callable, optional
+        Called as progress(fraction_done, message).
 
     Returns
     -------
@@ -87,10 +96,11 @@ def transfer_labels(
     """
     if labels.shape != (source.n_faces,):
         raise InvalidParameterError(f"There must be one label a face, {source.n_faces}; there are {len(labels)}.")
-    found = find_parts(source)
+    found = find_parts(source, progress=partly(progress, 0, 0.25))
     ours = found.parts if n_parts is None else _cut(found, n_parts)
-    theirs = _cut(find_parts(target), len(ours.features.vertices))
-    one, two = _described(target, theirs.labels), _described(source, ours.labels)
+    theirs = _cut(find_parts(target, progress=partly(progress, 0.25, 0.5)), len(ours.features.vertices))
+    one = _described(target, theirs.labels, partly(progress, 0.5, 0.75))
+    two = _described(source, ours.labels, partly(progress, 0.75, 1))
     prices = _prices(one, two)
     matches = _matched(prices, one.apart, two.apart)
     named = _majority(labels, ours.labels, face_areas(source))
@@ -116,8 +126,9 @@ class _DescribedParts:
     apart: Float[np.ndarray, "m m"]
 
 
-def _described(mesh: TriangleMesh, parts: Int[np.ndarray, " f"]) -> _DescribedParts:
-    spectrum = solve_spectrum(cotangent_laplacian(mesh), min(SCALE_FREE.n_modes, mesh.n_vertices))
+def _described(mesh: TriangleMesh, parts: Int[np.ndarray, " f"], progress: Progress | None) -> _DescribedParts:
+    k = min(SCALE_FREE.n_modes, mesh.n_vertices)
+    spectrum = solve_spectrum(cotangent_laplacian(mesh), k, progress=progress)
     ones = np.ones(mesh.n_vertices)
     everywhere = FeaturePoints(np.arange(mesh.n_vertices), ones, ones)
     vectors = describe(spectrum, everywhere, replace(SCALE_FREE, n_features=mesh.n_vertices)).vectors

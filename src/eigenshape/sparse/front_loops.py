@@ -5,15 +5,12 @@ from typing import no_type_check
 import numpy as np
 from numba import njit
 
-from eigenshape.sparse.blas_loops import solve_triangle, subtract_product
+from eigenshape.sparse.dense_loops import LONG, NARROW, eliminate_blocked, eliminate_plain
 from eigenshape.sparse.lane_loops import LANES, subtract_four_sums, subtract_sum
 
 WIDE = 64  # columns to a panel of L
-NARROW = 16  # columns that are eliminated one by one
 SMALL = 40  # rows of a front up to which plain loops are the faster ones
-TALL = 96  # rows of an update at once
 NEAR = 32  # rows of a panel that stay in the nearest cache
-LONG = 256  # terms of a sum in one product: shorter sums round less
 
 
 @njit(cache=True, nogil=True)
@@ -109,9 +106,9 @@ def factor_fronts(lower_ptr, lower_rows, values, first, begins, rows, above, pla
                 for j in range(i + 1):
                     front[target, local[rows[skip + j]]] += stack[given + j]
         if height <= SMALL:
-            sound = _eliminate_plain(front, width, pivots[low:high])
+            sound = eliminate_plain(front, width, pivots[low:high])
         else:
-            sound = _eliminate_blocked(
+            sound = eliminate_blocked(
                 front, width, pivots[low:high], times[: height * width].reshape(height, width), blas
             )
         if not sound:
@@ -132,88 +129,6 @@ def factor_fronts(lower_ptr, lower_rows, values, first, begins, rows, above, pla
             waiting[n_waiting] = s
             n_waiting += 1
     return True
-
-
-@njit(cache=True, nogil=True)
-@no_type_check
-def _eliminate_plain(front, width, pivots):
-    height = len(front)
-    for j in range(width):
-        pivot = front[j, j]
-        if pivot == 0 or not np.isfinite(pivot):
-            return False
-        pivots[j] = pivot
-        front[j, j] = 1.0
-        for i in range(j + 1, height):
-            share = front[i, j] / pivot
-            if share != 0:
-                for k in range(j + 1, i + 1):
-                    front[i, k] -= share * front[k, j]
-        for i in range(j + 1, height):
-            front[i, j] /= pivot
-    return True
-
-
-@njit(cache=True, nogil=True)
-@no_type_check
-def _eliminate_blocked(front, width, pivots, times, blas):
-    """Eliminate by halves: products of matrices take the left half of some columns out of the right half.
-
-    After every NARROW columns those of the largest power of two that has just been filled update as many that follow,
-    which is the order of the recursion. L D goes into `times`.
-    """
-    height = len(front)
-    for start in range(0, width, NARROW):
-        end = min(start + NARROW, width)
-        if not _eliminate_narrow(front, start, end, pivots, times, blas[1]):
-            return False
-        done = (end + NARROW - 1) // NARROW
-        span = (done & -done) * NARROW
-        if end < width:
-            _update(front, times, max(end - span, 0), end, min(end + span, width), blas[0])
-    if width < height:
-        _update(front, times, 0, width, height, blas[0])
-    return True
-
-
-@njit(cache=True, nogil=True)
-@no_type_check
-def _eliminate_narrow(front, start, end, pivots, times, trsm):
-    """Eliminate a few columns, all rows; those to the right are left as they are."""
-    height = len(front)
-    for j in range(start, end):
-        pivot = front[j, j]
-        if pivot == 0 or not np.isfinite(pivot):
-            return False
-        pivots[j] = pivot
-        front[j, j] = 1.0
-        for i in range(j + 1, end):
-            times[i, j] = front[i, j]
-            front[i, j] /= pivot
-            for k in range(j + 1, i + 1):
-                front[i, k] -= times[i, j] * front[k, j]
-    for i in range(end, height):
-        for j in range(start, end):
-            times[i, j] = front[i, j]
-    rest, wide = height - end, times.shape[1]
-    solve_triangle(trsm, (rest, end - start), front, start * height + start, times, end * wide + start)
-    for i in range(end, height):
-        for j in range(start, end):
-            front[i, j] = times[i, j] / pivots[j]
-    return True
-
-
-@njit(cache=True, nogil=True)
-@no_type_check
-def _update(front, times, start, end, stop, gemm):
-    """Take what the columns from start to end contribute out of those from end to stop, on and below the diagonal."""
-    height, wide = len(front), times.shape[1]
-    for low in range(end, height, TALL):
-        high = min(low + TALL, height)
-        for term in range(start, end, LONG):
-            size = (high - low, min(high, stop) - end, min(term + LONG, end) - term)
-            left, right = low * wide + term, end * height + term
-            subtract_product(gemm, size, times, left, front, right, front, low * height + end)
 
 
 @njit(cache=True, nogil=True)

@@ -1,14 +1,17 @@
 """What is wrong with an operator that could not be solved."""
 
+from contextlib import suppress
+
 import numpy as np
 
 from eigenshape._errors import ConvergenceError, InvalidParameterError
-from eigenshape.spectral.factor import Factor, factorise, rounding
+from eigenshape.spectral.count import count_beside
+from eigenshape.spectral.factor import Factor
+from eigenshape.spectral.pairs import Pairs
 from eigenshape.spectral.pencil import Pencil
 
 DIGITS = 1e10  # of W_ii/B_ii from the stiffest point to the softest: beyond it rounding at one hides the other
 BELOW_ZERO = 1e-12  # of the pencil's level
-TRIALS = 6
 LOWER = 8.0
 DEPTH = 60
 
@@ -41,33 +44,28 @@ def _require_near_scales(pencil: Pencil, error: ConvergenceError) -> None:
 
 
 def _require_semidefinite(pencil: Pencil, error: ConvergenceError) -> None:
-    shift = -BELOW_ZERO * pencil.level
-    count = _surely_below(pencil, shift)
-    if not count:
+    first = last = _counted_below(pencil, -BELOW_ZERO * pencil.level)
+    if first is None or last is None:
         return
-    lowest = shift
     for _ in range(DEPTH):
-        lowest *= LOWER
-        if not _surely_below(pencil, lowest):
+        farther = _counted_below(pencil, LOWER * last.shift)
+        if farther is None:
             break
-    high, low, least = pencil.values_out(np.array([shift, lowest / LOWER, lowest]))
+        last = farther
+    high, low, least = pencil.values_out(np.array([first.shift, last.shift, LOWER * last.shift]))
     raise InvalidParameterError(
         f"stiffness must be positive semidefinite; eigenvalue 0 lies between {least:.3g} and {low:.3g}, and "
-        f"{count} lie below {high:.1e}."
+        f"{first.count} lie below {high:.1e}."
     ) from error
 
 
-def _surely_below(pencil: Pencil, shift: float) -> int:
-    """Count eigenvalues that lie below a negative shift whatever the rounding; 0 where that cannot be told.
+def _counted_below(pencil: Pencil, shift: float) -> Factor | None:
+    """Count eigenvalues below a negative value, or one farther off, whatever the rounding; None where none surely is.
 
-    The mirror image of the proof in `certify`: W - σB + S with S beyond the rounding has no more negative pivots than
-    W - σB has negative eigenvalues.
+    No eigenpair is known. 0 and the constant should be one, and `count_beside` keeps rounding away from it.
     """
-    slack = np.zeros(pencil.n)
-    for _ in range(TRIALS):
-        factor: Factor | None = factorise(pencil, shift, -slack)
-        loss = rounding(factor) if factor else np.full(pencil.n, np.abs(shift) * pencil.mass_diagonal)
-        if factor and (loss <= slack).all():
-            return factor.count
-        slack = np.maximum(slack, 3 * loss)
-    return 0
+    constant = np.full((pencil.n, 1), pencil.mass_diagonal.sum() ** -0.5)
+    with suppress(ConvergenceError):
+        found = count_beside(pencil, Pairs(np.zeros(1), constant, np.zeros(1)), 0, shift, most=False)
+        return found if found.count else None
+    return None

@@ -1,0 +1,29 @@
+"""What experiments share: where real shapes lie, which there are, and how figures are given out."""
+
+import csv
+import json
+import os
+import sys
+from pathlib import Path
+
+DATA = Path(os.environ.get("EIGENSHAPE_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+
+
+def manifest() -> list[dict[str, str]]:
+    """Return class and path of each shape."""
+    with (DATA / "retrieval" / "manifest.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+def require_data() -> None:
+    """End where there are no real shapes."""
+    if not DATA.is_dir():
+        sys.exit(f"real shapes are absent: {DATA} is not a folder (set EIGENSHAPE_DATA)")
+
+
+def give_out(results: object, path: Path | None) -> None:
+    """Print figures as JSON, and write them where there is a path."""
+    text = json.dumps(results, indent=2) + "\n"
+    sys.stdout.write(text)
+    if path:
+        path.write_text(text)

@@ -1,0 +1,92 @@
+"""eigenshape label: the labels of one mesh, given to the parts of another."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from eigenshape.cli.console import (
+    JsonOption,
+    MeshArgument,
+    RepairOption,
+    load_mesh,
+    print_json,
+    progress_bar,
+    said,
+    save_picture,
+)
+from eigenshape.cli.parts import part_rows, print_rows, require_paths, save_colors
+from eigenshape.figures.fields import part_colors
+from eigenshape.figures.sheet import figure_label_transfer
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.labels import read_labels, write_labels
+from eigenshape.io.mesh_files import read_mesh
+from eigenshape.retrieval.transfer import LabelTransfer, transfer_labels
+
+COLUMNS = {
+    "part": "part",
+    "label": "label",
+    "confidence": "confidence",
+    "feature point": "vertex",
+    "area": "area_share",
+    "like part": "like_part",
+}
+
+
+def label(
+    mesh: MeshArgument,
+    *,
+    like: Annotated[Path, typer.Option("--like", help="Mesh whose faces have labels.")],
+    labels: Annotated[
+        Path,
+        typer.Option(
+            "--labels", help="Those labels: one whole number a line and face, or .json from `segment --json`."
+        ),
+    ],
+    n_parts: Annotated[
+        int | None,
+        typer.Option("-n", "--n-parts", help="Parts to cut both into, at most; by default as many as found."),
+    ] = None,
+    repair: RepairOption = "",
+    save: Annotated[Path | None, typer.Option(help="Write the labels, one a line and face.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Write the mesh with the labels as colours (PLY).")
+    ] = None,
+    picture: Annotated[Path | None, typer.Option(help="Draw both meshes side by side (PNG, SVG or PDF).")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Give the parts of a mesh the labels of another's: label one horse, get the camel.
+
+    Left and right cannot be told. Repairs are done to the mesh that gets the labels.
+    """
+    require_paths(picture, output, save)
+    given = read_labels(labels)
+    source, target = read_mesh(like), load_mesh(mesh, repair)
+    with progress_bar("label") as progress:
+        found = transfer_labels(source, given, target, n_parts=n_parts, progress=progress)
+    rows = _rows(target, found)
+    if as_json:
+        print_json({"path": str(mesh), "like": str(like), "parts": rows, "face_labels": found.labels})
+    else:
+        print_rows("Labels", COLUMNS, rows)
+    if save:
+        write_labels(found.labels, save)
+        said(save)
+    if output:
+        save_colors(target, part_colors(target, np.searchsorted(np.unique(given), found.labels)), output)
+    if picture:
+        save_picture(figure_label_transfer(source, target, found), picture)
+
+
+def _rows(target: TriangleMesh, found: LabelTransfer) -> list[dict[str, Any]]:
+    return [
+        {
+            "part": number,
+            **row,
+            "label": int(found.part_labels[number]),
+            "confidence": float(found.confidence[number]),
+            "like_part": int(found.matches[number]),
+        }
+        for number, row in enumerate(part_rows(target, found.target))
+    ]

@@ -1,0 +1,60 @@
+"""Labels of faces: a whole number a line, as .seg files have them, or what `eigenshape segment --json` prints."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Int
+
+from eigenshape._errors import FileFormatError
+from eigenshape._files import read_regular, replace_file
+from eigenshape.io.text import INT64, Line, lines_of, shown, whole, whole_table
+
+KEY = "face_labels"
+
+
+def read_labels(path: Path) -> Int[np.ndarray, " f"]:
+    """Read one label a face: a line each, or those under "face_labels" where the suffix is .json.
+
+    Raises
+    ------
+    FileFormatError
+        With the line or the entry that is no whole number, or if there is no such list.
+    OSError
+        If the system cannot open the file.
+    """
+    data = read_regular(path, "labels")
+    try:
+        return _from_json(data) if path.suffix.lower() == ".json" else _from_lines(lines_of(data))
+    except FileFormatError as err:
+        raise type(err)(f"{path}: {err}") from err
+
+
+def write_labels(labels: Int[np.ndarray, " f"], path: Path) -> None:
+    """Write one label a line; the file appears whole or not at all."""
+    replace_file(path, "".join(f"{label}\n" for label in labels.tolist()).encode())
+
+
+def _from_lines(lines: list[Line]) -> Int[np.ndarray, " f"]:
+    table = whole_table(lines)
+    if table is not None and table.shape[1] == 1:
+        return table[:, 0]
+    several = next((line for line in lines if len(line[1].split()) > 1), None)
+    if several:
+        raise FileFormatError(f"A line must hold the label of one face; line {several[0]} is {shown(several)}.")
+    return np.array([whole(line[1], line, "A label") for line in lines], dtype=np.int64)
+
+
+def _from_json(data: bytes) -> Int[np.ndarray, " f"]:
+    try:
+        found: Any = json.loads(data)
+    except (ValueError, RecursionError) as err:
+        raise FileFormatError(f"A .json file of labels must hold JSON; it does not: {err}.") from err
+    labels = found.get(KEY) if isinstance(found, dict) else None
+    if not isinstance(labels, list):
+        raise FileFormatError(f'A .json file of labels must have a list "{KEY}", as `eigenshape segment --json` has.')
+    for place, label in enumerate(labels):
+        if type(label) is not int or not -INT64 <= label < INT64:
+            raise FileFormatError(f"Labels must be whole numbers of 64 bits; that of face {place} is {label!r}.")
+    return np.array(labels, dtype=np.int64)
