@@ -143,10 +143,13 @@ def _lower(indptr: Indices, indices: Indices, order: Indices) -> tuple[Indices, 
     return pointers, rows[kept], kept
 
 
-def factorise(elimination: Elimination, data: Float[np.ndarray, " e"]) -> SymmetricFactor | None:
-    """Factor the matrix with these entries; None where a pivot is zero or not finite."""
+def factorise(
+    elimination: Elimination, data: Float[np.ndarray, " e"], spent: SymmetricFactor | None = None
+) -> SymmetricFactor | None:
+    """Factor the matrix with these entries, in the room of a spent factor; None where a pivot is zero or not finite."""
     e = elimination
-    panels, pivots = np.empty(e.n_entries), np.empty(len(e.order))
+    panels = np.empty(e.n_entries) if spent is None else spent.panels  # fresh pages cost half as much as a factor
+    pivots = np.empty(len(e.order))
     lower = e.lower_ptr, e.lower_rows, data[e.source]
     tree = e.first, e.begins, e.rows, e.above, e.places
     sound = fronts.factor_fronts(*lower, *tree, panels, pivots, e.workspace, addresses())

@@ -21,7 +21,7 @@ def count_beside(
 
     The count is not less than the number of eigenvalues below `shift` of what is returned; with `most=False` it is not
     more. A factor tells how much slack the next one needs for its count to stand above rounding (`rounding`). One that
-    has counted right beside had enough.
+    has counted right beside had enough; it is spent.
 
     Raises
     ------
@@ -37,10 +37,10 @@ def count_beside(
     def too_much(loss: float, shift: float) -> bool:
         return not 2 * loss < np.abs(pairs.values - shift).min()
 
-    none, sigma = np.zeros(pencil.n), value + step
+    factor, none, sigma = beside, np.zeros(pencil.n), value + step
     slack = none if beside is None or too_much(taken(beside.slack), sigma) else beside.slack
     for _ in range(TRIALS):
-        factor = factorise(pencil, sigma, side * slack)
+        factor = factorise(pencil, sigma, side * slack, factor)
         loss = rounding(factor) if factor else np.full(pencil.n, np.inf)
         # What is above the slack moves σ: W - σB - S + E ≤ W - (σ - ρ)B where no row has more than ρ c D of it.
         over = float(((loss - slack) / pencil.mass_diagonal).max(initial=0.0)) / pencil.mass_floor

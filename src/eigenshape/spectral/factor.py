@@ -36,13 +36,18 @@ class Factor:
         return self.lower.solve(right)
 
 
-def factorise(pencil: Pencil, shift: float, slack: Float[np.ndarray, " n"] | None = None) -> Factor | None:
-    """Factor W - σB - S, S = diag(slack), pivots on the diagonal; None where one is zero or not finite."""
+def factorise(
+    pencil: Pencil, shift: float, slack: Float[np.ndarray, " n"] | None = None, spent: Factor | None = None
+) -> Factor | None:
+    """Factor W - σB - S, S = diag(slack), pivots on the diagonal; None where one is zero or not finite.
+
+    A factor of the same pencil that is spent gives its room: what it solved before, it solves no more.
+    """
     slack = np.zeros(pencil.n) if slack is None else slack
     shifted = pencil.shifted
     data = shifted.stiffness - shift * shifted.mass
     data[shifted.diagonal] -= slack
-    lower = factorise_symmetric(shifted.elimination, data)
+    lower = factorise_symmetric(shifted.elimination, data, spent and spent.lower)
     return Factor(shift, int(np.count_nonzero(lower.pivots < 0)), slack, lower) if lower else None
 
 
