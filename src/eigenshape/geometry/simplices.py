@@ -1,5 +1,6 @@
 """Volumes of simplices in any dimension and codimension, right at any scale of the coordinates."""
 
+from itertools import combinations
 from math import factorial
 
 import numpy as np
@@ -25,15 +26,22 @@ def scaled_corners(mesh: Mesh) -> tuple[Float[np.ndarray, "s corners d"], float]
     Nothing is moved: what is measured between corners depends on them alone, to the last digit, and not on the order
     of the vertices, nor on those that no simplex uses.
     """
-    return size_one(mesh.points[mesh.simplices])
+    corners = mesh.points[mesh.simplices]
+    scale = _size(corners)
+    corners /= scale
+    return corners, scale
 
 
 def size_one(coordinates: Float[np.ndarray, "..."]) -> tuple[Float[np.ndarray, "..."], float]:
     """Return coordinates divided by a power of two that brings the largest to size 1, and that power."""
-    largest = np.abs(coordinates).max()
-    # One below the exponent of frexp, so that the largest of all numbers has a power too.
-    scale = float(2.0 ** (np.frexp(largest)[1] - 1)) if largest > 0 else 1.0
+    scale = _size(coordinates)
     return coordinates / scale, scale
+
+
+def _size(coordinates: Float[np.ndarray, "..."]) -> float:
+    largest = max(coordinates.max(), -coordinates.min())
+    # One below the exponent of frexp, so that the largest of all numbers has a power too.
+    return float(2.0 ** (np.frexp(largest)[1] - 1)) if largest > 0 else 1.0
 
 
 def in_length(values: Float[np.ndarray, "..."], scale: float, power: int) -> Float[np.ndarray, "..."]:
@@ -64,17 +72,16 @@ def triangular_sides(
     forming that matrix would lose. Gram-Schmidt (modified), all simplices at once; a simplex without volume has zeros
     on the diagonal, and in the basis.
     """
-    basis = (corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1).copy()
-    n, _, dim = basis.shape
-    triangles = np.zeros((n, dim, dim))
+    sides = np.ascontiguousarray((corners[:, 1:] - corners[:, :1]).transpose(1, 2, 0))
+    dim, _, n = sides.shape
+    triangles = np.zeros((dim, dim, n))
     for i in range(dim):
-        length = np.sqrt(np.einsum("sa,sa->s", basis[:, :, i], basis[:, :, i]))
-        triangles[:, i, i] = length
-        basis[:, :, i] /= np.where(length > 0, length, 1.0)[:, None]
+        length = np.sqrt(np.einsum("as,as->s", sides[i], sides[i]), out=triangles[i, i])
+        sides[i] /= np.where(length > 0, length, 1.0)
         for j in range(i + 1, dim):
-            triangles[:, i, j] = np.einsum("sa,sa->s", basis[:, :, i], basis[:, :, j])
-            basis[:, :, j] -= triangles[:, i, j, None] * basis[:, :, i]
-    return basis, triangles
+            np.einsum("as,as->s", sides[i], sides[j], out=triangles[i, j])
+            sides[j] -= triangles[i, j] * sides[i]
+    return sides.transpose(2, 1, 0), triangles.transpose(2, 0, 1)
 
 
 def volumes(corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndarray, " s"]:
@@ -116,8 +123,10 @@ def mean_side_length(mesh: Mesh) -> float:
 def degenerate_simplices(mesh: Mesh) -> Int[np.ndarray, " k"]:
     """Return the simplices without volume: at most 1e-14 of the cube on their longest side."""
     corners, _ = scaled_corners(mesh)
-    first, second = np.triu_indices(corners.shape[1], 1)
-    longest = np.linalg.norm(corners[:, first] - corners[:, second], axis=2).max(axis=1)
+    longest = np.zeros(len(corners))
+    for first, second in combinations(range(corners.shape[1]), 2):
+        side = corners[:, first] - corners[:, second]
+        np.maximum(longest, np.sqrt(np.einsum("sd,sd->s", side, side)), out=longest)
     return np.flatnonzero(factorial(mesh.dim) * volumes(corners) <= THINNEST * longest**mesh.dim)
 
 

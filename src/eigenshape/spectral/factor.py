@@ -47,7 +47,7 @@ def factorise(
     shifted = pencil.shifted
     data = shifted.stiffness - shift * shifted.mass
     data[shifted.diagonal] -= slack
-    lower = factorise_symmetric(shifted.elimination, data, spent and spent.lower)
+    lower = factorise_symmetric(shifted.elimination, data, spent.lower if spent else None)
     return Factor(shift, int(np.count_nonzero(lower.pivots < 0)), slack, lower) if lower else None
 
 
