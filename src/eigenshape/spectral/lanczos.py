@@ -13,7 +13,7 @@ from eigenshape.sparse.lane_loops import LANES
 from eigenshape.spectral.factor import Factor
 from eigenshape.spectral.pencil import Pencil
 
-TOLERANCE = 1e-10  # of a residual, relative to the shift
+TOLERANCE = 5e-12  # of a residual, relative to the shift
 FLOOR = 32 * float(np.finfo(np.float64).eps)  # of a residual, relative to the largest θ: rounding goes no lower
 SHRUNK = 1e-2  # a column that projection shortened this much is projected once more
 REPEATS = 5
