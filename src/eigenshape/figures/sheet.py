@@ -65,7 +65,7 @@ def _fill(axes: Axes, panel: Panel) -> None:
 
 def figure_label_transfer(source: TriangleMesh, target: TriangleMesh, transfer: LabelTransfer) -> Figure:
     """Draw two shapes side by side: matched parts in one colour, and how sure each label is, at its feature."""
-    figure = Figure(figsize=(4.4 * PANEL, 2.2 * PANEL), layout="constrained")
+    figure = Figure(figsize=(4.4 * PANEL, 2.2 * PANEL + 0.4), layout="constrained")
     left, right = figure.subplots(1, 2)
     _fill(left, Panel(source, "labelled", transfer.source.labels, transfer.source.features.vertices))
     colors = transfer.matches[transfer.target.labels]
@@ -73,9 +73,9 @@ def figure_label_transfer(source: TriangleMesh, target: TriangleMesh, transfer: 
     show(right, drawing)
     vertices = transfer.target.features.vertices
     mark(right, drawing, vertices)
+    paper = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
     for vertex, label, sure in zip(vertices, transfer.part_labels, transfer.confidence, strict=True):
-        if drawing.visible[vertex]:
-            text = f"label {label}, {100 * sure:.0f} %"
-            right.annotate(text, drawing.places[vertex], (6, 6), textcoords="offset points", fontsize=8)
-    right.set_title("labels given, with their confidence", fontsize=10)
+        text = f"label {label}, {100 * sure:.0f} %"
+        right.annotate(text, drawing.places[vertex], (7, 7), textcoords="offset points", fontsize=8, bbox=paper)
+    right.set_title("labels given, with their confidence (hollow: on the far side)", fontsize=10)
     return figure
