@@ -53,10 +53,11 @@ def approximate_spectrum(
     """Compute approximations of the k lowest eigenpairs of W φ = λ B φ, without a factor of W - σB and without proof.
 
     Points are joined into aggregates, whose indicators are smoothed (Vaněk, Mandel and Brezina 1996), until an
-    operator of some thousand points is left. That one is solved exactly. On the way back its eigenvectors are refined
-    level by level, by Rayleigh-Ritz among them and their corrections through all coarser levels (block Davidson),
-    in the spirit of Nasikun and Hildebrandt (2022). Some more pairs than asked for are refined along, so that copies
-    of a multiple eigenvalue find their place; but no count tells whether one is missing.
+    operator of some thousand points is left. That one is solved exactly. On the way back its eigenvectors are smoothed
+    level by level, and where that is not enough refined by Rayleigh-Ritz among them and their corrections through all
+    coarser levels (block Davidson), in the spirit of Nasikun and Hildebrandt (2022). Some more pairs than asked for
+    are refined along, so that copies of a multiple eigenvalue find their place; but no count tells whether one is
+    missing.
 
     Parameters
     ----------
@@ -65,8 +66,8 @@ def approximate_spectrum(
     k : int
         Number of eigenpairs, 1 to n.
     accuracy : float
-        Error of the eigenvalues relative to the k-th, judged by how far the last round of refinement lowered them;
-        1e-10 to 0.1. It is told in `certificate.estimate`.
+        Error of the eigenvalues relative to the k-th, judged by how far the last round lowered them and their
+        residuals; 1e-10 to 0.1. The estimate is told in `certificate.estimate`.
     bound : float, optional
         Go on until every residual, relative to the k-th eigenvalue, is at most this too. It bounds the error for
         certain, and is far larger than the error: that goes with its square.
