@@ -61,14 +61,14 @@ class Report:
         self.figures = new_figures(packages, repeats=options.repeats)
 
     def add(self, row: Row) -> None:
-        """Keep a row and print it."""
+        """Keep a row, also in the JSON file, and print it."""
         self.figures["rows"].append(row)
+        if self.options.json:
+            dump(self.options.json, self.figures)
         print(*self.cells(row), sep="  ", flush=True)
 
     def write(self) -> None:
-        """Write what was asked for."""
-        if self.options.json:
-            dump(self.options.json, self.figures)
+        """Write the table, if one was asked for."""
         if self.options.markdown:
             rows = [self.cells(row) for row in self.figures["rows"]]
             put(self.options.markdown, f"{measured_on(self.figures)}\n\n{table(self.columns, rows)}", self.script)
