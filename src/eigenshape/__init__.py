@@ -73,6 +73,7 @@ from eigenshape.geometry.repair import (
     drop_unreferenced,
     largest_component,
     repair,
+    seal_holes,
     weld,
 )
 from eigenshape.geometry.sampling import MeshPart, cut_by_planes, partial_scan, random_planes
@@ -309,6 +310,7 @@ __all__ = [
     "robust_laplacian",
     "save_figure",
     "scale_invariant_heat_kernel_signature",
+    "seal_holes",
     "segment",
     "simplex_volumes",
     "smooth_boundaries",

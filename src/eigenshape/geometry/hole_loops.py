@@ -1,0 +1,55 @@
+"""Compiled loop of `holes`: the least triangulation of a closed chain of points."""
+
+from typing import no_type_check
+
+import numpy as np
+from numba import njit
+
+SHAPE = 0.01  # of the squares of a triangle's sides, beside its area: in flat holes slivers lose
+FLAT = 1e-7  # of the squares of a triangle's sides, up to which it has no area
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def triangulate(points, taken, triangles):
+    """Fill the triangles between points 0..n-1 in order, of the least sum of costs; tell whether there is one.
+
+    Dynamic programming over the chains i..j (Barequet and Sharir 1995). Sides that are `taken` are not drawn.
+    """
+    n = len(points)
+    costs, middles = np.full((n, n), np.inf), np.zeros((n, n), dtype=np.int64)
+    for i in range(n - 1):
+        costs[i, i + 1] = 0.0
+    for span in range(2, n):
+        for i in range(n - span):
+            j = i + span
+            if span < n - 1 and taken[i, j]:
+                continue
+            for m in range(i + 1, j):
+                known = costs[i, m] + costs[m, j]
+                if known < costs[i, j]:
+                    total = known + _cost(points[i], points[m], points[j])
+                    if total < costs[i, j]:
+                        costs[i, j], middles[i, j] = total, m
+    if not np.isfinite(costs[0, n - 1]):
+        return False
+    waiting = [(0, n - 1)]
+    for place in range(n - 2):
+        i, j = waiting.pop()
+        m = middles[i, j]
+        triangles[place] = j, m, i
+        if m - i > 1:
+            waiting.append((i, m))
+        if j - m > 1:
+            waiting.append((m, j))
+    return True
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def _cost(a, b, c):
+    u, v = b - a, c - a
+    x, y, z = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+    area, w = np.sqrt(x * x + y * y + z * z) / 2, c - b
+    sides = (u * u).sum() + (v * v).sum() + (w * w).sum()
+    return area + SHAPE * sides if area > FLAT * sides else np.inf

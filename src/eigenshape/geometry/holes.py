@@ -1,0 +1,63 @@
+"""Holes, triangulated between the vertices around them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Bool, Int
+
+from eigenshape.geometry.hole_loops import triangulate
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import size_one
+from eigenshape.geometry.topology import boundary_edges, boundary_loops, edge_table
+
+
+@dataclass(frozen=True, eq=False)
+class Patches:
+    """What closes holes.
+
+    Attributes
+    ----------
+    faces : tuple of (t, 3) int
+        For each hole that is closed.
+    n_long, n_open : int
+        How many holes have too many edges, and how many others no good faces close.
+    """
+
+    faces: tuple[Int[np.ndarray, "t 3"], ...]
+    n_long: int
+    n_open: int
+
+
+def patches(mesh: TriangleMesh, most_edges: int) -> Patches:
+    """Triangulate each boundary loop of at most so many edges."""
+    edges, sides = edge_table(mesh).edges, {tuple(side) for side in boundary_edges(mesh).tolist()}
+    graph = sp.csr_array((np.ones(len(edges), dtype=bool), edges.T), shape=(mesh.n_vertices,) * 2)
+    graph, n_long, n_open = (graph + graph.T).tocsr(), 0, 0
+    added: list[Int[np.ndarray, "t 3"]] = []
+    for loop in boundary_loops(mesh):
+        ahead = zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
+        if len(loop) < 3 or not all(side in sides for side in ahead):
+            n_open += 1
+        elif len(loop) > most_edges:
+            n_long += 1
+        else:
+            points, _ = size_one(mesh.vertices[loop] - mesh.vertices[loop[0]])
+            triangles = np.empty((len(loop) - 2, 3), dtype=np.int64)
+            good = triangulate(points, _taken(graph, loop, added), triangles)
+            added += [loop[triangles]] if good else []
+            n_open += not good
+    return Patches(tuple(added), n_long, n_open)
+
+
+def _taken(
+    graph: sp.csr_array, loop: Int[np.ndarray, " k"], added: list[Int[np.ndarray, "t 3"]]
+) -> Bool[np.ndarray, "k k"]:
+    """Mark the pairs of the loop that are edges already, of the mesh or of faces added before."""
+    taken = np.array(graph[loop][:, loop].toarray(), dtype=bool)
+    if added:
+        faces, places = np.concatenate(added), {vertex: place for place, vertex in enumerate(loop.tolist())}
+        drawn = np.concatenate([faces[:, :2], faces[:, 1:], faces[:, ::2]])
+        for one, other in drawn[np.isin(drawn, loop).all(axis=1)].tolist():
+            taken[places[one], places[other]] = taken[places[other], places[one]] = True
+    return taken
