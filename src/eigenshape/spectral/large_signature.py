@@ -26,7 +26,7 @@ from eigenshape.spectral.coarse_refinement import (
 )
 from eigenshape.spectral.coarse_space import CoarseSpace, coarse_space
 from eigenshape.spectral.kernel_values import from_pencil, require_readable
-from eigenshape.spectral.outcome import Progress
+from eigenshape.spectral.outcome import Progress, silent
 from eigenshape.spectral.pencil import Pencil, normalise
 from eigenshape.spectral.signature import heat_kernel_signature
 from eigenshape.spectral.solver import solve_spectrum
@@ -127,7 +127,7 @@ def approximate_heat_kernel_signature(
     wanted = _Wanted(
         pairs, coarse if n_coarse else max(PER_PAIR * pairs, LEAST_COARSE), positive_values(times, "times")
     )
-    report = progress or _silent
+    report = progress or silent
     with threadpool_limits(1, user_api="blas"):
         pencil = normalise(laplacian)
         if pencil.mass_floor != 1.0:
@@ -138,10 +138,6 @@ def approximate_heat_kernel_signature(
         if pencil.n < COARSENED * wanted.n_coarse or wanted.n_coarse < LEAST_PER_PAIR * _with_guards(wanted.k):
             return _exact(laplacian, wanted, report)
         return _coarsened(pencil, wanted, report)
-
-
-def _silent(fraction: float, message: str) -> None:
-    """Report to nobody."""
 
 
 def _with_guards(k: int) -> int:
