@@ -219,8 +219,7 @@ def test_a_match_without_a_file_cannot_be_drawn(database, zoo, tmp_path):
 
 def test_features_of_large_meshes_say_how_far_heat_is_off(tmp_path, monkeypatch):
     monkeypatch.setattr("eigenshape.cli.features.LARGE", 1000)
-    monkeypatch.setattr("eigenshape.spectral.large_signature.LEAST_COARSE", 700)
-    monkeypatch.setattr("eigenshape.spectral.large_signature.PER_PAIR", 4)
+    monkeypatch.setattr("eigenshape.spectral.climbing.COARSENED", 5)
     path = tmp_path / "large.ply"
     write_mesh(make_creature("hand", n_vertices=2500), path)
     assert "2,500 vertices: their heat is approximate, off by about" in run("features", path).stderr
@@ -230,3 +229,5 @@ def test_features_of_large_meshes_say_how_far_heat_is_off(tmp_path, monkeypatch)
     small = tmp_path / "small.ply"
     write_mesh(make_creature("hand", n_vertices=900), small)
     assert run_json("features", small)["heat_error"] is None
+    rough, fine = (run_json("features", small, "--accuracy", share)["heat_error"] for share in ("0.1", "1e-4"))
+    assert rough > 10 * fine > 0

@@ -16,7 +16,7 @@ from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.spectral import approximate, outcome, refinement
+from eigenshape.spectral import approximate, climbing, outcome, refinement
 from eigenshape.spectral.approximate import approximate_spectrum
 from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
@@ -25,8 +25,8 @@ from eigenshape.spectral.spectrum import Spectrum
 @pytest.fixture
 def always_coarsen(monkeypatch):
     """Take the road of large operators, also for small ones."""
-    monkeypatch.setattr(approximate, "SMALL", 0)
-    monkeypatch.setattr(approximate, "COARSENED", 3)
+    monkeypatch.setattr(climbing, "SMALL", 0)
+    monkeypatch.setattr(climbing, "COARSENED", 3)
 
 
 def require_near(laplacian, k, accuracy, expected=None):
@@ -165,8 +165,8 @@ def test_the_order_of_points_does_not_matter():
 
 
 def test_several_levels(monkeypatch):
-    monkeypatch.setattr(approximate, "COARSEST", 100)
-    monkeypatch.setattr(approximate, "COARSEST_PER_PAIR", 1)
+    monkeypatch.setattr(climbing, "COARSEST", 100)
+    monkeypatch.setattr(climbing, "COARSEST_PER_PAIR", 1)
     laplacian = cotangent_laplacian(fibonacci_sphere(12000))
     said = []
     found = approximate_spectrum(laplacian, 9, accuracy=1e-5, progress=lambda *parts: said.append(parts))
@@ -203,14 +203,13 @@ def test_an_indefinite_stiffness_is_refused(always_coarsen):
 
 
 def test_what_does_not_converge_is_not_returned(always_coarsen, monkeypatch):
-    with pytest.raises(
-        ConvergenceError,
-        match=r"estimated at no more than 1\.0e-03 of the last eigenvalue, .* be above 1\.0e-03; after 100 rounds",
-    ):
+    with pytest.raises(ConvergenceError, match=r"Corrections must be finite; those of eigenvector \d+ and following"):
         approximate_spectrum(wild(), 12, bound=1e-3)  # weights over eight decades: the way to the exact solver
     monkeypatch.setattr(approximate, "ROUNDS", 1)
     with pytest.raises(
-        ConvergenceError, match=r"after 1 rounds these are .*Ask for less accuracy, or take solve_spectrum"
+        ConvergenceError,
+        match=r"estimated at no more than 1\.0e-10 of the last eigenvalue, .* after 1 rounds these are .*"
+        r"Ask for less accuracy, or take solve_spectrum",
     ):
         approximate_spectrum(cotangent_laplacian(icosphere(4)), 12, accuracy=1e-10)
 

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 
 from eigenshape.geometry.spheres import fibonacci_sphere
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.spectral import approximate, device
+from eigenshape.spectral import climbing, device
 from eigenshape.spectral.approximate import approximate_spectrum
 
 
@@ -33,8 +33,8 @@ def cupy(monkeypatch):
 
 
 def test_another_pair_of_libraries_gives_the_same_bits(cupy, monkeypatch):
-    monkeypatch.setattr(approximate, "COARSEST", 100)
-    monkeypatch.setattr(approximate, "COARSEST_PER_PAIR", 1)
+    monkeypatch.setattr(climbing, "COARSEST", 100)
+    monkeypatch.setattr(climbing, "COARSEST_PER_PAIR", 1)
     monkeypatch.setattr(device, "CPU", replace(device.CPU, rows=device.GPU_ROWS))  # sums in the same order
     cupy(lambda: 1)
     laplacian = cotangent_laplacian(fibonacci_sphere(9000))

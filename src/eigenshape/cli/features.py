@@ -24,7 +24,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.retrieval.describe import DescribedShape, describe_mesh
 from eigenshape.retrieval.describe_large import DescribedLargeShape, describe_large_mesh
 from eigenshape.retrieval.descriptor import PRESETS, SCALE_FREE, Recipe
-from eigenshape.spectral.large_signature import LARGE
+from eigenshape.spectral.large_signature import LARGE, USUAL_ACCURACY
 from eigenshape.spectral.outcome import Progress
 
 COLUMNS = {
@@ -58,6 +58,10 @@ def features(
         bool, typer.Option("--largest-gap", help="Cut where persistence falls most; replaces the number.")
     ] = False,
     preset_name: PresetOption = SCALE_FREE.name,
+    accuracy: Annotated[
+        float | None,
+        typer.Option(help="Take approximate heat, .0001 (slow) to .1; beyond 100,000 vertices .01 unless given."),
+    ] = None,
     repair: RepairOption = "",
     picture: Annotated[Path | None, typer.Option(help="Draw parts and feature points (PNG, SVG or PDF).")] = None,
     ply: Annotated[Path | None, typer.Option(help="Write the mesh with the heat as colours (PLY).")] = None,
@@ -65,13 +69,13 @@ def features(
 ) -> None:
     """Find the feature points of a mesh and the parts around them, most persistent first.
 
-    Beyond 25,000 vertices heat is approximate, and its error is said.
+    Beyond 100,000 vertices, or with --accuracy, heat is approximate, and its error is said.
     """
     recipe = preset(preset_name)
     require_paths(picture, ply)
     surface = load_mesh(mesh, repair)
     with progress_bar("features") as progress:
-        shape = _described(surface, recipe, progress)
+        shape = _described(surface, recipe, accuracy, progress)
     error = shape.error if isinstance(shape, DescribedLargeShape) else None
     if error is not None:
         err.print(f"{surface.n_vertices:,} vertices: their heat is approximate, off by about {100 * error:.2g} %")
@@ -89,8 +93,12 @@ def features(
         save_colors(surface, value_colors(np.log(np.maximum(shape.heat, np.finfo(np.float64).tiny))), ply)
 
 
-def _described(surface: TriangleMesh, recipe: Recipe, progress: Progress) -> DescribedShape | DescribedLargeShape:
-    """Take a spectrum as far as the thesis does, and approximate heat beyond."""
-    if surface.n_vertices <= LARGE:
+def _described(
+    surface: TriangleMesh, recipe: Recipe, accuracy: float | None, progress: Progress
+) -> DescribedShape | DescribedLargeShape:
+    """Take a certified spectrum where that is not asked too much, and approximate heat beyond."""
+    if accuracy is None and surface.n_vertices <= LARGE:
         return describe_mesh(surface, recipe, progress=progress)
-    return describe_large_mesh(surface, recipe, progress=progress)
+    return describe_large_mesh(
+        surface, recipe, accuracy=USUAL_ACCURACY if accuracy is None else accuracy, progress=progress
+    )

@@ -9,9 +9,14 @@ from eigenshape.features.merge_tree import MergeTree
 from eigenshape.features.segmentation import Segmentation
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.boundary import dirichlet_laplacian
+from eigenshape.operators.laplacian import Laplacian
 from eigenshape.retrieval.describe import clock, parts_and_descriptor, prepared
 from eigenshape.retrieval.descriptor import SCALE_FREE, Recipe, ShapeDescriptor
-from eigenshape.spectral.large_signature import approximate_heat_kernel_signature
+from eigenshape.spectral.large_signature import (
+    USUAL_ACCURACY,
+    ApproximateSignature,
+    approximate_heat_kernel_signature,
+)
 from eigenshape.spectral.outcome import Progress
 
 
@@ -43,18 +48,24 @@ class DescribedLargeShape:
 
 
 def describe_large_mesh(
-    mesh: TriangleMesh, recipe: Recipe = SCALE_FREE, *, progress: Progress | None = None
+    mesh: TriangleMesh,
+    recipe: Recipe = SCALE_FREE,
+    *,
+    accuracy: float = USUAL_ACCURACY,
+    progress: Progress | None = None,
 ) -> DescribedLargeShape:
     """Walk the road of `describe_mesh` with `approximate_heat_kernel_signature` in place of a spectrum.
 
-    A million vertices take about a minute on one core. Up to three times as many vertices as coarse functions the
-    operator is solved as it is, and the result is that of `describe_mesh`.
+    A million vertices take about a minute on one core. Where vertices are few for the recipe's pairs the operator is
+    solved as it is, and the result is that of `describe_mesh`.
 
     Parameters
     ----------
     mesh : TriangleMesh
         A closed or open surface.
     recipe : Recipe
+    accuracy : float
+        As of `approximate_heat_kernel_signature`.
     progress : callable, optional
         Called as progress(fraction_done, message), twice from 0 to 1 where the boundary is held too.
 
@@ -70,11 +81,16 @@ def describe_large_mesh(
     """
     mesh, laplacian, held = prepared(mesh, recipe)
     unit, times = clock(laplacian.mass, recipe)
-    found = approximate_heat_kernel_signature(laplacian, min(recipe.n_modes, mesh.n_vertices), times, progress=progress)
+
+    def heat_of(operator: Laplacian) -> ApproximateSignature:
+        k = min(recipe.n_modes, operator.n_points)
+        return approximate_heat_kernel_signature(operator, k, times, accuracy=accuracy, progress=progress)
+
+    found = heat_of(laplacian)
     columns, error = found.values, float(found.errors[0])
     if len(held):
         inner, free = dirichlet_laplacian(laplacian, held)
-        fixed = approximate_heat_kernel_signature(inner, min(recipe.n_modes, len(free)), times, progress=progress)
+        fixed = heat_of(inner)
         columns, error = columns / 2, max(error, float(fixed.errors[0]))
         columns[free] += fixed.values / 2
     heat = columns[:, 0]

@@ -1,44 +1,33 @@
 """The lowest eigenpairs of a Laplacian, roughly but at once: no factor of the whole operator, and no proof."""
 
-from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import replace
 from typing import SupportsIndex
 
 import numpy as np
-import scipy.sparse as sp
-from jaxtyping import Float
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 from threadpoolctl import threadpool_limits
 
 from eigenshape._arrays import whole_number
-from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.certify import require_orthonormal
-from eigenshape.spectral.correction import Coarsest, Tower
-from eigenshape.spectral.device import Device, fetch, open_device, put
-from eigenshape.spectral.hierarchy import Level, build_levels, load
-from eigenshape.spectral.outcome import Progress, require_room, silent, spectrum_of
+from eigenshape.spectral.climbing import (
+    LEAST_ACCURATE,
+    ROUNDS,
+    SINGLE,
+    climb,
+    on_finest,
+    require_accuracy,
+    require_lumped,
+)
+from eigenshape.spectral.device import Device, fetch, open_device
+from eigenshape.spectral.outcome import Progress, silent, spectrum_of
 from eigenshape.spectral.pairs import Pairs
-from eigenshape.spectral.pencil import Pencil, as_pencil, normalise, residual_norms
-from eigenshape.spectral.refinement import WIDTH, Goal, refine, settled
+from eigenshape.spectral.pencil import Pencil, normalise, residual_norms
+from eigenshape.spectral.refinement import Goal, refine, settled
 from eigenshape.spectral.roads import proved
-from eigenshape.spectral.shift import factorise_near
 from eigenshape.spectral.spectrum import Spectrum
 
-ACCURACIES = (1e-10, 0.1)
-SMALL = 600  # points up to which the exact solve is the quicker one
-GUARDS = 8  # more pairs than asked for, at least, and in all a multiple of it
-GUARD_SHARE = 1.125
-COARSEST = 3000  # points of the coarsest level, at least; and times k:
-COARSEST_PER_PAIR = 30
-COARSENED = 8  # times, at least
-SHIFTS = (0.2, 0.5, 0.75, 0.93)  # of the k-th eigenvalue
-ROUNDS = 100
-SINGLE = 1e-4  # accuracy from which vectors are kept in single precision while they are refined
-INNER_ACCURACY = 0.03  # on levels between, within so many rounds
-INNER_ROUNDS = 3
+ACCURATE = 1e-10
 
 
 def approximate_spectrum(
@@ -97,11 +86,10 @@ def approximate_spectrum(
         If there is no GPU to be used, or eigenvalues of a kernel lie too near to 1/t to tell those of the shape.
     """
     wanted = whole_number(k, "k", 1, laplacian.n_points)
-    for name, value in (("accuracy", accuracy), ("bound", ACCURACIES[1] if bound is None else bound)):
-        if not ACCURACIES[0] <= value <= ACCURACIES[1]:
-            raise InvalidParameterError(f"{name} must lie in {ACCURACIES[0]}..{ACCURACIES[1]}; it is {value}.")
+    for name, value in (("accuracy", accuracy), ("bound", LEAST_ACCURATE if bound is None else bound)):
+        require_accuracy(name, value, ACCURATE)
     place, report = open_device(device), progress or silent
-    _require_lumped(laplacian)
+    require_lumped(laplacian)
     with threadpool_limits(1, user_api="blas"):
         report(0.0, "scaling the operator")
         pencil = normalise(laplacian)
@@ -112,85 +100,17 @@ def approximate_spectrum(
     return spectrum_of(laplacian, pencil, pairs, certificate)
 
 
-def _require_lumped(laplacian: Laplacian) -> None:
-    rows = laplacian.mass.tocoo()
-    beside = np.flatnonzero((rows.row != rows.col) & (rows.data != 0))
-    if beside.size:
-        raise InvalidParameterError(
-            f"mass must be diagonal here; entry ({rows.row[beside[0]]}, {rows.col[beside[0]]}) is "
-            f"{rows.data[beside[0]]:.6g}. Lump the mass, or take solve_spectrum."
-        )
-
-
 def _approximated(pencil: Pencil, goal: Goal, device: Device, report: Progress) -> tuple[Pairs, Certificate]:
-    n, m = pencil.n, -(-max(goal.k + GUARDS, int(GUARD_SHARE * goal.k)) // GUARDS) * GUARDS
-    if n <= max(SMALL, COARSENED * m):
+    dtype = np.float32 if goal.accuracy >= SINGLE and np.isinf(goal.bound) else np.float64
+    start = climb(pencil, goal.k, device, report, dtype=dtype, kept=16 * pencil.n * goal.k)
+    if start is None:
         return proved(pencil, goal.k, report)
-    _require_room(pencil, goal.k, m)
-    report(0.01, "making coarser levels")
-    order = reverse_cuthill_mckee(sp.csr_matrix(pencil.stiffness), symmetric_mode=True)
-    stiffness, mass = (sp.csr_array(sp.csr_array(part)[order][:, order]) for part in (pencil.stiffness, pencil.mass))
-    start = _coarsened(stiffness, mass, goal.k, m)
-    if start is None:  # no two points are coupled
-        return proved(pencil, goal.k, report)
-    vectors = np.empty((n, goal.k))
-    vectors[order], values, estimate = _climbed(*start, goal, device, report)
+    columns, values, estimate = refine(start.tower, start.below, goal, on_finest(report, start))
+    columns, values = settled(start.tower, columns[:, : goal.k], values[: goal.k])
+    vectors = np.empty((pencil.n, goal.k))
+    vectors[start.order] = fetch(device, columns)
     pairs = Pairs(values, vectors, residual_norms(pencil, values, vectors))
     return pairs, replace(_uncounted(pencil, pairs), estimate=estimate)
-
-
-def _require_room(pencil: Pencil, k: int, m: int) -> None:
-    entries = pencil.stiffness.nnz
-    parts = {"bases": 8 * pencil.n * (4 * m + 3 * k) + 20 * pencil.n * WIDTH, "levels of their operator": 100 * entries}
-    require_room(f"{k} pairs of {pencil.n} points", parts, "Ask for fewer pairs")
-
-
-def _coarsened(
-    stiffness: sp.csr_array, mass: sp.csr_array, k: int, m: int
-) -> tuple[list[Level], Coarsest, Float[np.ndarray, " m"]] | None:
-    """Return the levels with the solved coarsest one, and its values; None where nothing can be joined."""
-    n_coarsest = min(max(COARSEST_PER_PAIR * k, COARSEST), stiffness.shape[0] // COARSENED)
-    levels = build_levels(stiffness, mass, n_coarsest)
-    if len(levels) == 1:
-        return None
-    with suppress(ConvergenceError, InvalidParameterError):
-        return levels, *_solved_coarsest(levels[-1], k, m)
-    levels = build_levels(stiffness, mass, n_coarsest, smooth=False)  # weights over many decades
-    return levels, *_solved_coarsest(levels[-1], k, m)
-
-
-def _climbed(
-    levels: list[Level],
-    coarsest: Coarsest,
-    values: Float[np.ndarray, " m"],
-    goal: Goal,
-    device: Device,
-    report: Progress,
-) -> tuple[Float[np.ndarray, "n k"], Float[np.ndarray, " k"], float]:
-    """Return the lowest eigenvectors of the first level, their values, and an estimate of these' error."""
-    dtype = np.float32 if goal.accuracy >= SINGLE and np.isinf(goal.bound) else np.float64
-    loaded = [load(device, level, dtype, lumped=place == 0) for place, level in enumerate(levels[:-1])]
-    vectors, estimate = put(device, coarsest.vectors), np.inf
-    for place in reversed(range(len(loaded))):
-        tower = Tower(device, tuple(loaded[place:]), coarsest)
-        inner = replace(goal, accuracy=np.inf, bound=INNER_ACCURACY, rounds=INNER_ROUNDS, strict=False)
-        here, report_here = inner if place else goal, _in_level(report, place, len(loaded))
-        vectors, values, estimate = refine(tower, (vectors, values), here, report_here)
-    vectors, values = settled(tower, vectors[:, : goal.k], values[: goal.k])
-    return fetch(device, vectors), values, estimate
-
-
-def _in_level(report: Progress, place: int, n_levels: int) -> Callable[[float], None]:
-    start, share = (0.35, 0.6) if place == 0 else (0.35 - 0.15 * place / n_levels, 0.15 / n_levels)
-    return lambda done: report(start + share * done, f"refining on level {n_levels - place} of {n_levels}")
-
-
-def _solved_coarsest(level: Level, k: int, m: int) -> tuple[Coarsest, Float[np.ndarray, " m"]]:
-    pencil = as_pencil(level.stiffness, level.mass)
-    pairs, _ = proved(pencil, m, silent)
-    last = max(float(pairs.values[k - 1]), pencil.level / pencil.n)  # where all that is wanted is 0
-    factors = tuple(factorise_near(pencil, share * last) for share in SHIFTS)
-    return Coarsest(pencil, pairs.vectors, factors), pairs.values
 
 
 def _uncounted(pencil: Pencil, pairs: Pairs) -> Certificate:

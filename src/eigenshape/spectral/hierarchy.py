@@ -18,7 +18,7 @@ PASSED = 4.0  # points of an aggregate to the wavelength from which functions ar
 LEAST_RATIO = 2.5  # of the top to the least of these zeros' interval
 LANCZOS = 12
 SMOOTHED = 0.6  # of an aggregate's points: how far below the top of the spectrum smoothing reaches
-LEAST_SPREAD = 6.0
+LEAST_SPREAD = 20.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,19 +1,22 @@
 """Block Davidson: Rayleigh-Ritz among approximate eigenvectors and their corrections, until what is left is small."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
 from eigenshape._errors import ConvergenceError
+from eigenshape.spectral.blocks import chosen, images, keep_outside, norms_of_residuals, residual_block, row_chunks
 from eigenshape.spectral.correction import Tower, correct, smooth
 from eigenshape.spectral.device import Array, fetch, multiply, put
 
 WIDTH = 32  # columns that are corrected at once
 STEPS = (8, 30)  # of smoothing, fewest and most
-FIRST_STEPS = 2.0  # of smoothing alone, times the root of what is to be smoothed
+FIRST_STEPS = 1.5  # of smoothing alone, times the root of what is to be smoothed
 DEPENDENT = {4: 1e-6, 8: 1e-13}  # of the largest eigenvalue of a Gram matrix of unit columns, by their bytes
+NOTHING = 1e-6
+FIRST_SHARE = 0.3  # of the work, told while the columns are smoothed the first time
 PROBES = 8  # random columns of a last look
 PROBE_STEPS = 4
 MOST_LEFT = 10.0  # times what a round has lowered
@@ -35,7 +38,7 @@ class Goal:
     """What the first k pairs are to reach, in shares of the k-th eigenvalue, after so many rounds at most.
 
     What is left of the values' errors is estimated at no more than `accuracy`, and no residual is above `bound`.
-    `least` stands for the eigenvalue where it is smaller: all may be 0.
+    `least` stands for the eigenvalue where that is next to nothing beside it: all may be 0.
     """
 
     k: int
@@ -69,14 +72,13 @@ def refine(
     ConvergenceError
         If a strict goal is not reached in its rounds.
     """
-    report(0.0)
     values, m = below[1], len(below[1])
     space = _prolonged(tower, below[0])
-    standing = _standing(goal, values, _smooth_all(tower, space, values), np.inf, np.inf)
+    standing = _standing(goal, values, _smooth_all(tower, space, values, report), np.inf, np.inf)
     before, values = values, _ritz(tower, space, values, slice(0, m))
     first, looked = standing.worst, not goal.strict
     for done in range(goal.rounds + 1):
-        residuals = _residuals(tower, space, values)
+        residuals = norms_of_residuals(tower, space.columns, values)
         lowered = float(np.abs(before - values)[: goal.k].max())
         standing = _standing(goal, values, residuals, standing.worst, lowered if done else UNSEEN * lowered)
         bound, worst = min(goal.bound, np.sqrt(goal.accuracy)), standing.worst
@@ -89,7 +91,8 @@ def refine(
                 continue
         if reached or (done == goal.rounds and not goal.strict):
             return space.columns, values, standing.left
-        report(min(float(np.log(first / worst) / np.log(first / bound)), 0.95) if first > worst > bound else 0.0)
+        way = float(np.log(first / worst) / np.log(first / bound)) if first > worst > bound else 0.0
+        report(min(FIRST_SHARE + (1 - FIRST_SHARE) * way, 0.95))
         enough = EARLY * goal.bound if np.isfinite(goal.bound) else EXACT * goal.accuracy
         late = np.flatnonzero(residuals > enough * standing.scale)
         _add_corrections(tower, space, (values, residuals), late, max(worst / bound, 1.0))
@@ -113,7 +116,8 @@ def _standing(goal: Goal, values: np.ndarray, residuals: np.ndarray, before: flo
     Errors go with the squares of residuals. If they fell only as much as those did, by a factor q, then of what the
     round lowered q / (1 - q) is left; no more than ten times is taken to be left, lest rounding in residuals decides.
     """
-    scale = max(float(values[goal.k - 1]), goal.least)
+    last = float(values[goal.k - 1])
+    scale = last if last > NOTHING * goal.least else goal.least
     worst = float(residuals[: goal.k].max()) / scale
     factor = worst / before if np.isfinite(before) and before > 0 else 1.0
     return Standing(scale, worst, lowered / scale * min(factor / max(1 - factor, 0.01), MOST_LEFT))
@@ -126,72 +130,17 @@ def _prolonged(tower: Tower, vectors: Array) -> Space:
     return Space(multiply(tower.device, level.prolong, vectors.astype(columns.dtype), columns), added)
 
 
-def _row_chunks(tower: Tower) -> list[slice]:
-    n, rows = tower.levels[0].n, tower.device.rows
-    return [slice(start, min(start + rows, n)) for start in range(0, n, rows)]
-
-
-def _images(tower: Tower, columns: Array) -> Iterator[tuple[slice, Array, Array]]:
-    """Give A and M times columns some rows at a time, in double precision."""
-    level, device = tower.levels[0], tower.device
-    width, arrays = columns.shape[1], device.arrays
-    room = [arrays.empty((min(device.rows, level.n), width)) for _ in range(2)]
-    for rows in _row_chunks(tower):
-        image, weighed = (part[: rows.stop - rows.start] for part in room)
-        multiply(device, level.stiffness, columns, image, rows)
-        if level.mass is None:
-            arrays.multiply(columns[rows], level.weights[rows], out=weighed)
-        else:
-            multiply(device, level.mass, columns, weighed, rows)
-        yield rows, image, weighed
-
-
-def _residual_rows(tower: Tower, columns: Array, values: np.ndarray) -> Iterator[tuple[slice, Array]]:
-    """Give A S - M S θ some rows at a time."""
-    known = put(tower.device, values)
-    for rows, image, weighed in _images(tower, columns):
-        tower.device.arrays.multiply(weighed, known, out=weighed)
-        yield rows, tower.device.arrays.subtract(image, weighed, out=image)
-
-
-def _residuals(tower: Tower, space: Space, values: np.ndarray) -> Float[np.ndarray, " m"]:
-    """Return the norms of the columns' residuals, in the inverse of M or of its diagonal."""
-    squares = tower.device.arrays.zeros(len(values))
-    for rows, rest in _residual_rows(tower, space.columns, values):
-        squares += _squares(tower, rows, rest)
-    return np.sqrt(fetch(tower.device, squares))
-
-
-def _squares(tower: Tower, rows: slice, rest: Array) -> Array:
-    rest *= rest
-    rest /= tower.levels[0].weights[rows]
-    return rest.sum(axis=0)
-
-
-def _residual_block(
-    tower: Tower, space: Space, some: np.ndarray, values: np.ndarray, scales: np.ndarray
-) -> tuple[Array, Float[np.ndarray, " b"]]:
-    """Return scaled residuals of some columns in single precision, and their norms."""
-    arrays, device = tower.device.arrays, tower.device
-    picked = arrays.empty((len(space.columns), len(some)), dtype=space.columns.dtype)
-    places, factors, squares = put(device, some), put(device, scales), arrays.zeros(len(some))
-    for rows in _row_chunks(tower):
-        picked[rows] = arrays.take(space.columns[rows], places, axis=1)
-    block = arrays.empty(picked.shape, dtype=np.float32)
-    for rows, rest in _residual_rows(tower, picked, values):
-        block[rows] = rest * factors
-        squares += _squares(tower, rows, rest)
-    return block, np.sqrt(fetch(device, squares))
-
-
-def _smooth_all(tower: Tower, space: Space, values: np.ndarray) -> Float[np.ndarray, " m"]:
+def _smooth_all(
+    tower: Tower, space: Space, values: np.ndarray, report: Callable[[float], None]
+) -> Float[np.ndarray, " m"]:
     """Smooth the columns, and return the norms of the residuals that they had."""
     steps, norms = int(np.ceil(FIRST_STEPS * np.sqrt(tower.levels[0].spread))), np.empty(len(values))
     for start in range(0, len(values), WIDTH):
+        report(FIRST_SHARE * start / len(values))
         some = np.arange(start, min(start + WIDTH, len(values)))
-        block, norms[some] = _residual_block(tower, space, some, values[some], np.ones(len(some)))
+        block, norms[some] = residual_block(tower, chosen(tower, space.columns, some), values[some], np.ones(len(some)))
         corrections = smooth(tower, block, values[some].astype(np.float32), steps)
-        for rows in _row_chunks(tower):
+        for rows in row_chunks(tower):
             space.columns[rows, start : start + len(some)] -= corrections[rows]
     return norms
 
@@ -199,14 +148,25 @@ def _smooth_all(tower: Tower, space: Space, values: np.ndarray) -> Float[np.ndar
 def _add_corrections(
     tower: Tower, space: Space, state: tuple[np.ndarray, np.ndarray], late: np.ndarray, excess: float
 ) -> None:
-    """Add the corrections of late columns, which have these values and residuals."""
+    """Add the corrections of late columns, which have these values and residuals.
+
+    Raises
+    ------
+    ConvergenceError
+        If they overflow: far below zero, where single rows are next to nothing beside θM, smoothing makes them grow.
+    """
     steps = int(np.clip(np.ceil(0.5 * np.sqrt(tower.levels[0].spread) * np.log(8 * excess)), *STEPS))
     values, residuals = state
     for start in range(0, len(late), WIDTH):
         some = late[start : start + WIDTH]
-        block, _ = _residual_block(tower, space, some, values[some], 1 / residuals[some])
+        block, _ = residual_block(tower, chosen(tower, space.columns, some), values[some], 1 / residuals[some])
         corrections = correct(tower, block, values[some].astype(np.float32), steps)
-        for rows in _row_chunks(tower):
+        if not tower.device.arrays.isfinite(corrections.sum()):
+            raise ConvergenceError(
+                f"Corrections must be finite; those of eigenvector {some[0]} and following overflow. The weights of "
+                f"the operator spread too far for its diagonal: take solve_spectrum."
+            )
+        for rows in row_chunks(tower):
             space.added[rows, start : start + len(some)] = corrections[rows]
 
 
@@ -215,8 +175,9 @@ def _look_again(
 ) -> Float[np.ndarray, " m"]:
     """Look for eigenvectors that the coarser levels cannot see, with columns that know nothing of them.
 
-    Some steps of inverse iteration on random columns. Where they lower one of the first k values by half the bound
-    or more, they are taken in, and the new values returned; else everything stays as it is.
+    Some steps of inverse iteration on random columns, outside the span of those that are known. Where they lower one
+    of the first k values by half the bound or more, they are taken in, and the new values returned; else everything
+    stays as it is.
     """
     level, device, m = tower.levels[0], tower.device, len(values)
     shifts = np.zeros(PROBES, dtype=np.float32)
@@ -224,6 +185,7 @@ def _look_again(
     for _ in range(PROBE_STEPS):
         block *= level.rough_scales[0] / device.arrays.abs(block).max(axis=0)
         block = correct(tower, block, shifts, STEPS[0])
+        keep_outside(tower, space.columns, block)
     space = Space(space.columns, block)
     lower, weights = _combination(tower, space, values, slice(m, m + PROBES))
     if (values[:k] - lower[:k] < 0.5 * bound).all():
@@ -245,7 +207,7 @@ def _ritz(tower: Tower, space: Space, values: np.ndarray, fresh: slice) -> np.nd
 def _combine(tower: Tower, space: Space, weights: Array) -> None:
     m, weights = space.columns.shape[1], weights.astype(space.columns.dtype)
     late = len(weights) - m
-    for rows in _row_chunks(tower):
+    for rows in row_chunks(tower):
         part = space.columns[rows] @ weights[:m]
         if late:
             part += space.added[rows, :late].astype(part.dtype) @ weights[m:]
@@ -272,7 +234,7 @@ def _grams(tower: Tower, space: Space, fresh: slice) -> tuple[Array, Array]:
     arrays, size, m = tower.device.arrays, fresh.stop, space.columns.shape[1]
     gram, projected = arrays.zeros((size, size)), arrays.zeros((size, size))
     of = space.columns if fresh.start == 0 else space.added[:, : size - m]
-    for rows, image, weighed in _images(tower, of):
+    for rows, image, weighed in images(tower, of):
         for block, start in ((space.columns, 0), (space.added, m)):
             if start < size:
                 part = block[rows, : size - start].astype(np.float64)
