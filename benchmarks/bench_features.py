@@ -125,7 +125,7 @@ def measured(method: str, saved: str, reference: str) -> Row:
 
 
 def compared(mesh: es.TriangleMesh, heat: np.ndarray, features: np.ndarray, reference: str) -> Row:
-    """Return the heat's relative error, how many features are farther than 2 % of √area from all certified, and equal."""
+    """Return the heat's relative error, how many features are beyond 2 % of √area from all certified, and equal."""
     if not Path(reference).exists():
         return {}
     with np.load(reference) as arrays:

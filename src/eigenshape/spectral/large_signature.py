@@ -159,7 +159,7 @@ def _errors(
 def _changes(
     tower: Tower, columns: Array, ritz: Float[np.ndarray, " m"], sample: Int[np.ndarray, " s"]
 ) -> tuple[Float[np.ndarray, " s"], Float[np.ndarray, " s"]]:
-    """Correct some Ritz vectors, and return what that changes: the norms of φ'² - φ² in M, and the values.
+    """Return what some Ritz vectors become with their corrections: the norms of φ'² - φ² in M, and their values' fall.
 
     Only what lies outside the span of all columns counts: within it Ritz vectors are what they can be.
     """
@@ -167,8 +167,13 @@ def _changes(
     residual, _ = residual_block(tower, vectors, values, np.ones(len(sample)))
     step = correct(tower, residual, values.astype(np.float32), STEPS)
     keep_outside(tower, columns, step)
-    before = vectors.astype(np.float64)
-    better = before - step
-    better /= np.sqrt((mass * better**2).sum(axis=0))
-    lower = sum((better[rows] * image).sum(axis=0) for rows, image, _ in images(tower, better))
-    return np.sqrt((mass * (better**2 - before**2) ** 2).sum(axis=0)), np.abs(values - lower)
+    before, step = vectors.astype(np.float64), step.astype(np.float64)
+    step /= np.sqrt((mass * step**2).sum(axis=0)) + np.finfo(np.float32).tiny
+    beside, above = np.zeros(len(sample)), np.zeros(len(sample))
+    for rows, image, _ in images(tower, step):
+        beside += (before[rows] * image).sum(axis=0)
+        above += (step[rows] * image).sum(axis=0)
+    turn = np.arctan2(2 * beside, above - values) / 2  # of the lowest Ritz vector of the two
+    better = np.cos(turn) * before - np.sin(turn) * step
+    fall = np.hypot((above - values) / 2, beside) - (above - values) / 2
+    return np.sqrt((mass * (better**2 - before**2) ** 2).sum(axis=0)), fall
