@@ -52,12 +52,20 @@ FUNCTIONS = {
 
 
 @dataclass(frozen=True, eq=False)
+class Part:
+    """The features of a part by each function, and what it shows; both are vertices of the whole."""
+
+    features: dict[str, np.ndarray]
+    shown: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class Shape:
-    """A mesh with the features of each function, and its parts with theirs, at vertices of the whole."""
+    """A mesh with the features of each function, and its parts."""
 
     mesh: es.TriangleMesh
     features: dict[str, np.ndarray]
-    parts: dict[str, dict[str, np.ndarray]]
+    parts: dict[str, Part]
 
 
 def found_on(mesh: es.TriangleMesh) -> dict[str, np.ndarray]:
@@ -86,7 +94,8 @@ def shape_of(mesh: es.TriangleMesh, seed: int) -> Shape:
     """Find everything on a mesh and on its parts."""
     parts = {}
     for name, part in parts_of(mesh, seed).items():
-        parts[name] = {key: part.source_vertices[found] for key, found in found_on(part.mesh).items()}
+        found = {key: part.source_vertices[vertices] for key, vertices in found_on(part.mesh).items()}
+        parts[name] = Part(found, part.source_vertices)
     return Shape(mesh, found_on(mesh), parts)
 
 
@@ -111,8 +120,11 @@ def measured(shapes: list[Shape], maps: dict[tuple[int, int], np.ndarray]) -> di
             there = to[shapes[one].features[name]]
             rows[name]["poses"].append(share_near(shapes[two].mesh, there, shapes[two].features[name]))
         for shape in shapes:
-            for part, found in shape.parts.items():
-                rows[name][part].append(share_near(shape.mesh, found[name], shape.features[name]))
+            for kind, part in shape.parts.items():
+                rows[name][kind].append(share_near(shape.mesh, part.features[name], shape.features[name]))
+                shown = np.intersect1d(shape.features[name], part.shown)
+                if len(shown):
+                    rows[name][f"{kind}, kept"].append(share_near(shape.mesh, shown, part.features[name]))
             rows[name]["chance"].append(chance(shape.mesh, shape.features[name]))
             rows[name]["number"].append(len(shape.features[name]) / 100)
     return rows
@@ -146,7 +158,7 @@ def quality_of_maps(kind: str, n_vertices: int) -> dict[str, float]:
 
 def table(rows: list[dict[str, dict[str, list[float]]]]) -> dict[str, dict[str, float]]:
     """Return the means over all individuals, in per cent; and how many features there are."""
-    columns = ("poses", "partial", "incomplete", "chance", "number")
+    columns = ("poses", "partial", "partial, kept", "incomplete", "incomplete, kept", "chance", "number")
     return {
         name: {key: round(100 * float(np.mean([x for row in rows for x in row[name][key]])), 1) for key in columns}
         for name in FUNCTIONS

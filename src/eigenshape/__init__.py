@@ -48,7 +48,7 @@ from eigenshape.geometry.exact import (
     sphere_eigenvalues,
 )
 from eigenshape.geometry.facets import FacetTable, facet_table
-from eigenshape.geometry.geodesic import geodesic_balls, geodesic_distances
+from eigenshape.geometry.geodesic import farthest_points, geodesic_balls, geodesic_distances
 from eigenshape.geometry.measure import (
     edge_lengths,
     enclosed_volume,
@@ -122,10 +122,13 @@ from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 from eigenshape.operators.neighbors import neighbor_graph
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.retrieval.batch import BatchReport, Item, Workers, build_index
+from eigenshape.retrieval.codebook import PatchCodebook, encode_patches, train_codebook
 from eigenshape.retrieval.describe import DescribedShape, describe, describe_mesh, describe_views
 from eigenshape.retrieval.describe_large import DescribedLargeShape, describe_large_mesh
 from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDescriptor
 from eigenshape.retrieval.index import Match, Record, ShapeIndex
+from eigenshape.retrieval.patch_score import patch_distances
+from eigenshape.retrieval.patches import Patches, describe_patches
 from eigenshape.retrieval.score import match_features, matching_score
 from eigenshape.retrieval.transfer import LabelTransfer, transfer_labels
 from eigenshape.spectral.approximate import approximate_spectrum
@@ -184,6 +187,8 @@ __all__ = [
     "OperatorReport",
     "Panel",
     "PartTree",
+    "PatchCodebook",
+    "Patches",
     "PersistenceDiagram",
     "PersistencePairs",
     "PointCloud",
@@ -229,6 +234,7 @@ __all__ = [
     "describe",
     "describe_large_mesh",
     "describe_mesh",
+    "describe_patches",
     "describe_views",
     "dirichlet_laplacian",
     "disc",
@@ -242,10 +248,12 @@ __all__ = [
     "edge_lengths",
     "edge_table",
     "enclosed_volume",
+    "encode_patches",
     "euler_characteristic",
     "face_areas",
     "face_normals",
     "facet_table",
+    "farthest_points",
     "fem_boundary_nodes",
     "fem_laplacian",
     "fem_nodes",
@@ -295,6 +303,7 @@ __all__ = [
     "part_spectrum",
     "part_tree",
     "partial_scan",
+    "patch_distances",
     "persistence_diagram",
     "point_cloud_laplacian",
     "projective_plane",
@@ -330,6 +339,7 @@ __all__ = [
     "torus",
     "torus_quadrature",
     "touching_parts",
+    "train_codebook",
     "transfer_labels",
     "uniform_quadrature",
     "value_colors",

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidShapeError
-from eigenshape.geometry.geodesic import waves_on
+from eigenshape.geometry.geodesic import farthest_points
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import vertex_components
@@ -47,21 +47,7 @@ def average_geodesic_distance(mesh: TriangleMesh, *, n_bases: SupportsIndex = N_
             f"Average distances need one piece; the mesh has {pieces} components. Repair with largest_component, or "
             "with weld where they touch."
         )
-    rows, nearest = _from_farthest_points(mesh, count)
+    _, rows, nearest = farthest_points(mesh, count)
     areas = dual_volumes(mesh)
     shares = np.bincount(nearest, weights=areas / areas.sum(), minlength=count)
     return shares @ rows
-
-
-def _from_farthest_points(mesh: TriangleMesh, count: int) -> tuple[Float[np.ndarray, "b n"], np.ndarray]:
-    """Return the distances from each base, and for each vertex which base is the nearest."""
-    wave = waves_on(mesh)
-    base = int(wave(0).argmax())
-    rows = np.empty((count, mesh.n_vertices))
-    least, nearest = np.full(mesh.n_vertices, np.inf), np.zeros(mesh.n_vertices, dtype=np.int64)
-    for number in range(count):
-        rows[number] = wave(base)
-        nearer = rows[number] < least
-        least[nearer], nearest[nearer] = rows[number][nearer], number
-        base = int(least.argmax())
-    return rows, nearest

@@ -103,6 +103,35 @@ def waves_on(mesh: Mesh) -> Callable[[int], Float[np.ndarray, " n"]]:
     return wave
 
 
+def farthest_points(
+    mesh: Mesh, count: int
+) -> tuple[Int[np.ndarray, " c"], Float[np.ndarray, "c n"], Int[np.ndarray, " n"]]:
+    """Choose vertices of a surface, each as far along it from those before as can be (Eldar and others 1997).
+
+    The first is the one farthest from vertex 0.
+
+    Returns
+    -------
+    chosen : (c,) int
+        Vertices; pieces that none is on come before all else.
+    distances : (c, n) float
+        From each to all vertices, in length; infinite from one piece to another.
+    nearest : (n,) int
+        For each vertex the number of the nearest.
+    """
+    wave, n = waves_on(mesh), mesh.n_points
+    first = wave(0)
+    chosen, rows = np.empty(count, dtype=np.int64), np.empty((count, n))
+    least, nearest = np.full(n, np.inf), np.zeros(n, dtype=np.int64)
+    following = int(np.where(np.isinf(first), 0.0, first).argmax())
+    for number in range(count):
+        chosen[number], rows[number] = following, wave(following)
+        nearer = rows[number] < least
+        least[nearer], nearest[nearer] = rows[number][nearer], number
+        following = int(least.argmax())
+    return chosen, rows, nearest
+
+
 def _require_surface(mesh: Mesh) -> None:
     if mesh.dim != 2:
         raise InvalidShapeError(f"Geodesic distances are measured on surfaces; this mesh has dimension {mesh.dim}.")

@@ -1,0 +1,70 @@
+"""What the surface is like around points spread all over it: descriptors of geodesic discs of several sizes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float32, Int
+
+from eigenshape._arrays import frozen
+from eigenshape.geometry.geodesic import farthest_points
+from eigenshape.geometry.measure import vertex_normals
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.normalize import normalize_box
+from eigenshape.geometry.simplices import dual_volumes
+from eigenshape.geometry.topology import boundary_vertices
+from eigenshape.retrieval.patch_loops import NUMBERS, describe_discs
+
+N_SAMPLES = 150
+RADII = 0.05 * 1.25 ** np.arange(1, 10)  # in sides of the box
+AT_BOUNDARY = 0.5  # of the radius, nearer than which to a boundary a disc weighs less
+LEAST_WEIGHT = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Patches:
+    """Geodesic discs around points of a shape in a unit box.
+
+    Attributes
+    ----------
+    numbers : (m, r, 64) float32
+        Of m points at r radii; see `describe_patches`.
+    weights : (m, r) float32
+        Share of the surface that a point stands for, less near a boundary.
+    vertices : (m,) int
+        The vertex of each point.
+    """
+
+    numbers: Float32[np.ndarray, "m r c"]
+    weights: Float32[np.ndarray, "m r"]
+    vertices: Int[np.ndarray, " m"]
+
+
+def describe_patches(mesh: TriangleMesh, *, n_samples: int = N_SAMPLES) -> Patches:
+    """Describe the discs around farthest points, at nine radii from .0625 to .37 of the box.
+
+    A disc's normal n is the mean normal within .35 of its radius R. Only what faces the same way counts, N_q · n > 0:
+    so a scan from one side compares with the whole. In each of four rings of equal width: histograms of N_q · n
+    (8 bins) and of the height (x_q - x_p) · n / R (6 bins), by area, square roots of shares; the logarithm of the area
+    up to there over that of a flat disc; and the mean of the straight over the geodesic distance.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        Oriented outward. In any size: it is put into a unit box.
+    n_samples : int
+        Points at most; never more than vertices.
+
+    Returns
+    -------
+    Patches
+    """
+    mesh = normalize_box(mesh)
+    chosen, rows, nearest = farthest_points(mesh, min(n_samples, mesh.n_vertices))
+    areas = dual_volumes(mesh)
+    numbers = np.empty((len(chosen), len(RADII), NUMBERS), dtype=np.float32)
+    describe_discs(rows, chosen, (mesh.vertices, vertex_normals(mesh), areas), RADII, numbers)
+    cells = np.bincount(nearest, weights=areas / areas.sum(), minlength=len(chosen))
+    rim = boundary_vertices(mesh)
+    away = rows[:, rim].min(axis=1) if len(rim) else np.full(len(chosen), np.inf)
+    weights = cells[:, None] * np.clip(away[:, None] / (AT_BOUNDARY * RADII), LEAST_WEIGHT, 1.0)
+    return Patches(frozen(numbers), frozen(weights.astype(np.float32)), frozen(chosen))

@@ -1,0 +1,95 @@
+"""Words and vectors of patches beside their definitions."""
+
+import numpy as np
+import pytest
+from sklearn.mixture import GaussianMixture
+
+import eigenshape as es
+from eigenshape.retrieval import codebook as codes
+from eigenshape.retrieval.codebook import encode_patches, train_codebook
+from eigenshape.retrieval.patch_score import SIZE_PRICE, patch_distances
+from eigenshape.retrieval.patches import Patches, describe_patches
+
+KINDS = ("quadruped", "hand", "octopus", "biped")
+
+
+@pytest.fixture(scope="module")
+def creatures():
+    return {
+        (kind, seed): describe_patches(es.make_creature(kind, seed, n_vertices=1200))
+        for kind in KINDS
+        for seed in (1, 2)
+    }
+
+
+@pytest.fixture(scope="module")
+def book(creatures):
+    return train_codebook([patches for (_, seed), patches in creatures.items() if seed == 1])
+
+
+def test_another_pose_is_the_nearest(creatures, book):
+    vectors = {key: encode_patches(patches, book) for key, patches in creatures.items()}
+    known = np.array([vectors[kind, 1] for kind in KINDS])
+    for place, kind in enumerate(KINDS):
+        assert patch_distances(vectors[kind, 2], known).argmin() == place
+        assert patch_distances(vectors[kind, 1], known)[place] == pytest.approx(0, abs=1e-6)
+
+
+def test_vectors_are_gradients_of_the_likelihood(creatures, book):
+    shape = creatures["hand", 2]
+    place, radius, step = 1, codes.BASES[1], 1e-5
+    points = codes._scaled(shape.numbers[:, radius].astype(float), book.means[place], book.spreads[place])
+    points = points @ book.axes[place]
+    weights = shape.weights[:, radius] / shape.weights[:, radius].sum(dtype=np.float64)
+
+    def likelihood(centers, spreads):
+        joint = codes._log_joint(points, book.shares[place], centers, spreads**2)
+        return float(weights @ np.log(np.exp(joint).sum(axis=1)))
+
+    found = codes._fisher(shape, radius, book, place).reshape(2, *book.centers[place].shape)
+    spreads = np.sqrt(book.variances[place])
+    for word, axis in ((0, 0), (3, 7), (31, 19)):
+        moved, root = np.zeros_like(spreads), np.sqrt(book.shares[place, word])
+        moved[word, axis] = step * spreads[word, axis]
+        slopes = [
+            (likelihood(book.centers[place] + moved, spreads) - likelihood(book.centers[place] - moved, spreads)),
+            (likelihood(book.centers[place], spreads + moved) - likelihood(book.centers[place], spreads - moved)),
+        ]
+        expected = np.array(slopes) / (2 * step) / root / [1, np.sqrt(2)]
+        assert found[:, word, axis] == pytest.approx(expected, abs=1e-5)
+
+
+def test_the_mixture_is_as_likely_as_another_librarys():
+    rng = np.random.default_rng(0)
+    points = np.concatenate([rng.normal(place, 0.5 + 0.1 * place, (200, 4)) for place in range(8)])
+    shares, centers, variances = codes._mixture(points, 0)
+    ours = np.log(np.exp(codes._log_joint(points, shares, centers, variances)).sum(axis=1)).mean() - 2 * np.log(
+        2 * np.pi
+    )
+    theirs = GaussianMixture(
+        codes.N_WORDS, covariance_type="diag", reg_covar=0, tol=1e-5, max_iter=2000, random_state=0
+    ).fit(points)
+    assert shares.sum() == pytest.approx(1)
+    assert ours > theirs.score(points) - 0.05
+
+
+def test_steps_of_size_are_found_and_have_a_price():
+    rng = np.random.default_rng(0)
+    query = rng.standard_normal((3, 3, 8)).astype(np.float32)
+    query /= np.linalg.norm(query, axis=2, keepdims=True)
+    larger = np.roll(query, 1, axis=1)  # what one has at a radius the other has at the next
+    assert patch_distances(query, query[None]) == pytest.approx(0, abs=1e-6)
+    assert patch_distances(query, larger[None]) == pytest.approx(SIZE_PRICE, abs=1e-6)
+    assert patch_distances(larger, query[None]) == pytest.approx(SIZE_PRICE, abs=1e-6)
+
+
+def test_the_same_again(creatures):
+    one, two = (train_codebook(list(creatures.values()), seed=3) for _ in range(2))
+    for name in ("means", "spreads", "axes", "shares", "centers", "variances"):
+        assert np.array_equal(getattr(one, name), getattr(two, name))
+
+
+def test_too_few_patches_are_refused():
+    few = Patches(np.zeros((3, 9, 64), np.float32), np.ones((3, 9), np.float32), np.arange(3))
+    with pytest.raises(es.InvalidParameterError, match="takes at least 64 patches; 2 shapes have 6"):
+        train_codebook([few, few])
