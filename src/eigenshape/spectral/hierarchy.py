@@ -18,7 +18,7 @@ PASSED = 4.0  # points of an aggregate to the wavelength from which functions ar
 LEAST_RATIO = 2.5  # of the top to the least of these zeros' interval
 LANCZOS = 12
 SMOOTHED = 0.6  # of an aggregate's points: how far below the top of the spectrum smoothing reaches
-LEAST_SPREAD = 20.0
+LEAST_SPREADS = (6.0, 20.0)  # of operators whose rows are full, and of those of a triangle mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,13 +79,18 @@ def build_levels(stiffness: sp.csr_array, mass: sp.csr_array, n_coarsest: int, *
         top = _top(stiffness)
         indicators = _aggregates(stiffness, n_coarsest) if n > TOO_LITTLE * n_coarsest else None
         if indicators is None or n < TOO_LITTLE * indicators.shape[1]:
-            levels.append(Level(stiffness, mass, top, LEAST_SPREAD, None, None))
+            levels.append(Level(stiffness, mass, top, LEAST_SPREADS[0], None, None))
             return levels
         down = _smoothed(stiffness, top, indicators) if smooth else indicators
-        spread = max(SMOOTHED * n / down.shape[1], LEAST_SPREAD)
+        spread = max(SMOOTHED * n / down.shape[1], _least_spread(stiffness))
         up = _by_rows(down.T)
         levels.append(Level(stiffness, mass, top, spread, down, up))
         stiffness, mass = _projected(up, stiffness, down), _projected(up, mass, down)
+
+
+def _least_spread(stiffness: sp.csr_array) -> float:
+    least, most = LEAST_SPREADS
+    return max(least, min(most, most * MESH_ROW * stiffness.shape[0] / stiffness.nnz))
 
 
 def load(device: Device, level: Level, dtype: type, *, lumped: bool) -> Loaded:

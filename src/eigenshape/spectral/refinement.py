@@ -13,7 +13,7 @@ from eigenshape.spectral.device import Array, fetch, multiply, put
 
 WIDTH = 32  # columns that are corrected at once
 STEPS = (8, 30)  # of smoothing, fewest and most
-FIRST_STEPS = 1.5  # of smoothing alone, times the root of what is to be smoothed
+FIRST_STEPS = 2.0  # of smoothing alone, times the root of what is to be smoothed
 DEPENDENT = {4: 1e-6, 8: 1e-13}  # of the largest eigenvalue of a Gram matrix of unit columns, by their bytes
 NOTHING = 1e-6
 FIRST_SHARE = 0.3  # of the work, told while the columns are smoothed the first time
