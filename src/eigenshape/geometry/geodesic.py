@@ -88,15 +88,15 @@ def geodesic_distances(mesh: Mesh, sources: ArrayLike) -> Float[np.ndarray, "k n
     return np.array([wave(source) for source in wanted]).reshape(-1, mesh.n_points)
 
 
-def waves_on(mesh: Mesh) -> Callable[[int], Float[np.ndarray, " n"]]:
-    """Return a function from a vertex to the distances of all vertices from it, prepared once for many."""
+def waves_on(mesh: Mesh) -> Callable[..., Float[np.ndarray, " n"]]:
+    """Return a function from a vertex, and a length, to the distances of all vertices within that, or infinite."""
     _require_surface(mesh)
     corners, scale = scaled_corners(mesh)
     starts, others, sides = _fans(mesh, corners)
 
-    def wave(source: int) -> Float[np.ndarray, " n"]:
+    def wave(source: int, reach: float = np.inf) -> Float[np.ndarray, " n"]:
         found = np.full(mesh.n_points, np.inf)
-        _, reached, values = balls(starts, *others, sides, np.inf, source, source + 1)
+        _, reached, values = balls(starts, *others, sides, reach / scale, source, source + 1)
         found[reached] = in_length(values, scale, 1)
         return found
 
@@ -104,18 +104,25 @@ def waves_on(mesh: Mesh) -> Callable[[int], Float[np.ndarray, " n"]]:
 
 
 def farthest_points(
-    mesh: Mesh, count: int
+    mesh: Mesh, count: int, *, reach: float = np.inf
 ) -> tuple[Int[np.ndarray, " c"], Float[np.ndarray, "c n"], Int[np.ndarray, " n"]]:
     """Choose vertices of a surface, each as far along it from those before as can be (Eldar and others 1997).
 
     The first is the one farthest from vertex 0.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh or SimplicialMesh
+    count : int
+    reach : float
+        Length up to which distances are wanted; shorter ones are quicker.
 
     Returns
     -------
     chosen : (c,) int
         Vertices; pieces that none is on come before all else.
     distances : (c, n) float
-        From each to all vertices, in length; infinite from one piece to another.
+        From each to all vertices, in length; infinite from one piece to another, and perhaps beyond `reach`.
     nearest : (n,) int
         For each vertex the number of the nearest.
     """
@@ -125,7 +132,7 @@ def farthest_points(
     least, nearest = np.full(n, np.inf), np.zeros(n, dtype=np.int64)
     following = int(np.where(np.isinf(first), 0.0, first).argmax())
     for number in range(count):
-        chosen[number], rows[number] = following, wave(following)
+        chosen[number], rows[number] = following, wave(following, max(reach, least.max()))
         nearer = rows[number] < least
         least[nearer], nearest[nearer] = rows[number][nearer], number
         following = int(least.argmax())

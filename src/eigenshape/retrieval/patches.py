@@ -59,7 +59,7 @@ def describe_patches(mesh: TriangleMesh, *, n_samples: int = N_SAMPLES) -> Patch
     Patches
     """
     mesh = normalize_box(mesh)
-    chosen, rows, nearest = farthest_points(mesh, min(n_samples, mesh.n_vertices))
+    chosen, rows, nearest = farthest_points(mesh, min(n_samples, mesh.n_vertices), reach=RADII[-1])
     areas = dual_volumes(mesh)
     numbers = np.empty((len(chosen), len(RADII), NUMBERS), dtype=np.float32)
     describe_discs(rows, chosen, (mesh.vertices, vertex_normals(mesh), areas), RADII, numbers)
