@@ -127,8 +127,8 @@ from eigenshape.retrieval.describe import DescribedShape, describe, describe_mes
 from eigenshape.retrieval.describe_large import DescribedLargeShape, describe_large_mesh
 from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDescriptor
 from eigenshape.retrieval.index import Match, Record, ShapeIndex
-from eigenshape.retrieval.patch_score import patch_distances
-from eigenshape.retrieval.patches import Patches, describe_patches
+from eigenshape.retrieval.patch_score import patch_distances, view_distances
+from eigenshape.retrieval.patches import Patches, describe_patch_views, describe_patches
 from eigenshape.retrieval.score import match_features, matching_score
 from eigenshape.retrieval.transfer import LabelTransfer, transfer_labels
 from eigenshape.spectral.approximate import approximate_spectrum
@@ -234,6 +234,7 @@ __all__ = [
     "describe",
     "describe_large_mesh",
     "describe_mesh",
+    "describe_patch_views",
     "describe_patches",
     "describe_views",
     "dirichlet_laplacian",
@@ -345,6 +346,7 @@ __all__ = [
     "value_colors",
     "vertex_components",
     "vertex_normals",
+    "view_distances",
     "wave_kernel_signature",
     "weld",
     "write_mesh",

@@ -5,9 +5,10 @@ import pytest
 from sklearn.mixture import GaussianMixture
 
 import eigenshape as es
+from eigenshape.geometry.sampling import viewpoint
 from eigenshape.retrieval import codebook as codes
 from eigenshape.retrieval.codebook import encode_patches, train_codebook
-from eigenshape.retrieval.patch_score import SIZE_PRICE, patch_distances
+from eigenshape.retrieval.patch_score import SIZE_PRICE, patch_distances, view_distances
 from eigenshape.retrieval.patches import Patches, describe_patches
 
 KINDS = ("quadruped", "hand", "octopus", "biped")
@@ -81,6 +82,30 @@ def test_steps_of_size_are_found_and_have_a_price():
     assert patch_distances(query, query[None]) == pytest.approx(0, abs=1e-6)
     assert patch_distances(query, larger[None]) == pytest.approx(SIZE_PRICE, abs=1e-6)
     assert patch_distances(larger, query[None]) == pytest.approx(SIZE_PRICE, abs=1e-6)
+
+
+def test_a_view_counts_by_half():
+    rng = np.random.default_rng(1)
+    rows = rng.standard_normal((4, 3, 1, 8)).astype(np.float32)
+    query, one, two, seen = rows / np.linalg.norm(rows, axis=3, keepdims=True)
+    far, near = patch_distances(query, np.array([one, two])), patch_distances(query, np.array([seen, query]))
+    found = view_distances(query, np.array([one, two]), np.array([seen, query]), np.array([0, 0]))
+    assert found == pytest.approx([(far[0] + min(far[0], near.min())) / 2, far[1]], abs=1e-6)
+    without = view_distances(query, np.array([one, two]), np.empty((0, 3, 1, 8), np.float32), np.empty(0, np.int64))
+    assert without == pytest.approx(far)
+
+
+def test_a_scan_is_nearest_to_the_view_from_its_side(creatures, book):
+    mesh = es.make_creature("hand", 1, n_vertices=1200)
+    views = es.describe_patch_views(mesh, n_views=3)
+    codes = np.array([encode_patches(view, book) for view in views])
+    for place in range(3):
+        scan = es.partial_scan(mesh, viewpoint(place)).mesh
+        found = patch_distances(encode_patches(describe_patches(scan), book), codes)
+        assert found.argmin() == place
+        assert found[place] == pytest.approx(0, abs=1e-5)
+        assert set(views[place].vertices) <= set(range(mesh.n_vertices))
+    assert es.describe_patch_views(scan) == []
 
 
 def test_the_same_again(creatures):

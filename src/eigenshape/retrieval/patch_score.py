@@ -1,7 +1,7 @@
 """How far apart two shapes are by their patches: the least over relative sizes."""
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float, Float32, Int
 
 SIZE_PRICE = 0.01  # of a step of size
 
@@ -23,6 +23,31 @@ def patch_distances(
     best = np.full(len(others), np.inf)
     for step in sorted(range(1 - n_sizes, n_sizes), key=abs):
         ours, theirs = query[:, max(-step, 0)], others[:, :, max(step, 0)]
-        cosines = theirs.reshape(len(others), -1) @ ours.ravel() / n_bases
+        cosines = theirs.reshape(len(others), ours.size) @ ours.ravel() / n_bases
         best = np.minimum(best, 1.0 - cosines + SIZE_PRICE * abs(step))
     return best
+
+
+def view_distances(
+    query: Float32[np.ndarray, "b s v"],
+    others: Float32[np.ndarray, "k b s v"],
+    views: Float32[np.ndarray, "w b s v"],
+    of: Int[np.ndarray, " w"],
+) -> Float[np.ndarray, " k"]:
+    """Return the means of `patch_distances` to shapes and to what is nearest of each, itself or one of its views.
+
+    A partial scan is nearer to a scan from the same side than to the whole; a whole stays nearest to the whole.
+
+    Parameters
+    ----------
+    query : (b, s, v) float32
+    others : (k, b, s, v) float32
+    views : (w, b, s, v) float32
+        What single viewpoints see of them, of as many or as few as there are.
+    of : (w,) int
+        Which of the others each is a view of.
+    """
+    own = patch_distances(query, others)
+    nearest = own.copy()
+    np.minimum.at(nearest, of, patch_distances(query, views))
+    return (own + nearest) / 2

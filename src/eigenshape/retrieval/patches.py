@@ -1,6 +1,6 @@
 """What the surface is like around points spread all over it: descriptors of geodesic discs of several sizes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float32, Int
@@ -10,11 +10,13 @@ from eigenshape.geometry.geodesic import farthest_points
 from eigenshape.geometry.measure import vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_box
+from eigenshape.geometry.sampling import partial_scan, viewpoint
 from eigenshape.geometry.simplices import dual_volumes
-from eigenshape.geometry.topology import boundary_vertices
+from eigenshape.geometry.topology import boundary_vertices, is_closed
 from eigenshape.retrieval.patch_loops import NUMBERS, describe_discs
 
 N_SAMPLES = 150
+N_VIEWS = 6
 RADII = 0.05 * 1.25 ** np.arange(1, 10)  # in sides of the box
 AT_BOUNDARY = 0.5  # of the radius, nearer than which to a boundary a disc weighs less
 LEAST_WEIGHT = 0.02
@@ -68,3 +70,16 @@ def describe_patches(mesh: TriangleMesh, *, n_samples: int = N_SAMPLES) -> Patch
     away = rows[:, rim].min(axis=1) if len(rim) else np.full(len(chosen), np.inf)
     weights = cells[:, None] * np.clip(away[:, None] / (AT_BOUNDARY * RADII), LEAST_WEIGHT, 1.0)
     return Patches(frozen(numbers), frozen(weights.astype(np.float32)), frozen(chosen))
+
+
+def describe_patch_views(mesh: TriangleMesh, *, n_views: int = N_VIEWS) -> list[Patches]:
+    """Describe what single viewpoints see of a closed shape, as partial scans of it will be.
+
+    Returns
+    -------
+    list of Patches
+        With points at vertices of the whole; empty for an open shape, which is a part already.
+    """
+    parts = [partial_scan(mesh, viewpoint(view)) for view in range(n_views if is_closed(mesh) else 0)]
+    seen = [(part, describe_patches(part.mesh)) for part in parts]
+    return [replace(patches, vertices=frozen(part.source_vertices[patches.vertices])) for part, patches in seen]
