@@ -165,10 +165,15 @@ def table(rows: list[dict[str, dict[str, list[float]]]]) -> dict[str, dict[str, 
     }
 
 
+def upright(mesh: es.TriangleMesh) -> es.TriangleMesh:
+    """Turn a shape of TOSCA, where z is up, so that y is."""
+    return es.TriangleMesh(mesh.vertices[:, [1, 2, 0]], mesh.faces)
+
+
 def picture(stem: str, n_poses: int) -> object:
     """Draw poses with a partial and an incomplete version; parts have the colour of the feature that they answer."""
     paths = sorted((DATA / "retrieval").glob(f"{stem}*.ply"))[:n_poses]
-    meshes = [es.read_mesh(path) for path in paths]
+    meshes = [upright(es.read_mesh(path)) for path in paths]
     find = FUNCTIONS["HKS, scale-free"]
     known = find(meshes[0])
     panels = [es.Panel(meshes[0], f"{paths[0].stem}: 15 maxima", known.labels, known.features.vertices)]
