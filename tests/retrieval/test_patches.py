@@ -93,3 +93,25 @@ def test_each_piece_is_sampled():
     pair = es.disjoint_union(one, es.TriangleMesh(two.vertices + 3, two.faces))
     found = describe_patches(pair, n_samples=30)
     assert (found.vertices < one.n_vertices).sum() == pytest.approx(15, abs=2)
+
+
+def test_two_triangles_are_enough():
+    mesh = es.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    found = describe_patches(mesh)
+    assert len(found.vertices) == 4
+    assert np.isfinite(found.numbers).all()
+    assert (found.weights > 0).all()
+
+
+def test_bad_input_is_named():
+    ball = es.icosphere(1)
+    with pytest.raises(es.InvalidParameterError, match="n_samples must be at least 1; it is 0"):
+        describe_patches(ball, n_samples=0)
+    loose = es.TriangleMesh(np.concatenate([ball.vertices, [[2, 0, 0]]]), ball.faces)
+    with pytest.raises(es.InvalidShapeError, match="42"):
+        describe_patches(loose)
+    line = es.TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
+    with pytest.raises(
+        es.InvalidShapeError, match="must have an area to be described by patches; all its faces have none"
+    ):
+        describe_patches(line)

@@ -1,18 +1,20 @@
 """What the surface is like around points spread all over it: descriptors of geodesic discs of several sizes."""
 
 from dataclasses import dataclass, replace
+from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float32, Int
 
-from eigenshape._arrays import frozen
+from eigenshape._arrays import frozen, whole_number
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.geodesic import farthest_points
 from eigenshape.geometry.measure import vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_box
 from eigenshape.geometry.sampling import partial_scan, viewpoint
 from eigenshape.geometry.simplices import dual_volumes
-from eigenshape.geometry.topology import boundary_vertices, is_closed
+from eigenshape.geometry.topology import boundary_vertices, is_closed, require_simplices_everywhere
 from eigenshape.retrieval.patch_loops import NUMBERS, describe_discs
 
 N_SAMPLES = 150
@@ -41,7 +43,7 @@ class Patches:
     vertices: Int[np.ndarray, " m"]
 
 
-def describe_patches(mesh: TriangleMesh, *, n_samples: int = N_SAMPLES) -> Patches:
+def describe_patches(mesh: TriangleMesh, *, n_samples: SupportsIndex = N_SAMPLES) -> Patches:
     """Describe the discs around farthest points, at nine radii from .0625 to .37 of the box.
 
     A disc's normal n is the mean normal within .35 of its radius R. Only what faces the same way counts, N_q · n > 0:
@@ -59,10 +61,21 @@ def describe_patches(mesh: TriangleMesh, *, n_samples: int = N_SAMPLES) -> Patch
     Returns
     -------
     Patches
+
+    Raises
+    ------
+    InvalidParameterError
+        If n_samples is not positive.
+    InvalidShapeError
+        If a vertex has no face, or the surface no area.
     """
+    count = min(whole_number(n_samples, "n_samples", 1), mesh.n_vertices)
+    require_simplices_everywhere(mesh)
     mesh = normalize_box(mesh)
-    chosen, rows, nearest = farthest_points(mesh, min(n_samples, mesh.n_vertices), reach=RADII[-1])
     areas = dual_volumes(mesh)
+    if not areas.sum() > 0:
+        raise InvalidShapeError("A surface must have an area to be described by patches; all its faces have none.")
+    chosen, rows, nearest = farthest_points(mesh, count, reach=RADII[-1])
     numbers = np.empty((len(chosen), len(RADII), NUMBERS), dtype=np.float32)
     describe_discs(rows, chosen, (mesh.vertices, vertex_normals(mesh), areas), RADII, numbers)
     cells = np.bincount(nearest, weights=areas / areas.sum(), minlength=len(chosen))
