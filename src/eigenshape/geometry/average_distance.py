@@ -3,7 +3,7 @@
 from typing import SupportsIndex
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidShapeError
@@ -47,21 +47,34 @@ def average_geodesic_distance(mesh: TriangleMesh, *, n_bases: SupportsIndex = N_
             f"Average distances need one piece; the mesh has {pieces} components. Repair with largest_component, or "
             "with weld where they touch."
         )
-    rows, nearest = _from_farthest_points(mesh, count)
+    rows, nearest, _ = from_farthest_points(mesh, count)
     areas = dual_volumes(mesh)
     shares = np.bincount(nearest, weights=areas / areas.sum(), minlength=count)
     return shares @ rows
 
 
-def _from_farthest_points(mesh: TriangleMesh, count: int) -> tuple[Float[np.ndarray, "b n"], np.ndarray]:
-    """Return the distances from each base, and for each vertex which base is the nearest."""
+def from_farthest_points(
+    mesh: TriangleMesh, count: int
+) -> tuple[Float[np.ndarray, "b n"], Int[np.ndarray, " n"], Int[np.ndarray, " b"]]:
+    """Choose points far from each other, the first that farthest from vertex 0.
+
+    Returns
+    -------
+    rows : (b, n) float
+        Distance from each of them to each vertex, in length; infinite where there is no way.
+    nearest : (n,) int
+        Which of them is nearest to each vertex.
+    bases : (b,) int
+        Their vertices; another piece of the mesh is farther than all else.
+    """
     wave = waves_on(mesh)
+    bases = np.empty(count, dtype=np.int64)
     base = int(wave(0).argmax())
     rows = np.empty((count, mesh.n_vertices))
     least, nearest = np.full(mesh.n_vertices, np.inf), np.zeros(mesh.n_vertices, dtype=np.int64)
     for number in range(count):
-        rows[number] = wave(base)
+        bases[number], rows[number] = base, wave(base)
         nearer = rows[number] < least
         least[nearer], nearest[nearer] = rows[number][nearer], number
         base = int(least.argmax())
-    return rows, nearest
+    return rows, nearest, bases
