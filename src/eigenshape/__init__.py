@@ -127,6 +127,7 @@ from eigenshape.retrieval.describe import DescribedShape, describe, describe_mes
 from eigenshape.retrieval.describe_large import DescribedLargeShape, describe_large_mesh
 from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDescriptor
 from eigenshape.retrieval.index import Match, Record, ShapeIndex
+from eigenshape.retrieval.light_field import light_field, light_field_distance
 from eigenshape.retrieval.score import match_features, matching_score
 from eigenshape.retrieval.shape_dna import shape_dna, shape_dna_distance
 from eigenshape.retrieval.transfer import LabelTransfer, transfer_labels
@@ -282,6 +283,8 @@ __all__ = [
     "is_closed",
     "is_manifold",
     "largest_component",
+    "light_field",
+    "light_field_distance",
     "make_creature",
     "match_features",
     "matching_score",
