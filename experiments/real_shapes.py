@@ -6,6 +6,10 @@ import os
 import sys
 from pathlib import Path
 
+import numpy as np
+
+import eigenshape as es
+
 DATA = Path(os.environ.get("EIGENSHAPE_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
 
 
@@ -27,3 +31,10 @@ def give_out(results: object, path: Path | None) -> None:
     sys.stdout.write(text)
     if path:
         path.write_text(text)
+
+
+def inner_curvature(mesh: es.TriangleMesh) -> np.ndarray:
+    """Return the Gaussian curvature; on a boundary, where it is none, the least inside."""
+    values, edge = es.gaussian_curvature(mesh), es.boundary_vertices(mesh)
+    values[edge] = np.delete(values, edge).min()
+    return values

@@ -18,7 +18,7 @@ from rich.progress import track
 import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
-from real_shapes import DATA, give_out, require_data
+from real_shapes import DATA, give_out, inner_curvature, require_data
 
 NEAR, N_FEATURES = 0.05, 15
 KINDS, REAL = ("biped", "giraffe", "hand", "quadruped"), ("human/tosca_david", "human/tosca_victoria", "cat/tosca_cat")
@@ -36,18 +36,11 @@ def by_values(function: object) -> object:
     return lambda mesh: es.segment(es.merge_tree(mesh, function(mesh)), n_regions=N_FEATURES)
 
 
-def curvature(mesh: es.TriangleMesh) -> np.ndarray:
-    """Return the Gaussian curvature; on a boundary, where it is none, the least inside."""
-    values, edge = es.gaussian_curvature(mesh), es.boundary_vertices(mesh)
-    values[edge] = np.delete(values, edge).min()
-    return values
-
-
 FUNCTIONS = {
     "HKS, scale-free": by_heat(es.SCALE_FREE),
     "HKS, thesis": by_heat(es.THESIS),
     "AGD": by_values(es.average_geodesic_distance),
-    "GC": by_values(curvature),
+    "GC": by_values(inner_curvature),
 }
 
 

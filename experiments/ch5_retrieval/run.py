@@ -1,121 +1,101 @@
-"""Leave-one-out retrieval over real, complete shapes, and over partial scans of them.
+"""Retrieval by whole, partial and incomplete shapes: tables 5.2 and 5.4 of the thesis, on shapes of our own.
 
-The index is kept in a folder, so that a second run measures without describing anything again.
+Descriptors are kept in a folder, so that a second run only measures distances.
 """
 
 import argparse
 import sys
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-from rich.progress import Progress, TaskID, track
-
-import eigenshape as es
-
 sys.path.append(str(Path(__file__).resolve().parents[1]))
-from real_shapes import DATA, give_out, manifest, require_data
+from describing import Failure, Store, describe_all
+from draws import HALVES, Draw, Shape, Version, complete, draw, half_of, make, shapes
+from methods import METHODS, SLOW, Method, Trainable
+from real_shapes import give_out, require_data
+from rich.progress import track
+from scores import Outcome, differences, four_legged_as_one, rates
+from tables import PROTOCOLS, printed
 
-FOUR_LEGGED = frozenset({"fourleg", "horse", "dog", "cat", "wolf", "lion"})
-QUICK = ("ant", "chair", "fish", "glasses", "hand", "octopus", "teddy")
-TOPS = (1, 3, 5)
-N_VIEWS = 4
-
-
-def describe_file(path: Path, recipe: es.Recipe, n_views: int) -> list[es.ShapeDescriptor]:
-    """Read a mesh and describe it, whole and from some sides."""
-    mesh = es.read_mesh(path)
-    return [es.describe_mesh(mesh, recipe).descriptor, *es.describe_views(mesh, recipe, n_views=n_views)]
+SEEDS = (0, 1, 2)
+QUICK_CLASSES, QUICK_QUERIES = ("ant", "chair", "glasses", "octopus", "teddy"), (4, 8)
 
 
-def shapes(quick: bool) -> list[es.Item]:
-    """List the shapes of all classes with at least three members, or half of a few classes."""
-    rows = manifest()
-    sizes = {row["cls"]: sum(other["cls"] == row["cls"] for other in rows) for row in rows}
-    kept = [row for row in rows if sizes[row["cls"]] >= 3]
-    if quick:
-        kept = [row for row in kept if row["cls"] in QUICK][::2]
-    return [es.Item(f"{row['cls']}/{Path(row['path']).stem}", DATA / row["path"], row["cls"]) for row in kept]
+def ready(method: Method, some: Sequence[Shape]) -> Method:
+    """Let a method learn from complete shapes, where it does."""
+    return method.train(make(complete(shape)) for shape in some) if isinstance(method, Trainable) else method
 
 
-def ranking(index: es.ShapeIndex, item: es.Item, query: es.ShapeDescriptor) -> list[str]:
-    """Return the classes of the first answers, the shape itself left out."""
-    matches = index.query(query, n_matches=TOPS[-1] + 1)
-    return [match.label for match in matches if match.name != item.name][: TOPS[-1]]
+def outcomes(method: Method, store: Store, queries: Sequence[Version], database: Sequence[Version]) -> list[Outcome]:
+    """Ask for each query; a shape without descriptor is no answer, and a query without has none."""
+    entries = [(version.shape.label, store.load(method, version)) for version in database]
+    known = [(label, entry) for label, entry in entries if not isinstance(entry, Failure)]
+    found = []
+    for version in queries:
+        entry = store.load(method, version)
+        ranking: tuple[str, ...] = ()
+        if not isinstance(entry, Failure):
+            order = method.distances(entry, [other for _, other in known]).argsort(kind="stable")
+            ranking = tuple(known[place][0] for place in order)
+        found.append(Outcome(version.kind, version.shape.label, ranking))
+    return found
 
 
-def merged(label: str) -> str:
-    """Call all four-legged animals by one name."""
-    return "four-legged" if label in FOUR_LEGGED else label
-
-
-def hit_rates(labels: list[str], rankings: list[list[str]]) -> list[float]:
-    """Return the share of queries, in per cent, with a hit among the first 1, 3 and 5."""
-    pairs = list(zip(labels, rankings, strict=True))
-    return [round(100 * float(np.mean([label in ranked[:top] for label, ranked in pairs])), 1) for top in TOPS]
-
-
-def table(items: list[es.Item], rankings: list[list[str]]) -> dict[str, list[float]]:
-    """Score rankings strictly, without the mixed class among the queries, and with the four-legged classes as one."""
-    labels = [item.label or "" for item in items]
-    plain = [place for place, label in enumerate(labels) if label != "fourleg"]
+def asked(method: Method, store: Store, draws: Sequence[Draw]) -> dict[str, list[Outcome]]:
+    """Return the outcomes of all draws in both protocols."""
     return {
-        "strict, fourleg not asked for": hit_rates([labels[i] for i in plain], [rankings[i] for i in plain]),
-        "strict": hit_rates(labels, rankings),
-        "four-legged as one class": hit_rates(
-            [merged(label) for label in labels], [[merged(label) for label in ranked] for ranked in rankings]
-        ),
+        protocol: [one for each in draws for one in outcomes(method, store, each.queries, getattr(each, protocol))]
+        for protocol in PROTOCOLS
     }
 
 
-def partial_scan(item: es.Item, place: int) -> es.TriangleMesh:
-    """Scan a shape from a random side, which depends on its place in the list alone."""
-    return es.partial_scan(es.read_mesh(item.path), np.random.default_rng([1, place])).mesh
+def measure(found: dict[str, dict[str, list[Outcome]]], reference: str) -> dict[str, object]:
+    """Return all rates, by protocol and method, and differences to the reference."""
+    results: dict[str, object] = {}
+    for protocol in PROTOCOLS:
+        results[protocol] = {name: rates(each[protocol]) for name, each in found.items()}
+        one = {name: [four_legged_as_one(outcome) for outcome in each[protocol]] for name, each in found.items()}
+        results[f"{protocol}, four-legged as one"] = {name: rates(each) for name, each in one.items()}
+        if reference in found:
+            others = {name: each[protocol] for name, each in found.items() if name != reference}
+            results[f"{protocol}, less {reference}"] = {
+                name: differences(each, found[reference][protocol]) for name, each in others.items()
+            }
+    return results
 
 
-def measure(items: list[es.Item], recipe: es.Recipe, n_views: int, folder: Path) -> dict[str, object]:
-    """Index all shapes, ask for each of them, and for a partial scan of every third."""
-    index = es.ShapeIndex.open(folder) if folder.exists() else es.ShapeIndex.create(folder)
-    describe = partial(describe_file, recipe=recipe, n_views=n_views)
-    with Progress() as bar:
-        task = bar.add_task(recipe.name, total=len(items))
-        told = partial(tell, bar, task)
-        report = es.build_index(index, items, describe, recipes=(recipe,), told=told)
-    taken = [item for item in items if item.name not in dict(report.failed)]
-    complete = [ranking(index, item, index.descriptor(item.name, recipe)) for item in track(taken, "whole shapes")]
-    scanned = [(place, item) for place, item in enumerate(taken) if place % 3 == 0]
-    partials = [
-        ranking(index, item, es.describe_mesh(partial_scan(item, place), recipe).descriptor)
-        for place, item in track(scanned, "partial scans")
-    ]
-    return {
-        "not taken": dict(report.failed),
-        "complete": table(taken, complete),
-        "partial scans": table([item for _, item in scanned], partials),
-    }
-
-
-def tell(bar: Progress, task: TaskID, n_done: int, n_items: int, name: str, error: str | None) -> None:
-    """Move the bar, and name what cannot be taken."""
-    bar.update(task, completed=n_done)
-    if error:
-        bar.print(f"not taken: {name}: {error}")
+def arguments() -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help=f"classes {', '.join(QUICK_CLASSES)}, one draw")
+    parser.add_argument("--half", choices=HALVES, default="reporting")
+    parser.add_argument("--draws", type=int, nargs="*", default=SEEDS, help="seeds of the draws")
+    parser.add_argument("--methods", nargs="*", choices=sorted(METHODS), default=[m for m in METHODS if m not in SLOW])
+    parser.add_argument("--against", choices=sorted(METHODS), default="thesis, cotangent", help="of paired differences")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--cache", type=Path, default=Path("ch5-descriptors"), help="folder of descriptors, kept")
+    parser.add_argument("--out", type=Path, default=Path("ch5-results.json"))
+    return parser.parse_args()
 
 
 def main() -> None:
-    """Build the index, ask for everything, print and save the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help=f"half of the classes {', '.join(QUICK)}")
-    parser.add_argument("--db", type=Path, default=Path("ch5-index"), help="folder of the indexes, kept")
-    parser.add_argument("--out", type=Path, default=Path("ch5-results.json"))
-    arguments = parser.parse_args()
+    """Draw, describe, ask, print and save."""
+    chosen = arguments()
     require_data()
-    items = shapes(arguments.quick)
-    results = {}
-    for recipe, n_views in ((es.SCALE_FREE, N_VIEWS), (es.THESIS, 0)):
-        folder = arguments.db / f"{recipe.name}-{len(items)}"
-        results[recipe.name] = measure(items, recipe, n_views, folder)
-    give_out(results, arguments.out)
+    everything = [shape for shape in shapes() if not chosen.quick or shape.label in QUICK_CLASSES]
+    some = half_of(everything, chosen.half)
+    rest = [shape for shape in everything if shape not in some]
+    seeds, numbers = (chosen.draws[:1], QUICK_QUERIES) if chosen.quick else (chosen.draws, (18, 32))
+    draws = [draw(some, seed, *numbers) for seed in seeds]
+    methods = {name: ready(METHODS[name], rest) for name in chosen.methods}
+    store = Store(chosen.cache)
+    versions = [version for each in draws for part in (each.queries, each.mixed, each.complete) for version in part]
+    failed = describe_all(store, list(methods.values()), list(dict.fromkeys(versions)), chosen.workers)
+    found = {name: asked(method, store, draws) for name, method in track(methods.items(), "asking")}
+    results = measure(found, chosen.against)
+    counts = {"shapes": len(some), "queries": sum(len(each.queries) for each in draws), "draws": len(draws)}
+    print(printed(results, counts))
+    give_out({"counts": counts, "without descriptor": failed, **results}, chosen.out)
 
 
 if __name__ == "__main__":

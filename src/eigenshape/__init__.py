@@ -121,15 +121,18 @@ from eigenshape.operators.graph import edge_graph, graph_laplacian
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 from eigenshape.operators.neighbors import neighbor_graph
 from eigenshape.operators.robust import robust_laplacian
+from eigenshape.retrieval.affinity import affinity_distance, affinity_eigenvalues
 from eigenshape.retrieval.batch import BatchReport, Item, Workers, build_index
 from eigenshape.retrieval.codebook import PatchCodebook, encode_patches, train_codebook
 from eigenshape.retrieval.describe import DescribedShape, describe, describe_mesh, describe_views
 from eigenshape.retrieval.describe_large import DescribedLargeShape, describe_large_mesh
 from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDescriptor
 from eigenshape.retrieval.index import Match, Record, ShapeIndex
+from eigenshape.retrieval.light_field import light_field, light_field_distance
 from eigenshape.retrieval.patch_score import patch_distances, view_distances
 from eigenshape.retrieval.patches import Patches, describe_patch_views, describe_patches
 from eigenshape.retrieval.score import match_features, matching_score
+from eigenshape.retrieval.shape_dna import shape_dna, shape_dna_distance
 from eigenshape.retrieval.transfer import LabelTransfer, transfer_labels
 from eigenshape.spectral.approximate import approximate_spectrum
 from eigenshape.spectral.brackets import Brackets, bracket_eigenvalues
@@ -204,6 +207,8 @@ __all__ = [
     "StoreError",
     "TriangleMesh",
     "Workers",
+    "affinity_distance",
+    "affinity_eigenvalues",
     "anisotropic_laplacian",
     "approximate_heat_kernel_signature",
     "approximate_spectrum",
@@ -287,6 +292,8 @@ __all__ = [
     "is_closed",
     "is_manifold",
     "largest_component",
+    "light_field",
+    "light_field_distance",
     "make_creature",
     "match_features",
     "matching_score",
@@ -322,6 +329,8 @@ __all__ = [
     "scale_invariant_heat_kernel_signature",
     "seal_holes",
     "segment",
+    "shape_dna",
+    "shape_dna_distance",
     "simplex_volumes",
     "smooth_boundaries",
     "solve_dirichlet",

@@ -108,7 +108,7 @@ def farthest_points(
 ) -> tuple[Int[np.ndarray, " c"], Float[np.ndarray, "c n"], Int[np.ndarray, " n"]]:
     """Choose vertices of a surface, each as far along it from those before as can be (Eldar and others 1997).
 
-    The first is the one farthest from vertex 0.
+    The first is the one farthest from vertex 0; another piece is farther than all else.
 
     Parameters
     ----------
@@ -120,17 +120,16 @@ def farthest_points(
     Returns
     -------
     chosen : (c,) int
-        Vertices; pieces that none is on come before all else.
+        Vertices.
     distances : (c, n) float
         From each to all vertices, in length; infinite from one piece to another, and perhaps beyond `reach`.
     nearest : (n,) int
         For each vertex the number of the nearest.
     """
     wave, n = waves_on(mesh), mesh.n_points
-    first = wave(0)
     chosen, rows = np.empty(count, dtype=np.int64), np.empty((count, n))
     least, nearest = np.full(n, np.inf), np.zeros(n, dtype=np.int64)
-    following = int(np.where(np.isinf(first), 0.0, first).argmax())
+    following = int(wave(0).argmax())
     for number in range(count):
         chosen[number], rows[number] = following, wave(following, max(reach, least.max()))
         nearer = rows[number] < least

@@ -5,7 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
+from numpy.typing import ArrayLike
 
+from eigenshape._arrays import vertex_values
 from eigenshape._errors import InvalidShapeError
 from eigenshape.features.merge_tree import MergeTree, merge_tree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment
@@ -35,9 +37,9 @@ class DescribedShape:
         As it was described: in a unit box where the recipe says so.
     spectrum : Spectrum
     heat : (n,) float
-        The heat whose maxima are the features, in 1/length².
+        The heat whose maxima are the features, in 1/length², or the function that was given in its place.
     tree : MergeTree
-        Of the heat; it can be cut elsewhere without computing anything again.
+        Of that function; it can be cut elsewhere without computing anything again.
     parts : Segmentation
         One region around each feature point.
     descriptor : ShapeDescriptor
@@ -75,15 +77,24 @@ def describe(
 
 
 def describe_mesh(
-    mesh: TriangleMesh, recipe: Recipe = SCALE_FREE, *, progress: Progress | None = None
+    mesh: TriangleMesh,
+    recipe: Recipe = SCALE_FREE,
+    *,
+    values: ArrayLike | None = None,
+    progress: Progress | None = None,
 ) -> DescribedShape:
     """Walk the whole road: cotangent Laplacian, spectrum, heat, merge tree, parts, descriptor.
+
+    The features are the persistent maxima of heat, or of another function of the vertices; either way they are
+    described by the heat that they keep. Thesis table 5.4 tries `average_geodesic_distance` and `gaussian_curvature`.
 
     Parameters
     ----------
     mesh : TriangleMesh
         A closed or open surface.
     recipe : Recipe
+    values : (n,) float, optional
+        The function whose maxima are the features, in place of heat; only its order and its differences count.
     progress : callable, optional
         Told of the eigensolver's progress.
 
@@ -96,14 +107,19 @@ def describe_mesh(
     InvalidShapeError
         If the mesh falls into more pieces than the recipe has features, or has a face without area or a vertex
         without face.
+    InvalidParameterError
+        If `values` are not one finite number a vertex.
     """
+    height = None if values is None else vertex_values(values, "values", mesh.n_vertices)
     mesh, laplacian, held = prepared(mesh, recipe)
     spectrum = solve_spectrum(laplacian, min(recipe.n_modes, mesh.n_vertices), progress=progress)
     n_free = mesh.n_vertices - len(held)
     fixed = solve_dirichlet(laplacian, min(recipe.n_modes, n_free), held, progress=progress) if len(held) else None
     unit, times = clock(laplacian.mass, recipe)
-    heat, later = _heat(spectrum, fixed, times[:1])[:, 0], _heat(spectrum, fixed, times[1:])
-    return DescribedShape(mesh, spectrum, heat, *parts_and_descriptor(mesh, heat, later, recipe, unit))
+    later = _heat(spectrum, fixed, times[1:])
+    if height is None:
+        height = _heat(spectrum, fixed, times[:1])[:, 0]
+    return DescribedShape(mesh, spectrum, height, *parts_and_descriptor(mesh, height, later, recipe, unit))
 
 
 def describe_views(mesh: TriangleMesh, recipe: Recipe = SCALE_FREE, *, n_views: int = N_VIEWS) -> list[ShapeDescriptor]:
