@@ -174,4 +174,4 @@ METHODS: dict[str, Method] = {
         Patches("patches, made words", "creatures"),
     )
 }
-SLOW = ("thesis, mesh Laplacian",)  # ten seconds a shape; asked for by name
+SLOW = ("thesis, mesh Laplacian", "patches, made words")  # ten seconds a shape, a minute to learn; asked for by name

@@ -14,6 +14,7 @@ from draws import HALVES, Draw, Shape, Version, complete, draw, half_of, make, s
 from methods import METHODS, SLOW, Method, Trainable
 from real_shapes import give_out, require_data
 from rich.progress import track
+from rich.status import Status
 from scores import Outcome, differences, four_legged_as_one, rates
 from tables import PROTOCOLS, printed
 
@@ -23,7 +24,10 @@ QUICK_CLASSES, QUICK_QUERIES = ("ant", "chair", "glasses", "octopus", "teddy"), 
 
 def ready(method: Method, some: Sequence[Shape]) -> Method:
     """Let a method learn from complete shapes, where it does."""
-    return method.train(make(complete(shape)) for shape in some) if isinstance(method, Trainable) else method
+    if not isinstance(method, Trainable):
+        return method
+    with Status(f"{method.name}: learning"):
+        return method.train(make(complete(shape)) for shape in some)
 
 
 def outcomes(method: Method, store: Store, queries: Sequence[Version], database: Sequence[Version]) -> list[Outcome]:
