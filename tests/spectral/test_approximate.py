@@ -203,7 +203,9 @@ def test_an_indefinite_stiffness_is_refused(always_coarsen):
 
 
 def test_what_does_not_converge_is_not_returned(always_coarsen, monkeypatch):
-    with pytest.raises(ConvergenceError, match=r"Corrections must be finite; those of eigenvector \d+ and following"):
+    with pytest.raises(
+        ConvergenceError, match=r"Smoothed eigenvectors must be independent; fewer than 24 are\. The weights"
+    ):
         approximate_spectrum(wild(), 12, bound=1e-3)  # weights over eight decades: the way to the exact solver
     monkeypatch.setattr(approximate, "ROUNDS", 1)
     with pytest.raises(
@@ -211,6 +213,13 @@ def test_what_does_not_converge_is_not_returned(always_coarsen, monkeypatch):
         match=r"estimated at no more than 1\.0e-10 of the last eigenvalue, .* after 1 rounds these are .*"
         r"Ask for less accuracy, or take solve_spectrum",
     ):
+        approximate_spectrum(cotangent_laplacian(icosphere(4)), 12, accuracy=1e-10)
+
+
+@pytest.mark.parametrize("which", ["smooth", "correct"])
+def test_corrections_that_overflow_are_refused(always_coarsen, monkeypatch, which):
+    monkeypatch.setattr(refinement, which, lambda tower, block, shifts, steps: np.full_like(block, np.inf))
+    with pytest.raises(ConvergenceError, match=r"Corrections must be finite; those of eigenvector [01] overflow\. The"):
         approximate_spectrum(cotangent_laplacian(icosphere(4)), 12, accuracy=1e-10)
 
 

@@ -22,6 +22,7 @@ PROBE_STEPS = 4
 MOST_LEFT = 10.0  # times what a round has lowered
 EARLY = 0.5  # of the bound, or:
 EXACT = 0.01  # of the accuracy, under which a residual is left as it is
+TOO_FAR = "The weights of the operator spread too far for its diagonal: take solve_spectrum."
 UNSEEN = 3.0  # times what is estimated, where only smoothing has been at work
 
 
@@ -70,7 +71,7 @@ def refine(
     Raises
     ------
     ConvergenceError
-        If a strict goal is not reached in its rounds.
+        If a strict goal is not reached in its rounds, or columns overflow or become dependent.
     """
     values, m = below[1], len(below[1])
     space = _prolonged(tower, below[0])
@@ -140,6 +141,7 @@ def _smooth_all(
         some = np.arange(start, min(start + WIDTH, len(values)))
         block, norms[some] = residual_block(tower, chosen(tower, space.columns, some), values[some], np.ones(len(some)))
         corrections = smooth(tower, block, values[some].astype(np.float32), steps)
+        _require_finite(tower, corrections, some)
         for rows in row_chunks(tower):
             space.columns[rows, start : start + len(some)] -= corrections[rows]
     return norms
@@ -153,7 +155,7 @@ def _add_corrections(
     Raises
     ------
     ConvergenceError
-        If they overflow: far below zero, where single rows are next to nothing beside θM, smoothing makes them grow.
+        If they overflow.
     """
     steps = int(np.clip(np.ceil(0.5 * np.sqrt(tower.levels[0].spread) * np.log(8 * excess)), *STEPS))
     values, residuals = state
@@ -161,13 +163,15 @@ def _add_corrections(
         some = late[start : start + WIDTH]
         block, _ = residual_block(tower, chosen(tower, space.columns, some), values[some], 1 / residuals[some])
         corrections = correct(tower, block, values[some].astype(np.float32), steps)
-        if not tower.device.arrays.isfinite(corrections.sum()):
-            raise ConvergenceError(
-                f"Corrections must be finite; those of eigenvector {some[0]} and following overflow. The weights of "
-                f"the operator spread too far for its diagonal: take solve_spectrum."
-            )
+        _require_finite(tower, corrections, some)
         for rows in row_chunks(tower):
             space.added[rows, start : start + len(some)] = corrections[rows]
+
+
+def _require_finite(tower: Tower, corrections: Array, some: np.ndarray) -> None:
+    # Far below zero, where single rows are next to nothing beside θM, smoothing makes columns grow.
+    if not tower.device.arrays.isfinite(corrections.sum()):
+        raise ConvergenceError(f"Corrections must be finite; those of eigenvector {some[0]} overflow. {TOO_FAR}")
 
 
 def _look_again(
@@ -223,6 +227,8 @@ def _combination(tower: Tower, space: Space, values: np.ndarray, fresh: slice) -
     scales = 1 / arrays.sqrt(arrays.diagonal(gram))
     sizes, axes = arrays.linalg.eigh(gram * scales * scales[:, None])
     kept = sizes > DEPENDENT[space.columns.dtype.itemsize] * sizes[-1]
+    if np.count_nonzero(fetch(tower.device, kept)) < len(values):
+        raise ConvergenceError(f"Smoothed eigenvectors must be independent; fewer than {len(values)} are. {TOO_FAR}")
     axes = (scales[:, None] * axes[:, kept]) / arrays.sqrt(sizes[kept])
     found, weights = arrays.linalg.eigh(axes.T @ projected @ axes)
     m = len(values)
