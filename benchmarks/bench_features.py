@@ -15,6 +15,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -53,15 +54,9 @@ def times() -> np.ndarray:
     return es.THESIS.time_unit * np.array(es.THESIS.scales)
 
 
-def ours(mesh: es.TriangleMesh) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return the heat at the first time, the features, and the stated error, at the usual accuracy."""
-    found = es.describe_large_mesh(mesh, es.THESIS)
-    return found.heat, found.descriptor.vertices, found.error
-
-
-def nearer(mesh: es.TriangleMesh) -> tuple[np.ndarray, np.ndarray, float]:
-    """Ask for ten times the accuracy."""
-    found = es.describe_large_mesh(mesh, es.THESIS, accuracy=1e-3)
+def ours(mesh: es.TriangleMesh, accuracy: float = 1e-2) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return the heat at the first time, the features, and the stated error; the accuracy is the usual one."""
+    found = es.describe_large_mesh(mesh, es.THESIS, accuracy=accuracy)
     return found.heat, found.descriptor.vertices, found.error
 
 
@@ -102,7 +97,7 @@ def tomato(mesh: es.TriangleMesh, heat: np.ndarray) -> np.ndarray:
 METHODS: dict[str, Callable[[es.TriangleMesh], tuple[np.ndarray, np.ndarray, float]]] = {
     "eigenshape, certified": exact,
     "eigenshape": ours,
-    "eigenshape, 1e-3": nearer,
+    "eigenshape, 1e-3": partial(ours, accuracy=1e-3),
     "pyFM and ToMATo": pyfm,
     "LaPy, NumPy and ToMATo": lapy,
 }

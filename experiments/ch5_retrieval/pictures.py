@@ -19,6 +19,7 @@ from draws import Draw, Version, draw, half_of, make, shapes
 from methods import METHODS, Method
 from real_shapes import require_data
 from rich.progress import track
+from run import answers, ready
 
 import eigenshape as es
 
@@ -37,14 +38,13 @@ class Asked:
     @property
     def hits(self) -> int:
         """Return how many of the first answers are of the query's class."""
-        return sum(answer.shape.label == self.query.shape.label for answer in self.answers[:N_ANSWERS])
+        return sum(answer.shape.label == self.query.shape.label for answer in self.answers)
 
 
-def ask(method: Method, store: Store, query: Version, database: Sequence[Version]) -> Asked:
-    """Return the first answers to a query."""
-    described = [store.load(method, version) for version in database]
-    order = method.distances(store.load(method, query), described).argsort(kind="stable")
-    return Asked(method.name, query, tuple(database[place] for place in order[:N_ANSWERS]))
+def ask(method: Method, store: Store, queries: Sequence[Version], database: Sequence[Version]) -> list[Asked]:
+    """Return the first answers to queries."""
+    ranked = answers(method, store, queries, database)
+    return [Asked(method.name, query, found[:N_ANSWERS]) for query, found in zip(queries, ranked, strict=True)]
 
 
 def panel(version: Version, title: str, color: int) -> es.Panel:
@@ -102,20 +102,21 @@ def main() -> None:
     chosen = parser.parse_args()
     require_data()
     chosen.folder.mkdir(parents=True, exist_ok=True)
-    drawn, store = draw(half_of(shapes(), "reporting"), chosen.seed), Store(chosen.cache)
-    methods = [METHODS[name] for name in dict.fromkeys([chosen.method, *chosen.methods])]
+    some, others = (half_of(shapes(), half) for half in ("reporting", "tuning"))
+    drawn, store = draw(some, chosen.seed), Store(chosen.cache)
+    methods = [ready(METHODS[name], others) for name in dict.fromkeys([chosen.method, *chosen.methods])]
     describe_all(store, methods, [*drawn.queries, *drawn.mixed], chosen.workers)
     all_pictures(drawn, store, methods, chosen.folder)
 
 
 def all_pictures(drawn: Draw, store: Store, methods: Sequence[Method], folder: Path) -> None:
     """Draw queries of seven classes, an octopus by all methods, and queries without a hit."""
-    found = [ask(methods[0], store, query, drawn.mixed) for query in drawn.queries]
+    found = ask(methods[0], store, drawn.queries, drawn.mixed)
     save_stack(one_a_class([asked for asked in found if asked.hits], 7), folder / "table_5_1.png")
     octopuses = [version for version in (*drawn.queries, *drawn.mixed) if version.shape.label == "octopus"]
     cut = max(octopuses, key=lambda version: version.kind == "incomplete")
     rest = [version for version in drawn.mixed if version != cut]
-    save_stack([ask(method, store, cut, rest) for method in methods], folder / "figure_5_4.png")
+    save_stack([one for method in methods for one in ask(method, store, [cut], rest)], folder / "figure_5_4.png")
     save_stack(one_a_class([asked for asked in found if not asked.hits], 8), folder / "failures.png")
 
 

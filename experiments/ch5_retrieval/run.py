@@ -8,6 +8,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from describing import Failure, Store, describe_all
 from draws import HALVES, Draw, Shape, Version, complete, draw, half_of, make, shapes
@@ -32,16 +34,25 @@ def ready(method: Method, some: Sequence[Shape]) -> Method:
 
 def outcomes(method: Method, store: Store, queries: Sequence[Version], database: Sequence[Version]) -> list[Outcome]:
     """Ask for each query; a shape without descriptor is no answer, and a query without has none."""
-    entries = [(version.shape.label, store.load(method, version)) for version in database]
-    known = [(label, entry) for label, entry in entries if not isinstance(entry, Failure)]
-    found = []
-    for version in queries:
-        entry = store.load(method, version)
-        ranking: tuple[str, ...] = ()
+    ranked = answers(method, store, queries, database)
+    return [
+        Outcome(query.kind, query.shape.label, tuple(version.shape.label for version in found))
+        for query, found in zip(queries, ranked, strict=True)
+    ]
+
+
+def answers(
+    method: Method, store: Store, queries: Sequence[Version], database: Sequence[Version]
+) -> list[tuple[Version, ...]]:
+    """Return for each query what was described of the database, nearest first."""
+    entries = [(version, store.load(method, version)) for version in database]
+    known = [(version, entry) for version, entry in entries if not isinstance(entry, Failure)]
+    found: list[tuple[Version, ...]] = []
+    for query in queries:
+        entry, order = store.load(method, query), np.empty(0, dtype=np.int64)
         if not isinstance(entry, Failure):
             order = method.distances(entry, [other for _, other in known]).argsort(kind="stable")
-            ranking = tuple(known[place][0] for place in order)
-        found.append(Outcome(version.kind, version.shape.label, ranking))
+        found.append(tuple(known[place][0] for place in order))
     return found
 
 

@@ -49,16 +49,17 @@ def average_precision(right: np.ndarray) -> float:
 
 def rates(outcomes: Sequence[Outcome]) -> dict[str, dict[str, list[float]]]:
     """Return for each group of queries the mean of each measure in per cent, with an interval of 95 %."""
-    table = np.array([measured(outcome) for outcome in outcomes])
-    return {
-        group: {name: interval(table[rows, column]) for column, name in enumerate(MEASURES)}
-        for group, rows in groups(outcomes).items()
-    }
+    return by_group(np.array([measured(outcome) for outcome in outcomes]), outcomes)
 
 
 def differences(outcomes: Sequence[Outcome], reference: Sequence[Outcome]) -> dict[str, dict[str, list[float]]]:
     """Return the same of the differences to another method, query by query."""
-    table = np.array([measured(one) - measured(two) for one, two in zip(outcomes, reference, strict=True)])
+    pairs = zip(outcomes, reference, strict=True)
+    return by_group(np.array([measured(one) - measured(two) for one, two in pairs]), outcomes)
+
+
+def by_group(table: np.ndarray, outcomes: Sequence[Outcome]) -> dict[str, dict[str, list[float]]]:
+    """Return the interval of each column of a table with a row a query, for each group of queries."""
     return {
         group: {name: interval(table[rows, column]) for column, name in enumerate(MEASURES)}
         for group, rows in groups(outcomes).items()

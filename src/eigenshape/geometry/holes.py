@@ -13,7 +13,7 @@ from eigenshape.geometry.topology import boundary_edges, boundary_loops, edge_ta
 
 
 @dataclass(frozen=True, eq=False)
-class Patches:
+class Fillings:
     """What closes holes.
 
     Attributes
@@ -29,7 +29,7 @@ class Patches:
     n_open: int
 
 
-def patches(mesh: TriangleMesh, most_edges: int) -> Patches:
+def fillings(mesh: TriangleMesh, most_edges: int) -> Fillings:
     """Triangulate each boundary loop of at most so many edges."""
     edges, sides = edge_table(mesh).edges, {tuple(side) for side in boundary_edges(mesh).tolist()}
     graph = sp.csr_array((np.ones(len(edges), dtype=bool), edges.T), shape=(mesh.n_vertices,) * 2)
@@ -47,7 +47,7 @@ def patches(mesh: TriangleMesh, most_edges: int) -> Patches:
             good = triangulate(points, _taken(graph, loop, added), triangles)
             added += [loop[triangles]] if good else []
             n_open += not good
-    return Patches(tuple(added), n_long, n_open)
+    return Fillings(tuple(added), n_long, n_open)
 
 
 def _taken(

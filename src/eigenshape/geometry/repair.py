@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.geometry.holes import patches
+from eigenshape.geometry.holes import fillings
 from eigenshape.geometry.measure import area_vectors, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import degenerate_simplices, scaled_corners
@@ -137,7 +137,7 @@ def seal_holes(mesh: TriangleMesh, *, most_edges: int = 1000) -> Repaired:
     """
     if most_edges < 3:
         raise InvalidParameterError(f"most_edges must be at least 3, the sides of a triangle; it is {most_edges}.")
-    found = patches(mesh, most_edges)
+    found = fillings(mesh, most_edges)
     sealed = TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, *found.faces]))
     n_closed, n_faces = len(found.faces), sealed.n_faces - mesh.n_faces
     report = f"seal_holes closed {n_closed} hole{'s' * (n_closed != 1)} with {n_faces} face{'s' * (n_faces != 1)}"

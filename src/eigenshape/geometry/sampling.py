@@ -12,7 +12,7 @@ from eigenshape.geometry.measure import unit_scaled, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.raster import rasterize
 from eigenshape.geometry.repair import faces_of_largest
-from eigenshape.geometry.topology import submesh
+from eigenshape.geometry.topology import is_closed, submesh
 
 SLACK = 1.5  # pixels that a vertex may lie off the place where the surface was seen
 STEEPEST = 10.0  # slope up to which that may hide it behind its own surface
@@ -83,6 +83,11 @@ def viewpoint(number: int) -> Float[np.ndarray, "3"]:
     height, around = 2 * u - 1, 2 * np.pi * v
     radius = np.sqrt(1 - height**2)
     return np.array([radius * np.cos(around), height, radius * np.sin(around)])
+
+
+def views_of(mesh: TriangleMesh, n_views: int) -> list[MeshPart]:
+    """Return what the first few viewpoints see of a closed shape; nothing of an open one, which is a part already."""
+    return [partial_scan(mesh, viewpoint(view)) for view in range(n_views if is_closed(mesh) else 0)]
 
 
 def _direction(view: ArrayLike | np.random.Generator) -> Float[np.ndarray, "3"]:

@@ -13,8 +13,8 @@ from eigenshape.features.merge_tree import MergeTree, merge_tree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_box
-from eigenshape.geometry.sampling import MeshPart, partial_scan, viewpoint
-from eigenshape.geometry.topology import boundary_edges, is_closed, vertex_components
+from eigenshape.geometry.sampling import MeshPart, partial_scan, viewpoint, views_of
+from eigenshape.geometry.topology import boundary_edges, vertex_components
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.retrieval.descriptor import SCALE_FREE, Recipe, ShapeDescriptor
@@ -137,8 +137,8 @@ def describe_views(mesh: TriangleMesh, recipe: Recipe = SCALE_FREE, *, n_views: 
     list of ShapeDescriptor
         With features at vertices of the whole shape; empty for an open one, which is a part already.
     """
-    views = [described_view(mesh, recipe, view) for view in range(n_views if is_closed(mesh) else 0)]
-    return [replace(seen.descriptor, vertices=part.source_vertices[seen.descriptor.vertices]) for part, seen in views]
+    seen = [(part, describe_mesh(part.mesh, recipe).descriptor) for part in views_of(mesh, n_views)]
+    return [replace(found, vertices=part.source_vertices[found.vertices]) for part, found in seen]
 
 
 def described_view(mesh: TriangleMesh, recipe: Recipe, view: int) -> tuple[MeshPart, DescribedShape]:

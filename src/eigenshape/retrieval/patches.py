@@ -12,9 +12,9 @@ from eigenshape.geometry.geodesic import farthest_points
 from eigenshape.geometry.measure import vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_box
-from eigenshape.geometry.sampling import partial_scan, viewpoint
+from eigenshape.geometry.sampling import views_of
 from eigenshape.geometry.simplices import dual_volumes
-from eigenshape.geometry.topology import boundary_vertices, is_closed, require_simplices_everywhere
+from eigenshape.geometry.topology import boundary_vertices, require_simplices_everywhere
 from eigenshape.retrieval.patch_loops import NUMBERS, describe_discs
 
 N_SAMPLES = 150
@@ -93,6 +93,5 @@ def describe_patch_views(mesh: TriangleMesh, *, n_views: int = N_VIEWS) -> list[
     list of Patches
         With points at vertices of the whole; empty for an open shape, which is a part already.
     """
-    parts = [partial_scan(mesh, viewpoint(view)) for view in range(n_views if is_closed(mesh) else 0)]
-    seen = [(part, describe_patches(part.mesh)) for part in parts]
+    seen = [(part, describe_patches(part.mesh)) for part in views_of(mesh, n_views)]
     return [replace(patches, vertices=frozen(part.source_vertices[patches.vertices])) for part, patches in seen]
