@@ -122,18 +122,28 @@ from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 from eigenshape.operators.neighbors import neighbor_graph
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.retrieval.affinity import affinity_distance, affinity_eigenvalues
-from eigenshape.retrieval.batch import BatchReport, Item, Workers, build_index
-from eigenshape.retrieval.codebook import PatchCodebook, encode_patches, train_codebook
+from eigenshape.retrieval.batch import BatchReport, build_index, learn_words
+from eigenshape.retrieval.codebook import (
+    PatchCodebook,
+    encode_patches,
+    made_codebook,
+    read_codebook,
+    train_codebook,
+    write_codebook,
+)
 from eigenshape.retrieval.describe import DescribedShape, describe, describe_mesh, describe_views
 from eigenshape.retrieval.describe_large import DescribedLargeShape, describe_large_mesh
 from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDescriptor
 from eigenshape.retrieval.index import Match, Record, ShapeIndex
+from eigenshape.retrieval.kinds import describe_shape, describe_sides
 from eigenshape.retrieval.light_field import light_field, light_field_distance
+from eigenshape.retrieval.patch_descriptor import PatchDescriptor, PatchRecipe
 from eigenshape.retrieval.patch_score import patch_distances, view_distances
 from eigenshape.retrieval.patches import Patches, describe_patch_views, describe_patches
 from eigenshape.retrieval.score import match_features, matching_score
 from eigenshape.retrieval.shape_dna import shape_dna, shape_dna_distance
 from eigenshape.retrieval.transfer import LabelTransfer, transfer_labels
+from eigenshape.retrieval.workers import Item, Workers
 from eigenshape.spectral.approximate import approximate_spectrum
 from eigenshape.spectral.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.certificate import Certificate
@@ -191,6 +201,8 @@ __all__ = [
     "Panel",
     "PartTree",
     "PatchCodebook",
+    "PatchDescriptor",
+    "PatchRecipe",
     "Patches",
     "PersistenceDiagram",
     "PersistencePairs",
@@ -241,6 +253,8 @@ __all__ = [
     "describe_mesh",
     "describe_patch_views",
     "describe_patches",
+    "describe_shape",
+    "describe_sides",
     "describe_views",
     "dirichlet_laplacian",
     "disc",
@@ -292,8 +306,10 @@ __all__ = [
     "is_closed",
     "is_manifold",
     "largest_component",
+    "learn_words",
     "light_field",
     "light_field_distance",
+    "made_codebook",
     "make_creature",
     "match_features",
     "matching_score",
@@ -319,6 +335,7 @@ __all__ = [
     "quadrature_laplacian",
     "random_planes",
     "random_sphere",
+    "read_codebook",
     "read_mesh",
     "read_points",
     "read_shape",
@@ -358,6 +375,7 @@ __all__ = [
     "view_distances",
     "wave_kernel_signature",
     "weld",
+    "write_codebook",
     "write_mesh",
     "write_points",
 ]

@@ -9,8 +9,9 @@ from describers import RECIPE, by_content, descriptor
 from filelock import FileLock
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.retrieval.batch import Item, Workers, build_index, content_digest
+from eigenshape.retrieval.batch import build_index, content_digest
 from eigenshape.retrieval.index import ShapeIndex
+from eigenshape.retrieval.workers import Item, Workers
 
 
 @pytest.fixture

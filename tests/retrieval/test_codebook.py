@@ -43,18 +43,19 @@ def test_vectors_are_gradients_of_the_likelihood(creatures, book):
     points = points @ book.axes[place]
     weights = shape.weights[:, radius] / shape.weights[:, radius].sum(dtype=np.float64)
 
+    middles, spreads = book.centers[place].astype(float), np.sqrt(book.variances[place].astype(float))
+
     def likelihood(centers, spreads):
-        joint = codes._log_joint(points, book.shares[place], centers, spreads**2)
+        joint = codes._log_joint(points, book.shares[place].astype(float), centers, spreads**2)
         return float(weights @ np.log(np.exp(joint).sum(axis=1)))
 
     found = codes._fisher(shape, radius, book, place).reshape(2, *book.centers[place].shape)
-    spreads = np.sqrt(book.variances[place])
     for word, axis in ((0, 0), (3, 7), (31, 19)):
         moved, root = np.zeros_like(spreads), np.sqrt(book.shares[place, word])
         moved[word, axis] = step * spreads[word, axis]
         slopes = [
-            (likelihood(book.centers[place] + moved, spreads) - likelihood(book.centers[place] - moved, spreads)),
-            (likelihood(book.centers[place], spreads + moved) - likelihood(book.centers[place], spreads - moved)),
+            (likelihood(middles + moved, spreads) - likelihood(middles - moved, spreads)),
+            (likelihood(middles, spreads + moved) - likelihood(middles, spreads - moved)),
         ]
         expected = np.array(slopes) / (2 * step) / root / [1, np.sqrt(2)]
         assert found[:, word, axis] == pytest.approx(expected, abs=1e-5)

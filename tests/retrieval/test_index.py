@@ -240,7 +240,7 @@ def test_folders_that_are_no_index(tmp_path, index):
     database = sqlite3.connect(index.folder / store.DATABASE)
     database.execute("PRAGMA user_version = 9")
     database.close()
-    with pytest.raises(StoreError, match="must be an index of format 1; it is of format 9"):
+    with pytest.raises(StoreError, match="must be an index of format 2; it is of format 9"):
         ShapeIndex.open(index.folder)
 
 
@@ -274,10 +274,10 @@ def test_of_several_creators_one_succeeds(tmp_path):
 
 def test_damaged_rows_are_named(index):
     index.add("one", [descriptor(1)])
-    path = index.folder / "rows-1.f32"
+    path = index.folder / "rows-1.bin"
     whole = path.read_bytes()
     path.write_bytes(whole[:-4])
-    with pytest.raises(StoreError, match=r"rows-1.f32 must hold 24 bytes; it holds 20"):
+    with pytest.raises(StoreError, match=r"rows-1.bin must hold 24 bytes; it holds 20"):
         index.query(descriptor(1))
     path.write_bytes(bytes([whole[0] ^ 1]) + whole[1:])
     with pytest.raises(StoreError, match="must hold what was written; bytes 0 to 24 differ"):

@@ -144,6 +144,17 @@ def progress_bar(title: str) -> Iterator[Callable[[float, str], None]]:
         yield lambda share, what: bar.update(task, completed=share, description=f"{title}: {what}" if what else title)
 
 
+def told_by(progress: Callable[[float, str], None]) -> Callable[[int, int, str, str | None], None]:
+    """Return what a batch tells of each file: the bar moves, and what cannot be taken is named."""
+
+    def told(n_done: int, n_items: int, name: str, error: str | None) -> None:
+        progress(n_done / n_items, f"{n_done} of {n_items}, {name}")
+        if error is not None:
+            err.print(f"[yellow]not taken:[/] {escape(name)}: {escape(error)}")
+
+    return told
+
+
 def said(path: Path) -> None:
     """Tell on stderr that a file was written."""
     err.print(f"wrote {escape(str(path))}")

@@ -10,13 +10,13 @@ import typer
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import out, progress_bar, save_picture
 from eigenshape.cli.index import WorkersOption, describe_all, describe_file, open_or_create
-from eigenshape.cli.query import CAPTION, contact_sheet, print_matches
+from eigenshape.cli.presets import PATCHES, recipe_to_fill
+from eigenshape.cli.query import print_matches
+from eigenshape.cli.sheets import CAPTION, asked, contact_sheet
 from eigenshape.geometry.creatures import CREATURES, make_creature
 from eigenshape.geometry.sampling import partial_scan
 from eigenshape.io.mesh_files import write_mesh
-from eigenshape.retrieval.batch import Item, Workers
-from eigenshape.retrieval.describe import N_VIEWS, describe_mesh
-from eigenshape.retrieval.descriptor import SCALE_FREE
+from eigenshape.retrieval.workers import Item, Workers
 
 FOLDER = Path("eigenshape-demo")
 POSES = 3
@@ -43,15 +43,16 @@ def demo(
         raise InvalidParameterError(f"--kind takes {', '.join(CREATURES)}; it was given {kind!r}.")
     items = _make(folder / "creatures")
     shelf = open_or_create(folder / "index")
-    describe = partial(describe_file, recipe=SCALE_FREE, repairs=(), n_views=N_VIEWS)
-    report = describe_all(shelf, items, describe, SCALE_FREE, Workers(workers))
+    recipe = recipe_to_fill(shelf, PATCHES, items, (), Workers(workers))
+    describe = partial(describe_file, recipe=recipe, repairs=(), n_views=None)
+    report = describe_all(shelf, items, describe, recipe, Workers(workers))
     out.print(f"indexed {len(shelf)} shapes ({len(report.skipped)} known already)")
 
     scan_path = folder / "scan.ply"
     scan = partial_scan(make_creature(kind, UNSEEN, n_vertices=N_VERTICES), np.array([0.9, 0.25, 0.45])).mesh
     write_mesh(scan, scan_path)
     out.print(f"scanned a {kind} from one side, in a pose that the index has not seen: {scan_path}")
-    shape = describe_mesh(scan)
+    shape = asked(scan, recipe)
     matches = shelf.query(shape.descriptor, n_matches=6)
     print_matches(matches)
 

@@ -6,7 +6,6 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import (
     JsonOption,
     MeshArgument,
@@ -18,12 +17,13 @@ from eigenshape.cli.console import (
     save_picture,
 )
 from eigenshape.cli.parts import part_rows, print_rows, require_paths, save_colors
+from eigenshape.cli.presets import HeatPresetOption, heat_preset
 from eigenshape.features.segmentation import segment
 from eigenshape.figures.fields import figure_segments, value_colors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.retrieval.describe import DescribedShape, describe_mesh
 from eigenshape.retrieval.describe_large import DescribedLargeShape, describe_large_mesh
-from eigenshape.retrieval.descriptor import PRESETS, SCALE_FREE, Recipe
+from eigenshape.retrieval.descriptor import SCALE_FREE, Recipe
 from eigenshape.spectral.large_signature import LARGE, USUAL_ACCURACY
 from eigenshape.spectral.outcome import Progress
 
@@ -37,16 +37,6 @@ COLUMNS = {
 }
 
 
-def preset(name: str) -> Recipe:
-    """Look a recipe up by the name that a user typed."""
-    if name not in PRESETS:
-        raise InvalidParameterError(f"--preset takes {' or '.join(PRESETS)}; it was given {name!r}.")
-    return PRESETS[name]
-
-
-PresetOption = Annotated[str, typer.Option("--preset", help=f"How shapes are described: {' or '.join(PRESETS)}.")]
-
-
 def features(
     mesh: MeshArgument,
     *,
@@ -57,7 +47,7 @@ def features(
     largest_gap: Annotated[
         bool, typer.Option("--largest-gap", help="Cut where persistence falls most; replaces the number.")
     ] = False,
-    preset_name: PresetOption = SCALE_FREE.name,
+    preset_name: HeatPresetOption = SCALE_FREE.name,
     accuracy: Annotated[
         float | None,
         typer.Option(help="Take approximate heat, .0001 (slow) to .1; beyond 100,000 vertices .01 unless given."),
@@ -71,7 +61,7 @@ def features(
 
     Beyond 100,000 vertices, or with --accuracy, heat is approximate, and its error is said.
     """
-    recipe = preset(preset_name)
+    recipe = heat_preset(preset_name)
     require_paths(picture, ply)
     surface = load_mesh(mesh, repair)
     with progress_bar("features") as progress:

@@ -10,21 +10,26 @@ import typer
 from rich.markup import escape
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import JsonOption, RepairOption, err, out, print_json, progress_bar, repair_names
-from eigenshape.cli.features import PresetOption, preset
+from eigenshape.cli.console import JsonOption, RepairOption, out, print_json, progress_bar, repair_names, told_by
+from eigenshape.cli.presets import PATCHES, PresetOption, recipe_to_fill, require_preset
 from eigenshape.geometry.repair import repair as repaired
 from eigenshape.io.mesh_files import FORMATS, read_mesh
-from eigenshape.retrieval.batch import BatchReport, Describe, Item, Workers, build_index
-from eigenshape.retrieval.describe import N_VIEWS, describe_mesh, describe_views
-from eigenshape.retrieval.descriptor import SCALE_FREE, Recipe, ShapeDescriptor
+from eigenshape.retrieval.batch import BatchReport, Describe, build_index
 from eigenshape.retrieval.index import ShapeIndex
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe_shape, describe_sides
 from eigenshape.retrieval.store import DATABASE
+from eigenshape.retrieval.workers import Item, Workers
 
 SOME_FAILED = 3
 
 DbOption = Annotated[Path, typer.Option("--db", help="Folder of the index.")]
 ViewsOption = Annotated[
-    int, typer.Option(min=0, max=50, help="Sides from which each closed shape is described as well, for partial scans.")
+    int | None,
+    typer.Option(
+        min=0,
+        max=50,
+        help="Sides from which closed shapes are described too, for partial scans; by default 6 by patches, 4 by heat.",
+    ),
 ]
 WorkersOption = Annotated[int, typer.Option(min=1, help="Processes that describe shapes side by side.")]
 
@@ -33,8 +38,8 @@ def index(
     sources: Annotated[list[Path], typer.Argument(help="Mesh files, or folders to search for them.")],
     *,
     db: DbOption,
-    preset_name: PresetOption = SCALE_FREE.name,
-    views: ViewsOption = N_VIEWS,
+    preset_name: PresetOption = PATCHES,
+    views: ViewsOption = None,
     repair: RepairOption = "",
     workers: WorkersOption = 2,
     timeout: Annotated[float, typer.Option(min=1, help="Seconds after which a file is given up.")] = 300.0,
@@ -45,11 +50,12 @@ def index(
     A shape's name is its path below the given folder, its class the folder that it lies in. After Ctrl-C or a crash
     the same command does what is left.
     """
-    recipe, repairs = preset(preset_name), repair_names(repair)
-    items = _items(sources)
+    require_preset(preset_name)
+    items, repairs, processes = _items(sources), repair_names(repair), Workers(workers, timeout)
     shelf = open_or_create(db)
+    recipe = recipe_to_fill(shelf, preset_name, items, repairs, processes)
     describe = partial(describe_file, recipe=recipe, repairs=repairs, n_views=views)
-    report = describe_all(shelf, items, describe, recipe, Workers(workers, timeout))
+    report = describe_all(shelf, items, describe, recipe, processes)
     if as_json:
         print_json({"db": str(db), "shapes": len(shelf), **vars(report)})
     else:
@@ -64,23 +70,17 @@ def open_or_create(folder: Path) -> ShapeIndex:
 
 
 def describe_all(
-    shelf: ShapeIndex, items: Sequence[Item], describe: Describe, recipe: Recipe, workers: Workers
+    shelf: ShapeIndex, items: Sequence[Item], describe: Describe, recipe: AnyRecipe, workers: Workers
 ) -> BatchReport:
     """Build an index with a progress bar, naming what cannot be taken as it comes."""
     with progress_bar("index") as progress:
-
-        def told(n_done: int, n_items: int, name: str, error: str | None) -> None:
-            progress(n_done / n_items, f"{n_done} of {n_items}, {name}")
-            if error is not None:
-                err.print(f"[yellow]not taken:[/] {escape(name)}: {escape(error)}")
-
-        return build_index(shelf, items, describe, recipes=(recipe,), workers=workers, told=told)
+        return build_index(shelf, items, describe, recipes=(recipe,), workers=workers, told=told_by(progress))
 
 
-def describe_file(path: Path, *, recipe: Recipe, repairs: tuple[str, ...], n_views: int) -> list[ShapeDescriptor]:
+def describe_file(path: Path, *, recipe: AnyRecipe, repairs: tuple[str, ...], n_views: int | None) -> list[Descriptor]:
     """Read a mesh, repair it as asked, and describe it, first whole and then as it is seen from some sides."""
     mesh = repaired(read_mesh(path), repairs).mesh
-    return [describe_mesh(mesh, recipe).descriptor, *describe_views(mesh, recipe, n_views=n_views)]
+    return [describe_shape(mesh, recipe), *describe_sides(mesh, recipe, n_views=n_views)]
 
 
 def _items(sources: Sequence[Path]) -> list[Item]:

@@ -1,47 +1,25 @@
 """Describe many shapes in worker processes that may die, and keep what they find."""
 
-import multiprocessing
-import os
-import signal
-import threading
-from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import Future, as_completed
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from hashlib import file_digest
+from functools import partial
+from hashlib import file_digest, sha256
 from pathlib import Path
+from typing import get_args
 
-from pebble import ProcessExpired, ProcessPool
-from threadpoolctl import threadpool_limits
-
-from eigenshape._arrays import positive_values, whole_number
-from eigenshape._errors import EigenshapeError, InvalidParameterError
-from eigenshape.retrieval.descriptor import SCALE_FREE, Recipe, ShapeDescriptor
+from eigenshape._errors import InvalidParameterError
+from eigenshape.retrieval.codebook import PatchCodebook, made_codebook, train_codebook
+from eigenshape.retrieval.descriptor import SCALE_FREE
 from eigenshape.retrieval.index import Record, ShapeIndex
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
+from eigenshape.retrieval.patches import Patches
+from eigenshape.retrieval.workers import Item, Workers, in_workers
 
-Describe = Callable[[Path], Sequence[ShapeDescriptor]]
+Describe = Callable[[Path], Sequence[Descriptor]]
+Teach = Callable[[Path], Sequence[Patches]]
 Told = Callable[[int, int, str, str | None], None]
-
-
-@dataclass(frozen=True)
-class Workers:
-    """How many processes describe side by side, and after how many seconds a file is given up."""
-
-    count: int = 2
-    timeout: float = 300.0
-
-    def __post_init__(self) -> None:
-        whole_number(self.count, "count", 1)
-        positive_values([self.timeout], "timeout")
-
-
-@dataclass(frozen=True)
-class Item:
-    """A file to describe, the name it goes by, and its class where that is known."""
-
-    name: str
-    path: Path
-    label: str | None = None
+FEWEST_TEACHERS, MOST_TEACHERS = 40, 100  # shapes
 
 
 @dataclass(frozen=True)
@@ -64,7 +42,7 @@ class BatchReport:
 @dataclass(frozen=True)
 class _Described:
     digest: str
-    descriptors: tuple[ShapeDescriptor, ...]
+    descriptors: tuple[Descriptor, ...]
 
 
 def build_index(
@@ -72,7 +50,7 @@ def build_index(
     items: Sequence[Item],
     describe: Describe,
     *,
-    recipes: Sequence[Recipe] = (SCALE_FREE,),
+    recipes: Sequence[AnyRecipe] = (SCALE_FREE,),
     workers: Workers = Workers(),
     told: Told | None = None,
 ) -> BatchReport:
@@ -88,7 +66,7 @@ def build_index(
     items : sequence of Item
     describe : callable
         From a path to descriptors of each of `recipes`; importable by name, since it runs in fresh processes.
-    recipes : sequence of Recipe
+    recipes : sequence of Recipe or PatchRecipe
         What `describe` follows.
     workers : Workers
     told : callable, optional
@@ -114,10 +92,11 @@ def build_index(
     n_done = len(items) - len(todo)
     if n_done:
         tell(n_done, len(items), "already in the index", None)
-    with closing(_described(todo, describe, recipes, workers)) as outcomes:  # closed at once, also after Ctrl-C
+    work = partial(_described, describe, tuple(recipes))
+    with closing(in_workers(work, todo, workers)) as outcomes:  # closed at once, also after Ctrl-C
         for item, outcome in outcomes:
             n_done += 1
-            reason = outcome if isinstance(outcome, str) else _keep(index, item, outcome)
+            reason = outcome.reason if outcome.found is None else _keep(index, item, outcome.found)
             if reason is None:
                 added.add(item.name)
             else:
@@ -131,6 +110,43 @@ def build_index(
     )
 
 
+def learn_words(
+    items: Sequence[Item], teach: Teach, *, workers: Workers = Workers(), told: Told | None = None
+) -> PatchCodebook:
+    """Learn the words of patches from files side by side; a small collection takes words that come with the library.
+
+    At most 100 files teach, those whose names have the lowest hashes; the same whatever their order. Those that cannot
+    be taken are passed over: `build_index` will name them.
+
+    Parameters
+    ----------
+    items : sequence of Item
+    teach : callable
+        From a path to the patches of a shape and of some views of it; importable by name.
+    workers : Workers
+    told : callable, optional
+        As in `build_index`.
+
+    Returns
+    -------
+    PatchCodebook
+        Of `made_codebook` where there are fewer than 40 files, or fewer that can be taken.
+    """
+    if len(items) < FEWEST_TEACHERS:
+        return made_codebook()
+    tell = told or _silent
+    teachers = sorted(items, key=lambda item: sha256(item.name.encode()).digest())[:MOST_TEACHERS]
+    lessons: dict[str, Sequence[Patches]] = {}
+    with closing(in_workers(teach, teachers, workers)) as outcomes:
+        for number, (item, outcome) in enumerate(outcomes):
+            if outcome.found is not None:
+                lessons[item.name] = outcome.found
+            tell(number + 1, len(teachers), item.name, None)
+    if len(lessons) < FEWEST_TEACHERS:
+        return made_codebook()
+    return train_codebook([patches for item in teachers for patches in lessons.get(item.name, ())])
+
+
 def _require_names(items: Sequence[Item]) -> None:
     paths: dict[str, Path] = {}
     for item in items:
@@ -141,68 +157,22 @@ def _require_names(items: Sequence[Item]) -> None:
         paths[item.name] = item.path
 
 
-def _described(
-    todo: Sequence[Item], describe: Describe, recipes: Sequence[Recipe], workers: Workers
-) -> Generator[tuple[Item, _Described | str], None, None]:
-    """Yield each item with what was found or, as text, the reason why nothing was, as they come."""
-    context = multiprocessing.get_context("spawn")
-    count = max(min(workers.count, len(todo)), 1)
-    with ProcessPool(max_workers=count, initializer=_start_worker, context=context) as pool:
-        try:
-            futures = {
-                pool.schedule(_work, args=[describe, item.path, tuple(recipes)], timeout=workers.timeout): item
-                for item in todo
-            }
-            for future in as_completed(futures):
-                yield futures[future], _outcome(future, workers)
-        except BaseException:
-            pool.stop()
-            raise
-
-
-def _start_worker() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's affair, which stops its workers itself
-    threading.Thread(target=_die_with_parent, daemon=True).start()
-    threadpool_limits(1)
-
-
-def _die_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)  # killed, it can stop nobody, and nobody waits for the answer
-
-
-def _work(describe: Describe, path: Path, recipes: tuple[Recipe, ...]) -> _Described | str:
-    """Describe a file in a worker; only what surely survives the way back is returned."""
-    try:
-        digest = content_digest(path)  # before it is read: a file that changes meanwhile is done again next time
-        descriptors = tuple(describe(path))
-        _require_described(descriptors, recipes)
-    except Exception as err:  # noqa: BLE001  an error that cannot be pickled would take the whole pool with it
-        return str(err) if isinstance(err, EigenshapeError | OSError) else f"{type(err).__name__}: {err}"
+def _described(describe: Describe, recipes: tuple[AnyRecipe, ...], path: Path) -> _Described:
+    """Describe a file, in a worker."""
+    digest = content_digest(path)  # before it is read: a file that changes meanwhile is done again next time
+    descriptors = tuple(describe(path))
+    _require_described(descriptors, recipes)
     return _Described(digest, descriptors)
 
 
-def _require_described(descriptors: tuple[ShapeDescriptor, ...], recipes: tuple[Recipe, ...]) -> None:
+def _require_described(descriptors: tuple[Descriptor, ...], recipes: tuple[AnyRecipe, ...]) -> None:
     for found in descriptors:
-        if not isinstance(found, ShapeDescriptor):
+        if not isinstance(found, get_args(Descriptor)):
             raise InvalidParameterError(f"A describer must return descriptors; it returned {type(found).__name__}.")
     there = {found.recipe for found in descriptors}
     for recipe in recipes:
         if recipe not in there:
             raise InvalidParameterError(f"A describer must follow every recipe; {recipe.name!r} has no descriptor.")
-
-
-def _outcome(future: "Future[_Described | str]", workers: Workers) -> _Described | str:
-    error = future.exception()
-    if error is None:
-        return future.result()
-    if isinstance(error, TimeoutError):
-        return f"it took more than {workers.timeout:g} s"
-    if isinstance(error, ProcessExpired):
-        return f"it ended its process with exit code {error.exitcode}"
-    return f"{type(error).__name__}: {error}"
 
 
 def _keep(index: ShapeIndex, item: Item, found: _Described) -> str | None:
@@ -221,7 +191,7 @@ def content_digest(path: Path) -> str:
         return file_digest(file, "sha256").hexdigest()
 
 
-def _is_known(item: Item, record: Record | None, recipes: Sequence[Recipe]) -> bool:
+def _is_known(item: Item, record: Record | None, recipes: Sequence[AnyRecipe]) -> bool:
     if record is None or not set(recipes) <= set(record.recipes):
         return False
     try:

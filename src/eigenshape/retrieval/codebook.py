@@ -1,7 +1,11 @@
 """A vocabulary of patches, learnt from shapes without labels, and the shapes' vectors in it (Fisher vectors)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cached_property, lru_cache
+from hashlib import sha256
+from importlib.resources import files
+from io import BytesIO
 
 import numpy as np
 import scipy.linalg as sl
@@ -24,28 +28,51 @@ LEAST_VARIANCE = 1e-3  # of a word, where all words' together is 1
 ROUNDS = 60
 SETTLED = 1e-5  # of the likelihood
 POWER = 0.4
+MADE = "made_words.npz"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PatchCodebook:
     """For each base radius: how numbers are centred, scaled and turned, and a mixture of Gaussians.
 
+    Equal to another whose numbers are the same.
+
     Attributes
     ----------
-    means, spreads : (b, c) float
-    axes : (b, c, d) float
+    means, spreads : (b, c) float32
+    axes : (b, c, d) float32
         Columns that whiten.
-    shares : (b, w) float
+    shares : (b, w) float32
         Of the words, summing to 1.
-    centers, variances : (b, w, d) float
+    centers, variances : (b, w, d) float32
     """
 
-    means: Float[np.ndarray, "b c"]
-    spreads: Float[np.ndarray, "b c"]
-    axes: Float[np.ndarray, "b c d"]
-    shares: Float[np.ndarray, "b w"]
-    centers: Float[np.ndarray, "b w d"]
-    variances: Float[np.ndarray, "b w d"]
+    means: Float32[np.ndarray, "b c"]
+    spreads: Float32[np.ndarray, "b c"]
+    axes: Float32[np.ndarray, "b c d"]
+    shares: Float32[np.ndarray, "b w"]
+    centers: Float32[np.ndarray, "b w d"]
+    variances: Float32[np.ndarray, "b w d"]
+
+    @cached_property
+    def digest(self) -> str:
+        """Return the SHA-256 of all numbers."""
+        return sha256(b"".join(getattr(self, field.name).tobytes() for field in fields(self))).hexdigest()
+
+    @property
+    def code_shape(self) -> tuple[int, int, int]:
+        """Return base radii, sizes, and numbers of a Fisher vector."""
+        n_bases, n_words, n_axes = self.centers.shape
+        return n_bases, N_SIZES, 2 * n_words * n_axes
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, PatchCodebook) and self.digest == other.digest
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    def __repr__(self) -> str:
+        return f"PatchCodebook({self.digest[:8]})"
 
 
 def train_codebook(shapes: Sequence[Patches], *, seed: int = 0) -> PatchCodebook:
@@ -72,7 +99,29 @@ def train_codebook(shapes: Sequence[Patches], *, seed: int = 0) -> PatchCodebook
         )
     with threadpool_limits(1):
         books = [_trained(np.concatenate([s.numbers[:, base] for s in shapes]), seed) for base in BASES]
-    return PatchCodebook(*(frozen(np.stack(parts)) for parts in zip(*books, strict=True)))
+    return PatchCodebook(*(frozen(np.stack(parts).astype(np.float32)) for parts in zip(*books, strict=True)))
+
+
+@lru_cache(maxsize=1)
+def made_codebook() -> PatchCodebook:
+    """Return the words that come with the library, learnt from made-up creatures (`make_creature`) alone.
+
+    For collections too small to learn words from.
+    """
+    return read_codebook((files("eigenshape.retrieval") / MADE).read_bytes())
+
+
+def write_codebook(codebook: PatchCodebook) -> bytes:
+    """Return a codebook as the bytes of an npz file, the same for the same numbers."""
+    file = BytesIO()
+    np.savez_compressed(file, **{field.name: getattr(codebook, field.name) for field in fields(codebook)})
+    return file.getvalue()
+
+
+def read_codebook(data: bytes) -> PatchCodebook:
+    """Return the codebook of `write_codebook`."""
+    with np.load(BytesIO(data)) as arrays:
+        return PatchCodebook(**{name: frozen(arrays[name]) for name in arrays.files})
 
 
 def _trained(rows: Float32[np.ndarray, "p c"], seed: int) -> tuple[np.ndarray, ...]:
@@ -132,7 +181,7 @@ def encode_patches(shape: Patches, codebook: PatchCodebook) -> Float32[np.ndarra
     (b, s, v) float32
         Of b base radii, s sizes and v = 2 × words × axes numbers.
     """
-    vectors = np.empty((len(BASES), N_SIZES, 2 * codebook.centers.shape[1] * codebook.centers.shape[2]))
+    vectors = np.empty(codebook.code_shape)
     for place, base in enumerate(BASES):
         for size in range(N_SIZES):
             vectors[place, size] = _fisher(shape, base + size, codebook, place)

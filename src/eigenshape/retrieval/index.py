@@ -4,7 +4,7 @@ import sqlite3
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, SupportsIndex
+from typing import SupportsIndex
 from zlib import crc32
 
 import numpy as np
@@ -13,8 +13,8 @@ from jaxtyping import Int
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError, StoreError
 from eigenshape.retrieval import store
-from eigenshape.retrieval.descriptor import Recipe, ShapeDescriptor
-from eigenshape.retrieval.score import match_features, matching_scores
+from eigenshape.retrieval.held import held_by
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Record:
         Where the shape came from, a path say.
     digest : str or None
         Hash of the content, by which a batch knows that it has the shape already.
-    recipes : tuple of Recipe
+    recipes : tuple of Recipe or PatchRecipe
         By which it is described.
     """
 
@@ -39,7 +39,7 @@ class Record:
     label: str | None
     source: str | None
     digest: str | None
-    recipes: tuple[Recipe, ...]
+    recipes: tuple[AnyRecipe, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,11 +51,11 @@ class Match:
     name, label, source : str
         As in its `Record`.
     score : float
-        Of `matching_score`: 0 for the same descriptor, smaller is more alike.
+        Of `matching_score` or `patch_distances`: 0 for the same descriptor, smaller is more alike.
     correspondences : (p, 2) int
-        Feature of the query, feature of this shape, closest pairs first.
+        Feature or patch of the query, the same of this shape, surest pairs first.
     vertices : (m,) int
-        The vertex at which each feature of this shape lies.
+        The vertex at which each feature or patch of this shape lies.
     view : int
         Which of the shape's descriptors is meant, in the order in which they were added: 0 is the first.
     """
@@ -111,16 +111,32 @@ class ShapeIndex:
         """List all shapes by name."""
         with store.reading(self.folder) as database:
             shapes = database.execute("SELECT id, name, label, source, digest FROM shape ORDER BY name").fetchall()
-            query = "SELECT DISTINCT shape, fields FROM descriptor JOIN recipe ON recipe.id = recipe ORDER BY recipe.id"
-            recipes: dict[int, list[Recipe]] = {}
-            for shape, fields in database.execute(query):
-                recipes.setdefault(shape, []).append(store.read_recipe(fields))
+            known = dict(store.recipes(database))
+            recipes: dict[int, list[AnyRecipe]] = {}
+            for shape, recipe in database.execute("SELECT DISTINCT shape, recipe FROM descriptor ORDER BY recipe"):
+                recipes.setdefault(shape, []).append(known[recipe])
         return [Record(*known, tuple(recipes.get(shape, ()))) for shape, *known in shapes]  # type: ignore[call-arg]
+
+    def recipes(self) -> list[AnyRecipe]:
+        """List the recipes by which shapes are described or are to be, in the order in which they came."""
+        with store.reading(self.folder) as database:
+            return [recipe for _, recipe in store.recipes(database)]
+
+    def keep_recipe(self, recipe: AnyRecipe) -> None:
+        """Keep a recipe before any shape is described by it, one whose words were long to learn, say.
+
+        Raises
+        ------
+        StoreError
+            If another process is writing.
+        """
+        with store.writing(self.folder) as database:
+            store.keep_recipe(database, recipe)
 
     def add(
         self,
         name: str,
-        descriptors: Sequence[ShapeDescriptor],
+        descriptors: Sequence[Descriptor],
         *,
         label: str | None = None,
         source: str | None = None,
@@ -130,9 +146,9 @@ class ShapeIndex:
         """Add a shape with one or more descriptors.
 
         Descriptors of one recipe are views of the shape, the whole first, say, and then what is seen of it from some
-        sides: the view with the lowest score counts. A name that is there with the same digest gains the recipes that
-        it lacks, and keeps what it has of the others. With `replace`, a shape that is there with another digest gives
-        way in the same step.
+        sides: the view with the lowest score counts, for patches beside the first by half. A name that is there
+        with the same digest gains the recipes that it lacks, and keeps what it has of the others. With `replace`, a
+        shape that is there with another digest gives way in the same step.
 
         Raises
         ------
@@ -142,23 +158,25 @@ class ShapeIndex:
             If the name is there with another digest and is not to be replaced, or another process is writing.
         """
         _require_text(name, label, source, digest)
-        _require_storable(name, descriptors)
+        rows = _packed(name, descriptors)
         with store.writing(self.folder) as database:
             shape = _shape_id(database, (name, label, source, digest), replace=replace)
             for recipe in dict.fromkeys(descriptor.recipe for descriptor in descriptors):
-                views = [descriptor for descriptor in descriptors if descriptor.recipe == recipe]
+                views = [pair for pair in zip(descriptors, rows, strict=True) if pair[0].recipe == recipe]
                 self._put(database, shape, store.keep_recipe(database, recipe), views)
 
-    def _put(self, database: sqlite3.Connection, shape: int, recipe: int, views: Sequence[ShapeDescriptor]) -> None:
+    def _put(
+        self, database: sqlite3.Connection, shape: int, recipe: int, views: Sequence[tuple[Descriptor, np.ndarray]]
+    ) -> None:
         other = database.execute("SELECT n_columns FROM descriptor WHERE recipe = ? LIMIT 1", (recipe,)).fetchone()
-        for descriptor in views:
-            _require_columns(descriptor, other[0] if other else views[0].vectors.shape[1])
+        for descriptor, rows in views:
+            _require_columns(descriptor, rows, other[0] if other else views[0][1].shape[1])
         if database.execute("SELECT 1 FROM descriptor WHERE shape = ? AND recipe = ?", (shape, recipe)).fetchone():
             return
-        for view, descriptor in enumerate(views):
-            rows, vertices = descriptor.vectors.astype(store.ROW), descriptor.vertices.astype("<i8").tobytes()
+        for view, (descriptor, rows) in enumerate(views):
+            details = kind_of(descriptor.recipe).details(descriptor)
             offset = store.append_rows(self.folder, database, recipe, rows)
-            entry = (shape, recipe, view, offset, *rows.shape, crc32(rows.tobytes()), vertices)
+            entry = (shape, recipe, view, offset, *rows.shape, crc32(rows.tobytes()), details)
             database.execute("INSERT INTO descriptor VALUES (?, ?, ?, ?, ?, ?, ?, ?)", entry)
 
     def remove(self, name: str) -> None:
@@ -173,8 +191,8 @@ class ShapeIndex:
             if not database.execute("DELETE FROM shape WHERE name = ?", (name,)).rowcount:
                 raise StoreError(f"A shape must be in the index to be removed; {name!r} is not.")
 
-    def query(self, descriptor: ShapeDescriptor, *, n_matches: SupportsIndex = 5) -> list[Match]:
-        """Find the shapes whose descriptors of the same recipe have the lowest matching score, each shape once.
+    def query(self, descriptor: Descriptor, *, n_matches: SupportsIndex = 5) -> list[Match]:
+        """Find the shapes whose descriptors of the same recipe have the lowest score, each shape once.
 
         Numbers are kept in single precision, and those of the query are rounded alike, so that a shape in the index
         finds itself with score 0. Equal scores are sorted by name.
@@ -187,22 +205,23 @@ class ShapeIndex:
             If no shape has a descriptor of that recipe, or a file is damaged.
         """
         wanted = whole_number(n_matches, "n_matches", 1, 2**31)
-        _require_storable("the query", [descriptor])
-        single = ShapeDescriptor(
-            descriptor.vectors.astype(store.ROW).astype(np.float64), descriptor.vertices, descriptor.recipe
-        )
+        kind, (ours,) = kind_of(descriptor.recipe), _packed("the query", [descriptor])
+        asked = kind.restored(ours, kind.details(descriptor), descriptor.recipe)
         with store.reading(self.folder) as database:
-            entries, vectors = self._rows(database, descriptor.recipe)
-        _require_columns(descriptor, vectors[0].shape[1])
-        starts = np.cumsum([0, *(len(rows) for rows in vectors)])[:-1]
-        scores, _ = matching_scores(single.vectors, np.concatenate(vectors).astype(np.float64), starts, single.recipe)
-        order = np.argsort(scores, kind="stable")
-        _, first = np.unique([entries[place][4] for place in order], return_index=True)
-        best = order[np.sort(first)[:wanted]]
-        return [_match(single, entries[place], vectors[place], float(scores[place])) for place in best]
+            held = held_by(self.folder, database, descriptor.recipe)
+            _require_columns(descriptor, ours, held.entries[0].n_columns)
+            firsts = np.unique([entry.name for entry in held.entries], return_index=True)[1]
+            scores, places = kind.ranked(asked, held.rows, firsts)
+            best = np.argsort(scores, kind="stable")[:wanted]
+            found = [held.restored(database, place) for place in places[best].tolist()]
+            answers = [held.entries[place][:4] for place in places[best].tolist()]
+        return [
+            Match(name, label, source, score, kind.paired(asked, other), other.vertices, view)
+            for (name, label, source, view), score, other in zip(answers, scores[best].tolist(), found, strict=True)
+        ]
 
-    def descriptor(self, name: str, recipe: Recipe) -> ShapeDescriptor:
-        """Return the first descriptor of a shape by a recipe, in single precision, to ask for more of its like.
+    def descriptor(self, name: str, recipe: AnyRecipe) -> Descriptor:
+        """Return the first descriptor of a shape by a recipe, as it is kept, to ask for more of its like.
 
         Raises
         ------
@@ -210,39 +229,11 @@ class ShapeIndex:
             If the shape is not there or has no descriptor of that recipe, or a file is damaged.
         """
         with store.reading(self.folder) as database:
-            entries, vectors = self._rows(database, recipe)
-        for entry, rows in zip(entries, vectors, strict=True):
-            if entry[4] == name:
-                return _stored(entry, rows, recipe)
+            held = held_by(self.folder, database, recipe)
+            for place, entry in enumerate(held.entries):
+                if entry.name == name:
+                    return held.restored(database, place)
         raise StoreError(f"A shape must be described by the recipe asked for; {name!r} is not described by {recipe}.")
-
-    def _rows(self, database: sqlite3.Connection, recipe: Recipe) -> tuple[list[Any], list[np.ndarray]]:
-        number = store.recipe_id(database, recipe)
-        query = (
-            "SELECT offset, n_rows, n_columns, checksum, name, label, source, vertices, view "
-            "FROM descriptor JOIN shape ON shape.id = shape WHERE recipe = ? ORDER BY name, view"
-        )
-        entries = database.execute(query, (number,)).fetchall()
-        if not entries:
-            held = database.execute("SELECT fields FROM recipe WHERE id IN (SELECT recipe FROM descriptor)")
-            there = sorted(store.read_recipe(fields).name for (fields,) in held)
-            raise StoreError(
-                f"An index answers in the recipes it holds; {self.folder} holds {', '.join(there) or 'no shape'} and "
-                f"was asked in {recipe}."
-            )
-        path = store.rows_path(self.folder, number or 0)
-        data = memoryview(path.read_bytes() if path.exists() else b"")
-        return entries, [store.read_rows(data, entry[:4], path) for entry in entries]
-
-
-def _match(query: ShapeDescriptor, entry: Any, rows: np.ndarray, score: float) -> Match:
-    name, label, source, _, view = entry[4:]
-    found = _stored(entry, rows, query.recipe)
-    return Match(name, label, source, score, match_features(query, found), found.vertices, view)
-
-
-def _stored(entry: Any, rows: np.ndarray, recipe: Recipe) -> ShapeDescriptor:
-    return ShapeDescriptor(rows.astype(np.float64), np.frombuffer(entry[7], "<i8"), recipe)
 
 
 def _require_text(name: str, *others: str | None) -> None:
@@ -251,28 +242,18 @@ def _require_text(name: str, *others: str | None) -> None:
             raise InvalidParameterError(f"What an index keeps beside numbers must be Unicode text; {text!r} is not.")
 
 
-def _require_storable(name: str, descriptors: Sequence[ShapeDescriptor]) -> None:
+def _packed(name: str, descriptors: Sequence[Descriptor]) -> list[np.ndarray]:
+    """Return the rows of descriptors as they are kept, refusing what cannot be."""
     if not descriptors:
         raise InvalidParameterError(f"A shape needs a descriptor to be found by; {name!r} has none.")
-    for descriptor in descriptors:
-        rows = descriptor.vectors
-        with np.errstate(over="ignore"):
-            bad = np.argwhere(~np.isfinite(rows.astype(store.ROW)))
-        if bad.size or not rows.size:
-            where = f"entry {bad[0].tolist()} is {rows[tuple(bad[0])]}" if bad.size else "it has none"
-            raise InvalidParameterError(f"A descriptor must hold finite single-precision numbers; of {name!r} {where}.")
-        if descriptor.vertices.shape != rows.shape[:1]:
-            raise InvalidParameterError(
-                f"A descriptor must name one vertex a feature; of {name!r} {len(rows)} features have vertices of shape "
-                f"{descriptor.vertices.shape}."
-            )
+    return [kind_of(descriptor.recipe).rows(descriptor, name) for descriptor in descriptors]
 
 
-def _require_columns(descriptor: ShapeDescriptor, n_columns: int) -> None:
-    if descriptor.vectors.shape[1] != n_columns:
+def _require_columns(descriptor: Descriptor, rows: np.ndarray, n_columns: int) -> None:
+    if rows.shape[1] != n_columns:
         raise InvalidParameterError(
             f"Features of one recipe must have equally many numbers; of {descriptor.recipe.name!r} they have "
-            f"{n_columns}, and here {descriptor.vectors.shape[1]}."
+            f"{n_columns}, and here {rows.shape[1]}."
         )
 
 

@@ -1,38 +1,34 @@
-"""Rows of float32 beside a SQLite database that says which of them count.
+"""Rows of numbers beside a SQLite database that says which of them count.
 
 A descriptor is written behind the last row that the database knows of, forced to disk, and then committed by one SQLite
 transaction. A writer that dies before the commit leaves bytes that nobody owns; the next writer takes their place.
 Readers see what is committed and never wait.
 """
 
-import json
 import os
 import socket
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 from zlib import crc32
 
 import numpy as np
 from filelock import FileLock, Timeout
-from jaxtyping import Float32
 
 from eigenshape._errors import StoreError
-from eigenshape.retrieval.descriptor import Recipe
+from eigenshape.retrieval.kinds import AnyRecipe, read, written
 
 DATABASE = "index.sqlite"
 DRAFT = "draft.sqlite"
 LOCK = "writer.lock"
 HOLDER = "writer.txt"
 APPLICATION = 0x65696773  # "eigs"
-FORMAT = 1
+FORMAT = 2
 WAIT = 5.0  # seconds for another writer
-ROW = np.dtype("<f4")
 SCHEMA = """
-CREATE TABLE recipe (id INTEGER PRIMARY KEY, fields TEXT NOT NULL UNIQUE, size INTEGER NOT NULL);
+CREATE TABLE recipe (id INTEGER PRIMARY KEY, fields TEXT NOT NULL UNIQUE, words BLOB, size INTEGER NOT NULL);
 CREATE TABLE shape (
     id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, label TEXT, source TEXT, digest TEXT
 );
@@ -41,7 +37,7 @@ CREATE TABLE descriptor (
     recipe INTEGER NOT NULL REFERENCES recipe,
     view INTEGER NOT NULL,
     offset INTEGER NOT NULL, n_rows INTEGER NOT NULL, n_columns INTEGER NOT NULL, checksum INTEGER NOT NULL,
-    vertices BLOB NOT NULL,
+    details BLOB NOT NULL,
     PRIMARY KEY (shape, recipe, view)
 );
 """
@@ -182,25 +178,30 @@ def _lock(folder: Path) -> Iterator[None]:
         lock.release()
 
 
-def recipe_id(database: sqlite3.Connection, recipe: Recipe) -> int | None:
+def recipe_id(database: sqlite3.Connection, recipe: AnyRecipe) -> int | None:
     """Return the number of a recipe, None where no descriptor was made by it.
 
     A field that a stored recipe lacks, since it is younger, counts as its default.
     """
-    rows = database.execute("SELECT id, fields FROM recipe ORDER BY id")
-    return next((int(number) for number, fields in rows if read_recipe(fields) == recipe), None)
+    return next((number for number, other in recipes(database) if other == recipe), None)
 
 
-def keep_recipe(database: sqlite3.Connection, recipe: Recipe) -> int:
+def recipes(database: sqlite3.Connection) -> Iterator[tuple[int, AnyRecipe]]:
+    """Yield the number of each recipe, and it."""
+    for number, fields, words in database.execute("SELECT id, fields, words FROM recipe ORDER BY id").fetchall():
+        yield int(number), read_recipe(fields, words)
+
+
+def keep_recipe(database: sqlite3.Connection, recipe: AnyRecipe) -> int:
     """Return the number of a recipe, a new one where it is new."""
     number = recipe_id(database, recipe)
     if number is not None:
         return number
-    fields = json.dumps(asdict(recipe), sort_keys=True, default=np.generic.item)
-    return int(database.execute("INSERT INTO recipe (fields, size) VALUES (?, 0)", (fields,)).lastrowid or 0)
+    row = database.execute("INSERT INTO recipe (fields, words, size) VALUES (?, ?, 0)", written(recipe))
+    return int(row.lastrowid or 0)
 
 
-def read_recipe(fields: str) -> Recipe:
+def read_recipe(fields: str, words: bytes | None) -> AnyRecipe:
     """Return a recipe from its stored fields.
 
     Raises
@@ -209,7 +210,7 @@ def read_recipe(fields: str) -> Recipe:
         If this version of eigenshape knows no such recipe.
     """
     try:
-        return Recipe(**{key: _tuples(value) for key, value in json.loads(fields).items()})
+        return read(fields, words)
     except (TypeError, ValueError) as err:
         raise StoreError(
             f"Recipes of an index must be known to this version of eigenshape; {fields} is not: {err}. "
@@ -217,19 +218,15 @@ def read_recipe(fields: str) -> Recipe:
         ) from err
 
 
-def _tuples(value: Any) -> Any:
-    return tuple(map(_tuples, value)) if isinstance(value, list) else value
-
-
 def rows_path(folder: Path, recipe: int) -> Path:
     """Return the file that holds the rows of a recipe."""
-    return folder / f"rows-{recipe}.f32"
+    return folder / f"rows-{recipe}.bin"
 
 
-def append_rows(folder: Path, database: sqlite3.Connection, recipe: int, rows: Float32[np.ndarray, "m q"]) -> int:
+def append_rows(folder: Path, database: sqlite3.Connection, recipe: int, rows: np.ndarray) -> int:
     """Write rows behind the last committed ones and force them to disk; the byte at which they begin."""
     offset = int(database.execute("SELECT size FROM recipe WHERE id = ?", (recipe,)).fetchone()[0])
-    data = rows.astype(ROW).tobytes()
+    data = rows.tobytes()
     path = rows_path(folder, recipe)
     if not path.exists():
         path.touch()
@@ -244,8 +241,8 @@ def append_rows(folder: Path, database: sqlite3.Connection, recipe: int, rows: F
     return offset
 
 
-def read_rows(data: memoryview, entry: "tuple[int, int, int, int]", path: Path) -> Float32[np.ndarray, "m q"]:
-    """Return the rows that (offset, n_rows, n_columns, checksum) speaks of.
+def read_rows(data: memoryview, entry: "tuple[int, int, int, int]", row: "np.dtype[Any]", path: Path) -> np.ndarray:
+    """Return the rows, of a type, that (offset, n_rows, n_columns, checksum) speaks of.
 
     Raises
     ------
@@ -253,9 +250,9 @@ def read_rows(data: memoryview, entry: "tuple[int, int, int, int]", path: Path) 
         If they are not there, or not what was written.
     """
     offset, n_rows, n_columns, checksum = entry
-    end = offset + n_rows * n_columns * ROW.itemsize
+    end = offset + n_rows * n_columns * row.itemsize
     if end > len(data):
         raise StoreError(f"{path} must hold {end} bytes; it holds {len(data)}. Index the shapes again.")
     if crc32(data[offset:end]) != checksum:
         raise StoreError(f"{path} must hold what was written; bytes {offset} to {end} differ. Index the shapes again.")
-    return np.frombuffer(data, ROW, n_rows * n_columns, offset).reshape(n_rows, n_columns)
+    return np.frombuffer(data, row, n_rows * n_columns, offset).reshape(n_rows, n_columns)

@@ -1,0 +1,38 @@
+"""Learn the words of patches that come with the library, from made-up creatures alone, and write them into it."""
+
+import argparse
+from concurrent.futures import ProcessPoolExecutor
+from itertools import product
+from pathlib import Path
+
+from rich.progress import track
+from threadpoolctl import threadpool_limits
+
+import eigenshape as es
+
+PLACE = Path(__file__).resolve().parents[2] / "src" / "eigenshape" / "retrieval" / "made_words.npz"
+INDIVIDUALS, SIZES, VIEWS = 6, (2000, 5000), 3
+
+
+def lesson(what: tuple[str, int]) -> list[es.Patches]:
+    """Return the patches of one creature, in a pose of its own, and of views of it."""
+    kind, number = what
+    mesh = es.make_creature(kind, number, individual=number, n_vertices=SIZES[number % len(SIZES)])
+    return [es.describe_patches(mesh), *es.describe_patch_views(mesh, n_views=VIEWS)]
+
+
+def main() -> None:
+    """Learn and write."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=PLACE)
+    chosen = parser.parse_args()
+    everyone = list(product(es.CREATURES, range(INDIVIDUALS)))
+    with ProcessPoolExecutor(2, initializer=threadpool_limits, initargs=(1,)) as pool:
+        lessons = list(track(pool.map(lesson, everyone), "describing", total=len(everyone)))
+    book = es.train_codebook([patches for some in lessons for patches in some])
+    chosen.out.write_bytes(es.write_codebook(book))
+    print(f"{chosen.out}: {book}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,114 @@
+"""A query beside its matches, with what corresponds in one colour."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Int
+from matplotlib.figure import Figure
+
+from eigenshape._errors import StoreError
+from eigenshape.cli.console import progress_bar
+from eigenshape.figures.sheet import Panel, figure_contact_sheet
+from eigenshape.geometry.geodesic import geodesic_distances
+from eigenshape.geometry.measure import surface_area
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.repair import repair as repair_mesh
+from eigenshape.io.mesh_files import read_mesh
+from eigenshape.retrieval.describe import describe_mesh, described_view
+from eigenshape.retrieval.descriptor import Recipe
+from eigenshape.retrieval.index import Match
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe_shape
+from eigenshape.spectral.outcome import Progress
+
+CAPTION = "parts that correspond share a colour"
+N_CELLS = 12  # of the query by patches
+REACH = 2.0  # times what a patch has of the surface, in length: farther from a matched patch nothing is known
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """A query with the colours of its parts.
+
+    Attributes
+    ----------
+    mesh : TriangleMesh
+    descriptor : ShapeDescriptor or PatchDescriptor
+    labels : (f,) int
+        Colour of each face.
+    colors : (m,) int
+        Colour of each feature or patch.
+    dots : (p,) int
+        Features or patches to mark.
+    """
+
+    mesh: TriangleMesh
+    descriptor: Descriptor
+    labels: Int[np.ndarray, " f"]
+    colors: Int[np.ndarray, " m"]
+    dots: Int[np.ndarray, " p"]
+
+
+def asked(mesh: TriangleMesh, recipe: AnyRecipe, progress: Progress | None = None) -> Asked:
+    """Describe a query, and cut it into parts: around its features, or around the first of its patches."""
+    if isinstance(recipe, Recipe):
+        shape = describe_mesh(mesh, recipe, progress=progress)
+        every = np.arange(len(shape.descriptor.vertices))
+        return Asked(shape.mesh, shape.descriptor, shape.parts.labels, every, every)
+    descriptor = describe_shape(mesh, recipe)
+    distances = geodesic_distances(mesh, descriptor.vertices[:N_CELLS])
+    cells = distances.argmin(axis=0)
+    return Asked(mesh, descriptor, cells[mesh.faces[:, 0]], cells[descriptor.vertices], np.arange(len(distances)))
+
+
+def contact_sheet(
+    query: Asked, title: str, matches: Sequence[Match], *, repairs: tuple[str, ...] = (), caption: str = ""
+) -> Figure:
+    """Draw a query beside its matches, read from their files.
+
+    The parts of the query have colours of their own; a part of a match has the colour of the query's part that it
+    corresponds to, and is grey where there is none.
+    """
+    first = Panel(query.mesh, f"query: {title}", query.labels, query.descriptor.vertices[query.dots])
+    with progress_bar("draw") as progress:
+        panels = []
+        for done, match in enumerate(matches):
+            progress(done / len(matches), match.name)
+            panels.append(_panel(query, match, repairs))
+    return figure_contact_sheet(first, panels, caption=caption)
+
+
+def _panel(query: Asked, match: Match, repairs: tuple[str, ...]) -> Panel:
+    if match.source is None:
+        raise StoreError(f"A match needs its file to be drawn; {match.name!r} was added without one.")
+    mesh = repair_mesh(read_mesh(match.source), repairs).mesh
+    ours, theirs = match.correspondences.T
+    recipe = query.descriptor.recipe
+    if isinstance(recipe, Recipe):
+        colors = np.full(len(match.vertices) + 1, -1)  # the last one is for what no view of the match shows
+        colors[theirs] = query.colors[ours]
+        labels = colors[_parts(mesh, recipe, match)]
+    else:
+        labels = _cells(mesh, match.vertices[theirs], query.colors[ours])
+    marked = theirs[np.isin(ours, query.dots)]
+    return Panel(mesh, f"{match.name}\nscore {match.score:.4g}", labels, match.vertices[marked])
+
+
+def _parts(mesh: TriangleMesh, recipe: Recipe, match: Match) -> Int[np.ndarray, " f"]:
+    """Find the parts of a match again, -1 where the view that matched does not see its surface."""
+    if match.view == 0:
+        return describe_mesh(mesh, recipe).parts.labels
+    part, seen = described_view(mesh, recipe, match.view - 1)
+    labels = np.full(mesh.n_faces, -1)
+    labels[part.source_faces] = seen.parts.labels
+    return labels
+
+
+def _cells(mesh: TriangleMesh, vertices: Int[np.ndarray, " p"], colors: Int[np.ndarray, " p"]) -> Int[np.ndarray, " f"]:
+    """Give each face the colour of the matched patch that is nearest, -1 where none is near."""
+    if not len(vertices):
+        return np.full(mesh.n_faces, -1)
+    distances = geodesic_distances(mesh, vertices)
+    near = distances.min(axis=0) < REACH * np.sqrt(surface_area(mesh) / len(vertices))
+    labels = np.where(near, colors[distances.argmin(axis=0)], -1)
+    return labels[mesh.faces[:, 0]]

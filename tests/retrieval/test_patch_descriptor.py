@@ -1,0 +1,128 @@
+"""Patches in an index: words, codes and answers."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+import eigenshape as es
+from eigenshape.retrieval import batch
+from eigenshape.retrieval.codebook import encode_patches
+from eigenshape.retrieval.patch_descriptor import rounded, unit
+from eigenshape.retrieval.patch_score import view_distances
+
+KINDS = ("quadruped", "hand", "octopus", "biped")
+
+
+@pytest.fixture(scope="module")
+def recipe():
+    return es.PatchRecipe(es.made_codebook())
+
+
+@pytest.fixture(scope="module")
+def meshes():
+    return {kind: es.make_creature(kind, 1, n_vertices=1200) for kind in KINDS}
+
+
+@pytest.fixture(scope="module")
+def index(recipe, meshes, tmp_path_factory):
+    index = es.ShapeIndex.create(tmp_path_factory.mktemp("patches") / "index")
+    for kind, mesh in meshes.items():
+        index.add(kind, [es.describe_shape(mesh, recipe), *es.describe_sides(mesh, recipe, n_views=2)], label=kind)
+    return index
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_scan_of_another_pose_finds_its_kind(index, recipe, kind):
+    pose = es.make_creature(kind, 2, n_vertices=1500)
+    scan = es.partial_scan(pose, np.array([0.3, 0.5, 0.8])).mesh
+    for shape in (pose, scan):
+        assert index.query(es.describe_shape(shape, recipe))[0].name == kind
+
+
+def test_a_shape_finds_itself_at_no_distance(index, recipe, meshes):
+    best = index.query(es.describe_shape(meshes["hand"], recipe))[0]
+    assert (best.name, best.view) == ("hand", 0)
+    assert best.score == pytest.approx(0, abs=1e-6)
+
+
+def test_an_index_scores_as_the_functions_do(index, recipe, meshes):
+    scan = es.partial_scan(meshes["biped"], np.array([1.0, 0.2, 0.1])).mesh
+    whole = np.array([es.describe_shape(meshes[kind], recipe).codes for kind in sorted(KINDS)])
+    sides = [es.describe_sides(meshes[kind], recipe, n_views=2) for kind in sorted(KINDS)]
+    views, of = np.array([side.codes for some in sides for side in some]), np.repeat(np.arange(4), 2)
+    query = es.describe_shape(scan, recipe)
+    expected = view_distances(unit(query.codes), unit(whole), unit(views), of)
+    found = {match.name: match.score for match in index.query(query)}
+    assert [found[kind] for kind in sorted(KINDS)] == pytest.approx(expected, abs=1e-6)
+
+
+def test_rounding_hardly_turns_a_code(recipe, meshes):
+    codes = encode_patches(es.describe_patches(meshes["octopus"]), recipe.codebook)
+    assert (unit(rounded(codes)) * codes).sum(axis=2) == pytest.approx(1, abs=2e-3)
+
+
+def test_words_survive_the_file_and_the_index(index, recipe):
+    again = es.read_codebook(es.write_codebook(recipe.codebook))
+    assert (again, again.digest) == (recipe.codebook, recipe.codebook.digest)
+    assert es.write_codebook(again) == es.write_codebook(recipe.codebook)
+    assert index.recipes() == [recipe]
+    assert index.records()[0].recipes == (recipe,)
+    assert index.descriptor("hand", recipe).recipe == recipe
+
+
+def other_words(book):
+    return es.PatchRecipe(es.PatchCodebook(**{**vars(book), "means": np.asarray(book.means + 1, dtype=np.float32)}))
+
+
+def test_other_words_are_another_recipe(index, recipe, meshes):
+    query = es.describe_shape(meshes["hand"], other_words(es.read_codebook(es.write_codebook(recipe.codebook))))
+    message = rf"holds patches {recipe.codebook.digest[:8]} and was asked in PatchRecipe\(codebook=PatchCodebook\("
+    with pytest.raises(es.StoreError, match=message):
+        index.query(query)
+    with pytest.raises(es.StoreError, match=r"holds patches .* and was asked in Recipe"):
+        index.query(es.describe_shape(meshes["hand"], es.SCALE_FREE))
+
+
+def test_an_index_keeps_heat_and_patches_side_by_side(tmp_path, recipe, meshes):
+    index = es.ShapeIndex.create(tmp_path / "both")
+    index.keep_recipe(recipe)
+    assert (index.recipes(), len(index)) == ([recipe], 0)
+    for kind in KINDS[:2]:
+        shapes = [es.describe_shape(meshes[kind], one) for one in (recipe, es.SCALE_FREE)]
+        index.add(kind, shapes)
+    assert index.recipes() == [recipe, es.SCALE_FREE]
+    for one in index.recipes():
+        assert index.query(es.describe_shape(meshes["hand"], one))[0].name == "hand"
+
+
+def taught(path, *, known):
+    if path.stem == "bad":
+        raise es.InvalidShapeError("A face must have area; face 3 has none.")
+    return [known[path.stem]]
+
+
+@pytest.fixture(scope="module")
+def lessons(meshes):
+    return {kind: es.describe_patches(mesh) for kind, mesh in meshes.items()}
+
+
+def files(folder, names):
+    return [es.Item(name, folder / f"{name}.ply") for name in names]
+
+
+def test_words_are_learnt_from_files_in_any_order(tmp_path, lessons, monkeypatch):
+    monkeypatch.setattr(batch, "FEWEST_TEACHERS", 3)
+    items, heard = files(tmp_path, [*KINDS, "bad"]), []
+    learn = partial(es.learn_words, teach=partial(taught, known=lessons))
+    book = learn(items, told=lambda *news: heard.append(news))
+    assert book == learn(items[::-1], workers=es.Workers(1))
+    assert book != es.made_codebook()
+    assert [news[:2] for news in heard] == [(done, 5) for done in range(1, 6)]
+
+
+def test_few_shapes_take_words_that_are_there(tmp_path, lessons, monkeypatch):
+    teach = partial(taught, known=lessons)
+    assert es.learn_words(files(tmp_path, KINDS), teach) == es.made_codebook()
+    monkeypatch.setattr(batch, "FEWEST_TEACHERS", 3)
+    assert es.learn_words(files(tmp_path, ["hand", "bad", "biped"]), teach) == es.made_codebook()
