@@ -152,15 +152,15 @@ def test_a_stopped_index_goes_on_without_doing_a_shape_twice(tmp_path, how):
         "--workers",
         "1",
     ]
-    running = subprocess.Popen([*command, "--views", "0"], stderr=subprocess.PIPE, text=True)
-    while running.poll() is None and not (db / "rows-1.f32").exists():
+    running = subprocess.Popen([*command, "--views", "0", "--preset", "scale-free"], stderr=subprocess.PIPE, text=True)
+    while running.poll() is None and not (db / "rows-1.bin").exists():
         time.sleep(0.01)
     running.send_signal(getattr(signal, how))
     told = running.communicate()[1]
     if how == "SIGINT":
         assert (running.returncode, told) == (130, "stopped; what was finished is kept\n")
     before = {record.name for record in ShapeIndex.open(db).records()}
-    report = run_json("index", folder, "--db", db, "--workers", 1, "--views", 0)
+    report = run_json("index", folder, "--db", db, "--workers", 1, "--views", 0, "--preset", "scale-free")
     assert set(report["skipped"]) == before
     assert len(before) < 6
     assert set(report["added"]) | before == {f"fish{number}" for number in range(6)}

