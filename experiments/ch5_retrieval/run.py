@@ -6,13 +6,14 @@ Descriptors are kept in a folder, so that a second run only measures distances.
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from describing import Failure, Store, describe_all
-from draws import HALVES, Draw, Shape, Version, complete, draw, half_of, make, shapes
+from draws import HALVES, Draw, Shape, Version, complete, draw, half_of, make, own_choice, shapes
 from methods import METHODS, SLOW, Method, Trainable
 from real_shapes import give_out, require_data
 from rich.progress import track
@@ -44,7 +45,7 @@ def outcomes(method: Method, store: Store, queries: Sequence[Version], database:
 def answers(
     method: Method, store: Store, queries: Sequence[Version], database: Sequence[Version]
 ) -> list[tuple[Version, ...]]:
-    """Return for each query what was described of the database, nearest first."""
+    """Return for each query what was described of other poses in the database, nearest first."""
     entries = [(version, store.load(method, version)) for version in database]
     known = [(version, entry) for version, entry in entries if not isinstance(entry, Failure)]
     found: list[tuple[Version, ...]] = []
@@ -52,8 +53,14 @@ def answers(
         entry, order = store.load(method, query), np.empty(0, dtype=np.int64)
         if not isinstance(entry, Failure):
             order = method.distances(entry, [other for _, other in known]).argsort(kind="stable")
-        found.append(tuple(known[place][0] for place in order))
+        found.append(tuple(known[place][0] for place in order if known[place][0].shape != query.shape))
     return found
+
+
+def among_all(one: Draw, some: Sequence[Shape]) -> Draw:
+    """Return a draw whose databases hold all poses, also those of queries: each is asked for among all others."""
+    everyone = [own_choice(shape, one.seed)[1] for shape in some]
+    return replace(one, mixed=tuple(everyone), complete=tuple(map(complete, some)))
 
 
 def asked(method: Method, store: Store, draws: Sequence[Draw]) -> dict[str, list[Outcome]]:
@@ -84,6 +91,8 @@ def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help=f"classes {', '.join(QUICK_CLASSES)}, one draw")
     parser.add_argument("--half", choices=HALVES, default="reporting")
+    parser.add_argument("--source", default="", help="how the names of files must begin: psb for shapes of one source")
+    parser.add_argument("--among-all", action="store_true", help="leave the poses of other queries in the database")
     parser.add_argument("--draws", type=int, nargs="*", default=SEEDS, help="seeds of the draws")
     parser.add_argument("--methods", nargs="*", choices=sorted(METHODS), default=[m for m in METHODS if m not in SLOW])
     parser.add_argument("--against", choices=sorted(METHODS), default="thesis, cotangent", help="of paired differences")
@@ -98,10 +107,12 @@ def main() -> None:
     chosen = arguments()
     require_data()
     everything = [shape for shape in shapes() if not chosen.quick or shape.label in QUICK_CLASSES]
-    some = half_of(everything, chosen.half)
-    rest = [shape for shape in everything if shape not in some]
+    some = [shape for shape in half_of(everything, chosen.half) if Path(shape.path).stem.startswith(chosen.source)]
+    rest = half_of(everything, HALVES[1 - HALVES.index(chosen.half)])
     seeds, numbers = (chosen.draws[:1], QUICK_QUERIES) if chosen.quick else (chosen.draws, (18, 32))
     draws = [draw(some, seed, *numbers) for seed in seeds]
+    if chosen.among_all:
+        draws = [among_all(one, some) for one in draws]
     methods = {name: ready(METHODS[name], rest) for name in chosen.methods}
     store = Store(chosen.cache)
     versions = [version for each in draws for part in (each.queries, each.mixed, each.complete) for version in part]
