@@ -129,7 +129,9 @@ from eigenshape.retrieval.describe_large import DescribedLargeShape, describe_la
 from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDescriptor
 from eigenshape.retrieval.index import Match, Record, ShapeIndex
 from eigenshape.retrieval.light_field import light_field, light_field_distance
+from eigenshape.retrieval.patch_matching import PatchMatch, PatchPoints, match_patches, patch_points
 from eigenshape.retrieval.patch_score import patch_distances, view_distances
+from eigenshape.retrieval.patch_verify import PatchedShape, patched_shape, shape_agreement, verify_distances
 from eigenshape.retrieval.patches import Patches, describe_patch_views, describe_patches
 from eigenshape.retrieval.score import match_features, matching_score
 from eigenshape.retrieval.shape_dna import shape_dna, shape_dna_distance
@@ -191,6 +193,9 @@ __all__ = [
     "Panel",
     "PartTree",
     "PatchCodebook",
+    "PatchMatch",
+    "PatchPoints",
+    "PatchedShape",
     "Patches",
     "PersistenceDiagram",
     "PersistencePairs",
@@ -296,6 +301,7 @@ __all__ = [
     "light_field_distance",
     "make_creature",
     "match_features",
+    "match_patches",
     "matching_score",
     "mean_curvature",
     "mean_side_length",
@@ -312,6 +318,8 @@ __all__ = [
     "part_tree",
     "partial_scan",
     "patch_distances",
+    "patch_points",
+    "patched_shape",
     "persistence_diagram",
     "point_cloud_laplacian",
     "projective_plane",
@@ -329,6 +337,7 @@ __all__ = [
     "scale_invariant_heat_kernel_signature",
     "seal_holes",
     "segment",
+    "shape_agreement",
     "shape_dna",
     "shape_dna_distance",
     "simplex_volumes",
@@ -353,6 +362,7 @@ __all__ = [
     "transfer_labels",
     "uniform_quadrature",
     "value_colors",
+    "verify_distances",
     "vertex_components",
     "vertex_normals",
     "view_distances",
