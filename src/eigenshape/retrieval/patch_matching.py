@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float32, Int
+from jaxtyping import Float, Float32, Int
 
 from eigenshape._arrays import frozen
 from eigenshape._errors import InvalidParameterError
@@ -14,7 +14,9 @@ from eigenshape.retrieval.patches import RADII, Patches
 N_MATCHED = 10  # axes of most variance
 SLACK = 0.2  # of a distance, by which it may change and still speak for a match a little
 LEAST_LENGTH = 0.05  # sides of the box; errors of shorter distances count as of this
-SURE = 0.5  # of the support that the best match has
+SURE = 0.7  # of the support that the best match has
+N_ANCHORS = 20
+ANCHORED = 3.0  # typical distances of numbers, that keeping no distance counts as
 STEPS = sorted(range(1 - N_SIZES, N_SIZES), key=abs)
 SIZE_STEP = float(RADII[1] / RADII[0])
 
@@ -88,7 +90,8 @@ def match_patches(first: PatchPoints, second: PatchPoints) -> PatchMatch:
     Two matches agree as far as the distance along the surface between their points is the same on both shapes. The
     leading eigenvector of this agreement tells which matches belong to the largest consistent set, and its eigenvalue
     how large that is (Leordeanu and Hebert 2005). Of relative sizes, 1.25 a step and two either way, the one whose
-    eigenvalue is largest counts. Left and right cannot be told by distances: all of a match may be mirrored.
+    eigenvalue is largest counts. Then all points are matched once more, by their patches and by their distances to
+    the surest twenty. Left and right cannot be told by distances: all of a match may be mirrored.
 
     Parameters
     ----------
@@ -104,26 +107,63 @@ def match_patches(first: PatchPoints, second: PatchPoints) -> PatchMatch:
     InvalidParameterError
         If the two have different numbers a point.
     """
-    _require_alike(first, second)
-    return max((_match(first, second, step) for step in STEPS), key=lambda match: match.agreement)
+    found = _best_start(first, second)
+    points = _sure(
+        _consistent(first, second, _apart(first, second, found.step) + _strain(first, second, found), found.step)
+    )
+    vertices = np.column_stack([first.vertices[points[:, 0]], second.vertices[points[:, 1]]])
+    return PatchMatch(frozen(points), frozen(vertices), found.agreement, found.step)
 
 
 def patch_agreement(first: PatchPoints, second: PatchPoints) -> float:
-    """Return the agreement of `match_patches`."""
-    return match_patches(first, second).agreement
+    """Return the agreement of `match_patches`, which takes a tenth of its time."""
+    return _best_start(first, second).agreement
 
 
-def _match(first: PatchPoints, second: PatchPoints, step: int) -> PatchMatch:
-    rows, columns = nearest_of_each_other(_apart(first, second, step))
+@dataclass(frozen=True, eq=False)
+class _Matches:
+    """Matches at one relative size, the best supported first."""
+
+    points: Int[np.ndarray, "p 2"]
+    support: Float[np.ndarray, " p"]
+    agreement: float
+    step: int
+
+
+def _best_start(first: PatchPoints, second: PatchPoints) -> _Matches:
+    _require_alike(first, second)
+    starts = (_consistent(first, second, _apart(first, second, step), step) for step in STEPS)
+    return max(starts, key=lambda matches: matches.agreement)
+
+
+def _consistent(first: PatchPoints, second: PatchPoints, apart: Float32[np.ndarray, "m n"], step: int) -> _Matches:
+    rows, columns = nearest_of_each_other(apart)
     areas = first.weights.max(axis=1).astype(np.float64)
     shares = areas[rows] / areas.sum()
     ours, theirs = first.distances[np.ix_(rows, rows)], second.distances[np.ix_(columns, columns)]
     agreement, vector = leading(ours, theirs, shares, SIZE_STEP**step, SLACK, LEAST_LENGTH)
-    support = vector / np.sqrt(shares)
-    order = np.argsort(-support, kind="stable")[: np.count_nonzero(support > SURE * support.max(initial=0.0))]
-    points = np.column_stack([rows, columns])[order if agreement > 0 else []]
-    vertices = np.column_stack([first.vertices[points[:, 0]], second.vertices[points[:, 1]]])
-    return PatchMatch(frozen(points), frozen(vertices), float(agreement), step)
+    support = vector / np.sqrt(shares) if agreement > 0 else np.zeros(len(rows))
+    order = np.argsort(-support, kind="stable")
+    return _Matches(np.column_stack([rows, columns])[order], support[order], float(agreement), step)
+
+
+def _sure(matches: _Matches) -> Int[np.ndarray, "p 2"]:
+    return matches.points[matches.support > SURE * matches.support.max(initial=0.0)]
+
+
+def _strain(first: PatchPoints, second: PatchPoints, found: _Matches) -> Float32[np.ndarray, "m n"]:
+    """Return how badly each pair of points keeps its distances to points that are matched, in squares of numbers."""
+    anchors = _sure(found)[:N_ANCHORS]
+    if not len(anchors):
+        return np.zeros((len(first.numbers), len(second.numbers)), dtype=np.float32)
+    ours = np.float32(SIZE_STEP**found.step) * first.distances[:, None, anchors[:, 0]]
+    theirs = second.distances[None, :, anchors[:, 1]]
+    longest = np.maximum(np.maximum(ours, theirs), np.float32(LEAST_LENGTH))
+    known = np.isfinite(longest)
+    errors = np.subtract(ours, theirs, where=known, out=np.ones_like(longest))
+    errors = np.divide(errors, np.float32(SLACK) * longest, where=known, out=errors)
+    typical = np.median(_apart(first, second, found.step))
+    return np.asarray(ANCHORED * typical * np.minimum(errors**2, 1).mean(axis=2), dtype=np.float32)
 
 
 def _apart(first: PatchPoints, second: PatchPoints, step: int) -> Float32[np.ndarray, "m n"]:
