@@ -14,7 +14,8 @@ from eigenshape.retrieval.patches import RADII, Patches
 N_MATCHED = 10  # axes of most variance
 SLACK = 0.2  # of a distance, by which it may change and still speak for a match a little
 LEAST_LENGTH = 0.05  # sides of the box; errors of shorter distances count as of this
-SURE = 0.7  # of the support that the best match has
+SURE = 0.7  # of the support of the best match, that a match needs to be kept,
+ANCHORING = 0.5  # and to be one of those by which all points are matched once more
 N_ANCHORS = 20
 ANCHORED = 3.0  # typical distances of numbers, that keeping no distance counts as
 STEPS = sorted(range(1 - N_SIZES, N_SIZES), key=abs)
@@ -108,15 +109,15 @@ def match_patches(first: PatchPoints, second: PatchPoints) -> PatchMatch:
         If the two have different numbers a point.
     """
     found = _best_start(first, second)
-    points = _sure(
-        _consistent(first, second, _apart(first, second, found.step) + _strain(first, second, found), found.step)
-    )
+    apart = _apart(first, second, found.step)
+    strained = apart + ANCHORED * np.median(apart) * _strain(first, second, found)
+    points = _supported(_consistent(first, second, strained, found.step), SURE)
     vertices = np.column_stack([first.vertices[points[:, 0]], second.vertices[points[:, 1]]])
     return PatchMatch(frozen(points), frozen(vertices), found.agreement, found.step)
 
 
 def patch_agreement(first: PatchPoints, second: PatchPoints) -> float:
-    """Return the agreement of `match_patches`, which takes a tenth of its time."""
+    """Return the agreement of `match_patches`, without its second round."""
     return _best_start(first, second).agreement
 
 
@@ -147,13 +148,13 @@ def _consistent(first: PatchPoints, second: PatchPoints, apart: Float32[np.ndarr
     return _Matches(np.column_stack([rows, columns])[order], support[order], float(agreement), step)
 
 
-def _sure(matches: _Matches) -> Int[np.ndarray, "p 2"]:
-    return matches.points[matches.support > SURE * matches.support.max(initial=0.0)]
+def _supported(matches: _Matches, share: float) -> Int[np.ndarray, "p 2"]:
+    return matches.points[matches.support > share * matches.support.max(initial=0.0)]
 
 
 def _strain(first: PatchPoints, second: PatchPoints, found: _Matches) -> Float32[np.ndarray, "m n"]:
-    """Return how badly each pair of points keeps its distances to points that are matched, in squares of numbers."""
-    anchors = _sure(found)[:N_ANCHORS]
+    """Return how badly each pair of points keeps its distances to the surest matches, 0 to 1."""
+    anchors = _supported(found, ANCHORING)[:N_ANCHORS]
     if not len(anchors):
         return np.zeros((len(first.numbers), len(second.numbers)), dtype=np.float32)
     ours = np.float32(SIZE_STEP**found.step) * first.distances[:, None, anchors[:, 0]]
@@ -162,8 +163,7 @@ def _strain(first: PatchPoints, second: PatchPoints, found: _Matches) -> Float32
     known = np.isfinite(longest)
     errors = np.subtract(ours, theirs, where=known, out=np.ones_like(longest))
     errors = np.divide(errors, np.float32(SLACK) * longest, where=known, out=errors)
-    typical = np.median(_apart(first, second, found.step))
-    return np.asarray(ANCHORED * typical * np.minimum(errors**2, 1).mean(axis=2), dtype=np.float32)
+    return np.asarray(np.minimum(errors**2, 1).mean(axis=2))
 
 
 def _apart(first: PatchPoints, second: PatchPoints, step: int) -> Float32[np.ndarray, "m n"]:
