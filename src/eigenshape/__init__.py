@@ -138,7 +138,9 @@ from eigenshape.retrieval.index import Match, Record, ShapeIndex
 from eigenshape.retrieval.kinds import describe_shape, describe_sides
 from eigenshape.retrieval.light_field import light_field, light_field_distance
 from eigenshape.retrieval.patch_descriptor import PatchDescriptor, PatchRecipe
+from eigenshape.retrieval.patch_matching import PatchMatch, PatchPoints, match_patches, patch_points
 from eigenshape.retrieval.patch_score import patch_distances, view_distances
+from eigenshape.retrieval.patch_verify import PatchedShape, patched_shape, shape_agreement, verify_distances
 from eigenshape.retrieval.patches import Patches, describe_patch_views, describe_patches
 from eigenshape.retrieval.score import match_features, matching_score
 from eigenshape.retrieval.shape_dna import shape_dna, shape_dna_distance
@@ -202,7 +204,10 @@ __all__ = [
     "PartTree",
     "PatchCodebook",
     "PatchDescriptor",
+    "PatchMatch",
+    "PatchPoints",
     "PatchRecipe",
+    "PatchedShape",
     "Patches",
     "PersistenceDiagram",
     "PersistencePairs",
@@ -312,6 +317,7 @@ __all__ = [
     "made_codebook",
     "make_creature",
     "match_features",
+    "match_patches",
     "matching_score",
     "mean_curvature",
     "mean_side_length",
@@ -328,6 +334,8 @@ __all__ = [
     "part_tree",
     "partial_scan",
     "patch_distances",
+    "patch_points",
+    "patched_shape",
     "persistence_diagram",
     "point_cloud_laplacian",
     "projective_plane",
@@ -346,6 +354,7 @@ __all__ = [
     "scale_invariant_heat_kernel_signature",
     "seal_holes",
     "segment",
+    "shape_agreement",
     "shape_dna",
     "shape_dna_distance",
     "simplex_volumes",
@@ -370,6 +379,7 @@ __all__ = [
     "transfer_labels",
     "uniform_quadrature",
     "value_colors",
+    "verify_distances",
     "vertex_components",
     "vertex_normals",
     "view_distances",

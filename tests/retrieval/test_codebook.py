@@ -116,6 +116,8 @@ def test_the_same_again(creatures):
 
 
 def test_too_few_patches_are_refused():
-    few = Patches(np.zeros((3, 9, 64), np.float32), np.ones((3, 9), np.float32), np.arange(3))
+    few = Patches(
+        np.zeros((3, 9, 64), np.float32), np.ones((3, 9), np.float32), np.arange(3), np.zeros((3, 3), np.float32)
+    )
     with pytest.raises(es.InvalidParameterError, match="takes at least 64 patches; 2 shapes have 6"):
         train_codebook([few, few])

@@ -189,10 +189,15 @@ def encode_patches(shape: Patches, codebook: PatchCodebook) -> Float32[np.ndarra
     return np.asarray(rooted / np.linalg.norm(rooted, axis=2, keepdims=True), dtype=np.float32)
 
 
+def whitened(shape: Patches, radius: int, codebook: PatchCodebook, place: int) -> Float[np.ndarray, "m d"]:
+    """Turn the numbers at one radius into the whitened ones of a base radius."""
+    scaled = _scaled(shape.numbers[:, radius].astype(np.float64), codebook.means[place], codebook.spreads[place])
+    return scaled @ codebook.axes[place]
+
+
 def _fisher(shape: Patches, radius: int, codebook: PatchCodebook, place: int) -> Float[np.ndarray, " v"]:
     shares, centers, variances = codebook.shares[place], codebook.centers[place], codebook.variances[place]
-    scaled = _scaled(shape.numbers[:, radius].astype(np.float64), codebook.means[place], codebook.spreads[place])
-    points = scaled @ codebook.axes[place]
+    points = whitened(shape, radius, codebook, place)
     joint = _log_joint(points, shares, centers, variances)
     belief = np.exp(joint - logsumexp(joint, axis=1, keepdims=True))
     weights = shape.weights[:, radius].astype(np.float64)

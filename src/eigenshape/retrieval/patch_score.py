@@ -33,10 +33,13 @@ def view_distances(
     others: Float32[np.ndarray, "k b s v"],
     views: Float32[np.ndarray, "w b s v"],
     of: Int[np.ndarray, " w"],
+    *,
+    query_views: Float32[np.ndarray, "u b s v"] | None = None,
 ) -> Float[np.ndarray, " k"]:
     """Return the means of `patch_distances` to shapes and to what is nearest of each, itself or one of its views.
 
-    A partial scan is nearer to a scan from the same side than to the whole; a whole stays nearest to the whole.
+    A partial scan is nearer to a scan from the same side than to the whole; a whole stays nearest to the whole. Where
+    a shape has no views, since it is a part, those of the query serve in their place.
 
     Parameters
     ----------
@@ -46,8 +49,13 @@ def view_distances(
         What single viewpoints see of them, of as many or as few as there are.
     of : (w,) int
         Which of the others each is a view of.
+    query_views : (u, b, s, v) float32, optional
+        What single viewpoints see of the query, if it is closed.
     """
     own = patch_distances(query, others)
     nearest = own.copy()
     np.minimum.at(nearest, of, patch_distances(query, views))
+    parts = np.setdiff1d(np.arange(len(others)), of)
+    for view in query_views if query_views is not None else []:
+        nearest[parts] = np.minimum(nearest[parts], patch_distances(view, others[parts]))
     return (own + nearest) / 2

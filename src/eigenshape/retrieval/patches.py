@@ -4,7 +4,8 @@ from dataclasses import dataclass, replace
 from typing import SupportsIndex
 
 import numpy as np
-from jaxtyping import Float32, Int
+from jaxtyping import Float, Float32, Int
+from scipy.sparse.csgraph import shortest_path
 
 from eigenshape._arrays import frozen, whole_number
 from eigenshape._errors import InvalidShapeError
@@ -36,11 +37,15 @@ class Patches:
         Share of the surface that a point stands for, less near a boundary.
     vertices : (m,) int
         The vertex of each point.
+    distances : (m, m) float32
+        Along the surface between points, in sides of the box; far ones by way of other points, and so a few per cent
+        long; infinite between pieces.
     """
 
     numbers: Float32[np.ndarray, "m r c"]
     weights: Float32[np.ndarray, "m r"]
     vertices: Int[np.ndarray, " m"]
+    distances: Float32[np.ndarray, "m m"]
 
 
 def describe_patches(mesh: TriangleMesh, *, n_samples: SupportsIndex = N_SAMPLES) -> Patches:
@@ -82,7 +87,13 @@ def describe_patches(mesh: TriangleMesh, *, n_samples: SupportsIndex = N_SAMPLES
     rim = boundary_vertices(mesh)
     away = rows[:, rim].min(axis=1) if len(rim) else np.full(len(chosen), np.inf)
     weights = cells[:, None] * np.clip(away[:, None] / (AT_BOUNDARY * RADII), LEAST_WEIGHT, 1.0)
-    return Patches(frozen(numbers), frozen(weights.astype(np.float32)), frozen(chosen))
+    between = _by_way(rows[:, chosen]).astype(np.float32)
+    return Patches(frozen(numbers), frozen(weights.astype(np.float32)), frozen(chosen), frozen(between))
+
+
+def _by_way(near: Float[np.ndarray, "m m"]) -> Float[np.ndarray, "m m"]:
+    """Fill in distances that waves did not reach, along others."""
+    return np.asarray(shortest_path(np.minimum(near, near.T), directed=False))
 
 
 def describe_patch_views(mesh: TriangleMesh, *, n_views: int = N_VIEWS) -> list[Patches]:
