@@ -77,6 +77,7 @@ from eigenshape.geometry.repair import (
     weld,
 )
 from eigenshape.geometry.sampling import MeshPart, cut_by_planes, partial_scan, random_planes
+from eigenshape.geometry.scanner import DepthCamera, DepthScan, simulate_scan
 from eigenshape.geometry.simplices import dual_volumes, mean_side_length, simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.spheres import (
@@ -166,6 +167,8 @@ __all__ = [
     "Camera",
     "Certificate",
     "ConvergenceError",
+    "DepthCamera",
+    "DepthScan",
     "DescribedLargeShape",
     "DescribedShape",
     "EdgeTable",
@@ -332,6 +335,7 @@ __all__ = [
     "shape_dna",
     "shape_dna_distance",
     "simplex_volumes",
+    "simulate_scan",
     "smooth_boundaries",
     "solve_dirichlet",
     "solve_spectrum",
