@@ -122,6 +122,7 @@ from eigenshape.operators.graph import edge_graph, graph_laplacian
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 from eigenshape.operators.neighbors import neighbor_graph
 from eigenshape.operators.robust import robust_laplacian
+from eigenshape.operators.smoothing import denoise, noise_level
 from eigenshape.retrieval.affinity import affinity_distance, affinity_eigenvalues
 from eigenshape.retrieval.batch import BatchReport, Item, Workers, build_index
 from eigenshape.retrieval.codebook import PatchCodebook, encode_patches, train_codebook
@@ -239,6 +240,7 @@ __all__ = [
     "cut_by_planes",
     "default_energies",
     "default_times",
+    "denoise",
     "describe",
     "describe_large_mesh",
     "describe_mesh",
@@ -307,6 +309,7 @@ __all__ = [
     "mesh_laplacian",
     "mesh_quadrature",
     "neighbor_graph",
+    "noise_level",
     "normalize_area",
     "normalize_box",
     "normalize_diameter",

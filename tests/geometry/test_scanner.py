@@ -84,6 +84,11 @@ def test_what_lies_behind_a_jump_is_not_joined_and_the_larger_piece_stays():
     assert vertex_components(found.mesh)[0] == 1
     np.testing.assert_allclose(found.mesh.vertices[:, 2], 0, atol=1e-12)
     assert (found.source_faces >= near.n_faces).all()
+    both = simulate_scan(
+        disjoint_union(near, grid(4, 4)), np.random.default_rng(0), view=AHEAD, camera=PERFECT, all_pieces=True
+    )
+    assert vertex_components(both.mesh)[0] == 2
+    assert set(np.round(both.mesh.vertices[:, 2], 9)) == {0.0, 1.0}
 
 
 def test_the_same_source_gives_the_same_scan_and_another_gives_another():

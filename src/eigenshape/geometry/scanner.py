@@ -81,7 +81,12 @@ class _Picture:
 
 
 def simulate_scan(
-    mesh: TriangleMesh, rng: np.random.Generator, *, view: ArrayLike | None = None, camera: DepthCamera | None = None
+    mesh: TriangleMesh,
+    rng: np.random.Generator,
+    *,
+    view: ArrayLike | None = None,
+    camera: DepthCamera | None = None,
+    all_pieces: bool = False,
 ) -> DepthScan:
     """Scan a shape from one side by a depth camera, as simulated.
 
@@ -100,6 +105,8 @@ def simulate_scan(
         Direction from the shape to the camera.
     camera : DepthCamera, optional
         `DepthCamera()` by default.
+    all_pieces : bool
+        Keep every piece, and not only the one with the most area: an arm before the body, say.
 
     Returns
     -------
@@ -124,7 +131,9 @@ def simulate_scan(
     placed = TriangleMesh((points - middle) @ turn.T / diagonal - ahead, mesh.faces)
     picture = _taken(placed, camera)
     kept = _kept(picture, camera, rng)
-    seen, source = _joined(picture, _noisy(picture, camera, rng), kept)
+    joined = _joined(picture, _noisy(picture, camera, rng), kept)
+    wanted = np.ones(joined.n_faces, dtype=bool) if all_pieces else faces_of_largest(joined)
+    seen, source = submesh(joined, wanted)
     back = ((seen.vertices + ahead) * diagonal @ turn + middle) * scale
     columns = source % camera.resolution
     pixels = np.column_stack([columns, source // camera.resolution])
@@ -184,9 +193,7 @@ def _noisy(picture: _Picture, camera: DepthCamera, rng: np.random.Generator) -> 
     return np.where(picture.face >= 0, picture.depth + camera.noise * np.where(picture.face >= 0, growth, 0) * away, 0)
 
 
-def _joined(
-    picture: _Picture, depth: Float[np.ndarray, "h w"], kept: Bool[np.ndarray, "h w"]
-) -> tuple[TriangleMesh, Int[np.ndarray, " n"]]:
+def _joined(picture: _Picture, depth: Float[np.ndarray, "h w"], kept: Bool[np.ndarray, "h w"]) -> TriangleMesh:
     """Make triangles of squares of neighbours, cut along the diagonal with the lesser jump."""
     size = len(depth)
     corner = np.arange(size * size).reshape(size, size)
@@ -203,5 +210,4 @@ def _joined(
     if not len(faces):
         raise InvalidShapeError("A scan must have a face. No three neighbouring pixels see one surface from there.")
     points = (_rays(size, picture.focal) * np.where(kept, depth, 0)[:, :, None]).reshape(-1, 3)
-    joined = TriangleMesh(points, faces)
-    return submesh(joined, faces_of_largest(joined))
+    return TriangleMesh(points, faces)
