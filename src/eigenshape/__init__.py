@@ -59,6 +59,7 @@ from eigenshape.geometry.measure import (
 )
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_area, normalize_box, normalize_diameter
+from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.quadrature import (
     Quadrature,
     mesh_quadrature,
@@ -313,6 +314,7 @@ __all__ = [
     "normalize_area",
     "normalize_box",
     "normalize_diameter",
+    "orient_outward",
     "part_colors",
     "part_spectrum",
     "part_tree",
