@@ -61,6 +61,16 @@ def test_noise_is_as_stated_face_on_and_more_on_slanted_surfaces():
     assert depth.std() > 1.15 * 0.003 * np.sqrt(2)
 
 
+def test_noise_grows_with_the_square_of_the_depth():
+    far = TriangleMesh(grid(8, 8).vertices + np.array([2.0, 0, -3.0]), grid(8, 8).faces)
+    both, camera = disjoint_union(grid(8, 8), far), replace(PERFECT, noise=0.002, resolution=300)
+    seen = simulate_scan(both, np.random.default_rng(0), view=AHEAD, camera=camera, all_pieces=True).mesh
+    heights = seen.vertices[:, 2]
+    middle = camera.distance * np.sqrt(9 + 9 + 1)  # depth of the middle of the box, half way between the two
+    ratio = heights[heights < -1.5].std() / heights[heights > -1.5].std()
+    assert ratio == pytest.approx(((middle + 1.5) / (middle - 1.5)) ** 2, rel=0.05)
+
+
 def test_grazing_sides_get_lost():
     found = scanned(BALL, replace(PERFECT, lost_from=50.0))
     turned = np.rad2deg(np.arccos(np.clip(face_normals(BALL)[found.source_faces] @ AHEAD, -1, 1)))

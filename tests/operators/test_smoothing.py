@@ -79,6 +79,13 @@ def test_the_boundary_goes_its_own_way():
     assert one.vertices[rim, 2].mean() == pytest.approx(level, abs=0.3 * edge_lengths(HALF).mean())
 
 
+def test_the_boundary_gets_smooth_too():
+    rim = boundary_vertices(HALF)
+    rough = noisy(HALF, 0.25)
+    before, after = (mesh.vertices[rim] - HALF.vertices[rim] for mesh in (rough, denoise(rough)))
+    assert np.sqrt((after**2).mean()) < 0.85 * np.sqrt((before**2).mean())
+
+
 def test_rigid_motion_and_order_of_vertices():
     rough = noisy(make_creature("quadruped", n_vertices=1200), 0.25)
     turn, shift = rotation_towards(np.array([0.6, 0.0, 0.8])), np.array([3.0, -2.0, 1.0])
