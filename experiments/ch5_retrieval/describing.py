@@ -20,7 +20,7 @@ from threadpoolctl import threadpool_limits
 
 import eigenshape as es
 
-MAKING = Path(__file__).with_name("draws.py")
+MAKING = tuple(Path(__file__).with_name(name) for name in ("draws.py", "perturbing.py"))
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ class Store:
 
     def path(self, method: Method, version: Version) -> Path:
         """Return where a descriptor lies."""
-        sources = digest(DATA / version.shape.path), digest(MAKING), version_of("eigenshape")
-        what = (*sources, method, version.kind, version.seed, version.shape.number)
+        sources = digest(DATA / version.shape.path), *map(digest, MAKING), version_of("eigenshape")
+        what = (*sources, method, version.kind, version.seed, version.shape.number, version.change)
         return self.folder / hashlib.sha256(repr(what).encode()).hexdigest()
 
     def load(self, method: Method, version: Version) -> Any:

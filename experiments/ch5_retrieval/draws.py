@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from perturbing import CLEAN, SCANS, changed_part, changed_whole
 from real_shapes import DATA, manifest
 
 import eigenshape as es
@@ -31,16 +32,18 @@ class Shape:
 
 @dataclass(frozen=True)
 class Version:
-    """A shape as one draw sees it: complete, a partial scan, or incomplete."""
+    """A shape as one draw sees it: complete, a partial scan, or incomplete; and what was done to it."""
 
     shape: Shape
     kind: str
     seed: int
+    change: str = CLEAN
 
     @property
     def name(self) -> str:
-        """Return class, file and kind."""
-        return f"{self.shape.label}/{Path(self.shape.path).stem}, {self.kind}"
+        """Return class, file, kind and change."""
+        change = "" if self.change == CLEAN else f", {self.change}"
+        return f"{self.shape.label}/{Path(self.shape.path).stem}, {self.kind}{change}"
 
 
 @dataclass(frozen=True)
@@ -121,18 +124,24 @@ def complete(shape: Shape) -> Version:
 def make(version: Version, *, turned: bool = True) -> es.TriangleMesh:
     """Read a shape and make a version of it, in a unit box, then turned at random; pictures do not turn it.
 
+    Whatever the change, the sides, planes and turns that it draws are the same.
+
     Raises
     ------
     eigenshape.InvalidShapeError
         If no planes leave a piece of the wanted size.
     """
     rng = np.random.default_rng([version.seed, version.shape.number, 1 + KINDS.index(version.kind)])
-    whole = es.read_mesh(DATA / version.shape.path)
-    if version.kind == "partial":
-        whole = es.partial_scan(whole, rng).mesh
+    own = np.random.default_rng([version.seed, version.shape.number, 1 + len(KINDS)])
+    mesh = changed_whole(es.read_mesh(DATA / version.shape.path), version.change)
+    if version.change in SCANS:
+        view, all_pieces = rng.standard_normal(3), SCANS[version.change]
+        mesh = es.simulate_scan(mesh, own, view=view, all_pieces=all_pieces).mesh
+    elif version.kind == "partial":
+        mesh = es.partial_scan(mesh, rng).mesh
     elif version.kind == "incomplete":
-        whole = incomplete(whole, rng)
-    boxed = es.normalize_box(whole)
+        mesh = incomplete(mesh, rng)
+    boxed = es.normalize_box(changed_part(mesh, version.change, own))
     if not turned:
         return boxed
     return es.TriangleMesh(boxed.vertices @ rotation(rng).T, boxed.faces)

@@ -33,9 +33,11 @@ def ready(method: Method, some: Sequence[Shape]) -> Method:
         return method.train(make(complete(shape)) for shape in some)
 
 
-def outcomes(method: Method, store: Store, queries: Sequence[Version], database: Sequence[Version]) -> list[Outcome]:
+def outcomes(
+    method: Method, store: Store, queries: Sequence[Version], database: Sequence[Version], asking: Method | None = None
+) -> list[Outcome]:
     """Ask for each query; a shape without descriptor is no answer, and a query without has none."""
-    ranked = answers(method, store, queries, database)
+    ranked = answers(method, store, queries, database, asking)
     return [
         Outcome(query.kind, query.shape.label, tuple(version.shape.label for version in found))
         for query, found in zip(queries, ranked, strict=True)
@@ -43,14 +45,14 @@ def outcomes(method: Method, store: Store, queries: Sequence[Version], database:
 
 
 def answers(
-    method: Method, store: Store, queries: Sequence[Version], database: Sequence[Version]
+    method: Method, store: Store, queries: Sequence[Version], database: Sequence[Version], asking: Method | None = None
 ) -> list[tuple[Version, ...]]:
-    """Return for each query what was described of other poses in the database, nearest first."""
+    """Return for each query what was described of other poses, nearest first; another method may describe queries."""
     entries = [(version, store.load(method, version)) for version in database]
     known = [(version, entry) for version, entry in entries if not isinstance(entry, Failure)]
     found: list[tuple[Version, ...]] = []
     for query in queries:
-        entry, order = store.load(method, query), np.empty(0, dtype=np.int64)
+        entry, order = store.load(asking or method, query), np.empty(0, dtype=np.int64)
         if not isinstance(entry, Failure):
             order = method.distances(entry, [other for _, other in known]).argsort(kind="stable")
         found.append(tuple(known[place][0] for place in order if known[place][0].shape != query.shape))

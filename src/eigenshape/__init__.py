@@ -59,6 +59,7 @@ from eigenshape.geometry.measure import (
 )
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_area, normalize_box, normalize_diameter
+from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.quadrature import (
     Quadrature,
     mesh_quadrature,
@@ -77,6 +78,7 @@ from eigenshape.geometry.repair import (
     weld,
 )
 from eigenshape.geometry.sampling import MeshPart, cut_by_planes, partial_scan, random_planes
+from eigenshape.geometry.scanner import DepthCamera, DepthScan, simulate_scan
 from eigenshape.geometry.simplices import dual_volumes, mean_side_length, simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.spheres import (
@@ -121,6 +123,7 @@ from eigenshape.operators.graph import edge_graph, graph_laplacian
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 from eigenshape.operators.neighbors import neighbor_graph
 from eigenshape.operators.robust import robust_laplacian
+from eigenshape.operators.smoothing import denoise, noise_level
 from eigenshape.retrieval.affinity import affinity_distance, affinity_eigenvalues
 from eigenshape.retrieval.batch import BatchReport, build_index, learn_words
 from eigenshape.retrieval.codebook import (
@@ -178,6 +181,8 @@ __all__ = [
     "Camera",
     "Certificate",
     "ConvergenceError",
+    "DepthCamera",
+    "DepthScan",
     "DescribedLargeShape",
     "DescribedShape",
     "EdgeTable",
@@ -253,6 +258,7 @@ __all__ = [
     "cut_by_planes",
     "default_energies",
     "default_times",
+    "denoise",
     "describe",
     "describe_large_mesh",
     "describe_mesh",
@@ -326,9 +332,11 @@ __all__ = [
     "mesh_laplacian",
     "mesh_quadrature",
     "neighbor_graph",
+    "noise_level",
     "normalize_area",
     "normalize_box",
     "normalize_diameter",
+    "orient_outward",
     "part_colors",
     "part_spectrum",
     "part_tree",
@@ -358,6 +366,7 @@ __all__ = [
     "shape_dna",
     "shape_dna_distance",
     "simplex_volumes",
+    "simulate_scan",
     "smooth_boundaries",
     "solve_dirichlet",
     "solve_spectrum",

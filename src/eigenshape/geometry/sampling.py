@@ -67,7 +67,7 @@ def partial_scan(
         If no face is visible.
     """
     whole_number(resolution, "resolution", 16, 8192)
-    visible = _visible_vertices(mesh, _direction(view), resolution)
+    visible = _visible_vertices(mesh, unit_direction(view), resolution)
     keep = visible[mesh.faces].all(axis=1)
     if keep.any() and not all_pieces:
         keep[keep] = faces_of_largest(TriangleMesh(mesh.vertices, mesh.faces[keep]))
@@ -90,7 +90,14 @@ def views_of(mesh: TriangleMesh, n_views: int) -> list[MeshPart]:
     return [partial_scan(mesh, viewpoint(view)) for view in range(n_views if is_closed(mesh) else 0)]
 
 
-def _direction(view: ArrayLike | np.random.Generator) -> Float[np.ndarray, "3"]:
+def unit_direction(view: ArrayLike | np.random.Generator) -> Float[np.ndarray, "3"]:
+    """Return a direction at length 1, or draw one.
+
+    Raises
+    ------
+    InvalidParameterError
+        If it is zero or not finite.
+    """
     vector = view.standard_normal(3) if isinstance(view, np.random.Generator) else np.asarray(view, dtype=np.float64)
     if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
         raise InvalidParameterError(f"view must be three finite numbers, not all zero; it is {vector.tolist()}.")

@@ -1,0 +1,110 @@
+"""Changed queries: changes are what they are called, losses are of the same queries, the README shows the figures."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import eigenshape as es
+
+FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch5_retrieval"
+EXPECTED = json.loads((FOLDER / "expected_robustness.json").read_text())
+sys.path[:0] = [str(FOLDER), str(FOLDER.parent)]
+import draws  # noqa: E402
+import perturbing  # noqa: E402
+import robustness  # noqa: E402
+from scores import Outcome  # noqa: E402
+
+ONE_QUERY = 100 / 3 + 0.1  # in per cent, of the fewest queries of a row in the quick form: rounding may turn a tie
+BALL = es.icosphere(3)
+
+
+def test_noise_is_a_share_of_the_mean_edge():
+    found = perturbing.changed_part(BALL, "noise .25", np.random.default_rng(0))
+    moved = (found.vertices - BALL.vertices).std() / es.edge_lengths(BALL).mean()
+    assert moved == pytest.approx(0.25, rel=0.05)
+    assert np.array_equal(found.faces, BALL.faces)
+
+
+def test_resolutions_are_half_and_double():
+    half = perturbing.changed_whole(BALL, perturbing.HALF)
+    assert half.n_faces == BALL.n_faces // 2
+    assert es.is_closed(half)
+    double = perturbing.changed_whole(BALL, perturbing.DOUBLE)
+    assert es.mean_side_length(double) == pytest.approx(es.mean_side_length(BALL) / 2)
+
+
+def test_turned_over_faces_in():
+    rng = np.random.default_rng(0)
+    assert es.enclosed_volume(perturbing.changed_part(BALL, perturbing.FLIPPED, rng)) < 0
+    for change in (perturbing.CLEAN, perturbing.DOUBLE, *perturbing.SCANS):
+        assert perturbing.changed_part(BALL, change, rng) is BALL
+    for change in (perturbing.CLEAN, *perturbing.NOISES, perturbing.FLIPPED, *perturbing.SCANS):
+        assert perturbing.changed_whole(BALL, change) is BALL
+
+
+@pytest.mark.data
+def test_a_change_keeps_side_planes_and_turn():
+    one = next(one for one in draws.shapes() if one.path.endswith("psb122.ply"))
+    for kind in ("partial", "incomplete"):
+        clean = draws.make(draws.Version(one, kind, 1))
+        noisy = draws.make(draws.Version(one, kind, 1, "noise .1"))
+        assert np.array_equal(noisy.faces, clean.faces)
+        assert np.abs(noisy.vertices - clean.vertices).max() < 0.1
+        flipped = draws.make(draws.Version(one, kind, 1, perturbing.FLIPPED))
+        assert np.array_equal(flipped.vertices, clean.vertices)
+    scan = draws.make(draws.Version(one, "partial", 1, "scanner"))
+    assert es.vertex_components(scan)[0] == 1
+    assert not es.is_closed(scan)
+
+
+def test_losses_are_of_the_same_queries():
+    def outcome(kind, label):
+        return Outcome(kind, "ant", (label,))
+
+    clean = [outcome("partial", "ant"), outcome("incomplete", "cat"), outcome("partial", "ant")]
+    changed = [outcome("partial", "ant"), outcome("incomplete", "cat"), outcome("partial", "cat")]
+    assert robustness.loss(changed, clean, "noise .1")[0] == 33.3
+    assert robustness.loss([changed[0], changed[2]], clean, "scanner")[0] == 50.0
+    results = robustness.measure({"clean": {"as it is": clean}, "noise .1": {"as it is": changed}})
+    assert results["noise .1"]["as it is"]["loss"][0] == 33.3
+    assert robustness.cell(results["noise .1"]["as it is"]).startswith("33.3 / 33.3 / 33.3, -33.3 [")
+
+
+def test_a_cure_comes_before_the_method():
+    class Faces:
+        def describe(self, mesh):
+            return mesh
+
+        def distances(self, query, described):
+            return np.zeros(len(described))
+
+    flipped = es.TriangleMesh(BALL.vertices, BALL.faces[:, ::-1])
+    found = robustness.Cured(Faces(), "outward, denoised").describe(flipped)
+    assert es.enclosed_volume(found) > 0
+    assert robustness.Cured(Faces(), "as it is").describe(flipped) is flipped
+
+
+def test_the_readme_shows_the_expected_figures():
+    text = (FOLDER / "README.md").read_text()
+    for line in robustness.table(EXPECTED["full"]["rates"]).splitlines():
+        assert line in text
+
+
+@pytest.mark.slow
+@pytest.mark.data
+def test_the_quick_form_gives_the_expected_figures_whatever_the_workers(tmp_path):
+    found = []
+    for workers in ("1", "2"):
+        out = tmp_path / f"{workers}.json"
+        command = [sys.executable, FOLDER / "robustness.py", "--quick", "--workers", workers]
+        command += ["--cache", tmp_path / workers, "--out", out]
+        subprocess.run(command, check=True, capture_output=True)
+        found.append(json.loads(out.read_text()))
+    assert found[0] == found[1]
+    for change, row in EXPECTED["quick"]["rates"].items():
+        for cure, rates in row.items():
+            assert found[0]["rates"][change][cure]["top3"][0] == pytest.approx(rates["top3"][0], abs=ONE_QUERY)
