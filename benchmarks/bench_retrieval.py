@@ -49,8 +49,7 @@ def patches(mesh: es.TriangleMesh) -> es.PatchDescriptor:
 
 def patches_for_index(mesh: es.TriangleMesh) -> list[Any]:
     """Describe by patches, whole and from six sides."""
-    recipe = es.PatchRecipe(es.made_codebook())
-    return [es.describe_shape(mesh, recipe), *es.describe_sides(mesh, recipe)]
+    return es.describe_to_keep(mesh, es.PatchRecipe(es.made_codebook()))
 
 
 def thesis(mesh: es.TriangleMesh) -> es.ShapeDescriptor:
@@ -96,7 +95,7 @@ def asked(method: str, n_shapes: int) -> Row:
         query = METHODS[method](scan)
         return measured(lambda: [distance(query, known[number % len(known)]) for number in range(n_shapes)])
     recipe = es.THESIS if method == "thesis" else es.PatchRecipe(es.made_codebook())
-    views = [[es.describe_shape(mesh, recipe), *es.describe_sides(mesh, recipe)] for mesh in poses]
+    views = [es.describe_to_keep(mesh, recipe) for mesh in poses]
     with tempfile.TemporaryDirectory() as folder:
         index = es.ShapeIndex.create(Path(folder) / "index")
         for number in range(n_shapes):

@@ -1,8 +1,7 @@
 """The methods that are compared, each by the same three verbs: a name, to describe, to measure distances."""
 
-import hashlib
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from typing import Any, Protocol, runtime_checkable
 
@@ -120,50 +119,34 @@ class Global:
 
 
 TEACHING_VIEWS = 2
+TEACHERS = ("the other half", "made creatures")
 
 
 @dataclass(frozen=True)
 class Patches:
-    """Fisher vectors of patches, in words that the other half or made creatures taught; six views of what is closed.
-
-    If verified, a whole query's views are compared with parts too, and the nearest shapes verified by matched points.
-    """
+    """Patches as an index keeps and asks them, in words that the other half or made creatures have taught."""
 
     name: str
-    teachers: str
+    teachers: str = TEACHERS[0]
     verified: bool = True
-    taught: str = ""
-    book: es.PatchCodebook | None = field(default=None, repr=False, compare=False)
+    recipe: es.PatchRecipe | None = None
 
     def train(self, meshes: Iterable[es.TriangleMesh]) -> "Patches":
-        """Learn words; `taught` is a hash of them."""
-        some = meshes if self.teachers == "other half" else creatures()
-        book = es.train_codebook([patches for mesh in some for patches in seen(mesh, TEACHING_VIEWS)])
-        text = b"".join(getattr(book, each.name).tobytes() for each in fields(book))
-        return replace(self, taught=hashlib.sha256(text).hexdigest(), book=book)
+        """Learn words, or take those that come with the library."""
+        if self.teachers == TEACHERS[1]:
+            return replace(self, recipe=es.PatchRecipe(es.made_codebook()))
+        lessons = [patches for mesh in meshes for patches in es.seen_patches(mesh, n_views=TEACHING_VIEWS)]
+        return replace(self, recipe=es.PatchRecipe(es.train_codebook(lessons)))
 
-    def describe(self, mesh: es.TriangleMesh) -> es.PatchedShape:
-        """Return codes and points of the shape and of its views."""
-        return es.patched_shape(seen(mesh, 6), self.book)
+    def describe(self, mesh: es.TriangleMesh) -> Any:
+        """Return the descriptor, with six views of what is closed."""
+        return es.describe_shape(mesh, self.recipe)
 
-    def distances(self, query: es.PatchedShape, described: Sequence[es.PatchedShape]) -> np.ndarray:
-        """Return distances, in which views count by half, less what matched points agree."""
-        wholes, views = np.array([each.codes[0] for each in described]), [each.codes[1:] for each in described]
-        of = np.repeat(np.arange(len(described)), [len(each) for each in views])
-        measure = partial(es.view_distances, query.codes[0], wholes, np.concatenate(views), of)
-        if not self.verified:
-            return measure()
-        return es.verify_distances(query, described, measure(query_views=query.codes[1:]))
-
-
-def seen(mesh: es.TriangleMesh, n_views: int) -> list[es.Patches]:
-    """Return the patches of a shape and of some views of it."""
-    return [es.describe_patches(mesh), *es.describe_patch_views(mesh, n_views=n_views)]
-
-
-def creatures() -> Iterable[es.TriangleMesh]:
-    """Make four of each kind."""
-    return (es.make_creature(kind, number, n_vertices=3000) for kind in es.CREATURES for number in range(4))
+    def distances(self, query: Any, described: Sequence[Any]) -> np.ndarray:
+        """Return scores, or distances by words alone."""
+        if self.verified:
+            return es.patch_scores(query, described)
+        return es.word_distances(query.codes, [each.codes for each in described])
 
 
 METHODS: dict[str, Method] = {
@@ -182,4 +165,4 @@ METHODS: dict[str, Method] = {
         Patches("patches, made words", "creatures", verified=False),
     )
 }
-SLOW = ("thesis, mesh Laplacian", "patches, not verified", "patches, made words")  # asked for by name
+SLOW = ("thesis, mesh Laplacian", "patches, not verified")  # asked for by name

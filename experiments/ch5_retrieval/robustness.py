@@ -5,7 +5,7 @@ Descriptors are kept in the folder that `run.py` uses, so that the database is d
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ import numpy as np
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from describing import Store, describe_all
 from draws import HALVES, Draw, Version, draw, half_of, shapes
-from methods import METHODS, Method
+from methods import METHODS
 from perturbing import CHANGES, CLEAN, SCANS
 from real_shapes import give_out, require_data
 from run import QUICK_CLASSES, QUICK_QUERIES, SEEDS, outcomes, ready
@@ -24,17 +24,14 @@ from scores import Outcome, differences, rates
 import eigenshape as es
 
 GROUP = "incomplete"  # partial ones too, as everywhere here
-CURES: dict[str, Callable[[es.TriangleMesh], es.TriangleMesh]] = {
-    "as it is": lambda mesh: mesh,
-    "outward, denoised": lambda mesh: es.denoise(es.orient_outward(mesh)),
-}
+CURES = ("as it is", "outward, denoised")
 
 
 @dataclass(frozen=True)
-class Cured:
-    """A method for queries alone, which does something to them before it describes them."""
+class Asking:
+    """Patches of queries as these are, or as the method takes them, turned outward and denoised."""
 
-    method: Method
+    method: Any
     cure: str
 
     @property
@@ -43,11 +40,13 @@ class Cured:
         return self.cure
 
     def describe(self, mesh: es.TriangleMesh) -> Any:
-        """Return what the method makes of the cured shape."""
-        return self.method.describe(CURES[self.cure](mesh))
+        """Return the descriptor."""
+        if self.cure == CURES[1]:
+            return self.method.describe(mesh)
+        return es.in_words([es.describe_patches(mesh)], self.method.recipe)
 
     def distances(self, query: Any, described: Sequence[Any]) -> np.ndarray:
-        """Return the method's distances."""
+        """Return the method's scores."""
         return self.method.distances(query, described)
 
 
@@ -110,7 +109,7 @@ def main() -> None:
     seeds, numbers = (chosen.draws[:1], QUICK_QUERIES) if chosen.quick else (chosen.draws, (18, 32))
     draws = [draw(some, seed, *numbers) for seed in seeds]
     method = ready(METHODS["patches"], [shape for shape in everything if shape not in some])
-    cures, store = [Cured(method, cure) for cure in CURES], Store(chosen.cache)
+    cures, store = [Asking(method, cure) for cure in CURES], Store(chosen.cache)
     changes = list(dict.fromkeys([CLEAN, *chosen.changes]))
     database = [version for each in draws for version in each.mixed]
     asked = [query for each in draws for change in changes for query in queries(each, change)]

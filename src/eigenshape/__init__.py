@@ -138,12 +138,12 @@ from eigenshape.retrieval.describe import DescribedShape, describe, describe_mes
 from eigenshape.retrieval.describe_large import DescribedLargeShape, describe_large_mesh
 from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDescriptor
 from eigenshape.retrieval.index import Match, Record, ShapeIndex
-from eigenshape.retrieval.kinds import describe_shape, describe_sides
+from eigenshape.retrieval.kinds import describe_shape, describe_to_keep
 from eigenshape.retrieval.light_field import light_field, light_field_distance
-from eigenshape.retrieval.patch_descriptor import PatchDescriptor, PatchRecipe
+from eigenshape.retrieval.patch_descriptor import PatchDescriptor, PatchRecipe, in_words, seen_patches
 from eigenshape.retrieval.patch_matching import PatchMatch, PatchPoints, match_patches, patch_points
 from eigenshape.retrieval.patch_score import patch_distances, view_distances
-from eigenshape.retrieval.patch_verify import PatchedShape, patched_shape, shape_agreement, verify_distances
+from eigenshape.retrieval.patch_verify import patch_scores, word_distances
 from eigenshape.retrieval.patches import Patches, describe_patch_views, describe_patches
 from eigenshape.retrieval.score import match_features, matching_score
 from eigenshape.retrieval.shape_dna import shape_dna, shape_dna_distance
@@ -212,7 +212,6 @@ __all__ = [
     "PatchMatch",
     "PatchPoints",
     "PatchRecipe",
-    "PatchedShape",
     "Patches",
     "PersistenceDiagram",
     "PersistencePairs",
@@ -265,7 +264,7 @@ __all__ = [
     "describe_patch_views",
     "describe_patches",
     "describe_shape",
-    "describe_sides",
+    "describe_to_keep",
     "describe_views",
     "dirichlet_laplacian",
     "disc",
@@ -312,6 +311,7 @@ __all__ = [
     "grid",
     "heat_kernel_signature",
     "icosphere",
+    "in_words",
     "interval",
     "irregular_grid",
     "is_closed",
@@ -343,7 +343,7 @@ __all__ = [
     "partial_scan",
     "patch_distances",
     "patch_points",
-    "patched_shape",
+    "patch_scores",
     "persistence_diagram",
     "point_cloud_laplacian",
     "projective_plane",
@@ -361,8 +361,8 @@ __all__ = [
     "save_figure",
     "scale_invariant_heat_kernel_signature",
     "seal_holes",
+    "seen_patches",
     "segment",
-    "shape_agreement",
     "shape_dna",
     "shape_dna_distance",
     "simplex_volumes",
@@ -388,12 +388,12 @@ __all__ = [
     "transfer_labels",
     "uniform_quadrature",
     "value_colors",
-    "verify_distances",
     "vertex_components",
     "vertex_normals",
     "view_distances",
     "wave_kernel_signature",
     "weld",
+    "word_distances",
     "write_codebook",
     "write_mesh",
     "write_points",

@@ -7,9 +7,7 @@ import pytest
 
 import eigenshape as es
 from eigenshape.retrieval import batch
-from eigenshape.retrieval.codebook import encode_patches
 from eigenshape.retrieval.patch_descriptor import rounded, unit
-from eigenshape.retrieval.patch_score import view_distances
 
 KINDS = ("quadruped", "hand", "octopus", "biped")
 
@@ -28,7 +26,7 @@ def meshes():
 def index(recipe, meshes, tmp_path_factory):
     index = es.ShapeIndex.create(tmp_path_factory.mktemp("patches") / "index")
     for kind, mesh in meshes.items():
-        index.add(kind, [es.describe_shape(mesh, recipe), *es.describe_sides(mesh, recipe, n_views=2)], label=kind)
+        index.add(kind, es.describe_to_keep(mesh, recipe, n_views=2), label=kind)
     return index
 
 
@@ -40,25 +38,26 @@ def test_a_scan_of_another_pose_finds_its_kind(index, recipe, kind):
         assert index.query(es.describe_shape(shape, recipe))[0].name == kind
 
 
-def test_a_shape_finds_itself_at_no_distance(index, recipe, meshes):
-    best = index.query(es.describe_shape(meshes["hand"], recipe))[0]
+def test_a_shape_finds_itself_nearly_at_zero(index, recipe, meshes):
+    best, other = index.query(es.describe_shape(meshes["hand"], recipe), n_matches=2)
     assert (best.name, best.view) == ("hand", 0)
-    assert best.score == pytest.approx(0, abs=1e-6)
+    assert best.score < 0.3
+    assert other.score > 4
+    points = best.correspondences
+    assert len(points) > 100
+    assert np.array_equal(points[:, 0], points[:, 1])
+    assert np.array_equal(best.vertices, es.describe_shape(meshes["hand"], recipe).vertices)
 
 
-def test_an_index_scores_as_the_functions_do(index, recipe, meshes):
-    scan = es.partial_scan(meshes["biped"], np.array([1.0, 0.2, 0.1])).mesh
-    whole = np.array([es.describe_shape(meshes[kind], recipe).codes for kind in sorted(KINDS)])
-    sides = [es.describe_sides(meshes[kind], recipe, n_views=2) for kind in sorted(KINDS)]
-    views, of = np.array([side.codes for some in sides for side in some]), np.repeat(np.arange(4), 2)
-    query = es.describe_shape(scan, recipe)
-    expected = view_distances(unit(query.codes), unit(whole), unit(views), of)
+def test_an_index_scores_as_the_function_does(index, recipe, meshes):
+    kept = [es.describe_to_keep(meshes[kind], recipe, n_views=2)[0] for kind in sorted(KINDS)]
+    query = es.describe_shape(es.partial_scan(meshes["biped"], np.array([1.0, 0.2, 0.1])).mesh, recipe)
     found = {match.name: match.score for match in index.query(query)}
-    assert [found[kind] for kind in sorted(KINDS)] == pytest.approx(expected, abs=1e-6)
+    assert [found[kind] for kind in sorted(KINDS)] == pytest.approx(es.patch_scores(query, kept), abs=1e-6)
 
 
 def test_rounding_hardly_turns_a_code(recipe, meshes):
-    codes = encode_patches(es.describe_patches(meshes["octopus"]), recipe.codebook)
+    codes = es.encode_patches(es.describe_patches(meshes["octopus"]), recipe.codebook)
     assert (unit(rounded(codes)) * codes).sum(axis=2) == pytest.approx(1, abs=2e-3)
 
 

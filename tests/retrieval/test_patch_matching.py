@@ -8,6 +8,7 @@ import pytest
 import eigenshape as es
 from eigenshape.retrieval import patch_matching
 from eigenshape.retrieval.patch_matching_loops import leading, nearest_of_each_other
+from eigenshape.retrieval.patch_packing import pack_points, unpack_points
 
 HAND = es.make_creature("hand", 1, n_vertices=1500)
 KINDS = ("quadruped", "hand", "octopus", "biped")
@@ -92,6 +93,15 @@ def test_agreement_by_hand():
     value, vector = leading(ours, theirs, np.array([0.25, 0.25, 0.5]), 2.0, 0.2, 0.05)
     assert value == pytest.approx(0.25 * (1 - (0.2 / 2.2 / 0.2) ** 2))
     assert vector == pytest.approx([np.sqrt(0.5), np.sqrt(0.5), 0])
+
+
+def test_points_are_packed_without_loss(hand, book):
+    part = es.patch_points(es.describe_patches(es.partial_scan(HAND, [0.0, 0, 1]).mesh, n_samples=40), book)
+    data = pack_points([hand, part])
+    assert len(data) < 60_000
+    for before, after in zip([hand, part], unpack_points(data), strict=True):
+        for name in ("numbers", "weights", "distances", "vertices"):
+            assert np.array_equal(getattr(before, name), getattr(after, name))
 
 
 def test_what_does_not_agree_is_no_match(hand):

@@ -16,7 +16,7 @@ from eigenshape.geometry.repair import repair as repaired
 from eigenshape.io.mesh_files import FORMATS, read_mesh
 from eigenshape.retrieval.batch import BatchReport, Describe, build_index
 from eigenshape.retrieval.index import ShapeIndex
-from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe_shape, describe_sides
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe_to_keep
 from eigenshape.retrieval.store import DATABASE
 from eigenshape.retrieval.workers import Item, Workers
 
@@ -78,9 +78,9 @@ def describe_all(
 
 
 def describe_file(path: Path, *, recipe: AnyRecipe, repairs: tuple[str, ...], n_views: int | None) -> list[Descriptor]:
-    """Read a mesh, repair it as asked, and describe it, first whole and then as it is seen from some sides."""
+    """Read a mesh, repair it as asked, and describe it, whole and as it is seen from some sides."""
     mesh = repaired(read_mesh(path), repairs).mesh
-    return [describe_shape(mesh, recipe), *describe_sides(mesh, recipe, n_views=n_views)]
+    return describe_to_keep(mesh, recipe, n_views=n_views)
 
 
 def _items(sources: Sequence[Path]) -> list[Item]:

@@ -16,8 +16,8 @@ from eigenshape.retrieval.codebook import made_codebook
 from eigenshape.retrieval.descriptor import PRESETS, SCALE_FREE, Recipe
 from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.retrieval.kinds import AnyRecipe
-from eigenshape.retrieval.patch_descriptor import PatchRecipe
-from eigenshape.retrieval.patches import Patches, describe_patch_views, describe_patches
+from eigenshape.retrieval.patch_descriptor import PatchRecipe, seen_patches
+from eigenshape.retrieval.patches import Patches
 from eigenshape.retrieval.workers import Item, Workers
 
 PATCHES = "patches"
@@ -70,8 +70,7 @@ def recipe_to_fill(
 
 def teach(path: Path, *, repairs: tuple[str, ...]) -> list[Patches]:
     """Return the patches of a file's mesh and of two views of it."""
-    mesh = repaired(read_mesh(path), repairs).mesh
-    return [describe_patches(mesh), *describe_patch_views(mesh, n_views=TEACHING_VIEWS)]
+    return seen_patches(repaired(read_mesh(path), repairs).mesh, n_views=TEACHING_VIEWS)
 
 
 def recipe_to_ask(shelf: ShapeIndex, name: str | None) -> AnyRecipe:

@@ -1,9 +1,10 @@
 """All that a store holds of one recipe."""
 
 import sqlite3
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,6 +42,22 @@ class Held:
         query = "SELECT details FROM descriptor WHERE shape = ? AND recipe = ? AND view = ?"
         (details,) = database.execute(query, (entry.shape, self.number, entry.view)).fetchone()
         return kind_of(self.recipe).restored(self.rows[place], details, self.recipe)
+
+    def descriptors(self, database: sqlite3.Connection) -> Sequence[Descriptor]:
+        """Return all descriptors, each restored when it is asked for."""
+        return _Restored(self, database)
+
+
+@dataclass(frozen=True)
+class _Restored(Sequence[Descriptor]):
+    held: Held
+    database: sqlite3.Connection
+
+    def __len__(self) -> int:
+        return len(self.held.rows)
+
+    def __getitem__(self, place: Any) -> Any:
+        return self.held.restored(self.database, place)
 
 
 def held_by(folder: Path, database: sqlite3.Connection, recipe: AnyRecipe) -> Held:

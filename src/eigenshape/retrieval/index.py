@@ -51,7 +51,7 @@ class Match:
     name, label, source : str
         As in its `Record`.
     score : float
-        Of `matching_score` or `patch_distances`: 0 for the same descriptor, smaller is more alike.
+        Of `matching_score` or `patch_scores`: 0, or nearly, for the same descriptor; smaller is more alike.
     correspondences : (p, 2) int
         Feature or patch of the query, the same of this shape, surest pairs first.
     vertices : (m,) int
@@ -210,14 +210,14 @@ class ShapeIndex:
         with store.reading(self.folder) as database:
             held = held_by(self.folder, database, descriptor.recipe)
             _require_columns(descriptor, ours, held.entries[0].n_columns)
-            firsts = np.unique([entry.name for entry in held.entries], return_index=True)[1]
-            scores, places = kind.ranked(asked, held.rows, firsts)
-            best = np.argsort(scores, kind="stable")[:wanted]
-            found = [held.restored(database, place) for place in places[best].tolist()]
-            answers = [held.entries[place][:4] for place in places[best].tolist()]
+            scores = kind.verified(asked, held.descriptors(database), kind.scored(asked, held.rows))
+            order = np.argsort(scores, kind="stable")
+            firsts = np.unique([held.entries[place].name for place in order], return_index=True)[1]
+            best = order[np.sort(firsts)[:wanted]].tolist()
+            answers = [(held.entries[place], held.restored(database, place)) for place in best]
         return [
-            Match(name, label, source, score, kind.paired(asked, other), other.vertices, view)
-            for (name, label, source, view), score, other in zip(answers, scores[best].tolist(), found, strict=True)
+            Match(at.name, at.label, at.source, score, kind.paired(asked, other), other.vertices, at.view)
+            for (at, other), score in zip(answers, scores[best].tolist(), strict=True)
         ]
 
     def descriptor(self, name: str, recipe: AnyRecipe) -> Descriptor:

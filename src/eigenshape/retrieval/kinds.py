@@ -1,4 +1,4 @@
-"""What an index must know of each kind of descriptor: how it is kept, compared and paired."""
+"""What an index must know of each kind of descriptor: how it is made, kept, compared and paired."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -13,61 +13,58 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.retrieval.codebook import read_codebook, write_codebook
 from eigenshape.retrieval.describe import N_VIEWS, describe_mesh, describe_views
 from eigenshape.retrieval.descriptor import Recipe, ShapeDescriptor
-from eigenshape.retrieval.patch_descriptor import (
-    PatchDescriptor,
-    PatchRecipe,
-    describe_by_patches,
-    describe_views_by_patches,
-    unit,
-)
-from eigenshape.retrieval.patch_score import patch_distances
+from eigenshape.retrieval.patch_descriptor import PatchDescriptor, PatchRecipe, describe_by_patches
+from eigenshape.retrieval.patch_matching import match_patches
+from eigenshape.retrieval.patch_packing import pack_points, unpack_points
+from eigenshape.retrieval.patch_verify import verified_scores, word_distances
 from eigenshape.retrieval.patches import N_VIEWS as N_PATCH_VIEWS
 from eigenshape.retrieval.score import match_features, matching_scores
 
 AnyRecipe = Recipe | PatchRecipe
 Descriptor = ShapeDescriptor | PatchDescriptor
-Ranking = tuple[Float[np.ndarray, " k"], Int[np.ndarray, " k"]]
+Scores = Float[np.ndarray, " k"]
 VERTEX = np.dtype("<i8")
-AT_ONCE = 256  # descriptors whose codes are floats at a time
 
 
 @dataclass(frozen=True)
 class Kind:
-    """How descriptors of one kind are kept, compared and paired.
+    """How descriptors of one kind are made, kept, compared and paired.
 
     Attributes
     ----------
     name : str
     n_views : int
         Sides from which a closed shape is described, unless said otherwise.
-    describe : callable
-        From a mesh and a recipe to a descriptor.
-    sides : callable
-        From a mesh, a recipe and a number to descriptors of what is seen from so many sides.
+    to_ask : callable
+        From a mesh and a recipe to the descriptor of a query.
+    to_keep : callable
+        From a mesh, a recipe and a number of views to the descriptors that an index keeps.
     row : dtype
         Of the numbers that are compared with every shape.
     rows : callable
         From a descriptor, and the name of its shape for errors, to its (m, q) numbers of that type.
     details : callable
-        From a descriptor to the bytes that only answers need.
+        From a descriptor to the bytes that only the nearest need.
     restored : callable
         From rows, details and a recipe to the descriptor.
-    ranked : callable
-        From a query, the rows of all descriptors, shape after shape, and where each shape begins, to the score of each
-        shape and the descriptor meant by it.
+    scored : callable
+        From a query and the rows of k descriptors to their scores.
+    verified : callable
+        From a query, k descriptors and their scores to better scores.
     paired : callable
         From two descriptors to the (p, 2) features or points that correspond.
     """
 
     name: str
     n_views: int
-    describe: Callable[[TriangleMesh, Any], Descriptor]
-    sides: Callable[[TriangleMesh, Any, int], Sequence[Descriptor]]
+    to_ask: Callable[[TriangleMesh, Any], Descriptor]
+    to_keep: Callable[[TriangleMesh, Any, int], list[Descriptor]]
     row: "np.dtype[Any]"
     rows: Callable[[Any, str], np.ndarray]
     details: Callable[[Any], bytes]
     restored: Callable[[np.ndarray, bytes, Any], Descriptor]
-    ranked: Callable[[Any, Sequence[np.ndarray], Int[np.ndarray, " k"]], Ranking]
+    scored: Callable[[Any, Sequence[np.ndarray]], Scores]
+    verified: Callable[[Any, Sequence[Any], Scores], Scores]
     paired: Callable[[Any, Any], Int[np.ndarray, "p 2"]]
 
 
@@ -87,58 +84,44 @@ def _heat_rows(descriptor: ShapeDescriptor, name: str) -> np.ndarray:
     return single
 
 
-def _heat_ranked(query: ShapeDescriptor, rows: Sequence[np.ndarray], firsts: Int[np.ndarray, " k"]) -> Ranking:
-    """Take the best view of each shape."""
+def _heat_scored(query: ShapeDescriptor, rows: Sequence[np.ndarray]) -> Scores:
     starts = np.cumsum([0, *(len(each) for each in rows)])[:-1]
-    scores, _ = matching_scores(query.vectors, np.concatenate(rows).astype(np.float64), starts, query.recipe)
-    return _least(scores, firsts)
-
-
-def _least(scores: Float[np.ndarray, " w"], firsts: Int[np.ndarray, " k"]) -> Ranking:
-    least = np.minimum.reduceat(scores, firsts)
-    lasts = np.append(firsts[1:], len(scores))
-    places = [first + int(scores[first:last].argmin()) for first, last in zip(firsts, lasts, strict=True)]
-    return least, np.array(places)
-
-
-def _patch_ranked(query: PatchDescriptor, rows: Sequence[np.ndarray], firsts: Int[np.ndarray, " k"]) -> Ranking:
-    """Take the mean of the whole shape and of its best view, as `view_distances`."""
-    ours = unit(query.codes)
-    parts = (np.array(rows[first : first + AT_ONCE]) for first in range(0, len(rows), AT_ONCE))
-    distances = np.concatenate([patch_distances(ours, unit(part.reshape(-1, *ours.shape))) for part in parts])
-    nearest, places = _least(distances, firsts)
-    return (distances[firsts] + nearest) / 2, places
-
-
-def _patch_restored(rows: np.ndarray, details: bytes, recipe: PatchRecipe) -> PatchDescriptor:
-    return PatchDescriptor(rows.reshape(*recipe.codebook.code_shape), np.frombuffer(details, VERTEX), recipe)
+    return matching_scores(query.vectors, np.concatenate(rows).astype(np.float64), starts, query.recipe)[0]
 
 
 HEAT = Kind(
     name="heat",
     n_views=N_VIEWS,
-    describe=lambda mesh, recipe: describe_mesh(mesh, recipe).descriptor,
-    sides=lambda mesh, recipe, n_views: describe_views(mesh, recipe, n_views=n_views),
+    to_ask=lambda mesh, recipe: describe_mesh(mesh, recipe).descriptor,
+    to_keep=lambda mesh, recipe, n: [describe_mesh(mesh, recipe).descriptor, *describe_views(mesh, recipe, n_views=n)],
     row=np.dtype("<f4"),
     rows=_heat_rows,
     details=lambda descriptor: descriptor.vertices.astype(VERTEX).tobytes(),
     restored=lambda rows, details, recipe: ShapeDescriptor(
         rows.astype(np.float64), np.frombuffer(details, VERTEX), recipe
     ),
-    ranked=_heat_ranked,
+    scored=_heat_scored,
+    verified=lambda query, others, scores: scores,
     paired=match_features,
 )
+
+
+def _codes(rows: np.ndarray, recipe: PatchRecipe) -> np.ndarray:
+    return rows.reshape(-1, *recipe.codebook.code_shape)
+
+
 PATCHES = Kind(
     name="patches",
     n_views=N_PATCH_VIEWS,
-    describe=describe_by_patches,
-    sides=lambda mesh, recipe, n_views: describe_views_by_patches(mesh, recipe, n_views=n_views),
+    to_ask=describe_by_patches,
+    to_keep=lambda mesh, recipe, n: [describe_by_patches(mesh, recipe, n_views=n)],
     row=np.dtype("i1"),
-    rows=lambda descriptor, name: descriptor.codes.reshape(-1, descriptor.codes.shape[2]),
-    details=lambda descriptor: descriptor.vertices.astype(VERTEX).tobytes(),
-    restored=_patch_restored,
-    ranked=_patch_ranked,
-    paired=lambda first, second: np.empty((0, 2), dtype=np.int64),
+    rows=lambda descriptor, name: descriptor.codes.reshape(-1, descriptor.codes.shape[-1]),
+    details=lambda descriptor: pack_points(descriptor.points),
+    restored=lambda rows, details, recipe: PatchDescriptor(_codes(rows, recipe), unpack_points(details), recipe),
+    scored=lambda query, rows: word_distances(query.codes, [_codes(each, query.recipe) for each in rows]),
+    verified=verified_scores,
+    paired=lambda first, second: match_patches(first.points[0], second.points[0]).points,
 )
 
 
@@ -162,13 +145,13 @@ def describe_shape(mesh: TriangleMesh, recipe: AnyRecipe) -> Descriptor:
     Raises
     ------
     InvalidShapeError
-        As `describe_mesh` or `describe_patches`.
+        As `describe_mesh` or `seen_patches`.
     """
-    return kind_of(recipe).describe(mesh, recipe)
+    return kind_of(recipe).to_ask(mesh, recipe)
 
 
-def describe_sides(mesh: TriangleMesh, recipe: AnyRecipe, *, n_views: int | None = None) -> Sequence[Descriptor]:
-    """Describe what single viewpoints see of a closed shape, for an index that partial scans will ask.
+def describe_to_keep(mesh: TriangleMesh, recipe: AnyRecipe, *, n_views: int | None = None) -> list[Descriptor]:
+    """Describe a surface as an index keeps it: with what single viewpoints see of it if it is closed.
 
     Parameters
     ----------
@@ -179,11 +162,16 @@ def describe_sides(mesh: TriangleMesh, recipe: AnyRecipe, *, n_views: int | None
 
     Returns
     -------
-    sequence of ShapeDescriptor or PatchDescriptor
-        At vertices of the whole shape; empty for an open one, which is a part already.
+    list of ShapeDescriptor or PatchDescriptor
+        For `ShapeIndex.add`.
+
+    Raises
+    ------
+    InvalidShapeError
+        As `describe_mesh` or `seen_patches`.
     """
     kind = kind_of(recipe)
-    return kind.sides(mesh, recipe, kind.n_views if n_views is None else n_views)
+    return kind.to_keep(mesh, recipe, kind.n_views if n_views is None else n_views)
 
 
 def written(recipe: AnyRecipe) -> tuple[str, bytes | None]:

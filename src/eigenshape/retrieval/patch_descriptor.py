@@ -1,13 +1,18 @@
-"""What a shape is known by through its patches: codes in the words of a codebook."""
+"""What a shape is known by through its patches: codes in the words of a codebook, and points that can be matched."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float32, Int, Int8
 
 from eigenshape._arrays import frozen
+from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.orientation import orient_outward
+from eigenshape.operators.smoothing import denoise
 from eigenshape.retrieval.codebook import PatchCodebook, encode_patches
+from eigenshape.retrieval.patch_matching import PatchPoints, patch_points
 from eigenshape.retrieval.patches import N_VIEWS, Patches, describe_patch_views, describe_patches
 
 FULL = 127  # the largest entry of a code
@@ -32,52 +37,79 @@ class PatchRecipe:
 
 @dataclass(frozen=True, eq=False)
 class PatchDescriptor:
-    """A shape, or what is seen of it, in words.
+    """A shape in words, and what is seen of it from some sides if it is closed.
 
     Attributes
     ----------
-    codes : (b, s, v) int8
-        Fisher vectors of `encode_patches`, each rounded so that its largest entry is 127.
-    vertices : (m,) int
-        At which the patches lie.
+    codes : (1 + w, b, s, v) int8
+        Fisher vectors of `encode_patches`, of the shape and of w views, each rounded so that its largest entry is 127.
+    points : tuple of 1 + w PatchPoints
+        The same in points, at vertices of the whole.
     recipe : PatchRecipe
     """
 
-    codes: Int8[np.ndarray, "b s v"]
-    vertices: Int[np.ndarray, " m"]
+    codes: Int8[np.ndarray, "w b s v"]
+    points: tuple[PatchPoints, ...]
     recipe: PatchRecipe
 
+    @property
+    def vertices(self) -> Int[np.ndarray, " m"]:
+        """Return the vertex of each patch of the whole shape."""
+        return self.points[0].vertices
 
-def describe_by_patches(mesh: TriangleMesh, recipe: PatchRecipe) -> PatchDescriptor:
-    """Describe a surface by its patches; see `describe_patches`.
+
+def seen_patches(mesh: TriangleMesh, *, n_views: int = N_VIEWS) -> list[Patches]:
+    """Describe the patches of a surface, and of what single viewpoints see of it if it is closed.
+
+    They are those of a copy that `orient_outward` has turned and `denoise` has smoothed as far as its noise asks for,
+    so that neither sets a scan apart from clean shapes.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    n_views : int
+        Viewpoints, spread evenly around the shape.
+
+    Returns
+    -------
+    list of Patches
+        The whole first.
 
     Raises
     ------
     InvalidShapeError
-        If a vertex has no face, or the surface no area.
+        If a face has no area, or a vertex no face.
     """
-    return in_words(describe_patches(mesh), recipe)
+    clean = denoise(orient_outward(mesh))
+    return [describe_patches(clean), *describe_patch_views(clean, n_views=n_views)]
 
 
-def describe_views_by_patches(
-    mesh: TriangleMesh, recipe: PatchRecipe, *, n_views: int = N_VIEWS
-) -> list[PatchDescriptor]:
-    """Describe what single viewpoints see of a closed shape; see `describe_patch_views`."""
-    return [in_words(patches, recipe) for patches in describe_patch_views(mesh, n_views=n_views)]
+def describe_by_patches(mesh: TriangleMesh, recipe: PatchRecipe, *, n_views: int = N_VIEWS) -> PatchDescriptor:
+    """Describe a surface by its patches; see `seen_patches`."""
+    return in_words(seen_patches(mesh, n_views=n_views), recipe)
 
 
-def in_words(patches: Patches, recipe: PatchRecipe) -> PatchDescriptor:
-    """Return the descriptor of a shape whose patches are known."""
-    return PatchDescriptor(rounded(encode_patches(patches, recipe.codebook)), patches.vertices, recipe)
+def in_words(patches: Sequence[Patches], recipe: PatchRecipe) -> PatchDescriptor:
+    """Return the descriptor of a shape from its patches, and those of its views.
+
+    Raises
+    ------
+    InvalidParameterError
+        If there are none.
+    """
+    if not patches:
+        raise InvalidParameterError("A descriptor takes patches of a shape, then of its views; there are none.")
+    codes = np.stack([rounded(encode_patches(each, recipe.codebook)) for each in patches])
+    return PatchDescriptor(frozen(codes), tuple(patch_points(each, recipe.codebook) for each in patches), recipe)
 
 
-def rounded(codes: Float32[np.ndarray, "b s v"]) -> Int8[np.ndarray, "b s v"]:
+def rounded(codes: Float32[np.ndarray, "*k v"]) -> Int8[np.ndarray, "*k v"]:
     """Return codes as small integers, which find the same answers in a quarter of the room."""
-    return frozen(np.rint(FULL * codes / np.abs(codes).max(axis=2, keepdims=True)).astype(np.int8))
+    return np.rint(FULL * codes / np.abs(codes).max(axis=-1, keepdims=True)).astype(np.int8)
 
 
-def unit(codes: Int8[np.ndarray, "*k b s v"]) -> Float32[np.ndarray, "*k b s v"]:
-    """Return rounded codes with unit length."""
+def unit(codes: Int8[np.ndarray, "*k v"]) -> Float32[np.ndarray, "*k v"]:
+    """Return rounded codes at unit length."""
     floats = codes.astype(np.float32)
     floats /= np.linalg.norm(floats, axis=-1, keepdims=True)
     return floats

@@ -11,6 +11,7 @@ from eigenshape.retrieval.codebook import BASES, N_SIZES, PatchCodebook, whitene
 from eigenshape.retrieval.patch_matching_loops import leading, nearest_of_each_other
 from eigenshape.retrieval.patches import RADII, Patches
 
+NUMBER_STEP, LARGEST = 1 / 16, 127  # so that a number is a byte
 N_MATCHED = 10  # axes of most variance
 SLACK = 0.2  # of a distance, by which it may change and still speak for a match a little
 LEAST_LENGTH = 0.05  # sides of the box; errors of shorter distances count as of this
@@ -29,16 +30,16 @@ class PatchPoints:
     Attributes
     ----------
     numbers : (m, r, d) float32
-        Of m points at r radii, whitened by a codebook.
-    weights : (m, r) float32
-        As in `Patches`.
+        Of m points at r radii, whitened by a codebook, in whole sixteenths below 8.
+    weights : (m,) float32
+        The most that each weighs at any radius, in half precision.
     distances : (m, m) float32
-        Along the surface, in sides of the box.
+        Along the surface, in sides of the box, in half precision.
     vertices : (m,) int
     """
 
     numbers: Float32[np.ndarray, "m r d"]
-    weights: Float32[np.ndarray, "m r"]
+    weights: Float32[np.ndarray, " m"]
     distances: Float32[np.ndarray, "m m"]
     vertices: Int[np.ndarray, " m"]
 
@@ -81,8 +82,12 @@ def patch_points(shape: Patches, codebook: PatchCodebook) -> PatchPoints:
     rows = [
         whitened(shape, base + size, codebook, place) for place, base in enumerate(BASES) for size in range(N_SIZES)
     ]
-    numbers = frozen(np.stack(rows, axis=1)[:, :, :N_MATCHED].astype(np.float32))
-    return PatchPoints(numbers, shape.weights, shape.distances, shape.vertices)
+    whitened_rows = np.stack(rows, axis=1)[:, :, :N_MATCHED] / NUMBER_STEP
+    numbers = NUMBER_STEP * np.clip(np.rint(whitened_rows), -LARGEST, LARGEST).astype(np.float32)
+    weights, distances = (part.astype(np.float16) for part in (shape.weights.max(axis=1), shape.distances))
+    return PatchPoints(
+        frozen(numbers), frozen(weights.astype(np.float32)), frozen(distances.astype(np.float32)), shape.vertices
+    )
 
 
 def match_patches(first: PatchPoints, second: PatchPoints) -> PatchMatch:
@@ -139,7 +144,7 @@ def _best_start(first: PatchPoints, second: PatchPoints) -> _Matches:
 
 def _consistent(first: PatchPoints, second: PatchPoints, apart: Float32[np.ndarray, "m n"], step: int) -> _Matches:
     rows, columns = nearest_of_each_other(apart)
-    areas = first.weights.max(axis=1).astype(np.float64)
+    areas = first.weights.astype(np.float64)
     shares = areas[rows] / areas.sum()
     ours, theirs = first.distances[np.ix_(rows, rows)], second.distances[np.ix_(columns, columns)]
     agreement, vector = leading(ours, theirs, shares, SIZE_STEP**step, SLACK, LEAST_LENGTH)

@@ -1,95 +1,101 @@
-"""Whether the nearest shapes by patches are really like the query: their patches must lie alike, too."""
+"""How far a query is from many shapes: by their words first, and the nearest by how their patches lie."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float, Int8
 
-from eigenshape._arrays import frozen
-from eigenshape._errors import InvalidParameterError
-from eigenshape.retrieval.codebook import PatchCodebook, encode_patches
-from eigenshape.retrieval.patch_matching import PatchPoints, patch_agreement, patch_points
-from eigenshape.retrieval.patch_score import patch_distances
-from eigenshape.retrieval.patches import Patches
+from eigenshape.retrieval.patch_descriptor import PatchDescriptor, unit
+from eigenshape.retrieval.patch_matching import patch_agreement
+from eigenshape.retrieval.patch_score import patch_distances, view_distances
 
 N_VERIFIED = 30
 WORTH = 6.0  # of a distance, that agreement of all points would take off; a good match has a tenth of that
+AT_ONCE = 64  # shapes whose codes are floats at a time
 
 
-@dataclass(frozen=True, eq=False)
-class PatchedShape:
-    """A shape, and its views where it is closed, by their patches.
-
-    Attributes
-    ----------
-    codes : (1 + w, b, s, v) float32
-        Fisher vectors: the shape's, then those of its views.
-    points : tuple of 1 + w PatchPoints
-        The same in points.
-    """
-
-    codes: Float32[np.ndarray, "w b s v"]
-    points: tuple[PatchPoints, ...]
+def word_distances(
+    query: Int8[np.ndarray, "u b s v"], others: Sequence[Int8[np.ndarray, "_ b s v"]]
+) -> Float[np.ndarray, " k"]:
+    """Return `view_distances` of the codes of a shape and its views to those of k others."""
+    ours = unit(query)
+    parts = [others[first : first + AT_ONCE] for first in range(0, len(others), AT_ONCE)]
+    return np.concatenate([_distances(ours, [unit(codes) for codes in part]) for part in parts])
 
 
-def patched_shape(patches: Sequence[Patches], codebook: PatchCodebook) -> PatchedShape:
-    """Encode the patches of a shape, which come first, and of its views.
-
-    Raises
-    ------
-    InvalidParameterError
-        If there are none.
-    """
-    if not patches:
-        raise InvalidParameterError("A patched shape takes patches of the shape, then of its views; there are none.")
-    codes = np.stack([encode_patches(each, codebook) for each in patches])
-    return PatchedShape(frozen(codes), tuple(patch_points(each, codebook) for each in patches))
+def _distances(
+    query: Float[np.ndarray, "u b s v"], others: Sequence[Float[np.ndarray, "_ b s v"]]
+) -> Float[np.ndarray, " k"]:
+    of = np.repeat(np.arange(len(others)), [len(codes) - 1 for codes in others])
+    wholes, views = np.stack([codes[0] for codes in others]), np.concatenate([codes[1:] for codes in others])
+    return view_distances(query[0], wholes, views, of, query_views=query[1:])
 
 
-def verify_distances(
-    query: PatchedShape,
-    others: Sequence[PatchedShape],
+def verified_scores(
+    query: PatchDescriptor,
+    others: Sequence[PatchDescriptor],
     distances: Float[np.ndarray, " k"],
     *,
     n_verified: int = N_VERIFIED,
 ) -> Float[np.ndarray, " k"]:
-    """Take from the least distances six times the agreement of matched points.
+    """Add to distances six times what matched points of the nearest shapes lack in agreement.
 
     Fisher vectors tell which patches there are, and not where. So the points of the nearest shapes are matched with
     those of the query (`match_patches`), and what keeps its distances comes nearer.
 
     Parameters
     ----------
-    query : PatchedShape
-    others : sequence of k PatchedShape
+    query : PatchDescriptor
+    others : sequence of k PatchDescriptor
         Only the nearest are asked for.
     distances : (k,) float
-        As `view_distances` measured them.
+        Of `word_distances`.
     n_verified : int
-        Nearest shapes that are verified.
+        Nearest shapes that are verified; the others count as if nothing agreed.
 
     Returns
     -------
     (k,) float
-        May be negative; only their order has a meaning.
+        Near 0 for the same shape; smaller is more alike.
     """
-    verified = distances.copy()
-    for place in np.argsort(distances, kind="stable")[:n_verified]:
-        verified[place] -= WORTH * shape_agreement(query, others[place])
-    return verified
+    scores = distances + WORTH
+    for place in np.argsort(distances, kind="stable")[:n_verified].tolist():
+        scores[place] -= WORTH * shape_agreement(query, others[place])
+    return scores
 
 
-def shape_agreement(query: PatchedShape, other: PatchedShape) -> float:
+def patch_scores(query: PatchDescriptor, others: Sequence[PatchDescriptor]) -> Float[np.ndarray, " k"]:
+    """Score a query against described shapes as an index does: by words, the nearest 30 verified.
+
+    Parameters
+    ----------
+    query : PatchDescriptor
+    others : sequence of k PatchDescriptor
+        Of one recipe with the query.
+
+    Returns
+    -------
+    (k,) float
+        Near 0 for the same shape; smaller is more alike.
+    """
+    return verified_scores(query, others, word_distances(query.codes, [other.codes for other in others]))
+
+
+def shape_agreement(query: PatchDescriptor, other: PatchDescriptor) -> float:
     """Return the mean of the agreement with the shape and of the better of this and that with its nearest view.
 
     Where the other is open and the query is closed, the query's views serve in the same way: the nearest to the part.
     """
     own = patch_agreement(query.points[0], other.points[0])
     if len(other.codes) > 1:
-        nearest = 1 + int(patch_distances(query.codes[0], other.codes[1:]).argmin())
-        return (own + max(own, patch_agreement(query.points[0], other.points[nearest]))) / 2
-    if len(query.codes) > 1:
-        nearest = 1 + int(patch_distances(other.codes[0], query.codes[1:]).argmin())
-        return (own + max(own, patch_agreement(query.points[nearest], other.points[0]))) / 2
-    return own
+        view = patch_agreement(query.points[0], other.points[_nearest_view(query, other)])
+    elif len(query.codes) > 1:
+        view = patch_agreement(query.points[_nearest_view(other, query)], other.points[0])
+    else:
+        return own
+    return (own + max(own, view)) / 2
+
+
+def _nearest_view(one: PatchDescriptor, seen: PatchDescriptor) -> int:
+    """Return which view of a shape is nearest to another as a whole."""
+    return 1 + int(patch_distances(unit(one.codes[0]), unit(seen.codes[1:])).argmin())
