@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape.retrieval.patch_descriptor import unit
 from eigenshape.retrieval.patch_matching import patch_agreement
 from eigenshape.retrieval.patch_score import patch_distances, view_distances
 from eigenshape.retrieval.patch_verify import WORTH, patch_scores, shape_agreement, verified_scores, word_distances
@@ -28,6 +27,10 @@ def scan(book):
     return known(part.mesh, book)
 
 
+def floats(codes):
+    return codes.astype(np.float32)
+
+
 def known(mesh, book):
     return es.in_words(es.seen_patches(mesh, n_views=3), es.PatchRecipe(book))
 
@@ -35,8 +38,8 @@ def known(mesh, book):
 def test_only_the_nearest_come_nearer(wholes, scan):
     far = np.array([0.9, 0.3, 0.5, 0.8])
     found = verified_scores(scan, wholes, far, n_verified=2)
-    assert found[[0, 3]].tolist() == (far[[0, 3]] + WORTH).tolist()
-    expected = [far[place] + WORTH * (1 - shape_agreement(scan, wholes[place])) for place in (1, 2)]
+    assert found[[0, 3]].tolist() == ((far[[0, 3]] + WORTH) / (1 + WORTH)).tolist()
+    expected = [(far[place] + WORTH * (1 - shape_agreement(scan, wholes[place]))) / (1 + WORTH) for place in (1, 2)]
     assert found[[1, 2]] == pytest.approx(expected)
     assert far.tolist() == [0.9, 0.3, 0.5, 0.8]
     assert verified_scores(scan, wholes, np.ones(4)).argmin() == 1
@@ -45,7 +48,7 @@ def test_only_the_nearest_come_nearer(wholes, scan):
 def test_the_nearest_view_of_either_serves(wholes, scan):
     whole = wholes[1]
     own = patch_agreement(scan.points[0], whole.points[0])
-    nearest = patch_distances(unit(scan.codes[0]), unit(whole.codes[1:])).argmin()
+    nearest = patch_distances(floats(scan.codes[0]), floats(whole.codes[1:])).argmin()
     view = patch_agreement(scan.points[0], whole.points[1 + nearest])
     assert shape_agreement(scan, whole) == pytest.approx((own + max(own, view)) / 2)
     back = patch_agreement(whole.points[0], scan.points[0])
@@ -55,7 +58,7 @@ def test_the_nearest_view_of_either_serves(wholes, scan):
 
 
 def test_views_of_the_query_serve_against_parts(wholes, scan):
-    whole, other, part = (unit(shape.codes) for shape in (wholes[1], wholes[0], scan))
+    whole, other, part = (floats(shape.codes) for shape in (wholes[1], wholes[0], scan))
     shapes, of = np.array([part[0], other[0]]), np.array([1, 1, 1])
     found = view_distances(whole[0], shapes, other[1:], of, query_views=whole[1:])
     own = patch_distances(whole[0], shapes)

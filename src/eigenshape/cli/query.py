@@ -78,4 +78,4 @@ def _facts(shape: Asked, match: Match) -> dict[str, Any]:
 def print_matches(matches: Sequence[Match]) -> None:
     """Print matches, best first, with the vertices that correspond best."""
     rows = [[match.name, match.label or "", f"{match.score:.4g}", str(len(match.correspondences))] for match in matches]
-    print_table("Most similar shapes", ["shape", "class", "score", "corresponding features"], rows)
+    print_table("Most similar shapes", ["shape", "class", "score", "corresponding points"], rows)

@@ -23,7 +23,7 @@ from eigenshape.spectral.outcome import Progress
 
 CAPTION = "parts that correspond share a colour"
 N_CELLS = 12  # of the query by patches
-REACH = 2.0  # times what a patch has of the surface, in length: farther from a matched patch nothing is known
+REACH = 3.0  # times what a patch has of the surface, in length: farther from a matched patch nothing is known
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,8 @@ def _panel(query: Asked, match: Match, repairs: tuple[str, ...]) -> Panel:
         colors[theirs] = query.colors[ours]
         labels = colors[_parts(mesh, recipe, match)]
     else:
-        labels = _cells(mesh, match.vertices[theirs], query.colors[ours])
+        reach = REACH * np.sqrt(surface_area(mesh) / len(match.vertices))
+        labels = _cells(mesh, match.vertices[theirs], query.colors[ours], reach)
     marked = theirs[np.isin(ours, query.dots)]
     return Panel(mesh, f"{match.name}\nscore {match.score:.4g}", labels, match.vertices[marked])
 
@@ -104,11 +105,12 @@ def _parts(mesh: TriangleMesh, recipe: Recipe, match: Match) -> Int[np.ndarray, 
     return labels
 
 
-def _cells(mesh: TriangleMesh, vertices: Int[np.ndarray, " p"], colors: Int[np.ndarray, " p"]) -> Int[np.ndarray, " f"]:
+def _cells(
+    mesh: TriangleMesh, vertices: Int[np.ndarray, " p"], colors: Int[np.ndarray, " p"], reach: float
+) -> Int[np.ndarray, " f"]:
     """Give each face the colour of the matched patch that is nearest, -1 where none is near."""
     if not len(vertices):
         return np.full(mesh.n_faces, -1)
     distances = geodesic_distances(mesh, vertices)
-    near = distances.min(axis=0) < REACH * np.sqrt(surface_area(mesh) / len(vertices))
-    labels = np.where(near, colors[distances.argmin(axis=0)], -1)
+    labels = np.where(distances.min(axis=0) < reach, colors[distances.argmin(axis=0)], -1)
     return labels[mesh.faces[:, 0]]

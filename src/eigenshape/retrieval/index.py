@@ -9,6 +9,7 @@ from zlib import crc32
 
 import numpy as np
 from jaxtyping import Int
+from threadpoolctl import threadpool_limits
 
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError, StoreError
@@ -207,18 +208,18 @@ class ShapeIndex:
         wanted = whole_number(n_matches, "n_matches", 1, 2**31)
         kind, (ours,) = kind_of(descriptor.recipe), _packed("the query", [descriptor])
         asked = kind.restored(ours, kind.details(descriptor), descriptor.recipe)
-        with store.reading(self.folder) as database:
+        with store.reading(self.folder) as database, threadpool_limits(1, user_api="blas"):
             held = held_by(self.folder, database, descriptor.recipe)
             _require_columns(descriptor, ours, held.entries[0].n_columns)
             scores = kind.verified(asked, held.descriptors(database), kind.scored(asked, held.rows))
             order = np.argsort(scores, kind="stable")
             firsts = np.unique([held.entries[place].name for place in order], return_index=True)[1]
             best = order[np.sort(firsts)[:wanted]].tolist()
-            answers = [(held.entries[place], held.restored(database, place)) for place in best]
-        return [
-            Match(at.name, at.label, at.source, score, kind.paired(asked, other), other.vertices, at.view)
-            for (at, other), score in zip(answers, scores[best].tolist(), strict=True)
-        ]
+            found = [(held.entries[place], held.restored(database, place)) for place in best]
+            return [
+                Match(at.name, at.label, at.source, score, kind.paired(asked, other), other.vertices, at.view)
+                for (at, other), score in zip(found, scores[best].tolist(), strict=True)
+            ]
 
     def descriptor(self, name: str, recipe: AnyRecipe) -> Descriptor:
         """Return the first descriptor of a shape by a recipe, as it is kept, to ask for more of its like.

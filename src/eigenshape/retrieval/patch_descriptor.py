@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float32, Int, Int8
+from threadpoolctl import threadpool_limits
 
 from eigenshape._arrays import frozen
 from eigenshape._errors import InvalidParameterError
@@ -99,17 +100,12 @@ def in_words(patches: Sequence[Patches], recipe: PatchRecipe) -> PatchDescriptor
     """
     if not patches:
         raise InvalidParameterError("A descriptor takes patches of a shape, then of its views; there are none.")
-    codes = np.stack([rounded(encode_patches(each, recipe.codebook)) for each in patches])
-    return PatchDescriptor(frozen(codes), tuple(patch_points(each, recipe.codebook) for each in patches), recipe)
+    with threadpool_limits(1, user_api="blas"):
+        codes = np.stack([rounded(encode_patches(each, recipe.codebook)) for each in patches])
+        points = tuple(patch_points(each, recipe.codebook) for each in patches)
+    return PatchDescriptor(frozen(codes), points, recipe)
 
 
 def rounded(codes: Float32[np.ndarray, "*k v"]) -> Int8[np.ndarray, "*k v"]:
     """Return codes as small integers, which find the same answers in a quarter of the room."""
     return np.rint(FULL * codes / np.abs(codes).max(axis=-1, keepdims=True)).astype(np.int8)
-
-
-def unit(codes: Int8[np.ndarray, "*k v"]) -> Float32[np.ndarray, "*k v"]:
-    """Return rounded codes at unit length."""
-    floats = codes.astype(np.float32)
-    floats /= np.linalg.norm(floats, axis=-1, keepdims=True)
-    return floats

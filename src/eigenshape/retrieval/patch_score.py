@@ -9,7 +9,7 @@ SIZE_PRICE = 0.01  # of a step of size
 def patch_distances(
     query: Float32[np.ndarray, "b s v"], others: Float32[np.ndarray, "k b s v"]
 ) -> Float[np.ndarray, " k"]:
-    """Return 1 - the mean over base radii of the cosine between Fisher vectors, the least over steps of size.
+    """Return 1 - the mean over base radii of the cosine between Fisher vectors of any length, least over steps of size.
 
     Cutting a part off makes the rest larger in its unit box, so a radius of one shape is compared with the same, the
     next or the next but one of the other, each step at a small price.
@@ -19,13 +19,14 @@ def patch_distances(
     (k,) float
         0 for the same vectors, up to 2.
     """
-    n_bases, n_sizes, _ = query.shape
-    best = np.full(len(others), np.inf)
-    for step in sorted(range(1 - n_sizes, n_sizes), key=abs):
-        ours, theirs = query[:, max(-step, 0)], others[:, :, max(step, 0)]
-        cosines = theirs.reshape(len(others), ours.size) @ ours.ravel() / n_bases
-        best = np.minimum(best, 1.0 - cosines + SIZE_PRICE * abs(step))
-    return best
+    cosines = others @ query.transpose(0, 2, 1) / (_lengths(others)[..., None] * _lengths(query)[:, None])
+    steps = range(1 - query.shape[1], query.shape[1])
+    means = [cosines[:, :, max(step, 0), max(-step, 0)].mean(axis=1) - SIZE_PRICE * abs(step) for step in steps]
+    return 1.0 - np.max(means, axis=0).astype(np.float64)
+
+
+def _lengths(codes: Float32[np.ndarray, "*k v"]) -> Float32[np.ndarray, "*k"]:
+    return np.sqrt(np.einsum("...v,...v->...", codes, codes))
 
 
 def view_distances(

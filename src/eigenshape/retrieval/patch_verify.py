@@ -4,13 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float, Int8
+from threadpoolctl import threadpool_limits
 
-from eigenshape.retrieval.patch_descriptor import PatchDescriptor, unit
+from eigenshape.retrieval.patch_descriptor import PatchDescriptor
 from eigenshape.retrieval.patch_matching import patch_agreement
 from eigenshape.retrieval.patch_score import patch_distances, view_distances
 
 N_VERIFIED = 30
-WORTH = 6.0  # of a distance, that agreement of all points would take off; a good match has a tenth of that
+WORTH = 6.0  # times a distance; a good match has an agreement of .1
 AT_ONCE = 64  # shapes whose codes are floats at a time
 
 
@@ -18,9 +19,9 @@ def word_distances(
     query: Int8[np.ndarray, "u b s v"], others: Sequence[Int8[np.ndarray, "_ b s v"]]
 ) -> Float[np.ndarray, " k"]:
     """Return `view_distances` of the codes of a shape and its views to those of k others."""
-    ours = unit(query)
+    ours = query.astype(np.float32)
     parts = [others[first : first + AT_ONCE] for first in range(0, len(others), AT_ONCE)]
-    return np.concatenate([_distances(ours, [unit(codes) for codes in part]) for part in parts])
+    return np.concatenate([_distances(ours, [codes.astype(np.float32) for codes in part]) for part in parts])
 
 
 def _distances(
@@ -38,7 +39,7 @@ def verified_scores(
     *,
     n_verified: int = N_VERIFIED,
 ) -> Float[np.ndarray, " k"]:
-    """Add to distances six times what matched points of the nearest shapes lack in agreement.
+    """Return the mean of a distance and of what matched points lack in agreement, which counts six times.
 
     Fisher vectors tell which patches there are, and not where. So the points of the nearest shapes are matched with
     those of the query (`match_patches`), and what keeps its distances comes nearer.
@@ -56,12 +57,12 @@ def verified_scores(
     Returns
     -------
     (k,) float
-        Near 0 for the same shape; smaller is more alike.
+        Near 0 for the same shape, about 1 where nothing is alike.
     """
-    scores = distances + WORTH
+    lacking = np.ones(len(distances))
     for place in np.argsort(distances, kind="stable")[:n_verified].tolist():
-        scores[place] -= WORTH * shape_agreement(query, others[place])
-    return scores
+        lacking[place] -= shape_agreement(query, others[place])
+    return (distances + WORTH * lacking) / (1 + WORTH)
 
 
 def patch_scores(query: PatchDescriptor, others: Sequence[PatchDescriptor]) -> Float[np.ndarray, " k"]:
@@ -76,9 +77,10 @@ def patch_scores(query: PatchDescriptor, others: Sequence[PatchDescriptor]) -> F
     Returns
     -------
     (k,) float
-        Near 0 for the same shape; smaller is more alike.
+        Near 0 for the same shape, about 1 where nothing is alike.
     """
-    return verified_scores(query, others, word_distances(query.codes, [other.codes for other in others]))
+    with threadpool_limits(1, user_api="blas"):
+        return verified_scores(query, others, word_distances(query.codes, [other.codes for other in others]))
 
 
 def shape_agreement(query: PatchDescriptor, other: PatchDescriptor) -> float:
@@ -98,4 +100,4 @@ def shape_agreement(query: PatchDescriptor, other: PatchDescriptor) -> float:
 
 def _nearest_view(one: PatchDescriptor, seen: PatchDescriptor) -> int:
     """Return which view of a shape is nearest to another as a whole."""
-    return 1 + int(patch_distances(unit(one.codes[0]), unit(seen.codes[1:])).argmin())
+    return 1 + int(patch_distances(*(codes.astype(np.float32) for codes in (one.codes[0], seen.codes[1:]))).argmin())
