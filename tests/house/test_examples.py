@@ -14,6 +14,13 @@ def test_main_road_finds_the_octopus(tmp_path):
     assert matches[0].score <= matches[1].score <= matches[2].score
 
 
+def test_a_noisy_scan_is_found(tmp_path):
+    best, second, other = runpy.run_path(str(ROOT / "examples" / "find_a_scan.py"))["main"](tmp_path)
+    assert [best.label, second.label] == ["octopus"] * 2
+    assert best.score < second.score < other.score
+    assert len(best.correspondences) > 20
+
+
 def test_any_shape_has_its_spectrum(capsys):
     spectra = runpy.run_path(str(ROOT / "examples" / "any_shape.py"))["main"]()
     np.testing.assert_allclose(spectra["sphere"], [0, 2, 2, 2], atol=0.02)
