@@ -132,7 +132,7 @@ def test_odd_queries_are_answered_or_named(index, recipe):
     square = es.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]], [[0, 1, 2], [0, 2, 3]])
     assert len(index.query(es.describe_shape(square, recipe))) == len(KINDS)
     hand = es.make_creature("hand", 2, n_vertices=1200)
-    twice = np.concatenate([hand.vertices, hand.vertices + [5, 0, 0]])
+    twice = np.concatenate([hand.vertices, hand.vertices + np.array([5, 0, 0])])
     pair = es.TriangleMesh(twice, np.concatenate([hand.faces, hand.faces + hand.n_vertices]))
     assert len(index.query(es.describe_shape(pair, recipe))) == len(KINDS)
     sliver = es.TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0.0]], [[0, 1, 2]])
