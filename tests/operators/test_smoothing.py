@@ -111,3 +111,9 @@ def test_bad_reach_and_faces_without_area_are_refused():
     flat = TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0.5]], [[0, 1, 2], [0, 1, 3]])
     with pytest.raises(InvalidShapeError, match=r"face 0"):
         denoise(flat, reach=1.0)
+
+
+def test_equations_that_cannot_be_solved_are_named(monkeypatch):
+    monkeypatch.setattr("eigenshape.operators.smoothing.factorise", lambda *_: None)
+    with pytest.raises(InvalidShapeError, match="must have angles to be smoothed; some are too near to 0"):
+        denoise(make_creature("hand", n_vertices=600), reach=1.0)

@@ -3,10 +3,10 @@
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
-from scipy.sparse.linalg import splu
 from threadpoolctl import threadpool_limits
 
 from eigenshape._arrays import positive_values
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.measure import edge_lengths, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import mean_side_length, size_one
@@ -14,6 +14,7 @@ from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_facets, boundary_vertices, edge_table
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
+from eigenshape.sparse.elimination import analyse, factorise
 
 ONE_EDGE = 0.165  # noise level, that of Gaussian noise of a quarter of an edge, at which heat flows one mean edge far
 
@@ -69,7 +70,7 @@ def denoise(mesh: TriangleMesh, *, reach: float | None = None) -> TriangleMesh:
     InvalidParameterError
         If reach is not positive.
     InvalidShapeError
-        If a face has no area, or a vertex no face.
+        If a face has no area or next to no angles, or a vertex no face.
     """
     edges = float(positive_values(reach, "reach")[0]) if reach is not None else (noise_level(mesh) / ONE_EDGE) ** 2
     if edges == 0:
@@ -94,7 +95,11 @@ def _flowed(
     """Return where a step and its twicing take the free points, while the others stay."""
     pencil = (laplacian.mass + time * laplacian.stiffness).tocsr()[free]
     mass, held = laplacian.mass.diagonal()[free, None], np.setdiff1d(np.arange(len(points)), free)
+    matrix = pencil[:, free].tocsc()
+    matrix.sort_indices()
     with threadpool_limits(1, user_api="blas"):  # so that no digit depends on the number of threads
-        factor = splu(pencil[:, free].tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-        once = factor.solve(mass * points[free] - pencil[:, held] @ points[held])
-        return np.asarray(once + factor.solve(mass * (points[free] - once)))
+        factor = factorise(analyse(matrix), matrix.data)
+    if factor is None:
+        raise InvalidShapeError("A surface must have angles to be smoothed; some are too near to 0 for the equations.")
+    once = factor.solve(mass * points[free] - pencil[:, held] @ points[held])
+    return once + factor.solve(mass * (points[free] - once))
