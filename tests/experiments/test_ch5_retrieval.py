@@ -221,3 +221,14 @@ def test_the_quick_form_gives_the_expected_figures_whatever_the_workers(tmp_path
             for group, rates in row.items():
                 for measure, (mean, *_) in rates.items():
                     assert found[0][protocol][method][group][measure][0] == pytest.approx(mean, abs=ONE_QUERY)
+
+
+def test_each_is_asked_for_among_all_others(made):
+    some = [shape(number, "ant") for number in (1, 2, 4, 5)]
+    one = run.among_all(draws.Draw(0, (), (), ()), some)
+    assert [version.shape for version in one.mixed] == [version.shape for version in one.complete] == some
+    assert one.mixed == draws.draw(some, 0, 0, 0).mixed
+    database = [draws.complete(each) for each in some]
+    describing.describe_all(made, [Size()], database, 1)
+    for found, asked in zip(run.answers(Size(), made, database, database), some, strict=True):
+        assert sorted(version.shape.number for version in found) == [n for n in (1, 2, 4, 5) if n != asked.number]
