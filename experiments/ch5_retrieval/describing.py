@@ -4,7 +4,7 @@ import hashlib
 import multiprocessing
 import os
 import pickle
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from functools import cache
@@ -12,8 +12,8 @@ from importlib.metadata import version as version_of
 from pathlib import Path
 from typing import Any
 
-from draws import Version, make
-from methods import Method
+from draws import Shape, Version, make
+from methods import Method, Trainable
 from real_shapes import DATA
 from rich.progress import Progress
 from threadpoolctl import threadpool_limits
@@ -48,16 +48,30 @@ class Store:
         what = (*sources, method, version.kind, version.seed, version.shape.number, version.change)
         return self.folder / hashlib.sha256(repr(what).encode()).hexdigest()
 
+    def lesson(self, method: Trainable, shapes: Sequence[Shape], learn: Callable[[], Method]) -> Method:
+        """Return a method that has learnt from complete shapes, as it was kept; else let it learn, and keep it."""
+        sources = [digest(DATA / shape.path) for shape in shapes]
+        what = ("lesson", *sources, *map(digest, MAKING), version_of("eigenshape"), method)
+        path = self.folder / hashlib.sha256(repr(what).encode()).hexdigest()
+        if not path.exists():
+            self.folder.mkdir(parents=True, exist_ok=True)
+            keep(path, learn())
+        return pickle.loads(path.read_bytes())
+
     def load(self, method: Method, version: Version) -> Any:
         """Return a descriptor, or its Failure."""
         return pickle.loads(self.path(method, version).read_bytes())
 
     def save(self, method: Method, version: Version, descriptor: Any) -> None:
-        """Keep a descriptor, whole or not at all."""
-        path = self.path(method, version)
-        beside = path.with_suffix(f".{os.getpid()}")
-        beside.write_bytes(pickle.dumps(descriptor))
-        beside.replace(path)
+        """Keep a descriptor."""
+        keep(self.path(method, version), descriptor)
+
+
+def keep(path: Path, what: Any) -> None:
+    """Write a file whole or not at all."""
+    beside = path.with_suffix(f".{os.getpid()}")
+    beside.write_bytes(pickle.dumps(what))
+    beside.replace(path)
 
 
 def describe_all(store: Store, methods: Sequence[Method], versions: Sequence[Version], workers: int) -> dict[str, str]:

@@ -104,7 +104,7 @@ def main() -> None:
     chosen.folder.mkdir(parents=True, exist_ok=True)
     some, others = (half_of(shapes(), half) for half in ("reporting", "tuning"))
     drawn, store = draw(some, chosen.seed), Store(chosen.cache)
-    methods = [ready(METHODS[name], others) for name in dict.fromkeys([chosen.method, *chosen.methods])]
+    methods = [ready(METHODS[name], others, store) for name in dict.fromkeys([chosen.method, *chosen.methods])]
     describe_all(store, methods, [*drawn.queries, *drawn.mixed], chosen.workers)
     all_pictures(drawn, store, methods, chosen.folder)
 

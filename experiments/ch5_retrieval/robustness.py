@@ -108,8 +108,9 @@ def main() -> None:
     some = half_of(everything, chosen.half)
     seeds, numbers = (chosen.draws[:1], QUICK_QUERIES) if chosen.quick else (chosen.draws, (18, 32))
     draws = [draw(some, seed, *numbers) for seed in seeds]
-    method = ready(METHODS["patches"], [shape for shape in everything if shape not in some])
-    cures, store = [Asking(method, cure) for cure in CURES], Store(chosen.cache)
+    store = Store(chosen.cache)
+    method = ready(METHODS["patches"], [shape for shape in everything if shape not in some], store)
+    cures = [Asking(method, cure) for cure in CURES]
     changes = list(dict.fromkeys([CLEAN, *chosen.changes]))
     database = [version for each in draws for version in each.mixed]
     asked = [query for each in draws for change in changes for query in queries(each, change)]

@@ -25,12 +25,12 @@ SEEDS = (0, 1, 2)
 QUICK_CLASSES, QUICK_QUERIES = ("ant", "chair", "glasses", "octopus", "teddy"), (4, 8)
 
 
-def ready(method: Method, some: Sequence[Shape]) -> Method:
-    """Let a method learn from complete shapes, where it does."""
+def ready(method: Method, some: Sequence[Shape], store: Store) -> Method:
+    """Let a method learn from complete shapes, where it does and has not yet."""
     if not isinstance(method, Trainable):
         return method
     with Status(f"{method.name}: learning"):
-        return method.train(make(complete(shape)) for shape in some)
+        return store.lesson(method, some, lambda: method.train(make(complete(shape)) for shape in some))
 
 
 def outcomes(
@@ -115,8 +115,8 @@ def main() -> None:
     draws = [draw(some, seed, *numbers) for seed in seeds]
     if chosen.among_all:
         draws = [among_all(one, some) for one in draws]
-    methods = {name: ready(METHODS[name], rest) for name in chosen.methods}
     store = Store(chosen.cache)
+    methods = {name: ready(METHODS[name], rest, store) for name in chosen.methods}
     versions = [version for each in draws for part in (each.queries, each.mixed, each.complete) for version in part]
     failed = describe_all(store, list(methods.values()), list(dict.fromkeys(versions)), chosen.workers)
     found = {name: asked(method, store, draws) for name, method in track(methods.items(), "asking")}

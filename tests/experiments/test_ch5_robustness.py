@@ -14,6 +14,7 @@ FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch5_retrieval"
 EXPECTED = json.loads((FOLDER / "expected_robustness.json").read_text())
 sys.path[:0] = [str(FOLDER), str(FOLDER.parent)]
 import draws  # noqa: E402
+import methods  # noqa: E402
 import perturbing  # noqa: E402
 import robustness  # noqa: E402
 from scores import Outcome  # noqa: E402
@@ -74,18 +75,13 @@ def test_losses_are_of_the_same_queries():
     assert robustness.cell(results["noise .1"]["as it is"]).startswith("33.3 / 33.3 / 33.3, -33.3 [")
 
 
-def test_a_cure_comes_before_the_method():
-    class Faces:
-        def describe(self, mesh):
-            return mesh
-
-        def distances(self, query, described):
-            return np.zeros(len(described))
-
+def test_queries_are_described_as_they_are_or_as_the_method_takes_them():
+    method = methods.Patches("patches", recipe=es.PatchRecipe(es.made_codebook()))
     flipped = es.TriangleMesh(BALL.vertices, BALL.faces[:, ::-1])
-    found = robustness.Cured(Faces(), "outward, denoised").describe(flipped)
-    assert es.enclosed_volume(found) > 0
-    assert robustness.Cured(Faces(), "as it is").describe(flipped) is flipped
+    asking = [robustness.Asking(method, cure).describe(flipped) for cure in robustness.CURES]
+    outward = es.describe_shape(BALL, method.recipe)
+    assert np.array_equal(asking[1].codes, outward.codes)
+    assert not np.array_equal(asking[0].codes[0], outward.codes[0])
 
 
 def test_the_readme_shows_the_expected_figures():
