@@ -6,14 +6,7 @@ import pytest
 import eigenshape as es
 from eigenshape.retrieval.patch_matching import patch_agreement
 from eigenshape.retrieval.patch_score import patch_distances, view_distances
-from eigenshape.retrieval.patch_verify import (
-    SILHOUETTES,
-    WORTH,
-    patch_scores,
-    shape_agreement,
-    verified_scores,
-    word_distances,
-)
+from eigenshape.retrieval.patch_verify import WORTH, patch_scores, shape_agreement, verified_scores, word_distances
 
 KINDS = ("quadruped", "hand", "octopus", "biped")
 
@@ -39,18 +32,15 @@ def floats(codes):
 
 
 def known(mesh, book):
-    return es.in_words(es.seen_patches(mesh, n_views=3), es.light_field(mesh), es.PatchRecipe(book))
+    return es.in_words(es.seen_patches(mesh, n_views=3), es.PatchRecipe(book))
 
 
-def test_only_the_nearest_are_verified(wholes, scan):
+def test_only_the_nearest_come_nearer(wholes, scan):
     far = np.array([0.9, 0.3, 0.5, 0.8])
     found = verified_scores(scan, wholes, far, n_verified=2)
-    looks = [es.light_field_distance(scan.silhouettes, wholes[place].silhouettes) for place in (1, 2)]
-    lacking = [1 - shape_agreement(scan, wholes[place]) for place in (1, 2)]
-    assert (1 + WORTH) * found[[1, 2]] == pytest.approx(
-        far[[1, 2]] + WORTH * np.array(lacking) + SILHOUETTES * np.array(looks)
-    )
-    assert (1 + WORTH) * found[[0, 3]] == pytest.approx(far[[0, 3]] + WORTH + SILHOUETTES * max(looks))
+    assert found[[0, 3]].tolist() == ((far[[0, 3]] + WORTH) / (1 + WORTH)).tolist()
+    expected = [(far[place] + WORTH * (1 - shape_agreement(scan, wholes[place]))) / (1 + WORTH) for place in (1, 2)]
+    assert found[[1, 2]] == pytest.approx(expected)
     assert far.tolist() == [0.9, 0.3, 0.5, 0.8]
     assert verified_scores(scan, wholes, np.ones(4)).argmin() == 1
 
@@ -88,7 +78,7 @@ def test_many_shapes_are_scored_some_at_a_time(wholes, scan, monkeypatch):
 
 def test_a_descriptor_takes_patches(book, scan):
     with pytest.raises(es.InvalidParameterError, match="takes patches of a shape, then of its views; there are none"):
-        es.in_words([], es.light_field(es.make_creature("hand", n_vertices=800)), es.PatchRecipe(book))
+        es.in_words([], es.PatchRecipe(book))
     assert len(scan.points) == len(scan.codes) == 1
     assert not scan.codes.flags.writeable
 

@@ -15,7 +15,7 @@ from eigenshape.retrieval.describe import N_VIEWS, describe_mesh, describe_views
 from eigenshape.retrieval.descriptor import Recipe, ShapeDescriptor
 from eigenshape.retrieval.patch_descriptor import PatchDescriptor, PatchRecipe, describe_by_patches
 from eigenshape.retrieval.patch_matching import match_patches
-from eigenshape.retrieval.patch_packing import pack_details, unpack_details
+from eigenshape.retrieval.patch_packing import pack_points, unpack_points
 from eigenshape.retrieval.patch_verify import verified_scores, word_distances
 from eigenshape.retrieval.patches import N_VIEWS as N_PATCH_VIEWS
 from eigenshape.retrieval.score import match_features, matching_scores
@@ -117,8 +117,8 @@ PATCHES = Kind(
     to_keep=lambda mesh, recipe, n: [describe_by_patches(mesh, recipe, n_views=n)],
     row=np.dtype("i1"),
     rows=lambda descriptor, name: descriptor.codes.reshape(-1, descriptor.codes.shape[-1]),
-    details=lambda descriptor: pack_details(descriptor.points, descriptor.silhouettes),
-    restored=lambda rows, details, recipe: PatchDescriptor(_codes(rows, recipe), *unpack_details(details), recipe),
+    details=lambda descriptor: pack_points(descriptor.points),
+    restored=lambda rows, details, recipe: PatchDescriptor(_codes(rows, recipe), unpack_points(details), recipe),
     scored=lambda query, rows: word_distances(query.codes, [_codes(each, query.recipe) for each in rows]),
     verified=verified_scores,
     paired=lambda first, second: match_patches(first.points[0], second.points[0]).points,

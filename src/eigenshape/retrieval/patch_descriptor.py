@@ -1,10 +1,10 @@
-"""What a shape is known by through its patches: codes in words, points that can be matched, and silhouettes."""
+"""What a shape is known by through its patches: codes in the words of a codebook, and points that can be matched."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Float32, Int, Int8
+from jaxtyping import Float32, Int, Int8
 from threadpoolctl import threadpool_limits
 
 from eigenshape._arrays import frozen
@@ -13,7 +13,6 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.operators.smoothing import denoise
 from eigenshape.retrieval.codebook import PatchCodebook, encode_patches
-from eigenshape.retrieval.light_field import light_field
 from eigenshape.retrieval.patch_matching import PatchPoints, patch_points
 from eigenshape.retrieval.patches import N_VIEWS, Patches, describe_patch_views, describe_patches
 
@@ -47,14 +46,11 @@ class PatchDescriptor:
         Fisher vectors of `encode_patches`, of the shape and of w views, each rounded so that its largest entry is 127.
     points : tuple of 1 + w PatchPoints
         The same in points, at vertices of the whole.
-    silhouettes : (10, 10, 45) float32
-        `light_field` of the shape, in half precision.
     recipe : PatchRecipe
     """
 
     codes: Int8[np.ndarray, "w b s v"]
     points: tuple[PatchPoints, ...]
-    silhouettes: Float32[np.ndarray, "10 10 45"]
     recipe: PatchRecipe
 
     @property
@@ -63,19 +59,11 @@ class PatchDescriptor:
         return self.points[0].vertices
 
 
-def cleaned(mesh: TriangleMesh) -> TriangleMesh:
-    """Turn a copy outward, and smooth it as far as its noise asks for, so that neither sets a scan apart.
-
-    Raises
-    ------
-    InvalidShapeError
-        If a face has no area, or a vertex no face.
-    """
-    return denoise(orient_outward(mesh))
-
-
 def seen_patches(mesh: TriangleMesh, *, n_views: int = N_VIEWS) -> list[Patches]:
-    """Describe the patches of a surface, `cleaned`, and of what single viewpoints see of it if it is closed.
+    """Describe the patches of a surface, and of what single viewpoints see of it if it is closed.
+
+    They are those of a copy that `orient_outward` has turned and `denoise` has smoothed as far as its noise asks for,
+    so that neither sets a scan apart from clean shapes.
 
     Parameters
     ----------
@@ -93,53 +81,29 @@ def seen_patches(mesh: TriangleMesh, *, n_views: int = N_VIEWS) -> list[Patches]
     InvalidShapeError
         If a face has no area, or a vertex no face.
     """
-    return _seen(cleaned(mesh), n_views)
-
-
-def _seen(clean: TriangleMesh, n_views: int) -> list[Patches]:
+    clean = denoise(orient_outward(mesh))
     return [describe_patches(clean), *describe_patch_views(clean, n_views=n_views)]
 
 
 def describe_by_patches(mesh: TriangleMesh, recipe: PatchRecipe, *, n_views: int = N_VIEWS) -> PatchDescriptor:
-    """Describe a surface, `cleaned`, by its patches and its silhouettes.
-
-    Parameters
-    ----------
-    mesh : TriangleMesh
-    recipe : PatchRecipe
-    n_views : int
-        Viewpoints from which a closed surface is described, too.
-
-    Returns
-    -------
-    PatchDescriptor
-
-    Raises
-    ------
-    InvalidShapeError
-        If a face has no area, or a vertex no face.
-    """
-    clean = cleaned(mesh)
-    return in_words(_seen(clean, n_views), light_field(clean), recipe)
+    """Describe a surface by its patches; see `seen_patches`."""
+    return in_words(seen_patches(mesh, n_views=n_views), recipe)
 
 
-def in_words(
-    patches: Sequence[Patches], silhouettes: Float[np.ndarray, "10 10 45"], recipe: PatchRecipe
-) -> PatchDescriptor:
-    """Return the descriptor of a shape from its patches, those of its views, and its `light_field`.
+def in_words(patches: Sequence[Patches], recipe: PatchRecipe) -> PatchDescriptor:
+    """Return the descriptor of a shape from its patches, and those of its views.
 
     Raises
     ------
     InvalidParameterError
-        If there are no patches.
+        If there are none.
     """
     if not patches:
         raise InvalidParameterError("A descriptor takes patches of a shape, then of its views; there are none.")
     with threadpool_limits(1, user_api="blas"):
         codes = np.stack([rounded(encode_patches(each, recipe.codebook)) for each in patches])
         points = tuple(patch_points(each, recipe.codebook) for each in patches)
-    halves = frozen(silhouettes.astype(np.float16).astype(np.float32))
-    return PatchDescriptor(frozen(codes), points, halves, recipe)
+    return PatchDescriptor(frozen(codes), points, recipe)
 
 
 def rounded(codes: Float32[np.ndarray, "*k v"]) -> Int8[np.ndarray, "*k v"]:

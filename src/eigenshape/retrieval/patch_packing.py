@@ -1,27 +1,13 @@
-"""Points of patches and silhouettes as bytes, and back without loss."""
+"""Points of patches as bytes, and back without loss."""
 
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float32
 
 from eigenshape._arrays import frozen
-from eigenshape.retrieval.light_field import N_FIELDS, N_NUMBERS, N_VIEWS
 from eigenshape.retrieval.patch_matching import NUMBER_STEP, PatchPoints
 
-LIGHT_FIELD = (N_FIELDS, N_VIEWS, N_NUMBERS)
 LENGTH, VERTEX, HALF = np.dtype("<u4"), np.dtype("<i8"), np.dtype("<f2")
-
-
-def pack_details(points: Sequence[PatchPoints], silhouettes: Float32[np.ndarray, "10 10 45"]) -> bytes:
-    """Return silhouettes, then points."""
-    return silhouettes.astype(HALF).tobytes() + pack_points(points)
-
-
-def unpack_details(data: bytes) -> tuple[tuple[PatchPoints, ...], Float32[np.ndarray, "10 10 45"]]:
-    """Return what `pack_details` packed."""
-    silhouettes = np.frombuffer(data, HALF, np.prod(LIGHT_FIELD)).astype(np.float32).reshape(LIGHT_FIELD)
-    return unpack_points(data[silhouettes.size * HALF.itemsize :]), frozen(silhouettes)
 
 
 def pack_points(points: Sequence[PatchPoints]) -> bytes:

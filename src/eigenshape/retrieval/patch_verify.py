@@ -1,4 +1,4 @@
-"""How far a query is from many shapes: by their words, then the nearest by how their patches lie and how they look."""
+"""How far a query is from many shapes: by their words first, and the nearest by how their patches lie."""
 
 from collections.abc import Sequence
 
@@ -6,14 +6,12 @@ import numpy as np
 from jaxtyping import Float, Int8
 from threadpoolctl import threadpool_limits
 
-from eigenshape.retrieval.light_field import light_field_distance
 from eigenshape.retrieval.patch_descriptor import PatchDescriptor
 from eigenshape.retrieval.patch_matching import patch_agreement
 from eigenshape.retrieval.patch_score import patch_distances, view_distances
 
 N_VERIFIED = 30
 WORTH = 6.0  # times a distance; a good match has an agreement of .1
-SILHOUETTES = 0.03  # times a light-field distance, which is 17 between shapes that have nothing in common
 AT_ONCE = 64  # shapes whose codes are floats at a time
 
 
@@ -41,11 +39,10 @@ def verified_scores(
     *,
     n_verified: int = N_VERIFIED,
 ) -> Float[np.ndarray, " k"]:
-    """Add to distances what matched points of the nearest shapes lack in agreement, and how their silhouettes differ.
+    """Return the mean of a distance and of what matched points lack in agreement, which counts six times.
 
     Fisher vectors tell which patches there are, and not where. So the points of the nearest shapes are matched with
-    those of the query (`match_patches`), and what keeps its distances comes nearer; so does what looks alike from
-    outside (`light_field_distance`).
+    those of the query (`match_patches`), and what keeps its distances comes nearer.
 
     Parameters
     ----------
@@ -55,21 +52,17 @@ def verified_scores(
     distances : (k,) float
         Of `word_distances`.
     n_verified : int
-        Nearest shapes that are verified; the others count as if nothing agreed and they looked like the worst of these.
+        Nearest shapes that are verified; the others count as if nothing agreed.
 
     Returns
     -------
     (k,) float
         Near 0 for the same shape, about 1 where nothing is alike.
     """
-    nearest = np.argsort(distances, kind="stable")[:n_verified].tolist()
-    found = [others[place] for place in nearest]
-    lacking, apart = np.ones(len(distances)), np.empty(len(distances))
-    looks = [light_field_distance(query.silhouettes, other.silhouettes) for other in found]
-    lacking[nearest] = [1 - shape_agreement(query, other) for other in found]
-    apart[:] = max(looks)
-    apart[nearest] = looks
-    return (distances + WORTH * lacking + SILHOUETTES * apart) / (1 + WORTH)
+    lacking = np.ones(len(distances))
+    for place in np.argsort(distances, kind="stable")[:n_verified].tolist():
+        lacking[place] -= shape_agreement(query, others[place])
+    return (distances + WORTH * lacking) / (1 + WORTH)
 
 
 def patch_scores(query: PatchDescriptor, others: Sequence[PatchDescriptor]) -> Float[np.ndarray, " k"]:
