@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from real_shapes import inner_curvature
@@ -119,7 +119,6 @@ class Global:
 
 
 TEACHING_VIEWS = 2
-TEACHERS = ("the other half", "made creatures")
 
 
 @dataclass(frozen=True)
@@ -127,13 +126,13 @@ class Patches:
     """Patches as an index keeps and asks them, in words that the other half or made creatures have taught."""
 
     name: str
-    teachers: str = TEACHERS[0]
+    teachers: Literal["other half", "made creatures"] = "other half"
     verified: bool = True
     recipe: es.PatchRecipe | None = None
 
     def train(self, meshes: Iterable[es.TriangleMesh]) -> "Patches":
         """Learn words, or take those that come with the library."""
-        if self.teachers == TEACHERS[1]:
+        if self.teachers == "made creatures":
             return replace(self, recipe=es.PatchRecipe(es.made_codebook()))
         lessons = [patches for mesh in meshes for patches in es.seen_patches(mesh, n_views=TEACHING_VIEWS)]
         return replace(self, recipe=es.PatchRecipe(es.train_codebook(lessons)))
@@ -152,6 +151,9 @@ class Patches:
 METHODS: dict[str, Method] = {
     method.name: method
     for method in (
+        Patches("patches"),
+        Patches("patches, not verified", verified=False),
+        Patches("patches, made words", "made creatures"),
         ThesisRecipe("thesis, cotangent"),
         ThesisRecipe("thesis, mesh Laplacian", spectrum="kernel_spectrum"),
         ScaleFree(),
@@ -160,9 +162,6 @@ METHODS: dict[str, Method] = {
         Global("LFD", "light_field", "light_field_distance"),
         ThesisRecipe("AGD", "average_distance"),
         ThesisRecipe("GC", "curvature"),
-        Patches("patches", "other half"),
-        Patches("patches, not verified", "other half", verified=False),
-        Patches("patches, made words", "creatures", verified=False),
     )
 }
 SLOW = ("thesis, mesh Laplacian", "patches, not verified")  # asked for by name
