@@ -92,6 +92,11 @@ def _repaired(mesh: TriangleMesh, names: tuple[str, ...]) -> TriangleMesh:
     return done.mesh
 
 
+def read_repaired(path: Path, names: tuple[str, ...]) -> TriangleMesh:
+    """Read a mesh and apply repairs without a word, as for one of many."""
+    return repair(read_mesh(path), names).mesh
+
+
 def repair_names(text: str) -> tuple[str, ...]:
     """Split a comma-separated list of repairs, refusing an unknown name before any file is read."""
     names = tuple(name.strip() for name in text.split(",") if name.strip())

@@ -10,10 +10,18 @@ import typer
 from rich.markup import escape
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import JsonOption, RepairOption, out, print_json, progress_bar, repair_names, told_by
+from eigenshape.cli.console import (
+    JsonOption,
+    RepairOption,
+    out,
+    print_json,
+    progress_bar,
+    read_repaired,
+    repair_names,
+    told_by,
+)
 from eigenshape.cli.presets import PATCHES, PresetOption, recipe_to_fill, require_preset
-from eigenshape.geometry.repair import repair as repaired
-from eigenshape.io.mesh_files import FORMATS, read_mesh
+from eigenshape.io.mesh_files import FORMATS
 from eigenshape.retrieval.batch import BatchReport, Describe, build_index
 from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe_to_keep
@@ -79,7 +87,7 @@ def describe_all(
 
 def describe_file(path: Path, *, recipe: AnyRecipe, repairs: tuple[str, ...], n_views: int | None) -> list[Descriptor]:
     """Read a mesh, repair it as asked, and describe it, whole and as it is seen from some sides."""
-    mesh = repaired(read_mesh(path), repairs).mesh
+    mesh = read_repaired(path, repairs)
     return describe_to_keep(mesh, recipe, n_views=n_views)
 
 

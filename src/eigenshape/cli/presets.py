@@ -8,9 +8,7 @@ from typing import Annotated
 import typer
 
 from eigenshape._errors import InvalidParameterError, StoreError
-from eigenshape.cli.console import err, progress_bar, told_by
-from eigenshape.geometry.repair import repair as repaired
-from eigenshape.io.mesh_files import read_mesh
+from eigenshape.cli.console import err, progress_bar, read_repaired, told_by
 from eigenshape.retrieval.batch import learn_words
 from eigenshape.retrieval.codebook import made_codebook
 from eigenshape.retrieval.descriptor import PRESETS, SCALE_FREE, Recipe
@@ -70,7 +68,7 @@ def recipe_to_fill(
 
 def teach(path: Path, *, repairs: tuple[str, ...]) -> list[Patches]:
     """Return the patches of a file's mesh and of two views of it."""
-    return seen_patches(repaired(read_mesh(path), repairs).mesh, n_views=TEACHING_VIEWS)
+    return seen_patches(read_repaired(path, repairs), n_views=TEACHING_VIEWS)
 
 
 def recipe_to_ask(shelf: ShapeIndex, name: str | None) -> AnyRecipe:

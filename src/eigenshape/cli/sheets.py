@@ -2,19 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Int
 from matplotlib.figure import Figure
 
 from eigenshape._errors import StoreError
-from eigenshape.cli.console import progress_bar
+from eigenshape.cli.console import progress_bar, read_repaired
 from eigenshape.figures.sheet import Panel, figure_contact_sheet
 from eigenshape.geometry.geodesic import geodesic_distances
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import repair as repair_mesh
-from eigenshape.io.mesh_files import read_mesh
 from eigenshape.retrieval.describe import describe_mesh, described_view
 from eigenshape.retrieval.descriptor import Recipe
 from eigenshape.retrieval.index import Match
@@ -81,7 +80,7 @@ def contact_sheet(
 def _panel(query: Asked, match: Match, repairs: tuple[str, ...]) -> Panel:
     if match.source is None:
         raise StoreError(f"A match needs its file to be drawn; {match.name!r} was added without one.")
-    mesh = repair_mesh(read_mesh(match.source), repairs).mesh
+    mesh = read_repaired(Path(match.source), repairs)
     ours, theirs = match.correspondences.T
     recipe = query.descriptor.recipe
     if isinstance(recipe, Recipe):
