@@ -93,7 +93,7 @@ def one_a_class(some: Sequence[Asked], count: int) -> list[Asked]:
 def main() -> None:
     """Ask, and draw three pictures."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--method", choices=sorted(METHODS), default="scale-free", help="of table 5.1 and the failures")
+    parser.add_argument("--method", choices=sorted(METHODS), default="patches", help="of table 5.1 and the failures")
     parser.add_argument("--methods", nargs="*", choices=sorted(METHODS), default=["thesis, cotangent", "EVD", "LFD"])
     parser.add_argument("--seed", type=int, default=0, help="of the draw")
     parser.add_argument("--workers", type=int, default=2)
