@@ -50,8 +50,10 @@ def geodesic_balls(mesh: Mesh, radius: float) -> sp.csr_array:
     starts, others, sides = _fans(mesh, corners)
     firsts = range(0, mesh.n_points, SOURCES)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        lasts = (min(first + SOURCES, mesh.n_points) for first in firsts)
-        waves = pool.map(lambda first, last: balls(starts, *others, sides, radius / scale, first, last), firsts, lasts)
+        sources = [np.arange(first, min(first + SOURCES, mesh.n_points)) for first in firsts]
+        waves = pool.map(
+            lambda some: balls(starts, *others, sides, radius / scale, some, np.arange(len(some) + 1)), sources
+        )
         counts, columns, values = (np.concatenate(parts) for parts in zip(*waves, strict=True))
     rows = np.concatenate([[0], np.cumsum(counts)])
     found = sp.csr_array((in_length(values, scale, 1), columns, rows), shape=(mesh.n_points,) * 2)
@@ -84,19 +86,53 @@ def geodesic_distances(mesh: Mesh, sources: ArrayLike) -> Float[np.ndarray, "k n
         If a source is no vertex.
     """
     wave = waves_on(mesh)
+    return np.array([wave(source) for source in _vertices(mesh, sources)]).reshape(-1, mesh.n_points)
+
+
+def geodesic_distance_to_set(mesh: Mesh, sources: ArrayLike, *, reach: float = np.inf) -> Float[np.ndarray, " n"]:
+    """Measure along the surface from each vertex to the nearest of some; one wave leaves all of them at once.
+
+    As `geodesic_distances`; an edge between two of them is a source all along.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh or SimplicialMesh
+        Of dimension 2, in any R^d.
+    sources : (k,) int
+        Vertices.
+    reach : float
+        Length up to which distances are wanted; shorter ones are quicker.
+
+    Returns
+    -------
+    (n,) float
+        In length; infinite beyond `reach`, and where there is none on the same component.
+
+    Raises
+    ------
+    InvalidShapeError
+        If the mesh is no surface.
+    InvalidParameterError
+        If a source is no vertex.
+    """
+    return waves_on(mesh)(np.unique(_vertices(mesh, sources)), reach)
+
+
+def _vertices(mesh: Mesh, sources: ArrayLike) -> Int[np.ndarray, " k"]:
     wanted = [whole_number(source, "A source", 0, mesh.n_points - 1) for source in np.atleast_1d(sources)]
-    return np.array([wave(source) for source in wanted]).reshape(-1, mesh.n_points)
+    return np.array(wanted, dtype=np.int64)
 
 
 def waves_on(mesh: Mesh) -> Callable[..., Float[np.ndarray, " n"]]:
-    """Return a function from a vertex, and a length, to the distances of all vertices within that, or infinite."""
+    """Return a function from one vertex or some, and a length, to all vertices' distances, infinite beyond it."""
     _require_surface(mesh)
     corners, scale = scaled_corners(mesh)
     starts, others, sides = _fans(mesh, corners)
 
-    def wave(source: int, reach: float = np.inf) -> Float[np.ndarray, " n"]:
+    def wave(source: ArrayLike, reach: float = np.inf) -> Float[np.ndarray, " n"]:
         found = np.full(mesh.n_points, np.inf)
-        _, reached, values = balls(starts, *others, sides, reach / scale, source, source + 1)
+        sources = np.atleast_1d(np.asarray(source, dtype=np.int64))
+        _, reached, values = balls(starts, *others, sides, reach / scale, sources, np.array([0, len(sources)]))
         found[reached] = in_length(values, scale, 1)
         return found
 

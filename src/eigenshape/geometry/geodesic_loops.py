@@ -1,4 +1,4 @@
-"""Compiled loops of `geodesic`: a wave that leaves one vertex and crosses triangles laid flat."""
+"""Compiled loops of `geodesic`: a wave that leaves some vertices and crosses triangles laid flat."""
 
 from typing import no_type_check
 
@@ -12,12 +12,15 @@ def through_edge(near, far, length, left, right):
     """Return the distance of a triangle's third corner from a source seen through the opposite edge, or infinity.
 
     `near` and `far` are the distances of the edge's ends; the source is laid flat beyond the edge. `left` and `right`
-    are the third corner's distances from the same ends. Infinity where the straight line misses the edge.
+    are the third corner's distances from the same ends. Infinity where the straight line misses the edge. An edge
+    whose ends are both sources is one all along.
     """
     x = (near * near - far * far + length * length) / (2 * length)
     y = np.sqrt(max(near * near - x * x, 0.0))
     corner_x = (left * left - right * right + length * length) / (2 * length)
     corner_y = np.sqrt(max(left * left - corner_x * corner_x, 0.0))
+    if near == 0.0 and far == 0.0:
+        return corner_y if 0.0 <= corner_x <= length else np.inf
     depth = y + corner_y
     if depth == 0.0:
         return np.inf
@@ -29,27 +32,33 @@ def through_edge(near, far, length, left, right):
 
 @njit(cache=True, nogil=True)
 @no_type_check
-def balls(starts, first_corner, second_corner, sides, radius, first, last):
-    """Return for each source from `first` to `last` how many vertices lie within `radius`, which, and how far.
+def balls(starts, first_corner, second_corner, sides, radius, sources, begins):
+    """Return for each set of sources how many vertices lie within `radius`, which, and how far from the nearest.
 
+    Set i is sources[begins[i]:begins[i+1]].
     Entry k of `starts[v]` to `starts[v + 1]` is a triangle at vertex v with its other two corners; `sides[k]` are the
     lengths from v to each of them, and between them.
     """
     n = len(starts) - 1
     distance = np.full(n, np.inf)
     settled = np.zeros(n, dtype=np.bool_)
-    counts = np.zeros(last - first, dtype=np.int64)
+    counts = np.zeros(len(begins) - 1, dtype=np.int64)
     columns, values = np.empty(1024, dtype=np.int64), np.empty(1024)
     heap_keys, heap_ids = np.empty(1024), np.empty(1024, dtype=np.int64)
     touched = np.empty(n, dtype=np.int64)
     total = 0
-    for source in range(first, last):
+    for number in range(len(begins) - 1):
         before = total
-        distance[source] = 0.0
-        touched[0] = source
-        n_touched = 1
-        heap_keys[0], heap_ids[0] = 0.0, source
-        height = 1
+        n_touched = 0
+        if begins[number + 1] - begins[number] > len(heap_keys):
+            heap_keys = np.empty(begins[number + 1] - begins[number])
+            heap_ids = np.empty(len(heap_keys), dtype=np.int64)
+        for source in sources[begins[number] : begins[number + 1]]:
+            distance[source] = 0.0
+            heap_keys[n_touched], heap_ids[n_touched] = 0.0, source
+            touched[n_touched] = source
+            n_touched += 1
+        height = n_touched
         while height:
             key, vertex = heap_keys[0], heap_ids[0]
             height -= 1
@@ -85,7 +94,7 @@ def balls(starts, first_corner, second_corner, sides, radius, first, last):
                         distance[corner] = reached
                         _rise(heap_keys, heap_ids, height, reached, corner)
                         height += 1
-        counts[source - first] = total - before
+        counts[number] = total - before
         for place in range(n_touched):
             distance[touched[place]] = np.inf
             settled[touched[place]] = False

@@ -1,0 +1,127 @@
+"""Bound regions: by how much each vertex follows each handle, found once for many positions of the handles."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import SupportsIndex
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from eigenshape._arrays import whole_number
+from eigenshape._errors import InvalidParameterError
+from eigenshape.deformation.region import Region, region_mask, require_boundary
+from eigenshape.deformation.rig import EigenRig
+from eigenshape.deformation.rigidity import FreePart, free_part
+from eigenshape.geometry.geodesic import geodesic_distance_to_set
+
+RULE = ((0.75, 8), (0.1, 50), (0.0, 300))  # least size of a region over that of the rest, and its modes (thesis 6.3.2)
+CLIPPED = 0.02  # of the fit at either end: what follows less, or all but this, follows not at all, or wholly
+SMOOTHNESS = 1e-3  # of the untold part, against the fit of what is told
+
+
+@dataclass(frozen=True, eq=False)
+class Binding:
+    """Regions of a rig that handles can move.
+
+    Attributes
+    ----------
+    rig : EigenRig
+    regions : (r, n) bool
+    n_modes : (r,) int
+        Modes that spread the motion of each region.
+    distances : (r, n) float
+        Of each vertex from the boundary of each region, in length.
+    shares : (r, n) float
+        0 to 1: by how much of each handle's motion a vertex goes.
+    part : FreePart
+        What is free: where shares are neither 0 nor 1.
+    """
+
+    rig: EigenRig
+    regions: Bool[np.ndarray, "r n"]
+    n_modes: Int[np.ndarray, " r"]
+    distances: Float[np.ndarray, "r n"]
+    shares: Float[np.ndarray, "r n"]
+    part: FreePart
+
+
+def bind(
+    rig: EigenRig, regions: Sequence[Region], *, fixed: Region | None = None, n_modes: SupportsIndex | None = None
+) -> Binding:
+    """Find by how much each vertex follows the handles of some regions.
+
+    A region's indicator, fitted by the low modes, falls smoothly from 1 to 0 across its boundary: few modes spread the
+    bend far, many keep it near. Without `fixed`, all that is in no region stays as far as the fit lets it. With it,
+    the rest is free to follow: the fit knows the regions and what is fixed, and is smooth in between.
+
+    Parameters
+    ----------
+    rig : EigenRig
+    regions : sequence of regions
+        Disjoint; see `region_mask`.
+    fixed : region, optional
+        What must stay.
+    n_modes : int, optional
+        By default, with δ the extent of a region over that of the rest, both measured from its boundary: 8 if
+        δ ≥ .75, 50 if δ ≥ .1, else 300 (thesis 6.3.2); one more for each component beyond the first.
+
+    Returns
+    -------
+    Binding
+
+    Raises
+    ------
+    InvalidParameterError
+        If a region has no boundary, two share a vertex, or `n_modes` is not in 1..k.
+    """
+    masks = np.array([region_mask(rig.mesh, region) for region in regions]).reshape(-1, rig.mesh.n_vertices)
+    if not len(masks):
+        raise InvalidParameterError("There must be a region; none was given.")
+    told = np.ones(rig.mesh.n_vertices, dtype=bool) if fixed is None else region_mask(rig.mesh, fixed) | masks.any(0)
+    _require_disjoint(masks if fixed is None else np.vstack([masks, region_mask(rig.mesh, fixed)]))
+    rims = [require_boundary(rig.mesh, mask, number) for number, mask in enumerate(masks)]
+    distances = np.array([geodesic_distance_to_set(rig.mesh, rim) for rim in rims])
+    numbers = [_modes(rig, mask, away, n_modes) for mask, away in zip(masks, distances, strict=True)]
+    shares = np.array([_share(rig, mask, told, wanted) for mask, wanted in zip(masks, numbers, strict=True)])
+    shares /= np.maximum(shares.sum(axis=0), 1)
+    held = told & ((shares == 0).all(axis=0) | (shares == 1).any(axis=0))
+    return Binding(rig, masks, np.array(numbers), distances, shares, free_part(rig.edges, held))
+
+
+def _require_disjoint(masks: Bool[np.ndarray, "r n"]) -> None:
+    twice = np.flatnonzero(masks.sum(axis=0) > 1)
+    if twice.size:
+        raise InvalidParameterError(
+            f"Regions, and what is fixed, must not overlap; vertex {twice[0]} is in two of them ({twice.size} such)."
+        )
+
+
+def _modes(
+    rig: EigenRig, mask: Bool[np.ndarray, " n"], away: Float[np.ndarray, " n"], wanted: SupportsIndex | None
+) -> int:
+    if wanted is not None:
+        return whole_number(wanted, "n_modes", 1, rig.n_modes)
+    inside, outside = (np.max(away[part & np.isfinite(away)], initial=0.0) for part in (mask, ~mask))
+    by_rule = next(number for least, number in RULE if inside >= least * outside)
+    return min(by_rule + int(rig.components.max()), rig.n_modes)
+
+
+def _share(
+    rig: EigenRig, mask: Bool[np.ndarray, " n"], told: Bool[np.ndarray, " n"], n_modes: int
+) -> Float[np.ndarray, " n"]:
+    fit = _fit(rig, mask, told, n_modes)
+    low, high = max(CLIPPED, fit[told & ~mask].min()), min(1 - CLIPPED, fit[mask].max())
+    return np.clip((fit - low) / (high - low), 0, 1)
+
+
+def _fit(
+    rig: EigenRig, mask: Bool[np.ndarray, " n"], told: Bool[np.ndarray, " n"], n_modes: int
+) -> Float[np.ndarray, " n"]:
+    """Return the indicator of a region by the lowest modes: least squares by area where it is told, smooth elsewhere."""
+    modes, values = rig.eigenvectors[:, :n_modes], rig.eigenvalues[:n_modes]
+    goal = modes[mask].T @ rig.areas[mask]
+    if told.all():
+        return modes @ goal
+    gram = (modes[told] * rig.areas[told, None]).T @ modes[told]
+    stiff = SMOOTHNESS * rig.areas[told].sum() / rig.areas.sum() * (values / values[-1]) ** 2
+    return modes @ np.linalg.solve(gram + np.diag(stiff), goal)

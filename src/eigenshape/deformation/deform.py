@@ -1,0 +1,85 @@
+"""Bend a shape: a region of it follows a handle, and the rest follows smoothly."""
+
+from collections.abc import Sequence
+from typing import Literal, SupportsIndex, get_args
+
+from eigenshape._errors import InvalidParameterError
+from eigenshape.deformation.binding import Binding, bind
+from eigenshape.deformation.graded import graded
+from eigenshape.deformation.handles import Handle
+from eigenshape.deformation.region import Region
+from eigenshape.deformation.rig import EigenRig
+from eigenshape.deformation.skeleton import grip_skeleton
+from eigenshape.deformation.thesis import eigen_deformed
+from eigenshape.geometry.mesh import TriangleMesh
+
+Mode = Literal["graded", "thesis"]
+
+
+def deform(
+    rig: EigenRig,
+    region: Region,
+    handle: Handle,
+    *,
+    fixed: Region | None = None,
+    mode: Mode = "graded",
+    n_modes: SupportsIndex | None = None,
+) -> TriangleMesh:
+    """Turn or move a region of a shape; the rest follows smoothly, and details survive (thesis chapter 6).
+
+    For several edits of one region `bind` it once and `bend` it often; for several regions at once, the same.
+
+    Parameters
+    ----------
+    rig : EigenRig
+    region, fixed, n_modes
+        As for `bind`.
+    handle : Rotation or Translation
+    mode : "graded" or "thesis"
+        See `bend`.
+
+    Returns
+    -------
+    TriangleMesh
+        With the same faces.
+
+    Raises
+    ------
+    InvalidParameterError
+        As for `bind` and `bend`.
+    """
+    return bend(bind(rig, [region], fixed=fixed, n_modes=n_modes), [handle], mode=mode)
+
+
+def bend(binding: Binding, handles: Sequence[Handle], *, mode: Mode = "graded") -> TriangleMesh:
+    """Move bound regions by their handles.
+
+    Parameters
+    ----------
+    binding : Binding
+    handles : sequence of r Rotation or Translation
+        One for each region.
+    mode : "graded" or "thesis"
+        By graded rotations and as rigidly as possible; or by the thesis' least-squares fit and its details.
+
+    Returns
+    -------
+    TriangleMesh
+        With the same faces.
+
+    Raises
+    ------
+    InvalidParameterError
+        If there are more or fewer handles than regions, or the mode is another.
+    """
+    if len(handles) != len(binding.regions):
+        raise InvalidParameterError(
+            f"Each region must have one handle; there are {len(binding.regions)} regions and {len(handles)} handles."
+        )
+    if mode not in get_args(Mode):
+        raise InvalidParameterError(f"mode must be 'graded' or 'thesis'; it is {mode!r}.")
+    if mode == "thesis":
+        vertices = eigen_deformed(binding, grip_skeleton(binding), handles)
+    else:
+        vertices = graded(binding, handles)
+    return TriangleMesh(vertices, binding.rig.mesh.faces)

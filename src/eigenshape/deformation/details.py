@@ -1,0 +1,69 @@
+"""Details: what a skeleton lacks of its shape, kept in local frames and put back where it has moved (thesis 6.2.3)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from eigenshape.deformation.binding import Binding
+from eigenshape.deformation.handles import Handle, affine_offset
+from eigenshape.geometry.measure import vertex_normals
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.topology import edge_table
+
+Points = Float[np.ndarray, "n 3"]
+LEAST_TANGENT = 1e-6  # of an edge: below, it is along the normal, and frames no direction
+
+
+def details_by_frames(faces: Int[np.ndarray, "f 3"], before: Points, after: Points, details: Points) -> Points:
+    """Turn details with the local frames of a skeleton: its normal, and an edge that is as tangential as can be.
+
+    Where a frame is not told, before or after (the normal vanishes, or all edges are along it), a detail is not turned.
+    """
+    partner = _tangential_neighbors(TriangleMesh(before, faces))
+    (old, told), (new, still) = (_frames(TriangleMesh(points, faces), partner) for points in (before, after))
+    found = np.einsum("nji,njk,nk->ni", new, old, details)
+    return np.where((told & still)[:, None], found, details)
+
+
+def details_blended(binding: Binding, handles: Sequence[Handle], by_frames: Points, details: Points) -> Points:
+    """Blend details turned by frames, near the boundary of a region, with those turned by its handle (thesis 6.3.1)."""
+    by_handle, weight = details.copy(), np.zeros(len(details))
+    for mask, away, handle in zip(binding.regions, binding.distances, handles, strict=True):
+        by_handle[mask] += details[mask] @ affine_offset(handle)[:, :3].T
+        extent = away[mask & np.isfinite(away)].max()
+        weight = np.maximum(weight, _near(away, extent))
+    lengths = np.linalg.norm(details, axis=1, keepdims=True)
+    unit = np.divide(by_frames, lengths, out=np.zeros_like(details), where=lengths > 0)
+    other = np.divide(by_handle, lengths, out=np.zeros_like(details), where=lengths > 0)
+    return (weight[:, None] * unit + (1 - weight[:, None]) * other) * lengths
+
+
+def _near(away: Float[np.ndarray, " n"], extent: float) -> Float[np.ndarray, " n"]:
+    if extent == 0:  # the region is its own boundary
+        return (away == 0).astype(float)
+    return np.clip((extent / 4 - away) / (extent / 8), 0, 1)
+
+
+def _tangential_neighbors(skeleton: TriangleMesh) -> Int[np.ndarray, " n"]:
+    edges = edge_table(skeleton).edges
+    ends = np.concatenate([edges, edges[:, ::-1]])
+    arms = skeleton.vertices[ends[:, 1]] - skeleton.vertices[ends[:, 0]]
+    lengths, up = np.linalg.norm(arms, axis=1), vertex_normals(skeleton)[ends[:, 0]]
+    flat = np.linalg.norm(arms - np.einsum("ei,ei->e", arms, up)[:, None] * up, axis=1)
+    share = np.divide(flat, lengths, out=np.zeros_like(flat), where=lengths > 0)
+    order = np.lexsort((share, ends[:, 0]))
+    partner = np.empty(skeleton.n_vertices, dtype=np.int64)
+    partner[ends[order, 0]] = ends[order, 1]  # of several the last, which is the most tangential
+    return partner
+
+
+def _frames(
+    skeleton: TriangleMesh, partner: Int[np.ndarray, " n"]
+) -> tuple[Float[np.ndarray, "n 3 3"], Bool[np.ndarray, " n"]]:
+    normals, arms = vertex_normals(skeleton), skeleton.vertices[partner] - skeleton.vertices
+    flat = arms - np.einsum("ni,ni->n", arms, normals)[:, None] * normals
+    lengths, whole = np.linalg.norm(flat, axis=1, keepdims=True), np.linalg.norm(arms, axis=1)
+    told = normals.any(axis=1) & (lengths[:, 0] > LEAST_TANGENT * whole)
+    along = np.divide(flat, lengths, out=np.zeros_like(flat), where=told[:, None])
+    return np.stack([normals, along, np.cross(normals, along)], axis=1), told

@@ -1,0 +1,35 @@
+"""Graded deformation: vertices follow their handles by shares, and what lies between turns as rigidly as it can."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from eigenshape.deformation.binding import Binding
+from eigenshape.deformation.handles import Handle
+from eigenshape.deformation.rigidity import relax
+
+N_ROUNDS = 20
+
+
+def graded(
+    binding: Binding, handles: Sequence[Handle], *, n_rounds: int = N_ROUNDS
+) -> Float[np.ndarray, "n 3"]:
+    """Return the vertices where handles take them.
+
+    Each vertex turns and goes by its share s of a handle's motion, exp(s log r) for a rotation r, so that a twist
+    does not pinch (a fit of the turned coordinates would go straight through the axis). What has share 0 or 1 stays
+    there; in between, edges are made as rigid as possible.
+    """
+    rest = binding.rig.mesh.vertices
+    start = rest + sum(
+        (handle.carry(rest, share) for handle, share in zip(handles, binding.shares, strict=True)), np.zeros(3)
+    )
+    turns = quaternions(sum((np.outer(share, handle.turn) for handle, share in zip(handles, binding.shares, strict=True))))
+    return relax(binding.rig.edges, binding.part, rest, start, turns, n_rounds)
+
+
+def quaternions(turns: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 4"]:
+    """Return the unit quaternions, real part first, of axes times angles."""
+    angles = np.linalg.norm(turns, axis=1, keepdims=True)
+    return np.column_stack([np.cos(angles / 2), np.sinc(angles / (2 * np.pi)) / 2 * turns])

@@ -1,0 +1,126 @@
+"""Regions of a shape: the vertices that a handle moves, told by a mask, by indices, a box or a brush."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
+
+from eigenshape._arrays import frozen, positive_values, whole_number
+from eigenshape._errors import InvalidParameterError
+from eigenshape.deformation.handles import vector
+from eigenshape.geometry.geodesic import geodesic_distance_to_set
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.topology import edge_table
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Box:
+    """All vertices inside a box with sides along the axes.
+
+    Parameters
+    ----------
+    low, high : (3,) float
+        Opposite corners, in length; infinite ones leave a side open.
+    """
+
+    low: Float[np.ndarray, " 3"]
+    high: Float[np.ndarray, " 3"]
+
+    def __init__(self, low: ArrayLike, high: ArrayLike) -> None:
+        corners = [np.asarray(corner, dtype=np.float64) for corner in (low, high)]
+        for corner, name in zip(corners, ("low", "high"), strict=True):
+            if corner.shape != (3,) or np.isnan(corner).any():
+                raise InvalidParameterError(f"{name} must be three numbers; it is {corner.tolist()}.")
+        axis = np.flatnonzero(corners[0] > corners[1])
+        if axis.size:
+            raise InvalidParameterError(
+                f"low must lie below high; along axis {axis[0]} they are {corners[0][axis[0]]} and {corners[1][axis[0]]}."
+            )
+        object.__setattr__(self, "low", frozen(corners[0]))
+        object.__setattr__(self, "high", frozen(corners[1]))
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Brush:
+    """All vertices that lie within a length, along the surface, of the vertex next to a point.
+
+    Parameters
+    ----------
+    center : (3,) float
+        A point on the surface or near it, in length.
+    radius : float
+        In length.
+    """
+
+    center: Float[np.ndarray, " 3"]
+    radius: float
+
+    def __init__(self, center: ArrayLike, radius: float) -> None:
+        object.__setattr__(self, "center", frozen(vector(center, "center")))
+        object.__setattr__(self, "radius", float(positive_values(radius, "radius")[0]))
+
+
+Region = Box | Brush | np.ndarray | Iterable[int]
+
+
+def region_mask(mesh: TriangleMesh, region: Region) -> Bool[np.ndarray, " n"]:
+    """Tell which vertices of a shape a region holds.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    region : (n,) bool, (k,) int, Box or Brush
+        A mask, indices of vertices, or a place in space.
+
+    Returns
+    -------
+    (n,) bool
+
+    Raises
+    ------
+    InvalidParameterError
+        If a mask is of another length, or an index is no vertex.
+    """
+    if isinstance(region, Box):
+        return ((mesh.vertices >= region.low) & (mesh.vertices <= region.high)).all(axis=1)
+    if isinstance(region, Brush):
+        nearest = int(cKDTree(mesh.vertices).query(region.center)[1])
+        return geodesic_distance_to_set(mesh, [nearest], reach=region.radius) <= region.radius
+    chosen = np.asarray(region if isinstance(region, np.ndarray) else list(region))
+    if chosen.dtype == bool:
+        if chosen.shape != (mesh.n_vertices,):
+            raise InvalidParameterError(
+                f"A mask must have one entry a vertex, shape ({mesh.n_vertices},); the shape is {chosen.shape}."
+            )
+        return chosen
+    mask = np.zeros(mesh.n_vertices, dtype=bool)
+    mask[[whole_number(vertex, "A vertex of a region", 0, mesh.n_vertices - 1) for vertex in chosen.ravel()]] = True
+    return mask
+
+
+def region_boundary(mesh: TriangleMesh, mask: Bool[np.ndarray, " n"]) -> Int[np.ndarray, " b"]:
+    """Return the vertices of a region that have a neighbour outside it (thesis 6.3.1)."""
+    edges = edge_table(mesh).edges
+    across = edges[mask[edges[:, 0]] != mask[edges[:, 1]]]
+    return np.unique(across[mask[across]])
+
+
+def require_boundary(mesh: TriangleMesh, mask: Bool[np.ndarray, " n"], number: int) -> Int[np.ndarray, " b"]:
+    """Return the boundary of a region, and refuse one that has none.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the region is empty, all there is, or made of whole components.
+    """
+    rim = region_boundary(mesh, mask)
+    if len(rim):
+        return rim
+    what = "holds no vertex" if not mask.any() else f"holds {mask.sum()} of {len(mask)} vertices, whole components"
+    raise InvalidParameterError(
+        f"A region must have a boundary on the shape, where it bends; region {number} {what}. "
+        "What is to move as a whole needs no deformation."
+    )

@@ -1,0 +1,119 @@
+"""Compiled loops of `rigidity`: rotations that fit the edges at each vertex, and the edges turned by them."""
+
+from typing import no_type_check
+
+import numpy as np
+from numba import njit
+
+ROUNDS = 20
+SETTLED = 1e-6  # last turn, in radians; the one after it would be of its square
+LEAST = 1e-9  # share of the largest covariance that holds what no edge tells
+EPS = 1e-15
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def fit_rotations(vertices, starts, others, weights, rest, posed, turns):
+    """Turn the rotations (unit quaternions, real part first) of some vertices to where they fit the posed edges best.
+
+    max over R of Σ_j w_ij e'_ij · R e_ij, from the rotation that stands in `turns` on. Where edges do not tell a
+    rotation, it keeps what it had. Returns what is left, Σ_ij w_ij |R_i e_ij - e'_ij|² / 2.
+    """
+    covariance = np.empty((3, 3))
+    left = 0.0
+    for i in vertices:
+        covariance[:] = 0.0
+        for k in range(starts[i], starts[i + 1]):
+            j, w = others[k], weights[k]
+            for a in range(3):
+                before = w * (rest[j, a] - rest[i, a])
+                for b in range(3):
+                    covariance[a, b] += before * (posed[j, b] - posed[i, b])
+        _settle(covariance, turns, i)
+        w, x, y, z = turns[i]
+        for k in range(starts[i], starts[i + 1]):
+            j = others[k]
+            a, b, c = rest[j, 0] - rest[i, 0], rest[j, 1] - rest[i, 1], rest[j, 2] - rest[i, 2]
+            u, v, t = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+            a += w * u + y * t - z * v - (posed[j, 0] - posed[i, 0])
+            b += w * v + z * u - x * t - (posed[j, 1] - posed[i, 1])
+            c += w * t + x * v - y * u - (posed[j, 2] - posed[i, 2])
+            left += weights[k] * (a * a + b * b + c * c)
+    return left / 2
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def _settle(covariance, turns, i):
+    """Climb by Newton's steps, and by steps that cannot overshoot where the function is not concave."""
+    w, x, y, z = turns[i]
+    largest = np.abs(covariance).max()
+    for _ in range(ROUNDS if largest > 0.0 else 0):
+        m00, m01, m02 = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
+        m10, m11, m12 = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
+        m20, m21, m22 = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+        p00 = m00 * covariance[0, 0] + m01 * covariance[1, 0] + m02 * covariance[2, 0]
+        p01 = m00 * covariance[0, 1] + m01 * covariance[1, 1] + m02 * covariance[2, 1]
+        p02 = m00 * covariance[0, 2] + m01 * covariance[1, 2] + m02 * covariance[2, 2]
+        p10 = m10 * covariance[0, 0] + m11 * covariance[1, 0] + m12 * covariance[2, 0]
+        p11 = m10 * covariance[0, 1] + m11 * covariance[1, 1] + m12 * covariance[2, 1]
+        p12 = m10 * covariance[0, 2] + m11 * covariance[1, 2] + m12 * covariance[2, 2]
+        p20 = m20 * covariance[0, 0] + m21 * covariance[1, 0] + m22 * covariance[2, 0]
+        p21 = m20 * covariance[0, 1] + m21 * covariance[1, 1] + m22 * covariance[2, 1]
+        p22 = m20 * covariance[0, 2] + m21 * covariance[1, 2] + m22 * covariance[2, 2]
+        u, v, t = p12 - p21, p20 - p02, p01 - p10
+        size = np.sqrt(u * u + v * v + t * t)
+        if size <= EPS * largest:
+            break
+        floor = LEAST * largest
+        a, b, c = p11 + p22 + floor, p00 + p22 + floor, p00 + p11 + floor
+        d, e, f = -(p01 + p10) / 2, -(p02 + p20) / 2, -(p12 + p21) / 2
+        second = a * b - d * d
+        third = second * c - a * f * f + 2 * d * e * f - b * e * e
+        if a > 0.0 and second > 0.0 and third > 0.0:
+            u, v, t = (
+                (u * (b * c - f * f) + v * (e * f - d * c) + t * (d * f - b * e)) / third,
+                (u * (e * f - d * c) + v * (a * c - e * e) + t * (d * e - a * f)) / third,
+                (u * (d * f - b * e) + v * (d * e - a * f) + t * second) / third,
+            )
+            angle = np.sqrt(u * u + v * v + t * t)
+        else:
+            angle = np.arctan2(size, abs(p00 + p11 + p22))
+            u, v, t = u * angle / size, v * angle / size, t * angle / size
+        half = min(angle, 1.5) / 2
+        scale = np.sin(half) / angle
+        c, u, v, t = np.cos(half), u * scale, v * scale, t * scale
+        w, x, y, z = (
+            c * w - u * x - v * y - t * z,
+            c * x + u * w + v * z - t * y,
+            c * y - u * z + v * w + t * x,
+            c * z + u * y - v * x + t * w,
+        )
+        norm = np.sqrt(w * w + x * x + y * y + z * z)
+        w, x, y, z = w / norm, x / norm, y / norm, z / norm
+        if angle < SETTLED:
+            break
+    turns[i, 0], turns[i, 1], turns[i, 2], turns[i, 3] = w, x, y, z
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def turned_edges(vertices, starts, others, weights, rest, turns, sums):
+    """Write Σ_j w_ij ((R_i + R_j)/2 - 1) (x_i - x_j) for some vertices; nothing where nothing turns."""
+    n = len(starts) - 1
+    spin = np.empty((n, 9))
+    for i in range(n):
+        w, x, y, z = turns[i]
+        spin[i, 0], spin[i, 1], spin[i, 2] = -(y * y + z * z), x * y - w * z, x * z + w * y
+        spin[i, 3], spin[i, 4], spin[i, 5] = x * y + w * z, -(x * x + z * z), y * z - w * x
+        spin[i, 6], spin[i, 7], spin[i, 8] = x * z - w * y, y * z + w * x, -(x * x + y * y)
+    for place, i in enumerate(vertices):
+        a = b = c = 0.0
+        for k in range(starts[i], starts[i + 1]):
+            j, weight = others[k], weights[k]
+            x, y, z = rest[i, 0] - rest[j, 0], rest[i, 1] - rest[j, 1], rest[i, 2] - rest[j, 2]
+            p, q = spin[i], spin[j]
+            a += weight * ((p[0] + q[0]) * x + (p[1] + q[1]) * y + (p[2] + q[2]) * z)
+            b += weight * ((p[3] + q[3]) * x + (p[4] + q[4]) * y + (p[5] + q[5]) * z)
+            c += weight * ((p[6] + q[6]) * x + (p[7] + q[7]) * y + (p[8] + q[8]) * z)
+        sums[place, 0], sums[place, 1], sums[place, 2] = a, b, c
