@@ -13,6 +13,15 @@ from eigenshape._errors import (
     MissingExtraError,
     StoreError,
 )
+from eigenshape.deformation.binding import Binding, bind
+from eigenshape.deformation.deform import bend, deform
+from eigenshape.deformation.edits import Edit, Move, apply_edit
+from eigenshape.deformation.handles import Rotation, Translation, rotation_by_drag
+from eigenshape.deformation.peers import as_rigid_as_possible, biharmonic_blend, spectral_rigid
+from eigenshape.deformation.region import Box, Brush, region_boundary, region_mask
+from eigenshape.deformation.rig import EigenRig, eigen_skeleton, rig_shape
+from eigenshape.deformation.session import DeformationSession, replay
+from eigenshape.deformation.skeleton import SkeletonGrip, grip_skeleton, moved_skeleton
 from eigenshape.features.bottleneck import bottleneck_distance
 from eigenshape.features.boundaries import smooth_boundaries
 from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs, persistence_diagram
@@ -30,6 +39,7 @@ from eigenshape.figures.fields import (
     value_colors,
 )
 from eigenshape.figures.persistence import figure_diagram, figure_merge_tree
+from eigenshape.figures.poses import figure_poses
 from eigenshape.figures.save import save_figure
 from eigenshape.figures.sheet import Panel, figure_contact_sheet, figure_label_transfer
 from eigenshape.figures.spectra import figure_spectrum
@@ -48,7 +58,12 @@ from eigenshape.geometry.exact import (
     sphere_eigenvalues,
 )
 from eigenshape.geometry.facets import FacetTable, facet_table
-from eigenshape.geometry.geodesic import farthest_points, geodesic_balls, geodesic_distances
+from eigenshape.geometry.geodesic import (
+    farthest_points,
+    geodesic_balls,
+    geodesic_distance_to_set,
+    geodesic_distances,
+)
 from eigenshape.geometry.measure import (
     edge_lengths,
     enclosed_volume,
@@ -102,6 +117,7 @@ from eigenshape.geometry.topology import (
     vertex_components,
 )
 from eigenshape.io.bridges import from_arrays, from_pyvista, from_trimesh, to_arrays, to_pyvista, to_trimesh
+from eigenshape.io.edits import read_edits, write_edits
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.io.shape_files import read_points, read_shape, write_points
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
@@ -177,15 +193,21 @@ __all__ = [
     "USUAL",
     "ApproximateSignature",
     "BatchReport",
+    "Binding",
+    "Box",
     "Brackets",
+    "Brush",
     "Camera",
     "Certificate",
     "ConvergenceError",
+    "DeformationSession",
     "DepthCamera",
     "DepthScan",
     "DescribedLargeShape",
     "DescribedShape",
     "EdgeTable",
+    "Edit",
+    "EigenRig",
     "EigenshapeError",
     "FacetTable",
     "FeaturePoints",
@@ -202,6 +224,7 @@ __all__ = [
     "MergeTree",
     "MeshPart",
     "MissingExtraError",
+    "Move",
     "NotJudged",
     "Operator",
     "OperatorReport",
@@ -220,22 +243,30 @@ __all__ = [
     "Recipe",
     "Record",
     "Repaired",
+    "Rotation",
     "Segmentation",
     "ShapeDescriptor",
     "ShapeIndex",
     "SimplicialMesh",
+    "SkeletonGrip",
     "Spectrum",
     "StoreError",
+    "Translation",
     "TriangleMesh",
     "Workers",
     "affinity_distance",
     "affinity_eigenvalues",
     "anisotropic_laplacian",
+    "apply_edit",
     "approximate_heat_kernel_signature",
     "approximate_spectrum",
+    "as_rigid_as_possible",
     "average_geodesic_distance",
     "ball",
     "ball_eigenvalues",
+    "bend",
+    "biharmonic_blend",
+    "bind",
     "bottleneck_distance",
     "boundary_edges",
     "boundary_loops",
@@ -257,6 +288,7 @@ __all__ = [
     "cut_by_planes",
     "default_energies",
     "default_times",
+    "deform",
     "denoise",
     "describe",
     "describe_large_mesh",
@@ -277,6 +309,7 @@ __all__ = [
     "edge_graph",
     "edge_lengths",
     "edge_table",
+    "eigen_skeleton",
     "enclosed_volume",
     "encode_patches",
     "euler_characteristic",
@@ -294,6 +327,7 @@ __all__ = [
     "figure_field",
     "figure_label_transfer",
     "figure_merge_tree",
+    "figure_poses",
     "figure_segments",
     "figure_spectrum",
     "find_parts",
@@ -305,10 +339,12 @@ __all__ = [
     "gaussian_curvature",
     "gaussian_laplacian",
     "geodesic_balls",
+    "geodesic_distance_to_set",
     "geodesic_distances",
     "graded_sphere",
     "graph_laplacian",
     "grid",
+    "grip_skeleton",
     "heat_kernel_signature",
     "icosphere",
     "in_words",
@@ -331,6 +367,7 @@ __all__ = [
     "merge_tree",
     "mesh_laplacian",
     "mesh_quadrature",
+    "moved_skeleton",
     "neighbor_graph",
     "noise_level",
     "normalize_area",
@@ -352,12 +389,18 @@ __all__ = [
     "random_planes",
     "random_sphere",
     "read_codebook",
+    "read_edits",
     "read_mesh",
     "read_points",
     "read_shape",
     "reflection_free_signature",
+    "region_boundary",
+    "region_mask",
     "repair",
+    "replay",
+    "rig_shape",
     "robust_laplacian",
+    "rotation_by_drag",
     "save_figure",
     "scale_invariant_heat_kernel_signature",
     "seal_holes",
@@ -370,6 +413,7 @@ __all__ = [
     "smooth_boundaries",
     "solve_dirichlet",
     "solve_spectrum",
+    "spectral_rigid",
     "sphere_eigenvalues",
     "sphere_hull",
     "sphere_quadrature",
@@ -395,6 +439,7 @@ __all__ = [
     "weld",
     "word_distances",
     "write_codebook",
+    "write_edits",
     "write_mesh",
     "write_points",
 ]

@@ -117,7 +117,7 @@ def _share(
 def _fit(
     rig: EigenRig, mask: Bool[np.ndarray, " n"], told: Bool[np.ndarray, " n"], n_modes: int
 ) -> Float[np.ndarray, " n"]:
-    """Return the indicator of a region by the lowest modes: least squares by area where it is told, smooth elsewhere."""
+    """Return a region's indicator by the lowest modes: least squares by area where it is told, smooth elsewhere."""
     modes, values = rig.eigenvectors[:, :n_modes], rig.eigenvalues[:n_modes]
     goal = modes[mask].T @ rig.areas[mask]
     if told.all():

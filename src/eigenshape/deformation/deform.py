@@ -1,7 +1,7 @@
 """Bend a shape: a region of it follows a handle, and the rest follows smoothly."""
 
 from collections.abc import Sequence
-from typing import Literal, SupportsIndex, get_args
+from typing import Literal, SupportsIndex, cast, get_args
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.binding import Binding, bind
@@ -76,10 +76,20 @@ def bend(binding: Binding, handles: Sequence[Handle], *, mode: Mode = "graded") 
         raise InvalidParameterError(
             f"Each region must have one handle; there are {len(binding.regions)} regions and {len(handles)} handles."
         )
-    if mode not in get_args(Mode):
-        raise InvalidParameterError(f"mode must be 'graded' or 'thesis'; it is {mode!r}.")
-    if mode == "thesis":
+    if require_mode(mode) == "thesis":
         vertices = eigen_deformed(binding, grip_skeleton(binding), handles)
     else:
         vertices = graded(binding, handles)
     return TriangleMesh(vertices, binding.rig.mesh.faces)
+
+
+def require_mode(mode: str) -> Mode:
+    """Return the mode, or refuse another.
+
+    Raises
+    ------
+    InvalidParameterError
+    """
+    if mode not in get_args(Mode):
+        raise InvalidParameterError(f"mode must be 'graded' or 'thesis'; it is {mode!r}.")
+    return cast(Mode, mode)

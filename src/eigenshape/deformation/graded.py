@@ -12,21 +12,23 @@ from eigenshape.deformation.rigidity import relax
 N_ROUNDS = 20
 
 
-def graded(
-    binding: Binding, handles: Sequence[Handle], *, n_rounds: int = N_ROUNDS
-) -> Float[np.ndarray, "n 3"]:
+def graded(binding: Binding, handles: Sequence[Handle], *, n_rounds: int = N_ROUNDS) -> Float[np.ndarray, "n 3"]:
     """Return the vertices where handles take them.
 
     Each vertex turns and goes by its share s of a handle's motion, exp(s log r) for a rotation r, so that a twist
     does not pinch (a fit of the turned coordinates would go straight through the axis). What has share 0 or 1 stays
     there; in between, edges are made as rigid as possible.
     """
-    rest = binding.rig.mesh.vertices
-    start = rest + sum(
-        (handle.carry(rest, share) for handle, share in zip(handles, binding.shares, strict=True)), np.zeros(3)
-    )
-    turns = quaternions(sum((np.outer(share, handle.turn) for handle, share in zip(handles, binding.shares, strict=True))))
-    return relax(binding.rig.edges, binding.part, rest, start, turns, n_rounds)
+    pairs = zip(handles, binding.shares, strict=True)
+    turns = quaternions(sum((np.outer(share, handle.turn) for handle, share in pairs), np.zeros(3)))
+    start = shared_motion(binding, handles)
+    return relax(binding.rig.edges, binding.part, binding.rig.mesh.vertices, start, turns, n_rounds)
+
+
+def shared_motion(binding: Binding, handles: Sequence[Handle]) -> Float[np.ndarray, "n 3"]:
+    """Return the vertices where their shares of all motions take them."""
+    rest, pairs = binding.rig.mesh.vertices, zip(handles, binding.shares, strict=True)
+    return rest + sum((handle.carry(rest, share) for handle, share in pairs), np.zeros(3))
 
 
 def quaternions(turns: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 4"]:

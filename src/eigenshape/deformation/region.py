@@ -36,9 +36,8 @@ class Box:
                 raise InvalidParameterError(f"{name} must be three numbers; it is {corner.tolist()}.")
         axis = np.flatnonzero(corners[0] > corners[1])
         if axis.size:
-            raise InvalidParameterError(
-                f"low must lie below high; along axis {axis[0]} they are {corners[0][axis[0]]} and {corners[1][axis[0]]}."
-            )
+            below, above = (corner[axis[0]] for corner in corners)
+            raise InvalidParameterError(f"low must lie below high; along axis {axis[0]} they are {below} and {above}.")
         object.__setattr__(self, "low", frozen(corners[0]))
         object.__setattr__(self, "high", frozen(corners[1]))
 
@@ -85,10 +84,11 @@ def region_mask(mesh: TriangleMesh, region: Region) -> Bool[np.ndarray, " n"]:
         If a mask is of another length, or an index is no vertex.
     """
     if isinstance(region, Box):
-        return ((mesh.vertices >= region.low) & (mesh.vertices <= region.high)).all(axis=1)
+        inside = (mesh.vertices >= region.low) & (mesh.vertices <= region.high)
+        return np.asarray(inside.all(axis=1))
     if isinstance(region, Brush):
         nearest = int(cKDTree(mesh.vertices).query(region.center)[1])
-        return geodesic_distance_to_set(mesh, [nearest], reach=region.radius) <= region.radius
+        return np.asarray(geodesic_distance_to_set(mesh, [nearest], reach=region.radius) <= region.radius)
     chosen = np.asarray(region if isinstance(region, np.ndarray) else list(region))
     if chosen.dtype == bool:
         if chosen.shape != (mesh.n_vertices,):

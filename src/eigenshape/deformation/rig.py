@@ -8,13 +8,14 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 from scipy.linalg import cho_solve
+from threadpoolctl import threadpool_limits
 
 from eigenshape._arrays import finite_rows, frozen, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.rigidity import EdgeWeights, edge_weights
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
-from eigenshape.geometry.topology import edge_table, vertex_components
+from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
@@ -37,7 +38,8 @@ class EigenRig:
     areas : (n,) float
         Of the vertices, in length².
     factor : (k, k) float
-        Lower Cholesky factor of the Gram matrix ΦᵀΦ; its leading part is that of fewer modes (thesis 6.3.4).
+        Lower triangular, with factor factorᵀ = ΦᵀΦ, the Gram matrix; its leading part is that of fewer modes
+        (thesis 6.3.4).
     edges : EdgeWeights
     """
 
@@ -57,11 +59,6 @@ class EigenRig:
     def components(self) -> Int[np.ndarray, " n"]:
         """The number of each vertex' component."""
         return vertex_components(self.mesh)[1]
-
-    @cached_property
-    def links(self) -> Int[np.ndarray, "e 2"]:
-        """The edges."""
-        return edge_table(self.mesh).edges
 
 
 def rig_shape(mesh: TriangleMesh, spectrum: Spectrum | None = None) -> EigenRig:
@@ -93,7 +90,8 @@ def rig_shape(mesh: TriangleMesh, spectrum: Spectrum | None = None) -> EigenRig:
     modes = spectrum.eigenvectors
     if len(modes) != mesh.n_vertices:
         raise InvalidParameterError(f"The spectrum is of {len(modes)} vertices, the shape has {mesh.n_vertices}.")
-    factor = np.linalg.cholesky(modes.T @ modes)
+    with threadpool_limits(1, user_api="blas"):  # so that no digit depends on the number of threads
+        factor = np.linalg.qr(modes, mode="r").T  # of the Gram matrix too, without squaring how unequal areas are
     edges = edge_weights(laplacian.stiffness)
     return EigenRig(mesh, modes, spectrum.eigenvalues, frozen(dual_volumes(mesh)), frozen(factor), edges)
 

@@ -94,10 +94,17 @@ def free_part(edges: EdgeWeights, held: Bool[np.ndarray, " n"]) -> FreePart:
     free = np.flatnonzero(~held)
     rows = edges.matrix[free]
     fitted = np.unique(np.concatenate([free, rows.indices])).astype(np.int64)
-    return FreePart(free, fitted, rows, _factored(rows[:, free]) if len(free) else None)
+    return FreePart(free, fitted, rows, factored(rows[:, free]) if len(free) else None)
 
 
-def _factored(square: sp.csr_array) -> SymmetricFactor:
+def factored(square: sp.csr_array) -> SymmetricFactor:
+    """Factor the equations of what is free.
+
+    Raises
+    ------
+    InvalidShapeError
+        If they are not positive definite.
+    """
     matrix = square.tocsc()
     matrix.sort_indices()
     with threadpool_limits(1, user_api="blas"):  # so that no digit depends on the number of threads

@@ -1,0 +1,57 @@
+"""Poses of one shape side by side: the same view, the same scale."""
+
+from collections.abc import Mapping
+from itertools import product
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.figure import Figure
+
+from eigenshape.figures.camera import Camera, three_quarter_view
+from eigenshape.figures.fields import PANEL, show
+from eigenshape.figures.render import draw
+from eigenshape.geometry.mesh import TriangleMesh
+
+N_COLUMNS = 4
+MOVED = LinearSegmentedColormap.from_list("moved", ["#c9c9c9", "#f3c27b", "#d9541e"])
+
+
+def figure_poses(
+    poses: Mapping[str, TriangleMesh], shares: Float[np.ndarray, " n"], *, camera: Camera | None = None
+) -> Figure:
+    """Draw poses of one shape in a common frame, coloured by how much of a motion each vertex was to follow.
+
+    Parameters
+    ----------
+    poses : mapping of titles to TriangleMesh
+        With the same faces; the first one chooses the view.
+    shares : (n,) float
+        0 to 1; of `Binding.shares`.
+    camera : Camera, optional
+    """
+    rest = next(iter(poses.values()))
+    camera = camera or three_quarter_view(rest)
+    columns = min(len(poses), N_COLUMNS)
+    rows = -(-len(poses) // columns)
+    size = 1.5 * PANEL
+    figure = Figure(figsize=(size * columns + 0.8, (size + 0.3) * rows), layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False)
+    corners = _frame(list(poses.values()), camera)
+    colors = np.asarray(MOVED(np.append(shares, np.zeros(len(corners)))))[:, :3]
+    for axes in grid.flat:
+        axes.set_axis_off()
+    for axes, (title, mesh) in zip(grid.flat, poses.items(), strict=False):
+        framed = TriangleMesh(np.vstack([mesh.vertices, corners]), mesh.faces)
+        show(axes, draw(framed, camera, vertex_colors=colors))
+        axes.set_title(title, fontsize=10)
+    bar = figure.colorbar(ScalarMappable(Normalize(0, 1), MOVED), ax=grid.ravel().tolist(), shrink=0.6, pad=0.01)
+    bar.set_label("share of the motion")
+    return figure
+
+
+def _frame(meshes: list[TriangleMesh], camera: Camera) -> Float[np.ndarray, "8 3"]:
+    """Return the corners of the box, along the camera's axes, that holds all poses: pictures fit what they show."""
+    seen = np.vstack([mesh.vertices @ camera.rotation.T for mesh in meshes])
+    return np.array(list(product(*zip(seen.min(axis=0), seen.max(axis=0), strict=True)))) @ camera.rotation
