@@ -90,7 +90,8 @@ def _edit_out(edit: Edit) -> dict[str, Any]:
 
 def _region_out(region: Region) -> dict[str, Any]:
     if isinstance(region, Box):
-        return {"kind": "box", "low": region.low.tolist(), "high": region.high.tolist()}
+        low, high = ([value if np.isfinite(value) else None for value in c.tolist()] for c in (region.low, region.high))
+        return {"kind": "box", "low": low, "high": high}  # JSON has no infinity
     if isinstance(region, Brush):
         return {"kind": "brush", "center": region.center.tolist(), "radius": region.radius}
     chosen = np.asarray(region)
@@ -137,11 +138,15 @@ def _edit_in(entry: Mapping[str, Any], n_vertices: int) -> Edit:
 
 def _region_in(entry: Mapping[str, Any], n_vertices: int) -> Region:
     readers: dict[str, Callable[[], Region]] = {
-        "box": lambda: Box(entry["low"], entry["high"]),
+        "box": lambda: Box(_or_open(entry["low"], -np.inf), _or_open(entry["high"], np.inf)),
         "brush": lambda: Brush(entry["center"], entry["radius"]),
         "vertices": lambda: np.array([whole_number(v, "A vertex", 0, n_vertices - 1) for v in entry["vertices"]]),
     }
     return readers[entry["kind"]]()
+
+
+def _or_open(corner: Sequence[float | None], end: float) -> list[float]:
+    return [end if value is None else value for value in corner]
 
 
 def _handle_in(entry: Mapping[str, Any]) -> Handle:

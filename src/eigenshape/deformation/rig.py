@@ -91,7 +91,9 @@ def rig_shape(mesh: TriangleMesh, spectrum: Spectrum | None = None) -> EigenRig:
     if len(modes) != mesh.n_vertices:
         raise InvalidParameterError(f"The spectrum is of {len(modes)} vertices, the shape has {mesh.n_vertices}.")
     with threadpool_limits(1, user_api="blas"):  # so that no digit depends on the number of threads
-        factor = np.linalg.qr(modes, mode="r").T  # of the Gram matrix too, without squaring how unequal areas are
+        factor = np.asarray(
+            np.linalg.qr(modes, mode="r")
+        ).T  # of the Gram matrix too, without squaring how unequal areas are
     edges = edge_weights(laplacian.stiffness)
     return EigenRig(mesh, modes, spectrum.eigenvalues, frozen(dual_volumes(mesh)), frozen(factor), edges)
 
