@@ -15,6 +15,7 @@ from eigenshape._errors import (
 )
 from eigenshape.deformation.binding import Binding, bind
 from eigenshape.deformation.deform import bend, deform
+from eigenshape.deformation.distortion import Distortion, measure_distortion
 from eigenshape.deformation.edits import Edit, Move, apply_edit
 from eigenshape.deformation.handles import Rotation, Translation, rotation_by_drag
 from eigenshape.deformation.peers import as_rigid_as_possible, biharmonic_blend, spectral_rigid
@@ -205,6 +206,7 @@ __all__ = [
     "DepthScan",
     "DescribedLargeShape",
     "DescribedShape",
+    "Distortion",
     "EdgeTable",
     "Edit",
     "EigenRig",
@@ -363,6 +365,7 @@ __all__ = [
     "matching_score",
     "mean_curvature",
     "mean_side_length",
+    "measure_distortion",
     "merge_targets",
     "merge_tree",
     "mesh_laplacian",

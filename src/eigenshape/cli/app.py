@@ -3,6 +3,7 @@
 import typer
 
 from eigenshape.cli.console import Verbs
+from eigenshape.cli.deform import deform
 from eigenshape.cli.demo import demo
 from eigenshape.cli.features import features
 from eigenshape.cli.index import index
@@ -21,5 +22,5 @@ app = typer.Typer(
     epilog="Exit codes: 0 done, 1 an error named on stderr, 2 wrong usage, 3 some shapes could not be taken, "
     "130 stopped by Ctrl-C.",
 )
-for verb in (info, spectrum, operators, features, segment, label, index, query, demo):
+for verb in (info, spectrum, operators, features, segment, label, deform, index, query, demo):
     app.command(no_args_is_help=verb not in (demo, operators))(verb)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from eigenshape._arrays import whole_number
-from eigenshape._errors import FileFormatError, InvalidParameterError
+from eigenshape._errors import FileFormatError
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import Mode, bend, require_mode
 from eigenshape.deformation.handles import Handle, Rotation, Translation
@@ -102,9 +102,7 @@ def _handle_out(handle: Handle) -> dict[str, Any]:
     if isinstance(handle, Rotation):
         pivot, axis = handle.pivot.tolist(), handle.axis.tolist()
         return {"kind": "rotation", "pivot": pivot, "axis": axis, "angle": handle.angle}
-    if isinstance(handle, Translation):
-        return {"kind": "translation", "vector": handle.vector.tolist()}
-    raise InvalidParameterError(f"Rotations and translations are kept; a handle is a {type(handle).__name__}.")
+    return {"kind": "translation", "vector": handle.vector.tolist()}
 
 
 def edits_from_json(content: Any) -> tuple[int, list[Edit]]:

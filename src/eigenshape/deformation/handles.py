@@ -1,7 +1,6 @@
 """Handles: how a region is to be moved, and by how much of that."""
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float
@@ -9,24 +8,6 @@ from numpy.typing import ArrayLike
 
 from eigenshape._arrays import finite_values, frozen
 from eigenshape._errors import InvalidParameterError
-
-
-class Handle(Protocol):
-    """A rigid motion that can be done in part."""
-
-    @property
-    def turn(self) -> Float[np.ndarray, " 3"]:
-        """Axis times angle, in radians."""
-
-    def carry(self, points: Float[np.ndarray, "n 3"], share: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
-        """Return how far each point goes by its share of the motion."""
-
-
-def affine_offset(handle: Handle) -> Float[np.ndarray, "3 4"]:
-    """Return D with D [x, 1] = how far the whole motion takes x."""
-    origin, corners = np.zeros((1, 3)), np.eye(3)
-    shift = handle.carry(origin, np.ones(1))
-    return np.column_stack([(handle.carry(corners, np.ones(3)) - shift).T, shift[0]])
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -103,6 +84,16 @@ class Translation:
     def carry(self, points: Float[np.ndarray, "n 3"], share: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
         """Return the share of the vector by which each point goes."""
         return share[:, None] * self.vector
+
+
+Handle = Rotation | Translation
+
+
+def affine_offset(handle: Handle) -> Float[np.ndarray, "3 4"]:
+    """Return D with D [x, 1] = how far the whole motion takes x."""
+    origin, corners = np.zeros((1, 3)), np.eye(3)
+    shift = handle.carry(origin, np.ones(1))
+    return np.column_stack([(handle.carry(corners, np.ones(3)) - shift).T, shift[0]])
 
 
 def rotation_by_drag(pivot: ArrayLike, start: ArrayLike, end: ArrayLike) -> Rotation:

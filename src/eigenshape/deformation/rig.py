@@ -17,6 +17,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.spectral.outcome import Progress
 from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
@@ -61,7 +62,7 @@ class EigenRig:
         return vertex_components(self.mesh)[1]
 
 
-def rig_shape(mesh: TriangleMesh, spectrum: Spectrum | None = None) -> EigenRig:
+def rig_shape(mesh: TriangleMesh, spectrum: Spectrum | None = None, *, progress: Progress | None = None) -> EigenRig:
     """Prepare a shape for many edits.
 
     Parameters
@@ -71,6 +72,8 @@ def rig_shape(mesh: TriangleMesh, spectrum: Spectrum | None = None) -> EigenRig:
     spectrum : Spectrum, optional
         Of any operator of the shape (the thesis takes the mesh Laplacian); by default the 300 lowest modes of the
         cotangent Laplacian, and one more for each component beyond the first.
+    progress : callable, optional
+        As for `solve_spectrum`.
 
     Returns
     -------
@@ -86,7 +89,7 @@ def rig_shape(mesh: TriangleMesh, spectrum: Spectrum | None = None) -> EigenRig:
     laplacian = cotangent_laplacian(mesh)
     if spectrum is None:
         n_components, _ = vertex_components(mesh)
-        spectrum = solve_spectrum(laplacian, min(N_MODES + n_components - 1, mesh.n_vertices))
+        spectrum = solve_spectrum(laplacian, min(N_MODES + n_components - 1, mesh.n_vertices), progress=progress)
     modes = spectrum.eigenvectors
     if len(modes) != mesh.n_vertices:
         raise InvalidParameterError(f"The spectrum is of {len(modes)} vertices, the shape has {mesh.n_vertices}.")

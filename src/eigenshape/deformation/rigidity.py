@@ -167,6 +167,15 @@ def relax(
     return found
 
 
+def fitted_turns(edges: EdgeWeights, rest: Points, posed: Points) -> Float[np.ndarray, "n 3 3"]:
+    """Return the rotation of each vertex that fits its edges best, by singular values, from no start."""
+    one, two = np.repeat(np.arange(len(rest)), np.diff(edges.starts)), edges.others
+    products = np.einsum("e,ei,ej->eij", edges.weights, posed[two] - posed[one], rest[two] - rest[one])
+    left, _, right = np.linalg.svd(np.add.reduceat(products, edges.starts[:-1]))
+    left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
+    return np.asarray(left @ right)
+
+
 def _mixed(steps: Sequence[Step]) -> Points:
     """Return the combination of solutions whose combined change is least (Anderson 1965)."""
     changes = np.array([change.ravel() for change, _ in steps])

@@ -15,8 +15,6 @@ def write_edits(edits: Sequence[Edit], mesh: TriangleMesh, path: str | Path) -> 
 
     Raises
     ------
-    InvalidParameterError
-        If a handle is neither a rotation nor a translation.
     OSError
         If the system cannot write there.
     """
