@@ -23,6 +23,7 @@ from eigenshape.deformation.region import Box, Brush, region_boundary, region_ma
 from eigenshape.deformation.rig import EigenRig, eigen_skeleton, rig_shape
 from eigenshape.deformation.session import DeformationSession, replay
 from eigenshape.deformation.skeleton import SkeletonGrip, grip_skeleton, moved_skeleton
+from eigenshape.deformation.thesis import eigen_deformed
 from eigenshape.features.bottleneck import bottleneck_distance
 from eigenshape.features.boundaries import smooth_boundaries
 from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs, persistence_diagram
@@ -311,6 +312,7 @@ __all__ = [
     "edge_graph",
     "edge_lengths",
     "edge_table",
+    "eigen_deformed",
     "eigen_skeleton",
     "enclosed_volume",
     "encode_patches",

@@ -26,17 +26,27 @@ def details_by_frames(faces: Int[np.ndarray, "f 3"], before: Points, after: Poin
     return np.where((told & still)[:, None], found, details)
 
 
-def details_blended(binding: Binding, handles: Sequence[Handle], by_frames: Points, details: Points) -> Points:
-    """Blend details turned by frames, near the boundary of a region, with those turned by its handle (thesis 6.3.1)."""
-    by_handle, weight = details.copy(), np.zeros(len(details))
-    for mask, away, handle in zip(binding.regions, binding.distances, handles, strict=True):
-        by_handle[mask] += details[mask] @ affine_offset(handle)[:, :3].T
-        extent = away[mask & np.isfinite(away)].max()
-        weight = np.maximum(weight, _near(away, extent))
-    lengths = np.linalg.norm(details, axis=1, keepdims=True)
-    unit = np.divide(by_frames, lengths, out=np.zeros_like(details), where=lengths > 0)
-    other = np.divide(by_handle, lengths, out=np.zeros_like(details), where=lengths > 0)
-    return (weight[:, None] * unit + (1 - weight[:, None]) * other) * lengths
+def details_by_handles(binding: Binding, handles: Sequence[Handle], details: Points) -> Points:
+    """Turn details inside regions with their handles."""
+    turned = details.copy()
+    for mask, handle in zip(binding.regions, handles, strict=True):
+        turned[mask] += details[mask] @ affine_offset(handle)[:, :3].T
+    return turned
+
+
+def details_blended(binding: Binding, by_frames: Points, by_handles: Points) -> Points:
+    """Blend details turned by frames, near the boundary of a region, with those turned by its handle (thesis 6.3.1).
+
+    Directions are blended, and lengths kept up to that, as printed.
+    """
+    weight = np.zeros(len(by_frames))
+    for mask, away in zip(binding.regions, binding.distances, strict=True):
+        weight = np.maximum(weight, _near(away, away[mask & np.isfinite(away)].max()))
+    lengths = np.linalg.norm(by_frames, axis=1, keepdims=True)
+    one, other = (
+        np.divide(turned, lengths, out=np.zeros_like(turned), where=lengths > 0) for turned in (by_frames, by_handles)
+    )
+    return (weight[:, None] * one + (1 - weight[:, None]) * other) * lengths
 
 
 def _near(away: Float[np.ndarray, " n"], extent: float) -> Float[np.ndarray, " n"]:

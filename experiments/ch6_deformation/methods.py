@@ -1,0 +1,35 @@
+"""The methods that are compared: each takes a binding and its handles, and returns vertices."""
+
+from collections.abc import Callable, Sequence
+
+import igl  # of the test extra
+import numpy as np
+
+import eigenshape as es
+
+Method = Callable[[es.Binding, Sequence[es.Rotation | es.Translation]], np.ndarray]
+PEER_ROUNDS = 100
+
+
+def libigl(binding: es.Binding, handles: Sequence[es.Rotation | es.Translation]) -> np.ndarray:
+    """Bend as rigidly as possible by libigl, whose energy is that of spokes and rims, from the shape at rest."""
+    mesh, free = binding.rig.mesh, np.zeros(binding.rig.mesh.n_vertices, dtype=bool)
+    free[binding.part.free] = True
+    held, goal = np.flatnonzero(~free), es.as_rigid_as_possible(binding, handles, n_rounds=1)
+    data = igl.ARAPData()
+    data.max_iter = PEER_ROUNDS
+    vertices, faces = np.array(mesh.vertices), np.array(mesh.faces)
+    igl.arap_precomputation(vertices, faces, 3, held.astype(np.int32), data)
+    start = vertices.copy()
+    start[held] = goal[held]
+    return np.asarray(igl.arap_solve(np.ascontiguousarray(goal[held]), data, start))
+
+
+METHODS: dict[str, Method] = {
+    "graded": lambda binding, handles: es.bend(binding, handles).vertices,
+    "thesis": lambda binding, handles: es.bend(binding, handles, mode="thesis").vertices,
+    "ARAP": lambda binding, handles: es.as_rigid_as_possible(binding, handles, n_rounds=PEER_ROUNDS),
+    "ARAP (libigl)": libigl,
+    "biharmonic": es.biharmonic_blend,
+    "spectral": es.spectral_rigid,
+}

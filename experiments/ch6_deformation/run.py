@@ -1,0 +1,95 @@
+"""What bending does to edges and faces, by several methods at equal handles: table 6.2 of the thesis, and more."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from methods import METHODS
+from scenes import QUICK, SCENES, Scene
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+from real_shapes import give_out, require_data
+from rich.progress import track
+
+import eigenshape as es
+
+THESIS = {"arm stretched": (0.0023, 0.0022), "knee 60°": (0.001, 0.0007), "combined": (0.0052, 0.0021)}
+THESIS["plane 90°"] = (0.0028, 0.0022)  # ARAP, the thesis' own; of the box, as printed in table 6.2
+
+
+def bound(scene: Scene) -> tuple[es.Binding, list[es.Rotation | es.Translation]]:
+    """Rig a scene, and bind its regions."""
+    regions = [move.region for move in scene.moves]
+    binding = es.bind(es.rig_shape(scene.mesh), regions, fixed=scene.fixed, n_modes=scene.n_modes)
+    return binding, [move.handle for move in scene.moves]
+
+
+def measures(scene: Scene, vertices: np.ndarray, held: np.ndarray, goal: np.ndarray) -> dict[str, float]:
+    """Return what a method did to a shape."""
+    bent = es.TriangleMesh(vertices, scene.mesh.faces)
+    found = es.measure_distortion(scene.mesh, bent)
+    diagonal = np.linalg.norm(np.ptp(scene.mesh.vertices, axis=0))
+    away = np.linalg.norm((vertices - goal)[held], axis=1)
+    height = scene.mesh.vertices[:, "xyz".index(scene.up)]
+    foot = height < height.min() + 0.1 * np.ptp(height)
+    step = np.linalg.norm((vertices - scene.mesh.vertices)[foot], axis=1).max()
+    return {
+        "edges": round(found.edge_error, 4),
+        "of the box": round(found.edge_error_of_box, 5),
+        "least area": round(float(found.area_ratios.min()), 3),
+        "flipped": len(found.flipped),
+        "handles": round(float(np.sqrt(np.mean(away**2)) / diagonal), 6),
+        "feet": round(float(step / diagonal), 4),
+    }
+
+
+def compared(scene: Scene) -> dict[str, Any]:
+    """Return the measures of all methods on a scene."""
+    binding, handles = bound(scene)
+    goal = es.as_rigid_as_possible(binding, handles, n_rounds=1)
+    held = np.setdiff1d(np.arange(scene.mesh.n_vertices), binding.part.free)
+    rows: dict[str, Any] = {"vertices": scene.mesh.n_vertices, "modes": binding.n_modes.tolist()}
+    rows["held"] = round(len(held) / scene.mesh.n_vertices, 3)
+    for name, method in METHODS.items():
+        rows[name] = measures(scene, method(binding, handles), held, goal)
+    return rows
+
+
+def printed(results: dict[str, Any]) -> str:
+    """Return the tables in Markdown."""
+    lines = ["| edges, RMS of relative changes | " + " | ".join(METHODS) + " |", "|---|" + "---|" * len(METHODS)]
+    lines += [
+        f"| {name} | " + " | ".join(f"{row[m]['edges']:.4f}" for m in METHODS) + " |" for name, row in results.items()
+    ]
+    lines += ["", "| of the box's diagonal | " + " | ".join(METHODS) + " | thesis' ARAP, printed | thesis, printed |"]
+    lines += ["|---|" + "---|" * (len(METHODS) + 2)]
+    for name, row in results.items():
+        theirs = [f"{value}" for value in THESIS.get(name, ("", ""))]
+        lines.append(f"| {name} | " + " | ".join([f"{row[m]['of the box']:.5f}" for m in METHODS] + theirs) + " |")
+    lines += ["", "| least area, after over before; flipped faces | " + " | ".join(METHODS) + " |"]
+    lines += ["|---|" + "---|" * len(METHODS)]
+    for name, row in results.items():
+        cells = [f"{row[m]['least area']:.2f}; {row[m]['flipped']}" for m in METHODS]
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Measure, print and save."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help=", ".join(QUICK))
+    parser.add_argument("--only", nargs="*", choices=list(SCENES), help="scenes")
+    parser.add_argument("--out", type=Path, default=Path("ch6-results.json"))
+    chosen = parser.parse_args()
+    scenes = QUICK if chosen.quick else {name: SCENES[name] for name in chosen.only or SCENES}
+    if not chosen.quick:
+        require_data()
+    results = {name: compared(make()) for name, make in track(scenes.items(), "bending")}
+    print(printed(results))
+    give_out(results, chosen.out)
+
+
+if __name__ == "__main__":
+    main()
