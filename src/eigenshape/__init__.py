@@ -49,6 +49,7 @@ from eigenshape.geometry.average_distance import average_geodesic_distance
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.cloud_measure import cloud_quadrature
 from eigenshape.geometry.creatures import CREATURES, make_creature
+from eigenshape.geometry.crossings import self_intersections
 from eigenshape.geometry.curvature import gaussian_curvature
 from eigenshape.geometry.domains import ball, box, circle, disc, interval, irregular_grid
 from eigenshape.geometry.exact import (
@@ -411,6 +412,7 @@ __all__ = [
     "seal_holes",
     "seen_patches",
     "segment",
+    "self_intersections",
     "shape_dna",
     "shape_dna_distance",
     "simplex_volumes",
