@@ -27,6 +27,7 @@ def libigl(binding: es.Binding, handles: Sequence[es.Rotation | es.Translation])
 
 METHODS: dict[str, Method] = {
     "graded": lambda binding, handles: es.bend(binding, handles).vertices,
+    "uncrossed": lambda binding, handles: es.bend(binding, handles, mode="uncrossed").vertices,
     "thesis": lambda binding, handles: es.bend(binding, handles, mode="thesis").vertices,
     "ARAP": lambda binding, handles: es.as_rigid_as_possible(binding, handles, n_rounds=PEER_ROUNDS),
     "ARAP (libigl)": libigl,

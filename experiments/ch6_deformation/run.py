@@ -40,6 +40,7 @@ def measures(scene: Scene, vertices: np.ndarray, held: np.ndarray, goal: np.ndar
         "of the box": round(found.edge_error_of_box, 5),
         "least area": round(float(found.area_ratios.min()), 3),
         "flipped": len(found.flipped),
+        "crossing": len(es.self_intersections(bent)),
         "handles": round(float(np.sqrt(np.mean(away**2)) / diagonal), 6),
         "feet": round(float(step / diagonal), 4),
     }
@@ -68,10 +69,10 @@ def printed(results: dict[str, Any]) -> str:
     for name, row in results.items():
         theirs = [f"{value}" for value in THESIS.get(name, ("", ""))]
         lines.append(f"| {name} | " + " | ".join([f"{row[m]['of the box']:.5f}" for m in METHODS] + theirs) + " |")
-    lines += ["", "| least area, after over before; flipped faces | " + " | ".join(METHODS) + " |"]
+    lines += ["", "| least area, after over before; flipped faces; pairs that cross | " + " | ".join(METHODS) + " |"]
     lines += ["|---|" + "---|" * len(METHODS)]
     for name, row in results.items():
-        cells = [f"{row[m]['least area']:.2f}; {row[m]['flipped']}" for m in METHODS]
+        cells = [f"{row[m]['least area']:.2f}; {row[m]['flipped']}; {row[m]['crossing']:,}" for m in METHODS]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 

@@ -29,6 +29,7 @@ from eigenshape.deformation.handles import Handle
 from eigenshape.deformation.rig import EigenRig, rig_shape
 from eigenshape.deformation.session import replay
 from eigenshape.figures.poses import figure_poses
+from eigenshape.geometry.crossings import self_intersections
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.edits import read_edits, write_edits
 from eigenshape.io.mesh_files import write_mesh
@@ -43,7 +44,12 @@ def deform(
     ] = "",
     move: Annotated[str, typer.Option(metavar="X,Y,Z", help="Move it by a vector.")] = "",
     fixed: Annotated[str, typer.Option(help="What stays, in the same words; without it, all else is held.")] = "",
-    mode: Annotated[str, typer.Option(help="graded: as rigid as can be; thesis: as printed there.")] = "graded",
+    mode: Annotated[
+        str,
+        typer.Option(
+            help="graded: as rigid as can be; uncrossed: stiffer where faces would cross; thesis: as printed there."
+        ),
+    ] = "graded",
     n_modes: Annotated[
         int | None, typer.Option("-n", "--n-modes", help="Few bend widely, many sharply; 8, 50 or 300 by default.")
     ] = None,
@@ -111,6 +117,7 @@ def _report(
         "edge_error_of_box": found.edge_error_of_box,
         "least_area_ratio": float(found.area_ratios.min()),
         "flipped_faces": found.flipped,
+        "crossing_faces": self_intersections(after),
     }
     if as_json:
         print_json(values)
@@ -121,5 +128,9 @@ def _report(
         ["edges stretched, RMS", f"{100 * found.edge_error:.2f} %"],
         ["least area, after over before", f"{values['least_area_ratio']:.2f}"],
         ["faces flipped", f"{len(found.flipped):,}"],
+        [
+            "pairs of faces that cross",
+            f"{len(values['crossing_faces']):,} ({len(self_intersections(before)):,} before)",
+        ],
     ]
     print_table("Bent", ["", "value"], rows)

@@ -1,7 +1,7 @@
 """Bound regions: by how much each vertex follows each handle, found once for many positions of the handles."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import SupportsIndex
 
 import numpy as np
@@ -85,7 +85,18 @@ def bind(
     shares = np.array([_share(rig, mask, told, wanted) for mask, wanted in zip(masks, numbers, strict=True)])
     shares /= np.maximum(shares.sum(axis=0), 1)
     held = told & ((shares == 0).all(axis=0) | (shares == 1).any(axis=0))
-    return Binding(rig, masks, np.array(numbers), distances, shares, free_part(rig.edges, held))
+    part = free_part(rig.edges, held, np.zeros(len(held)))
+    return Binding(rig, masks, np.array(numbers), distances, shares, part)
+
+
+def pulled(binding: Binding, strength: float) -> Binding:
+    """Return a binding whose free vertices are pulled to where their shares take them.
+
+    Each by `strength` times its share of the area; nothing is free to fold away at a strength of some hundreds.
+    """
+    rig, held = binding.rig, np.ones(binding.rig.mesh.n_vertices, dtype=bool)
+    held[binding.part.free] = False
+    return replace(binding, part=free_part(rig.edges, held, strength * rig.areas / rig.areas.sum()))
 
 
 def _require_disjoint(masks: Bool[np.ndarray, "r n"]) -> None:

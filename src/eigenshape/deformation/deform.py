@@ -5,7 +5,7 @@ from typing import Literal, SupportsIndex, cast, get_args
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.binding import Binding, bind
-from eigenshape.deformation.graded import graded
+from eigenshape.deformation.graded import graded, uncrossed
 from eigenshape.deformation.handles import Handle
 from eigenshape.deformation.region import Region
 from eigenshape.deformation.rig import EigenRig
@@ -13,7 +13,7 @@ from eigenshape.deformation.skeleton import grip_skeleton
 from eigenshape.deformation.thesis import eigen_deformed
 from eigenshape.geometry.mesh import TriangleMesh
 
-Mode = Literal["graded", "thesis"]
+Mode = Literal["graded", "uncrossed", "thesis"]
 
 
 def deform(
@@ -35,7 +35,7 @@ def deform(
     region, fixed, n_modes
         As for `bind`.
     handle : Rotation or Translation
-    mode : "graded" or "thesis"
+    mode : "graded", "uncrossed" or "thesis"
         See `bend`.
 
     Returns
@@ -59,8 +59,9 @@ def bend(binding: Binding, handles: Sequence[Handle], *, mode: Mode = "graded") 
     binding : Binding
     handles : sequence of r Rotation or Translation
         One for each region.
-    mode : "graded" or "thesis"
-        By graded rotations and as rigidly as possible; or by the thesis' least-squares fit and its details.
+    mode : "graded", "uncrossed" or "thesis"
+        By graded rotations and as rigidly as possible; the same, stiffer where faces would cross, which folds and
+        pinches less at the price of longer edges; or by the thesis' least-squares fit and its details.
 
     Returns
     -------
@@ -79,7 +80,7 @@ def bend(binding: Binding, handles: Sequence[Handle], *, mode: Mode = "graded") 
     if require_mode(mode) == "thesis":
         vertices = eigen_deformed(binding, grip_skeleton(binding), handles)
     else:
-        vertices = graded(binding, handles)
+        vertices = (uncrossed if mode == "uncrossed" else graded)(binding, handles)
     return TriangleMesh(vertices, binding.rig.mesh.faces)
 
 
@@ -91,5 +92,5 @@ def require_mode(mode: str) -> Mode:
     InvalidParameterError
     """
     if mode not in get_args(Mode):
-        raise InvalidParameterError(f"mode must be 'graded' or 'thesis'; it is {mode!r}.")
+        raise InvalidParameterError(f"mode must be 'graded', 'uncrossed' or 'thesis'; it is {mode!r}.")
     return cast(Mode, mode)

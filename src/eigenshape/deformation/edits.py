@@ -37,7 +37,7 @@ class Edit:
     fixed : region, optional
     n_modes : int, optional
         As for `bind`.
-    mode : "graded" or "thesis"
+    mode : "graded", "uncrossed" or "thesis"
         As for `bend`.
     """
 

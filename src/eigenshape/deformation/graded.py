@@ -5,11 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape.deformation.binding import Binding
+from eigenshape.deformation.binding import Binding, pulled
 from eigenshape.deformation.handles import Handle
 from eigenshape.deformation.rigidity import relax
+from eigenshape.geometry.crossings import self_intersections
+from eigenshape.geometry.mesh import TriangleMesh
 
 N_ROUNDS = 20
+PULLS = (30.0, 100.0, 300.0, 1000.0)
 
 
 def graded(binding: Binding, handles: Sequence[Handle], *, n_rounds: int = N_ROUNDS) -> Float[np.ndarray, "n 3"]:
@@ -23,6 +26,25 @@ def graded(binding: Binding, handles: Sequence[Handle], *, n_rounds: int = N_ROU
     turns = quaternions(sum((np.outer(share, handle.turn) for handle, share in pairs), np.zeros(3)))
     start = shared_motion(binding, handles)
     return relax(binding.rig.edges, binding.part, binding.rig.mesh.vertices, start, turns, n_rounds)
+
+
+def uncrossed(binding: Binding, handles: Sequence[Handle]) -> Float[np.ndarray, "n 3"]:
+    """Return the vertices of `graded`, pulled to where their shares take them no more than it takes to cross no faces.
+
+    Pairs of faces that cross before count for nothing. If some cross at every strength, the fewest are taken.
+    """
+    mesh = binding.rig.mesh
+    before = {tuple(pair) for pair in self_intersections(mesh).tolist()}
+    least, best = np.inf, mesh.vertices
+    for strength in (0.0, *PULLS):
+        found = graded(pulled(binding, strength) if strength else binding, handles)
+        pairs = self_intersections(TriangleMesh(found, mesh.faces)).tolist()
+        crossing = sum(tuple(pair) not in before for pair in pairs)
+        if crossing < least:
+            least, best = crossing, found
+        if not crossing:
+            break
+    return best
 
 
 def shared_motion(binding: Binding, handles: Sequence[Handle]) -> Float[np.ndarray, "n 3"]:

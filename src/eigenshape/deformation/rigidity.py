@@ -50,13 +50,16 @@ class FreePart:
         Those that are free or have a free neighbour: only their rotations matter.
     rows : (u, n) sparse
         The matrix' rows of what is free.
+    pull : (u,) float
+        h: the energy of a free vertex grows by h |x' - g|², g being where it starts.
     factor : SymmetricFactor or None
-        Of its square part; None where nothing is free.
+        Of its square part and h; None where nothing is free.
     """
 
     free: Int[np.ndarray, " u"]
     fitted: Int[np.ndarray, " a"]
     rows: sp.csr_array
+    pull: Float[np.ndarray, " u"]
     factor: SymmetricFactor | None
 
 
@@ -74,8 +77,8 @@ def edge_weights(stiffness: sp.csr_array) -> EdgeWeights:
     return EdgeWeights(matrix, links.indptr.astype(np.int64), links.indices.astype(np.int64), links.data)
 
 
-def free_part(edges: EdgeWeights, held: Bool[np.ndarray, " n"]) -> FreePart:
-    """Factor the equations of the vertices that are not held.
+def free_part(edges: EdgeWeights, held: Bool[np.ndarray, " n"], pull: Float[np.ndarray, " n"]) -> FreePart:
+    """Factor the equations of the vertices that are not held, and are pulled to where they start.
 
     Raises
     ------
@@ -94,7 +97,8 @@ def free_part(edges: EdgeWeights, held: Bool[np.ndarray, " n"]) -> FreePart:
     free = np.flatnonzero(~held)
     rows = edges.matrix[free]
     fitted = np.unique(np.concatenate([free, rows.indices])).astype(np.int64)
-    return FreePart(free, fitted, rows, factored(rows[:, free]) if len(free) else None)
+    square = rows[:, free] + sp.diags_array(pull[free])
+    return FreePart(free, fitted, rows, pull[free], factored(square.tocsr()) if len(free) else None)
 
 
 def factored(square: sp.csr_array) -> SymmetricFactor:
@@ -142,25 +146,31 @@ def relax(
         return start
     links, turns = (edges.starts, edges.others, edges.weights), turns.copy()
     moved = start - rest
+    pulled = part.pull[:, None] * moved[part.free]
     moved[part.free] = 0
-    pull, sums = part.rows @ moved, np.empty((len(part.free), 3))
+    force, sums = pulled - part.rows @ moved, np.empty((len(part.free), 3))
     found, free = start.copy(), part.free
     least, tried, solved = np.inf, start[free], start[free]
     steps = deque[Step](maxlen=WINDOW + 1)
+
+    def settled(points: Float[np.ndarray, "u 3"]) -> float:
+        found[free] = points
+        away = part.pull @ np.square(points - start[free]).sum(axis=1)
+        return float(fit_rotations(part.fitted, *links, rest, found, turns) + away)
+
     with threadpool_limits(1, user_api="blas"):
         for _ in range(n_rounds):
-            found[free] = tried
-            energy = fit_rotations(part.fitted, *links, rest, found, turns)
+            energy = settled(tried)
             if energy > least:
                 steps.clear()
-                found[free] = tried = solved
-                energy = fit_rotations(part.fitted, *links, rest, found, turns)
+                tried = solved
+                energy = settled(tried)
             if least - energy <= SETTLED * energy and len(steps) > 1:
                 break
             least = energy
             turned_edges(free, *links, rest, turns, sums)
             # Solved for displacements, so that nothing at all moves where nothing is turned or pulled.
-            solved = rest[free] + part.factor.solve(sums - pull)
+            solved = rest[free] + part.factor.solve(sums + force)
             steps.append((solved - tried, solved))
             tried = _mixed(steps)
     found[free] = solved

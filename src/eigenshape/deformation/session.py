@@ -24,7 +24,7 @@ class DeformationSession:
     Parameters
     ----------
     rig : EigenRig
-    mode : "graded" or "thesis"
+    mode : "graded", "uncrossed" or "thesis"
         How commits bend; see `bend`.
 
     Raises
