@@ -4,50 +4,10 @@
     python benchmarks/bench_deform.py --quick               2,500 vertices, seconds
     python benchmarks/bench_deform.py --json deform.json --markdown docs/benchmarks.md
 
-The tail half of a giraffe turns by 60° (8 modes), or one leg (50). `bind` is done once a region, steps 1 and 2 at each
-move of the hand, step 3 when it lets go. ARAP starts at rest, with the same vertices held: ten rounds of ours, ten of
-libigl's after its preparation. Each size has a process of its own, after a small one that compiles.
-"""
-
-import statistics
-import tempfile
-import time
-from collections.abc import Callable
-from pathlib import Path
-
-import igl
-import numpy as np
-from bench_features import surface
-from machine import memory_now, peak_memory
-from report import Report, Row, in_process, options_of
-
-import eigenshape as es
-
-FULL = {  # vertices, splits, region: the thesis' modes, steps 1 and 2, and step 3, on a model of that size, in ms
-    (7_000, 0, "half"): ("camel, 7k, 8 modes", 2, 49),
-    (6_250, 1, "leg"): ("armadillo, 25k, 50 modes", 18, 125),
-    (6_250, 1, "half"): ("dragon, 22.5k, 8 modes", 13, 161),
-    (25_000, 1, "leg"): ("", None, None),
-    (25_000, 1, "half"): ("", None, None),
-}
-QUICK = {(2_500, 0, "half"): ("", None, None)}
-ROUNDS = 10
-PACKAGES = ["eigenshape", "numpy", "scipy", "numba", "libigl"]
-STEPS = {
-    "rig": "rig, once",
-    "bind": "bind",
-    "drag": "steps 1 and 2",
-    "thesis": "step 3, thesis",
-    "graded": "step 3, graded",
-    "arap": "ARAP, ours",
-    "igl_ready": "libigl, preparation",
-    "igl": "ARAP, libigl",
-}
-COLUMNS = ("vertices, region", "modes", "free", *STEPS.values(), "MiB", "the thesis, then: 1 and 2; 3")
-
-
-def region_of(mesh: es.TriangleMesh, name: str) -> np.ndarray:
-    """Return the half behind the middle, or what lies within a quarter of the height, along the surface, of a foot."""
+The tail half of a giraffe turns by 60° (8 modes), or one leg (50). `bind`, and details of a skeleton, are done once a
+region, steps 1 and 2 at each move of the hand, step 3 when it lets go. ARAP starts at rest, with the same vertices held:
+ten rounds of ours, ten of libigl's after its preparation. Each size has a process of its own.
+"""Return the half behind the middle, or what lies within a quarter of the height, along the surface, of a foot."""
     if name == "half":
         return mesh.vertices[:, 2] < np.median(mesh.vertices[:, 2])
     height = np.ptp(mesh.vertices[:, 1])
@@ -89,12 +49,12 @@ def bent(saved: str, region: str) -> Row:
 
     before, mask = memory_now(), region_of(mesh, region)
     rig = timed("rig", lambda: es.rig_shape(mesh))
-    binding = often("bind", lambda: (found := es.bind(rig, [mask]), es.grip_skeleton(found)))[0]
-    grip = es.grip_skeleton(binding)
+    binding = often("bind", lambda: es.bind(rig, [mask]))
+    skeleton = often("detail", lambda: es.detail_skeleton(binding))
     pivot = mesh.vertices[es.region_boundary(mesh, mask)].mean(axis=0)
     handles = [es.Rotation(pivot, [1, 0, 0], np.pi / 3)]
-    often("drag", lambda: es.moved_skeleton(grip, handles))
-    often("thesis", lambda: es.eigen_deformed(binding, grip, handles))
+    often("drag", lambda: es.moved_skeleton(skeleton.grip, handles))
+    often("thesis", lambda: es.eigen_deformed(skeleton, handles))
     goal = often("graded", lambda: es.bend(binding, handles)).vertices
     often("arap", lambda: es.as_rigid_as_possible(binding, handles, n_rounds=ROUNDS))
     by_libigl(binding, goal, timed)

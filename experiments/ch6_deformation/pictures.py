@@ -48,11 +48,12 @@ def skeletons(folder: Path) -> None:
     poses = {"shape": scene.mesh.vertices, "skeleton, 8 modes": grip.skeleton, "region turned": cut, "fitted": moved}
     meshes = {title: es.TriangleMesh(points, faces) for title, points in poses.items()}
     es.save_figure(es.figure_poses(meshes, whole, camera=view(scene)), folder / "figure_6_6.png")
+    once = es.detail_skeleton(binding, second_pass=False)
     ways = {
-        "details by local frames": es.eigen_deformed(binding, grip, handles, details="frames", second_pass=False),
-        "details by the handle": es.eigen_deformed(binding, grip, handles, details="handle", second_pass=False),
-        "blended (6.3.1)": es.eigen_deformed(binding, grip, handles, second_pass=False),
-        "blended, in two passes (6.3.3)": es.eigen_deformed(binding, grip, handles),
+        "details by local frames": es.eigen_deformed(once, handles, details="frames"),
+        "details by the handle": es.eigen_deformed(once, handles, details="handle"),
+        "blended (6.3.1)": es.eigen_deformed(once, handles),
+        "blended, in two passes (6.3.3)": es.eigen_deformed(es.detail_skeleton(binding), handles),
     }
     meshes = {title: es.TriangleMesh(points, faces) for title, points in ways.items()}
     es.save_figure(es.figure_poses(meshes, whole, camera=view(scene)), folder / "figure_6_7_and_6_9.png")

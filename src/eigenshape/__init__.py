@@ -23,7 +23,7 @@ from eigenshape.deformation.region import Box, Brush, region_boundary, region_ma
 from eigenshape.deformation.rig import EigenRig, eigen_skeleton, rig_shape
 from eigenshape.deformation.session import DeformationSession, replay
 from eigenshape.deformation.skeleton import SkeletonGrip, grip_skeleton, moved_skeleton
-from eigenshape.deformation.thesis import eigen_deformed
+from eigenshape.deformation.thesis import DetailedSkeleton, detail_skeleton, eigen_deformed
 from eigenshape.features.bottleneck import bottleneck_distance
 from eigenshape.features.boundaries import smooth_boundaries
 from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs, persistence_diagram
@@ -208,6 +208,7 @@ __all__ = [
     "DepthScan",
     "DescribedLargeShape",
     "DescribedShape",
+    "DetailedSkeleton",
     "Distortion",
     "EdgeTable",
     "Edit",
@@ -302,6 +303,7 @@ __all__ = [
     "describe_shape",
     "describe_to_keep",
     "describe_views",
+    "detail_skeleton",
     "dirichlet_laplacian",
     "disc",
     "disc_eigenvalues",

@@ -1,6 +1,7 @@
 """Details: what a skeleton lacks of its shape, kept in local frames and put back where it has moved (thesis 6.2.3)."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -15,18 +16,43 @@ Points = Float[np.ndarray, "n 3"]
 LEAST_TANGENT = 1e-6  # of an edge: below, it is along the normal, and frames no direction
 
 
-def details_by_frames(faces: Int[np.ndarray, "f 3"], before: Points, after: Points, details: Points) -> Points:
-    """Turn details with the local frames of a skeleton: its normal, and an edge that is as tangential as can be.
+@dataclass(frozen=True, eq=False)
+class FramedDetails:
+    """Details of a shape on a skeleton, kept in the skeleton's local frames.
 
-    Where a frame is not told, before or after (the normal vanishes, or all edges are along it), a detail is not turned.
+    Attributes
+    ----------
+    details : (n, 3) float
+        What the skeleton lacks.
+    local : (n, 3) float
+        The same along the normal, along an edge that is as tangential as can be, and across both.
+    partner : (n,) int
+        The other end of that edge.
+    told : (n,) bool
+        Whether a frame is told: the normal does not vanish, and some edge is not along it.
     """
-    partner = _tangential_neighbors(TriangleMesh(before, faces))
-    (old, told), (new, still) = (_frames(TriangleMesh(points, faces), partner) for points in (before, after))
-    found = np.einsum("nji,njk,nk->ni", new, old, details)
-    return np.where((told & still)[:, None], found, details)
+
+    details: Points
+    local: Points
+    partner: Int[np.ndarray, " n"]
+    told: Bool[np.ndarray, " n"]
 
 
-def details_by_handles(binding: Binding, handles: Sequence[Handle], details: Points) -> Points:
+def framed(faces: Int[np.ndarray, "f 3"], skeleton: Points, shape: Points) -> FramedDetails:
+    """Keep what a skeleton lacks of a shape in its local frames."""
+    mesh, details = TriangleMesh(skeleton, faces), shape - skeleton
+    partner = _tangential_neighbors(mesh)
+    frames, told = _frames(mesh, partner)
+    return FramedDetails(details, np.einsum("nij,nj->ni", frames, details), partner, told)
+
+
+def turned_by_frames(faces: Int[np.ndarray, "f 3"], kept: FramedDetails, moved: Points) -> Points:
+    """Return details as the local frames of the moved skeleton hold them; unturned where a frame is not told."""
+    frames, told = _frames(TriangleMesh(moved, faces), kept.partner)
+    return np.where((kept.told & told)[:, None], np.einsum("nji,nj->ni", frames, kept.local), kept.details)
+
+
+def turned_by_handles(binding: Binding, handles: Sequence[Handle], details: Points) -> Points:
     """Turn details inside regions with their handles."""
     turned = details.copy()
     for mask, handle in zip(binding.regions, handles, strict=True):
@@ -34,7 +60,7 @@ def details_by_handles(binding: Binding, handles: Sequence[Handle], details: Poi
     return turned
 
 
-def details_blended(binding: Binding, by_frames: Points, by_handles: Points) -> Points:
+def blended(binding: Binding, by_frames: Points, by_handles: Points) -> Points:
     """Blend details turned by frames, near the boundary of a region, with those turned by its handle (thesis 6.3.1).
 
     Directions are blended, and lengths kept up to that, as printed.

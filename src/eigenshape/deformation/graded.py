@@ -11,7 +11,7 @@ from eigenshape.deformation.rigidity import relax
 from eigenshape.geometry.crossings import self_intersections
 from eigenshape.geometry.mesh import TriangleMesh
 
-N_ROUNDS = 20
+N_ROUNDS = 12
 PULLS = (30.0, 100.0, 300.0, 1000.0)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 ROUNDS = 20
-SETTLED = 1e-6  # last turn, in radians; the one after it would be of its square
+SETTLED = 1e-3  # last turn, in radians; the one after it would be of its square
 LEAST = 1e-9  # share of the largest covariance that holds what no edge tells
 EPS = 1e-15
 
@@ -23,31 +23,31 @@ def fit_rotations(vertices, starts, others, weights, rest, posed, turns):
     left = 0.0
     for i in vertices:
         covariance[:] = 0.0
+        lengths = 0.0
         for k in range(starts[i], starts[i + 1]):
             j, w = others[k], weights[k]
+            u, v, t = posed[j, 0] - posed[i, 0], posed[j, 1] - posed[i, 1], posed[j, 2] - posed[i, 2]
+            lengths += w * (u * u + v * v + t * t)
             for a in range(3):
-                before = w * (rest[j, a] - rest[i, a])
-                for b in range(3):
-                    covariance[a, b] += before * (posed[j, b] - posed[i, b])
-        _settle(covariance, turns, i)
-        w, x, y, z = turns[i]
-        for k in range(starts[i], starts[i + 1]):
-            j = others[k]
-            a, b, c = rest[j, 0] - rest[i, 0], rest[j, 1] - rest[i, 1], rest[j, 2] - rest[i, 2]
-            u, v, t = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
-            a += w * u + y * t - z * v - (posed[j, 0] - posed[i, 0])
-            b += w * v + z * u - x * t - (posed[j, 1] - posed[i, 1])
-            c += w * t + x * v - y * u - (posed[j, 2] - posed[i, 2])
-            left += weights[k] * (a * a + b * b + c * c)
+                before = rest[j, a] - rest[i, a]
+                lengths += w * before * before
+                before *= w
+                covariance[a, 0] += before * u
+                covariance[a, 1] += before * v
+                covariance[a, 2] += before * t
+        left += lengths - 2 * _settle(covariance, turns, i)
     return left / 2
 
 
 @njit(cache=True, nogil=True)
 @no_type_check
 def _settle(covariance, turns, i):
-    """Climb by Newton's steps, and by steps that cannot overshoot where the function is not concave."""
+    """Climb by Newton's steps, and by steps that cannot overshoot where it is not concave; return the height."""
     w, x, y, z = turns[i]
-    largest = np.abs(covariance).max()
+    largest = 0.0
+    for a in range(3):
+        for b in range(3):
+            largest = max(largest, abs(covariance[a, b]))
     for _ in range(ROUNDS if largest > 0.0 else 0):
         m00, m01, m02 = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
         m10, m11, m12 = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
@@ -80,20 +80,25 @@ def _settle(covariance, turns, i):
         else:
             angle = np.arctan2(size, abs(p00 + p11 + p22))
             u, v, t = u * angle / size, v * angle / size, t * angle / size
-        half = min(angle, 1.5) / 2
-        scale = np.sin(half) / angle
-        c, u, v, t = np.cos(half), u * scale, v * scale, t * scale
+        # The quaternion (1, turn / 2) turns by as much up to third order, without sines.
+        u, v, t = u / 2, v / 2, t / 2
         w, x, y, z = (
-            c * w - u * x - v * y - t * z,
-            c * x + u * w + v * z - t * y,
-            c * y - u * z + v * w + t * x,
-            c * z + u * y - v * x + t * w,
+            w - u * x - v * y - t * z,
+            x + u * w + v * z - t * y,
+            y - u * z + v * w + t * x,
+            z + u * y - v * x + t * w,
         )
-        norm = np.sqrt(w * w + x * x + y * y + z * z)
-        w, x, y, z = w / norm, x / norm, y / norm, z / norm
+        shrink = 1 / np.sqrt(w * w + x * x + y * y + z * z)
+        w, x, y, z = w * shrink, x * shrink, y * shrink, z * shrink
         if angle < SETTLED:
             break
+    height = (1 - 2 * (y * y + z * z)) * covariance[0, 0] + 2 * (x * y - w * z) * covariance[1, 0]
+    height += 2 * (x * z + w * y) * covariance[2, 0] + 2 * (x * y + w * z) * covariance[0, 1]
+    height += (1 - 2 * (x * x + z * z)) * covariance[1, 1] + 2 * (y * z - w * x) * covariance[2, 1]
+    height += 2 * (x * z - w * y) * covariance[0, 2] + 2 * (y * z + w * x) * covariance[1, 2]
+    height += (1 - 2 * (x * x + y * y)) * covariance[2, 2]
     turns[i, 0], turns[i, 1], turns[i, 2], turns[i, 3] = w, x, y, z
+    return height
 
 
 @njit(cache=True, nogil=True)

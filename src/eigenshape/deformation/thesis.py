@@ -1,16 +1,17 @@
 """Eigen deformation as in the thesis: a skeleton moved by least squares, and details put back in two passes (6.3.3)."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from eigenshape.deformation.binding import Binding
-from eigenshape.deformation.details import details_blended, details_by_frames, details_by_handles
+from eigenshape.deformation.details import FramedDetails, blended, framed, turned_by_frames, turned_by_handles
 from eigenshape.deformation.handles import Handle
 from eigenshape.deformation.rig import eigen_skeleton, projected
-from eigenshape.deformation.skeleton import SkeletonGrip, moved_skeleton
+from eigenshape.deformation.skeleton import SkeletonGrip, grip_skeleton, moved_skeleton
 
 SECOND_PASS = 300  # modes
 
@@ -18,46 +19,67 @@ Points = Float[np.ndarray, "n 3"]
 Details = Literal["blended", "frames", "handle"]
 
 
-def eigen_deformed(
-    binding: Binding,
-    grip: SkeletonGrip,
-    handles: Sequence[Handle],
-    *,
-    details: Details = "blended",
-    second_pass: bool = True,
-) -> Points:
-    """Return the vertices where the thesis' algorithm takes them.
+@dataclass(frozen=True, eq=False)
+class DetailedSkeleton:
+    """A skeleton that handles can move, and what it takes to put details back.
 
-    With fewer than 300 modes details are added up to the skeleton of 300, which is fitted once more, and the rest by
-    local frames alone. With more, all at once.
+    Attributes
+    ----------
+    binding : Binding
+    grip : SkeletonGrip
+    fine : (n, 3) float
+        The skeleton of 300 modes; the shape itself where the grip has as many.
+    first, second : FramedDetails
+        From the grip's skeleton to the fine one, and from that to the shape.
+    """
+
+    binding: Binding
+    grip: SkeletonGrip
+    fine: Points
+    first: FramedDetails
+    second: FramedDetails
+
+
+def detail_skeleton(binding: Binding, *, second_pass: bool = True) -> DetailedSkeleton:
+    """Prepare a binding for the thesis' algorithm: for many positions of its handles.
 
     Parameters
     ----------
     binding : Binding
-    grip : SkeletonGrip
-        Of `grip_skeleton`.
+    second_pass : bool
+        Whether details come back by way of the skeleton of 300 modes (6.3.3); all at once otherwise.
+    """
+    rig, grip = binding.rig, grip_skeleton(binding)
+    shape, faces, most = rig.mesh.vertices, rig.mesh.faces, min(SECOND_PASS, rig.n_modes)
+    fine = eigen_skeleton(rig, most) if second_pass and binding.n_modes.max() < most else shape
+    return DetailedSkeleton(binding, grip, fine, framed(faces, grip.skeleton, fine), framed(faces, fine, shape))
+
+
+def eigen_deformed(skeleton: DetailedSkeleton, handles: Sequence[Handle], *, details: Details = "blended") -> Points:
+    """Return the vertices where the thesis' algorithm takes them.
+
+    Details are added up to the skeleton of 300 modes, which is fitted once more, and the rest by local frames alone;
+    with as many modes from the beginning, all at once.
+
+    Parameters
+    ----------
+    skeleton : DetailedSkeleton
     handles : sequence of r Rotation or Translation
     details : "blended", "frames" or "handle"
         How the first pass turns details: as in 6.3.1, or by either of its two ways alone (figure 6.7).
-    second_pass : bool
-        Whether there is one (6.3.3, figure 6.9).
 
     Returns
     -------
     (n, 3) float
     """
-    rig, moved = binding.rig, moved_skeleton(grip, handles)
-    vertices, faces, most = rig.mesh.vertices, rig.mesh.faces, min(SECOND_PASS, rig.n_modes)
-
-    def recovered(goal: Points) -> Points:
-        lacking = goal - grip.skeleton
-        by_frames = details_by_frames(faces, grip.skeleton, moved, lacking)
-        by_handles = details_by_handles(binding, handles, lacking)
-        ways = {"frames": by_frames, "handle": by_handles, "blended": details_blended(binding, by_frames, by_handles)}
-        return moved + ways[details]
-
-    if not second_pass or binding.n_modes.max() >= most:
-        return recovered(vertices)
-    fine = eigen_skeleton(rig, most)
-    fitted = rig.eigenvectors[:, :most] @ projected(rig, recovered(fine), most)
-    return fitted + details_by_frames(faces, fine, fitted, vertices - fine)
+    rig, faces = skeleton.binding.rig, skeleton.binding.rig.mesh.faces
+    moved = moved_skeleton(skeleton.grip, handles)
+    by_frames = turned_by_frames(faces, skeleton.first, moved)
+    by_handles = turned_by_handles(skeleton.binding, handles, skeleton.first.details)
+    ways = {"frames": by_frames, "handle": by_handles, "blended": blended(skeleton.binding, by_frames, by_handles)}
+    found = moved + ways[details]
+    if skeleton.fine is rig.mesh.vertices:
+        return found
+    most = min(SECOND_PASS, rig.n_modes)
+    fitted = rig.eigenvectors[:, :most] @ projected(rig, found, most)
+    return fitted + turned_by_frames(faces, skeleton.second, fitted)
