@@ -154,10 +154,12 @@ from eigenshape.spectral.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.certify import certify
 from eigenshape.spectral.dirichlet import solve_dirichlet
+from eigenshape.spectral.functional_map import FunctionalMap, compose_maps, functional_map, transfer_function
 from eigenshape.spectral.laplacian_laws import check_laplacian
 from eigenshape.spectral.large_signature import ApproximateSignature, approximate_heat_kernel_signature
 from eigenshape.spectral.laws import USUAL, Law, NotJudged, OperatorReport
 from eigenshape.spectral.operator_laws import check_operator
+from eigenshape.spectral.point_maps import map_from_points, point_map, refine_map
 from eigenshape.spectral.signature import (
     default_times,
     heat_kernel_signature,
@@ -191,6 +193,7 @@ __all__ = [
     "FeaturePoints",
     "FileFormatError",
     "FoundParts",
+    "FunctionalMap",
     "GaussianKernel",
     "InvalidParameterError",
     "InvalidShapeError",
@@ -250,6 +253,7 @@ __all__ = [
     "check_operator",
     "circle",
     "cloud_quadrature",
+    "compose_maps",
     "connection_laplacian",
     "cotangent_laplacian",
     "crouzeix_raviart_laplacian",
@@ -302,6 +306,7 @@ __all__ = [
     "from_pyvista",
     "from_trimesh",
     "functional_laplacian",
+    "functional_map",
     "gaussian_curvature",
     "gaussian_laplacian",
     "geodesic_balls",
@@ -322,6 +327,7 @@ __all__ = [
     "light_field_distance",
     "made_codebook",
     "make_creature",
+    "map_from_points",
     "match_features",
     "match_patches",
     "matching_score",
@@ -346,6 +352,7 @@ __all__ = [
     "patch_scores",
     "persistence_diagram",
     "point_cloud_laplacian",
+    "point_map",
     "projective_plane",
     "projective_plane_eigenvalues",
     "quadrature_laplacian",
@@ -355,6 +362,7 @@ __all__ = [
     "read_mesh",
     "read_points",
     "read_shape",
+    "refine_map",
     "reflection_free_signature",
     "repair",
     "robust_laplacian",
@@ -385,6 +393,7 @@ __all__ = [
     "torus_quadrature",
     "touching_parts",
     "train_codebook",
+    "transfer_function",
     "transfer_labels",
     "uniform_quadrature",
     "value_colors",
