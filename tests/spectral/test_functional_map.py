@@ -169,8 +169,8 @@ def test_more_modes_than_there_are_are_refused(hand, bent):
             es.refine_map(start, k)
     with pytest.raises(es.InvalidParameterError, match="step must be at least 1"):
         es.refine_map(start, 30, step=0)
-    with pytest.raises(es.InvalidParameterError, match=r"n_samples must lie in 30\.\."):
-        es.refine_map(start, 30, n_samples=29)
+    with pytest.raises(es.InvalidParameterError, match=r"n_samples must lie in 60\.\."):
+        es.refine_map(start, 30, n_samples=59)
 
 
 def test_point_maps_of_another_form_are_refused(hand):
