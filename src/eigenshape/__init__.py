@@ -173,10 +173,12 @@ from eigenshape.spectral.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.certify import certify
 from eigenshape.spectral.dirichlet import solve_dirichlet
+from eigenshape.spectral.functional_map import FunctionalMap, compose_maps, functional_map, transfer_function
 from eigenshape.spectral.laplacian_laws import check_laplacian
 from eigenshape.spectral.large_signature import ApproximateSignature, approximate_heat_kernel_signature
 from eigenshape.spectral.laws import USUAL, Law, NotJudged, OperatorReport
 from eigenshape.spectral.operator_laws import check_operator
+from eigenshape.spectral.point_maps import map_from_points, point_map, refine_map
 from eigenshape.spectral.signature import (
     default_times,
     heat_kernel_signature,
@@ -218,6 +220,7 @@ __all__ = [
     "FeaturePoints",
     "FileFormatError",
     "FoundParts",
+    "FunctionalMap",
     "GaussianKernel",
     "InvalidParameterError",
     "InvalidShapeError",
@@ -286,6 +289,7 @@ __all__ = [
     "check_operator",
     "circle",
     "cloud_quadrature",
+    "compose_maps",
     "connection_laplacian",
     "cotangent_laplacian",
     "crouzeix_raviart_laplacian",
@@ -343,6 +347,7 @@ __all__ = [
     "from_pyvista",
     "from_trimesh",
     "functional_laplacian",
+    "functional_map",
     "gaussian_curvature",
     "gaussian_laplacian",
     "geodesic_balls",
@@ -365,6 +370,7 @@ __all__ = [
     "light_field_distance",
     "made_codebook",
     "make_creature",
+    "map_from_points",
     "match_features",
     "match_patches",
     "matching_score",
@@ -391,6 +397,7 @@ __all__ = [
     "patch_scores",
     "persistence_diagram",
     "point_cloud_laplacian",
+    "point_map",
     "projective_plane",
     "projective_plane_eigenvalues",
     "quadrature_laplacian",
@@ -401,6 +408,7 @@ __all__ = [
     "read_mesh",
     "read_points",
     "read_shape",
+    "refine_map",
     "reflection_free_signature",
     "region_boundary",
     "region_mask",
@@ -438,6 +446,7 @@ __all__ = [
     "torus_quadrature",
     "touching_parts",
     "train_codebook",
+    "transfer_function",
     "transfer_labels",
     "uniform_quadrature",
     "value_colors",
