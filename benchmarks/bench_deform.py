@@ -5,9 +5,50 @@
     python benchmarks/bench_deform.py --json deform.json --markdown docs/benchmarks.md
 
 The tail half of a giraffe turns by 60° (8 modes), or one leg (50). `bind`, and details of a skeleton, are done once a
-region, steps 1 and 2 at each move of the hand, step 3 when it lets go. ARAP starts at rest, with the same vertices held:
-ten rounds of ours, ten of libigl's after its preparation. Each size has a process of its own.
-"""Return the half behind the middle, or what lies within a quarter of the height, along the surface, of a foot."""
+region, steps 1 and 2 at each move of the hand, step 3 when it lets go. ARAP starts at rest, the same vertices held: ten
+rounds of ours, ten of libigl's after its preparation. Each size has a process of its own.
+"""
+
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import igl
+import numpy as np
+from bench_features import surface
+from machine import memory_now, peak_memory
+from report import Report, Row, in_process, options_of
+
+import eigenshape as es
+
+FULL = {  # vertices, splits, region: the thesis' modes, steps 1 and 2, and step 3, on a model of that size, in ms
+    (7_000, 0, "half"): ("camel, 7k, 8 modes", 2, 49),
+    (6_250, 1, "leg"): ("armadillo, 25k, 50 modes", 18, 125),
+    (6_250, 1, "half"): ("dragon, 22.5k, 8 modes", 13, 161),
+    (25_000, 1, "leg"): ("", None, None),
+    (25_000, 1, "half"): ("", None, None),
+}
+QUICK = {(2_500, 0, "half"): ("", None, None)}
+ROUNDS = 10
+PACKAGES = ["eigenshape", "numpy", "scipy", "numba", "libigl"]
+STEPS = {
+    "rig": "rig, once",
+    "bind": "bind",
+    "detail": "details",
+    "drag": "steps 1 and 2",
+    "thesis": "step 3, thesis",
+    "graded": "step 3, graded",
+    "arap": "ARAP, ours",
+    "igl_ready": "libigl, preparation",
+    "igl": "ARAP, libigl",
+}
+COLUMNS = ("vertices, region", "modes", "free", *STEPS.values(), "MiB", "the thesis, then: 1 and 2; 3")
+
+
+def region_of(mesh: es.TriangleMesh, name: str) -> np.ndarray:
+    """Return the half behind the middle, or what lies within a quarter of the height, along the surface, of a foot."""
     if name == "half":
         return mesh.vertices[:, 2] < np.median(mesh.vertices[:, 2])
     height = np.ptp(mesh.vertices[:, 1])
