@@ -66,7 +66,7 @@ def heads(path: Path) -> None:
     poses = {"shape": mesh}
     for n_modes in (300, 50, 8):
         poses[f"skeleton, {n_modes} modes"] = es.TriangleMesh(es.eigen_skeleton(rig, n_modes), mesh.faces)
-    es.save_figure(es.figure_poses(poses, np.zeros(mesh.n_vertices)), path)
+    es.save_figure(es.figure_poses(poses), path)
 
 
 def main() -> None:

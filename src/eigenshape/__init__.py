@@ -24,6 +24,7 @@ from eigenshape.deformation.rig import EigenRig, eigen_skeleton, rig_shape
 from eigenshape.deformation.session import DeformationSession, replay
 from eigenshape.deformation.skeleton import SkeletonGrip, grip_skeleton, moved_skeleton
 from eigenshape.deformation.thesis import DetailedSkeleton, detail_skeleton, eigen_deformed
+from eigenshape.deformation.transfer import transfer_deformation
 from eigenshape.features.bottleneck import bottleneck_distance
 from eigenshape.features.boundaries import smooth_boundaries
 from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs, persistence_diagram
@@ -446,6 +447,7 @@ __all__ = [
     "torus_quadrature",
     "touching_parts",
     "train_codebook",
+    "transfer_deformation",
     "transfer_function",
     "transfer_labels",
     "uniform_quadrature",

@@ -19,15 +19,15 @@ MOVED = LinearSegmentedColormap.from_list("moved", ["#c9c9c9", "#f3c27b", "#d954
 
 
 def figure_poses(
-    poses: Mapping[str, TriangleMesh], shares: Float[np.ndarray, " n"], *, camera: Camera | None = None
+    poses: Mapping[str, TriangleMesh], shares: Float[np.ndarray, " n"] | None = None, *, camera: Camera | None = None
 ) -> Figure:
-    """Draw poses of one shape in a common frame, coloured by how much of a motion each vertex was to follow.
+    """Draw poses of one shape in a common frame, coloured by how much of a motion each vertex is to follow.
 
     Parameters
     ----------
     poses : mapping of titles to TriangleMesh
         With the same faces; the first one chooses the view.
-    shares : (n,) float
+    shares : (n,) float, optional
         0 to 1; of `Binding.shares`.
     camera : Camera, optional
     """
@@ -39,15 +39,17 @@ def figure_poses(
     figure = Figure(figsize=(size * columns + 0.8, (size + 0.3) * rows), layout="constrained")
     grid = figure.subplots(rows, columns, squeeze=False)
     corners = _frame(list(poses.values()), camera)
-    colors = np.asarray(MOVED(np.append(shares, np.zeros(len(corners)))))[:, :3]
+    told = np.zeros(rest.n_vertices) if shares is None else shares
+    colors = np.asarray(MOVED(np.append(told, np.zeros(len(corners)))))[:, :3]
     for axes in grid.flat:
         axes.set_axis_off()
     for axes, (title, mesh) in zip(grid.flat, poses.items(), strict=False):
         framed = TriangleMesh(np.vstack([mesh.vertices, corners]), mesh.faces)
         show(axes, draw(framed, camera, vertex_colors=colors))
         axes.set_title(title, fontsize=10)
-    bar = figure.colorbar(ScalarMappable(Normalize(0, 1), MOVED), ax=grid.ravel().tolist(), shrink=0.6, pad=0.01)
-    bar.set_label("share of the motion")
+    if shares is not None:
+        scale = ScalarMappable(Normalize(0, 1), MOVED)
+        figure.colorbar(scale, ax=grid.ravel().tolist(), shrink=0.6, pad=0.01).set_label("share of the motion")
     return figure
 
 
