@@ -5,7 +5,7 @@ from typing import no_type_check
 import numpy as np
 from numba import njit
 
-ROUNDS = 20
+ROUNDS = 100
 SETTLED = 1e-6  # last turn, in radians; the one after it would be of its square
 LEAST = 1e-9  # share of the largest covariance that holds what no edge tells
 EPS = 1e-15
@@ -48,6 +48,8 @@ def _settle(covariance, turns, i):
     """Climb by Newton's steps, and by steps that cannot overshoot where the function is not concave."""
     w, x, y, z = turns[i]
     largest = np.abs(covariance).max()
+    if largest > 0.0:  # cubes of it are taken below
+        covariance /= largest
     for _ in range(ROUNDS if largest > 0.0 else 0):
         m00, m01, m02 = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
         m10, m11, m12 = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
@@ -63,10 +65,9 @@ def _settle(covariance, turns, i):
         p22 = m20 * covariance[0, 2] + m21 * covariance[1, 2] + m22 * covariance[2, 2]
         u, v, t = p12 - p21, p20 - p02, p01 - p10
         size = np.sqrt(u * u + v * v + t * t)
-        if size <= EPS * largest:
+        if size <= EPS:
             break
-        floor = LEAST * largest
-        a, b, c = p11 + p22 + floor, p00 + p22 + floor, p00 + p11 + floor
+        a, b, c = p11 + p22 + LEAST, p00 + p22 + LEAST, p00 + p11 + LEAST
         d, e, f = -(p01 + p10) / 2, -(p02 + p20) / 2, -(p12 + p21) / 2
         second = a * b - d * d
         third = second * c - a * f * f + 2 * d * e * f - b * e * e
@@ -78,7 +79,8 @@ def _settle(covariance, turns, i):
             )
             angle = np.sqrt(u * u + v * v + t * t)
         else:
-            angle = np.arctan2(size, abs(p00 + p11 + p22))
+            along = (p00 * u * u + p11 * v * v + p22 * t * t - 2 * (d * u * v + e * u * t + f * v * t)) / size**2
+            angle = np.arctan2(size, p00 + p11 + p22 - along)  # the best about this axis
             u, v, t = u * angle / size, v * angle / size, t * angle / size
         half = min(angle, 1.5) / 2
         scale = np.sin(half) / angle
