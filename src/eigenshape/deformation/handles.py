@@ -38,9 +38,12 @@ class Rotation:
         largest = np.abs(direction).max()
         if largest == 0:
             raise InvalidParameterError("axis must have a direction; it is [0, 0, 0].")
-        direction = direction / largest
+        length = largest * np.linalg.norm(direction / largest)
+        if abs(length - 1) > 4 * np.finfo(float).eps:  # what is of length 1 is kept to the last digit
+            direction = direction / largest
+            direction = direction / np.linalg.norm(direction)
         object.__setattr__(self, "pivot", frozen(vector(pivot, "pivot")))
-        object.__setattr__(self, "axis", frozen(direction / np.linalg.norm(direction)))
+        object.__setattr__(self, "axis", frozen(direction))
         object.__setattr__(self, "angle", float(finite_values(angle, "angle")[0]))
 
     @property

@@ -97,7 +97,9 @@ def rig_shape(mesh: TriangleMesh, spectrum: Spectrum | None = None, *, progress:
             np.linalg.qr(modes, mode="r")
         ).T  # of the Gram matrix too, without squaring how unequal areas are
     edges = edge_weights(laplacian.stiffness)
-    return EigenRig(mesh, modes, spectrum.eigenvalues, frozen(spectrum.mass @ np.ones(len(modes))), frozen(factor), edges)
+    return EigenRig(
+        mesh, modes, spectrum.eigenvalues, frozen(spectrum.mass @ np.ones(len(modes))), frozen(factor), edges
+    )
 
 
 def posed(rig: EigenRig, vertices: ArrayLike) -> EigenRig:
