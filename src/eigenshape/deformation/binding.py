@@ -11,7 +11,7 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.region import Region, region_mask, require_boundary
 from eigenshape.deformation.rig import EigenRig
-from eigenshape.deformation.rigidity import FreePart, free_part
+from eigenshape.deformation.rigidity import FreePart, free_part, require_held
 from eigenshape.geometry.geodesic import geodesic_distance_to_set
 
 RULE = ((0.75, 8), (0.1, 50), (0.0, 300))  # least size of a region over that of the rest, and its modes (thesis 6.3.2)
@@ -73,8 +73,8 @@ def bind(
     Raises
     ------
     InvalidParameterError
-        If a region has no boundary, two share a vertex, `n_modes` is not in 1..k, or so few that they tell no region
-        from the rest.
+        If a region has no boundary, two share a vertex, a component has none that is in a region or fixed (where
+        anything is), `n_modes` is not in 1..k, or so few modes tell no region from the rest.
     """
     masks = np.array([region_mask(rig.mesh, region) for region in regions]).reshape(-1, rig.mesh.n_vertices)
     if not len(masks):
@@ -82,6 +82,7 @@ def bind(
     still = np.zeros(rig.mesh.n_vertices, dtype=bool) if fixed is None else region_mask(rig.mesh, fixed)
     _require_disjoint(np.vstack([masks, still]))
     told = masks.any(axis=0) | still if still.any() else np.ones_like(still)
+    require_held(rig.edges, told)  # else nothing tells the modes that are constant there
     rims = [require_boundary(rig.mesh, mask, number) for number, mask in enumerate(masks)]
     distances = np.array([geodesic_distance_to_set(rig.mesh, rim) for rim in rims])
     numbers = [_modes(rig, mask, away, n_modes) for mask, away in zip(masks, distances, strict=True)]

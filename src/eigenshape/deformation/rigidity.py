@@ -84,6 +84,20 @@ def free_part(edges: EdgeWeights, held: Bool[np.ndarray, " n"]) -> FreePart:
     InvalidShapeError
         If angles are too near to 0 for the equations.
     """
+    require_held(edges, held)
+    free = np.flatnonzero(~held)
+    rows = edges.matrix[free]
+    fitted = np.unique(np.concatenate([free, rows.indices])).astype(np.int64)
+    return FreePart(free, fitted, rows, factored(rows[:, free]) if len(free) else None)
+
+
+def require_held(edges: EdgeWeights, held: Bool[np.ndarray, " n"]) -> None:
+    """Refuse what holds no vertex of some component.
+
+    Raises
+    ------
+    InvalidParameterError
+    """
     n_components, component = connected_components(edges.matrix, directed=False)
     adrift = np.flatnonzero(np.bincount(component[held], minlength=n_components) == 0)
     if adrift.size:
@@ -91,10 +105,6 @@ def free_part(edges: EdgeWeights, held: Bool[np.ndarray, " n"]) -> FreePart:
         raise InvalidParameterError(
             f"Each component must be held somewhere; that of vertex {vertex} is not ({adrift.size} such)."
         )
-    free = np.flatnonzero(~held)
-    rows = edges.matrix[free]
-    fitted = np.unique(np.concatenate([free, rows.indices])).astype(np.int64)
-    return FreePart(free, fitted, rows, factored(rows[:, free]) if len(free) else None)
 
 
 def factored(square: sp.csr_array) -> SymmetricFactor:
