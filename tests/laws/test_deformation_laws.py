@@ -50,7 +50,7 @@ def test_a_shape_that_was_moved_bends_alike(mode, seed):
     handles = [Rotation(motion.apply(turn.pivot.copy()) + goes, motion.apply(turn.axis.copy()), turn.angle)]
     handles.append(Translation(motion.apply(shift.vector.copy())))
     other = bent(TriangleMesh(motion.apply(np.array(mesh.vertices)) + goes, mesh.faces), regions, handles, mode)
-    expected = motion.apply(bent(mesh, regions, [turn, shift], mode)) + goes
+    expected = motion.apply(bent(mesh, regions, [turn, shift], mode).copy()) + goes
     np.testing.assert_allclose(other, expected, atol=1e-9)
 
 
