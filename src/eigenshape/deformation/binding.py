@@ -11,11 +11,12 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.region import Region, region_mask, require_boundary
 from eigenshape.deformation.rig import EigenRig
-from eigenshape.deformation.rigidity import FreePart, free_part
+from eigenshape.deformation.rigidity import FreePart, free_part, require_held
 from eigenshape.geometry.geodesic import geodesic_distance_to_set
 
 RULE = ((0.75, 8), (0.1, 50), (0.0, 300))  # least size of a region over that of the rest, and its modes (thesis 6.3.2)
-CLIPPED = 0.02  # of the fit at either end: what follows less, or all but this, follows not at all, or wholly
+CLIPPED = 0.02  # of the best fit at either end: what follows less, or all but this, follows not at all, or wholly
+FLAT = 1e-9  # share of the best fit; modes that tell less of a region tell nothing of it
 SMOOTHNESS = 1e-3  # of the untold part, against the fit of what is told
 
 
@@ -60,7 +61,7 @@ def bind(
     regions : sequence of regions
         Disjoint; see `region_mask`.
     fixed : region, optional
-        What must stay.
+        What must stay; if it holds no vertex, as if it were not given.
     n_modes : int, optional
         By default, with δ the extent of a region over that of the rest, both measured from its boundary: 8 if
         δ ≥ .75, 50 if δ ≥ .1, else 300 (thesis 6.3.2); one more for each component beyond the first.
@@ -72,20 +73,23 @@ def bind(
     Raises
     ------
     InvalidParameterError
-        If a region has no boundary, two share a vertex, or `n_modes` is not in 1..k.
+        If a region has no boundary, two share a vertex, a component has none that is in a region or fixed (where
+        anything is), `n_modes` is not in 1..k, or so few modes tell no region from the rest.
     """
     masks = np.array([region_mask(rig.mesh, region) for region in regions]).reshape(-1, rig.mesh.n_vertices)
     if not len(masks):
         raise InvalidParameterError("There must be a region; none was given.")
-    told = np.ones(rig.mesh.n_vertices, dtype=bool) if fixed is None else region_mask(rig.mesh, fixed) | masks.any(0)
-    _require_disjoint(masks if fixed is None else np.vstack([masks, region_mask(rig.mesh, fixed)]))
+    still = np.zeros(rig.mesh.n_vertices, dtype=bool) if fixed is None else region_mask(rig.mesh, fixed)
+    _require_disjoint(np.vstack([masks, still]))
+    told = masks.any(axis=0) | still if still.any() else np.ones_like(still)
+    require_held(rig.edges, told)  # else nothing tells the modes that are constant there
     rims = [require_boundary(rig.mesh, mask, number) for number, mask in enumerate(masks)]
     distances = np.array([geodesic_distance_to_set(rig.mesh, rim) for rim in rims])
     numbers = [_modes(rig, mask, away, n_modes) for mask, away in zip(masks, distances, strict=True)]
     shares = np.array([_share(rig, mask, told, wanted) for mask, wanted in zip(masks, numbers, strict=True)])
     shares /= np.maximum(shares.sum(axis=0), 1)
     held = told & ((shares == 0).all(axis=0) | (shares == 1).any(axis=0))
-    part = free_part(rig.edges, held, np.zeros(len(held)))
+    part = free_part(rig.edges, held)
     return Binding(rig, masks, np.array(numbers), distances, shares, part)
 
 
@@ -121,7 +125,12 @@ def _share(
     rig: EigenRig, mask: Bool[np.ndarray, " n"], told: Bool[np.ndarray, " n"], n_modes: int
 ) -> Float[np.ndarray, " n"]:
     fit = _fit(rig, mask, told, n_modes)
-    low, high = max(CLIPPED, fit[told & ~mask].min()), min(1 - CLIPPED, fit[mask].max())
+    best, rest = fit[mask].max(), fit[told & ~mask].min()
+    if not best - rest > FLAT * abs(best):
+        raise InvalidParameterError(
+            f"Modes must tell a region from the rest; the lowest {n_modes} are constant there. Ask for more n_modes."
+        )
+    low, high = max(CLIPPED * min(best, 1), rest), min(1 - CLIPPED, best)
     return np.clip((fit - low) / (high - low), 0, 1)
 
 
@@ -134,5 +143,5 @@ def _fit(
     if told.all():
         return modes @ goal
     gram = (modes[told] * rig.areas[told, None]).T @ modes[told]
-    stiff = SMOOTHNESS * rig.areas[told].sum() / rig.areas.sum() * (values / values[-1]) ** 2
+    stiff = SMOOTHNESS * rig.areas[told].sum() / rig.areas.sum() * (values / max(values[-1], np.finfo(float).tiny)) ** 2
     return modes @ np.linalg.solve(gram + np.diag(stiff), goal)

@@ -8,11 +8,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from eigenshape._arrays import whole_number
-from eigenshape._errors import FileFormatError
+from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import Mode, bend, require_mode
 from eigenshape.deformation.handles import Handle, Rotation, Translation
-from eigenshape.deformation.region import Box, Brush, Region
+from eigenshape.deformation.region import Box, Brush, Region, kept_region, region_mask
 from eigenshape.deformation.rig import EigenRig, posed
 from eigenshape.geometry.mesh import TriangleMesh
 
@@ -25,6 +25,9 @@ class Move:
 
     region: Region
     handle: Handle
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "region", kept_region(self.region))
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +48,9 @@ class Edit:
     fixed: Region | None = None
     n_modes: int | None = None
     mode: Mode = "graded"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "fixed", None if self.fixed is None else kept_region(self.fixed))
 
 
 def apply_edit(rig: EigenRig, edit: Edit) -> EigenRig:
@@ -67,35 +73,37 @@ def carry_edit(edit: Edit, source: TriangleMesh, target: TriangleMesh) -> Edit:
     nearest = cKDTree(source.vertices).query(target.vertices)[1]
 
     def carried(region: Region) -> Region:
-        if isinstance(region, Box | Brush):
-            return region
-        mask = np.zeros(source.n_vertices, dtype=bool)
-        mask[np.asarray(region)] = True
-        return mask[nearest]
+        return region if isinstance(region, Box | Brush) else region_mask(source, region)[nearest]
 
     moves = tuple(Move(carried(move.region), move.handle) for move in edit.moves)
     return Edit(moves, None if edit.fixed is None else carried(edit.fixed), edit.n_modes, edit.mode)
 
 
 def edits_to_json(edits: Sequence[Edit], mesh: TriangleMesh) -> dict[str, Any]:
-    """Return edits of a mesh as what JSON holds; regions of vertices by their indices."""
-    return {"kind": KIND, "version": VERSION, "n_vertices": mesh.n_vertices, "edits": [_edit_out(e) for e in edits]}
+    """Return edits of a mesh as what JSON holds; regions of vertices by their indices.
+
+    Raises
+    ------
+    InvalidParameterError
+        If a region is none of the mesh.
+    """
+    out = [_edit_out(edit, mesh) for edit in edits]
+    return {"kind": KIND, "version": VERSION, "n_vertices": mesh.n_vertices, "edits": out}
 
 
-def _edit_out(edit: Edit) -> dict[str, Any]:
-    moves = [{"region": _region_out(move.region), "handle": _handle_out(move.handle)} for move in edit.moves]
-    fixed = None if edit.fixed is None else _region_out(edit.fixed)
+def _edit_out(edit: Edit, mesh: TriangleMesh) -> dict[str, Any]:
+    moves = [{"region": _region_out(move.region, mesh), "handle": _handle_out(move.handle)} for move in edit.moves]
+    fixed = None if edit.fixed is None else _region_out(edit.fixed, mesh)
     return {"moves": moves, "fixed": fixed, "n_modes": edit.n_modes, "mode": edit.mode}
 
 
-def _region_out(region: Region) -> dict[str, Any]:
+def _region_out(region: Region, mesh: TriangleMesh) -> dict[str, Any]:
     if isinstance(region, Box):
         low, high = ([value if np.isfinite(value) else None for value in c.tolist()] for c in (region.low, region.high))
         return {"kind": "box", "low": low, "high": high}  # JSON has no infinity
     if isinstance(region, Brush):
         return {"kind": "brush", "center": region.center.tolist(), "radius": region.radius}
-    chosen = np.asarray(region)
-    return {"kind": "vertices", "vertices": (np.flatnonzero(chosen) if chosen.dtype == bool else chosen).tolist()}
+    return {"kind": "vertices", "vertices": np.flatnonzero(region_mask(mesh, region)).tolist()}
 
 
 def _handle_out(handle: Handle) -> dict[str, Any]:
@@ -117,39 +125,69 @@ def edits_from_json(content: Any) -> tuple[int, list[Edit]]:
         raise FileFormatError(f"Edits are kept as a JSON object of kind {KIND!r}; this is none.")
     if content.get("version") != VERSION:
         raise FileFormatError(f"Edits of version {VERSION} are read; this is version {content.get('version')!r}.")
-    found = []
+    found: list[Edit] = []
     try:
-        n_vertices = whole_number(content["n_vertices"], "n_vertices", 1)
-        for entry in content["edits"]:
+        n_vertices = _whole(content["n_vertices"], "n_vertices", 1)
+        for entry in _listed(content["edits"], "edits"):
             found.append(_edit_in(entry, n_vertices))
-    except (KeyError, TypeError, ValueError, AttributeError) as err:
-        raise FileFormatError(f"Edit {len(found)} cannot be read: {err}.") from err
+    except (KeyError, TypeError, ValueError, OverflowError) as err:
+        raise FileFormatError(f"Edit {len(found)} cannot be read: {_reason(err)}") from err
     return n_vertices, found
 
 
-def _edit_in(entry: Mapping[str, Any], n_vertices: int) -> Edit:
-    moves = tuple(Move(_region_in(move["region"], n_vertices), _handle_in(move["handle"])) for move in entry["moves"])
+def _reason(err: Exception) -> str:
+    return f"{err} is missing, or not known." if isinstance(err, KeyError) else str(err)
+
+
+def _edit_in(entry: Any, n_vertices: int) -> Edit:
+    moves = [
+        (_region_in(move["region"], n_vertices), _handle_in(move["handle"]))
+        for move in _listed(entry["moves"], "moves")
+    ]
     fixed = None if entry["fixed"] is None else _region_in(entry["fixed"], n_vertices)
-    n_modes = None if entry["n_modes"] is None else whole_number(entry["n_modes"], "n_modes", 1)
-    return Edit(moves, fixed, n_modes, require_mode(entry["mode"]))
+    n_modes = None if entry["n_modes"] is None else _whole(entry["n_modes"], "n_modes", 1)
+    return Edit(tuple(Move(*pair) for pair in moves), fixed, n_modes, require_mode(str(entry["mode"])))
 
 
-def _region_in(entry: Mapping[str, Any], n_vertices: int) -> Region:
+def _region_in(entry: Any, n_vertices: int) -> Region:
     readers: dict[str, Callable[[], Region]] = {
-        "box": lambda: Box(_or_open(entry["low"], -np.inf), _or_open(entry["high"], np.inf)),
-        "brush": lambda: Brush(entry["center"], entry["radius"]),
-        "vertices": lambda: np.array([whole_number(v, "A vertex", 0, n_vertices - 1) for v in entry["vertices"]]),
+        "box": lambda: Box(_numbers(entry["low"], "low", -np.inf), _numbers(entry["high"], "high", np.inf)),
+        "brush": lambda: Brush(_numbers(entry["center"], "center"), _number(entry["radius"], "radius")),
+        "vertices": lambda: np.array(
+            [_whole(v, "A vertex", 0, n_vertices - 1) for v in _listed(entry["vertices"], "vertices")], dtype=np.int64
+        ),
     }
     return readers[entry["kind"]]()
 
 
-def _or_open(corner: Sequence[float | None], end: float) -> list[float]:
-    return [end if value is None else value for value in corner]
-
-
-def _handle_in(entry: Mapping[str, Any]) -> Handle:
+def _handle_in(entry: Any) -> Handle:
     readers: dict[str, Callable[[], Handle]] = {
-        "rotation": lambda: Rotation(entry["pivot"], entry["axis"], entry["angle"]),
-        "translation": lambda: Translation(entry["vector"]),
+        "rotation": lambda: Rotation(
+            _numbers(entry["pivot"], "pivot"), _numbers(entry["axis"], "axis"), _number(entry["angle"], "angle")
+        ),
+        "translation": lambda: Translation(_numbers(entry["vector"], "vector")),
     }
     return readers[entry["kind"]]()
+
+
+def _listed(value: Any, name: str) -> list[Any]:
+    if not isinstance(value, list):
+        raise InvalidParameterError(f"{name} must be a list; it is {value!r}.")
+    return value
+
+
+def _whole(value: Any, name: str, low: int, high: int | None = None) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise InvalidParameterError(f"{name} must be a whole number; it is {value!r}.")
+    return whole_number(value, name, low, high)
+
+
+def _number(value: Any, name: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InvalidParameterError(f"{name} must be a number; it is {value!r}.")
+    return float(value)
+
+
+def _numbers(value: Any, name: str, end: float | None = None) -> list[float]:
+    """Return numbers; where there is an end, it stands for null."""
+    return [end if end is not None and part is None else _number(part, name) for part in _listed(value, name)]

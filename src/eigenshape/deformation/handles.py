@@ -38,9 +38,12 @@ class Rotation:
         largest = np.abs(direction).max()
         if largest == 0:
             raise InvalidParameterError("axis must have a direction; it is [0, 0, 0].")
-        direction = direction / largest
+        length = largest * np.linalg.norm(direction / largest)
+        if abs(length - 1) > 4 * np.finfo(float).eps:  # what is of length 1 is kept to the last digit
+            direction = direction / largest
+            direction = direction / np.linalg.norm(direction)
         object.__setattr__(self, "pivot", frozen(vector(pivot, "pivot")))
-        object.__setattr__(self, "axis", frozen(direction / np.linalg.norm(direction)))
+        object.__setattr__(self, "axis", frozen(direction))
         object.__setattr__(self, "angle", float(finite_values(angle, "angle")[0]))
 
     @property
@@ -91,9 +94,11 @@ Handle = Rotation | Translation
 
 def affine_offset(handle: Handle) -> Float[np.ndarray, "3 4"]:
     """Return D with D [x, 1] = how far the whole motion takes x."""
-    origin, corners = np.zeros((1, 3)), np.eye(3)
-    shift = handle.carry(origin, np.ones(1))
-    return np.column_stack([(handle.carry(corners, np.ones(3)) - shift).T, shift[0]])
+    shift = handle.carry(np.zeros((1, 3)), np.ones(1))[0]
+    if isinstance(handle, Translation):
+        return np.column_stack([np.zeros((3, 3)), shift])
+    about_origin = Rotation(np.zeros(3), handle.axis, handle.angle)  # a far pivot would cost digits
+    return np.column_stack([about_origin.carry(np.eye(3), np.ones(3)).T, shift])
 
 
 def rotation_by_drag(pivot: ArrayLike, start: ArrayLike, end: ArrayLike) -> Rotation:

@@ -65,6 +65,13 @@ class Brush:
 Region = Box | Brush | np.ndarray | Iterable[int]
 
 
+def kept_region(region: Region) -> Region:
+    """Return a region that can be asked again and again, and that nobody else changes."""
+    if isinstance(region, Box | Brush):
+        return region
+    return frozen(np.asarray(region if isinstance(region, np.ndarray) else list(region)))
+
+
 def region_mask(mesh: TriangleMesh, region: Region) -> Bool[np.ndarray, " n"]:
     """Tell which vertices of a shape a region holds.
 

@@ -14,7 +14,6 @@ from eigenshape._arrays import finite_rows, frozen, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.rigidity import EdgeWeights, edge_weights
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.spectral.outcome import Progress
@@ -37,7 +36,7 @@ class EigenRig:
     eigenvalues : (k,) float
         In 1/length² of that shape.
     areas : (n,) float
-        Of the vertices, in length².
+        Of the vertices, in length²: what each has of the mass in which the modes are orthonormal.
     factor : (k, k) float
         Lower triangular, with factor factorᵀ = ΦᵀΦ, the Gram matrix; its leading part is that of fewer modes
         (thesis 6.3.4).
@@ -98,7 +97,9 @@ def rig_shape(mesh: TriangleMesh, spectrum: Spectrum | None = None, *, progress:
             np.linalg.qr(modes, mode="r")
         ).T  # of the Gram matrix too, without squaring how unequal areas are
     edges = edge_weights(laplacian.stiffness)
-    return EigenRig(mesh, modes, spectrum.eigenvalues, frozen(dual_volumes(mesh)), frozen(factor), edges)
+    return EigenRig(
+        mesh, modes, spectrum.eigenvalues, frozen(spectrum.mass @ np.ones(len(modes))), frozen(factor), edges
+    )
 
 
 def posed(rig: EigenRig, vertices: ArrayLike) -> EigenRig:

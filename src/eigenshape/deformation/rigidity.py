@@ -77,8 +77,10 @@ def edge_weights(stiffness: sp.csr_array) -> EdgeWeights:
     return EdgeWeights(matrix, links.indptr.astype(np.int64), links.indices.astype(np.int64), links.data)
 
 
-def free_part(edges: EdgeWeights, held: Bool[np.ndarray, " n"], pull: Float[np.ndarray, " n"]) -> FreePart:
-    """Factor the equations of the vertices that are not held, and are pulled to where they start.
+def free_part(
+    edges: EdgeWeights, held: Bool[np.ndarray, " n"], pull: Float[np.ndarray, " n"] | None = None
+) -> FreePart:
+    """Factor the equations of the vertices that are not held, and may be pulled to where they start.
 
     Raises
     ------
@@ -87,6 +89,22 @@ def free_part(edges: EdgeWeights, held: Bool[np.ndarray, " n"], pull: Float[np.n
     InvalidShapeError
         If angles are too near to 0 for the equations.
     """
+    require_held(edges, held)
+    free = np.flatnonzero(~held)
+    rows = edges.matrix[free]
+    fitted = np.unique(np.concatenate([free, rows.indices])).astype(np.int64)
+    hold = np.zeros(len(free)) if pull is None else pull[free]
+    square = (rows[:, free] + sp.diags_array(hold)).tocsr()
+    return FreePart(free, fitted, rows, hold, factored(square) if len(free) else None)
+
+
+def require_held(edges: EdgeWeights, held: Bool[np.ndarray, " n"]) -> None:
+    """Refuse what holds no vertex of some component.
+
+    Raises
+    ------
+    InvalidParameterError
+    """
     n_components, component = connected_components(edges.matrix, directed=False)
     adrift = np.flatnonzero(np.bincount(component[held], minlength=n_components) == 0)
     if adrift.size:
@@ -94,11 +112,6 @@ def free_part(edges: EdgeWeights, held: Bool[np.ndarray, " n"], pull: Float[np.n
         raise InvalidParameterError(
             f"Each component must be held somewhere; that of vertex {vertex} is not ({adrift.size} such)."
         )
-    free = np.flatnonzero(~held)
-    rows = edges.matrix[free]
-    fitted = np.unique(np.concatenate([free, rows.indices])).astype(np.int64)
-    square = rows[:, free] + sp.diags_array(pull[free])
-    return FreePart(free, fitted, rows, pull[free], factored(square.tocsr()) if len(free) else None)
 
 
 def factored(square: sp.csr_array) -> SymmetricFactor:

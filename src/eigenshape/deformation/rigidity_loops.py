@@ -5,10 +5,11 @@ from typing import no_type_check
 import numpy as np
 from numba import njit
 
-ROUNDS = 20
-SETTLED = 1e-3  # last turn, in radians; the one after it would be of its square
+ROUNDS = 100
+SETTLED = 1e-4  # last turn, in radians; the one after it would be of its square
 LEAST = 1e-9  # share of the largest covariance that holds what no edge tells
 EPS = 1e-15
+HALFWAY = 3.0  # radians: the most that one step turns
 
 
 @njit(cache=True, nogil=True)
@@ -45,9 +46,13 @@ def _settle(covariance, turns, i):
     """Climb by Newton's steps, and by steps that cannot overshoot where it is not concave; return the height."""
     w, x, y, z = turns[i]
     largest = 0.0
-    for a in range(3):
-        for b in range(3):
-            largest = max(largest, abs(covariance[a, b]))
+    for row in range(3):
+        for column in range(3):
+            largest = max(largest, abs(covariance[row, column]))
+    if largest > 0.0:  # cubes of it are taken below
+        for row in range(3):
+            for column in range(3):
+                covariance[row, column] /= largest
     for _ in range(ROUNDS if largest > 0.0 else 0):
         m00, m01, m02 = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
         m10, m11, m12 = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
@@ -63,10 +68,9 @@ def _settle(covariance, turns, i):
         p22 = m20 * covariance[0, 2] + m21 * covariance[1, 2] + m22 * covariance[2, 2]
         u, v, t = p12 - p21, p20 - p02, p01 - p10
         size = np.sqrt(u * u + v * v + t * t)
-        if size <= EPS * largest:
+        if size <= EPS:
             break
-        floor = LEAST * largest
-        a, b, c = p11 + p22 + floor, p00 + p22 + floor, p00 + p11 + floor
+        a, b, c = p11 + p22 + LEAST, p00 + p22 + LEAST, p00 + p11 + LEAST
         d, e, f = -(p01 + p10) / 2, -(p02 + p20) / 2, -(p12 + p21) / 2
         second = a * b - d * d
         third = second * c - a * f * f + 2 * d * e * f - b * e * e
@@ -77,11 +81,13 @@ def _settle(covariance, turns, i):
                 (u * (d * f - b * e) + v * (d * e - a * f) + t * second) / third,
             )
             angle = np.sqrt(u * u + v * v + t * t)
+            u, v, t = u / 2, v / 2, t / 2
         else:
-            angle = np.arctan2(size, abs(p00 + p11 + p22))
-            u, v, t = u * angle / size, v * angle / size, t * angle / size
-        # The quaternion (1, turn / 2) turns by as much up to third order, without sines.
-        u, v, t = u / 2, v / 2, t / 2
+            along = (p00 * u * u + p11 * v * v + p22 * t * t - 2 * (d * u * v + e * u * t + f * v * t)) / size**2
+            angle = np.arctan2(size, p00 + p11 + p22 - along)  # the best about this axis
+            half = np.tan(min(angle, HALFWAY) / 2) / size
+            u, v, t = u * half, v * half, t * half
+        # (1, tangent of half the turn) is its quaternion; small turns need no tangent.
         w, x, y, z = (
             w - u * x - v * y - t * z,
             x + u * w + v * z - t * y,
@@ -98,7 +104,7 @@ def _settle(covariance, turns, i):
     height += 2 * (x * z - w * y) * covariance[0, 2] + 2 * (y * z + w * x) * covariance[1, 2]
     height += (1 - 2 * (x * x + y * y)) * covariance[2, 2]
     turns[i, 0], turns[i, 1], turns[i, 2], turns[i, 3] = w, x, y, z
-    return height
+    return height * largest
 
 
 @njit(cache=True, nogil=True)

@@ -96,7 +96,7 @@ def _turned_by(target: TriangleMesh, turns: Turns) -> Float[np.ndarray, "n 3"]:
     """Return the target with its edges turned, its middle where it was."""
     edges, areas = edge_weights(cotangent_laplacian(target).stiffness), dual_volumes(target)
     held = np.arange(target.n_vertices) == 0
-    part = free_part(edges, held, np.zeros(target.n_vertices))
+    part = free_part(edges, held)
     sums = np.empty((len(part.free), 3))
     spins = np.roll(Rotation.from_matrix(turns).as_quat(), 1, axis=1)
     turned_edges(part.free, edges.starts, edges.others, edges.weights, target.vertices, spins, sums)

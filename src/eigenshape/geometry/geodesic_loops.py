@@ -5,6 +5,8 @@ from typing import no_type_check
 import numpy as np
 from numba import njit
 
+FRONT = -1
+
 
 @njit(cache=True, nogil=True)
 @no_type_check
@@ -12,15 +14,12 @@ def through_edge(near, far, length, left, right):
     """Return the distance of a triangle's third corner from a source seen through the opposite edge, or infinity.
 
     `near` and `far` are the distances of the edge's ends; the source is laid flat beyond the edge. `left` and `right`
-    are the third corner's distances from the same ends. Infinity where the straight line misses the edge. An edge
-    whose ends are both sources is one all along.
+    are the third corner's distances from the same ends. Infinity where the straight line misses the edge.
     """
     x = (near * near - far * far + length * length) / (2 * length)
     y = np.sqrt(max(near * near - x * x, 0.0))
     corner_x = (left * left - right * right + length * length) / (2 * length)
     corner_y = np.sqrt(max(left * left - corner_x * corner_x, 0.0))
-    if near == 0.0 and far == 0.0:
-        return corner_y if 0.0 <= corner_x <= length else np.inf
     depth = y + corner_y
     if depth == 0.0:
         return np.inf
@@ -28,6 +27,25 @@ def through_edge(near, far, length, left, right):
     if crossing < 0.0 or crossing > length:
         return np.inf
     return np.hypot(corner_x - x, depth)
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def across_edge(near, far, length, left, right):
+    """Return the same where no point sends the wave: its front is straight (Kimmel and Sethian 1998).
+
+    So it is before an edge whose ends are both sources, which is one all along.
+    """
+    climb = (far - near) / length
+    corner_x = (left * left - right * right + length * length) / (2 * length)
+    corner_y = np.sqrt(max(left * left - corner_x * corner_x, 0.0))
+    steep = np.sqrt(max(1.0 - climb * climb, 0.0))
+    if steep == 0.0:
+        return np.inf
+    crossing = corner_x - corner_y * climb / steep
+    if crossing < 0.0 or crossing > length:
+        return np.inf
+    return near + climb * corner_x + steep * corner_y
 
 
 @njit(cache=True, nogil=True)
@@ -41,6 +59,7 @@ def balls(starts, first_corner, second_corner, sides, radius, sources, begins):
     """
     n = len(starts) - 1
     distance = np.full(n, np.inf)
+    sender = np.empty(n, dtype=np.int64)  # the source that a vertex was reached from; FRONT where several sent the wave
     settled = np.zeros(n, dtype=np.bool_)
     counts = np.zeros(len(begins) - 1, dtype=np.int64)
     columns, values = np.empty(1024, dtype=np.int64), np.empty(1024)
@@ -55,6 +74,7 @@ def balls(starts, first_corner, second_corner, sides, radius, sources, begins):
             heap_ids = np.empty(len(heap_keys), dtype=np.int64)
         for source in sources[begins[number] : begins[number + 1]]:
             distance[source] = 0.0
+            sender[source] = source
             heap_keys[n_touched], heap_ids[n_touched] = 0.0, source
             touched[n_touched] = source
             n_touched += 1
@@ -83,15 +103,19 @@ def balls(starts, first_corner, second_corner, sides, radius, sources, begins):
                         corner, other, to_corner, to_other = other, corner, to_other, to_corner
                     if settled[corner]:
                         continue
-                    reached = key + to_corner
+                    reached, origin = key + to_corner, sender[vertex]
                     if settled[other]:
-                        flat = through_edge(key, distance[other], to_other, to_corner, sides[entry, 2])
+                        if origin == sender[other] and origin != FRONT:
+                            flat = through_edge(key, distance[other], to_other, to_corner, sides[entry, 2])
+                        else:
+                            flat = across_edge(key, distance[other], to_other, to_corner, sides[entry, 2])
+                            origin = FRONT if flat < reached else origin
                         reached = min(reached, flat)
                     if reached < distance[corner]:
                         if distance[corner] == np.inf:
                             touched[n_touched] = corner
                             n_touched += 1
-                        distance[corner] = reached
+                        distance[corner], sender[corner] = reached, origin
                         _rise(heap_keys, heap_ids, height, reached, corner)
                         height += 1
         counts[number] = total - before

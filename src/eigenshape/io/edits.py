@@ -41,6 +41,6 @@ def read_edits(path: str | Path) -> tuple[int, list[Edit]]:
     """
     try:
         content = json.loads(read_regular(Path(path), "edits"))
-    except (json.JSONDecodeError, UnicodeDecodeError) as err:
+    except (ValueError, RecursionError) as err:
         raise FileFormatError(f"{path} must hold JSON; {err}.") from err
     return edits_from_json(content)
