@@ -10,6 +10,7 @@ from eigenshape.deformation.graded import shared_motion
 from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.rig import eigen_skeleton, rig_shape
 from eigenshape.deformation.skeleton import grip_skeleton, moved_skeleton
+from eigenshape.geometry.crossings import self_intersections
 from eigenshape.geometry.domains import box
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
@@ -244,3 +245,16 @@ def test_wrong_modes_and_numbers_of_handles_are_refused():
         InvalidParameterError, match="Each region must have one handle; there are 1 regions and 2 handl"
     ):
         bend(bind(lump_rig(), [HEAD]), [TURN, TURN])
+
+
+def test_faces_that_would_cross_are_kept_apart(bar):
+    upper, half_turn = bar.mesh.vertices[:, 2] >= 3, Rotation([0.5, 0.5, 0], [0, 0, 1], np.pi)
+    assert len(self_intersections(deform(bar, upper, half_turn)))
+    apart = deform(bar, upper, half_turn, mode="uncrossed")
+    assert not len(self_intersections(apart))
+    assert (face_areas(apart) / face_areas(bar.mesh)).min() > 0.5
+
+
+def test_where_no_faces_cross_nothing_is_stiffer():
+    graded, apart = (deform(lump_rig(), HEAD, TURN, mode=mode).vertices for mode in ("graded", "uncrossed"))
+    np.testing.assert_array_equal(graded, apart)

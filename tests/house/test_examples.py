@@ -21,6 +21,15 @@ def test_a_noisy_scan_is_found(tmp_path):
     assert len(best.correspondences) > 10
 
 
+def test_a_bent_shape_is_bent_again_on_a_finer_mesh(tmp_path):
+    poses = runpy.run_path(str(ROOT / "examples" / "bend_a_shape.py"))["main"](tmp_path)
+    made, nodding, lifted, finer = (poses[name].vertices for name in ("as made", "nodding", "lifted", "again, finer"))
+    assert nodding[:, 1].max() < made[:, 1].max() - 0.05
+    assert np.abs(lifted - nodding).max() > 0.05
+    np.testing.assert_allclose(finer[: len(made)], lifted, atol=0.03)
+    assert (tmp_path / "giraffe.png").stat().st_size > 10_000
+
+
 def test_any_shape_has_its_spectrum(capsys):
     spectra = runpy.run_path(str(ROOT / "examples" / "any_shape.py"))["main"]()
     np.testing.assert_allclose(spectra["sphere"], [0, 2, 2, 2], atol=0.02)

@@ -1,0 +1,123 @@
+"""`eigenshape deform`: regions and handles in words."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from eigenshape.cli import app
+from eigenshape.cli.regions import told_region, told_rotation, told_translation
+from eigenshape.deformation.binding import bind
+from eigenshape.deformation.deform import bend
+from eigenshape.deformation.region import Box, Brush, region_boundary, region_mask
+from eigenshape.deformation.rig import rig_shape
+from eigenshape.features.parts import find_parts
+from eigenshape.geometry.creatures import make_creature
+from eigenshape.geometry.measure import surface_area
+from eigenshape.io.mesh_files import read_mesh, write_mesh
+
+PNG = b"\x89PNG\r\n\x1a\n"
+QUIET = lambda share, what: None  # noqa: E731
+
+
+def run(*arguments, code=0):
+    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    assert done.exit_code == code, done.output
+    return done
+
+
+@pytest.fixture(scope="module")
+def giraffe(tmp_path_factory):
+    path = tmp_path_factory.mktemp("giraffe") / "giraffe.ply"
+    write_mesh(make_creature("giraffe", 1, n_vertices=900), path)
+    return path
+
+
+def test_a_head_nods(giraffe, tmp_path):
+    bent, picture, edits = tmp_path / "bent.ply", tmp_path / "bent.png", tmp_path / "edits.json"
+    words = ["--region", "y>70%", "--rotate", "x by 40"]
+    done = run("deform", giraffe, *words, "--out", bent, "--picture", picture, "--save-edits", edits, "--json")
+    found = json.loads(done.stdout)
+    mesh = read_mesh(giraffe)
+    region = told_region("y>70%", mesh, QUIET)
+    expected = bend(bind(rig_shape(mesh), [region]), [told_rotation("x by 40", mesh, region)])
+    np.testing.assert_array_equal(read_mesh(bent).vertices, expected.vertices)
+    assert found["edits"] == 1
+    assert 0 < found["vertices_moved"] < mesh.n_vertices
+    assert 0 < found["edge_error"] < 0.2
+    assert found["crossing_faces"] == []
+    assert picture.read_bytes()[:8] == PNG
+
+    again = tmp_path / "again.ply"
+    run("deform", giraffe, "--edits", edits, "-o", again)
+    np.testing.assert_array_equal(read_mesh(again).vertices, expected.vertices)
+    more = json.loads(run("deform", giraffe, "--edits", edits, *words[:2], "--move", "0,0.1,0", "--json").stdout)
+    assert more["edits"] == 2
+
+
+def test_people_see_a_table(giraffe):
+    printed = run("deform", giraffe, "--region", "y>70%", "--move", "0,0.02,0", "--mode", "thesis").stdout
+    assert all(words in printed for words in ("vertices that moved", "edges stretched", "pairs of faces that cross"))
+
+
+def test_words_for_regions(giraffe, tmp_path):
+    mesh = read_mesh(giraffe)
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    box = told_region("y > 25%, x<0.5", mesh, QUIET)
+    assert isinstance(box, Box)
+    np.testing.assert_allclose(box.low, [-np.inf, low[1] + 0.25 * (high - low)[1], -np.inf])
+    np.testing.assert_allclose(box.high, [0.5, np.inf, np.inf])
+    brush = told_region("vertex 7 within 10%", mesh, QUIET)
+    assert isinstance(brush, Brush)
+    assert brush.radius == pytest.approx(0.1 * surface_area(mesh) ** 0.5)
+    assert told_region("vertex 7 within 0.25", mesh, QUIET).radius == 0.25
+    listed = tmp_path / "some.txt"
+    listed.write_text("3\n1\n4\n")
+    assert told_region(str(listed), mesh, QUIET).tolist() == [3, 1, 4]
+    n_parts = len(find_parts(mesh).parts.features.vertices)
+    masks = [region_mask(mesh, told_region(f"part {number}", mesh, QUIET)) for number in range(n_parts)]
+    assert np.all(np.any(masks, axis=0))
+    assert all(0 < mask.sum() < mesh.n_vertices for mask in masks)
+
+
+def test_words_for_handles(giraffe):
+    mesh = read_mesh(giraffe)
+    region = told_region("y>70%", mesh, QUIET)
+    turn = told_rotation("0,3,4 by -90", mesh, region)
+    np.testing.assert_allclose(turn.axis, [0, 0.6, 0.8])
+    assert turn.angle == pytest.approx(-np.pi / 2)
+    rim = region_boundary(mesh, region_mask(mesh, region))
+    np.testing.assert_allclose(turn.pivot, mesh.vertices[rim].mean(axis=0))
+    np.testing.assert_allclose(told_rotation("z by 720 @ 1,2,3", mesh, region).pivot, [1, 2, 3])
+    np.testing.assert_allclose(told_translation("0, -1e-1 ,2").vector, [0, -0.1, 2])
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--region", "head", "--move", "0,1,0"], "A region is one of these"),
+        (["--region", "y>500", "--move", "0,1,0"], "must have a boundary on the shape"),
+        (["--region", "y>70%", "--move", "0,1"], "A move is three numbers with commas between"),
+        (["--region", "y>70%", "--rotate", "x 90"], "A rotation is 'x by 90'"),
+        (["--region", "y>70%", "--rotate", "a,b,c by 3"], "An axis is three numbers"),
+        (["--region", "y>70%", "--rotate", "x by 3 @ 1,2"], "A pivot is three numbers"),
+        (["--region", "vertex 99999 within 1", "--move", "0,1,0"], "A vertex of a region must lie in 0"),
+        (["--region", "part 99", "--move", "0,1,0"], "A part must lie in 0"),
+        (["--region", "y>70%"], "Give --region with either --rotate or --move"),
+        (["--move", "0,1,0"], "Give --region with either --rotate or --move"),
+        (["--region", "y>70%", "--move", "0,1,0", "--rotate", "x by 3"], "Give --region with either"),
+        (["--region", "y>70%", "--move", "0,1,0", "--mode", "soft"], "mode must be 'graded', 'uncrossed'"),
+        (["--region", "y>70%", "--move", "0,1,0", "-n", "999"], "n_modes must lie in 1"),
+    ],
+)
+def test_what_is_wrong_is_named(giraffe, words, message):
+    done = run("deform", giraffe, *words, code=1)
+    assert message in " ".join(done.stderr.split())
+
+
+def test_a_list_that_is_none_is_named(giraffe, tmp_path):
+    listed = tmp_path / "some.txt"
+    listed.write_text("3\nx\n")
+    done = run("deform", giraffe, "--region", listed, "--move", "0,1,0", code=1)
+    assert "must hold one index of a vertex a line" in " ".join(done.stderr.split())
