@@ -112,7 +112,10 @@ def test_what_the_broken_ones_are_made_of_can_be_read():
         ({**GOOD, "moves": {}}, "Edit 1 cannot be read: moves must be a list; it is {}"),
         ({**GOOD, "moves": [5]}, "Edit 1 cannot be read"),
         ({**GOOD, "fixed": 5}, "Edit 1 cannot be read"),
-        ({**GOOD, "mode": "soft"}, "Edit 1 cannot be read: mode must be 'graded' or 'thesis'; it is 'soft'"),
+        (
+            {**GOOD, "mode": "soft"},
+            "Edit 1 cannot be read: mode must be 'graded', 'uncrossed' or 'thesis'; it is 'soft'",
+        ),
         ({**GOOD, "mode": ["graded"]}, "Edit 1 cannot be read: mode must be"),
         ({**GOOD, "n_modes": 0}, "Edit 1 cannot be read: n_modes must be at least 1; it is 0"),
         ({**GOOD, "n_modes": 2.5}, r"Edit 1 cannot be read: n_modes must be a whole number; it is 2\.5"),
