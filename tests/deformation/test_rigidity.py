@@ -66,9 +66,9 @@ def test_from_near_the_fit_is_that_of_singular_values(kind):
         assert left == pytest.approx(energy(best, *edges), abs=1e-13)
 
 
-@pytest.mark.parametrize(("kind", "strays"), [("bent", 0), ("flat", 0), ("anything", 0), ("mirrored", 2)])
-def test_from_anywhere_it_is_nearly_always(kind, strays):
-    """What turned inside out has a second-best rotation that a fit may linger at."""
+@pytest.mark.parametrize("kind", ["bent", "flat", "anything", "mirrored"])
+def test_from_anywhere_it_is_nearly_always(kind):
+    """Far away there are rotations that are neither best nor worse than their neighbours: a fit may linger there."""
     gaps = []
     for _ in range(500):
         edges = star(6, kind)
@@ -76,7 +76,7 @@ def test_from_anywhere_it_is_nearly_always(kind, strays):
         gaps.append(left - energy(best_turn(*edges), *edges))
         assert np.linalg.det(found) == pytest.approx(1, abs=1e-14)
     assert np.min(gaps) > -1e-12
-    assert np.sum(np.array(gaps) > 1e-10) <= strays
+    assert np.sum(np.array(gaps) > 1e-10) <= 2
 
 
 @pytest.mark.parametrize("size", [1e-100, 1e-10, 1e100])
@@ -197,7 +197,7 @@ def test_many_rounds_end_where_plain_alternation_does(monkeypatch):
 
 def test_nothing_free_is_nothing_to_relax():
     rig = lump_rig()
-    part = free_part(rig.edges, np.ones(642, dtype=bool))
+    part = free_part(rig.edges, np.ones(642, dtype=bool), np.zeros(642))
     assert part.factor is None
     start = RNG.standard_normal((642, 3))
     assert relax(rig.edges, part, rig.mesh.vertices, start, quaternions(np.zeros((642, 3))), 5) is start
@@ -208,7 +208,7 @@ def test_each_component_must_be_held():
     held = np.zeros(36, dtype=bool)
     held[3] = True
     with pytest.raises(InvalidParameterError, match=r"held somewhere; that of vertex 12 is not \(2 such\)"):
-        free_part(edges, held)
+        free_part(edges, held, np.zeros(36))
 
 
 def test_equations_that_are_not_definite_are_refused():

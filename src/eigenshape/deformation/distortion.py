@@ -26,7 +26,7 @@ class Distortion:
     area_ratios : (f,) float
         Area of each face, after over before.
     flipped : (k,) int
-        Faces that look away from where the rotations of all their corners would turn them.
+        Faces that look away from where the rotations of their corners, on the mean, would turn them.
     """
 
     edge_error: float
@@ -64,7 +64,7 @@ def measure_distortion(before: TriangleMesh, after: TriangleMesh) -> Distortion:
     normals, turned = (area_vectors(mesh.vertices[mesh.faces]) for mesh in (old, new))
     edges = edge_weights(cotangent_laplacian(old).stiffness)
     turns = fitted_turns(edges, old.vertices, new.vertices)[old.faces]
-    away = (np.einsum("fcij,fj,fi->fc", turns, normals, turned) < 0).all(axis=1)
+    away = np.einsum("fcij,fj,fi->f", turns, normals, turned) < 0
     return Distortion(
         float(np.sqrt(np.mean((change / lengths) ** 2))),
         float(np.sqrt(np.mean(change**2)) / np.linalg.norm(high - low)),
