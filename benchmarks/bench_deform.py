@@ -119,7 +119,7 @@ def cells(row: Row) -> list[str]:
     """Return the texts of one row."""
     name, early, late = row["printed"]
     then = f"{early}; {late} ({name})" if name else ""
-    times = [f"{row[step]:.3g}" for step in STEPS]
+    times = [f"{row[step]:,.0f}" if row[step] >= 100 else f"{row[step]:.3g}" for step in STEPS]
     return [row["what"], f"{row['modes']}", f"{100 * row['free']:.0f} %", *times, f"{row['memory']:.0f}", then]
 
 
