@@ -140,7 +140,9 @@ def _radial(n: int, m: int) -> tuple[int, ...]:
 def _fourier(image: Bool[np.ndarray, "h w"], centre: Float[np.ndarray, "2"]) -> Float[np.ndarray, "10"]:
     """Describe the outline of the largest piece by how its distance from the centre varies along it."""
     pieces, _ = label(image, np.ones((3, 3)))
-    largest = pieces == 1 + np.bincount(pieces[image] - 1).argmax()
+    names, away = pieces[image] - 1, np.square(np.argwhere(image) - centre).sum(axis=1)
+    # Of pieces of one size the outer one, so that the choice turns with the picture.
+    largest = pieces == 1 + np.lexsort((np.bincount(names, away), np.bincount(names)))[-1]
     start = int(largest.argmax())
     path = outline(largest, start // image.shape[1], start % image.shape[1]).astype(np.float64)
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
