@@ -28,6 +28,7 @@ from eigenshape.deformation.edits import Edit, Move
 from eigenshape.deformation.handles import Handle
 from eigenshape.deformation.rig import EigenRig, rig_shape
 from eigenshape.deformation.session import replay
+from eigenshape.figures.camera import three_quarter_view
 from eigenshape.figures.poses import figure_poses
 from eigenshape.geometry.crossings import self_intersections
 from eigenshape.geometry.mesh import TriangleMesh
@@ -62,7 +63,7 @@ def deform(
 ) -> None:
     """Bend, twist or stretch a mesh: a region is turned or moved, and the rest follows smoothly.
 
-    For instance: eigenshape deform horse.ply --region 'y>60%' --rotate 'x by 30' -o bent.ply --picture bent.png
+    For instance: eigenshape deform scan.ply --region 'y>60%' --rotate 'x by 30' -o bent.ply --picture bent.png
     """
     require_paths(picture, output)
     handles = [name for name in (rotate, move) if name]
@@ -89,7 +90,8 @@ def deform(
     if picture:
         moved = np.linalg.norm(session.mesh.vertices - surface.vertices, axis=1)
         shares = _last_shares(rig, session.edits) if len(session.edits) == 1 else moved / max(moved.max(), 1e-300)
-        save_picture(figure_poses({"before": surface, "after": session.mesh}, shares), picture)
+        camera = three_quarter_view(surface, up="auto")
+        save_picture(figure_poses({"before": surface, "after": session.mesh}, shares, camera=camera), picture)
 
 
 def _kept(path: Path, surface: TriangleMesh) -> list[Edit]:
