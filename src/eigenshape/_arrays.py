@@ -135,6 +135,15 @@ def whole_number(value: SupportsIndex, name: str, low: int, high: int | None = N
     return number
 
 
+def whole_numbers(value: ArrayLike, name: str, low: int, high: int) -> NDArray[np.int64]:
+    """Return a list of ints within low..high, both included; `name` is that of one of them."""
+    numbers = np.atleast_1d(value).ravel()
+    typed = numbers.dtype.kind in "iu"
+    for suspect in numbers[(numbers < low) | (numbers > high)] if typed else numbers:
+        whole_number(suspect, name, low, high)
+    return numbers.astype(np.int64)
+
+
 def machine_memory() -> float:
     """Return the bytes of memory of this machine; 8 GiB where it does not tell."""
     try:

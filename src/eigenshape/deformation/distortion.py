@@ -54,8 +54,7 @@ def measure_distortion(before: TriangleMesh, after: TriangleMesh) -> Distortion:
     InvalidShapeError
         If a face has no area before.
     """
-    if before.n_vertices != after.n_vertices or not np.array_equal(before.faces, after.faces):
-        raise InvalidParameterError(f"Poses of one mesh must have the same faces; these are {before} and {after}.")
+    require_poses(before, after)
     rest, scale = size_one(before.vertices)
     old, new = (TriangleMesh(points, before.faces) for points in (rest, after.vertices / scale))
     lengths = edge_lengths(old)
@@ -71,3 +70,15 @@ def measure_distortion(before: TriangleMesh, after: TriangleMesh) -> Distortion:
         np.linalg.norm(turned, axis=1) / np.linalg.norm(normals, axis=1),
         np.flatnonzero(away),
     )
+
+
+def require_poses(before: TriangleMesh, after: TriangleMesh) -> None:
+    """Refuse two meshes that are not poses of one.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the faces differ.
+    """
+    if before.n_vertices != after.n_vertices or not np.array_equal(before.faces, after.faces):
+        raise InvalidParameterError(f"Poses of one mesh must have the same faces; these are {before} and {after}.")

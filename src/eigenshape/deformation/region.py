@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from eigenshape._arrays import frozen, positive_values, whole_number
+from eigenshape._arrays import frozen, positive_values, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.handles import vector
 from eigenshape.geometry.geodesic import geodesic_distance_to_set
@@ -104,7 +104,7 @@ def region_mask(mesh: TriangleMesh, region: Region) -> Bool[np.ndarray, " n"]:
             )
         return chosen
     mask = np.zeros(mesh.n_vertices, dtype=bool)
-    mask[[whole_number(vertex, "A vertex of a region", 0, mesh.n_vertices - 1) for vertex in chosen.ravel()]] = True
+    mask[whole_numbers(chosen, "A vertex of a region", 0, mesh.n_vertices - 1)] = True
     return mask
 
 

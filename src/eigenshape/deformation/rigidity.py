@@ -194,7 +194,12 @@ def fitted_turns(edges: EdgeWeights, rest: Points, posed: Points) -> Float[np.nd
     """Return the rotation of each vertex that fits its edges best, by singular values, from no start."""
     one, two = np.repeat(np.arange(len(rest)), np.diff(edges.starts)), edges.others
     products = np.einsum("e,ei,ej->eij", edges.weights, posed[two] - posed[one], rest[two] - rest[one])
-    left, _, right = np.linalg.svd(np.add.reduceat(products, edges.starts[:-1]))
+    return nearest_rotations(np.add.reduceat(products, edges.starts[:-1]))
+
+
+def nearest_rotations(matrices: Float[np.ndarray, "k 3 3"]) -> Float[np.ndarray, "k 3 3"]:
+    """Return the rotation next to each matrix."""
+    left, _, right = np.linalg.svd(matrices)
     left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
     return np.asarray(left @ right)
 

@@ -8,7 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape.deformation.rigidity import edge_weights, fitted_turns, free_part
+from eigenshape.deformation.distortion import require_poses
+from eigenshape.deformation.rigidity import edge_weights, fitted_turns, free_part, nearest_rotations
 from eigenshape.deformation.rigidity_loops import turned_edges
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes, size_one
@@ -56,8 +57,7 @@ def transfer_deformation(
     InvalidShapeError
         If a face of `before` or the target has no area.
     """
-    if before.n_vertices != after.n_vertices or not np.array_equal(before.faces, after.faces):
-        raise InvalidParameterError(f"Poses of one mesh must have the same faces; these are {before} and {after}.")
+    require_poses(before, after)
     for mesh, spectrum, name in ((before, mapping.source, "source"), (target, mapping.target, "target")):
         if mesh.n_vertices != len(spectrum.eigenvectors):
             raise InvalidParameterError(
@@ -67,17 +67,11 @@ def transfer_deformation(
     k = whole_number(wanted, "n_modes", 1, mapping.matrix.shape[1])
     few = FunctionalMap(mapping.matrix[:, :k], mapping.source, mapping.target)
     turns = fitted_turns(edge_weights(cotangent_laplacian(before).stiffness), before.vertices, after.vertices)
-    carried = _nearest_rotations(transfer_function(few, turns.reshape(-1, 9)).reshape(-1, 3, 3))
+    carried = nearest_rotations(transfer_function(few, turns.reshape(-1, 9)).reshape(-1, 3, 3))
     stand = _turn_between(transfer_function(mapping, before.vertices), target.vertices, point_areas(mapping.target))
     return TriangleMesh(
         _turned_by(target, stand @ carried @ stand.T) + _step(before, after, target, stand), target.faces
     )
-
-
-def _nearest_rotations(matrices: Turns) -> Turns:
-    left, _, right = np.linalg.svd(matrices)
-    left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
-    return np.asarray(left @ right)
 
 
 def _turn_between(
@@ -85,7 +79,7 @@ def _turn_between(
 ) -> Float[np.ndarray, "3 3"]:
     """Return the rotation that takes points to their partners best (Kabsch 1976)."""
     one, two = (size_one(points - _middle(points, areas))[0] for points in (source, target))
-    return _nearest_rotations((two.T @ (areas[:, None] / areas.sum() * one))[None])[0]
+    return nearest_rotations((two.T @ (areas[:, None] / areas.sum() * one))[None])[0]
 
 
 def _middle(points: Float[np.ndarray, "n 3"], areas: Float[np.ndarray, " n"]) -> Float[np.ndarray, " 3"]:

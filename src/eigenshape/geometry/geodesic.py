@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
-from eigenshape._arrays import positive_values, whole_number
+from eigenshape._arrays import positive_values, whole_numbers
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.geodesic_loops import balls
 from eigenshape.geometry.simplices import in_length, scaled_corners
@@ -86,7 +86,8 @@ def geodesic_distances(mesh: Mesh, sources: ArrayLike) -> Float[np.ndarray, "k n
         If a source is no vertex.
     """
     wave = waves_on(mesh)
-    return np.array([wave(source) for source in _vertices(mesh, sources)]).reshape(-1, mesh.n_points)
+    wanted = whole_numbers(sources, "A source", 0, mesh.n_points - 1)
+    return np.array([wave(source) for source in wanted]).reshape(-1, mesh.n_points)
 
 
 def geodesic_distance_to_set(mesh: Mesh, sources: ArrayLike, *, reach: float = np.inf) -> Float[np.ndarray, " n"]:
@@ -115,12 +116,8 @@ def geodesic_distance_to_set(mesh: Mesh, sources: ArrayLike, *, reach: float = n
     InvalidParameterError
         If a source is no vertex.
     """
-    return waves_on(mesh)(np.unique(_vertices(mesh, sources)), reach)
-
-
-def _vertices(mesh: Mesh, sources: ArrayLike) -> Int[np.ndarray, " k"]:
-    wanted = [whole_number(source, "A source", 0, mesh.n_points - 1) for source in np.atleast_1d(sources)]
-    return np.array(wanted, dtype=np.int64)
+    wave = waves_on(mesh)
+    return wave(np.unique(whole_numbers(sources, "A source", 0, mesh.n_points - 1)), reach)
 
 
 def waves_on(mesh: Mesh) -> Callable[..., Float[np.ndarray, " n"]]:

@@ -82,6 +82,19 @@ def require_one_constant(spectrum: Spectrum, name: str) -> None:
         )
 
 
+def modes_of_both(source: Spectrum, target: Spectrum, n_modes: SupportsIndex) -> int:
+    """Return a number of modes that both shapes have.
+
+    Raises
+    ------
+    InvalidParameterError
+        If one has fewer, or its spectrum does not begin with one constant function.
+    """
+    for spectrum, name in ((source, "source"), (target, "target")):
+        require_one_constant(spectrum, name)
+    return whole_number(n_modes, "n_modes", 2, min(len(source.eigenvalues), len(target.eigenvalues)))
+
+
 def point_areas(spectrum: Spectrum) -> Float[np.ndarray, " n"]:
     """Return the area around each point, the row sums of B."""
     return np.asarray(spectrum.mass.sum(axis=1)).ravel()
@@ -126,9 +139,7 @@ def functional_map(
         If there is no pair, one names no vertex, a spectrum has too few modes or does not begin with one constant
         function.
     """
-    for spectrum, name in ((source, "source"), (target, "target")):
-        require_one_constant(spectrum, name)
-    k = whole_number(n_modes, "n_modes", 2, min(len(source.eigenvalues), len(target.eigenvalues)))
+    k = modes_of_both(source, target, n_modes)
     ends = _checked_pairs(pairs, len(source.eigenvectors), len(target.eigenvectors))
     ours, theirs = unit_modes(source, k)[ends[:, 0]], unit_modes(target, k)[ends[:, 1]]
     weights = (np.linalg.norm(ours, axis=1) * np.linalg.norm(theirs, axis=1))[:, None] ** -0.5

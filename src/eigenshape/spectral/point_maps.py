@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from eigenshape._arrays import frozen, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape.spectral.functional_map import N_MODES, FunctionalMap, point_areas, require_one_constant, unit_modes
+from eigenshape.spectral.functional_map import N_MODES, FunctionalMap, modes_of_both, point_areas, unit_modes
 from eigenshape.spectral.outcome import Progress, silent
 from eigenshape.spectral.spectrum import Spectrum
 
@@ -72,9 +72,7 @@ def map_from_points(
         If there is not one vertex of the source for each of the target, a spectrum has too few modes or does not
         begin with one constant function.
     """
-    for spectrum, name in ((source, "source"), (target, "target")):
-        require_one_constant(spectrum, name)
-    k = whole_number(n_modes, "n_modes", 2, min(len(source.eigenvalues), len(target.eigenvalues)))
+    k = modes_of_both(source, target, n_modes)
     places, n1, n2 = np.asarray(points), len(source.eigenvectors), len(target.eigenvectors)
     if places.shape != (n2,) or places.dtype.kind not in "iu":
         raise InvalidParameterError(
