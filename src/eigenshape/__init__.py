@@ -108,6 +108,7 @@ from eigenshape.geometry.spheres import (
     sphere_hull,
     three_sphere,
 )
+from eigenshape.geometry.surface_points import SurfacePoints, sample_surface
 from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, subdivide, torus
 from eigenshape.geometry.topology import (
     EdgeTable,
@@ -260,6 +261,7 @@ __all__ = [
     "SkeletonGrip",
     "Spectrum",
     "StoreError",
+    "SurfacePoints",
     "Translation",
     "TriangleMesh",
     "Workers",
@@ -418,6 +420,7 @@ __all__ = [
     "rig_shape",
     "robust_laplacian",
     "rotation_by_drag",
+    "sample_surface",
     "save_figure",
     "scale_invariant_heat_kernel_signature",
     "seal_holes",
