@@ -13,6 +13,7 @@ from eigenshape.cli.operators import operators
 from eigenshape.cli.query import query
 from eigenshape.cli.segment import segment
 from eigenshape.cli.spectrum import spectrum
+from eigenshape.cli.stability import stability
 
 app = typer.Typer(
     cls=Verbs,
@@ -22,5 +23,5 @@ app = typer.Typer(
     epilog="Exit codes: 0 done, 1 an error named on stderr, 2 wrong usage, 3 some shapes could not be taken, "
     "130 stopped by Ctrl-C.",
 )
-for verb in (info, spectrum, operators, features, segment, label, deform, index, query, demo):
+for verb in (info, spectrum, operators, features, segment, label, deform, stability, index, query, demo):
     app.command(no_args_is_help=verb not in (demo, operators))(verb)

@@ -1,4 +1,4 @@
-"""Labels of faces: a whole number a line, as .seg files have them, or what `eigenshape segment --json` prints."""
+"""Whole numbers, one a line: labels of faces, as .seg files have them, or of vertices that correspond."""
 
 import json
 from pathlib import Path
@@ -12,6 +12,8 @@ from eigenshape._files import read_regular, replace_file
 from eigenshape.io.text import INT64, Line, lines_of, shown, whole, whole_table
 
 KEY = "face_labels"
+LABEL = ("A label", "the label of one face")
+VERTEX = ("A vertex", "the number of one vertex")
 
 
 def read_labels(path: Path) -> Int[np.ndarray, " f"]:
@@ -26,7 +28,24 @@ def read_labels(path: Path) -> Int[np.ndarray, " f"]:
     """
     data = read_regular(path, "labels")
     try:
-        return _from_json(data) if path.suffix.lower() == ".json" else _from_lines(lines_of(data))
+        return _from_json(data) if path.suffix.lower() == ".json" else _from_lines(lines_of(data), LABEL)
+    except FileFormatError as err:
+        raise type(err)(f"{path}: {err}") from err
+
+
+def read_map(path: Path) -> Int[np.ndarray, " n"]:
+    """Read for each vertex of a shape the number of one of another, a line each, from 0.
+
+    Raises
+    ------
+    FileFormatError
+        With the line that is no whole number.
+    OSError
+        If the system cannot open the file.
+    """
+    data = read_regular(path, "vertices that correspond")
+    try:
+        return _from_lines(lines_of(data), VERTEX)
     except FileFormatError as err:
         raise type(err)(f"{path}: {err}") from err
 
@@ -36,14 +55,14 @@ def write_labels(labels: Int[np.ndarray, " f"], path: Path) -> None:
     replace_file(path, "".join(f"{label}\n" for label in labels.tolist()).encode())
 
 
-def _from_lines(lines: list[Line]) -> Int[np.ndarray, " f"]:
+def _from_lines(lines: list[Line], words: tuple[str, str]) -> Int[np.ndarray, " f"]:
     table = whole_table(lines)
     if table is not None and table.shape[1] == 1:
         return table[:, 0]
     several = next((line for line in lines if len(line[1].split()) > 1), None)
     if several:
-        raise FileFormatError(f"A line must hold the label of one face; line {several[0]} is {shown(several)}.")
-    return np.array([whole(line[1], line, "A label") for line in lines], dtype=np.int64)
+        raise FileFormatError(f"A line must hold {words[1]}; line {several[0]} is {shown(several)}.")
+    return np.array([whole(line[1], line, words[0]) for line in lines], dtype=np.int64)
 
 
 def _from_json(data: bytes) -> Int[np.ndarray, " f"]:

@@ -1,0 +1,277 @@
+"""How far do eigenvalues move when points or surfaces do, beside what the theorems allow? (thesis 3.1.4, 4.1.1, 4.3.1).
+
+Points of a torus of area 1, each moved by δ in a random direction; independent samples of it, matched one to one; and
+its mesh under a smooth motion.
+"""
+
+import sys
+import warnings
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from rich.progress import track
+
+import eigenshape as es
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+from frame import COLORS, chart, finish, label, parse_arguments, rounded
+
+HERE = Path(__file__).resolve().parent
+DIM, SHORT = 2, 4.0  # t ≥ 4δ² is what the theorem is asked about; t ≤ δ²/4 what it forbids
+FULL = {
+    "points": 1000,
+    "seeds": 5,
+    "times": [2e-3, 6e-3, 2e-2],
+    "deltas": [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3],
+    "samples": [250, 500, 1000, 2000],
+    "mesh": (100, 50),
+    "mesh times": [5e-4, 1e-3, 2e-3],
+    "heights": [1e-3, 3e-3, 1e-2, 3e-2],
+    "k": 100,
+}
+QUICK = {
+    **FULL,
+    "points": 300,
+    "seeds": 2,
+    "times": [6e-3, 2e-2],
+    "deltas": [1e-3, 1e-2, 0.1],
+    "samples": [125, 250],
+    "mesh": (40, 20),
+    "mesh times": [2e-3, 4e-3],
+    "heights": [3e-3, 3e-2],
+    "k": 30,
+}
+OPERATORS = {
+    "mesh, literal": lambda mesh, t: es.mesh_laplacian(mesh, t=t),
+    "mesh, corrected": lambda mesh, t: es.mesh_laplacian(mesh, t=t, correct="log"),
+    "cotangent, lumped": lambda mesh, t: es.cotangent_laplacian(mesh),
+}
+
+
+def torus_of_area_one(n_around: int, n_across: int) -> es.TriangleMesh:
+    """Return the torus on whose surface everything happens."""
+    return es.normalize_area(es.torus(n_around, n_across))
+
+
+def all_eigenvalues(laplacian: es.Laplacian) -> np.ndarray:
+    """Return every eigenvalue of a graph Laplacian, whose mass is 1/n."""
+    return np.linalg.eigvalsh(laplacian.n_points * laplacian.stiffness.toarray())
+
+
+def laplacians(one: np.ndarray, two: np.ndarray, t: float) -> list[es.Laplacian]:
+    """Return the graph Laplacians of two sets of points."""
+    return [es.gaussian_laplacian(points, t, DIM) for points in (one, two)]
+
+
+def moved_points(setup: dict) -> list[dict[str, float]]:
+    """Move each point of a sample by δ, and compare all n eigenvalues."""
+    mesh, rows = torus_of_area_one(96, 48), []
+    cases = list(product(setup["times"], setup["deltas"], range(setup["seeds"])))
+    for t, delta, seed in track(cases, description="points moved"):
+        rng = np.random.default_rng(seed)
+        points = es.sample_surface(mesh, setup["points"], rng=rng).points
+        steps = rng.standard_normal(points.shape)
+        there = points + delta * steps / np.linalg.norm(steps, axis=1, keepdims=True)
+        one, two = laplacians(points, there, t)
+        before, after = all_eigenvalues(one), all_eigenvalues(two)
+        low = slice(1, 11)
+        rows.append(
+            {
+                "t": t,
+                "delta": delta,
+                "change": float(np.abs(after - before).max()),
+                "lowest": float((np.abs(after - before)[low] / before[low]).mean()),
+                "weyl": es.weyl_bound(one, two).norm,
+            }
+        )
+    return rows
+
+
+def matched_samples(setup: dict) -> list[dict[str, float]]:
+    """Compare independent samples, as Theorem 4.1.1 has them: δ is what the best one-to-one correspondence leaves."""
+    mesh, t, rows = torus_of_area_one(96, 48), setup["times"][-1], []
+    for n, seed in track(list(product(setup["samples"], range(setup["seeds"]))), description="samples matched"):
+        rng = np.random.default_rng(seed)
+        one, two = (es.sample_surface(mesh, n, rng=rng).points for _ in range(2))
+        delta = es.bottleneck_matching(one, two).distance
+        values = [all_eigenvalues(laplacian) for laplacian in laplacians(one, two, t)]
+        change = float(np.abs(values[0] - values[1]).max())
+        low = float(np.abs(values[0] - values[1])[1:11].max())
+        rows.append({"n": n, "t": t, "delta": delta, "change": change, "lowest": low})
+    return rows
+
+
+def waved(mesh: es.TriangleMesh, height: float) -> es.TriangleMesh:
+    """Move a surface along its normals by a smooth function of size `height`."""
+    x, y, z = (4 * np.pi * mesh.vertices).T
+    waves = np.sin(x) * np.cos(y) + np.sin(z + x)
+    return es.TriangleMesh(mesh.vertices + height / 2 * waves[:, None] * es.vertex_normals(mesh), mesh.faces)
+
+
+def moved_surfaces(setup: dict) -> list[dict[str, object]]:
+    """Move a mesh smoothly, and compare the first k eigenvalues by each operator."""
+    mesh, rows = torus_of_area_one(*setup["mesh"]), []
+    cases = list(product(OPERATORS, setup["mesh times"]))
+    for name, t in track(cases, description="surfaces moved"):
+        if name.startswith("cotangent") and t != setup["mesh times"][0]:
+            continue
+        before = es.solve_spectrum(OPERATORS[name](mesh, t), setup["k"])
+        for height in setup["heights"]:
+            there = waved(mesh, height)
+            after = es.solve_spectrum(OPERATORS[name](there, t), setup["k"])
+            compared = es.compare_spectra(before, after)
+            rows.append(
+                {
+                    "operator": name,
+                    "t": t,
+                    "delta": es.map_closeness(mesh, there.vertices).delta,
+                    "hausdorff": compared.hausdorff,
+                    "change": compared.index_distance,
+                    "relative": compared.median_relative,
+                }
+            )
+    return rows
+
+
+def exponents(rows: list[dict], measured: str = "change") -> dict[str, float]:
+    """Fit powers of δ and t."""
+    law = es.fit_rate(*columns(rows, "delta", "t", measured))
+    return {"delta": law.delta, "t": law.t, "constant": law.constant}
+
+
+def columns(rows: list[dict], *names: str) -> list[np.ndarray]:
+    """Return some columns of a table."""
+    return [np.array([row[name] for row in rows]) for name in names]
+
+
+def summarise(points: list[dict], samples: list[dict], surfaces: list[dict]) -> dict[str, object]:
+    """Gather exponents and constants beside those that are proven."""
+    allowed = [row for row in points if row["t"] >= SHORT * row["delta"] ** 2]
+    forbidden = [row for row in points if row["t"] <= row["delta"] ** 2 / SHORT]
+    law, ours = es.theorem_rate("4.3.1", DIM), es.theorem_rate("lipschitz", DIM)
+    told = columns(points, "delta", "t", "change")
+    at_samples = columns(samples, "delta", "t")
+    return {
+        "points, t ≥ 4δ²": exponents(allowed),
+        "proven (4.3.1)": {"delta": law.delta, "t": law.t},
+        "proven (ours)": {"delta": ours.delta, "t": ours.t},
+        "constant that 4.3.1 needs": es.cover_by_rate(law, *columns(allowed, "delta", "t", "change")).constant,
+        "largest share of our bound": float((told[2] / ours.at(*told[:2])).max()),
+        "largest share of Weyl's norm": float(np.max(told[2] / columns(points, "weyl")[0])),
+        "lowest ten, relative, t ≥ 4δ²": float(np.mean(columns(allowed, "lowest")[0])),
+        "lowest ten, relative, t ≤ δ²/4": float(np.mean(columns(forbidden, "lowest")[0])),
+        "samples": {
+            str(n): _sample_row([row for row in samples if row["n"] == n]) for n in {r["n"]: 0 for r in samples}
+        },
+        "samples, largest share of our bound": float(np.max(columns(samples, "change")[0] / ours.at(*at_samples))),
+        "surfaces": {name: _surface_row([row for row in surfaces if row["operator"] == name]) for name in OPERATORS},
+    }
+
+
+def _sample_row(rows: list[dict]) -> dict[str, float]:
+    return {name: float(columns(rows, name)[0].mean()) for name in ("delta", "change", "lowest")}
+
+
+def _surface_row(rows: list[dict]) -> dict[str, float]:
+    law = exponents(rows, "hausdorff")
+    return {"delta": law["delta"], "t": law["t"], "relative at the largest δ": max(row["relative"] for row in rows)}
+
+
+def figure_law(points: list[dict], samples: list[dict], setup: dict) -> Figure:
+    """Draw the change against δ at each t with the bounds, and all of them on one curve of δ/√t."""
+    figure, (left, right) = chart(12, 5, columns=2)
+    law, ours = es.theorem_rate("4.3.1", DIM), es.theorem_rate("lipschitz", DIM)
+    for t, color in zip(setup["times"], COLORS, strict=False):
+        here = [row for row in points if row["t"] == t]
+        deltas = np.unique(columns(here, "delta")[0])
+        by_delta = [columns([row for row in here if row["delta"] == d], "change")[0] for d in deltas]
+        means = np.array([each.mean() for each in by_delta])
+        spans = np.abs([[each.min(), each.max()] for each in by_delta] - means[:, None]).T
+        left.errorbar(
+            deltas, means, spans, fmt="o", ms=4, color=color, label=f"measured, t = {t:g} (mean, least, largest)"
+        )
+        left.plot(deltas, ours.at(deltas, t), "-", lw=1, color=color)
+        left.plot(deltas, es.cover_by_rate(law, deltas[:1], [t], means[:1]).at(deltas, t), ":", lw=1, color=color)
+        unit = t ** (DIM / 2 + 1) * (4 * np.pi) ** (DIM / 2)
+        right.plot(deltas / t**0.5, means * unit, "o-", ms=4, lw=0.8, color=color, label=f"t = {t:g}")
+    left.plot([], [], "-", color="grey", label="our bound, δ t$^{-5/2}$ with its constant")
+    left.plot([], [], ":", color="grey", label="slope of Theorem 4.3.1, δ$^{4/5}$ t$^{-12/5}$")
+    t = samples[0]["t"]
+    unit = t ** (DIM / 2 + 1) * (4 * np.pi) ** (DIM / 2)
+    deltas, changes = columns(samples, "delta", "change")
+    right.plot(deltas / t**0.5, changes * unit, "k^", ms=4, label="independent samples, matched")
+    right.axvspan(1, right.get_xlim()[1], color="#f5e3df", zorder=0, label="t < δ², which the theorem forbids")
+    for axes in (left, right):
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+    n = setup["points"]
+    label(
+        left,
+        "δ, by how much each point moves (area 1)",
+        "largest change of an eigenvalue",
+        f"All {n} eigenvalues of the graph Laplacian, torus of area 1",
+    )
+    label(right, "δ / √t", "largest change, in units of the largest entry of the kernel", "All times on one curve")
+    return figure
+
+
+def figure_forbidden(points: list[dict], setup: dict) -> Figure:
+    """Draw the relative change of the ten lowest eigenvalues against δ/√t."""
+    figure, (axes,) = chart()
+    for t, color in zip(setup["times"], COLORS, strict=False):
+        ratio, low = columns([row for row in points if row["t"] == t], "delta", "lowest")
+        axes.plot(ratio / t**0.5, low, "o", ms=4, color=color, label=f"t = {t:g}")
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.axvspan(1, axes.get_xlim()[1], color="#f5e3df", zorder=0, label="t < δ², which the theorem forbids")
+    axes.axhline(1, color="grey", lw=0.8, ls="--")
+    label(
+        axes,
+        "δ / √t",
+        "relative change, mean of eigenvalues 1 to 10",
+        f"Below t = δ² the lowest eigenvalues are lost (n = {setup['points']}, torus of area 1)",
+    )
+    return figure
+
+
+def figure_surfaces(surfaces: list[dict], setup: dict) -> Figure:
+    """Draw the Hausdorff distance of spectra against δ_H for each operator."""
+    figure, (axes,) = chart()
+    styles = dict(zip(OPERATORS, ("o-", "s--", "^:"), strict=True))
+    for name, t in product(OPERATORS, setup["mesh times"]):
+        rows = [row for row in surfaces if row["operator"] == name and row["t"] == t]
+        if rows:
+            deltas, distances = columns(rows, "delta", "hausdorff")
+            color = COLORS[setup["mesh times"].index(t)] if not name.startswith("cotangent") else "black"
+            told = name if name.startswith("cotangent") else f"{name}, t = {t:g}"
+            axes.plot(deltas, distances, styles[name], ms=4, lw=1, color=color, label=told)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    n = setup["mesh"][0] * setup["mesh"][1]
+    label(
+        axes,
+        "δ_H, displacement or change of area (area 1)",
+        "Hausdorff distance of spectra, 1/length²",
+        f"First {setup['k']} eigenvalues of a mesh that moves smoothly, n = {n}",
+    )
+    return figure
+
+
+def main() -> None:
+    """Measure, print, draw."""
+    arguments = parse_arguments(__doc__, HERE)
+    warnings.simplefilter("ignore")
+    setup = QUICK if arguments.quick else FULL
+    points, samples, surfaces = moved_points(setup), matched_samples(setup), moved_surfaces(setup)
+    pictures = {
+        "law": figure_law(points, samples, setup),
+        "forbidden": figure_forbidden(points, setup),
+        "surfaces": figure_surfaces(surfaces, setup),
+    }
+    finish(rounded(summarise(points, samples, surfaces)), pictures, arguments)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,133 @@
+"""eigenshape stability: two shapes, how far their spectra are apart, and which heat times can be trusted."""
+
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+
+from eigenshape._errors import InvalidParameterError
+from eigenshape.cli.console import (
+    DimOption,
+    DropMissingOption,
+    JsonOption,
+    RepairOption,
+    ShapeArgument,
+    load_shape,
+    out,
+    print_json,
+    print_table,
+    progress_bar,
+    save_picture,
+)
+from eigenshape.figures.save import require_picture_path
+from eigenshape.figures.stability import figure_stability
+from eigenshape.geometry.cloud import Shape
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.normalize import normalize_area, normalize_diameter
+from eigenshape.io.labels import read_map
+from eigenshape.stability.report import StabilityPlan, StabilityReport, compare_shapes
+
+USUAL = StabilityPlan()
+Scale = Literal["none", "area", "diameter"]
+SCALES: dict[str, Callable[[TriangleMesh], TriangleMesh]] = {"area": normalize_area, "diameter": normalize_diameter}
+
+
+def stability(
+    one: ShapeArgument,
+    two: ShapeArgument,
+    *,
+    k: Annotated[int, typer.Option("-k", help="Number of eigenvalues to compare.")] = USUAL.k,
+    t: Annotated[
+        list[float] | None, typer.Option("-t", help="Heat time, in length²; may be repeated. By default four.")
+    ] = None,
+    n_samples: Annotated[
+        int, typer.Option("-n", "--n-samples", help="Points to throw on each shape.")
+    ] = USUAL.n_samples,
+    seed: Annotated[int, typer.Option(help="Of the random points.")] = USUAL.seed,
+    map_file: Annotated[
+        Path | None,
+        typer.Option("--map", help="For each vertex of the first shape the number of one of the second, a line each."),
+    ] = None,
+    scale: Annotated[
+        Scale,
+        typer.Option(help="Scale both to area 1, or to diameter 1, and centre them, before anything is compared."),
+    ] = "none",
+    brackets: Annotated[
+        bool, typer.Option("--brackets", help="Bound each eigenvalue of both meshes, to prove changes of the shapes.")
+    ] = False,
+    dim: DimOption = 2,
+    drop_missing: DropMissingOption = False,
+    repair: RepairOption = "",
+    picture: Annotated[Path | None, typer.Option(help="Draw the report (PNG, SVG or PDF).")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Compare two shapes: how close they lie, what changes in their spectra, and which heat times to trust.
+
+    Meshes with the same faces correspond vertex by vertex, others by --map, or else by points matched one to one as
+    they lie. For instance: eigenshape stability clean.ply noisy.ply --picture report.png
+    """
+    if picture:
+        require_picture_path(picture)
+    partners = read_map(map_file) if map_file else None
+    shapes = [_scaled(load_shape(path, repair, dim, drop_missing=drop_missing), scale) for path in (one, two)]
+    plan = StabilityPlan(k=k, n_samples=n_samples, times=tuple(t or ()), seed=seed, brackets=brackets)
+    with progress_bar("stability") as progress:
+        report = compare_shapes(*shapes, plan, partners=partners, progress=progress)
+    if as_json:
+        print_json({"one": str(one), "two": str(two), "scale": scale, **_facts(report)})
+    else:
+        _print(report)
+    if picture:
+        save_picture(figure_stability(report, *shapes, titles=(one.stem, two.stem)), picture)
+
+
+def _scaled(shape: Shape, scale: str) -> Shape:
+    if scale == "none":
+        return shape
+    if not isinstance(shape, TriangleMesh):
+        raise InvalidParameterError(f"--scale is for triangle meshes; the shape is {shape!r}.")
+    return SCALES[scale](shape)
+
+
+def _facts(report: StabilityReport) -> dict[str, Any]:
+    compared, angles = report.spectra, report.angles
+    return {
+        "spectra": {
+            **asdict(compared),
+            "told": compared.told,
+            "hausdorff": compared.hausdorff,
+            "index_distance": compared.index_distance,
+            "mean_relative": compared.mean_relative,
+            "median_relative": compared.median_relative,
+        },
+        "distance": report.distance,
+        "matched": report.matched,
+        "matched_floor": report.matched_floor,
+        "delta": report.delta,
+        "delta_of_the_map": report.closeness.delta if report.closeness else None,
+        "times": {**asdict(report.times), "empty": report.times.empty},
+        "changes": [{**asdict(change), "seen": change.seen} for change in report.changes],
+        "eigenspaces": asdict(angles),
+        "n_samples": report.n_samples,
+        "explanation": report.explain(),
+    }
+
+
+def _print(report: StabilityReport) -> None:
+    compared = report.spectra
+    rows = [
+        [str(number), f"{one:.6g}", f"{two:.6g}", f"{change:.2%}", "yes" if told else "no"]
+        for number, (one, two, change, told) in enumerate(
+            zip(compared.one, compared.two, compared.relative, compared.told, strict=True)
+        )
+    ]
+    print_table("Eigenvalues, in 1/length²", ["i", "first", "second", "change", "proved"], rows)
+    heat = [
+        [f"{row.t:.3g}", f"{row.change:.3g}", f"{row.floor:.3g}", f"{row.weyl:.3g}", "yes" if row.trusted else "no"]
+        for row in report.changes
+    ]
+    columns = ["heat time t, length²", "between shapes", "between samples", "Weyl's bound", "trusted"]
+    print_table(f"Largest change of {len(compared.one)} eigenvalues of graph Laplacians, over the last", columns, heat)
+    out.print(report.explain())

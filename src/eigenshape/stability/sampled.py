@@ -1,0 +1,145 @@
+"""Random points of two shapes, matched one to one, and what their graph Laplacians hear at several heat times."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial import cKDTree
+
+from eigenshape._arrays import frozen
+from eigenshape.geometry.cloud import PointCloud, Shape
+from eigenshape.geometry.surface_points import sample_surface
+from eigenshape.operators.gaussian import gaussian_laplacian
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.spectral.outcome import Progress
+from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.spectral.spectrum import Spectrum
+from eigenshape.stability.bounds import TimeRange, weyl_bound
+from eigenshape.stability.correspondence import BottleneckMatching, bottleneck_matching
+from eigenshape.stability.rates import theorem_rate
+
+N_TIMES = 4
+DENSER = 20  # times as many points to measure distances to, as are matched
+ABOVE_SAMPLING = 1.25  # a change that is so much more than that of two samples of one shape is the shapes'
+
+Points = Float[np.ndarray, "n d"]
+
+
+@dataclass(frozen=True)
+class ChangeAtTime:
+    """How far the graph Laplacians of samples of two shapes are apart at one heat time.
+
+    Shares are of the last eigenvalue of the first shape's sample.
+
+    Attributes
+    ----------
+    t : float
+        Heat time, in length².
+    change : float
+        Largest |λ_i - ω_i|, as a share.
+    floor : float
+        The same between two samples of the first shape: what sampling alone does.
+    weyl : float
+        ‖L_P - L_Q‖₂ of the matched points, as a share: no eigenvalue can change by more.
+    bound : float
+        What theory allows for points so far apart (`theorem_rate("lipschitz")`), as a share.
+    trusted : bool
+        Whether the time lies in the range that can be trusted.
+    """
+
+    t: float
+    change: float
+    floor: float
+    weyl: float
+    bound: float
+    trusted: bool
+
+    @property
+    def seen(self) -> bool:
+        """Whether the change stands out from what sampling does."""
+        return self.change > ABOVE_SAMPLING * self.floor
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Random points of two shapes of dimension m.
+
+    Attributes
+    ----------
+    one, two, again : (n, d) float
+        Of the first shape, of the second, and others of the first.
+    matched, floor : BottleneckMatching
+        From `one` to `two`, and from `one` to `again`.
+    dim : int
+    """
+
+    one: Points
+    two: Points
+    again: Points
+    matched: BottleneckMatching
+    floor: BottleneckMatching
+    dim: int
+
+
+def matched_samples(one: Shape, two: Shape, n: int, rng: np.random.Generator) -> Samples:
+    """Throw n points on each of two shapes, 2n on the first, and match them one to one."""
+    both, other = _thrown(one, 2 * n, rng), _thrown(two, n, rng)
+    matchings = [bottleneck_matching(both[:n], points) for points in (other, both[n:])]
+    return Samples(both[:n], other, both[n:], *matchings, one.dim)
+
+
+def _thrown(shape: Shape, n: int, rng: np.random.Generator) -> Points:
+    if isinstance(shape, PointCloud):
+        return shape.points[rng.choice(len(shape.points), n, replace=False)]
+    return sample_surface(shape, n, rng=rng).points
+
+
+def distances_between(one: Shape, two: Shape, n: int, rng: np.random.Generator) -> tuple[Points, Points]:
+    """Return how far each point of each shape is from the other, of which n points a match are known beside its own."""
+    clouds = [_dense(shape, DENSER * n, rng) for shape in (one, two)]
+    pairs = zip((one, two), clouds[::-1], strict=True)
+    first, second = (frozen(cKDTree(cloud).query(shape.points)[0]) for shape, cloud in pairs)
+    return first, second
+
+
+def _dense(shape: Shape, n: int, rng: np.random.Generator) -> Points:
+    if isinstance(shape, PointCloud):
+        return shape.points
+    return np.vstack([shape.points, sample_surface(shape, n, rng=rng).points])
+
+
+def spaced_times(times: TimeRange) -> tuple[float, ...]:
+    """Return heat times over the range that can be trusted, or the least that has a meaning."""
+    return (times.low,) if times.empty else tuple(np.geomspace(times.low, times.high, N_TIMES).tolist())
+
+
+def changes_over_times(
+    samples: Samples, k: int, asked: tuple[float, ...], trusted: TimeRange, progress: Progress
+) -> tuple[tuple[ChangeAtTime, ...], tuple[Spectrum, Spectrum]]:
+    """Return what changes at each heat time, and the spectra of both shapes' points at the one in the middle."""
+    changes, kept = [], []
+    for place, t in enumerate(asked):
+        progress(place / len(asked), f"heat time {t:.3g}")
+        laplacians = [
+            gaussian_laplacian(points, t, samples.dim) for points in (samples.one, samples.two, samples.again)
+        ]
+        spectra = [solve_spectrum(laplacian, k) for laplacian in laplacians]
+        kept.append((spectra[0], spectra[1]))
+        changes.append(_change(samples, laplacians, spectra, t, trusted))
+    return tuple(changes), kept[len(kept) // 2]
+
+
+def _change(
+    samples: Samples, laplacians: list[Laplacian], spectra: list[Spectrum], t: float, trusted: TimeRange
+) -> ChangeAtTime:
+    values = [spectrum.eigenvalues for spectrum in spectra]
+    last = float(values[0][-1])
+    moved = samples.matched
+    return ChangeAtTime(
+        t=t,
+        change=float(np.abs(values[1] - values[0]).max()) / last,
+        floor=float(np.abs(values[2] - values[0]).max()) / last,
+        weyl=weyl_bound(laplacians[0], laplacians[1], moved.partners).norm / last,
+        bound=float(theorem_rate("lipschitz", samples.dim).at(moved.distance, t)) / last,
+        trusted=trusted.low <= t <= trusted.high,
+    )
