@@ -191,7 +191,16 @@ from eigenshape.spectral.signature import (
 from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 from eigenshape.spectral.wave import default_energies, wave_kernel_signature
+from eigenshape.stability.anchors import AnchorNodes, anchor_nodes, anchor_region, witness_region
 from eigenshape.stability.closeness import Closeness, map_closeness, measure_closeness
+from eigenshape.stability.correspondence import (
+    BottleneckMatching,
+    MaximumMatching,
+    bottleneck_matching,
+    correspondence_graph,
+    matching_reach,
+    maximum_matching,
+)
 from eigenshape.stability.perturbation import Perturbation, perturbation, vertex_pairs
 
 __all__ = [
@@ -201,10 +210,12 @@ __all__ = [
     "SCALE_FREE",
     "THESIS",
     "USUAL",
+    "AnchorNodes",
     "ApproximateSignature",
     "Ball",
     "BatchReport",
     "Binding",
+    "BottleneckMatching",
     "Box",
     "Brackets",
     "Brush",
@@ -236,6 +247,7 @@ __all__ = [
     "Laplacian",
     "Law",
     "Match",
+    "MaximumMatching",
     "MergeTree",
     "MeshPart",
     "MissingExtraError",
@@ -273,6 +285,8 @@ __all__ = [
     "Workers",
     "affinity_distance",
     "affinity_eigenvalues",
+    "anchor_nodes",
+    "anchor_region",
     "anisotropic_laplacian",
     "apply_edit",
     "approximate_heat_kernel_signature",
@@ -285,6 +299,7 @@ __all__ = [
     "biharmonic_blend",
     "bind",
     "bottleneck_distance",
+    "bottleneck_matching",
     "boundary_edges",
     "boundary_loops",
     "boundary_vertices",
@@ -300,6 +315,7 @@ __all__ = [
     "cloud_quadrature",
     "compose_maps",
     "connection_laplacian",
+    "correspondence_graph",
     "cotangent_laplacian",
     "crouzeix_raviart_laplacian",
     "curvature_tensors",
@@ -384,7 +400,9 @@ __all__ = [
     "map_from_points",
     "match_features",
     "match_patches",
+    "matching_reach",
     "matching_score",
+    "maximum_matching",
     "mean_curvature",
     "mean_side_length",
     "measure_closeness",
@@ -471,6 +489,7 @@ __all__ = [
     "view_distances",
     "wave_kernel_signature",
     "weld",
+    "witness_region",
     "word_distances",
     "write_codebook",
     "write_edits",
