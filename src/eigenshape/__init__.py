@@ -191,9 +191,18 @@ from eigenshape.spectral.signature import (
 from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 from eigenshape.spectral.wave import default_energies, wave_kernel_signature
+from eigenshape.stability.anchors import AnchorNodes, anchor_nodes, anchor_region, witness_region
 from eigenshape.stability.bounds import TimeRange, WeylBound, trusted_times, weyl_bound
 from eigenshape.stability.cheeger import CheegerEstimate, cheeger_estimate
 from eigenshape.stability.closeness import Closeness, map_closeness, measure_closeness
+from eigenshape.stability.correspondence import (
+    BottleneckMatching,
+    MaximumMatching,
+    bottleneck_matching,
+    correspondence_graph,
+    matching_reach,
+    maximum_matching,
+)
 from eigenshape.stability.perturbation import Perturbation, perturbation, vertex_pairs
 from eigenshape.stability.rates import THEOREMS, Rate, cover_by_rate, fit_rate, theorem_rate
 
@@ -205,10 +214,12 @@ __all__ = [
     "THEOREMS",
     "THESIS",
     "USUAL",
+    "AnchorNodes",
     "ApproximateSignature",
     "Ball",
     "BatchReport",
     "Binding",
+    "BottleneckMatching",
     "Box",
     "Brackets",
     "Brush",
@@ -241,6 +252,7 @@ __all__ = [
     "Laplacian",
     "Law",
     "Match",
+    "MaximumMatching",
     "MergeTree",
     "MeshPart",
     "MissingExtraError",
@@ -281,6 +293,8 @@ __all__ = [
     "Workers",
     "affinity_distance",
     "affinity_eigenvalues",
+    "anchor_nodes",
+    "anchor_region",
     "anisotropic_laplacian",
     "apply_edit",
     "approximate_heat_kernel_signature",
@@ -293,6 +307,7 @@ __all__ = [
     "biharmonic_blend",
     "bind",
     "bottleneck_distance",
+    "bottleneck_matching",
     "boundary_edges",
     "boundary_loops",
     "boundary_vertices",
@@ -309,6 +324,7 @@ __all__ = [
     "cloud_quadrature",
     "compose_maps",
     "connection_laplacian",
+    "correspondence_graph",
     "cotangent_laplacian",
     "cover_by_rate",
     "crouzeix_raviart_laplacian",
@@ -395,7 +411,9 @@ __all__ = [
     "map_from_points",
     "match_features",
     "match_patches",
+    "matching_reach",
     "matching_score",
+    "maximum_matching",
     "mean_curvature",
     "mean_side_length",
     "measure_closeness",
@@ -485,6 +503,7 @@ __all__ = [
     "wave_kernel_signature",
     "weld",
     "weyl_bound",
+    "witness_region",
     "word_distances",
     "write_codebook",
     "write_edits",

@@ -1,4 +1,4 @@
-"""Compiled loops of the matching of two diagrams (Hopcroft and Karp 1973)."""
+"""Compiled loops of a maximum matching (Hopcroft and Karp 1973)."""
 
 from typing import no_type_check
 
@@ -8,21 +8,28 @@ from numba import njit
 
 @njit(cache=True, nogil=True)
 @no_type_check
-def covers_rows(starts, columns, n_columns):
-    """Say whether each row can have a column for itself; entries `starts[i]` to `starts[i + 1]` are those of row i."""
+def match_rows(starts, columns, n_columns, first):
+    """Match as many rows as can be with a column each; entries `starts[i]` to `starts[i + 1]` are those of row i.
+
+    `first` is a matching to begin with, the column of each row, or -1. Returned are that of the largest matching, and
+    where a row is without column a depth ≥ 0 for the rows that alternating paths reach from such: these are more than
+    the columns that they may have (Hall 1935).
+    """
     n = len(starts) - 1
-    row_of, column_of = np.full(n_columns, -1), np.full(n, -1)
-    depth, following = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    row_of, column_of = np.full(n_columns, -1), first.copy()
+    depth, following = np.full(n, -1), np.empty(n, dtype=np.int64)
     queue, path = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
     n_matched = 0
-    while n_matched < n:
-        if not _layer(starts, columns, row_of, column_of, depth, queue):
-            return False
+    for row in range(n):
+        if column_of[row] >= 0:
+            row_of[column_of[row]] = row
+            n_matched += 1
+    while n_matched < n and _layer(starts, columns, row_of, column_of, depth, queue):
         following[:] = starts[:-1]
         for row in range(n):
             if column_of[row] < 0 and _augment(row, columns, starts, row_of, column_of, depth, following, path):
                 n_matched += 1
-    return True
+    return column_of, depth
 
 
 @njit(cache=True, nogil=True)

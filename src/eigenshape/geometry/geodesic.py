@@ -1,8 +1,9 @@
 """Geodesic distances between all vertices that lie near each other on a triangle mesh."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
 
 import numpy as np
 import scipy.sparse as sp
@@ -159,16 +160,28 @@ def farthest_points(
     nearest : (n,) int
         For each vertex the number of the nearest.
     """
-    wave, n = waves_on(mesh), mesh.n_points
+    n = mesh.n_points
     chosen, rows = np.empty(count, dtype=np.int64), np.empty((count, n))
     least, nearest = np.full(n, np.inf), np.zeros(n, dtype=np.int64)
-    following = int(wave(0).argmax())
-    for number in range(count):
-        chosen[number], rows[number] = following, wave(following, max(reach, least.max()))
-        nearer = rows[number] < least
-        least[nearer], nearest[nearer] = rows[number][nearer], number
-        following = int(least.argmax())
+    first = int(waves_on(mesh)(0).argmax())
+    for number, (vertex, row) in enumerate(islice(farthest_first(mesh, first, reach=reach), count)):
+        chosen[number], rows[number] = vertex, row
+        nearer = row < least
+        least[nearer], nearest[nearer] = row[nearer], number
     return chosen, rows, nearest
+
+
+def farthest_first(mesh: Mesh, first: int, *, reach: float = 0.0) -> Iterator[tuple[int, Float[np.ndarray, " n"]]]:
+    """Go through the vertices of a surface, each as far along it from those before as can be, without end.
+
+    With each come the distances from it, as those of `farthest_points`; at least those below what they were before.
+    """
+    wave, least, following = waves_on(mesh), np.full(mesh.n_points, np.inf), first
+    while True:
+        row = wave(following, max(reach, least.max()))
+        yield following, row
+        np.minimum(least, row, out=least)
+        following = int(least.argmax())
 
 
 def _require_surface(mesh: Mesh) -> None:
