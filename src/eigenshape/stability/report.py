@@ -177,12 +177,10 @@ def compare_shapes(
     delta = float(closeness.displacement.max()) if closeness else distance
     spacing = neighbor_distance(samples.one, one.dim)
     times = trusted_times(delta=delta, spacing=spacing, eigenvalue=float(spectra[0].eigenvalues[-1]))
-    changes, heard = changes_over_times(
+    changes, angles = changes_over_times(
         samples, k, chosen.times or spaced_times(times), times, lambda share, what: tell(0.5 + share / 2, what)
     )
-    if points is None:
-        angles = eigenspace_angles(*heard, points=samples.matched.partners)
-    else:
+    if points is not None:
         angles = eigenspace_angles(*spectra, points=points, laplacian=laplacians[0])
     tell(1.0, "compared")
     return StabilityReport(

@@ -11,6 +11,7 @@ from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.surface_points import sample_surface
 from eigenshape.operators.gaussian import gaussian_laplacian
 from eigenshape.operators.laplacian import Laplacian
+from eigenshape.spectral.angles import EigenspaceAngles, eigenspace_angles
 from eigenshape.spectral.outcome import Progress
 from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
@@ -115,18 +116,19 @@ def spaced_times(times: TimeRange) -> tuple[float, ...]:
 
 def changes_over_times(
     samples: Samples, k: int, asked: tuple[float, ...], trusted: TimeRange, progress: Progress
-) -> tuple[tuple[ChangeAtTime, ...], tuple[Spectrum, Spectrum]]:
-    """Return what changes at each heat time, and the spectra of both shapes' points at the one in the middle."""
-    changes, kept = [], []
+) -> tuple[tuple[ChangeAtTime, ...], EigenspaceAngles]:
+    """Return what changes at each heat time, and how far eigenspaces turn at the one in the middle."""
+    changes = []
     for place, t in enumerate(asked):
         progress(place / len(asked), f"heat time {t:.3g}")
         laplacians = [
             gaussian_laplacian(points, t, samples.dim) for points in (samples.one, samples.two, samples.again)
         ]
         spectra = [solve_spectrum(laplacian, k) for laplacian in laplacians]
-        kept.append((spectra[0], spectra[1]))
         changes.append(_change(samples, laplacians, spectra, t, trusted))
-    return tuple(changes), kept[len(kept) // 2]
+        if place == len(asked) // 2:
+            angles = eigenspace_angles(*spectra[:2], points=samples.matched.partners, laplacian=laplacians[0])
+    return tuple(changes), angles
 
 
 def _change(
