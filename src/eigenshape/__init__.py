@@ -45,7 +45,7 @@ from eigenshape.figures.persistence import figure_diagram, figure_merge_tree
 from eigenshape.figures.poses import figure_poses
 from eigenshape.figures.save import save_figure
 from eigenshape.figures.sheet import Panel, figure_contact_sheet, figure_label_transfer
-from eigenshape.figures.spectra import figure_spectrum
+from eigenshape.figures.spectra import figure_spectra, figure_spectrum
 from eigenshape.geometry.average_distance import average_geodesic_distance
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.cloud_measure import cloud_quadrature
@@ -69,6 +69,7 @@ from eigenshape.geometry.geodesic import (
     geodesic_distance_to_set,
     geodesic_distances,
 )
+from eigenshape.geometry.harmonics import sphere_harmonics
 from eigenshape.geometry.measure import (
     edge_lengths,
     enclosed_volume,
@@ -171,11 +172,14 @@ from eigenshape.retrieval.score import match_features, matching_score
 from eigenshape.retrieval.shape_dna import shape_dna, shape_dna_distance
 from eigenshape.retrieval.transfer import LabelTransfer, transfer_labels
 from eigenshape.retrieval.workers import Item, Workers
+from eigenshape.spectral.angles import EigenspaceAngles, eigenspace_angles
 from eigenshape.spectral.approximate import approximate_spectrum
 from eigenshape.spectral.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.certify import certify
+from eigenshape.spectral.comparison import SpectrumComparison, compare_spectra, spectral_hausdorff_distance
 from eigenshape.spectral.dirichlet import solve_dirichlet
+from eigenshape.spectral.eigenspaces import eigenspace_errors, separated_groups
 from eigenshape.spectral.functional_map import FunctionalMap, compose_maps, functional_map, transfer_function
 from eigenshape.spectral.laplacian_laws import check_laplacian
 from eigenshape.spectral.large_signature import ApproximateSignature, approximate_heat_kernel_signature
@@ -239,6 +243,7 @@ __all__ = [
     "Edit",
     "EigenRig",
     "EigenshapeError",
+    "EigenspaceAngles",
     "FacetTable",
     "FeaturePoints",
     "FileFormatError",
@@ -284,6 +289,7 @@ __all__ = [
     "SimplicialMesh",
     "SkeletonGrip",
     "Spectrum",
+    "SpectrumComparison",
     "StoreError",
     "SurfacePoints",
     "TimeRange",
@@ -322,6 +328,7 @@ __all__ = [
     "cheeger_estimate",
     "circle",
     "cloud_quadrature",
+    "compare_spectra",
     "compose_maps",
     "connection_laplacian",
     "correspondence_graph",
@@ -356,6 +363,8 @@ __all__ = [
     "edge_table",
     "eigen_deformed",
     "eigen_skeleton",
+    "eigenspace_angles",
+    "eigenspace_errors",
     "enclosed_volume",
     "enclosing_ball",
     "encode_patches",
@@ -376,6 +385,7 @@ __all__ = [
     "figure_merge_tree",
     "figure_poses",
     "figure_segments",
+    "figure_spectra",
     "figure_spectrum",
     "find_parts",
     "fit_rate",
@@ -466,6 +476,7 @@ __all__ = [
     "seen_patches",
     "segment",
     "self_intersections",
+    "separated_groups",
     "shape_dna",
     "shape_dna_distance",
     "simplex_volumes",
@@ -473,8 +484,10 @@ __all__ = [
     "smooth_boundaries",
     "solve_dirichlet",
     "solve_spectrum",
+    "spectral_hausdorff_distance",
     "spectral_rigid",
     "sphere_eigenvalues",
+    "sphere_harmonics",
     "sphere_hull",
     "sphere_quadrature",
     "subdivide",

@@ -23,7 +23,7 @@ from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.spectral import changes, comparison, laplacian_laws, operator_laws
+from eigenshape.spectral import changes, laplacian_laws, operator_laws, sameness
 from eigenshape.spectral.laplacian_laws import check_laplacian
 from eigenshape.spectral.laws import USUAL, Law, NotJudged, OperatorReport, known_promises
 from eigenshape.spectral.operator_laws import check_operator
@@ -368,7 +368,7 @@ def test_eigenvalues_that_drown_in_rounding_are_not_judged():
     assert by_eigenvalues | not_judged_for(report, "rounding of coord") == BY_EIGENVALUES
 
 
-@pytest.mark.parametrize("module", [comparison, operator_laws])
+@pytest.mark.parametrize("module", [sameness, operator_laws])
 def test_eigenvalues_without_proof_are_not_compared(monkeypatch, module):
     def unproved(*_):
         message = "no proof of this"
@@ -376,7 +376,7 @@ def test_eigenvalues_without_proof_are_not_compared(monkeypatch, module):
 
     monkeypatch.setattr(module, "lowest_eigenvalues", unproved)
     report = check_operator(fem_laplacian, bumpy(icosphere(1)))
-    reason = "no proof of this" if module is comparison else "the lowest eigenvalues cannot be proved"
+    reason = "no proof of this" if module is sameness else "the lowest eigenvalues cannot be proved"
     assert report.passed, report.explain()
     assert not_judged_for(report, reason) == BY_EIGENVALUES
 

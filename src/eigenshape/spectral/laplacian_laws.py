@@ -13,7 +13,6 @@ from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.laplacian import ASYMMETRY, Laplacian
 from eigenshape.spectral.changes import Subject, as_subject
-from eigenshape.spectral.comparison import sizes_of
 from eigenshape.spectral.factor import Factor, factorise, rounding
 from eigenshape.spectral.laws import (
     USUAL,
@@ -27,6 +26,7 @@ from eigenshape.spectral.laws import (
     known_promises,
 )
 from eigenshape.spectral.pencil import Pencil, normalise
+from eigenshape.spectral.sameness import sizes_of
 
 ROW_SUM = 1e-11  # of the largest √(W_ii W_jj) in the row
 WEIGHT = 1e-11  # of √(W_ii W_jj): weights that are 0 in exact arithmetic come out on either side

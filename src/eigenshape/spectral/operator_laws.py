@@ -12,16 +12,6 @@ from eigenshape.geometry.cloud import PointCloud
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral import changes
 from eigenshape.spectral.changes import Subject
-from eigenshape.spectral.comparison import (
-    MOST_ROUNDING,
-    distance,
-    lowest_eigenvalues,
-    matrices,
-    permuted,
-    same_eigenvalues,
-    same_entries,
-    spectral_distance,
-)
 from eigenshape.spectral.laplacian_laws import check_laplacian
 from eigenshape.spectral.laws import (
     USUAL,
@@ -34,6 +24,16 @@ from eigenshape.spectral.laws import (
     judged,
     judgements,
     known_promises,
+)
+from eigenshape.spectral.sameness import (
+    MOST_ROUNDING,
+    distance,
+    lowest_eigenvalues,
+    matrices,
+    permuted,
+    same_eigenvalues,
+    same_entries,
+    spectral_distance,
 )
 from eigenshape.spectral.spectrum import Spectrum
 

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape.spectral.spectrum import Spectrum
+from eigenshape.spectral.spectrum import Spectrum, require_lowest
 
 EVEN = 1e-9  # steps between logarithms of times that differ less are equal
 NULL = 1e-9  # of the largest eigenvalue: what is below counts as 0
@@ -80,10 +80,7 @@ def heat_kernel_signature(spectrum: Spectrum, times: ArrayLike) -> Float[np.ndar
     InvalidParameterError
         If a time is not positive and finite, or the spectrum is of an interval.
     """
-    if spectrum.certificate.first:
-        raise InvalidParameterError(
-            f"spectrum must begin with the lowest eigenvalue; it begins with number {spectrum.certificate.first}."
-        )
+    require_lowest(spectrum, "spectrum")
     decay = np.exp(-np.outer(spectrum.eigenvalues, positive_values(times, "times")))
     return np.asarray(spectrum.eigenvectors**2 @ decay)
 

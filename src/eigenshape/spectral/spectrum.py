@@ -8,6 +8,7 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from eigenshape._arrays import frozen
+from eigenshape._errors import InvalidParameterError
 from eigenshape.spectral.archive import read_archive, write_archive
 from eigenshape.spectral.certificate import Certificate
 
@@ -61,3 +62,17 @@ class Spectrum:
         parts = read_archive(path)
         arrays = {name: frozen(parts[name]) for name in ("eigenvalues", "eigenvectors", "residuals")}
         return cls(**arrays, mass=parts["mass"], certificate=parts["certificate"])
+
+
+def require_lowest(spectrum: Spectrum, name: str) -> None:
+    """Refuse the spectrum of an interval.
+
+    Raises
+    ------
+    InvalidParameterError
+        If it does not begin with number 0.
+    """
+    if spectrum.certificate.first:
+        raise InvalidParameterError(
+            f"{name} must begin with the lowest eigenvalue; it begins with number {spectrum.certificate.first}."
+        )

@@ -1,0 +1,80 @@
+"""Eigenfunctions of Δ that are known exactly, in the order of their eigenvalues in `geometry.exact`."""
+
+from math import isqrt
+from typing import SupportsIndex
+
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from eigenshape._arrays import finite_rows, frozen, whole_number
+from eigenshape._errors import InvalidShapeError
+
+MOST = 10**5  # degrees up to 316; beyond 1400 the functions over (1 - z²)^{m/2} are no floats
+
+
+def sphere_harmonics(points: ArrayLike, k: SupportsIndex) -> Float[np.ndarray, "n k"]:
+    """Evaluate the first k eigenfunctions of the unit sphere: real spherical harmonics, orthonormal in its area.
+
+    Y_l^0 = N P_l(z) and Y_l^±m = √2 N P_l^m(z) times cos mφ (plus) or sin mφ (minus), from the normalised associated
+    Legendre functions by their recurrence upwards in l, which is stable (Press and others 2007, section 6.7).
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        A point stands for its direction from the origin.
+    k : int
+        1 to 100,000. Number l² + l + m has degree l, order m = -l..l and the eigenvalue l (l + 1), as in
+        `sphere_eigenvalues`.
+
+    Returns
+    -------
+    (n, k) float
+        Without unit: on a sphere of radius r divide by r.
+
+    Raises
+    ------
+    InvalidParameterError
+        If k is not in range.
+    InvalidShapeError
+        If a point is not finite or is the origin.
+    """
+    count = whole_number(k, "k", 1, MOST)
+    directions = _directions(points)
+    last = isqrt(count - 1)
+    harmonics = np.empty((len(directions), (last + 1) ** 2))
+    turn = directions[:, 0] + 1j * directions[:, 1]
+    power, top = np.ones(len(directions), dtype=np.complex128), (4 * np.pi) ** -0.5
+    for order in range(last + 1):
+        if order:
+            power = power * turn
+            top *= ((2 * order + 1) / (2 * order)) ** 0.5
+        values = (2**0.5 if order else 1.0) * _over_degrees(directions[:, 2], order, last, top)
+        degrees = np.arange(order, last + 1)
+        harmonics[:, degrees * (degrees + 1) - order] = values * power.imag[:, None]
+        harmonics[:, degrees * (degrees + 1) + order] = values * power.real[:, None]
+    return frozen(harmonics[:, :count])
+
+
+def _directions(points: ArrayLike) -> Float[np.ndarray, "n 3"]:
+    rows = finite_rows(points, "points", 3)
+    sizes = np.abs(rows).max(axis=1, initial=0.0)
+    origin = np.flatnonzero(sizes == 0)
+    if origin.size:
+        raise InvalidShapeError(f"points must have a direction from the origin; point {origin[0]} is the origin.")
+    rows = np.ldexp(rows, -np.frexp(sizes)[1][:, None])  # squares of tiny or huge coordinates are no floats
+    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
+
+
+def _over_degrees(heights: Float[np.ndarray, " n"], order: int, last: int, top: float) -> Float[np.ndarray, "n l"]:
+    """Return N P_l^m(z) / (1 - z²)^{m/2} for l = m..last, where that of l = m is `top`."""
+    values = np.empty((last - order + 1, len(heights)))
+    values[0] = top
+    if order < last:
+        values[1] = (2 * order + 3) ** 0.5 * heights * top
+    for degree in range(order + 2, last + 1):
+        ahead = ((4 * degree**2 - 1) / (degree**2 - order**2)) ** 0.5
+        behind = (((degree - 1) ** 2 - order**2) / (4 * (degree - 1) ** 2 - 1)) ** 0.5
+        place = degree - order
+        values[place] = ahead * (heights * values[place - 1] - behind * values[place - 2])
+    return values.T
