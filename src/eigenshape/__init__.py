@@ -46,6 +46,7 @@ from eigenshape.figures.poses import figure_poses
 from eigenshape.figures.save import save_figure
 from eigenshape.figures.sheet import Panel, figure_contact_sheet, figure_label_transfer
 from eigenshape.figures.spectra import figure_spectra, figure_spectrum
+from eigenshape.figures.stability import figure_stability
 from eigenshape.geometry.average_distance import average_geodesic_distance
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.cloud_measure import cloud_quadrature
@@ -209,6 +210,8 @@ from eigenshape.stability.correspondence import (
 )
 from eigenshape.stability.perturbation import Perturbation, perturbation, vertex_pairs
 from eigenshape.stability.rates import THEOREMS, Rate, cover_by_rate, fit_rate, theorem_rate
+from eigenshape.stability.report import StabilityPlan, StabilityReport, compare_shapes
+from eigenshape.stability.sampled import ChangeAtTime
 
 __all__ = [
     "CREATURES",
@@ -229,6 +232,7 @@ __all__ = [
     "Brush",
     "Camera",
     "Certificate",
+    "ChangeAtTime",
     "CheegerEstimate",
     "Closeness",
     "ConvergenceError",
@@ -290,6 +294,8 @@ __all__ = [
     "SkeletonGrip",
     "Spectrum",
     "SpectrumComparison",
+    "StabilityPlan",
+    "StabilityReport",
     "StoreError",
     "SurfacePoints",
     "TimeRange",
@@ -328,6 +334,7 @@ __all__ = [
     "cheeger_estimate",
     "circle",
     "cloud_quadrature",
+    "compare_shapes",
     "compare_spectra",
     "compose_maps",
     "connection_laplacian",
@@ -387,6 +394,7 @@ __all__ = [
     "figure_segments",
     "figure_spectra",
     "figure_spectrum",
+    "figure_stability",
     "find_parts",
     "fit_rate",
     "flat_torus_eigenvalues",

@@ -33,7 +33,7 @@ def folder(tmp_path_factory):
 def test_people_see_tables_words_and_a_picture(folder, tmp_path):
     picture = tmp_path / "report.png"
     printed = run("stability", folder / "one.ply", folder / "two.ply", *FEW, "--picture", picture).stdout
-    for words in ("Eigenvalues, in 1/length²", "heat time t", "Weyl's bound", "Trust heat times", "δ-close"):
+    for words in ("Eigenvalues, in 1/length²", "heat time t", "Weyl's bound", "heat time serves", "δ-close"):
         assert words in printed
     assert picture.read_bytes()[:8] == PNG
 

@@ -6,6 +6,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import eval_legendre
 
+import eigenshape as es
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.quadrature import (
@@ -254,3 +255,13 @@ def test_distance_is_one_of_two():
 
 def _plain(function):
     return getattr(function, "__wrapped__", function)
+
+
+@pytest.mark.parametrize("size", [1e-30, 1.0, 1e30])
+def test_graph_laplacians_know_the_volume_that_their_eigenvalues_are_over(size):
+    points = size * es.fibonacci_sphere(1500).vertices
+    laplacian = es.gaussian_laplacian(points, 0.02 * size**2, 2)
+    assert laplacian.kernel.volume == pytest.approx(4 * np.pi * size**2, rel=0.02)
+    es.solve_spectrum(laplacian, 20)  # whose eigenvalues are far from the last: no warning at any size
+    with pytest.warns(UserWarning, match=r"too near to 1/\(t × volume\)"):
+        es.solve_spectrum(laplacian, 200)

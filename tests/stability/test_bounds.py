@@ -72,7 +72,7 @@ def test_heat_times_are_trusted_between_the_change_and_the_last_eigenvalue():
     assert (times.low, times.high, times.low_by, times.empty) == (pytest.approx(0.01), 0.025, "closeness", False)
     assert "from 0.01" in times.explain()
     times = es.trusted_times(delta=0.0, spacing=0.1, eigenvalue=20.0, corrected=True)
-    assert (times.low, times.high, times.low_by) == (pytest.approx(0.075**2), pytest.approx(0.145), "spacing")
+    assert (times.low, times.high, times.low_by) == (pytest.approx(0.1**2), pytest.approx(0.145), "spacing")
     none = es.trusted_times(delta=0.5, spacing=0.1, eigenvalue=20.0)
     assert none.empty
     assert "No heat time serves" in none.explain()

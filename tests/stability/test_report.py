@@ -70,7 +70,7 @@ def test_other_meshes_are_matched_by_points_or_by_a_map(torus):
     finer = es.subdivide(torus)
     found = es.compare_shapes(torus, finer, PLAN)
     assert found.closeness is None
-    assert found.distance < 0.1 * found.matched
+    assert found.distance < 0.1  # edges are twice as long
     assert "between 300 matched points" in found.explain()
     told = es.compare_shapes(torus, finer, PLAN, partners=np.arange(torus.n_vertices))
     assert told.closeness.delta == 0.0
@@ -109,10 +109,11 @@ def test_a_change_that_is_too_large_leaves_no_heat_time(torus):
     away = es.TriangleMesh(torus.vertices + 3.0, torus.faces)
     found = es.compare_shapes(torus, away, PLAN)
     assert found.times.empty
-    assert len(found.changes) == 1
+    assert not any(change.trusted for change in found.changes)
+    assert found.times.low_by == "closeness"
     assert "No heat time serves" in found.explain()
-    asked = es.compare_shapes(torus, away, es.StabilityPlan(k=8, n_samples=300, times=(0.05,)))
-    assert [change.t for change in asked.changes] == [0.05]
+    asked = es.compare_shapes(torus, away, es.StabilityPlan(k=8, n_samples=300, times=(0.1,)))
+    assert [change.t for change in asked.changes] == [0.1]
     assert not asked.changes[0].trusted
 
 

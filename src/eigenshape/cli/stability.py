@@ -71,16 +71,16 @@ def stability(
     if picture:
         require_picture_path(picture)
     partners = read_map(map_file) if map_file else None
-    shapes = [_scaled(load_shape(path, repair, dim, drop_missing=drop_missing), scale) for path in (one, two)]
+    first, second = (_scaled(load_shape(path, repair, dim, drop_missing=drop_missing), scale) for path in (one, two))
     plan = StabilityPlan(k=k, n_samples=n_samples, times=tuple(t or ()), seed=seed, brackets=brackets)
     with progress_bar("stability") as progress:
-        report = compare_shapes(*shapes, plan, partners=partners, progress=progress)
+        report = compare_shapes(first, second, plan, partners=partners, progress=progress)
     if as_json:
         print_json({"one": str(one), "two": str(two), "scale": scale, **_facts(report)})
     else:
         _print(report)
     if picture:
-        save_picture(figure_stability(report, *shapes, titles=(one.stem, two.stem)), picture)
+        save_picture(figure_stability(report, first, second, titles=(one.stem, two.stem)), picture)
 
 
 def _scaled(shape: Shape, scale: str) -> Shape:
@@ -107,7 +107,7 @@ def _facts(report: StabilityReport) -> dict[str, Any]:
         "matched_floor": report.matched_floor,
         "delta": report.delta,
         "delta_of_the_map": report.closeness.delta if report.closeness else None,
-        "times": {**asdict(report.times), "empty": report.times.empty},
+        "times": {**asdict(report.times), "empty": report.times.empty, "low_by": report.times.low_by},
         "changes": [{**asdict(change), "seen": change.seen} for change in report.changes],
         "eigenspaces": asdict(angles),
         "n_samples": report.n_samples,

@@ -102,7 +102,17 @@ def figure_spectra(
     if len(rows) < 2:
         raise InvalidParameterError(f"Spectra side by side must be two or more; there are {len(rows)}.")
     figure = Figure(figsize=(7.5, 6.4), layout="constrained")
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    _draw_rows(figure.subplots(2, 1, sharex=True, height_ratios=(3, 2)), rows, unit)
+    return figure
+
+
+def draw_comparison(panels: np.ndarray, compared: SpectrumComparison, titles: tuple[str, str]) -> None:
+    """Draw a comparison into two panels, one above the other, as `figure_spectra` does."""
+    _draw_rows(panels, _rows(compared, titles, {}), "1/length²")
+
+
+def _draw_rows(panels: np.ndarray, rows: list[_Row], unit: str) -> None:
+    above, below = panels
     colors = palette(np.arange(len(rows)))
     for row, color in zip(rows, colors, strict=True):
         _draw_spectrum(above, row, color)
@@ -113,7 +123,6 @@ def figure_spectra(
     below.xaxis.set_major_locator(MaxNLocator(integer=True))
     for axes in (above, below):
         axes.spines[["top", "right"]].set_visible(False)
-    return figure
 
 
 def _rows(

@@ -1,5 +1,6 @@
 """Laplacians made from a Gaussian kernel: on meshes of any dimension, on samples, on surfaces that are known."""
 
+from dataclasses import replace
 from typing import Literal, SupportsIndex, TypedDict, Unpack
 
 import numpy as np
@@ -150,7 +151,17 @@ def gaussian_laplacian(
             "Weights of 1/n must be corrected in the random-walk form; form is 'literal', whose eigenvalues are over "
             "the unknown volume. Choose form='random-walk', or quadrature_laplacian with weights in length^m."
         )
-    return quadrature_laplacian(uniform_quadrature(points, dim), t, correct=correct, form=form, cutoff=cutoff)
+    laplacian = quadrature_laplacian(uniform_quadrature(points, dim), t, correct=correct, form=form, cutoff=cutoff)
+    return laplacian if form == "random-walk" else _over_volume(laplacian, int(dim))
+
+
+def _over_volume(laplacian: Laplacian, dim: int) -> Laplacian:
+    """Tell the kernel the volume that it sees: where weights are in length^m, they sum to 1 under the kernel."""
+    kernel, n = laplacian.kernel, laplacian.n_points
+    if kernel is None:
+        return laplacian
+    degrees = kernel.t * laplacian.stiffness.diagonal() * n + (4 * np.pi * kernel.t) ** (-dim / 2) / n
+    return replace(laplacian, kernel=replace(kernel, volume=float(1 / degrees.mean())))
 
 
 def quadrature_laplacian(

@@ -29,6 +29,9 @@ class GaussianKernel:
         Whether the mass of a point is its own measure, or what the kernel sees of the measure there.
     cutoff : float
         Distance, in widths h, beyond which the kernel is taken for zero.
+    volume : float
+        What eigenvalues are over: 1 where weights are in length^m; where they are 1/n, the volume of the manifold in
+        length^m, as the kernel sees it.
     """
 
     t: float
@@ -36,6 +39,7 @@ class GaussianKernel:
     corrected: bool = False
     form: str = "literal"
     cutoff: float = 4.0
+    volume: float = 1.0
 
     @property
     def width(self) -> float:

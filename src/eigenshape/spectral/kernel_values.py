@@ -34,7 +34,8 @@ def require_readable(kernel: GaussianKernel | None, values: Float[np.ndarray, " 
     """
     if kernel is None:
         return
-    shares = kernel.t * values
+    top = 1 / kernel.t / kernel.volume
+    shares = values / top
     beyond = np.flatnonzero(shares >= 1 - 1e-9)
     if kernel.corrected and beyond.size:
         raise InvalidParameterError(
@@ -51,10 +52,14 @@ def require_readable(kernel: GaussianKernel | None, values: Float[np.ndarray, " 
             f"{np.count_nonzero(shares <= BIASED)} are; or pass correct='log'"
         )
         warnings.warn(
-            f"Eigenvalues from number {late} on lie too near to 1/t = {1 / kernel.t:.4g} to tell those of the shape: "
-            f"{advice}. Choose a smaller t, or more points.",
+            f"Eigenvalues from number {late} on lie too near to {_named(kernel)} = {top:.4g} to tell those of the "
+            f"shape: {advice}. Choose a smaller t, or more points.",
             stacklevel=stacklevel,
         )
+
+
+def _named(kernel: GaussianKernel) -> str:
+    return "1/t" if kernel.volume == 1 else "1/(t × volume)"
 
 
 def from_pencil(kernel: GaussianKernel | None, values: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:

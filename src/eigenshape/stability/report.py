@@ -13,7 +13,7 @@ from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.catalog import build_laplacian
 from eigenshape.operators.kernel import neighbor_distance
 from eigenshape.spectral.angles import EigenspaceAngles, eigenspace_angles
-from eigenshape.spectral.brackets import bracket_eigenvalues
+from eigenshape.spectral.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.comparison import SpectrumComparison, compare_spectra
 from eigenshape.spectral.outcome import Progress
 from eigenshape.spectral.solver import solve_spectrum
@@ -105,8 +105,8 @@ class StabilityReport:
     def _lie(self) -> str:
         return (
             f"As they lie, no point of one shape is further than {self.distance:.3g} from the other. The best "
-            f"one-to-one correspondence of {self.n_samples} random points of each moves them by up to {self.matched:.3g}; "
-            f"two such samples of the first shape alone take {self.matched_floor:.3g}."
+            f"one-to-one correspondence of {self.n_samples} random points of each moves them by up to "
+            f"{self.matched:.3g}; two such samples of the first shape alone take {self.matched_floor:.3g}."
         )
 
     def _heard(self) -> str:
@@ -161,27 +161,27 @@ def compare_shapes(
     """
     chosen = plan or StabilityPlan()
     tell = progress or (lambda share, what: None)
-    n_samples, k = _checked(chosen, one, two)
     meshes = _meshes(one, two, chosen, partners)
-    points = _points(*meshes, partners) if meshes else None
+    n_samples, k = _checked(chosen, one, two)
+    told = _partners(*meshes, partners) if meshes else None
     tell(0.0, "spectra")
     laplacians = [build_laplacian(shape) for shape in (one, two)]
     spectra = [solve_spectrum(laplacian, k) for laplacian in laplacians]
-    brackets = tuple(bracket_eigenvalues(mesh, k) for mesh in meshes) if meshes and chosen.brackets else None
+    brackets = _brackets(*meshes, k) if meshes and chosen.brackets else None
     tell(0.3, "matching points")
     rng = np.random.default_rng(chosen.seed)
     samples = matched_samples(one, two, n_samples, rng)
     distances = distances_between(one, two, n_samples, rng)
     distance = float(max(each.max() for each in distances))
-    closeness = map_closeness(meshes[0], two.points[points]) if meshes and points is not None else None
+    closeness = map_closeness(meshes[0], two.points[told]) if meshes and told is not None else None
     delta = float(closeness.displacement.max()) if closeness else distance
-    spacing = neighbor_distance(samples.one, one.dim)
+    spacing = max(neighbor_distance(points, one.dim) for points in (samples.one, samples.two, samples.again))
     times = trusted_times(delta=delta, spacing=spacing, eigenvalue=float(spectra[0].eigenvalues[-1]))
     changes, angles = changes_over_times(
         samples, k, chosen.times or spaced_times(times), times, lambda share, what: tell(0.5 + share / 2, what)
     )
-    if points is not None:
-        angles = eigenspace_angles(*spectra, points=points, laplacian=laplacians[0])
+    if told is not None:
+        angles = eigenspace_angles(*spectra, points=told, laplacian=laplacians[0])
     tell(1.0, "compared")
     return StabilityReport(
         spectra=compare_spectra(*spectra, brackets=brackets),
@@ -205,7 +205,7 @@ def _checked(plan: StabilityPlan, one: Shape, two: Shape) -> tuple[int, int]:
         said = " and ".join(f"{dim} in R^{d}" for dim, d in kinds)
         raise InvalidParameterError(f"Shapes to compare must have one dimension, in one space; theirs are {said}.")
     if plan.times:
-        positive_values(plan.times, "times")
+        positive_values(np.array(plan.times), "times")
     clouds = [shape for shape in (one, two) if isinstance(shape, PointCloud)]
     wanted = whole_number(plan.n_samples, "n_samples", FEWEST_SAMPLES, MOST_SAMPLES)
     n_samples = min([wanted, *(len(cloud.points) // 2 for cloud in clouds)])
@@ -226,7 +226,7 @@ def _meshes(one: Shape, two: Shape, plan: StabilityPlan, partners: ArrayLike | N
     return None
 
 
-def _points(one: Mesh, two: Mesh, partners: ArrayLike | None) -> Int[np.ndarray, " n"] | None:
+def _partners(one: Mesh, two: Mesh, partners: ArrayLike | None) -> Int[np.ndarray, " n"] | None:
     """Return the point of the second mesh for each of the first, where that is known."""
     n = one.n_points
     if partners is None:
@@ -236,3 +236,7 @@ def _points(one: Mesh, two: Mesh, partners: ArrayLike | None) -> Int[np.ndarray,
     if len(found) != n:
         raise InvalidParameterError(f"partners must be one a point of the first mesh; there are {len(found)} for {n}.")
     return found
+
+
+def _brackets(one: Mesh, two: Mesh, k: int) -> tuple[Brackets, Brackets]:
+    return bracket_eigenvalues(one, k), bracket_eigenvalues(two, k)

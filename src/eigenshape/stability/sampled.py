@@ -1,5 +1,6 @@
 """Random points of two shapes, matched one to one, and what their graph Laplacians hear at several heat times."""
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,8 +86,9 @@ class Samples:
 def matched_samples(one: Shape, two: Shape, n: int, rng: np.random.Generator) -> Samples:
     """Throw n points on each of two shapes, 2n on the first, and match them one to one."""
     both, other = _thrown(one, 2 * n, rng), _thrown(two, n, rng)
-    matchings = [bottleneck_matching(both[:n], points) for points in (other, both[n:])]
-    return Samples(both[:n], other, both[n:], *matchings, one.dim)
+    first, again = both[:n], both[n:]
+    matched, floor = bottleneck_matching(first, other), bottleneck_matching(first, again)
+    return Samples(first, other, again, matched, floor, one.dim)
 
 
 def _thrown(shape: Shape, n: int, rng: np.random.Generator) -> Points:
@@ -95,7 +97,9 @@ def _thrown(shape: Shape, n: int, rng: np.random.Generator) -> Points:
     return sample_surface(shape, n, rng=rng).points
 
 
-def distances_between(one: Shape, two: Shape, n: int, rng: np.random.Generator) -> tuple[Points, Points]:
+def distances_between(
+    one: Shape, two: Shape, n: int, rng: np.random.Generator
+) -> tuple[Float[np.ndarray, " n1"], Float[np.ndarray, " n2"]]:
     """Return how far each point of each shape is from the other, of which n points a match are known beside its own."""
     clouds = [_dense(shape, DENSER * n, rng) for shape in (one, two)]
     pairs = zip((one, two), clouds[::-1], strict=True)
@@ -110,8 +114,9 @@ def _dense(shape: Shape, n: int, rng: np.random.Generator) -> Points:
 
 
 def spaced_times(times: TimeRange) -> tuple[float, ...]:
-    """Return heat times over the range that can be trusted, or the least that has a meaning."""
-    return (times.low,) if times.empty else tuple(np.geomspace(times.low, times.high, N_TIMES).tolist())
+    """Return heat times over the range that can be trusted; where that is empty, over what at least can be computed."""
+    low = times.reach if times.empty else times.low
+    return tuple(np.geomspace(low, times.high, N_TIMES).tolist()) if low < times.high else (low,)
 
 
 def changes_over_times(
