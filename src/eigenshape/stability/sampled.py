@@ -123,13 +123,13 @@ def changes_over_times(
     samples: Samples, k: int, asked: tuple[float, ...], trusted: TimeRange, progress: Progress
 ) -> tuple[tuple[ChangeAtTime, ...], EigenspaceAngles]:
     """Return what changes at each heat time, and how far eigenspaces turn at the one in the middle."""
-    changes = []
+    changes, three = [], (samples.one, samples.two, samples.again)
     for place, t in enumerate(asked):
         progress(place / len(asked), f"heat time {t:.3g}")
-        laplacians = [
-            gaussian_laplacian(points, t, samples.dim) for points in (samples.one, samples.two, samples.again)
-        ]
-        spectra = [solve_spectrum(laplacian, k) for laplacian in laplacians]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of heat times that do not serve: `trusted` tells
+            laplacians = [gaussian_laplacian(points, t, samples.dim) for points in three]
+            spectra = [solve_spectrum(laplacian, k) for laplacian in laplacians]
         changes.append(_change(samples, laplacians, spectra, t, trusted))
         if place == len(asked) // 2:
             angles = eigenspace_angles(*spectra[:2], points=samples.matched.partners, laplacian=laplacians[0])
