@@ -117,17 +117,20 @@ def _facts(report: StabilityReport) -> dict[str, Any]:
 
 def _print(report: StabilityReport) -> None:
     compared = report.spectra
+    values = zip(compared.one, compared.two, compared.relative, compared.told, compared.zero, strict=True)
     rows = [
-        [str(number), f"{one:.6g}", f"{two:.6g}", f"{change:.2%}", "yes" if told else "no"]
-        for number, (one, two, change, told) in enumerate(
-            zip(compared.one, compared.two, compared.relative, compared.told, strict=True)
-        )
+        [str(number), *_pair(one, two, zero), f"{change:.2%}", "yes" if told else "no"]
+        for number, (one, two, change, told, zero) in enumerate(values)
     ]
     print_table("Eigenvalues, in 1/length²", ["i", "first", "second", "change", "proved"], rows)
     heat = [
         [f"{row.t:.3g}", f"{row.change:.3g}", f"{row.floor:.3g}", f"{row.weyl:.3g}", "yes" if row.trusted else "no"]
         for row in report.changes
     ]
-    columns = ["heat time t, length²", "between shapes", "between samples", "Weyl's bound", "trusted"]
-    print_table(f"Largest change of {len(compared.one)} eigenvalues of graph Laplacians, over the last", columns, heat)
+    title = f"Largest change of {len(rows)} eigenvalues of graph Laplacians, over the last, at heat time t (length²)"
+    print_table(title, ["t", "shapes", "samples", "Weyl's bound", "trusted"], heat)
     out.print(report.explain())
+
+
+def _pair(one: float, two: float, zero: bool) -> list[str]:
+    return ["0", "0"] if zero else [f"{one:.6g}", f"{two:.6g}"]

@@ -120,8 +120,8 @@ def _draw_rows(panels: np.ndarray, rows: list[_Row], unit: str) -> None:
     above.set_ylabel(f"eigenvalue λ, {unit}")
     above.legend(frameon=False, loc="upper left", fontsize=9)
     below.set_xlabel("number i")
-    below.xaxis.set_major_locator(MaxNLocator(integer=True))
     for axes in (above, below):
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.spines[["top", "right"]].set_visible(False)
 
 

@@ -51,7 +51,7 @@ def _draw_shapes(
 ) -> None:
     panels = figure.subplots(1, 2)
     scale, colors = Normalize(0.0, report.distance or 1.0), mpl.colormaps["viridis"]
-    camera = three_quarter_view(meshes[0])
+    camera = three_quarter_view(meshes[0], up="auto")
     for axes, mesh, values, title in zip(panels, meshes, report.distances, titles, strict=True):
         show(axes, draw(mesh, camera, vertex_colors=_mapped(values, scale)))
         axes.set_title(title)
@@ -92,10 +92,10 @@ def _draw_angles(axes: Axes, report: StabilityReport) -> None:
     )
     if found.bounds is not None:
         axes.plot(middle, np.degrees(found.bounds), "v", ms=4, color="#999999", label="at most, by the gap (90°: none)")
-    axes.set_ylim(0, 95)
+    axes.set_ylim(0, 110)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("numbers of the eigenvalues of a group")
     axes.set_ylabel("largest angle of eigenspaces, degrees")
     where = "vertex to vertex" if report.closeness else "between matched points"
     axes.set_title(f"eigenspaces, {where}", fontsize=10, loc="left")
-    axes.legend(frameon=False, fontsize=8, loc="upper left")
+    axes.legend(frameon=False, fontsize=8, loc="upper left", ncols=2)

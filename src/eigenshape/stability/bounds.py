@@ -134,14 +134,16 @@ class TimeRange:
 
     def explain(self) -> str:
         """Say it in plain words."""
-        why = {
-            "closeness": "smaller ones see the change itself and not the shape, as t is under δ²",
-            "spacing": "smaller ones do not reach the neighbours",
+        below = {
+            "closeness": "below, they hear the change and not the shape, as t is under δ²",
+            "spacing": "below, they do not reach from point to point",
         }[self.low_by]
-        above = "larger ones press the last eigenvalues into what a kernel cannot tell apart"
+        above = "above, the last eigenvalues lie where a kernel cannot tell them apart"
         if self.empty:
-            return f"No heat time serves: below {self.low:.3g}, {why}; above {self.high:.3g}, {above}."
-        return f"Trust heat times from {self.low:.3g} ({why}) to {self.high:.3g} ({above})."
+            return (
+                f"No heat time serves: from {self.low:.3g} on ({below}) up to {self.high:.3g} ({above}) there is none."
+            )
+        return f"Trust heat times from {self.low:.3g} ({below}) to {self.high:.3g} ({above})."
 
 
 def trusted_times(*, delta: float, spacing: float, eigenvalue: float, corrected: bool = False) -> TimeRange:

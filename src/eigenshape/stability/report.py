@@ -100,6 +100,11 @@ class StabilityReport:
         if self.closeness:
             lines.append(self.closeness.explain())
         lines += [self.times.explain(), self._heard(), f"Eigenspaces, {where}: {self.angles.explain()}"]
+        if not self.closeness and self.times.low_by == "closeness":
+            lines.append(
+                "Points were matched as the shapes lie. Of one shape in two poses that tells little: bring a map between "
+                "their vertices, or look at the eigenvalues alone."
+            )
         return "\n\n".join(lines)
 
     def _lie(self) -> str:
