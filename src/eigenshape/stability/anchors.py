@@ -148,8 +148,8 @@ def witness_region(
     labels, before = preimages(perturbation, points)
     inside = np.zeros(points.n_points, dtype=bool)
     inside[labels == OUTSIDE] = _nearest(before, nodes) <= reach
-    met = regions_met(perturbation, nodes, reach).any(axis=0)
-    inside[labels != OUTSIDE] = met[labels[labels != OUTSIDE]]
+    met = np.any(regions_met(perturbation, nodes, reach), axis=0)
+    inside[labels != OUTSIDE] = np.take(met, labels[labels != OUTSIDE])
     return inside
 
 
