@@ -10,13 +10,13 @@ from eigenshape._arrays import frozen, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.geodesic import farthest_first
 from eigenshape.geometry.simplex_distance import squared_distances
-from eigenshape.geometry.simplices import in_length, scaled_corners
+from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.surface_points import SurfacePoints, place_points
 from eigenshape.operators.crouzeix_raviart import longest_edges
 from eigenshape.stability.perturbation import OUTSIDE, Perturbation
 
-AT_ONCE = 10**6  # distances between nodes and simplices held in memory
+SLACK = 1e-12  # of a distance: more than its rounding
 Points = Float[np.ndarray, "_ d"]
 
 
@@ -148,8 +148,8 @@ def witness_region(
     labels, before = preimages(perturbation, points)
     inside = np.zeros(points.n_points, dtype=bool)
     inside[labels == OUTSIDE] = _nearest(before, nodes) <= reach
-    met = (region_distances(perturbation, nodes) <= reach).any(axis=0)
-    inside[labels != OUTSIDE] = met[labels[labels != OUTSIDE]]
+    met = np.any(regions_met(perturbation, nodes, reach), axis=0)
+    inside[labels != OUTSIDE] = np.take(met, labels[labels != OUTSIDE])
     return inside
 
 
@@ -178,15 +178,26 @@ def preimages(
     return labels, before.points
 
 
-def region_distances(perturbation: Perturbation, nodes: Points) -> Float[np.ndarray, "_ r"]:
-    """Return the distance of each node to each region X_i, in length."""
-    corners, scale = scaled_corners(perturbation.one)
-    found = np.empty((len(nodes), perturbation.n_regions))
+def regions_met(perturbation: Perturbation, nodes: Points, reach: float) -> Bool[np.ndarray, "_ r"]:
+    """Say which regions X_i have a point within reach of each node.
+
+    A corner within reach says so. The squared distance to a simplex is at most the squared radius of a ball around it
+    less than that to its nearest corner, so that few nodes are left to be told by the simplices.
+    """
+    mesh, found = perturbation.one, np.empty((len(nodes), perturbation.n_regions), dtype=bool)
     for region in range(perturbation.n_regions):
-        some = corners[perturbation.regions_one == region]
-        pieces = np.array_split(nodes / scale, len(nodes) * len(some) // AT_ONCE + 1)
-        found[:, region] = np.concatenate([squared_distances(piece, some).min(axis=1) for piece in pieces])
-    return in_length(np.sqrt(found), scale, 1)
+        simplices = mesh.simplices[perturbation.regions_one == region]
+        some, scale = size_one(mesh.points[simplices])
+        within = reach / scale
+        farthest = np.hypot(within, np.linalg.norm(some - some[:, :1], axis=2).max())
+        corners = cKDTree(mesh.points[np.unique(simplices)] / scale)
+        away = corners.query(nodes / scale, distance_upper_bound=farthest * (1 + SLACK))[0]
+        found[:, region] = away <= within
+        unsure = np.flatnonzero(~found[:, region] & np.isfinite(away))
+        for node, point in zip(unsure, nodes[unsure] / scale, strict=True):
+            near = some[(np.linalg.norm(some - point, axis=2) <= farthest).any(axis=1)]
+            found[node, region] = squared_distances(point[None], near).min(initial=np.inf) <= within**2
+    return found
 
 
 def _nearest(points: Points, nodes: Points) -> Float[np.ndarray, " _"]:

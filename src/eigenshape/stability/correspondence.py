@@ -14,7 +14,7 @@ from eigenshape.features.least_matching import least_perfect, near_pairs
 from eigenshape.features.matching_loops import match_rows
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.surface_points import SurfacePoints
-from eigenshape.stability.anchors import preimages, region_distances
+from eigenshape.stability.anchors import preimages, regions_met
 from eigenshape.stability.perturbation import OUTSIDE, Perturbation
 
 
@@ -128,7 +128,7 @@ def _witnessed(
     labels, before = preimages(perturbation, points)
     near = near_pairs(nodes, before, reach, 2.0)
     rows, columns = [near.i], [np.flatnonzero(labels == OUTSIDE)[near.j]]
-    meets = region_distances(perturbation, nodes) <= reach
+    meets = regions_met(perturbation, nodes, reach)
     for region in range(perturbation.n_regions):
         inside, met = np.flatnonzero(labels == region), np.flatnonzero(meets[:, region])
         rows.append(np.repeat(met, len(inside)))
