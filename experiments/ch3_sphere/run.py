@@ -86,6 +86,12 @@ def noise_errors(n: int, k: int) -> dict[str, np.ndarray]:
     return {name: np.abs(es.solve_spectrum(each, k).eigenvalues[1:] / exact - 1) for name, each in heard.items()}
 
 
+def scatter(mesh: es.TriangleMesh) -> list[float]:
+    """Return how far the weights A_j, and those of Voronoi cells, scatter: standard deviation over mean."""
+    cells = es.cloud_quadrature(es.PointCloud(mesh.vertices, 2)).weights
+    return [float(weights.std() / weights.mean()) for weights in (es.dual_volumes(mesh), cells)]
+
+
 def order(edges: list[float], medians: list[float]) -> float:
     """Fit p in error ~ e^p, e the mean edge length."""
     return float(np.polyfit(np.log(edges), np.log(medians), 1)[0])
@@ -181,7 +187,9 @@ def main() -> None:
     n = chosen["noisy"]
     noise = noise_errors(n, k)
     medians = {name: [np.median(relative), relative.max()] for name, relative in noise.items()}
-    results = rounded({"operators": table, "noise": medians, "edges": edges})
+    results = rounded(
+        {"operators": table, "noise": medians, "edges": edges, "scatter": [scatter(mesh) for mesh in meshes]}
+    )
     pictures = {
         "figure_eigenvalues": by_number(
             {LITERAL: "mesh Laplacian as printed", CORRECTED: "mesh Laplacian, corrected"}, edges, found, "values"

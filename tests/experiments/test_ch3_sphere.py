@@ -55,6 +55,9 @@ def test_correction_leaves_eigenvectors_as_they_are():
 
 
 def test_uneven_weights_are_what_turns_eigenspaces_of_the_mesh_laplacian():
+    for of_triangles, of_cells in EXPECTED["full"]["scatter"]:
+        assert 0.035 < of_triangles < 0.075
+        assert 0.0015 < of_cells < 0.0075
     for name in MESHES:
         for mesh, points in zip(medians(name, "vectors"), medians("points, corrected", "vectors"), strict=True):
             assert mesh > 5 * points
@@ -73,6 +76,8 @@ def test_the_quick_form_gives_the_expected_figures(tmp_path):
     subprocess.run(run, check=True, capture_output=True)
     found = json.loads(out.read_text())
     expected = EXPECTED["quick"]
+    for found_row, row in zip(found["scatter"], expected["scatter"], strict=True):
+        assert found_row == pytest.approx(row, rel=2e-3)
     assert found["edges"] == pytest.approx(expected["edges"], rel=1e-3)
     assert found["operators"].keys() == expected["operators"].keys()
     for name, rows in expected["operators"].items():
