@@ -52,7 +52,9 @@ def dissect(indptr, indices):
         _tell_apart(indptr, indices, nodes, start, stop, owner, name, one, two, key)
         level, above = _cheapest_cut(indptr, indices, nodes, start, stop, owner, name, key)
         n_first, n_cut = _take_sides(indptr, indices, nodes, start, stop, owner, name, key, level, above, side)
-        if n_cut == stop - start or n_cut == 0:  # a clique, or nothing left to cut
+        parted = n_first > 0 and n_first + n_cut < stop - start
+        full = not parted and _half_full(indptr, indices, nodes, start, stop, owner, name)
+        if n_cut == stop - start or n_cut == 0 or full:  # a clique or nearly, or nothing left to cut
             for i in range(start, stop):
                 owner[nodes[i]] = -1
             continue
@@ -133,6 +135,18 @@ def _take_sides(indptr, indices, nodes, start, stop, owner, name, key, level, ab
         elif side[node] == 0:
             n_first += 1
     return n_first, n_cut
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def _half_full(indptr, indices, nodes, start, stop, owner, name):
+    """Say whether half of all pairs of a segment are joined: no order saves much, and one point a cut takes long."""
+    joined = 0
+    for i in range(start, stop):
+        for at in range(indptr[nodes[i]], indptr[nodes[i] + 1]):
+            if owner[indices[at]] == name:
+                joined += 1
+    return 2 * joined >= (stop - start) ** 2
 
 
 @njit(cache=True, nogil=True)
