@@ -36,7 +36,7 @@ QUICK = {
     "points": 300,
     "seeds": 2,
     "times": [6e-3, 2e-2],
-    "deltas": [1e-3, 1e-2, 0.1],
+    "deltas": [1e-3, 1e-2, 0.1, 0.3],
     "samples": [125, 250],
     "mesh": (40, 20),
     "mesh times": [2e-3, 4e-3],

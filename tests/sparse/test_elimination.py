@@ -57,6 +57,17 @@ def test_what_is_full_and_what_falls_apart():
         np.testing.assert_allclose(matrix @ found, right, atol=1e-9)
 
 
+@pytest.mark.parametrize("density", [0.4, 0.6, 0.95])
+def test_what_is_nearly_full_is_factored_and_counted(density):
+    rng = np.random.default_rng(1)
+    half = np.where(rng.random((500, 500)) < density, rng.normal(size=(500, 500)), 0.0)
+    dense = half + half.T + np.diag(np.where(np.arange(500) < 200, -200.0, 200.0))
+    factor, right, found = solved(sp.csc_array(dense))
+    assert sorted(factor.elimination.order) == list(range(500))
+    assert np.count_nonzero(factor.pivots < 0) == np.count_nonzero(np.linalg.eigvalsh(dense) < 0)
+    np.testing.assert_allclose(dense @ found, right, atol=1e-9)
+
+
 def test_ten_thousand_components():
     ring = sp.csc_array(sp.block_diag([np.full((3, 3), -1.0) + 3.5 * np.eye(3)] * 10_000))
     factor, right, found = solved(ring, 1)

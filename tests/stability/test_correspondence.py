@@ -291,3 +291,11 @@ def test_many_points_of_two_close_shapes_have_a_perfect_matching_and_few_have_no
     assert longest(points.points, images.points, found.partners) <= 7 * delta
     tight = es.correspondence_graph(changed, points, images, nodes=nodes, delta=0.05, rho=0.2)
     assert not es.maximum_matching(tight).is_perfect
+
+
+def test_pairs_that_would_not_fit_are_refused(monkeypatch):
+    monkeypatch.setattr("eigenshape.features.least_matching.machine_memory", lambda: 1e5)
+    near, far = np.random.default_rng(0).random((2, 40, 3))
+    es.bottleneck_matching(near, near + 1e-3)  # few pairs
+    with pytest.raises(es.InvalidShapeError, match=r"Pairs of near points must fit .*; 1.6e\+03 pairs within"):
+        es.bottleneck_matching(near, far + 100)

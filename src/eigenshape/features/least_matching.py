@@ -8,6 +8,8 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
+from eigenshape._arrays import machine_memory
+from eigenshape._errors import InvalidShapeError
 from eigenshape.features.matching_loops import match_rows
 
 Points = Float[np.ndarray, "_ d"]
@@ -17,6 +19,7 @@ Partners = Int[np.ndarray, " n"]
 FINE = 1e-4  # of the distance: an interval so short holds few candidates
 SLACK = 1e-9  # of a distance: more than the rounding of two ways to compute it
 GROWTH = 1.5
+PEAK = 150  # bytes a pair while pairs are listed
 COARSE = 1e-3  # of the largest distance of points in the same place of their lists: where the search begins
 
 
@@ -105,16 +108,37 @@ def _matched(near: Pairs, first: Partners, n_others: int) -> Int[np.ndarray, " n
 
 
 def near_pairs(some: Points, others: Points, distance: float, norm: float) -> Pairs:
-    """List the pairs of points at most the distance apart."""
+    """List the pairs of points at most the distance apart.
+
+    Raises
+    ------
+    InvalidShapeError
+        If they would not fit into half of the memory.
+    """
     if not len(some) or not len(others):
         return Pairs(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0))
     # The tree compares powers of distances: it is asked for a little more, and what is near decided here alone.
     reach = distance * (1 + SLACK)
-    found = cKDTree(some).sparse_distance_matrix(cKDTree(others), reach, p=norm, output_type="ndarray")
+    trees = cKDTree(some), cKDTree(others)
+    _require_room(*trees, reach, norm)
+    found = trees[0].sparse_distance_matrix(trees[1], reach, p=norm, output_type="ndarray")
     i, j = found["i"].astype(np.int64), found["j"].astype(np.int64)
     apart = _lengths(some[i] - others[j], norm)
     near = apart <= distance
     return Pairs(i[near], j[near], apart[near])
+
+
+def _require_room(one: cKDTree, two: cKDTree, reach: float, norm: float) -> None:
+    room, most = machine_memory() / 2, one.n * two.n
+    if most * PEAK <= room:
+        return
+    n_pairs = int(one.count_neighbors(two, reach, p=norm))
+    if n_pairs * PEAK > room:
+        raise InvalidShapeError(
+            f"Pairs of near points must fit into half of the memory, {room / 2**30:.1f} GiB; {n_pairs:.2g} pairs "
+            f"within {reach:.3g} take {n_pairs * PEAK / 2**30:.1f} GiB. "
+            "Bring the sets nearer to each other, or take fewer points."
+        )
 
 
 def _enclosed(one: Points, two: Points, norm: float) -> float:

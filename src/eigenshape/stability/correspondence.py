@@ -183,7 +183,7 @@ def bottleneck_matching(one: ArrayLike, two: ArrayLike) -> BottleneckMatching:
     Raises
     ------
     InvalidShapeError
-        If a coordinate is not finite.
+        If a coordinate is not finite, or the pairs would not fit into half of the memory.
     InvalidParameterError
         If there are no points, or the two sets differ in number or dimension.
     """

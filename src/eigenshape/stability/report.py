@@ -102,8 +102,8 @@ class StabilityReport:
         lines += [self.times.explain(), self._heard(), f"Eigenspaces, {where}: {self.angles.explain()}"]
         if not self.closeness and self.times.low_by == "closeness":
             lines.append(
-                "Points were matched as the shapes lie. Of one shape in two poses that tells little: bring a map between "
-                "their vertices, or look at the eigenvalues alone."
+                "Points were matched as the shapes lie. Of one shape in two poses that tells little: bring a map "
+                "between their vertices, or look at the eigenvalues alone."
             )
         return "\n\n".join(lines)
 
