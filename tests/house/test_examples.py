@@ -49,3 +49,13 @@ def test_every_example_has_a_test():
     examples = sorted((ROOT / "examples").glob("*.py"))
     assert examples
     assert all(example.name in tested for example in examples)
+
+
+def test_noise_moves_points_little_and_a_pose_eigenvalues_little(tmp_path):
+    reports = runpy.run_path(str(ROOT / "examples" / "how_stable.py"))["main"](tmp_path)
+    noisy, posed = reports["noisy"], reports["posed"]
+    assert noisy.delta < 0.1 * posed.delta
+    assert posed.spectra.median_relative < 0.5 * noisy.spectra.median_relative
+    assert not noisy.times.empty
+    assert posed.times.empty
+    assert (tmp_path / "posed.png").stat().st_size > 10_000

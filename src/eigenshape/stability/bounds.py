@@ -134,16 +134,15 @@ class TimeRange:
 
     def explain(self) -> str:
         """Say it in plain words."""
-        below = {
-            "closeness": "below, they hear the change and not the shape, as t is under δ²",
-            "spacing": "below, they do not reach from point to point",
+        smaller = {
+            "closeness": "smaller ones hear the change and not the shape, as t is under δ²",
+            "spacing": "smaller ones do not reach from point to point",
         }[self.low_by]
-        above = "above, the last eigenvalues lie where a kernel cannot tell them apart"
+        low = f"{self.low:.3g} ({smaller})"
+        high = f"{self.high:.3g} (larger ones press the last eigenvalues into what a kernel cannot tell apart)"
         if self.empty:
-            return (
-                f"No heat time serves: from {self.low:.3g} on ({below}) up to {self.high:.3g} ({above}) there is none."
-            )
-        return f"Trust heat times from {self.low:.3g} ({below}) to {self.high:.3g} ({above})."
+            return f"No heat time serves: it would have to be over {low} and under {high}."
+        return f"Trust heat times from {low} to {high}."
 
 
 def trusted_times(*, delta: float, spacing: float, eigenvalue: float, corrected: bool = False) -> TimeRange:

@@ -54,9 +54,9 @@ class Closeness:
         """Say in plain words how close the shapes are, and what decides it."""
         parts = _parts(self.displacement, self.jacobians, self.radii, self.volume_ratios, self.size)
         outside = (
-            f"Outside the anomalous regions points move by up to {_most(self.displacement):.3g} "
-            f"({_most(parts['displacement']):.3g} of the size {self.size:.3g}), and volumes change by up to "
-            f"{_most(parts['Jacobian']):.3g} of themselves."
+            f"{'Outside the anomalous regions points' if len(self.radii) else 'Points'} move by up to "
+            f"{_most(self.displacement):.3g} ({_most(parts['displacement']):.3g} of the size {self.size:.3g}), "
+            f"and the volumes of simplices change by up to {_most(parts['Jacobian']):.3g} of themselves."
         )
         inside = (
             f" Each of the {len(self.radii)} anomalous regions lies, with what replaces it, in a ball of radius at "

@@ -22,7 +22,7 @@ from eigenshape.stability.rates import theorem_rate
 
 N_TIMES = 4
 DENSER = 20  # times as many points to measure distances to, as are matched
-ABOVE_SAMPLING = 1.25  # a change that is so much more than that of two samples of one shape is the shapes'
+ABOVE_SAMPLING = 2.0  # a change that is so much more than that of two samples of one shape is the shapes'
 
 Points = Float[np.ndarray, "n d"]
 
