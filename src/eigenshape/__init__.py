@@ -53,6 +53,7 @@ from eigenshape.geometry.creatures import CREATURES, make_creature
 from eigenshape.geometry.crossings import self_intersections
 from eigenshape.geometry.curvature import gaussian_curvature
 from eigenshape.geometry.domains import ball, box, circle, disc, interval, irregular_grid
+from eigenshape.geometry.enclosing_ball import Ball, enclosing_ball
 from eigenshape.geometry.exact import (
     ball_eigenvalues,
     box_eigenvalues,
@@ -190,6 +191,8 @@ from eigenshape.spectral.signature import (
 from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 from eigenshape.spectral.wave import default_energies, wave_kernel_signature
+from eigenshape.stability.closeness import Closeness, map_closeness, measure_closeness
+from eigenshape.stability.perturbation import Perturbation, perturbation, vertex_pairs
 
 __all__ = [
     "CREATURES",
@@ -199,6 +202,7 @@ __all__ = [
     "THESIS",
     "USUAL",
     "ApproximateSignature",
+    "Ball",
     "BatchReport",
     "Binding",
     "Box",
@@ -206,6 +210,7 @@ __all__ = [
     "Brush",
     "Camera",
     "Certificate",
+    "Closeness",
     "ConvergenceError",
     "DeformationSession",
     "DepthCamera",
@@ -248,6 +253,7 @@ __all__ = [
     "Patches",
     "PersistenceDiagram",
     "PersistencePairs",
+    "Perturbation",
     "PointCloud",
     "Quadrature",
     "Recipe",
@@ -325,6 +331,7 @@ __all__ = [
     "eigen_deformed",
     "eigen_skeleton",
     "enclosed_volume",
+    "enclosing_ball",
     "encode_patches",
     "euler_characteristic",
     "face_areas",
@@ -373,12 +380,14 @@ __all__ = [
     "light_field_distance",
     "made_codebook",
     "make_creature",
+    "map_closeness",
     "map_from_points",
     "match_features",
     "match_patches",
     "matching_score",
     "mean_curvature",
     "mean_side_length",
+    "measure_closeness",
     "measure_distortion",
     "merge_targets",
     "merge_tree",
@@ -399,6 +408,7 @@ __all__ = [
     "patch_points",
     "patch_scores",
     "persistence_diagram",
+    "perturbation",
     "point_cloud_laplacian",
     "point_map",
     "projective_plane",
@@ -457,6 +467,7 @@ __all__ = [
     "value_colors",
     "vertex_components",
     "vertex_normals",
+    "vertex_pairs",
     "view_distances",
     "wave_kernel_signature",
     "weld",
