@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 import eigenshape as es
 
@@ -70,7 +71,7 @@ def _at_vertex(mesh: es.TriangleMesh, near: np.ndarray, vertex: int) -> np.ndarr
 
 
 def _pieces(mesh: es.TriangleMesh, chosen: np.ndarray) -> np.ndarray:
-    """Number the pieces, joined across edges, that chosen faces form."""
+    """Tell apart the pieces, joined across edges, that chosen faces form: give each face the number of its piece."""
     table = es.edge_table(mesh)
     faces, edges = np.repeat(np.flatnonzero(chosen), 3), table.face_edges[chosen].ravel()
     touch = sp.coo_array((np.ones(len(faces)), (faces, edges)), shape=(mesh.n_faces, len(table.edges))).tocsr()
@@ -121,9 +122,18 @@ def moved(mesh: es.TriangleMesh, vertices: np.ndarray) -> Surgery:
     return Surgery(mesh, es.TriangleMesh(vertices, mesh.faces), regions, regions)
 
 
-def _tube(
-    vertices: np.ndarray, rim_a: np.ndarray, rim_b: np.ndarray, bulge: float
-) -> tuple[np.ndarray, np.ndarray]:
+def widened(surgery: Surgery, by: float) -> Surgery:
+    """Count to its one region also the faces of which a corner of M lies within a distance of it; N stays as it is."""
+    one, inside = surgery.one, surgery.regions_one >= 0
+    region = np.unique(one.faces[inside])
+    near = cKDTree(one.vertices[region]).query(one.vertices)[0] <= by
+    wider = inside | near[one.faces].any(axis=1)
+    regions_two = surgery.regions_two.copy()
+    regions_two[np.flatnonzero(surgery.regions_two < 0)[wider[~inside]]] = 0
+    return Surgery(one, surgery.two, np.where(wider, 0, -1), regions_two)
+
+
+def _tube(vertices: np.ndarray, rim_a: np.ndarray, rim_b: np.ndarray, bulge: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the new points of a tube and its faces; rims run as in the discs that they bounded."""
     start, far = vertices[rim_a], rim_b[::-1]
     far = np.roll(far, -_best_start(start, vertices[far]))

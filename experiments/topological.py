@@ -5,11 +5,13 @@ from collections.abc import Iterator
 
 import numpy as np
 import scipy.linalg as sl
-from surgery import Surgery
+from rich.progress import track
+from surgery import Surgery, widened
 
 import eigenshape as es
 
 N_DENSE = 2500  # points up to which a dense solve is the quicker one
+WIDTHS = (0.01, 0.02, 0.04, 0.06, 0.08, 0.1, 0.15, 0.2, 0.3)  # of sqrt(area): by how much a region is tried wider
 
 
 def eigenvalues(points: np.ndarray, t: float, k: int, volume: float) -> np.ndarray:
@@ -67,7 +69,12 @@ def changes(before: np.ndarray, after: np.ndarray) -> dict[str, float]:
     """Return mean and largest |λ_i(P) - λ_i(Q)|, as given and of the largest λ(P)."""
     found = np.abs(after - before)
     last = before[-1]
-    return {"mean": found.mean(), "largest": found.max(), "largest/λ": found.max() / last, "mean/λ": found.mean() / last}
+    return {
+        "mean": found.mean(),
+        "largest": found.max(),
+        "largest/λ": found.max() / last,
+        "mean/λ": found.mean() / last,
+    }
 
 
 def summary(rows: list[dict[str, float]]) -> dict[str, dict[str, float]]:
@@ -113,16 +120,21 @@ def _one_seed(
         yield name, eigenvalues(points, t, k, volume)
 
 
-def mesh_spectra(surgeries: dict[str, Surgery], k: int = 100) -> dict[str, dict[str, np.ndarray]]:
+def mesh_spectra(
+    surgeries: dict[str, Surgery], k: int = 100, *, kernel: bool = True
+) -> dict[str, dict[str, np.ndarray]]:
     """Return vol(M) λ_i of operators on the meshes of M and each N, i = 1..k: cotangent, and kernel with t = e² of M.
 
     The mesh Laplacian is solved once: its corrected eigenvalues are -log(1 - t μ)/t of the literal ones μ.
     """
     one = next(iter(surgeries.values())).one
     volume, t = es.surface_area(one), float(np.mean(es.edge_lengths(one))) ** 2
-    found: dict[str, dict[str, np.ndarray]] = {"cotangent": {}, "mesh, literal": {}, "mesh, corrected": {}}
+    names = ("cotangent", "mesh, literal", "mesh, corrected") if kernel else ("cotangent",)
+    found: dict[str, dict[str, np.ndarray]] = {name: {} for name in names}
     for name, mesh in {"M": one, **{name: surgery.two for name, surgery in surgeries.items()}}.items():
         found["cotangent"][name] = volume * es.solve_spectrum(es.cotangent_laplacian(mesh), k).eigenvalues
+        if not kernel:
+            continue
         values = es.solve_spectrum(es.mesh_laplacian(mesh, t=t), k).eigenvalues
         found["mesh, literal"][name] = volume * values
         found["mesh, corrected"][name] = -volume * np.log1p(-t * values) / t
@@ -141,8 +153,8 @@ def mesh_changes(spectra: dict[str, dict[str, np.ndarray]]) -> dict[str, dict[st
     return table
 
 
-def soundness(surgery: Surgery) -> dict[str, float]:
-    """Return what is to be known of N: its topology, whether it crosses itself, and areas inside the regions."""
+def soundness(surgery: Surgery, *, close: bool = True, widen: bool = True) -> dict[str, float | str]:
+    """Return what is to be known of N: topology, crossing faces, areas inside the regions, how close it is to M."""
     two = surgery.two
     inside = [es.face_areas(mesh)[regions >= 0].sum() for mesh, regions in _sides(surgery)]
     return {
@@ -153,4 +165,43 @@ def soundness(surgery: Surgery) -> dict[str, float]:
         "area of X": inside[0],
         "area of Y": inside[1],
         "area of M": es.surface_area(surgery.one),
+        **(closeness(surgery, widen=widen) if close else {}),
+    }
+
+
+def closeness(surgery: Surgery, *, widen: bool = True) -> dict[str, float | str]:
+    """Return for which δ the surfaces are δ-close, with the regions as they are and, if one, with the best wider one.
+
+    What the region gains in area counts by its share of the region (condition C2): a wider region takes a larger ball,
+    and gains less of itself.
+    """
+    widths = [0.0]
+    if widen and surgery.regions_one.max() == 0:
+        widths += [width * es.surface_area(surgery.one) ** 0.5 for width in WIDTHS]
+    found = [_delta(surgery, width) for width in widths[:1]]
+    for width in widths[1:]:
+        if found[-1].limited_by == "ball":  # which a wider region only takes a larger one of
+            break
+        found.append(_delta(surgery, width))
+    best = min(range(len(found)), key=lambda place: found[place].delta)
+    return {
+        "δ": found[0].delta,
+        "limited by": found[0].limited_by,
+        "least δ": found[best].delta,
+        "widened by": widths[best],
+        "displacement": found[0].displacement.max(initial=0.0),
+    }
+
+
+def _delta(surgery: Surgery, width: float) -> es.Closeness:
+    one = widened(surgery, width) if width else surgery
+    pair = es.perturbation(one.one, one.two, regions_one=one.regions_one, regions_two=one.regions_two)
+    return es.measure_closeness(pair)
+
+
+def sample_all(surgeries: dict[str, Surgery], runs: tuple[tuple[float, str, int, int], ...], k: int) -> dict[str, dict]:
+    """Measure at each heat time, form, number of points and of seeds."""
+    return {
+        f"t = {t:g}, n = {n}, {form}": measure(surgeries, t, n, k=k, seeds=seeds, form=form)
+        for t, form, n, seeds in track(runs, description="samples")
     }

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from frame import COLORS
+from frame import COLORS, chart, label
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from surgery import Surgery
@@ -48,3 +48,31 @@ def draw_changes(
         floor = changes["M again"][key]
         axes.axhspan(floor["least"], floor["most"], color=color, alpha=0.15, linewidth=0)
         axes.axhline(floor["mean"], color=color, linestyle=":", label="the floor: M against M, other points")
+
+
+def figure_changes(
+    runs: Mapping[str, Mapping], x: Sequence[float], x_label: str, *, shown: str, log: tuple[bool, bool] = (False, True)
+) -> Figure:
+    """Draw the spectra of one run, how they change, and the changes of all runs against x."""
+    figure, panels = chart(14.5, 4.1, columns=3)
+    draw_spectra(panels[0], runs[shown]["spectra"])
+    label(panels[0], "i", "t vol(M) λ$_i$", f"Eigenvalues, {shown}, first seed")
+    draw_differences(panels[1], runs[shown]["spectra"])
+    label(panels[1], "i", "t vol(M) (λ$_i$(Q) - λ$_i$(P))", f"Their change, {shown}, first seed")
+    for number, (name, run) in enumerate(runs.items()):
+        draw_changes(panels[2], x, run["changes"], "largest", name=name, number=number)
+    panels[2].set_xscale("log" if log[0] else "linear")
+    panels[2].set_yscale("log" if log[1] else "linear")
+    k = len(runs[shown]["spectra"]["M"])
+    label(panels[2], x_label, f"largest change of t vol(M) λ$_i$, i ≤ {k}", "Mean over seeds; bars: least and most")
+    panels[2].legend(frameon=False, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.07))
+    return figure
+
+
+def figure_meshes(meshes: Mapping[str, Mapping], operators: Sequence[str], k: int = 20) -> Figure:
+    """Draw the first eigenvalues of operators on the meshes."""
+    figure, panels = chart(5 * len(operators), 4.2, columns=len(operators))
+    for panel, operator in zip(panels, operators, strict=True):
+        draw_spectra(panel, {name: values[:k] for name, values in meshes[operator].items()})
+        label(panel, "i", "vol(M) λ$_i$", f"{operator}: the first {k} eigenvalues")
+    return figure

@@ -7,15 +7,12 @@ ones, and coupled ones, which share their points outside the place of surgery. O
 import sys
 from pathlib import Path
 
-import numpy as np
-from rich.progress import track
-
 FOLDER = Path(__file__).resolve().parent
 sys.path.append(str(FOLDER.parent))
-from frame import chart, finish, label, parse_arguments, rounded  # noqa: E402
+from frame import finish, parse_arguments, rounded  # noqa: E402
 from surgery import Surgery, bridge  # noqa: E402
-from topological import measure, mesh_changes, mesh_spectra, soundness  # noqa: E402
-from topological_pictures import draw_changes, draw_differences, draw_spectra, figure_variants  # noqa: E402
+from topological import mesh_changes, mesh_spectra, sample_all, soundness  # noqa: E402
+from topological_pictures import figure_changes, figure_meshes, figure_variants  # noqa: E402
 
 import eigenshape as es  # noqa: E402
 
@@ -23,7 +20,12 @@ RADII = (0.014, 0.03, 0.045, 0.06, 0.08, 0.1)
 GAP = 0.18  # between the tori, in their larger radii
 AROUND, ACROSS = 160, 56
 # heat time, form, points, seeds
-RUNS = ((1e-3, "coupled", 2000, 5), (3e-4, "coupled", 3000, 3), (1e-4, "coupled", 6500, 3), (1e-3, "independent", 2000, 5))
+RUNS = (
+    (1e-3, "coupled", 2000, 5),
+    (3e-4, "coupled", 3000, 3),
+    (1e-4, "coupled", 6500, 3),
+    (1e-3, "independent", 2000, 5),
+)
 QUICK = ((1e-3, "coupled", 800, 2), (1e-3, "independent", 800, 2))
 MESHED = ("r = 0.014", "r = 0.045", "r = 0.1")
 
@@ -37,48 +39,25 @@ def bridged_tori(radii: tuple[float, ...]) -> dict[str, Surgery]:
     return {f"r = {radius:g}": bridge(tori, 0, across, radius) for radius in radii}
 
 
-def pictures(surgeries: dict[str, Surgery], runs: dict[str, dict], meshes: dict, radii: tuple[float, ...]) -> dict:
-    """Draw the variants, the spectra at one time, and the changes."""
-    figure, panels = chart(15, 4.6, columns=3)
-    first, *_ = runs
-    draw_spectra(panels[0], runs[first]["spectra"])
-    label(panels[0], "i", "t vol(M) λ$_i$", f"Eigenvalues, {first}, seed 0")
-    draw_differences(panels[1], runs[first]["spectra"])
-    label(panels[1], "i", "t vol(M) (λ$_i$(Q) - λ$_i$(P))", f"Their change, {first}, seed 0")
-    for number, (name, run) in enumerate(runs.items()):
-        draw_changes(panels[2], radii, run["changes"], "largest", name=name, number=number)
-    panels[2].set_yscale("log")
-    label(panels[2], "radius of the bridge (diameter of both tori: 1)", "largest change of t vol(M) λ$_i$, i ≤ 300",
-          "Mean over seeds; bars: least and most")  # fmt: skip
-    drawn = {"variants": figure_variants(surgeries, "Two tori and bridges of radius r (diameter of M: 1)")}
-    return drawn | {"changes": figure} | ({"meshes": _mesh_picture(meshes)} if meshes else {})
-
-
-def _mesh_picture(meshes: dict) -> object:
-    figure, panels = chart(10, 4.2, columns=2)
-    for panel, operator in zip(panels, ("cotangent", "mesh, corrected"), strict=True):
-        first = {name: values[:20] for name, values in meshes[operator].items()}
-        draw_spectra(panel, first)
-        label(panel, "i", "vol(M) λ$_i$", f"{operator}: the first 20 eigenvalues")
-    return figure
-
-
 def main() -> None:
     """Measure, draw and print."""
     arguments = parse_arguments(__doc__, FOLDER)
     radii = RADII[::3] if arguments.quick else RADII
     surgeries = bridged_tori(radii)
-    k = 100 if arguments.quick else 300
-    runs = {}
-    for t, form, n, seeds in track(QUICK if arguments.quick else RUNS, description="samples"):
-        runs[f"t = {t:g}, n = {n}, {form}"] = measure(surgeries, t, n, k=k, seeds=seeds, form=form)
+    runs = sample_all(surgeries, QUICK if arguments.quick else RUNS, 100 if arguments.quick else 300)
     meshes = {} if arguments.quick else mesh_spectra({name: surgeries[name] for name in MESHED})
     results = {
-        "surfaces": {name: soundness(surgery) for name, surgery in surgeries.items()},
+        "surfaces": {name: soundness(surgery, close=not arguments.quick) for name, surgery in surgeries.items()},
         "samples": {name: run["changes"] for name, run in runs.items()},
         "meshes": mesh_changes(meshes),
     }
-    finish(rounded(results), pictures(surgeries, runs, meshes, radii), arguments)
+    pictures = {
+        "variants": figure_variants(surgeries, "Two tori (M) and bridges of radius r; the diameter of M is 1"),
+        "changes": figure_changes(runs, radii, "radius of the bridge (diameter of M: 1)", shown=next(iter(runs))),
+    }
+    if meshes:
+        pictures["meshes"] = figure_meshes(meshes, ("cotangent", "mesh, corrected"))
+    finish(rounded(results), pictures, arguments)
 
 
 if __name__ == "__main__":
