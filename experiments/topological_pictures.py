@@ -76,3 +76,21 @@ def figure_meshes(meshes: Mapping[str, Mapping], operators: Sequence[str], k: in
         draw_spectra(panel, {name: values[:k] for name, values in meshes[operator].items()})
         label(panel, "i", "vol(M) λ$_i$", f"{operator}: the first {k} eigenvalues")
     return figure
+
+
+def figure_bars(runs: Mapping[str, Mapping], *, shown: str) -> Figure:
+    """Draw the spectra of one run, how they change, and the changes of all runs for each variant."""
+    figure, panels = chart(14.5, 4.6, columns=3)
+    draw_spectra(panels[0], runs[shown]["spectra"])
+    label(panels[0], "i", "t vol(M) λ$_i$", f"Eigenvalues, {shown}, first seed")
+    draw_differences(panels[1], runs[shown]["spectra"])
+    label(panels[1], "i", "t vol(M) (λ$_i$(Q) - λ$_i$(P))", f"Their change, {shown}, first seed")
+    names = [name for name in runs[shown]["spectra"] if name != "M"]
+    for number, (name, run) in enumerate(runs.items()):
+        places = np.arange(len(names)) + 0.12 * (number - (len(runs) - 1) / 2)
+        draw_changes(panels[2], places, run["changes"], "largest", name=name, number=number)
+    panels[2].set_yscale("log")
+    panels[2].set_xticks(np.arange(len(names)), [name.replace(", ", ",\n") for name in names], fontsize=8)
+    label(panels[2], "", "largest change of t vol(M) λ$_i$", "Mean over seeds; bars: least and most")
+    panels[2].legend(frameon=False, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.07))
+    return figure
