@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from frame import COLORS, chart, label
 from matplotlib.axes import Axes
+from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 from surgery import Surgery
 
@@ -37,20 +38,19 @@ def draw_differences(axes: Axes, spectra: Mapping[str, np.ndarray]) -> None:
 
 
 def draw_changes(
-    axes: Axes, x: Sequence[float], changes: Mapping[str, Mapping], key: str, *, name: str, number: int, line: str = "-"
-) -> None:
+    axes: Axes, x: Sequence[float], changes: Mapping[str, Mapping], key: str, *, name: str, number: int
+) -> ErrorbarContainer:
     """Draw a change against x with its mean over seeds; bars span the seeds."""
     rows = [changes[variant][key] for variant in changes if variant != "M again"]
     mean, least, most = (np.array([row[part] for row in rows]) for part in ("mean", "least", "most"))
     color = COLORS[number]
-    axes.errorbar(
+    bars = axes.errorbar(
         x,
         mean,
         [mean - least, most - mean],
         color=color,
         label=name,
         marker="o",
-        linestyle=line,
         capsize=3,
         markersize=4,
     )
@@ -58,6 +58,7 @@ def draw_changes(
         floor = changes["M again"][key]
         axes.axhspan(floor["least"], floor["most"], color=color, alpha=0.15, linewidth=0)
         axes.axhline(floor["mean"], color=color, linestyle=":", label="the floor: M against M, other points")
+    return bars
 
 
 def figure_changes(
@@ -98,7 +99,7 @@ def figure_bars(runs: Mapping[str, Mapping], *, shown: str) -> Figure:
     names = [name for name in runs[shown]["spectra"] if name != "M"]
     for number, (name, run) in enumerate(runs.items()):
         places = np.arange(len(names)) + 0.12 * (number - (len(runs) - 1) / 2)
-        draw_changes(panels[2], places, run["changes"], "largest", name=name, number=number, line="none")
+        draw_changes(panels[2], places, run["changes"], "largest", name=name, number=number)[0].set_linestyle("none")
     panels[2].set_yscale("log")
     panels[2].set_xticks(np.arange(len(names)), [name.replace(", ", ",\n") for name in names], fontsize=8)
     label(panels[2], "", "largest change of t vol(M) λ$_i$", "Mean over seeds; bars: least and most")

@@ -7,6 +7,8 @@ ones, and coupled ones, which share their points outside the place of surgery. O
 import sys
 from pathlib import Path
 
+import numpy as np
+
 FOLDER = Path(__file__).resolve().parent
 sys.path.append(str(FOLDER.parent))
 from frame import finish, parse_arguments, rounded  # noqa: E402
@@ -33,7 +35,7 @@ MESHED = ("r = 0.014", "r = 0.045", "r = 0.1")
 def bridged_tori(radii: tuple[float, ...]) -> dict[str, Surgery]:
     """Return two tori side by side, diameter 1, joined by a bridge of each radius where they are nearest."""
     left = es.torus(AROUND, ACROSS)
-    right = es.TriangleMesh(left.vertices + [2.8 + GAP, 0, 0], left.faces)
+    right = es.TriangleMesh(left.vertices + np.array([2.8 + GAP, 0, 0]), left.faces)
     tori = es.normalize_diameter(es.disjoint_union(left, right))
     across = left.n_vertices + AROUND // 2 * ACROSS
     return {f"r = {radius:g}": bridge(tori, 0, across, radius) for radius in radii}

@@ -9,14 +9,14 @@ import pytest
 import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "experiments"))
-from surgery import attach, bridge, disc_of_faces, moved, widened  # noqa: E402
-from topological import coupled_points  # noqa: E402
+from surgery import attach, bridge, disc_of_faces, moved, widened
+from topological import coupled_points
 
 
 @pytest.fixture(scope="module")
 def spheres():
     ball = es.icosphere(3)
-    return es.disjoint_union(ball, es.TriangleMesh(ball.vertices + [2.3, 0, 0], ball.faces))
+    return es.disjoint_union(ball, es.TriangleMesh(ball.vertices + np.array([2.3, 0, 0]), ball.faces))
 
 
 def facing(mesh, radius, **options):
