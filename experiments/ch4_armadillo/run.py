@@ -30,7 +30,7 @@ CLEARANCE = 0.002  # between the nose and the finger that touches it
 BRIDGE, BAR = 0.009, 0.04  # radii
 LEG = -0.27  # height of the bar
 # heat time, form, points, seeds
-RUNS = ((1e-4, "coupled", 8000, 2), (1e-3, "coupled", 2000, 3), (1e-3, "independent", 2000, 3))
+RUNS = ((1e-4, "coupled", 8000, 5), (1e-3, "coupled", 2000, 5), (1e-3, "independent", 2000, 5))
 QUICK = ((1e-3, "coupled", 800, 2),)
 
 

@@ -24,8 +24,8 @@ AROUND, ACROSS = 160, 56
 # heat time, form, points, seeds
 RUNS = (
     (1e-3, "coupled", 2000, 5),
-    (3e-4, "coupled", 3000, 3),
-    (1e-4, "coupled", 6500, 3),
+    (3e-4, "coupled", 3000, 5),
+    (1e-4, "coupled", 6500, 5),
     (1e-3, "independent", 2000, 5),
 )
 QUICK = ((1e-3, "coupled", 800, 2), (1e-3, "independent", 800, 2))

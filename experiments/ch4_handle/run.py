@@ -21,9 +21,9 @@ AROUND, ACROSS = 320, 112
 REACH = 0.1  # radius of the joint, and its length, in sizes of the attached torus (diameter 1)
 # heat time, form, points, seeds
 RUNS = (
-    (1e-3, "coupled", 3000, 3),
+    (1e-3, "coupled", 3000, 5),
     (1e-2, "coupled", 1500, 5),
-    (3e-4, "coupled", 8000, 2),
+    (3e-4, "coupled", 8000, 5),
     (1e-2, "independent", 1500, 5),
 )
 QUICK = ((1e-2, "coupled", 500, 2), (1e-2, "independent", 500, 2))
