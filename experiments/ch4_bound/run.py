@@ -21,13 +21,13 @@ from frame import COLORS, chart, finish, label, parse_arguments, rounded
 HERE = Path(__file__).resolve().parent
 DIM, SHORT = 2, 4.0  # t ≥ 4δ² is what the theorem is asked about; t ≤ δ²/4 what it forbids
 FULL = {
-    "points": 1000,
+    "points": 800,
     "seeds": 5,
     "times": [2e-3, 6e-3, 2e-2],
     "deltas": [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3],
     "samples": [250, 500, 1000, 2000],
-    "mesh": (100, 50),
-    "mesh times": [5e-4, 1e-3, 2e-3],
+    "mesh": (80, 40),
+    "mesh times": [4e-4, 8e-4, 1.6e-3],
     "heights": [1e-3, 3e-3, 1e-2, 3e-2],
     "k": 100,
 }
