@@ -62,6 +62,7 @@ from eigenshape.geometry.exact import (
     flat_torus_eigenvalues,
     projective_plane_eigenvalues,
     sphere_eigenvalues,
+    sphere_functional_eigenvalues,
 )
 from eigenshape.geometry.facets import FacetTable, facet_table
 from eigenshape.geometry.geodesic import (
@@ -495,6 +496,7 @@ __all__ = [
     "spectral_hausdorff_distance",
     "spectral_rigid",
     "sphere_eigenvalues",
+    "sphere_functional_eigenvalues",
     "sphere_harmonics",
     "sphere_hull",
     "sphere_quadrature",

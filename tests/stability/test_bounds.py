@@ -33,6 +33,20 @@ def test_no_eigenvalue_moves_further_than_weyl_and_ours_allow(seed, delta, t):
     assert bound.proven <= es.theorem_rate("lipschitz", 2).at(delta, t) * (1 + 1e-9)
 
 
+@pytest.mark.parametrize("dim", [1, 2, 3])
+def test_dense_samples_move_by_no_more_than_their_integrals(dim):
+    """Points of a flat torus of volume 1 (a grid in R^2m) that all move outward and inward by turns."""
+    n, t = {1: 4000, 2: 60, 3: 14}[dim], {1: 2e-4, 2: 4e-3, 3: 2e-2}[dim]
+    angles = np.stack(np.meshgrid(*[2 * np.pi * np.arange(n) / n] * dim, indexing="ij")).reshape(dim, -1)
+    points = np.concatenate([np.cos(angles), np.sin(angles)]).T / (2 * np.pi)
+    delta = 0.02 * t**0.5
+    steps = np.random.default_rng(0).standard_normal(points.shape)
+    steps *= delta / np.linalg.norm(steps, axis=1, keepdims=True)
+    one, two = (es.gaussian_laplacian(each, t, dim) for each in (points, points + steps))
+    law = es.theorem_rate("dense", dim)
+    assert es.weyl_bound(one, two).proven <= 1.02 * law.at(delta, t) < es.theorem_rate("lipschitz", dim).at(delta, t)
+
+
 def test_the_norm_is_that_of_the_dense_difference():
     points, moved = moved_points(200, 0.05, 1)
     one, two = (es.gaussian_laplacian(each, 0.1, 2) for each in (points, moved))

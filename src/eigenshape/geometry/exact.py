@@ -9,12 +9,15 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
-from scipy.special import comb, jn_zeros, jnp_zeros, spherical_jn
+from scipy.special import comb, eval_legendre, jn_zeros, jnp_zeros, spherical_jn
 
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 
 Condition = Literal["neumann", "dirichlet"]
+GAUSS = 600  # nodes: enough for degree 300 over the whole sphere
+NEGLIGIBLE = 60.0  # exp(-60) is far below rounding
+MOST_HARMONICS = 10**5
 HIGHEST = 1000  # frequency along a period: (2 · 1000 + 1)² of them are looked at, 64 MB of numbers
 
 
@@ -31,6 +34,40 @@ def sphere_eigenvalues(k: SupportsIndex, dim: SupportsIndex = 2) -> Float[np.nda
         values += [float(degree * (degree + m - 1))] * copies
         degree += 1
     return np.array(values[:count])
+
+
+def sphere_functional_eigenvalues(k: SupportsIndex, t: float) -> Float[np.ndarray, " k"]:
+    """Return the first k eigenvalues of the functional approximation 𝓛_t on the unit sphere (thesis eq. 3.1).
+
+    A kernel of the distance multiplies all harmonics of one degree by one number (Funk and Hecke). With
+    |x - y|² = 2 - 2s and u = (1 - s)/2t that of 𝓛_t is (1/t) ∫ exp(-u) (1 - P_l(1 - 2tu)) du from 0 to 1/t, taken by
+    Gauss' rule up to where exp(-u) is below rounding.
+
+    Parameters
+    ----------
+    k : int
+    t : float
+        Heat time, in squared radii.
+
+    Returns
+    -------
+    (k,) float
+        In the order of `sphere_eigenvalues`, which they tend to as t → 0. Not always ascending: for large degrees they
+        come near their limit (1 - exp(-1/t))/t from both sides.
+
+    Raises
+    ------
+    InvalidParameterError
+        If k is not in range, or t not positive.
+    """
+    count, time = whole_number(k, "k", 1, MOST_HARMONICS), float(positive_values(t, "t")[0])
+    nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
+    reach = min(1 / time, NEGLIGIBLE) / 2
+    u = reach * (nodes + 1)
+    degrees = np.arange(isqrt(count - 1) + 1)
+    missing = 1 - eval_legendre(degrees[:, None], 1 - 2 * time * u)
+    values = missing @ (reach * weights * np.exp(-u)) / time
+    return np.repeat(values, 2 * degrees + 1)[:count]
 
 
 def projective_plane_eigenvalues(k: SupportsIndex) -> Float[np.ndarray, " k"]:

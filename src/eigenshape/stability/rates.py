@@ -1,7 +1,7 @@
 """How far eigenvalues may move, as powers of the closeness δ and the heat time t, and what is measured of it."""
 
 from dataclasses import dataclass
-from math import e, pi, sqrt
+from math import e, exp, lgamma, pi, sqrt
 from typing import SupportsIndex
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 
-THEOREMS = ("3.1.1", "3.1.3", "3.1.4", "3.1.5", "4.1.1", "4.3.1", "lipschitz")
+THEOREMS = ("3.1.1", "3.1.3", "3.1.4", "3.1.5", "4.1.1", "4.3.1", "lipschitz", "dense")
 MOST_DIM = 100
 
 
@@ -51,6 +51,9 @@ def theorem_rate(theorem: str, dim: SupportsIndex) -> Rate:
       e^(-1/2)/√(2t) a unit of r, and r by at most 2δ; D = L_P - L_Q has rows whose entries sum to 0, those off its
       diagonal being at most that over n, so ‖D‖₂ ≤ ‖D‖_∞ ≤ 4δ e^(-1/2)/√(2t) / (t (4πt)^(m/2)). Weyl's theorem makes
       it a bound for every eigenvalue, at any t. It is (δ²/t)^(1/10) of 4.3.1, smaller wherever t > δ².
+    - "dense": δ t^(-3/2), ours, what "lipschitz" comes to where points sample a manifold of volume 1 ever more densely,
+      and δ ≪ √t ≪ 1/curvature. A row then sums to an integral instead of n times its largest term: on average the slope
+      of a Gaussian is Γ((m+1)/2)/Γ(m/2)/√t, and ‖D‖₂ ≤ 4δ Γ((m+1)/2)/Γ(m/2) t^(-3/2).
 
     Raises
     ------
@@ -66,6 +69,7 @@ def theorem_rate(theorem: str, dim: SupportsIndex) -> Rate:
         "4.1.1": Rate(4 / 5, -(m / 2 + 7 / 5)),
         "4.3.1": Rate(4 / 5, -(m / 2 + 7 / 5)),
         "lipschitz": Rate(1.0, -(m / 2 + 3 / 2), 4 / sqrt(2 * e) / (4 * pi) ** (m / 2)),
+        "dense": Rate(1.0, -3 / 2, 4 * exp(lgamma((m + 1) / 2) - lgamma(m / 2))),
     }
     if theorem not in rates:
         raise InvalidParameterError(f"theorem must be one of {', '.join(THEOREMS)}; it is {theorem!r}.")

@@ -5,13 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from eigenshape._arrays import frozen
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.surface_points import sample_surface
 from eigenshape.operators.gaussian import gaussian_laplacian
+from eigenshape.operators.kernel import require_whole
 from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.neighbors import neighbor_graph
 from eigenshape.spectral.angles import EigenspaceAngles, eigenspace_angles
 from eigenshape.spectral.outcome import Progress
 from eigenshape.spectral.solver import solve_spectrum
@@ -128,12 +131,21 @@ def changes_over_times(
         progress(place / len(asked), f"heat time {t:.3g}")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of heat times that do not serve: `trusted` tells
-            laplacians = [gaussian_laplacian(points, t, samples.dim) for points in three]
+            laplacians = [_whole(points, t, samples.dim) for points in three]
             spectra = [solve_spectrum(laplacian, k) for laplacian in laplacians]
         changes.append(_change(samples, laplacians, spectra, t, trusted))
         if place == len(asked) // 2:
             angles = eigenspace_angles(*spectra[:2], points=samples.matched.partners, laplacian=laplacians[0])
     return tuple(changes), angles
+
+
+def _whole(points: Points, t: float, dim: int) -> Laplacian:
+    """Build the graph Laplacian, which must hold together what nearest neighbours do."""
+    laplacian = gaussian_laplacian(points, t, dim)
+    joined = neighbor_graph(points, min(dim * (dim + 1), len(points) - 1))
+    if laplacian.kernel is not None:
+        require_whole(laplacian, connected_components(joined, directed=False)[1], laplacian.kernel)
+    return laplacian
 
 
 def _change(
