@@ -22,7 +22,7 @@ HERE = Path(__file__).resolve().parent
 N_FUNCTIONAL = 36  # eigenvalues of the sphere: degrees 0 to 5
 DIM, SHORT = 2, 4.0  # t ≥ 4δ² is what the theorem is asked about; t ≤ δ²/4 what it forbids
 FULL = {
-    "points": 800,
+    "points": 1000,
     "seeds": 5,
     "times": [2e-3, 6e-3, 2e-2],
     "deltas": [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3],
