@@ -1,12 +1,11 @@
 """The spectrum of a loop that is deformed: what the folder says is what comes out, and what its text claims."""
 
 import json
-import subprocess
-import sys
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from quick_forms import run_quickly
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch3_eight_loop"
 EXPECTED = json.loads((FOLDER / "expected.json").read_text())
@@ -46,9 +45,7 @@ def test_the_way_is_long_embedded_and_full_of_crossings():
 @pytest.mark.slow
 @pytest.mark.data
 def test_the_quick_form_gives_the_expected_figures(tmp_path):
-    out = tmp_path / "results.json"
-    subprocess.run([sys.executable, FOLDER / "run.py", "--quick", "--out", out], check=True, capture_output=True)
-    found, expected = json.loads(out.read_text()), EXPECTED["quick"]
+    found, expected = run_quickly(FOLDER, tmp_path), EXPECTED["quick"]
     for n, row in expected["steps"].items():
         assert found["steps"][n] == pytest.approx(row, rel=1e-3), n
     assert found["faces that cross"] == expected["faces that cross"]

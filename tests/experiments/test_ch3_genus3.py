@@ -2,12 +2,11 @@
 
 import json
 import runpy
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from quick_forms import run_quickly
 
 import eigenshape as es
 
@@ -71,9 +70,7 @@ def test_a_collapsed_torus_is_still_a_torus():
 @pytest.mark.slow
 @pytest.mark.data
 def test_the_quick_form_gives_the_expected_figures(tmp_path):
-    out = tmp_path / "results.json"
-    subprocess.run([sys.executable, FOLDER / "run.py", "--quick", "--out", out], check=True, capture_output=True)
-    found, expected = json.loads(out.read_text()), EXPECTED["quick"]
+    found, expected = run_quickly(FOLDER, tmp_path), EXPECTED["quick"]
     for name, row in expected["meshes"].items():
         assert found["meshes"][name] == pytest.approx(row, rel=1e-3), name
     for name, row in expected["errors"].items():

@@ -1,11 +1,10 @@
 """Poses and families of poses: what the folder says is what comes out, and what its text claims."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from quick_forms import run_quickly
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch3_poses"
 FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
@@ -15,9 +14,7 @@ KINDS = ("poses of one shape", "other individuals", "other species")
 
 @pytest.mark.data
 def test_the_quick_form_gives_the_expected_figures(tmp_path):
-    out = tmp_path / "results.json"
-    subprocess.run([sys.executable, FOLDER / "run.py", "--quick", "--out", out], check=True, capture_output=True)
-    found = json.loads(out.read_text())
+    found = run_quickly(FOLDER, tmp_path)
     quick = json.loads((FOLDER / "expected.json").read_text())["quick"]
     for name, row in quick["families"].items():
         assert found["families"][name].pop("nearest") == row.pop("nearest"), name

@@ -2,11 +2,10 @@
 
 import json
 import runpy
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from quick_forms import run_quickly
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch3_sphere"
 EXPECTED = json.loads((FOLDER / "expected.json").read_text())
@@ -71,10 +70,7 @@ def test_the_plain_product_makes_next_to_no_difference():
 
 @pytest.mark.slow
 def test_the_quick_form_gives_the_expected_figures(tmp_path):
-    out = tmp_path / "results.json"
-    run = [sys.executable, FOLDER / "run.py", "--quick", "--out", out]
-    subprocess.run(run, check=True, capture_output=True)
-    found = json.loads(out.read_text())
+    found = run_quickly(FOLDER, tmp_path)
     expected = EXPECTED["quick"]
     for found_row, row in zip(found["scatter"], expected["scatter"], strict=True):
         assert found_row == pytest.approx(row, rel=2e-3)

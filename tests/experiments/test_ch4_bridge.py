@@ -1,12 +1,11 @@
 """Two tori and a bridge: what the folder says is what comes out, and what its text claims."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from quick_forms import change_rows, largest, require_equal, run_quickly
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch4_bridge"
 EXPECTED = json.loads((FOLDER / "expected.json").read_text())
@@ -22,22 +21,9 @@ THOUSANDTH, HUNDREDTH, TEN_THOUSANDTH, INDEPENDENT = (
 )
 
 
-def largest(rows, part="mean"):
-    return np.array([row["largest"][part] for name, row in rows.items() if name != "M again"])
-
-
-def flat(value, path=""):
-    if isinstance(value, dict):
-        return {name: x for key, item in value.items() for name, x in flat(item, f"{path}/{key}").items()}
-    return {path: value}
-
-
 def test_the_readme_shows_the_expected_figures():
     text = (FOLDER / "README.md").read_text()
-    cells = "{mean:.4f} ({least:.4f} to {most:.4f})"
-    for name in ["M again", *FULL["surfaces"]]:
-        rows = [run.get(name) for run in FULL["samples"].values()]
-        assert f"| {name} | " + " | ".join(cells.format(**row["largest"]) if row else "" for row in rows) + " |" in text
+    assert all(row in text for row in change_rows(FULL["samples"]))
     for name, row in FULL["surfaces"].items():
         start = f"| {name} | {row['Euler characteristic']} | {row['area of X']:.4f} | {row['area of Y']:.4f} | "
         assert (
@@ -82,9 +68,4 @@ def test_only_the_cotangent_operator_knows_of_two_pieces():
 
 @pytest.mark.slow
 def test_the_quick_form_gives_the_expected_figures(tmp_path):
-    out = tmp_path / "results.json"
-    subprocess.run([sys.executable, FOLDER / "run.py", "--quick", "--out", out], check=True, capture_output=True)
-    found, expected = flat(json.loads(out.read_text())), flat(EXPECTED["quick"])
-    assert found.keys() == expected.keys()
-    for name, value in expected.items():
-        assert found[name] == pytest.approx(value, rel=2e-3, abs=1e-6), name
+    require_equal(run_quickly(FOLDER, tmp_path), EXPECTED["quick"])

@@ -1,11 +1,10 @@
 """One-to-one correspondences of close surfaces: what the folder says is what comes out, and what its text claims."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from quick_forms import run_quickly
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch4_matching"
 EXPECTED = json.loads((FOLDER / "expected.json").read_text())
@@ -62,9 +61,7 @@ def test_the_graph_is_generous():
 
 
 def test_the_quick_form_gives_the_expected_figures(tmp_path):
-    out = tmp_path / "results.json"
-    subprocess.run([sys.executable, FOLDER / "run.py", "--quick", "--out", out], check=True, capture_output=True)
-    found, expected = json.loads(out.read_text()), EXPECTED["quick"]
+    found, expected = run_quickly(FOLDER, tmp_path), EXPECTED["quick"]
     for n, row in expected["points"].items():
         for name, value in row.items():
             assert found["points"][n][name] == pytest.approx(value, rel=1e-3), (n, name)

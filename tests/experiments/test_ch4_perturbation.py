@@ -1,12 +1,11 @@
 """Points moved by noise: what the folder says is what comes out, and what its text claims."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from quick_forms import change_rows, largest, require_equal, run_quickly
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch4_perturbation"
 EXPECTED = json.loads((FOLDER / "expected.json").read_text())
@@ -14,23 +13,9 @@ FULL = EXPECTED["full"]
 SAMPLES = FULL["samples"]
 
 
-def largest(rows, part="mean"):
-    return np.array([row["largest"][part] for name, row in rows.items() if name != "M again"])
-
-
-def flat(value, path=""):
-    if isinstance(value, dict):
-        return {name: x for key, item in value.items() for name, x in flat(item, f"{path}/{key}").items()}
-    return {path: value}
-
-
 def test_the_readme_shows_the_expected_figures():
     text = (FOLDER / "README.md").read_text()
-    cells = "{mean:.4f} ({least:.4f} to {most:.4f})"
-    names = dict.fromkeys(name for run in SAMPLES.values() for name in run)
-    for name in names:
-        rows = [run.get(name) for run in SAMPLES.values()]
-        assert f"| {name} | " + " | ".join(cells.format(**row["largest"]) if row else "" for row in rows) + " |" in text
+    assert all(row in text for row in change_rows(SAMPLES))
 
     for name, row in FULL["power of δ"].items():
         assert f"| {name} | {row['largest']:.2f} | {row['mean']:.2f} |" in text
@@ -70,9 +55,4 @@ def test_one_operator_falls_and_the_other_rises():
 
 @pytest.mark.slow
 def test_the_quick_form_gives_the_expected_figures(tmp_path):
-    out = tmp_path / "results.json"
-    subprocess.run([sys.executable, FOLDER / "run.py", "--quick", "--out", out], check=True, capture_output=True)
-    found, expected = flat(json.loads(out.read_text())), flat(EXPECTED["quick"])
-    assert found.keys() == expected.keys()
-    for name, value in expected.items():
-        assert found[name] == pytest.approx(value, rel=2e-3, abs=1e-6), name
+    require_equal(run_quickly(FOLDER, tmp_path), EXPECTED["quick"])
