@@ -10,17 +10,17 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from rich.progress import track
 
 import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
-from frame import COLORS, chart, finish, label, parse_arguments, rounded
+from bound_pictures import DIM, columns, figure_forbidden, figure_law, figure_surfaces
+from frame import finish, parse_arguments, rounded
 
 HERE = Path(__file__).resolve().parent
 N_FUNCTIONAL = 36  # eigenvalues of the sphere: degrees 0 to 5
-DIM, SHORT = 2, 4.0  # t ≥ 4δ² is what the theorem is asked about; t ≤ δ²/4 what it forbids
+SHORT = 4.0  # t ≥ 4δ² is what the theorem is asked about; t ≤ δ²/4 what it forbids
 FULL = {
     "points": 1000,
     "seeds": 5,
@@ -142,11 +142,6 @@ def exponents(rows: list[dict], measured: str = "change") -> dict[str, float]:
     return {"delta": law.delta, "t": law.t, "constant": law.constant}
 
 
-def columns(rows: list[dict], *names: str) -> list[np.ndarray]:
-    """Return some columns of a table."""
-    return [np.array([row[name] for row in rows]) for name in names]
-
-
 def summarise(points: list[dict], samples: list[dict], surfaces: list[dict]) -> dict[str, object]:
     """Gather exponents and constants beside those that are proven."""
     allowed = [row for row in points if row["t"] >= SHORT * row["delta"] ** 2]
@@ -179,11 +174,17 @@ def _sample_row(rows: list[dict]) -> dict[str, float]:
 
 
 def _surface_row(rows: list[dict]) -> dict[str, float]:
-    law = exponents(rows, "hausdorff")
+    by_number, as_sets = exponents(rows, "change"), exponents(rows, "hausdorff")
     theorem = "3.1.5" if rows[0]["operator"].startswith("cotangent") else "3.1.4"
     covering = es.cover_by_rate(es.theorem_rate(theorem, DIM), *columns(rows, "delta", "t", "hausdorff"))
-    most = max(row["relative"] for row in rows)
-    return {"delta": law["delta"], "t": law["t"], f"constant of {theorem}": covering.constant, "relative, most": most}
+    return {
+        "δ, by number": by_number["delta"],
+        "t, by number": by_number["t"],
+        "δ, as sets": as_sets["delta"],
+        "t, as sets": as_sets["t"],
+        f"constant of {theorem}": covering.constant,
+        "relative, most": max(row["relative"] for row in rows),
+    }
 
 
 def functional_errors() -> dict[str, float]:
@@ -200,86 +201,28 @@ def functional_errors() -> dict[str, float]:
     }
 
 
-def figure_law(points: list[dict], samples: list[dict], setup: dict) -> Figure:
-    """Draw the change against δ at each t with the bounds, and all of them on one curve of δ/√t."""
-    figure, (left, right) = chart(12, 5, columns=2)
-    law, ours, dense = (es.theorem_rate(name, DIM) for name in ("4.3.1", "lipschitz", "dense"))
-    for t, color in zip(setup["times"], COLORS, strict=False):
-        here = [row for row in points if row["t"] == t]
-        deltas = np.unique(columns(here, "delta")[0])
-        by_delta = [columns([row for row in here if row["delta"] == d], "change")[0] for d in deltas]
-        means = np.array([each.mean() for each in by_delta])
-        spans = np.abs([[each.min(), each.max()] for each in by_delta] - means[:, None]).T
-        left.errorbar(
-            deltas, means, spans, fmt="o", ms=4, color=color, label=f"measured, t = {t:g} (mean, least, largest)"
-        )
-        left.plot(deltas, ours.at(deltas, t), "-", lw=1, color=color)
-        left.plot(deltas, dense.at(deltas, t), "--", lw=1, color=color)
-        left.plot(deltas, es.cover_by_rate(law, deltas[:1], [t], means[:1]).at(deltas, t), ":", lw=1, color=color)
-        right.plot(deltas / t**0.5, means * t, "o-", ms=4, lw=0.8, color=color, label=f"t = {t:g}")
-    left.plot([], [], "-", color="grey", label="our bound, δ t$^{-5/2}$ with its constant")
-    left.plot([], [], "--", color="grey", label="our bound for dense samples, 3.54 δ t$^{-3/2}$")
-    left.plot([], [], ":", color="grey", label="slope of Theorem 4.3.1, δ$^{4/5}$ t$^{-12/5}$")
-    t = samples[0]["t"]
-    deltas, changes = columns(samples, "delta", "change")
-    right.plot(deltas / t**0.5, changes * t, "k^", ms=4, label="independent samples, matched")
-    ends = np.array(right.get_xlim())
-    right.plot(ends, dense.constant * ends, "--", lw=1, color="grey", label="our bound for dense samples")
-    right.axvspan(1, right.get_xlim()[1], color="#f5e3df", zorder=0, label="t < δ², which the theorem forbids")
-    for axes in (left, right):
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-    n = setup["points"]
-    label(
-        left,
-        "δ, by how much each point moves (area 1)",
-        "largest change of an eigenvalue",
-        f"All {n} eigenvalues of the graph Laplacian, torus of area 1",
-    )
-    label(right, "δ / √t", "t × largest change of an eigenvalue", "All times on one curve")
-    return figure
-
-
-def figure_forbidden(points: list[dict], setup: dict) -> Figure:
-    """Draw the relative change of the ten lowest eigenvalues against δ/√t."""
-    figure, (axes,) = chart()
-    for t, color in zip(setup["times"], COLORS, strict=False):
-        ratio, low = columns([row for row in points if row["t"] == t], "delta", "lowest")
-        axes.plot(ratio / t**0.5, low, "o", ms=4, color=color, label=f"t = {t:g}")
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.axvspan(1, axes.get_xlim()[1], color="#f5e3df", zorder=0, label="t < δ², which the theorem forbids")
-    axes.axhline(1, color="grey", lw=0.8, ls="--")
-    label(
-        axes,
-        "δ / √t",
-        "relative change, mean of eigenvalues 1 to 10",
-        f"Below t = δ² the lowest eigenvalues are lost (n = {setup['points']}, torus of area 1)",
-    )
-    return figure
-
-
-def figure_surfaces(surfaces: list[dict], setup: dict) -> Figure:
-    """Draw the Hausdorff distance of spectra against δ_H for each operator."""
-    figure, (axes,) = chart()
-    styles = dict(zip(OPERATORS, ("o-", "s--", "^:"), strict=True))
-    for name, t in product(OPERATORS, setup["mesh times"]):
-        rows = [row for row in surfaces if row["operator"] == name and row["t"] == t]
-        if rows:
-            deltas, distances = columns(rows, "delta", "hausdorff")
-            color = COLORS[setup["mesh times"].index(t)] if not name.startswith("cotangent") else "black"
-            told = name if name.startswith("cotangent") else f"{name}, t = {t:g}"
-            axes.plot(deltas, distances, styles[name], ms=4, lw=1, color=color, label=told)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    n = setup["mesh"][0] * setup["mesh"][1]
-    label(
-        axes,
-        "δ_H, displacement or change of area (area 1)",
-        "Hausdorff distance of spectra, 1/length²",
-        f"First {setup['k']} eigenvalues of a mesh that moves smoothly, n = {n}",
-    )
-    return figure
+def markdown(results: dict) -> dict[str, str]:
+    """Return the README's tables."""
+    laws = {
+        "measured, t ≥ 4δ²": "points, t ≥ 4δ²",
+        "theorem 4.3.1": "proven (4.3.1)",
+        "our bound": "proven (ours)",
+        "our bound for dense samples": "expected (dense)",
+    }
+    points = ["| largest change | power of δ | power of t |", "|---|---|---|"]
+    points += [f"| {name} | {results[key]['delta']:.2f} | {results[key]['t']:.2f} |" for name, key in laws.items()]
+    samples = ["| points | δ | largest change | of eigenvalues 1 to 10 |", "|---|---|---|---|"]
+    for n, row in results["samples"].items():
+        samples.append(f"| {n} | {row['delta']:.3f} | {row['change']:.2f} | {row['lowest']:.2f} |")
+    surfaces = [
+        "| operator | by number: power of δ | of t | as sets: power of δ | of t | constant | relative, most |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for name, row in results["surfaces"].items():
+        *powers, constant, most = row.values()
+        told = f"{constant:.1e} (theorem {list(row)[4].split()[-1]})"
+        surfaces.append(f"| {name} | " + " | ".join(f"{x:.2f}" for x in powers) + f" | {told} | {most:.3f} |")
+    return {name: "\n".join(rows) for name, rows in (("points", points), ("samples", samples), ("surfaces", surfaces))}
 
 
 def main() -> None:
