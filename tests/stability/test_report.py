@@ -60,7 +60,7 @@ def test_a_report_can_be_read(bulged):
         "change by",
         "As they lie",
         "Trust heat times",
-        "Graph Laplacians",
+        "raph Laplacians of such samples",
         "Eigenspaces, from vertex to vertex",
     ):
         assert words in text

@@ -5,6 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 import typer
 
 from eigenshape._errors import InvalidParameterError
@@ -117,10 +118,10 @@ def _facts(report: StabilityReport) -> dict[str, Any]:
 
 def _print(report: StabilityReport) -> None:
     compared = report.spectra
-    values = zip(compared.one, compared.two, compared.relative, compared.told, compared.zero, strict=True)
+    pairs = np.where(compared.zero[:, None], 0.0, np.column_stack([compared.one, compared.two]))
     rows = [
-        [str(number), *_pair(one, two, zero), f"{change:.2%}", "yes" if told else "no"]
-        for number, (one, two, change, told, zero) in enumerate(values)
+        [str(number), f"{one:.6g}", f"{two:.6g}", f"{change:.2%}", "yes" if told else "no"]
+        for number, ((one, two), change, told) in enumerate(zip(pairs, compared.relative, compared.told, strict=True))
     ]
     print_table("Eigenvalues, in 1/length²", ["i", "first", "second", "change", "proved"], rows)
     heat = [
@@ -130,7 +131,3 @@ def _print(report: StabilityReport) -> None:
     title = f"Largest change of {len(rows)} eigenvalues of graph Laplacians, over the last, at heat time t (length²)"
     print_table(title, ["t", "shapes", "samples", "Weyl's bound", "trusted"], heat)
     out.print(report.explain())
-
-
-def _pair(one: float, two: float, zero: bool) -> list[str]:
-    return ["0", "0"] if zero else [f"{one:.6g}", f"{two:.6g}"]
