@@ -1,6 +1,7 @@
 """The solver's benchmark runs from end to end, calls every library, and counts what is missing."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -51,7 +52,8 @@ def test_the_script_runs_and_its_json_has_what_it_should(tmp_path):
     report, page = tmp_path / "report.json", tmp_path / "page.md"
     command = [sys.executable, BENCHMARKS / "bench_spectrum.py", "--quick", "--cases", "torus", "-k", "12"]
     more = ["--libraries", "lumped", "--repeats", "2", "--json", report, "--markdown", page]
-    done = subprocess.run([*command, *more], capture_output=True, text=True, check=True)
+    wide = {**os.environ, "COLUMNS": "200"}  # so that no name is broken
+    done = subprocess.run([*command, *more], capture_output=True, text=True, check=True, env=wide)
     assert "LaPy, lumped" in " ".join(done.stdout.split())
     found = json.loads(report.read_text())
     assert {"cpu", "cores", "memory_gib", "load", "blas", "versions"} <= found["machine"].keys()

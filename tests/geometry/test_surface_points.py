@@ -51,5 +51,5 @@ def test_what_has_no_area_cannot_be_sampled():
     flat = es.TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
     with pytest.raises(es.InvalidShapeError, match="must have area"):
         es.sample_surface(flat, 5, rng=np.random.default_rng(0))
-    with pytest.raises(es.InvalidParameterError, match="n must be"):
+    with pytest.raises(es.InvalidParameterError, match="n must lie in"):
         es.sample_surface(mesh_of_two(), 0, rng=np.random.default_rng(0))

@@ -42,7 +42,7 @@ def test_a_neck_is_found(neck):
     assert estimate(mesh).upper == pytest.approx(waist, rel=0.05)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(st.integers(0, 10**6), st.floats(-60, 60))
 def test_the_bounds_are_in_order_at_every_size(seed, exponent):
     rng = np.random.default_rng(seed)
