@@ -61,12 +61,13 @@ def figure_field(
     axes = figure.subplots()
     scale, colors = Normalize(float(values.min()), float(values.max())), mpl.colormaps[color_map]
     camera = camera or three_quarter_view(mesh)
-    show(axes, draw(mesh, camera, vertex_colors=_mapped(values, scale, colors)))
+    show(axes, draw(mesh, camera, vertex_colors=mapped(values, scale, colors)))
     figure.colorbar(ScalarMappable(scale, colors), ax=axes, shrink=0.8).set_label(label)
     return figure
 
 
-def _mapped(values: Float[np.ndarray, " n"], scale: Normalize, colors: Colormap) -> Float[np.ndarray, "n 3"]:
+def mapped(values: Float[np.ndarray, " n"], scale: Normalize, colors: Colormap) -> Float[np.ndarray, "n 3"]:
+    """Return the colour of each value."""
     return np.asarray(colors(scale(values)))[:, :3]
 
 
@@ -96,7 +97,7 @@ def part_colors(mesh: TriangleMesh, labels: Int[np.ndarray, " f"]) -> UInt8[np.n
 
 def value_colors(values: Float[np.ndarray, " n"], color_map: str = "viridis") -> UInt8[np.ndarray, "n 3"]:
     """Return red, green and blue of each vertex for `write_mesh`: a function from its lowest to its highest value."""
-    return _bytes(_mapped(values, Normalize(float(values.min()), float(values.max())), mpl.colormaps[color_map]))
+    return _bytes(mapped(values, Normalize(float(values.min()), float(values.max())), mpl.colormaps[color_map]))
 
 
 def _bytes(colors: Float[np.ndarray, "n 3"]) -> UInt8[np.ndarray, "n 3"]:

@@ -2,7 +2,6 @@
 
 import matplotlib as mpl
 import numpy as np
-from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
@@ -10,7 +9,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import MaxNLocator
 
 from eigenshape.figures.camera import three_quarter_view
-from eigenshape.figures.fields import PANEL, show
+from eigenshape.figures.fields import PANEL, mapped, show
 from eigenshape.figures.render import draw
 from eigenshape.figures.spectra import draw_comparison
 from eigenshape.geometry.cloud import Shape
@@ -53,14 +52,10 @@ def _draw_shapes(
     scale, colors = Normalize(0.0, report.distance or 1.0), mpl.colormaps["viridis"]
     camera = three_quarter_view(meshes[0], up="auto")
     for axes, mesh, values, title in zip(panels, meshes, report.distances, titles, strict=True):
-        show(axes, draw(mesh, camera, vertex_colors=_mapped(values, scale)))
+        show(axes, draw(mesh, camera, vertex_colors=mapped(values, scale, colors)))
         axes.set_title(title)
     bar = figure.colorbar(ScalarMappable(scale, colors), ax=panels.tolist(), shrink=0.8)
     bar.set_label("distance from the other shape, length")
-
-
-def _mapped(values: Float[np.ndarray, " n"], scale: Normalize) -> Float[np.ndarray, "n 3"]:
-    return np.asarray(mpl.colormaps["viridis"](scale(values)))[:, :3]
 
 
 def _draw_times(axes: Axes, report: StabilityReport) -> None:

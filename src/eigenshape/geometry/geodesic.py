@@ -160,23 +160,25 @@ def farthest_points(
     nearest : (n,) int
         For each vertex the number of the nearest.
     """
-    n = mesh.n_points
+    wave, n = waves_on(mesh), mesh.n_points
     chosen, rows = np.empty(count, dtype=np.int64), np.empty((count, n))
     least, nearest = np.full(n, np.inf), np.zeros(n, dtype=np.int64)
-    first = int(waves_on(mesh)(0).argmax())
-    for number, (vertex, row) in enumerate(islice(farthest_first(mesh, first, reach=reach), count)):
+    first = int(wave(0).argmax())
+    for number, (vertex, row) in enumerate(islice(farthest_first(wave, n, first, reach=reach), count)):
         chosen[number], rows[number] = vertex, row
         nearer = row < least
         least[nearer], nearest[nearer] = row[nearer], number
     return chosen, rows, nearest
 
 
-def farthest_first(mesh: Mesh, first: int, *, reach: float = 0.0) -> Iterator[tuple[int, Float[np.ndarray, " n"]]]:
-    """Go through the vertices of a surface, each as far along it from those before as can be, without end.
+def farthest_first(
+    wave: Callable[..., Float[np.ndarray, " n"]], n: int, first: int, *, reach: float = 0.0
+) -> Iterator[tuple[int, Float[np.ndarray, " n"]]]:
+    """Go through n vertices by the waves of their surface, each as far from those before as can be, without end.
 
     With each come the distances from it, as those of `farthest_points`; at least those below what they were before.
     """
-    wave, least, following = waves_on(mesh), np.full(mesh.n_points, np.inf), first
+    least, following = np.full(n, np.inf), first
     while True:
         row = wave(following, max(reach, least.max()))
         yield following, row

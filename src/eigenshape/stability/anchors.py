@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from eigenshape._arrays import frozen, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape.geometry.geodesic import farthest_first
+from eigenshape.geometry.geodesic import farthest_first, waves_on
 from eigenshape.geometry.simplex_distance import squared_distances
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.simplicial import Mesh
@@ -71,7 +71,8 @@ def anchor_nodes(mesh: Mesh, delta: float, *, start: int = 0) -> AnchorNodes:
     """
     positive_values(delta, "delta")
     least, chosen = np.full(mesh.n_points, np.inf), []
-    for vertex, row in farthest_first(mesh, whole_number(start, "start", 0, mesh.n_points - 1)):
+    first = whole_number(start, "start", 0, mesh.n_points - 1)
+    for vertex, row in farthest_first(waves_on(mesh), mesh.n_points, first):
         if least[vertex] < delta:
             break
         chosen.append(vertex)

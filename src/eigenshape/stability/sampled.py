@@ -4,7 +4,7 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
@@ -126,12 +126,13 @@ def changes_over_times(
     samples: Samples, k: int, asked: tuple[float, ...], trusted: TimeRange, progress: Progress
 ) -> tuple[tuple[ChangeAtTime, ...], EigenspaceAngles]:
     """Return what changes at each heat time, and how far eigenspaces turn at the one in the middle."""
-    changes, three = [], (samples.one, samples.two, samples.again)
+    changes = []
+    pieces = [(points, _pieces(points, samples.dim)) for points in (samples.one, samples.two, samples.again)]
     for place, t in enumerate(asked):
         progress(place / len(asked), f"heat time {t:.3g}")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of heat times that do not serve: `trusted` tells
-            laplacians = [_whole(points, t, samples.dim) for points in three]
+            laplacians = [_whole(points, t, samples.dim, labels) for points, labels in pieces]
             spectra = [solve_spectrum(laplacian, k) for laplacian in laplacians]
         changes.append(_change(samples, laplacians, spectra, t, trusted))
         if place == len(asked) // 2:
@@ -139,13 +140,18 @@ def changes_over_times(
     return tuple(changes), angles
 
 
-def _whole(points: Points, t: float, dim: int) -> Laplacian:
-    """Build the graph Laplacian, which must hold together what nearest neighbours do."""
+def _whole(points: Points, t: float, dim: int, labels: Int[np.ndarray, " n"]) -> Laplacian:
+    """Build the graph Laplacian, which must hold together what has one label."""
     laplacian = gaussian_laplacian(points, t, dim)
-    joined = neighbor_graph(points, min(dim * (dim + 1), len(points) - 1))
     if laplacian.kernel is not None:
-        require_whole(laplacian, connected_components(joined, directed=False)[1], laplacian.kernel)
+        require_whole(laplacian, labels, laplacian.kernel)
     return laplacian
+
+
+def _pieces(points: Points, dim: int) -> Int[np.ndarray, " n"]:
+    """Label the points that nearest neighbours hold together."""
+    joined = neighbor_graph(points, min(dim * (dim + 1), len(points) - 1))
+    return connected_components(joined, directed=False)[1]
 
 
 def _change(
