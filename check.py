@@ -1,6 +1,7 @@
-"""Run every check there is: format, lint, types, layers, tests. CI runs this same file.
+"""Run the checks: format, lint, types, layers, tests. CI runs this same file.
 
-python check.py           all of it
+python check.py           all of it but the long tests; under three minutes on two cores
+python check.py --all     the long tests, too: quick forms of all experiments, large shapes, many examples
 python check.py --fast    without the tests
 """
 
@@ -12,19 +13,25 @@ CHECKS = {
     "lint": ["-m", "ruff", "check", "."],
     "types": ["-m", "mypy"],
     "layers": ["-c", "from importlinter.cli import lint_imports_command as main; main()"],
-    "tests": ["-m", "pytest", "-n", "2"],
 }
+TESTS = ["-m", "pytest", "-n", "2"]
 
 
 def main() -> int:
     """Run the checks one after the other and say which failed."""
-    chosen = {name: command for name, command in CHECKS.items() if name != "tests" or "--fast" not in sys.argv[1:]}
+    options, checks = set(sys.argv[1:]), dict(CHECKS)
+    if unknown := options - {"--all", "--fast"}:
+        sys.exit(f"check.py takes --all or --fast; it was given {', '.join(sorted(unknown))}.")
+    if "--all" in options:
+        checks["all tests"] = TESTS
+    elif "--fast" not in options:
+        checks["tests"] = [*TESTS, "-m", "not long"]
     failed = []
-    for name, command in chosen.items():
+    for name, command in checks.items():
         print(f"== {name}", flush=True)
         if subprocess.run([sys.executable, *command], check=False).returncode:
             failed.append(name)
-    print(f"failed: {', '.join(failed)}" if failed else f"passed: {', '.join(chosen)}")
+    print(f"failed: {', '.join(failed)}" if failed else f"passed: {', '.join(checks)}")
     return 1 if failed else 0
 
 

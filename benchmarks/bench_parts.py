@@ -44,7 +44,7 @@ def _factor(elimination: Any, *_: object) -> Work:
     return REAL * float(elimination.n_entries), float((columns.astype(float) ** 2).sum())
 
 
-def _solve(mine: SymmetricFactor, right: np.ndarray, _: object) -> Work:
+def _solve(mine: SymmetricFactor, right: np.ndarray, *_: object) -> Work:
     entries = mine.elimination.n_entries
     return REAL * (2.0 * entries + 6.0 * right.size), 4.0 * entries * right.shape[1]  # L there and back
 

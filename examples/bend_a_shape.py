@@ -30,7 +30,7 @@ def main(folder: Path) -> dict[str, es.TriangleMesh]:
     session.redo()
 
     es.write_edits(session.edits, giraffe, folder / "edits.json")
-    _, edits = es.read_edits(folder / "edits.json")
+    edits = es.read_edits(folder / "edits.json", giraffe)
     again = es.replay(es.rig_shape(es.subdivide(giraffe)), edits).mesh
     es.save_figure(
         es.figure_poses({"as made": giraffe, "bent": lifted}, session_shares(giraffe, lifted)), folder / "giraffe.png"

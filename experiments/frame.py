@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from real_shapes import give_out
+from outputs import give_out, output_file, output_folder
 
 import eigenshape as es
 
@@ -18,8 +18,8 @@ def parse_arguments(doc: str, folder: Path) -> argparse.Namespace:
     """Read --quick, --out and --figures; pictures go to the experiment's folder unless it is run quickly."""
     parser = argparse.ArgumentParser(description=doc.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="a smaller form, in seconds")
-    parser.add_argument("--out", type=Path, help="write the figures as JSON")
-    parser.add_argument("--figures", type=Path, help="folder for the pictures; by default this experiment's")
+    parser.add_argument("--out", type=output_file, help="write the figures as JSON")
+    parser.add_argument("--figures", type=output_folder, help="folder for the pictures; by default this experiment's")
     arguments = parser.parse_args()
     if arguments.figures is None and not arguments.quick:
         arguments.figures = folder
@@ -30,7 +30,6 @@ def finish(results: object, pictures: Mapping[str, Figure], arguments: argparse.
     """Print the figures, and write them and the pictures (as PNG and SVG) where they were asked for."""
     give_out(results, arguments.out)
     if arguments.figures:
-        arguments.figures.mkdir(parents=True, exist_ok=True)
         for name, figure in pictures.items():
             for suffix in ("png", "svg"):
                 es.save_figure(figure, arguments.figures / f"{name}.{suffix}")

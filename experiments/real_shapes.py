@@ -1,7 +1,6 @@
-"""What experiments share: where real shapes lie, which there are, and how figures are given out."""
+"""What experiments share: where real shapes lie, and which there are."""
 
 import csv
-import json
 import os
 import sys
 from pathlib import Path
@@ -23,14 +22,6 @@ def require_data() -> None:
     """End where there are no real shapes."""
     if not DATA.is_dir():
         sys.exit(f"real shapes are absent: {DATA} is not a folder (set EIGENSHAPE_DATA)")
-
-
-def give_out(results: object, path: Path | None) -> None:
-    """Print figures as JSON, and write them where there is a path."""
-    text = json.dumps(results, indent=2) + "\n"
-    sys.stdout.write(text)
-    if path:
-        path.write_text(text)
 
 
 def inner_curvature(mesh: es.TriangleMesh) -> np.ndarray:

@@ -4,16 +4,30 @@ import os
 from pathlib import Path
 
 import pytest
+import scipy.linalg  # noqa: F401 - its BLAS must be there to be limited
 from jaxtyping import install_import_hook
+from threadpoolctl import threadpool_limits
 
 install_import_hook("eigenshape", "runtime_types.checked")
 
 ROOT = Path(__file__).resolve().parents[1]
+BEYOND_THE_QUICK_PART = ("analytic", "benchmarks", "laws", "oracle")
 DATA = Path(os.environ.get("EIGENSHAPE_DATA", ROOT.parent / "shared" / "data"))
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Give each worker of pytest-xdist one thread of BLAS: two workers with two each fight for two cores."""
+    if hasattr(config, "workerinput"):
+        threadpool_limits(1, user_api="blas")
+
+
+@pytest.hookimpl(tryfirst=True)  # before long tests are left out
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Skip what reads real shapes where they are absent, unless CI asks for them to be there."""
+    """Mark folders that are beyond the quick part; skip what reads real shapes where they are absent."""
+    for item in items:
+        if item.path.parent.name in BEYOND_THE_QUICK_PART:
+            item.add_marker(pytest.mark.long)
+    # unless CI asks for them to be there
     if DATA.is_dir() or os.environ.get("EIGENSHAPE_REQUIRE_DATA"):
         return
     skip = pytest.mark.skip(reason=f"real shapes are absent: {DATA} is not a folder (set EIGENSHAPE_DATA)")

@@ -5,8 +5,7 @@ known by formula, or by cubic elements on finer and finer pieces of the same fla
 """
 
 import argparse
-import json
-import os
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,9 +14,13 @@ from rich.progress import track
 
 import eigenshape as es
 
-HERE = Path(__file__).resolve().parent
-DATA = Path(os.environ.get("EIGENSHAPE_DATA", HERE.parents[2] / "shared" / "data"))
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+from frame import rounded
+from outputs import output_file, save_figures
+from real_shapes import DATA
+
 K = 100
+QUICK = ("square, irregular", "polygon of 24 sides", "flat torus in R⁴", "tetrahedron")
 FEW = 10  # eigenvalues whose brackets are followed through refinements
 Mesh = es.TriangleMesh | es.SimplicialMesh
 
@@ -172,11 +175,12 @@ def main() -> None:
     """Measure, print, and write what was asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", nargs="*", help="names of shapes")
-    parser.add_argument("--quick", action="store_true", help="no orders")
-    parser.add_argument("--out", type=Path, help="write the figures as JSON")
-    parser.add_argument("--table", type=Path, help="write the table as Markdown")
+    parser.add_argument("--quick", action="store_true", help=f"{', '.join(QUICK)}, without orders")
+    parser.add_argument("--out", type=output_file, help="write the figures as JSON")
+    parser.add_argument("--table", type=output_file, help="write the table as Markdown")
     arguments = parser.parse_args()
-    cases = {name: case for name, case in (made() | real()).items() if not arguments.only or name in arguments.only}
+    chosen = arguments.only or (QUICK if arguments.quick else None)
+    cases = {name: case for name, case in (made() | real()).items() if not chosen or name in chosen}
     open_ones = {name for name, case in cases.items() if es.facet_table(case.mesh).boundary.size}
     tasks = [(name, condition) for name in cases for condition in ("neumann", "dirichlet")]
     tasks = [(name, condition) for name, condition in tasks if condition == "neumann" or name in open_ones]
@@ -185,8 +189,7 @@ def main() -> None:
         label = f"{name}, {condition.capitalize()}" if name in open_ones else name
         table[label] = measured(cases[name], condition, with_order=not arguments.quick)
         print(label, table[label], flush=True)
-    if arguments.out:
-        arguments.out.write_text(json.dumps(table, indent=2, ensure_ascii=False) + "\n")
+    save_figures(rounded(table), arguments.out)
     if arguments.table:
         arguments.table.write_text(markdown(table))
 

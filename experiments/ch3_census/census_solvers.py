@@ -14,7 +14,8 @@ from census_shapes import Case
 
 import eigenshape as es
 
-DENSE_SWITCHES = {"SMALL": 0, "DENSE_LIMIT": 0}
+# Parts below a hundred points, which equal components have, leave no room for a search.
+DENSE_SWITCHES = {"SMALL": 100, "DENSE_LIMIT": 0}
 TAKES_RNG = "rng" in inspect.signature(spl.eigsh).parameters
 
 
@@ -22,7 +23,7 @@ def always_sparse() -> None:
     """Turn off the switches by which `solve_spectrum` solves small operators densely.
 
     They are no public names. So no more than one case in ten may lean on this: most are large enough to
-    be solved sparsely anyway, and `Ours` counts the solves that were dense all the same.
+    be solved sparsely anyway, and `Ours` counts the solves of whole operators that were dense all the same.
     """
     roads = import_module("eigenshape.spectral.roads")
     for name, value in DENSE_SWITCHES.items():

@@ -15,7 +15,7 @@ def noisy(mesh: es.TriangleMesh, edges: float, rng: np.random.Generator) -> es.T
 
 
 def denser(mesh: es.TriangleMesh, chosen: np.ndarray) -> es.TriangleMesh:
-    """Cut chosen faces in four at the middles of their edges, and their neighbours in two or three so that they fit.
+    """Cut chosen faces in four at the middles of their edges, and their neighbors in two or three so that they fit.
 
     Nothing moves: it is the same surface.
     """
@@ -50,43 +50,55 @@ def pieces(face: list[int], middles: list[int]) -> list[tuple[int, int, int]]:
 def coarser(mesh: es.TriangleMesh, n_vertices: int) -> es.TriangleMesh:
     """Collapse the shortest edges to their middles, one by one, until so many vertices are left.
 
-    An edge is passed over if its ends have more than two neighbours in common (the surface would pinch there), or if a
-    face around it would turn by more than 60 degrees.
+    An edge is passed over if its ends have more than two neighbors in common (the surface would
+    pinch there), or if a face around it would turn by more than 60 degrees.
+
+    Which edge is the shortest must not depend on the last digit of a length, which another CPU
+    rounds otherwise. So points are whole numbers: places on a grid of 2³⁰ steps along the longest
+    side of the box. Lengths are compared exactly, and of equal ones the lower numbers go first.
     """
-    points, rings = mesh.vertices.copy(), [set() for _ in range(mesh.n_vertices)]
+    # a power of two, so that dividing by it rounds nothing
+    step = 2.0 ** (np.frexp(np.ptp(mesh.vertices, axis=0).max())[1] - 30)
+    corner = mesh.vertices.min(axis=0)
+    points = np.rint((mesh.vertices - corner) / step).astype(np.int64)
+    rings = [set() for _ in range(mesh.n_vertices)]
     faces = {number: tuple(face) for number, face in enumerate(mesh.faces.tolist())}
     for number, face in faces.items():
-        for corner in face:
-            rings[corner].add(number)
-    heap = [
-        (length, *edge) for length, edge in zip(es.edge_lengths(mesh), es.edge_table(mesh).edges.tolist(), strict=True)
-    ]
+        for vertex in face:
+            rings[vertex].add(number)
+    edges = es.edge_table(mesh).edges.tolist()
+    heap = [(squared_length(points, *edge), *edge) for edge in edges]
     heapq.heapify(heap)
     left = mesh.n_vertices
     while left > n_vertices and heap:
         length, keep, gone = heapq.heappop(heap)
         joint = rings[keep] & rings[gone]
-        if not joint or length != np.linalg.norm(points[keep] - points[gone]):
+        if not joint or length != squared_length(points, keep, gone):
             continue  # collapsed or moved since
-        middle = (points[keep] + points[gone]) / 2
+        middle = (points[keep] + points[gone]) // 2
         if not may_collapse(points, faces, rings, (keep, gone), middle):
             continue
         for number in joint:
-            for corner in faces.pop(number):
-                rings[corner].discard(number)
+            for vertex in faces.pop(number):
+                rings[vertex].discard(number)
         for number in rings[gone]:
-            faces[number] = tuple(keep if corner == gone else corner for corner in faces[number])
+            faces[number] = tuple(keep if vertex == gone else vertex for vertex in faces[number])
         rings[keep] |= rings[gone]
         rings[gone] = set()
         points[keep] = middle
         left -= 1
-        for other in neighbours(faces, rings, keep):
-            heapq.heappush(heap, (float(np.linalg.norm(points[keep] - points[other])), keep, other))
+        for other in neighbors(faces, rings, keep):
+            heapq.heappush(heap, (squared_length(points, keep, other), keep, other))
     used, places = np.unique(np.array(list(faces.values())), return_inverse=True)
-    return es.TriangleMesh(points[used], places.reshape(-1, 3))
+    return es.TriangleMesh(corner + step * points[used], places.reshape(-1, 3))
 
 
-def neighbours(faces: dict[int, tuple[int, ...]], rings: list[set[int]], vertex: int) -> set[int]:
+def squared_length(points: np.ndarray, one: int, other: int) -> int:
+    """Return the squared length of an edge between points of whole numbers, exactly."""
+    return sum((a - b) ** 2 for a, b in zip(points[one].tolist(), points[other].tolist(), strict=True))
+
+
+def neighbors(faces: dict[int, tuple[int, ...]], rings: list[set[int]], vertex: int) -> set[int]:
     """Return the vertices that share a face with one."""
     return {corner for number in rings[vertex] for corner in faces[number]} - {vertex}
 
@@ -100,16 +112,15 @@ def may_collapse(
 ) -> bool:
     """Say whether an edge can become a point without pinching the surface or turning a face over."""
     keep, gone = edge
-    common = neighbours(faces, rings, keep) & neighbours(faces, rings, gone)
+    common = neighbors(faces, rings, keep) & neighbors(faces, rings, gone)
     if len(common) != 2 or any(len(rings[corner]) <= 3 for corner in common):
         return False
     around = np.array([faces[number] for number in rings[keep] ^ rings[gone]])
     before = points[around]
     after = np.where(np.isin(around, edge)[..., None], middle, before)
-    one, two = (np.cross(each[:, 1] - each[:, 0], each[:, 2] - each[:, 0]) for each in (before, after))
-    return bool(
-        np.all(
-            np.einsum("ij,ij->i", one, two)
-            > np.cos(np.pi / 3) * np.linalg.norm(one, axis=1) * np.linalg.norm(two, axis=1)
-        )
-    )
+    # whole numbers of Python: products of four coordinates and more do not fit into 64 bits
+    one, two = (np.cross(each[:, 1] - each[:, 0], each[:, 2] - each[:, 0]).astype(object) for each in (before, after))
+    product = (one * two).sum(axis=1)
+    squares = (one * one).sum(axis=1) * (two * two).sum(axis=1)
+    # the cosine of the turn, product / √squares, lies above that of 60 degrees, 1/2
+    return bool(np.all((product > 0) & (4 * product * product > squares)))

@@ -28,11 +28,15 @@ ORIGINAL = "original"
 
 def meshes_of(n_first: int | None, n_coarse: int) -> dict[str, es.TriangleMesh]:
     """Return the original with diameter 1, and its other meshes; the quick form begins with fewer points."""
-    mesh = es.normalize_diameter(es.read_mesh(DATA / "classics" / "genus3.off"))
+    raw = es.read_mesh(DATA / "classics" / "genus3.off")
     if n_first:
-        mesh = coarser(mesh, n_first)
-    coarse = coarser(mesh, n_coarse)
-    right = coarse.vertices[coarse.faces].mean(axis=1)[:, 0] > 0
+        raw = coarser(raw, n_first)
+    mesh = es.normalize_diameter(raw)
+    # made coarser as it was read: what the last digit of a diameter touches is not the same on every CPU
+    coarse = coarser(raw, n_coarse)
+    right = coarse.vertices[coarse.faces].mean(axis=1)[:, 0] > raw.vertices[:, 0].mean()
+    size = es.mean_side_length(mesh) / es.mean_side_length(raw)
+    coarse = es.TriangleMesh(size * coarse.vertices, coarse.faces)
     return {
         ORIGINAL: mesh,
         "noise, .1 edge": noisy(mesh, 0.1, np.random.default_rng(0)),

@@ -5,8 +5,7 @@ with vertices and faces in another order, and with one thread and two.
 """
 
 import argparse
-import json
-import os
+import sys
 import warnings
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -19,8 +18,10 @@ from threadpoolctl import threadpool_limits
 
 import eigenshape as es
 
-HERE = Path(__file__).resolve().parent
-DATA = Path(os.environ.get("EIGENSHAPE_DATA", HERE.parents[2] / "shared" / "data"))
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+from outputs import output_file, save_figures
+from real_shapes import DATA
+
 K = 50
 SCALES = (1e-100, 1e-30, 1e-3, 0.7, 25.4, 1e30, 1e100)
 EXPONENTS = (-300, -1, 7, 300)
@@ -106,7 +107,7 @@ def main() -> None:
     """Measure, print, and write what was asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="small made-up shapes")
-    parser.add_argument("--out", type=Path, help="write the figures as JSON")
+    parser.add_argument("--out", type=output_file, help="write the figures as JSON")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
     tasks = [
@@ -118,8 +119,7 @@ def main() -> None:
     for name, operator, mesh in track(tasks, description="invariance"):
         table[name] = measured(operator, mesh)
         print(f"{name:<22}" + "".join(f"{key}: {value:.1e}   " for key, value in table[name].items()))
-    if arguments.out:
-        arguments.out.write_text(json.dumps(table, indent=2, ensure_ascii=False) + "\n")
+    save_figures(table, arguments.out)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """Fingers join, touch each other, and touch the nose: what do eigenvalues hear? (thesis 4.4, Figure 4.5).
 
 Samples of each variant of the armadillo, coupled and independent, are compared by the first 300 eigenvalues of the
-Gaussian-weighted graph Laplacian. Only fingers are moved, so that the changes stay local; a bar between the legs is the
-larger change.
+Gaussian-weighted graph Laplacian. Only fingers are moved, so that the changes stay local. A bar
+between the legs, which the thesis does not have, is the larger change.
 """
 
 import sys

@@ -19,7 +19,8 @@ from sklearn.manifold import spectral_embedding
 import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
-from real_shapes import DATA, give_out, manifest, require_data
+from outputs import give_out, output_file, output_folder
+from real_shapes import DATA, manifest, require_data
 
 QUICK = ("ant", "armadillo", "human", "table", "teddy")
 N_TUNED = 5  # first members of each class: constants were chosen on them
@@ -181,11 +182,10 @@ def main() -> None:
     """Measure every shape, print and save the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help=f"two members of the classes {', '.join(QUICK)}")
-    parser.add_argument("--db", type=Path, default=Path("ch5-parts"), help="folder of what is done, kept")
-    parser.add_argument("--out", type=Path, default=Path("ch5-parts.json"))
+    parser.add_argument("--db", type=output_folder, default="ch5-parts", help="folder of what is done, kept")
+    parser.add_argument("--out", type=output_file, default="ch5-parts.json")
     arguments = parser.parse_args()
     require_data()
-    arguments.db.mkdir(parents=True, exist_ok=True)
     wanted = shapes(arguments.quick)
     rows = {name: kept(arguments.db, name, path) for name, _, path in track(wanted, "shapes")}
     give_out(summary(rows, tuning_names()), arguments.out)

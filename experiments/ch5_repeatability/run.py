@@ -18,7 +18,8 @@ from rich.progress import track
 import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
-from real_shapes import DATA, give_out, inner_curvature, require_data
+from outputs import give_out, output_file, output_folder
+from real_shapes import DATA, inner_curvature, require_data
 
 NEAR, N_FEATURES = 0.05, 15
 KINDS, REAL = ("biped", "giraffe", "hand", "quadruped"), ("human/tosca_david", "human/tosca_victoria", "cat/tosca_cat")
@@ -191,8 +192,8 @@ def main() -> None:
     """Measure, print and save the tables, and draw."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="two poses of two small creatures")
-    parser.add_argument("--out", type=Path, help="write the figures as JSON")
-    parser.add_argument("--pictures", type=Path, help="folder for figures 5.2 and 5.3 redrawn")
+    parser.add_argument("--out", type=output_file, help="write the figures as JSON")
+    parser.add_argument("--pictures", type=output_folder, help="folder for pictures after figure 5.2")
     arguments = parser.parse_args()
     if not arguments.quick:
         require_data()

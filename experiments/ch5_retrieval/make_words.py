@@ -1,6 +1,7 @@
 """Learn the words of patches that come with the library, from made-up creatures alone, and write them into it."""
 
 import argparse
+import sys
 from concurrent.futures import ProcessPoolExecutor
 from itertools import product
 from pathlib import Path
@@ -9,6 +10,9 @@ from rich.progress import track
 from threadpoolctl import threadpool_limits
 
 import eigenshape as es
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+from outputs import output_file
 
 PLACE = Path(__file__).resolve().parents[2] / "src" / "eigenshape" / "retrieval" / "made_words.npz"
 INDIVIDUALS, SIZES, VIEWS = 6, (2000, 5000), 3
@@ -24,7 +28,7 @@ def lesson(what: tuple[str, int]) -> list[es.Patches]:
 def main() -> None:
     """Learn and write."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=PLACE)
+    parser.add_argument("--out", type=output_file, default=str(PLACE))
     chosen = parser.parse_args()
     everyone = list(product(es.CREATURES, range(INDIVIDUALS)))
     with ProcessPoolExecutor(2, initializer=threadpool_limits, initargs=(1,)) as pool:

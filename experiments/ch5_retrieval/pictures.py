@@ -17,6 +17,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1]))
 from describing import Store, describe_all
 from draws import Draw, Version, draw, half_of, make, shapes
 from methods import METHODS, Method
+from outputs import output_folder
 from real_shapes import require_data
 from rich.progress import track
 from run import answers, ready
@@ -97,11 +98,10 @@ def main() -> None:
     parser.add_argument("--methods", nargs="*", choices=sorted(METHODS), default=["thesis, cotangent", "EVD", "LFD"])
     parser.add_argument("--seed", type=int, default=0, help="of the draw")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--cache", type=Path, default=Path("ch5-descriptors"))
-    parser.add_argument("--folder", type=Path, default=Path("ch5-pictures"))
+    parser.add_argument("--cache", type=output_folder, default="ch5-descriptors")
+    parser.add_argument("--folder", type=output_folder, default="ch5-pictures")
     chosen = parser.parse_args()
     require_data()
-    chosen.folder.mkdir(parents=True, exist_ok=True)
     some, others = (half_of(shapes(), half) for half in ("reporting", "tuning"))
     drawn, store = draw(some, chosen.seed), Store(chosen.cache)
     methods = [ready(METHODS[name], others, store) for name in dict.fromkeys([chosen.method, *chosen.methods])]

@@ -16,13 +16,15 @@ sys.path.append(str(Path(__file__).resolve().parents[1]))
 from describing import Store, describe_all
 from draws import HALVES, Draw, Version, draw, half_of, shapes
 from methods import METHODS
-from perturbing import CHANGES, CLEAN, SCANS
-from real_shapes import give_out, require_data
+from outputs import give_out, output_file, output_folder
+from perturbing import CHANGES, CLEAN, FLIPPED, SCANS
+from real_shapes import require_data
 from run import QUICK_CLASSES, QUICK_QUERIES, SEEDS, outcomes, ready
 from scores import Outcome, differences, rates
 
 import eigenshape as es
 
+QUICK_CHANGES = (CLEAN, "noise .25", FLIPPED)
 GROUP = "incomplete"  # partial ones too, as everywhere here
 CURES = ("as it is", "outward, denoised")
 
@@ -93,11 +95,14 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--quick", action="store_true", help=f"classes {', '.join(QUICK_CLASSES)}, one draw")
     parser.add_argument("--half", choices=HALVES, default="reporting")
     parser.add_argument("--draws", type=int, nargs="*", default=SEEDS, help="seeds of the draws")
-    parser.add_argument("--changes", nargs="*", choices=CHANGES, default=CHANGES)
+    parser.add_argument("--changes", nargs="*", choices=CHANGES, help="all; quickly, three")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--cache", type=Path, default=Path("ch5-descriptors"), help="folder of descriptors, kept")
-    parser.add_argument("--out", type=Path, default=Path("ch5-robustness.json"))
-    return parser.parse_args()
+    parser.add_argument("--cache", type=output_folder, default="ch5-descriptors", help="folder of descriptors, kept")
+    parser.add_argument("--out", type=output_file, default="ch5-robustness.json")
+    chosen = parser.parse_args()
+    if chosen.changes is None:
+        chosen.changes = QUICK_CHANGES if chosen.quick else CHANGES
+    return chosen
 
 
 def main() -> None:
@@ -109,7 +114,9 @@ def main() -> None:
     seeds, numbers = (chosen.draws[:1], QUICK_QUERIES) if chosen.quick else (chosen.draws, (18, 32))
     draws = [draw(some, seed, *numbers) for seed in seeds]
     store = Store(chosen.cache)
-    method = ready(METHODS["patches"], [shape for shape in everything if shape not in some], store)
+    # made words are there already, while those of the other half take a minute to learn
+    words = METHODS["patches, made words" if chosen.quick else "patches"]
+    method = ready(words, [shape for shape in everything if shape not in some], store)
     cures = [Asking(method, cure) for cure in CURES]
     changes = list(dict.fromkeys([CLEAN, *chosen.changes]))
     database = [version for each in draws for version in each.mixed]

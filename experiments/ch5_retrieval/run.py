@@ -15,14 +15,16 @@ sys.path.append(str(Path(__file__).resolve().parents[1]))
 from describing import Failure, Store, describe_all
 from draws import HALVES, Draw, Shape, Version, complete, draw, half_of, make, own_choice, shapes
 from methods import METHODS, SLOW, Method, Trainable
-from real_shapes import give_out, require_data
+from outputs import give_out, output_file, output_folder
+from real_shapes import require_data
 from rich.progress import track
 from rich.status import Status
 from scores import Outcome, differences, four_legged_as_one, rates
 from tables import PROTOCOLS, printed
 
 SEEDS = (0, 1, 2)
-QUICK_CLASSES, QUICK_QUERIES = ("ant", "chair", "glasses", "octopus", "teddy"), (4, 8)
+QUICK_CLASSES, QUICK_QUERIES = ("glasses", "octopus", "teddy"), (2, 4)
+QUICK_METHODS = ("patches, made words", "thesis, cotangent", "ShapeDNA")
 
 
 def ready(method: Method, some: Sequence[Shape], store: Store) -> Method:
@@ -96,12 +98,15 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--source", default="", help="how the names of files must begin: psb for shapes of one source")
     parser.add_argument("--among-all", action="store_true", help="leave the poses of other queries in the database")
     parser.add_argument("--draws", type=int, nargs="*", default=SEEDS, help="seeds of the draws")
-    parser.add_argument("--methods", nargs="*", choices=sorted(METHODS), default=[m for m in METHODS if m not in SLOW])
+    parser.add_argument("--methods", nargs="*", choices=sorted(METHODS), help="all but the slowest; quickly, three")
     parser.add_argument("--against", choices=sorted(METHODS), default="thesis, cotangent", help="of paired differences")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--cache", type=Path, default=Path("ch5-descriptors"), help="folder of descriptors, kept")
-    parser.add_argument("--out", type=Path, default=Path("ch5-results.json"))
-    return parser.parse_args()
+    parser.add_argument("--cache", type=output_folder, default="ch5-descriptors", help="folder of descriptors, kept")
+    parser.add_argument("--out", type=output_file, default="ch5-results.json")
+    chosen = parser.parse_args()
+    if chosen.methods is None:
+        chosen.methods = QUICK_METHODS if chosen.quick else [name for name in METHODS if name not in SLOW]
+    return chosen
 
 
 def main() -> None:

@@ -10,6 +10,7 @@ from run import bound
 from scenes import SCENES, Scene, real
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
+from outputs import output_folder
 from real_shapes import require_data
 from rich.progress import track
 
@@ -73,10 +74,9 @@ def main() -> None:
     """Draw all, or some scenes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", nargs="*", choices=list(SCENES), help="scenes")
-    parser.add_argument("--folder", type=Path, default=Path("ch6-pictures"))
+    parser.add_argument("--folder", type=output_folder, default="ch6-pictures")
     chosen = parser.parse_args()
     require_data()
-    chosen.folder.mkdir(parents=True, exist_ok=True)
     for name in track(chosen.only or list(SCENES), "drawing"):
         file = "".join(letter if letter.isalnum() else "_" for letter in name.replace("°", ""))
         by_all_methods(SCENES[name](), chosen.folder / f"{file}.png")

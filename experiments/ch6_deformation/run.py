@@ -10,7 +10,9 @@ from methods import METHODS
 from scenes import QUICK, SCENES, Scene
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
-from real_shapes import give_out, require_data
+from frame import rounded
+from outputs import give_out, output_file
+from real_shapes import require_data
 from rich.progress import track
 
 import eigenshape as es
@@ -36,13 +38,13 @@ def measures(scene: Scene, vertices: np.ndarray, held: np.ndarray, goal: np.ndar
     foot = height < height.min() + 0.1 * np.ptp(height)
     step = np.linalg.norm((vertices - scene.mesh.vertices)[foot], axis=1).max()
     return {
-        "edges": round(found.edge_error, 4),
-        "of the box": round(found.edge_error_of_box, 5),
-        "least area": round(float(found.area_ratios.min()), 3),
+        "edges": found.edge_error,
+        "of the box": found.edge_error_of_box,
+        "least area": float(found.area_ratios.min()),
         "flipped": len(found.flipped),
         "crossing": len(es.self_intersections(bent)),
-        "handles": round(float(np.sqrt(np.mean(away**2)) / diagonal), 6),
-        "feet": round(float(step / diagonal), 4),
+        "handles": float(np.sqrt(np.mean(away**2)) / diagonal),
+        "feet": float(step / diagonal),
     }
 
 
@@ -52,7 +54,7 @@ def compared(scene: Scene) -> dict[str, Any]:
     goal = es.as_rigid_as_possible(binding, handles, n_rounds=1)
     held = np.setdiff1d(np.arange(scene.mesh.n_vertices), binding.part.free)
     rows: dict[str, Any] = {"vertices": scene.mesh.n_vertices, "modes": binding.n_modes.tolist()}
-    rows["held"] = round(len(held) / scene.mesh.n_vertices, 3)
+    rows["held"] = len(held) / scene.mesh.n_vertices
     for name, method in METHODS.items():
         rows[name] = measures(scene, method(binding, handles), held, goal)
     return rows
@@ -82,14 +84,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help=", ".join(QUICK))
     parser.add_argument("--only", nargs="*", choices=list(SCENES), help="scenes")
-    parser.add_argument("--out", type=Path, default=Path("ch6-results.json"))
+    parser.add_argument("--out", type=output_file, default="ch6-results.json")
     chosen = parser.parse_args()
     scenes = QUICK if chosen.quick else {name: SCENES[name] for name in chosen.only or SCENES}
     if not chosen.quick:
         require_data()
     results = {name: compared(make()) for name, make in track(scenes.items(), "bending")}
     print(printed(results))
-    give_out(results, chosen.out)
+    give_out(rounded(results), chosen.out)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
-from real_shapes import DATA, give_out, require_data
+from outputs import give_out, output_file, output_folder
+from real_shapes import DATA, require_data
 
 import eigenshape as es
 
@@ -44,11 +45,10 @@ PAIRS = {
 def main() -> None:
     """Map, transfer, measure and draw."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--folder", type=Path, default=Path("ch6-pictures"))
-    parser.add_argument("--out", type=Path, default=Path("ch6-transfer.json"))
+    parser.add_argument("--folder", type=output_folder, default="ch6-pictures")
+    parser.add_argument("--out", type=output_file, default="ch6-transfer.json")
     chosen = parser.parse_args()
     require_data()
-    chosen.folder.mkdir(parents=True, exist_ok=True)
     give_out({name: transferred(name, pair, chosen.folder) for name, pair in PAIRS.items()}, chosen.out)
 
 

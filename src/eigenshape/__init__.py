@@ -4,6 +4,8 @@ A shape of any dimension gives a Laplacian, the Laplacian a certified spectrum, 
 that persist, and features an answer to the question which shapes are alike.
 """
 
+import importlib.metadata
+
 from eigenshape._errors import (
     ConvergenceError,
     EigenshapeError,
@@ -50,6 +52,7 @@ from eigenshape.figures.stability import figure_stability
 from eigenshape.geometry.average_distance import average_geodesic_distance
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.cloud_measure import cloud_quadrature
+from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_mesh, as_shape, from_arrays
 from eigenshape.geometry.creatures import CREATURES, make_creature
 from eigenshape.geometry.crossings import self_intersections
 from eigenshape.geometry.curvature import gaussian_curvature
@@ -64,7 +67,7 @@ from eigenshape.geometry.exact import (
     sphere_eigenvalues,
     sphere_functional_eigenvalues,
 )
-from eigenshape.geometry.facets import FacetTable, facet_table
+from eigenshape.geometry.facets import FacetTable, boundary_surface, facet_table
 from eigenshape.geometry.geodesic import (
     farthest_points,
     geodesic_balls,
@@ -92,13 +95,18 @@ from eigenshape.geometry.quadrature import (
 )
 from eigenshape.geometry.repair import (
     Repaired,
+    RepairedCloud,
+    drop_copies,
     drop_degenerate,
     drop_duplicate_faces,
     drop_unreferenced,
     largest_component,
+    orient,
     repair,
     seal_holes,
+    suggest_repairs,
     weld,
+    weld_seams,
 )
 from eigenshape.geometry.sampling import MeshPart, cut_by_planes, partial_scan, random_planes
 from eigenshape.geometry.scanner import DepthCamera, DepthScan, simulate_scan
@@ -125,7 +133,7 @@ from eigenshape.geometry.topology import (
     is_manifold,
     vertex_components,
 )
-from eigenshape.io.bridges import from_arrays, from_pyvista, from_trimesh, to_arrays, to_pyvista, to_trimesh
+from eigenshape.io.bridges import from_pyvista, from_trimesh, to_arrays, to_pyvista, to_trimesh
 from eigenshape.io.edits import read_edits, write_edits
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.io.shape_files import read_points, read_shape, write_points
@@ -214,6 +222,8 @@ from eigenshape.stability.rates import THEOREMS, Rate, cover_by_rate, fit_rate, 
 from eigenshape.stability.report import StabilityPlan, StabilityReport, compare_shapes
 from eigenshape.stability.sampled import ChangeAtTime
 
+__version__ = importlib.metadata.version("eigenshape")
+
 __all__ = [
     "CREATURES",
     "OPERATORS",
@@ -264,6 +274,7 @@ __all__ = [
     "Match",
     "MaximumMatching",
     "MergeTree",
+    "MeshLike",
     "MeshPart",
     "MissingExtraError",
     "Move",
@@ -287,10 +298,12 @@ __all__ = [
     "Recipe",
     "Record",
     "Repaired",
+    "RepairedCloud",
     "Rotation",
     "Segmentation",
     "ShapeDescriptor",
     "ShapeIndex",
+    "ShapeLike",
     "SimplicialMesh",
     "SkeletonGrip",
     "Spectrum",
@@ -312,7 +325,9 @@ __all__ = [
     "apply_edit",
     "approximate_heat_kernel_signature",
     "approximate_spectrum",
+    "as_mesh",
     "as_rigid_as_possible",
+    "as_shape",
     "average_geodesic_distance",
     "ball",
     "ball_eigenvalues",
@@ -323,6 +338,7 @@ __all__ = [
     "bottleneck_matching",
     "boundary_edges",
     "boundary_loops",
+    "boundary_surface",
     "boundary_vertices",
     "box",
     "box_eigenvalues",
@@ -362,6 +378,7 @@ __all__ = [
     "disc",
     "disc_eigenvalues",
     "disjoint_union",
+    "drop_copies",
     "drop_degenerate",
     "drop_duplicate_faces",
     "drop_unreferenced",
@@ -447,6 +464,7 @@ __all__ = [
     "normalize_area",
     "normalize_box",
     "normalize_diameter",
+    "orient",
     "orient_outward",
     "part_colors",
     "part_spectrum",
@@ -501,6 +519,7 @@ __all__ = [
     "sphere_hull",
     "sphere_quadrature",
     "subdivide",
+    "suggest_repairs",
     "surface_area",
     "tangent_frames",
     "theorem_rate",
@@ -525,6 +544,7 @@ __all__ = [
     "view_distances",
     "wave_kernel_signature",
     "weld",
+    "weld_seams",
     "weyl_bound",
     "witness_region",
     "word_distances",

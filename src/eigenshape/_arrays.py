@@ -7,10 +7,14 @@ from typing import Any, SupportsIndex, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from eigenshape._arguments import named_value
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 
 SINGULAR = {"vertices": "vertex", "faces": "face", "points": "point", "simplices": "simplex"}
 INDEXED = {"faces": "vertices", "simplices": "points"}
+
+SHARE_OF_ARRAYS = 0.5  # of the memory: what one array may take while it is checked and copied
+BYTES_OF_ENTRY = 17  # meanwhile: two copies of 8 bytes, and one bool
 
 ArrayT = TypeVar("ArrayT", bound=NDArray[Any])
 
@@ -20,6 +24,37 @@ def frozen(array: ArrayT) -> ArrayT:
     copy = np.array(array, order="C")
     copy.flags.writeable = False
     return copy  # type: ignore[return-value]
+
+
+def as_array(
+    value: ArrayLike, name: str, error: type[InvalidShapeError | InvalidParameterError] = InvalidParameterError
+) -> NDArray[Any]:
+    """Return `value` as an array; every array that a caller hands over comes through here.
+
+    Raises
+    ------
+    InvalidShapeError or InvalidParameterError
+        If an entry is masked, or checking and copying would take more than half of the memory: a broadcast array says
+        that it has numbers which stand nowhere yet.
+    ValueError
+        If rows differ in length.
+    """
+    nested = isinstance(value, list | tuple) and any(isinstance(row, np.ma.MaskedArray) for row in value)
+    array = np.ma.asarray(value) if nested else np.asanyarray(value)
+    masked = np.ma.getmask(array)
+    if np.any(masked):
+        place = tuple(int(index) for index in np.argwhere(masked)[0])
+        raise error(
+            f"{name} must not be masked; entry {place[0] if len(place) == 1 else place} is ({masked.sum()} such). "
+            "Fill what is masked with numbers, or leave it out."
+        )
+    size, most = array.size * BYTES_OF_ENTRY, SHARE_OF_ARRAYS * machine_memory()
+    if size > most:
+        raise error(
+            f"{name} must fit into half of the memory, {most / 2**30:.1f} GiB; to check and to copy an array of shape "
+            f"{array.shape} takes {size / 2**30:.1f} GiB."
+        )
+    return np.asarray(array)
 
 
 def finite_rows(value: ArrayLike, name: str, columns: int | None = None) -> NDArray[np.float64]:
@@ -59,7 +94,9 @@ def index_rows(value: ArrayLike, name: str, columns: int | None, n_vertices: int
 def _table(value: ArrayLike, name: str, columns: int | None) -> NDArray[Any]:
     wanted = f"(n, {columns or 'd'})"
     try:
-        rows = np.asarray(value)
+        rows = as_array(value, name, InvalidShapeError)
+    except InvalidShapeError:
+        raise
     except ValueError as err:
         raise InvalidShapeError(f"{name} must have shape {wanted}; the rows differ in length.") from err
     if rows.size == 0:
@@ -67,6 +104,11 @@ def _table(value: ArrayLike, name: str, columns: int | None) -> NDArray[Any]:
     if rows.ndim != 2 or columns not in (None, rows.shape[1]):
         hint = " Transpose it." if rows.ndim == 2 and rows.shape[0] == columns else ""
         raise InvalidShapeError(f"{name} must have shape {wanted}; the shape is {rows.shape}.{hint}")
+    if len(rows) > 1 and rows.strides[0] == 0:
+        raise InvalidShapeError(
+            f"{name} must have a place in memory for each row; all {len(rows)} are one row, {rows[0].tolist()}, that "
+            "is broadcast. Copy the array if that is what you mean."
+        )
     return rows
 
 
@@ -77,9 +119,7 @@ def _first(name: str, rows: NDArray[Any], bad: NDArray[np.bool_]) -> str:
 
 def positive_values(value: ArrayLike, name: str) -> NDArray[np.float64]:
     """Return `value` as a one-dimensional float64 array, refusing anything not positive and finite."""
-    values = np.atleast_1d(_numbers(value, name))
-    if values.ndim != 1 or not values.size:
-        raise InvalidParameterError(f"{name} must be a list of numbers; the shape is {values.shape}.")
+    values = _list_of_numbers(value, name)
     bad = np.flatnonzero(~(np.isfinite(values) & (values > 0)))
     if bad.size:
         raise InvalidParameterError(f"{name} must be positive and finite; entry {bad[0]} is {values[bad[0]]}.")
@@ -88,20 +128,19 @@ def positive_values(value: ArrayLike, name: str) -> NDArray[np.float64]:
 
 def finite_values(value: ArrayLike, name: str) -> NDArray[np.float64]:
     """Return `value` as a one-dimensional float64 array, refusing anything not finite."""
-    values = np.atleast_1d(_numbers(value, name))
-    if values.ndim != 1 or not values.size:
-        raise InvalidParameterError(f"{name} must be a list of numbers; the shape is {values.shape}.")
+    values = _list_of_numbers(value, name)
     _require_finite(values, name)
     return values
 
 
 def vertex_values(value: ArrayLike, name: str, n_vertices: int) -> NDArray[np.float64]:
     """Return `value` as one finite float64 number a vertex."""
-    values = _numbers(value, name)
+    values = real_numbers(value, name)
     if values.shape != (n_vertices,):
         raise InvalidParameterError(
             f"{name} must hold one number a vertex, shape ({n_vertices},); the shape is {values.shape}."
         )
+    values = values.astype(np.float64)
     _require_finite(values, name)
     return values
 
@@ -112,14 +151,32 @@ def _require_finite(values: NDArray[np.float64], name: str) -> None:
         raise InvalidParameterError(f"{name} must be finite; entry {bad[0]} is {values[bad[0]]}.")
 
 
-def _numbers(value: ArrayLike, name: str) -> NDArray[np.float64]:
+def _list_of_numbers(value: ArrayLike, name: str) -> NDArray[np.float64]:
+    values = np.atleast_1d(real_numbers(value, name))
+    if values.ndim != 1 or not values.size:
+        raise InvalidParameterError(f"{name} must be a list of numbers; the shape is {values.shape}.")
+    return values.astype(np.float64)
+
+
+def real_numbers(value: ArrayLike, name: str) -> NDArray[Any]:
+    """Return `value` as an array of real numbers, of any shape and of its own type.
+
+    Raises
+    ------
+    InvalidParameterError
+        If it holds anything else, or rows differ in length.
+    """
     try:
-        numbers = np.asarray(value)
+        numbers = as_array(value, name)
+    except InvalidParameterError:
+        raise
     except ValueError as err:
         raise InvalidParameterError(f"{name} must be a list of numbers; its entries differ in length.") from err
     if numbers.dtype.kind not in "biuf":
-        raise InvalidParameterError(f"{name} must be real numbers; the type is {numbers.dtype}.")
-    return numbers.astype(np.float64)
+        is_array = isinstance(value, list | tuple | np.ndarray)
+        given = f"the type is {numbers.dtype}" if is_array else f"it is {named_value(value)}"
+        raise InvalidParameterError(f"{name} must be real numbers; {given}.")
+    return numbers
 
 
 def whole_number(value: SupportsIndex, name: str, low: int, high: int | None = None) -> int:
@@ -137,7 +194,7 @@ def whole_number(value: SupportsIndex, name: str, low: int, high: int | None = N
 
 def whole_numbers(value: ArrayLike, name: str, low: int, high: int) -> NDArray[np.int64]:
     """Return a list of ints within low..high, both included; `name` is that of one of them."""
-    numbers = np.atleast_1d(value).ravel()
+    numbers = np.atleast_1d(as_array(value, name)).ravel()
     typed = numbers.dtype.kind in "iu"
     for suspect in numbers[(numbers < low) | (numbers > high)] if typed else numbers:
         whole_number(suspect, name, low, high)

@@ -38,3 +38,8 @@ class StoreError(EigenshapeError, RuntimeError):
 
 class MissingExtraError(EigenshapeError, ImportError):
     """An optional package is needed and not installed."""
+
+
+def try_auto(shape: str = "mesh") -> str:
+    """Return the last sentence of a message whose fault the repair "auto" mends."""
+    return f'Try repair({shape}, ["auto"]), or --repair auto on the command line.'

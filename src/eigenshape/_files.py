@@ -21,14 +21,23 @@ def read_regular(path: Path, what: str = "a mesh") -> bytes:
     FileFormatError
         If the path is no regular file, or is empty.
     """
-    _require_regular(path)
+    require_regular(path)
     data = path.read_bytes()
     if not data:
         raise FileFormatError(f"{path} must hold {what}; it is empty.")
     return data
 
 
-def _require_regular(path: Path) -> None:
+def require_regular(path: Path) -> None:
+    """Refuse a path that is there and is no regular file.
+
+    Raises
+    ------
+    FileNotFoundError, PermissionError
+        As the system says.
+    FileFormatError
+        With what it is instead.
+    """
     mode = path.stat().st_mode
     if not stat.S_ISREG(mode):
         kinds = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
@@ -49,7 +58,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
     """
     replaced = path.exists()
     if replaced:
-        _require_regular(path)
+        require_regular(path)
     beside = path.with_name(f".{secrets.token_hex(8)}.tmp")
     try:
         with beside.open("xb") as file:

@@ -15,6 +15,7 @@ from eigenshape.deformation.rig import rig_shape
 from eigenshape.features.parts import find_parts
 from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.measure import surface_area
+from eigenshape.geometry.surfaces import subdivide
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -54,6 +55,36 @@ def test_a_head_nods(giraffe, tmp_path):
     np.testing.assert_array_equal(read_mesh(again).vertices, expected.vertices)
     more = json.loads(run("deform", giraffe, "--edits", edits, *words[:2], "--move", "0,0.1,0", "--json").stdout)
     assert more["edits"] == 2
+
+
+def test_edits_of_another_mesh_are_refused_or_carried(giraffe, tmp_path):
+    edits, finer, bent = tmp_path / "edits.json", tmp_path / "finer.ply", tmp_path / "bent.ply"
+    listed = tmp_path / "head.txt"
+    mesh = read_mesh(giraffe)
+    head = np.flatnonzero(mesh.vertices[:, 1] > np.quantile(mesh.vertices[:, 1], 0.9))
+    listed.write_text("\n".join(map(str, head)))
+    run("deform", giraffe, "--region", listed, "--move", "0,0.05,0", "--save-edits", edits)
+    write_mesh(subdivide(mesh), finer)
+    refused = " ".join(run("deform", finer, "--edits", edits, "-o", bent, code=1).stderr.split())
+    assert "edits.json: Edits name vertices of the mesh that they were made on; that has 900 vertices" in refused
+    assert "Here --carry PATH names it." in refused
+    assert not bent.exists()
+    run("deform", finer, "--edits", edits, "--carry", giraffe, "-o", bent)
+    moved = np.linalg.norm(read_mesh(bent).vertices - read_mesh(finer).vertices, axis=1)
+    assert moved[head].max() == pytest.approx(0.05, rel=1e-3), "the middle of the head; its rim follows the neck"
+    assert moved[mesh.vertices.shape[0] :].max() == pytest.approx(0.05, rel=1e-3)
+    assert np.median(moved) < 1e-3
+    alone = " ".join(
+        run("deform", finer, *("--carry", giraffe, "--region", "y>70%", "--move", "0,0.1,0"), code=1).stderr.split()
+    )
+    assert "--carry names the mesh that --edits were made on" in alone
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".glb", ".stl", ".off", ".ply"])
+def test_a_bent_mesh_goes_to_every_format(giraffe, tmp_path, suffix):
+    bent = tmp_path / f"bent{suffix}"
+    run("deform", giraffe, "--region", "y>70%", "--move", "0,0.02,0", "-o", bent)
+    assert read_mesh(bent).n_faces == read_mesh(giraffe).n_faces
 
 
 def test_people_see_a_table(giraffe):
@@ -97,6 +128,11 @@ def test_words_for_handles(giraffe):
     ("words", "message"),
     [
         (["--region", "head", "--move", "0,1,0"], "A region is one of these"),
+        (
+            ["--region", "head", "--move", "0,1,0", "-o", "a.txt"],
+            "A mesh goes to .off, .obj, .ply, .stl, .glb; a.txt ends in '.txt'",
+        ),
+        (["--region", "head", "--move", "0,1,0", "-o", "nowhere/a.obj"], "A mesh needs a folder to lie in"),
         (["--region", "y>500", "--move", "0,1,0"], "must have a boundary on the shape"),
         (["--region", "y>70%", "--move", "0,1"], "A move is three numbers with commas between"),
         (["--region", "y>70%", "--rotate", "x 90"], "A rotation is 'x by 90'"),

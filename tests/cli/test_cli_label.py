@@ -36,6 +36,7 @@ def command(poses, *more):
     return ("label", poses / "posed.ply", "--like", poses / "rest.ply", "--labels", poses / "rest.seg", *more)
 
 
+@pytest.mark.long
 def test_label_gives_what_transfer_labels_gives(poses, tmp_path):
     saved, colored, picture = tmp_path / "posed.seg", tmp_path / "posed.ply", tmp_path / "both.png"
     done = run(*command(poses, "--json", "--save", saved, "-o", colored, "--picture", picture))

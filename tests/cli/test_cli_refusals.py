@@ -80,6 +80,7 @@ def test_pictures_of_every_kind_are_more_than_a_frame(fish, tmp_path, suffix, ma
     assert len(json.loads(done.stdout)["eigenvalues"]) == 5  # stdout stays JSON alone
 
 
+@pytest.mark.long
 def test_index_names_the_broken_file_takes_the_rest_and_knows_it_again(fish, tmp_path):
     folder = tmp_path / "shapes"
     folder.mkdir()

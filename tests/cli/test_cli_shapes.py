@@ -138,7 +138,7 @@ def test_operators_are_listed():
         (("spectrum", "sphere.xyz", "--boundary", "dirichlet"), "--boundary dirichlet is for meshes; a cloud"),
         (("spectrum", "sphere.xyz", "--brackets"), "--brackets is for meshes; a cloud of points has no flat pieces"),
         (("spectrum", "sphere.xyz", "--picture", "a.png"), "--picture draws triangle meshes; the shape is PointCloud"),
-        (("info", "sphere.xyz", "--repair", "weld"), "--repair is for triangle meshes"),
+        (("info", "sphere.xyz", "--repair", "weld"), "must be among auto, drop_copies; name 0 is 'weld'"),
         (("features", "sphere.xyz"), "must be of a known format, .off, .obj"),
         (("info", "sphere.xyz", "--dim", "4"), "dim must lie in 1..3; it is 4"),
     ],

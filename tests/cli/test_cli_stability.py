@@ -30,6 +30,7 @@ def folder(tmp_path_factory):
     return place
 
 
+@pytest.mark.long
 def test_people_see_tables_words_and_a_picture(folder, tmp_path):
     picture = tmp_path / "report.png"
     printed = run("stability", folder / "one.ply", folder / "two.ply", *FEW, "--picture", picture).stdout

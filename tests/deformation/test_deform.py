@@ -8,8 +8,10 @@ from eigenshape.deformation.deform import bend, deform, require_mode
 from eigenshape.deformation.details import blended, framed, turned_by_frames, turned_by_handles
 from eigenshape.deformation.graded import shared_motion
 from eigenshape.deformation.handles import Rotation, Translation
+from eigenshape.deformation.region import region_boundary
 from eigenshape.deformation.rig import eigen_skeleton, rig_shape
 from eigenshape.deformation.skeleton import grip_skeleton, moved_skeleton
+from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.crossings import self_intersections
 from eigenshape.geometry.domains import box
 from eigenshape.geometry.measure import face_areas
@@ -253,6 +255,35 @@ def test_faces_that_would_cross_are_kept_apart(bar):
     apart = deform(bar, upper, half_turn, mode="uncrossed")
     assert not len(self_intersections(apart))
     assert (face_areas(apart) / face_areas(bar.mesh)).min() > 0.5
+
+
+@pytest.fixture(scope="module")
+def halves():
+    """Return a biped and its rig, and its left half as a region."""
+    mesh = make_creature("biped", 0, n_vertices=2500)
+    middle = float(mesh.vertices[:, 0].min() + mesh.vertices[:, 0].max()) / 2
+    left = mesh.vertices[:, 0] <= middle
+    return rig_shape(mesh), left, mesh.vertices[region_boundary(mesh, left)].mean(axis=0)
+
+
+def test_folds_of_single_edges_take_a_strong_pull(halves):
+    """At a thousand six pairs cross; where shares take the vertices none does, and so much is never needed."""
+    rig, left, pivot = halves
+    turn = Rotation(pivot, [1, 0, 0], np.deg2rad(100))
+    assert len(self_intersections(deform(rig, left, turn))) > len(self_intersections(rig.mesh))
+    apart = deform(rig, left, turn, mode="uncrossed")
+    assert not len(self_intersections(apart))
+
+
+def test_what_no_pull_keeps_apart_is_said(halves):
+    """A half that is turned into the other half: both are held."""
+    rig, left, pivot = halves
+    binding, turn = bind(rig, [left]), Rotation(pivot, [0, 1, 0], np.deg2rad(100))
+    with pytest.warns(
+        UserWarning, match=r"No pull keeps all faces apart; \d+ pairs cross that did not before, faces"
+    ) as told:
+        bent = bend(binding, [turn], mode="uncrossed")
+    assert f" {len(self_intersections(bent))} pairs cross" in str(told[0].message)
 
 
 def test_where_no_faces_cross_nothing_is_stiffer():

@@ -1,13 +1,23 @@
 import json
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 from bent_shapes import lump, lump_rig, tube
 
 from eigenshape._errors import FileFormatError, InvalidParameterError
-from eigenshape.deformation.edits import Edit, Move, apply_edit, carry_edit, edits_from_json, edits_to_json
+from eigenshape.deformation.edits import (
+    Edit,
+    Move,
+    apply_edit,
+    carry_edit,
+    edits_from_json,
+    edits_to_json,
+    mesh_fingerprint,
+)
 from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.region import Box, Brush, region_mask
+from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.surfaces import subdivide
 
 HEAD, TAIL = (lump().vertices[:, 0] > 0.6, lump().vertices[:, 0] < -0.7)
@@ -16,9 +26,7 @@ PULL = Translation([0.1, 1 / 3, -2e-17])
 
 def there_and_back(edits, mesh=None):
     text = json.dumps(edits_to_json(edits, mesh or lump()), allow_nan=False)
-    n_vertices, back = edits_from_json(json.loads(text))
-    assert n_vertices == (mesh or lump()).n_vertices
-    return back
+    return edits_from_json(json.loads(text), mesh or lump())
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -89,8 +97,17 @@ GOOD = {
 }
 
 
+FIVE = TriangleMesh(np.arange(15.0).reshape(5, 3) ** 2, [[0, 1, 2], [2, 3, 4]])
+
+
 def content(*edits, **changes):
-    return {"kind": "eigenshape edits", "version": 1, "n_vertices": 5, "edits": list(edits), **changes}
+    return {
+        "kind": "eigenshape edits",
+        "version": 2,
+        "mesh": asdict(mesh_fingerprint(FIVE)),
+        "edits": list(edits),
+        **changes,
+    }
 
 
 def moving(region=None, handle=None):
@@ -99,8 +116,7 @@ def moving(region=None, handle=None):
 
 
 def test_what_the_broken_ones_are_made_of_can_be_read():
-    n_vertices, edits = edits_from_json(content(GOOD, moving()))
-    assert (n_vertices, len(edits)) == (5, 2)
+    assert len(edits_from_json(content(GOOD, moving()), FIVE)) == 2
 
 
 @pytest.mark.parametrize(
@@ -167,7 +183,7 @@ def test_what_the_broken_ones_are_made_of_can_be_read():
 )
 def test_what_is_no_edit_is_refused_by_its_number(broken, message):
     with pytest.raises(FileFormatError, match=message):
-        edits_from_json(content(GOOD, broken, GOOD))
+        edits_from_json(content(GOOD, broken, GOOD), FIVE)
 
 
 @pytest.mark.parametrize(
@@ -175,12 +191,20 @@ def test_what_is_no_edit_is_refused_by_its_number(broken, message):
     [
         ([], "Edits are kept as a JSON object of kind 'eigenshape edits'; this is none"),
         ({"kind": "mesh"}, "Edits are kept as a JSON object of kind"),
-        (content(GOOD, version=2), "Edits of version 1 are read; this is version 2"),
-        (content(GOOD, n_vertices="5"), "Edit 0 cannot be read: n_vertices must be a whole number; it is '5'"),
+        (content(GOOD, version=1), "Edits of version 2 are read; this is version 1"),
+        (
+            content(GOOD, mesh={"n_vertices": "5", "n_faces": 2, "digest": ""}),
+            "Edit 0 cannot be read: n_vertices must be a whole number; it is '5'",
+        ),
+        (content(GOOD, mesh={"n_vertices": 5}), "Edit 0 cannot be read: 'n_faces' is missing"),
+        (content(GOOD, mesh=None), "Edit 0 cannot be read"),
         (content(GOOD, edits={}), "Edit 0 cannot be read: edits must be a list; it is {}"),
-        ({"kind": "eigenshape edits", "version": 1, "n_vertices": 5}, "Edit 0 cannot be read: 'edits' is missing"),
+        (
+            {"kind": "eigenshape edits", "version": 2, "mesh": content()["mesh"]},
+            "Edit 0 cannot be read: 'edits' is missing",
+        ),
     ],
 )
 def test_what_is_no_list_of_edits_is_refused(whole, message):
     with pytest.raises(FileFormatError, match=message):
-        edits_from_json(whole)
+        edits_from_json(whole, FIVE)

@@ -174,6 +174,7 @@ def test_more_rounds_are_more_rigid():
     assert energies[-1] < 0.6 * energies[0]
 
 
+@pytest.mark.long
 def test_many_rounds_end_where_plain_alternation_does(monkeypatch):
     """Written out: the best rotations by singular values, then all free vertices by a dense solve, again and again."""
     binding, handle = bent_tube()

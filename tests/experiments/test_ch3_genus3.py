@@ -1,4 +1,4 @@
-"""Meshes of one genus 3 surface: what the folder says is what comes out, and what its text claims."""
+"""Meshes of one genus 3 surface: what the README shows and claims."""
 
 import json
 import runpy
@@ -6,44 +6,39 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from quick_forms import run_quickly
 
 import eigenshape as es
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch3_genus3"
-EXPECTED = json.loads((FOLDER / "expected.json").read_text())
-ERRORS, MESHES = EXPECTED["full"]["errors"], EXPECTED["full"]["meshes"]
+FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
 README = (FOLDER / "README.md").read_text()
 OTHER = runpy.run_path(str(FOLDER / "meshes.py"))
 
 
 def test_the_readme_shows_the_expected_figures():
-    for name, row in ERRORS.items():
+    for name, row in FULL["errors"].items():
         cells = (f"{median:.4f} / {worst:.4f}" for median, worst in row.values())
         assert f"| {name} | " + " | ".join(cells) + " |" in README
-    for name, row in MESHES.items():
+    for name, row in FULL["meshes"].items():
         numbers = f"{row['n']} | {row['edge / e']:.3f} | {row['area']:.3f} | {row['volume']:.3f}"
         assert f"| {name} | {numbers} | {row['longest / shortest edge']:.1f} | {row['crossings']} |" in README
 
 
-def test_every_mesh_is_one_of_the_surface():
-    for name, row in MESHES.items():
+@pytest.mark.long
+@pytest.mark.data
+def test_density_does_no_harm_and_only_the_random_walk_form_bears_much_noise(quick_form):
+    found = quick_form("ch3_genus3/run.py")
+    for name, row in found["meshes"].items():
         assert row["closed manifold of genus 3"], name
-        assert row["volume"] == pytest.approx(1, abs=0.01), name
-
-
-def test_density_does_no_harm():
+        assert row["volume"] == pytest.approx(1, abs=0.03), name
     for name in ("coarser", "non-uniform"):
-        for form, (median, worst) in ERRORS[name].items():
-            assert median < 0.008, (name, form)
-            assert worst < 0.04, (name, form)
-
-
-def test_only_the_random_walk_form_bears_much_noise():
-    strong = {form: median for form, (median, _) in ERRORS["noise, .5 edge"].items()}
-    assert strong.pop("mesh, random-walk") < 0.02
-    assert min(strong.values()) > 0.3
-    assert max(median for median, _ in ERRORS["noise, .1 edge"].values()) < 0.03
+        for form, (median, worst) in found["errors"][name].items():
+            assert median < 0.02, (name, form)
+            assert worst < 0.06, (name, form)
+    strong = {form: median for form, (median, _) in found["errors"]["noise, .5 edge"].items()}
+    assert strong.pop("mesh, random-walk") < 0.05
+    assert min(strong.values()) > 0.2
+    assert max(median for median, _ in found["errors"]["noise, .1 edge"].values()) < 0.03
 
 
 def test_faces_are_cut_without_a_gap_and_nothing_moves():
@@ -67,12 +62,10 @@ def test_a_collapsed_torus_is_still_a_torus():
     assert len(es.self_intersections(coarse)) == 0
 
 
-@pytest.mark.slow
-@pytest.mark.data
-def test_the_quick_form_gives_the_expected_figures(tmp_path):
-    found, expected = run_quickly(FOLDER, tmp_path), EXPECTED["quick"]
-    for name, row in expected["meshes"].items():
-        assert found["meshes"][name] == pytest.approx(row, rel=1e-3), name
-    for name, row in expected["errors"].items():
-        for form, values in row.items():
-            assert found["errors"][name][form] == pytest.approx(values, rel=1e-2), (name, form)
+def test_last_digits_do_not_choose_the_edges_that_collapse():
+    torus = es.torus(60, 30)  # full of edges of one length
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], torus.vertices.shape)
+    nudged = es.TriangleMesh(np.nextafter(torus.vertices, np.inf * signs), torus.faces)
+    one, other = OTHER["coarser"](torus, 900), OTHER["coarser"](nudged, 900)
+    np.testing.assert_array_equal(other.faces, one.faces)
+    np.testing.assert_allclose(other.vertices, one.vertices, rtol=0, atol=1e-14)

@@ -3,7 +3,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from eigenshape.figures import fields, poses, sheet, stability
 from eigenshape.figures.camera import in_picture, three_quarter_view
+from eigenshape.figures.fields import figure_field, figure_segments
+from eigenshape.figures.poses import figure_poses
+from eigenshape.figures.render import draw
+from eigenshape.figures.sheet import Panel, figure_contact_sheet
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.surfaces import disjoint_union, icosphere, torus
 from eigenshape.io.mesh_files import read_mesh
@@ -24,7 +29,7 @@ def leaning_tower(up):
 def test_a_shape_that_stands_along_one_axis_is_shown_standing():
     for up in ("y", "z"):
         tower = leaning_tower(up)
-        automatic, told = three_quarter_view(tower, up="auto"), three_quarter_view(tower, up=up)
+        automatic, told = three_quarter_view(tower), three_quarter_view(tower, up=up)
         assert np.array_equal(automatic.rotation, told.rotation)
         head_row = in_picture(tower, automatic)[-1, 1]
         plate_row = in_picture(tower, automatic)[-3 * BALL.n_vertices, 1]
@@ -33,20 +38,38 @@ def test_a_shape_that_stands_along_one_axis_is_shown_standing():
 
 def test_y_is_up_where_both_would_stand_or_neither():
     for mesh in (BALL, torus(), leaning_tower("x")):
-        assert np.array_equal(three_quarter_view(mesh, up="auto").rotation, three_quarter_view(mesh).rotation)
+        assert np.array_equal(three_quarter_view(mesh).rotation, three_quarter_view(mesh, up="y").rotation)
 
 
 def test_the_guess_does_not_depend_on_the_unit():
     tower = leaning_tower("z")
-    usual = three_quarter_view(tower, up="auto").rotation
+    usual = three_quarter_view(tower).rotation
     for power in (-330, 330):
         scaled = TriangleMesh(tower.vertices * 2.0**power, tower.faces)
-        assert np.array_equal(three_quarter_view(scaled, up="auto").rotation, usual)
+        assert np.array_equal(three_quarter_view(scaled).rotation, usual)
+
+
+def test_a_shape_is_shown_from_the_side_that_bends_more():
+    """A ball with a dented face on its far side is turned round, however its faces are numbered and scaled."""
+    ball = icosphere(4)
+    x, y, z = ball.vertices.T
+    for side in (1, -1):
+        relief = 0.05 * np.sin(20 * x) * np.sin(20 * y) * np.clip(side * z, 0, 1)
+        points = ball.vertices * (1 + relief)[:, None]
+        for mesh in (
+            TriangleMesh(points, ball.faces),
+            TriangleMesh(points * 2.0**-300, ball.faces),
+            TriangleMesh(points, ball.faces[:, ::-1]),
+        ):
+            right, down, towards = three_quarter_view(mesh).rotation
+            assert side * towards[2] > 0.5
+            assert towards[1] > 0.3
+            assert np.cross(right, towards) == pytest.approx(down, abs=1e-12)
 
 
 def test_a_shape_without_area_has_a_view():
     needle = TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
-    camera = three_quarter_view(needle, up="auto", size=50)
+    camera = three_quarter_view(needle, size=50)
     assert np.isfinite(in_picture(needle, camera)).all()
 
 
@@ -67,8 +90,36 @@ def test_cameras_are_rotations_with_up_upward_and_shapes_fill_the_picture(up, se
 
 
 @pytest.mark.data
+def test_a_real_head_shows_its_face(data):
+    assert three_quarter_view(read_mesh(data / "classics" / "decimated-max.obj")).rotation[2, 2] < -0.5
+
+
+@pytest.mark.data
+@pytest.mark.parametrize(
+    ("name", "down"), [("horse.ply", [0, 0, -1]), ("bunny.off", [0, -1, 0]), ("camel.off", [0, -1, 0])]
+)
+def test_every_picture_of_a_classic_shape_shows_it_upright(data, name, down, monkeypatch):
+    """Whichever figure draws it, and without being told which axis is up."""
+    mesh = read_mesh(data / "classics" / name)
+    views = []
+    for module in (fields, poses, sheet, stability):
+        monkeypatch.setattr(
+            module, "draw", lambda shape, camera, **_: views.append(camera.rotation) or draw(BALL, camera)
+        )
+    figure_segments(mesh, np.zeros(mesh.n_faces, dtype=int), np.array([0]))
+    figure_field(mesh, mesh.vertices[:, 0], "x")
+    figure_poses({"one": mesh})
+    panel = Panel(mesh, "a", np.zeros(mesh.n_faces, dtype=int), np.array([0]))
+    figure_contact_sheet(panel, [panel])
+    assert len(views) == 5
+    for rotation in views:
+        assert np.array_equal(rotation, views[0])
+        assert rotation[1] @ down > 0.8
+
+
+@pytest.mark.data
 @pytest.mark.parametrize(("name", "up"), [("tosca_cat0", "z"), ("tosca_dog0", "z"), ("sumner_horse-10", "y")])
 def test_real_animals_are_shown_on_their_feet(data, name, up):
     (path,) = (data / "retrieval").rglob(f"{name}.*")
     mesh = read_mesh(path)
-    assert np.array_equal(three_quarter_view(mesh, up="auto").rotation, three_quarter_view(mesh, up=up).rotation)
+    assert np.array_equal(three_quarter_view(mesh).rotation, three_quarter_view(mesh, up=up).rotation)

@@ -1,8 +1,15 @@
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
-from eigenshape._arrays import positive_values, vertex_values, whole_number
-from eigenshape._errors import InvalidParameterError
+from eigenshape import _arrays
+from eigenshape._arrays import finite_values, positive_values, vertex_values, whole_number, whole_numbers
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplicial import SimplicialMesh
 
 
 def test_whole_numbers_of_any_type_become_ints():
@@ -51,3 +58,91 @@ def test_what_is_no_number_is_refused(value, fact):
         positive_values(value, "times")
     with pytest.raises(InvalidParameterError, match=f"field {fact}"):
         vertex_values(value, "field", 1)
+
+
+POINTS = np.vstack([np.eye(3), np.zeros(3)])
+FACES = np.array([[0, 1, 2], [0, 2, 3]])
+MASKED_POINTS = np.ma.masked_array(POINTS, mask=np.zeros_like(POINTS))
+MASKED_POINTS[2, 1] = np.ma.masked
+MASKED_FACES = np.ma.masked_array(FACES, mask=FACES == 3)
+
+
+@pytest.mark.parametrize(
+    ("make", "fact"),
+    [
+        (lambda: TriangleMesh(MASKED_POINTS, FACES), r"vertices must not be masked; entry \(2, 1\) is \(1 such\)"),
+        (lambda: TriangleMesh(list(MASKED_POINTS), FACES), r"vertices must not be masked; entry \(2, 1\) is"),
+        (lambda: TriangleMesh(POINTS, MASKED_FACES), r"faces must not be masked; entry \(1, 2\) is"),
+        (lambda: SimplicialMesh(MASKED_POINTS, FACES), r"points must not be masked; entry \(2, 1\) is"),
+        (lambda: SimplicialMesh(POINTS, MASKED_FACES), r"simplices must not be masked; entry \(1, 2\) is"),
+        (lambda: PointCloud(MASKED_POINTS), r"points must not be masked; entry \(2, 1\) is"),
+    ],
+)
+def test_masked_entries_of_shapes_are_refused(make, fact):
+    with pytest.raises(InvalidShapeError, match=fact):
+        make()
+
+
+@pytest.mark.parametrize(
+    "door",
+    [
+        lambda values: positive_values(values, "times"),
+        lambda values: finite_values(values, "times"),
+        lambda values: vertex_values(values, "times", 4),
+        lambda values: whole_numbers(values, "times", 0, 9),
+    ],
+)
+def test_masked_entries_of_values_are_refused(door):
+    values = np.ma.masked_array([1, 2, 3, 4], mask=[0, 0, 1, 1])
+    with pytest.raises(InvalidParameterError, match=r"times must not be masked; entry 2 is \(2 such\)"):
+        door(values)
+    values.mask = False
+    np.testing.assert_array_equal(door(values), [1, 2, 3, 4])
+
+
+def test_a_masked_array_without_a_masked_entry_is_an_array():
+    mesh = TriangleMesh(np.ma.masked_array(POINTS), np.ma.masked_array(FACES))
+    assert type(mesh.vertices) is type(mesh.faces) is np.ndarray
+    np.testing.assert_array_equal(mesh.vertices, POINTS)
+
+
+BOMBS = {
+    "vertices": "TriangleMesh(np.broadcast_to([0.0, 1, 2], (2**28, 3)), [[0, 1, 2]])",
+    "faces": "TriangleMesh(np.eye(3), np.broadcast_to([0, 1, 2], (2**28, 3)))",
+    "points": "PointCloud(np.broadcast_to(0.0, (2**28, 3)))",
+    "values": "merge_tree(icosphere(0), np.broadcast_to(0.0, 2**40))",
+}
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_an_array_that_memory_cannot_hold_is_refused_before_it_is_copied(name):
+    script = f"""
+import resource, sys
+import numpy as np
+from eigenshape import *
+resource.setrlimit(resource.RLIMIT_DATA, (2**30,) * 2)
+try:
+    {BOMBS[name]}
+except EigenshapeError as error:
+    print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith(f"{name} must ")
+
+
+def test_an_array_is_measured_against_the_memory(monkeypatch):
+    monkeypatch.setattr(_arrays, "machine_memory", lambda: 2.0**10)
+    fact = r"points must fit into half of the memory, 0\.0 GiB; to check and to copy an array of shape \(20, 2\) takes"
+    with pytest.raises(InvalidShapeError, match=fact):
+        PointCloud(np.arange(40.0).reshape(20, 2))
+
+
+def test_one_row_that_is_broadcast_is_no_shape():
+    row = np.broadcast_to([0.0, 1.0, 2.0], (5, 3))
+    fact = (
+        r"points must have a place in memory for each row; all 5 are one row, \[0\.0, 1\.0, 2\.0\], that is broadcast"
+    )
+    with pytest.raises(InvalidShapeError, match=fact):
+        PointCloud(row)
+    assert PointCloud(np.array(row)).n_points == 5
+    assert PointCloud(row[:1]).n_points == 1

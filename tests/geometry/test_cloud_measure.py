@@ -70,7 +70,9 @@ def test_neighbours_that_do_not_span_are_named():
 def test_equal_points_are_named():
     points = np.random.default_rng(0).random((50, 3))
     points[40] = points[7]
-    with pytest.raises(InvalidShapeError, match=r"Points must differ; points 7 and 40 are both .* \(2 such\)\. Drop"):
+    with pytest.raises(
+        InvalidShapeError, match=r"Points must differ; points 7 and 40 are both .* \(2 such\)\. Try repair\(cloud,"
+    ):
         cloud_quadrature(PointCloud(points))
 
 
@@ -81,8 +83,9 @@ def test_too_few_points_and_neighbours_are_refused():
         cloud_quadrature(PointCloud(np.random.default_rng(0).random((50, 3))), n_neighbors=2)
 
 
-@pytest.mark.parametrize("n", [12, 24])
-@pytest.mark.parametrize("dim", [1, 2, 3])
+@pytest.mark.parametrize(
+    ("dim", "n"), [(1, 12), (1, 24), (2, 12), (2, 24), (3, 12), pytest.param(3, 24, marks=pytest.mark.long)]
+)
 def test_regular_lattices_have_the_measure_of_their_torus(n, dim):
     turns = np.stack(np.meshgrid(*[2 * np.pi * np.arange(n) / n] * dim), axis=-1).reshape(-1, dim)
     cloud = PointCloud(np.column_stack([np.cos(turns), np.sin(turns)]), dim)

@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
+from each_creature import KINDS
 from threadpoolctl import threadpool_limits
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry import creatures
-from eigenshape.geometry.creatures import CREATURES, make_creature
+from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.measure import edge_lengths, enclosed_volume
 from eigenshape.geometry.simplices import degenerate_simplices
 from eigenshape.geometry.topology import (
@@ -18,7 +19,7 @@ from eigenshape.geometry.topology import (
 
 N = 800
 POSES = (0, 1, 2, 3, 4)
-each_kind = pytest.mark.parametrize("kind", CREATURES)
+each_kind = pytest.mark.parametrize("kind", KINDS)
 
 
 def least_angles(mesh):

@@ -5,10 +5,11 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from each_creature import KINDS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eigenshape.geometry.creatures import CREATURES, make_creature
+from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.crossings import self_intersections
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
@@ -250,7 +251,7 @@ def test_clean_shapes_have_none_nor_have_their_loose_faces(shape):
     assert self_intersections(loose).shape == (0, 2)
 
 
-@pytest.mark.parametrize("kind", CREATURES)
+@pytest.mark.parametrize("kind", KINDS)
 def test_creatures_at_rest_have_none(kind):
     assert not self_intersections(make_creature(kind, n_vertices=1000)).size
 

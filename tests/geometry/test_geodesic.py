@@ -152,3 +152,14 @@ def test_sources_must_be_vertices_of_a_surface():
         geodesic_distance_to_set(icosphere(1), [3, 42])
     with pytest.raises(InvalidShapeError, match="are measured on surfaces; this mesh has dimension 1"):
         geodesic_distance_to_set(SimplicialMesh([[0.0], [1.0]], [[0, 1]]), [0])
+
+
+def test_edges_without_length_change_no_distance():
+    flat = grid(9, 9)
+    vertices, faces = flat.vertices.copy(), flat.faces
+    ends = faces[40, :2]
+    vertices[ends[0]] = vertices[ends[1]]
+    found = geodesic_distances(TriangleMesh(vertices, faces), [0])[0]
+    straight = np.linalg.norm(vertices - vertices[0], axis=1)
+    assert found[ends[0]] == pytest.approx(found[ends[1]], rel=1e-12)
+    np.testing.assert_allclose(found, straight, rtol=0.05)

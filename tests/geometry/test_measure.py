@@ -104,7 +104,7 @@ def test_a_face_without_area_is_refused(scale):
     assert degenerate_simplices(mesh).tolist() == [1, 2]
     with pytest.raises(
         InvalidShapeError,
-        match=r"Faces must have area; face 1 is \[0, 1, 3\] with corners .* \(2 such\)\. Repair with drop_degenerate",
+        match=r"Faces must have area; face 1 is \[0, 1, 3\] with corners .* \(2 such\)\. Try repair\(mesh,",
     ):
         require_volumes(mesh)
 

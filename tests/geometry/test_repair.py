@@ -1,7 +1,10 @@
 import numpy as np
 import pytest
+from broken_meshes import moebius, soup, tetrahedra, with_slivers
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import (
     REPAIRS,
@@ -9,16 +12,22 @@ from eigenshape.geometry.repair import (
     drop_duplicate_faces,
     drop_unreferenced,
     largest_component,
+    orient,
     repair,
+    suggest_repairs,
     weld,
+    weld_seams,
 )
+from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere
-from eigenshape.geometry.topology import euler_characteristic, is_closed, is_manifold
-
-
-def soup(mesh):
-    """Three vertices of its own for each face."""
-    return TriangleMesh(mesh.vertices[mesh.faces].reshape(-1, 3), np.arange(3 * mesh.n_faces).reshape(-1, 3))
+from eigenshape.geometry.topology import (
+    boundary_edges,
+    euler_characteristic,
+    inconsistent_edges,
+    is_closed,
+    is_manifold,
+)
+from eigenshape.retrieval.shape_dna import shape_dna
 
 
 def test_a_welded_soup_is_whole_again():
@@ -134,7 +143,7 @@ def test_no_repair_changes_nothing():
 
 
 def test_an_unknown_repair_is_refused_before_any_is_done():
-    with pytest.raises(InvalidParameterError, match=r"repairs must be among weld, .*; name 1 is 'polish'"):
+    with pytest.raises(InvalidParameterError, match=r"must be among auto, weld, .*; name 1 is 'polish'"):
         repair(icosphere(0), ["weld", "polish"])
 
 
@@ -161,3 +170,111 @@ def test_a_loose_vertex_is_no_component_of_a_mesh_without_area():
 def test_a_tolerance_that_reaches_nobody_joins_only_what_is_equal():
     points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0]]
     assert weld(TriangleMesh(points, [[0, 1, 2], [0, 3, 2]]), tolerance=1e-9).source_vertices.tolist() == [0, 1, 2]
+
+
+def test_seams_are_welded_and_touching_pieces_stay_apart():
+    cut = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0]], [[0, 1, 2], [3, 4, 5]])
+    done = weld_seams(cut)
+    assert done.mesh.faces.tolist() == [[0, 1, 2], [2, 1, 3]]
+    assert done.source_vertices.tolist() == [0, 1, 2, 5]
+    assert done.report == ("weld_seams joined 2 vertices along seams",)
+    bow = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0], [-1, 0, 0], [0, -1, 0]], [[0, 1, 2], [3, 4, 5]])
+    assert weld_seams(bow).mesh.n_vertices == 6
+    ball = icosphere(1)
+    touching = disjoint_union(ball, TriangleMesh(ball.vertices + 2 * ball.vertices[0], ball.faces))
+    assert weld(touching).mesh.n_vertices < touching.n_vertices
+    assert weld_seams(touching).mesh.n_vertices == touching.n_vertices
+
+
+def test_three_sheets_on_one_edge_are_welded_there():
+    points = [[0, 0, 0], [0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0]]
+    book = TriangleMesh(points, [[0, 1, 2], [0, 1, 3], [0, 1, 4]])
+    assert weld_seams(soup(book)).mesh.n_vertices == 5
+
+
+def test_tetrahedra_are_repaired_too():
+    mesh = tetrahedra()
+    points = np.concatenate([soup(mesh).points, [[9.0, 9, 9]]])
+    ugly = SimplicialMesh(points, [*soup(mesh).simplices, [0, 1, 2, 2], [3, 2, 1, 0]])
+    done = repair(ugly, ["auto"])
+    assert (done.mesh.n_points, done.mesh.n_simplices) == (5, 2)
+    assert done.report == (
+        "drop_duplicate_faces removed 1 tetrahedra that repeat an earlier one",
+        "weld_seams joined 3 vertices along seams",
+        "drop_degenerate removed 1 tetrahedra without volume",
+        "drop_unreferenced removed 1 vertices without a simplex",
+    )
+    np.testing.assert_array_equal(done.mesh.points, ugly.points[done.source_vertices])
+    with pytest.raises(InvalidParameterError, match=r"must be among auto, weld, .*; name 0 is 'orient'"):
+        repair(mesh, ["orient"])
+
+
+def test_copies_of_points_go():
+    cloud = PointCloud([[0, 0, 0], [1, 0, 0], [0, -0.0, 0], [1, 0, 0], [2, 0, 0]], 1)
+    assert suggest_repairs(cloud) == ("drop_copies",)
+    done = repair(cloud, ["auto"])
+    assert done.cloud.points.tolist() == [[0, 0, 0], [1, 0, 0], [2, 0, 0]]
+    assert (done.cloud.dim, done.source_points.tolist()) == (1, [0, 1, 4])
+    assert done.report == ("drop_copies removed 2 points at the places of others",)
+    assert suggest_repairs(done.cloud) == ()
+    assert repair(cloud, []).cloud is cloud
+    with pytest.raises(InvalidParameterError, match="must be among auto, drop_copies; name 1 is 'weld'"):
+        repair(cloud, ["auto", "weld"])
+
+
+def test_a_strip_with_one_side_is_named_and_left():
+    strip = moebius()
+    both = disjoint_union(icosphere(0), strip)
+    done = orient(both)
+    assert done.report == ("orient turned 0 faces over, left 1 piece with one side only, of face 20",)
+    np.testing.assert_array_equal(done.mesh.faces, both.faces)
+    many = orient(disjoint_union(*[moebius(6, 1)] * 11))
+    assert "left 11 pieces with one side only, of face 0, 12, 24, 36, 48, 60, 72, 84, 96 and others" in many.report[0]
+    assert suggest_repairs(both) == ()
+
+
+def test_what_is_left_of_nothing():
+    flat = TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
+    assert suggest_repairs(flat) == ()
+    with pytest.raises(InvalidShapeError, match="it has 3 vertices and no face"):
+        repair(flat, ["auto"])
+
+
+def test_specks_and_holes_are_suggested_up_to_a_share_of_the_area():
+    ball = icosphere(3)
+    for radius, count, few in ((0.09, 1, True), (0.12, 1, False), (0.09, 20, True), (0.09, 40, False)):
+        specks = [TriangleMesh(radius * ball.vertices + 5 * i, ball.faces) for i in range(1, count + 1)]
+        assert suggest_repairs(disjoint_union(ball, *specks)) == (("largest_component",) if few else ())
+    for height, few in ((0.95, True), (0.7, False)):
+        open_ball = TriangleMesh(ball.vertices, ball.faces[ball.vertices[ball.faces, 2].max(axis=1) < height])
+        assert ("seal_holes" in suggest_repairs(open_ball)) == few
+    assert suggest_repairs(grid(4, 4)) == ()
+
+
+def test_a_face_without_area_leaves_no_slit():
+    # The middle vertex 3 lies on the edge (0, 1); the face below is split there.
+    points = [[0, 0, 0], [2, 0, 0], [1, 1, 0], [1, 0, 0], [1, -1, 0]]
+    mesh = TriangleMesh(points, [[0, 3, 2], [3, 1, 2], [0, 1, 3], [1, 0, 4]])
+    done = drop_degenerate(mesh)
+    assert sorted(map(sorted, done.mesh.faces.tolist())) == [[0, 2, 3], [0, 3, 4], [1, 2, 3], [1, 3, 4]]
+    assert inconsistent_edges(done.mesh).size == 0
+    assert len(boundary_edges(done.mesh)) == 4
+    report = "drop_degenerate removed 1 faces without area, and split 1 neighbor at their vertices"
+    assert done.report == (report,)
+
+
+def test_a_flip_that_would_make_a_third_face_is_not_done():
+    points = [[0, 0, 0], [2, 0, 0], [1, 1, 0], [1, 0, 0], [1, -1, 0], [1, 0, 1]]
+    faces = [[0, 3, 2], [3, 1, 2], [0, 1, 3], [1, 0, 4], [3, 4, 5]]
+    done = drop_degenerate(TriangleMesh(points, faces))
+    assert done.mesh.faces.tolist() == [[0, 3, 2], [3, 1, 2], [1, 0, 4], [3, 4, 5]]
+    assert done.report == ("drop_degenerate removed 1 faces without area",)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_heat_flows_where_faces_without_area_were(seed):
+    whole = make_creature("quadruped", n_vertices=1500)
+    mended = repair(with_slivers(whole, np.random.default_rng(seed), 20), ["auto"]).mesh
+    assert is_closed(mended)
+    assert is_manifold(mended)
+    np.testing.assert_allclose(shape_dna(mended), shape_dna(whole), rtol=2e-3)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from tetrahedra import FILES
 
 from eigenshape import EigenshapeError, TriangleMesh
-from eigenshape.io.mesh_files import FORMATS
+from eigenshape.io.parsing import PARSERS
 
 
 def read_or_refuse(parse, data):
@@ -65,10 +65,10 @@ def test_any_piece_cut_out_doubled_or_put_in(name, data):
     read_or_refuse(parse, good[:start] + piece + good[stop:])
 
 
-@pytest.mark.parametrize("suffix", FORMATS)
+@pytest.mark.parametrize("suffix", PARSERS)
 @settings(max_examples=80, deadline=None)
 @given(noise=st.binary(max_size=200))
 def test_noise(suffix, noise):
     heads = {".off": b"OFF ", ".obj": b"v ", ".ply": b"ply\n", ".stl": b"solid ", ".glb": b"glTF"}
-    read_or_refuse(FORMATS[suffix], noise)
-    read_or_refuse(FORMATS[suffix], heads[suffix] + noise)
+    read_or_refuse(PARSERS[suffix], noise)
+    read_or_refuse(PARSERS[suffix], heads[suffix] + noise)

@@ -18,7 +18,7 @@ from tetrahedra import FILES
 
 from eigenshape import EigenshapeError, FileFormatError, TriangleMesh, read_mesh
 from eigenshape.io import glb, obj, ply
-from eigenshape.io.mesh_files import FORMATS
+from eigenshape.io.parsing import PARSERS
 
 MANY = 2**31
 PADDING = b"0 0 0\n" * 150
@@ -222,7 +222,7 @@ def test_real_files_with_a_piece_lost_or_doubled(data, suffix):
         for _ in range(40 if suffix != ".off" else 300):
             start, stop = np.sort(rng.integers(0, len(good) + 1, size=2))
             piece = good[start:stop] * int(rng.choice([0, 2]))
-            n_refused += read_or_refuse(FORMATS[suffix], good[:start] + piece + good[stop:]) is None
+            n_refused += read_or_refuse(PARSERS[suffix], good[:start] + piece + good[stop:]) is None
     assert len(small) >= 3
     assert n_refused > 10 * len(small)
 

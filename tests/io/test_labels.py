@@ -1,8 +1,11 @@
 import numpy as np
 import pytest
+import trimesh
+from tetrahedra import TETRAHEDRON
 
-from eigenshape._errors import FileFormatError
+from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape.io.labels import read_labels, write_labels
+from eigenshape.io.mesh_files import read_mesh, write_mesh
 
 
 def read(tmp_path, text, name="a.seg"):
@@ -54,3 +57,41 @@ def test_labels_out_of_json(tmp_path):
 def test_what_is_no_label_is_named(tmp_path, name, text, message):
     with pytest.raises(FileFormatError, match=message):
         read(tmp_path, text, name)
+
+
+@pytest.mark.parametrize("binary", [True, False])
+def test_labels_in_a_mesh_file_read_back_with_colors_or_without(tmp_path, binary):
+    labels = np.array([7, -1, 2**31 - 1, 0])
+    colors = np.full((4, 3), 9, dtype=np.uint8)
+    for options in ({}, {"colors": colors}):
+        write_mesh(TETRAHEDRON, tmp_path / "a.ply", binary=binary, face_labels=labels, **options)
+        assert read_labels(tmp_path / "a.ply").tolist() == labels.tolist()
+        np.testing.assert_array_equal(read_mesh(tmp_path / "a.ply").faces, TETRAHEDRON.faces)
+    other = trimesh.load(tmp_path / "a.ply", process=False)
+    assert other.metadata["_ply_raw"]["face"]["data"]["label"].ravel().tolist() == labels.tolist()
+
+
+def test_labels_of_polygons_are_those_of_their_triangles(tmp_path):
+    head = "ply\nformat ascii 1.0\nelement vertex 5\n"
+    head += "property float x\nproperty float y\nproperty float z\nelement face 2\n"
+    rows = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n"
+    for kind, of_faces in (("int", "6 4 0 1 2 3\n9 3 0 1 4\n"), ("uchar", "6 4 0 1 2 3\n9 3 0 1 4\n")):
+        columns = f"property {kind} label\nproperty list uchar int vertex_indices\nend_header\n"
+        (tmp_path / "a.ply").write_text(head + columns + rows + of_faces)
+        assert read_labels(tmp_path / "a.ply").tolist() == [6, 6, 9]
+    columns = "property float label\nproperty list uchar int vertex_indices\nend_header\n"
+    (tmp_path / "a.ply").write_text(head + columns + rows + "6.5 4 0 1 2 3\nnan 3 0 1 4\n")
+    with pytest.raises(FileFormatError, match=r"a\.ply: The property label of faces must be a whole number"):
+        read_labels(tmp_path / "a.ply")
+
+
+def test_labels_that_do_not_fit_are_refused(tmp_path):
+    with pytest.raises(InvalidParameterError, match=r"face_labels must be \(4,\) and go to a PLY file; .* go to \.off"):
+        write_mesh(TETRAHEDRON, tmp_path / "a.off", face_labels=np.zeros(4, int))
+    with pytest.raises(InvalidParameterError, match=r"face_labels must be \(4,\) .* they are \(3,\)"):
+        write_mesh(TETRAHEDRON, tmp_path / "a.ply", face_labels=np.zeros(3, int))
+    with pytest.raises(InvalidParameterError, match="must fit into 32 bits; that of face 1 is 2147483648"):
+        write_mesh(TETRAHEDRON, tmp_path / "a.ply", face_labels=np.array([0, 2**31, 0, 0]))
+    write_mesh(TETRAHEDRON, tmp_path / "a.ply")
+    with pytest.raises(FileFormatError, match="must have a property label; they have none"):
+        read_labels(tmp_path / "a.ply")

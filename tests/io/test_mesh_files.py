@@ -93,13 +93,12 @@ def test_colours(tmp_path):
         write_mesh(TETRAHEDRON, tmp_path / "a.ply", colors=colors[:3])
 
 
-@pytest.mark.parametrize("name", ["a.xyz", "a", "a.gltf", ".ply"])
+@pytest.mark.parametrize("name", ["a.xyz", "a", "a.gl", ".ply"])
 def test_unknown_suffix_is_refused_with_the_list_of_known_ones(tmp_path, name):
-    for work in (read_mesh, lambda path: write_mesh(TETRAHEDRON, path)):
-        with pytest.raises(
-            FileFormatError, match=r"must be of a known format, \.off, \.obj, \.ply, \.stl, \.glb; it is"
-        ):
-            work(tmp_path / name)
+    with pytest.raises(FileFormatError, match=r"must be of a known format, \.off, .*, \.glb, \.gltf, .*, \.msh; it is"):
+        read_mesh(tmp_path / name)
+    with pytest.raises(FileFormatError, match=r"known format, \.off, \.obj, \.ply, \.stl, \.glb; it is"):
+        write_mesh(TETRAHEDRON, tmp_path / name)
     assert not names(tmp_path)
 
 

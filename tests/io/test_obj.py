@@ -49,9 +49,6 @@ def test_polygons_become_fans_in_order():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("# nothing\n", "it holds 0 points and no face"),
-        (POINTS, "it holds 4 points and no face"),
-        (POINTS + "l 1 2\n", "it holds 4 points and no face"),
         ("v 0 0\n" + TRIANGLES, "A vertex must have three numbers; line 1 is '0 0'"),
         ("v\n" + POINTS + TRIANGLES, "A vertex must have three numbers; line 1 is ''"),
         (POINTS + "f 1 2\n", "A face must have three corners or more; line 5 is '1 2'"),

@@ -54,7 +54,7 @@ def test_polygons_become_fans_in_order():
         ("", "must begin with OFF, COFF, NOFF"),
         ("PLY\n4 4 6\n", "it begins with 'PLY'"),
         ("4OFF\n4 4 6\n", "it begins with '4OFF'"),
-        ("OFF BINARY\n", "line 1 says BINARY"),
+        ("OFF BINARY\n", "must hold 32-bit counts, x, y and z of each vertex"),
         ("OFF\n", "must declare vertices and faces; line 2 is ''"),
         ("OFF\n\n4\n", "must declare vertices and faces; line 3 is '4'"),
         ("nOFF\n3\n4 4 6\n", "must declare vertices and faces; line 2 is '3'"),
@@ -103,3 +103,49 @@ def test_wrong_values_are_refused(text, message):
 def test_written_text_is_plain():
     assert FILES["off"][1].decode().splitlines()[:3] == ["OFF", "4 4 0", "0.0 0.0 0.0"]
     np.testing.assert_array_equal(parse(FILES["off"][1])[0], TETRAHEDRON.vertices)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        ROWS.replace("3 0 2 1\n", "3\n0 2\n1\n"),
+        ROWS.replace("1 0 0\n", "1\n0 0\n"),
+        ROWS.replace("\n", " "),
+    ],
+)
+def test_lines_may_break_anywhere(body):
+    vertices, faces = parse(f"OFF\n4 4 6\n{body}".encode())
+    np.testing.assert_array_equal(vertices, VERTICES)
+    np.testing.assert_array_equal(faces, FACES)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        ROWS.replace("3 0 2 1\n", "3\n0 2\n1 9\n"),  # a color, which ends where its line ends
+        ROWS.replace("3 0 2 1\n", "2\n0 2\n1\n"),
+        ROWS.replace("3 0 3 2\n", "9\n0 3 2\n"),
+        ROWS.replace("3 0 3 2\n", ""),
+    ],
+)
+def test_broken_lines_that_do_not_fill_the_file_are_refused(body):
+    with pytest.raises(FileFormatError, match="declares 4 vertices and 4 faces and holds"):
+        parse(f"OFF\n4 4 6\n{body}".encode())
+    with pytest.raises(FileFormatError, match="declares 4 vertices and 4 faces and holds"):
+        parse(f"COFF\n4 4 6\n{ROWS}".replace("3 0 2 1", "3\n0 2\n1").encode())
+
+
+@pytest.mark.parametrize("order", [">", "<"])
+@pytest.mark.parametrize("colors", [None, 0, 3])
+def test_binary_files_of_both_orders_with_and_without_counts_of_colors(order, colors):
+    body = np.array([4, 4, 6], f"{order}i4").tobytes() + np.array(VERTICES, f"{order}f4").tobytes()
+    for face in FACES:
+        body += np.array([3, *face], f"{order}i4").tobytes()
+        if colors is not None:
+            body += np.array([colors], f"{order}i4").tobytes() + np.ones(colors, f"{order}f4").tobytes()
+    vertices, faces = parse(b"OFF BINARY\n" + body)
+    np.testing.assert_array_equal(vertices, VERTICES)
+    np.testing.assert_array_equal(faces, FACES)
+    for broken in (body[:-4], body[:-1], body + b"\0\0\0\0", body[:8]):
+        with pytest.raises(FileFormatError, match=f"it does not, in {len(broken)} bytes"):
+            parse(b"OFF BINARY\n" + broken)

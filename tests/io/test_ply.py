@@ -107,8 +107,7 @@ def simple(rows="3 0 1 2\n", corners="list uchar int vertex_indices", axes="xyz"
         (simple(corners="list uchar float vertex_indices"), "must declare a list of whole vertex_indices"),
         (simple(corners="int vertex_indices"), "must declare a list of whole vertex_indices"),
         (simple(corners="list uchar int corners"), "must declare a list of whole vertex_indices"),
-        (simple(rows="", count=0), "it holds 3 points and no face"),
-        (simple(rows="4 0 1 2 0\n").replace("face 1", "tristrips 1"), "no face. It has triangle strips, which are not"),
+        (simple(corners="int vertex_indices").replace("face 1", "tristrips 1"), "element tristrips of a PLY file must"),
         (simple(rows=""), "it declares 4 in all and holds 3"),
         (simple(rows="3 0 1 2\n3 0 1 2\n"), "it declares 4 in all and holds 5"),
         (simple(count=2**31), "2147483648 rows of face take 4294967296 bytes or more and 2[0-9] follow"),
@@ -168,3 +167,27 @@ def test_colours_stand_with_the_vertices(write):
     assert (b"0.0 0.0 1.0 9 10 11\n" in data) or (struct.pack("<dddBBB", 0, 0, 1, 9, 10, 11) in data)
     np.testing.assert_array_equal(parse(data)[0], VERTICES)
     np.testing.assert_array_equal(parse(data)[1], FACES)
+
+
+@pytest.mark.parametrize(
+    ("strips", "faces"),
+    [
+        ("4 0 1 2 3", [[0, 1, 2], [2, 1, 3]]),
+        ("8 0 1 2 3 -1 3 1 0", [[0, 1, 2], [2, 1, 3], [3, 1, 0]]),
+        ("7 0 1 2 2 1 3 -1", [[0, 1, 2], [1, 2, 3]]),  # turned by naming points twice
+        ("3 0 1 -1", []),
+    ],
+)
+def test_strips_of_triangles(strips, faces):
+    text = simple(rows=f"{strips}\n").replace("face 1", "tristrips 1").replace("uchar int", "int int")
+    text = text.replace("vertex 3", "vertex 4").replace("0 0 0\n", "0 0 0\n0 0 1\n")
+    assert turned(parse(text.encode())[1]) == turned(faces)
+
+
+def turned(faces):
+    """Begin each face with its lowest corner."""
+    return [np.roll(face, -int(np.argmin(face))).tolist() for face in faces]
+
+
+def test_a_strip_makes_the_tetrahedron():
+    assert sorted(turned(parse(FILES["ply strip"][1])[1])) == sorted(turned(FACES))

@@ -10,6 +10,7 @@ from eigenshape.geometry.domains import box, disc
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.io.lzf_loops import decompress
+from eigenshape.io.mesh_files import read_mesh
 from eigenshape.io.shape_files import read_points, read_shape, write_points
 
 CUBE = box(2, 1, 1)
@@ -44,6 +45,38 @@ def test_of_several_dimensions_the_highest_counts(tmp_path):
     assert read_shape(written(tmp_path / "a.vtu", CUBE.points, cells)).n_simplices == CUBE.n_simplices
 
 
+BESIDE = (
+    "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
+    "$Elements\n2\n1 4 2 0 0 1 2 3 4\n2 2 2 0 0 1 3 2\n$EndElements\n"
+)
+
+
+@pytest.mark.parametrize("suffix", [".mesh", ".msh", ".vtk", ".vtu"])
+def test_the_triangles_beside_tetrahedra_are_read_where_they_are_asked_for(tmp_path, suffix):
+    path = tmp_path / f"a{suffix}"
+    if suffix == ".msh":
+        path.write_text(BESIDE)
+    else:
+        cells = [("triangle", [[0, 2, 1]]), ("tetra", [[0, 1, 2, 3]])]
+        written(path, np.vstack([np.zeros(3), np.eye(3)]), cells)
+    with pytest.raises(
+        FileFormatError, match=r"it holds 1 tetrahedra in R\^3, .* cells=\"triangles\" reads the triangles"
+    ):
+        read_mesh(path)
+    assert read_shape(path).simplices.tolist() == [[0, 1, 2, 3]]
+    for read in (read_mesh, read_shape):
+        found = read(path, cells="triangles")
+        assert isinstance(found, TriangleMesh)
+        assert found.faces.tolist() == [[0, 2, 1]]
+
+
+def test_a_flat_mesh_is_no_triangle_mesh(tmp_path):
+    path = written(tmp_path / "a.mesh", DISC.vertices[:, :2], [("triangle", DISC.faces)])
+    assert read_shape(path).points.shape[1] == 2
+    with pytest.raises(FileFormatError, match=r"must hold triangles in R\^3; it holds \d+ triangles in R\^2"):
+        read_mesh(path)
+
+
 def test_a_curve_and_bare_points(tmp_path):
     found = read_shape(written(tmp_path / "a.vtu", CURVE, [("line", [[0, 1], [1, 2], [2, 3]])]))
     assert (found.dim, found.n_simplices) == (1, 3)
@@ -54,7 +87,9 @@ def test_a_curve_and_bare_points(tmp_path):
 
 def test_other_cells_are_named(tmp_path):
     path = written(tmp_path / "a.vtk", CUBE.points[:8], [("hexahedron", [[0, 1, 2, 3, 4, 5, 6, 7]])])
-    with pytest.raises(FileFormatError, match=r"must hold simplices .* it holds hexahedron\. Split them first"):
+    with pytest.raises(
+        FileFormatError, match=r"must be simplices, quads or polylines; it holds hexahedron\. Split them first"
+    ):
         read_shape(path)
 
 
@@ -80,7 +115,10 @@ def test_polylines(tmp_path, kind):
 
 
 def test_polygons_become_fans(tmp_path):
-    (tmp_path / "a.vtk").write_bytes(POLYDATA["text"].replace(b"LINES 2 7\n2 0 1\n3 1 2 3", b"POLYGONS 1 5\n4 0 1 2 3"))
+    flat = (
+        POLYDATA["text"].replace(b"LINES 2 7\n2 0 1\n3 1 2 3", b"POLYGONS 1 5\n4 0 1 2 3").replace(b" 5\nP", b" 0\nP")
+    )
+    (tmp_path / "a.vtk").write_bytes(flat)
     assert read_shape(tmp_path / "a.vtk").faces.tolist() == [[0, 1, 2], [0, 2, 3]]
 
 
@@ -96,7 +134,7 @@ def test_polygons_become_fans(tmp_path):
             (b"LINES 2 7\n2 0 1\n3 1 2 3\nPOINT_DATA 4\nSCALARS a float\n", b"LINES 2 9\n2 0"),
             "it ends within 9 numbers",
         ),
-        ((b"LINES", b"TRIANGLE_STRIPS"), "Triangle strips of a VTK file are not read"),
+        ((b"LINES", b"TRIANGLE_STRIPS"), "A cell of TRIANGLE_STRIPS must have 3 points or more; cell 0 has 2"),
         ((b"3 1 2 3", b"3 1 2 9"), r"simplices must index points 0\.\.3; simplex 2 is \[2, 9\]"),
     ],
 )
@@ -116,7 +154,7 @@ def test_binary_polydata_that_ends_early(tmp_path):
 def test_files_that_lack_cells_or_their_end_are_named(tmp_path):
     path = written(tmp_path / "a.vtk", CUBE.points, [("tetra", CUBE.simplices)])
     path.write_bytes(path.read_bytes().replace(b"CELLS 13", b"CELLS 23"))
-    with pytest.raises(FileFormatError, match=r"a\.vtk must be "):
+    with pytest.raises(FileFormatError, match=r"a\.vtk: Cells of a VTK file must be whole numbers; number 13 is"):
         read_shape(path)
     path = written(tmp_path / "a.msh", CUBE.points, [("tetra", CUBE.simplices)])
     path.write_bytes(path.read_bytes().replace(b"$EndElements", b"$EndElement"))
@@ -128,7 +166,7 @@ def test_files_that_lack_cells_or_their_end_are_named(tmp_path):
         read_shape(path)
     path = written(tmp_path / "b.vtk", CUBE.points, [("tetra", CUBE.simplices)], binary=False)
     path.write_bytes(path.read_bytes().rstrip())
-    with pytest.raises(FileFormatError, match=r"b\.vtk must be whole; its last number has no line break"):
+    with pytest.raises(FileFormatError, match=r"b\.vtk: A VTK file must be whole; its last number has no line break"):
         read_shape(path)
 
 

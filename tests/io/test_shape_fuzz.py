@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from lapy import TetMesh
 from test_shape_files import CUBE, POLYDATA, TABLES, pcd
 
 from eigenshape._errors import EigenshapeError
@@ -16,6 +17,8 @@ def files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fuzz")
     contents = {f"polydata {kind}.vtk": data for kind, data in POLYDATA.items()} | TABLES
     contents |= {f"{kind}.pcd": pcd(kind) for kind in ("ascii", "binary", "binary_compressed")}
+    TetMesh(CUBE.points, CUBE.simplices).write_vtk(str(folder / "lapy.vtk"))
+    contents["lapy.vtk"] = (folder / "lapy.vtk").read_bytes()
     for name, kind, options in (
         ("a.mesh", "medit", {}),
         ("a.msh", "gmsh", {}),

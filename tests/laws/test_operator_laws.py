@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from eigenshape.geometry.measure import enclosed_volume, face_areas, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.geometry.topology import inconsistent_edges
 from eigenshape.operators.cotangent import cotangent_laplacian
 
 seeds = st.integers(0, 2**32 - 1)
@@ -25,9 +26,10 @@ def shape(seed: int) -> TriangleMesh:
 
 
 def soup(rng: np.random.Generator) -> TriangleMesh:
-    """Faces over random points, most edges and vertices no manifold; none thinner than a needle, none loose."""
+    """Different faces over random points, most edges and vertices no manifold; none a needle, no vertex loose."""
     points = rng.standard_normal((9, 3))
     rows = np.array([rng.choice(9, 3, replace=False) for _ in range(25)])
+    rows = rows[np.sort(np.unique(np.sort(rows, axis=1), axis=0, return_index=True)[1])]
     a, b, c = points[rows].transpose(1, 0, 2)
     longest = np.max([np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c)], axis=0)
     kept = rows[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 0.02 * longest**2]
@@ -121,7 +123,8 @@ def test_powers_of_two_scale_bit_for_bit(seed, mass, power):
     np.testing.assert_array_equal(stiffness, one)
     np.testing.assert_array_equal(weights, two * scale * scale)
     np.testing.assert_array_equal(face_areas(far), face_areas(mesh) * scale * scale)
-    np.testing.assert_array_equal(enclosed_volume(far), enclosed_volume(mesh) * scale * scale * scale)
+    if not len(inconsistent_edges(mesh)):  # a soup encloses nothing, and is refused
+        np.testing.assert_array_equal(enclosed_volume(far), enclosed_volume(mesh) * scale * scale * scale)
 
 
 @few

@@ -258,3 +258,28 @@ def test_graph_laplacians_know_the_volume_that_their_eigenvalues_are_over(size):
     es.solve_spectrum(laplacian, 20)  # whose eigenvalues are far from the last: no warning at any size
     with pytest.warns(UserWarning, match=r"too near to 1/\(t × volume\)"):
         es.solve_spectrum(laplacian, 200)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-40, 1e40])
+@pytest.mark.parametrize(("flat", "place"), [(1, "on a line"), (2, "in a plane"), (3, "in a flat of 3 dimensions")])
+def test_points_must_span_the_dimension_that_they_sample(scale, flat, place):
+    rng = np.random.default_rng(7)
+    points = scale * (rng.random((60, flat)) @ rng.standard_normal((flat, 5)) + rng.standard_normal(5))
+    fact = rf"The points of a sample must span {flat + 1} dimensions; all 60 lie {place} through point 0"
+    with pytest.raises(InvalidShapeError, match=fact):
+        quadrature_laplacian(uniform_quadrature(points, flat + 1), scale**2)
+    assert quadrature_laplacian(uniform_quadrature(points, flat), scale**2).n_points == 60
+
+
+def test_what_converges_depends_on_how_t_falls():
+    # As the docstring of mesh_laplacian says: L z of the unit sphere should be 2z.
+    worst = {"e²": [], "e/10": []}
+    for n in (1000, 4000, 16000):
+        mesh = es.random_sphere(n, rng=np.random.default_rng(0))
+        edge, z = mean_side_length(mesh), mesh.vertices[:, 2]
+        for name, t in (("e²", edge**2), ("e/10", edge / 10)):
+            laplacian = mesh_laplacian(mesh, t=t)
+            applied = laplacian.stiffness @ z / laplacian.mass.diagonal()
+            worst[name].append(np.abs(applied - 2 * z).max())
+    assert worst["e²"][2] > 2 * worst["e²"][0]
+    assert worst["e/10"][2] < worst["e/10"][0] / 2

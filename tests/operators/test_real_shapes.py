@@ -29,6 +29,7 @@ def shapes(folder):
             yield path, read_shape(path)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", OPERATORS)
 def test_every_file_gives_a_sound_operator_or_a_named_error(data, name):
     built, refused = [], []

@@ -1,13 +1,18 @@
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
+import textwrap
 import threading
 import time
+from pathlib import Path
 
 import pytest
 from describers import RECIPE, by_content, descriptor
 from filelock import FileLock
 
+import eigenshape
 from eigenshape._errors import InvalidParameterError
 from eigenshape.retrieval.batch import build_index, content_digest
 from eigenshape.retrieval.index import ShapeIndex
@@ -100,6 +105,15 @@ def test_a_missing_file_is_named(index, tmp_path):
     assert "No such file" in report.failed[0][1]
 
 
+@pytest.fixture
+def stoppable():
+    """Have Ctrl-C raise KeyboardInterrupt, also where a background job runs the tests with Ctrl-C ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("stoppable")
 def test_ctrl_c_ends_workers_that_hang(index, tmp_path):
     todo = items(tmp_path, a="1", b="hang")
 
@@ -134,6 +148,37 @@ def wait_until(happens):
     while not happens():
         assert time.monotonic() < deadline
         time.sleep(0.01)
+
+
+UNGUARDED = """
+from pathlib import Path
+from describers import RECIPE, by_content
+import eigenshape as es
+
+index = es.ShapeIndex.open_or_create("index")
+items = [es.Item(name, Path(name)) for name in "abc"]
+print(es.build_index(index, items, by_content, recipes=(RECIPE,)))
+"""
+
+
+def run_script(folder, text):
+    (folder / "script.py").write_text(text)
+    paths = [str(Path(__file__).parent), str(Path(eigenshape.__file__).parents[1])]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
+    command = [sys.executable, "script.py"]
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_a_script_without_a_main_guard_is_told_so(tmp_path):
+    items(tmp_path, a="1", b="2", c="3")
+    done = run_script(tmp_path, UNGUARDED)
+    assert done.returncode == 1
+    assert done.stderr.count("Put what the script does, from its first call of eigenshape on, under `if __name__") == 1
+    assert "bootstrapping" not in done.stderr
+    assert len(ShapeIndex.open(tmp_path / "index")) == 0
+    imports, _, body = UNGUARDED.partition("\n\n")
+    guarded = f"{imports}\n\nif __name__ == '__main__':\n{textwrap.indent(body, '    ')}"
+    assert "added=('a', 'b', 'c')" in run_script(tmp_path, guarded).stdout
 
 
 def test_what_a_batch_cannot_begin_with(index, tmp_path):

@@ -39,11 +39,3 @@ def test_small_meshes_are_described_as_ever():
     exact, found = es.describe_mesh(mesh, SMALL_RECIPE), es.describe_large_mesh(mesh, SMALL_RECIPE)
     assert found.descriptor.vectors == pytest.approx(exact.descriptor.vectors, rel=1e-6)
     assert np.array_equal(found.descriptor.vertices, exact.descriptor.vertices)
-
-
-def test_too_many_pieces_are_refused():
-    ball = es.icosphere(1)
-    many = [ball.vertices + 3 * place for place in range(16)]
-    faces = [ball.faces + ball.n_vertices * place for place in range(16)]
-    with pytest.raises(es.InvalidShapeError, match="at most 15 connected components"):
-        es.describe_large_mesh(es.TriangleMesh(np.concatenate(many), np.concatenate(faces)))

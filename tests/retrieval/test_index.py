@@ -7,7 +7,7 @@ import sqlite3
 import tempfile
 import threading
 import time
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -197,12 +197,10 @@ def test_recipes_of_other_versions(index):
 
 
 def edit_recipe(index, edit):
-    database = sqlite3.connect(index.folder / store.DATABASE)
-    fields = json.loads(database.execute("SELECT fields FROM recipe").fetchone()[0])
-    edit(fields)
-    with database:
-        database.execute("UPDATE recipe SET fields = ?", (json.dumps(fields),))
-    database.close()
+    with store.writing(index.folder) as catalog:
+        fields = json.loads(catalog.recipe_rows[0].fields)
+        edit(fields)
+        catalog.database.execute("UPDATE recipe SET fields = ?", (json.dumps(fields),))
     return fields
 
 
@@ -240,7 +238,7 @@ def test_folders_that_are_no_index(tmp_path, index):
     database = sqlite3.connect(index.folder / store.DATABASE)
     database.execute("PRAGMA user_version = 9")
     database.close()
-    with pytest.raises(StoreError, match="must be an index of format 2; it is of format 9"):
+    with pytest.raises(StoreError, match="must be an index of format 3; it is of format 9"):
         ShapeIndex.open(index.folder)
 
 
@@ -272,6 +270,27 @@ def test_of_several_creators_one_succeeds(tmp_path):
     assert len(ShapeIndex.open(tmp_path / "index")) == 0
 
 
+def test_three_first_writers_share_one_index(tmp_path):
+    for trial in range(5):
+        folder = tmp_path / str(trial)
+        writers = [begin(writer.open_and_add, folder) for _ in range(3)]
+        assert [ours.recv() for _, ours in writers] == 3 * ["ready"]
+        for number, (_, ours) in enumerate(writers):
+            ours.send(f"shape {number}")
+        assert [ours.recv() for _, ours in writers] == 3 * ["added"]
+        for process, ours in writers:
+            process.join()
+            ours.close()
+        assert [record.name for record in ShapeIndex.open(folder).records()] == ["shape 0", "shape 1", "shape 2"]
+
+
+def test_a_folder_of_other_things_becomes_no_index(tmp_path):
+    (tmp_path / "letter.txt").touch()
+    with pytest.raises(StoreError, match="must be empty to become an index"):
+        ShapeIndex.open_or_create(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["letter.txt"]
+
+
 def test_damaged_rows_are_named(index):
     index.add("one", [descriptor(1)])
     path = index.folder / "rows-1.bin"
@@ -284,6 +303,23 @@ def test_damaged_rows_are_named(index):
         index.query(descriptor(1))
     path.write_bytes(whole)
     assert index.query(descriptor(1))[0].score == 0
+
+
+def test_a_copy_without_its_log_is_named(index, tmp_path):
+    index.add("one", [descriptor(1)])
+    with closing(sqlite3.connect(index.folder / store.DATABASE)) as reader:
+        reader.execute("BEGIN")
+        reader.execute("SELECT * FROM shape").fetchone()
+        index.add("two", [descriptor(2)])
+        whole = shutil.copytree(index.folder, tmp_path / "whole")
+        part = shutil.copytree(index.folder, tmp_path / "part", ignore=shutil.ignore_patterns("*-wal"))
+    assert len(ShapeIndex.open(whole)) == 2
+    for act in (lambda: ShapeIndex.open(part), lambda: ShapeIndex(part).add("three", [descriptor(3)])):
+        with pytest.raises(StoreError, match="must hold all 2 changes that were committed; it holds 1"):
+            act()
+    (whole / store.COMMITTED).unlink()
+    with pytest.raises(StoreError, match=r"committed.txt must hold a number twice; it holds b''"):
+        ShapeIndex.open(whole)
 
 
 def test_a_second_writer_is_told(index, monkeypatch):
@@ -455,8 +491,8 @@ def test_a_killed_creator_leaves_an_index_or_a_place_for_one(tmp_path):
 
 
 def test_a_stop_just_after_the_commit_stays_a_stop(index):
-    with pytest.raises(KeyboardInterrupt), store.writing(index.folder) as database:
-        _commit_and_stop(database)
+    with pytest.raises(KeyboardInterrupt), store.writing(index.folder) as catalog:
+        _commit_and_stop(catalog.database)
     assert index.records() == []
 
 
@@ -466,8 +502,8 @@ def _commit_and_stop(database):
 
 
 def test_what_a_stopped_block_wrote_is_gone(index):
-    with pytest.raises(KeyboardInterrupt), store.writing(index.folder) as database:
-        _write_and_stop(database)
+    with pytest.raises(KeyboardInterrupt), store.writing(index.folder) as catalog:
+        _write_and_stop(catalog.database)
     assert index.records() == []
 
 

@@ -11,6 +11,27 @@ from eigenshape.retrieval.patch_matching_loops import leading, nearest_of_each_o
 from eigenshape.retrieval.patch_packing import pack_points, unpack_points
 
 HAND = es.make_creature("hand", 1, n_vertices=1500)
+
+
+def moved(mesh, x):
+    return es.TriangleMesh(mesh.vertices + np.array([x, 0.0, 0.0]), mesh.faces)
+
+
+BALL = es.icosphere(2)
+BOX = es.TriangleMesh(
+    np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float),
+    np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])[
+        :, [[0, 1, 2], [0, 2, 3]]
+    ].reshape(-1, 3),
+)
+SYMMETRIC = {
+    "torus": lambda: es.torus(60, 40),
+    "sphere": lambda: es.icosphere(3),
+    "icosahedron": lambda: es.icosphere(0),
+    "box": lambda: BOX,
+    "two spheres": lambda: es.disjoint_union(BALL, moved(BALL, 3)),
+    "twelve boxes": lambda: es.disjoint_union(*(moved(BOX, 2 * number) for number in range(12))),
+}
 KINDS = ("quadruped", "hand", "octopus", "biped")
 
 
@@ -90,9 +111,36 @@ def test_agreement_by_hand():
     assert columns.tolist() == [0, 1]
     ours = np.array([[0.0, 1, 2], [1, 0, 2], [2, 2, 0]])
     theirs = np.array([[0.0, 2.2, 9], [2.2, 0, np.inf], [9, np.inf, 0]])
-    value, vector = leading(ours, theirs, np.array([0.25, 0.25, 0.5]), 2.0, 0.2, 0.05)
+    value, support = leading(ours, theirs, np.array([0.25, 0.25, 0.5]), 2.0, 0.2, 0.05)
     assert value == pytest.approx(0.25 * (1 - (0.2 / 2.2 / 0.2) ** 2))
-    assert vector == pytest.approx([np.sqrt(0.5), np.sqrt(0.5), 0])
+    assert support == pytest.approx([np.sqrt(2), np.sqrt(2), 0])
+
+
+def test_equally_near_points_are_paired_in_order():
+    alike = np.array([[0.0, 7, 0, 9], [7, 7, 7, 1], [0, 7, 0, 9]])
+    rows, columns = nearest_of_each_other(alike)
+    assert rows.tolist() == [0, 1, 2]
+    assert columns.tolist() == [0, 3, 2]
+
+
+@pytest.mark.parametrize("name", SYMMETRIC)
+def test_a_symmetric_shape_finds_itself_near_0(name, book):
+    shape = es.describe_shape(SYMMETRIC[name](), es.PatchRecipe(book))
+    assert es.patch_scores(shape, [shape])[0] == pytest.approx(0, abs=0.01)
+    match = es.match_patches(shape.points[0], shape.points[0])
+    assert np.array_equal(match.points[:, 0], match.points[:, 1])
+    assert len(match.points) == len(shape.vertices)
+
+
+def test_a_point_without_weight_spoils_no_match(hand):
+    """As the point of a speck, whose area is 0 in half precision."""
+    weights = hand.weights.copy()
+    weights[0] = 0
+    points = replace(hand, weights=weights)
+    match = es.match_patches(points, points)
+    assert np.array_equal(match.points[:, 0], match.points[:, 1])
+    assert len(match.points) == len(es.match_patches(hand, hand).points)
+    assert match.agreement == pytest.approx(1)
 
 
 def test_points_are_packed_without_loss(hand, book):

@@ -37,12 +37,12 @@ def known(mesh, book):
 
 def test_only_the_nearest_come_nearer(wholes, scan):
     far = np.array([0.9, 0.3, 0.5, 0.8])
-    found = verified_scores(scan, wholes, far, n_verified=2)
+    found = verified_scores(scan, wholes.__getitem__, far, n_verified=2)
     assert found[[0, 3]].tolist() == ((far[[0, 3]] + WORTH) / (1 + WORTH)).tolist()
     expected = [(far[place] + WORTH * (1 - shape_agreement(scan, wholes[place]))) / (1 + WORTH) for place in (1, 2)]
     assert found[[1, 2]] == pytest.approx(expected)
     assert far.tolist() == [0.9, 0.3, 0.5, 0.8]
-    assert verified_scores(scan, wholes, np.ones(4)).argmin() == 1
+    assert verified_scores(scan, wholes.__getitem__, np.ones(4)).argmin() == 1
 
 
 def test_the_nearest_view_of_either_serves(wholes, scan):

@@ -1,7 +1,9 @@
+import lapy
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from lapy import shapedna
 from scipy.spatial.transform import Rotation
 
 import eigenshape as es
@@ -19,6 +21,15 @@ def bumpy(seed):
 def test_on_a_sphere_it_is_known():
     exact = 4 * np.pi * es.sphere_eigenvalues(21)[1:] / np.arange(1, 21)
     np.testing.assert_allclose(es.shape_dna(es.icosphere(4)), exact, rtol=0.02)
+
+
+def test_lapy_divides_by_one_more():
+    mesh = es.torus(20, 12)
+    fem = lapy.TriaMesh(mesh.vertices, mesh.faces)
+    values = shapedna.compute_shapedna(fem, k=21, lump=True)["Eigenvalues"]
+    theirs = shapedna.reweight_ev(shapedna.normalize_ev(fem, values))[1:]
+    rank = np.arange(1, 21)
+    np.testing.assert_allclose(theirs, es.shape_dna(mesh) * rank / (rank + 1), rtol=1e-6)
 
 
 @few

@@ -4,6 +4,7 @@ import itertools
 
 from describers import descriptor
 
+from eigenshape._errors import StoreError
 from eigenshape.retrieval.index import ShapeIndex
 
 
@@ -30,3 +31,14 @@ def create_many(folder, done):
     for number in itertools.count(len(list(folder.iterdir()))):
         ShapeIndex.create(folder / str(number))
         done.send(number)
+
+
+def open_and_add(folder, done):
+    done.send("ready")
+    name = done.recv()
+    try:
+        ShapeIndex.open_or_create(folder).add(name, [descriptor(1)])
+    except StoreError as err:
+        done.send(str(err))
+    else:
+        done.send("added")

@@ -241,7 +241,7 @@ def test_without_a_gpu_the_cpu_computes_and_says_so(monkeypatch):
         assert np.array_equal(found.eigenvectors, approximate_spectrum(laplacian, 6).eigenvectors)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_census_of_missing_eigenvalues(always_coarsen):
     solves = missed = 0
     for laplacian in (

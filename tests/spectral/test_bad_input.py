@@ -241,7 +241,7 @@ def test_a_thousand_components_and_more_pairs_than_these(block, gap, k):
     assert len(solve_spectrum(copies(block, 1000), below=1.0).eigenvalues) == 1000
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_ten_thousand_triangles_and_more_pairs_than_these():
     spectrum = solve_spectrum(copies(TRIANGLE, 10_000), 10_050)  # 2.3 GiB of vectors
     np.testing.assert_allclose(spectrum.eigenvalues, [0] * 10_000 + [3] * 50, atol=1e-13)

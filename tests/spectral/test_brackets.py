@@ -1,4 +1,5 @@
 from dataclasses import FrozenInstanceError
+from inspect import unwrap
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
 from eigenshape.geometry.topology import boundary_facets
+from eigenshape.io.mesh_files import read_mesh
+from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import interpolation_constants
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
 from eigenshape.spectral.brackets import bracket_eigenvalues
@@ -27,9 +30,24 @@ def flat_torus(n):
     return SimplicialMesh(points, mesh.faces), 2 * n * np.sin(np.pi / n)
 
 
+def with_cut_corners(square):
+    """Turn the diagonal of each corner cell that leaves its corner to one face, which both sheets would share."""
+    faces = square.faces.copy()
+    for corner in np.flatnonzero(np.bincount(faces.ravel()) == 1):
+        (one,) = np.flatnonzero((faces == corner).any(axis=1))
+        place = int(np.flatnonzero(faces[one] == corner)[0])
+        _, left, right = np.roll(faces[one], -place)
+        both = np.isin(faces, [left, right]).sum(axis=1) == 2
+        both[one] = False
+        (two,) = np.flatnonzero(both)
+        (inner,) = np.setdiff1d(faces[two], [left, right])
+        faces[one], faces[two] = (corner, left, inner), (corner, inner, right)
+    return TriangleMesh(square.vertices, faces)
+
+
 def pillow(n):
     """Return two squares sewn along their rims: what is even across is Neumann's, what is odd Dirichlet's."""
-    front = grid(n, n)
+    front = with_cut_corners(grid(n, n))
     rim = ((front.vertices == 0) | (front.vertices == 1))[:, :2].any(axis=1)
     names = np.where(rim, np.arange(len(rim)), len(rim) + np.arange(len(rim)))
     back = names[front.faces[:, ::-1]]
@@ -190,7 +208,7 @@ def test_a_condition_needs_a_boundary_and_points_inside(mesh, n, inside):
 
 def test_other_conditions_are_refused():
     with pytest.raises(InvalidParameterError, match="boundary must be 'neumann' or 'dirichlet'; it is 'robin'"):
-        bracket_eigenvalues.__wrapped__(grid(2, 2), 1, boundary="robin")
+        unwrap(bracket_eigenvalues)(grid(2, 2), 1, boundary="robin")
 
 
 def test_flat_faces_and_loose_vertices_are_refused():
@@ -199,3 +217,24 @@ def test_flat_faces_and_loose_vertices_are_refused():
         bracket_eigenvalues(flat, 1)
     with pytest.raises(InvalidShapeError, match="Every vertex must belong to a face; vertex 3"):
         bracket_eigenvalues(TriangleMesh([*grid(1, 1).vertices[:3], [9, 9, 9]], [[0, 1, 2]]), 1)
+
+
+def test_slivers_in_which_rounding_leaves_nothing():
+    """Of edges of one and a hundred million, no digit of a lower bound is sure."""
+    mesh = TriangleMesh(grid(4, 4).vertices * [1e8, 1.0, 1.0], grid(4, 4).faces)
+    brackets = bracket_eigenvalues(mesh, 5)
+    assert brackets.lower.tolist() == [0.0] * 5
+    assert not np.signbit(brackets.lower).any()
+    assert (brackets.upper >= [0, *(np.pi / 1e8 * np.arange(1, 5)) ** 2]).all(), (
+        "an interval's, with Neumann's condition"
+    )
+    assert "Rounding in slivers leaves no lower end above 0" in brackets.explain()
+
+
+@pytest.mark.data
+def test_a_pillow_with_slivers(data):
+    mesh = read_mesh(data / "nasty" / "own" / "sliver_pillow.off")
+    brackets = bracket_eigenvalues(mesh, 10)
+    values = solve_spectrum(cotangent_laplacian(mesh, "consistent"), 10).eigenvalues
+    assert (brackets.lower == 0).all()
+    assert (brackets.upper >= values).all()

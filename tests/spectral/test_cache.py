@@ -13,7 +13,7 @@ from eigenshape.geometry.surfaces import icosphere
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.spectral import cache, solver
+from eigenshape.spectral import archive, cache, solver
 from eigenshape.spectral.solver import solve_spectrum
 
 
@@ -101,7 +101,7 @@ def test_a_damaged_file_is_computed_again_and_replaced(tmp_path, laplacian, noth
     bit[len(whole) // 2] ^= 1
     path.write_bytes({"cut": whole[:-100], "empty": b"", "one bit": bytes(bit), "not ours": b"hello" * 99}[harm])
     with pytest.warns(
-        UserWarning, match=r"A spectrum in the cache is damaged and is computed again: .*\.npz must hold"
+        UserWarning, match=r"A spectrum in the cache cannot be used and is computed again: .*\.npz must hold"
     ):
         require_same(solve_spectrum(laplacian, 20, cache=tmp_path), plain)
     assert list(tmp_path.iterdir()) == [path]
@@ -152,3 +152,39 @@ def test_two_processes_may_write_at_once(tmp_path, laplacian):
     assert [process.wait() for process in both] == [0, 0]
     assert len(list(tmp_path.iterdir())) == 8
     require_same(solve_spectrum(laplacian, 8, cache=tmp_path), solve_spectrum(laplacian, 8))
+
+
+def test_a_spectrum_under_the_name_of_another_is_not_believed(tmp_path, laplacian):
+    plain = solve_spectrum(laplacian, 20, cache=tmp_path)
+    (path,) = tmp_path.iterdir()
+    other = tmp_path / "other"
+    solve_spectrum(cotangent_laplacian(icosphere(1)), 20, cache=other)
+    (copied,) = other.iterdir()
+    path.write_bytes(copied.read_bytes())
+    with pytest.warns(UserWarning, match="must hold the spectrum of the key"):
+        require_same(solve_spectrum(laplacian, 20, cache=tmp_path), plain)
+
+
+@pytest.mark.parametrize("entry", ["a folder", "a pipe"])
+def test_an_entry_that_is_no_file_neither_hangs_nor_loses_the_spectrum(tmp_path, laplacian, entry):
+    plain = solve_spectrum(laplacian, 20, cache=tmp_path)
+    (path,) = tmp_path.iterdir()
+    path.unlink()
+    path.mkdir() if entry == "a folder" else os.mkfifo(path)
+    with pytest.warns(UserWarning, match="cache") as said:
+        require_same(solve_spectrum(laplacian, 20, cache=tmp_path), plain)
+    first, second = (str(warning.message) for warning in said)
+    assert f"cannot be used and is computed again: {path} must be a regular file; it is {entry}" in first
+    assert "was computed and could not be kept in the cache" in second
+
+
+def test_a_full_disk_does_not_lose_the_spectrum(tmp_path, laplacian, monkeypatch):
+    plain = solve_spectrum(laplacian, 20)
+
+    def fill(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(archive.np, "savez", fill)
+    with pytest.warns(UserWarning, match="could not be kept in the cache: .*No space left on device"):
+        require_same(solve_spectrum(laplacian, 20, cache=tmp_path), plain)
+    assert not list(tmp_path.iterdir())

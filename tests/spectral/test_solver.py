@@ -52,7 +52,7 @@ def test_no_eigenvalue_is_missing_or_extra(always_lanczos, mesh, mass):
     assert require_lowest(cotangent_laplacian(mesh, mass), [1, 2, 4, 7, 12, 15]) == 6
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_two_hundred_solves_miss_nothing(always_lanczos):
     done = 0
     for mass in ("lumped", "consistent", "averaged"):

@@ -33,6 +33,7 @@ def test_no_eigenvalue_moves_further_than_weyl_and_ours_allow(seed, delta, t):
     assert bound.proven <= es.theorem_rate("lipschitz", 2).at(delta, t) * (1 + 1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("dim", [1, 2, 3])
 def test_dense_samples_move_by_no_more_than_their_integrals(dim):
     """Points of a flat torus of volume 1 (a grid in R^2m) that all move outward and inward by turns."""

@@ -102,6 +102,7 @@ def neighbours(graph, rows):
     return np.unique(np.concatenate([graph.indices[graph.indptr[row] : graph.indptr[row + 1]] for row in rows]))
 
 
+@pytest.mark.long
 @some
 @given(seeds, st.integers(1, 40), st.integers(1, 40), st.floats(0, 0.3))
 def test_as_many_are_matched_as_by_scipy_and_the_blocked_prove_it(seed, n, k, share):

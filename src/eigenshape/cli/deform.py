@@ -11,7 +11,6 @@ from eigenshape.cli.console import (
     JsonOption,
     MeshArgument,
     RepairOption,
-    err,
     load_mesh,
     print_json,
     print_table,
@@ -19,6 +18,7 @@ from eigenshape.cli.console import (
     said,
     save_picture,
 )
+from eigenshape.cli.outputs import require_mesh_path, save_like
 from eigenshape.cli.parts import require_paths
 from eigenshape.cli.regions import REGIONS, told_region, told_rotation, told_translation
 from eigenshape.deformation.binding import bind
@@ -28,53 +28,88 @@ from eigenshape.deformation.edits import Edit, Move
 from eigenshape.deformation.handles import Handle
 from eigenshape.deformation.rig import EigenRig, rig_shape
 from eigenshape.deformation.session import replay
-from eigenshape.figures.camera import three_quarter_view
 from eigenshape.figures.poses import figure_poses
 from eigenshape.geometry.crossings import self_intersections
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.edits import read_edits, write_edits
-from eigenshape.io.mesh_files import write_mesh
 
 
 def deform(
     mesh: MeshArgument,
     *,
-    region: Annotated[str, typer.Option(help=f"What moves: {REGIONS}")] = "",
+    region: Annotated[str, typer.Option(help=f"Which part to turn or move: {REGIONS}")] = "",
     rotate: Annotated[
-        str, typer.Option(metavar="WORDS", help="Turn it: 'x by 90' (degrees), '0,1,1 by 30', 'z by 45 @ 0,0.1,0'.")
+        str,
+        typer.Option(
+            metavar="WORDS",
+            help=(
+                "Turn the region about an axis, in degrees: 'x by 90', '0,1,1 by 30', or 'z by "
+                "45 @ 0,0.1,0' about a point."
+            ),
+        ),
     ] = "",
-    move: Annotated[str, typer.Option(metavar="X,Y,Z", help="Move it by a vector.")] = "",
-    fixed: Annotated[str, typer.Option(help="What stays, in the same words; without it, all else is held.")] = "",
+    move: Annotated[str, typer.Option(metavar="X,Y,Z", help="Move the region by this vector.")] = "",
+    fixed: Annotated[
+        str,
+        typer.Option(
+            help="Which part must not move, in the words of --region; by default all that is not in the region."
+        ),
+    ] = "",
     mode: Annotated[
         str,
         typer.Option(
-            help="graded: as rigid as can be; uncrossed: stiffer where faces would cross; thesis: as printed there."
+            help=(
+                "graded keeps lengths best; uncrossed is stiffer where faces would cross; "
+                "thesis is the method as published."
+            )
         ),
     ] = "graded",
     n_modes: Annotated[
-        int | None, typer.Option("-n", "--n-modes", help="Few bend widely, many sharply; 8, 50 or 300 by default.")
+        int | None,
+        typer.Option(
+            "-n",
+            "--n-modes",
+            help=(
+                "Number of eigenfunctions: few bend over a wide zone, many bend sharply. By "
+                "default 8, 50 or 300, by the mode."
+            ),
+        ),
     ] = None,
-    edits: Annotated[Path | None, typer.Option(help="Do the edits of this JSON file first.")] = None,
-    save_edits: Annotated[Path | None, typer.Option(help="Write all edits to this JSON file.")] = None,
+    edits: Annotated[Path | None, typer.Option(help="Apply the edits of this JSON file first.")] = None,
+    carry: Annotated[
+        Path | None,
+        typer.Option(
+            help="Mesh on which --edits were made, if it is another: their regions go to the nearest vertices."
+        ),
+    ] = None,
+    save_edits: Annotated[Path | None, typer.Option(help="Write all edits to this JSON file, for --edits.")] = None,
     repair: RepairOption = "",
-    output: Annotated[Path | None, typer.Option("-o", "--output", "--out", help="Write the bent mesh.")] = None,
-    picture: Annotated[Path | None, typer.Option(help="Draw it before and after (PNG, SVG or PDF).")] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", "--out", help="Write the bent mesh (PLY, OBJ, OFF, STL or GLB).")
+    ] = None,
+    picture: Annotated[Path | None, typer.Option(help="Draw the mesh before and after (PNG, SVG or PDF).")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Bend, twist or stretch a mesh: a region is turned or moved, and the rest follows smoothly.
 
     For instance: eigenshape deform scan.ply --region 'y>60%' --rotate 'x by 30' -o bent.ply --picture bent.png
     """
-    require_paths(picture, output)
+    require_paths(picture, None)
+    require_mesh_path(output)
     handles = [name for name in (rotate, move) if name]
     if bool(region) != (len(handles) == 1) or not (region or edits):
         raise InvalidParameterError("Give --region with either --rotate or --move, or --edits, or all of them.")
+    if carry and not edits:
+        raise InvalidParameterError(
+            f"--carry names the mesh that --edits were made on; it is {carry}, without --edits."
+        )
     checked = require_mode(mode)
     surface = load_mesh(mesh, repair)
     with progress_bar("modes") as progress:
         rig = rig_shape(surface, progress=progress)
-        done = list(_kept(edits, surface)) if edits else []
-        session = replay(rig, done)
+        source = load_mesh(carry, repair) if carry else None
+        done = _read_edits(edits, source or surface) if edits else []
+        session = replay(rig, done, source=source)
         if region:
             chosen = told_region(region, session.mesh, progress)
             stays = told_region(fixed, session.mesh, progress) if fixed else None
@@ -82,23 +117,21 @@ def deform(
             session.apply(Edit((Move(chosen, handle),), stays, n_modes, checked))
     _report(session.mesh, surface, session.edits, rig, as_json=as_json)
     if output:
-        write_mesh(session.mesh, output)
-        said(output)
+        save_like(mesh, surface, output, session.mesh.vertices)
     if save_edits:
         write_edits(session.edits, surface, save_edits)
         said(save_edits)
     if picture:
         moved = np.linalg.norm(session.mesh.vertices - surface.vertices, axis=1)
         shares = _last_shares(rig, session.edits) if len(session.edits) == 1 else moved / max(moved.max(), 1e-300)
-        camera = three_quarter_view(surface, up="auto")
-        save_picture(figure_poses({"before": surface, "after": session.mesh}, shares, camera=camera), picture)
+        save_picture(figure_poses({"before": surface, "after": session.mesh}, shares), picture)
 
 
-def _kept(path: Path, surface: TriangleMesh) -> list[Edit]:
-    n_vertices, edits = read_edits(path)
-    if n_vertices != surface.n_vertices:
-        err.print(f"[yellow]note:[/] {path} was made on {n_vertices} vertices; this mesh has {surface.n_vertices}")
-    return edits
+def _read_edits(path: Path, mesh: TriangleMesh) -> list[Edit]:
+    try:
+        return read_edits(path, mesh)
+    except InvalidParameterError as error:
+        raise InvalidParameterError(f"{path}: {error} Here --carry PATH names it.") from error
 
 
 def _last_shares(rig: EigenRig, edits: tuple[Edit, ...]) -> np.ndarray:

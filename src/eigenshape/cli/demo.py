@@ -8,14 +8,15 @@ import numpy as np
 import typer
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import out, progress_bar, save_picture
-from eigenshape.cli.index import WorkersOption, describe_all, describe_file, open_or_create
+from eigenshape.cli.console import out, progress_bar, save_picture, shown
+from eigenshape.cli.index import WorkersOption, describe_all, describe_file
 from eigenshape.cli.presets import PATCHES, recipe_to_fill
 from eigenshape.cli.query import print_matches
 from eigenshape.cli.sheets import CAPTION, asked, contact_sheet
 from eigenshape.geometry.creatures import CREATURES, make_creature
 from eigenshape.geometry.sampling import partial_scan
 from eigenshape.io.mesh_files import write_mesh
+from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.retrieval.workers import Item, Workers
 
 FOLDER = Path("eigenshape-demo")
@@ -34,15 +35,15 @@ Read next:
 
 def demo(
     *,
-    folder: Annotated[Path, typer.Option("--out", help="Folder for meshes, index and pictures.")] = FOLDER,
+    folder: Annotated[Path, typer.Option("--out", help="Folder to write meshes, index and pictures to.")] = FOLDER,
     kind: Annotated[str, typer.Option(help=f"Creature to scan: {', '.join(CREATURES)}.")] = "biped",
     workers: WorkersOption = 2,
 ) -> None:
-    """Make creatures, index them, then find the kin of a partial scan in a pose that the index never saw."""
+    """Try everything: make creatures, index them, scan one from one side in a new pose, and find its kind."""
     if kind not in CREATURES:
         raise InvalidParameterError(f"--kind takes {', '.join(CREATURES)}; it was given {kind!r}.")
     items = _make(folder / "creatures")
-    shelf = open_or_create(folder / "index")
+    shelf = ShapeIndex.open_or_create(folder / "index")
     recipe = recipe_to_fill(shelf, PATCHES, items, (), Workers(workers))
     describe = partial(describe_file, recipe=recipe, repairs=(), n_views=None)
     report = describe_all(shelf, items, describe, recipe, Workers(workers))
@@ -51,7 +52,7 @@ def demo(
     scan_path = folder / "scan.ply"
     scan = partial_scan(make_creature(kind, UNSEEN, n_vertices=N_VERTICES), np.array([0.9, 0.25, 0.45])).mesh
     write_mesh(scan, scan_path)
-    out.print(f"scanned a {kind} from one side, in a pose that the index has not seen: {scan_path}")
+    out.print(f"scanned a {kind} from one side, in a pose that the index has not seen: {shown(scan_path)}")
     shape = asked(scan, recipe)
     matches = shelf.query(shape.descriptor, n_matches=6)
     print_matches(matches)
@@ -59,7 +60,7 @@ def demo(
     sheet = folder / "sheet.png"
     caption = f"A partial scan of a {kind} in a new pose, and the most similar shapes: {CAPTION}"
     save_picture(contact_sheet(shape, "partial scan", matches, caption=caption), sheet)
-    out.print(NEXT.format(scan=scan_path))
+    out.print(NEXT.format(scan=shown(scan_path)))
 
 
 def _make(folder: Path) -> list[Item]:
@@ -75,5 +76,5 @@ def _make(folder: Path) -> list[Item]:
             if not item.path.exists():
                 item.path.parent.mkdir(parents=True, exist_ok=True)
                 write_mesh(make_creature(item.label or "", done % POSES, n_vertices=N_VERTICES), item.path)
-    out.print(f"made {len(CREATURES)} kinds of creatures in {POSES} poses each: {folder}")
+    out.print(f"made {len(CREATURES)} kinds of creatures in {POSES} poses each: {shown(folder)}")
     return items

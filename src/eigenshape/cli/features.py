@@ -40,26 +40,38 @@ COLUMNS = {
 def features(
     mesh: MeshArgument,
     *,
-    n_regions: Annotated[int, typer.Option("-n", "--n-regions", help="Number of regions at most.")] = 15,
+    n_regions: Annotated[int, typer.Option("-n", "--n-regions", help="Largest number of regions.")] = 15,
     persistence: Annotated[
-        float | None, typer.Option(help="Keep what persists at least so long, in units of heat; replaces the number.")
+        float | None,
+        typer.Option(
+            help="Keep the features of at least this persistence, in units of heat, instead of a number of them."
+        ),
     ] = None,
     largest_gap: Annotated[
-        bool, typer.Option("--largest-gap", help="Cut where persistence falls most; replaces the number.")
+        bool,
+        typer.Option(
+            "--largest-gap",
+            help="Keep the features before the largest drop of persistence, instead of a number of them.",
+        ),
     ] = False,
     preset_name: HeatPresetOption = SCALE_FREE.name,
     accuracy: Annotated[
         float | None,
-        typer.Option(help="Take approximate heat, .0001 (slow) to .1; beyond 100,000 vertices .01 unless given."),
+        typer.Option(
+            help=(
+                "Compute heat approximately, to this relative error: 0.0001 (slow) to 0.1. By "
+                "default exactly up to 100,000 vertices, and to 0.01 beyond."
+            )
+        ),
     ] = None,
     repair: RepairOption = "",
     picture: Annotated[Path | None, typer.Option(help="Draw parts and feature points (PNG, SVG or PDF).")] = None,
-    ply: Annotated[Path | None, typer.Option(help="Write the mesh with the heat as colours (PLY).")] = None,
+    ply: Annotated[Path | None, typer.Option(help="Write the mesh, coloured by its heat (PLY).")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Find the feature points of a mesh and the parts around them, most persistent first.
 
-    Beyond 100,000 vertices, or with --accuracy, heat is approximate, and its error is said.
+    Beyond 100,000 vertices, or with --accuracy, heat is approximate, and its error is printed.
     """
     recipe = heat_preset(preset_name)
     require_paths(picture, ply)
@@ -69,14 +81,19 @@ def features(
     error = shape.error if isinstance(shape, DescribedLargeShape) else None
     if error is not None:
         err.print(f"{surface.n_vertices:,} vertices: their heat is approximate, off by about {100 * error:.2g} %")
-    by_number = n_regions if persistence is None and not largest_gap else None
+    n_fragments = int(np.isin(shape.tree.maxima, shape.fragments).sum())
+    by_number = n_regions + n_fragments if persistence is None and not largest_gap else None
     parts = segment(shape.tree, n_regions=by_number, persistence=persistence, largest_gap=largest_gap)
+    if n_fragments:
+        err.print(f"{n_fragments} fragments with less than 1 % of the area each are one region each, without a feature")
     rows = [row | {"heat": float(parts.features.values[i])} for i, row in enumerate(part_rows(shape.mesh, parts))]
+    loose = set(shape.fragments.tolist())
     if as_json:
         found = {"path": str(mesh), "recipe": recipe.name, "features": rows, "heat_error": error}
         print_json(found | {"face_labels": parts.labels})
     else:
-        print_rows("Feature points", COLUMNS, [row | {"feature": i} for i, row in enumerate(rows)])
+        features_alone = [row | {"feature": i} for i, row in enumerate(rows) if row["vertex"] not in loose]
+        print_rows("Feature points", COLUMNS, features_alone)
     if picture:
         save_picture(figure_segments(surface, parts.labels, parts.features.vertices), picture)
     if ply:

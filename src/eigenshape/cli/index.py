@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.markup import escape
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import (
@@ -18,28 +17,31 @@ from eigenshape.cli.console import (
     progress_bar,
     read_repaired,
     repair_names,
+    shown,
     told_by,
 )
 from eigenshape.cli.presets import PATCHES, PresetOption, recipe_to_fill, require_preset
-from eigenshape.io.mesh_files import FORMATS
+from eigenshape.io.parsing import MESH_FORMATS
 from eigenshape.retrieval.batch import BatchReport, Describe, build_index
 from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe_to_keep
-from eigenshape.retrieval.store import DATABASE
 from eigenshape.retrieval.workers import Item, Workers
 
 SOME_FAILED = 3
 
-DbOption = Annotated[Path, typer.Option("--db", help="Folder of the index.")]
+DbOption = Annotated[Path, typer.Option("--db", help="Folder of the index; made if it is not there.")]
 ViewsOption = Annotated[
     int | None,
     typer.Option(
         min=0,
         max=50,
-        help="Sides from which closed shapes are described too, for partial scans; by default 6 by patches, 4 by heat.",
+        help=(
+            "From how many sides closed shapes are also described, so that partial scans "
+            "find them. By default 6 with patches, 4 with the other presets."
+        ),
     ),
 ]
-WorkersOption = Annotated[int, typer.Option(min=1, help="Processes that describe shapes side by side.")]
+WorkersOption = Annotated[int, typer.Option(min=1, help="Number of processes that describe shapes at the same time.")]
 
 
 def index(
@@ -50,17 +52,17 @@ def index(
     views: ViewsOption = None,
     repair: RepairOption = "",
     workers: WorkersOption = 2,
-    timeout: Annotated[float, typer.Option(min=1, help="Seconds after which a file is given up.")] = 300.0,
+    timeout: Annotated[float, typer.Option(min=1, help="Seconds after which a file is given up and named.")] = 300.0,
     as_json: JsonOption = False,
 ) -> None:
-    """Describe meshes and add them to an index; files that cannot be taken are named and the others go on.
+    """Describe meshes and add them to an index; a file that fails is named, and the others are still added.
 
-    A shape's name is its path below the given folder, its class the folder that it lies in. After Ctrl-C or a crash
-    the same command does what is left.
+    A shape is named by its path below the given folder; its class is the folder that holds it. After Ctrl-C or a
+    crash, the same command continues where it stopped.
     """
     require_preset(preset_name)
     items, repairs, processes = _items(sources), repair_names(repair), Workers(workers, timeout)
-    shelf = open_or_create(db)
+    shelf = ShapeIndex.open_or_create(db)
     recipe = recipe_to_fill(shelf, preset_name, items, repairs, processes)
     describe = partial(describe_file, recipe=recipe, repairs=repairs, n_views=views)
     report = describe_all(shelf, items, describe, recipe, processes)
@@ -70,11 +72,6 @@ def index(
         _print(shelf, report)
     if report.failed:
         raise typer.Exit(SOME_FAILED)
-
-
-def open_or_create(folder: Path) -> ShapeIndex:
-    """Open an index, or make one where there is none yet."""
-    return ShapeIndex.open(folder) if (folder / DATABASE).exists() else ShapeIndex.create(folder)
 
 
 def describe_all(
@@ -97,7 +94,9 @@ def _items(sources: Sequence[Path]) -> list[Item]:
     if double is not None:
         raise InvalidParameterError(f"Names of shapes must differ; {double!r} comes twice. Give one common folder.")
     if not items:
-        raise InvalidParameterError(f"There must be meshes ({', '.join(FORMATS)}) to index; {sources[0]} holds none.")
+        raise InvalidParameterError(
+            f"There must be meshes ({', '.join(MESH_FORMATS)}) to index; {sources[0]} holds none."
+        )
     return items
 
 
@@ -106,7 +105,7 @@ def _items_of(source: Path) -> Iterator[Item]:
         yield Item(source.stem, source)
         return
     for path in sorted(source.rglob("*")):
-        if path.suffix.lower() in FORMATS:
+        if path.suffix.lower() in MESH_FORMATS:
             below = path.relative_to(source)
             yield Item(str(below.with_suffix("")), path, below.parent.name or None)
 
@@ -117,4 +116,4 @@ def _print(shelf: ShapeIndex, report: BatchReport) -> None:
         f"the index holds {len(shelf)} shapes."
     )
     for name, reason in report.failed:
-        out.print(f"  [yellow]{escape(name)}[/]: {escape(reason)}")
+        out.print(f"  [yellow]{shown(name)}[/]: {shown(reason)}")

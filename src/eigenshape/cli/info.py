@@ -3,10 +3,10 @@
 from typing import Any
 
 import numpy as np
-from rich.markup import escape
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape.cli.console import (
+    CellsOption,
     DimOption,
     DropMissingOption,
     JsonOption,
@@ -15,10 +15,12 @@ from eigenshape.cli.console import (
     load_shape,
     out,
     print_json,
+    shown,
 )
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.measure import bounding_box, edge_lengths, enclosed_volume, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.repair import drop_copies, suggest_repairs
 from eigenshape.geometry.simplices import degenerate_simplices, mean_side_length, simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import (
@@ -29,6 +31,8 @@ from eigenshape.geometry.topology import (
     is_closed,
     non_manifold_edges,
     non_manifold_vertices,
+    repeated_simplices,
+    seams,
     unreferenced_vertices,
     vertex_components,
 )
@@ -43,14 +47,15 @@ def info(
     repair: RepairOption = "",
     dim: DimOption = 2,
     drop_missing: DropMissingOption = False,
+    cells: CellsOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show size, topology and health of a shape, and which repairs a mesh would need."""
-    facts = shape_facts(load_shape(shape, repair, dim, drop_missing=drop_missing))
+    """Show the size, topology and faults of a shape, and which repairs would help."""
+    facts = shape_facts(load_shape(shape, repair, dim, drop_missing=drop_missing, cells=cells))
     if as_json:
         print_json({"path": str(shape), **facts})
         return
-    out.print(f"[bold]{escape(str(shape))}[/]")
+    out.print(f"[bold]{shown(shape)}[/]")
     for name, value in facts.items():
         out.print(f"  {name.replace('_', ' '):<24}{_shown(value)}")
 
@@ -70,10 +75,11 @@ def cloud_facts(cloud: PointCloud) -> dict[str, Any]:
         "points": cloud.n_points,
         "dimension": cloud.dim,
         "coordinates": cloud.points.shape[1],
-        "coinciding_points": cloud.n_points - len(np.unique(cloud.points + 0.0, axis=0)),
+        "coinciding_points": cloud.n_points - drop_copies(cloud).cloud.n_points,
         "mean_near_distance": _near_distance(cloud),
         "box_low": low.tolist(),
         "box_high": high.tolist(),
+        "repairs_to_try": list(suggest_repairs(cloud)),
     }
 
 
@@ -98,9 +104,11 @@ def simplicial_facts(mesh: SimplicialMesh) -> dict[str, Any]:
         MEASURES.get(mesh.dim, "volume"): float(simplex_volumes(mesh).sum()),
         "mean_side_length": mean_side_length(mesh),
         "without_volume": len(degenerate_simplices(mesh)),
+        "duplicates": len(repeated_simplices(mesh)),
         "loose_points": len(unreferenced_vertices(mesh)),
         "box_low": low.tolist(),
         "box_high": high.tolist(),
+        "repairs_to_try": list(suggest_repairs(mesh)),
     }
 
 
@@ -108,7 +116,7 @@ def mesh_facts(mesh: TriangleMesh) -> dict[str, Any]:
     """Gather what there is to say about a mesh, in the mesh's own length unit."""
     n_components, _ = vertex_components(mesh)
     low, high = bounding_box(mesh)
-    closed = is_closed(mesh)
+    closed, n_turned = is_closed(mesh), len(inconsistent_edges(mesh))
     facts = {
         "vertices": mesh.n_vertices,
         "faces": mesh.n_faces,
@@ -117,33 +125,22 @@ def mesh_facts(mesh: TriangleMesh) -> dict[str, Any]:
         "closed": closed,
         "euler_characteristic": euler_characteristic(mesh),
         "area": surface_area(mesh),
-        "enclosed_volume": enclosed_volume(mesh) if closed else None,
+        "enclosed_volume": enclosed_volume(mesh) if closed and not n_turned else None,
         "mean_edge_length": float(edge_lengths(mesh).mean()),
         "box_low": low.tolist(),
         "box_high": high.tolist(),
     }
-    return facts | _faults(mesh)
-
-
-def _faults(mesh: TriangleMesh) -> dict[str, Any]:
-    n_distinct = len(np.unique(np.sort(mesh.faces, axis=1), axis=0))
-    n_places = len(np.unique(mesh.vertices + 0.0, axis=0))
     faults = {
         "faces_without_area": len(degenerate_simplices(mesh)),
-        "duplicate_faces": mesh.n_faces - n_distinct,
+        "duplicate_faces": len(repeated_simplices(mesh)),
         "loose_vertices": len(unreferenced_vertices(mesh)),
-        "coinciding_vertices": mesh.n_vertices - n_places,
+        "coinciding_vertices": mesh.n_vertices - len(np.unique(mesh.vertices + 0.0, axis=0)),
+        "edges_on_seams": len(seams(mesh)),
         "non_manifold_edges": len(non_manifold_edges(mesh)),
         "non_manifold_vertices": len(non_manifold_vertices(mesh)),
-        "turned_over_edges": len(inconsistent_edges(mesh)),
+        "turned_over_edges": n_turned,
     }
-    cures = {
-        "coinciding_vertices": "weld",
-        "faces_without_area": "drop_degenerate",
-        "duplicate_faces": "drop_duplicate_faces",
-        "loose_vertices": "drop_unreferenced",
-    }
-    return faults | {"repairs_to_try": [cure for fault, cure in cures.items() if faults[fault]]}
+    return facts | faults | {"repairs_to_try": list(suggest_repairs(mesh))}
 
 
 def _shown(value: Any) -> str:

@@ -37,28 +37,34 @@ COLUMNS = {
 def label(
     mesh: MeshArgument,
     *,
-    like: Annotated[Path, typer.Option("--like", help="Mesh whose faces have labels.")],
+    like: Annotated[Path, typer.Option("--like", help="Mesh whose faces are labelled.")],
     labels: Annotated[
         Path,
         typer.Option(
-            "--labels", help="Those labels: one whole number a line and face, or .json from `segment --json`."
+            "--labels",
+            help=(
+                "Labels of the faces of --like: a text file with one whole number a line, the "
+                "JSON of `segment --json`, or the PLY of `segment -o`."
+            ),
         ),
     ],
     n_parts: Annotated[
         int | None,
-        typer.Option("-n", "--n-parts", help="Parts to cut both into, at most; by default as many as found."),
+        typer.Option(
+            "-n", "--n-parts", help="Largest number of parts to cut each mesh into; by default as many as are found."
+        ),
     ] = None,
     repair: RepairOption = "",
-    save: Annotated[Path | None, typer.Option(help="Write the labels, one a line and face.")] = None,
+    save: Annotated[Path | None, typer.Option(help="Write the labels, one a line for each face.")] = None,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Write the mesh with the labels as colours (PLY).")
+        Path | None, typer.Option("-o", "--output", help="Write the mesh with its labels, also as colors (PLY).")
     ] = None,
     picture: Annotated[Path | None, typer.Option(help="Draw both meshes side by side (PNG, SVG or PDF).")] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Give the parts of a mesh the labels of another's: label one horse, get the camel.
+    """Copy the labels of one mesh to the matching parts of another: label a horse, and get a labelled camel.
 
-    Left and right cannot be told. Repairs are done to the mesh that gets the labels.
+    Left and right cannot be told apart. Repairs are applied to the mesh that gets the labels.
     """
     require_paths(picture, output, save)
     given = read_labels(labels)
@@ -74,7 +80,8 @@ def label(
         write_labels(found.labels, save)
         said(save)
     if output:
-        save_colors(target, part_colors(target, np.searchsorted(np.unique(given), found.labels)), output)
+        colors = part_colors(target, np.searchsorted(np.unique(given), found.labels))
+        save_colors(target, colors, output, found.labels)
     if picture:
         save_picture(figure_label_transfer(source, target, found), picture)
 

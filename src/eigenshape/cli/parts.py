@@ -5,10 +5,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Int, UInt8
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import print_table, said
+from eigenshape.cli.outputs import require_mesh_path
 from eigenshape.features.segmentation import Segmentation
 from eigenshape.figures.save import require_picture_path
 from eigenshape.geometry.measure import face_areas
@@ -31,15 +32,19 @@ def require_paths(picture: Path | None, colored: Path | None, labels: Path | Non
         require_picture_path(picture)
     if colored and colored.suffix.lower() != ".ply":
         raise InvalidParameterError(f"Colours go to a .ply file; {colored} ends in {colored.suffix!r}.")
-    if colored and not colored.absolute().parent.is_dir():
-        raise InvalidParameterError(f"A mesh needs a folder to lie in; {colored.absolute().parent} is not there.")
+    require_mesh_path(colored)
     if labels and not labels.absolute().parent.is_dir():
         raise InvalidParameterError(f"Labels need a folder to lie in; {labels.absolute().parent} is not there.")
 
 
-def save_colors(mesh: TriangleMesh, colors: UInt8[np.ndarray, "n 3"], path: Path) -> None:
-    """Write a mesh in colours, and tell so."""
-    write_mesh(mesh, path, colors=colors)
+def save_colors(
+    mesh: TriangleMesh,
+    colors: UInt8[np.ndarray, "n 3"],
+    path: Path,
+    face_labels: Int[np.ndarray, " f"] | None = None,
+) -> None:
+    """Write a mesh with its colors, and its labels if there are any, and say so on stderr."""
+    write_mesh(mesh, path, colors=colors, face_labels=face_labels)
     said(path)
 
 

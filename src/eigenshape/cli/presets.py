@@ -24,12 +24,17 @@ EVERY = (PATCHES, *PRESETS)
 
 HeatPresetOption = Annotated[str, typer.Option("--preset", help=f"How shapes are described: {' or '.join(PRESETS)}.")]
 PresetOption = Annotated[
-    str, typer.Option("--preset", help=f"How shapes are described: {', '.join(EVERY)}; patches find parts best.")
+    str,
+    typer.Option("--preset", help=f"How shapes are described: {', '.join(EVERY)}; patches are best for partial scans."),
 ]
 HeldPresetOption = Annotated[
     str | None,
     typer.Option(
-        "--preset", help=f"{', '.join(EVERY)}; unless given, that of the index, patches where it has several."
+        "--preset",
+        help=(
+            f"Which descriptions to compare: {', '.join(EVERY)}. By default the index's "
+            "own, or patches if it has several."
+        ),
     ),
 ]
 
@@ -63,6 +68,7 @@ def recipe_to_fill(
         )
         held = PatchRecipe(book)
         shelf.keep_recipe(held)
+        held = _patch_recipe(shelf) or held  # of several first writers, the words of the first serve all
     return held
 
 

@@ -20,19 +20,23 @@ from eigenshape.cli.console import (
 )
 from eigenshape.cli.presets import HeldPresetOption, recipe_to_ask, require_preset
 from eigenshape.cli.sheets import CAPTION, Asked, asked, contact_sheet
+from eigenshape.figures.figure import literal
 from eigenshape.figures.save import require_picture_path
 from eigenshape.retrieval.index import Match, ShapeIndex
 
 
 def query(
     db: Annotated[Path, typer.Argument(help="Folder of the index.")],
-    scan: Annotated[Path, typer.Argument(help="Mesh to look for: whole, or a part of a shape, in any pose.")],
+    scan: Annotated[Path, typer.Argument(help="Mesh file to search for: a whole shape or a part of one, in any pose.")],
     *,
-    n_matches: Annotated[int, typer.Option("-n", "--n-matches", min=1, help="Number of answers.")] = 5,
+    n_matches: Annotated[int, typer.Option("-n", "--n-matches", min=1, help="Number of matches to show.")] = 5,
     preset_name: HeldPresetOption = None,
     repair: RepairOption = "",
     sheet: Annotated[
-        Path | None, typer.Option(help="Draw the scan beside its matches, corresponding parts in one colour.")
+        Path | None,
+        typer.Option(
+            help="Draw the scan beside its matches, with corresponding parts in one colour (PNG, SVG or PDF)."
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -57,8 +61,10 @@ def query(
         print_matches(matches)
         out.print(f"described in {described - began:.2f} s, answered in {1000 * (answered - described):.0f} ms")
     if sheet:
-        caption = f"{scan.name} and the {len(matches)} most similar shapes in {db.name}: {CAPTION}"
-        save_picture(contact_sheet(shape, scan.stem, matches, repairs=repair_names(repair), caption=caption), sheet)
+        names = literal(scan.name), literal(db.name)
+        caption = f"{names[0]} and the {len(matches)} most similar shapes in {names[1]}: {CAPTION}"
+        title, repairs = literal(scan.stem), repair_names(repair)
+        save_picture(contact_sheet(shape, title, matches, repairs=repairs, caption=caption), sheet)
 
 
 def _facts(shape: Asked, match: Match) -> dict[str, Any]:

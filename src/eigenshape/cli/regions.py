@@ -17,9 +17,9 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.spectral.outcome import Progress
 
 REGIONS = (
-    "'y>0.5' or 'y>0.5, x<0' (a half-space or several; also in parts of the box: 'y>60%'); 'vertex 17 within 0.2' "
-    "(along the surface; 'within 10%' of the square root of the area); 'part 3' (as `eigenshape segment` numbers "
-    "them); or a file with one index of a vertex a line."
+    "'y>0.5' or 'y>0.5, x<0' (coordinates, or per cent of the bounding box: 'y>60%'); 'vertex 17 within 0.2' "
+    "(distance along the surface, or per cent of the square root of the area: 'within 10%'); 'part 3' (a number that "
+    "`eigenshape segment` prints); or a file with one vertex index a line."
 )
 CONDITION = re.compile(r"\s*([xyz])\s*([<>])\s*(-?[\d.]+(?:e-?\d+)?)\s*(%?)\s*")
 VERTEX = re.compile(r"\s*vertex\s+(\d+)\s+within\s+([\d.]+(?:e-?\d+)?)\s*(%?)\s*")

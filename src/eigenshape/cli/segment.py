@@ -45,22 +45,36 @@ def segment(
     method: Annotated[
         str,
         typer.Option(
-            help=f"{PARTS}: rooms between which heat flows badly; {', '.join(PRESETS)}: regions of that recipe's heat."
+            help=(
+                f"{PARTS} finds limbs, head and torso, where little heat flows from one to the "
+                f"next; {' and '.join(PRESETS)} cut around the maxima of heat, as `features` does."
+            )
         ),
     ] = PARTS,
-    n_regions: Annotated[int | None, typer.Option("-n", "--n-regions", help="Number of parts at most.")] = None,
+    n_regions: Annotated[int | None, typer.Option("-n", "--n-regions", help="Largest number of parts.")] = None,
     persistence: Annotated[
         float | None,
-        typer.Option(help=f"Keep what persists so long: a share, {PART_CONTRAST} by default; of a recipe, heat."),
+        typer.Option(
+            help=(
+                f"Keep parts of at least this persistence: from 0 to 1 for {PARTS}, where the "
+                f"default is {PART_CONTRAST}; otherwise in units of heat."
+            )
+        ),
     ] = None,
-    largest_gap: Annotated[bool, typer.Option("--largest-gap", help="Cut where persistence falls most.")] = False,
+    largest_gap: Annotated[
+        bool, typer.Option("--largest-gap", help="Keep the parts before the largest drop of persistence.")
+    ] = False,
     smooth: Annotated[
         bool | None,
-        typer.Option("--smooth/--no-smooth", help=f"Move boundaries to the least cut; by default for {PARTS}."),
+        typer.Option(
+            "--smooth/--no-smooth",
+            help=f"Move the boundaries of parts to short cuts along creases; by default for {PARTS} only.",
+        ),
     ] = None,
     repair: RepairOption = "",
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Write the mesh with the parts as colours (PLY).")
+        Path | None,
+        typer.Option("-o", "--output", help="Write the mesh with its parts as colors and labels (PLY)."),
     ] = None,
     picture: Annotated[Path | None, typer.Option(help="Draw the parts (PNG, SVG or PDF).")] = None,
     as_json: JsonOption = False,
@@ -71,10 +85,10 @@ def segment(
     require_paths(picture, output)
     surface = load_mesh(mesh, repair)
     with progress_bar("parts") as progress:
-        tree = _tree(surface, method, progress)
+        tree, usual = _tree(surface, method, progress)
     rule = {"n_regions": n_regions, "persistence": persistence, "largest_gap": largest_gap}
     told = n_regions is not None or persistence is not None or largest_gap
-    parts = segmentation.segment(tree, **(rule if told else _usual(method)))
+    parts = segmentation.segment(tree, **(rule if told else usual))
     if smooth if smooth is not None else method == PARTS:
         parts = smooth_boundaries(facing_outward(surface), parts)
     rows = _rows(surface, tree, parts)
@@ -83,19 +97,18 @@ def segment(
     else:
         print_rows("Parts", COLUMNS, rows)
     if output:
-        save_colors(surface, part_colors(surface, parts.labels), output)
+        save_colors(surface, part_colors(surface, parts.labels), output, parts.labels)
     if picture:
         save_picture(figure_segments(surface, parts.labels, parts.features.vertices), picture)
 
 
-def _tree(surface: TriangleMesh, method: str, progress: Progress) -> Tree:
+def _tree(surface: TriangleMesh, method: str, progress: Progress) -> tuple[Tree, dict[str, Any]]:
+    """Return the tree of a method, and where it is cut unless told: fragments do not count among the regions."""
     if method == PARTS:
-        return find_parts(surface, progress=progress).tree
-    return describe_mesh(surface, PRESETS[method], progress=progress).tree
-
-
-def _usual(method: str) -> dict[str, Any]:
-    return {"persistence": PART_CONTRAST} if method == PARTS else {"n_regions": PRESETS[method].n_features}
+        return find_parts(surface, progress=progress).tree, {"persistence": PART_CONTRAST}
+    shape = describe_mesh(surface, PRESETS[method], progress=progress)
+    n_fragments = int(np.isin(shape.tree.maxima, shape.fragments).sum())
+    return shape.tree, {"n_regions": PRESETS[method].n_features + n_fragments}
 
 
 def _rows(surface: TriangleMesh, tree: Tree, parts: Segmentation) -> list[dict[str, Any]]:

@@ -8,8 +8,9 @@ import numpy as np
 from jaxtyping import Int
 from matplotlib.figure import Figure
 
-from eigenshape._errors import StoreError
-from eigenshape.cli.console import progress_bar, read_repaired
+from eigenshape._errors import EigenshapeError, StoreError
+from eigenshape.cli.console import err, progress_bar, read_repaired, shown
+from eigenshape.figures.figure import literal
 from eigenshape.figures.sheet import Panel, figure_contact_sheet
 from eigenshape.geometry.geodesic import geodesic_distances
 from eigenshape.geometry.measure import surface_area
@@ -66,7 +67,8 @@ def contact_sheet(
     """Draw a query beside its matches, read from their files.
 
     The parts of the query have colours of their own; a part of a match has the colour of the query's part that it
-    corresponds to, and is grey where there is none.
+    corresponds to, and is grey where there is none. A match whose file cannot be read is named on stderr, and its
+    place stays empty.
     """
     first = Panel(query.mesh, f"query: {title}", query.labels, query.descriptor.vertices[query.dots])
     with progress_bar("draw") as progress:
@@ -78,9 +80,13 @@ def contact_sheet(
 
 
 def _panel(query: Asked, match: Match, repairs: tuple[str, ...]) -> Panel:
-    if match.source is None:
-        raise StoreError(f"A match needs its file to be drawn; {match.name!r} was added without one.")
-    mesh = read_repaired(Path(match.source), repairs)
+    title = f"{literal(match.name)}\nscore {match.score:.4g}"
+    try:
+        mesh = _read_match(match, repairs)
+    except (EigenshapeError, OSError) as error:
+        err.print(f"[yellow]not drawn:[/] {shown(match.name)}: {shown(error)}")
+        nothing = np.zeros(0, dtype=np.int64)
+        return Panel(None, title, nothing, nothing)
     ours, theirs = match.correspondences.T
     recipe = query.descriptor.recipe
     if isinstance(recipe, Recipe):
@@ -91,13 +97,27 @@ def _panel(query: Asked, match: Match, repairs: tuple[str, ...]) -> Panel:
         reach = REACH * np.sqrt(surface_area(mesh) / len(match.vertices))
         labels = _cells(mesh, match.vertices[theirs], query.colors[ours], reach)
     marked = theirs[np.isin(ours, query.dots)]
-    return Panel(mesh, f"{match.name}\nscore {match.score:.4g}", labels, match.vertices[marked])
+    return Panel(mesh, title, labels, match.vertices[marked])
+
+
+def _read_match(match: Match, repairs: tuple[str, ...]) -> TriangleMesh:
+    if match.source is None:
+        raise StoreError("A match is drawn from its mesh file; it was added to the index without one.")
+    mesh = read_repaired(Path(match.source), repairs)
+    last = int(match.vertices.max(initial=-1))
+    if last >= mesh.n_vertices:
+        raise StoreError(
+            f"A match is drawn from the mesh that was indexed; that had a vertex {last}, and {match.source} now has "
+            f"{mesh.n_vertices} vertices. Give the same --repair as to `index`, or index the file again."
+        )
+    return mesh
 
 
 def _parts(mesh: TriangleMesh, recipe: Recipe, match: Match) -> Int[np.ndarray, " f"]:
-    """Find the parts of a match again, -1 where the view that matched does not see its surface."""
+    """Find the parts of a match again, -1 on fragments and where the view that matched does not see its surface."""
     if match.view == 0:
-        return describe_mesh(mesh, recipe).parts.labels
+        labels = describe_mesh(mesh, recipe).parts.labels
+        return np.where(labels < len(match.vertices), labels, -1)  # fragments, which come last, have no feature
     part, seen = described_view(mesh, recipe, match.view - 1)
     labels = np.full(mesh.n_faces, -1)
     labels[part.source_faces] = seen.parts.labels

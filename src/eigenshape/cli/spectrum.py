@@ -10,11 +10,13 @@ from jaxtyping import Int
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import (
+    CellsOption,
     DimOption,
     DropMissingOption,
     JsonOption,
     RepairOption,
     ShapeArgument,
+    err,
     load_shape,
     out,
     print_json,
@@ -54,46 +56,87 @@ def spectrum(
     shape: ShapeArgument,
     *,
     k: Annotated[
-        int | None, typer.Option("-k", help=f"Number of eigenpairs; {USUAL} where --below is not given.")
+        int | None,
+        typer.Option(
+            "-k",
+            help=f"Number of eigenpairs, the lowest ones; {USUAL}, or all if there are fewer, if --below is not given.",
+        ),
     ] = None,
-    below: Annotated[float | None, typer.Option(help="Instead of -k: all pairs below this, in 1/length².")] = None,
-    above: Annotated[float | None, typer.Option(help="With --below: all pairs from this on, in 1/length².")] = None,
+    below: Annotated[
+        float | None, typer.Option(help="Instead of -k: all eigenvalues below this value, in 1/length².")
+    ] = None,
+    above: Annotated[
+        float | None, typer.Option(help="With --below: only eigenvalues from this value on, in 1/length².")
+    ] = None,
     operator: Annotated[
         str | None,
         typer.Option(
-            "--operator", "-o", help=f"{', '.join(OPERATORS)}; by default cotangent on meshes, point-cloud on points."
+            "--operator",
+            "-o",
+            help=(
+                f"{', '.join(OPERATORS)} (see `eigenshape operators`). By default cotangent for "
+                "meshes, point-cloud for points."
+            ),
         ),
     ] = None,
     accuracy: Annotated[
         float | None,
-        typer.Option(help="Roughly but at once, without proof: errors of at most this share of the last, 1e-3 say."),
+        typer.Option(
+            help=(
+                "Solve fast and approximately, without proof: errors up to this share of the "
+                "largest eigenvalue, such as 1e-3."
+            )
+        ),
     ] = None,
-    device: Annotated[Device, typer.Option(help="Where --accuracy computes; gpu takes eigenshape[gpu].")] = "cpu",
-    boundary: Annotated[Condition, typer.Option(help="Condition on the boundary of a mesh.")] = "neumann",
+    device: Annotated[
+        Device, typer.Option(help="Where --accuracy computes; gpu needs `pip install eigenshape[gpu]`.")
+    ] = "cpu",
+    boundary: Annotated[
+        Condition, typer.Option(help="Boundary condition: neumann is free, dirichlet holds the boundary at 0.")
+    ] = "neumann",
     brackets: Annotated[
-        bool, typer.Option("--brackets", help="Bound each eigenvalue of the mesh itself from both sides.")
+        bool,
+        typer.Option(
+            "--brackets", help="Also compute guaranteed lower and upper bounds of the eigenvalues of the mesh itself."
+        ),
     ] = False,
     mass: Annotated[Mass | None, typer.Option(help="Mass matrix of the cotangent operator.")] = None,
-    t: Annotated[float | None, typer.Option(help="Heat time of a kernel, in length².")] = None,
-    h: Annotated[float | None, typer.Option(help="Width of a kernel, 2√t, in length.")] = None,
-    edge_factor: Annotated[float | None, typer.Option(help="Width of a kernel in mean edge lengths.")] = None,
-    correct: Annotated[Correction | None, typer.Option(help="Take a kernel's bias away.")] = None,
-    form: Annotated[Form | None, typer.Option(help="Mass of a kernel's points.")] = None,
-    distance: Annotated[Distance | None, typer.Option(help="Distance in the kernel of the mesh operator.")] = None,
-    cutoff: Annotated[float | None, typer.Option(help="Where a kernel is cut off, in widths.")] = None,
-    mollify: Annotated[float | None, typer.Option(help="Mollification of the robust operator.")] = None,
+    t: Annotated[float | None, typer.Option(help="Heat time of a kernel operator, in length².")] = None,
+    h: Annotated[float | None, typer.Option(help="Instead of --t: width of the kernel, 2√t, in length.")] = None,
+    edge_factor: Annotated[
+        float | None, typer.Option(help="Instead of --t: width of the kernel in mean edge lengths.")
+    ] = None,
+    correct: Annotated[Correction | None, typer.Option(help="Correct the bias of a kernel operator.")] = None,
+    form: Annotated[
+        Form | None, typer.Option(help="Mass matrix of a kernel operator; random-walk copes with noise.")
+    ] = None,
+    distance: Annotated[
+        Distance | None, typer.Option(help="Distance that the kernel of the mesh operator uses.")
+    ] = None,
+    cutoff: Annotated[float | None, typer.Option(help="Distance at which a kernel is cut off, in widths.")] = None,
+    mollify: Annotated[
+        float | None,
+        typer.Option(
+            help="Smallest height of triangles that the robust operator sees, in mean edge lengths; 1e-5 by default."
+        ),
+    ] = None,
     dim: DimOption = 2,
     drop_missing: DropMissingOption = False,
+    cells: CellsOption = None,
     repair: RepairOption = "",
     plot: Annotated[Path | None, typer.Option(help="Draw the eigenvalues (PNG, SVG or PDF).")] = None,
     picture: Annotated[
         Path | None, typer.Option(help="Draw the first eigenfunctions with their nodal lines (PNG, SVG or PDF).")
     ] = None,
     save: Annotated[
-        Path | None, typer.Option(help="Write the spectrum with its proof (.npz; Spectrum.load reads it).")
+        Path | None,
+        typer.Option(help="Write eigenvalues, eigenvectors and the proof (.npz; Spectrum.load reads it)."),
     ] = None,
     cache: Annotated[
-        Path | None, typer.Option(help="Folder in which spectra are kept, and looked for before one is computed.")
+        Path | None,
+        typer.Option(
+            help="Folder of finished spectra: one that is there is read instead of computed, a new one is added."
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -103,15 +146,16 @@ def spectrum(
     scale = {"t": t, "h": h, "edge_factor": edge_factor, "cutoff": cutoff}
     asked = {"mass": mass, "mollify": mollify, **scale, "correct": correct, "form": form, "distance": distance}
     options = {name: value for name, value in asked.items() if value is not None}
-    found = load_shape(shape, repair, dim, drop_missing=drop_missing)
+    found = load_shape(shape, repair, dim, drop_missing=drop_missing, cells=cells)
     _require_drawable(found, picture)
     bounded = _require_mesh(found) if brackets else None
     name = operator or default_operator(found)
     held = _held(found, ORDERS.get(name, 1)) if boundary == "dirichlet" else None
-    wanted = _Wanted(USUAL if k is None and below is None else k, above, below, held, accuracy, device, cache)
     with progress_bar("spectrum") as progress:
         progress(0.0, "building the operator")
         laplacian = build_laplacian(found, name, **options)
+        n_pairs = _usual_pairs(laplacian, held) if k is None and below is None else k
+        wanted = _Wanted(n_pairs, above, below, held, accuracy, device, cache)
         solved = _solved(laplacian, wanted, progress)
         count = solved.certificate.first + len(solved.eigenvalues)
         bounds = bracket_eigenvalues(bounded, count, boundary=boundary, progress=progress) if bounded else None
@@ -137,6 +181,14 @@ class _Wanted:
     accuracy: float | None
     device: str
     cache: Path | None
+
+
+def _usual_pairs(laplacian: Laplacian, held: Int[np.ndarray, " c"] | None) -> int:
+    """Return how many pairs to compute where nobody said, and tell on stderr where a shape has fewer than usual."""
+    most = laplacian.n_points - (0 if held is None else len(held))
+    if most < USUAL:
+        err.print(f"[yellow]note:[/] {USUAL} pairs are usual; this shape has {most}, and all are computed")
+    return max(1, min(USUAL, most))
 
 
 def _solved(laplacian: Laplacian, wanted: _Wanted, progress: Progress) -> Spectrum:

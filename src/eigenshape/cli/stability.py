@@ -22,13 +22,14 @@ from eigenshape.cli.console import (
     progress_bar,
     save_picture,
 )
+from eigenshape.figures.figure import literal
 from eigenshape.figures.save import require_picture_path
 from eigenshape.figures.stability import figure_stability
 from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_area, normalize_diameter
 from eigenshape.io.labels import read_map
-from eigenshape.stability.report import StabilityPlan, StabilityReport, compare_shapes
+from eigenshape.stability.report import USUAL_K, StabilityPlan, StabilityReport, compare_shapes
 
 USUAL = StabilityPlan()
 Scale = Literal["none", "area", "diameter"]
@@ -39,24 +40,36 @@ def stability(
     one: ShapeArgument,
     two: ShapeArgument,
     *,
-    k: Annotated[int, typer.Option("-k", help="Number of eigenvalues to compare.")] = USUAL.k,
+    k: Annotated[
+        int | None, typer.Option("-k", help=f"Number of eigenvalues to compare; {USUAL_K}, or as many as there are.")
+    ] = None,
     t: Annotated[
-        list[float] | None, typer.Option("-t", help="Heat time, in length²; may be repeated. By default four.")
+        list[float] | None,
+        typer.Option("-t", help="Heat time, in length²; may be repeated. By default four are chosen."),
     ] = None,
     n_samples: Annotated[
-        int, typer.Option("-n", "--n-samples", help="Points to throw on each shape.")
+        int, typer.Option("-n", "--n-samples", help="Number of random points on each shape.")
     ] = USUAL.n_samples,
-    seed: Annotated[int, typer.Option(help="Of the random points.")] = USUAL.seed,
+    seed: Annotated[int, typer.Option(help="Seed of the random points.")] = USUAL.seed,
     map_file: Annotated[
         Path | None,
-        typer.Option("--map", help="For each vertex of the first shape the number of one of the second, a line each."),
+        typer.Option(
+            "--map",
+            help=(
+                "Text file with one line for each vertex of the first shape: the number of its "
+                "partner in the second, from 0."
+            ),
+        ),
     ] = None,
     scale: Annotated[
         Scale,
-        typer.Option(help="Scale both to area 1, or to diameter 1, and centre them, before anything is compared."),
+        typer.Option(help="Center both shapes and scale them to area 1 or to diameter 1 before they are compared."),
     ] = "none",
     brackets: Annotated[
-        bool, typer.Option("--brackets", help="Bound each eigenvalue of both meshes, to prove changes of the shapes.")
+        bool,
+        typer.Option(
+            "--brackets", help="Compute guaranteed bounds of each eigenvalue, to prove that the shapes differ."
+        ),
     ] = False,
     dim: DimOption = 2,
     drop_missing: DropMissingOption = False,
@@ -66,8 +79,10 @@ def stability(
 ) -> None:
     """Compare two shapes: how close they lie, what changes in their spectra, and which heat times to trust.
 
-    Meshes with the same faces correspond vertex by vertex, others by --map, or else by points matched one to one as
-    they lie. For instance: eigenshape stability clean.ply noisy.ply --picture report.png
+    Meshes with the same faces correspond vertex by vertex. Others correspond by --map, or by random points that are
+    matched by their distances in space.
+
+    For instance: eigenshape stability clean.ply noisy.ply --picture report.png
     """
     if picture:
         require_picture_path(picture)
@@ -81,7 +96,7 @@ def stability(
     else:
         _print(report)
     if picture:
-        save_picture(figure_stability(report, first, second, titles=(one.stem, two.stem)), picture)
+        save_picture(figure_stability(report, first, second, titles=(literal(one.stem), literal(two.stem))), picture)
 
 
 def _scaled(shape: Shape, scale: str) -> Shape:

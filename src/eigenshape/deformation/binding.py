@@ -7,8 +7,10 @@ from typing import SupportsIndex
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from eigenshape._arguments import named_value, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.region import Region, region_mask, require_boundary
 from eigenshape.deformation.rig import EigenRig
 from eigenshape.deformation.rigidity import FreePart, free_part, require_held
@@ -46,6 +48,7 @@ class Binding:
     part: FreePart
 
 
+@one_blas_thread()
 def bind(
     rig: EigenRig, regions: Sequence[Region], *, fixed: Region | None = None, n_modes: SupportsIndex | None = None
 ) -> Binding:
@@ -76,6 +79,9 @@ def bind(
         If a region has no boundary, two share a vertex, a component has none that is in a region or fixed (where
         anything is), `n_modes` is not in 1..k, or so few modes tell no region from the rest.
     """
+    require_type(rig, EigenRig, "rig")
+    if not isinstance(regions, Sequence) or isinstance(regions, str):
+        raise InvalidParameterError(f"regions must be a list of regions; it is {named_value(regions)}. Pass [region].")
     masks = np.array([region_mask(rig.mesh, region) for region in regions]).reshape(-1, rig.mesh.n_vertices)
     if not len(masks):
         raise InvalidParameterError("There must be a region; none was given.")
@@ -96,7 +102,8 @@ def bind(
 def pulled(binding: Binding, strength: float) -> Binding:
     """Return a binding whose free vertices are pulled to where their shares take them.
 
-    Each by `strength` times its share of the area; nothing is free to fold away at a strength of some hundreds.
+    Each by `strength` times its share of the area. At some hundreds no limb is free to fold away; folds of single edges
+    take as much as there are vertices.
     """
     rig, held = binding.rig, np.ones(binding.rig.mesh.n_vertices, dtype=bool)
     held[binding.part.free] = False

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Literal, SupportsIndex, cast, get_args
 
+from eigenshape._arguments import require_each, require_type
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.binding import Binding, bind
 from eigenshape.deformation.graded import graded, uncrossed
@@ -47,6 +48,8 @@ def deform(
     InvalidParameterError
         As for `bind` and `bend`.
     """
+    require_type(rig, EigenRig, "rig")
+    require_type(handle, Handle, "handle")
     return bend(bind(rig, [region], fixed=fixed, n_modes=n_modes), [handle], mode=mode)
 
 
@@ -71,7 +74,14 @@ def bend(binding: Binding, handles: Sequence[Handle], *, mode: Mode = "graded") 
     ------
     InvalidParameterError
         If there are more or fewer handles than regions, or the mode is another.
+
+    Warns
+    -----
+    UserWarning
+        If "uncrossed" leaves faces that cross, with their number.
     """
+    require_type(binding, Binding, "binding")
+    require_each(handles, Handle, "handles")
     if len(handles) != len(binding.regions):
         raise InvalidParameterError(
             f"Each region must have one handle; there are {len(binding.regions)} regions and {len(handles)} handles."

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from eigenshape.deformation.binding import Binding
 from eigenshape.deformation.handles import Handle, affine_offset
-from eigenshape.geometry.measure import vertex_normals
+from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
 
@@ -85,7 +85,7 @@ def _tangential_neighbors(skeleton: TriangleMesh) -> Int[np.ndarray, " n"]:
     edges = edge_table(skeleton).edges
     ends = np.concatenate([edges, edges[:, ::-1]])
     arms = skeleton.vertices[ends[:, 1]] - skeleton.vertices[ends[:, 0]]
-    lengths, up = np.linalg.norm(arms, axis=1), vertex_normals(skeleton)[ends[:, 0]]
+    lengths, up = np.linalg.norm(arms, axis=1), mean_normals(skeleton)[ends[:, 0]]
     flat = np.linalg.norm(arms - np.einsum("ei,ei->e", arms, up)[:, None] * up, axis=1)
     share = np.divide(flat, lengths, out=np.zeros_like(flat), where=lengths > 0)
     order = np.lexsort((share, ends[:, 0]))
@@ -97,7 +97,7 @@ def _tangential_neighbors(skeleton: TriangleMesh) -> Int[np.ndarray, " n"]:
 def _frames(
     skeleton: TriangleMesh, partner: Int[np.ndarray, " n"]
 ) -> tuple[Float[np.ndarray, "n 3 3"], Bool[np.ndarray, " n"]]:
-    normals, arms = vertex_normals(skeleton), skeleton.vertices[partner] - skeleton.vertices
+    normals, arms = mean_normals(skeleton), skeleton.vertices[partner] - skeleton.vertices
     flat = arms - np.einsum("ni,ni->n", arms, normals)[:, None] * normals
     lengths, whole = np.linalg.norm(flat, axis=1, keepdims=True), np.linalg.norm(arms, axis=1)
     told = normals.any(axis=1) & (lengths[:, 0] > LEAST_TANGENT * whole)

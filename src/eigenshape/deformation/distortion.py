@@ -7,6 +7,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.rigidity import edge_weights, fitted_turns
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, bounding_box, edge_lengths
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
@@ -35,12 +36,12 @@ class Distortion:
     flipped: Int[np.ndarray, " k"]
 
 
-def measure_distortion(before: TriangleMesh, after: TriangleMesh) -> Distortion:
+def measure_distortion(before: MeshLike, after: MeshLike) -> Distortion:
     """Compare two poses of a mesh.
 
     Parameters
     ----------
-    before, after : TriangleMesh
+    before, after : MeshLike
         With the same faces; those before may not be flat.
 
     Returns
@@ -54,6 +55,8 @@ def measure_distortion(before: TriangleMesh, after: TriangleMesh) -> Distortion:
     InvalidShapeError
         If a face has no area before.
     """
+    before = as_mesh(before, "before")
+    after = as_mesh(after, "after")
     require_poses(before, after)
     rest, scale = size_one(before.vertices)
     old, new = (TriangleMesh(points, before.faces) for points in (rest, after.vertices / scale))

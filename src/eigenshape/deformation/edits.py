@@ -1,12 +1,14 @@
 """Edits as values: what was moved and how, fit to be kept as JSON and done again."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape.deformation.binding import bind
@@ -16,7 +18,33 @@ from eigenshape.deformation.region import Box, Brush, Region, kept_region, regio
 from eigenshape.deformation.rig import EigenRig, posed
 from eigenshape.geometry.mesh import TriangleMesh
 
-KIND, VERSION = "eigenshape edits", 1
+KIND, VERSION = "eigenshape edits", 2
+
+
+@dataclass(frozen=True)
+class MeshFingerprint:
+    """What tells a mesh from all others: its regions are indices of vertices, and mean nothing on another.
+
+    Attributes
+    ----------
+    n_vertices, n_faces : int
+    digest : str
+        SHA-256 of coordinates and faces, hexadecimal.
+    """
+
+    n_vertices: int
+    n_faces: int
+    digest: str
+
+    def __str__(self) -> str:
+        return f"{self.n_vertices:,} vertices and {self.n_faces:,} faces ({self.digest[:8]})"
+
+
+def mesh_fingerprint(mesh: TriangleMesh) -> MeshFingerprint:
+    """Return the fingerprint of a mesh, the same on every machine."""
+    numbers = mesh.vertices.astype("<f8") + 0.0  # -0 is 0
+    digest = sha256(numbers.tobytes() + mesh.faces.astype("<i8").tobytes()).hexdigest()
+    return MeshFingerprint(mesh.n_vertices, mesh.n_faces, digest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +55,7 @@ class Move:
     handle: Handle
 
     def __post_init__(self) -> None:
+        require_type(self.handle, Handle, "handle")
         object.__setattr__(self, "region", kept_region(self.region))
 
 
@@ -50,6 +79,7 @@ class Edit:
     mode: Mode = "graded"
 
     def __post_init__(self) -> None:
+        require_each(self.moves, Move, "moves")
         object.__setattr__(self, "fixed", None if self.fixed is None else kept_region(self.fixed))
 
 
@@ -61,6 +91,8 @@ def apply_edit(rig: EigenRig, edit: Edit) -> EigenRig:
     InvalidParameterError
         As for `bind` and `bend`.
     """
+    require_type(rig, EigenRig, "rig")
+    require_type(edit, Edit, "edit")
     binding = bind(rig, [move.region for move in edit.moves], fixed=edit.fixed, n_modes=edit.n_modes)
     return posed(rig, bend(binding, [move.handle for move in edit.moves], mode=edit.mode).vertices)
 
@@ -88,7 +120,7 @@ def edits_to_json(edits: Sequence[Edit], mesh: TriangleMesh) -> dict[str, Any]:
         If a region is none of the mesh.
     """
     out = [_edit_out(edit, mesh) for edit in edits]
-    return {"kind": KIND, "version": VERSION, "n_vertices": mesh.n_vertices, "edits": out}
+    return {"kind": KIND, "version": VERSION, "mesh": asdict(mesh_fingerprint(mesh)), "edits": out}
 
 
 def _edit_out(edit: Edit, mesh: TriangleMesh) -> dict[str, Any]:
@@ -113,13 +145,15 @@ def _handle_out(handle: Handle) -> dict[str, Any]:
     return {"kind": "translation", "vector": handle.vector.tolist()}
 
 
-def edits_from_json(content: Any) -> tuple[int, list[Edit]]:
-    """Return the number of vertices of the mesh that was edited, and its edits, as `edits_to_json` gave them.
+def edits_from_json(content: Any, mesh: TriangleMesh) -> list[Edit]:
+    """Return the edits of a mesh, as `edits_to_json` gave them.
 
     Raises
     ------
     FileFormatError
         If the content is no such thing; the message names the first edit at fault.
+    InvalidParameterError
+        If they were made on another mesh, with the size and digest of both.
     """
     if not isinstance(content, Mapping) or content.get("kind") != KIND:
         raise FileFormatError(f"Edits are kept as a JSON object of kind {KIND!r}; this is none.")
@@ -127,12 +161,24 @@ def edits_from_json(content: Any) -> tuple[int, list[Edit]]:
         raise FileFormatError(f"Edits of version {VERSION} are read; this is version {content.get('version')!r}.")
     found: list[Edit] = []
     try:
-        n_vertices = _whole(content["n_vertices"], "n_vertices", 1)
+        made_on = _fingerprint_in(content["mesh"])
+        n_vertices = made_on.n_vertices
         for entry in _listed(content["edits"], "edits"):
             found.append(_edit_in(entry, n_vertices))
     except (KeyError, TypeError, ValueError, OverflowError) as err:
         raise FileFormatError(f"Edit {len(found)} cannot be read: {_reason(err)}") from err
-    return n_vertices, found
+    present = mesh_fingerprint(mesh)
+    if made_on != present:
+        raise InvalidParameterError(
+            f"Edits name vertices of the mesh that they were made on; that has {made_on}, and this mesh has {present}. "
+            "Read them with the mesh that they were made on, and give it to replay as source to carry them over."
+        )
+    return found
+
+
+def _fingerprint_in(entry: Any) -> MeshFingerprint:
+    n_vertices, n_faces = (_whole(entry[name], name, 0) for name in ("n_vertices", "n_faces"))
+    return MeshFingerprint(n_vertices, n_faces, str(entry["digest"]))
 
 
 def _reason(err: Exception) -> str:

@@ -1,5 +1,6 @@
 """Graded deformation: vertices follow their handles by shares, and what lies between turns as rigidly as it can."""
 
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,7 +13,7 @@ from eigenshape.geometry.crossings import self_intersections
 from eigenshape.geometry.mesh import TriangleMesh
 
 N_ROUNDS = 12
-PULLS = (30.0, 100.0, 300.0, 1000.0)
+PULLS = (30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4, 1e5)  # a fold of a few edges gives way to about the number of vertices
 
 
 def graded(binding: Binding, handles: Sequence[Handle], *, n_rounds: int = N_ROUNDS) -> Float[np.ndarray, "n 3"]:
@@ -31,19 +32,35 @@ def graded(binding: Binding, handles: Sequence[Handle], *, n_rounds: int = N_ROU
 def uncrossed(binding: Binding, handles: Sequence[Handle]) -> Float[np.ndarray, "n 3"]:
     """Return the vertices of `graded`, pulled to where their shares take them no more than it takes to cross no faces.
 
-    Pairs of faces that cross before count for nothing. If some cross at every strength, the fewest are taken.
+    Pairs of faces that cross before count for nothing. The last try is a pull without end, to exactly where shares take
+    the vertices. If some cross there too, as where a handle takes a region into what is held, the vertices with the
+    fewest are returned.
+
+    Warns
+    -----
+    UserWarning
+        If faces cross that did not before, with the number of pairs and the first.
     """
     mesh = binding.rig.mesh
     before = {tuple(pair) for pair in self_intersections(mesh).tolist()}
-    least, best = np.inf, mesh.vertices
-    for strength in (0.0, *PULLS):
-        found = graded(pulled(binding, strength) if strength else binding, handles)
+    best, crossing = mesh.vertices, list[list[int]]()
+    for strength in (0.0, *PULLS, np.inf):
+        if np.isinf(strength):
+            found = shared_motion(binding, handles)
+        else:
+            found = graded(pulled(binding, strength) if strength else binding, handles)
         pairs = self_intersections(TriangleMesh(found, mesh.faces)).tolist()
-        crossing = sum(tuple(pair) not in before for pair in pairs)
-        if crossing < least:
-            least, best = crossing, found
-        if not crossing:
-            break
+        new = [pair for pair in pairs if tuple(pair) not in before]
+        if not strength or len(new) < len(crossing):
+            best, crossing = found, new
+        if not new:
+            return best
+    one, two = crossing[0]
+    warnings.warn(
+        f"No pull keeps all faces apart; {len(crossing)} pairs cross that did not before, faces {one} and {two} first. "
+        "Turn or move the region less, or choose another pivot.",
+        stacklevel=3,
+    )
     return best
 
 

@@ -11,6 +11,8 @@ from jaxtyping import Float
 from scipy.linalg import lu_factor, lu_solve
 from scipy.spatial.transform import Rotation
 
+from eigenshape._arguments import require_each, require_type
+from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.binding import Binding
 from eigenshape.deformation.graded import quaternions, shared_motion
 from eigenshape.deformation.handles import Handle
@@ -25,17 +27,22 @@ HOLD = 100.0  # of the mean diagonal of the reduced equations, for what the mode
 
 def as_rigid_as_possible(binding: Binding, handles: Sequence[Handle], *, n_rounds: int = 100) -> Points:
     """Bend as rigidly as possible from the shape as it stands (Sorkine and Alexa 2007), cotangents clamped."""
+    require_type(binding, Binding, "binding")
+    require_each(handles, Handle, "handles")
     rest = binding.rig.mesh.vertices
     start = shared_motion(binding, handles)
     start[binding.part.free] = rest[binding.part.free]
     return relax(binding.rig.edges, binding.part, rest, start, quaternions(np.zeros_like(rest)), n_rounds)
 
 
+@one_blas_thread()
 def biharmonic_blend(binding: Binding, handles: Sequence[Handle]) -> Points:
     """Blend the handles' motions by weights whose Laplacian varies least (Jacobson and others 2011, without bounds).
 
     min |M^-½ W w|² with w = 0 or 1 where a vertex is held; then each goes by the sum of its weights of the motions.
     """
+    require_type(binding, Binding, "binding")
+    require_each(handles, Handle, "handles")
     rig, free = binding.rig, binding.part.free
     laplacian = cotangent_laplacian(rig.mesh)
     twice = laplacian.stiffness @ sp.diags_array(1 / laplacian.mass.diagonal()) @ laplacian.stiffness
@@ -49,12 +56,15 @@ def biharmonic_blend(binding: Binding, handles: Sequence[Handle]) -> Points:
     return rest + sum((share[:, None] * handle.carry(rest, whole) for handle, share in moves), np.zeros(3))
 
 
+@one_blas_thread()
 def spectral_rigid(binding: Binding, handles: Sequence[Handle], *, n_modes: int = 100, n_rounds: int = 20) -> Points:
     """Bend the skeleton of some modes as rigidly as they can, and turn details with it (after Rong and others 2008).
 
     The unknowns are the skeleton's coefficients alone. What is held is pulled to its places, and details turn with the
     rotations that fit the skeleton's edges.
     """
+    require_type(binding, Binding, "binding")
+    require_each(handles, Handle, "handles")
     rig = binding.rig
     modes, rest = rig.eigenvectors[:, : min(n_modes, rig.n_modes)], rig.mesh.vertices
     skeleton = eigen_skeleton(rig, modes.shape[1])

@@ -4,13 +4,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from eigenshape._arrays import frozen, positive_values, whole_numbers
+from eigenshape._arguments import named_value
+from eigenshape._arrays import as_array, frozen, positive_values, real_numbers, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.handles import vector
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.geodesic import geodesic_distance_to_set
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
@@ -30,7 +33,7 @@ class Box:
     high: Float[np.ndarray, " 3"]
 
     def __init__(self, low: ArrayLike, high: ArrayLike) -> None:
-        corners = [np.asarray(corner, dtype=np.float64) for corner in (low, high)]
+        corners = [real_numbers(corner, "A corner of a box").astype(np.float64) for corner in (low, high)]
         for corner, name in zip(corners, ("low", "high"), strict=True):
             if corner.shape != (3,) or np.isnan(corner).any():
                 raise InvalidParameterError(f"{name} must be three numbers; it is {corner.tolist()}.")
@@ -69,15 +72,30 @@ def kept_region(region: Region) -> Region:
     """Return a region that can be asked again and again, and that nobody else changes."""
     if isinstance(region, Box | Brush):
         return region
-    return frozen(np.asarray(region if isinstance(region, np.ndarray) else list(region)))
+    return frozen(_entries(region))
 
 
-def region_mask(mesh: TriangleMesh, region: Region) -> Bool[np.ndarray, " n"]:
+def _entries(region: np.ndarray | Iterable[int]) -> np.ndarray:
+    """Return a mask or a list of indices as an array."""
+    try:
+        if isinstance(region, Iterable) and not isinstance(region, str) and not sp.issparse(region):
+            return as_array(region if isinstance(region, np.ndarray) else list(region), "A region")
+    except InvalidParameterError:
+        raise
+    except ValueError:  # rows that differ in length
+        pass
+    raise InvalidParameterError(
+        f"A region must be a Box, a Brush, a mask, or a list of vertices; it is {named_value(region)}. "
+        "Pass region_mask(mesh, region)."
+    )
+
+
+def region_mask(mesh: MeshLike, region: Region) -> Bool[np.ndarray, " n"]:
     """Tell which vertices of a shape a region holds.
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
     region : (n,) bool, (k,) int, Box or Brush
         A mask, indices of vertices, or a place in space.
 
@@ -90,13 +108,14 @@ def region_mask(mesh: TriangleMesh, region: Region) -> Bool[np.ndarray, " n"]:
     InvalidParameterError
         If a mask is of another length, or an index is no vertex.
     """
+    mesh = as_mesh(mesh)
     if isinstance(region, Box):
         inside = (mesh.vertices >= region.low) & (mesh.vertices <= region.high)
         return np.asarray(inside.all(axis=1))
     if isinstance(region, Brush):
         nearest = int(cKDTree(mesh.vertices).query(region.center)[1])
         return np.asarray(geodesic_distance_to_set(mesh, [nearest], reach=region.radius) <= region.radius)
-    chosen = np.asarray(region if isinstance(region, np.ndarray) else list(region))
+    chosen = _entries(region)
     if chosen.dtype == bool:
         if chosen.shape != (mesh.n_vertices,):
             raise InvalidParameterError(
@@ -108,8 +127,9 @@ def region_mask(mesh: TriangleMesh, region: Region) -> Bool[np.ndarray, " n"]:
     return mask
 
 
-def region_boundary(mesh: TriangleMesh, mask: Bool[np.ndarray, " n"]) -> Int[np.ndarray, " b"]:
+def region_boundary(mesh: MeshLike, mask: Bool[np.ndarray, " n"]) -> Int[np.ndarray, " b"]:
     """Return the vertices of a region that have a neighbour outside it (thesis 6.3.1)."""
+    mesh = as_mesh(mesh)
     edges = edge_table(mesh).edges
     across = edges[mask[edges[:, 0]] != mask[edges[:, 1]]]
     return np.unique(across[mask[across]])

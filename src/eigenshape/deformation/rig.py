@@ -8,11 +8,13 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 from scipy.linalg import cho_solve
-from threadpoolctl import threadpool_limits
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_rows, frozen, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.rigidity import EdgeWeights, edge_weights
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.cotangent import cotangent_laplacian
@@ -58,15 +60,15 @@ class EigenRig:
     @cached_property
     def components(self) -> Int[np.ndarray, " n"]:
         """The number of each vertex' component."""
-        return vertex_components(self.mesh)[1]
+        return frozen(vertex_components(self.mesh)[1])
 
 
-def rig_shape(mesh: TriangleMesh, spectrum: Spectrum | None = None, *, progress: Progress | None = None) -> EigenRig:
+def rig_shape(mesh: MeshLike, spectrum: Spectrum | None = None, *, progress: Progress | None = None) -> EigenRig:
     """Prepare a shape for many edits.
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
         Its faces may not be flat, and each vertex has one.
     spectrum : Spectrum, optional
         Of any operator of the shape (the thesis takes the mesh Laplacian); by default the 300 lowest modes of the
@@ -85,6 +87,8 @@ def rig_shape(mesh: TriangleMesh, spectrum: Spectrum | None = None, *, progress:
     InvalidParameterError
         If the spectrum is of another number of vertices.
     """
+    mesh = as_mesh(mesh)
+    require_type(spectrum, Spectrum | None, "spectrum")
     laplacian = cotangent_laplacian(mesh)
     if spectrum is None:
         n_components, _ = vertex_components(mesh)
@@ -92,7 +96,7 @@ def rig_shape(mesh: TriangleMesh, spectrum: Spectrum | None = None, *, progress:
     modes = spectrum.eigenvectors
     if len(modes) != mesh.n_vertices:
         raise InvalidParameterError(f"The spectrum is of {len(modes)} vertices, the shape has {mesh.n_vertices}.")
-    with threadpool_limits(1, user_api="blas"):  # so that no digit depends on the number of threads
+    with one_blas_thread():
         factor = np.asarray(
             np.linalg.qr(modes, mode="r")
         ).T  # of the Gram matrix too, without squaring how unequal areas are
@@ -118,6 +122,7 @@ def projected(rig: EigenRig, values: Float[np.ndarray, "n q"], n_modes: int) -> 
     return cho_solve((rig.factor[:n_modes, :n_modes], True), rig.eigenvectors[:, :n_modes].T @ values)
 
 
+@one_blas_thread()
 def eigen_skeleton(rig: EigenRig, n_modes: SupportsIndex) -> Float[np.ndarray, "n 3"]:
     """Return the vertices of a shape as its lowest modes know them (thesis 6.1.1).
 
@@ -137,5 +142,6 @@ def eigen_skeleton(rig: EigenRig, n_modes: SupportsIndex) -> Float[np.ndarray, "
     InvalidParameterError
         If the rig has fewer modes.
     """
+    require_type(rig, EigenRig, "rig")
     wanted = whole_number(n_modes, "n_modes", 1, rig.n_modes)
     return rig.eigenvectors[:, :wanted] @ projected(rig, rig.mesh.vertices, wanted)

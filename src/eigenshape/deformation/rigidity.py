@@ -8,9 +8,9 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import connected_components
-from threadpoolctl import threadpool_limits
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.rigidity_loops import fit_rotations, turned_edges
 from eigenshape.sparse.elimination import SymmetricFactor, analyse, factorise
 
@@ -124,7 +124,7 @@ def factored(square: sp.csr_array) -> SymmetricFactor:
     """
     matrix = square.tocsc()
     matrix.sort_indices()
-    with threadpool_limits(1, user_api="blas"):  # so that no digit depends on the number of threads
+    with one_blas_thread():
         factor = factorise(analyse(matrix), matrix.data)
     if factor is None or not (factor.pivots > 0).all():
         raise InvalidShapeError("A shape must have angles to be bent; some are too near to 0 for the equations.")
@@ -165,13 +165,14 @@ def relax(
     found, free = start.copy(), part.free
     least, tried, solved = np.inf, start[free], start[free]
     steps = deque[Step](maxlen=WINDOW + 1)
+    scratch = part.factor.scratch()
 
     def settled(points: Float[np.ndarray, "u 3"]) -> float:
         found[free] = points
         away = part.pull @ np.square(points - start[free]).sum(axis=1)
         return float(fit_rotations(part.fitted, *links, rest, found, turns) + away)
 
-    with threadpool_limits(1, user_api="blas"):
+    with one_blas_thread():
         for _ in range(n_rounds):
             energy = settled(tried)
             if energy > least:
@@ -183,7 +184,7 @@ def relax(
             least = energy
             turned_edges(free, *links, rest, turns, sums)
             # Solved for displacements, so that nothing at all moves where nothing is turned or pulled.
-            solved = rest[free] + part.factor.solve(sums + force)
+            solved = rest[free] + part.factor.solve(sums + force, scratch)
             steps.append((solved - tried, solved))
             tried = _mixed(steps)
     found[free] = solved

@@ -3,7 +3,8 @@
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
+
+from eigenshape._compile import njit
 
 ROUNDS = 100
 SETTLED = 1e-4  # last turn, in radians; the one after it would be of its square
@@ -12,7 +13,7 @@ EPS = 1e-15
 HALFWAY = 3.0  # radians: the most that one step turns
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def fit_rotations(vertices, starts, others, weights, rest, posed, turns):
     """Turn the rotations (unit quaternions, real part first) of some vertices to where they fit the posed edges best.
@@ -40,7 +41,7 @@ def fit_rotations(vertices, starts, others, weights, rest, posed, turns):
     return left / 2
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _settle(covariance, turns, i):
     """Climb by Newton's steps, and by steps that cannot overshoot where it is not concave; return the height."""
@@ -107,7 +108,7 @@ def _settle(covariance, turns, i):
     return height * largest
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def turned_edges(vertices, starts, others, weights, rest, turns, sums):
     """Write Σ_j w_ij ((R_i + R_j)/2 - 1) (x_i - x_j) for some vertices; nothing where nothing turns."""

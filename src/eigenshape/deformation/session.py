@@ -6,6 +6,7 @@ from typing import SupportsIndex
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.binding import Binding, bind
@@ -15,6 +16,7 @@ from eigenshape.deformation.handles import Handle
 from eigenshape.deformation.region import Region, region_mask
 from eigenshape.deformation.rig import EigenRig, posed
 from eigenshape.deformation.skeleton import SkeletonGrip, grip_skeleton, moved_skeleton
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 
 
@@ -34,6 +36,7 @@ class DeformationSession:
     """
 
     def __init__(self, rig: EigenRig, *, mode: Mode = "graded") -> None:
+        require_type(rig, EigenRig, "rig")
         self._mode: Mode = require_mode(mode)
         self._poses = [rig]
         self._edits: list[Edit] = []
@@ -78,6 +81,7 @@ class DeformationSession:
 
         A region that is dragged again, with the same options, is not bound anew. See `drag_all`.
         """
+        require_type(handle, Handle, "handle")
         return self.drag_all([Move(region, handle)], fixed=fixed, n_modes=n_modes)
 
     def drag_all(
@@ -102,6 +106,8 @@ class DeformationSession:
             As for `bind`.
         """
         number = None if n_modes is None else whole_number(n_modes, "n_modes", 1, self.rig.n_modes)
+        moves = tuple(moves) if isinstance(moves, Iterable) else moves
+        require_each(moves, Move, "moves")
         edit = Edit(tuple(moves), fixed, number, self._mode)
         if self._pending is None or not self._binds_alike(edit, self._pending[0]):
             binding = bind(self.rig, [move.region for move in edit.moves], fixed=fixed, n_modes=number)
@@ -142,6 +148,7 @@ class DeformationSession:
         InvalidParameterError
             As for `apply_edit`.
         """
+        require_type(edit, Edit, "edit")
         self._advance(edit, apply_edit(self.rig, edit))
         return self.mesh
 
@@ -184,14 +191,14 @@ class DeformationSession:
         return self.mesh
 
 
-def replay(rig: EigenRig, edits: Sequence[Edit], *, source: TriangleMesh | None = None) -> DeformationSession:
+def replay(rig: EigenRig, edits: Sequence[Edit], *, source: MeshLike | None = None) -> DeformationSession:
     """Do edits again, on the same shape or on another mesh of it.
 
     Parameters
     ----------
     rig : EigenRig
     edits : sequence of Edit
-    source : TriangleMesh, optional
+    source : MeshLike, optional
         The mesh, unbent, whose vertices the regions of the edits name, where it is another than the rig's.
 
     Returns
@@ -203,7 +210,10 @@ def replay(rig: EigenRig, edits: Sequence[Edit], *, source: TriangleMesh | None 
     InvalidParameterError
         As for `bind`, of the first edit that cannot be done.
     """
+    require_type(rig, EigenRig, "rig")
+    require_each(edits, Edit, "edits")
     session = DeformationSession(rig)
+    unbent = None if source is None else as_mesh(source, "source")
     for edit in edits:
-        session.apply(edit if source is None else carry_edit(edit, source, rig.mesh))
+        session.apply(edit if unbent is None else carry_edit(edit, unbent, rig.mesh))
     return session

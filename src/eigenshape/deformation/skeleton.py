@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._arguments import require_each, require_type
+from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.binding import Binding
 from eigenshape.deformation.handles import Handle, affine_offset
 from eigenshape.deformation.rig import eigen_skeleton, projected
@@ -27,12 +29,14 @@ class SkeletonGrip:
     weights: Float[np.ndarray, "r n 4"]
 
 
+@one_blas_thread()
 def grip_skeleton(binding: Binding) -> SkeletonGrip:
     """Find the least-squares fit of moved regions by the low modes, for all motions at once (thesis eq. 6.1).
 
     A motion cuts a region of the skeleton out and moves it; the fit is Φ (ΦᵀΦ)⁻¹ Φ_Rᵀ [K_R, 1] times D, and so four
     columns serve all motions.
     """
+    require_type(binding, Binding, "binding")
     rig, n_modes = binding.rig, int(binding.n_modes.max())
     skeleton = eigen_skeleton(rig, n_modes)
     ends = np.column_stack([skeleton, np.ones(len(skeleton))])
@@ -42,5 +46,7 @@ def grip_skeleton(binding: Binding) -> SkeletonGrip:
 
 def moved_skeleton(grip: SkeletonGrip, handles: Sequence[Handle]) -> Float[np.ndarray, "n 3"]:
     """Return K*, the skeleton where handles take it."""
+    require_type(grip, SkeletonGrip, "grip")
+    require_each(handles, Handle, "handles")
     pairs = zip(grip.weights, handles, strict=True)
     return grip.skeleton + sum((weights @ affine_offset(handle).T for weights, handle in pairs), np.zeros(3))

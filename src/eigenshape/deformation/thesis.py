@@ -7,6 +7,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._arguments import require_each, require_type
+from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.binding import Binding
 from eigenshape.deformation.details import FramedDetails, blended, framed, turned_by_frames, turned_by_handles
 from eigenshape.deformation.handles import Handle
@@ -40,6 +42,7 @@ class DetailedSkeleton:
     second: FramedDetails
 
 
+@one_blas_thread()
 def detail_skeleton(binding: Binding, *, second_pass: bool = True) -> DetailedSkeleton:
     """Prepare a binding for the thesis' algorithm: for many positions of its handles.
 
@@ -49,12 +52,14 @@ def detail_skeleton(binding: Binding, *, second_pass: bool = True) -> DetailedSk
     second_pass : bool
         Whether details come back by way of the skeleton of 300 modes (6.3.3); all at once otherwise.
     """
+    require_type(binding, Binding, "binding")
     rig, grip = binding.rig, grip_skeleton(binding)
     shape, faces, most = rig.mesh.vertices, rig.mesh.faces, min(SECOND_PASS, rig.n_modes)
     fine = eigen_skeleton(rig, most) if second_pass and binding.n_modes.max() < most else shape
     return DetailedSkeleton(binding, grip, fine, framed(faces, grip.skeleton, fine), framed(faces, fine, shape))
 
 
+@one_blas_thread()
 def eigen_deformed(skeleton: DetailedSkeleton, handles: Sequence[Handle], *, details: Details = "blended") -> Points:
     """Return the vertices where the thesis' algorithm takes them.
 
@@ -72,6 +77,8 @@ def eigen_deformed(skeleton: DetailedSkeleton, handles: Sequence[Handle], *, det
     -------
     (n, 3) float
     """
+    require_type(skeleton, DetailedSkeleton, "skeleton")
+    require_each(handles, Handle, "handles")
     rig, faces = skeleton.binding.rig, skeleton.binding.rig.mesh.faces
     moved = moved_skeleton(skeleton.grip, handles)
     by_frames = turned_by_frames(faces, skeleton.first, moved)

@@ -6,11 +6,14 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.distortion import require_poses
 from eigenshape.deformation.rigidity import edge_weights, fitted_turns, free_part, nearest_rotations
 from eigenshape.deformation.rigidity_loops import turned_edges
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes, size_one
 from eigenshape.operators.cotangent import cotangent_laplacian
@@ -19,10 +22,11 @@ from eigenshape.spectral.functional_map import FunctionalMap, point_areas, trans
 Turns = Float[np.ndarray, "n 3 3"]
 
 
+@one_blas_thread()
 def transfer_deformation(
-    before: TriangleMesh,
-    after: TriangleMesh,
-    target: TriangleMesh,
+    before: MeshLike,
+    after: MeshLike,
+    target: MeshLike,
     mapping: FunctionalMap,
     *,
     n_modes: SupportsIndex | None = None,
@@ -36,9 +40,9 @@ def transfer_deformation(
 
     Parameters
     ----------
-    before, after : TriangleMesh
+    before, after : MeshLike
         Two poses of the source, with the same faces.
-    target : TriangleMesh
+    target : MeshLike
         In the pose that answers to `before`.
     mapping : FunctionalMap
         From the modes of `before` to those of the target.
@@ -57,6 +61,10 @@ def transfer_deformation(
     InvalidShapeError
         If a face of `before` or the target has no area.
     """
+    before = as_mesh(before, "before")
+    after = as_mesh(after, "after")
+    target = as_mesh(target, "target")
+    require_type(mapping, FunctionalMap, "mapping")
     require_poses(before, after)
     for mesh, spectrum, name in ((before, mapping.source, "source"), (target, mapping.target, "target")):
         if mesh.n_vertices != len(spectrum.eigenvectors):

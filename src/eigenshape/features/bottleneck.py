@@ -3,6 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._arguments import require_type
 from eigenshape._errors import InvalidParameterError
 from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs
 from eigenshape.features.least_matching import least_distance, least_perfect
@@ -37,6 +38,8 @@ def bottleneck_distance(one: PersistenceDiagram, two: PersistenceDiagram) -> flo
     InvalidParameterError
         If the loops of one diagram alone are known.
     """
+    require_type(one, PersistenceDiagram, "one")
+    require_type(two, PersistenceDiagram, "two")
     if (one.loops is None) != (two.loops is None):
         raise InvalidParameterError(
             "Diagrams must both have loops, or neither, to be compared; one is of a solid or of points. Compare such "

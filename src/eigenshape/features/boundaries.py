@@ -7,8 +7,10 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import breadth_first_order, connected_components, dijkstra, maximum_flow
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, positive_values
 from eigenshape.features.segmentation import Segmentation, touching_parts
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, face_pairs
@@ -20,7 +22,7 @@ CORE = 0.9  # of a part's depth: no band reaches deeper
 CAPACITY = 2.0**30  # of all edges together: what the flow counts with has 31 bits
 
 
-def smooth_boundaries(mesh: TriangleMesh, segmentation: Segmentation, *, width: float = WIDTH) -> Segmentation:
+def smooth_boundaries(mesh: MeshLike, segmentation: Segmentation, *, width: float = WIDTH) -> Segmentation:
     """Move the boundary between each two parts to the least cut in a band around it.
 
     A cut costs the length of its edges times the conductivity across them, which is low in concave creases
@@ -30,7 +32,7 @@ def smooth_boundaries(mesh: TriangleMesh, segmentation: Segmentation, *, width: 
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
         Its faces seen from outside counter-clockwise, so that creases are known from ridges.
     segmentation : Segmentation
     width : float
@@ -49,6 +51,8 @@ def smooth_boundaries(mesh: TriangleMesh, segmentation: Segmentation, *, width: 
     InvalidShapeError
         If a face has no area.
     """
+    mesh = as_mesh(mesh)
+    require_type(segmentation, Segmentation, "segmentation")
     (share,) = positive_values(width, "width")
     network, labels = _network(mesh), segmentation.labels.copy()
     held = _faces_at(mesh, segmentation)

@@ -11,6 +11,7 @@ from eigenshape._arrays import frozen, vertex_values
 from eigenshape.features.loops import extended_loops
 from eigenshape.features.union_loops import join_points
 from eigenshape.geometry.cloud import PointCloud, Shape
+from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.operators.graph import edge_graph
 from eigenshape.operators.neighbors import neighbor_graph
 
@@ -65,7 +66,7 @@ class PersistenceDiagram:
     loops: PersistencePairs | None
 
 
-def persistence_diagram(shape: Shape, values: ArrayLike, *, n_neighbors: int = N_NEIGHBORS) -> PersistenceDiagram:
+def persistence_diagram(shape: ShapeLike, values: ArrayLike, *, n_neighbors: int = N_NEIGHBORS) -> PersistenceDiagram:
     """Pair the maxima and minima of a function with the saddles where they merge.
 
     The function is that of the vertices, linear on simplices; what is connected, edges tell alone (Edelsbrunner and
@@ -78,7 +79,7 @@ def persistence_diagram(shape: Shape, values: ArrayLike, *, n_neighbors: int = N
 
     Parameters
     ----------
-    shape : TriangleMesh, SimplicialMesh or PointCloud
+    shape : ShapeLike
         Of any dimension; the points of a cloud are joined to their nearest neighbours.
     values : (n,) float
         The function at the vertices.
@@ -97,6 +98,7 @@ def persistence_diagram(shape: Shape, values: ArrayLike, *, n_neighbors: int = N
     InvalidShapeError
         If a simplex has a corner twice.
     """
+    shape = as_shape(shape)
     height = vertex_values(values, "values", shape.n_points)
     graph = _graph(shape, n_neighbors)
     order = np.argsort(height, kind="stable")

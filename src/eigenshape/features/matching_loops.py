@@ -3,10 +3,11 @@
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
+
+from eigenshape._compile import njit
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def match_rows(starts, columns, n_columns, first):
     """Match as many rows as can be with a column each; entries `starts[i]` to `starts[i + 1]` are those of row i.
@@ -32,7 +33,7 @@ def match_rows(starts, columns, n_columns, first):
     return column_of, depth
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _layer(starts, columns, row_of, column_of, depth, queue):
     """Count for each row the steps from a free one along alternating paths; whether a free column is reached."""
@@ -60,7 +61,7 @@ def _layer(starts, columns, row_of, column_of, depth, queue):
     return last >= 0
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _augment(free, columns, starts, row_of, column_of, depth, following, path):
     """Walk down the layers from a free row to a free column, and turn the path over."""

@@ -7,14 +7,14 @@ the ranks from the top meets all edges in falling order, and only the few sides 
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
 
+from eigenshape._compile import njit
 from eigenshape.features.union_loops import find_root
 
 FEW = 48  # sides of a vertex that insertion sorts faster than the general sort
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def falling_corners(faces, rank):
     """Return the ranks of each face's corners, highest first."""
@@ -31,7 +31,7 @@ def falling_corners(faces, rank):
     return corners
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def sides_by_vertex(corners, n):
     """File the three sides of each face under the higher vertex: where each vertex' sides start, lower vertex, face."""
@@ -53,7 +53,7 @@ def sides_by_vertex(corners, n):
     return starts, lower, owner
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def join_faces(corners, starts, lower, owner):
     """Join faces over falling edges: for each, the face it climbs to; of each basin that ends, itself, edge, neighbour.
@@ -92,7 +92,7 @@ def join_faces(corners, starts, lower, owner):
     return climbs_to, ended[:n_ended].copy()
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _is_lower(corners, one, two):
     """Say whether a face comes before another by highest, middle, lowest vertex, then number."""
@@ -102,7 +102,7 @@ def _is_lower(corners, one, two):
     return one < two
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _sort_sides(corners, lower, owner, first, end):
     """Sort the sides of a vertex by falling lower vertex, of equals the lower face first."""
@@ -120,7 +120,7 @@ def _sort_sides(corners, lower, owner, first, end):
         lower[into], owner[into] = low, face
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _sort_many(corners, lower, owner, first, end):
     # Sides come by number of their face, and of two faces at one edge that with the lower corners is lower: stable

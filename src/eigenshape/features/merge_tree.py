@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arrays import frozen, vertex_values
 from eigenshape.features.merge_loops import falling_corners, join_faces, sides_by_vertex
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 
 
@@ -43,7 +44,7 @@ class MergeTree:
     basins: Int[np.ndarray, " f"]
 
 
-def merge_tree(mesh: TriangleMesh, values: ArrayLike) -> MergeTree:
+def merge_tree(mesh: MeshLike, values: ArrayLike) -> MergeTree:
     """Merge the faces of a mesh into the basins of the function's maxima, and pair each maximum with its saddle.
 
     The order is total (simulation of simplicity): vertices by (value, index), edges by (higher, lower vertex),
@@ -57,7 +58,7 @@ def merge_tree(mesh: TriangleMesh, values: ArrayLike) -> MergeTree:
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
     values : (n,) float
         The function at the vertices.
 
@@ -70,6 +71,7 @@ def merge_tree(mesh: TriangleMesh, values: ArrayLike) -> MergeTree:
     InvalidParameterError
         If there is not one finite value a vertex.
     """
+    mesh = as_mesh(mesh)
     height = vertex_values(values, "values", mesh.n_vertices)
     return _gather(height, _joined(mesh, height))
 

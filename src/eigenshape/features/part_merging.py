@@ -6,22 +6,25 @@ from heapq import heapify, heappop, heappush
 import numpy as np
 from jaxtyping import Float, Int
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, positive_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.part_tree import PartTree
 from eigenshape.features.segmentation import Segmentation, segment, touching_parts
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.topology import vertex_components
 from eigenshape.spectral.signature import heat_kernel_signature
 from eigenshape.spectral.spectrum import Spectrum
 
 SEED_TIME = 1e-3  # of the area: heat so early has a maximum at every tip and bump
 PART_TIME = 0.1  # of the area: after it, what is no part by itself has come to one temperature
-N_SEEDS = 150  # basins to merge at most: the rest is below what anybody calls a part
+N_SEEDS = 150  # basins to merge at most, and one for each further component: less is not called a part by anybody
 
 
-def part_tree(mesh: TriangleMesh, spectrum: Spectrum, *, time: float = PART_TIME) -> PartTree:
+def part_tree(mesh: MeshLike, spectrum: Spectrum, *, time: float = PART_TIME) -> PartTree:
     """Merge the basins of heat maxima, those first between which least of a difference in temperature is left.
 
     Parts R and S of areas |R|, |S| that touch are given the unit function u, constant on each, of mean 0. Of its energy
@@ -34,7 +37,7 @@ def part_tree(mesh: TriangleMesh, spectrum: Spectrum, *, time: float = PART_TIME
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
     spectrum : Spectrum
         Of the mesh, any Laplacian: that of `part_spectrum` conducts badly across concave creases.
     time : float
@@ -49,6 +52,8 @@ def part_tree(mesh: TriangleMesh, spectrum: Spectrum, *, time: float = PART_TIME
     InvalidParameterError
         If the spectrum is of another shape or does not begin with the lowest eigenvalue, or the time is not positive.
     """
+    mesh = as_mesh(mesh)
+    require_type(spectrum, Spectrum, "spectrum")
     (share,) = positive_values(time, "time")
     if len(spectrum.eigenvectors) != mesh.n_vertices:
         raise InvalidParameterError(
@@ -56,7 +61,8 @@ def part_tree(mesh: TriangleMesh, spectrum: Spectrum, *, time: float = PART_TIME
         )
     area = float(spectrum.mass.sum())
     heat = heat_kernel_signature(spectrum, [SEED_TIME * area])[:, 0]
-    seeds = segment(merge_tree(mesh, heat), n_regions=N_SEEDS)
+    n_components, _ = vertex_components(mesh)
+    seeds = segment(merge_tree(mesh, heat), n_regions=N_SEEDS + n_components - 1)
     coordinates = spectrum.eigenvectors * np.exp(-share * area * spectrum.eigenvalues)
     return _gather(seeds, _merged(_rooms(mesh, seeds, coordinates), seeds.features.values))
 

@@ -10,13 +10,16 @@ from eigenshape.features.boundaries import CONCAVITY, smooth_boundaries
 from eigenshape.features.part_merging import SEED_TIME, part_tree
 from eigenshape.features.part_tree import PartTree
 from eigenshape.features.segmentation import Segmentation, segment
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.fragments import fragment_vertices
 from eigenshape.geometry.measure import enclosed_volume
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.requirements import require_describable
 from eigenshape.geometry.topology import is_closed, vertex_components
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
+from eigenshape.spectral.dirichlet import solve_free
 from eigenshape.spectral.outcome import Progress
 from eigenshape.spectral.signature import heat_kernel_signature
-from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 N_MODES = 25  # beside one for each component
@@ -32,7 +35,7 @@ class FoundParts:
     mesh : TriangleMesh
         As it was given, or turned to face outward.
     spectrum : Spectrum
-        Of a Laplacian that conducts badly across concave creases.
+        Of a Laplacian that conducts badly across concave creases; with zeros on fragments, whose pairs are left out.
     heat : (n,) float
         What seeds are the maxima of, in 1/length².
     tree : PartTree
@@ -47,7 +50,7 @@ class FoundParts:
     parts: Segmentation
 
 
-def find_parts(mesh: TriangleMesh, *, n_modes: int = N_MODES, progress: Progress | None = None) -> FoundParts:
+def find_parts(mesh: MeshLike, *, n_modes: int = N_MODES, progress: Progress | None = None) -> FoundParts:
     """Find the parts of a surface: rooms between which heat flows badly, cut along concave creases.
 
     Heat flows slowly across concave creases (`curvature_tensors`, α = 10); regions around the maxima of early heat are
@@ -55,12 +58,15 @@ def find_parts(mesh: TriangleMesh, *, n_modes: int = N_MODES, progress: Progress
     difference is left, and their boundaries are moved to the least cut (`smooth_boundaries`). All times are shares of
     the area, so no unit counts.
 
+    Each component is a part at least. A fragment of less than a hundredth of the area (`fragment_vertices`) is exactly
+    one: it comes to one temperature long before the time at which parts are told apart.
+
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
         A closed surface is turned outward; of an open one the faces are seen from outside counter-clockwise.
     n_modes : int
-        Eigenpairs, at least 2, to which one a component is added.
+        Eigenpairs, at least 2, to which one is added for each component that is no fragment.
     progress : callable, optional
         Told of the eigensolver's progress.
 
@@ -73,8 +79,10 @@ def find_parts(mesh: TriangleMesh, *, n_modes: int = N_MODES, progress: Progress
     InvalidParameterError
         If there are fewer than 2 modes.
     InvalidShapeError
-        If the mesh has a face without area or a vertex without face.
+        If the mesh has a face without area or twice, or a vertex without face; if neighboring faces are turned against
+        each other; or if it is a soup, whose faces lie edge on edge without sharing vertices.
     """
+    mesh = as_mesh(mesh)
     outward = facing_outward(mesh)
     spectrum = part_spectrum(outward, n_modes=n_modes, progress=progress)
     tree = part_tree(outward, spectrum)
@@ -83,14 +91,19 @@ def find_parts(mesh: TriangleMesh, *, n_modes: int = N_MODES, progress: Progress
     return FoundParts(outward, spectrum, frozen(heat), tree, parts)
 
 
-def part_spectrum(mesh: TriangleMesh, *, n_modes: int = N_MODES, progress: Progress | None = None) -> Spectrum:
-    """Solve for the lowest modes of a Laplacian that conducts badly across concave creases.
+def part_spectrum(mesh: MeshLike, *, n_modes: int = N_MODES, progress: Progress | None = None) -> Spectrum:
+    """Solve for the lowest modes of a Laplacian that conducts badly across concave creases, fragments left out.
 
     Parameters and errors are those of `find_parts`, the faces of the mesh being turned outward.
     """
-    wanted = whole_number(n_modes, "n_modes", 2) + vertex_components(mesh)[0]
+    mesh = as_mesh(mesh)
+    require_describable(mesh)
+    fragments = fragment_vertices(mesh)
+    _, labels = vertex_components(mesh)
+    n_components = len(np.unique(np.delete(labels, fragments)))
+    wanted = whole_number(n_modes, "n_modes", 2) + n_components
     laplacian = anisotropic_laplacian(mesh, curvature_tensors(mesh, CONCAVITY, concave=True))
-    return solve_spectrum(laplacian, min(wanted, mesh.n_vertices), progress=progress)
+    return solve_free(laplacian, min(wanted, mesh.n_vertices - len(fragments)), fragments, progress)
 
 
 def facing_outward(mesh: TriangleMesh) -> TriangleMesh:

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.features.merge_tree import MergeTree, merged_regions
 from eigenshape.features.part_tree import PartTree
-from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.topology import edge_table, face_pairs
 
 Tree = MergeTree | PartTree
@@ -76,6 +77,7 @@ def segment(
     InvalidParameterError
         If not exactly one of the three is given, or it is below its least value.
     """
+    require_type(tree, Tree, "tree")
     rules = {"n_regions": n_regions, "persistence": persistence, "largest_gap": largest_gap or None}
     given = [name for name, value in rules.items() if value is not None]
     if len(given) != 1:
@@ -116,8 +118,9 @@ def _above_largest_gap(tree: Tree) -> float:
     return float(finite[np.argmax(finite - np.append(finite[1:], 0.0))])
 
 
-def touching_parts(mesh: TriangleMesh, labels: Int[np.ndarray, " f"]) -> Int[np.ndarray, "p 2"]:
+def touching_parts(mesh: MeshLike, labels: Int[np.ndarray, " f"]) -> Int[np.ndarray, "p 2"]:
     """List the pairs of different labels that meet at an edge, the lower first, ascending."""
+    mesh = as_mesh(mesh)
     faces, _ = face_pairs(edge_table(mesh))
     pairs = np.sort(labels[faces], axis=1)
     return np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0)
@@ -129,6 +132,7 @@ def merge_targets(tree: Tree) -> Int[np.ndarray, " m"]:
     The neighbour across the saddle may have merged before; then it is whoever took that one over, and so on. Maxima
     that stand earlier persist longer, so the first earlier one on the way is it.
     """
+    require_type(tree, Tree, "tree")
     target = tree.parent.copy()
     for number in range(len(target)):
         while target[number] > number:

@@ -3,10 +3,11 @@
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
+
+from eigenshape._compile import njit
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def join_points(starts, neighbours, order):
     """Let points enter in order and join each to the neighbours before it.
@@ -38,7 +39,7 @@ def join_points(starts, neighbours, order):
     return root, ended[:n_ended].copy()
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def spanning_forest(ends, order, n):
     """Say of each edge whether it joins two components where edges enter in order."""
@@ -52,7 +53,7 @@ def spanning_forest(ends, order, n):
     return joins
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def find_root(root, point):
     """Return the root of a tree that a point is in, halving the way there (Tarjan and van Leeuwen 1984)."""

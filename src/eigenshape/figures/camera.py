@@ -5,14 +5,20 @@ from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial import ConvexHull, QhullError
 
+from eigenshape._threads import one_blas_thread
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.topology import edge_table, face_pairs
 
 Up = Literal["auto", "x", "y", "z"]
 ONE_WAY = 0.3  # length of the mean normal, which a closed surface has 0 of, from which on a surface is a scan
 MARGIN = 0.04  # of the picture, left free on each side
-SOLE = 0.03  # of the longest side of the box: what is at most so far above the lowest point carries the shape
+SOLE = 0.02  # of the longest side of the box: what is at most so far above the lowest point carries the shape
+WIDER = 4.0  # times the base along y: less upsets many shapes for which y is up
+LESS = 0.8  # of the bending seen from behind: with less, a shape is shown from behind
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,42 +36,80 @@ class Camera:
     size: int
 
 
-def three_quarter_view(mesh: TriangleMesh, *, up: Up = "y", size: int = 600) -> Camera:
+@one_blas_thread()
+def three_quarter_view(mesh: MeshLike, *, up: Up = "auto", size: int = 600) -> Camera:
     """Look at a shape from its front, its left and a little from above; at a scan from where it was seen.
 
-    The front is +z where y is up, as in most collections and in glTF; +x where z is up; +y where x is up. A surface
-    that is open and mostly faces one way is a scan, and is looked at from there.
+    The front is +z where y is up, as in most collections and in glTF; +x where z is up; +y where x
+    is up. If the other side bends clearly more, it is the front: a face bends more than the back of
+    a head. A surface that is open and mostly faces one way is a scan, and is looked at from there.
 
-    "auto" takes z for up where the shape stands on its lowest points along z and would fall over along y, and y
-    otherwise. It is a guess: it rights many shapes of collections where z is up, and upsets a few where y is.
+    "auto" takes y for up; but z if the shape would fall over along y and would stand along z, on a
+    base more than four times as large. It is a guess: of 243 real shapes whose upright pose is
+    known, it shows 183 upright, and y alone shows 143.
     """
-    axis = "xyz".index(_standing_axis(mesh) if up == "auto" else up)
+    mesh = as_mesh(mesh)
+    axis = "xyz".index(_upright_axis(mesh) if up == "auto" else up)
     upward, front = np.eye(3)[axis], np.eye(3)[(axis + 1) % 3]
-    towards = 0.78 * front + 0.48 * np.cross(upward, front) + 0.4 * upward
+    side = np.cross(upward, front)
+    towards = 0.78 * front + 0.48 * side + 0.4 * upward
+    behind = -0.78 * front - 0.48 * side + 0.4 * upward
     facing = _facing(mesh)
     if facing is not None and np.linalg.norm(np.cross(upward, facing)) > 0.1:
         towards = facing
+    elif _seen_bending(mesh, towards) < LESS * _seen_bending(mesh, behind):
+        towards = behind
     towards = towards / np.linalg.norm(towards)
     right = np.cross(upward, towards)
     right = right / np.linalg.norm(right)
     return Camera(np.stack([right, -np.cross(towards, right), towards]), size)
 
 
-def _standing_axis(mesh: TriangleMesh) -> Literal["y", "z"]:
+def _upright_axis(mesh: TriangleMesh) -> Literal["y", "z"]:
     points = unit_scaled(mesh)[0]
     areas = np.linalg.norm(area_vectors(points[mesh.faces]), axis=1)
     weights = areas / max(areas.sum(), np.finfo(np.float64).tiny)
-    centre = weights @ points[mesh.faces].mean(axis=1)
-    return "z" if _stands(points - centre, 2) and not _stands(points - centre, 1) else "y"
+    center = weights @ points[mesh.faces].mean(axis=1)
+    along_y, along_z = (_base(points - center, axis) for axis in (1, 2))
+    falls_along_y = not _surrounds_origin(along_y)
+    wider_along_z = _hull_area(along_z) > WIDER * _hull_area(along_y)
+    return "z" if falls_along_y and _surrounds_origin(along_z) and wider_along_z else "y"
 
 
-def _stands(points: Float[np.ndarray, "n 3"], axis: int) -> bool:
-    """Say whether the origin, the centre of the surface, lies over the convex hull of the lowest points."""
+def _base(points: Float[np.ndarray, "n 3"], axis: int) -> Float[np.ndarray, "k 2"]:
+    """Return where the lowest points would touch the ground."""
     height = points[:, axis] - points[:, axis].min()
-    one, two = np.delete(points, axis, axis=1)[height <= SOLE * np.ptp(points, axis=0).max()].T
-    around = np.sort(np.arctan2(two, one))
+    return np.delete(points, axis, axis=1)[height <= SOLE * np.ptp(points, axis=0).max()]
+
+
+def _surrounds_origin(points: Float[np.ndarray, "k 2"]) -> bool:
+    """Say whether the origin lies inside the convex hull: what stands on these points does not fall over."""
+    around = np.sort(np.arctan2(points[:, 1], points[:, 0]))
     gaps = np.diff(around, append=around[0] + 2 * np.pi)
     return bool(gaps.max() < np.pi)
+
+
+def _hull_area(points: Float[np.ndarray, "k 2"]) -> float:
+    try:
+        return float(ConvexHull(points).volume)
+    except QhullError:  # fewer than three points, or all on a line
+        return 0.0
+
+
+def _seen_bending(mesh: TriangleMesh, towards: Float[np.ndarray, "3"]) -> float:
+    """Sum the bending of a surface, angle times length of each edge, weighted by how far the edge faces the viewer."""
+    points = unit_scaled(mesh)[0]
+    vectors = area_vectors(points[mesh.faces])
+    normals = vectors / np.maximum(np.linalg.norm(vectors, axis=1), np.finfo(np.float64).tiny)[:, None]
+    if np.einsum("ij,ij->", vectors, points[mesh.faces].mean(axis=1)) < 0:
+        normals = -normals  # the faces look inward
+    table = edge_table(mesh)
+    pairs, edges = face_pairs(table)
+    one, two = normals[pairs].transpose(1, 0, 2)
+    angles = np.arccos(np.clip(np.einsum("ij,ij->i", one, two), -1, 1))
+    begin, end = points[table.edges[edges]].transpose(1, 0, 2)
+    lengths = np.linalg.norm(end - begin, axis=1)
+    return float((angles * lengths) @ np.maximum((one + two) @ towards, 0))
 
 
 def _facing(mesh: TriangleMesh) -> Float[np.ndarray, "3"] | None:

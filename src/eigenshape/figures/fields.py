@@ -9,12 +9,13 @@ from jaxtyping import Float, Int, UInt8
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, Normalize
-from matplotlib.figure import Figure
 
+from eigenshape._arguments import require_type
 from eigenshape.figures.camera import Camera, three_quarter_view
+from eigenshape.figures.figure import Figure
 from eigenshape.figures.render import Drawing, draw, palette
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
-from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.spectral.spectrum import Spectrum
 
 PANEL = 3.2  # inches
@@ -22,9 +23,12 @@ DOT = 46.0
 
 
 def figure_eigenfunctions(
-    mesh: TriangleMesh, spectrum: Spectrum, indices: Sequence[int], *, camera: Camera | None = None
+    mesh: MeshLike, spectrum: Spectrum, indices: Sequence[int], *, camera: Camera | None = None
 ) -> Figure:
     """Draw eigenfunctions side by side, each with its nodal lines dark, in units of its largest value."""
+    mesh = as_mesh(mesh)
+    require_type(spectrum, Spectrum, "spectrum")
+    require_type(camera, Camera | None, "camera")
     camera = camera or three_quarter_view(mesh, size=420)
     n_columns = min(len(indices), 4)
     n_rows = -(-len(indices) // n_columns)
@@ -49,7 +53,7 @@ def _constant_as_one(function: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n
 
 
 def figure_field(
-    mesh: TriangleMesh,
+    mesh: MeshLike,
     values: Float[np.ndarray, " n"],
     label: str,
     *,
@@ -57,6 +61,8 @@ def figure_field(
     color_map: str = "viridis",
 ) -> Figure:
     """Draw one function on a shape with a labelled colour bar, heat for instance."""
+    mesh = as_mesh(mesh)
+    require_type(camera, Camera | None, "camera")
     figure = Figure(figsize=(2 * PANEL + 1.2, 2 * PANEL), layout="constrained")
     axes = figure.subplots()
     scale, colors = Normalize(float(values.min()), float(values.max())), mpl.colormaps[color_map]
@@ -72,9 +78,11 @@ def mapped(values: Float[np.ndarray, " n"], scale: Normalize, colors: Colormap) 
 
 
 def figure_segments(
-    mesh: TriangleMesh, labels: Int[np.ndarray, " f"], vertices: Int[np.ndarray, " m"], *, camera: Camera | None = None
+    mesh: MeshLike, labels: Int[np.ndarray, " f"], vertices: Int[np.ndarray, " m"], *, camera: Camera | None = None
 ) -> Figure:
     """Draw the parts of a shape in colours, with their numbered feature points; hidden ones are hollow."""
+    mesh = as_mesh(mesh)
+    require_type(camera, Camera | None, "camera")
     figure = Figure(figsize=(2 * PANEL, 2 * PANEL + 0.4), layout="constrained")
     axes = figure.subplots()
     drawing = draw(mesh, camera or three_quarter_view(mesh), face_colors=palette(labels))
@@ -84,11 +92,12 @@ def figure_segments(
     return figure
 
 
-def part_colors(mesh: TriangleMesh, labels: Int[np.ndarray, " f"]) -> UInt8[np.ndarray, "n 3"]:
+def part_colors(mesh: MeshLike, labels: Int[np.ndarray, " f"]) -> UInt8[np.ndarray, "n 3"]:
     """Return red, green and blue of each vertex for `write_mesh`: those of the part with most area around it.
 
     Parts have the colours that `figure_segments` gives them; what has no label, below 0, is grey.
     """
+    mesh = as_mesh(mesh)
     corners, areas = mesh.faces.ravel(), np.repeat(face_areas(mesh), 3)
     shape = (mesh.n_vertices, int(labels.max(initial=-1)) + 2)
     around = sp.coo_array((areas / (areas.max() or 1.0), (corners, np.repeat(labels, 3) + 1)), shape=shape).tocsr()

@@ -4,11 +4,12 @@ import numpy as np
 from jaxtyping import Float, Int
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
-from matplotlib.figure import Figure
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import whole_number
 from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs
 from eigenshape.features.segmentation import Tree, merge_targets
+from eigenshape.figures.figure import Figure
 from eigenshape.figures.render import palette
 
 KINDS = {  # colour, marker and text of each kind of pair
@@ -30,6 +31,7 @@ def figure_diagram(diagram: PersistenceDiagram, *, label: str = "function") -> F
     label : str
         What the function is, with its unit.
     """
+    require_type(diagram, PersistenceDiagram, "diagram")
     figure = Figure(figsize=(6.6, 6.0), layout="constrained")
     axes = figure.subplots()
     for kind, (color, marker, text) in KINDS.items():
@@ -78,6 +80,7 @@ def figure_merge_tree(
     InvalidParameterError
         If `n_maxima` is below 1.
     """
+    require_type(tree, Tree, "tree")
     shown = min(whole_number(n_maxima, "n_maxima", 1), len(tree.maxima))
     into = merge_targets(tree)[:shown]
     finite = tree.persistence[np.isfinite(tree.persistence)]

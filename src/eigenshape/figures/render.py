@@ -6,11 +6,12 @@ import matplotlib as mpl
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from eigenshape._threads import one_blas_thread
 from eigenshape.figures.camera import Camera, in_picture
-from eigenshape.geometry.measure import vertex_normals
+from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.raster import Raster, rasterize
-from eigenshape.geometry.topology import boundary_edges
+from eigenshape.geometry.topology import agreeing, boundary_edges
 
 FINER = 2  # pixels drawn for each shown, along each side
 LIGHT = np.array([-0.35, -0.55, 0.76])  # from the upper left, towards the viewer
@@ -42,6 +43,7 @@ class Drawing:
     visible: Bool[np.ndarray, " n"]
 
 
+@one_blas_thread()
 def draw(
     mesh: TriangleMesh,
     camera: Camera,
@@ -106,7 +108,7 @@ def _blend(values: Float[np.ndarray, "n c"], mesh: TriangleMesh, raster: Raster)
 
 
 def _brightness(mesh: TriangleMesh, camera: Camera, raster: Raster) -> Float[np.ndarray, "h w"]:
-    normals = _blend(vertex_normals(mesh) @ camera.rotation.T, mesh, raster)
+    normals = _blend(mean_normals(agreeing(mesh)) @ camera.rotation.T, mesh, raster)
     normals = normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-12)
     normals = np.where(normals[..., 2:] < 0, -normals, normals)  # both sides of an open surface are lit
     light = LIGHT / np.linalg.norm(LIGHT)

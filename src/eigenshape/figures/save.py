@@ -5,6 +5,7 @@ from pathlib import Path
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from eigenshape._arguments import require_type
 from eigenshape._errors import InvalidParameterError
 from eigenshape._files import replacing
 
@@ -28,13 +29,16 @@ def require_picture_path(path: str | Path) -> Path:
 
 
 def save_figure(figure: Figure, path: str | Path) -> None:
-    """Write a figure as PNG, SVG or PDF, whole or not at all; the same figure gives the same bytes.
+    """Write a figure as PNG, SVG or PDF, whole or not at all.
+
+    Figures made alike give the same bytes as PNG and as PDF; in SVG, Matplotlib gives parts random names.
 
     Raises
     ------
     InvalidParameterError
         If the suffix is unknown or the folder is not there.
     """
+    require_type(figure, Figure, "figure")
     path = require_picture_path(path)
     FigureCanvasAgg(figure)
     kind = path.suffix.lower()

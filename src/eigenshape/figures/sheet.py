@@ -6,15 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
+from eigenshape._arguments import require_each, require_type
 from eigenshape.figures.camera import three_quarter_view
 from eigenshape.figures.fields import PANEL, mark, show
+from eigenshape.figures.figure import Figure
 from eigenshape.figures.render import draw, palette
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.retrieval.transfer import LabelTransfer
 
 N_COLUMNS = 3
+QUIET = "#808080"
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +26,8 @@ class Panel:
 
     Attributes
     ----------
-    mesh : TriangleMesh
+    mesh : TriangleMesh or None
+        None where there is nothing to draw: the panel says so.
     title : str
         One or two lines.
     colors : (f,) int
@@ -32,14 +36,20 @@ class Panel:
         Vertices to mark by dots.
     """
 
-    mesh: TriangleMesh
+    mesh: TriangleMesh | None
     title: str
     colors: Int[np.ndarray, " f"]
     vertices: Int[np.ndarray, " m"]
 
+    def __post_init__(self) -> None:
+        if self.mesh is not None:
+            require_type(self.mesh, TriangleMesh, "mesh")
+
 
 def figure_contact_sheet(query: Panel, matches: Sequence[Panel], *, caption: str = "") -> Figure:
     """Draw a query, large, beside its matches in reading order (thesis fig. 5.1)."""
+    require_type(query, Panel, "query")
+    require_each(matches, Panel, "matches")
     n_rows = max(-(-len(matches) // N_COLUMNS), 1)
     size = PANEL * (1.0 if n_rows > 1 else 0.9)
     figure = Figure(figsize=(size * (N_COLUMNS + 1.5), size * n_rows + 0.8), layout="constrained")
@@ -57,14 +67,21 @@ def figure_contact_sheet(query: Panel, matches: Sequence[Panel], *, caption: str
 
 
 def _fill(axes: Axes, panel: Panel) -> None:
+    axes.set_title(panel.title, fontsize=10)
+    if panel.mesh is None:
+        axes.text(0.5, 0.5, "no mesh to draw", ha="center", va="center", color=QUIET, transform=axes.transAxes)
+        axes.set_axis_off()
+        return
     drawing = draw(panel.mesh, three_quarter_view(panel.mesh, size=440), face_colors=palette(panel.colors))
     show(axes, drawing)
     mark(axes, drawing, panel.vertices[drawing.visible[panel.vertices]])
-    axes.set_title(panel.title, fontsize=10)
 
 
-def figure_label_transfer(source: TriangleMesh, target: TriangleMesh, transfer: LabelTransfer) -> Figure:
+def figure_label_transfer(source: MeshLike, target: MeshLike, transfer: LabelTransfer) -> Figure:
     """Draw two shapes side by side: matched parts in one colour, and how sure each label is, at its feature."""
+    source = as_mesh(source, "source")
+    target = as_mesh(target, "target")
+    require_type(transfer, LabelTransfer, "transfer")
     figure = Figure(figsize=(4.4 * PANEL, 2.2 * PANEL + 0.4), layout="constrained")
     left, right = figure.subplots(1, 2)
     _fill(left, Panel(source, "labelled", transfer.source.labels, transfer.source.features.vertices))

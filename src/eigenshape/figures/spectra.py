@@ -6,12 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_values
 from eigenshape._errors import InvalidParameterError
+from eigenshape.figures.figure import Figure
 from eigenshape.figures.render import palette
 from eigenshape.spectral.brackets import Brackets
 from eigenshape.spectral.comparison import (
@@ -38,6 +39,8 @@ def figure_spectrum(spectrum: Spectrum, *, area: float | None = None, brackets: 
     brackets : Brackets, optional
         Of the same shape: draws the interval in which each eigenvalue of the shape itself lies.
     """
+    require_type(spectrum, Spectrum, "spectrum")
+    require_type(brackets, Brackets | None, "brackets")
     figure = Figure(figsize=(7.5, 4.6), layout="constrained")
     axes = figure.subplots()
     proof = spectrum.certificate
@@ -98,6 +101,8 @@ def figure_spectra(
     InvalidParameterError
         If there are fewer than two, one does not begin with the lowest eigenvalue, or brackets belong to none.
     """
+    require_type(spectra, SpectrumComparison | Mapping, "spectra")
+    require_type(brackets, Mapping | None, "brackets")
     rows = _rows(spectra, titles, brackets or {})
     if len(rows) < 2:
         raise InvalidParameterError(f"Spectra side by side must be two or more; there are {len(rows)}.")

@@ -5,14 +5,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
-from matplotlib.figure import Figure, SubFigure
+from matplotlib.figure import SubFigure
 from matplotlib.ticker import MaxNLocator
 
+from eigenshape._arguments import require_type
 from eigenshape.figures.camera import three_quarter_view
 from eigenshape.figures.fields import PANEL, mapped, show
+from eigenshape.figures.figure import Figure
 from eigenshape.figures.render import draw
 from eigenshape.figures.spectra import draw_comparison
-from eigenshape.geometry.cloud import Shape
+from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.stability.report import StabilityReport
 
@@ -20,17 +22,20 @@ TRUSTED = "#e4f1e4"
 
 
 def figure_stability(
-    report: StabilityReport, one: Shape, two: Shape, *, titles: tuple[str, str] = ("one", "two")
+    report: StabilityReport, one: ShapeLike, two: ShapeLike, *, titles: tuple[str, str] = ("one", "two")
 ) -> Figure:
     """Draw two shapes coloured by their distance, their spectra, what changes at each heat time, and eigenspaces.
 
     Parameters
     ----------
     report : StabilityReport
-    one, two : TriangleMesh, SimplicialMesh or PointCloud
+    one, two : ShapeLike
         The shapes compared; only triangle meshes are drawn.
     titles : (str, str)
     """
+    require_type(report, StabilityReport, "report")
+    one = as_shape(one, "one")
+    two = as_shape(two, "two")
     drawn = isinstance(one, TriangleMesh) and isinstance(two, TriangleMesh)
     figure = Figure(figsize=(11, 11.5 if drawn else 8), layout="constrained")
     rows = figure.subfigures(2 if drawn else 1, 1, squeeze=False, height_ratios=[PANEL, 8] if drawn else None)[:, 0]
@@ -50,7 +55,7 @@ def _draw_shapes(
 ) -> None:
     panels = figure.subplots(1, 2)
     scale, colors = Normalize(0.0, report.distance or 1.0), mpl.colormaps["viridis"]
-    camera = three_quarter_view(meshes[0], up="auto")
+    camera = three_quarter_view(meshes[0])
     for axes, mesh, values, title in zip(panels, meshes, report.distances, titles, strict=True):
         show(axes, draw(mesh, camera, vertex_colors=mapped(values, scale, colors)))
         axes.set_title(title)

@@ -7,15 +7,18 @@ from jaxtyping import Float
 
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidShapeError
+from eigenshape._threads import one_blas_thread
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.geodesic import farthest_points
-from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.requirements import require_describable
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import vertex_components
 
 N_BASES = 150
 
 
-def average_geodesic_distance(mesh: TriangleMesh, *, n_bases: SupportsIndex = N_BASES) -> Float[np.ndarray, " n"]:
+@one_blas_thread()
+def average_geodesic_distance(mesh: MeshLike, *, n_bases: SupportsIndex = N_BASES) -> Float[np.ndarray, " n"]:
     """Measure for each vertex the mean geodesic distance to all points of the surface.
 
     a(x) = ∫ g(x, y) dy / area ≈ Σ_b g(x, b) A_b / area over bases b (Hilaga, Shinagawa, Kohmura and Kunii 2001, who
@@ -25,7 +28,7 @@ def average_geodesic_distance(mesh: TriangleMesh, *, n_bases: SupportsIndex = N_
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
         In one piece.
     n_bases : int
         At least 1; at most n are used. A distance from one base to all vertices takes about as long as sorting them.
@@ -38,14 +41,15 @@ def average_geodesic_distance(mesh: TriangleMesh, *, n_bases: SupportsIndex = N_
     Raises
     ------
     InvalidShapeError
-        If the mesh has several components, between which there is no way.
+        If the mesh has several components, between which there is no way, a vertex without face or a face twice.
     """
+    mesh = as_mesh(mesh)
     count = min(whole_number(n_bases, "n_bases", 1), mesh.n_vertices)
+    require_describable(mesh)
     pieces, _ = vertex_components(mesh)
     if pieces > 1:
         raise InvalidShapeError(
-            f"Average distances need one piece; the mesh has {pieces} components. Repair with largest_component, or "
-            "with weld where they touch."
+            f"Average distances need one piece; the mesh has {pieces} components. Repair with largest_component."
         )
     _, rows, nearest = farthest_points(mesh, count)
     areas = dual_volumes(mesh)

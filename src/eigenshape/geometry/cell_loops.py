@@ -3,10 +3,11 @@
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
+
+from eigenshape._compile import njit
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def cell_areas(places):
     """Return for each set of points (k, 2) the area of the Voronoi cell of the origin, inside their convex hull.

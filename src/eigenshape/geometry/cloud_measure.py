@@ -6,8 +6,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError, cKDTree
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import whole_number
-from eigenshape._errors import InvalidShapeError
+from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape.geometry.cell_loops import cell_areas
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.quadrature import Quadrature
@@ -45,6 +46,7 @@ def cloud_quadrature(cloud: PointCloud, *, n_neighbors: SupportsIndex | None = N
     InvalidParameterError
         If `n_neighbors` is less than m + 1 or not less than the number of points.
     """
+    require_type(cloud, PointCloud, "cloud")
     dim = cloud.dim
     if cloud.n_points <= dim + 1:
         raise InvalidShapeError(f"A cloud of dimension {dim} needs over {dim + 1} points; it has {cloud.n_points}.")
@@ -72,7 +74,7 @@ def _require_different(cloud: PointCloud, distances: np.ndarray, neighbors: np.n
         other = next(int(index) for index in neighbors[equal[0]] if index != equal[0])
         raise InvalidShapeError(
             f"Points must differ; points {equal[0]} and {other} are both {cloud.points[equal[0]].tolist()} "
-            f"({equal.size} such). Drop the copies."
+            f"({equal.size} such). {try_auto('cloud')}"
         )
 
 

@@ -6,14 +6,14 @@ Face i has the corners `points[3 i : 3 i + 3]`. The faces stand in the order of 
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
 
+from eigenshape._compile import njit
 from eigenshape.geometry.predicate_loops import same_place, side_of_line, side_of_plane
 
 LEAF = 4  # faces at most
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def face_boxes(points):
     """Return the least and the largest coordinates of each face, (f, 6)."""
@@ -25,7 +25,7 @@ def face_boxes(points):
     return boxes
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def curve_places(boxes):
     """Return for the middle of each box its place on Morton's curve through 2^20 cells a side."""
@@ -42,7 +42,7 @@ def curve_places(boxes):
     return places
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def box_tree(boxes):
     """Return the boxes of a complete binary tree: below node k are nodes 2 k + 1 and 2 k + 2, and 2^levels leaves."""
@@ -62,20 +62,20 @@ def box_tree(boxes):
     return levels, nodes
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _widen(box, other):
     for axis in range(3):
         box[axis], box[3 + axis] = min(box[axis], other[axis]), max(box[3 + axis], other[3 + axis])
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _box(boxes, i):
     return boxes[i, 0], boxes[i, 1], boxes[i, 2], boxes[i, 3], boxes[i, 4], boxes[i, 5]
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _meet(one, other):
     return (
@@ -88,7 +88,7 @@ def _meet(one, other):
     )
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def crossing_pairs(points, boxes):
     """Return the pairs of faces that cross, (p, 2), in no order.
@@ -123,7 +123,7 @@ def crossing_pairs(points, boxes):
     return pairs[:found].copy()
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _axes(points):
     """Return for each face an axis along which its shadow has area, -1 where the face has none."""
@@ -137,7 +137,7 @@ def _axes(points):
     return axes
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _cross(points, axes, i, j):
     """Tell whether a point inside one of two faces belongs to the other; one of them has area.
@@ -171,7 +171,7 @@ def _cross(points, axes, i, j):
     return least < 0 and most > 0
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _beyond_shared_side(points, a, b):
     """Return the corner of face b across a side that it has in common with face a, -1 where there is no such side."""
@@ -184,7 +184,7 @@ def _beyond_shared_side(points, a, b):
     return apex if shared == 2 else -1
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _sides(points, a, b):
     """Return the least and the largest side of the plane of face a for corners of b, and the corner alone on one."""
@@ -202,7 +202,7 @@ def _sides(points, a, b):
     return min(x, y, z), max(x, y, z), alone
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _is_apart(points, u, v, a, p, q, r):
     """Tell whether a side of face a has p, q, r beyond or on it, in the plane of axes u and v."""
@@ -218,7 +218,7 @@ def _is_apart(points, u, v, a, p, q, r):
     return False
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _enters(points, axis, a, b):
     """Tell whether face a, a segment or a point, has a point inside face b, whose shadow along `axis` has area."""
@@ -237,7 +237,7 @@ def _enters(points, axis, a, b):
     return same_place(points, p, q) or min(x, y, z) * max(x, y, z) < 0
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _ends(points, a):
     """Return the first and the last of three corners on a line, by x, then y, then z."""
@@ -250,7 +250,7 @@ def _ends(points, a):
     return first, last
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _is_before(points, p, q):
     for axis in range(3):

@@ -3,14 +3,14 @@
 import numpy as np
 from jaxtyping import Int
 
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.crossing_loops import crossing_pairs, curve_places, face_boxes
-from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import scaled_corners
 
 FINEST = 300  # in powers of two below the largest coordinate: products of three are exact
 
 
-def self_intersections(mesh: TriangleMesh) -> Int[np.ndarray, "p 2"]:
+def self_intersections(mesh: MeshLike) -> Int[np.ndarray, "p 2"]:
     """Return the pairs of faces that cross: a point inside one, off its border, belongs to the other.
 
     So faces that go through each other cross, those that overlap in one plane too, and where a corner, a side or a
@@ -31,7 +31,7 @@ def self_intersections(mesh: TriangleMesh) -> Int[np.ndarray, "p 2"]:
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
         Of any topology, in any length unit.
 
     Returns
@@ -39,6 +39,7 @@ def self_intersections(mesh: TriangleMesh) -> Int[np.ndarray, "p 2"]:
     (p, 2) int
         Faces i < j of each pair, in ascending order.
     """
+    mesh = as_mesh(mesh)
     corners, _ = scaled_corners(mesh)
     points = np.ldexp(np.rint(np.ldexp(corners.reshape(-1, 3), FINEST)), -FINEST)
     boxes = face_boxes(points)

@@ -3,9 +3,11 @@
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import dual_volumes, require_volumes, scaled_corners
-from eigenshape.geometry.topology import edge_table, require_simplices_everywhere
+from eigenshape.geometry.requirements import require_sound
+from eigenshape.geometry.simplices import dual_volumes, scaled_corners
+from eigenshape.geometry.topology import edge_table
 
 
 def face_angles(mesh: TriangleMesh) -> Float[np.ndarray, "f 3"]:
@@ -29,7 +31,7 @@ def angle_defects(mesh: TriangleMesh) -> Float[np.ndarray, " n"]:
     return 2 * np.pi - turned - np.pi / 2 * np.bincount(table.edges.ravel(), weights=at_edges, minlength=n)
 
 
-def gaussian_curvature(mesh: TriangleMesh) -> Float[np.ndarray, " n"]:
+def gaussian_curvature(mesh: MeshLike) -> Float[np.ndarray, " n"]:
     """Measure the Gaussian curvature at each vertex: the angle defect over the area around it.
 
     K_i / A_i with A_i a third of the faces' area (Meyer, Desbrun, Schröder and Barr 2003, with that area; thesis 5.4
@@ -39,7 +41,7 @@ def gaussian_curvature(mesh: TriangleMesh) -> Float[np.ndarray, " n"]:
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
 
     Returns
     -------
@@ -49,8 +51,8 @@ def gaussian_curvature(mesh: TriangleMesh) -> Float[np.ndarray, " n"]:
     Raises
     ------
     InvalidShapeError
-        If a face has no area, a vertex no face, or floats cannot hold areas.
+        If a face has no area or is there twice, a vertex has no face, or floats cannot hold areas.
     """
-    require_volumes(mesh)
-    require_simplices_everywhere(mesh)
+    mesh = as_mesh(mesh)
+    require_sound(mesh)
     return angle_defects(mesh) / dual_volumes(mesh)

@@ -7,6 +7,7 @@ from typing import SupportsIndex
 import numpy as np
 from scipy.spatial import Delaunay
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
@@ -69,6 +70,7 @@ def irregular_grid(
 
     Delaunay triangles, facing +z; eigenvalues are `box_eigenvalues(k)`.
     """
+    require_type(rng, np.random.Generator, "rng")
     counts = whole_number(n_x, "n_x", 1, 2000), whole_number(n_y, "n_y", 1, 2000)
     if not 0 <= jitter < 0.5:
         raise InvalidParameterError(f"jitter must be at least 0 and less than 0.5; it is {jitter}.")

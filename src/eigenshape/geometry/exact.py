@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.special import comb, eval_legendre, jn_zeros, jnp_zeros, spherical_jn
 
-from eigenshape._arrays import positive_values, whole_number
+from eigenshape._arrays import positive_values, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
 
 Condition = Literal["neumann", "dirichlet"]
 GAUSS = 600  # nodes: enough for degree 300 over the whole sphere
@@ -36,6 +37,7 @@ def sphere_eigenvalues(k: SupportsIndex, dim: SupportsIndex = 2) -> Float[np.nda
     return np.array(values[:count])
 
 
+@one_blas_thread()
 def sphere_functional_eigenvalues(k: SupportsIndex, t: float) -> Float[np.ndarray, " k"]:
     """Return the first k eigenvalues of the functional approximation 𝓛_t on the unit sphere (thesis eq. 3.1).
 
@@ -105,7 +107,7 @@ def _lowest_sums(one: Float[np.ndarray, " k"], two: Float[np.ndarray, " k"]) -> 
 
 def flat_torus_eigenvalues(k: SupportsIndex, periods: ArrayLike) -> Float[np.ndarray, " k"]:
     """Return 4π² |ξ|² over the frequencies ξ that are whole on both periods, the rows of a 2 x 2 matrix."""
-    count, rows = whole_number(k, "k", 1, None), np.asarray(periods, dtype=np.float64)
+    count, rows = whole_number(k, "k", 1, None), real_numbers(periods, "periods").astype(np.float64)
     if rows.shape != (2, 2) or not np.isfinite(rows).all():
         raise InvalidParameterError(f"periods must be a finite 2 x 2 matrix; they are {rows.tolist()}.")
     reach = np.ceil(np.sqrt(count) * np.linalg.cond(rows)) + 1

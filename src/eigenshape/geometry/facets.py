@@ -7,6 +7,10 @@ import scipy.sparse as sp
 from jaxtyping import Int
 from scipy.sparse.csgraph import connected_components
 
+from eigenshape._errors import InvalidShapeError
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 
 
@@ -34,11 +38,37 @@ class FacetTable:
         return np.flatnonzero(self.n_simplices == 1)
 
 
-def facet_table(mesh: Mesh) -> FacetTable:
+def facet_table(mesh: MeshLike) -> FacetTable:
     """List the facets of the mesh once each, with the simplices' way to them."""
+    mesh = as_simplicial(mesh)
     named = mesh.simplices[np.arange(len(mesh.simplices))[:, None, None], _corners_of_facets(mesh)]
     facets, inverse, counts = np.unique(named.reshape(-1, mesh.dim), axis=0, return_inverse=True, return_counts=True)
     return FacetTable(facets, inverse.reshape(mesh.simplices.shape), counts)
+
+
+def boundary_surface(mesh: MeshLike) -> TriangleMesh:
+    """Return the surface around tetrahedra in R³: the triangles that one tetrahedron alone has, turned outward.
+
+    Points inside are left out; the others keep their order.
+
+    Raises
+    ------
+    InvalidShapeError
+        If the mesh is not one of tetrahedra in R³.
+    """
+    solid = as_simplicial(mesh)
+    if (solid.dim, solid.points.shape[1]) != (3, 3):
+        raise InvalidShapeError(f"Only tetrahedra in R^3 have a surface around them; the mesh is a {solid!r}.")
+    table = facet_table(solid)
+    owner, apex = np.nonzero(table.n_simplices[table.simplex_facets] == 1)
+    triangles = table.facets[table.simplex_facets[owner, apex]]
+    points, _ = size_one(solid.points)
+    a, b, c = (points[corner] for corner in triangles.T)
+    inside = points[solid.simplices[owner, apex]]
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), inside - a) > 0
+    triangles[inward] = triangles[inward][:, ::-1]
+    used, renumbered = np.unique(triangles, return_inverse=True)
+    return TriangleMesh(solid.points[used], renumbered.reshape(-1, 3))
 
 
 def _corners_of_facets(mesh: Mesh) -> Int[np.ndarray, "s corners m"]:

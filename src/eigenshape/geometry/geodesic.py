@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from eigenshape._arrays import positive_values, whole_numbers
 from eigenshape._errors import InvalidShapeError
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.geodesic_loops import balls
 from eigenshape.geometry.simplices import in_length, scaled_corners
 from eigenshape.geometry.simplicial import Mesh
@@ -19,7 +20,7 @@ from eigenshape.geometry.simplicial import Mesh
 SOURCES = 256  # a task
 
 
-def geodesic_balls(mesh: Mesh, radius: float) -> sp.csr_array:
+def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
     """Measure along the surface from each vertex to all vertices within a radius.
 
     Waves leave each vertex as in Dijkstra's algorithm, and cross each triangle as if what lies behind were flat: the
@@ -28,7 +29,7 @@ def geodesic_balls(mesh: Mesh, radius: float) -> sp.csr_array:
 
     Parameters
     ----------
-    mesh : TriangleMesh or SimplicialMesh
+    mesh : MeshLike
         Of dimension 2, in any R^d.
     radius : float
         In length.
@@ -45,6 +46,7 @@ def geodesic_balls(mesh: Mesh, radius: float) -> sp.csr_array:
     InvalidParameterError
         If the radius is not positive.
     """
+    mesh = as_simplicial(mesh)
     _require_surface(mesh)
     positive_values(radius, "radius")
     corners, scale = scaled_corners(mesh)
@@ -62,14 +64,14 @@ def geodesic_balls(mesh: Mesh, radius: float) -> sp.csr_array:
     return found.minimum(found.T)  # what one direction alone reached counts as out of reach
 
 
-def geodesic_distances(mesh: Mesh, sources: ArrayLike) -> Float[np.ndarray, "k n"]:
+def geodesic_distances(mesh: MeshLike, sources: ArrayLike) -> Float[np.ndarray, "k n"]:
     """Measure along the surface from some vertices to all others.
 
     As `geodesic_balls`, without limit, and in one direction: from the sources.
 
     Parameters
     ----------
-    mesh : TriangleMesh or SimplicialMesh
+    mesh : MeshLike
         Of dimension 2, in any R^d.
     sources : (k,) int
         Vertices.
@@ -86,19 +88,20 @@ def geodesic_distances(mesh: Mesh, sources: ArrayLike) -> Float[np.ndarray, "k n
     InvalidParameterError
         If a source is no vertex.
     """
+    mesh = as_simplicial(mesh)
     wave = waves_on(mesh)
     wanted = whole_numbers(sources, "A source", 0, mesh.n_points - 1)
     return np.array([wave(source) for source in wanted]).reshape(-1, mesh.n_points)
 
 
-def geodesic_distance_to_set(mesh: Mesh, sources: ArrayLike, *, reach: float = np.inf) -> Float[np.ndarray, " n"]:
+def geodesic_distance_to_set(mesh: MeshLike, sources: ArrayLike, *, reach: float = np.inf) -> Float[np.ndarray, " n"]:
     """Measure along the surface from each vertex to the nearest of some; one wave leaves all of them at once.
 
     As `geodesic_distances`; an edge between two of them is a source all along.
 
     Parameters
     ----------
-    mesh : TriangleMesh or SimplicialMesh
+    mesh : MeshLike
         Of dimension 2, in any R^d.
     sources : (k,) int
         Vertices.
@@ -117,6 +120,7 @@ def geodesic_distance_to_set(mesh: Mesh, sources: ArrayLike, *, reach: float = n
     InvalidParameterError
         If a source is no vertex.
     """
+    mesh = as_simplicial(mesh)
     wave = waves_on(mesh)
     return wave(np.unique(whole_numbers(sources, "A source", 0, mesh.n_points - 1)), reach)
 
@@ -138,7 +142,7 @@ def waves_on(mesh: Mesh) -> Callable[..., Float[np.ndarray, " n"]]:
 
 
 def farthest_points(
-    mesh: Mesh, count: int, *, reach: float = np.inf
+    mesh: MeshLike, count: int, *, reach: float = np.inf
 ) -> tuple[Int[np.ndarray, " c"], Float[np.ndarray, "c n"], Int[np.ndarray, " n"]]:
     """Choose vertices of a surface, each as far along it from those before as can be (Eldar and others 1997).
 
@@ -146,7 +150,7 @@ def farthest_points(
 
     Parameters
     ----------
-    mesh : TriangleMesh or SimplicialMesh
+    mesh : MeshLike
     count : int
     reach : float
         Length up to which distances are wanted; shorter ones are quicker.
@@ -160,6 +164,7 @@ def farthest_points(
     nearest : (n,) int
         For each vertex the number of the nearest.
     """
+    mesh = as_simplicial(mesh)
     wave, n = waves_on(mesh), mesh.n_points
     chosen, rows = np.empty(count, dtype=np.int64), np.empty((count, n))
     least, nearest = np.full(n, np.inf), np.zeros(n, dtype=np.int64)

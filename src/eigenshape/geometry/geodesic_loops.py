@@ -3,12 +3,13 @@
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
+
+from eigenshape._compile import njit
 
 FRONT = -1
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def through_edge(near, far, length, left, right):
     """Return the distance of a triangle's third corner from a source seen through the opposite edge, or infinity.
@@ -16,6 +17,8 @@ def through_edge(near, far, length, left, right):
     `near` and `far` are the distances of the edge's ends; the source is laid flat beyond the edge. `left` and `right`
     are the third corner's distances from the same ends. Infinity where the straight line misses the edge.
     """
+    if length == 0.0:  # both ends are one point, and the wave walks around it along the other edges
+        return np.inf
     x = (near * near - far * far + length * length) / (2 * length)
     y = np.sqrt(max(near * near - x * x, 0.0))
     corner_x = (left * left - right * right + length * length) / (2 * length)
@@ -29,13 +32,15 @@ def through_edge(near, far, length, left, right):
     return np.hypot(corner_x - x, depth)
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def across_edge(near, far, length, left, right):
     """Return the same where no point sends the wave: its front is straight (Kimmel and Sethian 1998).
 
     So it is before an edge whose ends are both sources, which is one all along.
     """
+    if length == 0.0:
+        return np.inf
     climb = (far - near) / length
     corner_x = (left * left - right * right + length * length) / (2 * length)
     corner_y = np.sqrt(max(left * left - corner_x * corner_x, 0.0))
@@ -48,7 +53,7 @@ def across_edge(near, far, length, left, right):
     return near + climb * corner_x + steep * corner_y
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def balls(starts, first_corner, second_corner, sides, radius, sources, begins):
     """Return for each set of sources how many vertices lie within `radius`, which, and how far from the nearest.
@@ -125,7 +130,7 @@ def balls(starts, first_corner, second_corner, sides, radius, sources, begins):
     return counts, columns[:total].copy(), values[:total].copy()
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _rise(keys, ids, height, key, vertex):
     place = height
@@ -138,7 +143,7 @@ def _rise(keys, ids, height, key, vertex):
     keys[place], ids[place] = key, vertex
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _sink(keys, ids, height):
     key, vertex = keys[height], ids[height]

@@ -3,13 +3,14 @@
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
+
+from eigenshape._compile import njit
 
 SHAPE = 0.01  # of the squares of a triangle's sides, beside its area: in flat holes slivers lose
 FLAT = 1e-7  # of the squares of a triangle's sides, up to which it has no area
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def triangulate(points, taken, triangles):
     """Fill the triangles between points 0..n-1 in order, of the least sum of costs; tell whether there is one.
@@ -45,7 +46,7 @@ def triangulate(points, taken, triangles):
     return True
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _cost(a, b, c):
     u, v = b - a, c - a

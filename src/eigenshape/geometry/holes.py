@@ -9,7 +9,7 @@ from jaxtyping import Bool, Int
 from eigenshape.geometry.hole_loops import triangulate
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
-from eigenshape.geometry.topology import boundary_edges, boundary_loops, edge_table
+from eigenshape.geometry.topology import EdgeTable, boundary_loops, edge_table, half_edges
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,20 +24,23 @@ class Fillings:
         How many holes have too many edges, and how many others no good faces close.
     """
 
-    faces: tuple[Int[np.ndarray, "t 3"], ...]
+    faces: tuple[Int[np.ndarray, "_ 3"], ...]
     n_long: int
     n_open: int
 
 
 def fillings(mesh: TriangleMesh, most_edges: int) -> Fillings:
     """Triangulate each boundary loop of at most so many edges."""
-    edges, sides = edge_table(mesh).edges, {tuple(side) for side in boundary_edges(mesh).tolist()}
+    table = edge_table(mesh)
+    edges, face_of = table.edges, _faces_on_boundary(mesh, table)
     graph = sp.csr_array((np.ones(len(edges), dtype=bool), edges.T), shape=(mesh.n_vertices,) * 2)
     graph, n_long, n_open = (graph + graph.T).tocsr(), 0, 0
-    added: list[Int[np.ndarray, "t 3"]] = []
+    added: list[Int[np.ndarray, "_ 3"]] = []
     for loop in boundary_loops(mesh):
         ahead = zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
-        if len(loop) < 3 or not all(side in sides for side in ahead):
+        behind = {face_of.get(side) for side in ahead}
+        # None: the chain is not closed. A single face would be closed by itself, turned over.
+        if len(loop) < 3 or None in behind or len(behind) == 1:
             n_open += 1
         elif len(loop) > most_edges:
             n_long += 1
@@ -50,8 +53,15 @@ def fillings(mesh: TriangleMesh, most_edges: int) -> Fillings:
     return Fillings(tuple(added), n_long, n_open)
 
 
+def _faces_on_boundary(mesh: TriangleMesh, table: EdgeTable) -> dict[tuple[int, int], int]:
+    """Return the face of each side that no other face has, by its vertices in the order of that face."""
+    places = np.flatnonzero(table.n_faces[table.face_edges.T.ravel()] == 1)
+    sides = map(tuple, half_edges(mesh)[places].tolist())
+    return dict(zip(sides, (places % mesh.n_faces).tolist(), strict=True))
+
+
 def _taken(
-    graph: sp.csr_array, loop: Int[np.ndarray, " k"], added: list[Int[np.ndarray, "t 3"]]
+    graph: sp.csr_array, loop: Int[np.ndarray, " k"], added: list[Int[np.ndarray, "_ 3"]]
 ) -> Bool[np.ndarray, "k k"]:
     """Mark the pairs of the loop that are edges already, of the mesh or of faces added before."""
     taken = np.array(graph[loop][:, loop].toarray(), dtype=bool)

@@ -4,7 +4,9 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape.geometry.cloud import Shape
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.requirements import require_oriented
 from eigenshape.geometry.simplices import in_length, scaled_corners, size_one
 from eigenshape.geometry.topology import edge_table
 
@@ -26,31 +28,55 @@ def area_vectors(corners: Float[np.ndarray, "f 3 3"]) -> Float[np.ndarray, "f 3"
     return 0.5 * np.cross(b - a, c - a)
 
 
-def face_areas(mesh: TriangleMesh) -> Float[np.ndarray, " f"]:
+def face_areas(mesh: MeshLike) -> Float[np.ndarray, " f"]:
     """Return the area of each face, in length^2."""
+    mesh = as_mesh(mesh)
     corners, scale = scaled_corners(mesh)
     return in_length(np.linalg.norm(area_vectors(corners), axis=1), scale, 2)
 
 
-def surface_area(mesh: TriangleMesh) -> float:
+def surface_area(mesh: MeshLike) -> float:
     """Return the total area, in length^2."""
+    mesh = as_mesh(mesh)
     return float(face_areas(mesh).sum())
 
 
-def enclosed_volume(mesh: TriangleMesh) -> float:
-    """Return the signed volume under the surface, in length^3: positive for a closed mesh that faces outward."""
+def enclosed_volume(mesh: MeshLike) -> float:
+    """Return the signed volume under the surface, in length^3: positive for a closed mesh that faces outward.
+
+    Raises
+    ------
+    InvalidShapeError
+        If two neighboring faces are turned against each other.
+    """
+    mesh = as_mesh(mesh)
+    require_oriented(mesh)
     corners, scale = scaled_corners(mesh)
     a, b, c = (corners - corners.mean(axis=(0, 1))).transpose(1, 0, 2)
     return float(in_length(np.einsum("ij,ij->i", a, np.cross(b, c)) / 6, scale, 3).sum())
 
 
-def face_normals(mesh: TriangleMesh) -> Float[np.ndarray, "f 3"]:
+def face_normals(mesh: MeshLike) -> Float[np.ndarray, "f 3"]:
     """Return the unit normal of each face; zero where the face has no area."""
+    mesh = as_mesh(mesh)
     return _unit(area_vectors(scaled_corners(mesh)[0]))
 
 
-def vertex_normals(mesh: TriangleMesh) -> Float[np.ndarray, "n 3"]:
-    """Return at each vertex the unit mean of its faces' normals, weighted by area; zero where there is none."""
+def vertex_normals(mesh: MeshLike) -> Float[np.ndarray, "n 3"]:
+    """Return at each vertex the unit mean of its faces' normals, weighted by area; zero where there is none.
+
+    Raises
+    ------
+    InvalidShapeError
+        If two neighboring faces are turned against each other.
+    """
+    mesh = as_mesh(mesh)
+    require_oriented(mesh)
+    return mean_normals(mesh)
+
+
+def mean_normals(mesh: TriangleMesh) -> Float[np.ndarray, "n 3"]:
+    """Return `vertex_normals` of any mesh; where neighbors disagree their normals cancel, in part or all."""
     vectors = area_vectors(scaled_corners(mesh)[0])
     sums = [
         np.bincount(mesh.faces.ravel(), weights=np.repeat(vectors[:, axis], 3), minlength=mesh.n_vertices)
@@ -64,8 +90,9 @@ def _unit(vectors: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
     return np.divide(vectors, norms, out=np.zeros_like(vectors), where=norms > 0)
 
 
-def edge_lengths(mesh: TriangleMesh) -> Float[np.ndarray, " e"]:
+def edge_lengths(mesh: MeshLike) -> Float[np.ndarray, " e"]:
     """Return the length of each edge of `edge_table`."""
+    mesh = as_mesh(mesh)
     ends, scale = size_one(mesh.vertices[edge_table(mesh).edges])
     return in_length(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1), scale, 1)
 

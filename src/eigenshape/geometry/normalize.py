@@ -8,6 +8,7 @@ from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.distance import cdist
 
 from eigenshape._errors import InvalidShapeError
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import degenerate_simplices
@@ -15,7 +16,7 @@ from eigenshape.geometry.simplices import degenerate_simplices
 Points = Float[np.ndarray, "n 3"]
 
 
-def normalize_box(mesh: TriangleMesh) -> TriangleMesh:
+def normalize_box(mesh: MeshLike) -> TriangleMesh:
     """Scale so that the longest side of the axis-aligned bounding box is 1 (thesis 5.4).
 
     Raises
@@ -23,10 +24,11 @@ def normalize_box(mesh: TriangleMesh) -> TriangleMesh:
     InvalidShapeError
         If all vertices are equal.
     """
+    mesh = as_mesh(mesh)
     return _resized(mesh, lambda points: float(np.ptp(points, axis=0).max()))
 
 
-def normalize_area(mesh: TriangleMesh) -> TriangleMesh:
+def normalize_area(mesh: MeshLike) -> TriangleMesh:
     """Scale so that the surface area is 1.
 
     Raises
@@ -34,11 +36,12 @@ def normalize_area(mesh: TriangleMesh) -> TriangleMesh:
     InvalidShapeError
         If no face has area.
     """
+    mesh = as_mesh(mesh)
     sound = np.delete(mesh.faces, degenerate_simplices(mesh), axis=0)
     return _resized(mesh, lambda points: float(np.linalg.norm(area_vectors(points[sound]), axis=1).sum()) ** 0.5)
 
 
-def normalize_diameter(mesh: TriangleMesh) -> TriangleMesh:
+def normalize_diameter(mesh: MeshLike) -> TriangleMesh:
     """Scale so that the two farthest vertices are 1 apart.
 
     Raises
@@ -46,6 +49,7 @@ def normalize_diameter(mesh: TriangleMesh) -> TriangleMesh:
     InvalidShapeError
         If all vertices are equal.
     """
+    mesh = as_mesh(mesh)
     return _resized(mesh, _diameter)
 
 

@@ -9,7 +9,8 @@ most 2 and whole multiples of 2^-300, so that no product of three underflows.
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
+
+from eigenshape._compile import njit
 
 UNIT = 2.0**-53  # half the distance from 1 to the next float
 LINE_BOUND = (3 + 16 * UNIT) * UNIT
@@ -18,7 +19,7 @@ SPLITTER = 2.0**27 + 1
 MOST_TERMS = 192  # 6 products of three differences, each of two floats, each product of three floats being four
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _two_sum(a, b):
     """Return a + b and what rounding left out (Knuth)."""
@@ -27,7 +28,7 @@ def _two_sum(a, b):
     return total, (a - (total - of_b)) + (b - of_b)
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _two_product(a, b):
     """Return a b and what rounding left out (Dekker, Veltkamp)."""
@@ -38,7 +39,7 @@ def _two_product(a, b):
     return product, low_a * low_b - (((product - high_a * high_b) - low_a * high_b) - high_a * low_b)
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _add(expansion, length, value):
     """Add a float to an expansion in place, leaving out zeros; return its length (Shewchuk's GROW-EXPANSION)."""
@@ -54,13 +55,13 @@ def _add(expansion, length, value):
     return kept
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _sign(value):
     return (value > 0.0) - (value < 0.0)
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def side_of_line(points, u, v, a, b, c):
     """Return the sign of the area of points a, b, c in the plane of axes u and v: 1 where they turn left."""
@@ -72,7 +73,7 @@ def side_of_line(points, u, v, a, b, c):
     return _exact_side_of_line(points, u, v, a, b, c)
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _exact_side_of_line(points, u, v, a, b, c):
     expansion, length = np.empty(MOST_TERMS), 0
@@ -85,7 +86,7 @@ def _exact_side_of_line(points, u, v, a, b, c):
     return _sign(expansion[length - 1]) if length else 0
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def side_of_plane(points, a, b, c, d):
     """Return the sign of det[a - d, b - d, c - d]: 1 where a, b, c turn left when seen from the side away from d."""
@@ -101,7 +102,7 @@ def side_of_plane(points, a, b, c, d):
     return _exact_side_of_plane(points, a, b, c, d)
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _exact_side_of_plane(points, a, b, c, d):
     if same_place(points, a, b) or same_place(points, a, c) or same_place(points, b, c):
@@ -127,7 +128,7 @@ def _exact_side_of_plane(points, a, b, c, d):
     return _sign(expansion[length - 1]) if length else 0
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def same_place(points, a, b):
     return points[a, 0] == points[b, 0] and points[a, 1] == points[b, 1] and points[a, 2] == points[b, 2]

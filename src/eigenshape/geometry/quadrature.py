@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 
 from eigenshape._arrays import finite_rows, frozen, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape.geometry.simplices import dual_volumes, require_volumes
-from eigenshape.geometry.simplicial import Mesh
-from eigenshape.geometry.topology import require_simplices_everywhere
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
+from eigenshape.geometry.requirements import require_sound
+from eigenshape.geometry.simplices import dual_volumes
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -61,16 +61,16 @@ class Quadrature:
         return f"Quadrature({self.n_points} points in R^{self.points.shape[1]}, dim={self.dim})"
 
 
-def mesh_quadrature(mesh: Mesh) -> Quadrature:
+def mesh_quadrature(mesh: MeshLike) -> Quadrature:
     """Weigh each point of a mesh with 1/(m+1) of the volume of its simplices: exact for linear functions.
 
     Raises
     ------
     InvalidShapeError
-        If a simplex has no volume, or a point no simplex.
+        If a simplex has no volume or the corners of another, or a point no simplex.
     """
-    require_volumes(mesh)
-    require_simplices_everywhere(mesh)
+    mesh = as_simplicial(mesh)
+    require_sound(mesh)
     return Quadrature(mesh.points, dual_volumes(mesh), mesh.dim)
 
 

@@ -6,13 +6,16 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy.typing import ArrayLike
 
-from eigenshape._arrays import whole_number
+from eigenshape._arguments import require_type
+from eigenshape._arrays import real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape.geometry.measure import unit_scaled, vertex_normals
+from eigenshape._threads import one_blas_thread
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.measure import mean_normals, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.raster import rasterize
 from eigenshape.geometry.repair import faces_of_largest
-from eigenshape.geometry.topology import is_closed, submesh
+from eigenshape.geometry.topology import agreeing, is_closed, submesh
 
 SLACK = 1.5  # pixels that a vertex may lie off the place where the surface was seen
 STEEPEST = 10.0  # slope up to which that may hide it behind its own surface
@@ -36,8 +39,9 @@ class MeshPart:
     source_faces: Int[np.ndarray, " f"]
 
 
+@one_blas_thread()
 def partial_scan(
-    mesh: TriangleMesh, view: ArrayLike | np.random.Generator, *, resolution: int = 512, all_pieces: bool = False
+    mesh: MeshLike, view: ArrayLike | np.random.Generator, *, resolution: int = 512, all_pieces: bool = False
 ) -> MeshPart:
     """Keep what is visible from far away in one direction.
 
@@ -46,7 +50,7 @@ def partial_scan(
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
     view : (3,) float or numpy.random.Generator
         Direction from the shape to the viewer, or the source of a random one.
     resolution : int
@@ -66,6 +70,7 @@ def partial_scan(
     InvalidShapeError
         If no face is visible.
     """
+    mesh = as_mesh(mesh)
     whole_number(resolution, "resolution", 16, 8192)
     visible = _visible_vertices(mesh, unit_direction(view), resolution)
     keep = visible[mesh.faces].all(axis=1)
@@ -98,7 +103,7 @@ def unit_direction(view: ArrayLike | np.random.Generator) -> Float[np.ndarray, "
     InvalidParameterError
         If it is zero or not finite.
     """
-    vector = view.standard_normal(3) if isinstance(view, np.random.Generator) else np.asarray(view, dtype=np.float64)
+    vector = view.standard_normal(3) if isinstance(view, np.random.Generator) else real_numbers(view, "view")
     if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
         raise InvalidParameterError(f"view must be three finite numbers, not all zero; it is {vector.tolist()}.")
     vector = vector / np.abs(vector).max()
@@ -122,17 +127,17 @@ def _visible_vertices(mesh: TriangleMesh, view: Float[np.ndarray, "3"], resoluti
     pixels = (points - low) * ((resolution - 2) / span) + 1
     raster = rasterize(pixels, mesh.faces, resolution, resolution)
     column, row = pixels[:, :2].astype(np.int64).T
-    towards = np.abs(vertex_normals(mesh) @ view)
+    towards = np.abs(mean_normals(agreeing(mesh)) @ view)  # which side is out does not matter
     slope = np.minimum(np.sqrt(1 - np.minimum(towards, 1) ** 2) / np.maximum(towards, 1 / STEEPEST), STEEPEST)
     return pixels[:, 2] >= raster.depth[row, column] - SLACK * (1 + slope)
 
 
-def cut_by_planes(mesh: TriangleMesh, planes: ArrayLike) -> MeshPart:
+def cut_by_planes(mesh: MeshLike, planes: ArrayLike) -> MeshPart:
     """Remove the portions of a mesh that lie beyond planes.
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
     planes : (p, 4) float
         Rows (a, b, c, d): a vertex with a x + b y + c z > d for any row goes, and every face that it belongs to.
 
@@ -147,7 +152,8 @@ def cut_by_planes(mesh: TriangleMesh, planes: ArrayLike) -> MeshPart:
     InvalidShapeError
         If nothing is left.
     """
-    rows = np.atleast_2d(np.asarray(planes, dtype=np.float64))
+    mesh = as_mesh(mesh)
+    rows = np.atleast_2d(real_numbers(planes, "planes").astype(np.float64))
     if rows.ndim != 2 or rows.shape[1] != 4:
         raise InvalidParameterError(f"planes must have shape (p, 4); the shape is {rows.shape}.")
     bad = np.flatnonzero(~np.isfinite(rows).all(axis=1) | ~rows[:, :3].any(axis=1))
@@ -160,7 +166,7 @@ def cut_by_planes(mesh: TriangleMesh, planes: ArrayLike) -> MeshPart:
 
 
 def random_planes(
-    mesh: TriangleMesh, rng: np.random.Generator, *, n_planes: int = 1, share: float = 0.2
+    mesh: MeshLike, rng: np.random.Generator, *, n_planes: int = 1, share: float = 0.2
 ) -> Float[np.ndarray, "p 4"]:
     """Draw planes in random directions that each cut off a share of the vertices.
 
@@ -169,6 +175,8 @@ def random_planes(
     InvalidParameterError
         If the share is not within 0..1 or there is no plane to draw.
     """
+    mesh = as_mesh(mesh)
+    require_type(rng, np.random.Generator, "rng")
     whole_number(n_planes, "n_planes", 1, 100)
     if not 0 < share < 1:
         raise InvalidParameterError(f"share must lie between 0 and 1; it is {share}.")

@@ -6,8 +6,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy.typing import ArrayLike
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.raster import rasterize
@@ -81,7 +83,7 @@ class _Picture:
 
 
 def simulate_scan(
-    mesh: TriangleMesh,
+    mesh: MeshLike,
     rng: np.random.Generator,
     *,
     view: ArrayLike | None = None,
@@ -98,7 +100,7 @@ def simulate_scan(
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
     rng : numpy.random.Generator
         Source of noise and losses, and of the direction where none is given.
     view : (3,) float, optional
@@ -119,6 +121,9 @@ def simulate_scan(
     InvalidShapeError
         If the shape has no size, or no face is seen.
     """
+    mesh = as_mesh(mesh)
+    require_type(rng, np.random.Generator, "rng")
+    require_type(camera, DepthCamera | None, "camera")
     camera = _checked(camera or DepthCamera())
     towards = unit_direction(rng if view is None else view)
     points, scale = size_one(mesh.vertices)

@@ -6,11 +6,15 @@ from math import factorial
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._errors import InvalidShapeError
+from eigenshape._errors import InvalidShapeError, try_auto
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.simplicial import Mesh
 
 # A simplex thinner than this, volume over that of a cube on its longest side, is flat as far as rounding can tell.
 THINNEST = 1e-14
+# Points nearer than this to a line or a plane lie in it as far as the rounding of coordinates of size 1 can tell.
+SPAN_ROUNDING = 64 * float(np.finfo(np.float64).eps)
+FLATS = {1: "on a line", 2: "in a plane"}
 # Powers of two up to which areas and volumes are handed out: beyond, sums overflow or small simplices lose digits.
 LARGEST_EXPONENT = 1000
 MEASURES = {
@@ -95,14 +99,16 @@ def volumes_of(triangles: Float[np.ndarray, "s m m"]) -> Float[np.ndarray, " s"]
     return np.einsum("sii->si", triangles).prod(axis=1) / factorial(triangles.shape[1])
 
 
-def simplex_volumes(mesh: Mesh) -> Float[np.ndarray, " s"]:
+def simplex_volumes(mesh: MeshLike) -> Float[np.ndarray, " s"]:
     """Return the m-volume of each simplex, in length^m."""
+    mesh = as_simplicial(mesh)
     corners, scale = scaled_corners(mesh)
     return in_length(volumes(corners), scale, mesh.dim)
 
 
-def dual_volumes(mesh: Mesh) -> Float[np.ndarray, " n"]:
+def dual_volumes(mesh: MeshLike) -> Float[np.ndarray, " n"]:
     """Return A_j = 1/(m+1) of the volume of the simplices at each point, in length^m (thesis 2.1)."""
+    mesh = as_simplicial(mesh)
     return at_points(mesh, simplex_volumes(mesh) / (mesh.dim + 1))
 
 
@@ -112,8 +118,9 @@ def at_points(mesh: Mesh, values: Float[np.ndarray, " s"]) -> Float[np.ndarray, 
     return np.bincount(mesh.simplices.ravel(), weights=np.repeat(values, corners), minlength=mesh.n_points)
 
 
-def mean_side_length(mesh: Mesh) -> float:
+def mean_side_length(mesh: MeshLike) -> float:
     """Return e, the mean length of the sides of all simplices: a side that two share counts twice, in length."""
+    mesh = as_simplicial(mesh)
     corners, scale = scaled_corners(mesh)
     first, second = np.triu_indices(corners.shape[1], 1)
     lengths = np.linalg.norm(corners[:, first] - corners[:, second], axis=2)
@@ -130,13 +137,39 @@ def degenerate_simplices(mesh: Mesh) -> Int[np.ndarray, " k"]:
     return np.flatnonzero(factorial(mesh.dim) * volumes(corners) <= THINNEST * longest**mesh.dim)
 
 
+def require_span(points: Float[np.ndarray, "n d"], dim: int, noun: str) -> None:
+    """Refuse points that lie in a flat of fewer than `dim` dimensions, as far as the rounding of coordinates can tell.
+
+    Raises
+    ------
+    InvalidShapeError
+        With that flat.
+    """
+    offsets = size_one(points)[0]
+    offsets = offsets - offsets[0]
+    for found in range(dim):
+        lengths = np.linalg.norm(offsets, axis=1)
+        farthest = int(lengths.argmax())
+        if lengths[farthest] > SPAN_ROUNDING:
+            direction = offsets[farthest] / lengths[farthest]
+            offsets = offsets - np.outer(offsets @ direction, direction)
+        elif not found:
+            raise InvalidShapeError(f"{noun} must differ; all {len(points)} are {points[0].tolist()}.")
+        else:
+            flat = FLATS.get(found, f"in a flat of {found} dimensions")
+            raise InvalidShapeError(
+                f"{noun} must span {dim} dimensions; all {len(points)} lie {flat} through point 0, "
+                f"{points[0].tolist()}."
+            )
+
+
 def require_volumes(mesh: Mesh) -> None:
     """Refuse a mesh with a simplex that has no volume, naming the first.
 
     Raises
     ------
     InvalidShapeError
-        With the index, corners and number of such simplices.
+        With the index, corners and number of such simplices; or if rounding alone gives them volume.
     """
     flat = degenerate_simplices(mesh)
     all_of, one, measure = MEASURES.get(mesh.dim, ("Simplices", "simplex", "volume"))
@@ -149,5 +182,8 @@ def require_volumes(mesh: Mesh) -> None:
         corners = mesh.simplices[flat[0]]
         raise InvalidShapeError(
             f"{all_of} must have {measure}; {one} {flat[0]} is {corners.tolist()} with corners "
-            f"{mesh.points[corners].tolist()} ({flat.size} such). Repair with drop_degenerate."
+            f"{mesh.points[corners].tolist()} ({flat.size} such). {try_auto()}"
         )
+    used = np.zeros(mesh.n_points, dtype=bool)
+    used[mesh.simplices] = True
+    require_span(mesh.points[used], mesh.dim, "The points of a mesh")

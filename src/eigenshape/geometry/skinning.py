@@ -6,8 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 from scipy.sparse.linalg import splu
-from threadpoolctl import threadpool_limits
 
+from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
 
@@ -50,7 +50,7 @@ def diffused(
     # Over six neighbours at one length, differences add up to 3/2 length² times the Laplacian; variance is twice time.
     pencil = sp.eye_array(mesh.n_vertices) + step / (3 * length2) * (sp.diags_array(links.sum(axis=1)) - links)
     spread, n_steps = values.copy(), np.rint(widths**2 / step)
-    with threadpool_limits(1, user_api="blas"):  # so that no digit depends on the number of threads
+    with one_blas_thread():
         solve = splu(pencil.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve
         for done in range(int(n_steps.max())):
             going = n_steps > done

@@ -7,6 +7,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull, QhullError
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_rows, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
@@ -25,6 +26,7 @@ def fibonacci_sphere(n: SupportsIndex = 1000) -> TriangleMesh:
 
 def random_sphere(n: SupportsIndex = 1000, *, rng: np.random.Generator) -> TriangleMesh:
     """Throw n points on the unit sphere, uniformly and independently."""
+    require_type(rng, np.random.Generator, "rng")
     count = whole_number(n, "n", 20, MOST)
     return _outward(_unit(rng.standard_normal((count, 3))))
 

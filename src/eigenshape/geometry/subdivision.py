@@ -6,6 +6,7 @@ from itertools import permutations
 import numpy as np
 from jaxtyping import Int
 
+from eigenshape._arrays import frozen
 from eigenshape.geometry.simplicial import SimplicialMesh
 
 
@@ -43,4 +44,4 @@ def pieces(dim: int) -> Int[np.ndarray, "pieces corners 2"]:
     walks = np.concatenate([np.zeros((len(steps), 1, dim), dtype=np.int64), steps.cumsum(axis=1)], axis=1)
     places = (starts[:, None, None] + walks).reshape(-1, dim + 1, dim)
     inside = (np.diff(places, axis=2) <= 0).all(axis=(1, 2))
-    return np.stack([(places[inside] >= least).sum(axis=2) for least in (1, 2)], axis=-1)
+    return frozen(np.stack([(places[inside] >= least).sum(axis=2) for least in (1, 2)], axis=-1))

@@ -6,7 +6,9 @@ from typing import SupportsIndex
 import numpy as np
 from jaxtyping import Float, Int
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, whole_number
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.simplices import require_volumes, scaled_corners, volumes
 from eigenshape.geometry.simplicial import Mesh
 
@@ -37,12 +39,12 @@ class SurfacePoints:
         return len(self.points)
 
 
-def sample_surface(mesh: Mesh, n: SupportsIndex, *, rng: np.random.Generator) -> SurfacePoints:
+def sample_surface(mesh: MeshLike, n: SupportsIndex, *, rng: np.random.Generator) -> SurfacePoints:
     """Throw n points on a mesh, uniformly by volume and independently (thesis 4.1).
 
     Parameters
     ----------
-    mesh : TriangleMesh or SimplicialMesh
+    mesh : MeshLike
     n : int
         At least 1.
     rng : numpy.random.Generator
@@ -58,6 +60,8 @@ def sample_surface(mesh: Mesh, n: SupportsIndex, *, rng: np.random.Generator) ->
     InvalidParameterError
         If n is not in range.
     """
+    mesh = as_simplicial(mesh)
+    require_type(rng, np.random.Generator, "rng")
     count = whole_number(n, "n", 1, MOST)
     require_volumes(mesh)
     shares = np.cumsum(volumes(scaled_corners(mesh)[0]))

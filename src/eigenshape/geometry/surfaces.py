@@ -7,6 +7,7 @@ from jaxtyping import Int
 
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 from eigenshape.geometry.subdivision import halve_simplices
@@ -54,11 +55,14 @@ def _faces_around_origin(points: np.ndarray) -> Int[np.ndarray, "f 3"]:
 def subdivide(mesh: TriangleMesh) -> TriangleMesh: ...
 @overload
 def subdivide(mesh: SimplicialMesh) -> SimplicialMesh: ...
-def subdivide(mesh: Mesh) -> Mesh:
+@overload
+def subdivide(mesh: MeshLike) -> Mesh: ...
+def subdivide(mesh: MeshLike) -> Mesh:
     """Split each simplex at the middles of its edges: a triangle in four, which face as it does, in general in 2^m.
 
     Nothing moves: it is the same shape with finer simplices.
     """
+    mesh = as_simplicial(mesh)
     if isinstance(mesh, TriangleMesh):
         return _quartered(mesh)
     return halve_simplices(mesh)
@@ -107,10 +111,11 @@ def grid(n_x: int = 20, n_y: int = 20, *, width: float = 1.0, height: float = 1.
     return TriangleMesh(points, faces)
 
 
-def disjoint_union(*meshes: TriangleMesh) -> TriangleMesh:
+def disjoint_union(*meshes: MeshLike) -> TriangleMesh:
     """Put meshes into one, as separate components with their coordinates unchanged."""
     if not meshes:
         raise InvalidParameterError("disjoint_union must be given a mesh; it was given none.")
-    starts = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])[:-1]
-    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]
-    return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+    parts = [as_mesh(mesh, f"meshes[{index}]") for index, mesh in enumerate(meshes)]
+    starts = np.cumsum([0, *(mesh.n_vertices for mesh in parts)])[:-1]
+    faces = [mesh.faces + start for mesh, start in zip(parts, starts, strict=True)]
+    return TriangleMesh(np.concatenate([mesh.vertices for mesh in parts]), np.concatenate(faces))

@@ -7,9 +7,12 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Int
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._errors import InvalidShapeError
+from eigenshape._errors import InvalidShapeError, try_auto
+from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
+
+MIXER = np.uint64(0x9E3779B97F4A7C15)  # 2^64 over the golden ratio, odd: the multiplier of Fibonacci hashing
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +34,9 @@ class EdgeTable:
     n_faces: Int[np.ndarray, " e"]
 
 
-def edge_table(mesh: TriangleMesh) -> EdgeTable:
+def edge_table(mesh: MeshLike) -> EdgeTable:
     """List the edges of the mesh once each, with the faces' way to them."""
+    mesh = as_mesh(mesh)
     sides = np.sort(half_edges(mesh), axis=1)
     keys, inverse, counts = np.unique(
         sides[:, 0] * mesh.n_vertices + sides[:, 1], return_inverse=True, return_counts=True
@@ -55,8 +59,9 @@ def half_edges(mesh: TriangleMesh) -> Int[np.ndarray, "s 2"]:
     return np.concatenate([np.column_stack(side) for side in ((b, c), (c, a), (a, b))])
 
 
-def vertex_components(mesh: Mesh) -> tuple[int, Int[np.ndarray, " n"]]:
+def vertex_components(mesh: MeshLike) -> tuple[int, Int[np.ndarray, " n"]]:
     """Count the connected components and number each point with its own; a loose point is one by itself."""
+    mesh = as_simplicial(mesh)
     corners = mesh.simplices
     ends = np.column_stack([np.repeat(corners[:, 0], mesh.dim), corners[:, 1:].ravel()])
     graph = sp.coo_array((np.ones(len(ends), dtype=np.int8), ends.T), shape=(mesh.n_points,) * 2)
@@ -84,36 +89,82 @@ def require_simplices_everywhere(mesh: Mesh) -> None:
         point, simplex = ("vertex", "face") if mesh.dim == 2 else ("point", "simplex")
         raise InvalidShapeError(
             f"Every {point} must belong to a {simplex}; {point} {loose[0]} at {mesh.points[loose[0]].tolist()} has "
-            f"none ({loose.size} such). Repair with drop_unreferenced."
+            f"none ({loose.size} such). {try_auto()}"
         )
 
 
 def boundary_facets(mesh: Mesh) -> Int[np.ndarray, "b m"]:
     """Return the sides of simplices that one simplex alone has, by their corners, ascending."""
     facets = np.concatenate([np.delete(mesh.simplices, corner, axis=1) for corner in range(mesh.dim + 1)])
-    once, counts = np.unique(np.sort(facets, axis=1), axis=0, return_counts=True)
-    return once[counts == 1]
+    facets, repeats = sorted_rows(np.sort(facets, axis=1))[1:]
+    alone = ~repeats & ~np.append(repeats[1:], False)
+    return facets[alone]
 
 
-def boundary_vertices(mesh: Mesh) -> Int[np.ndarray, " k"]:
+def sorted_rows(
+    rows: Int[np.ndarray, "r c"],
+) -> tuple[Int[np.ndarray, " r"], Int[np.ndarray, "r c"], Bool[np.ndarray, " r"]]:
+    """Return the stable order that sorts rows, the sorted rows, and which of them repeat the row before."""
+    order = np.lexsort(rows.T[::-1])
+    ordered = rows[order]
+    repeats = np.zeros(len(rows), dtype=bool)
+    repeats[1:] = (ordered[1:] == ordered[:-1]).all(axis=1)
+    return order, ordered, repeats
+
+
+def repeated_simplices(mesh: Mesh) -> Int[np.ndarray, "k 2"]:
+    """Return each simplex that has the corners of an earlier one, in any order, after that earlier one."""
+    rows = np.sort(mesh.simplices, axis=1)
+    # Different rows rarely share this number, taken modulo 2^64: to sort numbers takes a fifth of the time.
+    keys = np.sort(rows.astype(np.uint64) @ MIXER ** np.arange(1, rows.shape[1] + 1, dtype=np.uint64))
+    if (keys[1:] != keys[:-1]).all():
+        return np.empty((0, 2), dtype=np.int64)
+    order, _, repeats = sorted_rows(rows)
+    starts = np.flatnonzero(~repeats)
+    firsts = order[starts][np.cumsum(~repeats) - 1]
+    pairs = np.column_stack([firsts, order])[repeats]
+    return pairs[np.argsort(pairs[:, 1])]
+
+
+def seams(mesh: Mesh) -> Int[np.ndarray, "k 2 m"]:
+    """Return pairs of sides on the boundary that lie on each other, corner by corner, with vertices of their own.
+
+    Of several in one place each is paired with the next, so that the pairs join all of them.
+    """
+    facets = boundary_facets(mesh)
+    used, numbers = np.unique(facets, return_inverse=True)
+    # Adding 0.0 makes -0.0 equal to 0.0 also where bytes are compared.
+    _, place = np.unique(mesh.points[used] + 0.0, axis=0, return_inverse=True)
+    places = place.ravel()[numbers.reshape(facets.shape)]
+    by_place = np.argsort(places, axis=1, kind="stable")
+    facets, places = (np.take_along_axis(rows, by_place, axis=1) for rows in (facets, places))
+    order, _, repeats = sorted_rows(places)
+    second = np.flatnonzero(repeats)
+    return np.stack([facets[order[second - 1]], facets[order[second]]], axis=1)
+
+
+def boundary_vertices(mesh: MeshLike) -> Int[np.ndarray, " k"]:
     """Return the points on the boundary, ascending: the corners of `boundary_facets`."""
+    mesh = as_simplicial(mesh)
     return np.unique(boundary_facets(mesh))
 
 
-def boundary_edges(mesh: TriangleMesh) -> Int[np.ndarray, "b 2"]:
+def boundary_edges(mesh: MeshLike) -> Int[np.ndarray, "b 2"]:
     """Return the sides that only one face has, directed as in that face."""
+    mesh = as_mesh(mesh)
     table = edge_table(mesh)
     lonely = table.n_faces[table.face_edges.T.ravel()] == 1
     return half_edges(mesh)[lonely]
 
 
-def boundary_loops(mesh: TriangleMesh) -> list[Int[np.ndarray, " k"]]:
+def boundary_loops(mesh: MeshLike) -> list[Int[np.ndarray, " k"]]:
     """Chain the boundary edges into closed loops of vertices.
 
     A vertex where several loops touch is passed once by each of them; the loops are sorted by length, longest
     first, then by their first vertex. Where neighbouring faces are turned against each other, or more than two share
     an edge, a chain may stay open.
     """
+    mesh = as_mesh(mesh)
     sides = boundary_edges(mesh)
     leaving: dict[int, list[int]] = {}
     for start, end in sides[::-1].tolist():
@@ -179,25 +230,91 @@ def _corner_fans(mesh: TriangleMesh) -> tuple[Int[np.ndarray, " c"], Int[np.ndar
 def inconsistent_edges(mesh: TriangleMesh) -> Int[np.ndarray, "k 2"]:
     """Return the edges that two faces pass in the same direction: one of the two is turned over."""
     sides = half_edges(mesh)
+    directed = np.sort(sides[:, 0] * mesh.n_vertices + sides[:, 1])
+    if (directed[1:] != directed[:-1]).all():  # the usual case, told at a third of the cost of a table
+        return np.empty((0, 2), dtype=np.int64)
     forward = (sides[:, 0] < sides[:, 1]).astype(np.int64)
     table = edge_table(mesh)
     n_forward = np.bincount(table.face_edges.T.ravel(), weights=forward, minlength=len(table.edges))
     return table.edges[(table.n_faces == 2) & (n_forward != 1)]
 
 
-def euler_characteristic(mesh: TriangleMesh) -> int:
+@dataclass(frozen=True, eq=False)
+class FaceTurns:
+    """Which faces to turn over so that neighbors agree.
+
+    Faces are neighbors at an edge that has no third face; patches are what hangs together by neighbors.
+
+    Attributes
+    ----------
+    turned : (f,) bool
+        In each patch the fewer of its faces; of equally many those that disagree with the first. None in a patch that
+        cannot be oriented, such as a Möbius strip.
+    patches : (f,) int
+        The patch of each face; numbers need not follow one another.
+    orientable : (f,) bool
+        Whether the patch of each face can be oriented.
+    """
+
+    turned: Bool[np.ndarray, " f"]
+    patches: Int[np.ndarray, " f"]
+    orientable: Bool[np.ndarray, " f"]
+
+
+def face_turns(mesh: TriangleMesh) -> FaceTurns:
+    """Find which faces to turn over so that neighbors agree.
+
+    Each face has two sides. Sides of neighbors that look the same way are linked; a patch can be oriented if and only
+    if no chain of links leads from one side of a face to the other (the orientation double cover).
+    """
+    table, f = edge_table(mesh), mesh.n_faces
+    at_edge = table.face_edges.ravel()
+    order = np.argsort(at_edge, kind="stable")
+    one, two = order[table.n_faces[at_edge[order]] == 2].reshape(-1, 2).T
+    sides = half_edges(mesh).reshape(3, f, 2).transpose(1, 0, 2).reshape(-1, 2)
+    opposed = sides[one, 0] == sides[two, 1]
+    one, two = one // 3, two // 3
+    front, back = np.where(opposed, two, two + f), np.where(opposed, two + f, two)
+    ends = (np.concatenate([one, one + f]), np.concatenate([front, back]))
+    links = sp.coo_array((np.ones(len(ends[0]), dtype=np.int8), ends), shape=(2 * f, 2 * f))
+    count, labels = connected_components(links, directed=False)
+    as_is, over = labels[:f].astype(np.int64), labels[f:].astype(np.int64)
+    # Components are numbered by their first side, so that of two halves the lower has the first face as it is.
+    n_kept = np.bincount(as_is, minlength=count)
+    turned = np.where(n_kept[as_is] == n_kept[over], as_is > over, n_kept[as_is] < n_kept[over])
+    return FaceTurns(turned, np.minimum(as_is, over), as_is != over)
+
+
+def with_turned_faces(mesh: TriangleMesh, turned: Bool[np.ndarray, " f"]) -> TriangleMesh:
+    """Return the mesh with some faces turned over; itself where there are none."""
+    if not turned.any():
+        return mesh
+    return TriangleMesh(mesh.vertices, np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces))
+
+
+def agreeing(mesh: TriangleMesh) -> TriangleMesh:
+    """Return the mesh with faces turned so that neighbors agree; itself where they do."""
+    if not len(inconsistent_edges(mesh)):
+        return mesh
+    return with_turned_faces(mesh, face_turns(mesh).turned)
+
+
+def euler_characteristic(mesh: MeshLike) -> int:
     """Return V - E + F, over the vertices that faces use."""
+    mesh = as_mesh(mesh)
     n_used = mesh.n_vertices - len(unreferenced_vertices(mesh))
     return n_used - len(edge_table(mesh).edges) + mesh.n_faces
 
 
-def is_closed(mesh: TriangleMesh) -> bool:
+def is_closed(mesh: MeshLike) -> bool:
     """Say whether every edge has exactly two faces."""
+    mesh = as_mesh(mesh)
     return bool((edge_table(mesh).n_faces == 2).all())
 
 
-def is_manifold(mesh: TriangleMesh) -> bool:
+def is_manifold(mesh: MeshLike) -> bool:
     """Say whether every edge has at most two faces and every vertex one fan."""
+    mesh = as_mesh(mesh)
     return not len(non_manifold_edges(mesh)) and not len(non_manifold_vertices(mesh))
 
 

@@ -5,10 +5,10 @@ from types import ModuleType
 from typing import Any, SupportsIndex
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from eigenshape._errors import InvalidShapeError, MissingExtraError
 from eigenshape.geometry.cloud import PointCloud, Shape
+from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 
@@ -16,31 +16,9 @@ VTK_CELLS = {1: 3, 2: 5, 3: 10}  # VTK's numbers for segment, triangle and tetra
 POINTS, LINES = (1, 2), (3, 4)  # those of a point and of several, of a segment and of a polyline
 
 
-def from_arrays(points: ArrayLike, simplices: ArrayLike | None = None, *, dim: SupportsIndex = 2) -> Shape:
-    """Return the shape that arrays describe: a TriangleMesh where they can be one.
-
-    Parameters
-    ----------
-    points : (n, d) float
-    simplices : (s, m+1) int, optional
-        Without them the points are a cloud of dimension `dim`.
-    dim : int
-
-    Raises
-    ------
-    InvalidShapeError, InvalidParameterError
-        As the three classes.
-    """
-    if simplices is None:
-        return PointCloud(points, dim)
-    shapes = np.shape(points), np.shape(simplices)
-    if shapes[0][1:] == (3,) and shapes[1][1:] == (3,):
-        return TriangleMesh(points, simplices)
-    return SimplicialMesh(points, simplices)
-
-
-def to_arrays(shape: Shape) -> tuple[np.ndarray, np.ndarray | None]:
+def to_arrays(shape: ShapeLike) -> tuple[np.ndarray, np.ndarray | None]:
     """Return copies of points (n, d) and simplices (s, m+1) that may be written to; None for a cloud's simplices."""
+    shape = as_shape(shape)
     return shape.points.copy(), None if isinstance(shape, PointCloud) else shape.simplices.copy()
 
 
@@ -62,7 +40,7 @@ def from_trimesh(mesh: Any, *, dim: SupportsIndex = 2) -> TriangleMesh | PointCl
     return TriangleMesh(np.asarray(mesh.vertices), np.asarray(mesh.faces))
 
 
-def to_trimesh(shape: Shape) -> Any:
+def to_trimesh(shape: ShapeLike) -> Any:
     """Return a trimesh.Trimesh or trimesh.PointCloud with the same points in the same order; nothing is merged.
 
     Raises
@@ -72,6 +50,7 @@ def to_trimesh(shape: Shape) -> Any:
     MissingExtraError
         If trimesh is not installed.
     """
+    shape = as_shape(shape)
     trimesh = _extra("trimesh")
     if isinstance(shape, PointCloud) and shape.points.shape[1] == 3:
         return trimesh.PointCloud(shape.points.copy())
@@ -104,9 +83,10 @@ def from_pyvista(dataset: Any, *, dim: SupportsIndex = 2) -> Shape:
     for dim_of_cells in (3, 2):
         at = starts[:-1][kinds == VTK_CELLS[dim_of_cells]]
         if at.size:
-            return from_arrays(points, corners[at[:, None] + np.arange(dim_of_cells + 1)])
+            cells = corners[at[:, None] + np.arange(dim_of_cells + 1)]
+            return TriangleMesh(points, cells) if dim_of_cells == 2 else SimplicialMesh(points, cells)
     segments = _segments(kinds, np.diff(starts), corners)
-    return from_arrays(points, segments if segments.size else None, dim=dim)
+    return SimplicialMesh(points, segments) if segments.size else PointCloud(points, dim)
 
 
 def _segments(kinds: np.ndarray, sizes: np.ndarray, corners: np.ndarray) -> np.ndarray:
@@ -125,7 +105,7 @@ def _require_simplices(kinds: np.ndarray) -> None:
         )
 
 
-def to_pyvista(shape: Shape) -> Any:
+def to_pyvista(shape: ShapeLike) -> Any:
     """Return a PolyData of a surface or a cloud, or an UnstructuredGrid of segments or tetrahedra, in R³.
 
     Points of R¹ and R² get zeros for what they lack.
@@ -137,6 +117,7 @@ def to_pyvista(shape: Shape) -> Any:
     MissingExtraError
         If PyVista is not installed.
     """
+    shape = as_shape(shape)
     pyvista = _extra("pyvista")
     ambient = shape.points.shape[1]
     if ambient > 3:

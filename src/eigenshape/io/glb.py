@@ -1,6 +1,7 @@
-"""Binary glTF: all triangles of all nodes, each moved to its place; single precision by the format."""
+"""glTF, binary or with its files beside it: all triangles of all nodes, each moved to its place."""
 
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,17 +14,26 @@ from eigenshape.io.text import shown
 
 JSON_CHUNK = b"JSON"
 BINARY_CHUNK = b"BIN\0"
-COPIES = 2**25  # so many vertices and faces may be made of copies in a small file
+COPIES = 2**22  # so many vertices and faces may be made of copies in a small file; they take 200 MB
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     """Read vertices and faces of the scene; a buffer outside the file is refused, never opened."""
     chunks = _chunks(data)
     tree = _tree(chunks.get(JSON_CHUNK, b""))
-    buffers = decoded_buffers(tree, chunks.get(BINARY_CHUNK, b""))
-    vertices, faces = placed_triangles(Gltf(tree, buffers, most=max(len(data), COPIES)))
+    return _scene(tree, decoded_buffers(tree, chunks.get(BINARY_CHUNK, b"")))
+
+
+def parse_text(data: bytes, folder: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Read vertices and faces of the scene of a .gltf file, whose buffers lie in this folder or in data URIs."""
+    tree = _tree(data)
+    return _scene(tree, decoded_buffers(tree, b"", folder))
+
+
+def _scene(tree: dict[str, Any], buffers: list[bytes]) -> tuple[np.ndarray, np.ndarray]:
+    vertices, faces = placed_triangles(Gltf(tree, buffers, most=max(sum(map(len, buffers)), COPIES)))
     if not len(faces):
-        raise FileFormatError("A GLB file must hold triangles; it holds none.")
+        raise FileFormatError("A glTF file must hold triangles; it holds none.")
     return vertices, faces
 
 
@@ -49,9 +59,9 @@ def _tree(text: bytes) -> dict[str, Any]:
     try:
         tree: Any = json.loads(text)
     except (ValueError, RecursionError) as err:
-        raise FileFormatError(f"The first chunk of a GLB file must be JSON; {err}.") from err
+        raise FileFormatError(f"The first chunk of a GLB file, and a .gltf file, must be JSON; {err}.") from err
     if not isinstance(tree, dict):
-        raise FileFormatError(f"The JSON of a GLB file must be an object; it is a {type(tree).__name__}.")
+        raise FileFormatError(f"The JSON of a glTF file must be an object; it is a {type(tree).__name__}.")
     return tree
 
 

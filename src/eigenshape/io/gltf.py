@@ -4,12 +4,15 @@ import base64
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from eigenshape._errors import FileFormatError
+from eigenshape._files import read_regular
 
 KINDS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC3": 3}
@@ -38,50 +41,76 @@ class Gltf:
         known = type(index) is int and 0 <= index < len(entries)
         if not known or not isinstance(entries[index], dict):
             raise FileFormatError(
-                f"A GLB file must hold what it names; it names {kind}[{ascii(index)[:60]}] and holds none."
+                f"A glTF file must hold what it names; it names {kind}[{ascii(index)[:60]}] and holds none."
             )
         return entries[index]
 
 
-def decoded_buffers(tree: dict[str, Any], binary: bytes) -> list[bytes]:
-    """Return the buffers: the chunk beside the tree, and those in data URIs; any other is refused, never opened."""
-    return [_decoded(index, entry, binary) for index, entry in enumerate(_list(tree, "buffers"))]
+def decoded_buffers(tree: dict[str, Any], binary: bytes, folder: Path | None = None) -> list[bytes]:
+    """Return the buffers: the chunk beside the tree, those in data URIs, and, given a folder, the files in it.
+
+    Raises
+    ------
+    FileFormatError
+        If a buffer lies outside of the file, or of the folder; it is never opened.
+    """
+    return [_decoded(index, entry, binary, folder) for index, entry in enumerate(_list(tree, "buffers"))]
 
 
-def _decoded(index: int, entry: Any, binary: bytes) -> bytes:
+def _decoded(index: int, entry: Any, binary: bytes, folder: Path | None) -> bytes:
     uri = entry.get("uri") if isinstance(entry, dict) else None
     if uri is None:
         return binary if index == 0 else b""
     scheme, _, content = str(uri).partition(",")
-    if not (scheme.startswith("data:") and scheme.endswith(";base64")):
+    if scheme.startswith("data:") and scheme.endswith(";base64"):
+        try:
+            return base64.b64decode(content, validate=True)
+        except ValueError as err:
+            raise FileFormatError(f"A data URI must be in base64; buffers[{index}] is not.") from err
+    if folder is None:
         raise FileFormatError(
             f"A GLB file must hold all its data; buffers[{index}] points outside, to {str(uri)[:80]!r}."
         )
+    size = _whole(entry, "byteLength")
+    data = read_regular(_beside(index, str(uri), folder), "numbers")
+    if len(data) < size:
+        raise FileFormatError(f"buffers[{index}] must have {size} bytes; the file {str(uri)[:80]!r} has {len(data)}.")
+    return data[:size]
+
+
+def _beside(index: int, uri: str, folder: Path) -> Path:
+    """Return the file that a relative URI names, which must lie in the folder or below, links followed."""
     try:
-        return base64.b64decode(content, validate=True)
-    except ValueError as err:
-        raise FileFormatError(f"A data URI must be in base64; buffers[{index}] is not.") from err
+        root = folder.resolve()
+        path = (root / unquote(uri, errors="strict")).resolve()
+    except (ValueError, OSError, RuntimeError):  # no text, a zero byte, a loop of links
+        path = root.parent
+    if ":" in uri or not path.is_relative_to(root):
+        raise FileFormatError(
+            f"Buffers of a .gltf file must lie in its folder; buffers[{index}] points to {uri[:80]!r}."
+        )
+    return path
 
 
 def placed_triangles(gltf: Gltf) -> Piece:
     """Gather the triangles of all nodes, in world coordinates."""
     _refuse_extensions(gltf)
     shapes: dict[int, Piece] = {}
-    placed: list[Piece] = []
+    places = []
     total = 0
     for index, matrix in _placed_meshes(gltf):
         mesh = gltf.entry("meshes", index)
         if index not in shapes:
             shapes[index] = _mesh(gltf, mesh)
         total += sum(map(len, shapes[index]))
-        _require_few(total, gltf)
-        placed.append(_moved(shapes[index], matrix))
-    return _merged(placed)
+        _require_few(total, gltf)  # before any copy is made
+        places.append((index, matrix))
+    return _merged([_moved(shapes[index], matrix) for index, matrix in places])
 
 
 def _require_few(total: int, gltf: Gltf) -> None:
     if total > gltf.most:
-        raise FileFormatError(f"A GLB file must stay within {gltf.most} vertices and faces; its copies make more.")
+        raise FileFormatError(f"A glTF file must stay within {gltf.most} vertices and faces; its copies make more.")
 
 
 def _merged(pieces: Sequence[Piece]) -> Piece:
@@ -94,7 +123,7 @@ def _merged(pieces: Sequence[Piece]) -> Piece:
 def _refuse_extensions(gltf: Gltf) -> None:
     for name in _list(gltf.tree, "extensionsRequired"):
         if not str(name).startswith(HARMLESS):
-            raise FileFormatError(f"A GLB file must be plain glTF 2.0; it requires the extension {str(name)[:60]!r}.")
+            raise FileFormatError(f"A glTF file must be plain glTF 2.0; it requires the extension {str(name)[:60]!r}.")
 
 
 def _placed_meshes(gltf: Gltf) -> Iterator[tuple[Any, np.ndarray]]:
@@ -104,7 +133,7 @@ def _placed_meshes(gltf: Gltf) -> Iterator[tuple[Any, np.ndarray]]:
         index, above = waiting.pop()
         node = gltf.entry("nodes", index)
         if index in seen:
-            raise FileFormatError(f"The nodes of a GLB file must form trees; node {index} is met twice.")
+            raise FileFormatError(f"The nodes of a glTF file must form trees; node {index} is met twice.")
         seen.add(index)
         matrix = above @ _local_matrix(node)
         if "mesh" in node:
@@ -215,14 +244,14 @@ def _view(gltf: Gltf, index: Any) -> tuple[memoryview, int]:
 def _list(entry: Any, key: str) -> list[Any]:
     value = entry.get(key, []) if isinstance(entry, dict) else None
     if not isinstance(value, list):
-        raise FileFormatError(f"{key} of a GLB file must be a list; it is {str(value)[:60]!r}.")
+        raise FileFormatError(f"{key} of a glTF file must be a list; it is {str(value)[:60]!r}.")
     return value
 
 
 def _whole(entry: Any, key: str, default: int | None = None) -> int:
     value = entry.get(key, default) if isinstance(entry, dict) else None
     if type(value) is not int or value < 0:
-        raise FileFormatError(f"{key} in a GLB file must be a whole number from 0; it is {str(value)[:60]!r}.")
+        raise FileFormatError(f"{key} in a glTF file must be a whole number from 0; it is {str(value)[:60]!r}.")
     return value
 
 

@@ -1,4 +1,4 @@
-"""Whole numbers, one a line: labels of faces, as .seg files have them, or of vertices that correspond."""
+"""Whole numbers: labels of faces, in .seg, .json or .ply files, or vertices of two shapes that correspond."""
 
 import json
 from pathlib import Path
@@ -9,6 +9,7 @@ from jaxtyping import Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape._files import read_regular, replace_file
+from eigenshape.io.ply import parse_labels
 from eigenshape.io.text import INT64, Line, lines_of, shown, whole, whole_table
 
 KEY = "face_labels"
@@ -17,7 +18,7 @@ VERTEX = ("A vertex", "the number of one vertex")
 
 
 def read_labels(path: Path) -> Int[np.ndarray, " f"]:
-    """Read one label a face: a line each, or those under "face_labels" where the suffix is .json.
+    """Read one label a face: a line each, those under "face_labels" of a .json file, or the property of a .ply file.
 
     Raises
     ------
@@ -28,7 +29,10 @@ def read_labels(path: Path) -> Int[np.ndarray, " f"]:
     """
     data = read_regular(path, "labels")
     try:
-        return _from_json(data) if path.suffix.lower() == ".json" else _from_lines(lines_of(data), LABEL)
+        suffix = path.suffix.lower()
+        if suffix == ".ply":
+            return parse_labels(data)
+        return _from_json(data) if suffix == ".json" else _from_lines(lines_of(data), LABEL)
     except FileFormatError as err:
         raise type(err)(f"{path}: {err}") from err
 

@@ -3,10 +3,11 @@
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
+
+from eigenshape._compile import njit
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def decompress(data, size):
     """Return `size` bytes, or fewer where the data ends early or points outside of what is there."""

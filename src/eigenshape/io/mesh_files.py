@@ -5,30 +5,36 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Int, UInt8
 
-from eigenshape._errors import FileFormatError, InvalidParameterError, InvalidShapeError
+from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._files import read_regular, replace_file
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io import glb, obj, off, ply, stl
+from eigenshape.io.cells import CellKind, require_kind
+from eigenshape.io.parsing import MESH_FORMATS, naming, parse_mesh, suffix_of
 
-FORMATS = {".off": off.parse, ".obj": obj.parse, ".ply": ply.parse, ".stl": stl.parse, ".glb": glb.parse}
 TEXT = {".off": off.format_mesh, ".obj": obj.format_mesh, ".ply": ply.format_text, ".stl": stl.format_text}
 BINARY = {".ply": ply.format_binary, ".stl": stl.format_binary, ".glb": glb.format_mesh}
+WRITTEN = tuple({**TEXT, **BINARY})
 
 
-def read_mesh(path: str | Path, *, file_format: str | None = None) -> TriangleMesh:
-    """Read a triangle mesh from an OFF, OBJ, PLY, STL or GLB file.
+def read_mesh(path: str | Path, *, file_format: str | None = None, cells: CellKind | None = None) -> TriangleMesh:
+    """Read a triangle mesh from a file of any format that can hold one.
 
     Vertices keep their order and are neither joined nor split, but in STL, which cannot say that corners are shared:
-    there equal coordinates become one vertex. Polygons become fans of triangles around their first corner. Colours,
+    there equal coordinates become one vertex. Polygons become fans of triangles around their first corner. Colors,
     normals, textures and materials are passed over. The file is read whole into memory.
 
     Parameters
     ----------
     path : str or Path
+        OFF, OBJ, PLY, STL, GLB, glTF; surfaces in .mesh, .msh, .vtk, .vtu.
     file_format : str, optional
-        "off", "obj", "ply", "stl" or "glb", in any case; by default the suffix says it.
+        One of these suffixes, with or without its dot, in any case; by default that of the path.
+    cells : {"triangles", "quads", "tetrahedra"}, optional
+        The cells to read, where the file holds several kinds or does not say which; see `read_shape`.
 
     Returns
     -------
@@ -37,24 +43,45 @@ def read_mesh(path: str | Path, *, file_format: str | None = None) -> TriangleMe
     Raises
     ------
     FileFormatError
-        If the format is unknown, the path is no regular file, or the content is not what it declares.
+        If the format is unknown, the path is no regular file, the content is not what it declares, or it holds no
+        triangles in space.
     InvalidShapeError
         If a coordinate is not finite, a face does not index the vertices, or there is none.
+    InvalidParameterError
+        If `cells` is unknown.
     OSError
         If the system cannot open the file; FileNotFoundError where there is none.
     """
     path = Path(path)
-    parse = FORMATS[_suffix(path, file_format)]
+    suffix = suffix_of(path, file_format, MESH_FORMATS)
+    require_kind(cells)
     data = read_regular(path)
-    try:
-        with np.errstate(all="ignore"):  # what overflows is found by the check of the mesh
-            return TriangleMesh(*parse(data))
-    except (FileFormatError, InvalidShapeError) as err:
-        raise type(err)(f"{path}: {err}") from err
+    with naming(path):
+        points, simplices = parse_mesh(path, suffix, data, cells)
+        _require_surface(points, simplices)
+        return TriangleMesh(points, simplices)
+
+
+def _require_surface(points: np.ndarray, simplices: np.ndarray) -> None:
+    if not len(simplices):
+        raise FileFormatError(f"A mesh file must hold triangles; it holds {len(points)} points and no face.")
+    n_corners, dim = simplices.shape[1], points.shape[1]
+    if (n_corners, dim) != (3, 3):
+        what = {2: "segments", 3: "triangles", 4: "tetrahedra"}[n_corners]
+        remedy = ' cells="triangles" reads the triangles beside them, if there are any.' if n_corners == 4 else ""
+        raise FileFormatError(
+            f"A mesh file must hold triangles in R^3; it holds {len(simplices)} {what} in R^{dim}, which read_shape "
+            f"reads.{remedy}"
+        )
 
 
 def write_mesh(
-    mesh: TriangleMesh, path: str | Path, *, binary: bool | None = None, colors: UInt8[np.ndarray, "n 3"] | None = None
+    mesh: MeshLike,
+    path: str | Path,
+    *,
+    binary: bool | None = None,
+    colors: UInt8[np.ndarray, "n 3"] | None = None,
+    face_labels: Int[np.ndarray, " f"] | None = None,
 ) -> None:
     """Write a mesh in the format that the suffix names; the file appears whole or not at all.
 
@@ -63,39 +90,37 @@ def write_mesh(
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
     path : str or Path
     binary : bool, optional
         PLY and STL: binary by default. OFF and OBJ are text, GLB is binary.
     colors : (n, 3) uint8, optional
         Red, green and blue of each vertex; PLY only.
+    face_labels : (f,) int, optional
+        A whole number of 32 bits for each face, such as its part; PLY only, as the property `label` of faces.
 
     Raises
     ------
     FileFormatError
         If the suffix is unknown, or coordinates do not fit into single precision where the format has no other.
     InvalidParameterError
-        If the format has no such kind, or takes no colours, or they are not one a vertex.
+        If the format has no such kind, takes no colors or labels, or they are not one a vertex or face.
     OSError
         If the system cannot write there.
     """
+    mesh = as_mesh(mesh)
     path = Path(path)
-    suffix = _suffix(path, None)
+    suffix = suffix_of(path, None, WRITTEN)
     write = _writer(suffix, suffix in BINARY if binary is None else binary)
     if colors is not None:
         write = partial(write, colors=_colors(colors, mesh, suffix))
+    if face_labels is not None:
+        write = partial(write, face_labels=_labels(face_labels, mesh, suffix))
     try:
         data = write(mesh)
     except FileFormatError as err:
         raise FileFormatError(f"{path} cannot hold the mesh. {err}") from err
     replace_file(path, data)
-
-
-def _suffix(path: Path, file_format: str | None) -> str:
-    suffix = path.suffix.lower() if file_format is None else f".{file_format.lower().removeprefix('.')}"
-    if suffix not in FORMATS:
-        raise FileFormatError(f"{path} must be of a known format, {', '.join(FORMATS)}; it is {suffix!r}.")
-    return suffix
 
 
 def _writer(suffix: str, binary: bool) -> Callable[..., bytes]:
@@ -112,3 +137,16 @@ def _colors(colors: np.ndarray, mesh: TriangleMesh, suffix: str) -> np.ndarray:
             f"and go to {suffix}."
         )
     return colors
+
+
+def _labels(labels: np.ndarray, mesh: TriangleMesh, suffix: str) -> np.ndarray:
+    if suffix != ".ply" or labels.shape != (mesh.n_faces,):
+        raise InvalidParameterError(
+            f"face_labels must be ({mesh.n_faces},) and go to a PLY file; they are {labels.shape} and go to {suffix}."
+        )
+    beyond = np.flatnonzero(labels != labels.astype(np.int32))
+    if beyond.size:
+        raise InvalidParameterError(
+            f"face_labels must fit into 32 bits; that of face {beyond[0]} is {labels[beyond[0]]}."
+        )
+    return labels

@@ -17,22 +17,12 @@ AFTER_POSITION = re.compile(rb"(?<=\d)/\S*")  # a corner is position/texture/nor
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Read vertices and faces; polygons become fans."""
-    vertices, faces = parse_any(data)
-    if faces.shape[1] != 3:
-        raise FileFormatError(f"An OBJ file must hold faces; it holds {len(vertices)} points and no face.")
-    return vertices, faces
-
-
-def parse_any(data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Read vertices, and the faces, or else the segments of lines, or else none, of shape (0, 2)."""
-    if JOINT.search(data):
-        data = CONTINUED.sub(_joined, data)
+    """Read vertices, and the faces, or else the segments of lines, or else none."""
     positions: list[Line] = []
     polygons: list[Line] = []
     polylines: list[Line] = []
     n_so_far: dict[bytes, list[int]] = {b"f": [], b"l": []}
-    for number, text in lines_of(data):
+    for number, text in lines_of(joined_lines(data)):
         keyword = text.split(None, 1)[0]
         if keyword == b"v":
             positions.append((number, text[1:]))
@@ -44,6 +34,11 @@ def parse_any(data: bytes) -> tuple[np.ndarray, np.ndarray]:
             n_so_far[keyword].append(len(positions))
     vertices = coordinates(positions)
     return vertices, _triangles(polygons, n_so_far[b"f"]) if polygons else _segments(polylines, n_so_far[b"l"])
+
+
+def joined_lines(data: bytes) -> bytes:
+    """Join lines of numbers that end in a backslash with the next; all others keep their places."""
+    return CONTINUED.sub(_joined, data) if JOINT.search(data) else data
 
 
 def _joined(match: re.Match[bytes]) -> bytes:
@@ -62,20 +57,27 @@ def _corners(line: Line, n_so_far: int) -> list[int]:
     words = line[1].split()
     if len(words) < 3:
         raise FileFormatError(f"A face must have three corners or more; line {line[0]} is {shown(line)}.")
-    return [_index(word, line, n_so_far) for word in words]
+    return [corner_index(word, line, n_so_far) for word in words]
 
 
 def _segments(polylines: Sequence[Line], n_so_far: Sequence[int]) -> np.ndarray:
     pairs: list[tuple[int, int]] = []
     for line, count in zip(polylines, n_so_far, strict=True):
-        places = [_index(word, line, count) for word in line[1].split()]
+        places = [corner_index(word, line, count) for word in line[1].split()]
         if len(places) < 2:
             raise FileFormatError(f"A polyline must have two points or more; line {line[0]} is {shown(line)}.")
         pairs += pairwise(places)
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
 
-def _index(word: bytes, line: Line, n_so_far: int) -> int:
+def corner_index(word: bytes, line: Line, n_so_far: int) -> int:
+    """Return the vertex that a corner names, from 0, after so many vertices.
+
+    Raises
+    ------
+    FileFormatError
+        If it names none, or counts back beyond the first.
+    """
     index = whole(word, line, "A corner")
     if index == 0 or index < -n_so_far:
         raise FileFormatError(

@@ -1,4 +1,4 @@
-"""Object File Format: counts, then a line a vertex, then a line a face."""
+"""Object File Format: counts, then vertices, then faces; as text mostly one a line, or binary."""
 
 import re
 from collections.abc import Sequence
@@ -7,22 +7,96 @@ import numpy as np
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.text import Line, coordinates, fans, lines_of, rows_text, shown, whole, whole_table
+from eigenshape.io.text import Line, coordinates, fans, lines_of, number, rows_text, shown, whole, whole_table
 
 KEYWORD = re.compile(rb"(?:ST)?C?N?OFF(?P<glued>\d*)", re.IGNORECASE)  # some write OFF8 6 12
+PLAIN = re.compile(rb"OFF", re.IGNORECASE)  # three numbers a vertex
+BINARY = re.compile(rb"OFF[ \t]+BINARY[ \t]*\r?\n", re.IGNORECASE)
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Read vertices and faces; polygons become fans, colours and normals are passed over."""
-    counts, rows = _head(lines_of(data))
+    """Read vertices and faces; polygons become fans, colors and normals are passed over."""
+    binary = BINARY.match(data)
+    if binary:
+        return _parse_binary(data[binary.end() :])
+    lines = lines_of(data)
+    counts, rows = _head(lines)
     n_vertices, n_faces = _counts(counts)
     if n_vertices + n_faces != len(rows):
+        found = _parse_stream(rows, n_vertices, n_faces) if PLAIN.match(lines[0][1]) else None
+        if found is not None:
+            return found
         raise FileFormatError(
             f"An OFF file must hold the rows it declares; it declares {n_vertices} vertices and {n_faces} faces "
             f"and holds {len(rows)} rows."
         )
     _require_equal_rows(rows[:n_vertices])
     return coordinates(rows[:n_vertices]), _triangles(rows[n_vertices:])
+
+
+def _parse_stream(rows: Sequence[Line], n_vertices: int, n_faces: int) -> tuple[np.ndarray, np.ndarray] | None:
+    """Read numbers wherever lines break; None where vertices and faces without colors do not fill the file."""
+    words = [(at, word) for at, text in rows for word in text.split()]
+    if 3 * n_vertices + 4 * n_faces > len(words):
+        return None
+    place = 3 * n_vertices
+    polygons = []
+    for _ in range(n_faces):
+        if place >= len(words):
+            return None
+        line = words[place]
+        count = whole(line[1], line, "A number of corners")
+        if not 3 <= count < len(words) - place:
+            return None
+        corners = words[place + 1 : place + 1 + count]
+        polygons.append([whole(word, (at, word), "A corner") for at, word in corners])
+        place += 1 + count
+    if place != len(words):
+        return None
+    numbers = [number(word, (at, word)) for at, word in words[: 3 * n_vertices]]
+    return np.array(numbers).reshape(-1, 3), fans(polygons)
+
+
+def _parse_binary(body: bytes) -> tuple[np.ndarray, np.ndarray]:
+    """Read 32-bit numbers in the order and with the counts of colors that fill the file.
+
+    Geomview writes big-endian numbers and after each face how many colors follow; the Polygon Mesh Processing library
+    and OpenMesh write those of the machine, and faces without such a count.
+    """
+    for order in ">", "<":
+        for has_colors in True, False:
+            found = _binary_mesh(body, order, has_colors)
+            if found is not None:
+                return found
+    raise FileFormatError(
+        f"A binary OFF file must hold 32-bit counts, x, y and z of each vertex, and faces that fill it; it does not, "
+        f"in {len(body)} bytes."
+    )
+
+
+def _binary_mesh(body: bytes, order: str, has_colors: bool) -> tuple[np.ndarray, np.ndarray] | None:
+    numbers = np.frombuffer(body, f"{order}i4", len(body) // 4).tolist()
+    if len(body) % 4 or len(numbers) < 3:
+        return None
+    n_vertices, n_faces, _ = numbers[:3]
+    place = 3 + 3 * n_vertices
+    if min(n_vertices, n_faces) < 0 or place + 4 * n_faces > len(numbers):
+        return None
+    polygons = []
+    for _ in range(n_faces):
+        if place >= len(numbers) or not 3 <= numbers[place] < len(numbers) - place:
+            return None
+        polygons.append(numbers[place + 1 : place + 1 + numbers[place]])
+        place += 1 + numbers[place]
+        if has_colors:
+            n_colors = numbers[place] if place < len(numbers) else -1
+            if not 0 <= n_colors <= 4:
+                return None
+            place += 1 + n_colors
+    if place != len(numbers):
+        return None
+    vertices = np.frombuffer(body, f"{order}f4", 3 * n_vertices, 12).reshape(-1, 3)
+    return vertices.astype(np.float64), fans(polygons)
 
 
 def _head(lines: list[Line]) -> tuple[Line, list[Line]]:
@@ -33,8 +107,6 @@ def _head(lines: list[Line]) -> tuple[Line, list[Line]]:
         raise FileFormatError(
             f"An OFF file must begin with OFF, COFF, NOFF or the like; it begins with {shown(first)}."
         )
-    if b"BINARY" in (word.upper() for word in words):
-        raise FileFormatError("An OFF file must be text; line 1 says BINARY.")
     counts = b" ".join([match["glued"], *words]).strip()
     if counts:
         return (first[0], counts), lines[1:]

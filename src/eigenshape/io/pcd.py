@@ -9,6 +9,7 @@ from jaxtyping import Float
 from eigenshape._errors import FileFormatError
 from eigenshape.io.lzf_loops import decompress
 from eigenshape.io.text import Line, coordinates, lines_of, number_table, shown, whole
+from eigenshape.io.unpacking import require_reasonable
 
 AXES = (b"x", b"y", b"z")
 KINDS = {(b"F", 4): "<f4", (b"F", 8): "<f8"}
@@ -143,6 +144,7 @@ def _unpacked(header: Header, body: bytes) -> np.ndarray:
             f"Compressed points must have the size they declare; {packed} bytes that unpack to {size} are declared, "
             f"{len(body) - 8} are there, and {header.n_points} points take {header.n_points * header.record}."
         )
+    require_reasonable(size, len(body))
     unpacked = decompress(np.frombuffer(body, np.uint8, packed, 8), size)
     _require_bytes(header, unpacked)
     return unpacked

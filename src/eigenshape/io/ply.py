@@ -6,48 +6,64 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from jaxtyping import Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.ply_header import TEXT, Column, Element, parse_header
-from eigenshape.io.text import Line, fans, lines_of, number, number_table, rows_text, shown, whole, whole_table
+from eigenshape.io.text import (
+    Line,
+    fans,
+    lines_of,
+    number,
+    number_table,
+    rows_text,
+    shown,
+    strip_triangles,
+    whole,
+    whole_table,
+)
 
 AXES = ("x", "y", "z")
 CORNERS = ("vertex_indices", "vertex_index")
+LABEL = "label"  # the property of faces that says of which part each is
 Table = dict[str, Any]  # the values of each column, by name
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Read vertices and faces; polygons become fans, all other elements and properties are passed over."""
-    vertices, faces, strips = parse_points(data)
-    if not len(faces):
-        hint = " It has triangle strips, which are not read." if strips else ""
-        raise FileFormatError(f"A PLY file must hold faces; it holds {len(vertices)} points and no face.{hint}")
-    return vertices, faces
+    """Read vertices and faces, if any; polygons become fans, strips triangles, the rest is passed over."""
+    tables = _tables(data)
+    vertices = np.column_stack([np.asarray(tables["vertex"][axis], dtype=np.float64) for axis in AXES])
+    polygons, strips = _lists(tables, "face"), _lists(tables, "tristrips")
+    triangles = [_triangles(polygons)] if len(polygons) else []
+    if len(strips):
+        triangles.append(strip_triangles(_pieces(strips)))
+    return vertices, np.concatenate(triangles) if triangles else np.empty((0, 3), dtype=np.int64)
 
 
-def parse_points(data: bytes) -> tuple[np.ndarray, np.ndarray, bool]:
-    """Read vertices, the faces if there are any, and whether there are triangle strips, which are not read."""
+def _tables(data: bytes) -> dict[str, Table]:
     header = parse_header(data)
     elements = [element for element in header.elements if element.columns]
     _require_mesh(elements)
     body = data[header.end :]
     if header.order == TEXT:
-        tables = _text_tables(lines_of(body, first=header.n_lines + 1), elements)
-    else:
-        tables = _binary_tables(body, elements, header.order)
-    vertices = np.column_stack([np.asarray(tables["vertex"][axis], dtype=np.float64) for axis in AXES])
-    polygons = next((tables["face"][name] for name in CORNERS if name in tables.get("face", {})), ())
-    faces = _triangles(polygons) if len(polygons) else np.empty((0, 3), dtype=np.int64)
-    return vertices, faces, "tristrips" in tables
+        return _text_tables(lines_of(body, first=header.n_lines + 1), elements)
+    return _binary_tables(body, elements, header.order)
 
 
-def parse_any(data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Read vertices, and the faces if there are any; strips of triangles are refused rather than left out."""
-    vertices, faces, strips = parse_points(data)
-    if strips:
-        raise FileFormatError("Triangle strips of a PLY file are not read; convert them to faces.")
-    return vertices, faces
+def _lists(tables: dict[str, Table], name: str) -> Any:
+    table = tables.get(name, {})
+    return next((table[column] for column in CORNERS if column in table), ())
+
+
+def _pieces(strips: Sequence[Sequence[int]] | np.ndarray) -> list[np.ndarray]:
+    """Cut strips where a -1 ends one and begins the next."""
+    pieces = []
+    for strip in strips:
+        corners = np.asarray(strip, dtype=np.int64)
+        ends = np.flatnonzero(corners == -1)
+        pieces += [piece[piece != -1] for piece in np.split(corners, ends)]
+    return pieces
 
 
 def _require_mesh(elements: Sequence[Element]) -> None:
@@ -55,10 +71,14 @@ def _require_mesh(elements: Sequence[Element]) -> None:
     axes = [columns.get(("vertex", axis)) for axis in AXES]
     if any(axis is None or axis.length_kind for axis in axes):
         raise FileFormatError("A PLY file must declare an element vertex with the numbers x, y and z; it does not.")
-    corners = [columns["face", name] for name in CORNERS if ("face", name) in columns]
-    has_faces = any(element.name == "face" and element.count for element in elements)
-    if has_faces and not (corners and corners[0].length_kind and corners[0].is_whole):
-        raise FileFormatError("Faces of a PLY file must declare a list of whole vertex_indices; they do not.")
+    for element in elements:
+        if element.name not in ("face", "tristrips") or not element.count:
+            continue
+        corners = [columns[element.name, name] for name in CORNERS if (element.name, name) in columns]
+        if not (corners and corners[0].length_kind and corners[0].is_whole):
+            raise FileFormatError(
+                f"The element {element.name} of a PLY file must declare a list of whole vertex_indices; it does not."
+            )
 
 
 def _triangles(polygons: Sequence[Sequence[int]] | np.ndarray) -> np.ndarray:
@@ -187,24 +207,54 @@ def _ragged_table(body: bytes, element: Element, order: str, start: int) -> tupl
     return table, start
 
 
-def format_text(mesh: TriangleMesh, colors: np.ndarray | None = None) -> bytes:
-    """Write a mesh as text that reads back exactly; colours, (n, 3) uint8, stand with the vertices."""
+def parse_labels(data: bytes) -> Int[np.ndarray, " f"]:
+    """Read the property `label` of faces: one whole number for each triangle that `parse` makes of them.
+
+    Raises
+    ------
+    FileFormatError
+        If faces have no such property, or it is no whole number.
+    """
+    tables = _tables(data)
+    labels = tables.get("face", {}).get(LABEL)
+    if labels is None:
+        raise FileFormatError(f"Faces of a PLY file of labels must have a property {LABEL}; they have none.")
+    try:
+        values = np.array([int(label) for label in labels], dtype=np.int64)
+    except (TypeError, ValueError, OverflowError) as err:
+        raise FileFormatError(f"The property {LABEL} of faces must be a whole number; it is not: {err}.") from err
+    n_triangles = [len(polygon) - 2 for polygon in _lists(tables, "face")]
+    return np.repeat(values, n_triangles)
+
+
+def format_text(
+    mesh: TriangleMesh, colors: np.ndarray | None = None, face_labels: Int[np.ndarray, " f"] | None = None
+) -> bytes:
+    """Write a mesh as text that reads back exactly; colors, (n, 3) uint8, stand with the vertices."""
     vertices = rows_text("", mesh.vertices)
     if colors is not None:
         vertices = [f"{row} {tint}" for row, tint in zip(vertices, rows_text("", colors), strict=True)]
-    rows = [*vertices, *rows_text("3 ", mesh.faces)]
-    return _header_text(mesh, "ascii", colors) + ("\n".join(rows) + "\n").encode()
+    faces = rows_text("3 ", mesh.faces)
+    if face_labels is not None:
+        faces = [f"{row} {label}" for row, label in zip(faces, face_labels.tolist(), strict=True)]
+    rows = [*vertices, *faces]
+    return _header_text(mesh, "ascii", colors, face_labels) + ("\n".join(rows) + "\n").encode()
 
 
-def format_binary(mesh: TriangleMesh, colors: np.ndarray | None = None) -> bytes:
-    """Write a mesh in binary that reads back exactly; colours, (n, 3) uint8, stand with the vertices."""
+def format_binary(
+    mesh: TriangleMesh, colors: np.ndarray | None = None, face_labels: Int[np.ndarray, " f"] | None = None
+) -> bytes:
+    """Write a mesh in binary that reads back exactly; colors, (n, 3) uint8, stand with the vertices."""
     vertices = np.zeros(mesh.n_vertices, dtype=[("xyz", "<f8", 3)] + ([("rgb", "u1", 3)] if colors is not None else []))
     vertices["xyz"] = mesh.vertices
     if colors is not None:
         vertices["rgb"] = colors
-    faces = np.zeros(mesh.n_faces, dtype=[("n", "u1"), ("corners", "<i4", 3)])
+    label = [(LABEL, "<i4")] if face_labels is not None else []
+    faces = np.zeros(mesh.n_faces, dtype=[("n", "u1"), ("corners", "<i4", 3), *label])
     faces["n"], faces["corners"] = 3, mesh.faces
-    return _header_text(mesh, "binary_little_endian", colors) + vertices.tobytes() + faces.tobytes()
+    if face_labels is not None:
+        faces[LABEL] = face_labels
+    return _header_text(mesh, "binary_little_endian", colors, face_labels) + vertices.tobytes() + faces.tobytes()
 
 
 def format_points(points: np.ndarray) -> bytes:
@@ -216,11 +266,14 @@ def format_points(points: np.ndarray) -> bytes:
     return ("\n".join(lines) + "\n").encode() + points.astype("<f8").tobytes()
 
 
-def _header_text(mesh: TriangleMesh, order: str, colors: np.ndarray | None) -> bytes:
+def _header_text(
+    mesh: TriangleMesh, order: str, colors: np.ndarray | None, face_labels: Int[np.ndarray, " f"] | None
+) -> bytes:
     tints = [f"property uchar {name}" for name in ("red", "green", "blue") if colors is not None]
     lines = [
         "ply", f"format {order} 1.0",
         f"element vertex {mesh.n_vertices}", *(f"property double {axis}" for axis in AXES), *tints,
-        f"element face {mesh.n_faces}", "property list uchar int vertex_indices", "end_header",
+        f"element face {mesh.n_faces}", "property list uchar int vertex_indices",
+        *([f"property int {LABEL}"] if face_labels is not None else []), "end_header",
     ]  # fmt: skip
     return ("\n".join(lines) + "\n").encode()

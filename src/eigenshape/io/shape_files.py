@@ -6,33 +6,44 @@ from typing import SupportsIndex
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._arguments import require_type
 from eigenshape._errors import FileFormatError, InvalidShapeError
 from eigenshape._files import read_regular, replace_file
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.io import mesh_files, obj, pcd, ply, points, unstructured, vtk_polydata
+from eigenshape.io import pcd, ply, points
+from eigenshape.io.cells import CellKind, require_kind
+from eigenshape.io.parsing import MESH_FORMATS, naming, parse_mesh, suffix_of
 
 POINTS = {".pts": points.parse, ".xyz": points.parse, ".pcd": pcd.parse}
-EITHER = {".ply": ply.parse_any, ".obj": obj.parse_any}
 WRITERS = {".xyz": points.format_text, ".pts": points.format_counted, ".ply": ply.format_points}
-FORMATS = (*mesh_files.FORMATS, *unstructured.READERS, *POINTS)
+FORMATS = (*MESH_FORMATS, *POINTS)
 
 
 def read_shape(
-    path: str | Path, *, file_format: str | None = None, dim: SupportsIndex = 2, drop_missing: bool = False
+    path: str | Path,
+    *,
+    file_format: str | None = None,
+    dim: SupportsIndex = 2,
+    drop_missing: bool = False,
+    cells: CellKind | None = None,
 ) -> Shape:
     """Read a shape of any kind: what the file holds decides what comes back.
 
     Triangles in space become a TriangleMesh, tetrahedra, segments and flat triangles a SimplicialMesh, points without
     anything between them a PointCloud. Where a file holds simplices of several dimensions the highest count: the
     boundary triangles of a tetrahedral mesh are passed over. Points keep their order, those that nothing uses too.
-    Polylines become segments, in OBJ and in VTK's POLYDATA.
+    Polylines become segments, in OBJ and in VTK files.
+
+    Legacy VTK files of POLYDATA write tetrahedra and quads alike, as polygons of four corners. They are taken for quads
+    where all are flat or where they join as the faces of a surface do, and for tetrahedra where most share three
+    corners with another and some side belongs to more than two. Where neither is so, `cells` must say it.
 
     Parameters
     ----------
     path : str or Path
-        OFF, OBJ, PLY, STL, GLB; .mesh, .msh, .vtk, .vtu; .pts, .xyz, .pcd.
+        OFF, OBJ, PLY, STL, GLB, glTF; .mesh, .msh, .vtk, .vtu; .pts, .xyz, .pcd.
     file_format : str, optional
         One of these suffixes, with or without its dot; by default that of the path.
     dim : int
@@ -40,6 +51,9 @@ def read_shape(
     drop_missing : bool
         Whether points of a cloud that are not finite, as scanners mark what they missed, are dropped. By default they
         are refused.
+    cells : {"triangles", "quads", "tetrahedra"}, optional
+        The cells to read, such as the boundary triangles of a tetrahedral mesh; "quads" become two triangles each and
+        bring the triangles between them along. By default those of the highest dimension.
 
     Returns
     -------
@@ -53,36 +67,23 @@ def read_shape(
     InvalidShapeError
         If a coordinate is not finite, a simplex does not index the points, or there is none.
     InvalidParameterError
-        If `dim` is larger than the space around.
+        If `dim` is larger than the space around, or `cells` unknown.
     OSError
         If the system cannot open the file.
     """
     path = Path(path)
-    suffix = _suffix(path, file_format)
+    suffix = suffix_of(path, file_format, FORMATS)
+    require_kind(cells)
     data = read_regular(path)
-    try:
-        with np.errstate(all="ignore"):  # what overflows is found by the check of the shape
-            coordinates, simplices = _parse(path, suffix, data)
-            if not simplices.size:
-                return PointCloud(_finite(coordinates, drop_missing), dim)
-            if simplices.shape[1] == 3 and coordinates.shape[1] == 3:
-                return TriangleMesh(coordinates, simplices)
-            return SimplicialMesh(coordinates, simplices)
-    except (FileFormatError, InvalidShapeError) as err:
-        name = "" if str(err).startswith(str(path)) else f"{path}: "
-        raise type(err)(f"{name}{err}") from err
-
-
-def _parse(path: Path, suffix: str, data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    if suffix in POINTS:
-        return POINTS[suffix](data), np.empty((0, 0), dtype=np.int64)
-    if suffix in EITHER:
-        return EITHER[suffix](data)
-    if suffix in mesh_files.FORMATS:
-        return mesh_files.FORMATS[suffix](data)
-    if suffix == ".vtk" and vtk_polydata.is_polydata(data):
-        return vtk_polydata.parse(data)
-    return unstructured.read(path, suffix, data)
+    with naming(path):
+        if suffix in POINTS:
+            return PointCloud(_finite(POINTS[suffix](data), drop_missing), dim)
+        coordinates, simplices = parse_mesh(path, suffix, data, cells)
+        if not len(simplices):
+            return PointCloud(_finite(coordinates, drop_missing), dim)
+        if simplices.shape[1] == 3 and coordinates.shape[1] == 3:
+            return TriangleMesh(coordinates, simplices)
+        return SimplicialMesh(coordinates, simplices)
 
 
 def _finite(coordinates: Float[np.ndarray, "n d"], drop_missing: bool) -> Float[np.ndarray, "m d"]:
@@ -131,6 +132,7 @@ def write_points(cloud: PointCloud, path: str | Path) -> None:
     OSError
         If the system cannot write there.
     """
+    require_type(cloud, PointCloud, "cloud")
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in WRITERS:
@@ -138,10 +140,3 @@ def write_points(cloud: PointCloud, path: str | Path) -> None:
     if cloud.points.shape[1] != 3:
         raise InvalidShapeError(f"Files of points hold three coordinates; these points have {cloud.points.shape[1]}.")
     replace_file(path, WRITERS[suffix](cloud.points))
-
-
-def _suffix(path: Path, file_format: str | None) -> str:
-    suffix = path.suffix.lower() if file_format is None else f".{file_format.lower().removeprefix('.')}"
-    if suffix not in FORMATS:
-        raise FileFormatError(f"{path} must be of a known format, {', '.join(FORMATS)}; it is {suffix!r}.")
-    return suffix

@@ -98,6 +98,21 @@ def fans(polygons: Sequence[Sequence[int]] | Int[np.ndarray, "p c"]) -> Int[np.n
     return np.array(triangles, dtype=np.int64).reshape(-1, 3)
 
 
+def strip_triangles(strips: Sequence[Int[np.ndarray, " _"]]) -> Int[np.ndarray, "f 3"]:
+    """Split strips into triangles, every second one turned so that all agree.
+
+    A strip turns a corner by naming a point twice; the triangles without area that this makes are no part of the shape.
+    """
+    pieces = [np.empty((0, 3), dtype=np.int64)]
+    for corners in strips:
+        triangles = np.column_stack([corners[:-2], corners[1:-1], corners[2:]])
+        triangles[1::2] = triangles[1::2, [1, 0, 2]]
+        pieces.append(triangles)
+    found = np.concatenate(pieces).astype(np.int64)
+    first, second, third = found.T
+    return found[(first != second) & (second != third) & (third != first)]
+
+
 def rows_text(prefix: str, rows: np.ndarray) -> list[str]:
     """Write rows so that each number reads back exactly."""
     return [prefix + " ".join(map(repr, row)) for row in rows.tolist()]

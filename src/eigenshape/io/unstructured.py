@@ -1,43 +1,43 @@
-"""Unstructured meshes by meshio, behind a guard: it may end the process, print, or return what was never declared."""
+"""Medit and gmsh files by meshio, behind a guard: it may end the process, print, or return what was never declared."""
 
 import io
+import sys
 import warnings
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from threading import Lock, get_ident
 from types import SimpleNamespace
 from typing import Any
 
 import meshio.gmsh
 import meshio.medit
-import meshio.vtk
-import meshio.vtu
 import numpy as np
 
 from eigenshape._errors import FileFormatError
+from eigenshape.io.cells import SEGMENTS
 from eigenshape.io.declarations import checked
 
 READERS: dict[str, Callable[[Path], Any]] = {
     ".mesh": meshio.medit.read,
     ".meshb": meshio.medit.read,
     ".msh": meshio.gmsh.read,
-    ".vtk": meshio.vtk.read,
-    ".vtu": meshio.vtu.read,
 }
 ENDS = (b"$EndNodes", b"$EndElements")  # without which a .msh was cut off
-SIMPLICES = ("tetra", "triangle", "line", "vertex")
+KINDS = {"tetra": "tetrahedra", "triangle": "triangles", "quad": "quads", "line": SEGMENTS}
+_ONE_READER = Lock()  # meshio prints to the streams of the process, which only one thread at a time may redirect
 
 
-def read(path: Path, suffix: str, data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Return points and the simplices of the highest dimension; (n, 0) where there are none.
+def read(path: Path, suffix: str, data: bytes) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return points and cells by kind.
 
     meshio sees a copy of `data`, what the file holds, once that is known to be safe for it.
 
     Raises
     ------
     FileFormatError
-        If meshio cannot read the file, it is not whole, or it holds cells that are no simplices.
+        If meshio cannot read the file, it is not whole, or it holds cells that are neither simplices nor quads.
     """
     _require_ends(path, suffix, data)
     readable, n_cells = checked(suffix, data)
@@ -47,27 +47,27 @@ def read(path: Path, suffix: str, data: bytes) -> tuple[np.ndarray, np.ndarray]:
         found = _guarded(READERS[suffix], copy, path)
     _require_whole(path, suffix, data, found, n_cells)
     cells = [(str(block.type), np.asarray(block.data)) for block in found.cells if len(block.data)]
-    others = sorted({kind for kind, _ in cells} - set(SIMPLICES))
+    others = sorted({kind for kind, _ in cells} - {*KINDS, "vertex"})
     if others:
         raise FileFormatError(
-            f"{path} must hold simplices (tetra, triangle or line); it holds {', '.join(others)}. Split them first."
+            f"{path} must hold simplices (tetra, triangle or line) or quads; it holds {', '.join(others)}. "
+            "Split them first."
         )
     points = np.asarray(found.points)
     if points.ndim != 2:
         raise FileFormatError(f"{path} must hold points in rows; meshio reads an array of shape {points.shape}.")
-    for kind in SIMPLICES[:-1]:
-        blocks = [data for name, data in cells if name == kind]
-        if blocks:
-            return points, np.concatenate(blocks)
-    return points, np.empty((len(points), 0), dtype=np.int64)
+    blocks = {}
+    for kind, name in KINDS.items():
+        of_kind = [block for found_kind, block in cells if found_kind == kind]
+        if of_kind:
+            blocks[name] = np.concatenate(of_kind)
+    return points, blocks
 
 
 def _require_ends(path: Path, suffix: str, data: bytes) -> None:
     missing = [name for name in ENDS if suffix == ".msh" and name not in data]
     if missing:
         raise FileFormatError(f"{path} must be whole; it has no {missing[0].decode()}.")
-    if suffix == ".vtk" and b"\nASCII" in data[:512] and not data[-1:].isspace():
-        raise FileFormatError(f"{path} must be whole; its last number has no line break after it.")
 
 
 def _require_whole(path: Path, suffix: str, data: bytes, found: Any, declared: int | None) -> None:
@@ -84,12 +84,33 @@ def _require_whole(path: Path, suffix: str, data: bytes, found: Any, declared: i
 
 
 def _guarded(reader: Callable[[Path], Any], copy: Path, path: Path) -> Any:
-    said = io.StringIO()
-    try:
-        with redirect_stdout(said), redirect_stderr(said), warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")
-            found = reader(copy)
-            return SimpleNamespace(points=found.points, cells=found.cells, said=" ".join(said.getvalue().split()))
-    except (SystemExit, Exception) as err:
-        what = " ".join(said.getvalue().split()) or f"{type(err).__name__}: {err}"
-        raise FileFormatError(f"{path} must be a readable {copy.suffix} file; meshio says {what[:200]!r}.") from err
+    with _ONE_READER:
+        printed = _Printed(sys.stderr)
+        try:
+            with (
+                redirect_stdout(printed),
+                redirect_stderr(printed),
+                warnings.catch_warnings(),
+                np.errstate(all="ignore"),
+            ):
+                warnings.filterwarnings("ignore", module=r"meshio\b")  # and nobody else's warnings
+                found = reader(copy)
+            return SimpleNamespace(points=found.points, cells=found.cells, said=printed.words())
+        except (SystemExit, Exception) as err:
+            what = printed.words() or f"{type(err).__name__}: {err}"
+            raise FileFormatError(f"{path} must be a readable {copy.suffix} file; meshio says {what[:200]!r}.") from err
+
+
+class _Printed(io.StringIO):
+    """What this thread prints; what other threads print in the meantime is passed on."""
+
+    def __init__(self, others: Any) -> None:
+        super().__init__()
+        self._others = others
+        self._reader = get_ident()
+
+    def write(self, text: str) -> int:
+        return super().write(text) if get_ident() == self._reader else self._others.write(text)
+
+    def words(self) -> str:
+        return " ".join(self.getvalue().split())

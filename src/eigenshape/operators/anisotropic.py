@@ -4,11 +4,11 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._errors import InvalidParameterError
+from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.measure import surface_area, vertex_normals
-from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import require_volumes, scaled_corners, triangular_sides
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.geometry.topology import require_simplices_everywhere
 from eigenshape.operators import elements
 from eigenshape.operators.cotangent import Mass, linear_mass, require_mass
 from eigenshape.operators.laplacian import Laplacian
@@ -16,14 +16,14 @@ from eigenshape.operators.laplacian import Laplacian
 ROUNDING = 1e-12  # of the largest entry of a tensor: what may be asymmetric, or lie below zero
 
 
-def anisotropic_laplacian(mesh: Mesh, tensors: Float[np.ndarray, "s d d"], mass: Mass = "lumped") -> Laplacian:
+def anisotropic_laplacian(mesh: MeshLike, tensors: Float[np.ndarray, "s d d"], mass: Mass = "lumped") -> Laplacian:
     """Build the Laplacian -div(D grad) of linear elements, with one conductivity tensor a simplex.
 
     W has the energy Σ V ∇fᵀD∇f. With the identity everywhere it is the cotangent Laplacian.
 
     Parameters
     ----------
-    mesh : TriangleMesh or SimplicialMesh
+    mesh : MeshLike
     tensors : (s, d, d) float
         Symmetric, positive semidefinite, without unit; only the part along the simplex counts.
     mass : "lumped", "consistent" or "averaged"
@@ -40,10 +40,10 @@ def anisotropic_laplacian(mesh: Mesh, tensors: Float[np.ndarray, "s d d"], mass:
     InvalidShapeError
         As `cotangent_laplacian`.
     """
+    mesh = as_simplicial(mesh)
     require_mass(mass)
     _require_tensors(mesh, tensors)
-    require_volumes(mesh)
-    require_simplices_everywhere(mesh)
+    require_sound(mesh)
     products = elements.gradient_products(mesh, tensors)
     return Laplacian(elements.stiffness(mesh.simplices, products, 1), linear_mass(mesh, mass))
 
@@ -73,7 +73,7 @@ def _require_tensors(mesh: Mesh, tensors: np.ndarray) -> None:
         )
 
 
-def curvature_tensors(mesh: TriangleMesh, alpha: float, *, concave: bool = False) -> Float[np.ndarray, "f 3 3"]:
+def curvature_tensors(mesh: MeshLike, alpha: float, *, concave: bool = False) -> Float[np.ndarray, "f 3 3"]:
     """Return tensors that slow diffusion down across bends (Andreux, Rodolà, Aubry, Cremers 2014).
 
     Along each principal direction of a face the conductivity is 1 / (1 + α |κ| √area), with κ the principal curvature
@@ -81,7 +81,7 @@ def curvature_tensors(mesh: TriangleMesh, alpha: float, *, concave: bool = False
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
         Its faces turned one way.
     alpha : float
         At least 0.
@@ -99,8 +99,9 @@ def curvature_tensors(mesh: TriangleMesh, alpha: float, *, concave: bool = False
     InvalidParameterError
         If alpha is negative or not finite.
     InvalidShapeError
-        If a face has no area.
+        If a face has no area, or neighboring faces are turned against each other.
     """
+    mesh = as_mesh(mesh)
     if not 0 <= alpha < np.inf:
         raise InvalidParameterError(f"alpha must be finite and not negative; it is {alpha}.")
     require_volumes(mesh)

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Int
 
+from eigenshape._arguments import require_type
 from eigenshape._errors import InvalidParameterError
 from eigenshape.operators.laplacian import Laplacian
 
@@ -37,6 +38,7 @@ def dirichlet_laplacian(
     InvalidParameterError
         If a fixed point is out of range, or none is free.
     """
+    require_type(laplacian, Laplacian, "laplacian")
     bad = np.flatnonzero((fixed < 0) | (fixed >= laplacian.n_points))
     if bad.size:
         raise InvalidParameterError(

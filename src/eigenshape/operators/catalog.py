@@ -9,6 +9,7 @@ import scipy.sparse as sp
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.cloud import PointCloud, Shape
+from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
@@ -60,12 +61,12 @@ OPERATORS = {
 }
 
 
-def build_laplacian(shape: Shape | sp.sparray, operator: str | None = None, **options: Any) -> Laplacian:
+def build_laplacian(shape: ShapeLike | sp.sparray, operator: str | None = None, **options: Any) -> Laplacian:
     """Build the operator of a name on a shape.
 
     Parameters
     ----------
-    shape : TriangleMesh, SimplicialMesh, PointCloud or (n, n) sparse adjacency matrix
+    shape : ShapeLike or (n, n) sparse adjacency matrix
     operator : str, optional
         A name in `OPERATORS`; by default "cotangent" on meshes, "point-cloud" on points and "weighted" on graphs.
     **options
@@ -82,6 +83,8 @@ def build_laplacian(shape: Shape | sp.sparray, operator: str | None = None, **op
     InvalidShapeError
         As the operator says.
     """
+    if not isinstance(shape, sp.sparray):
+        shape = as_shape(shape)
     name = operator or default_operator(shape)
     if name not in OPERATORS:
         raise InvalidParameterError(f"operator must be one of {', '.join(OPERATORS)}; it is {name!r}.")

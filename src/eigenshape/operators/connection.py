@@ -5,6 +5,7 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Complex, Float
 
 from eigenshape._errors import InvalidShapeError
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
@@ -17,7 +18,7 @@ MASS_SHARES = {"lumped": 0.0, "consistent": 1 / 12, "averaged": 1 / 24}  # of a 
 COCIRCULAR = 1e-14  # a sum of cotangents that rounding may leave below zero
 
 
-def connection_laplacian(mesh: TriangleMesh, mass: Mass = "lumped") -> Laplacian:
+def connection_laplacian(mesh: MeshLike, mass: Mass = "lumped") -> Laplacian:
     """Build the Laplacian of tangent vectors, with the Levi-Civita connection of the mesh.
 
     W has the energy sum_ij w_ij |v_j - r_ij v_i|²: cotangent weights w_ij, and r_ij the rotation that carries a vector
@@ -35,7 +36,7 @@ def connection_laplacian(mesh: TriangleMesh, mass: Mass = "lumped") -> Laplacian
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
         A manifold, with or without boundary, its faces turned one way.
     mass : "lumped", "consistent" or "averaged"
         As in `cotangent_laplacian`; the consistent one carries vectors as W does, in faces made flat.
@@ -54,6 +55,7 @@ def connection_laplacian(mesh: TriangleMesh, mass: Mass = "lumped") -> Laplacian
     InvalidParameterError
         If `mass` is none of the three.
     """
+    mesh = as_mesh(mesh)
     scalar = cotangent_laplacian(mesh, mass)
     sides = vertex_directions(mesh)
     turns = np.exp(1j * (sides.at_head + np.pi - sides.at_tail))
@@ -65,7 +67,7 @@ def connection_laplacian(mesh: TriangleMesh, mass: Mass = "lumped") -> Laplacian
     return Laplacian(_real(stiffness), _real(_carried(mesh, scalar.mass.diagonal(), shares * flat_turns)))
 
 
-def tangent_frames(mesh: TriangleMesh) -> Float[np.ndarray, "n 2 3"]:
+def tangent_frames(mesh: MeshLike) -> Float[np.ndarray, "n 2 3"]:
     """Return two orthonormal tangent vectors at each vertex.
 
     The first is the direction of the vertex' first edge, made orthogonal to the mean normal of its faces (weighted by
@@ -77,6 +79,7 @@ def tangent_frames(mesh: TriangleMesh) -> Float[np.ndarray, "n 2 3"]:
     InvalidShapeError
         As in `connection_laplacian`; or if at a vertex the normals of the faces cancel, or the first edge is normal.
     """
+    mesh = as_mesh(mesh)
     sides = vertex_directions(mesh)
     points, _ = size_one(mesh.vertices)
     normals = vertex_normals(mesh)

@@ -5,16 +5,17 @@ from typing import Literal
 import scipy.sparse as sp
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.geometry.simplices import dual_volumes, require_volumes
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
+from eigenshape.geometry.requirements import require_sound
+from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.geometry.topology import require_simplices_everywhere
 from eigenshape.operators import elements
 from eigenshape.operators.laplacian import Laplacian
 
 Mass = Literal["lumped", "consistent", "averaged"]
 
 
-def cotangent_laplacian(mesh: Mesh, mass: Mass = "lumped") -> Laplacian:
+def cotangent_laplacian(mesh: MeshLike, mass: Mass = "lumped") -> Laplacian:
     """Build the linear finite-element Laplacian of a mesh of any dimension and codimension.
 
     w_ij = (cot α_ij + cot β_ij) / 2 on triangles, with the angles opposite to the edge (thesis 1.1.2; Pinkall and
@@ -23,7 +24,7 @@ def cotangent_laplacian(mesh: Mesh, mass: Mass = "lumped") -> Laplacian:
 
     Parameters
     ----------
-    mesh : TriangleMesh or SimplicialMesh
+    mesh : MeshLike
     mass : "lumped", "consistent" or "averaged"
         B: 1/(m+1) of the incident volumes on the diagonal; the full matrix ∫ φ_i φ_j, with the eigenvalues of
         conforming elements, which bound those of the surface from above; or the mean of the two, whose leading
@@ -37,13 +38,14 @@ def cotangent_laplacian(mesh: Mesh, mass: Mass = "lumped") -> Laplacian:
     Raises
     ------
     InvalidShapeError
-        If a simplex has no volume, a point no simplex, or floats cannot hold lengths to these powers.
+        If a simplex has no volume or the corners of another, a point no simplex, or floats cannot hold
+        lengths to these powers.
     InvalidParameterError
         If `mass` is none of the three.
     """
+    mesh = as_simplicial(mesh)
     require_mass(mass)
-    require_volumes(mesh)
-    require_simplices_everywhere(mesh)
+    require_sound(mesh)
     products = elements.gradient_products(mesh)
     return Laplacian(elements.stiffness(mesh.simplices, products, 1), linear_mass(mesh, mass))
 

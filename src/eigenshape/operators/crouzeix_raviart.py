@@ -10,10 +10,11 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import FacetTable, facet_table
-from eigenshape.geometry.simplices import in_length, require_volumes, scaled_corners, simplex_volumes, triangular_sides
+from eigenshape.geometry.requirements import require_sound
+from eigenshape.geometry.simplices import in_length, scaled_corners, simplex_volumes, triangular_sides
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.geometry.topology import require_simplices_everywhere
 from eigenshape.operators import elements
 from eigenshape.operators.laplacian import Laplacian
 
@@ -21,7 +22,7 @@ TRIANGLE = 0.1893  # of the longest edge
 REGULAR_TETRAHEDRON = 0.147  # of its edge
 
 
-def crouzeix_raviart_laplacian(mesh: Mesh) -> Laplacian:
+def crouzeix_raviart_laplacian(mesh: MeshLike) -> Laplacian:
     """Build the Laplacian of nonconforming linear elements, whose unknowns are means over facets.
 
     The function of a facet is ψ_a = 1 - m λ_a on a simplex where corner a lies opposite: 1 on that facet, 0 in the mean
@@ -32,7 +33,7 @@ def crouzeix_raviart_laplacian(mesh: Mesh) -> Laplacian:
 
     Parameters
     ----------
-    mesh : TriangleMesh or SimplicialMesh
+    mesh : MeshLike
 
     Returns
     -------
@@ -43,10 +44,11 @@ def crouzeix_raviart_laplacian(mesh: Mesh) -> Laplacian:
     Raises
     ------
     InvalidShapeError
-        If a simplex has no volume, a point no simplex, or floats cannot hold lengths to these powers.
+        If a simplex has no volume or the corners of another, a point no simplex, or floats cannot hold
+        lengths to these powers.
     """
-    require_volumes(mesh)
-    require_simplices_everywhere(mesh)
+    mesh = as_simplicial(mesh)
+    require_sound(mesh)
     table = facet_table(mesh)
     weights = elements.stiffness(table.simplex_facets, mesh.dim**2 * elements.gradient_products(mesh), 1)
     return Laplacian(weights, facet_mass(table, simplex_volumes(mesh)))

@@ -3,10 +3,11 @@
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
+
+from eigenshape._compile import njit
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def worst_asymmetry(starts, columns, values):
     """Return the largest |M_ij - M_ji| with its i and j, in one pass that stores one number a row.
@@ -38,7 +39,7 @@ def worst_asymmetry(starts, columns, values):
     return worst, row, column
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def component_labels(starts, columns):
     """Return for each row the number of its connected component, counted in the order of their first rows."""

@@ -3,13 +3,14 @@
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import unit_scaled, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import in_length
 from eigenshape.operators.cotangent import cotangent_laplacian
 
 
-def mean_curvature(mesh: TriangleMesh) -> Float[np.ndarray, " n"]:
+def mean_curvature(mesh: MeshLike) -> Float[np.ndarray, " n"]:
     """Measure the mean curvature at each vertex, the half sum of the principal ones.
 
     L x = 2 H N for positions x and the outer normal N (L is positive; Meyer, Desbrun, Schröder and Barr 2003, with the
@@ -19,7 +20,7 @@ def mean_curvature(mesh: TriangleMesh) -> Float[np.ndarray, " n"]:
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
 
     Returns
     -------
@@ -29,8 +30,10 @@ def mean_curvature(mesh: TriangleMesh) -> Float[np.ndarray, " n"]:
     Raises
     ------
     InvalidShapeError
-        If a face has no area, or a vertex no face.
+        If a face has no area or is there twice, a vertex has no face, or neighboring faces are turned against each
+        other.
     """
+    mesh = as_mesh(mesh)
     points, scale = unit_scaled(mesh)
     operator = cotangent_laplacian(TriangleMesh(points, mesh.faces))
     pull = (operator.stiffness @ points) / operator.mass.diagonal()[:, None]

@@ -7,12 +7,11 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import require_volumes, scaled_corners
+from eigenshape.geometry.requirements import require_oriented, require_sound
+from eigenshape.geometry.simplices import scaled_corners
 from eigenshape.geometry.topology import (
-    inconsistent_edges,
     non_manifold_edges,
     non_manifold_vertices,
-    require_simplices_everywhere,
 )
 from eigenshape.operators.tufted import edge_keys
 
@@ -47,8 +46,7 @@ def vertex_directions(mesh: TriangleMesh) -> Directions:
         If the mesh is no manifold, two neighbouring faces are turned against each other, a face has no area or a
         vertex no face; the message names the first.
     """
-    require_volumes(mesh)
-    require_simplices_everywhere(mesh)
+    require_sound(mesh)
     _require_oriented_manifold(mesh)
     twins = _twins(mesh)
     first, inner = _first_sides(mesh, twins)
@@ -109,7 +107,7 @@ def _turned(
 
 
 def _require_oriented_manifold(mesh: TriangleMesh) -> None:
-    edges, vertices, turned = non_manifold_edges(mesh), non_manifold_vertices(mesh), inconsistent_edges(mesh)
+    edges, vertices = non_manifold_edges(mesh), non_manifold_vertices(mesh)
     if len(edges):
         raise InvalidShapeError(
             "Tangent planes need a manifold; more than two faces share edge "
@@ -120,8 +118,4 @@ def _require_oriented_manifold(mesh: TriangleMesh) -> None:
             f"Tangent planes need a manifold; the faces at vertex {vertices[0]} at "
             f"{mesh.vertices[vertices[0]].tolist()} form more than one fan ({vertices.size} such)."
         )
-    if len(turned):
-        raise InvalidShapeError(
-            "Tangent planes need faces turned one way; the two at edge "
-            f"({turned[0, 0]}, {turned[0, 1]}) are turned against each other ({len(turned)} such)."
-        )
+    require_oriented(mesh)

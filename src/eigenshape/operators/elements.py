@@ -11,8 +11,9 @@ from math import factorial
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
-from threadpoolctl import threadpool_limits
 
+from eigenshape._arrays import frozen
+from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.simplices import in_length, scaled_corners, simplex_volumes, triangular_sides, volumes_of
 from eigenshape.geometry.simplicial import Mesh
 
@@ -39,7 +40,7 @@ def stiffness(
 ) -> sp.csr_array:
     """Assemble ∫ ∇N_i·D∇N_j; the diagonal is what makes the rows sum to zero."""
     dim = products.shape[1] - 1
-    with threadpool_limits(1, user_api="blas"):  # threads would cut the product where they like, and change last digits
+    with one_blas_thread():  # threads would cut the product where they like, and change last digits
         local = np.einsum("sab,abij->sij", products, reference_stiffness(dim, order), optimize=True)
     weights = _assembled(nodes, local)
     return (weights - sp.diags_array(weights.sum(axis=1))).tocsr()
@@ -70,7 +71,7 @@ def _assembled(nodes: Int[np.ndarray, "s nodes"], local: Float[np.ndarray, "s no
 @lru_cache
 def local_nodes(dim: int, order: int) -> Int[np.ndarray, "nodes order"]:
     """Name the nodes of one simplex by its corners."""
-    return np.array(list(combinations_with_replacement(range(dim + 1), order)))
+    return frozen(np.array(list(combinations_with_replacement(range(dim + 1), order))))
 
 
 def number_nodes(simplices: Int[np.ndarray, "s corners"], order: int) -> tuple[np.ndarray, Int[np.ndarray, "s nodes"]]:
@@ -97,7 +98,7 @@ def _keys(n_corners: Int[np.ndarray, "s nodes"], named: Int[np.ndarray, "s nodes
 def reference_mass(dim: int, order: int) -> Float[np.ndarray, "nodes nodes"]:
     """Return ∫ N_i N_j over a simplex of volume 1."""
     exponents, coefficients = _basis(dim, order)
-    return coefficients.T @ _integrals(exponents[:, None] + exponents) @ coefficients
+    return frozen(coefficients.T @ _integrals(exponents[:, None] + exponents) @ coefficients)
 
 
 @lru_cache
@@ -111,7 +112,7 @@ def reference_stiffness(dim: int, order: int) -> Float[np.ndarray, "corners corn
             factors = np.outer(exponents[:, a], exponents[:, b])
             sums = np.maximum((exponents - units[a])[:, None] + (exponents - units[b]), 0)
             pairs[a, b] = coefficients.T @ (factors * _integrals(sums)) @ coefficients
-    return pairs
+    return frozen(pairs)
 
 
 @lru_cache
@@ -120,7 +121,7 @@ def _basis(dim: int, order: int) -> tuple[Int[np.ndarray, "nodes corners"], Floa
     names = local_nodes(dim, order)
     exponents = (names[:, :, None] == np.arange(dim + 1)).sum(axis=1)
     places = exponents / order
-    return exponents, np.linalg.inv(np.prod(places[:, None] ** exponents, axis=2))
+    return frozen(exponents), frozen(np.linalg.inv(np.prod(places[:, None] ** exponents, axis=2)))
 
 
 def _integrals(exponents: Int[np.ndarray, "i j corners"]) -> Float[np.ndarray, "i j"]:

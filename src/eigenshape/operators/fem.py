@@ -6,7 +6,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arrays import whole_number
-from eigenshape.geometry.simplices import require_volumes
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
+from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import boundary_facets, require_simplices_everywhere
 from eigenshape.operators import elements
@@ -15,7 +16,7 @@ from eigenshape.operators.laplacian import Laplacian
 HIGHEST = 3
 
 
-def fem_laplacian(mesh: Mesh, order: SupportsIndex = 2) -> Laplacian:
+def fem_laplacian(mesh: MeshLike, order: SupportsIndex = 2) -> Laplacian:
     """Build the finite-element Laplacian with Lagrange elements of order 1, 2 or 3.
 
     On flat domains with smooth eigenfunctions an eigenvalue converges with twice the order (Strang and Fix 1973): 4 for
@@ -23,7 +24,7 @@ def fem_laplacian(mesh: Mesh, order: SupportsIndex = 2) -> Laplacian:
 
     Parameters
     ----------
-    mesh : TriangleMesh or SimplicialMesh
+    mesh : MeshLike
     order : int
         1, 2 or 3.
 
@@ -36,19 +37,20 @@ def fem_laplacian(mesh: Mesh, order: SupportsIndex = 2) -> Laplacian:
     Raises
     ------
     InvalidShapeError
-        If a simplex has no volume, a point no simplex, or floats cannot hold lengths to these powers.
+        If a simplex has no volume or the corners of another, a point no simplex, or floats cannot hold
+        lengths to these powers.
     InvalidParameterError
         If the order is not in 1..3.
     """
+    mesh = as_simplicial(mesh)
     degree = whole_number(order, "order", 1, HIGHEST)
-    require_volumes(mesh)
-    require_simplices_everywhere(mesh)
+    require_sound(mesh)
     _, nodes = elements.number_nodes(mesh.simplices, degree)
     products = elements.gradient_products(mesh)
     return Laplacian(elements.stiffness(nodes, products, degree), elements.mass(mesh, nodes, degree))
 
 
-def fem_nodes(mesh: Mesh, order: SupportsIndex = 2) -> Float[np.ndarray, "nodes d"]:
+def fem_nodes(mesh: MeshLike, order: SupportsIndex = 2) -> Float[np.ndarray, "nodes d"]:
     """Return where the nodes of `fem_laplacian` lie: first the points of the mesh, then nodes on edges, then in faces.
 
     Raises
@@ -58,10 +60,11 @@ def fem_nodes(mesh: Mesh, order: SupportsIndex = 2) -> Float[np.ndarray, "nodes 
     InvalidParameterError
         If the order is not in 1..3.
     """
+    mesh = as_simplicial(mesh)
     return mesh.points[_names(mesh, order)].mean(axis=1)
 
 
-def fem_boundary_nodes(mesh: Mesh, order: SupportsIndex = 2) -> Int[np.ndarray, " b"]:
+def fem_boundary_nodes(mesh: MeshLike, order: SupportsIndex = 2) -> Int[np.ndarray, " b"]:
     """Return the nodes on the boundary of the mesh, ascending: those to hold for the Dirichlet condition.
 
     Raises
@@ -71,6 +74,7 @@ def fem_boundary_nodes(mesh: Mesh, order: SupportsIndex = 2) -> Int[np.ndarray, 
     InvalidParameterError
         If the order is not in 1..3.
     """
+    mesh = as_simplicial(mesh)
     names = _names(mesh, order)
     facets = boundary_facets(mesh)
     if not len(facets):

@@ -8,16 +8,17 @@ Triangle f has the sides 3f, 3f + 1, 3f + 2, one after the other around it. Side
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
+
+from eigenshape._compile import njit
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(error_model="numpy")
 @no_type_check
 def next_side(side):
     return side - 2 if side % 3 == 2 else side + 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(error_model="numpy")
 @no_type_check
 def area_of(a, b, c):
     # Kahan's order of Heron's formula: every digit right, needles too.
@@ -28,7 +29,7 @@ def area_of(a, b, c):
     return 0.25 * np.sqrt(max(product, 0.0))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(error_model="numpy")
 @no_type_check
 def areas(lengths):
     found = np.empty(len(lengths) // 3)
@@ -37,7 +38,7 @@ def areas(lengths):
     return found
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(error_model="numpy")
 @no_type_check
 def cotangent(lengths, side):
     """Return the cotangent opposite to a side, and the size of the terms in it."""
@@ -48,7 +49,7 @@ def cotangent(lengths, side):
     return (b * b + c * c - a * a) / four_areas, (a * a + b * b + c * c) / four_areas
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(error_model="numpy")
 @no_type_check
 def cotangents(lengths):
     found = np.empty(len(lengths))
@@ -57,7 +58,7 @@ def cotangents(lengths):
     return found
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(error_model="numpy")
 @no_type_check
 def needs_flip(twins, lengths, side, tolerance):
     one, size_one = cotangent(lengths, side)
@@ -65,7 +66,7 @@ def needs_flip(twins, lengths, side, tolerance):
     return one + two < -tolerance * (size_one + size_two)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(error_model="numpy")
 @no_type_check
 def _apex(lengths, side):
     """Return where the corner opposite to a side lies, along the side and beside it."""
@@ -75,7 +76,7 @@ def _apex(lengths, side):
     return (a * a + c * c - b * b) / (2 * a), 2 * area_of(a, b, c) / a
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(error_model="numpy")
 @no_type_check
 def _crossing(lengths, side, twin):
     """Return the length of the other diagonal of the two triangles at a side, laid out in the plane."""
@@ -84,7 +85,7 @@ def _crossing(lengths, side, twin):
     return np.hypot(lengths[side] - along - back, above + below)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(error_model="numpy")
 @no_type_check
 def _flip(tails, twins, lengths, side):
     # Triangles (u, v, w) and (v, u, x) become (x, w, u) and (w, x, v): each outer side moves one place on.
@@ -107,7 +108,7 @@ def _flip(tails, twins, lengths, side):
     return new
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(error_model="numpy")
 @no_type_check
 def flip_to_delaunay(tails, twins, lengths, tolerance, most):
     """Flip until no edge needs it, in place, first come first served; return the number of flips, -1 beyond `most`."""

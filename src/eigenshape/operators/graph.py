@@ -6,10 +6,10 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape._errors import InvalidParameterError, InvalidShapeError, try_auto
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.simplices import in_length, size_one
-from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
+from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.laplacian import Laplacian
 
 Kind = Literal["combinatorial", "weighted", "normalized"]
@@ -18,12 +18,12 @@ EdgeWeights = Literal["unit", "inverse_length"]
 ASYMMETRY = 1e-12  # of a pair of weights, relative to the larger: what rounding may leave
 
 
-def graph_laplacian(graph: sp.sparray | sp.spmatrix | Mesh, kind: Kind = "combinatorial") -> Laplacian:
+def graph_laplacian(graph: sp.sparray | sp.spmatrix | MeshLike, kind: Kind = "combinatorial") -> Laplacian:
     """Build the Laplacian of a graph: W = D - A with D the row sums of A (thesis 1.1.2).
 
     Parameters
     ----------
-    graph : (n, n) sparse, or Mesh
+    graph : (n, n) sparse, or MeshLike
         Symmetric adjacency matrix, entry (i, j) the weight of the edge, > 0; explicit zeros are no edges. Or a mesh
         of any dimension, whose graph has the sides of all its simplices.
     kind : "combinatorial", "weighted" or "normalized"
@@ -46,10 +46,10 @@ def graph_laplacian(graph: sp.sparray | sp.spmatrix | Mesh, kind: Kind = "combin
     """
     if kind not in ("combinatorial", "weighted", "normalized"):
         raise InvalidParameterError(f"kind must be 'combinatorial', 'weighted' or 'normalized'; it is {kind!r}.")
-    if isinstance(graph, TriangleMesh | SimplicialMesh):
-        adjacency = edge_graph(graph, "inverse_length" if kind == "weighted" else "unit")
-    else:
+    if sp.issparse(graph) or isinstance(graph, np.ndarray):
         adjacency = _checked_adjacency(graph)
+    else:
+        adjacency = edge_graph(as_simplicial(graph, "graph"), "inverse_length" if kind == "weighted" else "unit")
     if kind == "combinatorial":
         adjacency.data[:] = 1.0
     degrees = sp.diags_array(adjacency.sum(axis=1)).tocsr()
@@ -115,12 +115,12 @@ def _require_neighbors(adjacency: sp.csr_array) -> None:
         )
 
 
-def edge_graph(mesh: Mesh, weights: EdgeWeights = "unit") -> sp.csr_array:
+def edge_graph(mesh: MeshLike, weights: EdgeWeights = "unit") -> sp.csr_array:
     """Return the adjacency matrix of the edges of a mesh: the sides of all its simplices, in any dimension.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : MeshLike
     weights : "unit" or "inverse_length"
         1, or 1 / length of the edge, in 1/length.
 
@@ -136,6 +136,7 @@ def edge_graph(mesh: Mesh, weights: EdgeWeights = "unit") -> sp.csr_array:
     InvalidParameterError
         If `weights` is neither of the two.
     """
+    mesh = as_simplicial(mesh)
     if weights not in ("unit", "inverse_length"):
         raise InvalidParameterError(f"weights must be 'unit' or 'inverse_length'; it is {weights!r}.")
     require_distinct_corners(mesh)
@@ -158,7 +159,7 @@ def require_distinct_corners(mesh: Mesh) -> None:
         plural, singular = ("Faces", "face") if mesh.dim == 2 else ("Simplices", "simplex")
         raise InvalidShapeError(
             f"{plural} must have distinct corners; {singular} {bad[0]} is {mesh.simplices[bad[0]].tolist()} "
-            f"({bad.size} such). Repair with drop_degenerate."
+            f"({bad.size} such). {try_auto()}"
         )
 
 
@@ -177,7 +178,7 @@ def _lengths(mesh: Mesh, edges: Int[np.ndarray, "e 2"]) -> Float[np.ndarray, " e
         one, two = edges[bad[0]]
         raise InvalidShapeError(
             f"Edges must have length; edge ({one}, {two}) is from {mesh.points[one].tolist()} to "
-            f"{mesh.points[two].tolist()} ({bad.size} such). Repair with weld."
+            f"{mesh.points[two].tolist()} ({bad.size} such). {try_auto()}"
         )
     return in_length(lengths, scale, 1)
 

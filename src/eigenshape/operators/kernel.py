@@ -65,12 +65,6 @@ def choose_kernel(options: KernelOptions, edge: float) -> GaussianKernel:
             f"A kernel must reach the neighbours, h ≥ e; h = 2√t is {factor:.3g} of the mean edge length "
             f"e = {edge:.4g}, t = {t:.4g}. Choose t ≥ {edge**2 / 4:.4g}; t = e² is the default."
         )
-    if factor < NARROW:
-        warnings.warn(
-            f"A kernel of width h = {factor:.3g} e serves regular points only; on irregular ones eigenvalues come out "
-            "5 to 20 % low. h = 2e is the default.",
-            stacklevel=3,
-        )
     return GaussianKernel(t, factor, corrected=options.correct == "log", form=options.form, cutoff=options.cutoff)
 
 
@@ -192,6 +186,16 @@ def require_whole(laplacian: Laplacian, labels: np.ndarray, kernel: GaussianKern
         raise InvalidShapeError(
             f"A kernel must hold a shape together; at t = {kernel.t:.4g} component {torn[0]} falls into "
             f"{np.count_nonzero(pairs[:, 0] == torn[0])} parts ({parts.max() + 1} in all). Choose a larger t."
+        )
+
+
+def warn_of_narrow(kernel: GaussianKernel) -> None:
+    """Warn where the kernel hardly reaches the neighbors."""
+    if kernel.edge_factor < NARROW:
+        warnings.warn(
+            f"A kernel of width h = {kernel.edge_factor:.3g} e serves regular points only; on irregular ones "
+            "eigenvalues come out 5 to 20 % low. h = 2e is the default.",
+            stacklevel=3,
         )
 
 

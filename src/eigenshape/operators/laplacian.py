@@ -97,6 +97,9 @@ class Laplacian:
 def _checked(name: str, value: sp.sparray) -> sp.csr_array:
     _require_square(name, value)
     matrix = sp.csr_array(value, dtype=np.float64)
+    if not matrix.has_canonical_format:
+        matrix = matrix.copy()  # else duplicates would be summed in the caller's own arrays
+        matrix.sum_duplicates()
     _require_finite(name, matrix)
     _require_symmetric(name, matrix)
     return matrix
@@ -120,7 +123,6 @@ def _require_finite(name: str, matrix: sp.csr_array) -> None:
 
 
 def _require_symmetric(name: str, matrix: sp.csr_array) -> None:
-    matrix.sum_duplicates()
     worst, row, column = worst_asymmetry(matrix.indptr, matrix.indices, matrix.data)
     if worst > ASYMMETRY * max(matrix.data.max(initial=0.0), -matrix.data.min(initial=0.0)):
         raise InvalidParameterError(

@@ -7,10 +7,11 @@ Each walks the cells from `first` to `last`, and for each point of a cell the ru
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
+
+from eigenshape._compile import njit
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _square(points, i, j):
     total = 0.0
@@ -20,7 +21,7 @@ def _square(points, i, j):
     return total
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def count(points, order, cells, runs, farthest, wanted, counts, first, last):
     for cell in range(first, last):
@@ -34,7 +35,7 @@ def count(points, order, cells, runs, farthest, wanted, counts, first, last):
             counts[order[i]] = found
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _candidates(points, order, runs, cell):
     """Return what may lie within reach of a cell, by its number before sorting, ascending, and its coordinates."""
@@ -52,7 +53,7 @@ def _candidates(points, order, runs, cell):
     return numbers[ascending], points[places[ascending]]
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def fill(points, order, cells, runs, farthest, weights, rate, starts, columns, values, first, last):
     for cell in range(first, last):
@@ -72,7 +73,7 @@ def fill(points, order, cells, runs, farthest, weights, rate, starts, columns, v
                     place += 1
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def difference(points, cells, runs, farthest, weights, rate, values, sums, first, last):
     for cell in range(first, last):

@@ -5,8 +5,10 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import in_length, require_volumes, size_one
+from eigenshape.geometry.requirements import require_different_simplices
+from eigenshape.geometry.simplices import degenerate_simplices, in_length, require_span, require_volumes, size_one
 from eigenshape.geometry.topology import require_simplices_everywhere
 from eigenshape.operators import flip_loops
 from eigenshape.operators.graph import require_distinct_corners
@@ -14,7 +16,7 @@ from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.tufted import Triangulation, edge_keys, flipped_to_delaunay, mollified, tufted_cover
 
 
-def robust_laplacian(mesh: TriangleMesh, *, mollify: float = 1e-5) -> Laplacian:
+def robust_laplacian(mesh: MeshLike, *, mollify: float = 1e-5) -> Laplacian:
     """Build the Laplacian of Sharp and Crane, "A Laplacian for Nonmanifold Triangle Meshes" (2020).
 
     Edge lengths are mollified, each face gets a front and a back that are glued into the tufted cover, edges are
@@ -24,13 +26,13 @@ def robust_laplacian(mesh: TriangleMesh, *, mollify: float = 1e-5) -> Laplacian:
     the mesh.
 
     Edges may have any number of faces and faces may be turned any way (a Möbius strip, a soup); faces may lie on each
-    other and have no area. A face without area has no angle around its edges: where more than two meet, its place
-    among them is that of its number. Of two diagonals that are both Delaunay, as in a square, that of the mesh stays;
-    B depends on which it is, W does not.
+    other, if not with the same three vertices, and have no area. A face without area has no angle around its edges:
+    where more than two meet, its place among them is that of its number. Of two diagonals that are both Delaunay, as in
+    a square, that of the mesh stays; B depends on which it is, W does not.
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
     mollify : float
         ε ≥ 0, a multiple of the mean edge length: all edges grow by the least length that leaves every triangle
         a + b ≥ c + ε, by none where that holds. At 0, faces without area are refused.
@@ -43,16 +45,19 @@ def robust_laplacian(mesh: TriangleMesh, *, mollify: float = 1e-5) -> Laplacian:
     Raises
     ------
     InvalidShapeError
-        If a face has a corner twice, a vertex no face, all vertices are equal, or a face has no area and `mollify`
-        gives it none that rounding spares; or if coordinates are beyond 1e±150.
+        If a face has a corner twice or all corners of another, a vertex no face, all vertices lie on a line, no face
+        has area, or one has none and `mollify` gives it none that rounding spares; or if coordinates are beyond 1e±150.
     InvalidParameterError
         If `mollify` is negative or not finite.
     """
+    mesh = as_mesh(mesh)
     if not 0 <= mollify < np.inf:
         raise InvalidParameterError(f"mollify must be finite and not negative; it is {mollify}.")
     require_distinct_corners(mesh)
     require_simplices_everywhere(mesh)
-    if not mollify:
+    require_different_simplices(mesh)
+    require_span(mesh.vertices, 2, "The vertices of a mesh")
+    if not mollify or len(degenerate_simplices(mesh)) == mesh.n_faces:  # no face: all area would be that of mollifying
         require_volumes(mesh)
     cover, scale = _cover(mesh, mollify)
     delaunay = flipped_to_delaunay(cover)
@@ -63,10 +68,6 @@ def robust_laplacian(mesh: TriangleMesh, *, mollify: float = 1e-5) -> Laplacian:
 def _cover(mesh: TriangleMesh, mollify: float) -> tuple[Triangulation, float]:
     points, scale = size_one(mesh.vertices)
     lengths = np.linalg.norm(points[mesh.faces] - points[np.roll(mesh.faces, -1, axis=1)], axis=2).ravel()
-    if not lengths.any():
-        raise InvalidShapeError(
-            f"The vertices of a mesh must differ; all {mesh.n_vertices} are {mesh.vertices[0].tolist()}."
-        )
     lengths = mollified(lengths, edge_keys(mesh.faces, mesh.n_vertices), mollify)
     flat = np.flatnonzero(flip_loops.areas(lengths) == 0)
     if flat.size:

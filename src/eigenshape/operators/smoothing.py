@@ -3,15 +3,16 @@
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
-from threadpoolctl import threadpool_limits
 
 from eigenshape._arrays import positive_values
 from eigenshape._errors import InvalidShapeError
-from eigenshape.geometry.measure import edge_lengths, vertex_normals
+from eigenshape._threads import one_blas_thread
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.measure import edge_lengths, mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import mean_side_length, size_one
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.topology import boundary_facets, boundary_vertices, edge_table
+from eigenshape.geometry.topology import agreeing, boundary_facets, boundary_vertices, edge_table
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.sparse.elimination import analyse, factorise
@@ -19,7 +20,8 @@ from eigenshape.sparse.elimination import analyse, factorise
 ONE_EDGE = 0.165  # noise level, that of Gaussian noise of a quarter of an edge, at which heat flows one mean edge far
 
 
-def noise_level(mesh: TriangleMesh) -> float:
+@one_blas_thread()
+def noise_level(mesh: MeshLike) -> float:
     """Measure the noise of vertices in mean edges, as far as it stands off the surface.
 
     The median, over vertices that are not on the boundary, of |N · (mean of neighbours - vertex)|. What is finely
@@ -31,6 +33,7 @@ def noise_level(mesh: TriangleMesh) -> float:
     float
         Without unit, the same at any scale; 0 where all vertices are on the boundary.
     """
+    mesh = as_mesh(mesh)
     points, _ = size_one(mesh.vertices)
     unit = TriangleMesh(points, mesh.faces)
     edges = edge_table(mesh).edges
@@ -42,11 +45,12 @@ def noise_level(mesh: TriangleMesh) -> float:
     if not inside.any():
         return 0.0
     away = links[inside] @ points / degrees[inside, None] - points[inside]
-    heights = np.abs(np.einsum("ni,ni->n", away, vertex_normals(unit)[inside]))
+    normals = mean_normals(agreeing(unit))[inside]  # which side is out does not matter
+    heights = np.abs(np.einsum("ni,ni->n", away, normals))
     return float(np.median(heights) / edge_lengths(unit).mean())
 
 
-def denoise(mesh: TriangleMesh, *, reach: float | None = None) -> TriangleMesh:
+def denoise(mesh: MeshLike, *, reach: float | None = None) -> TriangleMesh:
     """Take the noise out of a surface's vertices by a step of heat flow, as long as the noise asks for.
 
     H solves (B + h² W) y = B x: implicit fairing (Desbrun, Meyer, Schröder and Barr 1999). Twicing, H x + H (x - H x),
@@ -55,7 +59,7 @@ def denoise(mesh: TriangleMesh, *, reach: float | None = None) -> TriangleMesh:
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
         Without faces that have no area.
     reach : float, optional
         h in mean edges; by default (`noise_level` / .165)², so that what has little noise hardly moves.
@@ -72,6 +76,7 @@ def denoise(mesh: TriangleMesh, *, reach: float | None = None) -> TriangleMesh:
     InvalidShapeError
         If a face has no area or next to no angles, or a vertex no face.
     """
+    mesh = as_mesh(mesh)
     edges = float(positive_values(reach, "reach")[0]) if reach is not None else (noise_level(mesh) / ONE_EDGE) ** 2
     if edges == 0:
         return mesh
@@ -97,7 +102,7 @@ def _flowed(
     mass, held = laplacian.mass.diagonal()[free, None], np.setdiff1d(np.arange(len(points)), free)
     matrix = pencil[:, free].tocsc()
     matrix.sort_indices()
-    with threadpool_limits(1, user_api="blas"):  # so that no digit depends on the number of threads
+    with one_blas_thread():
         factor = factorise(analyse(matrix), matrix.data)
     if factor is None:
         raise InvalidShapeError("A surface must have angles to be smoothed; some are too near to 0 for the equations.")

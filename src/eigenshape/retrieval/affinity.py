@@ -6,15 +6,18 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arrays import whole_number
+from eigenshape._threads import one_blas_thread
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.geodesic import farthest_points
-from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.requirements import require_describable
 from eigenshape.retrieval.shape_dna import N_VALUES, require_one_length
 
 N_SAMPLES = 20  # few, as in the paper; 50 to 200 find no more on the tuning half of experiments/ch5_retrieval
 
 
+@one_blas_thread()
 def affinity_eigenvalues(
-    mesh: TriangleMesh, *, n_values: SupportsIndex = N_VALUES, n_samples: SupportsIndex = N_SAMPLES
+    mesh: MeshLike, *, n_values: SupportsIndex | None = None, n_samples: SupportsIndex | None = None
 ) -> Float[np.ndarray, " k"]:
     """Describe a shape by the highest eigenvalues of the affinities between its points.
 
@@ -28,11 +31,11 @@ def affinity_eigenvalues(
 
     Parameters
     ----------
-    mesh : TriangleMesh
-    n_values : int
-        1 to n_samples.
-    n_samples : int
-        1 to n.
+    mesh : MeshLike
+    n_values : int, optional
+        1 to n_samples; by default 20, or n_samples where that is less.
+    n_samples : int, optional
+        1 to n; by default 20, or n where that is less.
 
     Returns
     -------
@@ -43,14 +46,20 @@ def affinity_eigenvalues(
     ------
     InvalidParameterError
         If a number is out of its range.
+    InvalidShapeError
+        If a vertex has no face, a face is there twice, or the mesh is a soup, whose faces lie edge on edge without
+        sharing vertices.
 
     References
     ----------
     V. Jain, H. Zhang: A spectral approach to shape-based retrieval of articulated 3D models. Computer-Aided Design 39,
     2007.
     """
-    samples = whole_number(n_samples, "n_samples", 1, mesh.n_vertices)
-    count = whole_number(n_values, "n_values", 1, samples)
+    mesh = as_mesh(mesh)
+    most = mesh.n_vertices
+    samples = min(N_SAMPLES, most) if n_samples is None else whole_number(n_samples, "n_samples", 1, most)
+    count = min(N_VALUES, samples) if n_values is None else whole_number(n_values, "n_values", 1, samples)
+    require_describable(mesh)
     points, rows, _ = farthest_points(mesh, samples)
     between = np.minimum(rows[:, points], rows[:, points].T)  # the wave of one end may come a little later
     longest = between[np.isfinite(between)].max(initial=0.0)

@@ -8,6 +8,7 @@ from hashlib import file_digest, sha256
 from pathlib import Path
 from typing import get_args
 
+from eigenshape._arguments import require_each, require_type
 from eigenshape._errors import InvalidParameterError
 from eigenshape.retrieval.codebook import PatchCodebook, made_codebook, train_codebook
 from eigenshape.retrieval.descriptor import SCALE_FREE
@@ -83,7 +84,13 @@ def build_index(
         If two items have one name.
     StoreError
         If the index cannot be written.
+    EigenshapeError
+        If no worker can start: a script must call this under ``if __name__ == "__main__":``, since workers import it.
     """
+    require_type(index, ShapeIndex, "index")
+    require_type(workers, Workers, "workers")
+    require_each(items, Item, "items")
+    require_each(recipes, AnyRecipe, "recipes")
     _require_names(items)
     tell = told or _silent
     known = {record.name: record for record in index.records()}
@@ -131,7 +138,14 @@ def learn_words(
     -------
     PatchCodebook
         Of `made_codebook` where there are fewer than 40 files, or fewer that can be taken.
+
+    Raises
+    ------
+    EigenshapeError
+        As `build_index`, if no worker can start.
     """
+    require_type(workers, Workers, "workers")
+    require_each(items, Item, "items")
     if len(items) < FEWEST_TEACHERS:
         return made_codebook()
     tell = told or _silent
@@ -177,7 +191,7 @@ def _require_described(descriptors: tuple[Descriptor, ...], recipes: tuple[AnyRe
 
 def _keep(index: ShapeIndex, item: Item, found: _Described) -> str | None:
     """Add a shape; the reason, where the index does not take it."""
-    known = {"label": item.label, "source": str(item.path), "digest": found.digest}
+    known = {"label": item.label, "source": str(item.path.absolute()), "digest": found.digest}
     try:
         index.add(item.name, found.descriptors, **known, replace=True)
     except InvalidParameterError as err:

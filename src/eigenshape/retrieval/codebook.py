@@ -12,10 +12,11 @@ import scipy.linalg as sl
 from jaxtyping import Float, Float32
 from scipy.cluster.vq import kmeans2
 from scipy.special import logsumexp
-from threadpoolctl import threadpool_limits
 
+from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import frozen
 from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches import Patches
 
 BASES = (0, 3, 6)  # radii at which words are learnt
@@ -92,12 +93,13 @@ def train_codebook(shapes: Sequence[Patches], *, seed: int = 0) -> PatchCodebook
     InvalidParameterError
         If there are fewer patches than words.
     """
+    require_each(shapes, Patches, "shapes")
     count = sum(len(shape.vertices) for shape in shapes)
     if count < 2 * N_WORDS:
         raise InvalidParameterError(
             f"A codebook takes at least {2 * N_WORDS} patches; {len(shapes)} shapes have {count}."
         )
-    with threadpool_limits(1):
+    with one_blas_thread():
         books = [_trained(np.concatenate([s.numbers[:, base] for s in shapes]), seed) for base in BASES]
     return PatchCodebook(*(frozen(np.stack(parts).astype(np.float32)) for parts in zip(*books, strict=True)))
 
@@ -113,6 +115,7 @@ def made_codebook() -> PatchCodebook:
 
 def write_codebook(codebook: PatchCodebook) -> bytes:
     """Return a codebook as the bytes of an npz file, the same for the same numbers."""
+    require_type(codebook, PatchCodebook, "codebook")
     file = BytesIO()
     np.savez_compressed(file, **{field.name: getattr(codebook, field.name) for field in fields(codebook)})
     return file.getvalue()
@@ -170,6 +173,7 @@ def _log_joint(
     return np.asarray(np.log(shares) - 0.5 * (squares + np.log(variances).sum(axis=1)))
 
 
+@one_blas_thread()
 def encode_patches(shape: Patches, codebook: PatchCodebook) -> Float32[np.ndarray, "b s v"]:
     """Encode a shape as Fisher vectors: how its patches would have the words move (Perronnin, Sánchez, Mensink 2010).
 
@@ -181,6 +185,8 @@ def encode_patches(shape: Patches, codebook: PatchCodebook) -> Float32[np.ndarra
     (b, s, v) float32
         Of b base radii, s sizes and v = 2 × words × axes numbers.
     """
+    require_type(shape, Patches, "shape")
+    require_type(codebook, PatchCodebook, "codebook")
     vectors = np.empty(codebook.code_shape)
     for place, base in enumerate(BASES):
         for size in range(N_SIZES):

@@ -3,25 +3,26 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
-from eigenshape._arrays import vertex_values
-from eigenshape._errors import InvalidShapeError
+from eigenshape._arguments import require_type
+from eigenshape._arrays import frozen, vertex_values
 from eigenshape.features.merge_tree import MergeTree, merge_tree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.fragments import fragment_vertices
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_box
+from eigenshape.geometry.requirements import require_describable
 from eigenshape.geometry.sampling import MeshPart, partial_scan, viewpoint, views_of
 from eigenshape.geometry.topology import boundary_edges, vertex_components
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.retrieval.descriptor import SCALE_FREE, Recipe, ShapeDescriptor
-from eigenshape.spectral.dirichlet import solve_dirichlet
+from eigenshape.spectral.dirichlet import solve_free
 from eigenshape.spectral.outcome import Progress
 from eigenshape.spectral.signature import heat_kernel_signature, reflection_free_signature
-from eigenshape.spectral.solver import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 N_VIEWS = 4
@@ -36,13 +37,17 @@ class DescribedShape:
     mesh : TriangleMesh
         As it was described: in a unit box where the recipe says so.
     spectrum : Spectrum
+        With zeros on fragments, whose pairs are left out.
     heat : (n,) float
         The heat whose maxima are the features, in 1/length², or the function that was given in its place.
     tree : MergeTree
         Of that function; it can be cut elsewhere without computing anything again.
     parts : Segmentation
-        One region around each feature point.
+        One region around each feature point: first those that are described, then one for each fragment.
     descriptor : ShapeDescriptor
+    fragments : (c,) int
+        Vertices of fragments, which have no features: components with less than a hundredth of the area
+        (`fragment_vertices`).
     """
 
     mesh: TriangleMesh
@@ -51,6 +56,7 @@ class DescribedShape:
     tree: MergeTree
     parts: Segmentation
     descriptor: ShapeDescriptor
+    fragments: Int[np.ndarray, " c"]
 
 
 def describe(
@@ -72,12 +78,16 @@ def describe(
     -------
     ShapeDescriptor
     """
-    unit, times = clock(spectrum.mass, recipe)
-    return _descriptor(_heat(spectrum, dirichlet, times[1:]), features, recipe, unit)
+    require_type(spectrum, Spectrum, "spectrum")
+    require_type(features, FeaturePoints, "features")
+    require_type(recipe, Recipe, "recipe")
+    require_type(dirichlet, Spectrum | None, "dirichlet")
+    unit, times = clock(float(spectrum.mass.sum()), recipe)
+    return _descriptor(_heat(spectrum, dirichlet, times[1:]), features.vertices[: recipe.n_features], recipe, unit)
 
 
 def describe_mesh(
-    mesh: TriangleMesh,
+    mesh: MeshLike,
     recipe: Recipe = SCALE_FREE,
     *,
     values: ArrayLike | None = None,
@@ -88,9 +98,13 @@ def describe_mesh(
     The features are the persistent maxima of heat, or of another function of the vertices; either way they are
     described by the heat that they keep. Thesis table 5.4 tries `average_geodesic_distance` and `gaussian_curvature`.
 
+    Each component has a feature at least, so there are as many as components where these are more than the recipe's
+    features. A fragment of less than a hundredth of the area has none: at the recipe's times it has come to one
+    temperature, 1 over its own area, which tells nothing of its form.
+
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
         A closed or open surface.
     recipe : Recipe
     values : (n,) float, optional
@@ -105,29 +119,36 @@ def describe_mesh(
     Raises
     ------
     InvalidShapeError
-        If the mesh falls into more pieces than the recipe has features, or has a face without area or a vertex
-        without face.
+        If the mesh has a face without area or twice or a vertex without face, or is a soup, whose faces lie edge on
+        edge without sharing vertices.
     InvalidParameterError
         If `values` are not one finite number a vertex.
     """
+    mesh = as_mesh(mesh)
+    require_type(recipe, Recipe, "recipe")
     height = None if values is None else vertex_values(values, "values", mesh.n_vertices)
-    mesh, laplacian, held = prepared(mesh, recipe)
-    spectrum = solve_spectrum(laplacian, min(recipe.n_modes, mesh.n_vertices), progress=progress)
-    n_free = mesh.n_vertices - len(held)
-    fixed = solve_dirichlet(laplacian, min(recipe.n_modes, n_free), held, progress=progress) if len(held) else None
-    unit, times = clock(laplacian.mass, recipe)
+    shape = prepare(mesh, recipe)
+
+    def spectrum_without(points: Int[np.ndarray, " c"]) -> Spectrum:
+        n_free = shape.mesh.n_vertices - len(points)
+        return solve_free(shape.laplacian, min(shape.n_modes, n_free), points, progress)
+
+    spectrum = spectrum_without(shape.fragments)
+    fixed = spectrum_without(np.union1d(shape.fragments, shape.boundary)) if len(shape.boundary) else None
+    unit, times = clock(shape.area, recipe)
     later = _heat(spectrum, fixed, times[1:])
     if height is None:
-        height = _heat(spectrum, fixed, times[:1])[:, 0]
-    return DescribedShape(mesh, spectrum, height, *parts_and_descriptor(mesh, height, later, recipe, unit))
+        height = heat_with_fragments(shape, _heat(spectrum, fixed, times[:1])[:, 0])
+    found = parts_and_descriptor(shape, height, later, recipe, unit)
+    return DescribedShape(shape.mesh, spectrum, height, *found, shape.fragments)
 
 
-def describe_views(mesh: TriangleMesh, recipe: Recipe = SCALE_FREE, *, n_views: int = N_VIEWS) -> list[ShapeDescriptor]:
+def describe_views(mesh: MeshLike, recipe: Recipe = SCALE_FREE, *, n_views: int = N_VIEWS) -> list[ShapeDescriptor]:
     """Describe what single viewpoints see of a closed shape, as partial scans of it will be.
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
     recipe : Recipe
     n_views : int
         Viewpoints, spread evenly around the shape.
@@ -137,6 +158,8 @@ def describe_views(mesh: TriangleMesh, recipe: Recipe = SCALE_FREE, *, n_views: 
     list of ShapeDescriptor
         With features at vertices of the whole shape; empty for an open one, which is a part already.
     """
+    mesh = as_mesh(mesh)
+    require_type(recipe, Recipe, "recipe")
     seen = [(part, describe_mesh(part.mesh, recipe).descriptor) for part in views_of(mesh, n_views)]
     return [replace(found, vertices=part.source_vertices[found.vertices]) for part, found in seen]
 
@@ -153,49 +176,94 @@ def _heat(spectrum: Spectrum, dirichlet: Spectrum | None, times: Float[np.ndarra
     return reflection_free_signature(spectrum, dirichlet, times)
 
 
-def prepared(mesh: TriangleMesh, recipe: Recipe) -> tuple[TriangleMesh, Laplacian, Int[np.ndarray, " c"]]:
-    """Return a mesh as the recipe takes it, its operator, and the boundary of whose reflections to free heat.
+@dataclass(frozen=True, eq=False)
+class PreparedShape:
+    """A shape as a recipe takes it.
 
-    There is none where the recipe lets it throw heat back, or where nothing lies inside.
-
-    Raises
-    ------
-    InvalidShapeError
-        If there are more components than features, with their number.
+    Attributes
+    ----------
+    mesh : TriangleMesh
+    laplacian : Laplacian
+    boundary : (c,) int
+        Vertices of the boundary of whose reflections to free heat: none where the recipe lets it throw heat back, or
+        where nothing lies inside.
+    fragments : (c,) int
+        Vertices of `fragment_vertices`.
+    n_components : int
+        Others than fragments.
+    area : float
+        Without fragments, in length².
+    n_modes : int
+        Eigenpairs to take: those of the recipe, and one for each further component.
     """
-    count, _ = vertex_components(mesh)
-    if count > recipe.n_features:
-        raise InvalidShapeError(
-            f"A shape must have at most {recipe.n_features} connected components to be described; it has {count}. "
-            "Repair with weld where they touch, or with largest_component."
-        )
+
+    mesh: TriangleMesh
+    laplacian: Laplacian
+    boundary: Int[np.ndarray, " b"]
+    fragments: Int[np.ndarray, " c"]
+    n_components: int
+    area: float
+    n_modes: int
+
+
+def prepare(mesh: TriangleMesh, recipe: Recipe) -> PreparedShape:
+    """Put a mesh into the box of its recipe, build its operator, and find its boundary and fragments."""
+    require_describable(mesh)
     mesh = normalize_box(mesh) if recipe.unit == "box" else mesh
-    boundary = np.unique(boundary_edges(mesh))
-    loose = recipe.reflections or len(boundary) == mesh.n_vertices
-    return mesh, cotangent_laplacian(mesh), boundary[:0] if loose else boundary
+    laplacian = cotangent_laplacian(mesh)
+    fragments = fragment_vertices(mesh)
+    _, labels = vertex_components(mesh)
+    n_components = len(np.unique(np.delete(labels, fragments)))
+    boundary = np.setdiff1d(boundary_edges(mesh), fragments)
+    loose = recipe.reflections or len(boundary) + len(fragments) == mesh.n_vertices
+    if loose:
+        boundary = boundary[:0]
+    area = float(laplacian.mass.sum()) - float(laplacian.mass.diagonal()[fragments].sum())
+    return PreparedShape(mesh, laplacian, boundary, fragments, n_components, area, recipe.n_modes + n_components - 1)
 
 
-def clock(mass: sp.csr_array, recipe: Recipe) -> tuple[float, Float[np.ndarray, " q"]]:
+def heat_with_fragments(shape: PreparedShape, heat: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """Give each fragment the heat of a body that has come to one temperature: 1 over its area."""
+    if not len(shape.fragments):
+        return heat
+    _, labels = vertex_components(shape.mesh)
+    areas = np.bincount(labels, weights=shape.laplacian.mass.diagonal())
+    heat = heat.copy()
+    heat[shape.fragments] = 1 / areas[labels[shape.fragments]]
+    return heat
+
+
+def clock(area: float, recipe: Recipe) -> tuple[float, Float[np.ndarray, " q"]]:
     """Return what a time of 1 means, and the time of the heat that finds features before those that describe them.
 
     All in length².
     """
-    unit = float(mass.sum()) if recipe.unit == "area" else 1.0
+    unit = area if recipe.unit == "area" else 1.0
     return unit, unit * recipe.time_unit * np.array([recipe.feature_scale, *recipe.scales])
 
 
 def parts_and_descriptor(
-    mesh: TriangleMesh, heat: Float[np.ndarray, " n"], later: Float[np.ndarray, "n q"], recipe: Recipe, unit: float
+    shape: PreparedShape, heat: Float[np.ndarray, " n"], later: Float[np.ndarray, "n q"], recipe: Recipe, unit: float
 ) -> tuple[MergeTree, Segmentation, ShapeDescriptor]:
-    """Cut a shape around the maxima of heat, and describe them by what they keep later."""
-    tree = merge_tree(mesh, heat)
-    parts = segment(tree, n_regions=recipe.n_features)
-    return tree, parts, _descriptor(later, parts.features, recipe, unit)
+    """Cut a shape around the maxima of heat, and describe those that are not on fragments by what they keep later."""
+    tree = merge_tree(shape.mesh, heat)
+    on_fragments = int(np.isin(tree.maxima, shape.fragments).sum())
+    parts = segment(tree, n_regions=recipe.n_features + on_fragments)
+    last = np.isin(parts.features.vertices, shape.fragments)
+    parts = _reordered(parts, np.argsort(last, kind="stable"))
+    n_described = max(recipe.n_features, shape.n_components)
+    described = parts.features.vertices[: min(n_described, int((~last).sum()))]
+    return tree, parts, _descriptor(later, described, recipe, unit)
+
+
+def _reordered(parts: Segmentation, order: Int[np.ndarray, " m"]) -> Segmentation:
+    features, number = parts.features, np.argsort(order)
+    columns = (features.vertices, features.values, features.persistence)
+    return Segmentation(frozen(number[parts.labels]), FeaturePoints(*(frozen(column[order]) for column in columns)))
 
 
 def _descriptor(
-    heat: Float[np.ndarray, "n q"], features: FeaturePoints, recipe: Recipe, unit: float
+    heat: Float[np.ndarray, "n q"], vertices: Int[np.ndarray, " m"], recipe: Recipe, unit: float
 ) -> ShapeDescriptor:
-    vertices = features.vertices[: recipe.n_features]
     kept = unit * heat[vertices]
     return ShapeDescriptor(np.log(kept) if recipe.logarithmic else kept, vertices, recipe)

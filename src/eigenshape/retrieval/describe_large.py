@@ -3,18 +3,18 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
+from eigenshape._arguments import require_type
 from eigenshape.features.merge_tree import MergeTree
 from eigenshape.features.segmentation import Segmentation
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.boundary import dirichlet_laplacian
-from eigenshape.operators.laplacian import Laplacian
-from eigenshape.retrieval.describe import clock, parts_and_descriptor, prepared
+from eigenshape.retrieval.describe import clock, heat_with_fragments, parts_and_descriptor, prepare
 from eigenshape.retrieval.descriptor import SCALE_FREE, Recipe, ShapeDescriptor
 from eigenshape.spectral.large_signature import (
     USUAL_ACCURACY,
-    ApproximateSignature,
     approximate_heat_kernel_signature,
 )
 from eigenshape.spectral.outcome import Progress
@@ -35,8 +35,10 @@ class DescribedLargeShape:
     tree : MergeTree
         Of the heat; it can be cut elsewhere without computing anything again.
     parts : Segmentation
-        One region around each feature point.
+        One region around each feature point: first those that are described, then one for each fragment.
     descriptor : ShapeDescriptor
+    fragments : (c,) int
+        As of `DescribedShape`.
     """
 
     mesh: TriangleMesh
@@ -45,10 +47,11 @@ class DescribedLargeShape:
     tree: MergeTree
     parts: Segmentation
     descriptor: ShapeDescriptor
+    fragments: Int[np.ndarray, " c"]
 
 
 def describe_large_mesh(
-    mesh: TriangleMesh,
+    mesh: MeshLike,
     recipe: Recipe = SCALE_FREE,
     *,
     accuracy: float = USUAL_ACCURACY,
@@ -61,7 +64,7 @@ def describe_large_mesh(
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
         A closed or open surface.
     recipe : Recipe
     accuracy : float
@@ -76,22 +79,25 @@ def describe_large_mesh(
     Raises
     ------
     InvalidShapeError
-        If the mesh falls into more pieces than the recipe has features, or has a face without area or a vertex
-        without face.
+        As `describe_mesh`.
     """
-    mesh, laplacian, held = prepared(mesh, recipe)
-    unit, times = clock(laplacian.mass, recipe)
+    mesh = as_mesh(mesh)
+    require_type(recipe, Recipe, "recipe")
+    shape = prepare(mesh, recipe)
+    unit, times = clock(shape.area, recipe)
 
-    def heat_of(operator: Laplacian) -> ApproximateSignature:
-        k = min(recipe.n_modes, operator.n_points)
-        return approximate_heat_kernel_signature(operator, k, times, accuracy=accuracy, progress=progress)
+    def heat_without(points: Int[np.ndarray, " c"]) -> tuple[Float[np.ndarray, "n q"], float]:
+        inner, free = dirichlet_laplacian(shape.laplacian, points)
+        k = min(shape.n_modes, inner.n_points)
+        found = approximate_heat_kernel_signature(inner, k, times, accuracy=accuracy, progress=progress)
+        columns = np.zeros((shape.mesh.n_vertices, len(times)))
+        columns[free] = found.values
+        return columns, float(found.errors[0])
 
-    found = heat_of(laplacian)
-    columns, error = found.values, float(found.errors[0])
-    if len(held):
-        inner, free = dirichlet_laplacian(laplacian, held)
-        fixed = heat_of(inner)
-        columns, error = columns / 2, max(error, float(fixed.errors[0]))
-        columns[free] += fixed.values / 2
-    heat = columns[:, 0]
-    return DescribedLargeShape(mesh, heat, error, *parts_and_descriptor(mesh, heat, columns[:, 1:], recipe, unit))
+    columns, error = heat_without(shape.fragments)
+    if len(shape.boundary):
+        fixed, fixed_error = heat_without(np.union1d(shape.fragments, shape.boundary))
+        columns, error = (columns + fixed) / 2, max(error, fixed_error)
+    heat = heat_with_fragments(shape, columns[:, 0])
+    found = parts_and_descriptor(shape, heat, columns[:, 1:], recipe, unit)
+    return DescribedLargeShape(shape.mesh, heat, error, *found, shape.fragments)

@@ -1,6 +1,5 @@
 """A collection of described shapes in a folder, and the question which of them are most alike."""
 
-import sqlite3
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,12 +8,14 @@ from zlib import crc32
 
 import numpy as np
 from jaxtyping import Int
-from threadpoolctl import threadpool_limits
 
+from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError, StoreError
+from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval import store
-from eigenshape.retrieval.held import held_by
+from eigenshape.retrieval.catalog import Catalog, ShapeRow, keep_recipe
+from eigenshape.retrieval.held import Held, held_by
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
 
 
@@ -99,29 +100,51 @@ class ShapeIndex:
         Raises
         ------
         StoreError
-            If the folder is no index, or one of another format.
+            If the folder is no index, or one of another format, or its database is damaged.
         """
-        store.require(Path(folder))
-        return cls(Path(folder))
+        with store.reading(Path(folder)):
+            return cls(Path(folder))
+
+    @classmethod
+    def open_or_create(cls, folder: str | Path) -> "ShapeIndex":
+        """Open the index in a folder, or make an empty one; of several processes at once, one makes it.
+
+        Raises
+        ------
+        StoreError
+            If the folder holds anything but an index of this format.
+
+        Examples
+        --------
+        >>> from tempfile import TemporaryDirectory
+        >>> import eigenshape as es
+        >>> with TemporaryDirectory() as folder:
+        ...     es.ShapeIndex.open_or_create(folder) == es.ShapeIndex.open_or_create(folder)
+        True
+        """
+        store.create_if_missing(Path(folder))
+        return cls.open(folder)
 
     def __len__(self) -> int:
-        with store.reading(self.folder) as database:
-            return int(database.execute("SELECT count(*) FROM shape").fetchone()[0])
+        with store.reading(self.folder) as catalog:
+            return len(catalog.shapes)
 
     def records(self) -> list[Record]:
         """List all shapes by name."""
-        with store.reading(self.folder) as database:
-            shapes = database.execute("SELECT id, name, label, source, digest FROM shape ORDER BY name").fetchall()
-            known = dict(store.recipes(database))
-            recipes: dict[int, list[AnyRecipe]] = {}
-            for shape, recipe in database.execute("SELECT DISTINCT shape, recipe FROM descriptor ORDER BY recipe"):
-                recipes.setdefault(shape, []).append(known[recipe])
-        return [Record(*known, tuple(recipes.get(shape, ()))) for shape, *known in shapes]  # type: ignore[call-arg]
+        with store.reading(self.folder) as catalog:
+            recipes = dict(catalog.recipes())
+        numbers: dict[int, set[int]] = {shape.id: set() for shape in catalog.shapes}
+        for kept in catalog.descriptors:
+            numbers[kept.shape].add(kept.recipe)
+        return [
+            Record(*shape[1:], tuple(recipes[number] for number in sorted(numbers[shape.id])))
+            for shape in sorted(catalog.shapes, key=lambda shape: shape.name)
+        ]
 
     def recipes(self) -> list[AnyRecipe]:
         """List the recipes by which shapes are described or are to be, in the order in which they came."""
-        with store.reading(self.folder) as database:
-            return [recipe for _, recipe in store.recipes(database)]
+        with store.reading(self.folder) as catalog:
+            return [recipe for _, recipe in catalog.recipes()]
 
     def keep_recipe(self, recipe: AnyRecipe) -> None:
         """Keep a recipe before any shape is described by it, one whose words were long to learn, say.
@@ -131,8 +154,9 @@ class ShapeIndex:
         StoreError
             If another process is writing.
         """
-        with store.writing(self.folder) as database:
-            store.keep_recipe(database, recipe)
+        require_type(recipe, AnyRecipe, "recipe")
+        with store.writing(self.folder) as catalog:
+            keep_recipe(catalog, recipe)
 
     def add(
         self,
@@ -158,27 +182,27 @@ class ShapeIndex:
         StoreError
             If the name is there with another digest and is not to be replaced, or another process is writing.
         """
+        require_each(descriptors, Descriptor, "descriptors")
         _require_text(name, label, source, digest)
         rows = _packed(name, descriptors)
-        with store.writing(self.folder) as database:
-            shape = _shape_id(database, (name, label, source, digest), replace=replace)
+        with store.writing(self.folder) as before:
+            catalog, shape = _with_shape(before, ShapeRow(0, name, label, source, digest), replace=replace)
             for recipe in dict.fromkeys(descriptor.recipe for descriptor in descriptors):
                 views = [pair for pair in zip(descriptors, rows, strict=True) if pair[0].recipe == recipe]
-                self._put(database, shape, store.keep_recipe(database, recipe), views)
+                self._put(catalog, shape, keep_recipe(catalog, recipe), views)
 
-    def _put(
-        self, database: sqlite3.Connection, shape: int, recipe: int, views: Sequence[tuple[Descriptor, np.ndarray]]
-    ) -> None:
-        other = database.execute("SELECT n_columns FROM descriptor WHERE recipe = ? LIMIT 1", (recipe,)).fetchone()
+    def _put(self, catalog: Catalog, shape: int, recipe: int, views: Sequence[tuple[Descriptor, np.ndarray]]) -> None:
+        others = [kept for kept in catalog.descriptors if kept.recipe == recipe]
+        n_columns = others[0].n_columns if others else views[0][1].shape[1]
         for descriptor, rows in views:
-            _require_columns(descriptor, rows, other[0] if other else views[0][1].shape[1])
-        if database.execute("SELECT 1 FROM descriptor WHERE shape = ? AND recipe = ?", (shape, recipe)).fetchone():
+            _require_columns(descriptor, rows, n_columns)
+        if any(kept.shape == shape for kept in others):
             return
         for view, (descriptor, rows) in enumerate(views):
             details = kind_of(descriptor.recipe).details(descriptor)
-            offset = store.append_rows(self.folder, database, recipe, rows)
-            entry = (shape, recipe, view, offset, *rows.shape, crc32(rows.tobytes()), details)
-            database.execute("INSERT INTO descriptor VALUES (?, ?, ?, ?, ?, ?, ?, ?)", entry)
+            offset = store.append_rows(self.folder, catalog.database, recipe, rows)
+            entry = (shape, recipe, view, offset, *rows.shape, crc32(rows.tobytes()), crc32(details), details)
+            catalog.database.execute("INSERT INTO descriptor VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?)", entry)
 
     def remove(self, name: str) -> None:
         """Remove a shape. The bytes of its rows stay in the file, so that a reader of the old state still finds them.
@@ -188,9 +212,11 @@ class ShapeIndex:
         StoreError
             If there is no shape of that name, or another process is writing.
         """
-        with store.writing(self.folder) as database:
-            if not database.execute("DELETE FROM shape WHERE name = ?", (name,)).rowcount:
+        with store.writing(self.folder) as catalog:
+            shape = catalog.shape(name)
+            if shape is None:
                 raise StoreError(f"A shape must be in the index to be removed; {name!r} is not.")
+            catalog.without(shape)
 
     def query(self, descriptor: Descriptor, *, n_matches: SupportsIndex = 5) -> list[Match]:
         """Find the shapes whose descriptors of the same recipe have the lowest score, each shape once.
@@ -205,21 +231,18 @@ class ShapeIndex:
         StoreError
             If no shape has a descriptor of that recipe, or a file is damaged.
         """
+        require_type(descriptor, Descriptor, "descriptor")
         wanted = whole_number(n_matches, "n_matches", 1, 2**31)
         kind, (ours,) = kind_of(descriptor.recipe), _packed("the query", [descriptor])
         asked = kind.restored(ours, kind.details(descriptor), descriptor.recipe)
-        with store.reading(self.folder) as database, threadpool_limits(1, user_api="blas"):
-            held = held_by(self.folder, database, descriptor.recipe)
-            _require_columns(descriptor, ours, held.entries[0].n_columns)
-            scores = kind.verified(asked, held.descriptors(database), kind.scored(asked, held.rows))
+        with store.reading(self.folder) as catalog, one_blas_thread():
+            held = held_by(self.folder, catalog, descriptor.recipe)
+            _require_columns(descriptor, ours, held.entries[0].kept.n_columns)
+            scores = kind.verified(asked, held.restored, kind.scored(asked, held.rows))
             order = np.argsort(scores, kind="stable")
-            firsts = np.unique([held.entries[place].name for place in order], return_index=True)[1]
+            firsts = np.unique([held.entries[place].shape.name for place in order], return_index=True)[1]
             best = order[np.sort(firsts)[:wanted]].tolist()
-            found = [(held.entries[place], held.restored(database, place)) for place in best]
-            return [
-                Match(at.name, at.label, at.source, score, kind.paired(asked, other), other.vertices, at.view)
-                for (at, other), score in zip(found, scores[best].tolist(), strict=True)
-            ]
+            return [_match(asked, held, place, float(scores[place])) for place in best]
 
     def descriptor(self, name: str, recipe: AnyRecipe) -> Descriptor:
         """Return the first descriptor of a shape by a recipe, as it is kept, to ask for more of its like.
@@ -229,12 +252,19 @@ class ShapeIndex:
         StoreError
             If the shape is not there or has no descriptor of that recipe, or a file is damaged.
         """
-        with store.reading(self.folder) as database:
-            held = held_by(self.folder, database, recipe)
+        require_type(recipe, AnyRecipe, "recipe")
+        with store.reading(self.folder) as catalog:
+            held = held_by(self.folder, catalog, recipe)
             for place, entry in enumerate(held.entries):
-                if entry.name == name:
-                    return held.restored(database, place)
+                if entry.shape.name == name:
+                    return held.restored(place)
         raise StoreError(f"A shape must be described by the recipe asked for; {name!r} is not described by {recipe}.")
+
+
+def _match(asked: Descriptor, held: Held, place: int, score: float) -> Match:
+    (shape, kept), other = held.entries[place], held.restored(place)
+    pairs = kind_of(held.recipe).paired(asked, other)
+    return Match(shape.name, shape.label, shape.source, score, pairs, other.vertices, kept.view)
 
 
 def _require_text(name: str, *others: str | None) -> None:
@@ -258,17 +288,17 @@ def _require_columns(descriptor: Descriptor, rows: np.ndarray, n_columns: int) -
         )
 
 
-def _shape_id(
-    database: sqlite3.Connection, known: tuple[str, str | None, str | None, str | None], *, replace: bool
-) -> int:
-    name, digest = known[0], known[-1]
-    row = database.execute("SELECT id, digest FROM shape WHERE name = ?", (name,)).fetchone()
-    if row is not None and row[1] is not None and row[1] == digest:
-        return int(row[0])
-    if row is not None and not replace:
+def _with_shape(catalog: Catalog, new: ShapeRow, *, replace: bool) -> tuple[Catalog, int]:
+    """Return a catalog with room for a shape's descriptors, and the number of the shape."""
+    old = catalog.shape(new.name)
+    if old is not None and old.digest is not None and old.digest == new.digest:
+        return catalog, old.id
+    if old is not None and not replace:
         raise StoreError(
-            f"A name stands for one shape; {name!r} is in the index with digest {row[1]}, not {digest}. "
+            f"A name stands for one shape; {new.name!r} is in the index with digest {old.digest}, not {new.digest}. "
             "Remove it first, or add it with replace=True."
         )
-    database.execute("DELETE FROM shape WHERE name = ?", (name,))
-    return int(database.execute("INSERT INTO shape VALUES (NULL, ?, ?, ?, ?)", known).lastrowid or 0)
+    if old is not None:
+        catalog = catalog.without(old)
+    row = catalog.database.execute("INSERT INTO shape VALUES (NULL, ?, ?, ?, ?)", new[1:])
+    return catalog, int(row.lastrowid or 0)

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
+from eigenshape._arguments import require_type
 from eigenshape._errors import InvalidParameterError
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.retrieval.codebook import read_codebook, write_codebook
 from eigenshape.retrieval.describe import N_VIEWS, describe_mesh, describe_views
@@ -50,7 +52,7 @@ class Kind:
     scored : callable
         From a query and the rows of k descriptors to their scores.
     verified : callable
-        From a query, k descriptors and their scores to better scores.
+        From a query, what returns the descriptor of a number below k, and k scores to better scores.
     paired : callable
         From two descriptors to the (p, 2) features or points that correspond.
     """
@@ -64,7 +66,7 @@ class Kind:
     details: Callable[[Any], bytes]
     restored: Callable[[np.ndarray, bytes, Any], Descriptor]
     scored: Callable[[Any, Sequence[np.ndarray]], Scores]
-    verified: Callable[[Any, Sequence[Any], Scores], Scores]
+    verified: Callable[[Any, Callable[[int], Any], Scores], Scores]
     paired: Callable[[Any, Any], Int[np.ndarray, "p 2"]]
 
 
@@ -130,12 +132,12 @@ def kind_of(recipe: AnyRecipe) -> Kind:
     return PATCHES if isinstance(recipe, PatchRecipe) else HEAT
 
 
-def describe_shape(mesh: TriangleMesh, recipe: AnyRecipe) -> Descriptor:
+def describe_shape(mesh: MeshLike, recipe: AnyRecipe) -> Descriptor:
     """Describe a surface by any recipe, to ask an index for its like.
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
     recipe : Recipe or PatchRecipe
 
     Returns
@@ -147,15 +149,17 @@ def describe_shape(mesh: TriangleMesh, recipe: AnyRecipe) -> Descriptor:
     InvalidShapeError
         As `describe_mesh` or `seen_patches`.
     """
+    mesh = as_mesh(mesh)
+    require_type(recipe, AnyRecipe, "recipe")
     return kind_of(recipe).to_ask(mesh, recipe)
 
 
-def describe_to_keep(mesh: TriangleMesh, recipe: AnyRecipe, *, n_views: int | None = None) -> list[Descriptor]:
+def describe_to_keep(mesh: MeshLike, recipe: AnyRecipe, *, n_views: int | None = None) -> list[Descriptor]:
     """Describe a surface as an index keeps it: with what single viewpoints see of it if it is closed.
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
     recipe : Recipe or PatchRecipe
     n_views : int, optional
         Viewpoints, spread evenly around the shape: by patches 6 and by heat 4 unless given.
@@ -170,6 +174,8 @@ def describe_to_keep(mesh: TriangleMesh, recipe: AnyRecipe, *, n_views: int | No
     InvalidShapeError
         As `describe_mesh` or `seen_patches`.
     """
+    mesh = as_mesh(mesh)
+    require_type(recipe, AnyRecipe, "recipe")
     kind = kind_of(recipe)
     return kind.to_keep(mesh, recipe, kind.n_views if n_views is None else n_views)
 

@@ -11,6 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from eigenshape._arrays import frozen, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._threads import one_blas_thread
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.raster import EDGE_SLACK, THINNEST
@@ -27,8 +29,9 @@ MARGIN = 1.0  # pixels left free around the sphere that holds the shape
 CANDIDATES = 2000
 
 
+@one_blas_thread()
 def light_field(
-    mesh: TriangleMesh, *, n_fields: SupportsIndex = N_FIELDS, size: SupportsIndex = 256
+    mesh: MeshLike, *, n_fields: SupportsIndex = N_FIELDS, size: SupportsIndex = 256
 ) -> Float[np.ndarray, "fields 10 45"]:
     """Describe a shape by silhouettes from the vertices of dodecahedra around it, opposite ones being mirror images.
 
@@ -39,7 +42,7 @@ def light_field(
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
         In any number of pieces, of which a silhouette's outline follows the largest.
     n_fields : int
         Dodecahedra, 1 to 100; 10 in the paper.
@@ -63,6 +66,7 @@ def light_field(
     D.-Y. Chen, X.-P. Tian, Y.-T. Shen, M. Ouhyoung: On visual similarity based 3D model retrieval. Computer Graphics
     Forum 22, 2003. The numbers are not quantised here.
     """
+    mesh = as_mesh(mesh)
     fields = whole_number(n_fields, "n_fields", 1, 100)
     pixels = whole_number(size, "size", 16, 4096)
     points = _in_unit_ball(mesh)

@@ -3,14 +3,15 @@
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
+
+from eigenshape._compile import njit
 
 # The eight neighbours of a pixel, row and column, clockwise from the left
 ROW = np.array([0, -1, -1, -1, 0, 1, 1, 1])
 COLUMN = np.array([-1, -1, 0, 1, 1, 1, 0, -1])
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def silhouette(points, faces, size, slack, thinnest):
     """Return which pixel middles of a square picture lie in a face; points are pixels to the right and down."""
@@ -37,7 +38,7 @@ def silhouette(points, faces, size, slack, thinnest):
     return image
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def power_sums(x, y, order):
     """Return the sums of z^m |z|^2j over points z = x + iy, for m + 2j up to the order."""
@@ -55,7 +56,7 @@ def power_sums(x, y, order):
     return sums
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def outline(image, row, column):
     """Walk clockwise around the pixels that hang together with the uppermost, and there leftmost, of them.
@@ -88,7 +89,7 @@ def outline(image, row, column):
     return path[:length].copy()
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def least_difference(first, second, pairings):
     """Return the least sum of L1 distances of paired views, over all pairs of light fields and all pairings.

@@ -5,12 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float32, Int, Int8
-from threadpoolctl import threadpool_limits
 
+from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import frozen
 from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
+from eigenshape.geometry.requirements import require_describable
 from eigenshape.operators.smoothing import denoise
 from eigenshape.retrieval.codebook import PatchCodebook, encode_patches
 from eigenshape.retrieval.patch_matching import PatchPoints, patch_points
@@ -59,7 +62,7 @@ class PatchDescriptor:
         return self.points[0].vertices
 
 
-def seen_patches(mesh: TriangleMesh, *, n_views: int = N_VIEWS) -> list[Patches]:
+def seen_patches(mesh: MeshLike, *, n_views: int = N_VIEWS) -> list[Patches]:
     """Describe the patches of a surface, and of what single viewpoints see of it if it is closed.
 
     They are those of a copy that `orient_outward` has turned and `denoise` has smoothed as far as its noise asks for,
@@ -67,7 +70,7 @@ def seen_patches(mesh: TriangleMesh, *, n_views: int = N_VIEWS) -> list[Patches]
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
     n_views : int
         Viewpoints, spread evenly around the shape.
 
@@ -79,8 +82,10 @@ def seen_patches(mesh: TriangleMesh, *, n_views: int = N_VIEWS) -> list[Patches]
     Raises
     ------
     InvalidShapeError
-        If a face has no area, or a vertex no face.
+        If a face has no area, or as `describe_patches`.
     """
+    mesh = as_mesh(mesh)
+    require_describable(mesh)
     clean = denoise(orient_outward(mesh))
     return [describe_patches(clean), *describe_patch_views(clean, n_views=n_views)]
 
@@ -98,9 +103,11 @@ def in_words(patches: Sequence[Patches], recipe: PatchRecipe) -> PatchDescriptor
     InvalidParameterError
         If there are none.
     """
+    require_type(recipe, PatchRecipe, "recipe")
+    require_each(patches, Patches, "patches")
     if not patches:
         raise InvalidParameterError("A descriptor takes patches of a shape, then of its views; there are none.")
-    with threadpool_limits(1, user_api="blas"):
+    with one_blas_thread():
         codes = np.stack([rounded(encode_patches(each, recipe.codebook)) for each in patches])
         points = tuple(patch_points(each, recipe.codebook) for each in patches)
     return PatchDescriptor(frozen(codes), points, recipe)

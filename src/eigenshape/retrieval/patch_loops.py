@@ -3,7 +3,8 @@
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
+
+from eigenshape._compile import njit
 
 RINGS = 4
 TURN_BINS = 8  # of the cosine to the disc's normal, on 0..1
@@ -14,7 +15,7 @@ INNER = 0.35  # of the radius: where the disc's normal is taken
 LEAST_AREA = 1e-3  # of a flat disc's, added before the logarithm
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def describe_discs(rows, chosen, surface, radii, found):
     """Write NUMBERS for each chosen point and radius; `surface` are points, normals and areas of all vertices."""
@@ -25,7 +26,7 @@ def describe_discs(rows, chosen, surface, radii, found):
             _describe_disc(rows[sample], surface[0][chosen[sample]], order, surface, radii[place], found[sample, place])
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _describe_disc(distances, center, order, surface, radius, found):
     points, normals, areas = surface
@@ -69,7 +70,7 @@ def _describe_disc(distances, center, order, surface, radius, found):
         found[first + RING_NUMBERS - 1] = straight[ring] / kept[ring] if kept[ring] > 0 else 1.0
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _add(bins, share, weight):
     """Add a weight at 0..1 to the two bins whose centres it lies between."""

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Float32, Int
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen
 from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.codebook import BASES, N_SIZES, PatchCodebook, whitened
 from eigenshape.retrieval.patch_matching_loops import leading, nearest_of_each_other
 from eigenshape.retrieval.patches import RADII, Patches
@@ -55,8 +57,8 @@ class PatchMatch:
     vertices : (p, 2) int
         Their vertices.
     agreement : float
-        0 where nothing agrees; near 1 where all points of the first match and keep all distances. Not symmetric: the
-        area of the first counts, of which the second may be the whole.
+        0 where nothing agrees; 1 where all points of the first match and keep all distances, piece by piece. Not
+        symmetric: the area of the first counts, of which the second may be the whole.
     step : int
         Lengths of the first are 1.25^-step of those of the second, each in sides of its box.
     """
@@ -79,6 +81,8 @@ def patch_points(shape: Patches, codebook: PatchCodebook) -> PatchPoints:
     -------
     PatchPoints
     """
+    require_type(shape, Patches, "shape")
+    require_type(codebook, PatchCodebook, "codebook")
     rows = [
         whitened(shape, base + size, codebook, place) for place, base in enumerate(BASES) for size in range(N_SIZES)
     ]
@@ -90,14 +94,16 @@ def patch_points(shape: Patches, codebook: PatchCodebook) -> PatchPoints:
     )
 
 
+@one_blas_thread()
 def match_patches(first: PatchPoints, second: PatchPoints) -> PatchMatch:
     """Match points whose patches are each other's nearest, and keep the matches that agree with the most of others.
 
     Two matches agree as far as the distance along the surface between their points is the same on both shapes. The
     leading eigenvector of this agreement tells which matches belong to the largest consistent set, and its eigenvalue
-    how large that is (Leordeanu and Hebert 2005). Of relative sizes, 1.25 a step and two either way, the one whose
-    eigenvalue is largest counts. Then all points are matched once more, by their patches and by their distances to
-    the surest twenty. Left and right cannot be told by distances: all of a match may be mirrored.
+    how large that is (Leordeanu and Hebert 2005). Each piece of the first is matched with one piece of the second. Of
+    relative sizes, 1.25 a step and two either way, the one whose agreement is largest counts. Then all points are
+    matched once more, by their patches and by their distances to the surest twenty. Left and right cannot be told by
+    distances: all of a match may be mirrored.
 
     Parameters
     ----------
@@ -113,6 +119,8 @@ def match_patches(first: PatchPoints, second: PatchPoints) -> PatchMatch:
     InvalidParameterError
         If the two have different numbers a point.
     """
+    require_type(first, PatchPoints, "first")
+    require_type(second, PatchPoints, "second")
     found = _best_start(first, second)
     apart = _apart(first, second, found.step)
     strained = apart + ANCHORED * np.median(apart) * _strain(first, second, found)
@@ -121,6 +129,7 @@ def match_patches(first: PatchPoints, second: PatchPoints) -> PatchMatch:
     return PatchMatch(frozen(points), frozen(vertices), found.agreement, found.step)
 
 
+@one_blas_thread()
 def patch_agreement(first: PatchPoints, second: PatchPoints) -> float:
     """Return the agreement of `match_patches`, without its second round."""
     return _best_start(first, second).agreement
@@ -143,14 +152,43 @@ def _best_start(first: PatchPoints, second: PatchPoints) -> _Matches:
 
 
 def _consistent(first: PatchPoints, second: PatchPoints, apart: Float32[np.ndarray, "m n"], step: int) -> _Matches:
+    """Match nearest points, and rate the matches piece by piece, since no distance leads to another piece.
+
+    Each piece of the first is matched with one piece of the second, those that agree most first.
+    What agrees in a piece is a share of what its matches with itself would, times its area.
+    """
     rows, columns = nearest_of_each_other(apart)
-    areas = first.weights.astype(np.float64)
-    shares = areas[rows] / areas.sum()
-    ours, theirs = first.distances[np.ix_(rows, rows)], second.distances[np.ix_(columns, columns)]
-    agreement, vector = leading(ours, theirs, shares, SIZE_STEP**step, SLACK, LEAST_LENGTH)
-    support = vector / np.sqrt(shares) if agreement > 0 else np.zeros(len(rows))
-    order = np.argsort(-support, kind="stable")
-    return _Matches(np.column_stack([rows, columns])[order], support[order], float(agreement), step)
+    shares = first.weights.astype(np.float64) / first.weights.sum(dtype=np.float64)
+    ours, theirs = _pieces(first), _pieces(second)
+    pairs = []
+    for one, two in sorted(set(zip(ours[rows].tolist(), theirs[columns].tolist(), strict=True))):
+        places = np.flatnonzero((ours[rows] == one) & (theirs[columns] == two))
+        own, other = rows[places], columns[places]
+        between = first.distances[np.ix_(own, own)], second.distances[np.ix_(other, other)]
+        value, support = leading(*between, shares[own], SIZE_STEP**step, SLACK, LEAST_LENGTH)
+        if value > 0:
+            piece = shares[ours == one]
+            # No match agrees with itself, so that even a perfect eigenvalue is below the area.
+            perfect = piece.sum() - (piece**2).sum() / piece.sum()
+            agreement = piece.sum() * min(value / perfect, 1.0)
+            pairs.append((agreement, one, two, places, support * np.sqrt(value)))
+    total, supports = 0.0, np.zeros(len(rows))
+    matched: tuple[set[int], set[int]] = set(), set()
+    for agreement, one, two, places, support in sorted(pairs, key=lambda pair: -pair[0]):
+        if one not in matched[0] and two not in matched[1]:
+            matched[0].add(one)
+            matched[1].add(two)
+            total += float(agreement)
+            supports[places] = support
+    order = np.argsort(-supports, kind="stable")
+    return _Matches(np.column_stack([rows, columns])[order], supports[order], total, step)
+
+
+def _pieces(points: PatchPoints) -> Int[np.ndarray, " m"]:
+    """Return for each point the first point of its piece."""
+    if np.isfinite(points.distances[0]).all():  # by far the most shapes
+        return np.zeros(len(points.vertices), dtype=np.int64)
+    return np.isfinite(points.distances).argmax(axis=1)
 
 
 def _supported(matches: _Matches, share: float) -> Int[np.ndarray, "p 2"]:

@@ -3,36 +3,47 @@
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
+
+from eigenshape._compile import njit
 
 ROUNDS = 20
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def nearest_of_each_other(apart):
-    """Return the rows and columns of entries that are least in both their row and their column."""
+    """Return the rows and columns of entries that are least in both their row and their column, each once.
+
+    Where several are equally near, as on a sphere, they are paired in their order. So a shape is
+    matched with itself point by point, whatever its symmetry.
+    """
     n_rows, n_columns = apart.shape
-    of_column = np.empty(n_columns, dtype=np.int64)
-    for column in range(n_columns):
-        of_column[column] = apart[:, column].argmin()
+    least = apart[0].copy()
+    for row in range(1, n_rows):
+        least = np.minimum(least, apart[row])
+    free = np.ones(n_columns, dtype=np.bool_)
     rows, columns = np.empty(n_rows, dtype=np.int64), np.empty(n_rows, dtype=np.int64)
     count = 0
     for row in range(n_rows):
-        column = apart[row].argmin()
-        if of_column[column] == row:
-            rows[count], columns[count] = row, column
-            count += 1
+        first = apart[row].argmin()
+        nearest = apart[row, first]
+        for column in range(first, n_columns):
+            if free[column] and apart[row, column] == nearest and nearest == least[column]:
+                rows[count], columns[count] = row, column
+                free[column] = False
+                count += 1
+                break
     return rows[:count], columns[:count]
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def leading(ours, theirs, shares, ratio, slack, least):
-    """Return the largest eigenvalue, and its vector, of how well each two matches agree in their distance.
+    """Return the largest eigenvalue of how well each two matches agree in their distance, and each one's support.
 
     `ours` and `theirs` are distances between matched points, `ratio` what the first are multiplied by. Two matches
-    agree by 1 - (error / slack)^2, where the error is a share of the longer distance, and count by their shares.
+    agree by A = 1 - (error / slack)^2, where the error is a share of the longer distance. Of √s A √s with the shares s,
+    and its eigenvector v, the support is A √s v over the eigenvalue: v / √s, and finite also where a share is 0.
     """
     count = len(ours)
     agreeing = np.zeros((count, count))
@@ -43,13 +54,14 @@ def leading(ours, theirs, shares, ratio, slack, least):
                 continue
             error = abs(a - b) / max(a, b, least) / slack
             if error < 1:
-                agreeing[one, two] = (1 - error * error) * np.sqrt(shares[one] * shares[two])
-                agreeing[two, one] = agreeing[one, two]
-    vector, value = np.ones(count), 0.0
+                agreeing[one, two] = agreeing[two, one] = 1 - error * error
+    roots, vector = np.sqrt(shares), np.ones(count)
+    support, value = np.zeros(count), 0.0
     for _ in range(ROUNDS):
-        image = agreeing @ vector
+        support = agreeing @ (roots * vector)
+        image = roots * support
         value = np.sqrt((image * image).sum())
         if value == 0:
             break
-        vector = image / value
-    return value, vector
+        vector, support = image / value, support / value
+    return value, support

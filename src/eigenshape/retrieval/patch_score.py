@@ -3,9 +3,12 @@
 import numpy as np
 from jaxtyping import Float, Float32, Int
 
+from eigenshape._threads import one_blas_thread
+
 SIZE_PRICE = 0.01  # of a step of size
 
 
+@one_blas_thread()
 def patch_distances(
     query: Float32[np.ndarray, "b s v"], others: Float32[np.ndarray, "k b s v"]
 ) -> Float[np.ndarray, " k"]:
@@ -29,6 +32,7 @@ def _lengths(codes: Float32[np.ndarray, "*k v"]) -> Float32[np.ndarray, "*k"]:
     return np.sqrt(np.einsum("...v,...v->...", codes, codes))
 
 
+@one_blas_thread()
 def view_distances(
     query: Float32[np.ndarray, "b s v"],
     others: Float32[np.ndarray, "k b s v"],

@@ -1,11 +1,12 @@
 """How far a query is from many shapes: by their words first, and the nearest by how their patches lie."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from jaxtyping import Float, Int8
-from threadpoolctl import threadpool_limits
 
+from eigenshape._arguments import require_each, require_type
+from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patch_descriptor import PatchDescriptor
 from eigenshape.retrieval.patch_matching import patch_agreement
 from eigenshape.retrieval.patch_score import patch_distances, view_distances
@@ -34,7 +35,7 @@ def _distances(
 
 def verified_scores(
     query: PatchDescriptor,
-    others: Sequence[PatchDescriptor],
+    other: Callable[[int], PatchDescriptor],
     distances: Float[np.ndarray, " k"],
     *,
     n_verified: int = N_VERIFIED,
@@ -47,8 +48,8 @@ def verified_scores(
     Parameters
     ----------
     query : PatchDescriptor
-    others : sequence of k PatchDescriptor
-        Only the nearest are asked for.
+    other : callable
+        From a number below k to the descriptor that has this place in `distances`; called for the nearest alone.
     distances : (k,) float
         Of `word_distances`.
     n_verified : int
@@ -57,11 +58,12 @@ def verified_scores(
     Returns
     -------
     (k,) float
-        Near 0 for the same shape, about 1 where nothing is alike.
+        0 for the same descriptor up to rounding, about 1 where nothing is alike. The same surface with other vertex
+        numbers is sampled at other points, and may score up to about 0.8.
     """
     lacking = np.ones(len(distances))
     for place in np.argsort(distances, kind="stable")[:n_verified].tolist():
-        lacking[place] -= shape_agreement(query, others[place])
+        lacking[place] -= shape_agreement(query, other(place))
     return (distances + WORTH * lacking) / (1 + WORTH)
 
 
@@ -77,10 +79,14 @@ def patch_scores(query: PatchDescriptor, others: Sequence[PatchDescriptor]) -> F
     Returns
     -------
     (k,) float
-        Near 0 for the same shape, about 1 where nothing is alike.
+        0 for the same descriptor up to rounding, about 1 where nothing is alike. The same surface with other vertex
+        numbers is sampled at other points, and may score up to about 0.8.
     """
-    with threadpool_limits(1, user_api="blas"):
-        return verified_scores(query, others, word_distances(query.codes, [other.codes for other in others]))
+    require_type(query, PatchDescriptor, "query")
+    require_each(others, PatchDescriptor, "others")
+    with one_blas_thread():
+        distances = word_distances(query.codes, [other.codes for other in others])
+        return verified_scores(query, others.__getitem__, distances)
 
 
 def shape_agreement(query: PatchDescriptor, other: PatchDescriptor) -> float:

@@ -9,13 +9,16 @@ from scipy.sparse.csgraph import shortest_path
 
 from eigenshape._arrays import frozen, whole_number
 from eigenshape._errors import InvalidShapeError
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.fragments import fragment_vertices
 from eigenshape.geometry.geodesic import farthest_points
-from eigenshape.geometry.measure import vertex_normals
+from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_box
+from eigenshape.geometry.requirements import require_describable, require_oriented
 from eigenshape.geometry.sampling import views_of
 from eigenshape.geometry.simplices import dual_volumes
-from eigenshape.geometry.topology import boundary_vertices, require_simplices_everywhere
+from eigenshape.geometry.topology import boundary_vertices, submesh
 from eigenshape.retrieval.patch_loops import NUMBERS, describe_discs
 
 N_SAMPLES = 150
@@ -48,7 +51,7 @@ class Patches:
     distances: Float32[np.ndarray, "m m"]
 
 
-def describe_patches(mesh: TriangleMesh, *, n_samples: SupportsIndex = N_SAMPLES) -> Patches:
+def describe_patches(mesh: MeshLike, *, n_samples: SupportsIndex = N_SAMPLES) -> Patches:
     """Describe the discs around farthest points, at nine radii from .0625 to .37 of the box.
 
     A disc's normal n is the mean normal within .35 of its radius R. Only what faces the same way counts, N_q · n > 0:
@@ -56,9 +59,11 @@ def describe_patches(mesh: TriangleMesh, *, n_samples: SupportsIndex = N_SAMPLES
     (8 bins) and of the height (x_q - x_p) · n / R (6 bins), by area, square roots of shares; the logarithm of the area
     up to there over that of a flat disc; and the mean of the straight over the geodesic distance.
 
+    Components whose area is less than a point's share are left out (`fragment_vertices`), of the box too.
+
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
         Oriented outward. In any size: it is put into a unit box.
     n_samples : int
         Points at most; never more than vertices.
@@ -72,17 +77,31 @@ def describe_patches(mesh: TriangleMesh, *, n_samples: SupportsIndex = N_SAMPLES
     InvalidParameterError
         If n_samples is not positive.
     InvalidShapeError
-        If a vertex has no face, or the surface no area.
+        If a vertex has no face, a face is there twice, neighboring faces are turned against each other, the mesh is
+        a soup, whose faces lie edge on edge without sharing vertices, or the surface has no area.
     """
-    count = min(whole_number(n_samples, "n_samples", 1), mesh.n_vertices)
-    require_simplices_everywhere(mesh)
+    mesh = as_mesh(mesh)
+    count = whole_number(n_samples, "n_samples", 1)
+    require_describable(mesh)
+    require_oriented(mesh)
+    fragments = fragment_vertices(mesh, count)
+    if not len(fragments):
+        return _describe_patches(mesh, count)
+    body, source = submesh(mesh, ~np.isin(mesh.faces[:, 0], fragments))
+    found = _describe_patches(body, count)
+    return replace(found, vertices=frozen(source[found.vertices]))
+
+
+def _describe_patches(mesh: TriangleMesh, n_samples: int) -> Patches:
+    """Describe the discs of a mesh without fragments: each component gets a point, since there are fewer of them."""
+    count = min(n_samples, mesh.n_vertices)
     mesh = normalize_box(mesh)
     areas = dual_volumes(mesh)
     if not areas.sum() > 0:
         raise InvalidShapeError("A surface must have an area to be described by patches; all its faces have none.")
     chosen, rows, nearest = farthest_points(mesh, count, reach=RADII[-1])
     numbers = np.empty((len(chosen), len(RADII), NUMBERS), dtype=np.float32)
-    describe_discs(rows, chosen, (mesh.vertices, vertex_normals(mesh), areas), RADII, numbers)
+    describe_discs(rows, chosen, (mesh.vertices, mean_normals(mesh), areas), RADII, numbers)
     cells = np.bincount(nearest, weights=areas / areas.sum(), minlength=len(chosen))
     rim = boundary_vertices(mesh)
     away = rows[:, rim].min(axis=1) if len(rim) else np.full(len(chosen), np.inf)
@@ -96,7 +115,7 @@ def _by_way(near: Float[np.ndarray, "m m"]) -> Float[np.ndarray, "m m"]:
     return np.asarray(shortest_path(np.minimum(near, near.T), directed=False))
 
 
-def describe_patch_views(mesh: TriangleMesh, *, n_views: int = N_VIEWS) -> list[Patches]:
+def describe_patch_views(mesh: MeshLike, *, n_views: int = N_VIEWS) -> list[Patches]:
     """Describe what single viewpoints see of a closed shape, as partial scans of it will be.
 
     Returns
@@ -104,5 +123,6 @@ def describe_patch_views(mesh: TriangleMesh, *, n_views: int = N_VIEWS) -> list[
     list of Patches
         With points at vertices of the whole; empty for an open shape, which is a part already.
     """
+    mesh = as_mesh(mesh)
     seen = [(part, describe_patches(part.mesh)) for part in views_of(mesh, n_views)]
     return [replace(patches, vertices=frozen(part.source_vertices[patches.vertices])) for part, patches in seen]

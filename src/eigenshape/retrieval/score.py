@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial.distance import cdist
 
+from eigenshape._arguments import require_type
 from eigenshape._errors import InvalidParameterError
 from eigenshape.retrieval.descriptor import Recipe, ShapeDescriptor
 
@@ -24,6 +25,8 @@ def matching_score(first: ShapeDescriptor, second: ShapeDescriptor) -> float:
     InvalidParameterError
         If the two were made by different recipes.
     """
+    require_type(first, ShapeDescriptor, "first")
+    require_type(second, ShapeDescriptor, "second")
     _require_one_recipe(first, second)
     scores, _ = matching_scores(first.vectors, second.vectors, np.array([0]), first.recipe)
     return float(scores[0])
@@ -102,6 +105,8 @@ def match_features(first: ShapeDescriptor, second: ShapeDescriptor) -> Int[np.nd
     InvalidParameterError
         If the two were made by different recipes.
     """
+    require_type(first, ShapeDescriptor, "first")
+    require_type(second, ShapeDescriptor, "second")
     _require_one_recipe(first, second)
     _, shifts = matching_scores(first.vectors, second.vectors, np.array([0]), first.recipe)
     distances = _distances(*shifted(first.vectors, second.vectors, int(shifts[0]), first.recipe))

@@ -2,7 +2,8 @@
 
 A descriptor is written behind the last row that the database knows of, forced to disk, and then committed by one SQLite
 transaction. A writer that dies before the commit leaves bytes that nobody owns; the next writer takes their place.
-Readers see what is committed and never wait.
+Readers see what is committed and never wait. What they read is verified: rows by their checksum, the database by
+`catalog`, and that no change is lost with the log of SQLite by the number of changes in a file of its own.
 """
 
 import os
@@ -18,29 +19,15 @@ import numpy as np
 from filelock import FileLock, Timeout
 
 from eigenshape._errors import StoreError
-from eigenshape.retrieval.kinds import AnyRecipe, read, written
+from eigenshape.retrieval.catalog import Catalog, DescriptorRow, create_tables, read_catalog, seal
 
 DATABASE = "index.sqlite"
 DRAFT = "draft.sqlite"
 LOCK = "writer.lock"
 HOLDER = "writer.txt"
-APPLICATION = 0x65696773  # "eigs"
-FORMAT = 2
+COMMITTED = "committed.txt"
 WAIT = 5.0  # seconds for another writer
-SCHEMA = """
-CREATE TABLE recipe (id INTEGER PRIMARY KEY, fields TEXT NOT NULL UNIQUE, words BLOB, size INTEGER NOT NULL);
-CREATE TABLE shape (
-    id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, label TEXT, source TEXT, digest TEXT
-);
-CREATE TABLE descriptor (
-    shape INTEGER NOT NULL REFERENCES shape ON DELETE CASCADE,
-    recipe INTEGER NOT NULL REFERENCES recipe,
-    view INTEGER NOT NULL,
-    offset INTEGER NOT NULL, n_rows INTEGER NOT NULL, n_columns INTEGER NOT NULL, checksum INTEGER NOT NULL,
-    details BLOB NOT NULL,
-    PRIMARY KEY (shape, recipe, view)
-);
-"""
+DAMAGE = (sqlite3.Error, UnicodeError)  # SQLite passes on its messages with bytes of a damaged file
 
 
 def create(folder: Path) -> None:
@@ -51,55 +38,68 @@ def create(folder: Path) -> None:
     StoreError
         If there is one already, or the folder holds something else or cannot be made.
     """
+    with _creating(folder):
+        _require_empty(folder)
+        _make(folder)
+
+
+def create_if_missing(folder: Path) -> None:
+    """Make an empty store where there is none; of several callers at once, one makes it.
+
+    Raises
+    ------
+    StoreError
+        If the folder holds something else or cannot be made.
+    """
+    if (folder / DATABASE).is_file():  # also where one may only read
+        return
+    with _creating(folder):
+        if not (folder / DATABASE).is_file():
+            _require_empty(folder)
+            _make(folder)
+
+
+@contextmanager
+def _creating(folder: Path) -> Iterator[None]:
+    """Lock a folder that is new, empty or a store; the lock's file appears in no other."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as err:
         raise StoreError(f"An index needs a folder; {folder} cannot be made: {err.strerror}.") from err
-    _require_empty(folder)  # before the lock leaves its file in a folder that is not ours
+    _require_empty(folder, or_store=True)
     with _lock(folder):
-        _require_empty(folder)
-        for left in folder.glob(f"{DRAFT}*"):
-            left.unlink()
-        with closing(sqlite3.connect(folder / DRAFT, isolation_level=None)) as database:
-            database.executescript(
-                f"BEGIN; {SCHEMA} PRAGMA application_id = {APPLICATION}; PRAGMA user_version = {FORMAT}; COMMIT;"
-                "PRAGMA journal_mode = WAL;"
-            )
-        (folder / DRAFT).replace(folder / DATABASE)
-        _sync(folder)
+        yield
 
 
-def _require_empty(folder: Path) -> None:
-    if any(entry.name not in (LOCK, HOLDER) and not entry.name.startswith(DRAFT) for entry in folder.iterdir()):
+def _require_empty(folder: Path, *, or_store: bool = False) -> None:
+    names = {entry.name for entry in folder.iterdir()} - {LOCK, HOLDER, COMMITTED}
+    if or_store and (folder / DATABASE).is_file():  # asked after the list, into which another may just have put it
+        return
+    if not all(name.startswith(DRAFT) for name in names):
         raise StoreError(f"{folder} must be empty to become an index; it is not. Open it, or choose another folder.")
+
+
+def _make(folder: Path) -> None:
+    for left in folder.glob(f"{DRAFT}*"):
+        left.unlink()
+    with closing(sqlite3.connect(folder / DRAFT, isolation_level=None)) as database:
+        database.execute("BEGIN")
+        create_tables(database)
+        database.execute("COMMIT")
+        database.execute("PRAGMA journal_mode = WAL")
+    _keep_count(folder, 0)
+    (folder / DRAFT).replace(folder / DATABASE)
+    _sync(folder)
 
 
 def _sync(folder: Path) -> None:
     """Force the names of new files to disk, where a folder can be opened for that."""
     if os.name == "posix":
         handle = os.open(folder, os.O_RDONLY)
-        os.fsync(handle)
-        os.close(handle)
-
-
-def require(folder: Path) -> None:
-    """Refuse a folder that is not a store of this format.
-
-    Raises
-    ------
-    StoreError
-        Saying what is there instead.
-    """
-    with reading(folder) as database:
-        application = database.execute("PRAGMA application_id").fetchone()[0]
-        version = database.execute("PRAGMA user_version").fetchone()[0]
-    if application != APPLICATION:
-        raise StoreError(f"{folder} must be an index of eigenshape; its {DATABASE} belongs to another program.")
-    if version != FORMAT:
-        raise StoreError(
-            f"{folder} must be an index of format {FORMAT}; it is of format {version}. "
-            "Use the version of eigenshape that made it, or index the shapes again."
-        )
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def _require_database(folder: Path) -> None:
@@ -108,14 +108,21 @@ def _require_database(folder: Path) -> None:
 
 
 @contextmanager
-def reading(folder: Path) -> Iterator[sqlite3.Connection]:
-    """Open the database to read one consistent state, also where the folder cannot be written."""
+def reading(folder: Path) -> Iterator[Catalog]:
+    """Open the database to read one consistent state, also where the folder cannot be written.
+
+    Raises
+    ------
+    StoreError
+        If the folder is not a store of this format, or something in it is damaged.
+    """
     _require_database(folder)
     try:
         with closing(_connect_to_read(folder)) as database:
+            committed = _read_count(folder)  # before the state is chosen that is read
             database.execute("BEGIN")
-            yield database
-    except sqlite3.Error as err:
+            yield _whole_catalog(folder, database, committed)
+    except DAMAGE as err:
         raise StoreError(f"{folder / DATABASE} must be a readable index; {err}.") from err
 
 
@@ -123,9 +130,9 @@ def _connect_to_read(folder: Path) -> sqlite3.Connection:
     database = _connect(folder, "mode=ro")
     try:
         database.execute("SELECT count(*) FROM sqlite_master")
-    except sqlite3.OperationalError as err:
+    except sqlite3.Error as err:
         database.close()
-        if os.access(folder, os.W_OK):
+        if not isinstance(err, sqlite3.OperationalError) or os.access(folder, os.W_OK):
             raise
         log = folder / f"{DATABASE}-wal"
         if log.exists() and log.stat().st_size:
@@ -142,18 +149,64 @@ def _connect(folder: Path, mode: str) -> sqlite3.Connection:
     return sqlite3.connect(uri, uri=True, isolation_level=None)
 
 
+def _whole_catalog(folder: Path, database: sqlite3.Connection, committed: bytes) -> Catalog:
+    """Read the catalog, and refuse one that lacks committed changes.
+
+    Changes stay in a log beside the database as long as somebody reads, and SQLite ignores all of
+    it that follows a damaged bit.
+    """
+    catalog = read_catalog(folder / DATABASE, database)
+    count, _, again = committed.partition(b" ")
+    if count != again or not count.isdigit():
+        raise StoreError(
+            f"{folder / COMMITTED} must hold a number twice; it holds {committed!r}. Index the shapes again."
+        )
+    if catalog.n_changes < int(count):
+        raise StoreError(
+            f"{folder} must hold all {int(count)} changes that were committed; it holds {catalog.n_changes}. Its file "
+            f"{DATABASE}-wal is damaged, or was not copied with the others. Copy all files, or index the shapes again."
+        )
+    return catalog
+
+
+def _read_count(folder: Path) -> bytes:
+    path = folder / COMMITTED
+    return path.read_bytes() if path.exists() else b""
+
+
+def _keep_count(folder: Path, n_changes: int) -> None:
+    beside = folder / f"{DRAFT}.{COMMITTED}"
+    with beside.open("wb") as file:
+        file.write(f"{n_changes} {n_changes}".encode())
+        file.flush()
+        os.fsync(file.fileno())
+    beside.replace(folder / COMMITTED)
+    _sync(folder)
+
+
 @contextmanager
-def writing(folder: Path) -> Iterator[sqlite3.Connection]:
-    """Open the database as its one writer; what the block did is committed whole at its end, or not at all."""
+def writing(folder: Path) -> Iterator[Catalog]:
+    """Open the database as its one writer; what the block did is committed whole at its end, or not at all.
+
+    The catalog is that from before the block.
+
+    Raises
+    ------
+    StoreError
+        If the folder is not a store of this format, something in it is damaged, or another process is writing.
+    """
     _require_database(folder)
     try:
         with _lock(folder), closing(_connect(folder, "mode=rw")) as database:
             database.execute("PRAGMA foreign_keys = ON")
             database.execute("PRAGMA synchronous = FULL")
             database.execute("BEGIN IMMEDIATE")
-            yield database
+            catalog = _whole_catalog(folder, database, _read_count(folder))
+            yield catalog
+            seal(database, catalog.n_changes + 1)
             database.execute("COMMIT")  # whatever ends the block before, closing rolls back
-    except sqlite3.Error as err:
+            _keep_count(folder, catalog.n_changes + 1)
+    except DAMAGE as err:
         raise StoreError(f"{folder / DATABASE} must be a writable index; {err}.") from err
 
 
@@ -164,7 +217,7 @@ def _lock(folder: Path) -> Iterator[None]:
     try:
         lock.acquire()
     except Timeout as err:
-        who = holder.read_text() if holder.exists() else "another process"
+        who = holder.read_text(errors="replace") if holder.exists() else "another process"
         raise StoreError(
             f"An index has one writer; {who} has held {folder / LOCK} for more than {WAIT:g} s. Wait for it to end."
         ) from err
@@ -178,46 +231,6 @@ def _lock(folder: Path) -> Iterator[None]:
         lock.release()
 
 
-def recipe_id(database: sqlite3.Connection, recipe: AnyRecipe) -> int | None:
-    """Return the number of a recipe, None where no descriptor was made by it.
-
-    A field that a stored recipe lacks, since it is younger, counts as its default.
-    """
-    return next((number for number, other in recipes(database) if other == recipe), None)
-
-
-def recipes(database: sqlite3.Connection) -> Iterator[tuple[int, AnyRecipe]]:
-    """Yield the number of each recipe, and it."""
-    for number, fields, words in database.execute("SELECT id, fields, words FROM recipe ORDER BY id").fetchall():
-        yield int(number), read_recipe(fields, words)
-
-
-def keep_recipe(database: sqlite3.Connection, recipe: AnyRecipe) -> int:
-    """Return the number of a recipe, a new one where it is new."""
-    number = recipe_id(database, recipe)
-    if number is not None:
-        return number
-    row = database.execute("INSERT INTO recipe (fields, words, size) VALUES (?, ?, 0)", written(recipe))
-    return int(row.lastrowid or 0)
-
-
-def read_recipe(fields: str, words: bytes | None) -> AnyRecipe:
-    """Return a recipe from its stored fields.
-
-    Raises
-    ------
-    StoreError
-        If this version of eigenshape knows no such recipe.
-    """
-    try:
-        return read(fields, words)
-    except (TypeError, ValueError) as err:
-        raise StoreError(
-            f"Recipes of an index must be known to this version of eigenshape; {fields} is not: {err}. "
-            "Use the version that wrote it, or index the shapes again."
-        ) from err
-
-
 def rows_path(folder: Path, recipe: int) -> Path:
     """Return the file that holds the rows of a recipe."""
     return folder / f"rows-{recipe}.bin"
@@ -225,7 +238,7 @@ def rows_path(folder: Path, recipe: int) -> Path:
 
 def append_rows(folder: Path, database: sqlite3.Connection, recipe: int, rows: np.ndarray) -> int:
     """Write rows behind the last committed ones and force them to disk; the byte at which they begin."""
-    offset = int(database.execute("SELECT size FROM recipe WHERE id = ?", (recipe,)).fetchone()[0])
+    (offset,) = database.execute("SELECT size FROM recipe WHERE id = ?", (recipe,)).fetchone()
     data = rows.tobytes()
     path = rows_path(folder, recipe)
     if not path.exists():
@@ -238,21 +251,21 @@ def append_rows(folder: Path, database: sqlite3.Connection, recipe: int, rows: n
         file.flush()
         os.fsync(file.fileno())
     database.execute("UPDATE recipe SET size = ? WHERE id = ?", (offset + len(data), recipe))
-    return offset
+    return int(offset)
 
 
-def read_rows(data: memoryview, entry: "tuple[int, int, int, int]", row: "np.dtype[Any]", path: Path) -> np.ndarray:
-    """Return the rows, of a type, that (offset, n_rows, n_columns, checksum) speaks of.
+def read_rows(data: memoryview, kept: DescriptorRow, row: "np.dtype[Any]", path: Path) -> np.ndarray:
+    """Return the rows of a descriptor, of a type.
 
     Raises
     ------
     StoreError
         If they are not there, or not what was written.
     """
-    offset, n_rows, n_columns, checksum = entry
-    end = offset + n_rows * n_columns * row.itemsize
+    begin, count = kept.offset, kept.n_rows * kept.n_columns
+    end = begin + count * row.itemsize
     if end > len(data):
         raise StoreError(f"{path} must hold {end} bytes; it holds {len(data)}. Index the shapes again.")
-    if crc32(data[offset:end]) != checksum:
-        raise StoreError(f"{path} must hold what was written; bytes {offset} to {end} differ. Index the shapes again.")
-    return np.frombuffer(data, row, n_rows * n_columns, offset).reshape(n_rows, n_columns)
+    if crc32(data[begin:end]) != kept.checksum:
+        raise StoreError(f"{path} must hold what was written; bytes {begin} to {end} differ. Index the shapes again.")
+    return np.frombuffer(data, row, count, begin).reshape(kept.n_rows, kept.n_columns)

@@ -10,9 +10,11 @@ from scipy.spatial.distance import cdist
 
 from eigenshape._arrays import frozen
 from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
 from eigenshape.features.boundaries import smooth_boundaries
 from eigenshape.features.parts import FoundParts, find_parts
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
@@ -54,10 +56,11 @@ class LabelTransfer:
     confidence: Float[np.ndarray, " m"]
 
 
+@one_blas_thread()
 def transfer_labels(
-    source: TriangleMesh,
+    source: MeshLike,
     labels: Int[np.ndarray, " f"],
-    target: TriangleMesh,
+    target: MeshLike,
     *,
     n_parts: int | None = None,
     progress: Progress | None = None,
@@ -74,10 +77,10 @@ def transfer_labels(
 
     Parameters
     ----------
-    source : TriangleMesh
+    source : MeshLike
     labels : (f,) int
         Of each face of the source.
-    target : TriangleMesh
+    target : MeshLike
     n_parts : int, optional
         Parts to cut both shapes into, at most; by default as many as `find_parts` finds on the source.
     progress : callable, optional
@@ -94,6 +97,8 @@ def transfer_labels(
     InvalidShapeError
         If a mesh has a face without area or a vertex without face.
     """
+    source = as_mesh(source, "source")
+    target = as_mesh(target, "target")
     if labels.shape != (source.n_faces,):
         raise InvalidParameterError(f"There must be one label a face, {source.n_faces}; there are {len(labels)}.")
     found = find_parts(source, progress=partly(progress, 0, 0.25))

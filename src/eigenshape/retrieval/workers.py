@@ -4,9 +4,12 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Generic, TypeVar
 
@@ -17,6 +20,10 @@ from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import EigenshapeError
 
 T = TypeVar("T")
+NO_WORKERS = (
+    "Worker processes import the script that starts them, and must come to its end; all of them ended before they took "
+    'a file. Put what the script does, from its first call of eigenshape on, under `if __name__ == "__main__":`.'
+)
 
 
 @dataclass(frozen=True)
@@ -54,21 +61,65 @@ def in_workers(
     """Yield each item with what `work`, importable by name, made of its path, as they come.
 
     Close the generator to stop all workers at once.
+
+    Raises
+    ------
+    EigenshapeError
+        If no worker can start, as in a script that has no main guard.
     """
+    _require_main_guard()
     context = multiprocessing.get_context("spawn")
     count = max(min(workers.count, len(items)), 1)
-    with ProcessPool(max_workers=count, initializer=_start_worker, context=context) as pool:
-        try:
-            futures = {pool.schedule(_work, args=[work, item.path], timeout=workers.timeout): item for item in items}
-            for future in as_completed(futures):
-                yield futures[future], _outcome(future, workers)
-        except BaseException:
-            pool.stop()
-            raise
+    pool = ProcessPool(max_workers=count, initializer=_start_worker, context=context)
+    try:
+        with _sigint_blocked():
+            _ = pool.active  # starts the processes, and the threads that replace those that die
+        futures = {pool.schedule(_work, args=[work, item.path], timeout=workers.timeout): item for item in items}
+        for number, future in enumerate(as_completed(futures)):
+            if number == 0:
+                _require_started(future)
+            yield futures[future], _outcome(future, workers)
+        pool.close()
+    except BaseException:
+        pool.stop()
+        raise
+    finally:
+        pool.join()
+
+
+@contextmanager
+def _sigint_blocked() -> Iterator[None]:
+    """Block Ctrl-C in the processes and threads that the block starts, which inherit this, from their first moment.
+
+    Ctrl-C is the parent's affair, which stops its workers itself.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # on Windows
+        yield
+        return
+    resource_tracker.ensure_running()  # Python's helper of processes, whose start would unblock Ctrl-C
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _require_main_guard() -> None:
+    """End a worker that is still importing the script that started it, and would start workers in turn.
+
+    Quietly: the process that waits for it says why.
+    """
+    if getattr(multiprocessing.current_process(), "_inheriting", False):  # as multiprocessing itself tells
+        raise SystemExit(1)
+
+
+def _require_started(first: "Future[Outcome[T]]") -> None:
+    if isinstance(first.exception(), BrokenProcessPool):
+        raise EigenshapeError(NO_WORKERS) from first.exception()
 
 
 def _start_worker() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's affair, which stops its workers itself
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it could not be blocked
     threading.Thread(target=_die_with_parent, daemon=True).start()
     threadpool_limits(1)
 

@@ -2,14 +2,13 @@
 
 from typing import no_type_check
 
-from numba import njit
-
+from eigenshape._compile import njit
 from eigenshape.sparse.lane_loops import LANES, add_eight_sums, subtract_four_sums, subtract_sum
 
 CHUNK = 1024  # rows that stay in the second cache
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def add_products(space, columns, parts):
     """Add spaceᵀ columns: slots (s, n, LANES) and (g, n, LANES) to parts (g, s LANES, LANES)."""
@@ -32,7 +31,7 @@ def add_products(space, columns, parts):
                 )
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def subtract_combination(space, parts, columns):
     """Take space parts from the columns, shapes as in `add_products`."""
@@ -51,7 +50,7 @@ def subtract_combination(space, parts, columns):
                     subtract_sum(space, (slot * n + row) * LANES, 1, 0, parts, given, LANES, columns, to + row)
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def gather_rows(space, start, stop, flat):
     """Write rows of all slots as rows of one matrix (rows, slots LANES)."""

@@ -3,8 +3,8 @@
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
 
+from eigenshape._compile import njit
 from eigenshape.sparse.blas_loops import solve_triangle, subtract_product
 
 NARROW = 16  # columns that are eliminated one by one
@@ -12,7 +12,7 @@ TALL = 96  # rows of an update at once
 LONG = 256  # terms of a sum in one product: shorter sums round less
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def eliminate_plain(front, width, pivots):
     """Eliminate the first columns one by one; say whether all pivots served."""
@@ -33,7 +33,7 @@ def eliminate_plain(front, width, pivots):
     return True
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def eliminate_blocked(front, width, pivots, times, blas):
     """Eliminate by halves: products of matrices take the left half of some columns out of the right half.
@@ -55,7 +55,7 @@ def eliminate_blocked(front, width, pivots, times, blas):
     return True
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _eliminate_narrow(front, start, end, pivots, times, trsm):
     """Eliminate a few columns, all rows; those to the right are left as they are."""
@@ -82,7 +82,7 @@ def _eliminate_narrow(front, start, end, pivots, times, trsm):
     return True
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _update(front, times, start, end, stop, gemm):
     """Take what the columns from start to end contribute out of those from end to stop, on and below the diagonal."""

@@ -3,7 +3,8 @@
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
+
+from eigenshape._compile import njit
 
 LEAF = 160  # points that minimum degree orders
 WORD = 64
@@ -11,7 +12,7 @@ FINE = 64  # parts of an edge
 SMOOTHINGS = 4
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def dissect(indptr, indices):
     """Return the points of a graph, separators after what they separate (George 1973).
@@ -79,7 +80,7 @@ def dissect(indptr, indices):
     return nodes
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _pieces(indptr, indices, nodes, start, stop, owner, name, place, distance, queue):
     """Put the connected pieces of a segment one after the other, named name + 1 on, and return where each begins."""
@@ -97,7 +98,7 @@ def _pieces(indptr, indices, nodes, start, stop, owner, name, place, distance, q
     return begins
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _tell_apart(indptr, indices, nodes, start, stop, owner, name, one, two, key):
     """Fill `key` with the difference of two distances, smoothed: a ragged cut is a long one. The first is used up."""
@@ -116,7 +117,7 @@ def _tell_apart(indptr, indices, nodes, start, stop, owner, name, one, two, key)
             key[nodes[i]] = one[nodes[i]]
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _take_sides(indptr, indices, nodes, start, stop, owner, name, key, level, above, side):
     """Fill `side` with 0 below the level, 1 above, 2 on the cut; return how many are 0, and how many 2."""
@@ -137,7 +138,7 @@ def _take_sides(indptr, indices, nodes, start, stop, owner, name, key, level, ab
     return n_first, n_cut
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _half_full(indptr, indices, nodes, start, stop, owner, name):
     """Say whether half of all pairs of a segment are joined: no order saves much, and one point a cut takes long."""
@@ -149,7 +150,7 @@ def _half_full(indptr, indices, nodes, start, stop, owner, name):
     return 2 * joined >= (stop - start) ** 2
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _breadth_first(indptr, indices, root, owner, name, distance, queue):
     """Fill `distance` from the root within a segment, `queue` with its points by distance; return how many."""
@@ -172,7 +173,7 @@ def _breadth_first(indptr, indices, root, owner, name, distance, queue):
     return tail
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _cheapest_cut(indptr, indices, nodes, start, stop, owner, name, key):
     """Return the value to cut at, and whether the cut is taken from above it: key < value | key ≥ value."""
@@ -208,7 +209,7 @@ def _cheapest_cut(indptr, indices, nodes, start, stop, owner, name, key):
     return level, above
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _eliminate(indptr, indices, nodes, start, stop, owner, place):
     """Order a leaf by minimum degree, its neighbours outside counted, its elimination graph in bits."""
@@ -254,7 +255,7 @@ def _eliminate(indptr, indices, nodes, start, stop, owner, place):
         owner[order[i]] = -1
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _ones(words):
     total = 0

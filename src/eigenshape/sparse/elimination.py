@@ -1,7 +1,6 @@
 """Symmetric matrices of one pattern: an order of elimination, and factors L D Lᵀ with pivots on the diagonal."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,6 +15,7 @@ from eigenshape.sparse.lane_loops import LANES
 EPS = float(np.finfo(np.float64).eps)
 
 Indices = Int[np.ndarray, " ..."]
+Scratch = tuple[Float[np.ndarray, "n 8"], Float[np.ndarray, "t 8"]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,17 +53,6 @@ class Elimination:
     lower_rows: Indices
     source: Indices
 
-    @cached_property
-    def workspace(self) -> tuple[Float[np.ndarray, " w"], Float[np.ndarray, " r"], Float[np.ndarray, " r"]]:
-        """Room for waiting updates and for two fronts: every fresh page costs, so factors share it one by one."""
-        waiting, tallest = self.room
-        return np.empty(waiting), np.empty(tallest**2), np.empty(tallest**2)
-
-    @cached_property
-    def lanes(self) -> tuple[Float[np.ndarray, "n 8"], Float[np.ndarray, "t 8"]]:
-        """Room for right-hand sides in the order of elimination, and for those of one front."""
-        return np.empty((len(self.order), LANES)), np.empty((self.room[1], LANES))
-
     @property
     def n_entries(self) -> int:
         """Entries of L that are stored."""
@@ -78,22 +67,30 @@ class SymmetricFactor:
     panels: Float[np.ndarray, " e"]
     pivots: Float[np.ndarray, " n"]
 
-    def solve(self, right: Float[np.ndarray, "n b"]) -> Float[np.ndarray, "n b"]:
-        """Solve A x = right."""
-        width = right.shape[1]
+    def solve(self, right: Float[np.ndarray, "n b"], scratch: Scratch | None = None) -> Float[np.ndarray, "n b"]:
+        """Solve A x = right, in memory of the caller or in fresh memory."""
+        width, scratch = right.shape[1], scratch or self.scratch()
         solution, lanes = np.empty((len(right), width)), np.zeros((len(right), LANES))
         for start in range(0, width, LANES):
             stop = min(start + LANES, width)
             lanes[:, : stop - start] = right[:, start:stop]
-            self.solve_lanes(lanes, lanes)
+            self.solve_lanes(lanes, lanes, scratch)
             solution[:, start:stop] = lanes[:, : stop - start]
         return solution
 
-    def solve_lanes(self, right: Float[np.ndarray, "n 8"], out: Float[np.ndarray, "n 8"]) -> None:
+    def scratch(self) -> Scratch:
+        """Return fresh memory for solves: right-hand sides in the order of elimination, and those of one front.
+
+        Whoever solves often keeps it, and shares it with no other thread: a factor is a value and holds none.
+        """
+        e = self.elimination
+        return np.empty((len(e.order), LANES)), np.empty((e.room[1], LANES))
+
+    def solve_lanes(self, right: Float[np.ndarray, "n 8"], out: Float[np.ndarray, "n 8"], scratch: Scratch) -> None:
         """Solve A x = right for eight right-hand sides, arrays in C order, at once; `out` may be `right` itself."""
         e = self.elimination
         tree = e.order, e.first, e.begins, e.rows, e.places
-        fronts.solve_fronts(*tree, self.panels, self.pivots, right, out, e.lanes)
+        fronts.solve_fronts(*tree, self.panels, self.pivots, right, out, scratch)
 
     def rounding(self) -> Float[np.ndarray, " n"]:
         """Bound what rounding has put between A and L D Lᵀ, row by row.
@@ -152,5 +149,7 @@ def factorise(
     pivots = np.empty(len(e.order))
     lower = e.lower_ptr, e.lower_rows, data[e.source]
     tree = e.first, e.begins, e.rows, e.above, e.places
-    sound = fronts.factor_fronts(*lower, *tree, panels, pivots, e.workspace, addresses())
+    waiting, tallest = e.room
+    workspace = np.empty(waiting), np.empty(tallest**2), np.empty(tallest**2)
+    sound = fronts.factor_fronts(*lower, *tree, panels, pivots, workspace, addresses())
     return SymmetricFactor(e, panels, pivots) if sound else None

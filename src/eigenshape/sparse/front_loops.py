@@ -3,8 +3,8 @@
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
 
+from eigenshape._compile import njit
 from eigenshape.sparse.dense_loops import LONG, NARROW, eliminate_blocked, eliminate_plain
 from eigenshape.sparse.lane_loops import LANES, subtract_four_sums, subtract_sum
 
@@ -13,7 +13,7 @@ SMALL = 40  # rows of a front up to which plain loops are the faster ones
 NEAR = 32  # rows of a panel that stay in the nearest cache
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def panel_places(first, begins):
     """Return where the panels of each front begin among all entries: at most WIDE columns to a panel."""
@@ -28,7 +28,7 @@ def panel_places(first, begins):
     return places
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def stack_size(first, begins, above):
     """Return the most numbers that updates waiting for their parents take, and the rows of the largest front."""
@@ -47,7 +47,7 @@ def stack_size(first, begins, above):
     return most, tallest
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def sum_lengths(first, begins, above, lengths):
     """Fill how many roundings a product may see in each front, on its way from below: at most LONG in its own sum.
@@ -69,7 +69,7 @@ def sum_lengths(first, begins, above, lengths):
             lengths[above[s]] = max(lengths[above[s]], lengths[s])
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def factor_fronts(lower_ptr, lower_rows, values, first, begins, rows, above, places, panels, pivots, room, blas):
     """Fill panels and pivots with L and D of a matrix whose lower triangle is given by columns; tell if it could be.
@@ -131,7 +131,7 @@ def factor_fronts(lower_ptr, lower_rows, values, first, begins, rows, above, pla
     return True
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def solve_fronts(order, first, begins, rows, places, panels, pivots, right, solution, room):
     """Solve for LANES right-hand sides (n, LANES); the solution may take the place of the right-hand sides."""
@@ -164,7 +164,7 @@ def solve_fronts(order, first, begins, rows, places, panels, pivots, right, solu
             solution[order[i], lane] = lanes[i, lane]
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _forward(panels, at, columns, rows, lanes, gathered):
     mine, height = rows[0], len(rows)
@@ -183,7 +183,7 @@ def _forward(panels, at, columns, rows, lanes, gathered):
             lanes[row, lane] += gathered[i, lane]
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _backward(panels, at, columns, rows, lanes, gathered, near):
     mine, height = rows[0], len(rows)
@@ -207,7 +207,7 @@ def _backward(panels, at, columns, rows, lanes, gathered, near):
         )
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def column_sizes(first, begins, places, panels, sizes):
     """Fill the sums of the columns of |L|."""
@@ -223,7 +223,7 @@ def column_sizes(first, begins, places, panels, sizes):
                 at += columns
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def row_sizes(first, begins, rows, places, panels, weights, sizes, terms):
     """Fill |L| weights, and how many entries of L each row has."""

@@ -3,7 +3,8 @@
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
+
+from eigenshape._compile import njit
 
 # A supernode joins the next one while few of the entries are zeros that the factor would not have (CHOLMOD's rule).
 ALWAYS = 4  # columns
@@ -12,7 +13,7 @@ RARELY, RARELY_ZEROS = 48, 0.1
 BEYOND_ZEROS = 0.05
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def elimination_tree(indptr, indices, order):
     """Return the parent of each column of the factor, columns in the order given; -1 at a root (Liu 1990)."""
@@ -34,7 +35,7 @@ def elimination_tree(indptr, indices, order):
     return parent
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def postordered(parent):
     """Return the columns with every subtree in one piece, children before parents."""
@@ -63,7 +64,7 @@ def postordered(parent):
     return order
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def column_counts(indptr, indices, order, parent):
     """Return how many entries each column of the factor has, its diagonal among them."""
@@ -84,7 +85,7 @@ def column_counts(indptr, indices, order, parent):
     return counts
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def supernodes(parent, counts):
     """Return the first column of each run of columns with (nearly) the same entries, and n at the end."""
@@ -126,7 +127,7 @@ def supernodes(parent, counts):
     return first[: kept + 1].copy()
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def front_rows(indptr, indices, order, parent, first):
     """Return for each supernode the rows of its front, ascending: where they begin, the rows, its parent supernode.

@@ -6,8 +6,10 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, whole_numbers
 from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.certify import quality
 from eigenshape.spectral.eigenspaces import SEPARATED, orthonormal, outside, separated_groups
@@ -58,6 +60,7 @@ class EigenspaceAngles:
         return f"{says} For {n_bounded} of them the gap proves a bound below a right angle."
 
 
+@one_blas_thread()
 def eigenspace_angles(
     one: Spectrum,
     two: Spectrum,
@@ -102,6 +105,9 @@ def eigenspace_angles(
     ConvergenceError
         If `laplacian` is not the operator that `one` is of.
     """
+    require_type(one, Spectrum, "one")
+    require_type(two, Spectrum, "two")
+    require_type(laplacian, Laplacian | None, "laplacian")
     require_lowest(one, "one")
     require_lowest(two, "two")
     partners = _partners(one, two, points)

@@ -4,9 +4,10 @@ from dataclasses import replace
 from typing import SupportsIndex
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import whole_number
+from eigenshape._threads import one_blas_thread
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.certify import require_orthonormal
@@ -85,12 +86,13 @@ def approximate_spectrum(
     UserWarning
         If there is no GPU to be used, or eigenvalues of a kernel lie too near to 1/t to tell those of the shape.
     """
+    require_type(laplacian, Laplacian, "laplacian")
     wanted = whole_number(k, "k", 1, laplacian.n_points)
     for name, value in (("accuracy", accuracy), ("bound", LEAST_ACCURATE if bound is None else bound)):
         require_accuracy(name, value, ACCURATE)
     place, report = open_device(device), progress or silent
     require_lumped(laplacian)
-    with threadpool_limits(1, user_api="blas"):
+    with one_blas_thread():
         report(0.0, "scaling the operator")
         pencil = normalise(laplacian)
         limits = float(accuracy), np.inf if bound is None else float(bound)

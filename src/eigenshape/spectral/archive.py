@@ -1,6 +1,7 @@
 """Spectra on disk: NumPy's .npz, no pickle, whole or not at all."""
 
 import json
+import typing
 import zipfile
 from dataclasses import asdict
 from pathlib import Path
@@ -10,58 +11,110 @@ import numpy as np
 import scipy.sparse as sp
 
 from eigenshape._errors import FileFormatError
-from eigenshape._files import replacing
+from eigenshape._files import replacing, require_regular
 from eigenshape.spectral.certificate import Certificate
 
-FORMAT = 1
+FORMAT = 2
 ARRAYS = ("eigenvalues", "eigenvectors", "residuals")
 MASS = ("data", "indices", "indptr")
+ROUNDING = 1e-6  # of the largest eigenvalue: how far below 0 rounding may put one, as in Certificate.resolution
 
 
 def write_archive(
-    path: str | Path, arrays: dict[str, np.ndarray], mass: sp.csr_array, certificate: Certificate
+    path: str | Path, arrays: dict[str, np.ndarray], mass: sp.csr_array, certificate: Certificate, key: str | None
 ) -> None:
-    """Write what a spectrum holds."""
+    """Write what a spectrum holds, and the key of what it was computed from."""
     parts: dict[str, Any] = {f"mass_{name}": getattr(mass, name) for name in MASS}
-    head = json.dumps({"eigenshape_spectrum": FORMAT, "certificate": asdict(certificate)})
+    head = json.dumps({"eigenshape_spectrum": FORMAT, "key": key, "certificate": asdict(certificate)})
     with replacing(Path(path)) as file:
         np.savez(file, **{**parts, **arrays, "head": np.array(head)})
 
 
-def read_archive(path: str | Path) -> dict[str, Any]:
+def read_archive(path: str | Path, key: str | None) -> dict[str, Any]:
     """Return what a spectrum is made from.
 
     Raises
     ------
     FileFormatError
-        If the file is no spectrum, is cut off, or its parts do not fit one another.
+        If the file is no spectrum, is cut off, its parts do not fit one another or hold what no
+        spectrum holds, or it has another key than the given one.
     """
+    require_regular(Path(path))
     try:
-        with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            facts = _facts(path, json.loads(str(archive["head"])))
-            certificate = Certificate(**{**facts, "gap": tuple(facts["gap"]), "clusters": tuple(facts["clusters"])})
-            arrays = {name: archive[name] for name in ARRAYS}
-            parts = tuple(archive[f"mass_{name}"] for name in MASS)
+        with Path(path).open("rb") as file:
+            _require_stored(path, file)
+            with np.load(file, allow_pickle=False) as archive:
+                certificate = _certificate(path, json.loads(str(archive["head"])), key)
+                arrays = {name: archive[name] for name in ARRAYS}
+                parts = tuple(archive[f"mass_{name}"] for name in MASS)
         n = len(arrays["eigenvectors"])
         mass = sp.csr_array(parts, shape=(n, n))
         mass.check_format()
     except FileFormatError:
         raise
-    except (KeyError, TypeError, ValueError, EOFError, zipfile.BadZipFile) as error:
+    except (KeyError, TypeError, ValueError, EOFError, MemoryError, zipfile.BadZipFile) as error:
         raise FileFormatError(f"{path} must hold a spectrum that eigenshape saved; {error}.") from error
-    k = len(arrays["eigenvalues"])
-    shapes = {name: array.shape for name, array in arrays.items()}
+    _require_sound(path, {**arrays, "mass": mass.data}, certificate)
+    return {**arrays, "mass": mass, "certificate": certificate}
+
+
+def _require_stored(path: str | Path, file: typing.BinaryIO) -> None:
+    """Refuse compressed parts: a spectrum has none, and a few bytes of them could fill the memory."""
+    for part in zipfile.ZipFile(file).infolist():
+        if part.compress_type != zipfile.ZIP_STORED:
+            raise FileFormatError(
+                f"{path} must hold a spectrum that eigenshape saved; its part {part.filename} is compressed."
+            )
+    file.seek(0)
+
+
+def _certificate(path: str | Path, head: dict[str, Any], key: str | None) -> Certificate:
+    if head["eigenshape_spectrum"] != FORMAT:
+        raise FileFormatError(
+            f"{path} must hold a spectrum in format {FORMAT}; it is in format {head['eigenshape_spectrum']}."
+        )
+    if key is not None and head["key"] != key:
+        raise FileFormatError(f"{path} must hold the spectrum of the key {key}; its key is {head['key']}.")
+    facts = head["certificate"]
+    facts = {**facts, "gap": tuple(facts["gap"]), "clusters": tuple(facts["clusters"])}
+    for name, kind in typing.get_type_hints(Certificate).items():
+        if not _is_of(facts[name], kind):
+            raise FileFormatError(f"{path} must hold a certificate whose {name} is {kind}; it is {facts[name]!r}.")
+    return Certificate(**facts)
+
+
+def _is_of(value: object, kind: Any) -> bool:
+    """Whether a value has the type of a certificate's attribute; a whole number is a float too, NaN is none."""
+    if isinstance(value, tuple):
+        entries = typing.get_args(kind)
+        kinds = [entries[0]] * len(value) if entries[1:] == (...,) else entries
+        return len(value) == len(kinds) and all(map(_is_of, value, kinds))
+    kinds = typing.get_args(kind) or (kind,)
+    if isinstance(value, bool) or (isinstance(value, float) and np.isnan(value)):
+        return False
+    return isinstance(value, kinds) or (float in kinds and isinstance(value, int))
+
+
+def _require_sound(path: str | Path, arrays: dict[str, np.ndarray], certificate: Certificate) -> None:
+    for name, array in arrays.items():
+        if array.dtype != np.float64 or not np.isfinite(array).all():
+            raise FileFormatError(f"{path} must hold finite float64 numbers as {name}; there are others.")
+    n, k = len(arrays["eigenvectors"]), arrays["eigenvalues"].size
+    shapes = {name: arrays[name].shape for name in ARRAYS}
     if shapes != {"eigenvalues": (k,), "eigenvectors": (n, k), "residuals": (k,)} or certificate.n_pairs != k:
         raise FileFormatError(
             f"{path} must hold arrays that fit one another; their shapes are {shapes}, and {certificate.n_pairs} pairs "
             f"are certified."
         )
-    return {**arrays, "mass": mass, "certificate": certificate}
-
-
-def _facts(path: str | Path, head: dict[str, Any]) -> dict[str, Any]:
-    if head["eigenshape_spectrum"] != FORMAT:
+    values = arrays["eigenvalues"]
+    falling = np.flatnonzero(np.diff(values) < 0)
+    if falling.size:
+        at = int(falling[0]) + 1
         raise FileFormatError(
-            f"{path} must hold a spectrum in format {FORMAT}; it is in format {head['eigenshape_spectrum']}."
+            f"{path} must hold ascending eigenvalues; number {at} is {values[at]} after {values[at - 1]}."
         )
-    return head["certificate"]
+    if k and values[0] < -max(certificate.resolution, ROUNDING * values[-1]):
+        raise FileFormatError(f"{path} must hold eigenvalues of at least 0; number 0 is {values[0]}.")
+    if (arrays["residuals"] < 0).any():
+        at = int(np.argmax(arrays["residuals"] < 0))
+        raise FileFormatError(f"{path} must hold residuals of at least 0; number {at} is {arrays['residuals'][at]}.")

@@ -8,15 +8,19 @@ from jaxtyping import Float, Int
 
 from eigenshape._arrays import frozen, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.exact import Condition
 from eigenshape.geometry.facets import FacetTable, facet_components, facet_table, without_pinches
-from eigenshape.geometry.simplices import in_length, require_volumes, size_one
+from eigenshape.geometry.requirements import require_sound
+from eigenshape.geometry.simplices import in_length, size_one
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
-from eigenshape.geometry.topology import boundary_vertices, require_simplices_everywhere
+from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import interpolation_constants, longest_edges
+from eigenshape.spectral.dirichlet import solve_free
 from eigenshape.spectral.enclosure import enclose, relative_rounding
-from eigenshape.spectral.nonconforming import lower_bounds, partly, solve_free
+from eigenshape.spectral.nonconforming import lower_bounds, partly
 from eigenshape.spectral.outcome import Progress
 
 LINEAR_FLOOR = 0.5  # consistent mass of linear elements over its diagonal, in any dimension
@@ -67,6 +71,8 @@ class Brackets:
         zero = {0: "", 1: "The first is 0. "}.get(self.n_zero, f"The first {self.n_zero} are 0. ")
         if self.n_zero == len(self.upper):
             return zero.strip()
+        if self.lower[-1] == 0:
+            return f"{zero}Rounding in slivers leaves no lower end above 0; only longer edges across them would help."
         widths = 1 - self.lower[self.n_zero :] / self.upper[self.n_zero :]
         return (
             f"{zero}The brackets are {np.median(widths):.2g} of their upper ends wide in the median, "
@@ -74,8 +80,9 @@ class Brackets:
         )
 
 
+@one_blas_thread()
 def bracket_eigenvalues(
-    mesh: Mesh, k: SupportsIndex, *, boundary: Condition = "neumann", progress: Progress | None = None
+    mesh: MeshLike, k: SupportsIndex, *, boundary: Condition = "neumann", progress: Progress | None = None
 ) -> Brackets:
     """Bound each of the k lowest eigenvalues of a mesh from both sides, as the shape of flat simplices that it is.
 
@@ -96,7 +103,7 @@ def bracket_eigenvalues(
 
     Parameters
     ----------
-    mesh : TriangleMesh or SimplicialMesh
+    mesh : MeshLike
         Of any dimension; two triangles that touch in a point alone are apart.
     k : int
         Number of eigenvalues, 1 to the number of points that are not held.
@@ -112,16 +119,16 @@ def bracket_eigenvalues(
     Raises
     ------
     InvalidShapeError
-        If a simplex has no volume, a point no simplex, or floats cannot hold 1/length².
+        If a simplex has no volume or the corners of another, a point no simplex, or floats cannot hold 1/length².
     InvalidParameterError
         If `boundary` is neither of the two, or "dirichlet" on a mesh without boundary or without points inside; or k
         is not in range.
     ConvergenceError
         If the proof of completeness fails.
     """
+    mesh = as_simplicial(mesh)
     _require_condition(boundary)
-    require_volumes(mesh)
-    require_simplices_everywhere(mesh)
+    require_sound(mesh)
     points, scale = size_one(mesh.points)
     unit = SimplicialMesh(points, mesh.simplices)
     table = facet_table(unit)

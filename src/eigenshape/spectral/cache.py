@@ -39,17 +39,21 @@ def remembered(folder: str | Path, key: str, compute: Callable[[], Spectrum]) ->
     Warns
     -----
     UserWarning
-        If the file of that key is damaged; it is computed again and replaced.
+        If the file of that key is damaged, or is of another key; it is computed again and replaced. If the spectrum
+        cannot be kept, as on a full disk; it is returned all the same.
     """
     path = Path(folder) / f"{key}.npz"
     if path.exists():
         try:
-            return Spectrum.load(path)
+            return Spectrum.load(path, key=key)
         except FileFormatError as error:
-            warnings.warn(f"A spectrum in the cache is damaged and is computed again: {error}", stacklevel=3)
+            warnings.warn(f"A spectrum in the cache cannot be used and is computed again: {error}", stacklevel=3)
     _require_writable(Path(folder))
     spectrum = compute()
-    spectrum.save(path)
+    try:
+        spectrum.save(path, key=key)
+    except (OSError, FileFormatError) as error:
+        warnings.warn(f"A spectrum was computed and could not be kept in the cache: {error}", stacklevel=3)
     return spectrum
 
 

@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
-from threadpoolctl import threadpool_limits
 
+from eigenshape._arguments import require_type
+from eigenshape._arrays import as_array
 from eigenshape._errors import ConvergenceError, InvalidParameterError
+from eigenshape._threads import one_blas_thread
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.count import count_beside
@@ -50,9 +52,10 @@ def certify(
     ConvergenceError
         If the columns are not B-orthonormal eigenvectors, or more or fewer eigenvalues lie there.
     """
-    values, vectors = _checked(laplacian, np.asarray(eigenvalues), np.asarray(eigenvectors))
+    require_type(laplacian, Laplacian, "laplacian")
+    values, vectors = _checked(laplacian, as_array(eigenvalues, "eigenvalues"), as_array(eigenvectors, "eigenvectors"))
     values = to_pencil(laplacian.kernel, values)
-    with threadpool_limits(1, user_api="blas"):
+    with one_blas_thread():
         pencil = normalise(laplacian)
         values, vectors = np.ldexp(values, -pencil.value_exponent), np.ldexp(vectors, -pencil.vector_exponent)
         certificate = prove(pencil, Pairs(values, vectors, residual_norms(pencil, values, vectors)))

@@ -1,23 +1,23 @@
 """The same shape, told otherwise: moved, mirrored, renumbered, turned over, in another unit, twice."""
 
-from typing import TypeAlias, TypeVar
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from eigenshape.geometry.cloud import PointCloud, Shape
+from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.simplicial import Mesh
 
 Subject: TypeAlias = Shape | sp.csr_array
-SubjectT = TypeVar("SubjectT", Shape, Shape | None)
 
 APART = 16  # diameters between a shape and its copy
 
 
-def as_subject(shape: SubjectT | sp.sparray) -> SubjectT | sp.csr_array:
+def as_subject(shape: ShapeLike | sp.sparray) -> Subject:
     """Return the shape, an adjacency matrix in the one sparse form that all functions here know."""
-    return sp.csr_array(shape) if isinstance(shape, sp.sparray) else shape
+    return sp.csr_array(shape) if isinstance(shape, sp.sparray) else as_shape(shape)
 
 
 def with_points(shape: Shape, points: Float[np.ndarray, "n d"]) -> Shape:

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy.typing import ArrayLike
 
+from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import finite_values, frozen
 from eigenshape._errors import InvalidParameterError
 from eigenshape.spectral.brackets import Brackets
@@ -102,6 +103,8 @@ def compare_spectra(
     InvalidParameterError
         If a spectrum does not begin with the lowest eigenvalue, or there are fewer brackets than eigenvalues.
     """
+    require_type(one, Spectrum, "one")
+    require_type(two, Spectrum, "two")
     require_lowest(one, "one")
     require_lowest(two, "two")
     k = min(len(one.eigenvalues), len(two.eigenvalues))
@@ -109,6 +112,7 @@ def compare_spectra(
     bars = [within_residuals(one, k), within_residuals(two, k)]
     zeros = bars[0][:, 0] <= 0, bars[1][:, 0] <= 0
     if brackets is not None:
+        require_each(brackets, Brackets, "brackets")
         bars = [within_brackets(each, k, name) for each, name in zip(brackets, ("one", "two"), strict=True)]
     return SpectrumComparison(
         one=frozen(values[0]),

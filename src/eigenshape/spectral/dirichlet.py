@@ -6,6 +6,7 @@ from typing import SupportsIndex
 import numpy as np
 from jaxtyping import Int
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen
 from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.laplacian import Laplacian
@@ -50,8 +51,18 @@ def solve_dirichlet(
     ConvergenceError
         If the proof of completeness fails.
     """
+    require_type(laplacian, Laplacian, "laplacian")
     inner, free = dirichlet_laplacian(laplacian, fixed)
     found = solve_spectrum(inner, k, above=above, below=below, progress=progress)
     vectors = np.zeros((laplacian.n_points, found.eigenvectors.shape[1]))
     vectors[free] = found.eigenvectors
     return replace(found, eigenvectors=frozen(vectors), mass=laplacian.mass)
+
+
+def solve_free(
+    laplacian: Laplacian, k: SupportsIndex, held: Int[np.ndarray, " h"], progress: Progress | None = None
+) -> Spectrum:
+    """Compute the k lowest eigenpairs with some points held at zero, or none."""
+    if not held.size:
+        return solve_spectrum(laplacian, k, progress=progress)
+    return solve_dirichlet(laplacian, k, held, progress=progress)

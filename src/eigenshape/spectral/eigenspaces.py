@@ -8,8 +8,10 @@ import scipy.sparse as sp
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_values
 from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
 from eigenshape.spectral.spectrum import Spectrum, require_lowest
 
 EQUAL = 1e-9  # of the larger: exact eigenvalues that differ less are one
@@ -17,6 +19,7 @@ SEPARATED = 4.0
 DEPENDENT = 1e-12  # least eigenvalue of the Gram matrix of unit columns: below, they span less than they should
 
 
+@one_blas_thread()
 def eigenspace_errors(
     spectrum: Spectrum, eigenvalues: ArrayLike, functions: Float[np.ndarray, "n j"]
 ) -> Float[np.ndarray, " k"]:
@@ -48,6 +51,7 @@ def eigenspace_errors(
         If the spectrum does not begin with the lowest eigenvalue, eigenvalues are not ascending, functions are not
         one finite row a point, their last group is cut, or those of a group are dependent at these points.
     """
+    require_type(spectrum, Spectrum, "spectrum")
     require_lowest(spectrum, "spectrum")
     values = finite_values(eigenvalues, "eigenvalues")
     _require_functions(spectrum, values, functions)

@@ -35,7 +35,8 @@ def enclose(
     rows = abs(laplacian.stiffness).sum(axis=1) / laplacian.mass.diagonal()
     longest_row = int(np.diff(laplacian.stiffness.indptr).max())
     stray += (longest_row + 4) * EPS * float(rows.max()) / floor
-    return np.maximum(values - stray, 0.0) * (1 - relative), (values + stray) * (1 + relative)
+    lower = np.maximum(values - stray, 0.0) * max(1 - relative, 0.0)  # slivers may leave no digit: then 0 is all
+    return lower, (values + stray) * (1 + relative)
 
 
 def relative_rounding(mesh: Mesh) -> float:

@@ -8,8 +8,10 @@ import scipy.linalg as sl
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
-from eigenshape._arrays import frozen, whole_number
+from eigenshape._arguments import require_type
+from eigenshape._arrays import as_array, frozen, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
 from eigenshape.spectral.signature import NULL
 from eigenshape.spectral.spectrum import Spectrum
 
@@ -105,6 +107,7 @@ def unit_modes(spectrum: Spectrum, k: int) -> Float[np.ndarray, "n k"]:
     return spectrum.eigenvectors[:, :k] * np.sqrt(point_areas(spectrum).sum())
 
 
+@one_blas_thread()
 def functional_map(
     source: Spectrum, target: Spectrum, pairs: ArrayLike, *, n_modes: SupportsIndex = N_MODES
 ) -> FunctionalMap:
@@ -139,6 +142,8 @@ def functional_map(
         If there is no pair, one names no vertex, a spectrum has too few modes or does not begin with one constant
         function.
     """
+    require_type(source, Spectrum, "source")
+    require_type(target, Spectrum, "target")
     k = modes_of_both(source, target, n_modes)
     ends = _checked_pairs(pairs, len(source.eigenvectors), len(target.eigenvectors))
     ours, theirs = unit_modes(source, k)[ends[:, 0]], unit_modes(target, k)[ends[:, 1]]
@@ -168,7 +173,7 @@ def _least_squares(
 
 
 def _checked_pairs(pairs: ArrayLike, n_source: int, n_target: int) -> Int[np.ndarray, "p 2"]:
-    rows = np.asarray(pairs)
+    rows = as_array(pairs, "pairs")
     if rows.ndim != 2 or rows.shape[1] != 2 or not len(rows) or rows.dtype.kind not in "iu":
         raise InvalidParameterError(
             f"pairs must be whole numbers in shape (p, 2), at least one row; the shape is {rows.shape} and the type "
@@ -183,6 +188,7 @@ def _checked_pairs(pairs: ArrayLike, n_source: int, n_target: int) -> Int[np.nda
     return rows.astype(np.int64)
 
 
+@one_blas_thread()
 def transfer_function(mapping: FunctionalMap, values: ArrayLike) -> Float[np.ndarray, "n2 ..."]:
     """Carry functions from the source to the target: project on its modes, map, and expand in the target's.
 
@@ -202,7 +208,8 @@ def transfer_function(mapping: FunctionalMap, values: ArrayLike) -> Float[np.nda
     InvalidParameterError
         If there is not one finite row a vertex of the source.
     """
-    functions, n = np.asarray(values, dtype=np.float64), len(mapping.source.eigenvectors)
+    require_type(mapping, FunctionalMap, "mapping")
+    functions, n = real_numbers(values, "Functions to be carried").astype(np.float64), len(mapping.source.eigenvectors)
     if functions.ndim not in (1, 2) or len(functions) != n:
         raise InvalidParameterError(f"Functions to be carried must have {n} rows; the shape is {functions.shape}.")
     bad = np.flatnonzero(~np.isfinite(functions.reshape(n, -1)).all(axis=1))
@@ -214,6 +221,7 @@ def transfer_function(mapping: FunctionalMap, values: ArrayLike) -> Float[np.nda
     return np.asarray(unit_modes(mapping.target, k2) @ coefficients)
 
 
+@one_blas_thread()
 def compose_maps(first: FunctionalMap, second: FunctionalMap) -> FunctionalMap:
     """Carry by one map, then by another, in the modes that both have of the shape between.
 
@@ -231,6 +239,8 @@ def compose_maps(first: FunctionalMap, second: FunctionalMap) -> FunctionalMap:
     InvalidParameterError
         If the shape between is not one and the same.
     """
+    require_type(first, FunctionalMap, "first")
+    require_type(second, FunctionalMap, "second")
     k = min(first.matrix.shape[0], second.matrix.shape[1])
     one, other = (spectrum.eigenvectors[:, :k] for spectrum in (first.target, second.source))
     if not np.array_equal(one, other):

@@ -17,6 +17,7 @@ MESH_ROW = 7.0  # entries in a row of a triangle mesh, whose steps reach one edg
 PASSED = 4.0  # points of an aggregate to the wavelength from which functions are kept
 LEAST_RATIO = 2.5  # of the top to the least of these zeros' interval
 LANCZOS = 12
+ROUNDING = 1e-12  # of the energy that functions of a component would have without their neighbours
 SMOOTHED = 0.6  # of an aggregate's points: how far below the top of the spectrum smoothing reaches
 LEAST_SPREADS = (6.0, 20.0)  # of operators whose rows are full, and of those of a triangle mesh
 
@@ -85,7 +86,9 @@ def build_levels(stiffness: sp.csr_array, mass: sp.csr_array, n_coarsest: int, *
         spread = max(SMOOTHED * n / down.shape[1], _least_spread(stiffness))
         up = _by_rows(down.T)
         levels.append(Level(stiffness, mass, top, spread, down, up))
+        energies = up.power(2) @ stiffness.diagonal()
         stiffness, mass = _projected(up, stiffness, down), _projected(up, mass, down)
+        _clear_rounding(stiffness, energies)
 
 
 def _least_spread(stiffness: sp.csr_array) -> float:
@@ -142,6 +145,17 @@ def _smoothed(stiffness: sp.csr_array, top: float, columns: sp.csr_array) -> sp.
 def _projected(up: sp.csr_array, matrix: sp.csr_array, down: sp.csr_array) -> sp.csr_array:
     product = up @ (matrix @ down)
     return _by_rows((product + product.T) * 0.5)
+
+
+def _clear_rounding(stiffness: sp.csr_array, energies: Float[np.ndarray, " m"]) -> None:
+    """Set to 0 what rounding left of components that have become one point: constants there, which have no energy.
+
+    Else their rounding, 1e-16 of the energy of what was summed up, stands for an eigenvalue of its own.
+    """
+    alone = np.flatnonzero(np.diff(stiffness.indptr) == 1)
+    places = stiffness.indptr[alone]
+    rounding = np.abs(stiffness.data[places]) <= ROUNDING * energies[alone]
+    stiffness.data[places[rounding]] = 0.0
 
 
 def _by_rows(matrix: sp.sparray) -> sp.csr_array:

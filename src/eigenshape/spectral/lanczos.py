@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float, Int
 
 from eigenshape._errors import ConvergenceError
 from eigenshape.sparse.basis import Block, Slots, combined, packed, products, subtract
+from eigenshape.sparse.elimination import Scratch
 from eigenshape.sparse.lane_loops import LANES
 from eigenshape.spectral.factor import Factor
 from eigenshape.spectral.pencil import Pencil
@@ -32,16 +33,17 @@ class Operator:
     pencil: Pencil
     factor: Factor
     roots: Float[np.ndarray, "n 1"] | None
+    scratch: Scratch
 
     def image(self, block: Block) -> Block:
         """Return the operator's image of each slot."""
         images = np.empty_like(block)
         for slot, image in zip(block, images, strict=True):
             if self.roots is None:
-                self.factor.lower.solve_lanes(self.pencil.weigh(slot), image)
+                self.factor.lower.solve_lanes(self.pencil.weigh(slot), image, self.scratch)
             else:
                 np.multiply(slot, self.roots, out=image)
-                self.factor.lower.solve_lanes(image, image)
+                self.factor.lower.solve_lanes(image, image, self.scratch)
                 np.multiply(image, self.roots, out=image)
         return images
 
@@ -61,8 +63,9 @@ class Operator:
 
 
 def operator(pencil: Pencil, factor: Factor) -> Operator:
-    """Choose the inner product."""
-    return Operator(pencil, factor, np.sqrt(pencil.mass_diagonal)[:, None] if pencil.mass_floor == 1.0 else None)
+    """Choose the inner product, and make the memory of one run's solves."""
+    roots = np.sqrt(pencil.mass_diagonal)[:, None] if pencil.mass_floor == 1.0 else None
+    return Operator(pencil, factor, roots, factor.lower.scratch())
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,11 @@ import scipy.sparse as sp
 from jaxtyping import Int
 from scipy.sparse.csgraph import connected_components
 
+from eigenshape._arguments import require_type
 from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.conversion import ShapeLike
 from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.laplacian import ASYMMETRY, Laplacian
@@ -40,8 +43,9 @@ LARGEST_ZERO = 1e-6  # up to where rounding, or constants that are not annihilat
 NUDGES = (1.0, 1.07, 0.93, 1.15)
 
 
+@one_blas_thread()
 def check_laplacian(
-    laplacian: Laplacian, shape: Subject | sp.sparray | None = None, *, promises: Iterable[Promise] = USUAL
+    laplacian: Laplacian, shape: ShapeLike | sp.sparray | None = None, *, promises: Iterable[Promise] = USUAL
 ) -> OperatorReport:
     """Judge the laws that can be read off the two matrices.
 
@@ -52,7 +56,7 @@ def check_laplacian(
     Parameters
     ----------
     laplacian : Laplacian
-    shape : TriangleMesh, SimplicialMesh, PointCloud or (n, n) sparse adjacency, optional
+    shape : ShapeLike or (n, n) sparse adjacency, optional
         What the operator was made from; "volume" and "components" take a mesh.
     promises : iterable of str
         "constants": zero row sums, and no more zeros among the eigenvalues than the graph of W has components.
@@ -69,7 +73,8 @@ def check_laplacian(
     InvalidParameterError
         If a promise is unknown.
     """
-    promised, subject = known_promises(promises), as_subject(shape)
+    require_type(laplacian, Laplacian, "laplacian")
+    promised, subject = known_promises(promises), None if shape is None else as_subject(shape)
     mass, pencil = _mass(laplacian)
     optional: dict[Promise, Callable[[], list[Outcome]]] = {
         "constants": lambda: [_row_sums(laplacian), _kernel(laplacian, pencil)],

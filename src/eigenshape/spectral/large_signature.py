@@ -6,9 +6,10 @@ from typing import SupportsIndex
 import numpy as np
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
-from threadpoolctl import threadpool_limits
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, positive_values, whole_number
+from eigenshape._threads import one_blas_thread
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.blocks import chosen, images, keep_outside, residual_block, row_chunks
 from eigenshape.spectral.climbing import ROUNDS, SINGLE, Start, climb, on_finest, require_accuracy, require_lumped
@@ -97,11 +98,12 @@ def approximate_heat_kernel_signature(
     ConvergenceError
         If the accuracy is not reached.
     """
+    require_type(laplacian, Laplacian, "laplacian")
     wanted, clock = whole_number(k, "k", 1, laplacian.n_points), positive_values(times, "times")
     require_accuracy("accuracy", accuracy, SINGLE)
     require_lumped(laplacian)
     report = progress or silent
-    with threadpool_limits(1, user_api="blas"):
+    with one_blas_thread():
         pencil = normalise(laplacian)
         start = climb(pencil, wanted, CPU, report)
         if start is None:

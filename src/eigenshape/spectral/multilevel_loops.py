@@ -3,13 +3,14 @@
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
+
+from eigenshape._compile import njit
 
 STRONG = 0.25  # of a row's strongest coupling, below which points are not neighbours
 FRAGMENT = 0.25  # of the size aimed at, below which an aggregate is given away
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def grow_aggregates(starts, columns, values, size):
     """Label points by aggregates of about `size`, grown along strong negative couplings; count them."""
@@ -44,7 +45,7 @@ def grow_aggregates(starts, columns, values, size):
     return _joined(starts, columns, values, labels, counts[:n_aggregates], FRAGMENT * size)
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _joined(starts, columns, values, labels, counts, least):
     """Give each point of a fragment to the aggregate it is coupled with most, and number what is left."""
@@ -68,7 +69,7 @@ def _joined(starts, columns, values, labels, counts, least):
     return labels, n_left
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def smooth_columns(matrix, factors, sparse, n_columns):
     """Return P - diag(factors) A P, both sparse by rows; rows of the result are not sorted."""
@@ -98,7 +99,7 @@ def smooth_columns(matrix, factors, sparse, n_columns):
     return new_starts, new_columns[:height].copy(), new_values[:height].copy()
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _row_bound(starts, columns, old_starts, i):
     bound = old_starts[i + 1] - old_starts[i]
@@ -107,7 +108,7 @@ def _row_bound(starts, columns, old_starts, i):
     return bound
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _doubled(array, more):
     longer = np.empty(2 * len(array) + more, dtype=array.dtype)
@@ -115,7 +116,7 @@ def _doubled(array, more):
     return longer
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def multiply(starts, columns, values, block, product):
     """Write a sparse matrix times a block of columns; `starts` may be that of some rows only."""
@@ -123,7 +124,7 @@ def multiply(starts, columns, values, block, product):
         _row_product(starts, columns, values, block, i, product)
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _row_product(starts, columns, values, block, i, product):
     width = block.shape[1]
@@ -135,7 +136,7 @@ def _row_product(starts, columns, values, block, i, product):
             product[i, c] += value * block[j, c]
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def smoothing_step(matrix, scales, terms, block, step, moved, old, new):
     """Write the next Chebyshev step, in place of the last, and where it leads from `block`.

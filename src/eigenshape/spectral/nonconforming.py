@@ -16,11 +16,9 @@ from eigenshape.operators.crouzeix_raviart import (
     mass_floor,
 )
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.spectral.dirichlet import solve_dirichlet
+from eigenshape.spectral.dirichlet import solve_free
 from eigenshape.spectral.enclosure import enclose, relative_rounding
 from eigenshape.spectral.outcome import Progress
-from eigenshape.spectral.solver import solve_spectrum
-from eigenshape.spectral.spectrum import Spectrum
 
 EVEN = 1.5  # largest over mean C² up to which one constant serves all simplices
 STEP = 2.0  # from one weight to the next
@@ -60,9 +58,10 @@ def lower_bounds(
 
 def _weights(values: Values, mean: float, largest: float) -> list[float]:
     """Return values μ: near the last eigenvalue, and in steps from there to the first above 0."""
-    last, positive = float(values[-1]), values[values > 0]
-    if not last or largest <= EVEN * mean:
+    positive = values[values > 0]
+    if not positive.size or largest <= EVEN * mean:
         return []
+    last = float(positive[-1])
     top = min(last / (1 + mean * last), NEAREST / largest)
     n_steps = int(np.ceil(np.log(max(top / float(positive[0]), 1.0)) / np.log(STEP)))
     return [top / STEP**step for step in range(min(n_steps + 1, MOST))]
@@ -80,13 +79,6 @@ def _solver(
         return enclose(found, laplacian, mass_floor(mesh.dim), rounding)[0]
 
     return solve
-
-
-def solve_free(laplacian: Laplacian, k: int, held: Int[np.ndarray, " h"], progress: Progress | None) -> Spectrum:
-    """Compute the k lowest eigenpairs with some unknowns held at zero, or none."""
-    if not held.size:
-        return solve_spectrum(laplacian, k, progress=progress)
-    return solve_dirichlet(laplacian, k, held, progress=progress)
 
 
 def partly(progress: Progress | None, start: float, end: float) -> Progress | None:

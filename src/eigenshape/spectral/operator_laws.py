@@ -7,8 +7,10 @@ from typing import Any, TypeAlias
 import numpy as np
 import scipy.sparse as sp
 
+from eigenshape._arguments import require_type
 from eigenshape._errors import EigenshapeError, InvalidParameterError
 from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.conversion import ShapeLike
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral import changes
 from eigenshape.spectral.changes import Subject
@@ -82,7 +84,7 @@ class Trial:
 
 def check_operator(
     build: Build,
-    shape: Subject | sp.sparray,
+    shape: ShapeLike | sp.sparray,
     *,
     promises: Iterable[Promise] = USUAL,
     by_points: bool | None = None,
@@ -102,7 +104,7 @@ def check_operator(
     ----------
     build : callable
         Shape to `Laplacian`. A scale parameter is to be chosen inside, as a multiple of a length of the shape.
-    shape : TriangleMesh, SimplicialMesh, PointCloud or (n, n) sparse adjacency
+    shape : ShapeLike or (n, n) sparse adjacency
     promises : iterable of str
         As in `check_laplacian`, and: "rigid_motion": turned and moved by its own size, the shape has the same operator.
         "reflection": so has its mirror image. "orientation": so has the mesh with some simplices turned over.
@@ -124,6 +126,7 @@ def check_operator(
     InvalidParameterError
         If a promise is unknown, or what `build` returns is not a `Laplacian`.
     """
+    require_type(rng, np.random.Generator | None, "rng")
     promised = known_promises(promises)
     random = rng or np.random.default_rng(0)
     subject = changes.as_subject(shape)

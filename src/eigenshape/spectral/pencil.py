@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
+from scipy.sparse.csgraph import connected_components
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
@@ -49,9 +50,12 @@ class Pencil:
         D, the diagonal of `mass`.
     mass_floor : float
         A proven c in (0, 1] with B ≥ c D as quadratic forms; 1 where B is diagonal.
+    labels : (n,) int
+        The connected part of W and B that each point belongs to, numbered by their first points.
     level : float
-        trace W / trace B: the mean of the eigenvalues up to the shape of B, and the unit for every tolerance. Where a
-        few points make it far larger than W_ii/B_ii is in the median, that median.
+        trace W / trace B: the mean of the eigenvalues up to the shape of B, and the unit for every tolerance. Of
+        several parts the harmonic mean, since few of the low eigenvalues are of small parts. Where a few points make it
+        far larger than W_ii/B_ii is in the median, that median.
     value_exponent, vector_exponent : int
         An eigenvalue is 2**value_exponent times larger in the user's units, a vector 2**vector_exponent times.
     kernel : GaussianKernel or None
@@ -62,6 +66,7 @@ class Pencil:
     mass: sp.csc_array
     mass_diagonal: Float[np.ndarray, " n"]
     mass_floor: float
+    labels: Int[np.ndarray, " n"]
     level: float
     value_exponent: int
     vector_exponent: int
@@ -102,11 +107,13 @@ def normalise(laplacian: Laplacian) -> Pencil:
     """
     _require_range("stiffness", laplacian.stiffness.diagonal())
     _require_range("mass", laplacian.mass.diagonal())
-    up_w, up_b = _exponent(laplacian.stiffness), _exponent(laplacian.mass)
-    up_b -= up_b % 2  # an even power, so that its square root is a power of two as well
-    stiffness = _scaled(laplacian.stiffness, -up_w)
-    mass = _scaled(laplacian.mass, -up_b)
-    return _pencil(stiffness, mass, (up_w - up_b, -(up_b // 2)), laplacian.kernel)
+    return _normalised(laplacian.stiffness, laplacian.mass, (0, 0), laplacian.kernel)
+
+
+def part_pencil(whole: Pencil, stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
+    """Scale some rows and columns of W and B of a pencil, apart from all others, to units of their own."""
+    exponents = whole.value_exponent, whole.vector_exponent
+    return _normalised(stiffness, mass, exponents, whole.kernel)
 
 
 def as_pencil(stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
@@ -120,16 +127,30 @@ def as_pencil(stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
     return _pencil(_scaled(stiffness, 0), _scaled(mass, 0), (0, 0), None)
 
 
+def _normalised(
+    stiffness: sp.sparray, mass: sp.sparray, exponents: tuple[int, int], kernel: GaussianKernel | None
+) -> Pencil:
+    """Scale a pencil whose eigenvalues and vectors are powers of two times those in the user's units."""
+    up_w, up_b = _exponent(stiffness), _exponent(mass)
+    up_b -= up_b % 2  # an even power, so that its square root is a power of two as well
+    exponents = exponents[0] + up_w - up_b, exponents[1] - up_b // 2
+    return _pencil(_scaled(stiffness, -up_w), _scaled(mass, -up_b), exponents, kernel)
+
+
 def _pencil(
     stiffness: sp.csc_array, mass: sp.csc_array, exponents: tuple[int, int], kernel: GaussianKernel | None
 ) -> Pencil:
     diagonal = mass.diagonal()
+    mass_floor = _mass_floor(mass, diagonal)
+    pattern = abs(stiffness) if mass_floor == 1.0 else abs(stiffness) + abs(mass)
+    labels = connected_components(pattern, directed=False)[1].astype(np.int64)
     return Pencil(
         stiffness=stiffness,
         mass=mass,
         mass_diagonal=diagonal,
-        mass_floor=_mass_floor(mass, diagonal),
-        level=_level(stiffness.diagonal(), diagonal),
+        mass_floor=mass_floor,
+        labels=labels,
+        level=_level(stiffness.diagonal(), diagonal, labels),
         value_exponent=exponents[0],
         vector_exponent=exponents[1],
         kernel=kernel,
@@ -148,8 +169,10 @@ def _require_range(name: str, diagonal: Float[np.ndarray, " n"]) -> None:
         )
 
 
-def _level(stiffness: Float[np.ndarray, " n"], mass: Float[np.ndarray, " n"]) -> float:
+def _level(stiffness: Float[np.ndarray, " n"], mass: Float[np.ndarray, " n"], labels: Int[np.ndarray, " n"]) -> float:
     mean = float(stiffness.sum() / mass.sum())
+    if labels.any() and mean > 0:
+        mean = _harmonic_mean(stiffness, mass, labels)
     ratios = (stiffness / mass)[stiffness > 0]
     if mean <= 0 or not ratios.size:
         return 1.0
@@ -157,7 +180,16 @@ def _level(stiffness: Float[np.ndarray, " n"], mass: Float[np.ndarray, " n"]) ->
     return mean if mean < median * ALIKE else median
 
 
-def _exponent(matrix: sp.csr_array) -> int:
+def _harmonic_mean(
+    stiffness: Float[np.ndarray, " n"], mass: Float[np.ndarray, " n"], labels: Int[np.ndarray, " n"]
+) -> float:
+    """Return the level with which parts have as many low eigenvalues as each with its own (Weyl's law)."""
+    levels = np.bincount(labels, stiffness) / np.bincount(labels, mass)
+    counts, stiff = np.bincount(labels), levels > 0
+    return float(counts[stiff].sum() / (counts[stiff] / levels[stiff]).sum())
+
+
+def _exponent(matrix: sp.sparray) -> int:
     largest = float(np.abs(matrix.data).max(initial=0.0))
     return int(np.frexp(largest)[1]) - 1 if largest > 0 else 0
 

@@ -8,8 +8,10 @@ import scipy.linalg as sl
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
-from eigenshape._arrays import frozen, whole_number
+from eigenshape._arguments import require_type
+from eigenshape._arrays import as_array, frozen, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
 from eigenshape.spectral.functional_map import N_MODES, FunctionalMap, modes_of_both, point_areas, unit_modes
 from eigenshape.spectral.outcome import Progress, silent
 from eigenshape.spectral.spectrum import Spectrum
@@ -20,6 +22,7 @@ SPREAD_MODES = 20  # in which samples are far from each other
 AT_ONCE = 2**22  # distances
 
 
+@one_blas_thread()
 def point_map(mapping: FunctionalMap) -> Int[np.ndarray, " n2"]:
     """Find for each vertex of the target the vertex of the source that the map takes nearest to it.
 
@@ -35,6 +38,7 @@ def point_map(mapping: FunctionalMap) -> Int[np.ndarray, " n2"]:
     (n2,) int
         Vertices of the source; the first of equally near ones. It need not be one to one.
     """
+    require_type(mapping, FunctionalMap, "mapping")
     k2, k1 = mapping.matrix.shape
     carried = unit_modes(mapping.source, k1) @ mapping.matrix.T
     return frozen(_nearest(carried, unit_modes(mapping.target, k2)))
@@ -46,6 +50,7 @@ def _nearest(points: Float[np.ndarray, "n k"], queries: Float[np.ndarray, "q k"]
     return np.concatenate(found)
 
 
+@one_blas_thread()
 def map_from_points(
     source: Spectrum, target: Spectrum, points: ArrayLike, *, n_modes: SupportsIndex = N_MODES
 ) -> FunctionalMap:
@@ -72,8 +77,10 @@ def map_from_points(
         If there is not one vertex of the source for each of the target, a spectrum has too few modes or does not
         begin with one constant function.
     """
+    require_type(source, Spectrum, "source")
+    require_type(target, Spectrum, "target")
     k = modes_of_both(source, target, n_modes)
-    places, n1, n2 = np.asarray(points), len(source.eigenvectors), len(target.eigenvectors)
+    places, n1, n2 = as_array(points, "A point map"), len(source.eigenvectors), len(target.eigenvectors)
     if places.shape != (n2,) or places.dtype.kind not in "iu":
         raise InvalidParameterError(
             f"A point map must hold one whole number a vertex of the target, shape ({n2},); the shape is "
@@ -96,6 +103,7 @@ class _Samples:
     weighed: Float[np.ndarray, "s k"]
 
 
+@one_blas_thread()
 def refine_map(
     start: FunctionalMap,
     n_modes: SupportsIndex,
@@ -133,6 +141,7 @@ def refine_map(
     InvalidParameterError
         If a spectrum has too few modes, the start has more, or samples are too few or too many.
     """
+    require_type(start, FunctionalMap, "start")
     ends, first = (start.source, start.target), start.matrix.shape
     k = whole_number(n_modes, "n_modes", max(first), min(len(spectrum.eigenvalues) for spectrum in ends))
     stride, n2, report = whole_number(step, "step", 1), len(start.target.eigenvectors), progress or silent

@@ -3,12 +3,13 @@
 from typing import no_type_check
 
 import numpy as np
-from numba import njit
+
+from eigenshape._compile import njit
 
 ROWS = 256  # whose sums are added up before they are added to those of others, for accuracy
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def quotient_sums(stiffness, mass, vectors, sums):
     """Add φᵀWφ and φᵀBφ of each column to the rows of `sums`; W and B are symmetric."""
@@ -22,7 +23,7 @@ def quotient_sums(stiffness, mass, vectors, sums):
         _pass_on(part, sums, i, len(vectors))
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def residual_sums(stiffness, mass, vectors, values, weights, sums):
     """Add Σ (Wφ - λBφ)² / weights and φᵀBφ of each column to the rows of `sums`."""
@@ -37,7 +38,7 @@ def residual_sums(stiffness, mass, vectors, values, weights, sums):
         _pass_on(part, sums, i, len(vectors))
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _image(matrix, vectors, i, image):
     starts, columns, entries = matrix
@@ -48,7 +49,7 @@ def _image(matrix, vectors, i, image):
             image[c] += value * vectors[j, c]
 
 
-@njit(cache=True, nogil=True)
+@njit
 @no_type_check
 def _pass_on(part, sums, i, n):
     if (i + 1) % ROWS == 0 or i + 1 == n:

@@ -12,13 +12,19 @@ from eigenshape._errors import ConvergenceError
 from eigenshape.sparse.lane_loops import LANES
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.certify import in_user_units, prove
-from eigenshape.spectral.components import Parts, connected_parts, pairs_of_parts
+from eigenshape.spectral.components import (
+    Parts,
+    connected_parts,
+    merge_pairs,
+    solve_small,
+    widths,
+)
 from eigenshape.spectral.factor import Factor
 from eigenshape.spectral.lanczos import Wanted, block_lanczos
-from eigenshape.spectral.outcome import Progress, require_room
+from eigenshape.spectral.outcome import Progress, require_room, silent
 from eigenshape.spectral.pairs import Pairs, lowest, polished
 from eigenshape.spectral.pencil import Pencil
-from eigenshape.spectral.shift import shift_inside
+from eigenshape.spectral.shift import expected_values, factor_below, shift_inside
 from eigenshape.spectral.slices import walk
 
 Start = Callable[[Pencil, int, Callable[[float], None]], tuple[np.ndarray, Factor]]
@@ -31,6 +37,8 @@ WHOLE = 400  # pairs up to which one shift serves
 FEWEST_VECTORS = 150  # of a space, however few pairs are wanted
 WIDEST = 8  # groups of eight columns to a block
 RUNS = 40
+MARGIN = 1.1  # times as many pairs of a part as Weyl's law says are among the k lowest of all,
+MORE = 2  # and so many more: asking once for a few too many is cheaper than asking twice
 
 
 def proved(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
@@ -43,9 +51,12 @@ def proved(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate
     ConvergenceError
         If none does.
     """
-    parts = connected_parts(pencil)
-    if len(parts.sizes) > 1 and parts.sizes.max() <= SMALL:
-        return _in_parts(pencil, parts, k, report)
+    if pencil.labels.any():
+        return _in_parts(connected_parts(pencil), k, report)
+    return _connected(pencil, k, report)
+
+
+def _connected(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
     if dense_serves(pencil, k):
         return _dense(pencil, k, report)
     roads: list[Road] = [partial(_sparse, start=walk)] if k > WHOLE else []
@@ -74,12 +85,66 @@ def _dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate
     return _complete(pencil, pairs)
 
 
-def _in_parts(pencil: Pencil, parts: Parts, k: int, report: Progress) -> tuple[Pairs, Certificate]:
-    require_memory(pencil, k, 24 * int((parts.sizes**2).sum()))
-    report(0.1, f"solving {len(parts.sizes)} parts densely")
-    pairs = pairs_of_parts(pencil, parts, k)
-    report(0.8, "counting eigenvalues")
-    return _complete(pencil, pairs)
+def _in_parts(parts: Parts, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+    """Solve each part by itself, and prove what is merged of them as a whole.
+
+    A Krylov space of all of them would see few copies of an eigenvalue at a time, and 0 has as many as there are parts.
+    A large part is asked for as many pairs as Weyl's law expects of it, and for more until its last value is not below
+    the k-th of all: then nothing that it has beyond is among the k lowest.
+    """
+    require_memory(parts.pencil, k)
+    report(0.02, f"solving {len(parts.sizes)} parts")
+    found = dict(enumerate(solve_small(parts, SMALL, k)))
+    large = {number: parts.only(number) for number in range(len(found), len(parts.sizes))}
+    wanted = _expected_counts(parts, large, found, k)
+    progress = report
+    while wanted:
+        for number, count in wanted.items():
+            found[number] = _solve_part(parts, large[number], count, _share(progress, parts, number))
+        wanted = _missing_counts(parts, large, found, k)
+        progress = silent  # it has come to the end once
+    report(0.9, "counting eigenvalues")
+    return _complete(parts.pencil, merge_pairs(parts, [found[number] for number in range(len(found))], k))
+
+
+def _expected_counts(parts: Parts, large: dict[int, Pencil], found: dict[int, Pairs], k: int) -> dict[int, int]:
+    """Return how many of the k lowest pairs are expected of each large part, and some more."""
+    expected = {}
+    for number, pencil in large.items():
+        values = expected_values(pencil, np.arange(min(k, pencil.n), dtype=float))
+        expected[number] = np.ldexp(values, parts.exponent(pencil))
+    known = np.concatenate([*expected.values(), *(pairs.values for pairs in found.values())])
+    last = np.partition(known, k - 1)[k - 1]
+    counts = {number: int(np.count_nonzero(values <= last)) for number, values in expected.items()}
+    return {number: min(int(MARGIN * count) + MORE, k, large[number].n) for number, count in counts.items()}
+
+
+def _missing_counts(parts: Parts, large: dict[int, Pencil], found: dict[int, Pairs], k: int) -> dict[int, int]:
+    """Return how many pairs each part has below the k-th of all where those found of it end before."""
+    known = np.concatenate([pairs.values for pairs in found.values()])
+    residuals = np.concatenate([pairs.residuals for pairs in found.values()])
+    last = float(np.partition(known + widths(known, residuals), k - 1)[k - 1])
+    counts = {}
+    for number, pencil in large.items():
+        n_found = len(found[number].values)
+        if n_found < min(k, pencil.n) and found[number].values[-1] < last:
+            n_below = factor_below(pencil, float(np.ldexp(last, -parts.exponent(pencil)))).count
+            counts[number] = min(max(n_below, n_found) + MORE, k, pencil.n)
+    return counts
+
+
+def _share(report: Progress, parts: Parts, number: int) -> Progress:
+    """Return what reports the solving of one part as a share of all points."""
+    begin, end = (parts.starts[number : number + 2] / parts.pencil.n).tolist()
+    label = f"part {number + 1} of {len(parts.sizes)}"
+    return lambda done, message: report(0.05 + 0.85 * (begin + done * (end - begin)), f"{label}: {message}")
+
+
+def _solve_part(parts: Parts, pencil: Pencil, k: int, report: Progress) -> Pairs:
+    pairs, _ = _connected(pencil, k, report)
+    up = pencil.vector_exponent - parts.pencil.vector_exponent
+    values, residuals = np.ldexp([pairs.values, pairs.residuals], parts.exponent(pencil))
+    return Pairs(values, np.ldexp(pairs.vectors, up), residuals)
 
 
 def _complete(pencil: Pencil, pairs: Pairs) -> tuple[Pairs, Certificate]:

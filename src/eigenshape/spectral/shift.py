@@ -1,6 +1,7 @@
 """Where to shift, found from the operator alone."""
 
 import numpy as np
+from jaxtyping import Float
 
 from eigenshape._errors import ConvergenceError
 from eigenshape.spectral.factor import Factor, factorise
@@ -26,7 +27,7 @@ def shift_inside(pencil: Pencil, k: int) -> Factor:
     counts, whatever the dimension of the shape. Where a cluster leaves no such shift (k smaller than the number of
     components, say), the highest shift with fewer than k eigenvalues below it serves, or one below zero.
     """
-    guess = _expected(pencil, SHARE * k)
+    guess = float(expected_values(pencil, np.array([SHARE * k]))[0])
     low: Factor | None = None
     high: Factor | None = None
     factor = factor_below(pencil, guess)
@@ -40,12 +41,12 @@ def shift_inside(pencil: Pencil, k: int) -> Factor:
     return low or factorise_near(pencil, -guess)
 
 
-def _expected(pencil: Pencil, k: float) -> float:
-    """Return λ_k of a surface by Weyl's law, as its operator would have it."""
-    share = UNIFORM_MESH * k / pencil.n
+def expected_values(pencil: Pencil, numbers: Float[np.ndarray, " j"]) -> Float[np.ndarray, " j"]:
+    """Return λ_k of a surface for some k by Weyl's law, as its operator would have it."""
+    shares = UNIFORM_MESH * numbers / pencil.n
     if pencil.kernel is None:
-        return pencil.level * share
-    return -pencil.level * float(np.expm1(-share * pencil.kernel.edge_factor**2))  # (1 - e^{-tλ})/t, where level is 1/t
+        return pencil.level * shares
+    return -pencil.level * np.expm1(-shares * pencil.kernel.edge_factor**2)  # (1 - e^{-tλ})/t, where level is 1/t
 
 
 def factor_below(pencil: Pencil, shift: float) -> Factor:

@@ -6,8 +6,10 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
 from eigenshape.spectral.spectrum import Spectrum, require_lowest
 
 EVEN = 1e-9  # steps between logarithms of times that differ less are equal
@@ -54,10 +56,12 @@ def default_times(spectrum: Spectrum, n_times: SupportsIndex = N_TIMES) -> Float
     InvalidParameterError
         If there are fewer than 2 times, or no eigenvalue above 0.
     """
+    require_type(spectrum, Spectrum, "spectrum")
     values = positive_eigenvalues(spectrum)
     return 4 * np.log(10) / np.geomspace(values[-1], values[0], whole_number(n_times, "n_times", 2))
 
 
+@one_blas_thread()
 def heat_kernel_signature(spectrum: Spectrum, times: ArrayLike) -> Float[np.ndarray, "n q"]:
     """Measure the heat left at each point after each time.
 
@@ -80,11 +84,13 @@ def heat_kernel_signature(spectrum: Spectrum, times: ArrayLike) -> Float[np.ndar
     InvalidParameterError
         If a time is not positive and finite, or the spectrum is of an interval.
     """
+    require_type(spectrum, Spectrum, "spectrum")
     require_lowest(spectrum, "spectrum")
     decay = np.exp(-np.outer(spectrum.eigenvalues, positive_values(times, "times")))
     return np.asarray(spectrum.eigenvectors**2 @ decay)
 
 
+@one_blas_thread()
 def reflection_free_signature(neumann: Spectrum, dirichlet: Spectrum, times: ArrayLike) -> Float[np.ndarray, "n q"]:
     """Measure the heat left at each point as if the surface went on beyond its boundary.
 
@@ -109,12 +115,15 @@ def reflection_free_signature(neumann: Spectrum, dirichlet: Spectrum, times: Arr
     InvalidParameterError
         If a time is not positive and finite, or the spectra are of different sizes.
     """
+    require_type(neumann, Spectrum, "neumann")
+    require_type(dirichlet, Spectrum, "dirichlet")
     sizes = len(neumann.eigenvectors), len(dirichlet.eigenvectors)
     if sizes[0] != sizes[1]:
         raise InvalidParameterError(f"Both spectra must be of one surface; they have {sizes[0]} and {sizes[1]} points.")
     return (heat_kernel_signature(neumann, times) + heat_kernel_signature(dirichlet, times)) / 2
 
 
+@one_blas_thread()
 def scale_invariant_heat_kernel_signature(
     spectrum: Spectrum, times: ArrayLike | None = None, *, n_frequencies: SupportsIndex = 6
 ) -> Float[np.ndarray, "n frequencies"]:
@@ -145,6 +154,7 @@ def scale_invariant_heat_kernel_signature(
     InvalidParameterError
         If the times are not positive or no geometric sequence of at least 3, or frequencies are more than q/2.
     """
+    require_type(spectrum, Spectrum, "spectrum")
     moments = default_times(spectrum) if times is None else positive_values(times, "times")
     steps = np.diff(np.log(moments))
     if len(moments) < 3 or np.ptp(steps) > EVEN * np.abs(steps).max():

@@ -7,10 +7,11 @@ from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
-from threadpoolctl import threadpool_limits
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import ConvergenceError, InvalidParameterError
+from eigenshape._threads import one_blas_thread
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.cache import content_key, remembered
 from eigenshape.spectral.certificate import Certificate
@@ -83,12 +84,13 @@ def solve_spectrum(
     UserWarning
         If eigenvalues of a kernel lie too near to 1/t to tell those of the shape, or a file in `cache` is damaged.
     """
+    require_type(laplacian, Laplacian, "laplacian")
     wanted, limits = _asked(laplacian, k, above, below)
     if cache is not None:
         compute = partial(solve_spectrum, laplacian, k, above=above, below=below, progress=progress)
         return remembered(cache, content_key(laplacian, (wanted, *limits.tolist())), compute)
     report = progress or silent
-    with threadpool_limits(1, user_api="blas"):
+    with one_blas_thread():
         report(0.0, "scaling the operator")
         pencil = normalise(laplacian)
         try:

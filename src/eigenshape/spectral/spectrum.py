@@ -37,8 +37,14 @@ class Spectrum:
     residuals: Float[np.ndarray, " k"]
     certificate: Certificate
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | Path, *, key: str | None = None) -> None:
         """Write the spectrum to a .npz file, whole or not at all; `load` reads it again to the last digit.
+
+        Parameters
+        ----------
+        path : str or Path
+        key : str, optional
+            What tells this spectrum from others, such as a hash of the mesh; `load` can require it.
 
         Raises
         ------
@@ -46,20 +52,27 @@ class Spectrum:
             If the system cannot write there.
         """
         arrays = {"eigenvalues": self.eigenvalues, "eigenvectors": self.eigenvectors, "residuals": self.residuals}
-        write_archive(path, arrays, self.mass, self.certificate)
+        write_archive(path, arrays, self.mass, self.certificate, key)
 
     @classmethod
-    def load(cls, path: str | Path) -> "Spectrum":
+    def load(cls, path: str | Path, *, key: str | None = None) -> "Spectrum":
         """Read a spectrum that `save` wrote; no code in a file is ever run.
+
+        Parameters
+        ----------
+        path : str or Path
+        key : str, optional
+            The one that it must have been saved with; by default any.
 
         Raises
         ------
         OSError
             If the system cannot read it.
         FileFormatError
-            If it is no such file, is cut off, or its parts do not fit one another.
+            If it is no such file, is cut off, its parts do not fit one another, it holds what no spectrum holds
+            (numbers that are not finite, eigenvalues that descend or are negative), or its key is another.
         """
-        parts = read_archive(path)
+        parts = read_archive(path, key)
         arrays = {name: frozen(parts[name]) for name in ("eigenvalues", "eigenvectors", "residuals")}
         return cls(**arrays, mass=parts["mass"], certificate=parts["certificate"])
 

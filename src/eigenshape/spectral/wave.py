@@ -6,7 +6,9 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_values, positive_values, whole_number
+from eigenshape._threads import one_blas_thread
 from eigenshape.spectral.signature import positive_eigenvalues
 from eigenshape.spectral.spectrum import Spectrum
 
@@ -42,6 +44,7 @@ def default_energies(
     InvalidParameterError
         If there are fewer than 2 energies, or no two different eigenvalues above 0.
     """
+    require_type(spectrum, Spectrum, "spectrum")
     count = whole_number(n_energies, "n_energies", 2)
     ends = np.log(positive_eigenvalues(spectrum)[[0, -1]])
     sigma = SPREAD * float(ends[1] - ends[0]) / (count - 1 + 2 * MARGIN * SPREAD)
@@ -49,6 +52,7 @@ def default_energies(
     return np.linspace(ends[0] + MARGIN * sigma, ends[1] - MARGIN * sigma, count), sigma
 
 
+@one_blas_thread()
 def wave_kernel_signature(
     spectrum: Spectrum, energies: ArrayLike | None = None, *, sigma: float | None = None
 ) -> Float[np.ndarray, "n q"]:
@@ -76,6 +80,7 @@ def wave_kernel_signature(
     InvalidParameterError
         If an energy is not finite, sigma not positive, or the spectrum has no two different eigenvalues above 0.
     """
+    require_type(spectrum, Spectrum, "spectrum")
     values = positive_eigenvalues(spectrum)
     if energies is None or sigma is None:
         suggested, spread = default_energies(spectrum)

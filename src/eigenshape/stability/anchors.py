@@ -6,12 +6,13 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.geodesic import farthest_first, waves_on
 from eigenshape.geometry.simplex_distance import squared_distances
 from eigenshape.geometry.simplices import size_one
-from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.surface_points import SurfacePoints, place_points
 from eigenshape.operators.crouzeix_raviart import longest_edges
 from eigenshape.stability.perturbation import OUTSIDE, Perturbation
@@ -43,7 +44,7 @@ class AnchorNodes:
     cover: float
 
 
-def anchor_nodes(mesh: Mesh, delta: float, *, start: int = 0) -> AnchorNodes:
+def anchor_nodes(mesh: MeshLike, delta: float, *, start: int = 0) -> AnchorNodes:
     """Choose anchor-nodes: at least δ apart, and none of the surface farther than δ from all (thesis 4.2.1).
 
     Vertices stand for the points of the surface. The one that is farthest from all before, along the surface, is the
@@ -51,7 +52,7 @@ def anchor_nodes(mesh: Mesh, delta: float, *, start: int = 0) -> AnchorNodes:
 
     Parameters
     ----------
-    mesh : TriangleMesh or SimplicialMesh
+    mesh : MeshLike
         Of dimension 2.
     delta : float
         δ, in length.
@@ -69,6 +70,7 @@ def anchor_nodes(mesh: Mesh, delta: float, *, start: int = 0) -> AnchorNodes:
     InvalidParameterError
         If δ is not positive, or `start` no vertex.
     """
+    mesh = as_simplicial(mesh)
     positive_values(delta, "delta")
     least, chosen = np.full(mesh.n_points, np.inf), []
     first = whole_number(start, "start", 0, mesh.n_points - 1)
@@ -145,6 +147,8 @@ def witness_region(
     InvalidParameterError
         If δ or ρ is not positive, or a point lies in no simplex of N.
     """
+    require_type(perturbation, Perturbation, "perturbation")
+    require_type(points, SurfacePoints, "points")
     reach = (positive_values(rho, "rho")[0] + 1) * positive_values(delta, "delta")[0]
     labels, before = preimages(perturbation, points)
     inside = np.zeros(points.n_points, dtype=bool)

@@ -7,8 +7,10 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike
 from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_numbers
 from eigenshape._errors import ConvergenceError, InvalidParameterError
+from eigenshape._threads import one_blas_thread
 from eigenshape.operators.kernel import EDGE_FACTOR, LAST
 from eigenshape.operators.laplacian import Laplacian
 
@@ -34,6 +36,7 @@ class WeylBound:
     proven: float
 
 
+@one_blas_thread()
 def weyl_bound(one: Laplacian, two: Laplacian, partners: ArrayLike | None = None) -> WeylBound:
     """Bound |λ_i - ω_i| for all eigenvalues of two operators on as many points (Weyl 1912; thesis 4.3).
 
@@ -57,6 +60,8 @@ def weyl_bound(one: Laplacian, two: Laplacian, partners: ArrayLike | None = None
     ConvergenceError
         If Lanczos' method does not settle.
     """
+    require_type(one, Laplacian, "one")
+    require_type(two, Laplacian, "two")
     if one.n_points != two.n_points:
         raise InvalidParameterError(
             f"Weyl's bound takes operators on as many points; they have {one.n_points} and {two.n_points}."

@@ -6,8 +6,10 @@ from typing import SupportsIndex
 import numpy as np
 from jaxtyping import Bool, Float
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.spectral.spectrum import Spectrum
@@ -43,7 +45,7 @@ class CheegerEstimate:
 
 
 def cheeger_estimate(
-    mesh: TriangleMesh,
+    mesh: MeshLike,
     spectrum: Spectrum,
     *,
     n_modes: SupportsIndex = N_MODES,
@@ -57,7 +59,7 @@ def cheeger_estimate(
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
         In one piece.
     spectrum : Spectrum
         Of the mesh, from number 0 on, e.g. of `cotangent_laplacian(mesh)`.
@@ -72,6 +74,8 @@ def cheeger_estimate(
         If the spectrum is that of another shape, begins higher up, holds the constant alone, or tells that the mesh
         is in several pieces (then μ = 0).
     """
+    mesh = as_mesh(mesh)
+    require_type(spectrum, Spectrum, "spectrum")
     values = _first_values(mesh, spectrum)
     count = min(whole_number(n_modes, "n_modes", 1), len(values) - 1)
     cuts = [(*_best_cut(mesh, spectrum.eigenvectors[:, mode]), mode) for mode in range(1, count + 1)]
@@ -143,4 +147,5 @@ def _ratio(
         below[chosen] = areas[chosen] * (share if end is low else 1 - share)
         length += float((2 * areas[chosen] * slopes[chosen] * share / reach).sum())
     part = float(below.sum())
-    return length / min(part, float(areas.sum()) - part)
+    smaller = min(part, float(areas.sum()) - part)
+    return length / smaller if smaller > 0 else np.inf  # a level at a vertex of few faces may part nothing

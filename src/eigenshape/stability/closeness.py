@@ -7,12 +7,14 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_rows, frozen
 from eigenshape._errors import InvalidParameterError
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.enclosing_ball import enclosing_ball
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import require_volumes, size_one, volumes
-from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
+from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.stability.perturbation import Perturbation, perturbation, vertex_pairs
 
 Limit = Literal["nothing", "displacement", "Jacobian", "ball", "volume"]
@@ -94,6 +96,7 @@ def measure_closeness(perturbation: Perturbation) -> Closeness:
     InvalidShapeError
         If a simplex of M has no volume.
     """
+    require_type(perturbation, Perturbation, "perturbation")
     require_volumes(perturbation.one)
     here, there, scale = _scaled(perturbation)
     pairs = vertex_pairs(perturbation)
@@ -110,12 +113,12 @@ def measure_closeness(perturbation: Perturbation) -> Closeness:
     )
 
 
-def map_closeness(mesh: Mesh, images: ArrayLike) -> Closeness:
+def map_closeness(mesh: MeshLike, images: ArrayLike) -> Closeness:
     """Measure for which δ_H a shape and its image are δ_H-close (thesis 3.1).
 
     Parameters
     ----------
-    mesh : TriangleMesh or SimplicialMesh
+    mesh : MeshLike
     images : (n, d) float
         Where the map takes the vertices, in length; it is linear on each face.
 
@@ -131,6 +134,7 @@ def map_closeness(mesh: Mesh, images: ArrayLike) -> Closeness:
     InvalidParameterError
         If there is not one image a vertex.
     """
+    mesh = as_simplicial(mesh)
     places = finite_rows(images, "points", mesh.points.shape[1])
     if len(places) != mesh.n_points:
         raise InvalidParameterError(

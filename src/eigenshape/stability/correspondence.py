@@ -8,6 +8,7 @@ from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_rows, frozen, positive_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape.features.least_matching import least_perfect, near_pairs
@@ -115,6 +116,9 @@ def correspondence_graph(
     InvalidParameterError
         If δ or ρ is not positive, or a point of N lies in no simplex of it.
     """
+    require_type(perturbation, Perturbation, "perturbation")
+    require_type(points_one, SurfacePoints, "points_one")
+    require_type(points_two, SurfacePoints, "points_two")
     reach = float((positive_values(rho, "rho")[0] + 1) * positive_values(delta, "delta")[0])
     used, node = np.unique(cKDTree(nodes).query(points_one.points)[1], return_inverse=True)
     witnessed = _witnessed(perturbation, points_two, nodes[used], reach)

@@ -6,8 +6,10 @@ import numpy as np
 from jaxtyping import Int
 from numpy.typing import ArrayLike
 
-from eigenshape._arrays import frozen
+from eigenshape._arguments import require_type
+from eigenshape._arrays import as_array, frozen
 from eigenshape._errors import InvalidParameterError
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.simplicial import Mesh
 
@@ -55,7 +57,7 @@ class Perturbation:
 
 
 def perturbation(
-    one: Mesh, two: Mesh, *, regions_one: ArrayLike | None = None, regions_two: ArrayLike | None = None
+    one: MeshLike, two: MeshLike, *, regions_one: ArrayLike | None = None, regions_two: ArrayLike | None = None
 ) -> Perturbation:
     """Say how one shape became another: by a map, and by anything at all in some regions.
 
@@ -64,7 +66,7 @@ def perturbation(
 
     Parameters
     ----------
-    one, two : TriangleMesh or SimplicialMesh
+    one, two : MeshLike
         Of the same dimensions.
     regions_one, regions_two : (s1,) and (s2,) int, optional
         For each face the number of its anomalous region, from 0; -1 outside. Closures of two regions are disjoint: no
@@ -81,6 +83,8 @@ def perturbation(
         faces outside differ; a vertex would go to two places, or two to one; or the boundary of a region X_i does not
         go to that of Y_i (condition C1).
     """
+    one = as_simplicial(one, "one")
+    two = as_simplicial(two, "two")
     dims = [(mesh.dim, mesh.points.shape[1]) for mesh in (one, two)]
     if dims[0] != dims[1]:
         raise InvalidParameterError(
@@ -101,6 +105,7 @@ def vertex_pairs(perturbation: Perturbation) -> Int[np.ndarray, "v 2"]:
     InvalidParameterError
         If a vertex would go to two places, or two vertices to one.
     """
+    require_type(perturbation, Perturbation, "perturbation")
     here, there = (
         mesh.simplices[outside].ravel()
         for mesh, outside in (
@@ -125,7 +130,7 @@ def _labels(regions: ArrayLike | None, mesh: Mesh, name: str) -> Labels:
     n = len(mesh.simplices)
     if regions is None:
         return np.full(n, OUTSIDE)
-    labels = np.asarray(regions)
+    labels = as_array(regions, name)
     if labels.shape != (n,) or labels.dtype.kind not in "iu":
         raise InvalidParameterError(
             f"{name} must hold one whole number a face, shape ({n},); it has shape {labels.shape} and type "

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 
@@ -90,6 +91,7 @@ def cover_by_rate(rate: Rate, delta: ArrayLike, t: ArrayLike, measured: ArrayLik
     InvalidParameterError
         If a value is not positive and finite, or their numbers differ.
     """
+    require_type(rate, Rate, "rate")
     deltas, times, values = _measurements(delta, t, measured)
     shape = Rate(rate.delta, rate.t)
     return Rate(rate.delta, rate.t, float((values / shape.at(deltas, times)).max()))

@@ -6,9 +6,11 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.cloud import PointCloud, Shape
+from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.catalog import build_laplacian
 from eigenshape.operators.kernel import neighbor_distance
@@ -29,6 +31,7 @@ from eigenshape.stability.sampled import (
 
 FEWEST_SAMPLES = 100
 MOST_SAMPLES = 20_000
+USUAL_K = 20
 
 
 @dataclass(frozen=True)
@@ -37,8 +40,8 @@ class StabilityPlan:
 
     Attributes
     ----------
-    k : int
-        Eigenvalues to compare.
+    k : int, optional
+        Eigenvalues to compare; by default 20, or as many as the smaller shape has to compare.
     n_samples : int
         Points to throw on each shape, 100 to 20,000; of a cloud at most half of its points.
     times : sequence of float, optional
@@ -49,7 +52,7 @@ class StabilityPlan:
         Whether to bound each eigenvalue of both meshes, so that changes are proved of the shapes themselves.
     """
 
-    k: int = 20
+    k: int | None = None
     n_samples: int = 2000
     times: tuple[float, ...] = ()
     seed: int = 0
@@ -127,8 +130,8 @@ class StabilityReport:
 
 
 def compare_shapes(
-    one: Shape,
-    two: Shape,
+    one: ShapeLike,
+    two: ShapeLike,
     plan: StabilityPlan | None = None,
     *,
     partners: ArrayLike | None = None,
@@ -142,7 +145,7 @@ def compare_shapes(
 
     Parameters
     ----------
-    one, two : TriangleMesh, SimplicialMesh or PointCloud
+    one, two : ShapeLike
         Of one dimension, in one space.
     plan : StabilityPlan, optional
     partners : (n1,) int, optional
@@ -164,6 +167,9 @@ def compare_shapes(
     ConvergenceError
         If a spectrum cannot be proved complete.
     """
+    one = as_shape(one, "one")
+    two = as_shape(two, "two")
+    require_type(plan, StabilityPlan | None, "plan")
     chosen = plan or StabilityPlan()
     tell = progress or (lambda share, what: None)
     meshes = _meshes(one, two, chosen, partners)
@@ -220,7 +226,8 @@ def _checked(plan: StabilityPlan, one: Shape, two: Shape) -> tuple[int, int]:
             f"A cloud to compare is halved, and takes {2 * FEWEST_SAMPLES} points; it is {smallest!r}."
         )
     most = min(n_samples, len(one.points), len(two.points)) - 1
-    return n_samples, whole_number(plan.k, "k", 2, most)
+    k = min(USUAL_K, max(most, 2)) if plan.k is None else plan.k
+    return n_samples, whole_number(k, "k", 2, most)
 
 
 def _meshes(one: Shape, two: Shape, plan: StabilityPlan, partners: ArrayLike | None) -> tuple[Mesh, Mesh] | None:

@@ -1,7 +1,6 @@
 """Random points of two shapes, matched one to one, and what their graph Laplacians hear at several heat times."""
 
-import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -10,9 +9,15 @@ from scipy.spatial import cKDTree
 
 from eigenshape._arrays import frozen
 from eigenshape.geometry.cloud import PointCloud, Shape
+from eigenshape.geometry.quadrature import uniform_quadrature
 from eigenshape.geometry.surface_points import sample_surface
-from eigenshape.operators.gaussian import gaussian_laplacian
-from eigenshape.operators.kernel import require_whole
+from eigenshape.operators.kernel import (
+    KernelOptions,
+    choose_kernel,
+    kernel_laplacian,
+    neighbor_distance,
+    require_whole,
+)
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.neighbors import neighbor_graph
 from eigenshape.spectral.angles import EigenspaceAngles, eigenspace_angles
@@ -130,10 +135,8 @@ def changes_over_times(
     pieces = [(points, _pieces(points, samples.dim)) for points in (samples.one, samples.two, samples.again)]
     for place, t in enumerate(asked):
         progress(place / len(asked), f"heat time {t:.3g}")
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # of heat times that do not serve: `trusted` tells
-            laplacians = [_whole(points, t, samples.dim, labels) for points, labels in pieces]
-            spectra = [solve_spectrum(laplacian, k) for laplacian in laplacians]
+        laplacians = [_whole(points, t, samples.dim, labels) for points, labels in pieces]
+        spectra = [solve_spectrum(laplacian, k) for laplacian in laplacians]
         changes.append(_change(samples, laplacians, spectra, t, trusted))
         if place == len(asked) // 2:
             angles = eigenspace_angles(*spectra[:2], points=samples.matched.partners, laplacian=laplacians[0])
@@ -141,11 +144,16 @@ def changes_over_times(
 
 
 def _whole(points: Points, t: float, dim: int, labels: Int[np.ndarray, " n"]) -> Laplacian:
-    """Build the graph Laplacian, which must hold together what has one label."""
-    laplacian = gaussian_laplacian(points, t, dim)
-    if laplacian.kernel is not None:
-        require_whole(laplacian, labels, laplacian.kernel)
-    return laplacian
+    """Build `gaussian_laplacian`, which must hold together what has one label, without its kernel.
+
+    Nobody is warned of heat times that do not serve: `ChangeAtTime.trusted` tells. (To silence
+    warnings would silence those of other threads too.)
+    """
+    measure = uniform_quadrature(points, dim)
+    kernel = choose_kernel(KernelOptions(t=t), neighbor_distance(measure.points, dim))
+    laplacian = kernel_laplacian(measure, kernel)
+    require_whole(laplacian, labels, kernel)
+    return replace(laplacian, kernel=None)
 
 
 def _pieces(points: Points, dim: int) -> Int[np.ndarray, " n"]:

@@ -1,0 +1,40 @@
+"""Where experiments write, checked before their work begins, and figures as JSON."""
+
+import argparse
+import json
+import os
+import sys
+from pathlib import Path
+
+
+def output_folder(text: str) -> Path:
+    """Return a folder to write to, a type for argparse: it is made where it is missing."""
+    folder = Path(text)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as err:
+        raise argparse.ArgumentTypeError(f"the folder {folder} cannot be made: {err.strerror}") from err
+    if not os.access(folder, os.W_OK):
+        raise argparse.ArgumentTypeError(f"the folder {folder} cannot be written to")
+    return folder
+
+
+def output_file(text: str) -> Path:
+    """Return a file to write, a type for argparse: its folder is made where it is missing."""
+    path = Path(text)
+    output_folder(str(path.parent))
+    if path.is_dir():
+        raise argparse.ArgumentTypeError(f"{path} is a folder, not a file")
+    return path
+
+
+def save_figures(results: object, path: Path | None) -> None:
+    """Write figures as JSON, where there is a path."""
+    if path:
+        path.write_text(json.dumps(results, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def give_out(results: object, path: Path | None) -> None:
+    """Print figures as JSON, and write them where there is a path."""
+    sys.stdout.write(json.dumps(results, indent=2) + "\n")
+    save_figures(results, path)

@@ -1,0 +1,5 @@
+"""`python -m eigenshape`: the command line."""
+
+from eigenshape_command import main
+
+main()

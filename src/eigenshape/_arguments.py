@@ -1,0 +1,148 @@
+"""What an argument must be, and what to pass instead of what was given."""
+
+import os
+from collections.abc import Iterable
+from dataclasses import fields, is_dataclass
+from types import UnionType
+from typing import get_args
+
+from eigenshape._errors import InvalidParameterError
+
+# The call that makes each value, from a mesh where one can.
+MAKERS = {
+    "Binding": "bind(rig, [region])",
+    "Brackets": "bracket_eigenvalues(mesh, k)",
+    "Camera": "three_quarter_view(mesh)",
+    "DepthCamera": "DepthCamera()",
+    "DetailedSkeleton": "detail_skeleton(binding)",
+    "Edit": "Edit((Move(region, handle),))",
+    "EigenRig": "rig_shape(mesh)",
+    "FeaturePoints": "segment(tree).features",
+    "Figure": "figure_spectrum(spectrum)",
+    "FunctionalMap": "functional_map(source, target, pairs)",
+    "Generator": "numpy.random.default_rng(0)",
+    "Item": "Item(name, path)",
+    "LabelTransfer": "transfer_labels(source, labels, target)",
+    "Laplacian": "cotangent_laplacian(mesh)",
+    "Mapping": "{title: value}",
+    "MergeTree": "merge_tree(mesh, values)",
+    "Move": "Move(region, handle)",
+    "Panel": "Panel(mesh, title, labels, vertices)",
+    "PartTree": "find_parts(mesh).tree",
+    "PatchCodebook": "made_codebook()",
+    "PatchDescriptor": "describe_shape(mesh, PatchRecipe(made_codebook()))",
+    "PatchPoints": "patch_points(describe_patches(mesh), made_codebook())",
+    "PatchRecipe": "PatchRecipe(made_codebook())",
+    "Patches": "describe_patches(mesh)",
+    "PersistenceDiagram": "persistence_diagram(shape, values)",
+    "Perturbation": "perturbation(one, two)",
+    "PointCloud": "PointCloud(points, dim=2)",
+    "Quadrature": "mesh_quadrature(mesh)",
+    "Rate": "theorem_rate(theorem, dim)",
+    "Recipe": "SCALE_FREE",
+    "Rotation": "Rotation(pivot, axis, angle)",
+    "Segmentation": "segment(tree)",
+    "ShapeDescriptor": "describe_mesh(mesh).descriptor",
+    "ShapeIndex": "ShapeIndex.open(folder)",
+    "SkeletonGrip": "grip_skeleton(binding)",
+    "Spectrum": "solve_spectrum(laplacian, k)",
+    "SpectrumComparison": "compare_spectra(one, two)",
+    "StabilityPlan": "StabilityPlan()",
+    "StabilityReport": "compare_shapes(one, two)",
+    "SurfacePoints": "sample_surface(mesh, n)",
+    "Translation": "Translation(vector)",
+    "TriangleMesh": "TriangleMesh(vertices, faces)",
+    "Workers": "Workers()",
+}
+# What reads a value of each kind from a file.
+READERS = {
+    "PatchCodebook": "read_codebook(Path({path}).read_bytes())",
+    "PointCloud": "read_points({path}, dim=2)",
+    "ShapeIndex": "ShapeIndex.open({path})",
+    "Spectrum": "Spectrum.load({path})",
+}
+# What makes a value of one kind from one of another, where that is not the usual call.
+CONVERSIONS = {
+    ("PointCloud", "Laplacian"): "point_cloud_laplacian(cloud)",
+    ("PointCloud", "Quadrature"): "cloud_quadrature(cloud)",
+    ("TriangleMesh", "PointCloud"): "PointCloud(mesh.points)",
+    ("SimplicialMesh", "PointCloud"): "PointCloud(mesh.points, dim)",
+    ("ndarray", "Laplacian"): "Laplacian(csr_array(stiffness), csr_array(mass))",
+    ("sparse", "Laplacian"): "Laplacian(stiffness, mass)",
+}
+
+
+def require_type(value: object, kind: type | UnionType, name: str) -> None:
+    """Refuse an argument of another kind, by its type and with what to pass instead.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the value is no instance of `kind`.
+    """
+    if not isinstance(value, kind):
+        raise InvalidParameterError(
+            f"{name} must be {named_kind(kind)}; the value is {named_value(value)}. {instead(value, kind)}"
+        )
+
+
+def require_each(values: object, kind: type | UnionType, name: str) -> None:
+    """Refuse an argument that is no list of values of one kind.
+
+    Raises
+    ------
+    InvalidParameterError
+        If it is none, or a value in it is no instance of `kind`.
+    """
+    if isinstance(values, kind) or not isinstance(values, Iterable) or isinstance(values, str | bytes):
+        remedy = f"Pass [{name}]." if isinstance(values, kind) else instead(values, kind)
+        raise InvalidParameterError(
+            f"{name} must be a list, each entry {named_kind(kind)}; it is {named_value(values)}. {remedy}"
+        )
+    for index, value in enumerate(values):
+        require_type(value, kind, f"{name}[{index}]")
+
+
+def named_kind(kind: type | UnionType) -> str:
+    """Return the name of a type with its article, or those of several joined by "or"."""
+    names = ["None" if each is type(None) else f"{_article(each.__name__)} {each.__name__}" for each in _kinds(kind)]
+    return " or ".join(names)
+
+
+def named_value(value: object) -> str:
+    """Return what a value is: None, text or a number as it stands, of anything else its type."""
+    if value is None:
+        return "None"
+    name = type(value).__name__
+    text = os.fspath(value) if isinstance(value, os.PathLike) else value
+    shown = f" ({text!r})" if isinstance(text, str | int | float) else ""
+    return f"{_article(name)} {name}{shown}"
+
+
+def instead(value: object, kind: type | UnionType) -> str:
+    """Say what to pass instead of a value: a part of it, what a file holds, or what a call makes of it."""
+    part = attribute_of(value, kind)
+    if part:
+        return f"Pass its attribute {part}."
+    wanted = [each.__name__ for each in _kinds(kind) if each is not type(None)]
+    if isinstance(value, str | os.PathLike):
+        readers = [READERS[name].format(path=repr(os.fspath(value))) for name in wanted if name in READERS]
+        if readers:
+            return f"Pass {readers[0]}."
+    given = "sparse" if hasattr(value, "tocsr") else type(value).__name__
+    calls = [CONVERSIONS.get((given, name)) or MAKERS.get(name) for name in wanted]
+    return f"Pass {' or '.join(call for call in calls if call)}." if any(calls) else ""
+
+
+def attribute_of(value: object, kind: type | UnionType) -> str | None:
+    """Return the name of the first attribute of a value that is of some kind, as `mesh` is of a Repaired."""
+    parts = fields(value) if is_dataclass(value) else ()
+    return next((part.name for part in parts if isinstance(getattr(value, part.name, None), kind)), None)
+
+
+def _kinds(kind: type | UnionType) -> tuple[type, ...]:
+    return get_args(kind) or (kind,)
+
+
+def _article(name: str) -> str:
+    return "an" if name.lower().startswith(("a", "e", "i", "o", "un", "nd")) else "a"

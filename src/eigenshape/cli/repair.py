@@ -1,0 +1,69 @@
+"""eigenshape repair: a mesh repaired, or converted, and written."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from eigenshape.cli.console import (
+    CellsOption,
+    JsonOption,
+    MeshArgument,
+    err,
+    print_json,
+    print_table,
+    repair_names,
+    shown,
+)
+from eigenshape.cli.info import mesh_facts
+from eigenshape.cli.outputs import require_mesh_path, save_like
+from eigenshape.geometry import repair as repairs
+from eigenshape.io.mesh_files import read_mesh
+
+USUAL = "auto"
+ROWS = (
+    "vertices", "faces", "components", "boundary_loops", "closed", "faces_without_area", "duplicate_faces",
+    "loose_vertices", "coinciding_vertices", "non_manifold_edges", "turned_over_edges",
+)  # fmt: skip
+
+
+def repair(
+    mesh: MeshArgument,
+    *,
+    output: Annotated[Path, typer.Option("-o", "--output", "--out", help="Mesh to write: OFF, OBJ, PLY, STL or GLB.")],
+    names: Annotated[
+        str,
+        typer.Option(
+            "--repair",
+            metavar="NAMES",
+            help=(
+                f"Repairs to apply in this order, separated by commas: {', '.join(repairs.REPAIRS)}. '' only converts."
+            ),
+        ),
+    ] = USUAL,
+    cells: CellsOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Repair a mesh and write it, and report what was done. From OBJ to OBJ, polygons, textures and groups stay.
+
+    For instance: eigenshape repair scan.ply --repair auto -o clean.ply
+    """
+    require_mesh_path(output)
+    chosen = repair_names(names)
+    before = read_mesh(mesh, cells=cells)
+    done = repairs.repair(before, chosen)
+    for line in done.report:
+        err.print(f"[yellow]repair:[/] {shown(line)}")
+    facts = {"before": mesh_facts(before), "after": mesh_facts(done.mesh)}
+    save_like(mesh, done.mesh, output)
+    if as_json:
+        print_json({"path": str(mesh), "output": str(output), "report": list(done.report), **facts})
+        return
+    rows = [[name.replace("_", " "), *(_shown(fact[name]) for fact in facts.values())] for name in ROWS]
+    print_table("Repaired", ["", *facts], rows)
+
+
+def _shown(value: bool | int) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:,}"

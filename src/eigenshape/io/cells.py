@@ -1,0 +1,92 @@
+"""Which cells of a file are read: those of the highest dimension, or those that the caller names."""
+
+from collections.abc import Mapping
+from typing import Literal, cast, get_args
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from eigenshape._errors import FileFormatError, InvalidParameterError
+from eigenshape.io.text import fans
+
+CellKind = Literal["triangles", "quads", "tetrahedra"]
+SEGMENTS = "segments"
+Blocks = Mapping[str, Int[np.ndarray, "_ _"]]  # by CellKind, or SEGMENTS
+SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))  # of a polygon of four corners
+FLAT = 1e-6  # share of the third power of a cell's size; files of single precision are flat to 1e-7
+
+
+def require_kind(cells: str | None) -> CellKind | None:
+    """Return the kind of cells, or refuse another.
+
+    Raises
+    ------
+    InvalidParameterError
+        If it is another.
+    """
+    if cells is not None and cells not in get_args(CellKind):
+        raise InvalidParameterError(f"cells must be {', '.join(get_args(CellKind))} or None; it is {cells!r}.")
+    return cast(CellKind | None, cells)
+
+
+def chosen_cells(blocks: Blocks, cells: CellKind | None) -> Int[np.ndarray, "s corners"]:
+    """Return the simplices that are to be read; quads become two triangles each, of shape (0, 3) where there is none.
+
+    "quads" takes the triangles that lie between them, too.
+
+    Raises
+    ------
+    FileFormatError
+        If the file has no cells of the kind that is asked for.
+    """
+    quads = fans(blocks["quads"]) if "quads" in blocks else np.empty((0, 3), dtype=np.int64)
+    triangles = blocks.get("triangles", quads[:0])
+    surface = np.concatenate([triangles, quads])
+    tetrahedra = blocks.get("tetrahedra", np.empty((0, 4), dtype=np.int64))
+    found = {"tetrahedra": tetrahedra, "quads": surface, "triangles": triangles}
+    if cells is not None:
+        if not len(found[cells]):
+            held = ", ".join(name for name, block in blocks.items() if len(block)) or "points alone"
+            raise FileFormatError(f"A file that is read with cells={cells!r} must hold {cells}; it holds {held}.")
+        return found[cells]
+    by_dimension = [tetrahedra, surface, blocks.get(SEGMENTS, surface)]
+    return next((block for block in by_dimension if len(block)), surface)
+
+
+def four_cornered(
+    points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "c 4"]
+) -> Literal["quads", "tetrahedra"] | None:
+    """Tell whether cells of four corners are quads or tetrahedra; None where they could be either.
+
+    They are quads where all are flat, or where they join as the faces of a surface do: most share a side with one
+    other, none with two, and few share three corners with another. They are tetrahedra where most share three corners
+    with another, and some side belongs to more than two.
+    """
+    if not len(cells) or cells.min() < 0 or cells.max() >= len(points):
+        return "quads"  # whatever is made of them refuses them by index
+    if _are_flat(points, cells):
+        return "quads"
+    distinct = np.unique(np.sort(cells, axis=1), axis=0, return_index=True)[1]
+    cells = cells[np.sort(distinct)]
+    triples = np.sort(np.stack([np.delete(cells, corner, axis=1) for corner in range(4)], axis=1), axis=2)
+    sides = np.sort(np.stack([cells[:, side] for side in SIDES], axis=1), axis=2)
+    shares_triple = (_multiplicities(triples) > 1).any(axis=1).mean()
+    of_sides = _multiplicities(sides)
+    if of_sides.max() > 2:
+        return "tetrahedra" if shares_triple > 0.5 else None
+    shares_side = (of_sides == 2).any(axis=1).mean()
+    return "quads" if shares_triple < 0.5 < shares_side else None
+
+
+def _are_flat(points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "c 4"]) -> bool:
+    edges = points[cells[:, 1:]] - points[cells[:, :1]]
+    size = np.abs(edges).max(axis=(1, 2))
+    unit = edges / np.where(size > 0, size, 1.0)[:, None, None]
+    return points.shape[1] < 3 or bool((np.abs(np.linalg.det(unit)) <= FLAT).all())
+
+
+def _multiplicities(rows: Int[np.ndarray, "c p corners"]) -> Int[np.ndarray, "c p"]:
+    """Return how often each row of corners occurs among all."""
+    flat = rows.reshape(-1, rows.shape[2])
+    _, inverse, counts = np.unique(flat, axis=0, return_inverse=True, return_counts=True)
+    return counts[inverse.ravel()].reshape(rows.shape[:2])

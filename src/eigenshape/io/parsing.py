@@ -1,0 +1,66 @@
+"""From the bytes of a file to points and simplices, whatever the format; errors name the file."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from eigenshape._errors import FileFormatError, InvalidShapeError
+from eigenshape.io import glb, obj, off, ply, stl, unstructured, vtk_legacy, vtu
+from eigenshape.io.cells import SEGMENTS, Blocks, CellKind, chosen_cells
+
+# Formats whose bytes alone give vertices, and triangles or segments.
+PARSERS = {".off": off.parse, ".obj": obj.parse, ".ply": ply.parse, ".stl": stl.parse, ".glb": glb.parse}
+NAMES = {2: SEGMENTS, 3: "triangles"}
+MESH_FORMATS = (*PARSERS, ".gltf", ".vtk", ".vtu", *unstructured.READERS)
+
+
+def suffix_of(path: Path, file_format: str | None, known: tuple[str, ...]) -> str:
+    """Return the suffix that says the format, in lower case.
+
+    Raises
+    ------
+    FileFormatError
+        If it is not among those that are known.
+    """
+    suffix = path.suffix.lower() if file_format is None else f".{file_format.lower().removeprefix('.')}"
+    if suffix not in known:
+        raise FileFormatError(f"{path} must be of a known format, {', '.join(known)}; it is {suffix!r}.")
+    return suffix
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Put the path before the message of an error; what overflows is left to the check of the shape."""
+    try:
+        with np.errstate(all="ignore"):
+            yield
+    except (FileFormatError, InvalidShapeError) as err:
+        name = "" if str(err).startswith(str(path)) else f"{path}: "
+        raise type(err)(f"{name}{err}") from err
+    except MemoryError as err:
+        raise FileFormatError(f"{path} must fit into memory; there is too little to read it.") from err
+
+
+def parse_mesh(
+    path: Path, suffix: str, data: bytes, cells: CellKind | None
+) -> tuple[Float[np.ndarray, "n d"], Int[np.ndarray, "s corners"]]:
+    """Return points and the simplices that are chosen; of shape (0, 3) where there are points alone."""
+    points, blocks = _blocks(path, suffix, data, cells)
+    return points, chosen_cells(blocks, cells)
+
+
+def _blocks(path: Path, suffix: str, data: bytes, cells: CellKind | None) -> tuple[np.ndarray, Blocks]:
+    if suffix in PARSERS:
+        points, simplices = PARSERS[suffix](data)
+        return points, {NAMES[simplices.shape[1]]: simplices}
+    if suffix == ".gltf":
+        points, simplices = glb.parse_text(data, path.parent)
+        return points, {"triangles": simplices}
+    if suffix == ".vtk":
+        return vtk_legacy.parse(data, cells)
+    if suffix == ".vtu":
+        return vtu.parse(data)
+    return unstructured.read(path, suffix, data)

@@ -1,0 +1,233 @@
+"""XML files of unstructured grids: points and cells alone are unpacked, after their sizes are checked."""
+
+import base64
+import binascii
+import re
+from dataclasses import dataclass
+from xml.etree import ElementTree
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from eigenshape._errors import FileFormatError
+from eigenshape.io.unpacking import COMPRESSORS, require_reasonable, unpacked_block
+from eigenshape.io.vtk_cells import CellLists, cells_of_types
+
+HEADER_TYPES = {"UInt32": "u4", "UInt64": "u8"}
+ORDERS = {"LittleEndian": "<", "BigEndian": ">"}
+NUMBERS = {
+    "Int8": "i1", "UInt8": "u1", "Int16": "i2", "UInt16": "u2", "Int32": "i4", "UInt32": "u4",
+    "Int64": "i8", "UInt64": "u8", "Float32": "f4", "Float64": "f8",
+}  # fmt: skip
+RAW = re.compile(rb"<AppendedData[^>]*\bencoding\s*=\s*[\"']raw[\"'][^>]*>\s*_")
+
+
+@dataclass(frozen=True)
+class _Packing:
+    """How the arrays of a file are written, and the bytes after its tags."""
+
+    size: np.dtype  # of the counts before each array
+    order: str
+    compressor: str | None
+    appended: bytes
+    is_raw: bool
+    n_bytes: int  # of the file
+
+    def numbers(self, array: ElementTree.Element, count: int | None = None) -> np.ndarray:
+        """Read an array, of `count` numbers if that is known, which is checked before any is unpacked."""
+        name = array.get("Name", "an array")
+        kind = NUMBERS.get(array.get("type", ""))
+        if kind is None:
+            raise FileFormatError(f"Arrays of a VTU file must be of numbers; {name!r} is of {array.get('type')!r}.")
+        if array.get("format", "ascii") == "ascii":
+            found = _text_numbers(array.text or "", name)
+        else:
+            dtype = np.dtype(self.order + kind)
+            data = self._data(array, None if count is None else count * dtype.itemsize, name)
+            if len(data) % dtype.itemsize:
+                raise FileFormatError(f"Arrays of a VTU file must be of whole numbers; {name!r} has {len(data)} bytes.")
+            found = np.frombuffer(data, dtype)
+        if count is not None and len(found) != count:
+            raise FileFormatError(
+                f"A VTU file must hold what it declares; {name!r} must have {count} numbers and has {len(found)}."
+            )
+        return found
+
+    def _data(self, array: ElementTree.Element, size: int | None, name: str) -> bytes:
+        if array.get("format") == "appended":
+            offset = array.get("offset", "")
+            if not re.fullmatch(r"\s*[0-9]{1,18}\s*", offset):
+                raise FileFormatError(f"An appended array must have an offset; that of {name!r} is {offset!r}.")
+            text, is_raw = self.appended[int(offset) :], self.is_raw
+        else:
+            text, is_raw = (array.text or "").strip().encode(), False
+        source = _Source(text, is_raw, name)
+        if self.compressor is None:
+            (length,) = source.counts(self.size, 1)
+            _require_size(length, size, name)
+            return source.after_counts(length, joined=True)
+        if self.compressor not in COMPRESSORS:
+            raise FileFormatError(
+                f"A VTU file must be compressed by {' or '.join(COMPRESSORS)}, or not at all; it is by "
+                f"{self.compressor[:40]!r}. Save it uncompressed."
+            )
+        (n_blocks,) = source.counts(self.size, 1)
+        if n_blocks > len(text):
+            raise FileFormatError(f"A VTU file must hold what it declares; {name!r} is of {n_blocks} blocks.")
+        _, usual, last, *packed = source.counts(self.size, 3 + n_blocks)
+        sizes = [usual] * n_blocks
+        if n_blocks and last:  # 0 stands for a last block as large as the others
+            sizes[-1] = last
+        _require_size(sum(sizes), size, name)
+        require_reasonable(sum(sizes), self.n_bytes)
+        data = source.after_counts(sum(packed), joined=False)
+        pieces = []
+        start = 0
+        for length, n_packed in zip(sizes, packed, strict=True):
+            pieces.append(unpacked_block(data[start : start + n_packed], length, self.compressor))
+            start += n_packed
+        return b"".join(pieces)
+
+
+class _Source:
+    """Counts and then data, raw or in base64."""
+
+    def __init__(self, text: bytes, is_raw: bool, name: str) -> None:
+        self.text, self.is_raw, self.name = text, is_raw, name
+        self.n_counts = 0  # bytes of all counts
+
+    def counts(self, kind: np.dtype, count: int) -> list[int]:
+        """Return the first `count` numbers."""
+        self.n_counts = count * kind.itemsize
+        return np.frombuffer(self._first(self.text, self.n_counts), kind).tolist()
+
+    def after_counts(self, length: int, *, joined: bool) -> bytes:
+        """Return the bytes after the counts; in base64 these are coded with the counts, if joined, or on their own."""
+        if self.is_raw:
+            return self._first(self.text[self.n_counts :], length)
+        if joined and b"=" not in self.text[: _coded(self.n_counts)]:
+            return self._first(self.text, self.n_counts + length)[self.n_counts :]
+        return self._first(self.text[_coded(self.n_counts) :], length)
+
+    def _first(self, text: bytes, length: int) -> bytes:
+        found = text[:length]
+        if not self.is_raw:
+            try:
+                found = base64.b64decode(text[: _coded(length)], validate=True)[:length]
+            except binascii.Error as err:
+                raise FileFormatError(f"Arrays of a VTU file must be in base64; {self.name!r} is not: {err}.") from err
+        if len(found) < length:
+            raise FileFormatError(
+                f"A VTU file must hold what it declares; {self.name!r} lacks {length - len(found)} of {length} bytes."
+            )
+        return found
+
+
+def _coded(length: int) -> int:
+    """Return how many characters of base64 so many bytes take."""
+    return -(-length // 3) * 4
+
+
+def _require_size(found: int, expected: int | None, name: str) -> None:
+    if expected is not None and found != expected:
+        raise FileFormatError(f"A VTU file must hold what it declares; {name!r} takes {expected} bytes, not {found}.")
+
+
+def _text_numbers(text: str, name: str) -> np.ndarray:
+    try:
+        return np.array([float(word.replace("_", "?")) for word in text.split()])
+    except ValueError as err:
+        raise FileFormatError(f"Arrays of a VTU file must be of numbers; {name!r} is not: {err}.") from err
+
+
+def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], dict[str, Int[np.ndarray, "_ _"]]]:
+    """Return points and cells by kind; data on points and cells is never unpacked.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is not what it declares, or declares far more than it can hold.
+    """
+    root, packing = _opened(data)
+    pieces = root.findall("./UnstructuredGrid/Piece")
+    counts = [(piece.get("NumberOfPoints", ""), piece.get("NumberOfCells", "")) for piece in pieces]
+    if not counts or not all(re.fullmatch(r"\s*[0-9]{1,18}\s*", word) for pair in counts for word in pair):
+        raise FileFormatError(f"A VTU file must hold pieces that count points and cells; the counts are {counts[:9]}.")
+    filled = [piece for piece, (_, n_cells) in zip(pieces, counts, strict=True) if int(n_cells)]
+    if len(filled) > 1:
+        raise FileFormatError(
+            f"A VTU file must hold one piece; it holds {len(filled)} that have cells. Merge them first."
+        )
+    piece = filled[0] if filled else pieces[0]
+    n_points, n_cells = int(piece.get("NumberOfPoints", "")), int(piece.get("NumberOfCells", ""))
+    points = _points(piece, packing, n_points)
+    return points, _cells(piece, packing, n_cells)
+
+
+def _opened(data: bytes) -> tuple[ElementTree.Element, _Packing]:
+    """Parse the tags; what is appended raw is no text and is cut out before."""
+    raw = RAW.search(data)
+    tags, appended = data, b""
+    if raw:
+        end = data.rfind(b"</AppendedData")
+        appended = data[raw.end() : max(end, raw.end())]
+        tags = data[: raw.end()] + data[max(end, raw.end()) :]
+    if b"<!DOCTYPE" in tags:
+        raise FileFormatError("A VTU file must be plain XML; it has a DOCTYPE, whose entities could be of any size.")
+    try:
+        root = ElementTree.fromstring(tags)
+    except (ElementTree.ParseError, ValueError, LookupError) as err:
+        raise FileFormatError(f"A VTU file must be whole XML; {err}.") from err
+    if root.tag != "VTKFile" or root.get("type") != "UnstructuredGrid":
+        raise FileFormatError(
+            f"A VTU file must be a VTKFile of the type UnstructuredGrid; it is a {root.tag[:30]} of "
+            f"{str(root.get('type'))[:30]!r}."
+        )
+    section = root.find("AppendedData")
+    if section is not None and not raw:
+        appended = (section.text or "").strip().removeprefix("_").encode()
+    header_type = root.get("header_type", "UInt32")
+    if header_type not in HEADER_TYPES:
+        raise FileFormatError(f"header_type of a VTU file must be UInt32 or UInt64; it is {header_type[:30]!r}.")
+    order = root.get("byte_order", "LittleEndian")
+    if order not in ORDERS:
+        raise FileFormatError(f"byte_order of a VTU file must be LittleEndian or BigEndian; it is {order[:30]!r}.")
+    compressor = root.get("compressor") or None
+    size = np.dtype(ORDERS[order] + HEADER_TYPES[header_type])
+    return root, _Packing(size, ORDERS[order], compressor, appended, raw is not None, len(data))
+
+
+def _points(piece: ElementTree.Element, packing: _Packing, n_points: int) -> Float[np.ndarray, "n d"]:
+    array = piece.find("./Points/DataArray")
+    if array is None:
+        raise FileFormatError("A VTU file must have points; it has none.")
+    width = (array.get("NumberOfComponents") or "3").strip()
+    if width not in ("1", "2", "3"):
+        raise FileFormatError(f"Points of a VTU file must have 1 to 3 coordinates each; they have {width[:30]!r}.")
+    numbers = packing.numbers(array, n_points * int(width))
+    return numbers.reshape(n_points, int(width)).astype(np.float64)
+
+
+def _cells(piece: ElementTree.Element, packing: _Packing, n_cells: int) -> dict[str, Int[np.ndarray, "_ _"]]:
+    arrays = {array.get("Name"): array for array in piece.findall("./Cells/DataArray")}
+    if not n_cells:
+        return {}
+    if not {"connectivity", "offsets", "types"} <= arrays.keys():
+        raise FileFormatError(
+            f"Cells of a VTU file must have connectivity, offsets and types; it has {', '.join(map(str, arrays))}."
+        )
+    types = _wholes(packing.numbers(arrays["types"], n_cells), "types")
+    ends = _wholes(packing.numbers(arrays["offsets"], n_cells), "offsets")
+    starts = np.concatenate([[0], ends])
+    if (np.diff(starts) < 0).any():
+        raise FileFormatError(f"Offsets of a VTU file must rise from 0; they begin with {ends[:9].tolist()}.")
+    corners = _wholes(packing.numbers(arrays["connectivity"], int(starts[-1])), "connectivity")
+    return cells_of_types(CellLists(starts, corners), types)
+
+
+def _wholes(numbers: np.ndarray, name: str) -> Int[np.ndarray, " k"]:
+    whole = numbers.astype(np.int64)
+    bad = np.flatnonzero(whole != numbers)
+    if bad.size:
+        raise FileFormatError(f"{name} of a VTU file must be whole numbers; number {bad[0]} is {numbers[bad[0]]}.")
+    return whole

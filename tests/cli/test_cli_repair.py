@@ -1,0 +1,177 @@
+"""`eigenshape repair`; and what verbs keep of the files that they read: polygons, textures, labels."""
+
+import json
+
+import meshio
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from eigenshape import TriangleMesh, deform, read_mesh, repair, rig_shape, write_mesh
+from eigenshape.cli import app
+from eigenshape.cli.index import _items
+from eigenshape.deformation.handles import Translation
+from eigenshape.geometry.creatures import make_creature
+from eigenshape.geometry.repair import REPAIRS
+from eigenshape.geometry.spheres import icosphere
+from eigenshape.io.labels import read_labels
+
+BALL = icosphere(2)
+SOUP = TriangleMesh(BALL.vertices[BALL.faces].reshape(-1, 3), np.arange(3 * BALL.n_faces).reshape(-1, 3))
+
+
+def run(*arguments, code=0):
+    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    assert done.exit_code == code, done.output
+    return done
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".off", ".obj", ".stl", ".glb"])
+def test_a_soup_is_welded_and_written_in_every_format(tmp_path, suffix):
+    write_mesh(SOUP, tmp_path / "soup.ply")
+    done = run("repair", tmp_path / "soup.ply", "--repair", "weld", "-o", tmp_path / f"ball{suffix}")
+    assert "repair: weld joined 798 vertices to others at the same place" in done.stderr
+    assert "wrote " in done.stderr
+    assert "480" not in done.stderr
+    assert "components" in done.stdout
+    found, wanted = read_mesh(tmp_path / f"ball{suffix}"), repair(SOUP, ["weld"]).mesh
+    assert (found.n_vertices, found.n_faces) == (162, 320)
+    np.testing.assert_allclose(found.vertices, wanted.vertices, atol=1e-7)
+    np.testing.assert_array_equal(found.faces, wanted.faces)
+
+
+def test_json_holds_the_report_and_the_facts_before_and_after(tmp_path):
+    write_mesh(SOUP, tmp_path / "soup.ply")
+    arguments = (
+        "repair",
+        tmp_path / "soup.ply",
+        "--repair",
+        "weld,drop_unreferenced",
+        "-o",
+        tmp_path / "a.ply",
+        "--json",
+    )
+    found = json.loads(run(*arguments).stdout)
+    assert found["report"] == [
+        "weld joined 798 vertices to others at the same place",
+        "drop_unreferenced removed 0 vertices without a face",
+    ]
+    assert (found["before"]["vertices"], found["after"]["vertices"]) == (960, 162)
+    assert (found["before"]["closed"], found["after"]["closed"]) == (False, True)
+    assert found["output"] == str(tmp_path / "a.ply")
+
+
+@pytest.mark.skipif("auto" not in REPAIRS, reason="the repair auto comes with another change")
+def test_by_default_it_does_what_is_needed(tmp_path):
+    write_mesh(SOUP, tmp_path / "soup.ply")
+    run("repair", tmp_path / "soup.ply", "-o", tmp_path / "ball.ply")
+    assert read_mesh(tmp_path / "ball.ply").n_vertices == 162
+
+
+def test_without_repairs_it_converts(tmp_path):
+    write_mesh(BALL, tmp_path / "a.ply")
+    done = run("repair", tmp_path / "a.ply", "--repair", "", "-o", tmp_path / "a.off")
+    assert "repair:" not in done.stderr
+    np.testing.assert_array_equal(read_mesh(tmp_path / "a.off").vertices, BALL.vertices)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--repair", "polish", "-o", "{folder}/b.ply"), "--repair takes "),
+        (("--repair", "weld", "-o", "{folder}/b.vtk"), "A mesh goes to .off, .obj, .ply, .stl, .glb; "),
+        (("--repair", "weld", "-o", "{folder}/no/b.ply"), "A mesh needs a folder to lie in; "),
+    ],
+)
+def test_what_is_wrong_is_named_and_nothing_written(tmp_path, options, message):
+    write_mesh(BALL, tmp_path / "a.ply")
+    done = run("repair", tmp_path / "a.ply", *(word.format(folder=tmp_path) for word in options), code=1)
+    assert message in " ".join(done.stderr.split())
+    assert [path.name for path in tmp_path.iterdir()] == ["a.ply"]
+
+
+def test_a_mesh_that_is_no_mesh_is_named(tmp_path):
+    (tmp_path / "a.ply").write_text("ply\n")
+    assert (
+        "must end with end_header"
+        in run("repair", tmp_path / "a.ply", "--repair", "weld", "-o", "b.ply", code=1).stderr
+    )
+    assert "Missing option" in " ".join(run("repair", tmp_path / "a.ply", code=2).output.split())
+
+
+def write_quads(path):
+    """Write a closed tube of quads with texture coordinates, and a loose vertex."""
+    turns, rings = 12, 10
+    angle = 2 * np.pi * np.arange(turns) / turns
+    points = [(float(np.cos(a)), float(np.sin(a)), 0.6 * z) for z in range(rings) for a in angle]
+    quads = [
+        [z * turns + i, z * turns + (i + 1) % turns, (z + 1) * turns + (i + 1) % turns, (z + 1) * turns + i]
+        for z in range(rings - 1)
+        for i in range(turns)
+    ]
+    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in (*points, (9.0, 9.0, 9.0))]
+    rows += [f"vt {i / turns} {z / rings}" for z in range(rings) for i in range(turns)]
+    rows += ["usemtl skin", *("f " + " ".join(f"{c + 1}/{c + 1}" for c in quad) for quad in quads)]
+    path.write_text("\n".join(rows) + "\n")
+
+
+def test_quads_and_textures_stay_on_the_way_through_repair_and_deform(tmp_path):
+    write_quads(tmp_path / "tube.obj")
+    faces = [line for line in (tmp_path / "tube.obj").read_text().splitlines() if line.startswith("f ")]
+    run("repair", tmp_path / "tube.obj", "--repair", "drop_unreferenced", "-o", tmp_path / "clean.obj")
+    clean = (tmp_path / "clean.obj").read_text().splitlines()
+    assert [line for line in clean if line.startswith("f ")] == faces
+    assert sum(line.startswith("v ") for line in clean) == 120
+    assert sum(line.startswith("vt ") for line in clean) == 120
+    assert "usemtl skin" in clean
+    arguments = ("--region", "z>80%", "--move", "0.5,0,0", "--fixed", "z<20%", "--repair", "drop_unreferenced")
+    run("deform", tmp_path / "tube.obj", *arguments, "-o", tmp_path / "bent.obj")
+    bent = (tmp_path / "bent.obj").read_text().splitlines()
+    assert [line for line in bent if line.startswith("f ")] == faces
+    mesh = read_mesh(tmp_path / "clean.obj")
+    z = mesh.vertices[:, 2]
+    low, high = z.min(), z.max()
+    region, fixed = z > low + 0.8 * (high - low), z < low + 0.2 * (high - low)
+    expected = deform(rig_shape(mesh), region, Translation([0.5, 0, 0]), fixed=fixed)
+    np.testing.assert_allclose(read_mesh(tmp_path / "bent.obj").vertices, expected.vertices, atol=1e-9)
+    run("deform", tmp_path / "tube.obj", *arguments, "-o", tmp_path / "bent.stl")
+    assert read_mesh(tmp_path / "bent.stl").n_faces == expected.n_faces
+
+
+def test_labels_are_a_property_of_faces_that_label_reads(tmp_path):
+    shape = make_creature("giraffe", 0, n_vertices=600)
+    write_mesh(shape, tmp_path / "a.ply")
+    done = run("segment", tmp_path / "a.ply", "-o", tmp_path / "parts.ply", "--json")
+    labels = json.loads(done.stdout)["face_labels"]
+    assert read_labels(tmp_path / "parts.ply").tolist() == labels
+    arguments = ("label", tmp_path / "a.ply", "--like", tmp_path / "a.ply", "--labels", tmp_path / "parts.ply")
+    run(*arguments, "-o", tmp_path / "again.ply", "--save", tmp_path / "again.seg")
+    again = read_labels(tmp_path / "again.ply")
+    assert again.tolist() == read_labels(tmp_path / "again.seg").tolist()
+    assert np.mean(again == labels) > 0.95
+    assert again.dtype == np.int64
+
+
+@pytest.mark.parametrize("suffix", [".msh", ".mesh", ".vtk", ".vtu"])
+def test_triangles_of_other_formats_serve_verbs_for_meshes(tmp_path, suffix):
+    kinds = {".msh": "gmsh", ".mesh": "medit"}
+    path = tmp_path / f"ball{suffix}"
+    meshio.write_points_cells(path, BALL.vertices, [("triangle", BALL.faces)], file_format=kinds.get(suffix))
+    done = run("features", path, "--json", "-n", 3)
+    assert len(json.loads(done.stdout)["face_labels"]) == BALL.n_faces
+    run("repair", path, "--repair", "", "-o", tmp_path / "again.ply")
+    np.testing.assert_array_equal(read_mesh(tmp_path / "again.ply").faces, BALL.faces)
+    assert {item.path.name for item in _items([tmp_path])} == {path.name, "again.ply"}
+
+
+def test_cells_say_what_polygons_of_four_corners_are(tmp_path):
+    polygon = "POINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 1\nPOLYGONS 1 5\n4 0 1 2 3\n"
+    (tmp_path / "a.vtk").write_text(f"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\n{polygon}")
+    done = run("info", tmp_path / "a.vtk", code=1)
+    assert "--cells in the commands info, spectrum and repair" in " ".join(done.stderr.split())
+    assert json.loads(run("info", tmp_path / "a.vtk", "--cells", "tetrahedra", "--json").stdout)["simplices"] == 1
+    assert json.loads(run("info", tmp_path / "a.vtk", "--cells", "quads", "--json").stdout)["faces"] == 2
+    run("repair", tmp_path / "a.vtk", "--cells", "quads", "--repair", "", "-o", tmp_path / "a.ply")
+    assert read_mesh(tmp_path / "a.ply").n_faces == 2
+    done = json.loads(run("spectrum", tmp_path / "a.vtk", "--cells", "tetrahedra", "-k", 3, "--json").stdout)
+    assert len(done["eigenvalues"]) == 3

@@ -1,0 +1,32 @@
+"""Quick forms of experiments: each is run once in a session, for all of its tests and all workers."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from filelock import FileLock
+
+EXPERIMENTS = Path(__file__).resolve().parents[2] / "experiments"
+
+
+@pytest.fixture(scope="session")
+def quick_form(tmp_path_factory, worker_id):
+    """Return a function that runs an experiment in its quick form, and gives the figures that it wrote."""
+    # workers of pytest-xdist have a folder each, side by side
+    own = tmp_path_factory.getbasetemp()
+    shared = own if worker_id == "master" else own.parent
+
+    def run(script):
+        folder = shared / script.replace("/", "-").removesuffix(".py")
+        out = folder / "figures.json"
+        with FileLock(f"{folder}.lock"):
+            if not out.exists():
+                folder.mkdir(exist_ok=True)
+                command = [sys.executable, EXPERIMENTS / script, "--quick", "--out", out]
+                done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+                assert done.returncode == 0, done.stderr[-3000:]
+        return json.loads(out.read_text(encoding="utf-8"))
+
+    return run

@@ -1,0 +1,399 @@
+"""Hand every public function what people hand over by mistake, as they see it: without the type checks of the tests.
+
+Run as a script, it prints what went wrong as JSON. A new public function that takes one of our values needs nothing
+here as long as its other arguments have a type or a name that is known below.
+"""
+
+import inspect
+import json
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import is_dataclass
+from functools import cache
+from pathlib import Path
+from types import UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+import scipy.sparse as sp
+from matplotlib.figure import Figure
+
+import eigenshape as es
+
+FOLDER = Path(tempfile.mkdtemp())
+
+
+@cache
+def body() -> es.TriangleMesh:
+    """A closed surface without symmetry."""
+    ball = es.icosphere(2)
+    x, y, z = ball.vertices.T
+    radius = 1 + 0.3 * x * y + 0.2 * z**3 + 0.1 * np.sin(3 * x + y)
+    return es.TriangleMesh(ball.vertices * [1.0, 1.3, 0.8] * radius[:, None], ball.faces)
+
+
+@cache
+def bent() -> es.TriangleMesh:
+    mesh = body()
+    return es.TriangleMesh(mesh.vertices + 0.01 * np.sin(mesh.vertices[:, ::-1]), mesh.faces)
+
+
+@cache
+def spectrum() -> es.Spectrum:
+    return es.solve_spectrum(es.cotangent_laplacian(body()), 40)
+
+
+@cache
+def rig() -> es.EigenRig:
+    return es.rig_shape(body())
+
+
+HEAD = es.Box([-9.0, 0.8, -9.0], [9.0, 9.0, 9.0])
+TURN = es.Rotation([0, 0.5, 0], [1, 0, 0], 0.2)
+
+
+@cache
+def binding() -> es.Binding:
+    return es.bind(rig(), [HEAD])
+
+
+@cache
+def described() -> es.DescribedShape:
+    return es.describe_mesh(body())
+
+
+@cache
+def recipe() -> es.PatchRecipe:
+    return es.PatchRecipe(es.made_codebook())
+
+
+@cache
+def patches() -> es.Patches:
+    return es.describe_patches(body())
+
+
+@cache
+def patched() -> es.PatchDescriptor:
+    return es.in_words([patches()], recipe())
+
+
+@cache
+def shelf() -> es.ShapeIndex:
+    index = es.ShapeIndex.create(FOLDER / "index")
+    index.add("body", [described().descriptor])
+    return index
+
+
+@cache
+def labels() -> np.ndarray:
+    return described().parts.labels
+
+
+@cache
+def mapping() -> es.FunctionalMap:
+    return es.map_from_points(spectrum(), spectrum(), np.arange(body().n_vertices), n_modes=10)
+
+
+@cache
+def report() -> es.StabilityReport:
+    return es.compare_shapes(body(), bent(), es.StabilityPlan(k=5, n_samples=100))
+
+
+def written_edits() -> Path:
+    es.write_edits([es.Edit((es.Move(HEAD, TURN),))], body(), FOLDER / "edits.json")
+    return FOLDER / "edits.json"
+
+
+def height() -> np.ndarray:
+    return body().vertices[:, 1].copy()
+
+
+# A right value of each type; of a mesh and its kin, `body` itself.
+VALUES: dict[Any, Callable[[], Any]] = {
+    es.TriangleMesh: body,
+    es.PointCloud: lambda: es.PointCloud(body().vertices),
+    es.Laplacian: lambda: es.cotangent_laplacian(body()),
+    es.Spectrum: spectrum,
+    es.MergeTree: lambda: es.merge_tree(body(), height()),
+    es.Segmentation: lambda: described().parts,
+    es.FeaturePoints: lambda: described().parts.features,
+    es.ShapeDescriptor: lambda: described().descriptor,
+    es.Recipe: lambda: es.SCALE_FREE,
+    es.PatchRecipe: recipe,
+    es.PatchCodebook: es.made_codebook,
+    es.PatchDescriptor: patched,
+    es.Patches: patches,
+    es.PatchPoints: lambda: es.patch_points(patches(), es.made_codebook()),
+    es.PersistenceDiagram: lambda: es.persistence_diagram(body(), height()),
+    es.EigenRig: rig,
+    es.Binding: binding,
+    es.Rotation: lambda: TURN,
+    es.Move: lambda: es.Move(HEAD, TURN),
+    es.Edit: lambda: es.Edit((es.Move(HEAD, TURN),)),
+    es.Box: lambda: HEAD,
+    es.SkeletonGrip: lambda: es.grip_skeleton(binding()),
+    es.DetailedSkeleton: lambda: es.detail_skeleton(binding()),
+    es.FunctionalMap: mapping,
+    es.Perturbation: lambda: es.perturbation(body(), bent()),
+    es.SurfacePoints: lambda: es.sample_surface(body(), 60, rng=np.random.default_rng(0)),
+    es.Quadrature: lambda: es.mesh_quadrature(body()),
+    es.Brackets: lambda: es.bracket_eigenvalues(body(), 10),
+    es.Rate: lambda: es.Rate(1.0, -1.0),
+    es.Camera: lambda: es.three_quarter_view(body()),
+    es.DepthCamera: es.DepthCamera,
+    es.Panel: lambda: es.Panel(body(), "body", labels(), np.arange(3)),
+    es.LabelTransfer: lambda: es.transfer_labels(body(), labels(), body()),
+    es.StabilityPlan: es.StabilityPlan,
+    es.StabilityReport: report,
+    es.SpectrumComparison: lambda: es.compare_spectra(spectrum(), spectrum()),
+    es.ShapeIndex: shelf,
+    es.DeformationSession: lambda: es.DeformationSession(rig()),
+    es.Workers: es.Workers,
+    es.Item: lambda: es.Item("body", FOLDER / "body.ply"),
+    Figure: Figure,
+    np.random.Generator: lambda: np.random.default_rng(0),
+}
+# A right value of each argument whose type is not ours, by its name; "function.name" where a name has several meanings.
+NAMED: dict[str, Callable[[], Any]] = {
+    "alpha": lambda: 1.0,
+    "approximate_spectrum.k": lambda: 5,
+    "bind.regions": lambda: [HEAD],
+    "boundary_surface.mesh": lambda: es.box(2, 2, 2),
+    "build": lambda: es.cotangent_laplacian,
+    "build_index.describe": lambda: len,
+    "caption": lambda: "",
+    "certify.eigenvalues": lambda: spectrum().eigenvalues,
+    "certify.eigenvectors": lambda: spectrum().eigenvectors,
+    "check_laplacian.shape": body,
+    "compare_shapes.plan": lambda: es.StabilityPlan(k=5, n_samples=100),
+    "count": lambda: 4,
+    "cover_by_rate.delta": lambda: [0.1, 0.2],
+    "cover_by_rate.measured": lambda: [0.1, 0.2],
+    "cover_by_rate.t": lambda: [1.0, 2.0],
+    "delta": lambda: 0.3,
+    "eigenspace_errors.eigenvalues": lambda: spectrum().eigenvalues[:8],
+    "eigenspace_errors.functions": lambda: spectrum().eigenvectors[:, :6],
+    "fixed": lambda: np.arange(4),
+    "functional_map.pairs": lambda: np.column_stack([np.arange(160)] * 2),
+    "images": lambda: bent().vertices,
+    "indices": lambda: [1, 2],
+    "items": list,
+    "k": lambda: 5,
+    "label": lambda: "height",
+    "labels": labels,
+    "map_from_points.points": lambda: np.arange(body().n_vertices),
+    "mask": lambda: es.region_mask(body(), HEAD),
+    "n": lambda: 50,
+    "n_features": lambda: 3,
+    "n_modes": lambda: 10,
+    "name": lambda: "body",
+    "names": lambda: ["weld"],
+    "nodes": lambda: body().vertices[:3],
+    "order": lambda: 2,
+    "path": lambda: FOLDER / "written.ply",
+    "planes": lambda: [[0.0, 1.0, 0.0, 0.5]],
+    "point_map.mapping": mapping,
+    "poses": lambda: {"rest": body()},
+    "radius": lambda: 0.4,
+    "read_edits.path": written_edits,
+    "region": lambda: HEAD,
+    "rho": lambda: 3.0,
+    "save_figure.path": lambda: FOLDER / "written.png",
+    "ShapeIndex.add.replace": lambda: True,
+    "segment.n_regions": lambda: 3,
+    "solve_spectrum.k": lambda: 5,
+    "sources": lambda: [0, 5],
+    "spectra": lambda: {"one": spectrum(), "two": spectrum()},
+    "t": lambda: 0.05,
+    "teach": lambda: len,
+    "tensors": lambda: es.curvature_tensors(body(), 1.0),
+    "times": lambda: [0.1, 0.2],
+    "transfer_function.values": height,
+    "up": lambda: "y",
+    "values": height,
+    "vertices": lambda: np.arange(3),
+    "view": lambda: [0.0, 0.0, 1.0],
+    "write_edits.path": lambda: FOLDER / "edits.json",
+    "write_points.path": lambda: FOLDER / "written.xyz",
+}
+# What a mesh is in all but type: an answer must be that of the mesh.
+SAME_MESH: dict[str, Callable[[], Any]] = {
+    "trimesh": lambda: es.to_trimesh(body()),
+    "pyvista": lambda: es.to_pyvista(body()),
+    "pair": lambda: (body().vertices, body().faces),
+    "SimplicialMesh": lambda: es.SimplicialMesh(body().points, body().simplices),
+}
+SLIPS: dict[str, Callable[[], Any]] = {
+    **SAME_MESH,
+    "mesh": body,
+    "text": lambda: "cat.ply",
+    "path": lambda: Path("cat.ply"),
+    "cloud": lambda: es.PointCloud(body().vertices),
+    "tetrahedra": lambda: es.box(2, 2, 2),
+    "points": lambda: body().vertices,
+    "repaired": lambda: es.weld(body()),
+    "laplacian": lambda: es.cotangent_laplacian(body()),
+    "matrix": lambda: sp.eye_array(3, format="csr"),
+    "spectrum": spectrum,
+    "None": lambda: None,
+    "number": lambda: 3,
+}
+DEAR = 0.5  # seconds, beyond which one of the forms of a mesh must do
+OF_ITS_OWN_KIND = {("subdivide", "SimplicialMesh")}  # a SimplicialMesh is cut in another order than a TriangleMesh
+MESHES = {es.TriangleMesh, es.SimplicialMesh, es.PointCloud}
+
+
+def kinds(annotation: Any) -> Iterator[Any]:
+    """Yield the types that a union is of, and what its lists and mappings are of."""
+    if get_origin(annotation) in (Union, UnionType) or get_origin(annotation) in (Sequence, Iterable, Mapping, tuple):
+        for part in get_args(annotation):
+            yield from kinds(part)
+    else:
+        yield annotation
+
+
+def public_callables() -> Iterator[tuple[str, Callable[..., Any], type | None]]:
+    """Yield public functions, and public methods of public classes with their class."""
+    for name in es.__all__:
+        thing = getattr(es, name)
+        if inspect.isfunction(thing):
+            yield name, thing, None
+        elif inspect.isclass(thing):
+            for method, code in vars(thing).items():
+                if inspect.isfunction(code) and not method.startswith("_"):
+                    yield f"{name}.{method}", code, thing
+
+
+def right_value(function: str, name: str, annotation: Any) -> Any:
+    """Return a value that the argument may have.
+
+    Raises
+    ------
+    LookupError
+        If there is none here.
+    """
+    for key in (f"{function}.{name}", name):
+        if key in NAMED:
+            return NAMED[key]()
+    wanted = [kind for kind in kinds(annotation) if kind in VALUES]
+    if not wanted:
+        raise LookupError(f"no right value of {name}: {annotation}")
+    value = VALUES[wanted[0]]()
+    return [value] if get_origin(annotation) in (Sequence, Iterable) else value
+
+
+def fresh(value: Any) -> Any:
+    """Return a value, and a generator of random numbers at its beginning."""
+    return np.random.default_rng(0) if isinstance(value, np.random.Generator) else value
+
+
+def same(one: Any, two: Any) -> bool:
+    """Compare two answers part by part."""
+    if isinstance(one, np.ndarray) or sp.issparse(one):
+        both = [np.asarray(each.todense() if sp.issparse(each) else each) for each in (one, two)]
+        return bool(np.array_equal(*both, equal_nan=both[0].dtype.kind == "f"))
+    if isinstance(one, es.TriangleMesh | es.SimplicialMesh):
+        return same(one.points, two.points) and same(one.simplices, two.simplices)
+    if isinstance(one, float):
+        return bool(np.array_equal(one, two, equal_nan=True))
+    if isinstance(one, list | tuple):
+        return len(one) == len(two) and all(map(same, one, two))
+    if is_dataclass(one):
+        return type(one) is type(two) and all(same(value, vars(two)[key]) for key, value in vars(one).items())
+    return type(one) is type(two)
+
+
+def unnamed(value: Any, message: str) -> str | None:
+    """Return a message that does not name what was given: its type, or that of the first where a list is meant."""
+    first = value[:1] if isinstance(value, tuple) else ()
+    names = ["None"] if value is None else [type(each).__name__ for each in (value, *first)]
+    return None if any(name in message for name in names) else f"does not name {names[0]}: {message}"
+
+
+def right_arguments(function: str, code: Callable[..., Any], owner: type | None) -> tuple[dict[str, Any], set[str]]:
+    """Return arguments that a function takes, and the names of those whose type is ours.
+
+    Raises
+    ------
+    LookupError
+        If there is no right value for one.
+    """
+    hints = get_type_hints(code)
+    given: dict[str, Any] = {}
+    ours = {name for name, hint in hints.items() if set(kinds(hint)) & (VALUES.keys() | MESHES)} - {"return"}
+    for name, parameter in inspect.signature(code).parameters.items():
+        needed = parameter.default is parameter.empty and parameter.kind is not parameter.VAR_KEYWORD
+        if name == "self":
+            given[name] = VALUES[owner]() if ours else None
+        elif ours and (needed or f"{function}.{name}" in NAMED):
+            given[name] = right_value(function, name, hints.get(name))
+        elif name in ours:
+            given[name] = parameter.default
+    return given, ours & given.keys()
+
+
+def is_accepted(slip: str, value: Any, allowed: set[Any]) -> bool:
+    """Tell whether a signature promises to take a value; what it then makes of it is for other tests to say."""
+    if es.SimplicialMesh in allowed and slip in (*SAME_MESH, "mesh", "tetrahedra"):
+        return True
+    if {complex, np.ndarray} & allowed and slip in ("points", "pair", "number", "matrix"):
+        return True
+    return any(isinstance(value, kind) for kind in allowed if isinstance(kind, type))
+
+
+def complaints_about(function: str, code: Callable[..., Any], owner: type | None) -> Iterator[tuple[str, str]]:
+    """Yield what goes wrong where one argument of a function is a slip and the others are right."""
+    starred = next(
+        (name for name, each in inspect.signature(code).parameters.items() if each.kind is each.VAR_POSITIONAL), None
+    )
+
+    def call(**arguments: Any) -> Any:
+        arguments = {name: fresh(value) for name, value in arguments.items()}
+        first = [] if starred is None else [arguments.pop(starred)]
+        return code(*first, **arguments)
+
+    started = time.process_time()
+    try:
+        given, ours = right_arguments(function, code, owner)
+        right = call(**given) if ours else None
+    except Exception as error:  # noqa: BLE001 - the tables above are to be mended
+        yield function, f"fails on right values: {type(error).__name__}: {error}"
+        return
+    dear = time.process_time() - started > DEAR
+    for name in sorted(ours):
+        allowed = set(kinds(get_type_hints(code)[name]))
+        for slip, made in SLIPS.items():
+            value = made()
+            accepted = is_accepted(slip, value, allowed)
+            is_the_mesh = es.SimplicialMesh in allowed and slip in SAME_MESH
+            if (function, slip) in OF_ITS_OWN_KIND or (accepted and (slip == "mesh" or (dear and slip != "trimesh"))):
+                continue
+            try:
+                answer = call(**{**given, name: value})
+            except es.EigenshapeError as error:
+                found = None if accepted else unnamed(value, str(error))
+            except Exception as error:  # noqa: BLE001 - the law is that there is none
+                found = f"{type(error).__name__}: {error}"
+            else:
+                wrong = "another answer than for the mesh" if is_the_mesh and not same(right, answer) else None
+                found = wrong if accepted else "took it"
+            if found:
+                yield f"{function}({name}={slip})", found
+
+
+def main() -> None:
+    warnings.simplefilter("ignore")
+    chosen = sys.argv[1:]
+    found, n_functions = [], 0
+    for name, code, owner in public_callables():
+        if not chosen or name in chosen:
+            n_functions += 1
+            found += list(complaints_about(name, code, owner))
+    sys.stdout.write(json.dumps({"functions": n_functions, "complaints": found}))
+
+
+if __name__ == "__main__":
+    main()
