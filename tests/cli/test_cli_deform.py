@@ -71,8 +71,10 @@ def test_edits_of_another_mesh_are_refused_or_carried(giraffe, tmp_path):
     assert not bent.exists()
     run("deform", finer, "--edits", edits, "--carry", giraffe, "-o", bent)
     moved = np.linalg.norm(read_mesh(bent).vertices - read_mesh(finer).vertices, axis=1)
-    assert moved[head].max() == pytest.approx(0.05, rel=1e-3), "the middle of the head; its rim follows the neck"
-    assert moved[mesh.vertices.shape[0] :].max() == pytest.approx(0.05, rel=1e-3)
+    # The middle of the head moves as one; its rim follows the neck.
+    assert np.median(moved[head]) == pytest.approx(0.05, rel=1e-6)
+    new = moved[mesh.vertices.shape[0] :]
+    assert np.isclose(new, 0.05, rtol=1e-6).sum() > len(head)
     assert np.median(moved) < 1e-3
     alone = " ".join(
         run("deform", finer, *("--carry", giraffe, "--region", "y>70%", "--move", "0,0.1,0"), code=1).stderr.split()

@@ -237,4 +237,5 @@ def test_a_pillow_with_slivers(data):
     brackets = bracket_eigenvalues(mesh, 10)
     values = solve_spectrum(cotangent_laplacian(mesh, "consistent"), 10).eigenvalues
     assert (brackets.lower == 0).all()
-    assert (brackets.upper >= values).all()
+    assert brackets.upper[0] == 0, "the constant function's; the solver finds it but for rounding"
+    assert (brackets.upper[1:] >= values[1:]).all()

@@ -72,7 +72,7 @@ def in_workers(
     count = max(min(workers.count, len(items)), 1)
     pool = ProcessPool(max_workers=count, initializer=_start_worker, context=context)
     try:
-        with _sigint_blocked():
+        with _sigint_deferred():
             _ = pool.active  # starts the processes, and the threads that replace those that die
         futures = {pool.schedule(_work, args=[work, item.path], timeout=workers.timeout): item for item in items}
         for number, future in enumerate(as_completed(futures)):
@@ -88,20 +88,44 @@ def in_workers(
 
 
 @contextmanager
-def _sigint_blocked() -> Iterator[None]:
-    """Block Ctrl-C in the processes and threads that the block starts, which inherit this, from their first moment.
+def _sigint_deferred() -> Iterator[None]:
+    """Start processes and threads with Ctrl-C blocked, and raise what came meanwhile at the end of the block.
 
-    Ctrl-C is the parent's affair, which stops its workers itself.
+    Processes and threads inherit the mask of blocked signals, so that Ctrl-C never reaches a worker: the parent stops
+    its workers. A worker whose parent stops halfway through starting it would print a traceback.
     """
+    resource_tracker.ensure_running()  # Python's helper of processes, whose start would unblock Ctrl-C
+    with _mask_of_sigint(), _handler_of_sigint():
+        yield
+
+
+@contextmanager
+def _mask_of_sigint() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):  # on Windows
         yield
         return
-    resource_tracker.ensure_running()  # Python's helper of processes, whose start would unblock Ctrl-C
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _handler_of_sigint() -> Iterator[None]:
+    """Keep Ctrl-C until the end of the block: a thread of BLAS may take it though this thread blocks it."""
+    before = signal.getsignal(signal.SIGINT)
+    if not callable(before) or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    interrupted = threading.Event()
+    signal.signal(signal.SIGINT, lambda _number, _frame: interrupted.set())
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if interrupted.is_set():
+            signal.raise_signal(signal.SIGINT)
 
 
 def _require_main_guard() -> None:
