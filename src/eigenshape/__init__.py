@@ -96,6 +96,7 @@ from eigenshape.geometry.quadrature import (
 from eigenshape.geometry.repair import (
     Repaired,
     RepairedCloud,
+    collapse_needles,
     drop_copies,
     drop_degenerate,
     drop_duplicate_faces,
@@ -351,6 +352,7 @@ __all__ = [
     "cheeger_estimate",
     "circle",
     "cloud_quadrature",
+    "collapse_needles",
     "compare_shapes",
     "compare_spectra",
     "compose_maps",

@@ -8,6 +8,7 @@ from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import (
     REPAIRS,
+    collapse_needles,
     drop_degenerate,
     drop_duplicate_faces,
     drop_unreferenced,
@@ -261,6 +262,27 @@ def test_a_face_without_area_leaves_no_slit():
     assert len(boundary_edges(done.mesh)) == 4
     report = "drop_degenerate removed 1 faces without area, and split 1 neighbor at their vertices"
     assert done.report == (report,)
+
+
+@pytest.mark.parametrize("share", [1e-7, 1e-9])
+def test_needles_collapse_to_the_face_that_they_were_cut_from(share):
+    ball = icosphere(1)
+    a, b, c = ball.faces[0]
+    on_edge = ball.vertices[a] + share * (ball.vertices[b] - ball.vertices[a])
+    cut = [[a, 42, c], [42, b, c], [a, b, 42]]
+    needles = TriangleMesh([*ball.vertices, on_edge], [*cut, *ball.faces[1:]])
+    done = collapse_needles(needles)
+    np.testing.assert_array_equal(np.sort(done.mesh.faces[0]), np.sort(ball.faces[0]))
+    np.testing.assert_array_equal(done.mesh.faces[1:], ball.faces[1:])
+    np.testing.assert_array_equal(done.mesh.vertices, ball.vertices)
+    assert done.report == ("collapse_needles joined 1 vertices to others beside them, and removed 2 faces",)
+
+
+def test_what_is_no_needle_or_nothing_else_stays():
+    narrow = TriangleMesh(icosphere(1).vertices * [1, 1, 1e-5], icosphere(1).faces)
+    nothing_else = TriangleMesh(grid(2, 2).vertices * [1e8, 1, 1], grid(2, 2).faces)
+    for mesh in (narrow, nothing_else):
+        np.testing.assert_array_equal(collapse_needles(mesh).mesh.faces, mesh.faces)
 
 
 def test_a_flip_that_would_make_a_third_face_is_not_done():

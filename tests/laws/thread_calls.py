@@ -234,6 +234,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "disc_eigenvalues": lambda v: es.disc_eigenvalues(9),
     "disjoint_union": lambda v: es.disjoint_union(v.ball, v.torus),
     "drop_copies": lambda v: es.drop_copies(v.cloud),
+    "collapse_needles": lambda v: es.collapse_needles(v.animal),
     "drop_degenerate": lambda v: es.drop_degenerate(v.animal),
     "drop_duplicate_faces": lambda v: es.drop_duplicate_faces(v.animal),
     "drop_unreferenced": lambda v: es.drop_unreferenced(v.animal),

@@ -4,7 +4,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from eigenshape._errors import ConvergenceError, InvalidParameterError
+from eigenshape._errors import ConvergenceError, InvalidParameterError, try_auto
 from eigenshape.spectral.count import count_beside
 from eigenshape.spectral.factor import Factor
 from eigenshape.spectral.pairs import Pairs
@@ -39,7 +39,7 @@ def _require_near_scales(pencil: Pencil, error: ConvergenceError) -> None:
         raise InvalidParameterError(
             f"W_ii/B_ii must not span more digits than floats have; it is {high:.3g} at point {stiff} and {low:.3g} at "
             f"point {soft}, and rounding at the one hides the eigenvalues of the other. Solve parts of so different "
-            f"sizes apart, or repair nearly degenerate elements."
+            f"sizes apart; where nearly degenerate elements are the cause, repair these. {try_auto()}"
         ) from error
 
 
