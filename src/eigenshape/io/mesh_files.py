@@ -64,7 +64,9 @@ def read_mesh(path: str | Path, *, file_format: str | None = None, cells: CellKi
 
 def _require_surface(points: np.ndarray, simplices: np.ndarray) -> None:
     if not len(simplices):
-        raise FileFormatError(f"A mesh file must hold triangles; it holds {len(points)} points and no face.")
+        raise FileFormatError(
+            f"A mesh file must hold triangles; it holds {len(points)} points and no face, and no repair makes faces."
+        )
     n_corners, dim = simplices.shape[1], points.shape[1]
     if (n_corners, dim) != (3, 3):
         what = {2: "segments", 3: "triangles", 4: "tetrahedra"}[n_corners]
