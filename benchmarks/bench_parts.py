@@ -22,7 +22,9 @@ from threadpoolctl import threadpool_limits
 
 import eigenshape as es
 from eigenshape.sparse.elimination import SymmetricFactor
-from eigenshape.spectral import count, factor, lanczos, pairs, pencil, roads
+from eigenshape.spectral.solver import factor, lanczos, pairs, pencil
+from eigenshape.spectral.solver import inertia as count
+from eigenshape.spectral.solver import strategy as roads
 
 COLUMNS = ("shape", "part", "calls", "CPU s", "share", "bound s", "set by", "times the bound")
 REAL = 8  # bytes

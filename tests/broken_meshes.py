@@ -4,7 +4,7 @@ import numpy as np
 
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.surfaces import disjoint_union, icosphere
+from eigenshape.shapes.surfaces import disjoint_union, icosphere
 
 
 def soup(mesh):

@@ -10,7 +10,8 @@ from threadpoolctl import threadpool_limits
 
 install_import_hook("eigenshape", "runtime_types.checked")
 
-ROOT = Path(__file__).resolve().parents[1]
+TESTS = Path(__file__).resolve().parent
+ROOT = TESTS.parent
 BEYOND_THE_QUICK_PART = ("analytic", "benchmarks", "laws", "oracle")
 DATA = Path(os.environ.get("EIGENSHAPE_DATA", ROOT.parent / "shared" / "data"))
 
@@ -25,7 +26,7 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark folders that are beyond the quick part; skip what reads real shapes where they are absent."""
     for item in items:
-        if item.path.parent.name in BEYOND_THE_QUICK_PART:
+        if item.path.relative_to(TESTS).parts[0] in BEYOND_THE_QUICK_PART:
             item.add_marker(pytest.mark.long)
     # unless CI asks for them to be there
     if DATA.is_dir() or os.environ.get("EIGENSHAPE_REQUIRE_DATA"):

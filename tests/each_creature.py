@@ -2,7 +2,7 @@
 
 import pytest
 
-from eigenshape.geometry.creatures import CREATURES
+from eigenshape.shapes.creatures import CREATURES
 
 QUICK = ("octopus", "quadruped")
 KINDS = [kind if kind in QUICK else pytest.param(kind, marks=pytest.mark.long) for kind in CREATURES]

@@ -14,7 +14,7 @@ import eigenshape as es
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from outputs import output_file
 
-PLACE = Path(__file__).resolve().parents[2] / "src" / "eigenshape" / "retrieval" / "made_words.npz"
+PLACE = Path(__file__).resolve().parents[2] / "src" / "eigenshape" / "retrieval" / "patches" / "made_words.npz"
 INDIVIDUALS, SIZES, VIEWS = 6, (2000, 5000), 3
 
 

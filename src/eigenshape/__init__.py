@@ -35,38 +35,13 @@ from eigenshape.features.part_merging import part_tree
 from eigenshape.features.part_tree import PartTree
 from eigenshape.features.parts import PART_CONTRAST, FoundParts, find_parts, part_spectrum
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, merge_targets, segment, touching_parts
-from eigenshape.figures.camera import Camera, three_quarter_view
-from eigenshape.figures.fields import (
-    figure_eigenfunctions,
-    figure_field,
-    figure_segments,
-    part_colors,
-    value_colors,
-)
-from eigenshape.figures.persistence import figure_diagram, figure_merge_tree
-from eigenshape.figures.poses import figure_poses
-from eigenshape.figures.save import save_figure
-from eigenshape.figures.sheet import Panel, figure_contact_sheet, figure_label_transfer
-from eigenshape.figures.spectra import figure_spectra, figure_spectrum
-from eigenshape.figures.stability import figure_stability
 from eigenshape.geometry.average_distance import average_geodesic_distance
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.cloud_measure import cloud_quadrature
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_mesh, as_shape, from_arrays
-from eigenshape.geometry.creatures import CREATURES, make_creature
 from eigenshape.geometry.crossings import self_intersections
 from eigenshape.geometry.curvature import gaussian_curvature
-from eigenshape.geometry.domains import ball, box, circle, disc, interval, irregular_grid
 from eigenshape.geometry.enclosing_ball import Ball, enclosing_ball
-from eigenshape.geometry.exact import (
-    ball_eigenvalues,
-    box_eigenvalues,
-    disc_eigenvalues,
-    flat_torus_eigenvalues,
-    projective_plane_eigenvalues,
-    sphere_eigenvalues,
-    sphere_functional_eigenvalues,
-)
 from eigenshape.geometry.facets import FacetTable, boundary_surface, facet_table
 from eigenshape.geometry.geodesic import (
     farthest_points,
@@ -74,7 +49,6 @@ from eigenshape.geometry.geodesic import (
     geodesic_distance_to_set,
     geodesic_distances,
 )
-from eigenshape.geometry.harmonics import sphere_harmonics
 from eigenshape.geometry.measure import (
     edge_lengths,
     enclosed_volume,
@@ -109,20 +83,9 @@ from eigenshape.geometry.repair import (
     weld,
     weld_seams,
 )
-from eigenshape.geometry.sampling import MeshPart, cut_by_planes, partial_scan, random_planes
-from eigenshape.geometry.scanner import DepthCamera, DepthScan, simulate_scan
 from eigenshape.geometry.simplices import dual_volumes, mean_side_length, simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.spheres import (
-    fibonacci_sphere,
-    graded_sphere,
-    projective_plane,
-    random_sphere,
-    sphere_hull,
-    three_sphere,
-)
 from eigenshape.geometry.surface_points import SurfacePoints, sample_surface
-from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, subdivide, torus
 from eigenshape.geometry.topology import (
     EdgeTable,
     boundary_edges,
@@ -158,9 +121,29 @@ from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 from eigenshape.operators.neighbors import neighbor_graph
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.operators.smoothing import denoise, noise_level
-from eigenshape.retrieval.affinity import affinity_distance, affinity_eigenvalues
-from eigenshape.retrieval.batch import BatchReport, build_index, learn_words
-from eigenshape.retrieval.codebook import (
+from eigenshape.plot.camera import Camera, three_quarter_view
+from eigenshape.plot.fields import (
+    figure_eigenfunctions,
+    figure_field,
+    figure_segments,
+    part_colors,
+    value_colors,
+)
+from eigenshape.plot.persistence import figure_diagram, figure_merge_tree
+from eigenshape.plot.poses import figure_poses
+from eigenshape.plot.save import save_figure
+from eigenshape.plot.sheet import Panel, figure_contact_sheet, figure_label_transfer
+from eigenshape.plot.spectra import figure_spectra, figure_spectrum
+from eigenshape.plot.stability import figure_stability
+from eigenshape.retrieval.baselines.affinity import affinity_distance, affinity_eigenvalues
+from eigenshape.retrieval.baselines.light_field import light_field, light_field_distance
+from eigenshape.retrieval.baselines.shape_dna import shape_dna, shape_dna_distance
+from eigenshape.retrieval.heat.describe import DescribedShape, describe, describe_mesh, describe_views
+from eigenshape.retrieval.heat.describe_large import DescribedLargeShape, describe_large_mesh
+from eigenshape.retrieval.heat.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDescriptor
+from eigenshape.retrieval.heat.score import match_features, matching_score
+from eigenshape.retrieval.label_transfer import LabelTransfer, transfer_labels
+from eigenshape.retrieval.patches.codebook import (
     PatchCodebook,
     encode_patches,
     made_codebook,
@@ -168,44 +151,61 @@ from eigenshape.retrieval.codebook import (
     train_codebook,
     write_codebook,
 )
-from eigenshape.retrieval.describe import DescribedShape, describe, describe_mesh, describe_views
-from eigenshape.retrieval.describe_large import DescribedLargeShape, describe_large_mesh
-from eigenshape.retrieval.descriptor import SCALE_FREE, THESIS, Recipe, ShapeDescriptor
-from eigenshape.retrieval.index import Match, Record, ShapeIndex
-from eigenshape.retrieval.kinds import describe_shape, describe_to_keep
-from eigenshape.retrieval.light_field import light_field, light_field_distance
-from eigenshape.retrieval.patch_descriptor import PatchDescriptor, PatchRecipe, in_words, seen_patches
-from eigenshape.retrieval.patch_matching import PatchMatch, PatchPoints, match_patches, patch_points
-from eigenshape.retrieval.patch_score import patch_distances, view_distances
-from eigenshape.retrieval.patch_verify import patch_scores, word_distances
-from eigenshape.retrieval.patches import Patches, describe_patch_views, describe_patches
-from eigenshape.retrieval.score import match_features, matching_score
-from eigenshape.retrieval.shape_dna import shape_dna, shape_dna_distance
-from eigenshape.retrieval.transfer import LabelTransfer, transfer_labels
-from eigenshape.retrieval.workers import Item, Workers
-from eigenshape.spectral.angles import EigenspaceAngles, eigenspace_angles
-from eigenshape.spectral.approximate import approximate_spectrum
-from eigenshape.spectral.brackets import Brackets, bracket_eigenvalues
+from eigenshape.retrieval.patches.descriptor import PatchDescriptor, PatchRecipe, in_words, seen_patches
+from eigenshape.retrieval.patches.distance import patch_distances, view_distances
+from eigenshape.retrieval.patches.matching import PatchMatch, PatchPoints, match_patches, patch_points
+from eigenshape.retrieval.patches.patches import Patches, describe_patch_views, describe_patches
+from eigenshape.retrieval.patches.verification import patch_scores, word_distances
+from eigenshape.retrieval.store.batch import BatchReport, build_index, learn_words
+from eigenshape.retrieval.store.index import Match, Record, ShapeIndex
+from eigenshape.retrieval.store.kinds import describe_shape, describe_to_keep
+from eigenshape.retrieval.store.workers import Item, Workers
+from eigenshape.scans.depth_camera import DepthCamera, DepthScan, simulate_scan
+from eigenshape.scans.partial import MeshPart, cut_by_planes, partial_scan, random_planes
+from eigenshape.shapes.creatures import CREATURES, make_creature
+from eigenshape.shapes.domains import ball, box, circle, disc, interval, irregular_grid
+from eigenshape.shapes.exact import (
+    ball_eigenvalues,
+    box_eigenvalues,
+    disc_eigenvalues,
+    flat_torus_eigenvalues,
+    projective_plane_eigenvalues,
+    sphere_eigenvalues,
+    sphere_functional_eigenvalues,
+)
+from eigenshape.shapes.harmonics import sphere_harmonics
+from eigenshape.shapes.spheres import (
+    fibonacci_sphere,
+    graded_sphere,
+    projective_plane,
+    random_sphere,
+    sphere_hull,
+    three_sphere,
+)
+from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, subdivide, torus
+from eigenshape.spectral.bounds.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.certificate import Certificate
-from eigenshape.spectral.certify import certify
-from eigenshape.spectral.comparison import SpectrumComparison, compare_spectra, spectral_hausdorff_distance
-from eigenshape.spectral.dirichlet import solve_dirichlet
-from eigenshape.spectral.eigenspaces import eigenspace_errors, separated_groups
-from eigenshape.spectral.functional_map import FunctionalMap, compose_maps, functional_map, transfer_function
-from eigenshape.spectral.laplacian_laws import check_laplacian
-from eigenshape.spectral.large_signature import ApproximateSignature, approximate_heat_kernel_signature
-from eigenshape.spectral.laws import USUAL, Law, NotJudged, OperatorReport
-from eigenshape.spectral.operator_laws import check_operator
-from eigenshape.spectral.point_maps import map_from_points, point_map, refine_map
-from eigenshape.spectral.signature import (
+from eigenshape.spectral.comparison.angles import EigenspaceAngles, eigenspace_angles
+from eigenshape.spectral.comparison.eigenspaces import eigenspace_errors, separated_groups
+from eigenshape.spectral.comparison.spectra import SpectrumComparison, compare_spectra, spectral_hausdorff_distance
+from eigenshape.spectral.laws.laplacian_laws import check_laplacian
+from eigenshape.spectral.laws.operator_laws import check_operator
+from eigenshape.spectral.laws.report import USUAL, Law, NotJudged, OperatorReport
+from eigenshape.spectral.maps.functional_map import FunctionalMap, compose_maps, functional_map, transfer_function
+from eigenshape.spectral.maps.point_maps import map_from_points, point_map, refine_map
+from eigenshape.spectral.multilevel.approximate import approximate_spectrum
+from eigenshape.spectral.signatures.approximate_heat import ApproximateSignature, approximate_heat_kernel_signature
+from eigenshape.spectral.signatures.heat import (
     default_times,
     heat_kernel_signature,
     reflection_free_signature,
     scale_invariant_heat_kernel_signature,
 )
-from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.spectral.signatures.wave import default_energies, wave_kernel_signature
+from eigenshape.spectral.solver.certify import certify
+from eigenshape.spectral.solver.dirichlet import solve_dirichlet
+from eigenshape.spectral.solver.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
-from eigenshape.spectral.wave import default_energies, wave_kernel_signature
 from eigenshape.stability.anchors import AnchorNodes, anchor_nodes, anchor_region, witness_region
 from eigenshape.stability.bounds import TimeRange, WeylBound, trusted_times, weyl_bound
 from eigenshape.stability.cheeger import CheegerEstimate, cheeger_estimate

@@ -1,7 +1,6 @@
-"""Small checks that name what they check, freezing of arrays, and how much memory there is."""
+"""Small checks that name what they check, and read-only copies of arrays."""
 
 import operator
-import os
 from typing import Any, SupportsIndex, TypeVar
 
 import numpy as np
@@ -9,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigenshape._arguments import named_value
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._memory import machine_memory
 
 SINGULAR = {"vertices": "vertex", "faces": "face", "points": "point", "simplices": "simplex"}
 INDEXED = {"faces": "vertices", "simplices": "points"}
@@ -199,11 +199,3 @@ def whole_numbers(value: ArrayLike, name: str, low: int, high: int) -> NDArray[n
     for suspect in numbers[(numbers < low) | (numbers > high)] if typed else numbers:
         whole_number(suspect, name, low, high)
     return numbers.astype(np.int64)
-
-
-def machine_memory() -> float:
-    """Return the bytes of memory of this machine; 8 GiB where it does not tell."""
-    try:
-        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, ValueError, OSError):
-        return 8 * 2.0**30

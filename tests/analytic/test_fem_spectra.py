@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from eigenshape.geometry import exact
-from eigenshape.geometry.domains import ball, box, disc, interval, irregular_grid
-from eigenshape.geometry.surfaces import grid, subdivide
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
-from eigenshape.spectral.dirichlet import solve_dirichlet
-from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.shapes import exact
+from eigenshape.shapes.domains import ball, box, disc, interval, irregular_grid
+from eigenshape.shapes.surfaces import grid, subdivide
+from eigenshape.spectral.solver.dirichlet import solve_dirichlet
+from eigenshape.spectral.solver.solve import solve_spectrum
 
 
 def worst(mesh, order, eigenvalues, condition):

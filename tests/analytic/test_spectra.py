@@ -5,10 +5,10 @@ import pytest
 import scipy.sparse as sp
 
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.surfaces import grid, icosphere
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.shapes.surfaces import grid, icosphere
+from eigenshape.spectral.solver.solve import solve_spectrum
 
 MASSES = ["lumped", "consistent", "averaged"]
 

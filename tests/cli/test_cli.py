@@ -11,15 +11,15 @@ import pytest
 from typer.testing import CliRunner
 
 from eigenshape.cli import app
-from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.sampling import partial_scan
-from eigenshape.geometry.surfaces import icosphere
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.retrieval.describe import describe_mesh
-from eigenshape.retrieval.index import ShapeIndex
-from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.retrieval.heat.describe import describe_mesh
+from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.scans.partial import partial_scan
+from eigenshape.shapes.creatures import make_creature
+from eigenshape.shapes.surfaces import icosphere
+from eigenshape.spectral.solver.solve import solve_spectrum
 
 PNG = b"\x89PNG\r\n\x1a\n"
 STOPPABLE = """
@@ -248,7 +248,7 @@ def test_a_match_without_its_file_leaves_its_place_empty(zoo, tmp_path):
 
 def test_features_of_large_meshes_say_how_far_heat_is_off(tmp_path, monkeypatch):
     monkeypatch.setattr("eigenshape.cli.features.LARGE", 1000)
-    monkeypatch.setattr("eigenshape.spectral.climbing.COARSENED", 5)
+    monkeypatch.setattr("eigenshape.spectral.multilevel.start.COARSENED", 5)
     path = tmp_path / "large.ply"
     write_mesh(make_creature("hand", n_vertices=2500), path)
     assert "2,500 vertices: their heat is approximate, off by about" in run("features", path).stderr

@@ -13,10 +13,10 @@ from eigenshape.deformation.deform import bend
 from eigenshape.deformation.region import Box, Brush, region_boundary, region_mask
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.features.parts import find_parts
-from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.measure import surface_area
-from eigenshape.geometry.surfaces import subdivide
 from eigenshape.io.mesh_files import read_mesh, write_mesh
+from eigenshape.shapes.creatures import make_creature
+from eigenshape.shapes.surfaces import subdivide
 
 PNG = b"\x89PNG\r\n\x1a\n"
 QUIET = lambda share, what: None  # noqa: E731

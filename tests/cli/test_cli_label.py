@@ -8,10 +8,10 @@ from typer.testing import CliRunner
 
 from eigenshape.cli import app
 from eigenshape.features.parts import find_parts
-from eigenshape.geometry.creatures import make_creature
 from eigenshape.io.labels import read_labels, write_labels
 from eigenshape.io.mesh_files import read_mesh, write_mesh
-from eigenshape.retrieval.transfer import transfer_labels
+from eigenshape.retrieval.label_transfer import transfer_labels
+from eigenshape.shapes.creatures import make_creature
 
 
 def run(*arguments, code=0):

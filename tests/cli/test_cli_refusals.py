@@ -7,9 +7,9 @@ import pytest
 from typer.testing import CliRunner
 
 from eigenshape.cli import app
-from eigenshape.geometry.creatures import make_creature
-from eigenshape.geometry.surfaces import icosphere
 from eigenshape.io.mesh_files import write_mesh
+from eigenshape.shapes.creatures import make_creature
+from eigenshape.shapes.surfaces import icosphere
 
 VERBS = ["info", "spectrum", "features", "segment", "label", "index", "query", "demo"]
 BROKEN = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n"

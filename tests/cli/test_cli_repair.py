@@ -11,10 +11,10 @@ from eigenshape import TriangleMesh, deform, read_mesh, repair, rig_shape, write
 from eigenshape.cli import app
 from eigenshape.cli.index import _items
 from eigenshape.deformation.handles import Translation
-from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.repair import REPAIRS
-from eigenshape.geometry.spheres import icosphere
 from eigenshape.io.labels import read_labels
+from eigenshape.shapes.creatures import make_creature
+from eigenshape.shapes.spheres import icosphere
 
 BALL = icosphere(2)
 SOUP = TriangleMesh(BALL.vertices[BALL.faces].reshape(-1, 3), np.arange(3 * BALL.n_faces).reshape(-1, 3))

@@ -17,12 +17,12 @@ from typer.testing import CliRunner
 
 from eigenshape.cli import app
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.spheres import fibonacci_sphere
-from eigenshape.geometry.surfaces import icosphere
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.io.shape_files import write_points
+from eigenshape.shapes.creatures import make_creature
+from eigenshape.shapes.spheres import fibonacci_sphere
+from eigenshape.shapes.surfaces import icosphere
 
 
 def run(*arguments, code=0):

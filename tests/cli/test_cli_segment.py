@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 from eigenshape.cli import app
 from eigenshape.features.parts import find_parts
 from eigenshape.features.segmentation import segment
-from eigenshape.figures.fields import part_colors
-from eigenshape.geometry.creatures import make_creature
 from eigenshape.io.mesh_files import read_mesh, write_mesh
+from eigenshape.plot.fields import part_colors
+from eigenshape.shapes.creatures import make_creature
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

@@ -8,13 +8,13 @@ from typer.testing import CliRunner
 
 from eigenshape.cli import app
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.domains import box, disc
-from eigenshape.geometry.exact import box_eigenvalues, disc_eigenvalues
-from eigenshape.geometry.spheres import fibonacci_sphere
-from eigenshape.geometry.surfaces import icosphere
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.io.shape_files import write_points
 from eigenshape.operators.catalog import OPERATORS
+from eigenshape.shapes.domains import box, disc
+from eigenshape.shapes.exact import box_eigenvalues, disc_eigenvalues
+from eigenshape.shapes.spheres import fibonacci_sphere
+from eigenshape.shapes.surfaces import icosphere
 
 
 def run(*arguments, code=0):

@@ -3,11 +3,11 @@
 import pytest
 from test_cli import run, run_json
 
-from eigenshape.geometry.domains import box
 from eigenshape.geometry.facets import boundary_surface
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.surfaces import grid
 from eigenshape.io.mesh_files import write_mesh
+from eigenshape.shapes.domains import box
+from eigenshape.shapes.surfaces import grid
 
 TINY = {
     "triangle": TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]),

@@ -8,10 +8,10 @@ import time
 
 import pytest
 
-from eigenshape.geometry.creatures import make_creature
-from eigenshape.geometry.surfaces import icosphere
 from eigenshape.io.mesh_files import write_mesh
-from eigenshape.retrieval.index import ShapeIndex
+from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.shapes.creatures import make_creature
+from eigenshape.shapes.surfaces import icosphere
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "killpg"), reason="groups of processes are a Unix thing")
 

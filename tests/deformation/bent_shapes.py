@@ -6,7 +6,7 @@ import numpy as np
 
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.surfaces import icosphere
+from eigenshape.shapes.surfaces import icosphere
 
 
 def tube(n_around=12, n_along=40, radius=0.5, length=6.0):

@@ -11,13 +11,13 @@ from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.region import region_boundary
 from eigenshape.deformation.rig import eigen_skeleton, rig_shape
 from eigenshape.deformation.skeleton import grip_skeleton, moved_skeleton
-from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.crossings import self_intersections
-from eigenshape.geometry.domains import box
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.surfaces import torus
 from eigenshape.geometry.topology import edge_table
+from eigenshape.shapes.creatures import make_creature
+from eigenshape.shapes.domains import box
+from eigenshape.shapes.surfaces import torus
 
 TURN = Rotation([0.6, 0, 0], [0, 1, 2], 1.2)
 HEAD = lump().vertices[:, 0] > 0.6

@@ -6,11 +6,11 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.deform import deform
 from eigenshape.deformation.handles import Rotation
 from eigenshape.deformation.transfer import transfer_deformation
-from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.spectral.functional_map import FunctionalMap
-from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.shapes.creatures import make_creature
+from eigenshape.spectral.maps.functional_map import FunctionalMap
+from eigenshape.spectral.solver.solve import solve_spectrum
 
 TURN = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
 

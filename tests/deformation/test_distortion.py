@@ -5,7 +5,7 @@ from bent_shapes import lump
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.distortion import measure_distortion
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.surfaces import grid
+from eigenshape.shapes.surfaces import grid
 
 
 def test_a_rigid_motion_distorts_nothing():

@@ -4,7 +4,7 @@ import pytest
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.region import Box, Brush, kept_region, region_boundary, region_mask, require_boundary
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere
+from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
 
 GRID = grid(4, 4, width=4.0, height=4.0)  # vertex 5 x + y
 

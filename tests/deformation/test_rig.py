@@ -7,11 +7,11 @@ from eigenshape.deformation.binding import bind
 from eigenshape.deformation.rig import eigen_skeleton, posed, projected, rig_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
-from eigenshape.geometry.surfaces import disjoint_union, icosphere, torus
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.operators.graph import graph_laplacian
-from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.shapes.surfaces import disjoint_union, icosphere, torus
+from eigenshape.spectral.solver.solve import solve_spectrum
 
 
 def test_all_modes_give_the_shape_back():

@@ -11,9 +11,9 @@ from eigenshape.deformation.handles import Rotation
 from eigenshape.deformation.rigidity import edge_weights, factored, fitted_turns, free_part, relax
 from eigenshape.deformation.rigidity_loops import fit_rotations, turned_edges
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere
 from eigenshape.geometry.topology import edge_table
 from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
 
 RNG = np.random.default_rng(0)
 

@@ -10,7 +10,7 @@ from eigenshape.deformation.region import Box, Brush
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.deformation.session import DeformationSession, replay
 from eigenshape.deformation.skeleton import moved_skeleton
-from eigenshape.geometry.surfaces import subdivide
+from eigenshape.shapes.surfaces import subdivide
 
 HEAD = np.flatnonzero(lump().vertices[:, 0] > 0.6)
 TAIL = lump().vertices[:, 0] < -0.7

@@ -8,15 +8,15 @@ from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.part_merging import SEED_TIME, part_tree
 from eigenshape.features.parts import find_parts, part_spectrum
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment, touching_parts
-from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.facets import facet_components, facet_table
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere
 from eigenshape.geometry.topology import edge_table, face_pairs, submesh
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.spectral.signature import heat_kernel_signature
-from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.shapes.creatures import make_creature
+from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
+from eigenshape.spectral.signatures.heat import heat_kernel_signature
+from eigenshape.spectral.solver.solve import solve_spectrum
 
 
 def dumbbell(neck=0.25):

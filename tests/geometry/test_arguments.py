@@ -11,8 +11,8 @@ from eigenshape._arguments import require_each, require_type
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.surfaces import icosphere
 from eigenshape.operators.laplacian import Laplacian
+from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.spectrum import Spectrum
 
 MESH = icosphere(0)

@@ -7,9 +7,9 @@ from scipy.spatial import SphericalVoronoi
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.cloud_measure import _cell_volume, _cell_volumes, cloud_quadrature
-from eigenshape.geometry.domains import disc
 from eigenshape.geometry.measure import surface_area
-from eigenshape.geometry.spheres import fibonacci_sphere, graded_sphere, random_sphere, three_sphere
+from eigenshape.shapes.domains import disc
+from eigenshape.shapes.spheres import fibonacci_sphere, graded_sphere, random_sphere, three_sphere
 
 
 @settings(max_examples=40, deadline=None)

@@ -9,15 +9,15 @@ import eigenshape as es
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import as_mesh, as_shape, as_simplicial, from_arrays
-from eigenshape.geometry.domains import box, circle
 from eigenshape.geometry.facets import boundary_surface
 from eigenshape.geometry.measure import enclosed_volume
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import weld
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.surfaces import icosphere
 from eigenshape.geometry.topology import is_closed
 from eigenshape.io.bridges import to_pyvista, to_trimesh
+from eigenshape.shapes.domains import box, circle
+from eigenshape.shapes.surfaces import icosphere
 
 MESH = icosphere(1)
 FLAT = SimplicialMesh([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]])

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from eigenshape.geometry.domains import ball, box, interval
 from eigenshape.geometry.facets import facet_components, facet_table, without_pinches
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere
 from eigenshape.geometry.topology import boundary_facets, edge_table
+from eigenshape.shapes.domains import ball, box, interval
+from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
 
 BOWTIE = TriangleMesh([[0, 0, 0], [1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]], [[0, 1, 2], [4, 3, 0]])
 

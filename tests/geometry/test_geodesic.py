@@ -9,7 +9,7 @@ from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.geodesic import geodesic_balls, geodesic_distance_to_set, geodesic_distances
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere
+from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
 
 
 def test_on_a_flat_grid_the_way_is_straight():

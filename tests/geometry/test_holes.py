@@ -8,7 +8,6 @@ from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import repair, seal_holes
 from eigenshape.geometry.simplices import degenerate_simplices
-from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
 from eigenshape.geometry.topology import (
     euler_characteristic,
     inconsistent_edges,
@@ -17,6 +16,7 @@ from eigenshape.geometry.topology import (
     non_manifold_edges,
 )
 from eigenshape.io.mesh_files import read_mesh
+from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
 
 
 def without(mesh, keep):

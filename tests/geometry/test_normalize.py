@@ -8,7 +8,7 @@ from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.measure import bounding_box, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_area, normalize_box, normalize_diameter
-from eigenshape.geometry.surfaces import grid, icosphere, torus
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 ALL = [normalize_box, normalize_area, normalize_diameter]
 MOVED = torus(9, 7, outer=5.0, inner=2.0)

@@ -4,15 +4,15 @@ from broken_meshes import everted, flipped, moebius
 from each_creature import KINDS
 
 from eigenshape._errors import InvalidShapeError
-from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.measure import enclosed_volume, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.repair import orient, repair
-from eigenshape.geometry.sampling import cut_by_planes, partial_scan, random_planes, rotation_towards, viewpoint
-from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
 from eigenshape.operators.curvature import mean_curvature
-from eigenshape.retrieval.patches import describe_patches
+from eigenshape.retrieval.patches.patches import describe_patches
+from eigenshape.scans.partial import cut_by_planes, partial_scan, random_planes, rotation_towards, viewpoint
+from eigenshape.shapes.creatures import make_creature
+from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
 
 
 def require_out(mesh):

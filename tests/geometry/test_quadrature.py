@@ -9,7 +9,7 @@ from eigenshape.geometry.quadrature import (
     torus_quadrature,
     uniform_quadrature,
 )
-from eigenshape.geometry.surfaces import grid
+from eigenshape.shapes.surfaces import grid
 
 
 def integral(measure, values):

@@ -4,7 +4,6 @@ from broken_meshes import moebius, soup, tetrahedra, with_slivers
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import (
     REPAIRS,
@@ -20,7 +19,6 @@ from eigenshape.geometry.repair import (
     weld_seams,
 )
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere
 from eigenshape.geometry.topology import (
     boundary_edges,
     euler_characteristic,
@@ -28,7 +26,9 @@ from eigenshape.geometry.topology import (
     is_closed,
     is_manifold,
 )
-from eigenshape.retrieval.shape_dna import shape_dna
+from eigenshape.retrieval.baselines.shape_dna import shape_dna
+from eigenshape.shapes.creatures import make_creature
+from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
 
 
 def test_a_welded_soup_is_whole_again():

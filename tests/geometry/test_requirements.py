@@ -22,9 +22,6 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.quadrature import mesh_quadrature
 from eigenshape.geometry.repair import REPAIRS, repair
 from eigenshape.geometry.requirements import require_joined
-from eigenshape.geometry.sampling import partial_scan, viewpoint
-from eigenshape.geometry.spheres import fibonacci_sphere
-from eigenshape.geometry.surfaces import disjoint_union, icosphere
 from eigenshape.operators.anisotropic import curvature_tensors
 from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
@@ -34,18 +31,21 @@ from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.operators.graph import graph_laplacian
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.operators.smoothing import noise_level
-from eigenshape.retrieval.affinity import affinity_eigenvalues
-from eigenshape.retrieval.codebook import made_codebook
-from eigenshape.retrieval.describe import describe_mesh
-from eigenshape.retrieval.describe_large import describe_large_mesh
-from eigenshape.retrieval.descriptor import SCALE_FREE
-from eigenshape.retrieval.kinds import describe_shape, describe_to_keep
-from eigenshape.retrieval.patch_descriptor import PatchRecipe, seen_patches
-from eigenshape.retrieval.patches import describe_patches
-from eigenshape.retrieval.shape_dna import shape_dna
-from eigenshape.retrieval.transfer import transfer_labels
-from eigenshape.spectral.brackets import bracket_eigenvalues
-from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.retrieval.baselines.affinity import affinity_eigenvalues
+from eigenshape.retrieval.baselines.shape_dna import shape_dna
+from eigenshape.retrieval.heat.describe import describe_mesh
+from eigenshape.retrieval.heat.describe_large import describe_large_mesh
+from eigenshape.retrieval.heat.descriptor import SCALE_FREE
+from eigenshape.retrieval.label_transfer import transfer_labels
+from eigenshape.retrieval.patches.codebook import made_codebook
+from eigenshape.retrieval.patches.descriptor import PatchRecipe, seen_patches
+from eigenshape.retrieval.patches.patches import describe_patches
+from eigenshape.retrieval.store.kinds import describe_shape, describe_to_keep
+from eigenshape.scans.partial import partial_scan, viewpoint
+from eigenshape.shapes.spheres import fibonacci_sphere
+from eigenshape.shapes.surfaces import disjoint_union, icosphere
+from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
+from eigenshape.spectral.solver.solve import solve_spectrum
 
 BALL = icosphere(2)
 OPERATORS = {

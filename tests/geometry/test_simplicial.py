@@ -4,7 +4,7 @@ import pytest
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.surfaces import grid
+from eigenshape.shapes.surfaces import grid
 
 CUBE = [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
 

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from eigenshape.geometry.domains import ball, circle, interval
 from eigenshape.geometry.facets import facet_components, facet_table
 from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.subdivision import pieces
-from eigenshape.geometry.surfaces import grid, subdivide
+from eigenshape.shapes.domains import ball, circle, interval
+from eigenshape.shapes.surfaces import grid, subdivide
 
 
 def test_an_interval_by_hand():

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
 from eigenshape.geometry.topology import (
     boundary_edges,
     boundary_loops,
@@ -20,6 +19,7 @@ from eigenshape.geometry.topology import (
     unreferenced_vertices,
     vertex_components,
 )
+from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
 
 
 def mesh_of(*faces):

@@ -8,12 +8,12 @@ import trimesh
 from eigenshape._errors import InvalidShapeError, MissingExtraError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import from_arrays
-from eigenshape.geometry.domains import box, circle, interval
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.spheres import projective_plane
-from eigenshape.geometry.surfaces import icosphere
 from eigenshape.io.bridges import from_pyvista, from_trimesh, to_arrays, to_pyvista, to_trimesh
+from eigenshape.shapes.domains import box, circle, interval
+from eigenshape.shapes.spheres import projective_plane
+from eigenshape.shapes.surfaces import icosphere
 
 
 def same(one, two):

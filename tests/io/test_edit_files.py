@@ -8,8 +8,8 @@ from eigenshape.deformation.region import Box
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.deformation.session import replay
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.surfaces import icosphere
 from eigenshape.io.edits import read_edits, write_edits
+from eigenshape.shapes.surfaces import icosphere
 
 BALL = icosphere(2)
 EDITS = [

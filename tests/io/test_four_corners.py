@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from lapy import TetMesh
 
 from eigenshape import FileFormatError, InvalidParameterError, SimplicialMesh, TriangleMesh, read_mesh, read_shape
-from eigenshape.geometry.domains import box
 from eigenshape.io.cells import four_cornered, require_kind
 from eigenshape.io.obj import parse as parse_obj
+from eigenshape.shapes.domains import box
 
 CUBE = box(3, 2, 2)
 

@@ -6,12 +6,12 @@ import pytest
 
 from eigenshape._errors import EigenshapeError, FileFormatError, InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.domains import box, disc
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.io.lzf_loops import decompress
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.io.shape_files import read_points, read_shape, write_points
+from eigenshape.shapes.domains import box, disc
 
 CUBE = box(2, 1, 1)
 DISC = disc(2)

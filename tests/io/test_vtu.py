@@ -6,8 +6,8 @@ from pyvista import _vtk
 from test_declarations import XML
 
 from eigenshape import FileFormatError
-from eigenshape.geometry.domains import box
 from eigenshape.io.vtu import parse
+from eigenshape.shapes.domains import box
 
 CUBE = box(2, 1, 1)
 

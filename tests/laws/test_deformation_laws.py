@@ -14,7 +14,7 @@ from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.deformation.session import DeformationSession
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.surfaces import torus
+from eigenshape.shapes.surfaces import torus
 
 modes = pytest.mark.parametrize("mode", ["graded", "thesis"])
 seeds = st.integers(0, 2**16)

@@ -15,11 +15,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import drop_duplicate_faces
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
 from eigenshape.operators.boundary import dirichlet_laplacian
@@ -31,9 +29,11 @@ from eigenshape.operators.graph import graph_laplacian
 from eigenshape.operators.kernel import neighbor_distance
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.robust import robust_laplacian
-from eigenshape.spectral.changes import random_rotation
-from eigenshape.spectral.laws import USUAL
-from eigenshape.spectral.operator_laws import check_operator
+from eigenshape.shapes.creatures import make_creature
+from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.spectral.laws.operator_laws import check_operator
+from eigenshape.spectral.laws.report import USUAL
+from eigenshape.spectral.laws.transformations import random_rotation
 
 seeds = st.integers(0, 2**32 - 1)
 few = settings(deadline=None, max_examples=8)

@@ -18,13 +18,13 @@ from broken_meshes import (
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import repair, suggest_repairs
 from eigenshape.geometry.requirements import require_describable, require_oriented, require_sound
-from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
 from eigenshape.geometry.topology import is_closed
+from eigenshape.shapes.creatures import make_creature
+from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
 
 BASES = {
     "ball": icosphere(1),

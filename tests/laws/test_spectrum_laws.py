@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.surfaces import disjoint_union, icosphere, torus
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.spectral import roads
-from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.shapes.surfaces import disjoint_union, icosphere, torus
+from eigenshape.spectral.solver import strategy as roads
+from eigenshape.spectral.solver.solve import solve_spectrum
 
 seeds = st.integers(0, 2**32 - 1)
 masses = st.sampled_from(["lumped", "consistent", "averaged"])

@@ -108,7 +108,7 @@ def test_every_method_that_takes_something_is_called():
 
 
 def test_four_threads_get_what_one_gets_bit_for_bit(tmp_path, monkeypatch):
-    monkeypatch.setattr("eigenshape.figures.render.FINER", 1)  # pictures without smooth edges, in a quarter of the time
+    monkeypatch.setattr("eigenshape.plot.render.FINER", 1)  # pictures without smooth edges, in a quarter of the time
     values = Shared(tmp_path)
     before = {name: digest(value) for name, value in vars(values).items()}
     with threadpool_limits(1, user_api="blas"):

@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import binary_fill_holes
 
-from eigenshape.geometry import raster
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.raster import rasterize
-from eigenshape.geometry.sampling import cut_by_planes, partial_scan, random_planes, rotation_towards
-from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
 from eigenshape.geometry.topology import unreferenced_vertices
+from eigenshape.scans import raster
+from eigenshape.scans.partial import cut_by_planes, partial_scan, random_planes, rotation_towards
+from eigenshape.scans.raster import rasterize
+from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
 
 SPHERE = icosphere(3)
 seeds = st.integers(0, 2**32 - 1)

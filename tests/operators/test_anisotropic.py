@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.geometry.domains import box
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.surfaces import grid, icosphere, torus
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.shapes.domains import box
+from eigenshape.shapes.surfaces import grid, icosphere, torus
+from eigenshape.spectral.solver.solve import solve_spectrum
 
 
 @pytest.mark.parametrize("mesh", [torus(8, 6), box(2, 2, 1)])

@@ -4,10 +4,10 @@ import scipy.sparse as sp
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.domains import box, interval
-from eigenshape.geometry.surfaces import icosphere
 from eigenshape.operators.catalog import OPERATORS, build_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.shapes.domains import box, interval
+from eigenshape.shapes.surfaces import icosphere
 
 SHAPES = {
     "triangles": icosphere(2),

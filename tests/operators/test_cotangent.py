@@ -3,8 +3,8 @@ import pytest
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.surfaces import grid, torus
 from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.shapes.surfaces import grid, torus
 
 RIGHT = TriangleMesh([[0, 0, 0], [2, 0, 0], [0, 2, 0]], [[0, 1, 2]])
 

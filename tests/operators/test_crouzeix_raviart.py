@@ -3,13 +3,10 @@ import pytest
 import scipy.sparse as sp
 
 from eigenshape._errors import InvalidShapeError
-from eigenshape.geometry import exact
-from eigenshape.geometry.domains import ball, box, circle, interval, irregular_grid
 from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.surfaces import grid, icosphere
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import (
     REGULAR_TETRAHEDRON,
@@ -20,7 +17,10 @@ from eigenshape.operators.crouzeix_raviart import (
     mass_floor,
 )
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.shapes import exact
+from eigenshape.shapes.domains import ball, box, circle, interval, irregular_grid
+from eigenshape.shapes.surfaces import grid, icosphere
+from eigenshape.spectral.solver.solve import solve_spectrum
 
 RIGHT = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
 CORNER = SimplicialMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape.geometry.domains import ball, box, disc, interval, irregular_grid
 from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.surfaces import grid, icosphere, torus
 from eigenshape.operators import elements
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian, fem_nodes
+from eigenshape.shapes.domains import ball, box, disc, interval, irregular_grid
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 RNG = np.random.default_rng
 

@@ -17,7 +17,6 @@ from eigenshape.geometry.quadrature import (
 )
 from eigenshape.geometry.simplices import dual_volumes, mean_side_length
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere
 from eigenshape.operators import kernel
 from eigenshape.operators.gaussian import (
     functional_laplacian,
@@ -25,6 +24,7 @@ from eigenshape.operators.gaussian import (
     mesh_laplacian,
     quadrature_laplacian,
 )
+from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
 
 
 def by_the_book(points, weights, t, dim):

@@ -4,10 +4,10 @@ import pytest
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.cloud_measure import cloud_quadrature
-from eigenshape.geometry.exact import sphere_eigenvalues
-from eigenshape.geometry.spheres import fibonacci_sphere, graded_sphere, three_sphere
 from eigenshape.operators.gaussian import gaussian_laplacian, point_cloud_laplacian
-from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.shapes.exact import sphere_eigenvalues
+from eigenshape.shapes.spheres import fibonacci_sphere, graded_sphere, three_sphere
+from eigenshape.spectral.solver.solve import solve_spectrum
 
 
 @pytest.mark.parametrize("mesh", [fibonacci_sphere(1500), graded_sphere(1500)])

@@ -9,12 +9,12 @@ from eigenshape._errors import ConvergenceError, EigenshapeError, InvalidParamet
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import drop_duplicate_faces
-from eigenshape.geometry.surfaces import disjoint_union, grid, icosphere, torus
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.operators.tufted import Triangulation, edge_keys, flipped_to_delaunay, mollified, tufted_cover
-from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.spectral.solver.solve import solve_spectrum
 
 few = settings(deadline=None, max_examples=15)
 seeds = st.integers(0, 2**32 - 1)

@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape.geometry.creatures import make_creature
 from eigenshape.geometry.measure import edge_lengths, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.sampling import cut_by_planes, rotation_towards
-from eigenshape.geometry.surfaces import grid, icosphere
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators.smoothing import denoise, noise_level
+from eigenshape.scans.partial import cut_by_planes, rotation_towards
+from eigenshape.shapes.creatures import make_creature
+from eigenshape.shapes.surfaces import grid, icosphere
 
 BALL = icosphere(4)
 HALF = cut_by_planes(BALL, [[0, 0, 1, 0.1]]).mesh

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from eigenshape.features.merge_tree import merge_tree
-from eigenshape.geometry.sampling import cut_by_planes
-from eigenshape.geometry.surfaces import grid, icosphere, torus
 from eigenshape.geometry.topology import boundary_loops, is_closed, is_manifold
 from eigenshape.io.mesh_files import read_mesh
+from eigenshape.scans.partial import cut_by_planes
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 CLOSED = (
     "retrieval/airplane/psb68.ply", "retrieval/ant/psb84.ply", "retrieval/armadillo/psb284.ply",

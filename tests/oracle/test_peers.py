@@ -8,9 +8,9 @@ import robust_laplacian
 import scipy.sparse as sp
 from pyFM.mesh import laplacian as pyfm
 
-from eigenshape.geometry.surfaces import torus
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.shapes.surfaces import torus
 
 FACTORS = {  # theirs = factor × ours
     "libigl stiffness": -1.0,

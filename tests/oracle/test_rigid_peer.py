@@ -11,7 +11,7 @@ from eigenshape.deformation.peers import as_rigid_as_possible
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.deformation.rigidity import fitted_turns
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.surfaces import icosphere
+from eigenshape.shapes.surfaces import icosphere
 
 BALL = icosphere(3)
 LONG = TriangleMesh(BALL.vertices * [1, 1, 3], BALL.faces)

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import repair
-from eigenshape.geometry.surfaces import grid, icosphere, torus
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.operators.robust import robust_laplacian
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 FLIPPED_FROM = 1e-6  # theirs leaves weights down to minus this; ours down to 0
 

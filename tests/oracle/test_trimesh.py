@@ -9,7 +9,6 @@ import trimesh
 from eigenshape.geometry.measure import edge_lengths, enclosed_volume, face_normals, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import degenerate_simplices
-from eigenshape.geometry.surfaces import icosphere, torus
 from eigenshape.geometry.topology import (
     boundary_edges,
     boundary_loops,
@@ -20,6 +19,7 @@ from eigenshape.geometry.topology import (
     non_manifold_edges,
     vertex_components,
 )
+from eigenshape.shapes.surfaces import icosphere, torus
 
 SHAPES = [
     "classics/3holes.off",

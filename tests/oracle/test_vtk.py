@@ -6,8 +6,8 @@ import pyvista as pv
 from pyvista import _vtk
 
 from eigenshape import SimplicialMesh, TriangleMesh, read_mesh, read_shape
-from eigenshape.geometry.domains import box
-from eigenshape.geometry.spheres import icosphere
+from eigenshape.shapes.domains import box
+from eigenshape.shapes.spheres import icosphere
 
 CUBE = box(4, 3, 2)
 GRID = pv.UnstructuredGrid({10: CUBE.simplices}, CUBE.points)

@@ -4,9 +4,9 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eigenshape.geometry.domains import box
-from eigenshape.geometry.spheres import fibonacci_sphere
 from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.shapes.domains import box
+from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.sparse.elimination import analyse, factorise
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from eigenshape._errors import FileFormatError
-from eigenshape.geometry.surfaces import icosphere
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.shapes.surfaces import icosphere
+from eigenshape.spectral.solver.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 

@@ -19,13 +19,13 @@ from typer.core import TyperGroup
 from eigenshape._errors import EigenshapeError, InvalidParameterError
 from eigenshape._text import printable
 from eigenshape.cli.interrupt import interruptible
-from eigenshape.figures.save import save_figure
 from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import CLOUD_REPAIRS, REPAIRS, RepairedCloud, repair
 from eigenshape.io.cells import CellKind
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.io.shape_files import read_shape
+from eigenshape.plot.save import save_figure
 
 out = Console(highlight=False, soft_wrap=True)
 err = Console(stderr=True, highlight=False, soft_wrap=True)

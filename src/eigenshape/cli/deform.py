@@ -28,10 +28,10 @@ from eigenshape.deformation.edits import Edit, Move
 from eigenshape.deformation.handles import Handle
 from eigenshape.deformation.rig import EigenRig, rig_shape
 from eigenshape.deformation.session import replay
-from eigenshape.figures.poses import figure_poses
 from eigenshape.geometry.crossings import self_intersections
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.edits import read_edits, write_edits
+from eigenshape.plot.poses import figure_poses
 
 
 def deform(

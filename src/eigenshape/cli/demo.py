@@ -13,11 +13,11 @@ from eigenshape.cli.index import WorkersOption, describe_all, describe_file
 from eigenshape.cli.presets import PATCHES, recipe_to_fill
 from eigenshape.cli.query import print_matches
 from eigenshape.cli.sheets import CAPTION, asked, contact_sheet
-from eigenshape.geometry.creatures import CREATURES, make_creature
-from eigenshape.geometry.sampling import partial_scan
 from eigenshape.io.mesh_files import write_mesh
-from eigenshape.retrieval.index import ShapeIndex
-from eigenshape.retrieval.workers import Item, Workers
+from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.retrieval.store.workers import Item, Workers
+from eigenshape.scans.partial import partial_scan
+from eigenshape.shapes.creatures import CREATURES, make_creature
 
 FOLDER = Path("eigenshape-demo")
 POSES = 3

@@ -6,6 +6,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from eigenshape._progress import Progress
 from eigenshape.cli.console import (
     JsonOption,
     MeshArgument,
@@ -19,13 +20,12 @@ from eigenshape.cli.console import (
 from eigenshape.cli.parts import part_rows, print_rows, require_paths, save_colors
 from eigenshape.cli.presets import HeatPresetOption, heat_preset
 from eigenshape.features.segmentation import segment
-from eigenshape.figures.fields import figure_segments, value_colors
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.retrieval.describe import DescribedShape, describe_mesh
-from eigenshape.retrieval.describe_large import DescribedLargeShape, describe_large_mesh
-from eigenshape.retrieval.descriptor import SCALE_FREE, Recipe
-from eigenshape.spectral.large_signature import LARGE, USUAL_ACCURACY
-from eigenshape.spectral.outcome import Progress
+from eigenshape.plot.fields import figure_segments, value_colors
+from eigenshape.retrieval.heat.describe import DescribedShape, describe_mesh
+from eigenshape.retrieval.heat.describe_large import DescribedLargeShape, describe_large_mesh
+from eigenshape.retrieval.heat.descriptor import SCALE_FREE, Recipe
+from eigenshape.spectral.signatures.approximate_heat import LARGE, USUAL_ACCURACY
 
 COLUMNS = {
     "feature": "feature",

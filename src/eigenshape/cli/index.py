@@ -22,10 +22,10 @@ from eigenshape.cli.console import (
 )
 from eigenshape.cli.presets import PATCHES, PresetOption, recipe_to_fill, require_preset
 from eigenshape.io.parsing import MESH_FORMATS
-from eigenshape.retrieval.batch import BatchReport, Describe, build_index
-from eigenshape.retrieval.index import ShapeIndex
-from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe_to_keep
-from eigenshape.retrieval.workers import Item, Workers
+from eigenshape.retrieval.store.batch import BatchReport, Describe, build_index
+from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.retrieval.store.kinds import AnyRecipe, Descriptor, describe_to_keep
+from eigenshape.retrieval.store.workers import Item, Workers
 
 SOME_FAILED = 3
 

@@ -17,12 +17,12 @@ from eigenshape.cli.console import (
     save_picture,
 )
 from eigenshape.cli.parts import part_rows, print_rows, require_paths, save_colors
-from eigenshape.figures.fields import part_colors
-from eigenshape.figures.sheet import figure_label_transfer
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.labels import read_labels, write_labels
 from eigenshape.io.mesh_files import read_mesh
-from eigenshape.retrieval.transfer import LabelTransfer, transfer_labels
+from eigenshape.plot.fields import part_colors
+from eigenshape.plot.sheet import figure_label_transfer
+from eigenshape.retrieval.label_transfer import LabelTransfer, transfer_labels
 
 COLUMNS = {
     "part": "part",

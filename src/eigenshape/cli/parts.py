@@ -11,10 +11,10 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import print_table, said
 from eigenshape.cli.outputs import require_mesh_path
 from eigenshape.features.segmentation import Segmentation
-from eigenshape.figures.save import require_picture_path
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.mesh_files import write_mesh
+from eigenshape.plot.save import require_picture_path
 
 SHOWN: dict[str, Callable[[Any], str]] = {
     "position": lambda place: "  ".join(f"{coordinate:.4g}" for coordinate in place),

@@ -9,14 +9,14 @@ import typer
 
 from eigenshape._errors import InvalidParameterError, StoreError
 from eigenshape.cli.console import err, progress_bar, read_repaired, told_by
-from eigenshape.retrieval.batch import learn_words
-from eigenshape.retrieval.codebook import made_codebook
-from eigenshape.retrieval.descriptor import PRESETS, SCALE_FREE, Recipe
-from eigenshape.retrieval.index import ShapeIndex
-from eigenshape.retrieval.kinds import AnyRecipe
-from eigenshape.retrieval.patch_descriptor import PatchRecipe, seen_patches
-from eigenshape.retrieval.patches import Patches
-from eigenshape.retrieval.workers import Item, Workers
+from eigenshape.retrieval.heat.descriptor import PRESETS, SCALE_FREE, Recipe
+from eigenshape.retrieval.patches.codebook import made_codebook
+from eigenshape.retrieval.patches.descriptor import PatchRecipe, seen_patches
+from eigenshape.retrieval.patches.patches import Patches
+from eigenshape.retrieval.store.batch import learn_words
+from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.retrieval.store.kinds import AnyRecipe
+from eigenshape.retrieval.store.workers import Item, Workers
 
 PATCHES = "patches"
 TEACHING_VIEWS = 2

@@ -20,9 +20,9 @@ from eigenshape.cli.console import (
 )
 from eigenshape.cli.presets import HeldPresetOption, recipe_to_ask, require_preset
 from eigenshape.cli.sheets import CAPTION, Asked, asked, contact_sheet
-from eigenshape.figures.figure import literal
-from eigenshape.figures.save import require_picture_path
-from eigenshape.retrieval.index import Match, ShapeIndex
+from eigenshape.plot.figure import literal
+from eigenshape.plot.save import require_picture_path
+from eigenshape.retrieval.store.index import Match, ShapeIndex
 
 
 def query(

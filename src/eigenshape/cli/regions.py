@@ -7,6 +7,7 @@ import numpy as np
 
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._progress import Progress
 from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.region import Box, Brush, Region, region_boundary, region_mask
 from eigenshape.features.boundaries import smooth_boundaries
@@ -14,7 +15,6 @@ from eigenshape.features.parts import PART_CONTRAST, facing_outward, find_parts
 from eigenshape.features.segmentation import segment
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.spectral.outcome import Progress
 
 REGIONS = (
     "'y>0.5' or 'y>0.5, x<0' (coordinates, or per cent of the bounding box: 'y>60%'); 'vertex 17 within 0.2' "

@@ -7,6 +7,7 @@ import numpy as np
 import typer
 
 from eigenshape._errors import InvalidParameterError
+from eigenshape._progress import Progress
 from eigenshape.cli.console import (
     JsonOption,
     MeshArgument,
@@ -21,11 +22,10 @@ from eigenshape.features import segmentation
 from eigenshape.features.boundaries import smooth_boundaries
 from eigenshape.features.parts import PART_CONTRAST, facing_outward, find_parts
 from eigenshape.features.segmentation import Segmentation, Tree, merge_targets
-from eigenshape.figures.fields import figure_segments, part_colors
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.retrieval.describe import describe_mesh
-from eigenshape.retrieval.descriptor import PRESETS
-from eigenshape.spectral.outcome import Progress
+from eigenshape.plot.fields import figure_segments, part_colors
+from eigenshape.retrieval.heat.describe import describe_mesh
+from eigenshape.retrieval.heat.descriptor import PRESETS
 
 PARTS = "parts"
 METHODS = (PARTS, *PRESETS)

@@ -9,17 +9,17 @@ from jaxtyping import Int
 from matplotlib.figure import Figure
 
 from eigenshape._errors import EigenshapeError, StoreError
+from eigenshape._progress import Progress
 from eigenshape.cli.console import err, progress_bar, read_repaired, shown
-from eigenshape.figures.figure import literal
-from eigenshape.figures.sheet import Panel, figure_contact_sheet
 from eigenshape.geometry.geodesic import geodesic_distances
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.retrieval.describe import describe_mesh, described_view
-from eigenshape.retrieval.descriptor import Recipe
-from eigenshape.retrieval.index import Match
-from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe_shape
-from eigenshape.spectral.outcome import Progress
+from eigenshape.plot.figure import literal
+from eigenshape.plot.sheet import Panel, figure_contact_sheet
+from eigenshape.retrieval.heat.describe import describe_mesh, described_view
+from eigenshape.retrieval.heat.descriptor import Recipe
+from eigenshape.retrieval.store.index import Match
+from eigenshape.retrieval.store.kinds import AnyRecipe, Descriptor, describe_shape
 
 CAPTION = "parts that correspond share a colour"
 N_CELLS = 12  # of the query by patches

@@ -9,6 +9,7 @@ import typer
 from jaxtyping import Int
 
 from eigenshape._errors import InvalidParameterError
+from eigenshape._progress import Progress
 from eigenshape.cli.console import (
     CellsOption,
     DimOption,
@@ -25,25 +26,24 @@ from eigenshape.cli.console import (
     said,
     save_picture,
 )
-from eigenshape.figures.fields import figure_eigenfunctions
-from eigenshape.figures.save import require_picture_path
-from eigenshape.figures.spectra import figure_spectrum
 from eigenshape.geometry.cloud import PointCloud, Shape
-from eigenshape.geometry.exact import Condition
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
+from eigenshape.operators.boundary import Condition
 from eigenshape.operators.catalog import OPERATORS, build_laplacian, default_operator
 from eigenshape.operators.cotangent import Mass
 from eigenshape.operators.fem import fem_boundary_nodes
 from eigenshape.operators.gaussian import Distance
 from eigenshape.operators.kernel import Correction, Form
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.spectral.approximate import approximate_spectrum
-from eigenshape.spectral.brackets import Brackets, bracket_eigenvalues
-from eigenshape.spectral.dirichlet import solve_dirichlet
-from eigenshape.spectral.outcome import Progress
-from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.plot.fields import figure_eigenfunctions
+from eigenshape.plot.save import require_picture_path
+from eigenshape.plot.spectra import figure_spectrum
+from eigenshape.spectral.bounds.brackets import Brackets, bracket_eigenvalues
+from eigenshape.spectral.multilevel.approximate import approximate_spectrum
+from eigenshape.spectral.solver.dirichlet import solve_dirichlet
+from eigenshape.spectral.solver.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 N_PICTURED = 8

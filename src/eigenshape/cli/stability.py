@@ -22,13 +22,13 @@ from eigenshape.cli.console import (
     progress_bar,
     save_picture,
 )
-from eigenshape.figures.figure import literal
-from eigenshape.figures.save import require_picture_path
-from eigenshape.figures.stability import figure_stability
 from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_area, normalize_diameter
 from eigenshape.io.labels import read_map
+from eigenshape.plot.figure import literal
+from eigenshape.plot.save import require_picture_path
+from eigenshape.plot.stability import figure_stability
 from eigenshape.stability.report import USUAL_K, StabilityPlan, StabilityReport, compare_shapes
 
 USUAL = StabilityPlan()

@@ -12,14 +12,14 @@ from scipy.linalg import cho_solve
 from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_rows, frozen, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._progress import Progress
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.rigidity import EdgeWeights, edge_weights
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.spectral.outcome import Progress
-from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.spectral.solver.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 N_MODES = 300

@@ -17,7 +17,7 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes, size_one
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.spectral.functional_map import FunctionalMap, point_areas, transfer_function
+from eigenshape.spectral.maps.functional_map import FunctionalMap, point_areas, transfer_function
 
 Turns = Float[np.ndarray, "n 3 3"]
 

@@ -8,8 +8,8 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
-from eigenshape._arrays import machine_memory
 from eigenshape._errors import InvalidShapeError
+from eigenshape._memory import machine_memory
 from eigenshape.features.matching_loops import match_rows
 
 Points = Float[np.ndarray, "_ d"]

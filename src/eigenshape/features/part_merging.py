@@ -16,7 +16,7 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import vertex_components
-from eigenshape.spectral.signature import heat_kernel_signature
+from eigenshape.spectral.signatures.heat import heat_kernel_signature
 from eigenshape.spectral.spectrum import Spectrum
 
 SEED_TIME = 1e-3  # of the area: heat so early has a maximum at every tip and bump

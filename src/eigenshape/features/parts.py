@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arrays import frozen, whole_number
+from eigenshape._progress import Progress
 from eigenshape.features.boundaries import CONCAVITY, smooth_boundaries
 from eigenshape.features.part_merging import SEED_TIME, part_tree
 from eigenshape.features.part_tree import PartTree
@@ -17,9 +18,8 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.geometry.topology import is_closed, vertex_components
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
-from eigenshape.spectral.dirichlet import solve_free
-from eigenshape.spectral.outcome import Progress
-from eigenshape.spectral.signature import heat_kernel_signature
+from eigenshape.spectral.signatures.heat import heat_kernel_signature
+from eigenshape.spectral.solver.dirichlet import solve_free
 from eigenshape.spectral.spectrum import Spectrum
 
 N_MODES = 25  # beside one for each component

@@ -5,6 +5,7 @@ Dirichlet condition, a part of it the mixed one.
 """
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Int
@@ -12,6 +13,8 @@ from jaxtyping import Int
 from eigenshape._arguments import require_type
 from eigenshape._errors import InvalidParameterError
 from eigenshape.operators.laplacian import Laplacian
+
+Condition = Literal["neumann", "dirichlet"]
 
 
 def dirichlet_laplacian(

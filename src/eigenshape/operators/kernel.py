@@ -13,8 +13,9 @@ import scipy.sparse as sp
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
-from eigenshape._arrays import machine_memory, positive_values
+from eigenshape._arrays import positive_values
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._memory import machine_memory
 from eigenshape.geometry.geodesic import geodesic_balls
 from eigenshape.geometry.quadrature import Quadrature
 from eigenshape.geometry.simplices import LARGEST_EXPONENT, size_one

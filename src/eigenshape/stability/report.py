@@ -9,16 +9,16 @@ from numpy.typing import ArrayLike
 from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number, whole_numbers
 from eigenshape._errors import InvalidParameterError
+from eigenshape._progress import Progress
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.catalog import build_laplacian
 from eigenshape.operators.kernel import neighbor_distance
-from eigenshape.spectral.angles import EigenspaceAngles, eigenspace_angles
-from eigenshape.spectral.brackets import Brackets, bracket_eigenvalues
-from eigenshape.spectral.comparison import SpectrumComparison, compare_spectra
-from eigenshape.spectral.outcome import Progress
-from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.spectral.bounds.brackets import Brackets, bracket_eigenvalues
+from eigenshape.spectral.comparison.angles import EigenspaceAngles, eigenspace_angles
+from eigenshape.spectral.comparison.spectra import SpectrumComparison, compare_spectra
+from eigenshape.spectral.solver.solve import solve_spectrum
 from eigenshape.stability.bounds import TimeRange, trusted_times
 from eigenshape.stability.closeness import Closeness, map_closeness
 from eigenshape.stability.sampled import (

@@ -8,6 +8,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from eigenshape._arrays import frozen
+from eigenshape._progress import Progress
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.quadrature import uniform_quadrature
 from eigenshape.geometry.surface_points import sample_surface
@@ -20,9 +21,8 @@ from eigenshape.operators.kernel import (
 )
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.neighbors import neighbor_graph
-from eigenshape.spectral.angles import EigenspaceAngles, eigenspace_angles
-from eigenshape.spectral.outcome import Progress
-from eigenshape.spectral.solver import solve_spectrum
+from eigenshape.spectral.comparison.angles import EigenspaceAngles, eigenspace_angles
+from eigenshape.spectral.solver.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 from eigenshape.stability.bounds import TimeRange, weyl_bound
 from eigenshape.stability.correspondence import BottleneckMatching, bottleneck_matching

@@ -1,1 +1,0 @@
-"""Pictures of shapes and spectra, drawn without a display or a GPU."""

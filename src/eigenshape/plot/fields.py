@@ -1,0 +1,130 @@
+"""Figures of functions and parts on a shape."""
+
+from collections.abc import Sequence
+
+import matplotlib as mpl
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int, UInt8
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Colormap, Normalize
+
+from eigenshape._arguments import require_type
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.measure import face_areas
+from eigenshape.plot.camera import Camera, three_quarter_view
+from eigenshape.plot.figure import Figure
+from eigenshape.plot.render import Drawing, draw, palette
+from eigenshape.spectral.spectrum import Spectrum
+
+PANEL = 3.2  # inches
+DOT = 46.0
+
+
+def figure_eigenfunctions(
+    mesh: MeshLike, spectrum: Spectrum, indices: Sequence[int], *, camera: Camera | None = None
+) -> Figure:
+    """Draw eigenfunctions side by side, each with its nodal lines dark, in units of its largest value."""
+    mesh = as_mesh(mesh)
+    require_type(spectrum, Spectrum, "spectrum")
+    require_type(camera, Camera | None, "camera")
+    camera = camera or three_quarter_view(mesh, size=420)
+    n_columns = min(len(indices), 4)
+    n_rows = -(-len(indices) // n_columns)
+    figure = Figure(figsize=(PANEL * n_columns + 0.8, (PANEL + 0.3) * n_rows), layout="constrained")
+    grid = figure.subplots(n_rows, n_columns, squeeze=False)
+    colors, scale = mpl.colormaps["RdBu_r"], Normalize(-1, 1)
+    for axes, index in zip(grid.flat, indices, strict=False):
+        function = spectrum.eigenvectors[:, index]
+        shown = function / np.abs(function).max()
+        show(axes, draw(mesh, camera, vertex_colors=colors(scale(shown))[:, :3], zero_set_of=_constant_as_one(shown)))
+        number = spectrum.certificate.first + index
+        axes.set_title(f"φ$_{{{number}}}$,  λ = {spectrum.eigenvalues[index]:.4g}")
+    for axes in grid.flat[len(indices) :]:
+        axes.set_axis_off()
+    bar = figure.colorbar(ScalarMappable(scale, colors), ax=grid, shrink=0.7)
+    bar.set_label("eigenfunction / its largest value (dark line: 0)")
+    return figure
+
+
+def _constant_as_one(function: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    return function if np.ptp(function) > 1e-6 else np.ones_like(function)
+
+
+def figure_field(
+    mesh: MeshLike,
+    values: Float[np.ndarray, " n"],
+    label: str,
+    *,
+    camera: Camera | None = None,
+    color_map: str = "viridis",
+) -> Figure:
+    """Draw one function on a shape with a labelled colour bar, heat for instance."""
+    mesh = as_mesh(mesh)
+    require_type(camera, Camera | None, "camera")
+    figure = Figure(figsize=(2 * PANEL + 1.2, 2 * PANEL), layout="constrained")
+    axes = figure.subplots()
+    scale, colors = Normalize(float(values.min()), float(values.max())), mpl.colormaps[color_map]
+    camera = camera or three_quarter_view(mesh)
+    show(axes, draw(mesh, camera, vertex_colors=mapped(values, scale, colors)))
+    figure.colorbar(ScalarMappable(scale, colors), ax=axes, shrink=0.8).set_label(label)
+    return figure
+
+
+def mapped(values: Float[np.ndarray, " n"], scale: Normalize, colors: Colormap) -> Float[np.ndarray, "n 3"]:
+    """Return the colour of each value."""
+    return np.asarray(colors(scale(values)))[:, :3]
+
+
+def figure_segments(
+    mesh: MeshLike, labels: Int[np.ndarray, " f"], vertices: Int[np.ndarray, " m"], *, camera: Camera | None = None
+) -> Figure:
+    """Draw the parts of a shape in colours, with their numbered feature points; hidden ones are hollow."""
+    mesh = as_mesh(mesh)
+    require_type(camera, Camera | None, "camera")
+    figure = Figure(figsize=(2 * PANEL, 2 * PANEL + 0.4), layout="constrained")
+    axes = figure.subplots()
+    drawing = draw(mesh, camera or three_quarter_view(mesh), face_colors=palette(labels))
+    show(axes, drawing)
+    mark(axes, drawing, vertices, numbers=True)
+    axes.set_title(f"{len(vertices)} parts around their feature points (hollow: on the far side)", fontsize=10)
+    return figure
+
+
+def part_colors(mesh: MeshLike, labels: Int[np.ndarray, " f"]) -> UInt8[np.ndarray, "n 3"]:
+    """Return red, green and blue of each vertex for `write_mesh`: those of the part with most area around it.
+
+    Parts have the colours that `figure_segments` gives them; what has no label, below 0, is grey.
+    """
+    mesh = as_mesh(mesh)
+    corners, areas = mesh.faces.ravel(), np.repeat(face_areas(mesh), 3)
+    shape = (mesh.n_vertices, int(labels.max(initial=-1)) + 2)
+    around = sp.coo_array((areas / (areas.max() or 1.0), (corners, np.repeat(labels, 3) + 1)), shape=shape).tocsr()
+    return _bytes(palette(np.asarray(around.argmax(axis=1)).ravel() - 1))
+
+
+def value_colors(values: Float[np.ndarray, " n"], color_map: str = "viridis") -> UInt8[np.ndarray, "n 3"]:
+    """Return red, green and blue of each vertex for `write_mesh`: a function from its lowest to its highest value."""
+    return _bytes(mapped(values, Normalize(float(values.min()), float(values.max())), mpl.colormaps[color_map]))
+
+
+def _bytes(colors: Float[np.ndarray, "n 3"]) -> UInt8[np.ndarray, "n 3"]:
+    return np.round(255 * colors).astype(np.uint8)
+
+
+def show(axes: Axes, drawing: Drawing) -> None:
+    """Put a drawing into axes without ticks or frame."""
+    axes.imshow(drawing.image, interpolation="antialiased")
+    axes.set_axis_off()
+
+
+def mark(axes: Axes, drawing: Drawing, vertices: Int[np.ndarray, " m"], *, numbers: bool = False) -> None:
+    """Mark vertices by red dots, hollow where the shape hides them."""
+    for number, vertex in enumerate(vertices.tolist()):
+        x, y = drawing.places[vertex]
+        seen = bool(drawing.visible[vertex])
+        face = "#d62728" if seen else "none"
+        axes.scatter([x], [y], s=DOT, c=face, edgecolors="black" if seen else "#7f7f7f", linewidths=1.0, zorder=3)
+        if numbers and seen:
+            axes.annotate(str(number), (x, y), (5, 5), textcoords="offset points", fontsize=8, zorder=4)

@@ -1,0 +1,143 @@
+"""Figures of persistence: pairs of birth and death, and how maxima merge."""
+
+import numpy as np
+from jaxtyping import Float, Int
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+
+from eigenshape._arguments import require_type
+from eigenshape._arrays import whole_number
+from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs
+from eigenshape.features.segmentation import Tree, merge_targets
+from eigenshape.plot.figure import Figure
+from eigenshape.plot.render import palette
+
+KINDS = {  # colour, marker and text of each kind of pair
+    "maxima": ("#d62728", "^", "maxima, to the saddle that ends them"),
+    "minima": ("#1f77b4", "v", "minima, to the saddle that ends them"),
+    "components": ("#2ca02c", "s", "components, lowest to highest point"),
+    "loops": ("#9467bd", "o", "loops that nothing fills"),
+}
+HEADROOM = 1.12  # height of what never merges, in units of the highest merge
+QUIET = "#b0b0b0"
+
+
+def figure_diagram(diagram: PersistenceDiagram, *, label: str = "function") -> Figure:
+    """Plot birth and death of all pairs: the farther from the diagonal, the longer they persist.
+
+    Parameters
+    ----------
+    diagram : PersistenceDiagram
+    label : str
+        What the function is, with its unit.
+    """
+    require_type(diagram, PersistenceDiagram, "diagram")
+    figure = Figure(figsize=(6.6, 6.0), layout="constrained")
+    axes = figure.subplots()
+    for kind, (color, marker, text) in KINDS.items():
+        pairs: PersistencePairs | None = getattr(diagram, kind)
+        if pairs is None or not len(pairs.births):
+            continue
+        points = axes.scatter(pairs.births, pairs.deaths, s=34, marker=marker, c=color, alpha=0.85, zorder=3)
+        points.set(edgecolor="white", linewidth=0.4, label=f"{text} ({len(pairs.births):,})")
+    low, high = _limits(diagram)
+    axes.plot([low, high], [low, high], color=QUIET, lw=1, zorder=1)
+    axes.set(xlim=(low, high), ylim=(low, high), aspect="equal")
+    axes.set_xlabel(f"birth: {label}")
+    axes.set_ylabel(f"death: {label}")
+    axes.legend(frameon=False, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
+def _limits(diagram: PersistenceDiagram) -> tuple[float, float]:
+    """Return the range of the function, widened: no pair leaves that of its component."""
+    low, high = float(diagram.components.births.min()), float(diagram.components.deaths.max())
+    margin = 0.05 * (high - low) or 0.5 * max(abs(high), np.finfo(np.float64).tiny)
+    return low - margin, high + margin
+
+
+def figure_merge_tree(
+    tree: Tree, *, persistence: float | None = None, n_maxima: int = 40, label: str = "function"
+) -> Figure:
+    """Draw which maximum's region merges into which, and after what persistence; a cut is a level line.
+
+    Regions merge from the bottom to the top, as in `segment`: those whose stems cross the line are left, in the colours
+    that `figure_segments` gives them.
+
+    Parameters
+    ----------
+    tree : MergeTree or PartTree
+    persistence : float, optional
+        Where to cut, in the function's unit.
+    n_maxima : int
+        Most persistent maxima to draw, at least 1.
+    label : str
+        What the function is, with its unit.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `n_maxima` is below 1.
+    """
+    require_type(tree, Tree, "tree")
+    shown = min(whole_number(n_maxima, "n_maxima", 1), len(tree.maxima))
+    into = merge_targets(tree)[:shown]
+    finite = tree.persistence[np.isfinite(tree.persistence)]
+    cut = persistence if persistence is not None and np.isfinite(persistence) else 0.0
+    top = HEADROOM * max(float(finite.max(initial=0.0)), cut) or 1.0
+    figure = Figure(figsize=(max(4.5, 2.2 + 0.24 * shown), 4.6), layout="constrained")
+    axes = figure.subplots()
+    place = leaf_places(into)
+    _draw_stems(axes, place, into, np.minimum(tree.persistence[:shown], top), _colors(tree, shown, persistence))
+    axes.set_xticks(place, [str(number) for number in range(shown)], fontsize=7)
+    axes.set(ylim=(0, top), xlim=(-0.8, shown - 0.2))
+    axes.set_xlabel("number of the maximum, 0 the most persistent" + _left_out(tree, shown))
+    axes.set_ylabel(f"persistence: {label}")
+    if persistence is not None:
+        left = int(np.count_nonzero(tree.persistence >= persistence))
+        axes.axhline(min(persistence, top), color="black", lw=1, ls="--", zorder=4)
+        axes.set_title(f"cut at {persistence:.4g}: {left:,} region{'s' * (left != 1)} left", fontsize=10)
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
+def _left_out(tree: Tree, shown: int) -> str:
+    more = len(tree.maxima) - shown
+    return f" ({more:,} more merge by {tree.persistence[shown - 1]:.3g})" if more else ""
+
+
+def leaf_places(into: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
+    """Return places from left to right at which no stem crosses a bar.
+
+    Each is followed by what merges into it: first what merges first.
+    """
+    children: dict[int, list[int]] = {}
+    for number, target in enumerate(into.tolist()):
+        children.setdefault(target, []).append(number)
+    order, waiting = [], children.get(-1, [])[::-1]
+    while waiting:
+        number = waiting.pop()
+        order.append(number)
+        waiting.extend(children.get(number, []))
+    return np.argsort(order)
+
+
+def _colors(tree: Tree, shown: int, persistence: float | None) -> Float[np.ndarray, "m 3"]:
+    """Return the colour of each region that a cut leaves, grey for the others."""
+    left = tree.persistence[:shown] >= (persistence or 0.0)
+    return palette(np.where(left, np.cumsum(left) - 1, -1))
+
+
+def _draw_stems(
+    axes: Axes,
+    place: Int[np.ndarray, " m"],
+    into: Int[np.ndarray, " m"],
+    height: Float[np.ndarray, " m"],
+    colors: Float[np.ndarray, "m 3"],
+) -> None:
+    axes.vlines(place, 0, height, colors=[to_hex(color) for color in colors], lw=2.2, zorder=3)
+    merging = into >= 0
+    for number in np.flatnonzero(~merging):  # an arrow: upward for ever
+        axes.plot(place[number], height[number], "^", color=colors[number], markersize=8, clip_on=False, zorder=5)
+    axes.hlines(height[merging], place[into[merging]], place[merging], colors=QUIET, lw=1, zorder=2)

@@ -1,0 +1,65 @@
+"""Poses of one shape side by side: the same view, the same scale."""
+
+from collections.abc import Mapping
+from itertools import product
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+
+from eigenshape._arguments import require_type
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.plot.camera import Camera, three_quarter_view
+from eigenshape.plot.fields import PANEL, show
+from eigenshape.plot.figure import Figure
+from eigenshape.plot.render import draw
+
+N_COLUMNS = 4
+MOVED = ("#c9c9c9", "#f3c27b", "#d9541e")  # colors of shares 0, 1/2 and 1
+
+
+def figure_poses(
+    poses: Mapping[str, MeshLike], shares: Float[np.ndarray, " n"] | None = None, *, camera: Camera | None = None
+) -> Figure:
+    """Draw poses of one shape in a common frame, coloured by how much of a motion each vertex is to follow.
+
+    Parameters
+    ----------
+    poses : mapping of titles to MeshLike
+        With the same faces; the first one chooses the view.
+    shares : (n,) float, optional
+        0 to 1; of `Binding.shares`.
+    camera : Camera, optional
+    """
+    require_type(camera, Camera | None, "camera")
+    require_type(poses, Mapping, "poses")
+    meshes = {title: as_mesh(mesh, title) for title, mesh in poses.items()}
+    rest = next(iter(meshes.values()))
+    camera = camera or three_quarter_view(rest)
+    columns = min(len(poses), N_COLUMNS)
+    rows = -(-len(poses) // columns)
+    size = 1.5 * PANEL
+    figure = Figure(figsize=(size * columns + 0.8, (size + 0.3) * rows), layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False)
+    corners = _frame(list(meshes.values()), camera)
+    told = np.zeros(rest.n_vertices) if shares is None else shares
+    colormap = LinearSegmentedColormap.from_list("moved", MOVED)  # of this call: it fills its table at first use
+    colors = np.asarray(colormap(np.append(told, np.zeros(len(corners)))))[:, :3]
+    for axes in grid.flat:
+        axes.set_axis_off()
+    for axes, (title, mesh) in zip(grid.flat, meshes.items(), strict=False):
+        framed = TriangleMesh(np.vstack([mesh.vertices, corners]), mesh.faces)
+        show(axes, draw(framed, camera, vertex_colors=colors))
+        axes.set_title(title, fontsize=10)
+    if shares is not None:
+        scale = ScalarMappable(Normalize(0, 1), colormap)
+        figure.colorbar(scale, ax=grid.ravel().tolist(), shrink=0.6, pad=0.01).set_label("share of the motion")
+    return figure
+
+
+def _frame(meshes: list[TriangleMesh], camera: Camera) -> Float[np.ndarray, "8 3"]:
+    """Return the corners of the box, along the camera's axes, that holds all poses: pictures fit what they show."""
+    seen = np.vstack([mesh.vertices @ camera.rotation.T for mesh in meshes])
+    return np.array(list(product(*zip(seen.min(axis=0), seen.max(axis=0), strict=True)))) @ camera.rotation

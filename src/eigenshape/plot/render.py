@@ -1,0 +1,185 @@
+"""A shaded picture of a mesh, drawn pixel by pixel in numpy."""
+
+from dataclasses import dataclass
+
+import matplotlib as mpl
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from eigenshape._threads import one_blas_thread
+from eigenshape.geometry.measure import mean_normals
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.topology import agreeing, boundary_edges
+from eigenshape.plot.camera import Camera, in_picture
+from eigenshape.scans.raster import Raster, rasterize
+
+FINER = 2  # pixels drawn for each shown, along each side
+LIGHT = np.array([-0.35, -0.55, 0.76])  # from the upper left, towards the viewer
+AMBIENT = 0.42
+INK = 0.12  # brightness of lines
+LINE = 1.6  # their width, in shown pixels
+BEHIND = 0.02  # share of the picture's size that a point may lie behind what is seen and still count as seen
+GREY_PAIR = 7  # of matplotlib's tab20, left to what has no label
+
+Image = Float[np.ndarray, "h w 4"]
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """A picture and the places of the vertices in it.
+
+    Attributes
+    ----------
+    image : (h, w, 4) float
+        Red, green, blue, opacity in 0..1.
+    places : (n, 2) float
+        Pixels right and down of each vertex.
+    visible : (n,) bool
+        Whether nothing lies before it.
+    """
+
+    image: Image
+    places: Float[np.ndarray, "n 2"]
+    visible: Bool[np.ndarray, " n"]
+
+
+@one_blas_thread()
+def draw(
+    mesh: TriangleMesh,
+    camera: Camera,
+    *,
+    vertex_colors: Float[np.ndarray, "n 3"] | None = None,
+    face_colors: Float[np.ndarray, "f 3"] | None = None,
+    zero_set_of: Float[np.ndarray, " n"] | None = None,
+) -> Drawing:
+    """Draw a mesh with soft light.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    camera : Camera
+    vertex_colors : (n, 3) float, optional
+        Colours in 0..1, blended across faces.
+    face_colors : (f, 3) float, optional
+        Colours of whole faces, with dark lines where they change.
+    zero_set_of : (n,) float, optional
+        A function whose zero set is drawn as a dark line.
+
+    Returns
+    -------
+    Drawing
+        Boundary edges are drawn dark as well.
+    """
+    fine = Camera(camera.rotation, camera.size * FINER)
+    points = in_picture(mesh, fine)
+    raster = rasterize(points, mesh.faces, fine.size, fine.size)
+    colors = _surface_colors(mesh, raster, vertex_colors, face_colors)
+    shaded = colors * _brightness(mesh, fine, raster)[..., None]
+    ink = _edge_ink(mesh, points, raster)
+    if face_colors is not None:
+        ink |= _changes(_pick(face_colors, raster).sum(axis=2), raster)
+    if zero_set_of is not None:
+        ink |= _changes(np.sign(_blend(zero_set_of[:, None], mesh, raster)[..., 0]), raster)
+    seen = raster.face >= 0
+    shaded = np.where((_thickened(ink) & seen)[..., None], INK, shaded)
+    image = np.concatenate([np.clip(shaded, 0, 1), seen[..., None].astype(np.float64)], axis=2)
+    return Drawing(_shrunk(image), points[:, :2] / FINER, _visible(points, raster))
+
+
+def _surface_colors(
+    mesh: TriangleMesh,
+    raster: Raster,
+    vertex_colors: Float[np.ndarray, "n 3"] | None,
+    face_colors: Float[np.ndarray, "f 3"] | None,
+) -> Float[np.ndarray, "h w 3"]:
+    if face_colors is not None:
+        return _pick(face_colors, raster)
+    if vertex_colors is not None:
+        return _blend(vertex_colors, mesh, raster)
+    return np.full((*raster.face.shape, 3), 0.78)
+
+
+def _pick(values: Float[np.ndarray, "f c"], raster: Raster) -> Float[np.ndarray, "h w c"]:
+    return values[raster.face]
+
+
+def _blend(values: Float[np.ndarray, "n c"], mesh: TriangleMesh, raster: Raster) -> Float[np.ndarray, "h w c"]:
+    return np.einsum("hwk,hwkc->hwc", raster.weights, values[mesh.faces[raster.face]])
+
+
+def _brightness(mesh: TriangleMesh, camera: Camera, raster: Raster) -> Float[np.ndarray, "h w"]:
+    normals = _blend(mean_normals(agreeing(mesh)) @ camera.rotation.T, mesh, raster)
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-12)
+    normals = np.where(normals[..., 2:] < 0, -normals, normals)  # both sides of an open surface are lit
+    light = LIGHT / np.linalg.norm(LIGHT)
+    return np.asarray(AMBIENT + (1.08 - AMBIENT) * np.clip(normals @ light, 0, 1))
+
+
+def _changes(values: Float[np.ndarray, "h w"], raster: Raster) -> Bool[np.ndarray, "h w"]:
+    """Mark pixels whose value differs from that of the neighbour to the right or below on the same surface."""
+    ink = np.zeros(values.shape, dtype=bool)
+    near = 0.01 * values.shape[0]
+    for axis in (0, 1):
+        here, there = _neighbours(values, axis)
+        with np.errstate(invalid="ignore"):
+            depth_here, depth_there = _neighbours(raster.depth, axis)
+            joined = np.abs(depth_here - depth_there) < near
+        window = (slice(None, -1), slice(None)) if axis == 0 else (slice(None), slice(None, -1))
+        ink[window] |= (here != there) & joined
+    return ink
+
+
+def _neighbours(values: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
+    n = values.shape[axis]
+    return values.take(np.arange(n - 1), axis), values.take(np.arange(1, n), axis)
+
+
+def _edge_ink(mesh: TriangleMesh, points: Float[np.ndarray, "n 3"], raster: Raster) -> Bool[np.ndarray, "h w"]:
+    """Mark the pixels under boundary edges that nothing hides."""
+    ink = np.zeros(raster.face.shape, dtype=bool)
+    edges = boundary_edges(mesh)
+    if not len(edges):
+        return ink
+    begin, end = points[edges[:, 0]], points[edges[:, 1]]
+    steps = np.arange(0, 1, 1 / (2 + int(np.abs(end - begin)[:, :2].max())))
+    along = (begin[:, None] + steps[:, None] * (end - begin)[:, None]).reshape(-1, 3)
+    column, row = _pixels(along, ink.shape)
+    shown = along[:, 2] >= raster.depth[row, column] - BEHIND * len(ink)
+    ink[row[shown], column[shown]] = True
+    return ink
+
+
+def _pixels(points: Float[np.ndarray, "k 3"], shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    column, row = np.clip(points[:, :2].astype(np.int64), 0, [shape[1] - 1, shape[0] - 1]).T
+    return column, row
+
+
+def _thickened(ink: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:
+    radius = int(np.ceil(LINE * FINER / 2 - 0.5))
+    thick = ink.copy()
+    for down in range(-radius, radius + 1):
+        for right in range(-radius, radius + 1):
+            if down**2 + right**2 <= radius**2:
+                thick |= np.roll(ink, (down, right), axis=(0, 1))
+    return thick
+
+
+def _visible(points: Float[np.ndarray, "n 3"], raster: Raster) -> Bool[np.ndarray, " n"]:
+    column, row = _pixels(points, raster.depth.shape)
+    return points[:, 2] >= raster.depth[row, column] - BEHIND * len(raster.depth)
+
+
+def _shrunk(image: Image) -> Float[np.ndarray, "rows columns 4"]:
+    h, w = image.shape[0] // FINER, image.shape[1] // FINER
+    blocks = image.reshape(h, FINER, w, FINER, 4)
+    opacity = blocks[..., 3:]
+    weight = np.maximum(opacity.sum(axis=(1, 3)), 1e-12)
+    color = (blocks[..., :3] * opacity).sum(axis=(1, 3)) / weight
+    return np.concatenate([color, opacity.mean(axis=(1, 3))], axis=2)
+
+
+def palette(labels: Int[np.ndarray, " k"]) -> Float[np.ndarray, "k 3"]:
+    """Return a colour for each label, 18 different ones in turn; below 0 is grey."""
+    pairs = mpl.colormaps["tab20"](np.arange(20))[:, :3].reshape(10, 2, 3)
+    colors = np.concatenate(pairs[np.arange(10) != GREY_PAIR].transpose(1, 0, 2))
+    return np.where(labels[:, None] < 0, 0.82, colors[labels % len(colors)])

@@ -1,0 +1,98 @@
+"""A contact sheet: a query and the shapes that answer it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Int
+from matplotlib.axes import Axes
+
+from eigenshape._arguments import require_each, require_type
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.plot.camera import three_quarter_view
+from eigenshape.plot.fields import PANEL, mark, show
+from eigenshape.plot.figure import Figure
+from eigenshape.plot.render import draw, palette
+from eigenshape.retrieval.label_transfer import LabelTransfer
+
+N_COLUMNS = 3
+QUIET = "#808080"
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """A shape on a contact sheet.
+
+    Attributes
+    ----------
+    mesh : TriangleMesh or None
+        None where there is nothing to draw: the panel says so.
+    title : str
+        One or two lines.
+    colors : (f,) int
+        Number of each face's colour: equal numbers have equal colours on all panels, negative ones are grey.
+    vertices : (m,) int
+        Vertices to mark by dots.
+    """
+
+    mesh: TriangleMesh | None
+    title: str
+    colors: Int[np.ndarray, " f"]
+    vertices: Int[np.ndarray, " m"]
+
+    def __post_init__(self) -> None:
+        if self.mesh is not None:
+            require_type(self.mesh, TriangleMesh, "mesh")
+
+
+def figure_contact_sheet(query: Panel, matches: Sequence[Panel], *, caption: str = "") -> Figure:
+    """Draw a query, large, beside its matches in reading order (thesis fig. 5.1)."""
+    require_type(query, Panel, "query")
+    require_each(matches, Panel, "matches")
+    n_rows = max(-(-len(matches) // N_COLUMNS), 1)
+    size = PANEL * (1.0 if n_rows > 1 else 0.9)
+    figure = Figure(figsize=(size * (N_COLUMNS + 1.5), size * n_rows + 0.8), layout="constrained")
+    left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=[1.5, N_COLUMNS])[0]
+    left.set_facecolor("#f3f3f3")
+    _fill(left.subplots(), query)
+    grid = right.subplots(n_rows, N_COLUMNS, squeeze=False)
+    for axes in grid.flat:
+        axes.set_axis_off()
+    for axes, panel in zip(grid.flat, matches, strict=False):
+        _fill(axes, panel)
+    if caption:
+        figure.suptitle(caption, fontsize=11)
+    return figure
+
+
+def _fill(axes: Axes, panel: Panel) -> None:
+    axes.set_title(panel.title, fontsize=10)
+    if panel.mesh is None:
+        axes.text(0.5, 0.5, "no mesh to draw", ha="center", va="center", color=QUIET, transform=axes.transAxes)
+        axes.set_axis_off()
+        return
+    drawing = draw(panel.mesh, three_quarter_view(panel.mesh, size=440), face_colors=palette(panel.colors))
+    show(axes, drawing)
+    mark(axes, drawing, panel.vertices[drawing.visible[panel.vertices]])
+
+
+def figure_label_transfer(source: MeshLike, target: MeshLike, transfer: LabelTransfer) -> Figure:
+    """Draw two shapes side by side: matched parts in one colour, and how sure each label is, at its feature."""
+    source = as_mesh(source, "source")
+    target = as_mesh(target, "target")
+    require_type(transfer, LabelTransfer, "transfer")
+    figure = Figure(figsize=(4.4 * PANEL, 2.2 * PANEL + 0.4), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    _fill(left, Panel(source, "labelled", transfer.source.labels, transfer.source.features.vertices))
+    colors = transfer.matches[transfer.target.labels]
+    drawing = draw(target, three_quarter_view(target), face_colors=palette(colors))
+    show(right, drawing)
+    vertices = transfer.target.features.vertices
+    mark(right, drawing, vertices)
+    paper = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
+    for vertex, label, sure in zip(vertices, transfer.part_labels, transfer.confidence, strict=True):
+        text = f"label {label}, {100 * sure:.0f} %"
+        right.annotate(text, drawing.places[vertex], (7, 7), textcoords="offset points", fontsize=8, bbox=paper)
+    right.set_title("labels given, with their confidence (hollow: on the far side)", fontsize=10)
+    return figure

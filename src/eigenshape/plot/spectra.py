@@ -1,0 +1,192 @@
+"""Figures of eigenvalues."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike
+
+from eigenshape._arguments import require_type
+from eigenshape._arrays import finite_values
+from eigenshape._errors import InvalidParameterError
+from eigenshape.plot.figure import Figure
+from eigenshape.plot.render import palette
+from eigenshape.spectral.bounds.brackets import Brackets
+from eigenshape.spectral.comparison.spectra import (
+    SpectrumComparison,
+    count_as_zero,
+    relative_change,
+    within_brackets,
+    within_residuals,
+)
+from eigenshape.spectral.spectrum import Spectrum, require_lowest
+
+DECADES = 1.5  # over which relative differences are drawn on a logarithmic axis
+FAINT = 1e-12  # smaller relative differences are rounding, and have no place on a logarithmic axis
+
+
+def figure_spectrum(spectrum: Spectrum, *, area: float | None = None, brackets: Brackets | None = None) -> Figure:
+    """Plot eigenvalues by their number, with the lines between which none is missing.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+    area : float, optional
+        Of a surface: draws Weyl's law λ_i ≈ 4π i / area beside them.
+    brackets : Brackets, optional
+        Of the same shape: draws the interval in which each eigenvalue of the shape itself lies.
+    """
+    require_type(spectrum, Spectrum, "spectrum")
+    require_type(brackets, Brackets | None, "brackets")
+    figure = Figure(figsize=(7.5, 4.6), layout="constrained")
+    axes = figure.subplots()
+    proof = spectrum.certificate
+    number = proof.first + np.arange(len(spectrum.eigenvalues))
+    if brackets is not None:
+        lower, upper = brackets.lower[number], brackets.upper[number]
+        axes.vlines(number, lower, upper, color="#f2b36b", lw=3, label="bracket of the shape's eigenvalue")
+    axes.plot(number, spectrum.eigenvalues, ".", color="#1f77b4", markersize=5, label="eigenvalues of the operator")
+    if area is not None:
+        axes.plot(number, 4 * np.pi * number / area, "-", color="#999999", lw=1, label="Weyl's law, 4π i / area")
+    ends = [end for end in (proof.floor, proof.shift) if np.isfinite(end)]
+    if proof.complete and ends:
+        label = "none is missing below" if len(ends) == 1 else "none is missing between"
+        axes.hlines(ends, number[0], number[-1], color="#2ca02c", lw=1, ls="--", label=label)
+    axes.set_xlabel("number i")
+    axes.set_ylabel("eigenvalue λ, 1/length²")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.legend(frameon=False, loc="lower right")
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
+@dataclass(frozen=True, eq=False)
+class _Row:
+    """One spectrum to be drawn, with the intervals of its eigenvalues where they are known."""
+
+    title: str
+    values: Float[np.ndarray, " k"]
+    zero: Bool[np.ndarray, " k"]
+    intervals: Float[np.ndarray, "k 2"] | None = None
+    bracketed: bool = False
+
+
+def figure_spectra(
+    spectra: SpectrumComparison | Mapping[str, Spectrum | ArrayLike],
+    *,
+    titles: tuple[str, str] = ("one", "two"),
+    brackets: Mapping[str, Brackets] | None = None,
+    unit: str = "1/length²",
+) -> Figure:
+    """Plot several spectra side by side by number, and beneath them how far each is from the first.
+
+    Bars are residual bounds, or brackets; most are too short to be seen.
+
+    Parameters
+    ----------
+    spectra : SpectrumComparison, or {title: Spectrum or (k,) float}
+        Two or more, from the lowest eigenvalue on; numbers alone have no bars.
+    titles : (str, str)
+        Of the two of a comparison.
+    brackets : {title: Brackets}, optional
+        Of the shapes with these titles, in place of residual bounds.
+    unit : str
+        Of the eigenvalues.
+
+    Raises
+    ------
+    InvalidParameterError
+        If there are fewer than two, one does not begin with the lowest eigenvalue, or brackets belong to none.
+    """
+    require_type(spectra, SpectrumComparison | Mapping, "spectra")
+    require_type(brackets, Mapping | None, "brackets")
+    rows = _rows(spectra, titles, brackets or {})
+    if len(rows) < 2:
+        raise InvalidParameterError(f"Spectra side by side must be two or more; there are {len(rows)}.")
+    figure = Figure(figsize=(7.5, 6.4), layout="constrained")
+    _draw_rows(figure.subplots(2, 1, sharex=True, height_ratios=(3, 2)), rows, unit)
+    return figure
+
+
+def draw_comparison(panels: np.ndarray, compared: SpectrumComparison, titles: tuple[str, str]) -> None:
+    """Draw a comparison into two panels, one above the other, as `figure_spectra` does."""
+    _draw_rows(panels, _rows(compared, titles, {}), "1/length²")
+
+
+def _draw_rows(panels: np.ndarray, rows: list[_Row], unit: str) -> None:
+    above, below = panels
+    colors = palette(np.arange(len(rows)))
+    for row, color in zip(rows, colors, strict=True):
+        _draw_spectrum(above, row, color)
+    _draw_differences(below, rows, colors)
+    above.set_ylabel(f"eigenvalue λ, {unit}")
+    above.legend(frameon=False, loc="upper left", fontsize=9)
+    below.set_xlabel("number i")
+    for axes in (above, below):
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        axes.spines[["top", "right"]].set_visible(False)
+
+
+def _rows(
+    spectra: SpectrumComparison | Mapping[str, Spectrum | ArrayLike],
+    titles: tuple[str, str],
+    brackets: Mapping[str, Brackets],
+) -> list[_Row]:
+    if isinstance(spectra, SpectrumComparison):
+        parts = (spectra.one, spectra.intervals_one), (spectra.two, spectra.intervals_two)
+        return [
+            _Row(title, values, intervals[:, 0] <= 0, intervals, spectra.bracketed)
+            for title, (values, intervals) in zip(titles, parts, strict=True)
+        ]
+    unknown = [title for title in brackets if title not in spectra]
+    if unknown:
+        raise InvalidParameterError(
+            f"brackets must belong to spectra by their titles; {unknown[0]!r} is none of {list(spectra)}."
+        )
+    return [_row(title, spectrum, brackets.get(title)) for title, spectrum in spectra.items()]
+
+
+def _row(title: str, spectrum: Spectrum | ArrayLike, brackets: Brackets | None) -> _Row:
+    if isinstance(spectrum, Spectrum):
+        require_lowest(spectrum, title)
+        values = spectrum.eigenvalues
+        intervals = within_residuals(spectrum, len(values))
+        zero = intervals[:, 0] <= 0
+    else:
+        values, intervals = finite_values(spectrum, title), None
+        zero = count_as_zero(values)
+    if brackets is not None:
+        intervals = within_brackets(brackets, len(values), title)
+    return _Row(title, values, zero, intervals, brackets is not None)
+
+
+def _draw_spectrum(axes: Axes, row: _Row, color: Float[np.ndarray, "3"]) -> None:
+    number = np.arange(len(row.values))
+    if row.intervals is not None:
+        bars = f"{row.title}: bracket" if row.bracketed else "_"
+        axes.vlines(number, *row.intervals.T, color=color, lw=3 if row.bracketed else 1, alpha=0.35, label=bars)
+    axes.plot(number, row.values, ".-", color=color, markersize=3.5, lw=0.8, label=row.title)
+
+
+def _draw_differences(axes: Axes, rows: list[_Row], colors: Float[np.ndarray, "r 3"]) -> None:
+    """Draw relative differences from the first row, on a logarithmic axis where they span decades."""
+    changes = [_differences(rows[0], row) for row in rows[1:]]
+    seen = np.concatenate([change[change > FAINT] for change in changes])
+    logarithmic = seen.size and np.ptp(np.log10(seen)) > DECADES
+    for change, color in zip(changes, colors[1:], strict=True):
+        drawn = np.where(change > FAINT, change, np.nan) if logarithmic else change
+        axes.plot(np.arange(len(drawn)), drawn, ".-", color=color, markersize=3.5, lw=0.8)
+    if logarithmic:
+        axes.set_yscale("log")
+    else:
+        axes.set_ylim(bottom=0)
+    axes.set_ylabel(f"relative difference\nfrom {rows[0].title}")
+
+
+def _differences(first: _Row, other: _Row) -> Float[np.ndarray, " k"]:
+    k = min(len(first.values), len(other.values))
+    change = relative_change(first.values[:k], other.values[:k], zero=(first.zero[:k], other.zero[:k]))
+    return np.where(np.isfinite(change), change, np.nan)

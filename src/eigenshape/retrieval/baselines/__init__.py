@@ -1,0 +1,1 @@
+"""Peers of the literature: ShapeDNA, affinity spectra, light fields."""

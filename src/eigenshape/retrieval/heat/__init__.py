@@ -1,0 +1,1 @@
+"""The heat descriptor of the thesis, and its score."""

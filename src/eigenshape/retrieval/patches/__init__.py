@@ -1,0 +1,1 @@
+"""Descriptors of patches: one codebook entry a patch, and geometric verification."""

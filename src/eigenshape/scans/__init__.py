@@ -1,0 +1,1 @@
+"""What a scanner sees: partial scans, depth images, and the rasterizer behind them."""

@@ -1,0 +1,1 @@
+"""Synthetic shapes: surfaces, domains, creatures in poses, and their exact spectra."""

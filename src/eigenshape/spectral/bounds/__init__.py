@@ -1,0 +1,1 @@
+"""Brackets that contain the exact eigenvalues of a shape."""

@@ -1,0 +1,86 @@
+"""Lower bounds of eigenvalues by Crouzeix-Raviart elements."""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from eigenshape._errors import ConvergenceError
+from eigenshape._progress import Progress
+from eigenshape.geometry.facets import FacetTable
+from eigenshape.geometry.simplices import simplex_volumes
+from eigenshape.geometry.simplicial import Mesh
+from eigenshape.operators.crouzeix_raviart import (
+    crouzeix_raviart_laplacian,
+    facet_mass,
+    interpolation_constants,
+    mass_floor,
+)
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.spectral.bounds.rounding import enclose, relative_rounding
+from eigenshape.spectral.solver.dirichlet import solve_free
+
+EVEN = 1.5  # largest over mean C² up to which one constant serves all simplices
+STEP = 2.0  # from one weight to the next
+MOST = 10  # weights
+NEAREST = 0.9  # of the weights' pole
+
+Values = Float[np.ndarray, " k"]
+
+
+def lower_bounds(
+    mesh: Mesh, table: FacetTable, k: int, held: Int[np.ndarray, " h"], progress: Progress | None
+) -> Values:
+    """Return lower bounds of the k lowest eigenvalues with some facets held at zero, in 1/length².
+
+    `bracket_eigenvalues` has the proof. Where the interpolation constants are even, the weight μ = 0 is all. Where they
+    are not, weights near the last eigenvalue and in steps below serve the eigenvalues up to each, so that later ones
+    cost less.
+    """
+    squares, measure = interpolation_constants(mesh) ** 2, simplex_volumes(mesh)
+    mean, largest = float((squares * measure).sum() / measure.sum()), float(squares.max())
+    solve = _solver(mesh, table, held)
+    values = solve(measure, k, partly(progress, 0.3, 0.6))
+    best = values / (1 + largest * values)
+    done = 0.6
+    for weight in _weights(values, mean, largest):
+        n_served = min(int(np.count_nonzero(best <= weight)) + 1, k)
+        after = min(done + 0.4 / STEP * (n_served / k), 1.0)
+        report, done = partly(progress, done, after), after
+        try:
+            found = solve(measure / (1 - weight * squares), n_served, report)
+        except ConvergenceError:
+            continue  # a weight may only better the bounds, which stand without
+        bounds = found / (1 + largest * np.maximum(found - weight, 0.0))
+        best[:n_served] = np.maximum(best[:n_served], bounds)
+    return np.maximum.accumulate(best)
+
+
+def _weights(values: Values, mean: float, largest: float) -> list[float]:
+    """Return values μ: near the last eigenvalue, and in steps from there to the first above 0."""
+    positive = values[values > 0]
+    if not positive.size or largest <= EVEN * mean:
+        return []
+    last = float(positive[-1])
+    top = min(last / (1 + mean * last), NEAREST / largest)
+    n_steps = int(np.ceil(np.log(max(top / float(positive[0]), 1.0)) / np.log(STEP)))
+    return [top / STEP**step for step in range(min(n_steps + 1, MOST))]
+
+
+def _solver(
+    mesh: Mesh, table: FacetTable, held: Int[np.ndarray, " h"]
+) -> Callable[[Float[np.ndarray, " s"], int, Progress | None], Values]:
+    """Return what bounds from below the eigenvalues of Crouzeix-Raviart elements for a measure of each simplex."""
+    stiffness, rounding = crouzeix_raviart_laplacian(mesh).stiffness, relative_rounding(mesh)
+
+    def solve(measure: Float[np.ndarray, " s"], k: int, progress: Progress | None) -> Values:
+        laplacian = Laplacian(stiffness, facet_mass(table, measure))
+        found = solve_free(laplacian, k, held, progress)
+        return enclose(found, laplacian, mass_floor(mesh.dim), rounding)[0]
+
+    return solve
+
+
+def partly(progress: Progress | None, start: float, end: float) -> Progress | None:
+    """Return what reports a part of the work as a share of all of it."""
+    return progress and (lambda done, message: progress(start + done * (end - start), message))

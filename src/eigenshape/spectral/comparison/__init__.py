@@ -1,0 +1,1 @@
+"""Two spectra side by side."""

@@ -1,0 +1,199 @@
+"""Angles between the eigenspaces of two shapes, measured, and bounded by gaps (thesis 3.5)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy.typing import ArrayLike
+
+from eigenshape._arguments import require_type
+from eigenshape._arrays import frozen, whole_numbers
+from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.spectral.comparison.eigenspaces import SEPARATED, orthonormal, outside, separated_groups
+from eigenshape.spectral.solver.certify import quality
+from eigenshape.spectral.solver.kernel_values import to_pencil
+from eigenshape.spectral.solver.pairs import Pairs, spread
+from eigenshape.spectral.solver.pencil import Pencil, normalise, residual_norms
+from eigenshape.spectral.spectrum import Spectrum, require_lowest
+
+Vectors = Float[np.ndarray, "n p"]
+
+
+@dataclass(frozen=True, eq=False)
+class EigenspaceAngles:
+    """How far the eigenspaces of one shape turn when it becomes another.
+
+    Attributes
+    ----------
+    starts, stops : (g,) int
+        Group j has the numbers starts[j] to stops[j] - 1.
+    angles : (g,) float
+        Largest principal angle between the two spaces of a group, in radians, 0 to π/2.
+    gaps : (g,) float
+        Distance of the group from the nearest other eigenvalue of the first shape, in 1/length².
+    bounds : (g,) float or None
+        No angle is larger than its bound, in radians; π/2 says nothing. None without an operator.
+    """
+
+    starts: Int[np.ndarray, " g"]
+    stops: Int[np.ndarray, " g"]
+    angles: Float[np.ndarray, " g"]
+    gaps: Float[np.ndarray, " g"]
+    bounds: Float[np.ndarray, " g"] | None
+
+    def explain(self) -> str:
+        """Say in plain words how far the spaces turn, and for how many that is bounded."""
+        if not len(self.angles):
+            return "No group of eigenvalues is known whole."
+        worst = int(self.angles.argmax())
+        numbers = f"numbers {self.starts[worst]} to {self.stops[worst] - 1}"
+        degrees = np.degrees([np.median(self.angles), self.angles[worst]])
+        says = (
+            f"The eigenspaces of {len(self.angles)} groups turn by {degrees[0]:.3g}° in the median and by at most "
+            f"{degrees[1]:.3g}° ({numbers})."
+        )
+        if self.bounds is None:
+            return says
+        n_bounded = np.count_nonzero(self.bounds < np.pi / 2)
+        return f"{says} For {n_bounded} of them the gap proves a bound below a right angle."
+
+
+@one_blas_thread()
+def eigenspace_angles(
+    one: Spectrum,
+    two: Spectrum,
+    *,
+    points: ArrayLike | None = None,
+    laplacian: Laplacian | None = None,
+    ratio: float = SEPARATED,
+) -> EigenspaceAngles:
+    """Measure how far eigenspaces turn between two shapes, and bound it where gaps allow (thesis 3.5).
+
+    Groups are the `separated_groups` of `one` that are known whole. The eigenvectors of `two` with the same numbers are
+    pulled back to the points of `one` (thesis, lemma 3.2.1) and made orthonormal in its mass.
+
+    With the operator (W, B) of `one` the angle has a bound. Let V be that basis, H = VᵀWV, R = WV - BVH, and δ the
+    distance of the interval that the eigenvalues of H span from all eigenvalues of `one` outside the group. Then
+    sin θ ≤ ‖R‖/δ, the largest singular value in B⁻¹ (Davis and Kahan 1970, the sin θ theorem; Parlett 1998, section
+    11.7), as X = U⊥ᵀBV, U⊥ the eigenvectors of the rest, solves Λ⊥X - XH = U⊥ᵀR. The eigenvectors of `one` have the
+    same bound by their own residuals, which is added, and eigenvalues are off by at most √2 times the norm of all
+    residuals, which the gap loses. What the bound needs of `two` is V alone: it is a posteriori, and says nothing where
+    numbers are exchanged.
+
+    Parameters
+    ----------
+    one, two : Spectrum
+        From the lowest eigenvalue on.
+    points : (n_one,) int, optional
+        The point of `two` that belongs to each point of `one`; by default that of the same number.
+    laplacian : Laplacian, optional
+        The operator that `one` is of.
+    ratio : float
+        As in `separated_groups`.
+
+    Returns
+    -------
+    EigenspaceAngles
+
+    Raises
+    ------
+    InvalidParameterError
+        If a spectrum does not begin with the lowest eigenvalue, the points do not fit, eigenvectors are dependent where
+        they are pulled back to, or `laplacian` is given and `one` has no proof of completeness or other points.
+    ConvergenceError
+        If `laplacian` is not the operator that `one` is of.
+    """
+    require_type(one, Spectrum, "one")
+    require_type(two, Spectrum, "two")
+    require_type(laplacian, Laplacian | None, "laplacian")
+    require_lowest(one, "one")
+    require_lowest(two, "two")
+    partners = _partners(one, two, points)
+    groups = [
+        group
+        for group in separated_groups(one.eigenvalues, ratio=ratio)
+        if group.stop < len(one.eigenvalues) and group.stop <= len(two.eigenvalues)
+    ]
+    exact = None if laplacian is None else _unit_pairs(one, laplacian)
+    angles, bounds = np.empty(len(groups)), np.empty(len(groups))
+    for place, group in enumerate(groups):
+        name = f"Eigenvectors {group.start} to {group.stop - 1} of two"
+        pulled = orthonormal(two.eigenvectors[partners, group], one.mass, name)
+        angles[place] = _largest_angle(one, group, pulled)
+        bounds[place] = np.pi / 2 if exact is None else _bound(*exact, group, pulled)
+    steps = np.concatenate([[np.inf], np.diff(one.eigenvalues)])
+    starts, stops = (np.array([getattr(group, end) for group in groups], dtype=np.int64) for end in ("start", "stop"))
+    return EigenspaceAngles(
+        starts=frozen(starts),
+        stops=frozen(stops),
+        angles=frozen(angles),
+        gaps=frozen(np.minimum(steps[starts], steps[stops])),
+        bounds=None if exact is None else frozen(bounds),
+    )
+
+
+def _partners(one: Spectrum, two: Spectrum, points: ArrayLike | None) -> Int[np.ndarray, " n"]:
+    n_one, n_two = len(one.eigenvectors), len(two.eigenvectors)
+    if points is None and n_one != n_two:
+        raise InvalidParameterError(
+            f"Spectra on different numbers of points, {n_one} and {n_two}, need to be told which point of two belongs "
+            f"to each point of one. Pass points."
+        )
+    partners = whole_numbers(np.arange(n_one) if points is None else points, "a point of two", 0, n_two - 1)
+    if len(partners) != n_one:
+        raise InvalidParameterError(f"points must name one for each of {n_one} points; there are {len(partners)}.")
+    return partners
+
+
+def _largest_angle(one: Spectrum, group: slice, pulled: Vectors) -> float:
+    """Return the largest principal angle, small ones by their sine and large ones by their cosine."""
+    vectors = one.eigenvectors[:, group]
+    rest = outside(pulled, vectors, one.mass)
+    sine = np.sqrt(max(np.linalg.eigvalsh(rest.T @ (one.mass @ rest))[-1], 0.0))
+    cosine = np.linalg.svd(vectors.T @ (one.mass @ pulled), compute_uv=False)[-1]
+    return float(np.arctan2(sine, cosine))
+
+
+def _unit_pairs(one: Spectrum, laplacian: Laplacian) -> tuple[Pencil, Pairs]:
+    """Return the operator, and eigenpairs with residuals, in units of its own."""
+    if laplacian.n_points != len(one.eigenvectors):
+        raise InvalidParameterError(
+            f"laplacian must be the operator that one is of; they have {laplacian.n_points} and "
+            f"{len(one.eigenvectors)} points."
+        )
+    if one.certificate.count is None:
+        raise InvalidParameterError("Bounds of angles need a spectrum without gaps; one was not counted.")
+    pencil = normalise(laplacian)
+    values = np.ldexp(to_pencil(laplacian.kernel, one.eigenvalues), -pencil.value_exponent)
+    vectors = np.ldexp(one.eigenvectors, -pencil.vector_exponent)
+    pairs = Pairs(values, vectors, residual_norms(pencil, values, vectors))
+    quality(pencil, pairs)
+    return pencil, pairs
+
+
+def _bound(pencil: Pencil, pairs: Pairs, group: slice, pulled: Vectors) -> float:
+    """Return the bound of Davis and Kahan for the pulled space, with that for the eigenvectors themselves."""
+    basis = np.ldexp(pulled, -pencil.vector_exponent)
+    moved = pencil.stiffness @ basis
+    inner = basis.T @ moved
+    residual = moved - pencil.weigh(basis @ inner)
+    squares = (residual / pencil.mass_diagonal[:, None]).T @ residual
+    size = np.sqrt(max(np.linalg.eigvalsh(squares)[-1], 0.0) / pencil.mass_floor)
+    own = float(np.linalg.norm(pairs.residuals[group]))
+    turned = _sine_bound(float(size), _distance(pairs, group, np.linalg.eigvalsh(inner)))
+    return min(turned + _sine_bound(own, _distance(pairs, group, pairs.values[group])), float(np.pi / 2))
+
+
+def _distance(pairs: Pairs, group: slice, inside: Float[np.ndarray, " p"]) -> float:
+    """Return how far the interval of some values is from the eigenvalues outside a group."""
+    stray = np.sqrt(2) * spread(pairs)
+    above = pairs.values[group.stop] - stray - inside[-1]
+    if group.start == 0:
+        return float(above)
+    return float(min(above, inside[0] - pairs.values[group.start - 1] - stray))
+
+
+def _sine_bound(size: float, distance: float) -> float:
+    return float(np.arcsin(size / distance)) if size < distance else float(np.pi / 2)

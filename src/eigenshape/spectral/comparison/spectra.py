@@ -1,0 +1,199 @@
+"""Spectra of two shapes side by side: what changes, by how much, and which changes are proved."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy.typing import ArrayLike
+
+from eigenshape._arguments import require_each, require_type
+from eigenshape._arrays import finite_values, frozen
+from eigenshape._errors import InvalidParameterError
+from eigenshape.spectral.bounds.brackets import Brackets
+from eigenshape.spectral.signatures.heat import NULL
+from eigenshape.spectral.spectrum import Spectrum, require_lowest
+
+
+@dataclass(frozen=True, eq=False)
+class SpectrumComparison:
+    """The k lowest eigenvalues of two shapes, number by number.
+
+    Attributes
+    ----------
+    one, two : (k,) float
+        Eigenvalues, ascending, in 1/length².
+    intervals_one, intervals_two : (k, 2) float
+        Where the eigenvalues that they stand for lie: of the operator, within the residual; of the shape itself, in
+        its bracket.
+    relative : (k,) float
+        |two - one| / one; 0 where both are 0 to rounding, infinite where one of them is.
+    zero : (k,) bool
+        Whether both are 0 to rounding.
+    bracketed : bool
+        Whether the intervals are brackets.
+    """
+
+    one: Float[np.ndarray, " k"]
+    two: Float[np.ndarray, " k"]
+    intervals_one: Float[np.ndarray, "k 2"]
+    intervals_two: Float[np.ndarray, "k 2"]
+    relative: Float[np.ndarray, " k"]
+    zero: Bool[np.ndarray, " k"]
+    bracketed: bool
+
+    @property
+    def told(self) -> Bool[np.ndarray, " k"]:
+        """Which changes are proved: the two intervals have no point in common."""
+        (low_one, high_one), (low_two, high_two) = self.intervals_one.T, self.intervals_two.T
+        return np.asarray((high_one < low_two) | (high_two < low_one))
+
+    @property
+    def index_distance(self) -> float:
+        """Largest |λ_i - ω_i|, in 1/length² (thesis, theorem 3.1.5)."""
+        return float(np.abs(self.one - self.two).max())
+
+    @property
+    def hausdorff(self) -> float:
+        """Hausdorff distance of the two sets, as far as they are known, in 1/length² (thesis, theorem 3.1.4)."""
+        return spectral_hausdorff_distance(self.one, self.two)
+
+    @property
+    def mean_relative(self) -> float:
+        """Mean relative change of the eigenvalues that are not 0 in both; 0 where there is none."""
+        return float(self._changes().mean())
+
+    @property
+    def median_relative(self) -> float:
+        """Median relative change of the eigenvalues that are not 0 in both; 0 where there is none."""
+        return float(np.median(self._changes()))
+
+    def _changes(self) -> Float[np.ndarray, " j"]:
+        return np.zeros(1) if self.zero.all() else self.relative[~self.zero]
+
+    def explain(self) -> str:
+        """Say in plain words how far the spectra are apart, and what of it is proved."""
+        k, n_told, worst = len(self.one), int(self.told.sum()), int(np.abs(self.one - self.two).argmax())
+        bars = "brackets of the shapes'" if self.bracketed else "error bars of the operators'"
+        return (
+            f"Of the {k} lowest eigenvalues, number {worst} changes most, from {self.one[worst]:.6g} to "
+            f"{self.two[worst]:.6g} (1/length²). They change by {self.median_relative:.3g} of themselves in the median "
+            f"and {self.mean_relative:.3g} in the mean, and the sets are {self.hausdorff:.3g} apart (Hausdorff). "
+            f"{n_told} of the {k} changes are proved: the {bars} eigenvalues do not overlap."
+        )
+
+
+def compare_spectra(
+    one: Spectrum, two: Spectrum, *, brackets: tuple[Brackets, Brackets] | None = None
+) -> SpectrumComparison:
+    """Set the eigenvalues of two shapes side by side, as many as both have (thesis 3.1, 3.4).
+
+    Parameters
+    ----------
+    one, two : Spectrum
+        From the lowest eigenvalue on. Where size shall not matter, of shapes with one area.
+    brackets : (Brackets, Brackets), optional
+        Of the two shapes. A change is then proved of the shapes, and not of the operators alone.
+
+    Returns
+    -------
+    SpectrumComparison
+
+    Raises
+    ------
+    InvalidParameterError
+        If a spectrum does not begin with the lowest eigenvalue, or there are fewer brackets than eigenvalues.
+    """
+    require_type(one, Spectrum, "one")
+    require_type(two, Spectrum, "two")
+    require_lowest(one, "one")
+    require_lowest(two, "two")
+    k = min(len(one.eigenvalues), len(two.eigenvalues))
+    values = one.eigenvalues[:k], two.eigenvalues[:k]
+    bars = [within_residuals(one, k), within_residuals(two, k)]
+    zeros = bars[0][:, 0] <= 0, bars[1][:, 0] <= 0
+    if brackets is not None:
+        require_each(brackets, Brackets, "brackets")
+        bars = [within_brackets(each, k, name) for each, name in zip(brackets, ("one", "two"), strict=True)]
+    return SpectrumComparison(
+        one=frozen(values[0]),
+        two=frozen(values[1]),
+        intervals_one=frozen(bars[0]),
+        intervals_two=frozen(bars[1]),
+        relative=frozen(relative_change(*values, zero=zeros)),
+        zero=frozen(zeros[0] & zeros[1]),
+        bracketed=brackets is not None,
+    )
+
+
+def within_residuals(spectrum: Spectrum, k: int) -> Float[np.ndarray, "k 2"]:
+    """Return [λ - r, λ + r], from 0 on where λ is 0 to rounding."""
+    values, residuals = spectrum.eigenvalues[:k], spectrum.residuals[:k]
+    lower = np.where(count_as_zero(values), 0.0, np.maximum(values - residuals, 0.0))
+    return np.column_stack([lower, values + residuals])
+
+
+def within_brackets(brackets: Brackets, k: int, name: str) -> Float[np.ndarray, "k 2"]:
+    """Return the lowest k brackets.
+
+    Raises
+    ------
+    InvalidParameterError
+        If there are fewer.
+    """
+    if len(brackets.upper) < k:
+        raise InvalidParameterError(
+            f"brackets must hold each eigenvalue that is compared; there are {k} of these, and "
+            f"{len(brackets.upper)} brackets of {name}."
+        )
+    return np.column_stack([brackets.lower[:k], brackets.upper[:k]])
+
+
+def count_as_zero(values: Float[np.ndarray, " k"]) -> Bool[np.ndarray, " k"]:
+    """Return which of these eigenvalues are 0 beside the last."""
+    return np.asarray(values <= NULL * values[-1])
+
+
+def relative_change(
+    one: Float[np.ndarray, " k"],
+    two: Float[np.ndarray, " k"],
+    *,
+    zero: tuple[Bool[np.ndarray, " k"], Bool[np.ndarray, " k"]],
+) -> Float[np.ndarray, " k"]:
+    """Return |two - one| / one, where masks say which of each are 0: of two zeros 0, of one alone infinite."""
+    either, both = zero[0] | zero[1], zero[0] & zero[1]
+    change = np.abs(two - one) / np.where(either, 1.0, one)
+    return np.where(either, np.where(both, 0.0, np.inf), change)
+
+
+def spectral_hausdorff_distance(one: ArrayLike, two: ArrayLike) -> float:
+    """Measure how far an eigenvalue of one set may be from the nearest of the other (thesis, theorem 3.1.4).
+
+    max(max_λ dist(λ, Ω), max_ω dist(ω, Λ)) over what the known ends of two spectra tell. An eigenvalue above the last
+    known one of the other set is left out, because its nearest neighbour may be unknown. For one at or below it none
+    is: what is not known of the other set lies at or above its last known eigenvalue, and so no nearer than that one.
+
+    Parameters
+    ----------
+    one : (k1,) float
+        All eigenvalues up to the last, in any order, in 1/length².
+    two : (k2,) float
+
+    Returns
+    -------
+    float
+        In 1/length²; at most the largest |λ_i - ω_i| where both have as many.
+
+    Raises
+    ------
+    InvalidParameterError
+        If a value is not finite, or there is none.
+    """
+    first, second = np.sort(finite_values(one, "one")), np.sort(finite_values(two, "two"))
+    return max(_farthest(first, second), _farthest(second, first))
+
+
+def _farthest(values: Float[np.ndarray, " k"], others: Float[np.ndarray, " j"]) -> float:
+    told = values[values <= others[-1]]
+    above = np.searchsorted(others, told)
+    below = np.maximum(above - 1, 0)
+    return float(np.minimum(np.abs(others[above] - told), np.abs(told - others[below])).max(initial=0.0))

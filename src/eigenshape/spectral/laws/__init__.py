@@ -1,0 +1,1 @@
+"""What every operator must keep, checked on a given one."""

@@ -1,0 +1,94 @@
+"""Two operators that should be one: how far apart their entries lie, or their eigenvalues."""
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+
+from eigenshape._errors import ConvergenceError
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.sparse.elimination import EPS
+from eigenshape.spectral.laws.report import Law, NotJudged, Outcome, judged
+from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.spectrum import Spectrum
+
+N_EIGENVALUES = 20
+MOST_ROUNDING = 1e-4  # above, a comparison would prove nothing
+
+
+def sizes_of(matrix: sp.csr_array) -> Float[np.ndarray, " n"]:
+    """Return the root of each diagonal entry: of a semidefinite matrix no |W_ij| is above √W_ii √W_jj."""
+    diagonal = np.abs(matrix.diagonal())
+    return np.sqrt(np.maximum(diagonal, EPS * diagonal.max(initial=0.0)))
+
+
+def same_entries(name: str, found: Laplacian, expected: Laplacian, allowed: float) -> Law:
+    """Compare entry by entry."""
+    if found.n_points != expected.n_points:
+        return judged(name, np.inf, allowed, _other_rows(found.n_points, expected.n_points))
+    measured, says = distance(expected, found)
+    return judged(name, measured, allowed, f"{says}; rounding takes up to {allowed:.1e}.")
+
+
+def _other_rows(found: int, expected: int) -> str:
+    return f"the operator has {found} rows where {expected} are expected."
+
+
+def distance(expected: Laplacian, found: Laplacian) -> tuple[float, str]:
+    """Return the largest change of an entry, relative to √(W_ii W_jj) or √(B_ii B_jj), and say where it is."""
+    sized = zip("WB", matrices(expected), matrices(found), strict=True)
+    return max((_largest_change(*each) for each in sized), key=lambda change: change[0])
+
+
+def _largest_change(name: str, expected: sp.csr_array, found: sp.csr_array) -> tuple[float, str]:
+    change = (found - expected).tocoo()
+    roots = sizes_of(expected)
+    relative = np.abs(change.data) / np.maximum(roots[change.row] * roots[change.col], np.finfo(float).tiny)
+    if not relative.any():
+        return 0.0, f"no entry of {name} changes"
+    worst = int(relative.argmax())
+    i, j = int(change.row[worst]), int(change.col[worst])
+    where = f"the largest change is that of {name}_ij at ({i}, {j}), from {expected[i, j]:.6g} to {found[i, j]:.6g}"
+    return float(relative[worst]), f"{where}, {relative[worst]:.1e} of √({name}_ii {name}_jj)"
+
+
+def same_eigenvalues(name: str, found: Laplacian, spectrum: Spectrum, allowed: float, *, copies: int = 1) -> Outcome:
+    """Compare the lowest eigenvalues, whatever the order of the rows, with those of so many copies of an operator."""
+    n_rows, k = copies * len(spectrum.eigenvectors), len(spectrum.eigenvalues)
+    if found.n_points != n_rows:
+        return judged(name, np.inf, allowed, _other_rows(found.n_points, n_rows))
+    try:
+        lowest = lowest_eigenvalues(found, k)
+    except ConvergenceError as err:
+        return NotJudged(name, str(err))
+    expected = np.repeat(spectrum.eigenvalues, copies)[:k]
+    change, worst = spectral_distance(expected, lowest.eigenvalues)
+    allowed += float(spectrum.residuals.max() + lowest.residuals.max()) / (float(expected[-1]) or 1.0)
+    if allowed > MOST_ROUNDING:
+        return NotJudged(name, f"rounding may change eigenvalues by {allowed:.0e} of the last: elements are thin")
+    says = (
+        f"of the {len(expected)} lowest eigenvalues, {worst} changes most, from {expected[worst]:.6g} to "
+        f"{lowest.eigenvalues[worst]:.6g}, {change:.1e} of the last; rounding takes up to {allowed:.1e}."
+    )
+    return judged(name, change, allowed, says)
+
+
+def spectral_distance(expected: Float[np.ndarray, " k"], found: Float[np.ndarray, " k"]) -> tuple[float, int]:
+    """Return the largest change of an eigenvalue relative to the last, and its index."""
+    change = np.abs(found - expected) / (float(expected[-1]) or 1.0)
+    worst = int(change.argmax())
+    return float(change[worst]), worst
+
+
+def lowest_eigenvalues(laplacian: Laplacian, k: int = N_EIGENVALUES) -> Spectrum:
+    """Solve the pencil itself, whatever correction its kernel has."""
+    return solve_spectrum(Laplacian(laplacian.stiffness, laplacian.mass), min(k, laplacian.n_points))
+
+
+def permuted(laplacian: Laplacian, old_of_new: Int[np.ndarray, " n"]) -> Laplacian:
+    """Return the operator with its rows in another order."""
+    return Laplacian(*(matrix[old_of_new][:, old_of_new] for matrix in matrices(laplacian)))
+
+
+def matrices(laplacian: Laplacian) -> tuple[sp.csr_array, sp.csr_array]:
+    """Return W and B."""
+    return laplacian.stiffness, laplacian.mass

@@ -1,0 +1,243 @@
+"""What must hold for the two matrices of a Laplace operator, and how well it does."""
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Int
+from scipy.sparse.csgraph import connected_components
+
+from eigenshape._arguments import require_type
+from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
+from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.conversion import ShapeLike
+from eigenshape.geometry.simplices import simplex_volumes
+from eigenshape.geometry.topology import vertex_components
+from eigenshape.operators.laplacian import ASYMMETRY, Laplacian
+from eigenshape.spectral.laws.comparison import sizes_of
+from eigenshape.spectral.laws.report import (
+    USUAL,
+    Law,
+    NotJudged,
+    OperatorReport,
+    Outcome,
+    Promise,
+    gathered,
+    judged,
+    known_promises,
+)
+from eigenshape.spectral.laws.transformations import Subject, as_subject
+from eigenshape.spectral.solver.factor import Factor, factorise, rounding
+from eigenshape.spectral.solver.pencil import Pencil, normalise
+
+ROW_SUM = 1e-11  # of the largest √(W_ii W_jj) in the row
+WEIGHT = 1e-11  # of √(W_ii W_jj): weights that are 0 in exact arithmetic come out on either side
+LINK = 1e-14
+VOLUME = 1e-11
+NEGATIVE = 1e-9  # of trace W / trace B
+# Shifts in trace W / trace B, from what rounding leaves of a zero upwards.
+LADDER = 10.0 ** np.arange(-12, 4)
+FIRST_LINE = 1e-14  # in the same unit: between zero and not zero
+LARGEST_ZERO = 1e-6  # up to where rounding, or constants that are not annihilated, may move that line
+NUDGES = (1.0, 1.07, 0.93, 1.15)
+
+
+@one_blas_thread()
+def check_laplacian(
+    laplacian: Laplacian, shape: ShapeLike | sp.sparray | None = None, *, promises: Iterable[Promise] = USUAL
+) -> OperatorReport:
+    """Judge the laws that can be read off the two matrices.
+
+    Symmetry of W and B, B positive definite and W positive semidefinite are always judged, the others where they are
+    promised. Signs of eigenvalues are counted by Sylvester's law of inertia (Parlett 1998, section 3.3), at any size:
+    a factor of W + δB without negative pivot shows that no eigenvalue lies below -δ.
+
+    Parameters
+    ----------
+    laplacian : Laplacian
+    shape : ShapeLike or (n, n) sparse adjacency, optional
+        What the operator was made from; "volume" and "components" take a mesh.
+    promises : iterable of str
+        "constants": zero row sums, and no more zeros among the eigenvalues than the graph of W has components.
+        "components": no entry of W or B joins two components of the shape, and W has one for each. "definite": no
+        eigenvalue is zero, in place of "constants" where a boundary condition holds points fixed. "volume": the
+        entries of B sum to the volume. "nonnegative_weights": w_ij = -W_ij ≥ 0. The others are for `check_operator`.
+
+    Returns
+    -------
+    OperatorReport
+
+    Raises
+    ------
+    InvalidParameterError
+        If a promise is unknown.
+    """
+    require_type(laplacian, Laplacian, "laplacian")
+    promised, subject = known_promises(promises), None if shape is None else as_subject(shape)
+    mass, pencil = _mass(laplacian)
+    optional: dict[Promise, Callable[[], list[Outcome]]] = {
+        "constants": lambda: [_row_sums(laplacian), _kernel(laplacian, pencil)],
+        "components": lambda: [_components(laplacian, subject)],
+        "definite": lambda: [_definite(pencil)],
+        "volume": lambda: [_volume(laplacian, subject)],
+        "nonnegative_weights": lambda: [_weights(laplacian)],
+    }
+    found: list[Outcome] = [
+        _symmetry("symmetry of W", laplacian.stiffness),
+        _symmetry("symmetry of B", laplacian.mass),
+        mass,
+        _semidefinite(pencil),
+    ]
+    for name, laws in optional.items():
+        found += laws() if name in promised else [NotJudged(name.replace("_", " "), "not promised")]
+    return gathered(found)
+
+
+def _symmetry(name: str, matrix: sp.csr_array) -> Law:
+    off = abs(matrix - matrix.T).tocoo()
+    largest = float(np.abs(matrix.data).max(initial=0.0)) or 1.0
+    worst = float(off.data.max(initial=0.0)) / largest
+    return judged(name, worst, ASYMMETRY, f"entries (i, j) and (j, i) differ by at most {worst:.1e} of the largest.")
+
+
+def _mass(laplacian: Laplacian) -> tuple[Law, Pencil]:
+    """Prove B ≥ c diag(B) with c > 0; where that fails, the other laws are judged with diag(B) for B."""
+    name = "positive mass"
+    try:
+        pencil = normalise(laplacian)
+    except InvalidParameterError as err:
+        diagonal = sp.diags_array(laplacian.mass.diagonal()).tocsr()
+        return Law(name, False, 1.0, 0.0, str(err)), normalise(Laplacian(laplacian.stiffness, diagonal))
+    floor = pencil.mass_floor
+    return Law(name, True, 0.0, 0.0, f"B is positive definite: it is at least {floor:.3g} of its diagonal."), pencil
+
+
+def _factor(pencil: Pencil, share: float) -> Factor | None:
+    """Factor at a share of trace W / trace B, or within a few per cent of it where a pivot is exactly zero."""
+    tries = (factorise(pencil, nudge * share * pencil.level) for nudge in NUDGES)
+    return next((factor for factor in tries if factor), None)
+
+
+def _count(pencil: Pencil, share: float) -> int | None:
+    """Count the eigenvalues below a share of trace W / trace B."""
+    factor = _factor(pencil, share)
+    return factor.count if factor else None
+
+
+def _semidefinite(pencil: Pencil) -> Law:
+    for share in LADDER:
+        factor = _factor(pencil, -float(share))
+        if factor and factor.count == 0:
+            return judged("positive semidefinite", float(share), NEGATIVE, _bounded_below(pencil, factor, float(share)))
+    says = f"eigenvalues lie below -{LADDER[-1]:.0e} trace W / trace B."
+    return judged("positive semidefinite", np.inf, NEGATIVE, says)
+
+
+def _bounded_below(pencil: Pencil, factor: Factor, share: float) -> str:
+    bound = -factor.shift + float((rounding(factor) / pencil.mass_diagonal).max()) / pencil.mass_floor
+    says = f"W + {share:.0e} (trace W / trace B) B has no negative pivot"
+    if share > LADDER[0]:
+        says = f"{says}, and some with {share / 10:.0e}"
+    proved = float(pencil.values_out(np.array([bound]))[0])
+    return f"{says}: rounding included, no eigenvalue lies below {-proved:.1e}."
+
+
+def _row_sums(laplacian: Laplacian) -> Law:
+    W = laplacian.stiffness
+    sums, roots = W.sum(axis=1), sizes_of(W)
+    rows = np.repeat(np.arange(W.shape[0]), np.diff(W.indptr))
+    largest = roots.copy()
+    np.maximum.at(largest, rows, roots[W.indices])
+    relative = np.abs(sums) / np.maximum(roots * largest, np.finfo(float).tiny)
+    worst = int(relative.argmax())
+    says = f"the largest sum of a row is that of row {worst}, {sums[worst]:.3g} where W_ii is {W[worst, worst]:.3g}."
+    return judged("row sums", relative[worst], ROW_SUM, says)
+
+
+def _kernel(laplacian: Laplacian, pencil: Pencil) -> Law:
+    """Count the eigenvalues on either side of zero: a zero for each component, and no other.
+
+    The energy of each component's indicator bounds that many eigenvalues from above (Courant-Fischer). So this law
+    finds zeros that are too many; those too few are found by the row sums.
+    """
+    n_parts, labels = _graph_parts(laplacian.stiffness)
+    energies = np.abs(np.bincount(labels, weights=pencil.stiffness.sum(axis=1)))
+    masses = np.bincount(labels, weights=pencil.mass.sum(axis=1))
+    energy = float((energies / np.maximum(np.abs(masses), np.finfo(float).tiny)).max()) / pencil.level
+    line = min(max(FIRST_LINE, 4 * energy), LARGEST_ZERO)
+    while (zeros := _zeros(pencil, line)) < n_parts and line < LARGEST_ZERO:
+        line *= 10  # what rounding makes of a zero may lie farther out; a larger interval holds no fewer
+    says = f"within {line:.0e} trace W / trace B of zero lie {zeros} of the eigenvalues; components of W: {n_parts}."
+    return judged("kernel", abs(zeros - n_parts), 0, says)
+
+
+def _zeros(pencil: Pencil, line: float) -> int:
+    """Count the eigenvalues on either side of zero; none where no factor serves."""
+    below, negative = _count(pencil, line), _count(pencil, -line)
+    return 0 if below is None or negative is None else below - negative
+
+
+def _graph_parts(matrix: sp.csr_array) -> tuple[int, Int[np.ndarray, " n"]]:
+    linked = matrix.copy()
+    linked.eliminate_zeros()
+    count, labels = connected_components(linked, directed=False)
+    return int(count), labels.astype(np.int64)
+
+
+def _components(laplacian: Laplacian, shape: Subject | None) -> Outcome:
+    if shape is None or isinstance(shape, PointCloud):
+        return NotJudged("components", "no mesh or graph says what belongs together")
+    n_parts, labels = _graph_parts(shape) if isinstance(shape, sp.csr_array) else vertex_components(shape)
+    if len(labels) != laplacian.n_points:
+        return _number_of_parts(laplacian, n_parts)
+    worst, says = 0.0, "no entry of W or B joins two of them."
+    for name, matrix in (("W", laplacian.stiffness), ("B", laplacian.mass)):
+        size, place = _largest_link(matrix, labels)
+        if size > worst:
+            worst = size
+            says = f"entry {place} of {name} joins two of them: it is {size:.1e} of √({name}_ii {name}_jj)."
+    return judged("components", worst, LINK, f"the shape has {n_parts}; {says}")
+
+
+def _number_of_parts(laplacian: Laplacian, n_parts: int) -> Law:
+    found = _graph_parts(laplacian.stiffness)[0]
+    return judged("components", abs(found - n_parts), 0, f"the shape has {n_parts}, and W has {found}.")
+
+
+def _largest_link(matrix: sp.csr_array, labels: Int[np.ndarray, " n"]) -> tuple[float, tuple[int, int]]:
+    entries, roots = matrix.tocoo(), sizes_of(matrix)
+    scaled = np.abs(entries.data) / (roots[entries.row] * roots[entries.col])
+    scaled[labels[entries.row] == labels[entries.col]] = 0.0
+    if not scaled.size:
+        return 0.0, (0, 0)
+    worst = int(scaled.argmax())
+    return float(scaled[worst]), (int(entries.row[worst]), int(entries.col[worst]))
+
+
+def _definite(pencil: Pencil) -> Law:
+    share = float(LADDER[0])
+    count = _count(pencil, share)
+    if count is None:
+        return judged("definite", np.inf, 0, "no factor near zero has its pivots on the diagonal.")
+    return judged("definite", count, 0, f"below {share:.0e} trace W / trace B lie {count} of the eigenvalues.")
+
+
+def _volume(laplacian: Laplacian, shape: Subject | None) -> Outcome:
+    if shape is None or isinstance(shape, PointCloud | sp.csr_array):
+        return NotJudged("volume", "only a mesh has one to compare with")
+    volume, total = float(simplex_volumes(shape).sum()), float(laplacian.mass.sum())
+    says = f"the entries of B sum to {total:.12g}, and the shape has volume {volume:.12g}."
+    return judged("volume", abs(total / volume - 1), VOLUME, says)
+
+
+def _weights(laplacian: Laplacian) -> Law:
+    entries, roots = laplacian.stiffness.tocoo(), sizes_of(laplacian.stiffness)
+    off = entries.row != entries.col
+    rows, columns, weights = entries.row[off], entries.col[off], -entries.data[off]
+    relative = -weights / (roots[rows] * roots[columns])
+    if not relative.size:
+        return judged("nonnegative weights", 0, WEIGHT, "there is no pair of points to weigh.")
+    worst = int(relative.argmax())
+    says = f"the lowest weight, {weights[worst]:.3g}, is that of points {rows[worst]} and {columns[worst]}."
+    return judged("nonnegative weights", max(relative[worst], 0.0), WEIGHT, says)

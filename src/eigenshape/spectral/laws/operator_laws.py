@@ -1,0 +1,303 @@
+"""What must hold between the operators of one shape told in different ways."""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+import scipy.sparse as sp
+
+from eigenshape._arguments import require_type
+from eigenshape._errors import EigenshapeError, InvalidParameterError
+from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.conversion import ShapeLike
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.spectral.laws import transformations as changes
+from eigenshape.spectral.laws.comparison import (
+    MOST_ROUNDING,
+    distance,
+    lowest_eigenvalues,
+    matrices,
+    permuted,
+    same_eigenvalues,
+    same_entries,
+    spectral_distance,
+)
+from eigenshape.spectral.laws.laplacian_laws import check_laplacian
+from eigenshape.spectral.laws.report import (
+    USUAL,
+    Law,
+    NotJudged,
+    OperatorReport,
+    Outcome,
+    Promise,
+    gathered,
+    judged,
+    judgements,
+    known_promises,
+)
+from eigenshape.spectral.laws.transformations import Subject
+from eigenshape.spectral.spectrum import Spectrum
+
+Build: TypeAlias = Callable[[Any], Laplacian]
+
+# Powers of two near 1e±100, 1e±50 and 1e±20, which round no coordinate; the first for which W and B stay floats serves.
+DOUBLINGS = (332, 166, 66)
+LARGEST_EXPONENT = 900
+ROUNDING = 1e-12  # of √(W_ii W_jj), whatever the shape
+JIGGLES = 3
+HEADROOM = 32  # over what jiggles by rounding change: an entry takes ten roundings or more, that may all go one way
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """An operator under trial: how it is made, of what, and how much rounding alone may change it.
+
+    Attributes
+    ----------
+    build : callable
+    subject : Shape or adjacency
+    laplacian : Laplacian
+        What `build` makes of `subject`.
+    rng : Generator
+    spectrum : Spectrum, optional
+        Its lowest eigenvalues, where rows are not points and are compared by these.
+    by_points : bool
+        Whether row i is point i.
+    rounding : float
+        What rounding may change, of √(W_ii W_jj) or of the last of the lowest eigenvalues.
+    """
+
+    build: Build
+    subject: Subject
+    laplacian: Laplacian
+    rng: np.random.Generator
+    spectrum: Spectrum | None
+    by_points: bool
+    rounding: float
+
+    @property
+    def allowed(self) -> float:
+        """What laws may change that leave the coordinates and corners as they are."""
+        return min(self.rounding, MOST_ROUNDING)
+
+
+def check_operator(
+    build: Build,
+    shape: ShapeLike | sp.sparray,
+    *,
+    promises: Iterable[Promise] = USUAL,
+    by_points: bool | None = None,
+    rng: np.random.Generator | None = None,
+) -> OperatorReport:
+    """Judge the laws that a Laplace operator of a shape must obey, by the operator that is handed over.
+
+    The matrices are judged as in `check_laplacian`; then the operator is built again of the same shape told otherwise,
+    and compared entry by entry, relative to √(W_ii W_jj) and √(B_ii B_jj). Where rows are not points (elements of
+    higher order, a boundary condition, vectors), the 20 lowest eigenvalues are compared.
+
+    Rounding moves entries where simplices are thin: allowed is 32 times what changes most in three jiggles of the
+    coordinates by their rounding, and 1e-12 at least. Where that is more than 1e-4, laws that round anew, coordinates
+    or the order of corners, are not judged.
+
+    Parameters
+    ----------
+    build : callable
+        Shape to `Laplacian`. A scale parameter is to be chosen inside, as a multiple of a length of the shape.
+    shape : ShapeLike or (n, n) sparse adjacency
+    promises : iterable of str
+        As in `check_laplacian`, and: "rigid_motion": turned and moved by its own size, the shape has the same operator.
+        "reflection": so has its mirror image. "orientation": so has the mesh with some simplices turned over.
+        "scaling": in a unit 1e±100 times as large W and B change by one factor each, and eigenvalues by 1/length² (by
+        any factor on a graph, whose weights are scaled). "union": a shape and its copy far away have the operator of
+        the shape twice, as blocks. That building twice gives the same bits, and that the order of points and simplices
+        does not matter, is always judged.
+    by_points : bool, optional
+        Whether row i of the operator is point i of the shape; by default where there are as many.
+    rng : Generator, optional
+        What is random about the changes; by default the same at each call.
+
+    Returns
+    -------
+    OperatorReport
+
+    Raises
+    ------
+    InvalidParameterError
+        If a promise is unknown, or what `build` returns is not a `Laplacian`.
+    """
+    require_type(rng, np.random.Generator | None, "rng")
+    promised = known_promises(promises)
+    random = rng or np.random.default_rng(0)
+    subject = changes.as_subject(shape)
+    laplacian = build(subject)
+    if not isinstance(laplacian, Laplacian):
+        raise InvalidParameterError(f"build must return a Laplacian; it returned a {type(laplacian).__name__}.")
+    report = check_laplacian(laplacian, subject, promises=promised)
+    rows_are_points = laplacian.n_points == _n_points(subject) if by_points is None else by_points
+    spectrum = None if rows_are_points else _spectrum(laplacian)
+    rounding = _rounding(build, subject, spectrum or laplacian, random)
+    trial = Trial(build, subject, laplacian, random, spectrum, rows_are_points, rounding)
+    return gathered([*judgements(report), *_rebuilt(trial, promised)])
+
+
+def _spectrum(laplacian: Laplacian) -> Spectrum | None:
+    try:
+        return lowest_eigenvalues(laplacian)
+    except EigenshapeError:  # laws that need it are not judged, and say so
+        return None
+
+
+def _rebuilt(trial: Trial, promised: frozenset[Promise]) -> Iterator[Outcome]:
+    yield _attempt("repetition", _repetition, trial)
+    yield _attempt("point order", _point_order, trial)
+    yield _attempt("simplex order", _simplex_order, trial)
+    optional: dict[Promise, Callable[[Trial], Outcome]] = {
+        "rigid_motion": _rigid_motion,
+        "reflection": _reflection,
+        "orientation": _orientation,
+        "scaling": _scaling,
+        "union": _union,
+    }
+    for promise, law in optional.items():
+        name = promise.replace("_", " ")
+        yield _attempt(name, law, trial) if promise in promised else NotJudged(name, "not promised")
+
+
+def _attempt(name: str, law: Callable[[Trial], Outcome], trial: Trial) -> Outcome:
+    """Judge a law; an operator that refuses the shape told otherwise breaks it."""
+    try:
+        return law(trial)
+    except (EigenshapeError, ValueError, ArithmeticError) as err:
+        return Law(name, False, np.inf, trial.allowed, f"told otherwise, the shape or its spectrum is refused: {err}")
+
+
+def _rounding(build: Build, subject: Subject, expected: Laplacian | Spectrum, rng: np.random.Generator) -> float:
+    if isinstance(subject, sp.csr_array):
+        return ROUNDING
+    try:
+        others = [build(changes.jiggled(subject, rng)) for _ in range(JIGGLES)]
+        return max(ROUNDING, HEADROOM * max(_jiggle(expected, other) for other in others))
+    except (EigenshapeError, ValueError, ArithmeticError):
+        return ROUNDING  # the laws that change coordinates will find the refusal
+
+
+def _jiggle(expected: Laplacian | Spectrum, other: Laplacian) -> float:
+    if isinstance(expected, Laplacian):
+        return distance(expected, other)[0] if expected.n_points == other.n_points else 0.0
+    k = len(expected.eigenvalues)
+    return spectral_distance(expected.eigenvalues, lowest_eigenvalues(other, k).eigenvalues)[0]
+
+
+def _repetition(trial: Trial) -> Outcome:
+    again = trial.build(trial.subject)
+    pairs = [(again.stiffness, trial.laplacian.stiffness), (again.mass, trial.laplacian.mass)]
+    n_changed = sum((one != two).nnz if one.shape == two.shape else max(one.nnz, two.nnz) for one, two in pairs)
+    return judged("repetition", n_changed, 0, f"built twice, {n_changed} entries differ.")
+
+
+def _point_order(trial: Trial) -> Outcome:
+    old_of_new = trial.rng.permutation(_n_points(trial.subject))
+    other = trial.build(changes.renumbered(trial.subject, old_of_new))
+    return _agree("point order", trial, other, permuted(trial.laplacian, old_of_new) if trial.by_points else None)
+
+
+def _simplex_order(trial: Trial) -> Outcome:
+    if isinstance(trial.subject, PointCloud | sp.csr_array):
+        return NotJudged("simplex order", "the shape has no simplices")
+    return _same("simplex order", trial, changes.reordered(trial.subject, trial.rng))
+
+
+def _orientation(trial: Trial) -> Outcome:
+    if isinstance(trial.subject, PointCloud | sp.csr_array):
+        return NotJudged("orientation", "the shape has no simplices")
+    return _same("orientation", trial, changes.turned_over(trial.subject, trial.rng))
+
+
+def _rigid_motion(trial: Trial) -> Outcome:
+    if isinstance(trial.subject, sp.csr_array):
+        return NotJudged("rigid motion", "a graph lies nowhere")
+    return _same("rigid motion", trial, changes.moved(trial.subject, trial.rng))
+
+
+def _reflection(trial: Trial) -> Outcome:
+    if isinstance(trial.subject, sp.csr_array):
+        return NotJudged("reflection", "a graph lies nowhere")
+    return _same("reflection", trial, changes.mirrored(trial.subject))
+
+
+def _scaling(trial: Trial) -> Outcome:
+    doublings = _doublings(trial)
+    laws = [_scaled(trial, power) for power in (doublings, -doublings)]
+    return next((law for law in laws if not law.holds), max(laws, key=lambda law: law.measured))
+
+
+def _doublings(trial: Trial) -> int:
+    """Measure how W and B grow with the shape, and say how far it may."""
+    few = 20
+    traces = [_unit_traces(trial.build(changes.rescaled(trial.subject, 2.0**power)))[2:] for power in (0, few)]
+    growth = max(np.abs(np.log2(traces[1]) - np.log2(traces[0]))) / few
+    return next((power for power in DOUBLINGS if growth * power <= LARGEST_EXPONENT), few)
+
+
+def _scaled(trial: Trial, power: int) -> Law:
+    """Compare W and B after division by their traces, and the ratio of the traces with 1/length²."""
+    other = trial.build(changes.rescaled(trial.subject, 2.0**power))
+    here, there = _unit_traces(trial.laplacian), _unit_traces(other)
+    law = same_entries("scaling", Laplacian(there[0], there[1]), Laplacian(here[0], here[1]), trial.allowed)
+    unit = f"in a unit 2^{power} (1e{power * np.log10(2):+.0f}) times as large,"
+    if not law.holds or isinstance(trial.subject, sp.csr_array):
+        return judged("scaling", law.measured, law.allowed, f"{unit} {law.says}")
+    ratio = (there[2] / here[2]) / (there[3] / here[3]) * 2.0**power * 2.0**power
+    says = f"{unit} W and B change by one factor each, and eigenvalues times length² by {abs(ratio - 1):.1e}."
+    return judged("scaling", max(law.measured, abs(ratio - 1)), law.allowed, says)
+
+
+def _unit_traces(laplacian: Laplacian) -> tuple[sp.csr_array, sp.csr_array, float, float]:
+    stiffness, mass = laplacian.stiffness, laplacian.mass
+    traces = [float(np.abs(matrix.diagonal()).sum()) or 1.0 for matrix in (stiffness, mass)]
+    return stiffness / traces[0], mass / traces[1], traces[0], traces[1]
+
+
+def _union(trial: Trial) -> Outcome:
+    other = trial.build(changes.doubled(trial.subject))
+    rounding = trial.rounding
+    if not isinstance(trial.subject, sp.csr_array):
+        rounding *= changes.APART  # the coordinates of a copy that far away are so many times coarser
+    if rounding > MOST_ROUNDING:
+        return _drowned("union", rounding)
+    if trial.by_points:
+        twice = Laplacian(*(sp.csr_array(sp.block_diag([matrix, matrix])) for matrix in matrices(trial.laplacian)))
+        return same_entries("union", other, twice, rounding)
+    if trial.spectrum is None:
+        return _unsolved("union")
+    return same_eigenvalues("union", other, trial.spectrum, rounding, copies=2)
+
+
+def _drowned(name: str, rounding: float) -> NotJudged:
+    return NotJudged(
+        name, f"rounding of coordinates may change W by {rounding:.0e}: simplices are thin, or the operator is unstable"
+    )
+
+
+def _unsolved(name: str) -> NotJudged:
+    return NotJudged(name, "rows are no points, and the lowest eigenvalues cannot be proved")
+
+
+def _same(name: str, trial: Trial, subject: Subject) -> Outcome:
+    """Compare with the operator of the same points; rows that are not points may have changed places, or frames."""
+    if trial.rounding > MOST_ROUNDING:
+        return _drowned(name, trial.rounding)
+    return _agree(name, trial, trial.build(subject), trial.laplacian)
+
+
+def _agree(name: str, trial: Trial, found: Laplacian, expected: Laplacian | None) -> Outcome:
+    if trial.by_points and expected is not None:
+        return same_entries(name, found, expected, trial.allowed)
+    if trial.spectrum is None:
+        return _unsolved(name)
+    return same_eigenvalues(name, found, trial.spectrum, trial.allowed)
+
+
+def _n_points(subject: Subject) -> int:
+    return int(subject.shape[0]) if isinstance(subject, sp.csr_array) else subject.n_points

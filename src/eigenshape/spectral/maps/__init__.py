@@ -1,0 +1,1 @@
+"""Functional maps and the point-to-point maps that they give."""

@@ -1,0 +1,1 @@
+"""Approximate eigenpairs without a factorization of the whole operator."""

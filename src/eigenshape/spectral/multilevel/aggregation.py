@@ -1,0 +1,195 @@
+"""Fewer and fewer points for the same operator: smoothed aggregation (Vaněk, Mandel, Brezina 1996)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as sl
+import scipy.sparse as sp
+from jaxtyping import Float
+
+from eigenshape.spectral.multilevel.device import Array, Device, put, put_matrix
+from eigenshape.spectral.multilevel.multilevel_loops import grow_aggregates, smooth_columns
+
+LARGEST = 64  # points to an aggregate
+TOO_LITTLE = 1.5  # times fewer points, under which another level is not worth its cost
+DEGREE = 1.0  # steps of smoothing per edge that an aggregate is across
+MESH_ROW = 7.0  # entries in a row of a triangle mesh, whose steps reach one edge far
+PASSED = 4.0  # points of an aggregate to the wavelength from which functions are kept
+LEAST_RATIO = 2.5  # of the top to the least of these zeros' interval
+LANCZOS = 12
+ROUNDING = 1e-12  # of the energy that functions of a component would have without their neighbours
+SMOOTHED = 0.6  # of an aggregate's points: how far below the top of the spectrum smoothing reaches
+LEAST_SPREADS = (6.0, 20.0)  # of operators whose rows are full, and of those of a triangle mesh
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """An operator with fewer points than the one before, and the way down to the next.
+
+    Attributes
+    ----------
+    stiffness, mass : (n, n) sparse
+        A and M.
+    top : float
+        A bound of the eigenvalues of diag(A)⁻¹ A.
+    spread : float
+        Smoothing is for the eigenvalues from top / spread on.
+    down : (n, m) sparse or None
+        P: columns are functions that the next level has as points.
+    up : (m, n) sparse or None
+        Pᵀ.
+    """
+
+    stiffness: sp.csr_array
+    mass: sp.csr_array
+    top: float
+    spread: float
+    down: sp.csr_array | None
+    up: sp.csr_array | None
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """A level on a device: A and M as they are, P as vectors are kept, and A, P and Pᵀ in single for corrections."""
+
+    stiffness: Array
+    mass: Array | None
+    weights: Array
+    rough: Array
+    rough_scales: tuple[Array, Array]
+    prolong: Array
+    rough_prolong: Array
+    rough_restrict: Array
+    top: float
+    spread: float
+
+    @property
+    def n(self) -> int:
+        """Number of points."""
+        return int(self.weights.shape[0])
+
+
+def build_levels(stiffness: sp.csr_array, mass: sp.csr_array, n_coarsest: int, *, smooth: bool = True) -> list[Level]:
+    """Coarsen a pencil to about so many points; the last level has no way down.
+
+    Without smoothing the columns of P are indicators of aggregates: rough, but never nearly dependent.
+    """
+    levels: list[Level] = []
+    while True:
+        n = stiffness.shape[0]
+        top = _top(stiffness)
+        indicators = _aggregates(stiffness, n_coarsest) if n > TOO_LITTLE * n_coarsest else None
+        if indicators is None or n < TOO_LITTLE * indicators.shape[1]:
+            levels.append(Level(stiffness, mass, top, LEAST_SPREADS[0], None, None))
+            return levels
+        down = _smoothed(stiffness, top, indicators) if smooth else indicators
+        spread = max(SMOOTHED * n / down.shape[1], _least_spread(stiffness))
+        up = _by_rows(down.T)
+        levels.append(Level(stiffness, mass, top, spread, down, up))
+        energies = up.power(2) @ stiffness.diagonal()
+        stiffness, mass = _projected(up, stiffness, down), _projected(up, mass, down)
+        _clear_rounding(stiffness, energies)
+
+
+def _least_spread(stiffness: sp.csr_array) -> float:
+    least, most = LEAST_SPREADS
+    return max(least, min(most, most * MESH_ROW * stiffness.shape[0] / stiffness.nnz))
+
+
+def load(device: Device, level: Level, dtype: type, *, lumped: bool) -> Loaded:
+    """Put a level with a way down on a device; `lumped` says that M is diagonal, `dtype` how vectors are kept."""
+    rough = put_matrix(device, level.down, np.float32)
+    diagonal = level.mass.diagonal()[:, None]
+    scales = diagonal, 1 / _positive(level.stiffness.diagonal())[:, None]
+    return Loaded(
+        stiffness=put_matrix(device, level.stiffness, np.float64),
+        mass=None if lumped else put_matrix(device, level.mass, np.float64),
+        weights=put(device, diagonal),
+        rough=put_matrix(device, level.stiffness, np.float32),
+        rough_scales=(put(device, scales[0].astype(np.float32)), put(device, scales[1].astype(np.float32))),
+        prolong=rough if dtype is np.float32 else put_matrix(device, level.down, dtype),
+        rough_prolong=rough,
+        rough_restrict=put_matrix(device, level.up, np.float32),
+        top=level.top,
+        spread=level.spread,
+    )
+
+
+def _aggregates(stiffness: sp.csr_array, n_coarsest: int) -> sp.csr_array:
+    """Return the indicators of aggregates, as columns."""
+    n = stiffness.shape[0]
+    ratio = n / n_coarsest
+    size = max(round(ratio ** (1 / np.ceil(np.log(ratio) / np.log(LARGEST)))), 2)
+    labels, count = grow_aggregates(stiffness.indptr, stiffness.indices, stiffness.data, size)
+    return sp.csr_array((np.ones(n), labels, np.arange(n + 1, dtype=np.int32)), shape=(n, count))
+
+
+def _smoothed(stiffness: sp.csr_array, top: float, columns: sp.csr_array) -> sp.csr_array:
+    """Smooth columns by a polynomial in diag(A)⁻¹A that is 1 at 0, so that constants stay.
+
+    Its zeros are those of a Chebyshev polynomial on the part of the spectrum that steps from aggregate to aggregate
+    lie in: what is left of the steps falls with the degree as fast as it can.
+    """
+    size = columns.shape[0] / columns.shape[1]
+    row = stiffness.nnz / stiffness.shape[0]
+    degree = max(round(DEGREE * np.sqrt(size * MESH_ROW / row)), 1)
+    low = top / max(size / PASSED, LEAST_RATIO)
+    matrix, inverse = (stiffness.indptr, stiffness.indices, stiffness.data), 1 / _positive(stiffness.diagonal())
+    rows = columns.indptr, columns.indices, columns.data
+    for node in np.cos(np.pi * (2 * np.arange(degree) + 1) / (2 * degree)):
+        step = 2 / (top + low + (top - low) * node)
+        rows = smooth_columns(matrix, step * inverse, rows, columns.shape[1])
+    return _by_rows(sp.csr_array((rows[2], rows[1], rows[0]), shape=columns.shape))
+
+
+def _projected(up: sp.csr_array, matrix: sp.csr_array, down: sp.csr_array) -> sp.csr_array:
+    product = up @ (matrix @ down)
+    return _by_rows((product + product.T) * 0.5)
+
+
+def _clear_rounding(stiffness: sp.csr_array, energies: Float[np.ndarray, " m"]) -> None:
+    """Set to 0 what rounding left of components that have become one point: constants there, which have no energy.
+
+    Else their rounding, 1e-16 of the energy of what was summed up, stands for an eigenvalue of its own.
+    """
+    alone = np.flatnonzero(np.diff(stiffness.indptr) == 1)
+    places = stiffness.indptr[alone]
+    rounding = np.abs(stiffness.data[places]) <= ROUNDING * energies[alone]
+    stiffness.data[places[rounding]] = 0.0
+
+
+def _by_rows(matrix: sp.sparray) -> sp.csr_array:
+    rows = sp.csr_array(matrix)
+    rows.sort_indices()
+    rows.indices, rows.indptr = rows.indices.astype(np.int32), rows.indptr.astype(np.int32)
+    return rows
+
+
+def _positive(diagonal: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    return np.where(diagonal > 0, diagonal, 1.0)
+
+
+def _top(matrix: sp.csr_array) -> float:
+    """Bound the eigenvalues of diag(A)⁻¹A: by Gershgorin, or by Lanczos with its last residual (Zhou and others 2006).
+
+    Only the speed of corrections hangs on it.
+    """
+    inverse = 1 / _positive(matrix.diagonal())
+    gershgorin = float((inverse * abs(matrix).sum(axis=1)).max())
+    return min(gershgorin, _lanczos_top(matrix, np.sqrt(inverse))) or 1.0
+
+
+def _lanczos_top(matrix: sp.csr_array, roots: Float[np.ndarray, " n"]) -> float:
+    column = np.random.default_rng(0).standard_normal(len(roots))
+    column /= np.linalg.norm(column)
+    before, rest, diagonal, beside = np.zeros_like(column), 0.0, [], []
+    for _ in range(LANCZOS):
+        image = roots * (matrix @ (roots * column)) - rest * before
+        diagonal.append(float(column @ image))
+        image -= diagonal[-1] * column
+        rest = float(np.linalg.norm(image))
+        beside.append(rest)
+        if rest < 1e-10:
+            break
+        before, column = column, image / rest
+    return float(sl.eigvalsh_tridiagonal(diagonal, beside[:-1])[-1]) + rest

@@ -1,0 +1,142 @@
+"""From an operator down to one of few points, and back up to the last level but one with its eigenvectors."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from eigenshape._errors import ConvergenceError, InvalidParameterError
+from eigenshape._memory import require_memory
+from eigenshape._progress import Progress, silent
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.spectral.multilevel.aggregation import Level, build_levels, load
+from eigenshape.spectral.multilevel.davidson import WIDTH, Goal, refine
+from eigenshape.spectral.multilevel.device import Array, Device, put
+from eigenshape.spectral.multilevel.vcycle import Coarsest, Tower
+from eigenshape.spectral.solver.pencil import Pencil, as_pencil
+from eigenshape.spectral.solver.shift import factorise_near
+from eigenshape.spectral.solver.strategy import proved
+
+SMALL = 600  # points up to which the exact solve is the quicker one
+GUARDS = 8  # more pairs than asked for, at least, and in all a multiple of it
+GUARD_SHARE = 1.125
+COARSEST = 3000  # points of the coarsest level, at least; and times k:
+COARSEST_PER_PAIR = 30
+COARSENED = 8  # times, at least
+SHIFTS = (0.2, 0.5, 0.75, 0.93)  # of the k-th eigenvalue
+ROUNDS = 100
+SINGLE = 1e-4  # accuracy from which vectors are kept in single precision while they are refined
+LEAST_ACCURATE = 0.1
+INNER_ACCURACY = 0.03  # on levels between, within so many rounds
+INNER_ROUNDS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where the refinement of an operator's eigenvectors starts.
+
+    Attributes
+    ----------
+    order : (n,) int
+        The points' order on the levels.
+    tower : Tower
+        All levels.
+    below : (m, g) float, (g,) float
+        Eigenvectors and values of the second level.
+    """
+
+    order: Int[np.ndarray, " n"]
+    tower: Tower
+    below: tuple[Array, np.ndarray]
+
+
+def climb(
+    pencil: Pencil, k: int, device: Device, report: Progress, *, dtype: type = np.float32, kept: int = 0
+) -> Start | None:
+    """Make the levels of a pencil with diagonal mass, solve the coarsest, and refine its vectors up to the second.
+
+    Some more pairs than k are carried along, in the precision given. `kept` are bytes that the caller needs at the end
+    beside these bases. None where the pencil has too few points to be worth it, or none that can be joined.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the memory is too small.
+    """
+    m = -(-max(k + GUARDS, int(GUARD_SHARE * k)) // GUARDS) * GUARDS
+    if pencil.n <= max(SMALL, COARSENED * m):
+        return None
+    bases = pencil.n * (2 * np.dtype(dtype).itemsize * m + 20 * WIDTH)
+    parts = {"bases": bases + kept, "levels of their operator": 100 * pencil.stiffness.nnz}
+    require_memory(f"{k} pairs of {pencil.n} points", parts, "Ask for fewer pairs")
+    report(0.01, "making coarser levels")
+    order = reverse_cuthill_mckee(sp.csr_matrix(pencil.stiffness), symmetric_mode=True)
+    coarsened = _coarsened(_reordered(pencil.stiffness, order), _reordered(pencil.mass, order), k, m)
+    if coarsened is None:
+        return None
+    levels, coarsest, values = coarsened
+    loaded = [load(device, level, dtype, lumped=place == 0) for place, level in enumerate(levels[:-1])]
+    goal = Goal(k, np.inf, INNER_ACCURACY, pencil.level / pencil.n, INNER_ROUNDS, strict=False)
+    vectors = put(device, coarsest.vectors)
+    for place in range(len(loaded) - 1, 0, -1):
+        tower = Tower(device, tuple(loaded[place:]), coarsest)
+        vectors, values, _ = refine(tower, (vectors, values), goal, _in_level(report, place, len(loaded)))
+    return Start(order, Tower(device, tuple(loaded), coarsest), (vectors, values))
+
+
+def require_lumped(laplacian: Laplacian) -> None:
+    """Refuse a mass with entries beside its diagonal, with the first."""
+    rows = laplacian.mass.tocoo()
+    beside = np.flatnonzero((rows.row != rows.col) & (rows.data != 0))
+    if beside.size:
+        raise InvalidParameterError(
+            f"mass must be diagonal here; entry ({rows.row[beside[0]]}, {rows.col[beside[0]]}) is "
+            f"{rows.data[beside[0]]:.6g}. Lump the mass, or take solve_spectrum."
+        )
+
+
+def require_accuracy(name: str, value: float, least: float) -> None:
+    """Refuse an accuracy out of range."""
+    if not least <= value <= LEAST_ACCURATE:
+        raise InvalidParameterError(f"{name} must lie in {least}..{LEAST_ACCURATE}; it is {value}.")
+
+
+def on_finest(report: Progress, start: Start) -> Callable[[float], None]:
+    """Return how a refinement of the first level, from 0 to 1, is told."""
+    n_levels = len(start.tower.levels)
+    return lambda done: report(0.35 + 0.6 * done, f"refining on level {n_levels} of {n_levels}")
+
+
+def _reordered(matrix: sp.sparray, order: Int[np.ndarray, " n"]) -> sp.csr_array:
+    return sp.csr_array(sp.csr_array(matrix)[order][:, order])
+
+
+def _coarsened(
+    stiffness: sp.csr_array, mass: sp.csr_array, k: int, m: int
+) -> tuple[list[Level], Coarsest, Float[np.ndarray, " m"]] | None:
+    """Return the levels with the solved coarsest one, and its values; None where nothing can be joined."""
+    n_coarsest = min(max(COARSEST_PER_PAIR * k, COARSEST), stiffness.shape[0] // COARSENED)
+    levels = build_levels(stiffness, mass, n_coarsest)
+    if len(levels) == 1:
+        return None
+    with suppress(ConvergenceError, InvalidParameterError):
+        return levels, *_solved_coarsest(levels[-1], k, m)
+    levels = build_levels(stiffness, mass, n_coarsest, smooth=False)  # weights over many decades
+    return levels, *_solved_coarsest(levels[-1], k, m)
+
+
+def _solved_coarsest(level: Level, k: int, m: int) -> tuple[Coarsest, Float[np.ndarray, " m"]]:
+    pencil = as_pencil(level.stiffness, level.mass)
+    pairs, _ = proved(pencil, m, silent)
+    last = max(float(pairs.values[k - 1]), pencil.level / pencil.n)  # where all that is wanted is 0
+    factors = tuple(factorise_near(pencil, share * last) for share in SHIFTS)
+    return Coarsest(pencil, pairs.vectors, factors), pairs.values
+
+
+def _in_level(report: Progress, place: int, n_levels: int) -> Callable[[float], None]:
+    share = 0.15 / n_levels
+    return lambda done: report(0.35 + share * (done - place), f"refining on level {n_levels - place} of {n_levels}")

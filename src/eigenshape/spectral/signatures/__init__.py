@@ -1,0 +1,1 @@
+"""Heat and wave kernel signatures."""

@@ -1,0 +1,221 @@
+"""The proof that a spectrum has no eigenvalue missing and none too many."""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from eigenshape._arguments import require_type
+from eigenshape._arrays import as_array
+from eigenshape._errors import ConvergenceError, InvalidParameterError, try_auto
+from eigenshape._threads import one_blas_thread
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.spectral.certificate import Certificate
+from eigenshape.spectral.solver.factor import Factor
+from eigenshape.spectral.solver.inertia import count_beside
+from eigenshape.spectral.solver.kernel_values import reported, to_pencil
+from eigenshape.spectral.solver.pairs import Pairs, spread
+from eigenshape.spectral.solver.pencil import Pencil, column_chunks, normalise, residual_norms
+
+RESOLUTION = 1e-6  # relative to the largest eigenvalue: what is closer counts as one cluster
+WIDEST_CLUSTER = 1e-3  # relative too: a chain of close eigenvalues longer than this proves nothing
+ORTHONORMAL = 1e-8
+LARGEST_RESIDUAL = 1e-5
+FARTHER = 10.0
+
+
+def certify(
+    laplacian: Laplacian, eigenvalues: Float[np.ndarray, " k"], eigenvectors: Float[np.ndarray, "n k"]
+) -> Certificate:
+    """Prove that these are the k lowest eigenpairs, or refuse them.
+
+    Sylvester's law of inertia (Parlett 1998, section 3.3): W - σB = L D Lᵀ has as many negative entries in D as
+    there are eigenvalues below σ. σ stands just above the k-th eigenvalue, farther than the rounding of the factor
+    can move the count.
+
+    Parameters
+    ----------
+    laplacian : Laplacian
+    eigenvalues : (k,) float
+        Ascending, in 1/length².
+    eigenvectors : (n, k) float
+        B-orthonormal columns.
+
+    Returns
+    -------
+    Certificate
+
+    Raises
+    ------
+    InvalidParameterError
+        If the arrays do not fit the operator, are not finite or not ascending.
+    ConvergenceError
+        If the columns are not B-orthonormal eigenvectors, or more or fewer eigenvalues lie there.
+    """
+    require_type(laplacian, Laplacian, "laplacian")
+    values, vectors = _checked(laplacian, as_array(eigenvalues, "eigenvalues"), as_array(eigenvectors, "eigenvectors"))
+    values = to_pencil(laplacian.kernel, values)
+    with one_blas_thread():
+        pencil = normalise(laplacian)
+        values, vectors = np.ldexp(values, -pencil.value_exponent), np.ldexp(vectors, -pencil.vector_exponent)
+        certificate = prove(pencil, Pairs(values, vectors, residual_norms(pencil, values, vectors)))
+    last = float(np.ldexp(values[-1], pencil.value_exponent))
+    certificate = reported(laplacian.kernel, in_user_units(pencil, certificate), last)
+    if not certificate.complete:
+        raise ConvergenceError(certificate.explain())
+    return certificate
+
+
+def prove(pencil: Pencil, pairs: Pairs) -> Certificate:
+    """Count eigenvalues above the last pair, and below its cluster where the cluster goes on.
+
+    The certificate, in the pencil's units, may be incomplete: then `count` differs from `n_found`.
+
+    Raises
+    ------
+    ConvergenceError
+        If the pairs are not B-orthonormal eigenvectors, or no factor is good enough to count by.
+    """
+    k, certificate = len(pairs.values), quality(pencil, pairs)
+    if k == pencil.n:
+        return certificate
+    above = count_beside(pencil, pairs, k - 1, certificate.resolution)
+    certificate = _counted(certificate, pairs, above)
+    return certificate if above.count <= k else _below_cluster(pencil, pairs, certificate, above)
+
+
+def quality(pencil: Pencil, pairs: Pairs) -> Certificate:
+    """Return what can be said of pairs without a count, in the pencil's units; it stands if these are all n.
+
+    Raises
+    ------
+    ConvergenceError
+        If the pairs are not B-orthonormal eigenvectors.
+    """
+    resolution = max(RESOLUTION * _scale(pencil, pairs), 4 * spread(pairs))
+    return Certificate(
+        n_pairs=len(pairs.values),
+        shift=np.inf,
+        count=pencil.n,
+        n_found=len(pairs.values),
+        gap=(float(pairs.values[-1]), np.inf),
+        resolution=resolution,
+        orthonormality=require_orthonormal(pencil, pairs.vectors),
+        max_residual=_require_eigenpairs(pencil, pairs),
+        n_split=0,
+        clusters=_clusters(pairs.values, resolution),
+    )
+
+
+def in_user_units(pencil: Pencil, certificate: Certificate) -> Certificate:
+    """Return the certificate with every value in the user's 1/length²."""
+    shift, floor, low, high, resolution = pencil.values_out(
+        np.array([certificate.shift, certificate.floor, *certificate.gap, certificate.resolution])
+    ).tolist()
+    return replace(certificate, shift=shift, floor=floor, gap=(low, high), resolution=resolution)
+
+
+def part(pencil: Pencil, pairs: Pairs, certificate: Certificate, start: int, stop: int) -> tuple[Pairs, Certificate]:
+    """Return the pairs from one number to another; what proves them all proves these."""
+    resolution = RESOLUTION * _scale(pencil, pairs)
+    rest = pairs.values[stop:] - pairs.values[stop - 1]
+    equal = int(np.count_nonzero(rest <= resolution))
+    fewer = Pairs(pairs.values[start:stop], pairs.vectors[:, start:stop], pairs.residuals[start:stop])
+    return fewer, replace(
+        certificate,
+        first=certificate.first + start,
+        n_pairs=stop - start,
+        n_split=equal + (certificate.n_split if equal == len(rest) else 0),
+        clusters=_clusters(fewer.values, resolution),
+    )
+
+
+def _below_cluster(pencil: Pencil, pairs: Pairs, above: Certificate, beside: Factor) -> Certificate:
+    # Eigenvalues below the cluster are counted. The next ones lie above that count, and not above those found.
+    jumps = np.flatnonzero(np.diff(pairs.values) > 2 * above.resolution)
+    first = int(jumps[-1]) + 1 if jumps.size else 0
+    factor = count_beside(pencil, pairs, first, -above.resolution, beside)
+    if factor.count > first:
+        # Slack may have taken copies of the cluster below σ that are not among the pairs: once more, from farther off.
+        farther = FARTHER * (factor.shift - float(pairs.values[first]))
+        factor = count_beside(pencil, pairs, first, farther, factor)
+    resolution = float(pairs.values[-1]) - factor.shift
+    if resolution > WIDEST_CLUSTER * _scale(pencil, pairs):
+        raise ConvergenceError(
+            f"Neighbouring eigenvalues must differ by more than rounding takes; the last {len(pairs.values) - first} "
+            f"of {len(pairs.values)} do not. Repair nearly degenerate elements."
+        )
+    return replace(_counted(above, pairs, factor), resolution=resolution, n_split=beside.count - len(pairs.values))
+
+
+def _counted(certificate: Certificate, pairs: Pairs, factor: Factor) -> Certificate:
+    n_found = int(np.count_nonzero(pairs.values < factor.shift))
+    low = float(pairs.values[n_found - 1]) + spread(pairs) if n_found else -np.inf
+    return replace(
+        certificate,
+        shift=factor.shift,
+        count=factor.count,
+        n_found=n_found,
+        gap=(low, factor.shift),
+        resolution=float(np.abs(pairs.values - factor.shift).min()),
+    )
+
+
+def _clusters(values: Float[np.ndarray, " k"], resolution: float) -> tuple[int, ...]:
+    ends = np.flatnonzero(np.append(np.diff(values) > resolution, True))
+    return tuple(np.diff(ends, prepend=-1).tolist())
+
+
+def _scale(pencil: Pencil, pairs: Pairs) -> float:
+    # level / n is far below the first positive eigenvalue of a surface, and serves where all that is found is 0.
+    return max(float(np.abs(pairs.values).max()), pencil.level / pencil.n)
+
+
+def require_orthonormal(pencil: Pencil, vectors: Float[np.ndarray, "n k"]) -> float:
+    """Return the largest entry of ΦᵀBΦ - I; raise a ConvergenceError where it is not small."""
+    worst = 0.0
+    for columns in column_chunks(vectors.shape[1]):
+        weighed = pencil.weigh(vectors[:, columns])
+        rows = np.flatnonzero(weighed.any(axis=1))  # few where vectors live on parts
+        every = len(rows) == pencil.n
+        off = vectors.T @ weighed if every else vectors[rows].T @ weighed[rows]
+        off[np.arange(columns.start, columns.stop), np.arange(off.shape[1])] -= 1
+        np.abs(off, out=off)
+        row, column = np.unravel_index(int(off.argmax()), off.shape)
+        if not off[row, column] <= ORTHONORMAL:
+            raise ConvergenceError(
+                f"Eigenvectors must be B-orthonormal to {ORTHONORMAL:.0e}; columns {row} and {columns.start + column} "
+                f"are off by {off[row, column]:.2e}."
+            )
+        worst = max(worst, float(off[row, column]))
+    return worst
+
+
+def _require_eigenpairs(pencil: Pencil, pairs: Pairs) -> float:
+    relative = pairs.residuals / _scale(pencil, pairs)
+    worst = int(relative.argmax())
+    if not relative[worst] <= LARGEST_RESIDUAL:
+        raise ConvergenceError(
+            f"Every pair must satisfy Wφ = λBφ to {LARGEST_RESIDUAL:.0e} of the largest eigenvalue; pair {worst} is "
+            f"off by {relative[worst]:.2e}. Nearly degenerate elements do this. {try_auto()}"
+        )
+    return float(relative[worst])
+
+
+def _checked(
+    laplacian: Laplacian, values: Float[np.ndarray, " k"], vectors: Float[np.ndarray, "n k"]
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, "n k"]]:
+    fits = values.ndim == 1 and values.size and vectors.shape == (laplacian.n_points, len(values))
+    if not fits:
+        raise InvalidParameterError(
+            f"eigenvalues and eigenvectors must have shapes (k,) and ({laplacian.n_points}, k); "
+            f"the shapes are {values.shape} and {vectors.shape}."
+        )
+    if not (np.isfinite(values).all() and np.isfinite(vectors).all()):
+        raise InvalidParameterError("eigenvalues and eigenvectors must be finite; some are not.")
+    drops = np.flatnonzero(np.diff(values) < 0)
+    if drops.size:
+        raise InvalidParameterError(
+            f"eigenvalues must ascend; {drops[0] + 1} is {values[drops[0] + 1]} after {values[drops[0]]}."
+        )
+    return values, vectors

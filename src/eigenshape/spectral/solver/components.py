@@ -1,0 +1,150 @@
+"""Operators that fall into parts: each is solved by itself, small ones of one size together."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+
+from eigenshape.spectral.solver.pairs import Pairs
+from eigenshape.spectral.solver.pencil import Pencil, part_pencil, residual_norms
+
+AT_ONCE = 2**22  # numbers in the blocks that are solved together
+FOUR = 4  # residuals: what is nearer to 0 is 0, as in `positive_eigenvalues`
+EQUAL = 1e-12  # relative: eigenvalues of congruent parts differ so much where coordinates are rounded
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """The connected parts of a pencil, small ones first; parts of one size in the order of their first points.
+
+    Attributes
+    ----------
+    pencil : Pencil
+        All of it.
+    order : (n,) int
+        Its points, part by part, ascending within each.
+    starts : (c + 1,) int
+        Where the points of each part begin in `order`, and n.
+    """
+
+    pencil: Pencil
+    order: Int[np.ndarray, " n"]
+    starts: Int[np.ndarray, " c1"]
+
+    @property
+    def sizes(self) -> Int[np.ndarray, " c"]:
+        """Points of each part, ascending."""
+        return np.diff(self.starts)
+
+    @cached_property
+    def ordered(self) -> tuple[sp.csc_array, sp.csc_array]:
+        """W and B with their points in order: each part is a block on the diagonal."""
+        stiffness, mass = (
+            sp.csc_array(matrix[self.order][:, self.order]) for matrix in (self.pencil.stiffness, self.pencil.mass)
+        )
+        return stiffness, mass
+
+    def points(self, part: int) -> Int[np.ndarray, " s"]:
+        """Return the points of a part."""
+        return self.order[self.starts[part] : self.starts[part + 1]]
+
+    def only(self, part: int) -> Pencil:
+        """Return the pencil of one part."""
+        inside = slice(int(self.starts[part]), int(self.starts[part + 1]))
+        stiffness, mass = self.ordered
+        return part_pencil(self.pencil, stiffness[inside, inside], mass[inside, inside])
+
+    def exponent(self, part: Pencil) -> int:
+        """Return the power of two by which a part's eigenvalues are larger in the units of the whole pencil."""
+        return part.value_exponent - self.pencil.value_exponent
+
+
+def connected_parts(pencil: Pencil) -> Parts:
+    """Find what W and B hold together."""
+    sizes = np.bincount(pencil.labels)
+    order = np.lexsort((pencil.labels, sizes[pencil.labels]))
+    return Parts(pencil, order, np.concatenate([[0], np.cumsum(np.sort(sizes))]))
+
+
+def solve_small(parts: Parts, largest: int, k: int) -> list[Pairs]:
+    """Solve the parts of few points densely, all of one size at once.
+
+    Of each those pairs are returned that may be among the k lowest of all, on its own points.
+    """
+    found: list[Pairs] = []
+    known = np.empty(0)
+    sizes, counts = np.unique(parts.sizes[parts.sizes <= largest], return_counts=True)
+    for size, count in zip(sizes.tolist(), counts.tolist(), strict=True):
+        n_chunks = -(-count * size**2 // AT_ONCE)
+        for chunk in np.array_split(np.arange(count) + len(found), n_chunks):
+            values, vectors, residuals = _solve_blocks(parts, int(chunk[0]), len(chunk))
+            known = np.concatenate([known, values.ravel()])
+            if len(known) > k:
+                known = np.partition(known, k - 1)[:k]
+            ceiling = known.max() if len(known) == k else np.inf
+            n_kept = np.count_nonzero(values - widths(values, residuals) <= ceiling, axis=1)
+            for i, n in enumerate(n_kept.tolist()):
+                found.append(Pairs(values[i, :n].copy(), vectors[i, :, :n].copy(), residuals[i, :n].copy()))
+    return found
+
+
+def _solve_blocks(
+    parts: Parts, first: int, count: int
+) -> tuple[Float[np.ndarray, "c s"], Float[np.ndarray, "c s s"], Float[np.ndarray, "c s"]]:
+    """Return all eigenpairs of some parts of one size, which stand next to each other, and their residuals."""
+    size = int(parts.sizes[first])
+    inside = slice(int(parts.starts[first]), int(parts.starts[first]) + count * size)
+    stiffness, mass = (_blocks(matrix[inside, inside], size) for matrix in parts.ordered)
+    diagonal = parts.pencil.mass_diagonal[parts.order[inside]].reshape(count, size, 1)
+    if parts.pencil.mass_floor == 1.0:
+        roots = np.sqrt(diagonal)
+        values, vectors = np.linalg.eigh(stiffness / roots / roots.transpose(0, 2, 1))
+        vectors /= roots
+    else:
+        inverse = np.linalg.inv(np.linalg.cholesky(mass))
+        values, vectors = np.linalg.eigh(inverse @ stiffness @ inverse.transpose(0, 2, 1))
+        vectors = inverse.transpose(0, 2, 1) @ vectors
+    rests = stiffness @ vectors - mass @ vectors * values[:, None, :]
+    squares = np.square(rests) / diagonal / parts.pencil.mass_floor  # as in `residual_norms`
+    return values, vectors, np.sqrt(squares.sum(axis=1))
+
+
+def _blocks(matrix: sp.csc_array, size: int) -> Float[np.ndarray, "c s s"]:
+    entries = matrix.tocoo()
+    blocks = np.zeros((matrix.shape[0] // size, size, size))
+    blocks[entries.row // size, entries.row % size, entries.col % size] = entries.data
+    return blocks
+
+
+def widths(values: Float[np.ndarray, "*k"], residuals: Float[np.ndarray, "*k"]) -> Float[np.ndarray, "*k"]:
+    """Return how far from each value another may lie that is equal to it but for rounding."""
+    return FOUR * residuals + EQUAL * np.abs(values)
+
+
+def merge_pairs(parts: Parts, found: list[Pairs], k: int) -> Pairs:
+    """Return the k lowest of all eigenpairs of all parts; each vector is zero outside its part.
+
+    Values that differ by no more than rounding are equal: they stand in the order of the first points of their parts,
+    whatever their last digits are, and are raised to the largest of those before them, so that all ascend. What may be
+    0 is 0.
+    """
+    counts = np.array([len(pairs.values) for pairs in found])
+    part = np.repeat(np.arange(len(found)), counts)
+    column = np.arange(len(part)) - np.repeat(np.cumsum(counts) - counts, counts)
+    values = np.concatenate([pairs.values for pairs in found])
+    width = widths(values, np.concatenate([pairs.residuals for pairs in found]))
+    values = np.where(np.abs(values) <= width, 0.0, values)
+    ascending = np.argsort(values, kind="stable")
+    steps = np.diff(values[ascending])
+    apart = steps > width[ascending][1:] + width[ascending][:-1]
+    group = np.empty(len(values), dtype=np.int64)
+    group[ascending] = np.concatenate([[0], np.cumsum(apart)])
+    lowest = np.lexsort((column, parts.order[parts.starts[part]], group))[:k]
+    merged = np.maximum.accumulate(values[lowest])
+    vectors = np.zeros((parts.pencil.n, k))
+    for number in np.unique(part[lowest]).tolist():
+        places = np.flatnonzero(part[lowest] == number)
+        vectors[np.ix_(parts.points(number), places)] = found[number].vectors[:, column[lowest[places]]]
+    return Pairs(merged, vectors, residual_norms(parts.pencil, merged, vectors))

@@ -1,0 +1,71 @@
+"""What is wrong with an operator that could not be solved."""
+
+from contextlib import suppress
+
+import numpy as np
+
+from eigenshape._errors import ConvergenceError, InvalidParameterError, try_auto
+from eigenshape.spectral.solver.factor import Factor
+from eigenshape.spectral.solver.inertia import count_beside
+from eigenshape.spectral.solver.pairs import Pairs
+from eigenshape.spectral.solver.pencil import Pencil
+
+DIGITS = 1e10  # of W_ii/B_ii from the stiffest point to the softest: beyond it rounding at one hides the other
+BELOW_ZERO = 1e-12  # of the pencil's level
+LOWER = 8.0
+DEPTH = 60
+
+
+def require_solvable(pencil: Pencil, error: ConvergenceError) -> None:
+    """Refuse an operator that no solver could have solved, where that is why `error` was raised.
+
+    Raises
+    ------
+    InvalidParameterError
+        If W has a negative eigenvalue, or W_ii/B_ii spans more digits than floats have.
+    """
+    _require_near_scales(pencil, error)
+    _require_semidefinite(pencil, error)
+
+
+def _require_near_scales(pencil: Pencil, error: ConvergenceError) -> None:
+    ratios = pencil.stiffness.diagonal() / pencil.mass_diagonal
+    scales = np.where(ratios > 0, ratios, np.nan)
+    if np.isnan(scales).all():
+        return
+    soft, stiff = int(np.nanargmin(scales)), int(np.nanargmax(scales))
+    if scales[stiff] > DIGITS * scales[soft]:
+        low, high = pencil.values_out(scales[[soft, stiff]])
+        raise InvalidParameterError(
+            f"W_ii/B_ii must not span more digits than floats have; it is {high:.3g} at point {stiff} and {low:.3g} at "
+            f"point {soft}, and rounding at the one hides the eigenvalues of the other. Solve parts of so different "
+            f"sizes apart; where nearly degenerate elements are the cause, repair these. {try_auto()}"
+        ) from error
+
+
+def _require_semidefinite(pencil: Pencil, error: ConvergenceError) -> None:
+    first = last = _counted_below(pencil, -BELOW_ZERO * pencil.level)
+    if first is None or last is None:
+        return
+    for _ in range(DEPTH):
+        farther = _counted_below(pencil, LOWER * last.shift)
+        if farther is None:
+            break
+        last = farther
+    high, low, least = pencil.values_out(np.array([first.shift, last.shift, LOWER * last.shift]))
+    raise InvalidParameterError(
+        f"stiffness must be positive semidefinite; eigenvalue 0 lies between {least:.3g} and {low:.3g}, and "
+        f"{first.count} lie below {high:.1e}."
+    ) from error
+
+
+def _counted_below(pencil: Pencil, shift: float) -> Factor | None:
+    """Count eigenvalues below a negative value, or one farther off, whatever the rounding; None where none surely is.
+
+    No eigenpair is known. 0 and the constant should be one, and `count_beside` keeps rounding away from it.
+    """
+    constant = np.full((pencil.n, 1), pencil.mass_diagonal.sum() ** -0.5)
+    with suppress(ConvergenceError):
+        found = count_beside(pencil, Pairs(np.zeros(1), constant, np.zeros(1)), 0, shift, most=False)
+        return found if found.count else None
+    return None

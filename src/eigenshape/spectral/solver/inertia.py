@@ -1,0 +1,63 @@
+"""How many eigenvalues lie below σ, whatever the rounding of the factor that counts them."""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from eigenshape._errors import ConvergenceError
+from eigenshape.spectral.solver.factor import Factor, factorise, rounding
+from eigenshape.spectral.solver.pairs import Pairs, spread
+from eigenshape.spectral.solver.pencil import Pencil
+
+WIDENING = 3.7
+TRIALS = 12
+
+
+def count_beside(
+    pencil: Pencil, pairs: Pairs, index: int, step: float, beside: Factor | None = None, *, most: bool = True
+) -> Factor:
+    """Count at `step` from a value, or farther off where rounding would move a value found across σ.
+
+    The count is not less than the number of eigenvalues below `shift` of what is returned; with `most=False` it is not
+    more. A factor tells how much slack the next one needs for its count to stand above rounding (`rounding`). One that
+    has counted right beside had enough; it is spent.
+
+    Raises
+    ------
+    ConvergenceError
+        If rounding takes more than the distance to the next value found, however far off.
+    """
+    value, shape, side = float(pairs.values[index]), pairs.vectors[:, index] ** 2, 1.0 if most else -1.0
+    found_error = spread(pairs)
+
+    def taken(slack: Float[np.ndarray, " n"]) -> float:
+        return found_error + float(slack @ shape)  # from this eigenvalue, to first order
+
+    def too_much(loss: float, shift: float) -> bool:
+        return not 2 * loss < np.abs(pairs.values - shift).min()
+
+    factor, none, sigma = beside, np.zeros(pencil.n), value + step
+    slack = none if beside is None or too_much(taken(beside.slack), sigma) else beside.slack
+    for _ in range(TRIALS):
+        factor = factorise(pencil, sigma, side * slack, factor)
+        loss = rounding(factor) if factor else np.full(pencil.n, np.inf)
+        # What is above the slack moves σ: W - σB - S + E ≤ W - (σ - ρ)B where no row has more than ρ c D of it.
+        over = float(((loss - slack) / pencil.mass_diagonal).max(initial=0.0)) / pencil.mass_floor
+        moved = sigma - side * over
+        if factor and not too_much(taken(slack) + over, moved):
+            return replace(factor, shift=moved)
+        slack = wanted = np.maximum(slack, _padded(pencil, loss))
+        if too_much(taken(slack), sigma):
+            step, slack = WIDENING * step, none
+            sigma = value + step
+    raise ConvergenceError(
+        f"Eigenvalues can be counted only where rounding takes less than their distance to σ; near "
+        f"{np.ldexp(value, pencil.value_exponent):.6g} (1/length²) it takes "
+        f"{np.ldexp(taken(wanted), pencil.value_exponent):.1e}. Repair nearly degenerate elements."
+    )
+
+
+def _padded(pencil: Pencil, loss: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    # Rounding wanders from factor to factor, most in rows where there was little.
+    return 3 * loss + 0.1 * float(np.median(loss / pencil.mass_diagonal)) * pencil.mass_diagonal

@@ -1,0 +1,300 @@
+"""Block Lanczos for the eigenvalues around a shift, with whatever was found before deflated."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as sl
+from jaxtyping import Bool, Float, Int
+
+from eigenshape._errors import ConvergenceError
+from eigenshape.sparse.basis import Block, Slots, combined, packed, products, subtract
+from eigenshape.sparse.elimination import Scratch
+from eigenshape.sparse.lane_loops import LANES
+from eigenshape.spectral.solver.factor import Factor
+from eigenshape.spectral.solver.pencil import Pencil
+
+TOLERANCE = 5e-12  # of a residual, relative to the shift
+FLOOR = 32 * float(np.finfo(np.float64).eps)  # of a residual, relative to the largest θ: rounding goes no lower
+SHRUNK = 1e-2  # a column that projection shortened this much is projected once more
+REPEATS = 5
+NEGLIGIBLE = 1e-13  # a column this short against what it was is rounding: the space is invariant
+ALIKE = 1e-4  # a pivot of a Gram matrix this small, in lengths: too many digits are lost in its square
+UNLIKE = 0.1  # and this large: none are
+
+
+@dataclass(frozen=True, eq=False)
+class Operator:
+    """(W - σB)⁻¹B in an inner product in which it is symmetric.
+
+    Where B is diagonal that is B^½ (W - σB)⁻¹ B^½ in the plain one, on u = B^½ φ, and nothing is weighed.
+    """
+
+    pencil: Pencil
+    factor: Factor
+    roots: Float[np.ndarray, "n 1"] | None
+    scratch: Scratch
+
+    def image(self, block: Block) -> Block:
+        """Return the operator's image of each slot."""
+        images = np.empty_like(block)
+        for slot, image in zip(block, images, strict=True):
+            if self.roots is None:
+                self.factor.lower.solve_lanes(self.pencil.weigh(slot), image, self.scratch)
+            else:
+                np.multiply(slot, self.roots, out=image)
+                self.factor.lower.solve_lanes(image, image, self.scratch)
+                np.multiply(image, self.roots, out=image)
+        return images
+
+    def weigh(self, block: Float[np.ndarray, "g n b"]) -> Float[np.ndarray, "g n b"]:
+        """Return what the plain product with columns is the inner product with."""
+        return block if self.roots is not None else np.stack([self.pencil.weigh(slot) for slot in block])
+
+    def enter(self, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+        """Return u for φ."""
+        return vectors if self.roots is None else vectors * self.roots
+
+    def leave(self, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+        """Return φ for u, in its place."""
+        if self.roots is not None:
+            vectors /= self.roots
+        return vectors
+
+
+def operator(pencil: Pencil, factor: Factor) -> Operator:
+    """Choose the inner product, and make the memory of one run's solves."""
+    roots = np.sqrt(pencil.mass_diagonal)[:, None] if pencil.mass_floor == 1.0 else None
+    return Operator(pencil, factor, roots, factor.lower.scratch())
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a run is to find: so many eigenvalues on either side of the shift, the nearest ones, all within bounds."""
+
+    below: int
+    above: int
+    floor: float = -np.inf
+    ceiling: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Krylov:
+    """A space V, the operator projected on it, and the block that continues it.
+
+    (W - σB)⁻¹B V = V T + fresh C Eᵀ, with E the last columns of the identity.
+    """
+
+    space: Slots
+    projected: Float[np.ndarray, "m m"]
+    coupling: Float[np.ndarray, "b b"]
+
+
+@dataclass(frozen=True, eq=False)
+class Ritz:
+    """Eigenpairs of `Krylov.projected`: θ ascending, coefficients, values σ + 1/θ, and which of them have converged."""
+
+    thetas: Float[np.ndarray, " m"]
+    coefficients: Float[np.ndarray, "m m"]
+    values: Float[np.ndarray, " m"]
+    converged: Bool[np.ndarray, " m"]
+
+
+def block_lanczos(
+    pencil: Pencil,
+    factor: Factor,
+    wanted: Wanted,
+    *,
+    locked: Float[np.ndarray, "n l"],
+    groups: int = 1,
+    report: Callable[[float], None],
+) -> tuple[Float[np.ndarray, " j"], Float[np.ndarray, "n j"]]:
+    """Return eigenvalues around the shift, and B-orthonormal eigenvectors, orthogonal to the B-orthonormal `locked`.
+
+    Unrestarted block Lanczos on (W - σB)⁻¹B in the inner product of B (Grimes, Lewis and Simon 1994), in blocks of
+    `groups` times eight columns, every block orthogonalised against all before it. It stops when what the space has
+    seen of `wanted` has converged; copies of an eigenvalue beyond the width of the block may be missing, which an
+    inertia count tells afterwards.
+
+    Raises
+    ------
+    ConvergenceError
+        If the space has grown to four times what is wanted, or to all there is.
+    """
+    inner = operator(pencil, factor)
+    rng, first, block = np.random.default_rng(0), -(-locked.shape[1] // LANES), groups * LANES
+    capacity = _capacity(pencil, wanted, locked.shape[1], block)
+    space = np.empty((first + capacity // LANES + groups, pencil.n, LANES))  # pages are touched only as it grows
+    space[:first] = packed(inner.enter(locked))
+    projected = np.zeros((capacity, capacity))
+    _orthonormalise(inner, space[: first + groups], rng.standard_normal((groups, pencil.n, LANES)), rng)
+    missing = wanted.below + wanted.above
+    check = min(min(missing, capacity // 4) + 2 * block, capacity)
+    for size in range(block, capacity + 1, block):
+        filled = first + size // LANES
+        image = inner.image(space[filled - groups : filled])
+        along, coupling = _orthonormalise(inner, space[: filled + groups], image, rng)
+        projected[:size, size - block : size] = along[first * LANES :]
+        if size >= check:
+            krylov = Krylov(space[first : filled + groups], projected[:size, :size], coupling)
+            ritz = _ritz(krylov, factor.shift)
+            chosen, missing = _choose(ritz, wanted)
+            if not missing:
+                return ritz.values[chosen], inner.leave(_vectors(krylov, ritz, chosen))
+            check = size + min(max(missing // 2, size // 20, block), max(size // 4, block))
+        report(size / (size + 0.6 * (wanted.below + wanted.above) + block))
+    raise ConvergenceError(
+        f"Block Lanczos must converge within {capacity} vectors; {missing} of {wanted.below + wanted.above} "
+        f"eigenvalues did not. Repair nearly degenerate elements, or ask for fewer pairs."
+    )
+
+
+def _capacity(pencil: Pencil, wanted: Wanted, n_locked: int, block: int) -> int:
+    room = pencil.n - n_locked - block
+    most = 4 * (wanted.below + wanted.above) + 40 * block
+    return max(min(room, most) // block, 1) * block
+
+
+def _orthonormalise(
+    inner: Operator, space: Slots, columns: Block, rng: np.random.Generator
+) -> tuple[Float[np.ndarray, "m b"], Float[np.ndarray, "b b"]]:
+    """Split columns = known along + fresh upper, with [known, fresh] = space orthonormal; return along and upper.
+
+    The last slots of `space` are filled with what is fresh; the columns are used up. The recent blocks, which take most
+    of a Lanczos image away, are projected out first, then all of them.
+    """
+    groups, block = len(columns), len(columns) * LANES
+    known, fresh = space[:-groups], space[-groups:]
+    along = np.zeros((len(known) * LANES, block))
+    lengths = np.sqrt(np.einsum("gij,gij->gj", columns, inner.weigh(columns))).ravel()
+    recent = max(len(known) - 2 * groups, 0)
+    along[recent * LANES :] += _project(inner, known[recent:], columns)
+    along += _project(inner, known, columns)
+    upper, short = _gram_schmidt(inner, columns, fresh, lengths, rng)
+    for _ in range(REPEATS):
+        if not short:
+            break
+        columns[:] = fresh
+        again = _project(inner, known, columns)
+        second, short = _gram_schmidt(inner, columns, fresh, np.ones(block), rng)
+        along += again @ upper
+        upper = second @ upper
+    return along, upper
+
+
+def _project(inner: Operator, space: Slots, columns: Block) -> Float[np.ndarray, "m b"]:
+    part = products(space, inner.weigh(columns))
+    subtract(space, part, columns)
+    return part
+
+
+def _gram_schmidt(
+    inner: Operator, columns: Block, fresh: Block, lengths: Float[np.ndarray, " b"], rng: np.random.Generator
+) -> tuple[Float[np.ndarray, "b b"], bool]:
+    """Orthonormalise a block into `fresh`; return the triangle, and whether a column became short against what it was.
+
+    By the Cholesky factor of the Gram matrix, twice where the first leaves digits to be gained (Yamamoto and others
+    2015), and column by column where it fails. The columns are used up.
+    """
+    upper = _by_cholesky(inner, columns, fresh)
+    if upper is None:
+        return _one_by_one(inner, columns, fresh, lengths, rng)
+    if np.diag(upper).min() <= UNLIKE * np.linalg.norm(upper, axis=0).max():
+        columns[:] = fresh
+        second = _by_cholesky(inner, columns, fresh)
+        if second is None:
+            second, _ = _one_by_one(inner, columns, fresh, np.ones(len(lengths)), rng)
+        upper = second @ upper
+    return upper, bool((np.diag(upper) < SHRUNK * lengths).any())
+
+
+def _by_cholesky(inner: Operator, columns: Block, fresh: Block) -> Float[np.ndarray, "b b"] | None:
+    triangle = _cholesky(products(columns, inner.weigh(columns)))
+    if triangle is not None:
+        fresh[:] = 0.0
+        subtract(columns, -sl.solve_triangular(triangle, np.eye(len(triangle))), fresh)
+    return triangle
+
+
+def _cholesky(gram: Float[np.ndarray, "b b"]) -> Float[np.ndarray, "b b"] | None:
+    """Return the triangle R with RᵀR = gram, or None where the columns are too much alike."""
+    sizes = np.sqrt(np.maximum(np.diag(gram), 0))
+    if not sizes.all():
+        return None
+    try:
+        triangle = sl.cholesky(gram / np.outer(sizes, sizes))
+    except np.linalg.LinAlgError:
+        return None
+    return triangle * sizes if np.diag(triangle).min() > ALIKE else None
+
+
+def _one_by_one(
+    inner: Operator, block: Block, fresh: Block, lengths: Float[np.ndarray, " b"], rng: np.random.Generator
+) -> tuple[Float[np.ndarray, "b b"], bool]:
+    """Orthonormalise a block; a negligible column is replaced by a random one that the triangle R leaves out."""
+    columns, width = np.concatenate(list(block), axis=1), len(lengths)
+    upper, short = np.zeros((width, width)), False
+    for i in range(width):
+        for _ in range(2):
+            part = columns[:, :i].T @ _weighed(inner, columns[:, i])
+            columns[:, i] -= columns[:, :i] @ part
+            upper[:i, i] += part
+        length = float(np.sqrt(columns[:, i] @ _weighed(inner, columns[:, i])))
+        short |= bool(length < SHRUNK * lengths[i])
+        if length <= NEGLIGIBLE * lengths[i]:
+            columns[:, i] = _random_unit(inner, columns[:, :i], rng)
+        else:
+            columns[:, i] /= length
+            upper[i, i] = length
+    fresh[:] = packed(columns)
+    return upper, short
+
+
+def _random_unit(
+    inner: Operator, against: Float[np.ndarray, "n b"], rng: np.random.Generator
+) -> Float[np.ndarray, " n"]:
+    column = rng.standard_normal(len(against))
+    for _ in range(2):
+        column -= against @ (against.T @ _weighed(inner, column))
+    return np.asarray(column / np.sqrt(column @ _weighed(inner, column)))
+
+
+def _weighed(inner: Operator, column: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    return inner.weigh(column[None, :, None])[0, :, 0]
+
+
+def _ritz(krylov: Krylov, shift: float) -> Ritz:
+    thetas, coefficients = sl.eigh(krylov.projected, lower=False)
+    block = len(krylov.coupling)
+    values = shift + 1 / np.where(thetas == 0, np.finfo(np.float64).tiny, thetas)
+    rests = np.linalg.norm(krylov.coupling @ coefficients[-block:], axis=0)
+    residuals = rests * (values - shift) ** 2
+    converged = (residuals <= TOLERANCE * abs(shift)) | (rests <= FLOOR * np.abs(thetas).max())
+    return Ritz(thetas, coefficients, values, converged)
+
+
+def _choose(ritz: Ritz, wanted: Wanted) -> tuple[Int[np.ndarray, " j"], int]:
+    """Return the converged pairs of the window, and how many are still to converge.
+
+    On either side only those count that no unconverged one is nearer than: nothing seen lies between.
+    """
+    above, below = np.flatnonzero(ritz.thetas > 0)[::-1], np.flatnonzero(ritz.thetas < 0)
+    n_above, n_below = (int(np.argmin(np.append(ritz.converged[side], False))) for side in (above, below))
+    past_ceiling = n_above > 0 and ritz.values[above[n_above - 1]] > wanted.ceiling
+    past_floor = n_below > 0 and ritz.values[below[n_below - 1]] < wanted.floor
+    late_above = 0 if past_ceiling else max(wanted.above - n_above, 0)
+    # Copies that the space cannot see are left to a later run; one converged value above proves it has looked.
+    goal = min(len(below), wanted.below) if n_above else wanted.below
+    late_below = 0 if past_floor else max(goal - n_below, 0)
+    above, below = above[: min(n_above, wanted.above)], below[: min(n_below, wanted.below)]
+    chosen = np.concatenate([below, above])
+    return chosen[
+        (ritz.values[chosen] > wanted.floor) & (ritz.values[chosen] <= wanted.ceiling)
+    ], late_above + late_below
+
+
+def _vectors(krylov: Krylov, ritz: Ritz, chosen: Int[np.ndarray, " j"]) -> Float[np.ndarray, "n j"]:
+    # One step of the operator takes the residual out of a Ritz vector y: A y / θ = y + fresh C s / θ, known already.
+    weights = ritz.coefficients[:, chosen]
+    step = krylov.coupling @ weights[-len(krylov.coupling) :] / ritz.thetas[chosen]
+    return combined(krylov.space, np.concatenate([weights, step]))

@@ -1,0 +1,67 @@
+"""Eigenpairs on their way: made orthonormal, put in order, refined."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from eigenshape._errors import ConvergenceError
+from eigenshape.spectral.solver.factor import Factor
+from eigenshape.spectral.solver.pencil import Pencil, rayleigh_residuals
+
+LOOSE = 1e-12
+SKEW = 1e-5
+POLISHED = 2e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Eigenpairs in a pencil's units, ascending, with residual bounds."""
+
+    values: Float[np.ndarray, " k"]
+    vectors: Float[np.ndarray, "n k"]
+    residuals: Float[np.ndarray, " k"]
+
+
+def spread(pairs: Pairs) -> float:
+    """Bound of the distance of all values together to eigenvalues, one to one (Kahan 1967)."""
+    return float(np.linalg.norm(pairs.residuals))
+
+
+def polished(pencil: Pencil, factor: Factor, pairs: Pairs) -> Pairs:
+    """Refine the pairs whose residual the rounding of the factor has kept large.
+
+    One step of (W - σB)⁻¹ on a residual gives the error of the vector outside the space of those found.
+    """
+    late = np.flatnonzero(pairs.residuals > POLISHED * np.abs(pairs.values).max(initial=0.0))
+    if not late.size:
+        return pairs
+    values, vectors, residuals = pairs.values.copy(), pairs.vectors.copy(), pairs.residuals.copy()
+    part = vectors[:, late]
+    step = factor.solve(pencil.stiffness @ part - pencil.weigh(part) * values[late])
+    vectors[:, late] -= step - vectors @ (vectors.T @ pencil.weigh(step))
+    values[late], residuals[late] = rayleigh_residuals(pencil, vectors[:, late])
+    order = np.argsort(values, kind="stable")
+    return Pairs(values[order], vectors[:, order], residuals[order])
+
+
+def lowest(pencil: Pencil, vectors: Float[np.ndarray, "n j"], k: int) -> Pairs:
+    """Return the lowest k of the pairs that these nearly B-orthonormal vectors stand for."""
+    vectors = _orthonormal(pencil, vectors)
+    values, residuals = rayleigh_residuals(pencil, vectors)
+    order = np.argsort(values, kind="stable")[:k]
+    if not np.array_equal(order, np.arange(vectors.shape[1])):
+        vectors = vectors[:, order]
+    return Pairs(values[order], vectors, residuals[order])
+
+
+def _orthonormal(pencil: Pencil, vectors: Float[np.ndarray, "n j"]) -> Float[np.ndarray, "n j"]:
+    # One Newton step towards the nearest B-orthonormal columns: they are so up to the tolerance of the iteration.
+    gram = vectors.T @ pencil.weigh(vectors)
+    identity = np.eye(len(gram))
+    off = np.abs(gram - identity).max(initial=0.0)
+    if off < LOOSE:
+        return vectors
+    if off > SKEW:
+        raise ConvergenceError(f"Vectors of different runs must be B-orthogonal; two are off by {off:.1e}.")
+    return vectors @ (1.5 * identity - 0.5 * gram)

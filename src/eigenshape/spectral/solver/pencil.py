@@ -1,0 +1,300 @@
+"""The operator in units of its own, so that a solve never sees the user's."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+from scipy.sparse.csgraph import connected_components
+
+from eigenshape._errors import InvalidParameterError
+from eigenshape.operators.laplacian import GaussianKernel, Laplacian
+from eigenshape.sparse.elimination import Elimination, analyse, factorise
+from eigenshape.spectral.solver.residual_loops import quotient_sums, residual_sums
+
+COLUMNS_AT_ONCE = 64
+WIDEST = 1e140  # of two entries on a diagonal: squares of vectors must fit into floats
+ALIKE = 1e11
+
+
+@dataclass(frozen=True, eq=False)
+class Shifted:
+    """What W - σB has entries of, ready to be factored at any σ.
+
+    Attributes
+    ----------
+    elimination : Elimination
+        Of the union of both patterns.
+    stiffness, mass : (e,) float
+        The entries of W and B in it, zeros among them.
+    diagonal : (n,) int
+        Where those of the diagonal are.
+    """
+
+    elimination: Elimination
+    stiffness: Float[np.ndarray, " e"]
+    mass: Float[np.ndarray, " e"]
+    diagonal: Int[np.ndarray, " n"]
+
+
+@dataclass(frozen=True, eq=False)
+class Pencil:
+    """W φ = λ B φ scaled by powers of two, which change no digit.
+
+    Attributes
+    ----------
+    stiffness, mass : (n, n) sparse
+        W and B with largest diagonal entries between 1 and 4.
+    mass_diagonal : (n,) float
+        D, the diagonal of `mass`.
+    mass_floor : float
+        A proven c in (0, 1] with B ≥ c D as quadratic forms; 1 where B is diagonal.
+    labels : (n,) int
+        The connected part of W and B that each point belongs to, numbered by their first points.
+    level : float
+        trace W / trace B: the mean of the eigenvalues up to the shape of B, and the unit for every tolerance. Of
+        several parts the harmonic mean, since few of the low eigenvalues are of small parts. Where a few points make it
+        far larger than W_ii/B_ii is in the median, that median.
+    value_exponent, vector_exponent : int
+        An eigenvalue is 2**value_exponent times larger in the user's units, a vector 2**vector_exponent times.
+    kernel : GaussianKernel or None
+        What W was built with, in the user's units.
+    """
+
+    stiffness: sp.csc_array
+    mass: sp.csc_array
+    mass_diagonal: Float[np.ndarray, " n"]
+    mass_floor: float
+    labels: Int[np.ndarray, " n"]
+    level: float
+    value_exponent: int
+    vector_exponent: int
+    kernel: GaussianKernel | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of points."""
+        return len(self.mass_diagonal)
+
+    @cached_property
+    def shifted(self) -> Shifted:
+        """W and B in one pattern, analysed once for the factors at all shifts."""
+        return _shifted(self.stiffness, self.mass)
+
+    def weigh(self, vectors: Float[np.ndarray, "n b"]) -> Float[np.ndarray, "n b"]:
+        """Multiply by B."""
+        if self.mass_floor == 1.0:
+            return self.mass_diagonal[:, None] * vectors
+        return self.mass @ vectors
+
+    def values_out(self, values: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+        """Return eigenvalues in the user's units."""
+        return np.ldexp(values, self.value_exponent)
+
+    def vectors_out(self, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+        """Return B-normalised vectors in the user's units."""
+        return np.ldexp(vectors, self.vector_exponent)
+
+
+def normalise(laplacian: Laplacian) -> Pencil:
+    """Scale W and B by powers of two, and find a lower bound of B.
+
+    Raises
+    ------
+    InvalidParameterError
+        If B is not positive definite, or entries on a diagonal lie too far apart for floats.
+    """
+    _require_range("stiffness", laplacian.stiffness.diagonal())
+    _require_range("mass", laplacian.mass.diagonal())
+    return _normalised(laplacian.stiffness, laplacian.mass, (0, 0), laplacian.kernel)
+
+
+def part_pencil(whole: Pencil, stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
+    """Scale some rows and columns of W and B of a pencil, apart from all others, to units of their own."""
+    exponents = whole.value_exponent, whole.vector_exponent
+    return _normalised(stiffness, mass, exponents, whole.kernel)
+
+
+def as_pencil(stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
+    """Take a pencil as it is, whose entries are of moderate size already.
+
+    Raises
+    ------
+    InvalidParameterError
+        If B is not positive definite.
+    """
+    return _pencil(_scaled(stiffness, 0), _scaled(mass, 0), (0, 0), None)
+
+
+def _normalised(
+    stiffness: sp.sparray, mass: sp.sparray, exponents: tuple[int, int], kernel: GaussianKernel | None
+) -> Pencil:
+    """Scale a pencil whose eigenvalues and vectors are powers of two times those in the user's units."""
+    up_w, up_b = _exponent(stiffness), _exponent(mass)
+    up_b -= up_b % 2  # an even power, so that its square root is a power of two as well
+    exponents = exponents[0] + up_w - up_b, exponents[1] - up_b // 2
+    return _pencil(_scaled(stiffness, -up_w), _scaled(mass, -up_b), exponents, kernel)
+
+
+def _pencil(
+    stiffness: sp.csc_array, mass: sp.csc_array, exponents: tuple[int, int], kernel: GaussianKernel | None
+) -> Pencil:
+    diagonal = mass.diagonal()
+    mass_floor = _mass_floor(mass, diagonal)
+    pattern = abs(stiffness) if mass_floor == 1.0 else abs(stiffness) + abs(mass)
+    labels = connected_components(pattern, directed=False)[1].astype(np.int64)
+    return Pencil(
+        stiffness=stiffness,
+        mass=mass,
+        mass_diagonal=diagonal,
+        mass_floor=mass_floor,
+        labels=labels,
+        level=_level(stiffness.diagonal(), diagonal, labels),
+        value_exponent=exponents[0],
+        vector_exponent=exponents[1],
+        kernel=kernel,
+    )
+
+
+def _require_range(name: str, diagonal: Float[np.ndarray, " n"]) -> None:
+    sizes = np.where(diagonal == 0, np.nan, np.abs(diagonal))
+    if np.isnan(sizes).all():
+        return
+    low, high = int(np.nanargmin(sizes)), int(np.nanargmax(sizes))
+    if sizes[high] / WIDEST > sizes[low]:
+        raise InvalidParameterError(
+            f"Entries on the diagonal of {name} must lie within a factor of {WIDEST:.0e}; entry {high} is "
+            f"{diagonal[high]:.3g} and entry {low} is {diagonal[low]:.3g}."
+        )
+
+
+def _level(stiffness: Float[np.ndarray, " n"], mass: Float[np.ndarray, " n"], labels: Int[np.ndarray, " n"]) -> float:
+    mean = float(stiffness.sum() / mass.sum())
+    if labels.any() and mean > 0:
+        mean = _harmonic_mean(stiffness, mass, labels)
+    ratios = (stiffness / mass)[stiffness > 0]
+    if mean <= 0 or not ratios.size:
+        return 1.0
+    median = float(np.median(ratios))
+    return mean if mean < median * ALIKE else median
+
+
+def _harmonic_mean(
+    stiffness: Float[np.ndarray, " n"], mass: Float[np.ndarray, " n"], labels: Int[np.ndarray, " n"]
+) -> float:
+    """Return the level with which parts have as many low eigenvalues as each with its own (Weyl's law)."""
+    levels = np.bincount(labels, stiffness) / np.bincount(labels, mass)
+    counts, stiff = np.bincount(labels), levels > 0
+    return float(counts[stiff].sum() / (counts[stiff] / levels[stiff]).sum())
+
+
+def _exponent(matrix: sp.sparray) -> int:
+    largest = float(np.abs(matrix.data).max(initial=0.0))
+    return int(np.frexp(largest)[1]) - 1 if largest > 0 else 0
+
+
+def _scaled(matrix: sp.sparray, exponent: int) -> sp.csc_array:
+    scaled = sp.csc_array(matrix, dtype=np.float64, copy=True)
+    scaled.data = np.ldexp(scaled.data, exponent)
+    scaled.sum_duplicates()
+    return scaled
+
+
+def _shifted(stiffness: sp.csc_array, mass: sp.csc_array) -> Shifted:
+    parts = [_ones(stiffness), _ones(mass), sp.eye_array(stiffness.shape[0], format="csc")]
+    union = sp.csc_array(parts[0] + parts[1] + parts[2])
+    union.sort_indices()
+    keys = _keys(union)
+    diagonal = np.searchsorted(keys, np.arange(union.shape[1]) * (union.shape[1] + 1))
+    return Shifted(analyse(union), _spread(stiffness, keys), _spread(mass, keys), diagonal)
+
+
+def _spread(matrix: sp.csc_array, keys: Int[np.ndarray, " e"]) -> Float[np.ndarray, " e"]:
+    if matrix.nnz == len(keys):
+        return matrix.data
+    data = np.zeros(len(keys))
+    data[np.searchsorted(keys, _keys(matrix))] = matrix.data
+    return data
+
+
+def _ones(matrix: sp.csc_array) -> sp.csc_array:
+    return sp.csc_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
+
+
+def _keys(matrix: sp.csc_array) -> Int[np.ndarray, " e"]:
+    """Return the place of each entry in a full matrix; they ascend where indices are sorted."""
+    n = matrix.shape[1]
+    return np.repeat(np.arange(n) * n, np.diff(matrix.indptr)) + matrix.indices
+
+
+def _mass_floor(mass: sp.csc_array, diagonal: Float[np.ndarray, " n"]) -> float:
+    # B - cD is positive definite exactly when all its pivots are positive. Linear elements have c = 1/2.
+    if (mass - sp.diags_array(diagonal)).count_nonzero() == 0:
+        return 1.0
+    shifted = _shifted(mass, sp.csc_array(sp.diags_array(diagonal)))
+    for halvings in range(12):
+        floor = 0.49 * 0.5**halvings
+        lower = factorise(shifted.elimination, shifted.stiffness - floor * shifted.mass)
+        if lower and (lower.pivots > 0).all():
+            return floor
+    place = int(np.argmax(lower.pivots <= 0)) if lower else 0
+    where = f", {lower.pivots[place]:.3g} at point {shifted.elimination.order[place]}" if lower else ""
+    raise InvalidParameterError(
+        f"mass must be positive definite; B - {floor:.1e} diag(B) has a pivot that is not positive{where}."
+    )
+
+
+def rayleigh_residuals(
+    pencil: Pencil, vectors: Float[np.ndarray, "n k"]
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
+    """Return Rayleigh quotients of the columns, and the bounds that `residual_norms` has for them."""
+    return _residuals(pencil, vectors, None)
+
+
+def residual_norms(
+    pencil: Pencil, values: Float[np.ndarray, " k"], vectors: Float[np.ndarray, "n k"]
+) -> Float[np.ndarray, " k"]:
+    """Bound the distance of each value to an eigenvalue.
+
+    |λ - eigenvalue| ≤ ‖Wφ - λBφ‖ / ‖φ‖ with the norms of B⁻¹ and B (Parlett 1998, theorem 15.9.1); B⁻¹ ≤ (cD)⁻¹.
+    """
+    return _residuals(pencil, vectors, values)[1]
+
+
+def _residuals(
+    pencil: Pencil, vectors: Float[np.ndarray, "n k"], given: Float[np.ndarray, " k"] | None
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
+    values, norms = np.empty(vectors.shape[1]), np.empty(vectors.shape[1])
+    matrices = tuple((part.indptr, part.indices, part.data) for part in (pencil.stiffness, pencil.mass))
+    for columns in column_chunks(vectors.shape[1]):
+        part = np.ascontiguousarray(vectors[:, columns])
+        if given is None:
+            products, sizes = sums = np.zeros((2, part.shape[1]))
+            quotient_sums(*matrices, part, sums)
+            values[columns] = products / sizes
+        else:
+            values[columns] = given[columns]
+        squares, sizes = sums = np.zeros((2, part.shape[1]))
+        residual_sums(*matrices, part, values[columns], pencil.mass_diagonal, sums)
+        norms[columns] = np.sqrt(squares / pencil.mass_floor / sizes)
+    return values, norms
+
+
+def column_chunks(k: int) -> list[slice]:
+    """Cut k columns into slices of few enough that what is computed of them stays small."""
+    return [slice(start, min(start + COLUMNS_AT_ONCE, k)) for start in range(0, k, COLUMNS_AT_ONCE)]
+
+
+def finished(pencil: Pencil, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+    """Return the vectors in the user's units, with the sign that `Spectrum` promises, read-only and in their place."""
+    vectors = np.ascontiguousarray(vectors)
+    signs = np.ones(vectors.shape[1])
+    for columns in column_chunks(vectors.shape[1]):
+        part = vectors[:, columns]
+        sizes = np.abs(part)
+        leading = np.argmax(sizes >= (1 - 1e-6) * sizes.max(axis=0), axis=0)
+        signs[columns] = np.where(part[leading, np.arange(part.shape[1])] < 0, -1.0, 1.0)
+    vectors *= pencil.vectors_out(signs[None])
+    vectors.flags.writeable = False
+    return vectors

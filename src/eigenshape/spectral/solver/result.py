@@ -1,0 +1,47 @@
+"""What every method ends with: a spectrum in the units of the user, corrected where the kernel is."""
+
+import numpy as np
+from jaxtyping import Float
+
+from eigenshape._arrays import frozen
+from eigenshape._errors import InvalidParameterError
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.spectral.certificate import Certificate
+from eigenshape.spectral.solver.certify import in_user_units
+from eigenshape.spectral.solver.kernel_values import from_pencil, reported, require_readable, widened
+from eigenshape.spectral.solver.pairs import Pairs
+from eigenshape.spectral.solver.pencil import Pencil, finished
+from eigenshape.spectral.spectrum import Spectrum
+
+ROUNDING = 1e-9  # of the mean eigenvalue
+
+
+def spectrum_of(laplacian: Laplacian, pencil: Pencil, pairs: Pairs, certificate: Certificate) -> Spectrum:
+    """Return pairs of the pencil as what the user is told: in the user's units, corrected where the kernel is.
+
+    Raises
+    ------
+    InvalidParameterError
+        If an eigenvalue is below zero by more than its error, or stands for none of a corrected kernel's shape.
+    """
+    values, residuals = pencil.values_out(_without_negatives(pencil, pairs)), pencil.values_out(pairs.residuals)
+    require_readable(laplacian.kernel, values, stacklevel=4)
+    return Spectrum(
+        eigenvalues=frozen(from_pencil(laplacian.kernel, values)),
+        eigenvectors=finished(pencil, pairs.vectors),
+        mass=laplacian.mass,
+        residuals=frozen(widened(laplacian.kernel, values, residuals)),
+        certificate=reported(laplacian.kernel, in_user_units(pencil, certificate), float(values[-1])),
+    )
+
+
+def _without_negatives(pencil: Pencil, pairs: Pairs) -> Float[np.ndarray, " k"]:
+    # A Rayleigh quotient below zero shows an eigenvalue below zero, however large its residual, but for rounding.
+    rounding = np.minimum(4 * pairs.residuals, ROUNDING * pencil.level) + 1e-14 * pencil.level
+    bad = np.flatnonzero(pairs.values < -rounding)
+    if bad.size:
+        value, bound = pencil.values_out(np.array([pairs.values[bad[0]], rounding[bad[0]]]))
+        raise InvalidParameterError(
+            f"stiffness must be positive semidefinite; eigenvalue {bad[0]} is {value:.6g}, its error under {bound:.1e}."
+        )
+    return np.maximum(pairs.values, 0.0)

@@ -1,0 +1,214 @@
+"""The roads to the lowest pairs of a pencil, and their proof: part by part, densely, at once, in slices."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+
+import numpy as np
+import scipy.linalg as sl
+from jaxtyping import Float
+
+from eigenshape._errors import ConvergenceError
+from eigenshape._memory import require_memory
+from eigenshape._progress import Progress, silent
+from eigenshape.sparse.lane_loops import LANES
+from eigenshape.spectral.certificate import Certificate
+from eigenshape.spectral.solver.certify import in_user_units, prove
+from eigenshape.spectral.solver.components import (
+    Parts,
+    connected_parts,
+    merge_pairs,
+    solve_small,
+    widths,
+)
+from eigenshape.spectral.solver.factor import Factor
+from eigenshape.spectral.solver.lanczos import Wanted, block_lanczos
+from eigenshape.spectral.solver.pairs import Pairs, lowest, polished
+from eigenshape.spectral.solver.pencil import Pencil
+from eigenshape.spectral.solver.shift import expected_values, factor_below, shift_inside
+from eigenshape.spectral.solver.slices import walk
+
+Start = Callable[[Pencil, int, Callable[[float], None]], tuple[np.ndarray, Factor]]
+Road = Callable[[Pencil, int, Progress], tuple[Pairs, Certificate]]
+
+SMALL = 300  # points up to which a dense solve is the faster one
+DENSE_SHARE = 4  # and where more than one in so many pairs is wanted,
+DENSE_LIMIT = 6000  # while the matrix still fits
+WHOLE = 400  # pairs up to which one shift serves
+FEWEST_VECTORS = 150  # of a space, however few pairs are wanted
+WIDEST = 8  # groups of eight columns to a block
+RUNS = 40
+MARGIN = 1.1  # times as many pairs of a part as Weyl's law says are among the k lowest of all,
+MORE = 2  # and so many more: asking once for a few too many is cheaper than asking twice
+
+
+def proved(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+    """Return the k lowest pairs of a pencil and their proof, by the quickest road that reaches it.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the memory is too small.
+    ConvergenceError
+        If none does.
+    """
+    if pencil.labels.any():
+        return _in_parts(connected_parts(pencil), k, report)
+    return _connected(pencil, k, report)
+
+
+def _connected(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+    if dense_serves(pencil, k):
+        return _dense(pencil, k, report)
+    roads: list[Road] = [partial(_sparse, start=walk)] if k > WHOLE else []
+    roads += [partial(_sparse, start=_at_once)]
+    roads += [_dense] if pencil.n <= DENSE_LIMIT else []  # nothing there can fail to converge
+    for road in roads[:-1]:
+        with suppress(ConvergenceError):
+            return road(pencil, k, report)
+    return roads[-1](pencil, k, report)
+
+
+def dense_serves(pencil: Pencil, k: int) -> bool:
+    """Tell whether a dense solve finds k pairs sooner than a sparse one."""
+    return pencil.n <= SMALL or (DENSE_SHARE * k > pencil.n and pencil.n <= DENSE_LIMIT)
+
+
+def _dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+    require_memory_for_pairs(pencil, k, 32 * pencil.n**2)
+    report(0.1, f"solving {pencil.n} points densely")
+    roots = np.sqrt(pencil.mass_diagonal)
+    stiffness = pencil.stiffness.toarray() / np.outer(roots, roots)
+    mass = None if pencil.mass_floor == 1.0 else pencil.mass.toarray() / np.outer(roots, roots)
+    _, vectors = sl.eigh(stiffness, mass)
+    pairs = lowest(pencil, vectors[:, :k] / roots[:, None], k)
+    report(0.8, "counting eigenvalues")
+    return _complete(pencil, pairs)
+
+
+def _in_parts(parts: Parts, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+    """Solve each part by itself, and prove what is merged of them as a whole.
+
+    A Krylov space of all of them would see few copies of an eigenvalue at a time, and 0 has as many as there are parts.
+    A large part is asked for as many pairs as Weyl's law expects of it, and for more until its last value is not below
+    the k-th of all: then nothing that it has beyond is among the k lowest.
+    """
+    require_memory_for_pairs(parts.pencil, k)
+    report(0.02, f"solving {len(parts.sizes)} parts")
+    found = dict(enumerate(solve_small(parts, SMALL, k)))
+    large = {number: parts.only(number) for number in range(len(found), len(parts.sizes))}
+    wanted = _expected_counts(parts, large, found, k)
+    progress = report
+    while wanted:
+        for number, count in wanted.items():
+            found[number] = _solve_part(parts, large[number], count, _share(progress, parts, number))
+        wanted = _missing_counts(parts, large, found, k)
+        progress = silent  # it has come to the end once
+    report(0.9, "counting eigenvalues")
+    return _complete(parts.pencil, merge_pairs(parts, [found[number] for number in range(len(found))], k))
+
+
+def _expected_counts(parts: Parts, large: dict[int, Pencil], found: dict[int, Pairs], k: int) -> dict[int, int]:
+    """Return how many of the k lowest pairs are expected of each large part, and some more."""
+    expected = {}
+    for number, pencil in large.items():
+        values = expected_values(pencil, np.arange(min(k, pencil.n), dtype=float))
+        expected[number] = np.ldexp(values, parts.exponent(pencil))
+    known = np.concatenate([*expected.values(), *(pairs.values for pairs in found.values())])
+    last = np.partition(known, k - 1)[k - 1]
+    counts = {number: int(np.count_nonzero(values <= last)) for number, values in expected.items()}
+    return {number: min(int(MARGIN * count) + MORE, k, large[number].n) for number, count in counts.items()}
+
+
+def _missing_counts(parts: Parts, large: dict[int, Pencil], found: dict[int, Pairs], k: int) -> dict[int, int]:
+    """Return how many pairs each part has below the k-th of all where those found of it end before."""
+    known = np.concatenate([pairs.values for pairs in found.values()])
+    residuals = np.concatenate([pairs.residuals for pairs in found.values()])
+    last = float(np.partition(known + widths(known, residuals), k - 1)[k - 1])
+    counts = {}
+    for number, pencil in large.items():
+        n_found = len(found[number].values)
+        if n_found < min(k, pencil.n) and found[number].values[-1] < last:
+            n_below = factor_below(pencil, float(np.ldexp(last, -parts.exponent(pencil)))).count
+            counts[number] = min(max(n_below, n_found) + MORE, k, pencil.n)
+    return counts
+
+
+def _share(report: Progress, parts: Parts, number: int) -> Progress:
+    """Return what reports the solving of one part as a share of all points."""
+    begin, end = (parts.starts[number : number + 2] / parts.pencil.n).tolist()
+    label = f"part {number + 1} of {len(parts.sizes)}"
+    return lambda done, message: report(0.05 + 0.85 * (begin + done * (end - begin)), f"{label}: {message}")
+
+
+def _solve_part(parts: Parts, pencil: Pencil, k: int, report: Progress) -> Pairs:
+    pairs, _ = _connected(pencil, k, report)
+    up = pencil.vector_exponent - parts.pencil.vector_exponent
+    values, residuals = np.ldexp([pairs.values, pairs.residuals], parts.exponent(pencil))
+    return Pairs(values, np.ldexp(pairs.vectors, up), residuals)
+
+
+def _complete(pencil: Pencil, pairs: Pairs) -> tuple[Pairs, Certificate]:
+    certificate = prove(pencil, pairs)
+    if not certificate.complete:
+        raise ConvergenceError(in_user_units(pencil, certificate).explain())
+    return pairs, certificate
+
+
+def _sparse(pencil: Pencil, k: int, report: Progress, *, start: Start) -> tuple[Pairs, Certificate]:
+    require_memory_for_pairs(pencil, k)
+    report(0.02, "looking for a shift")
+    vectors, factor = start(pencil, k, _in_run(report, 0))
+    for run in range(1, RUNS + 1):
+        pairs = polished(pencil, factor, lowest(pencil, vectors, k))
+        report(0.9, "counting eigenvalues")
+        certificate, wanted = _still_wanted(pencil, factor, pairs, k)
+        missing = wanted.below + wanted.above
+        if certificate is not None and certificate.complete:
+            return pairs, certificate
+        if missing == 0 or run == RUNS:
+            break
+        groups, more = min(1 + -(-missing // LANES), WIDEST), _in_run(report, run)
+        _, found = block_lanczos(pencil, factor, wanted, locked=pairs.vectors, groups=groups, report=more)
+        if not found.shape[1]:
+            break
+        vectors = np.hstack([pairs.vectors, found])
+    raise ConvergenceError(
+        f"Every eigenvalue that inertia counts must be found; {len(pairs.values)} of {k} were found in {run} runs "
+        f"and {missing} are missing."
+    )
+
+
+def require_memory_for_pairs(pencil: Pencil, k: int, factors: int | None = None) -> None:
+    """Refuse a solve for so many pairs that would not fit, given the bytes of its factors.
+
+    Raises
+    ------
+    InvalidParameterError
+        With the estimated sizes.
+    """
+    if factors is None:
+        factors = 24 * pencil.shifted.elimination.n_entries  # two at once, and their making
+    bases = 8 * pencil.n * (3 * k + FEWEST_VECTORS + 2 * min(k, WHOLE))  # a space of twice the pairs, results, a copy
+    advice = "Ask for fewer pairs, or for approximate_spectrum, which needs no factor"
+    require_memory(f"{k} pairs of {pencil.n} points", {"bases": bases, "factors of their operator": factors}, advice)
+
+
+def _at_once(pencil: Pencil, k: int, report: Callable[[float], None]) -> tuple[Float[np.ndarray, "n j"], Factor]:
+    factor = shift_inside(pencil, k)
+    wanted = Wanted(below=factor.count, above=k - factor.count)
+    return block_lanczos(pencil, factor, wanted, locked=np.empty((pencil.n, 0)), report=report)[1], factor
+
+
+def _in_run(report: Progress, run: int) -> Callable[[float], None]:
+    return lambda done: report(0.05 + 0.8 * done, f"run {run + 1} of block Lanczos")
+
+
+def _still_wanted(pencil: Pencil, factor: Factor, pairs: Pairs, k: int) -> tuple[Certificate | None, Wanted]:
+    """Return the proof as far as it goes, and what a further run has to find."""
+    certificate = prove(pencil, pairs) if len(pairs.values) == k else None
+    missing = certificate.n_missing if certificate else k - len(pairs.values)
+    missing = min(max(missing, 0), k)
+    ceiling = certificate.shift if certificate else np.inf
+    below = min(max(factor.count - int(np.count_nonzero(pairs.values < factor.shift)), 0), missing)
+    return certificate, Wanted(below=below, above=missing - below, ceiling=ceiling)

@@ -1,0 +1,125 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.mesh_files import read_mesh
+from eigenshape.plot import fields, poses, sheet, stability
+from eigenshape.plot.camera import in_picture, three_quarter_view
+from eigenshape.plot.fields import figure_field, figure_segments
+from eigenshape.plot.poses import figure_poses
+from eigenshape.plot.render import draw
+from eigenshape.plot.sheet import Panel, figure_contact_sheet
+from eigenshape.shapes.surfaces import disjoint_union, icosphere, torus
+
+BALL = icosphere(2)
+
+
+def leaning_tower(up):
+    """A shape that stands along `up` alone: plate, leg on its rim, heavy head, and most vertices on a tiny far nose."""
+    plate = BALL.vertices * [1.0, 1.0, 0.05]
+    leg = BALL.vertices * [0.1, 0.1, 0.5] + [0.85, 0, 0.5]
+    head = BALL.vertices * 0.6 + [0.35, 0, 1.5]
+    nose = TriangleMesh(icosphere(4).vertices * 0.05 + [3, 0, 1.5], icosphere(4).faces)
+    tower = disjoint_union(nose, *(TriangleMesh(points, BALL.faces) for points in (plate, leg, head)))
+    return TriangleMesh(np.roll(tower.vertices, {"z": 0, "x": 1, "y": 2}[up], axis=1), tower.faces)
+
+
+def test_a_shape_that_stands_along_one_axis_is_shown_standing():
+    for up in ("y", "z"):
+        tower = leaning_tower(up)
+        automatic, told = three_quarter_view(tower), three_quarter_view(tower, up=up)
+        assert np.array_equal(automatic.rotation, told.rotation)
+        head_row = in_picture(tower, automatic)[-1, 1]
+        plate_row = in_picture(tower, automatic)[-3 * BALL.n_vertices, 1]
+        assert head_row < plate_row
+
+
+def test_y_is_up_where_both_would_stand_or_neither():
+    for mesh in (BALL, torus(), leaning_tower("x")):
+        assert np.array_equal(three_quarter_view(mesh).rotation, three_quarter_view(mesh, up="y").rotation)
+
+
+def test_the_guess_does_not_depend_on_the_unit():
+    tower = leaning_tower("z")
+    usual = three_quarter_view(tower).rotation
+    for power in (-330, 330):
+        scaled = TriangleMesh(tower.vertices * 2.0**power, tower.faces)
+        assert np.array_equal(three_quarter_view(scaled).rotation, usual)
+
+
+def test_a_shape_is_shown_from_the_side_that_bends_more():
+    """A ball with a dented face on its far side is turned round, however its faces are numbered and scaled."""
+    ball = icosphere(4)
+    x, y, z = ball.vertices.T
+    for side in (1, -1):
+        relief = 0.05 * np.sin(20 * x) * np.sin(20 * y) * np.clip(side * z, 0, 1)
+        points = ball.vertices * (1 + relief)[:, None]
+        for mesh in (
+            TriangleMesh(points, ball.faces),
+            TriangleMesh(points * 2.0**-300, ball.faces),
+            TriangleMesh(points, ball.faces[:, ::-1]),
+        ):
+            right, down, towards = three_quarter_view(mesh).rotation
+            assert side * towards[2] > 0.5
+            assert towards[1] > 0.3
+            assert np.cross(right, towards) == pytest.approx(down, abs=1e-12)
+
+
+def test_a_shape_without_area_has_a_view():
+    needle = TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
+    camera = three_quarter_view(needle, size=50)
+    assert np.isfinite(in_picture(needle, camera)).all()
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.sampled_from(["x", "y", "z"]), st.integers(0, 2**32 - 1))
+def test_cameras_are_rotations_with_up_upward_and_shapes_fill_the_picture(up, seed):
+    points = np.random.default_rng(seed).standard_normal((30, 3)) * [1, 2, 3] + 5
+    mesh = TriangleMesh(points, np.arange(30).reshape(10, 3))
+    camera = three_quarter_view(mesh, up=up, size=100)
+    right, down, towards = camera.rotation
+    assert camera.rotation @ camera.rotation.T == pytest.approx(np.eye(3), abs=1e-12)
+    assert np.cross(right, towards) == pytest.approx(down, abs=1e-12)  # right, down, towards: a mirror would flip it
+    assert right["xyz".index(up)] == pytest.approx(0, abs=1e-12)
+    assert down["xyz".index(up)] < 0
+    places = in_picture(mesh, camera)[:, :2]
+    assert np.ptp(places, axis=0).max() == pytest.approx(92)
+    assert (places.min(axis=0) + places.max(axis=0)) / 2 == pytest.approx([50, 50])
+
+
+@pytest.mark.data
+def test_a_real_head_shows_its_face(data):
+    assert three_quarter_view(read_mesh(data / "classics" / "decimated-max.obj")).rotation[2, 2] < -0.5
+
+
+@pytest.mark.data
+@pytest.mark.parametrize(
+    ("name", "down"), [("horse.ply", [0, 0, -1]), ("bunny.off", [0, -1, 0]), ("camel.off", [0, -1, 0])]
+)
+def test_every_picture_of_a_classic_shape_shows_it_upright(data, name, down, monkeypatch):
+    """Whichever figure draws it, and without being told which axis is up."""
+    mesh = read_mesh(data / "classics" / name)
+    views = []
+    for module in (fields, poses, sheet, stability):
+        monkeypatch.setattr(
+            module, "draw", lambda shape, camera, **_: views.append(camera.rotation) or draw(BALL, camera)
+        )
+    figure_segments(mesh, np.zeros(mesh.n_faces, dtype=int), np.array([0]))
+    figure_field(mesh, mesh.vertices[:, 0], "x")
+    figure_poses({"one": mesh})
+    panel = Panel(mesh, "a", np.zeros(mesh.n_faces, dtype=int), np.array([0]))
+    figure_contact_sheet(panel, [panel])
+    assert len(views) == 5
+    for rotation in views:
+        assert np.array_equal(rotation, views[0])
+        assert rotation[1] @ down > 0.8
+
+
+@pytest.mark.data
+@pytest.mark.parametrize(("name", "up"), [("tosca_cat0", "z"), ("tosca_dog0", "z"), ("sumner_horse-10", "y")])
+def test_real_animals_are_shown_on_their_feet(data, name, up):
+    (path,) = (data / "retrieval").rglob(f"{name}.*")
+    mesh = read_mesh(path)
+    assert np.array_equal(three_quarter_view(mesh).rotation, three_quarter_view(mesh, up=up).rotation)

@@ -1,0 +1,144 @@
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+import eigenshape as es
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape.retrieval.baselines import light_field as lf
+from eigenshape.retrieval.baselines.light_field_loops import outline, power_sums, silhouette
+from eigenshape.scans.raster import EDGE_SLACK, THINNEST, rasterize
+
+few = settings(deadline=None, max_examples=8)
+HAND, ANT = es.make_creature("hand", n_vertices=800), es.make_creature("quadruped", n_vertices=800)
+
+
+def disc(size=201):
+    row, column = np.mgrid[:size, :size] - size // 2
+    return row**2 + column**2 <= (size // 2 - 3) ** 2
+
+
+def test_a_silhouette_is_what_the_depth_buffer_covers():
+    points = HAND.vertices * 60 / np.abs(HAND.vertices).max() + 64
+    seen = silhouette(points[:, :2].copy(), HAND.faces, 128, EDGE_SLACK, THINNEST)
+    assert seen.sum() > 500
+    assert np.array_equal(seen, rasterize(points, HAND.faces, 128, 128).face >= 0)
+
+
+def test_moments_are_those_of_the_definition():
+    rng = np.random.default_rng(3)
+    r, angle = np.sqrt(rng.random(50)), 2 * np.pi * rng.random(50)
+    found = lf.zernike_magnitudes(power_sums(r * np.cos(angle), r * np.sin(angle), lf.ORDER))
+    # R_1^1 = r, R_2^0 = 2r² - 1, R_2^2 = r², R_3^1 = 3r³ - 2r, R_3^3 = r³, R_4^0 = 6r⁴ - 6r² + 1
+    radial = [(r, 1), (2 * r**2 - 1, 0), (r**2, 2), (3 * r**3 - 2 * r, 1), (r**3, 3), (6 * r**4 - 6 * r**2 + 1, 0)]
+    np.testing.assert_allclose(found[:6], [abs(np.mean(R * np.exp(1j * m * angle))) for R, m in radial], rtol=1e-12)
+    assert len(found) == 35
+
+
+def test_a_disc_has_no_moments_and_no_waves():
+    assert np.abs(lf._described(disc())).max() < 0.01
+
+
+def test_a_square_has_only_waves_of_its_symmetry():
+    image = np.zeros((200, 200), dtype=bool)
+    image[50:151, 50:151] = True
+    waves = lf._fourier(image, np.array([100.0, 100.0]))
+    assert np.abs(waves[[3, 7]]).min() > 0.005
+    assert np.abs(np.delete(waves, [3, 7])).max() < 1e-3
+
+
+def test_the_outline_goes_once_around():
+    image = np.zeros((9, 9), dtype=bool)
+    image[2:6, 3:8] = True
+    path = outline(image, 2, 3)
+    assert len(path) == 14 + 1
+    assert np.array_equal(path[0], path[-1])
+    border = {(row, column) for row, column in np.argwhere(image) if row in (2, 5) or column in (3, 7)}
+    assert {tuple(place) for place in path} == border
+
+
+def test_a_thin_outline_goes_there_and_back():
+    image = np.zeros((5, 5), dtype=bool)
+    image[2, 1:4] = True
+    assert outline(image, 2, 1)[:, 1].tolist() == [1, 2, 3, 2, 1]
+    image[:] = False
+    image[4, 4] = True
+    assert outline(image, 4, 4).tolist() == [[4, 4]]
+
+
+@few
+@given(st.integers(0, 2**32 - 1))
+@example(126)  # two pieces of one size
+def test_turns_by_a_quarter_and_mirrors_leave_the_numbers(seed):
+    rng = np.random.default_rng(seed)
+    image = np.zeros((64, 64), dtype=bool)
+    for _ in range(4):
+        row, column = rng.integers(5, 40, 2)
+        image[row : row + rng.integers(5, 20), column : column + rng.integers(5, 20)] = True
+    expected = lf._described(image)
+    for other in (np.rot90(image), image[:, ::-1]):
+        np.testing.assert_allclose(lf._described(other.copy())[:35], expected[:35], atol=1e-12)
+        # The outline starts elsewhere, so that its samples lie between the old ones.
+        np.testing.assert_allclose(lf._described(other.copy())[35:], expected[35:], atol=0.02)
+
+
+def test_the_sixty_pairings_are_a_group():
+    pairings = lf._pairings()
+    rows = {tuple(row) for row in pairings}
+    assert len(rows) == 60
+    assert tuple(range(10)) in rows
+    assert all(sorted(row) == list(range(10)) for row in rows)
+    assert {tuple(one[list(two)]) for one in pairings for two in rows} == rows
+
+
+def test_turns_spread_views():
+    turns = lf._turns(10)
+    assert np.array_equal(turns[:3], lf._turns(3))
+    axes = np.concatenate([lf._axes() @ turn.T for turn in turns])
+    cosines = np.abs(axes @ axes.T)[~np.eye(len(axes), dtype=bool)]
+    assert np.degrees(np.arccos(cosines.max())) > 5
+
+
+def test_a_turn_of_the_dodecahedron_is_no_difference():
+    turn = Rotation.from_rotvec(2 * np.pi / 3 * lf._axes()[4]).as_matrix()
+    turned = es.TriangleMesh(HAND.vertices @ turn.T, HAND.faces)
+    one, two, other = (lf.light_field(mesh, n_fields=1) for mesh in (HAND, turned, ANT))
+    assert es.light_field_distance(one, one) == 0
+    assert es.light_field_distance(one, two) < 0.05 * es.light_field_distance(one, other)
+    assert es.light_field_distance(one, other) == pytest.approx(es.light_field_distance(other, one), rel=1e-12)
+
+
+@few
+@given(st.integers(0, 2**32 - 1))
+def test_any_turn_is_less_than_another_shape(seed):
+    turn = Rotation.random(random_state=seed).as_matrix()
+    turned = es.TriangleMesh(HAND.vertices @ turn.T, HAND.faces)
+    one, two, other = (es.light_field(mesh, n_fields=4, size=96) for mesh in (HAND, turned, ANT))
+    assert es.light_field_distance(one, two) < 0.5 * es.light_field_distance(one, other)
+
+
+@few
+@given(st.floats(-100, 100), st.integers(0, 2**32 - 1))
+def test_size_and_place_drop_out(power, seed):
+    place = np.random.default_rng(seed).standard_normal(3)
+    moved = es.TriangleMesh(10.0**power * (HAND.vertices + place), HAND.faces)
+    one, two = (es.light_field(mesh, n_fields=1, size=96) for mesh in (HAND, moved))
+    # A pixel at the very edge may fall to the other side by rounding.
+    np.testing.assert_allclose(two, one, atol=0.01)
+
+
+def test_a_flat_shape_may_show_nothing():
+    found = es.light_field(es.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), n_fields=1, size=32)
+    assert np.isfinite(found).all()
+
+
+def test_bad_input_is_named():
+    with pytest.raises(InvalidShapeError, match="A shape must have area to be seen; all 1 faces have none"):
+        es.light_field(es.TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]))
+    with pytest.raises(InvalidParameterError, match=r"n_fields must lie in 1\.\.100; it is 0"):
+        es.light_field(HAND, n_fields=0)
+    with pytest.raises(InvalidParameterError, match=r"size must lie in 16\.\.4096; it is 8"):
+        es.light_field(HAND, size=8)
+    with pytest.raises(InvalidParameterError, match="A light field must have shape"):
+        es.light_field_distance(np.zeros((1, 10, 45)), np.zeros((1, 10, 44)))

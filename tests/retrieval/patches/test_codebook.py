@@ -1,0 +1,123 @@
+"""Words and vectors of patches beside their definitions."""
+
+import numpy as np
+import pytest
+from sklearn.mixture import GaussianMixture
+
+import eigenshape as es
+from eigenshape.retrieval.patches import codebook as codes
+from eigenshape.retrieval.patches.codebook import encode_patches, train_codebook
+from eigenshape.retrieval.patches.distance import SIZE_PRICE, patch_distances, view_distances
+from eigenshape.retrieval.patches.patches import Patches, describe_patches
+from eigenshape.scans.partial import viewpoint
+
+KINDS = ("quadruped", "hand", "octopus", "biped")
+
+
+@pytest.fixture(scope="module")
+def creatures():
+    return {
+        (kind, seed): describe_patches(es.make_creature(kind, seed, n_vertices=1200))
+        for kind in KINDS
+        for seed in (1, 2)
+    }
+
+
+@pytest.fixture(scope="module")
+def book(creatures):
+    return train_codebook([patches for (_, seed), patches in creatures.items() if seed == 1])
+
+
+def test_another_pose_is_the_nearest(creatures, book):
+    vectors = {key: encode_patches(patches, book) for key, patches in creatures.items()}
+    known = np.array([vectors[kind, 1] for kind in KINDS])
+    for place, kind in enumerate(KINDS):
+        assert patch_distances(vectors[kind, 2], known).argmin() == place
+        assert patch_distances(vectors[kind, 1], known)[place] == pytest.approx(0, abs=1e-6)
+
+
+def test_vectors_are_gradients_of_the_likelihood(creatures, book):
+    shape = creatures["hand", 2]
+    place, radius, step = 1, codes.BASES[1], 1e-5
+    points = codes._scaled(shape.numbers[:, radius].astype(float), book.means[place], book.spreads[place])
+    points = points @ book.axes[place]
+    weights = shape.weights[:, radius] / shape.weights[:, radius].sum(dtype=np.float64)
+
+    middles, spreads = book.centers[place].astype(float), np.sqrt(book.variances[place].astype(float))
+
+    def likelihood(centers, spreads):
+        joint = codes._log_joint(points, book.shares[place].astype(float), centers, spreads**2)
+        return float(weights @ np.log(np.exp(joint).sum(axis=1)))
+
+    found = codes._fisher(shape, radius, book, place).reshape(2, *book.centers[place].shape)
+    for word, axis in ((0, 0), (3, 7), (31, 19)):
+        moved, root = np.zeros_like(spreads), np.sqrt(book.shares[place, word])
+        moved[word, axis] = step * spreads[word, axis]
+        slopes = [
+            (likelihood(middles + moved, spreads) - likelihood(middles - moved, spreads)),
+            (likelihood(middles, spreads + moved) - likelihood(middles, spreads - moved)),
+        ]
+        expected = np.array(slopes) / (2 * step) / root / [1, np.sqrt(2)]
+        assert found[:, word, axis] == pytest.approx(expected, abs=1e-5)
+
+
+def test_the_mixture_is_as_likely_as_another_librarys():
+    rng = np.random.default_rng(0)
+    points = np.concatenate([rng.normal(place, 0.5 + 0.1 * place, (200, 4)) for place in range(8)])
+    shares, centers, variances = codes._mixture(points, 0)
+    ours = np.log(np.exp(codes._log_joint(points, shares, centers, variances)).sum(axis=1)).mean() - 2 * np.log(
+        2 * np.pi
+    )
+    theirs = GaussianMixture(
+        codes.N_WORDS, covariance_type="diag", reg_covar=0, tol=1e-5, max_iter=2000, random_state=0
+    ).fit(points)
+    assert shares.sum() == pytest.approx(1)
+    assert ours > theirs.score(points) - 0.05
+
+
+def test_steps_of_size_are_found_and_have_a_price():
+    rng = np.random.default_rng(0)
+    query = rng.standard_normal((3, 3, 8)).astype(np.float32)
+    query /= np.linalg.norm(query, axis=2, keepdims=True)
+    larger = np.roll(query, 1, axis=1)  # what one has at a radius the other has at the next
+    assert patch_distances(query, query[None]) == pytest.approx(0, abs=1e-6)
+    assert patch_distances(query, larger[None]) == pytest.approx(SIZE_PRICE, abs=1e-6)
+    assert patch_distances(larger, query[None]) == pytest.approx(SIZE_PRICE, abs=1e-6)
+
+
+def test_a_view_counts_by_half():
+    rng = np.random.default_rng(1)
+    rows = rng.standard_normal((4, 3, 1, 8)).astype(np.float32)
+    query, one, two, seen = rows / np.linalg.norm(rows, axis=3, keepdims=True)
+    far, near = patch_distances(query, np.array([one, two])), patch_distances(query, np.array([seen, query]))
+    found = view_distances(query, np.array([one, two]), np.array([seen, query]), np.array([0, 0]))
+    assert found == pytest.approx([(far[0] + min(far[0], near.min())) / 2, far[1]], abs=1e-6)
+    without = view_distances(query, np.array([one, two]), np.empty((0, 3, 1, 8), np.float32), np.empty(0, np.int64))
+    assert without == pytest.approx(far)
+
+
+def test_a_scan_is_nearest_to_the_view_from_its_side(creatures, book):
+    mesh = es.make_creature("hand", 1, n_vertices=1200)
+    views = es.describe_patch_views(mesh, n_views=3)
+    codes = np.array([encode_patches(view, book) for view in views])
+    for place in range(3):
+        scan = es.partial_scan(mesh, viewpoint(place)).mesh
+        found = patch_distances(encode_patches(describe_patches(scan), book), codes)
+        assert found.argmin() == place
+        assert found[place] == pytest.approx(0, abs=1e-5)
+        assert set(views[place].vertices) <= set(range(mesh.n_vertices))
+    assert es.describe_patch_views(scan) == []
+
+
+def test_the_same_again(creatures):
+    one, two = (train_codebook(list(creatures.values()), seed=3) for _ in range(2))
+    for name in ("means", "spreads", "axes", "shares", "centers", "variances"):
+        assert np.array_equal(getattr(one, name), getattr(two, name))
+
+
+def test_too_few_patches_are_refused():
+    few = Patches(
+        np.zeros((3, 9, 64), np.float32), np.ones((3, 9), np.float32), np.arange(3), np.zeros((3, 3), np.float32)
+    )
+    with pytest.raises(es.InvalidParameterError, match="takes at least 64 patches; 2 shapes have 6"):
+        train_codebook([few, few])

@@ -1,0 +1,97 @@
+"""Verification by matched points: what it takes from distances, and from which."""
+
+import numpy as np
+import pytest
+
+import eigenshape as es
+from eigenshape.retrieval.patches.distance import patch_distances, view_distances
+from eigenshape.retrieval.patches.matching import patch_agreement
+from eigenshape.retrieval.patches.verification import (
+    WORTH,
+    patch_scores,
+    shape_agreement,
+    verified_scores,
+    word_distances,
+)
+
+KINDS = ("quadruped", "hand", "octopus", "biped")
+
+
+@pytest.fixture(scope="module")
+def book():
+    return es.train_codebook([es.describe_patches(es.make_creature(kind, 3, n_vertices=1200)) for kind in KINDS])
+
+
+@pytest.fixture(scope="module")
+def wholes(book):
+    return [known(es.make_creature(kind, 1, n_vertices=1200), book) for kind in KINDS]
+
+
+@pytest.fixture(scope="module")
+def scan(book):
+    part = es.partial_scan(es.make_creature("hand", 1, n_vertices=1200), [0.0, 0, 1])
+    return known(part.mesh, book)
+
+
+def floats(codes):
+    return codes.astype(np.float32)
+
+
+def known(mesh, book):
+    return es.in_words(es.seen_patches(mesh, n_views=3), es.PatchRecipe(book))
+
+
+def test_only_the_nearest_come_nearer(wholes, scan):
+    far = np.array([0.9, 0.3, 0.5, 0.8])
+    found = verified_scores(scan, wholes.__getitem__, far, n_verified=2)
+    assert found[[0, 3]].tolist() == ((far[[0, 3]] + WORTH) / (1 + WORTH)).tolist()
+    expected = [(far[place] + WORTH * (1 - shape_agreement(scan, wholes[place]))) / (1 + WORTH) for place in (1, 2)]
+    assert found[[1, 2]] == pytest.approx(expected)
+    assert far.tolist() == [0.9, 0.3, 0.5, 0.8]
+    assert verified_scores(scan, wholes.__getitem__, np.ones(4)).argmin() == 1
+
+
+def test_the_nearest_view_of_either_serves(wholes, scan):
+    whole = wholes[1]
+    own = patch_agreement(scan.points[0], whole.points[0])
+    nearest = patch_distances(floats(scan.codes[0]), floats(whole.codes[1:])).argmin()
+    view = patch_agreement(scan.points[0], whole.points[1 + nearest])
+    assert shape_agreement(scan, whole) == pytest.approx((own + max(own, view)) / 2)
+    back = patch_agreement(whole.points[0], scan.points[0])
+    view = patch_agreement(whole.points[1 + nearest], scan.points[0])
+    assert shape_agreement(whole, scan) == pytest.approx((back + max(back, view)) / 2)
+    assert shape_agreement(scan, scan) == pytest.approx(patch_agreement(scan.points[0], scan.points[0]))
+
+
+def test_views_of_the_query_serve_against_parts(wholes, scan):
+    whole, other, part = (floats(shape.codes) for shape in (wholes[1], wholes[0], scan))
+    shapes, of = np.array([part[0], other[0]]), np.array([1, 1, 1])
+    found = view_distances(whole[0], shapes, other[1:], of, query_views=whole[1:])
+    own = patch_distances(whole[0], shapes)
+    nearest = min(own[0], *(patch_distances(view, shapes[:1])[0] for view in whole[1:]))
+    assert nearest < own[0]
+    assert found[0] == pytest.approx((own[0] + nearest) / 2)
+    assert found[1] == view_distances(whole[0], shapes, other[1:], of)[1]
+    assert word_distances(wholes[1].codes, [scan.codes, wholes[0].codes]) == pytest.approx(found, abs=1e-6)
+
+
+def test_many_shapes_are_scored_some_at_a_time(wholes, scan, monkeypatch):
+    at_once = patch_scores(scan, wholes)
+    monkeypatch.setattr("eigenshape.retrieval.patches.verification.AT_ONCE", 3)
+    assert patch_scores(scan, wholes) == pytest.approx(at_once, abs=1e-6)
+    assert at_once.argmin() == 1
+
+
+def test_a_descriptor_takes_patches(book, scan):
+    with pytest.raises(es.InvalidParameterError, match="takes patches of a shape, then of its views; there are none"):
+        es.in_words([], es.PatchRecipe(book))
+    assert len(scan.points) == len(scan.codes) == 1
+    assert not scan.codes.flags.writeable
+
+
+def test_noise_and_inward_faces_hardly_matter(wholes):
+    mesh = es.make_creature("hand", 2, n_vertices=1500)
+    noise = 0.1 * es.edge_lengths(mesh).mean() * np.random.default_rng(0).standard_normal(mesh.vertices.shape)
+    spoilt = es.TriangleMesh(mesh.vertices + noise, mesh.faces[:, ::-1])
+    recipe = wholes[0].recipe
+    assert patch_scores(es.describe_shape(spoilt, recipe), wholes).argmin() == 1

@@ -1,0 +1,190 @@
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from describers import RECIPE, by_content, descriptor
+from filelock import FileLock
+
+import eigenshape
+from eigenshape._errors import InvalidParameterError
+from eigenshape.retrieval.store.batch import build_index, content_digest
+from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.retrieval.store.workers import Item, Workers
+
+
+@pytest.fixture
+def index(tmp_path):
+    return ShapeIndex.create(tmp_path / "index")
+
+
+def items(folder, **contents):
+    for name, word in contents.items():
+        (folder / name).write_text(word)
+    return [Item(name, folder / name, "label") for name in contents]
+
+
+def build(index, todo, timeout=60.0, told=None):
+    return build_index(index, todo, by_content, recipes=(RECIPE,), workers=Workers(2, timeout), told=told)
+
+
+BAD = {
+    "raise": "A face must have area; face 3 has none.",
+    "die": "it ended its process with exit code 77",
+    "hang": "it took more than 4 s",
+    "pickle badly": "PicklesBadlyError: pickle badly and more",
+    "nothing": "TypeError: 'NoneType' object is not iterable",
+    "text": "A describer must return descriptors; it returned str.",
+    "nan": "A descriptor must hold finite single-precision numbers; of 'nan' entry [0, 0] is nan.",
+    "another recipe": "A describer must follow every recipe; 'test' has no descriptor.",
+    "surprise": "ValueError: invalid literal for int() with base 10: 'surprise'",
+}
+
+
+def test_bad_shapes_are_named_and_the_others_go_on(index, tmp_path):
+    good = {"a": "1", "d": "2", "g": "3", "vanish": "vanish", "h": "4"}
+    todo = items(tmp_path, a="1", **{word: word for word in BAD}, d="2", g="3", vanish="vanish", h="4")
+    heard = []
+    report = build(index, todo, timeout=4.0, told=lambda *news: heard.append(news))
+    assert report.added == tuple(good)
+    assert report.failed == tuple(BAD.items())
+    assert [record.name for record in index.records()] == sorted(good)
+    assert [news[0] for news in heard] == list(range(1, len(todo) + 1))
+    assert {news[2]: news[3] for news in heard} == {**dict.fromkeys(good), **BAD}
+
+
+def test_what_is_there_is_not_done_twice(index, tmp_path):
+    todo = items(tmp_path, a="1", b="2")
+    build(index, todo[:1])
+    report = build(index, todo)
+    assert (report.added, report.skipped, report.failed) == (("b",), ("a",), ())
+    assert index.records()[0].digest == content_digest(tmp_path / "a")
+
+
+def test_a_changed_file_replaces_what_it_was(index, tmp_path):
+    todo = items(tmp_path, a="1", b="2")
+    build(index, todo)
+    (tmp_path / "a").write_text("5")
+    assert build(index, todo).added == ("a",)
+    assert index.query(descriptor(5))[0].name == "a"
+    assert len(index) == 2
+
+
+def test_a_file_that_changes_while_it_is_read_is_read_again(index, tmp_path):
+    todo = items(tmp_path, a="change")
+    assert build(index, todo).added == ("a",)
+    assert build(index, todo).added == ("a",)
+    assert index.query(descriptor(9))[0].score == 0
+    assert build(index, todo).skipped == ("a",)
+
+
+def test_ctrl_c_keeps_what_is_done(index, tmp_path):
+    todo = items(tmp_path, **{f"s{number}": str(number) for number in range(8)})
+
+    def interrupt(n_done, n_items, name, error):
+        if n_done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        build(index, todo, told=interrupt)
+    assert len(index) == 3
+    report = build(index, todo)
+    assert len(report.added) == 5
+    assert len(report.skipped) == 3
+
+
+def test_a_missing_file_is_named(index, tmp_path):
+    report = build(index, [Item("gone", tmp_path / "gone")])
+    assert report.failed[0][0] == "gone"
+    assert "No such file" in report.failed[0][1]
+
+
+@pytest.fixture
+def stoppable():
+    """Have Ctrl-C raise KeyboardInterrupt, also where a background job runs the tests with Ctrl-C ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("stoppable")
+def test_ctrl_c_ends_workers_that_hang(index, tmp_path):
+    todo = items(tmp_path, a="1", b="hang")
+
+    def interrupt_soon():
+        try:
+            wait_until((tmp_path / "b.busy").exists)
+            wait_until(lambda: len(index))
+        finally:  # without it the build would hang as long as its worker
+            os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=interrupt_soon, daemon=True).start()
+    with pytest.raises(KeyboardInterrupt):
+        build(index, todo, timeout=600)
+    with FileLock(tmp_path / "b.lock", timeout=20):  # let go by its death only
+        assert [record.name for record in index.records()] == ["a"]
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="kill -9 is a Unix thing")
+def test_workers_do_not_outlive_a_killed_batch(index, tmp_path):
+    todo = items(tmp_path, a="hang")
+    batch = multiprocessing.get_context("spawn").Process(target=build, args=(index, todo, 600.0))
+    batch.start()
+    wait_until((tmp_path / "a.busy").exists)
+    batch.kill()
+    batch.join()
+    with FileLock(tmp_path / "a.lock", timeout=20):
+        assert len(index) == 0
+
+
+def wait_until(happens):
+    deadline = time.monotonic() + 120
+    while not happens():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+UNGUARDED = """
+from pathlib import Path
+from describers import RECIPE, by_content
+import eigenshape as es
+
+index = es.ShapeIndex.open_or_create("index")
+items = [es.Item(name, Path(name)) for name in "abc"]
+print(es.build_index(index, items, by_content, recipes=(RECIPE,)))
+"""
+
+
+def run_script(folder, text):
+    (folder / "script.py").write_text(text)
+    paths = [str(Path(__file__).parents[2]), str(Path(eigenshape.__file__).parents[1])]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
+    command = [sys.executable, "script.py"]
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_a_script_without_a_main_guard_is_told_so(tmp_path):
+    items(tmp_path, a="1", b="2", c="3")
+    done = run_script(tmp_path, UNGUARDED)
+    assert done.returncode == 1
+    assert done.stderr.count("Put what the script does, from its first call of eigenshape on, under `if __name__") == 1
+    assert "bootstrapping" not in done.stderr
+    assert len(ShapeIndex.open(tmp_path / "index")) == 0
+    imports, _, body = UNGUARDED.partition("\n\n")
+    guarded = f"{imports}\n\nif __name__ == '__main__':\n{textwrap.indent(body, '    ')}"
+    assert "added=('a', 'b', 'c')" in run_script(tmp_path, guarded).stdout
+
+
+def test_what_a_batch_cannot_begin_with(index, tmp_path):
+    with pytest.raises(InvalidParameterError, match=r"Items must have different names; 'x' is both .*a and .*b"):
+        build(index, [Item("x", tmp_path / "a"), Item("x", tmp_path / "b")])
+    with pytest.raises(InvalidParameterError, match="count must be at least 1; it is 0"):
+        Workers(count=0)
+    with pytest.raises(InvalidParameterError, match="timeout must be positive and finite"):
+        Workers(timeout=0.0)

@@ -1,0 +1,77 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from pencils import cycle, dense_eigenvalues, graph, path, wild
+
+from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.csr_loops import component_labels
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.shapes.surfaces import disjoint_union, icosphere
+from eigenshape.spectral.multilevel.aggregation import build_levels
+from eigenshape.spectral.multilevel.multilevel_loops import grow_aggregates
+
+
+def grown(laplacian, size):
+    matrix = laplacian.stiffness
+    return grow_aggregates(matrix.indptr, matrix.indices, matrix.data, size)
+
+
+def test_a_path_is_cut_into_runs_by_hand():
+    labels, count = grown(graph(path(9)), 3)
+    assert labels.tolist() == [0, 0, 0, 1, 1, 1, 2, 2, 2]
+    assert count == 3
+
+
+def test_a_fragment_joins_its_neighbour():
+    labels, count = grown(graph(path(9)), 8)  # one point is left over, less than a quarter of eight
+    assert labels.tolist() == [0] * 9
+    assert count == 1
+
+
+def test_points_without_neighbours_stay_alone():
+    labels, count = grown(Laplacian(sp.csr_array((4, 4)), sp.csr_array(sp.eye_array(4))), 3)
+    assert labels.tolist() == [0, 1, 2, 3]
+    assert count == 4
+
+
+def test_aggregates_are_connected_and_of_the_size_asked_for():
+    laplacian = cotangent_laplacian(disjoint_union(icosphere(4), icosphere(3)))
+    labels, count = grown(laplacian, 16)
+    sizes = np.bincount(labels)
+    assert len(sizes) == count
+    assert 10 < sizes.mean() < 20
+    within = laplacian.stiffness.tocoo()
+    same = labels[within.row] == labels[within.col]
+    inside = sp.csr_array((np.ones(same.sum()), (within.row[same], within.col[same])), shape=laplacian.stiffness.shape)
+    assert component_labels(inside.indptr, inside.indices).max() + 1 <= 1.2 * count
+
+
+@pytest.mark.parametrize("smooth", [True, False])
+@pytest.mark.parametrize("laplacian", [cotangent_laplacian(icosphere(4)), graph(cycle(500)), wild()])
+def test_constants_stay_constant_and_symmetry_stays(laplacian, smooth):
+    levels = build_levels(laplacian.stiffness, laplacian.mass, 30, smooth=smooth)
+    assert len(levels) > 1
+    for level, below in pairwise(levels):
+        np.testing.assert_allclose(level.down.sum(axis=1), 1, atol=1e-9)
+        largest = below.stiffness.diagonal().max()
+        np.testing.assert_allclose(below.stiffness.sum(axis=1), 0, atol=1e-9 * largest)
+        assert (below.stiffness != below.stiffness.T).nnz == 0
+        np.testing.assert_allclose(below.mass.sum(), level.mass.sum(), rtol=1e-12)
+    assert levels[-1].down is None
+
+
+def test_coarse_eigenvalues_are_near_and_above():
+    laplacian = cotangent_laplacian(icosphere(4))
+    coarse = build_levels(laplacian.stiffness, laplacian.mass, 200)[-1]
+    exact, found = dense_eigenvalues(laplacian)[:16], dense_eigenvalues(Laplacian(coarse.stiffness, coarse.mass))[:16]
+    assert (found > exact - 1e-9).all()  # Rayleigh and Ritz
+    np.testing.assert_allclose(found[1:], exact[1:], rtol=0.02)
+
+
+def test_the_top_is_a_bound():
+    for laplacian in (cotangent_laplacian(icosphere(3)), graph(cycle(100)), wild(10)):
+        level = build_levels(laplacian.stiffness, laplacian.mass, 10**9)[0]
+        scaled = Laplacian(laplacian.stiffness, sp.csr_array(sp.diags_array(laplacian.stiffness.diagonal())))
+        assert dense_eigenvalues(scaled)[-1] <= level.top * (1 + 1e-12)

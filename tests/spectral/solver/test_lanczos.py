@@ -1,0 +1,57 @@
+import numpy as np
+import pytest
+from pencils import dense_eigenvalues, graph, path, tetrahedra
+
+from eigenshape._errors import ConvergenceError
+from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.shapes.surfaces import icosphere
+from eigenshape.spectral.solver.factor import factorise
+from eigenshape.spectral.solver.lanczos import Wanted, block_lanczos
+from eigenshape.spectral.solver.pencil import normalise, rayleigh_residuals
+
+
+def run(pencil, factor, wanted, locked=None):
+    locked = np.empty((pencil.n, 0)) if locked is None else locked
+    return block_lanczos(pencil, factor, wanted, locked=locked, report=lambda done: None)[1]
+
+
+def test_finds_both_sides_of_the_shift_orthonormal():
+    laplacian = cotangent_laplacian(icosphere(3), "consistent")
+    pencil = normalise(laplacian)
+    reference = np.ldexp(dense_eigenvalues(laplacian), -pencil.value_exponent)
+    factor = factorise(pencil, float(reference[15] + reference[16]) / 2)
+    assert factor.count == 16
+    vectors = run(pencil, factor, Wanted(below=16, above=9))
+    values, residuals = rayleigh_residuals(pencil, vectors)
+    np.testing.assert_allclose(np.sort(values), reference[:25], atol=1e-11 * reference[24])
+    assert residuals.max() < 1e-9 * reference[24]
+    np.testing.assert_allclose(vectors.T @ pencil.weigh(vectors), np.eye(25), atol=1e-11)
+
+
+def test_a_second_run_finds_the_copies_that_the_block_was_too_narrow_for():
+    pencil = normalise(cotangent_laplacian(tetrahedra(100)))  # the eigenvalue 0 a hundred times
+    factor = factorise(pencil, 0.01 * pencil.level)
+    assert factor.count == 100
+    first = run(pencil, factor, Wanted(below=5, above=0))
+    second = run(pencil, factor, Wanted(below=5, above=0), locked=first)
+    both = np.hstack([first, second])
+    assert both.shape[1] == 10
+    np.testing.assert_allclose(both.T @ pencil.weigh(both), np.eye(10), atol=1e-12)
+    np.testing.assert_allclose(rayleigh_residuals(pencil, both)[0], 0, atol=1e-13)
+
+
+def test_nothing_above_the_ceiling_is_returned():
+    pencil = normalise(graph(path(300)))
+    factor = factorise(pencil, 0.002)
+    below = factor.count
+    everything = run(pencil, factor, Wanted(below=below, above=5))
+    values = np.sort(rayleigh_residuals(pencil, everything)[0])
+    ceiling = float(values[below + 1] + values[below + 2]) / 2
+    assert run(pencil, factor, Wanted(below=below, above=5, ceiling=ceiling)).shape[1] == below + 2
+
+
+def test_too_little_room_is_an_error():
+    pencil = normalise(graph(path(40)))
+    factor = factorise(pencil, 0.1)
+    with pytest.raises(ConvergenceError, match=r"Block Lanczos must converge within 32 vectors"):
+        run(pencil, factor, Wanted(below=factor.count, above=40))
