@@ -100,6 +100,7 @@ def test_info_says_which_repairs_would_help_and_they_do(tmp_path):
     assert "repair: weld_seams joined" in mended.stderr
 
 
+@pytest.mark.long
 def test_spectrum(sphere, tmp_path):
     expected = solve_spectrum(cotangent_laplacian(read_mesh(sphere), "averaged"), 9)
     plot, picture, saved = tmp_path / "plot.png", tmp_path / "functions.png", tmp_path / "s.npz"
@@ -143,6 +144,7 @@ def test_index_goes_on_where_it_stopped(zoo, database):
     assert [name for name, _ in again["failed"]] == ["broken"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("how", ["SIGINT", "SIGKILL"])
 def test_a_stopped_index_goes_on_without_doing_a_shape_twice(tmp_path, how):
     folder, db = tmp_path / "meshes", tmp_path / "db"
@@ -174,6 +176,7 @@ def test_a_stopped_index_goes_on_without_doing_a_shape_twice(tmp_path, how):
     assert set(report["added"]) | before == {f"fish{number}" for number in range(6)}
 
 
+@pytest.mark.long
 def test_query_finds_the_kind_and_draws_it(zoo, database, tmp_path):
     scan = tmp_path / "scan.ply"
     write_mesh(partial_scan(make_creature("snake", 5, n_vertices=800), [0.2, 1.0, 0.1]).mesh, scan)
@@ -217,6 +220,7 @@ def test_names_that_come_twice_are_refused(zoo, tmp_path):
     assert "Names of shapes must differ; 'fish0' comes twice" in done.stderr
 
 
+@pytest.mark.long
 def test_a_sheet_is_drawn_from_another_folder_than_the_index_was_made_in(zoo, tmp_path, monkeypatch):
     monkeypatch.chdir(zoo)
     run("index", "fish", "--db", tmp_path / "index", "--views", 0, "--preset", "scale-free")
@@ -227,6 +231,7 @@ def test_a_sheet_is_drawn_from_another_folder_than_the_index_was_made_in(zoo, tm
     assert (tmp_path / "sheet.png").read_bytes()[:8] == PNG
 
 
+@pytest.mark.long
 def test_a_match_without_its_file_leaves_its_place_empty(zoo, tmp_path):
     path, moved, changed = zoo / "fish" / "fish0.ply", tmp_path / "moved.ply", tmp_path / "changed.ply"
     index = ShapeIndex.create(tmp_path / "index")
@@ -246,6 +251,7 @@ def test_a_match_without_its_file_leaves_its_place_empty(zoo, tmp_path):
     assert (tmp_path / "sheet.png").read_bytes()[:8] == PNG
 
 
+@pytest.mark.long
 def test_features_of_large_meshes_say_how_far_heat_is_off(tmp_path, monkeypatch):
     monkeypatch.setattr("eigenshape.cli.features.LARGE", 1000)
     monkeypatch.setattr("eigenshape.spectral.multilevel.start.COARSENED", 5)

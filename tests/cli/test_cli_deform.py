@@ -35,6 +35,7 @@ def giraffe(tmp_path_factory):
     return path
 
 
+@pytest.mark.long
 def test_a_head_nods(giraffe, tmp_path):
     bent, picture, edits = tmp_path / "bent.ply", tmp_path / "bent.png", tmp_path / "edits.json"
     words = ["--region", "y>70%", "--rotate", "x by 40"]
@@ -57,6 +58,7 @@ def test_a_head_nods(giraffe, tmp_path):
     assert more["edits"] == 2
 
 
+@pytest.mark.long
 def test_edits_of_another_mesh_are_refused_or_carried(giraffe, tmp_path):
     edits, finer, bent = tmp_path / "edits.json", tmp_path / "finer.ply", tmp_path / "bent.ply"
     listed = tmp_path / "head.txt"
@@ -94,6 +96,7 @@ def test_people_see_a_table(giraffe):
     assert all(words in printed for words in ("vertices that moved", "edges stretched", "pairs of faces that cross"))
 
 
+@pytest.mark.long
 def test_words_for_regions(giraffe, tmp_path):
     mesh = read_mesh(giraffe)
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)

@@ -55,6 +55,7 @@ def test_label_gives_what_transfer_labels_gives(poses, tmp_path):
     ]
 
 
+@pytest.mark.long
 def test_label_prints_a_table_and_takes_what_segment_prints(poses, tmp_path):
     parts = tmp_path / "rest.json"
     parts.write_text(run("segment", poses / "rest.ply", "--json").stdout)

@@ -138,6 +138,7 @@ def test_quads_and_textures_stay_on_the_way_through_repair_and_deform(tmp_path):
     assert read_mesh(tmp_path / "bent.stl").n_faces == expected.n_faces
 
 
+@pytest.mark.long
 def test_labels_are_a_property_of_faces_that_label_reads(tmp_path):
     shape = make_creature("giraffe", 0, n_vertices=600)
     write_mesh(shape, tmp_path / "a.ply")

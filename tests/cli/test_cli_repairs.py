@@ -46,6 +46,7 @@ def folder(tmp_path_factory):
     return folder
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["soup", "ugly", "flipped"])
 @pytest.mark.parametrize("preset", ["patches", "scale-free"])
 def test_a_broken_shape_is_found_once_it_is_repaired(folder, tmp_path, name, preset):
@@ -78,6 +79,7 @@ def test_loose_vertices_are_called_so_and_not_components(folder):
     assert "largest_component" not in said
 
 
+@pytest.mark.long
 def test_info_proposes_all_that_helps(tmp_path):
     ball, rng = icosphere(3), np.random.default_rng(1)
     cases = {
@@ -99,6 +101,7 @@ def test_info_proposes_all_that_helps(tmp_path):
     assert info(tmp_path / "holes.ply")["boundary_loops"] == 38
 
 
+@pytest.mark.long
 def test_copies_of_points_and_tetrahedra(tmp_path):
     points = fibonacci_sphere(300).vertices
     write_points(PointCloud(np.concatenate([points, points[:5]])), tmp_path / "copies.xyz")
@@ -119,6 +122,7 @@ def test_copies_of_points_and_tetrahedra(tmp_path):
     assert info(tmp_path / "twice.mesh")["repairs_to_try"] == ["drop_duplicate_faces"]
 
 
+@pytest.mark.long
 @pytest.mark.data
 def test_a_horse_that_faces_inward(data):
     path = data / "classics" / "horse.ply"

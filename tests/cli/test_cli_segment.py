@@ -41,6 +41,7 @@ def colors_in(path):
     return np.frombuffer(body, dtype=[("xyz", "<f8", 3), ("rgb", "u1", 3)], count=n)["rgb"]
 
 
+@pytest.mark.long
 def test_segment_gives_the_default_parts(biped, tmp_path):
     colored, picture = tmp_path / "parts.ply", tmp_path / "parts.png"
     found = run_json("segment", biped, "-o", colored, "--picture", picture)
@@ -58,6 +59,7 @@ def test_segment_gives_the_default_parts(biped, tmp_path):
     assert np.array_equal(colors_in(colored), part_colors(mesh, expected.labels))
 
 
+@pytest.mark.long
 def test_segment_cuts_where_it_is_told(biped):
     assert len(run_json("segment", biped, "-n", 3)["parts"]) == 3
     one = run_json("segment", biped, "--persistence", 2)
@@ -70,6 +72,7 @@ def test_segment_cuts_where_it_is_told(biped):
     assert len(run_json("segment", biped, "--largest-gap")["parts"]) == widest + 2
 
 
+@pytest.mark.long
 def test_segment_smooths_parts_and_leaves_regions_of_heat_as_they_are(biped):
     rough = run_json("segment", biped, "--no-smooth")["face_labels"]
     assert rough == segment(find_parts(read_mesh(biped)).tree, persistence=0.3).labels.tolist()

@@ -167,6 +167,7 @@ def test_a_closed_mesh_has_no_boundary_to_hold(folder, tmp_path):
     assert "--boundary dirichlet needs a boundary; TriangleMesh(50 vertices, 96 faces) is closed" in said
 
 
+@pytest.mark.long
 def test_roughly_and_kept(folder):
     write_mesh(icosphere(4), folder / "ball.off")
     rough = run("spectrum", folder / "ball.off", "-k", 9, "--accuracy", 1e-3).stdout

@@ -51,6 +51,7 @@ def test_machines_read_json(folder):
     assert found["explanation"] == report.explain()
 
 
+@pytest.mark.long
 def test_a_map_and_a_scale_can_be_given(folder):
     same = run("stability", folder / "one.ply", folder / "finer.ply", *FEW, "--map", folder / "map.txt", "--json")
     assert json.loads(same.stdout)["delta_of_the_map"] == 0.0

@@ -26,6 +26,7 @@ def tiny(request, tmp_path):
     return path
 
 
+@pytest.mark.long
 def test_all_pairs_are_computed_where_there_are_fewer_than_usual(tiny):
     n = TINY[tiny.stem].n_vertices
     done = run("spectrum", tiny)
@@ -43,6 +44,7 @@ def test_inner_points_alone_count_where_the_boundary_is_held(tmp_path):
     assert "note: 20 pairs are usual; this shape has 4, and all are computed" in done.stderr
 
 
+@pytest.mark.long
 def test_other_verbs_take_a_tiny_shape(tiny, tmp_path):
     run("info", tiny)
     run("features", tiny)
@@ -54,6 +56,7 @@ def test_other_verbs_take_a_tiny_shape(tiny, tmp_path):
     assert found["spectra"]["hausdorff"] == 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("preset", ["scale-free", "patches"])
 def test_tiny_shapes_are_indexed_and_found(preset, tmp_path):
     for name, mesh in TINY.items():

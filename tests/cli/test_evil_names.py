@@ -46,6 +46,7 @@ def parse(picture):
     return text
 
 
+@pytest.mark.long
 def test_a_mesh(zoo, tmp_path):
     mesh, picture, edits = zoo / f"{EVIL}0.ply", tmp_path / f"{EVIL}.svg", tmp_path / f"{EVIL}.json"
     labels, colored = tmp_path / f"{EVIL}.seg", tmp_path / f"{EVIL}.ply"
@@ -69,6 +70,7 @@ def changed(edits):
     return edits
 
 
+@pytest.mark.long
 def test_an_index(zoo, tmp_path):
     db, sheet = tmp_path / EVIL, tmp_path / "sheet.svg"
     done = run("index", zoo, "--db", db, "--views", 0, "--preset", "scale-free", code=3)

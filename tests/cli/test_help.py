@@ -57,6 +57,7 @@ def test_the_version():
     assert CliRunner().invoke(app, ["--version"]).stdout == f"eigenshape {version('eigenshape')}\n"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("module", ["eigenshape", "eigenshape_command"])
 def test_the_command_is_a_module_too(module):
     done = subprocess.run(

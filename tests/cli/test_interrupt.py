@@ -72,6 +72,7 @@ def herd(tmp_path):
     return folder
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("module", ["typer", "numba", "eigenshape.cli.app"])
 def test_while_libraries_are_imported(ball, module):
     running = start("info", ball, before=RESTORE + WAIT_AT.format(event="import", what=module))
@@ -79,6 +80,7 @@ def test_while_libraries_are_imported(ball, module):
     assert press_ctrl_c(running) == (130, "stopped\n")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("verb", ["info", "spectrum", "query"])
 def test_while_a_verb_runs(ball, tmp_path, verb):
     places = (ShapeIndex.create(tmp_path / "index").folder, ball) if verb == "query" else (ball,)
@@ -87,6 +89,7 @@ def test_while_a_verb_runs(ball, tmp_path, verb):
     assert press_ctrl_c(running) == (130, "stopped; what was finished is kept\n")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("n_files", [1, 8])
 def test_while_loops_are_compiled(ball, tmp_path, n_files):
     """Much of compiling is callbacks and finalizers, in which Python cannot raise what Ctrl-C raises."""
@@ -96,6 +99,7 @@ def test_while_loops_are_compiled(ball, tmp_path, n_files):
     assert press_ctrl_c(running) == (130, "stopped; what was finished is kept\n")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sign", ["index.sqlite", "rows-1.bin"])
 def test_while_workers_start_and_work(herd, tmp_path, sign):
     """The first sign comes before the workers' own imports, the second with the first shape."""
@@ -106,6 +110,7 @@ def test_while_workers_start_and_work(herd, tmp_path, sign):
     assert len(ShapeIndex.open(db)) < 4
 
 
+@pytest.mark.long
 def test_after_everything_is_done(ball):
     """What an exit handler waits for, a thread say, ends at once."""
     at_exit = "import atexit; atexit.register(lambda: print('reached', flush=True) or signal.pause())\n"
@@ -115,6 +120,7 @@ def test_after_everything_is_done(ball):
     assert press_ctrl_c(running) == (130, "stopped\n")
 
 
+@pytest.mark.long
 def test_a_background_job_goes_on(ball):
     ignore = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
     at_file = "import sys, os\nsys.addaudithook(lambda event, what: event == 'open' and str(what[0]) == {!r} and {})\n"

@@ -142,6 +142,7 @@ def test_details_are_those_of_the_thesis_vertex_by_vertex(small):
     assert np.abs(found - turned).max() > 0.01
 
 
+@pytest.mark.long
 def test_the_two_passes_of_the_thesis_by_hand(small):
     """6.3.3, with 288 modes for the 300."""
     rig, binding, handle = small
@@ -266,6 +267,7 @@ def halves():
     return rig_shape(mesh), left, mesh.vertices[region_boundary(mesh, left)].mean(axis=0)
 
 
+@pytest.mark.long
 def test_folds_of_single_edges_take_a_strong_pull(halves):
     """At a thousand six pairs cross; where shares take the vertices none does, and so much is never needed."""
     rig, left, pivot = halves

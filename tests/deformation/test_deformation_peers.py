@@ -14,6 +14,7 @@ TURN, PULL = Rotation([0.6, 0, 0], [0, 1, 2], 0.8), Translation([0, 0.3, 0])
 HEAD, TAIL = lump().vertices[:, 0] > 0.6, lump().vertices[:, 0] < -0.7
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("peer", PEERS)
 @pytest.mark.parametrize("handle", [Rotation([1, 2, 3], [0, 0, 1], 0.0), Translation([0, 0, 0])])
 def test_what_moves_nothing_leaves_all_in_place(peer, handle):

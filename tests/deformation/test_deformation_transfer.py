@@ -24,6 +24,7 @@ def bent():
     return deform(lump_rig(), lump().vertices[:, 0] > 0.6, Rotation([0.6, 0, 0], [0, 1, 2], 0.8))
 
 
+@pytest.mark.long
 def test_a_creature_is_given_its_own_pose():
     """Turns alone travel, so what is left is how far the pose stretches edges, by 3 %."""
     rest, pose = (make_creature("giraffe", number, n_vertices=1500) for number in (1, 4))
@@ -42,6 +43,7 @@ def test_few_modes_carry_less(bent):
     assert off[0] < off[1] < off[2]
 
 
+@pytest.mark.long
 def test_a_turned_and_larger_copy_is_bent_likewise(bent):
     copy = TriangleMesh(7 * lump().vertices @ TURN.T + [1, 2, 3], lump().faces)
     here = transfer_deformation(lump(), bent, lump(), mapped(lump(), 60))

@@ -79,6 +79,7 @@ def test_from_anywhere_it_is_nearly_always(kind):
     assert np.sum(np.array(gaps) > 1e-10) <= 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", [1e-100, 1e-10, 1e100])
 def test_units_change_no_fit(size):
     for kind in ("bent", "anything"):
@@ -166,6 +167,7 @@ def total(binding, posed):
     return edges.weights @ ((np.einsum("eij,ej->ei", turns[one], arms) - after) ** 2).sum(axis=1) / 2
 
 
+@pytest.mark.long
 def test_more_rounds_are_more_rigid():
     binding, handle = bent_tube()
     energies = [total(binding, shared_motion(binding, [handle]))]

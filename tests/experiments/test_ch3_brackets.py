@@ -24,6 +24,7 @@ def test_every_bracket_holds_a_truth_that_no_longer_moves(quick_form):
         assert row["room / moved"] is None or row["room / moved"] > 100, name
 
 
+@pytest.mark.long
 def test_widths_fall_with_the_square_where_eigenfunctions_are_smooth():
     order, case = (runpy.run_path(str(FOLDER / "run.py"))[name] for name in ("order", "flat_torus"))
     least, most = order(case(8), "neumann")

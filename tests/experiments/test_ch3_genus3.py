@@ -51,6 +51,7 @@ def test_faces_are_cut_without_a_gap_and_nothing_moves():
         assert es.enclosed_volume(cut) == pytest.approx(es.enclosed_volume(sphere), rel=1e-12)
 
 
+@pytest.mark.long
 def test_a_collapsed_torus_is_still_a_torus():
     torus = es.torus(60, 30)
     coarse = OTHER["coarser"](torus, 900)

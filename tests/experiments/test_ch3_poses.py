@@ -47,6 +47,7 @@ def test_poses_differ_little_and_other_species_more(quick_form):
     assert found["separation"]["right"] == 1
 
 
+@pytest.mark.long
 def test_a_kernel_leaks_through_space_where_a_shape_is_thin(monkeypatch):
     monkeypatch.syspath_prepend(FOLDER)
     leaks = runpy.run_path(str(FOLDER / "run.py"))["leaks"]

@@ -117,6 +117,7 @@ def test_versions_are_what_they_are_called():
         np.testing.assert_allclose(es.edge_lengths(mesh), es.edge_lengths(upright), rtol=1e-9)
 
 
+@pytest.mark.long
 def test_planes_keep_a_piece_of_the_wanted_size():
     whole = es.make_creature("quadruped", n_vertices=900)
     for seed in range(5):
@@ -203,6 +204,7 @@ def test_the_readme_shows_the_expected_figures():
         assert line in text
 
 
+@pytest.mark.long
 @pytest.mark.data
 def test_the_number_of_workers_changes_no_descriptor(tmp_path):
     glasses = [one for one in draws.shapes() if one.label == "glasses"][:3]

@@ -73,6 +73,7 @@ def test_losses_are_of_the_same_queries():
     assert robustness.cell(results["noise .1"]["as it is"]).startswith("33.3 / 33.3 / 33.3, -33.3 [")
 
 
+@pytest.mark.long
 def test_queries_are_described_as_they_are_or_as_the_method_takes_them():
     method = methods.Patches("patches", recipe=es.PatchRecipe(es.made_codebook()))
     flipped = es.TriangleMesh(BALL.vertices, BALL.faces[:, ::-1])

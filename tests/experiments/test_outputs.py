@@ -39,6 +39,7 @@ def test_a_closed_folder_is_refused(outputs, tmp_path, monkeypatch):
         outputs.output_folder(str(tmp_path))
 
 
+@pytest.mark.long
 def test_an_experiment_refuses_before_it_works(tmp_path):
     (tmp_path / "file").write_text("")
     command = [sys.executable, EXPERIMENTS / "ch5_repeatability" / "run.py", "--pictures", tmp_path / "file"]

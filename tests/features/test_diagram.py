@@ -17,6 +17,7 @@ def path(values):
     return es.SimplicialMesh(np.arange(len(values), dtype=float)[:, None], ends), np.array(values, dtype=float)
 
 
+@pytest.mark.long
 def test_a_mountain_range_by_hand():
     found = es.persistence_diagram(*path([0, 5, 2, 3, 1, 9, 4]))
     assert pairs_of(found.maxima) == [(1, 4), (3, 2)]
@@ -67,6 +68,7 @@ def test_minima_are_the_maxima_of_minus_the_function():
     assert sorted(pairs_of(one.loops)) == sorted((b, a) for a, b in pairs_of(two.loops))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scale", [1e-150, 1e150])
 def test_diagrams_scale_with_the_function(scale):
     mesh = es.torus(16, 10)

@@ -74,6 +74,7 @@ def test_pairs_equal_literal_merging(name, step):
     assert ours == lasting
 
 
+@pytest.mark.long
 @pytest.mark.data
 @pytest.mark.parametrize("step", [0.0, 0.125])
 @pytest.mark.parametrize("path", ["horse/sumner_horse-02.ply", "octopus/psb122.ply", "fish/psb222.ply"])

@@ -86,6 +86,7 @@ def brute_force_merging(mesh, spectrum, time):
     return np.maximum.accumulate(prices)
 
 
+@pytest.mark.long
 def test_part_tree_merges_the_cheapest_pair_each_time():
     mesh = make_creature("fish", n_vertices=600)
     spectrum = part_spectrum(mesh)
@@ -94,6 +95,7 @@ def test_part_tree_merges_the_cheapest_pair_each_time():
     np.testing.assert_allclose(tree.persistence[1:], expected[::-1], rtol=1e-9)
 
 
+@pytest.mark.long
 def test_a_part_splits_from_one_that_stands_before_it_and_is_higher(human):
     tree = human.tree
     number = np.arange(len(tree.maxima))
@@ -125,6 +127,7 @@ def test_a_human_has_a_head_four_limbs_and_a_torso(human):
     assert len(np.unique(labels)) > 5, "the torso belongs to none of them"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("kind", "count"), [("biped", 7), ("quadruped", 6)])
 def test_as_many_parts_are_the_same_ones_in_another_pose(kind, count):
     found = [find_parts(make_creature(kind, pose, n_vertices=2000)) for pose in (0, 3)]

@@ -114,6 +114,7 @@ BOMBS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", BOMBS)
 def test_an_array_that_memory_cannot_hold_is_refused_before_it_is_copied(name):
     script = f"""

@@ -31,6 +31,7 @@ def test_on_a_square_it_is_the_mean_of_straight_lines():
     assert found.argmin() == np.flatnonzero(centre)[0]
 
 
+@pytest.mark.long
 def test_a_sample_of_bases_comes_near():
     mesh = es.torus(60, 30)
     exact = es.average_geodesic_distance(mesh, n_bases=mesh.n_vertices)

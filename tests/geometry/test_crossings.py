@@ -90,6 +90,7 @@ def assert_as_by_fractions(vertices, faces):
     return len(expected)
 
 
+@pytest.mark.long
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 4), st.integers(0, 3))
 def test_lattice_triangles_are_told_as_by_fractions(seed, side, shift):
@@ -108,6 +109,7 @@ def test_flat_lattice_triangles_are_told_as_by_fractions(seed):
     assert_as_by_fractions(places @ slope / 10, rng.integers(0, 9, (14, 3)))
 
 
+@pytest.mark.long
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_random_triangles_are_told_as_by_fractions(seed):
@@ -116,6 +118,7 @@ def test_random_triangles_are_told_as_by_fractions(seed):
     assert_as_by_fractions(vertices, np.array([rng.permutation(15)[:3] for _ in range(14)]))
 
 
+@pytest.mark.long
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_lattices_turned_and_rounded_are_told_as_by_fractions(seed):
@@ -126,6 +129,7 @@ def test_lattices_turned_and_rounded_are_told_as_by_fractions(seed):
     assert_as_by_fractions(vertices, rng.integers(0, 12, (14, 3)))
 
 
+@pytest.mark.long
 @settings(max_examples=10, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_details_of_any_size_are_told_as_by_fractions(seed):
@@ -178,6 +182,7 @@ def arrays(mesh):
     return mesh.vertices, mesh.faces
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", [6, 7, 10])  # widths that floats hold, and such that they do not
 def test_a_grid_folded_flat(size):
     """Each square lies upon its mirror image, whose diagonal crosses its own: two faces cross two."""
@@ -251,11 +256,13 @@ def test_clean_shapes_have_none_nor_have_their_loose_faces(shape):
     assert self_intersections(loose).shape == (0, 2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_creatures_at_rest_have_none(kind):
     assert not self_intersections(make_creature(kind, n_vertices=1000)).size
 
 
+@pytest.mark.long
 def test_an_ant_crosses_its_legs():
     """Poses are drawn, not examined: legs may meet, and what crosses is two legs, not neighbours."""
     ant = make_creature("ant", 3)

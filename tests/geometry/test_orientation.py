@@ -25,6 +25,7 @@ def test_closed_surfaces_face_out(mesh):
     require_out(mesh)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_parts_and_scans_of_creatures_face_out(kind):
     whole = make_creature(kind, n_vertices=1500)

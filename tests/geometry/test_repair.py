@@ -293,6 +293,7 @@ def test_a_flip_that_would_make_a_third_face_is_not_done():
     assert done.report == ("drop_degenerate removed 1 faces without area",)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(3))
 def test_heat_flows_where_faces_without_area_were(seed):
     whole = make_creature("quadruped", n_vertices=1500)

@@ -110,11 +110,13 @@ def test_a_tetrahedron_does_not_count_twice(name):
     require_remedy(OPERATORS[name], with_flat_simplices(mesh, rng()), "Tetrahedra must have volume; ")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", DESCRIBERS)
 def test_a_soup_is_not_described(name):
     require_remedy(DESCRIBERS[name], soup(BALL), "Pieces that lie edge on edge must share their vertices; ")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", DESCRIBERS)
 def test_what_hides_a_shape_has_one_remedy(name):
     require_remedy(DESCRIBERS[name], with_loose_points(BALL, rng(), 30), "Every vertex must belong to a face; ")
@@ -122,6 +124,7 @@ def test_what_hides_a_shape_has_one_remedy(name):
     require_remedy(DESCRIBERS[name], cut_open(BALL, rng()), "Pieces that lie edge on edge ")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["describe_shape by patches", "describe_patches", "find_parts", "transfer_labels"])
 def test_what_looks_from_outside_needs_an_orientation(name):
     require_remedy(DESCRIBERS[name], flipped(BALL, rng()), "Faces must be turned one way; ")

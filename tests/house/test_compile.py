@@ -46,6 +46,7 @@ def run_without_home(code, installed):
     return done
 
 
+@pytest.mark.long
 def test_a_private_folder_keeps_loops_where_the_package_and_the_home_cannot(closed_copy):
     done = run_without_home(MEASURE, closed_copy)
     assert "Warning" not in done.stderr
@@ -54,6 +55,7 @@ def test_a_private_folder_keeps_loops_where_the_package_and_the_home_cannot(clos
     assert list(kept.rglob("*.nbi"))
 
 
+@pytest.mark.long
 def test_without_any_folder_loops_are_compiled_each_time_and_it_is_said_once(closed_copy):
     (closed_copy.parent / "temporary" / temporary_folder().name).write_text("in the way")
     done = run_without_home(f"import warnings; warnings.simplefilter('always')\n{MEASURE}", closed_copy)

@@ -2,10 +2,12 @@ import runpy
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
+@pytest.mark.long
 def test_main_road_finds_the_octopus(tmp_path):
     example = runpy.run_path(str(ROOT / "examples" / "main_road.py"))
     matches = example["main"](tmp_path)
@@ -14,6 +16,7 @@ def test_main_road_finds_the_octopus(tmp_path):
     assert matches[0].score <= matches[1].score <= matches[2].score
 
 
+@pytest.mark.long
 def test_a_noisy_scan_is_found(tmp_path):
     best, second, other = runpy.run_path(str(ROOT / "examples" / "find_a_scan.py"))["main"](tmp_path)
     assert [best.label, second.label] == ["octopus"] * 2
@@ -21,6 +24,7 @@ def test_a_noisy_scan_is_found(tmp_path):
     assert len(best.correspondences) > 10
 
 
+@pytest.mark.long
 def test_a_bent_shape_is_bent_again_on_a_finer_mesh(tmp_path):
     poses = runpy.run_path(str(ROOT / "examples" / "bend_a_shape.py"))["main"](tmp_path)
     made, nodding, lifted, finer = (poses[name].vertices for name in ("as made", "nodding", "lifted", "again, finer"))
@@ -51,6 +55,7 @@ def test_every_example_has_a_test():
     assert all(example.name in tested for example in examples)
 
 
+@pytest.mark.long
 def test_noise_moves_points_little_and_a_pose_eigenvalues_little(tmp_path):
     reports = runpy.run_path(str(ROOT / "examples" / "how_stable.py"))["main"](tmp_path)
     noisy, posed = reports["noisy"], reports["posed"]

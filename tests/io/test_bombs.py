@@ -144,6 +144,7 @@ def outcomes(tmp_path_factory):
     return {name: (float(grown), said) for name, (grown, said) in zip(files, lines, strict=True)}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", BOMBS)
 def test_bombs_are_refused_with_less_than_200_megabytes(outcomes, name):
     grown, said = outcomes[name]

@@ -31,6 +31,7 @@ def test_every_truncation_is_refused_or_loses_only_the_end_of_line(name):
     assert read_or_refuse(parse, data).n_faces == 4
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", FILES)
 @settings(max_examples=150, deadline=None)
 @given(st.data())
@@ -43,6 +44,7 @@ def test_any_changed_bytes(name, data):
     read_or_refuse(parse, bytes(bad))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", FILES)
 def test_every_single_bit(name):
     parse, good = FILES[name]

@@ -70,6 +70,7 @@ def many_declarations(line, count):
     return f"ply\nformat ascii 1.0\nelement vertex 0\n{rows}end_header\n".encode()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("line", ["property float a{}\n", "element a{} 0\n"])
 def test_a_header_of_many_lines_is_read_in_proportion(line):
     spent = []
@@ -165,6 +166,7 @@ RICH = {
 WORDS = [b"-1", b"0", b"100", b"255", b"256", b"2147483648", b"9" * 20, b"1e999", b"nan", b"1.5", b"", b"#", b"\\\n"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", RICH)
 @settings(max_examples=100, deadline=None)
 @given(st.data())
@@ -190,6 +192,7 @@ ODD = st.one_of(
 PLACES = places(unpacked()[0])
 
 
+@pytest.mark.long
 @settings(max_examples=300, deadline=None)
 @given(where=st.sampled_from(PLACES), to=ODD)
 @example(where=("bufferViews", 0, "byteStride"), to=10**30)
@@ -197,6 +200,7 @@ def test_any_value_anywhere_in_the_tree_of_a_glb_file(where, to):
     read_or_refuse(glb.parse, changed(*where, to=to))
 
 
+@pytest.mark.long
 @settings(max_examples=200, deadline=None)
 @given(
     st.dictionaries(st.sampled_from(["count", "byteOffset", "componentType", "normalized", "sparse"]), ODD),
@@ -211,6 +215,7 @@ def test_any_accessor_view_and_node(accessor, view, node):
     read_or_refuse(glb.parse, packed(json.loads(json.dumps(tree)), binary))
 
 
+@pytest.mark.long
 @pytest.mark.data
 @pytest.mark.parametrize("suffix", [".off", ".obj", ".ply", ".stl"])
 def test_real_files_with_a_piece_lost_or_doubled(data, suffix):

@@ -94,6 +94,7 @@ def test_polygons_turn_over_shrink_to_triangles_and_holes_are_sealed():
     ]  # fmt: skip
 
 
+@pytest.mark.long
 @settings(max_examples=150, deadline=None)
 @given(data=st.data())
 def test_what_is_written_reads_back_as_the_mesh_whatever_was_repaired(data):

@@ -158,6 +158,7 @@ def test_every_awkward_file_gives_the_right_mesh_or_a_named_error(data):
             read_mesh(files[name])
 
 
+@pytest.mark.long
 def test_classics(data):
     files = {path.name: path for path in (data / "classics").iterdir()}
     assert files.keys() == CLASSICS.keys()

@@ -180,6 +180,7 @@ def test_what_meshio_cannot_read_is_named_and_nothing_is_printed(tmp_path, capfd
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["medit", "gmsh", "gmsh22", "gmsh text", "vtk", "vtk text", "vtu", "vtu text"])
 def test_truncated_files_are_refused_or_whole(tmp_path, capfd, kind):
     name, _, text = kind.partition(" ")

@@ -126,6 +126,7 @@ def test_the_functional_approximation_on_the_sphere_is_exact(degree, t):
     np.testing.assert_allclose(found, es.sphere_functional_eigenvalues(degree**2 + 1, t)[-1] * harmonic, atol=1e-9)
 
 
+@pytest.mark.long
 def test_the_functional_tends_to_the_operator_as_t_shrinks():
     measure = sphere_quadrature(60)
     field = eval_legendre(2, measure.points[:, 2])
@@ -133,6 +134,7 @@ def test_the_functional_tends_to_the_operator_as_t_shrinks():
     np.testing.assert_allclose(np.log2(errors[:-1]) - np.log2(errors[1:]), 1, atol=0.1)  # first order in t
 
 
+@pytest.mark.long
 def test_the_functional_on_a_torus_does_not_depend_on_the_nodes():
     one, two = torus_quadrature(80, 40), torus_quadrature(160, 80)
     field = lambda points: points[:, 0] ** 2 + points[:, 2]  # noqa: E731
@@ -250,6 +252,7 @@ def _plain(function):
     return getattr(function, "__wrapped__", function)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", [1e-30, 1.0, 1e30])
 def test_graph_laplacians_know_the_volume_that_their_eigenvalues_are_over(size):
     points = size * es.fibonacci_sphere(1500).vertices
@@ -271,6 +274,7 @@ def test_points_must_span_the_dimension_that_they_sample(scale, flat, place):
     assert quadrature_laplacian(uniform_quadrature(points, flat), scale**2).n_points == 60
 
 
+@pytest.mark.long
 def test_what_converges_depends_on_how_t_falls():
     # As the docstring of mesh_laplacian says: L z of the unit sphere should be 2z.
     worst = {"e²": [], "e/10": []}

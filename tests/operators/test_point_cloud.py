@@ -30,6 +30,7 @@ def test_the_mass_is_the_measure_of_the_cloud():
     np.testing.assert_array_equal(point_cloud_laplacian(cloud).mass.diagonal(), cloud_quadrature(cloud).weights)
 
 
+@pytest.mark.long
 def test_a_three_sphere_from_points_alone():
     laplacian = point_cloud_laplacian(PointCloud(three_sphere(1500).points, 3), edge_factor=1.6, correct="log")
     found = solve_spectrum(laplacian, 5).eigenvalues

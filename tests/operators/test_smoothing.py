@@ -86,6 +86,7 @@ def test_the_boundary_gets_smooth_too():
     assert np.sqrt((after**2).mean()) < 0.85 * np.sqrt((before**2).mean())
 
 
+@pytest.mark.long
 def test_rigid_motion_and_order_of_vertices():
     rough = noisy(make_creature("quadruped", n_vertices=1200), 0.25)
     turn, shift = rotation_towards(np.array([0.6, 0.0, 0.8])), np.array([3.0, -2.0, 1.0])

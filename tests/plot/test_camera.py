@@ -94,6 +94,7 @@ def test_a_real_head_shows_its_face(data):
     assert three_quarter_view(read_mesh(data / "classics" / "decimated-max.obj")).rotation[2, 2] < -0.5
 
 
+@pytest.mark.long
 @pytest.mark.data
 @pytest.mark.parametrize(
     ("name", "down"), [("horse.ply", [0, 0, -1]), ("bunny.off", [0, -1, 0]), ("camel.off", [0, -1, 0])]

@@ -22,6 +22,7 @@ def figures(title):
     yield es.figure_merge_tree(es.merge_tree(BALL, BALL.vertices[:, 0]), label=title)
 
 
+@pytest.mark.long
 def test_notebooks_show_the_picture():
     """IPython asks an object for `_repr_png_` where nobody has told it of the type."""
     every = [
@@ -34,6 +35,7 @@ def test_notebooks_show_the_picture():
         assert figure._repr_png_()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", range(5))
 def test_control_characters_break_no_picture(tmp_path, number):
     path = tmp_path / "a.svg"
@@ -44,12 +46,14 @@ def test_control_characters_break_no_picture(tmp_path, number):
     assert not any(letter in text for letter in EVIL if not letter.isprintable())
 
 
+@pytest.mark.long
 def test_a_line_of_a_title_ends_where_it_did():
     figure = es.figure_poses({"one\ntwo": BALL})
     figure._repr_png_()
     assert figure.axes[0].get_title() == "one\ntwo"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["a$b$.ply", "$x_", r"$\frac{$", r"a\$b", "$$", "plain"])
 def test_a_name_is_shown_letter_by_letter(tmp_path, name):
     es.save_figure(es.figure_poses({literal(name): BALL}), tmp_path / "a.svg")

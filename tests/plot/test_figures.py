@@ -104,6 +104,7 @@ def test_palette_tells_fifteen_labels_apart_and_greys_the_rest():
     assert np.ptp(palette(np.array([-1]))) == 0
 
 
+@pytest.mark.long
 def test_figures_are_labelled(tmp_path):
     mesh = icosphere(2)
     found = solve_spectrum(cotangent_laplacian(mesh), 12)
@@ -129,6 +130,7 @@ def test_figures_are_labelled(tmp_path):
         assert (tmp_path / f"{number}.png").stat().st_size > 4000
 
 
+@pytest.mark.long
 def test_a_part_of_a_spectrum_is_numbered_from_its_first():
     mesh = icosphere(2)
     found = solve_spectrum(cotangent_laplacian(mesh), above=5.0, below=15.0)

@@ -22,6 +22,7 @@ def drawn_width(picture):
     return np.ptp(np.flatnonzero(away)) + 1
 
 
+@pytest.mark.long
 def test_each_pose_has_its_title_and_one_bar_serves_all(tmp_path):
     figure = es.figure_poses({"rest": BALL, "grown": twice(BALL)}, SHARES)
     assert [axes.get_title() for axes in figure.axes[:2]] == ["rest", "grown"]
@@ -29,12 +30,14 @@ def test_each_pose_has_its_title_and_one_bar_serves_all(tmp_path):
     es.save_figure(figure, tmp_path / "poses.png")
 
 
+@pytest.mark.long
 def test_a_pose_twice_as_large_looks_twice_as_large():
     one, two = pictures(es.figure_poses({"rest": BALL, "grown": twice(BALL)}, SHARES), 2)
     assert one.shape == two.shape
     assert drawn_width(two) / drawn_width(one) == pytest.approx(2, rel=0.05)
 
 
+@pytest.mark.long
 def test_more_poses_than_columns_go_on_in_another_row():
     poses = {f"pose {number}": BALL for number in range(N_COLUMNS + 1)}
     figure = es.figure_poses(poses, SHARES)
@@ -44,6 +47,7 @@ def test_more_poses_than_columns_go_on_in_another_row():
     np.testing.assert_array_equal(first, last)
 
 
+@pytest.mark.long
 def test_what_moves_more_is_redder():
     cold, warm = (pictures(es.figure_poses({"": BALL}, np.full(162, share)), 1)[0] for share in (0.0, 1.0))
     seen = np.abs(cold - warm).max(axis=2) > 1e-3

@@ -20,6 +20,7 @@ def right_share(kind, pose, labels_of):
     return areas[given.labels == labels].sum() / areas.sum(), given
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["giraffe", "bird"])
 def test_parts_of_a_pose_take_the_labels_of_the_same_parts_in_another(kind):
     share, given = right_share(kind, 3, lambda mesh: find_parts(mesh).parts.labels)
@@ -28,6 +29,7 @@ def test_parts_of_a_pose_take_the_labels_of_the_same_parts_in_another(kind):
     assert (given.confidence > 0.3).any()
 
 
+@pytest.mark.long
 def test_labels_of_a_person_reach_the_quadruped_in_another_pose():
     def named(mesh):
         centres = mesh.vertices[mesh.faces].mean(axis=1)
@@ -40,6 +42,7 @@ def test_labels_of_a_person_reach_the_quadruped_in_another_pose():
     assert np.array_equal(given.part_labels[given.target.labels], given.labels)
 
 
+@pytest.mark.long
 def test_a_shape_gives_itself_its_labels_in_any_unit_and_numbering():
     mesh = make_creature("lizard", n_vertices=1200)
     labels = find_parts(mesh).parts.labels
@@ -76,6 +79,7 @@ def test_parts_beyond_the_others_number_take_the_nearest():
     assert set(given.labels.tolist()) == {4}
 
 
+@pytest.mark.long
 def test_the_picture_gives_matched_parts_one_colour_and_says_how_sure():
     mesh = make_creature("lizard", n_vertices=800)
     given = transfer_labels(mesh, find_parts(mesh).parts.labels, mesh)

@@ -48,6 +48,7 @@ def outward(mesh):
     return normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
+@pytest.mark.long
 @each_kind
 @pytest.mark.parametrize(("n_vertices", "individual"), [(500, 0), (N, 1), (2500, 0)])
 def test_the_skin_is_one_closed_sphere_that_faces_outward(kind, n_vertices, individual):
@@ -62,6 +63,7 @@ def test_the_skin_is_one_closed_sphere_that_faces_outward(kind, n_vertices, indi
     assert abs(mesh.n_vertices / n_vertices - 1) < 0.02
 
 
+@pytest.mark.long
 @each_kind
 def test_triangles_are_even(kind):
     mesh = make_creature(kind, n_vertices=N)
@@ -122,6 +124,7 @@ def test_the_rest_pose_of_the_plan_is_as_wide_to_the_left_as_to_the_right(kind):
         assert points[:, 0].max() == pytest.approx(-points[:, 0].min(), abs=0.05)
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_bits():
     first = make_creature("fish", 5, n_vertices=800, individual=2)
     creatures._at_rest.cache_clear()
@@ -130,6 +133,7 @@ def test_the_same_seed_gives_the_same_bits():
     np.testing.assert_array_equal(again.faces, first.faces)
 
 
+@pytest.mark.long
 def test_the_number_of_threads_changes_no_bit():
     made = []
     for n_threads in (1, 4):
@@ -142,6 +146,7 @@ def test_the_number_of_threads_changes_no_bit():
     np.testing.assert_array_equal(joints_again.follows, joints.follows)
 
 
+@pytest.mark.long
 def test_individuals_differ_in_proportions():
     one, two = (make_creature("fish", n_vertices=800, individual=i) for i in (0, 1))
     assert abs(enclosed_volume(one) / enclosed_volume(two) - 1) > 0.01

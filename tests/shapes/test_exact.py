@@ -31,6 +31,7 @@ def test_zeros_from_tables():
     np.testing.assert_allclose(np.sqrt(exact.ball_eigenvalues(5)), [0, *[2.08158] * 3, 3.34209], atol=5e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("condition", ["neumann", "dirichlet"])
 def test_weyl_counts_them(condition):
     k = 400

@@ -42,6 +42,7 @@ def test_a_neck_is_found(neck):
     assert estimate(mesh).upper == pytest.approx(waist, rel=0.05)
 
 
+@pytest.mark.long
 @settings(max_examples=8, deadline=None)
 @given(st.integers(0, 10**6), st.floats(-60, 60))
 def test_the_bounds_are_in_order_at_every_size(seed, exponent):

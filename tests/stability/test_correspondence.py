@@ -50,6 +50,7 @@ def test_no_permutation_moves_less(seed, n, dim, spread):
     assert sorted(found.partners) == list(range(n))
 
 
+@pytest.mark.long
 @some
 @given(seeds, st.integers(1, 60), st.sampled_from([1e-100, 1.0, 1e100]))
 def test_laws_of_the_bottleneck(seed, n, scale):
@@ -127,6 +128,7 @@ def test_a_planted_matching_is_found():
     assert es.maximum_matching(planted + noise).is_perfect
 
 
+@pytest.mark.long
 def test_five_rows_with_three_columns_are_refused():
     graph = np.ones((9, 9))
     graph[2:7, 3:] = 0

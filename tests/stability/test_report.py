@@ -66,6 +66,7 @@ def test_a_report_can_be_read(bulged):
         assert words in text
 
 
+@pytest.mark.long
 def test_other_meshes_are_matched_by_points_or_by_a_map(torus):
     finer = es.subdivide(torus)
     found = es.compare_shapes(torus, finer, PLAN)
@@ -77,6 +78,7 @@ def test_other_meshes_are_matched_by_points_or_by_a_map(torus):
     assert told.angles.angles.max() < np.radians(5)
 
 
+@pytest.mark.long
 def test_points_and_meshes_can_be_compared(torus):
     rng = np.random.default_rng(1)
     cloud = es.PointCloud(es.sample_surface(torus, 1200, rng=rng).points)
@@ -87,6 +89,7 @@ def test_points_and_meshes_can_be_compared(torus):
     assert found.changes == again.changes
 
 
+@pytest.mark.long
 def test_a_report_follows_the_unit(torus):
     other = moved(torus, 0.05)
     small = [es.TriangleMesh(mesh.vertices * 1e-40, mesh.faces) for mesh in (torus, other)]
@@ -105,6 +108,7 @@ def test_brackets_prove_changes_of_the_shapes(torus):
     assert far.spectra.told[1:].all()
 
 
+@pytest.mark.long
 def test_a_change_that_is_too_large_leaves_no_heat_time(torus):
     away = es.TriangleMesh(torus.vertices + 3.0, torus.faces)
     found = es.compare_shapes(torus, away, PLAN)

@@ -16,6 +16,7 @@ def features_off(mesh, one, two):
     return np.linalg.norm(apart, axis=2).min(axis=1) / np.sqrt(es.surface_area(mesh))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("recipe", [SMALL_RECIPE, replace(es.THESIS, n_modes=40)])
 @pytest.mark.parametrize("cut", [False, True])
 def test_the_descriptor_is_nearly_that_of_a_spectrum(recipe, cut):

@@ -28,6 +28,7 @@ def book(creatures):
     return train_codebook([patches for (_, seed), patches in creatures.items() if seed == 1])
 
 
+@pytest.mark.long
 def test_another_pose_is_the_nearest(creatures, book):
     vectors = {key: encode_patches(patches, book) for key, patches in creatures.items()}
     known = np.array([vectors[kind, 1] for kind in KINDS])

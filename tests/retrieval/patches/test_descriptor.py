@@ -30,6 +30,7 @@ def index(recipe, meshes, tmp_path_factory):
     return index
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_scan_of_another_pose_finds_its_kind(index, recipe, kind):
     pose = es.make_creature(kind, 2, n_vertices=1500)
@@ -38,6 +39,7 @@ def test_a_scan_of_another_pose_finds_its_kind(index, recipe, kind):
         assert index.query(es.describe_shape(shape, recipe))[0].name == kind
 
 
+@pytest.mark.long
 def test_a_shape_finds_itself_nearly_at_zero(index, recipe, meshes):
     best, other = index.query(es.describe_shape(meshes["hand"], recipe), n_matches=2)
     assert (best.name, best.view) == ("hand", 0)
@@ -49,6 +51,7 @@ def test_a_shape_finds_itself_nearly_at_zero(index, recipe, meshes):
     assert np.array_equal(best.vertices, es.describe_shape(meshes["hand"], recipe).vertices)
 
 
+@pytest.mark.long
 def test_an_index_scores_as_the_function_does(index, recipe, meshes):
     kept = [es.describe_to_keep(meshes[kind], recipe, n_views=2)[0] for kind in sorted(KINDS)]
     query = es.describe_shape(es.partial_scan(meshes["biped"], np.array([1.0, 0.2, 0.1])).mesh, recipe)
@@ -75,6 +78,7 @@ def other_words(book):
     return es.PatchRecipe(es.PatchCodebook(**{**vars(book), "means": np.asarray(book.means + 1, dtype=np.float32)}))
 
 
+@pytest.mark.long
 def test_other_words_are_another_recipe(index, recipe, meshes):
     query = es.describe_shape(meshes["hand"], other_words(es.read_codebook(es.write_codebook(recipe.codebook))))
     message = rf"holds patches {recipe.codebook.digest[:8]} and was asked in PatchRecipe\(codebook=PatchCodebook\("
@@ -84,6 +88,7 @@ def test_other_words_are_another_recipe(index, recipe, meshes):
         index.query(es.describe_shape(meshes["hand"], es.SCALE_FREE))
 
 
+@pytest.mark.long
 def test_an_index_keeps_heat_and_patches_side_by_side(tmp_path, recipe, meshes):
     index = es.ShapeIndex.create(tmp_path / "both")
     index.keep_recipe(recipe)
@@ -111,6 +116,7 @@ def files(folder, names):
     return [es.Item(name, folder / f"{name}.ply") for name in names]
 
 
+@pytest.mark.long
 def test_words_are_learnt_from_files_in_any_order(tmp_path, lessons, monkeypatch):
     monkeypatch.setattr(batch, "FEWEST_TEACHERS", 3)
     items, heard = files(tmp_path, [*KINDS, "bad"]), []
@@ -121,6 +127,7 @@ def test_words_are_learnt_from_files_in_any_order(tmp_path, lessons, monkeypatch
     assert [news[:2] for news in heard] == [(done, 5) for done in range(1, 6)]
 
 
+@pytest.mark.long
 def test_few_shapes_take_words_that_are_there(tmp_path, lessons, monkeypatch):
     teach = partial(taught, known=lessons)
     assert es.learn_words(files(tmp_path, KINDS), teach) == es.made_codebook()

@@ -88,6 +88,7 @@ def test_other_vertex_numbers_change_little(hand, book):
     assert near.mean() > 0.9
 
 
+@pytest.mark.long
 def test_a_part_agrees_with_its_whole_more_than_with_another_kind(hand, book):
     part = es.partial_scan(HAND, [0.0, 0, 1])
     scan = es.patch_points(es.describe_patches(part.mesh), book)
@@ -105,6 +106,7 @@ def test_larger_lengths_are_a_step(hand, monkeypatch):
     assert match.agreement > 0.95
 
 
+@pytest.mark.long
 def test_agreement_by_hand():
     rows, columns = nearest_of_each_other(np.array([[1.0, 5, 2], [0.5, 3, 4], [9, 2, 8]]))
     assert rows.tolist() == [1, 2]
@@ -123,6 +125,7 @@ def test_equally_near_points_are_paired_in_order():
     assert columns.tolist() == [0, 3, 2]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", SYMMETRIC)
 def test_a_symmetric_shape_finds_itself_near_0(name, book):
     shape = es.describe_shape(SYMMETRIC[name](), es.PatchRecipe(book))

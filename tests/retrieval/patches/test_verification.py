@@ -41,6 +41,7 @@ def known(mesh, book):
     return es.in_words(es.seen_patches(mesh, n_views=3), es.PatchRecipe(book))
 
 
+@pytest.mark.long
 def test_only_the_nearest_come_nearer(wholes, scan):
     far = np.array([0.9, 0.3, 0.5, 0.8])
     found = verified_scores(scan, wholes.__getitem__, far, n_verified=2)
@@ -89,6 +90,7 @@ def test_a_descriptor_takes_patches(book, scan):
     assert not scan.codes.flags.writeable
 
 
+@pytest.mark.long
 def test_noise_and_inward_faces_hardly_matter(wholes):
     mesh = es.make_creature("hand", 2, n_vertices=1500)
     noise = 0.1 * es.edge_lengths(mesh).mean() * np.random.default_rng(0).standard_normal(mesh.vertices.shape)

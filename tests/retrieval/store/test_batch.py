@@ -47,6 +47,7 @@ BAD = {
 }
 
 
+@pytest.mark.long
 def test_bad_shapes_are_named_and_the_others_go_on(index, tmp_path):
     good = {"a": "1", "d": "2", "g": "3", "vanish": "vanish", "h": "4"}
     todo = items(tmp_path, a="1", **{word: word for word in BAD}, d="2", g="3", vanish="vanish", h="4")
@@ -59,6 +60,7 @@ def test_bad_shapes_are_named_and_the_others_go_on(index, tmp_path):
     assert {news[2]: news[3] for news in heard} == {**dict.fromkeys(good), **BAD}
 
 
+@pytest.mark.long
 def test_what_is_there_is_not_done_twice(index, tmp_path):
     todo = items(tmp_path, a="1", b="2")
     build(index, todo[:1])
@@ -67,6 +69,7 @@ def test_what_is_there_is_not_done_twice(index, tmp_path):
     assert index.records()[0].digest == content_digest(tmp_path / "a")
 
 
+@pytest.mark.long
 def test_a_changed_file_replaces_what_it_was(index, tmp_path):
     todo = items(tmp_path, a="1", b="2")
     build(index, todo)
@@ -76,6 +79,7 @@ def test_a_changed_file_replaces_what_it_was(index, tmp_path):
     assert len(index) == 2
 
 
+@pytest.mark.long
 def test_a_file_that_changes_while_it_is_read_is_read_again(index, tmp_path):
     todo = items(tmp_path, a="change")
     assert build(index, todo).added == ("a",)
@@ -84,6 +88,7 @@ def test_a_file_that_changes_while_it_is_read_is_read_again(index, tmp_path):
     assert build(index, todo).skipped == ("a",)
 
 
+@pytest.mark.long
 def test_ctrl_c_keeps_what_is_done(index, tmp_path):
     todo = items(tmp_path, **{f"s{number}": str(number) for number in range(8)})
 
@@ -99,6 +104,7 @@ def test_ctrl_c_keeps_what_is_done(index, tmp_path):
     assert len(report.skipped) == 3
 
 
+@pytest.mark.long
 def test_a_missing_file_is_named(index, tmp_path):
     report = build(index, [Item("gone", tmp_path / "gone")])
     assert report.failed[0][0] == "gone"
@@ -113,6 +119,7 @@ def stoppable():
     signal.signal(signal.SIGINT, before)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("stoppable")
 def test_ctrl_c_ends_workers_that_hang(index, tmp_path):
     todo = items(tmp_path, a="1", b="hang")
@@ -131,6 +138,7 @@ def test_ctrl_c_ends_workers_that_hang(index, tmp_path):
         assert [record.name for record in index.records()] == ["a"]
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="kill -9 is a Unix thing")
 def test_workers_do_not_outlive_a_killed_batch(index, tmp_path):
     todo = items(tmp_path, a="hang")
@@ -169,6 +177,7 @@ def run_script(folder, text):
     return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.long
 def test_a_script_without_a_main_guard_is_told_so(tmp_path):
     items(tmp_path, a="1", b="2", c="3")
     done = run_script(tmp_path, UNGUARDED)

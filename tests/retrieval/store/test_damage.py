@@ -72,6 +72,7 @@ SHARED = "index.sqlite-shm"  # made anew by whoever opens the database first
 FILES = ("index.sqlite", "index.sqlite-wal", SHARED, "committed.txt", "rows-1.bin", "rows-2.bin")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", FILES)
 def test_a_flipped_bit_changes_no_answer(sound, hand, tmp_path, name):
     named = count_named(sound, hand, tmp_path, name, 40)

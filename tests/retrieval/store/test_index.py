@@ -270,6 +270,7 @@ def test_of_several_creators_one_succeeds(tmp_path):
     assert len(ShapeIndex.open(tmp_path / "index")) == 0
 
 
+@pytest.mark.long
 def test_three_first_writers_share_one_index(tmp_path):
     for trial in range(5):
         folder = tmp_path / str(trial)
@@ -449,6 +450,7 @@ def killed_at_random(work, folder, rng):
 kills = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="kill -9 is a Unix thing")
 
 
+@pytest.mark.long
 @kills
 def test_a_killed_writer_leaves_the_state_before_or_after(index):
     rng = np.random.default_rng(0)
@@ -475,6 +477,7 @@ def test_a_killed_replacement_leaves_the_old_shape_or_the_new(index):
     assert done > 10
 
 
+@pytest.mark.long
 @kills
 def test_a_killed_creator_leaves_an_index_or_a_place_for_one(tmp_path):
     rng = np.random.default_rng(2)

@@ -104,6 +104,7 @@ def test_each_component_is_a_part_at_least(mesh):
         assert len(owners) == len(alone.parts.features.vertices) + 70
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("recipe", [RECIPE, es.PatchRecipe(es.made_codebook())], ids=["heat", "patches"])
 def test_an_index_of_shapes_of_many_parts(tmp_path, recipe):
     shapes = {"specked": SPECKED, "soup": SOUP, "other": es.make_creature("bird", 0, n_vertices=800)}

@@ -51,6 +51,7 @@ def test_a_closed_part_stays_free_where_another_is_held():
     assert found.lower[0] == found.upper[0] == 0 < found.lower[1]
 
 
+@pytest.mark.long
 @pytest.mark.data
 def test_a_real_solid(data):
     mesh = read_shape(data / "tets" / "octopus-low.mesh")
@@ -58,6 +59,7 @@ def test_a_real_solid(data):
     assert_around(found, np.maximum(solve_spectrum(fem_laplacian(mesh, 3), 12).eigenvalues, 0) * (np.arange(12) > 0))
 
 
+@pytest.mark.long
 @pytest.mark.data
 @pytest.mark.parametrize(
     "name", ["trimesh/teapot.stl", "geometrycentral/triple_vierbein.obj", "geometrycentral/fan3.obj"]

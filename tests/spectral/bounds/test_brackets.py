@@ -55,6 +55,7 @@ def pillow(n):
     return TriangleMesh(front.vertices[used % len(rim)], faces.reshape(-1, 3))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("condition", ["neumann", "dirichlet"])
 @pytest.mark.parametrize(
     ("mesh", "sides"),
@@ -112,6 +113,7 @@ def cube(n):
     return TriangleMesh(solid.points[used], faces.reshape(-1, 3))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("mesh", "bracketed", "refined", "condition"),
     [

@@ -261,6 +261,7 @@ DEPENDENT = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", DEPENDENT)
 @settings(deadline=None, max_examples=4)
 @given(seed=st.integers(0, 2**32 - 1))

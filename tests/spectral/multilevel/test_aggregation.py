@@ -62,6 +62,7 @@ def test_constants_stay_constant_and_symmetry_stays(laplacian, smooth):
     assert levels[-1].down is None
 
 
+@pytest.mark.long
 def test_coarse_eigenvalues_are_near_and_above():
     laplacian = cotangent_laplacian(icosphere(4))
     coarse = build_levels(laplacian.stiffness, laplacian.mass, 200)[-1]

@@ -65,6 +65,7 @@ def test_the_estimate_is_not_below_the_error(always_coarsen, mesh, accuracy):
     assert f"by about {estimate:.1e} of the largest" in found.certificate.explain()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "laplacian",
     [

@@ -34,6 +34,7 @@ def poor_torus():
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["quadruped", "octopus", "chair"])
 def test_heat_of_creatures_is_within_a_hundredth_and_the_stated_error_says_so(kind):
     _, laplacian = creature(kind=kind)
@@ -110,6 +111,7 @@ def test_graphs_without_geometry():
     assert true_errors(laplacian, found, exact(laplacian, 20, times)).max() < 0.01
 
 
+@pytest.mark.long
 def test_the_same_again():
     _, laplacian = creature(3000)
     one, two = (es.approximate_heat_kernel_signature(laplacian, 10, TIMES) for _ in range(2))

@@ -140,6 +140,7 @@ def test_an_operator_that_is_sound_is_not_blamed():
         require_solvable(normalise(laplacian), ConvergenceError("no"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("n", [1, 2, 300, 301, 10_000])
 def test_no_stiffness_at_all(n):
     laplacian = Laplacian(sp.csr_array((n, n)), unit(n))
@@ -217,6 +218,7 @@ def test_a_tiny_entry_is_as_good_as_none():
     np.testing.assert_allclose(found, solve_spectrum(graph(path(400)), 5).eigenvalues, atol=1e-14)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("block", "size", "gap"), [([[0.0]], 1, 0), (PAIR, 2, 2), (TRIANGLE, 3, 3)])
 @pytest.mark.parametrize("k", [1, 50, 500])
 def test_ten_thousand_components(block, size, gap, k):
@@ -256,6 +258,7 @@ def test_more_pairs_than_memory_are_refused_with_numbers(monkeypatch):
         solve_spectrum(copies(TRIANGLE, 10_000), 10_050)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mass", ["lumped", "consistent"])
 @pytest.mark.parametrize("k", [50, 3000])
 def test_three_thousand_spheres(mass, k):
@@ -296,6 +299,7 @@ def test_shapes_of_very_different_sizes(ratio):
         solve_spectrum(two_sizes(ratio), 20)  # rounding at the small sphere is more than all of these
 
 
+@pytest.mark.long
 def test_shapes_of_very_different_sizes_where_floats_suffice():
     one = solve_spectrum(cotangent_laplacian(icosphere(3)), 18).eigenvalues
     found = solve_spectrum(two_sizes(1e8), 660)  # all of the large sphere, 18 of the small one

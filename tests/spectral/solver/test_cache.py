@@ -144,6 +144,7 @@ def test_a_question_that_is_refused_leaves_nothing(tmp_path, laplacian):
     assert not list(tmp_path.glob("folder/*"))
 
 
+@pytest.mark.long
 def test_two_processes_may_write_at_once(tmp_path, laplacian):
     code = (
         "import sys, eigenshape as es; laplacian = es.cotangent_laplacian(es.icosphere(2), 'consistent'); "

@@ -24,6 +24,7 @@ def with_specks(big: TriangleMesh, n: int, scale: float = 0.03) -> TriangleMesh:
     return disjoint_union(big, *[moved(icosphere(2), scale, 3.0 + i) for i in range(n)])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("k", [1, 40, 41, 60])
 @pytest.mark.parametrize("mass", ["lumped", "consistent"])
 def test_a_sphere_with_forty_specks(mass, k):
@@ -38,6 +39,7 @@ def test_a_sphere_with_forty_specks(mass, k):
     certify(laplacian, spectrum.eigenvalues, spectrum.eigenvectors)
 
 
+@pytest.mark.long
 def test_parts_of_many_sizes_by_hand():
     """Cycles of m points have the eigenvalues 2 - 2 cos(2πj/m)."""
     sizes = [3, 700, 3, 350, 20, 301, 20]
@@ -124,6 +126,7 @@ def test_connected_parts_and_their_level():
     assert not alone.labels.any()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("k", [10, 100])
 def test_approximations_of_many_parts(k):
     """Specks become single points on the coarsest level, whose energy is rounding alone."""

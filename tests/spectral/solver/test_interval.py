@@ -41,6 +41,7 @@ def middle(reference, *numbers):
     return ends
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("laplacian", "fewest"),
     [

@@ -24,6 +24,7 @@ def irregular(n):
     return irregular_grid(n, n, rng=np.random.default_rng(0))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "laplacian",
     [

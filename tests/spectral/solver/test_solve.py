@@ -43,6 +43,7 @@ def test_two_points_by_hand():
     np.testing.assert_allclose(spectrum.eigenvectors[:, 1], [2 / np.sqrt(6), -1 / np.sqrt(6)])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mass", ["lumped", "consistent", "averaged"])
 @pytest.mark.parametrize(
     "mesh",
