@@ -37,13 +37,15 @@ class Case:
 
 def sphere(n: int) -> es.Laplacian:
     """Return the cotangent Laplacian of a Fibonacci sphere."""
-    return es.cotangent_laplacian(es.fibonacci_sphere(n))
+    return es.cotangent_laplacian(es.shapes.fibonacci_sphere(n))
 
 
 CASES = {
     "dragon": Case("dragon", lambda: es.cotangent_laplacian(es.read_mesh(DATA / "classics" / "dragon.off")), 300),
     "sphere-160k": Case("Fibonacci sphere", lambda: sphere(160_000), 50),
-    "kernel-20k": Case("kernel, 400 a row", lambda: es.mesh_laplacian(es.fibonacci_sphere(20_000), h=0.07138), 300),
+    "kernel-20k": Case(
+        "kernel, 400 a row", lambda: es.mesh_laplacian(es.shapes.fibonacci_sphere(20_000), h=0.07138), 300
+    ),
     "sphere-1.3M": Case("Fibonacci sphere", lambda: sphere(1_300_000), 50),
 }
 QUICK = {"sphere": Case("icosphere", lambda: es.cotangent_laplacian(es.icosphere(4)), 20)}
@@ -55,7 +57,7 @@ def solve(laplacian: es.Laplacian, k: int, accuracy: float | None) -> es.Spectru
     return (
         es.solve_spectrum(laplacian, k)
         if accuracy is None
-        else es.approximate_spectrum(laplacian, k, accuracy=accuracy)
+        else es.spectral.approximate_spectrum(laplacian, k, accuracy=accuracy)
     )
 
 

@@ -44,7 +44,7 @@ Method = Callable[[sp.csc_array, np.ndarray], tuple[Timed, np.ndarray, dict[str,
 
 def matrix(size: int) -> sp.csc_array:
     """Return W + σB of an icosphere of that level, or of a Fibonacci sphere of so many points."""
-    laplacian = es.cotangent_laplacian(es.icosphere(size) if size < LEVELS else es.fibonacci_sphere(size))
+    laplacian = es.cotangent_laplacian(es.icosphere(size) if size < LEVELS else es.shapes.fibonacci_sphere(size))
     mean = laplacian.stiffness.diagonal().sum() / laplacian.mass.diagonal().sum()
     return sp.csc_array(laplacian.stiffness + 1e-3 * mean * laplacian.mass)
 

@@ -23,7 +23,7 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 from sklearn.neighbors import radius_neighbors_graph
 
-from eigenshape import gaussian_laplacian
+from eigenshape.operators import gaussian_laplacian
 
 SIZES = {"mesh Laplacian, t = e²": (160_000, 247), "graph, 100 neighbours": (1_000_000, 100)}
 CUTOFF = 4.0

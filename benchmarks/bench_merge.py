@@ -31,7 +31,7 @@ COLUMNS = ("vertices, function", "method", "CPU s", "ratio", "wall s", "MiB", "m
 def surface(n: int) -> es.TriangleMesh:
     """Return a torus of about n vertices."""
     around = round((3 * n) ** 0.5)
-    return es.torus(around, max(n // around, 3))
+    return es.shapes.torus(around, max(n // around, 3))
 
 
 def values(mesh: es.TriangleMesh, function: str) -> np.ndarray:
@@ -66,7 +66,7 @@ def gudhi_graph(mesh: es.TriangleMesh, height: np.ndarray) -> np.ndarray:
 
 
 def _complex(mesh: es.TriangleMesh, height: np.ndarray) -> gudhi.SimplexTree:
-    edges = es.edge_table(mesh).edges
+    edges = es.geometry.edge_table(mesh).edges
     complex_ = gudhi.SimplexTree()
     complex_.insert_batch(np.arange(mesh.n_vertices)[None], height)
     complex_.insert_batch(np.ascontiguousarray(edges.T), height[edges].max(axis=1))
@@ -75,7 +75,7 @@ def _complex(mesh: es.TriangleMesh, height: np.ndarray) -> gudhi.SimplexTree:
 
 def gudhi_tomato(mesh: es.TriangleMesh, height: np.ndarray) -> np.ndarray:
     """Let ToMATo climb and merge on the graph of edges."""
-    graph = sp.csr_array(es.edge_graph(mesh))
+    graph = sp.csr_array(es.operators.edge_graph(mesh))
     neighbours = np.split(graph.indices, graph.indptr[1:-1])
     found = Tomato(graph_type="manual", density_type="manual").fit(neighbours, weights=height)
     finite = -np.diff(found.diagram_, axis=1)[:, 0]

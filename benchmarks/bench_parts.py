@@ -30,7 +30,7 @@ COLUMNS = ("shape", "part", "calls", "CPU s", "share", "bound s", "set by", "tim
 REAL = 8  # bytes
 CASES: dict[str, tuple[Callable[[], es.TriangleMesh], int]] = {
     "icosphere": (lambda: es.icosphere(6), 300),
-    "Fibonacci sphere": (lambda: es.fibonacci_sphere(160_000), 50),
+    "Fibonacci sphere": (lambda: es.shapes.fibonacci_sphere(160_000), 50),
 }
 QUICK: dict[str, tuple[Callable[[], es.TriangleMesh], int]] = {"icosphere": (lambda: es.icosphere(4), 40)}
 Work = tuple[float, float]  # bytes that must move, floating-point operations

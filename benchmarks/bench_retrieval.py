@@ -44,20 +44,20 @@ COLUMNS = ("vertices", "method", "CPU s", "wall s", "MiB", "the thesis, then")
 
 def patches(mesh: es.TriangleMesh) -> Any:
     """Describe by patches, with views where the shape is closed."""
-    return es.describe_shape(mesh, es.PatchRecipe(es.made_codebook()))
+    return es.retrieval.describe_shape(mesh, es.retrieval.PatchRecipe(es.retrieval.made_codebook()))
 
 
-def thesis(mesh: es.TriangleMesh) -> es.ShapeDescriptor:
+def thesis(mesh: es.TriangleMesh) -> es.retrieval.ShapeDescriptor:
     """Describe by the thesis' recipe, exactly where it does."""
-    describe = es.describe_mesh if mesh.n_vertices <= EXACT else es.describe_large_mesh
-    return describe(mesh, es.THESIS).descriptor
+    describe = es.retrieval.describe_mesh if mesh.n_vertices <= EXACT else es.retrieval.describe_large_mesh
+    return describe(mesh, es.retrieval.THESIS).descriptor
 
 
 METHODS: dict[str, Callable[[es.TriangleMesh], Any]] = {
     "patches": patches,
     "thesis": thesis,
-    "EVD": es.affinity_eigenvalues,
-    "LFD": es.light_field,
+    "EVD": es.retrieval.baselines.affinity_eigenvalues,
+    "LFD": es.retrieval.baselines.light_field,
 }
 PRINTED = {"thesis": 0, "EVD": 1, "LFD": 2}
 
@@ -66,7 +66,7 @@ def described(method: str, saved: str) -> Row:
     """Measure one description; run in a process of its own."""
     METHODS[method](es.make_creature("hand", n_vertices=1500))
     if method == "thesis":
-        es.approximate_heat_kernel_signature(es.cotangent_laplacian(es.torus(120, 80)), 9, [0.1])
+        es.spectral.approximate_heat_kernel_signature(es.cotangent_laplacian(es.shapes.torus(120, 80)), 9, [0.1])
     with np.load(saved) as arrays:
         mesh = es.TriangleMesh(arrays["vertices"], arrays["faces"])
     return measured(partial(METHODS[method], mesh))
@@ -81,20 +81,22 @@ def measured(work: Callable[[], Any]) -> Row:
 
 def asked(method: str, n_shapes: int) -> Row:
     """Measure one query among some shapes; run in a process of its own."""
-    poses = [es.make_creature(kind, pose, n_vertices=2500) for kind in es.CREATURES for pose in (1, 2)]
+    poses = [es.make_creature(kind, pose, n_vertices=2500) for kind in es.shapes.CREATURES for pose in (1, 2)]
     scan = es.partial_scan(es.make_creature("biped", 5, n_vertices=5000), np.array([0.9, 0.25, 0.45])).mesh
     if method in {"EVD", "LFD"}:
         known = [METHODS[method](mesh) for mesh in poses]
-        distance = es.affinity_distance if method == "EVD" else es.light_field_distance
+        distance = (
+            es.retrieval.baselines.affinity_distance if method == "EVD" else es.retrieval.baselines.light_field_distance
+        )
         query = METHODS[method](scan)
         return measured(lambda: [distance(query, known[number % len(known)]) for number in range(n_shapes)])
-    recipe = es.THESIS if method == "thesis" else es.PatchRecipe(es.made_codebook())
-    views = [es.describe_to_keep(mesh, recipe) for mesh in poses]
+    recipe = es.retrieval.THESIS if method == "thesis" else es.retrieval.PatchRecipe(es.retrieval.made_codebook())
+    views = [es.retrieval.describe_to_keep(mesh, recipe) for mesh in poses]
     with tempfile.TemporaryDirectory() as folder:
         index = es.ShapeIndex.create(Path(folder) / "index")
         for number in range(n_shapes):
             index.add(f"shape {number}", views[number % len(views)])
-        query = es.describe_shape(scan, recipe)
+        query = es.retrieval.describe_shape(scan, recipe)
         index.query(query)
         return measured(lambda: index.query(query))
 

@@ -55,7 +55,7 @@ def _our_mesh(shape: Shape) -> es.Laplacian:
 
 
 def _our_graph(shape: Shape) -> es.Laplacian:
-    return es.graph_laplacian(shape["adjacency"], "normalized")
+    return es.operators.graph_laplacian(shape["adjacency"], "normalized")
 
 
 def _our_solve(laplacian: es.Laplacian, k: int) -> tuple[np.ndarray, np.ndarray]:
@@ -133,7 +133,7 @@ def _sklearn_solve(adjacency: sp.csr_array, k: int) -> tuple[None, np.ndarray]:
 
 
 def _normalized(adjacency: sp.csr_array) -> tuple[sp.sparray, sp.sparray]:
-    return _our_matrices(es.graph_laplacian(adjacency, "normalized"))
+    return _our_matrices(es.operators.graph_laplacian(adjacency, "normalized"))
 
 
 LIBRARIES = {

@@ -39,7 +39,7 @@ def warm_up(library: Library) -> None:
     """Solve something small, by the road that large ones take."""
     sphere = es.icosphere(3)
     shape = {"vertices": np.array(sphere.vertices), "faces": np.array(sphere.faces)}
-    shape["adjacency"] = es.neighbor_graph(sphere.vertices, 6)
+    shape["adjacency"] = es.operators.neighbor_graph(sphere.vertices, 6)
     try:
         library.solve(library.build(shape), 20)
     except Exception as err:  # noqa: BLE001  (what fails on the real shape is reported there)

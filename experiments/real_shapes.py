@@ -26,6 +26,6 @@ def require_data() -> None:
 
 def inner_curvature(mesh: es.TriangleMesh) -> np.ndarray:
     """Return the Gaussian curvature; on a boundary, where it is none, the least inside."""
-    values, edge = es.gaussian_curvature(mesh), es.boundary_vertices(mesh)
+    values, edge = es.geometry.gaussian_curvature(mesh), es.geometry.boundary_vertices(mesh)
     values[edge] = np.delete(values, edge).min()
     return values

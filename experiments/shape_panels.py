@@ -14,7 +14,7 @@ AMBIENT = 0.42
 def show_shape(
     axes: Axes,
     mesh: es.TriangleMesh,
-    camera: es.Camera,
+    camera: es.plot.Camera,
     *,
     color: str = "#c9c9c9",
     edges: float = 0.0,
@@ -27,7 +27,7 @@ def show_shape(
     """
     seen = (mesh.vertices - (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2) @ camera.rotation.T
     corners = seen[mesh.faces]
-    normals = es.face_normals(mesh) @ camera.rotation.T
+    normals = es.geometry.face_normals(mesh) @ camera.rotation.T
     near = np.flatnonzero(normals[:, 2] > 0)
     near = near[np.argsort(corners[near, :, 2].mean(axis=1))]
     bright = AMBIENT + (1.08 - AMBIENT) * np.clip(normals[near] @ LIGHT / np.linalg.norm(LIGHT), 0, 1)

@@ -15,12 +15,12 @@ import eigenshape as es
 def figure_variants(surgeries: Mapping[str, Surgery], caption: str) -> Figure:
     """Draw M and each N, the anomalous regions in colour."""
     first = next(iter(surgeries.values()))
-    query = es.Panel(first.one, "M", np.full(first.one.n_faces, -1), np.array([], dtype=np.int64))
+    query = es.plot.Panel(first.one, "M", np.full(first.one.n_faces, -1), np.array([], dtype=np.int64))
     panels = [
-        es.Panel(surgery.two, name, np.where(surgery.regions_two < 0, -1, 2), query.vertices)
+        es.plot.Panel(surgery.two, name, np.where(surgery.regions_two < 0, -1, 2), query.vertices)
         for name, surgery in surgeries.items()
     ]
-    return es.figure_contact_sheet(query, panels, caption=caption)
+    return es.plot.figure_contact_sheet(query, panels, caption=caption)
 
 
 def draw_spectra(axes: Axes, spectra: Mapping[str, np.ndarray]) -> None:

@@ -30,7 +30,7 @@ CLASSES = ("even in x, even in y", "even in x, odd in y", "odd in x, even in y",
 
 def eight() -> es.TriangleMesh:
     """Return the loop with diameter 1, its middle at the origin, its rings along z."""
-    mesh = es.normalize_diameter(es.read_mesh(DATA / "classics" / "eight.off"))
+    mesh = es.geometry.normalize_diameter(es.read_mesh(DATA / "classics" / "eight.off"))
     middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
     return es.TriangleMesh(mesh.vertices - middle, mesh.faces)
 
@@ -80,11 +80,11 @@ def mirror_classes(mesh: es.TriangleMesh, spectrum: es.Spectrum) -> np.ndarray:
 def tracks(n_steps: int) -> dict[str, np.ndarray]:
     """Return what is known at each of n + 1 moments, and at each of the n steps between them."""
     start = eight()
-    t = es.mean_side_length(start) ** 2
+    t = es.geometry.mean_side_length(start) ** 2
     meshes = [moved(start, s) for s in np.linspace(0, 1, n_steps + 1)]
     kernel, linear, classes, matrices, crossing = [], [], [], [], 0
     for mesh in track(meshes, description="moments"):
-        crossing += len(es.self_intersections(mesh))
+        crossing += len(es.geometry.self_intersections(mesh))
         literal = es.mesh_laplacian(mesh, t=t)
         matrices.append(symmetric_matrix(literal))
         kernel.append(es.solve_spectrum(literal, K + 1).eigenvalues[1:])
@@ -149,7 +149,7 @@ def figure_tracks(found: dict[str, np.ndarray]) -> Figure:
     moments = np.linspace(0, 1, n)
     for axes, place in zip(above.subplots(1, 6), np.linspace(0, n - 1, 6).astype(int), strict=True):
         mesh = es.TriangleMesh(found["points"][place], start.faces)
-        show_shape(axes, mesh, es.three_quarter_view(mesh, up="z"), color="#d9c9a3", edges=0.15, reach=0.62)
+        show_shape(axes, mesh, es.plot.three_quarter_view(mesh, up="z"), color="#d9c9a3", edges=0.15, reach=0.62)
         axes.set_title(f"s = {moments[place]:.1f}", fontsize=9)
     left, right = below.subplots(1, 2)
     left.plot(moments, found["mesh"], color="#1f77b4", lw=1)

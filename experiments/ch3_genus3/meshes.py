@@ -9,9 +9,9 @@ import eigenshape as es
 
 def noisy(mesh: es.TriangleMesh, edges: float, rng: np.random.Generator) -> es.TriangleMesh:
     """Move vertices along their normals by Gaussian noise of so many mean edge lengths."""
-    size = edges * es.mean_side_length(mesh)
+    size = edges * es.geometry.mean_side_length(mesh)
     heights = size * rng.standard_normal((mesh.n_vertices, 1))
-    return es.TriangleMesh(mesh.vertices + heights * es.vertex_normals(mesh), mesh.faces)
+    return es.TriangleMesh(mesh.vertices + heights * es.geometry.vertex_normals(mesh), mesh.faces)
 
 
 def denser(mesh: es.TriangleMesh, chosen: np.ndarray) -> es.TriangleMesh:
@@ -19,7 +19,7 @@ def denser(mesh: es.TriangleMesh, chosen: np.ndarray) -> es.TriangleMesh:
 
     Nothing moves: it is the same surface.
     """
-    table = es.edge_table(mesh)
+    table = es.geometry.edge_table(mesh)
     cut = np.zeros(len(table.edges), dtype=bool)
     cut[table.face_edges[chosen]] = True
     number = np.full(len(cut), -1)
@@ -66,7 +66,7 @@ def coarser(mesh: es.TriangleMesh, n_vertices: int) -> es.TriangleMesh:
     for number, face in faces.items():
         for vertex in face:
             rings[vertex].add(number)
-    edges = es.edge_table(mesh).edges.tolist()
+    edges = es.geometry.edge_table(mesh).edges.tolist()
     heap = [(squared_length(points, *edge), *edge) for edge in edges]
     heapq.heapify(heap)
     left = mesh.n_vertices

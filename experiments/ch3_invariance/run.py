@@ -30,7 +30,7 @@ OPERATORS: dict[str, Callable[[es.TriangleMesh], es.Laplacian]] = {
     "cotangent": es.cotangent_laplacian,
     "robust": es.robust_laplacian,
     "mesh": es.mesh_laplacian,
-    "P2": partial(es.fem_laplacian, order=2),
+    "P2": partial(es.operators.fem_laplacian, order=2),
 }
 COLUMNS = ("scaled", "scaled by 2ᵖ", "shifted", "renumbered", "threads")
 

@@ -41,7 +41,7 @@ def spectra(paths: list[Path], name: str, n_values: int) -> np.ndarray:
     for path in track(paths, description=f"{name}: {paths[0].stem}"):
         mesh = es.read_mesh(path)
         values = es.solve_spectrum(OPERATORS[name](mesh), n_values + 1).eigenvalues[1:]
-        rows.append(values * es.surface_area(mesh))
+        rows.append(values * es.geometry.surface_area(mesh))
     return np.array(rows)
 
 
@@ -93,7 +93,7 @@ def figure_classical(rows: dict[str, np.ndarray]) -> Figure:
     above, below = figure.subfigures(2, 1, height_ratios=[1, 1.9])
     for axes, path, color in zip(above.subplots(1, len(paths)), paths, COLORS, strict=False):
         mesh = es.read_mesh(path)
-        show_shape(axes, mesh, es.three_quarter_view(mesh, up="z"), color=color)
+        show_shape(axes, mesh, es.plot.three_quarter_view(mesh, up="z"), color=color)
         axes.set_title(path.stem.removeprefix("tosca_"), fontsize=9)
     left, right = below.subplots(1, 2)
     index = np.arange(1, 101)
@@ -137,7 +137,7 @@ def figure_separation(found: dict[tuple[str, str], np.ndarray]) -> Figure:
 def figure_leak(paths: list[Path], shares: dict[str, float]) -> Figure:
     """Draw where the Euclidean kernel of the worst pose leaks."""
     worst = es.read_mesh(max(paths, key=lambda path: shares[path.stem]))
-    camera = es.three_quarter_view(worst, up="z")
+    camera = es.plot.three_quarter_view(worst, up="z")
     figure = es.figure_field(worst, leaks(worst), "share of the kernel out of reach along the surface", camera=camera)
     figure.set_dpi(70)
     return figure

@@ -35,22 +35,22 @@ def operators(mesh: es.TriangleMesh, t: float) -> dict[str, es.Laplacian]:
     found[CORRECTED] = es.mesh_laplacian(mesh, t=t, correct="log")
     found[RANDOM_WALK] = es.mesh_laplacian(mesh, t=t, correct="log", form="random-walk")
     found["points, corrected"] = es.point_cloud_laplacian(es.PointCloud(mesh.vertices, 2), t=t, correct="log")
-    found["graph of points"] = es.gaussian_laplacian(mesh.vertices, t, 2)
+    found["graph of points"] = es.operators.gaussian_laplacian(mesh.vertices, t, 2)
     return found
 
 
 def errors(mesh: es.TriangleMesh, k: int) -> dict:
     """Return n, and by operator the errors of eigenvalues 1 to k - 1, and of eigenvectors in whole eigenspaces."""
     whole = isqrt(k) ** 2  # degrees up to √k - 1 have so many eigenfunctions
-    exact, harmonics = es.sphere_eigenvalues(k + 1), es.sphere_harmonics(mesh.vertices, whole)
+    exact, harmonics = es.shapes.sphere_eigenvalues(k + 1), es.shapes.sphere_harmonics(mesh.vertices, whole)
     table: dict = {"n": mesh.n_vertices}
-    for name, operator in operators(mesh, es.mean_side_length(mesh) ** 2).items():
+    for name, operator in operators(mesh, es.geometry.mean_side_length(mesh) ** 2).items():
         spectrum = es.solve_spectrum(operator, k)
         values = spectrum.eigenvalues * (AREA if name == "graph of points" else 1)
         table[name] = {
             "values": np.abs(values - exact[:k])[1:],
             "relative": np.abs(values[1:] / exact[1:k] - 1),
-            "vectors": es.eigenspace_errors(spectrum, exact[: whole + 1], harmonics)[1:],
+            "vectors": es.spectral.eigenspace_errors(spectrum, exact[: whole + 1], harmonics)[1:],
             "plain": plain_errors(spectrum.eigenvectors, harmonics)[1:],
         }
     return table
@@ -69,27 +69,27 @@ def plain_errors(vectors: np.ndarray, harmonics: np.ndarray) -> np.ndarray:
 
 def noisy_sphere(n: int) -> es.TriangleMesh:
     """Return a sphere whose vertices are moved along the radius, by half an edge length (standard deviation)."""
-    mesh = es.fibonacci_sphere(n)
-    heights = 1 + 0.5 * es.mean_side_length(mesh) * np.random.default_rng(0).standard_normal((n, 1))
+    mesh = es.shapes.fibonacci_sphere(n)
+    heights = 1 + 0.5 * es.geometry.mean_side_length(mesh) * np.random.default_rng(0).standard_normal((n, 1))
     return es.TriangleMesh(mesh.vertices * heights, mesh.faces)
 
 
 def noise_errors(n: int, k: int) -> dict[str, np.ndarray]:
     """Return relative errors of eigenvalues 1 to k - 1 on the noisy sphere, at t of the clean one."""
-    mesh, t = noisy_sphere(n), es.mean_side_length(es.fibonacci_sphere(n)) ** 2
+    mesh, t = noisy_sphere(n), es.geometry.mean_side_length(es.shapes.fibonacci_sphere(n)) ** 2
     heard = {
         CORRECTED: es.mesh_laplacian(mesh, t=t, correct="log"),
         RANDOM_WALK: es.mesh_laplacian(mesh, t=t, correct="log", form="random-walk"),
         LUMPED: es.cotangent_laplacian(mesh),
     }
-    exact = es.sphere_eigenvalues(k)[1:]
+    exact = es.shapes.sphere_eigenvalues(k)[1:]
     return {name: np.abs(es.solve_spectrum(each, k).eigenvalues[1:] / exact - 1) for name, each in heard.items()}
 
 
 def scatter(mesh: es.TriangleMesh) -> list[float]:
     """Return how far the weights A_j, and those of Voronoi cells, scatter: standard deviation over mean."""
-    cells = es.cloud_quadrature(es.PointCloud(mesh.vertices, 2)).weights
-    return [float(weights.std() / weights.mean()) for weights in (es.dual_volumes(mesh), cells)]
+    cells = es.geometry.cloud_quadrature(es.PointCloud(mesh.vertices, 2)).weights
+    return [float(weights.std() / weights.mean()) for weights in (es.geometry.dual_volumes(mesh), cells)]
 
 
 def order(edges: list[float], medians: list[float]) -> float:
@@ -180,8 +180,8 @@ def main() -> None:
     arguments = parse_arguments(__doc__, HERE)
     chosen = QUICK if arguments.quick else FULL
     warnings.simplefilter("ignore")
-    meshes, k = [es.fibonacci_sphere(size) for size in chosen["sizes"]], chosen["k"]
-    edges = [es.mean_side_length(mesh) for mesh in meshes]
+    meshes, k = [es.shapes.fibonacci_sphere(size) for size in chosen["sizes"]], chosen["k"]
+    edges = [es.geometry.mean_side_length(mesh) for mesh in meshes]
     found = [errors(mesh, k) for mesh in track(meshes, description="sizes")]
     table = summary(edges, found)
     n = chosen["noisy"]
@@ -202,8 +202,11 @@ def main() -> None:
         ),
         "figure_orders": orders(edges, table),
         "figure_noise": noise_by_number(n, noise),
-        "figure_noisy_sphere": es.figure_poses(
-            {f"n = {n:,}, clean": es.fibonacci_sphere(n), "moved by half an edge along the radius": noisy_sphere(n)}
+        "figure_noisy_sphere": es.plot.figure_poses(
+            {
+                f"n = {n:,}, clean": es.shapes.fibonacci_sphere(n),
+                "moved by half an edge along the radius": noisy_sphere(n),
+            }
         ),
     }
     finish(results, pictures, arguments)

@@ -21,7 +21,7 @@ def columns(rows: list[dict], *names: str) -> list[np.ndarray]:
 def figure_law(points: list[dict], samples: list[dict], setup: dict) -> Figure:
     """Draw the change against δ at each t with the bounds, and all of them on one curve of δ/√t."""
     figure, (left, right) = chart(12, 5, columns=2)
-    law, ours, dense = (es.theorem_rate(name, DIM) for name in ("4.3.1", "lipschitz", "dense"))
+    law, ours, dense = (es.stability.theorem_rate(name, DIM) for name in ("4.3.1", "lipschitz", "dense"))
     for t, color in zip(setup["times"], COLORS, strict=False):
         here = [row for row in points if row["t"] == t]
         deltas = np.unique(columns(here, "delta")[0])
@@ -31,7 +31,9 @@ def figure_law(points: list[dict], samples: list[dict], setup: dict) -> Figure:
         left.errorbar(deltas, means, spans, fmt="o", ms=4, color=color, label=f"measured, t = {t:g}")
         left.plot(deltas, ours.at(deltas, t), "-", lw=1, color=color)
         left.plot(deltas, dense.at(deltas, t), "--", lw=1, color=color)
-        left.plot(deltas, es.cover_by_rate(law, deltas[:1], [t], means[:1]).at(deltas, t), ":", lw=1, color=color)
+        left.plot(
+            deltas, es.stability.cover_by_rate(law, deltas[:1], [t], means[:1]).at(deltas, t), ":", lw=1, color=color
+        )
         right.plot(deltas / t**0.5, means * t, "o-", ms=4, lw=0.8, color=color, label=f"t = {t:g}")
     left.plot([], [], "-", color="grey", label="our bound, δ t$^{-5/2}$ with its constant")
     left.plot([], [], "--", color="grey", label="our bound for dense samples, 3.54 δ t$^{-3/2}$")

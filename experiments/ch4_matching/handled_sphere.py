@@ -13,7 +13,7 @@ WAIST = 0.4  # of a handle
 RINGS = 12  # along a handle
 
 
-def make_pair(level: int, *, region: float, handle: float, stretch: float) -> es.Perturbation:
+def make_pair(level: int, *, region: float, handle: float, stretch: float) -> es.stability.Perturbation:
     """Return a sphere and its perturbation.
 
     `region` is the radius of the twelve regions, in length; `handle` the mesh's edge there over that elsewhere;
@@ -32,7 +32,7 @@ def make_pair(level: int, *, region: float, handle: float, stretch: float) -> es
         added, faces, others = add_handle(sphere, faces, others, number, feet(sphere, around), sum(map(len, points)))
         points.append(added)
     other = es.TriangleMesh(np.concatenate(points) * [1 + stretch, 1, 1 / (1 + stretch)], faces)
-    return es.perturbation(sphere, other, regions_one=labels, regions_two=others)
+    return es.stability.measure_perturbation(sphere, other, regions_one=labels, regions_two=others)
 
 
 def draw_together(points: np.ndarray, centers: np.ndarray, share: float) -> np.ndarray:

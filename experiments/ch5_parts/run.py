@@ -51,7 +51,7 @@ def tuning_names() -> set[str]:
 
 def face_neighbours(mesh: es.TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
     """Return the pairs of faces at an edge, and the edge."""
-    table = es.edge_table(mesh)
+    table = es.geometry.edge_table(mesh)
     order = np.argsort(table.face_edges.ravel(), kind="stable")
     edges = table.face_edges.ravel()[order]
     same = np.flatnonzero(edges[1:] == edges[:-1])
@@ -90,11 +90,11 @@ def spectral_coordinates(mesh: es.TriangleMesh) -> np.ndarray:
 def cut_affinity(mesh: es.TriangleMesh) -> sp.csr_array:
     """Return how strongly faces hang together: edge length / (1 + bend / mean bend), convex bends a fifth."""
     pairs, edges = face_neighbours(mesh)
-    normals, centres = es.face_normals(mesh), mesh.vertices[mesh.faces].mean(axis=1)
+    normals, centres = es.geometry.face_normals(mesh), mesh.vertices[mesh.faces].mean(axis=1)
     one, two = normals[pairs[:, 0]], normals[pairs[:, 1]]
     concave = np.einsum("pi,pi->p", two - one, centres[pairs[:, 1]] - centres[pairs[:, 0]]) < 0
     bend = np.where(concave, 1.0, 0.2) * (1 - np.einsum("pi,pi->p", one, two))
-    lengths = es.edge_lengths(mesh)[edges]
+    lengths = es.geometry.edge_lengths(mesh)[edges]
     weights = lengths / lengths.mean() / (1 + bend / bend.mean())
     both = np.concatenate([pairs, pairs[:, ::-1]]).T
     return sp.coo_array((np.tile(weights, 2), both), shape=(mesh.n_faces,) * 2).tocsr()
@@ -114,9 +114,11 @@ def segmentations(mesh: es.TriangleMesh) -> dict[str, Callable[[], Labels]]:
     count = len(found.parts.features.vertices)
     ways: dict[str, Callable[[], Labels]] = {
         DEFAULT: lambda: found.parts.labels,
-        "default, boundaries not smoothed": lambda: es.segment(found.tree, persistence=es.PART_CONTRAST).labels,
-        "heat, scale-free preset": lambda: es.describe_mesh(mesh).parts.labels,
-        "thesis preset": lambda: es.describe_mesh(mesh, es.THESIS).parts.labels,
+        "default, boundaries not smoothed": lambda: (
+            es.segment(found.tree, persistence=es.features.PART_CONTRAST).labels
+        ),
+        "heat, scale-free preset": lambda: es.retrieval.describe_mesh(mesh).parts.labels,
+        "thesis preset": lambda: es.retrieval.describe_mesh(mesh, es.retrieval.THESIS).parts.labels,
     }
     for name, coordinates in (("k-means", spectral_coordinates), ("normalised cut", normalised_cut_coordinates)):
         place = coordinates(mesh)

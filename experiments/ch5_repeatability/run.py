@@ -27,9 +27,9 @@ N_POSES, N_VERTICES = 4, 3000
 PICTURES = {"humans": ("human/tosca_michael", 3), "animals": ("cat/tosca_cat", 3)}
 
 
-def by_heat(recipe: es.Recipe) -> object:
+def by_heat(recipe: es.retrieval.Recipe) -> object:
     """Return the features of a recipe as they are described."""
-    return lambda mesh: es.describe_mesh(mesh, recipe).parts
+    return lambda mesh: es.retrieval.describe_mesh(mesh, recipe).parts
 
 
 def by_values(function: object) -> object:
@@ -38,9 +38,9 @@ def by_values(function: object) -> object:
 
 
 FUNCTIONS = {
-    "HKS, scale-free": by_heat(es.SCALE_FREE),
-    "HKS, thesis": by_heat(es.THESIS),
-    "AGD": by_values(es.average_geodesic_distance),
+    "HKS, scale-free": by_heat(es.retrieval.SCALE_FREE),
+    "HKS, thesis": by_heat(es.retrieval.THESIS),
+    "AGD": by_values(es.geometry.average_geodesic_distance),
     "GC": by_values(inner_curvature),
 }
 
@@ -67,21 +67,21 @@ def found_on(mesh: es.TriangleMesh) -> dict[str, np.ndarray]:
     return {name: find(mesh).features.vertices[:N_FEATURES] for name, find in FUNCTIONS.items()}
 
 
-def parts_of(mesh: es.TriangleMesh, seed: int) -> dict[str, es.MeshPart]:
+def parts_of(mesh: es.TriangleMesh, seed: int) -> dict[str, es.scans.MeshPart]:
     """Return what one side shows, and what one or two planes leave in its largest piece."""
     rng = np.random.default_rng([5, seed])
-    planes = es.random_planes(mesh, rng, n_planes=int(rng.integers(1, 3)), share=0.2)
-    cut = es.cut_by_planes(mesh, planes)
+    planes = es.scans.random_planes(mesh, rng, n_planes=int(rng.integers(1, 3)), share=0.2)
+    cut = es.scans.cut_by_planes(mesh, planes)
     return {"partial": es.partial_scan(mesh, rng), "incomplete": largest_piece(cut)}
 
 
-def largest_piece(part: es.MeshPart) -> es.MeshPart:
+def largest_piece(part: es.scans.MeshPart) -> es.scans.MeshPart:
     """Keep the piece of most vertices: between pieces there are no distances."""
-    _, labels = es.vertex_components(part.mesh)
+    _, labels = es.geometry.vertex_components(part.mesh)
     kept = np.flatnonzero(labels[part.mesh.faces[:, 0]] == np.bincount(labels).argmax())
     vertices, corners = np.unique(part.mesh.faces[kept], return_inverse=True)
     piece = es.TriangleMesh(part.mesh.vertices[vertices], corners.reshape(-1, 3))
-    return es.MeshPart(piece, part.source_vertices[vertices], part.source_faces[kept])
+    return es.scans.MeshPart(piece, part.source_vertices[vertices], part.source_faces[kept])
 
 
 def shape_of(mesh: es.TriangleMesh, seed: int) -> Shape:
@@ -95,14 +95,14 @@ def shape_of(mesh: es.TriangleMesh, seed: int) -> Shape:
 
 def share_near(mesh: es.TriangleMesh, some: np.ndarray, others: np.ndarray) -> float:
     """Return the share of some vertices with one of the others within 5 % of √area along the surface."""
-    distances = es.geodesic_distances(mesh, others)[:, some].min(axis=0)
-    return float(np.mean(distances <= NEAR * np.sqrt(es.surface_area(mesh))))
+    distances = es.geometry.geodesic_distances(mesh, others)[:, some].min(axis=0)
+    return float(np.mean(distances <= NEAR * np.sqrt(es.geometry.surface_area(mesh))))
 
 
 def chance(mesh: es.TriangleMesh, features: np.ndarray) -> float:
     """Return the share of the area within 5 % of √area of a feature: what points at random would reach."""
-    near = es.geodesic_distances(mesh, features).min(axis=0) <= NEAR * np.sqrt(es.surface_area(mesh))
-    areas = es.dual_volumes(mesh)
+    near = es.geometry.geodesic_distances(mesh, features).min(axis=0) <= NEAR * np.sqrt(es.geometry.surface_area(mesh))
+    areas = es.geometry.dual_volumes(mesh)
     return float(areas[near].sum() / areas.sum())
 
 
@@ -145,8 +145,8 @@ def quality_of_maps(kind: str, n_vertices: int) -> dict[str, float]:
     one, two = (es.make_creature(kind, pose, n_vertices=n_vertices) for pose in (1, 2))
     to = map_between(one, two)
     some = np.arange(0, len(to), 25)
-    off = np.array([es.geodesic_distances(two, [vertex])[0, to[vertex]] for vertex in some])
-    off /= np.sqrt(es.surface_area(two))
+    off = np.array([es.geometry.geodesic_distances(two, [vertex])[0, to[vertex]] for vertex in some])
+    off /= np.sqrt(es.geometry.surface_area(two))
     return {"median": float(np.median(off)), "within 5 %": float(np.mean(off <= NEAR))}
 
 
@@ -170,22 +170,24 @@ def picture(stem: str, n_poses: int) -> object:
     meshes = [upright(es.read_mesh(path)) for path in paths]
     find = FUNCTIONS["HKS, scale-free"]
     known = find(meshes[0])
-    panels = [es.Panel(meshes[0], f"{paths[0].stem}: 15 maxima", known.labels, known.features.vertices)]
+    panels = [es.plot.Panel(meshes[0], f"{paths[0].stem}: 15 maxima", known.labels, known.features.vertices)]
     for mesh, path in zip(meshes[1:], paths[1:], strict=True):
         panels.append(panel(mesh, path.stem, map_between(mesh, meshes[0]), (meshes[0], known)))
     for name, part in parts_of(meshes[0], 1).items():
         panels.append(panel(part.mesh, f"the first, {name}", part.source_vertices, (meshes[0], known)))
-    return es.figure_contact_sheet(panels[0], panels[1:], caption="grey: no partner within 5 % of √area")
+    return es.plot.figure_contact_sheet(panels[0], panels[1:], caption="grey: no partner within 5 % of √area")
 
 
-def panel(mesh: es.TriangleMesh, title: str, to: np.ndarray, reference: tuple[es.TriangleMesh, object]) -> es.Panel:
+def panel(
+    mesh: es.TriangleMesh, title: str, to: np.ndarray, reference: tuple[es.TriangleMesh, object]
+) -> es.plot.Panel:
     """Colour each part by the reference's feature nearest to its own, where one is near."""
     whole, known = reference
     parts = FUNCTIONS["HKS, scale-free"](mesh)
-    distances = es.geodesic_distances(whole, known.features.vertices)[:, to[parts.features.vertices]]
-    near = distances.min(axis=0) <= NEAR * np.sqrt(es.surface_area(whole))
+    distances = es.geometry.geodesic_distances(whole, known.features.vertices)[:, to[parts.features.vertices]]
+    near = distances.min(axis=0) <= NEAR * np.sqrt(es.geometry.surface_area(whole))
     colors = np.where(near, distances.argmin(axis=0), -1)
-    return es.Panel(mesh, f"{title}: {near.sum()} of {len(near)}", colors[parts.labels], parts.features.vertices)
+    return es.plot.Panel(mesh, f"{title}: {near.sum()} of {len(near)}", colors[parts.labels], parts.features.vertices)
 
 
 def main() -> None:

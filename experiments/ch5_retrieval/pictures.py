@@ -48,10 +48,10 @@ def ask(method: Method, store: Store, queries: Sequence[Version], database: Sequ
     return [Asked(method.name, query, found[:N_ANSWERS]) for query, found in zip(queries, ranked, strict=True)]
 
 
-def panel(version: Version, title: str, color: int) -> es.Panel:
+def panel(version: Version, title: str, color: int) -> es.plot.Panel:
     """Return a shape in one colour, as it stood before it was turned."""
     mesh = make(version, turned=False)
-    return es.Panel(mesh, title, np.full(mesh.n_faces, color), np.empty(0, dtype=np.int64))
+    return es.plot.Panel(mesh, title, np.full(mesh.n_faces, color), np.empty(0, dtype=np.int64))
 
 
 def sheet(asked: Asked) -> Figure:
@@ -61,7 +61,7 @@ def sheet(asked: Asked) -> Figure:
         panel(version, f"{place}: {version.shape.label},\n{version.kind}", right_or_wrong(version, asked))
         for place, version in enumerate(asked.answers, 1)
     ]
-    return es.figure_contact_sheet(query, answers, caption=asked.method)
+    return es.plot.figure_contact_sheet(query, answers, caption=asked.method)
 
 
 def right_or_wrong(version: Version, asked: Asked) -> int:

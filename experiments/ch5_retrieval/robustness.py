@@ -45,7 +45,7 @@ class Asking:
         """Return the descriptor."""
         if self.cure == CURES[1]:
             return self.method.describe(mesh)
-        return es.in_words([es.describe_patches(mesh)], self.method.recipe)
+        return es.retrieval.in_words([es.retrieval.describe_patches(mesh)], self.method.recipe)
 
     def distances(self, query: Any, described: Sequence[Any]) -> np.ndarray:
         """Return the method's scores."""

@@ -44,7 +44,7 @@ def shape_of(mesh, n_neighbors=8):
     return {
         "vertices": np.array(mesh.vertices),
         "faces": np.array(mesh.faces),
-        "adjacency": es.neighbor_graph(mesh.vertices, n_neighbors),
+        "adjacency": es.operators.neighbor_graph(mesh.vertices, n_neighbors),
     }
 
 
@@ -76,7 +76,7 @@ def test_the_script_runs_and_its_json_has_what_it_should(tmp_path):
 
 
 def test_every_library_solves_the_pencil_that_it_says(modules):
-    shape = shape_of(es.torus(24, 16))
+    shape = shape_of(es.shapes.torus(24, 16))
     shape["vertices"] *= [1.0, 1.1, 0.9]  # no symmetry left: nothing to be missed
     for name, library in modules["libraries"].LIBRARIES.items():
         found, (values, vectors), matrices = modules["worker"].measured(library, shape, 10)
@@ -88,7 +88,7 @@ def test_every_library_solves_the_pencil_that_it_says(modules):
 
 def test_a_wrong_list_is_counted(modules):
     worker = modules["worker"]
-    laplacian = es.cotangent_laplacian(es.torus(16, 12))
+    laplacian = es.cotangent_laplacian(es.shapes.torus(16, 12))
     matrices = laplacian.stiffness.tocsc(), laplacian.mass.tocsc()
     spectrum = es.solve_spectrum(laplacian, 20)
     np.testing.assert_allclose(worker.reference(matrices, 20), spectrum.eigenvalues, atol=1e-12)
@@ -155,7 +155,7 @@ def test_a_graph_comes_back_from_its_file(modules, tmp_path):
     case = modules["cases"].QUICK["graph"]
     n = case.save(tmp_path / "graph.npz")
     adjacency = modules["worker"].load(tmp_path / "graph.npz")["adjacency"]
-    assert (adjacency != es.neighbor_graph(case.make(), case.neighbors)).nnz == 0
+    assert (adjacency != es.operators.neighbor_graph(case.make(), case.neighbors)).nnz == 0
     assert n == adjacency.shape[0] == 800
 
 

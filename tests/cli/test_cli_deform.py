@@ -10,7 +10,7 @@ from eigenshape.cli import app
 from eigenshape.cli.regions import told_region, told_rotation, told_translation
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import bend
-from eigenshape.deformation.region import Box, Brush, region_boundary, region_mask
+from eigenshape.deformation.region import BoxRegion, BrushRegion, region_boundary, region_mask
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.features.parts import find_parts
 from eigenshape.geometry.measure import surface_area
@@ -101,11 +101,11 @@ def test_words_for_regions(giraffe, tmp_path):
     mesh = read_mesh(giraffe)
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     box = told_region("y > 25%, x<0.5", mesh, QUIET)
-    assert isinstance(box, Box)
+    assert isinstance(box, BoxRegion)
     np.testing.assert_allclose(box.low, [-np.inf, low[1] + 0.25 * (high - low)[1], -np.inf])
     np.testing.assert_allclose(box.high, [0.5, np.inf, np.inf])
     brush = told_region("vertex 7 within 10%", mesh, QUIET)
-    assert isinstance(brush, Brush)
+    assert isinstance(brush, BrushRegion)
     assert brush.radius == pytest.approx(0.1 * surface_area(mesh) ** 0.5)
     assert told_region("vertex 7 within 0.25", mesh, QUIET).radius == 0.25
     listed = tmp_path / "some.txt"

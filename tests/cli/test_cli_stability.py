@@ -22,10 +22,10 @@ def run(*arguments, code=0):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     place = tmp_path_factory.mktemp("stability")
-    mesh = es.torus(30, 15)
+    mesh = es.shapes.torus(30, 15)
     es.write_mesh(mesh, place / "one.ply")
     es.write_mesh(es.TriangleMesh(mesh.vertices * [1, 1, 1.3], mesh.faces), place / "two.ply")
-    es.write_mesh(es.subdivide(mesh), place / "finer.ply")
+    es.write_mesh(es.shapes.subdivide(mesh), place / "finer.ply")
     (place / "map.txt").write_text("".join(f"{vertex}\n" for vertex in range(mesh.n_vertices)))
     return place
 
@@ -42,7 +42,8 @@ def test_people_see_tables_words_and_a_picture(folder, tmp_path):
 def test_machines_read_json(folder):
     found = json.loads(run("stability", folder / "one.ply", folder / "two.ply", *FEW, "--json").stdout)
     report = es.compare_shapes(
-        *(es.read_mesh(folder / name) for name in ("one.ply", "two.ply")), es.StabilityPlan(k=6, n_samples=200)
+        *(es.read_mesh(folder / name) for name in ("one.ply", "two.ply")),
+        es.stability.StabilityPlan(k=6, n_samples=200),
     )
     assert found["delta"] == report.delta
     assert found["spectra"]["one"] == report.spectra.one.tolist()

@@ -16,7 +16,7 @@ from eigenshape.deformation.edits import (
     mesh_fingerprint,
 )
 from eigenshape.deformation.handles import Rotation, Translation
-from eigenshape.deformation.region import Box, Brush, region_mask
+from eigenshape.deformation.region import BoxRegion, BrushRegion, region_mask
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.shapes.surfaces import subdivide
 
@@ -41,8 +41,8 @@ def test_edits_come_back_to_the_last_digit(seed):
 
 
 def test_open_boxes_and_brushes_come_back():
-    box, brush = Box([-np.inf, 0.1, -np.inf], [np.inf, np.inf, 1 / 3]), Brush([1, 2, 1 / 3], 0.1)
-    (back,) = there_and_back([Edit((Move(box, PULL), Move(brush, PULL)), fixed=Box([0] * 3, [1] * 3))])
+    box, brush = BoxRegion([-np.inf, 0.1, -np.inf], [np.inf, np.inf, 1 / 3]), BrushRegion([1, 2, 1 / 3], 0.1)
+    (back,) = there_and_back([Edit((Move(box, PULL), Move(brush, PULL)), fixed=BoxRegion([0] * 3, [1] * 3))])
     found = back.moves[0].region
     np.testing.assert_array_equal([found.low, found.high], [box.low, box.high])
     np.testing.assert_array_equal(back.moves[1].region.center, brush.center)
@@ -77,7 +77,7 @@ def test_regions_of_another_mesh_are_refused():
 def test_a_finer_mesh_asks_its_nearest_vertices():
     fine = subdivide(tube())
     rows = np.arange(492) // 12
-    box = Box([0, 0, 0], [1, 1, 1])
+    box = BoxRegion([0, 0, 0], [1, 1, 1])
     carried = carry_edit(Edit((Move(rows >= 30, PULL),), fixed=box, n_modes=9, mode="thesis"), tube(), fine)
     mask = carried.moves[0].region
     np.testing.assert_array_equal(mask[:492], rows >= 30)

@@ -6,7 +6,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.deform import deform
 from eigenshape.deformation.edits import Edit, Move
 from eigenshape.deformation.handles import Rotation, Translation
-from eigenshape.deformation.region import Box, Brush
+from eigenshape.deformation.region import BoxRegion, BrushRegion
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.deformation.session import DeformationSession, replay
 from eigenshape.deformation.skeleton import moved_skeleton
@@ -87,7 +87,7 @@ def test_what_is_not_there_cannot_be_done(session):
 
 
 def test_a_drag_that_goes_on_binds_nothing_anew(session):
-    box = Box([0.6, -9, -9], [9, 9, 9])
+    box = BoxRegion([0.6, -9, -9], [9, 9, 9])
     session.drag(HEAD, TURN)
     grip = session.grip
     for again in (HEAD, HEAD.tolist(), lump().vertices[:, 0] > 0.6, box):
@@ -140,8 +140,8 @@ def test_several_regions_are_dragged_at_once(session):
 def test_boxes_and_brushes_are_looked_up_where_the_shape_is_now(session):
     session.drag(HEAD, Translation([5, 0, 0]))
     session.commit()
-    beyond = Box([4, -9, -9], [9, 9, 9])
-    tip = Brush(session.mesh.vertices[HEAD[0]], 0.2)
+    beyond = BoxRegion([4, -9, -9], [9, 9, 9])
+    tip = BrushRegion(session.mesh.vertices[HEAD[0]], 0.2)
     for region in (beyond, tip):
         session.drag(region, PULL)
         session.commit()

@@ -46,7 +46,7 @@ def test_ours_is_never_wrong_and_peers_are(quick_form):
 
 
 def test_a_missing_copy_is_counted(census):
-    case = census["Case"]("one", "one", es.cotangent_laplacian(es.torus(12, 8)))
+    case = census["Case"]("one", "one", es.cotangent_laplacian(es.shapes.torus(12, 8)))
     values = census["dense"](case)
     right = es.solve_spectrum(case.laplacian, 9).eigenvalues
     longer = es.solve_spectrum(case.laplacian, 10).eigenvalues

@@ -109,12 +109,12 @@ def test_versions_are_what_they_are_called():
         version = draws.Version(one, kind, 1)
         mesh = draws.make(version)
         assert np.array_equal(mesh.vertices, draws.make(version).vertices)
-        assert es.is_closed(mesh) == (kind == "complete")
-        assert es.vertex_components(mesh)[0] == 1
+        assert es.geometry.is_closed(mesh) == (kind == "complete")
+        assert es.geometry.vertex_components(mesh)[0] == 1
         upright = draws.make(version, turned=False)
         assert np.ptp(upright.vertices, axis=0).max() == pytest.approx(1)
         assert not np.allclose(mesh.vertices, upright.vertices)
-        np.testing.assert_allclose(es.edge_lengths(mesh), es.edge_lengths(upright), rtol=1e-9)
+        np.testing.assert_allclose(es.geometry.edge_lengths(mesh), es.geometry.edge_lengths(upright), rtol=1e-9)
 
 
 @pytest.mark.long
@@ -122,8 +122,8 @@ def test_planes_keep_a_piece_of_the_wanted_size():
     whole = es.make_creature("quadruped", n_vertices=900)
     for seed in range(5):
         piece = draws.incomplete(whole, np.random.default_rng(seed))
-        assert draws.KEPT[0] <= es.surface_area(piece) / es.surface_area(whole) <= draws.KEPT[1]
-        assert es.vertex_components(piece)[0] == 1
+        assert draws.KEPT[0] <= es.geometry.surface_area(piece) / es.geometry.surface_area(whole) <= draws.KEPT[1]
+        assert es.geometry.vertex_components(piece)[0] == 1
     with pytest.raises(es.InvalidShapeError, match="An incomplete version must keep"):
         draws.incomplete(es.TriangleMesh(np.eye(3), [[0, 1, 2]]), np.random.default_rng(0))
 

@@ -30,14 +30,14 @@ class Kept:
 @pytest.mark.parametrize(
     ("value", "kind", "message"),
     [
-        (MESH, Laplacian, r"the value is a TriangleMesh\. Pass cotangent_laplacian\(mesh\)\."),
-        (PointCloud(MESH.vertices), Laplacian, r"the value is a PointCloud\. Pass point_cloud_laplacian\(cloud\)\."),
-        (UNIT, Laplacian, r"the value is a csr_array\. Pass Laplacian\(stiffness, mass\)\."),
+        (MESH, Laplacian, r"the value is a TriangleMesh\. Pass es\.cotangent_laplacian\(mesh\)\."),
+        (PointCloud(MESH.vertices), Laplacian, r"the value is a PointCloud\. Pass es\.point_cloud_laplacian\(cloud\)\."),
+        (UNIT, Laplacian, r"the value is a csr_array\. Pass es\.Laplacian\(stiffness, mass\)\."),
         (Kept("it", Laplacian(UNIT, UNIT)), Laplacian, r"the value is a Kept\. Pass its attribute laplacian\."),
-        (Path("cat.npz"), Spectrum, r"the value is a PosixPath \('cat\.npz'\)\. Pass Spectrum\.load\('cat\.npz'\)\."),
-        (None, Spectrum, r"the value is None\. Pass solve_spectrum\(laplacian, k\)\."),
-        (2.5, Spectrum | None, r"Spectrum or None; the value is a float \(2\.5\)\. Pass solve_spectrum"),
-        (np.eye(3), Rotation | Translation, r"an ndarray\. Pass Rotation\(pivot, axis, angle\) or Translation\(vec"),
+        (Path("cat.npz"), Spectrum, r"the value is a PosixPath \('cat\.npz'\)\. Pass es\.Spectrum\.load\('cat\.npz'\)\."),
+        (None, Spectrum, r"the value is None\. Pass es\.solve_spectrum\(laplacian, k\)\."),
+        (2.5, Spectrum | None, r"Spectrum or None; the value is a float \(2\.5\)\. Pass es\.solve_spectrum"),
+        (np.eye(3), Rotation | Translation, r"an ndarray\. Pass es\.Rotation\(pivot, axis, angle\) or es\.Translation\(vec"),
     ],
 )
 def test_another_type_is_refused_with_what_to_pass(value, kind, message):

@@ -14,7 +14,7 @@ from eigenshape._compile import make_private, temporary_folder
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 MEASURE = """
 import eigenshape as es
-print(es.geodesic_distances(es.icosphere(1), [0]).max())
+print(es.geometry.geodesic_distances(es.icosphere(1), [0]).max())
 """
 
 

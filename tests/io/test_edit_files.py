@@ -4,7 +4,7 @@ import pytest
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape.deformation.edits import Edit, Move, mesh_fingerprint
 from eigenshape.deformation.handles import Rotation, Translation
-from eigenshape.deformation.region import Box
+from eigenshape.deformation.region import BoxRegion
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.deformation.session import replay
 from eigenshape.geometry.mesh import TriangleMesh
@@ -14,7 +14,7 @@ from eigenshape.shapes.surfaces import icosphere
 BALL = icosphere(2)
 EDITS = [
     Edit((Move(BALL.vertices[:, 2] > 0.5, Rotation([0, 0, 0.5], [1, 1 / 3, 0], 0.7)),), mode="thesis"),
-    Edit((Move(Box([-np.inf, -np.inf, -9], [np.inf, np.inf, -0.5]), Translation([0, 0.1, -1 / 3])),)),
+    Edit((Move(BoxRegion([-np.inf, -np.inf, -9], [np.inf, np.inf, -0.5]), Translation([0, 0.1, -1 / 3])),)),
 ]
 
 

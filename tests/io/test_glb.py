@@ -7,7 +7,8 @@ import pytest
 import trimesh
 from tetrahedra import FACES, FILES, TETRAHEDRON, VERTICES, read
 
-from eigenshape import FileFormatError, InvalidShapeError, TriangleMesh, enclosed_volume, read_mesh, write_mesh
+from eigenshape import FileFormatError, InvalidShapeError, TriangleMesh, read_mesh, write_mesh
+from eigenshape.geometry import enclosed_volume
 from eigenshape.io.glb import format_mesh, parse
 from eigenshape.io.gltf import Gltf, placed_triangles
 

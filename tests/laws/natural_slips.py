@@ -20,6 +20,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 import scipy.sparse as sp
 from matplotlib.figure import Figure
+from public_names import public_things
 
 import eigenshape as es
 
@@ -47,37 +48,37 @@ def spectrum() -> es.Spectrum:
 
 
 @cache
-def rig() -> es.EigenRig:
+def rig() -> es.deformation.EigenRig:
     return es.rig_shape(body())
 
 
-HEAD = es.Box([-9.0, 0.8, -9.0], [9.0, 9.0, 9.0])
+HEAD = es.deformation.BoxRegion([-9.0, 0.8, -9.0], [9.0, 9.0, 9.0])
 TURN = es.Rotation([0, 0.5, 0], [1, 0, 0], 0.2)
 
 
 @cache
-def binding() -> es.Binding:
-    return es.bind(rig(), [HEAD])
+def binding() -> es.deformation.Binding:
+    return es.deformation.bind(rig(), [HEAD])
 
 
 @cache
-def described() -> es.DescribedShape:
-    return es.describe_mesh(body())
+def described() -> es.retrieval.DescribedShape:
+    return es.retrieval.describe_mesh(body())
 
 
 @cache
-def recipe() -> es.PatchRecipe:
-    return es.PatchRecipe(es.made_codebook())
+def recipe() -> es.retrieval.PatchRecipe:
+    return es.retrieval.PatchRecipe(es.retrieval.made_codebook())
 
 
 @cache
-def patches() -> es.Patches:
-    return es.describe_patches(body())
+def patches() -> es.retrieval.Patches:
+    return es.retrieval.describe_patches(body())
 
 
 @cache
-def patched() -> es.PatchDescriptor:
-    return es.in_words([patches()], recipe())
+def patched() -> es.retrieval.PatchDescriptor:
+    return es.retrieval.in_words([patches()], recipe())
 
 
 @cache
@@ -93,17 +94,17 @@ def labels() -> np.ndarray:
 
 
 @cache
-def mapping() -> es.FunctionalMap:
-    return es.map_from_points(spectrum(), spectrum(), np.arange(body().n_vertices), n_modes=10)
+def mapping() -> es.spectral.FunctionalMap:
+    return es.spectral.map_from_points(spectrum(), spectrum(), np.arange(body().n_vertices), n_modes=10)
 
 
 @cache
-def report() -> es.StabilityReport:
-    return es.compare_shapes(body(), bent(), es.StabilityPlan(k=5, n_samples=100))
+def report() -> es.stability.StabilityReport:
+    return es.compare_shapes(body(), bent(), es.stability.StabilityPlan(k=5, n_samples=100))
 
 
 def written_edits() -> Path:
-    es.write_edits([es.Edit((es.Move(HEAD, TURN),))], body(), FOLDER / "edits.json")
+    es.io.write_edits([es.deformation.Edit((es.deformation.Move(HEAD, TURN),))], body(), FOLDER / "edits.json")
     return FOLDER / "edits.json"
 
 
@@ -117,42 +118,42 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.PointCloud: lambda: es.PointCloud(body().vertices),
     es.Laplacian: lambda: es.cotangent_laplacian(body()),
     es.Spectrum: spectrum,
-    es.MergeTree: lambda: es.merge_tree(body(), height()),
-    es.Segmentation: lambda: described().parts,
-    es.FeaturePoints: lambda: described().parts.features,
-    es.ShapeDescriptor: lambda: described().descriptor,
-    es.Recipe: lambda: es.SCALE_FREE,
-    es.PatchRecipe: recipe,
-    es.PatchCodebook: es.made_codebook,
-    es.PatchDescriptor: patched,
-    es.Patches: patches,
-    es.PatchPoints: lambda: es.patch_points(patches(), es.made_codebook()),
-    es.PersistenceDiagram: lambda: es.persistence_diagram(body(), height()),
-    es.EigenRig: rig,
-    es.Binding: binding,
+    es.features.MergeTree: lambda: es.merge_tree(body(), height()),
+    es.features.Segmentation: lambda: described().parts,
+    es.features.FeaturePoints: lambda: described().parts.features,
+    es.retrieval.ShapeDescriptor: lambda: described().descriptor,
+    es.retrieval.Recipe: lambda: es.retrieval.SCALE_FREE,
+    es.retrieval.PatchRecipe: recipe,
+    es.retrieval.PatchCodebook: es.retrieval.made_codebook,
+    es.retrieval.PatchDescriptor: patched,
+    es.retrieval.Patches: patches,
+    es.retrieval.PatchPoints: lambda: es.retrieval.patch_points(patches(), es.retrieval.made_codebook()),
+    es.features.PersistenceDiagram: lambda: es.features.persistence_diagram(body(), height()),
+    es.deformation.EigenRig: rig,
+    es.deformation.Binding: binding,
     es.Rotation: lambda: TURN,
-    es.Move: lambda: es.Move(HEAD, TURN),
-    es.Edit: lambda: es.Edit((es.Move(HEAD, TURN),)),
-    es.Box: lambda: HEAD,
-    es.SkeletonGrip: lambda: es.grip_skeleton(binding()),
-    es.DetailedSkeleton: lambda: es.detail_skeleton(binding()),
-    es.FunctionalMap: mapping,
-    es.Perturbation: lambda: es.perturbation(body(), bent()),
-    es.SurfacePoints: lambda: es.sample_surface(body(), 60, rng=np.random.default_rng(0)),
-    es.Quadrature: lambda: es.mesh_quadrature(body()),
-    es.Brackets: lambda: es.bracket_eigenvalues(body(), 10),
-    es.Rate: lambda: es.Rate(1.0, -1.0),
-    es.Camera: lambda: es.three_quarter_view(body()),
-    es.DepthCamera: es.DepthCamera,
-    es.Panel: lambda: es.Panel(body(), "body", labels(), np.arange(3)),
-    es.LabelTransfer: lambda: es.transfer_labels(body(), labels(), body()),
-    es.StabilityPlan: es.StabilityPlan,
-    es.StabilityReport: report,
-    es.SpectrumComparison: lambda: es.compare_spectra(spectrum(), spectrum()),
+    es.deformation.Move: lambda: es.deformation.Move(HEAD, TURN),
+    es.deformation.Edit: lambda: es.deformation.Edit((es.deformation.Move(HEAD, TURN),)),
+    es.deformation.BoxRegion: lambda: HEAD,
+    es.deformation.SkeletonGrip: lambda: es.deformation.grip_skeleton(binding()),
+    es.deformation.DetailedSkeleton: lambda: es.deformation.detail_skeleton(binding()),
+    es.spectral.FunctionalMap: mapping,
+    es.stability.Perturbation: lambda: es.stability.measure_perturbation(body(), bent()),
+    es.geometry.SurfacePoints: lambda: es.geometry.sample_surface(body(), 60, rng=np.random.default_rng(0)),
+    es.geometry.Quadrature: lambda: es.geometry.mesh_quadrature(body()),
+    es.spectral.Brackets: lambda: es.bracket_eigenvalues(body(), 10),
+    es.stability.Rate: lambda: es.stability.Rate(1.0, -1.0),
+    es.plot.Camera: lambda: es.plot.three_quarter_view(body()),
+    es.scans.DepthCamera: es.scans.DepthCamera,
+    es.plot.Panel: lambda: es.plot.Panel(body(), "body", labels(), np.arange(3)),
+    es.retrieval.LabelTransfer: lambda: es.transfer_labels(body(), labels(), body()),
+    es.stability.StabilityPlan: es.stability.StabilityPlan,
+    es.stability.StabilityReport: report,
+    es.spectral.SpectrumComparison: lambda: es.spectral.compare_spectra(spectrum(), spectrum()),
     es.ShapeIndex: shelf,
     es.DeformationSession: lambda: es.DeformationSession(rig()),
-    es.Workers: es.Workers,
-    es.Item: lambda: es.Item("body", FOLDER / "body.ply"),
+    es.retrieval.Workers: es.retrieval.Workers,
+    es.retrieval.Item: lambda: es.retrieval.Item("body", FOLDER / "body.ply"),
     Figure: Figure,
     np.random.Generator: lambda: np.random.default_rng(0),
 }
@@ -161,14 +162,14 @@ NAMED: dict[str, Callable[[], Any]] = {
     "alpha": lambda: 1.0,
     "approximate_spectrum.k": lambda: 5,
     "bind.regions": lambda: [HEAD],
-    "boundary_surface.mesh": lambda: es.box(2, 2, 2),
+    "boundary_surface.mesh": lambda: es.shapes.box(2, 2, 2),
     "build": lambda: es.cotangent_laplacian,
     "build_index.describe": lambda: len,
     "caption": lambda: "",
     "certify.eigenvalues": lambda: spectrum().eigenvalues,
     "certify.eigenvectors": lambda: spectrum().eigenvectors,
     "check_laplacian.shape": body,
-    "compare_shapes.plan": lambda: es.StabilityPlan(k=5, n_samples=100),
+    "compare_shapes.plan": lambda: es.stability.StabilityPlan(k=5, n_samples=100),
     "count": lambda: 4,
     "cover_by_rate.delta": lambda: [0.1, 0.2],
     "cover_by_rate.measured": lambda: [0.1, 0.2],
@@ -185,7 +186,7 @@ NAMED: dict[str, Callable[[], Any]] = {
     "label": lambda: "height",
     "labels": labels,
     "map_from_points.points": lambda: np.arange(body().n_vertices),
-    "mask": lambda: es.region_mask(body(), HEAD),
+    "mask": lambda: es.deformation.region_mask(body(), HEAD),
     "n": lambda: 50,
     "n_features": lambda: 3,
     "n_modes": lambda: 10,
@@ -209,7 +210,7 @@ NAMED: dict[str, Callable[[], Any]] = {
     "spectra": lambda: {"one": spectrum(), "two": spectrum()},
     "t": lambda: 0.05,
     "teach": lambda: len,
-    "tensors": lambda: es.curvature_tensors(body(), 1.0),
+    "tensors": lambda: es.operators.curvature_tensors(body(), 1.0),
     "times": lambda: [0.1, 0.2],
     "transfer_function.values": height,
     "up": lambda: "y",
@@ -221,8 +222,8 @@ NAMED: dict[str, Callable[[], Any]] = {
 }
 # What a mesh is in all but type: an answer must be that of the mesh.
 SAME_MESH: dict[str, Callable[[], Any]] = {
-    "trimesh": lambda: es.to_trimesh(body()),
-    "pyvista": lambda: es.to_pyvista(body()),
+    "trimesh": lambda: es.io.to_trimesh(body()),
+    "pyvista": lambda: es.io.to_pyvista(body()),
     "pair": lambda: (body().vertices, body().faces),
     "SimplicialMesh": lambda: es.SimplicialMesh(body().points, body().simplices),
 }
@@ -232,9 +233,9 @@ SLIPS: dict[str, Callable[[], Any]] = {
     "text": lambda: "cat.ply",
     "path": lambda: Path("cat.ply"),
     "cloud": lambda: es.PointCloud(body().vertices),
-    "tetrahedra": lambda: es.box(2, 2, 2),
+    "tetrahedra": lambda: es.shapes.box(2, 2, 2),
     "points": lambda: body().vertices,
-    "repaired": lambda: es.weld(body()),
+    "repaired": lambda: es.geometry.weld(body()),
     "laplacian": lambda: es.cotangent_laplacian(body()),
     "matrix": lambda: sp.eye_array(3, format="csr"),
     "spectrum": spectrum,
@@ -257,8 +258,7 @@ def kinds(annotation: Any) -> Iterator[Any]:
 
 def public_callables() -> Iterator[tuple[str, Callable[..., Any], type | None]]:
     """Yield public functions, and public methods of public classes with their class."""
-    for name in es.__all__:
-        thing = getattr(es, name)
+    for name, thing in public_things().items():
         if inspect.isfunction(thing):
             yield name, thing, None
         elif inspect.isclass(thing):

@@ -32,7 +32,7 @@ from eigenshape.operators.robust import robust_laplacian
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
 from eigenshape.spectral.laws.operator_laws import check_operator
-from eigenshape.spectral.laws.report import USUAL
+from eigenshape.spectral.laws.report import DEFAULT_PROMISES
 from eigenshape.spectral.laws.transformations import random_rotation
 
 seeds = st.integers(0, 2**32 - 1)
@@ -155,9 +155,9 @@ SURFACES = (surface, slivers, soup)
 MESHES = (*SURFACES, solid, curve)
 LITTLE = partial(solid, sizes=(8, 3, 2, 1))
 SMALL = (partial(surface, small=True), partial(slivers, small=True, thinnest=1e-4), soup, LITTLE, curve)
-FLAT = USUAL | {"volume"}
+FLAT = DEFAULT_PROMISES | {"volume"}
 MONOTONE = FLAT | {"nonnegative_weights"}
-GRAPH = (USUAL - {"scaling"}) | {"nonnegative_weights"}
+GRAPH = (DEFAULT_PROMISES - {"scaling"}) | {"nonnegative_weights"}
 VECTORS = frozenset({"rigid_motion", "reflection", "scaling", "union"})  # whose faces are all turned one way
 
 TABLE = [
@@ -172,15 +172,20 @@ TABLE = [
     Row("mesh", mesh_laplacian, (surface, solid, curve), MONOTONE, boundary_vertices),
     Row("mesh, random walk", partial(mesh_laplacian, form="random-walk"), (surface, solid), MONOTONE - {"volume"}),
     Row("mesh, geodesic", partial(mesh_laplacian, distance="geodesic"), (surface,), MONOTONE),
-    Row("gaussian", partial(gaussian, form="literal"), (cloud,), USUAL - {"scaling", "union"}),
-    Row("gaussian, random walk", partial(gaussian, form="random-walk"), (cloud,), USUAL - {"union"}),
-    Row("point cloud", point_cloud_laplacian, (cloud,), USUAL | {"nonnegative_weights"}),
+    Row("gaussian", partial(gaussian, form="literal"), (cloud,), DEFAULT_PROMISES - {"scaling", "union"}),
+    Row("gaussian, random walk", partial(gaussian, form="random-walk"), (cloud,), DEFAULT_PROMISES - {"union"}),
+    Row("point cloud", point_cloud_laplacian, (cloud,), DEFAULT_PROMISES | {"nonnegative_weights"}),
     Row("connection", connection_laplacian, (surface,), VECTORS),
     Row("connection consistent", partial(connection_laplacian, mass="consistent"), (surface,), VECTORS),
     Row("combinatorial", graph_laplacian, (surface, solid, curve), GRAPH, boundary_vertices),
     Row("inverse length", partial(graph_laplacian, kind="weighted"), (surface, solid, curve), GRAPH),
     *[
-        Row(f"{kind} of a graph", partial(graph_laplacian, kind=kind), (graph,), USUAL | {"nonnegative_weights"})
+        Row(
+            f"{kind} of a graph",
+            partial(graph_laplacian, kind=kind),
+            (graph,),
+            DEFAULT_PROMISES | {"nonnegative_weights"},
+        )
         for kind in ("combinatorial", "weighted", "normalized")
     ],
 ]

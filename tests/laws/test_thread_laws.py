@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from public_names import public_things
 from thread_calls import CALLS, LEFT_OUT, Shared
 from threadpoolctl import threadpool_info, threadpool_limits
 
@@ -86,23 +87,28 @@ def in_threads(calls: list[Callable[[], object]]) -> list[object]:
 
 
 def test_every_public_function_is_called_or_has_a_reason():
-    functions = {name for name in es.__all__ if inspect.isfunction(inspect.unwrap(getattr(es, name)))}
+    things = public_things()
+    functions = {name for name, thing in things.items() if inspect.isfunction(inspect.unwrap(thing))}
     assert functions <= CALLS.keys() | LEFT_OUT.keys()
-    assert {name.split(".")[0] for name in CALLS} | LEFT_OUT.keys() <= set(es.__all__)
+    assert {name.split(".")[0] for name in CALLS} | LEFT_OUT.keys() <= things.keys()
 
 
 def test_every_method_that_takes_something_is_called():
     # What takes nothing, `explain` and properties, is called for each value that comes up.
+    classes = {
+        name: thing
+        for name, thing in public_things().items()
+        if inspect.isclass(thing) and not issubclass(thing, Exception)
+    }
     methods = {
         f"{name}.{method}"
-        for name in es.__all__
-        if inspect.isclass(kind := getattr(es, name)) and not issubclass(kind, Exception)
+        for name, kind in classes.items()
         for method, function in vars(kind).items()
         if not method.startswith("_")
         and not isinstance(function, property | cached_property)
         and callable(getattr(kind, method))
     }
-    grouped = {name for name in CALLS if inspect.isclass(getattr(es, name, None))}  # one call for all methods
+    grouped = CALLS.keys() & classes.keys()  # one call for all methods
     left = {name for name in methods - CALLS.keys() if name.split(".")[0] not in grouped}
     assert {name.split(".")[1] for name in left} <= {"explain"}
 
@@ -127,9 +133,9 @@ def test_four_threads_get_what_one_gets_bit_for_bit(tmp_path, monkeypatch):
 def test_two_threads_bend_one_binding(tmp_path):
     values = Shared(tmp_path)
     handles = [es.Rotation(values.handle.pivot, [0, 0, 1], 0.05 * number) for number in range(1, 21)]
-    alone = [es.bend(values.binding, [handle]).vertices for handle in handles]
+    alone = [es.deformation.bend(values.binding, [handle]).vertices for handle in handles]
     with many_threads(), ThreadPoolExecutor(2) as pool:
-        together = list(pool.map(lambda handle: es.bend(values.binding, [handle]).vertices, handles))
+        together = list(pool.map(lambda handle: es.deformation.bend(values.binding, [handle]).vertices, handles))
     np.testing.assert_array_equal(together, alone)
 
 

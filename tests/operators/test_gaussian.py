@@ -123,7 +123,9 @@ def test_the_functional_approximation_on_the_sphere_is_exact(degree, t):
     measure = sphere_quadrature(48)
     harmonic = eval_legendre(degree, measure.points[:, 2])
     found = functional_laplacian(measure, t) @ harmonic
-    np.testing.assert_allclose(found, es.sphere_functional_eigenvalues(degree**2 + 1, t)[-1] * harmonic, atol=1e-9)
+    np.testing.assert_allclose(
+        found, es.shapes.sphere_functional_eigenvalues(degree**2 + 1, t)[-1] * harmonic, atol=1e-9
+    )
 
 
 @pytest.mark.long
@@ -255,8 +257,8 @@ def _plain(function):
 @pytest.mark.long
 @pytest.mark.parametrize("size", [1e-30, 1.0, 1e30])
 def test_graph_laplacians_know_the_volume_that_their_eigenvalues_are_over(size):
-    points = size * es.fibonacci_sphere(1500).vertices
-    laplacian = es.gaussian_laplacian(points, 0.02 * size**2, 2)
+    points = size * es.shapes.fibonacci_sphere(1500).vertices
+    laplacian = es.operators.gaussian_laplacian(points, 0.02 * size**2, 2)
     assert laplacian.kernel.volume == pytest.approx(4 * np.pi * size**2, rel=0.02)
     es.solve_spectrum(laplacian, 20)  # whose eigenvalues are far from the last: no warning at any size
     with pytest.warns(UserWarning, match=r"too near to 1/\(t × volume\)"):
@@ -279,7 +281,7 @@ def test_what_converges_depends_on_how_t_falls():
     # As the docstring of mesh_laplacian says: L z of the unit sphere should be 2z.
     worst = {"e²": [], "e/10": []}
     for n in (1000, 4000, 16000):
-        mesh = es.random_sphere(n, rng=np.random.default_rng(0))
+        mesh = es.shapes.random_sphere(n, rng=np.random.default_rng(0))
         edge, z = mean_side_length(mesh), mesh.vertices[:, 2]
         for name, t in (("e²", edge**2), ("e/10", edge / 10)):
             laplacian = mesh_laplacian(mesh, t=t)

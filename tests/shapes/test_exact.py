@@ -97,14 +97,14 @@ def test_none_is_left_out():
 def test_the_functional_of_the_sphere_by_another_quadrature(degree, t):
     weight = lambda s: np.exp(-(2 - 2 * s) / (4 * t)) * (1 - eval_legendre(degree, s))  # noqa: E731
     expected = quad(weight, -1, 1, epsabs=1e-13, epsrel=1e-12, limit=400)[0] / (2 * t**2)
-    found = es.sphere_functional_eigenvalues((degree + 1) ** 2, t)
+    found = es.shapes.sphere_functional_eigenvalues((degree + 1) ** 2, t)
     assert found[-1] == found[degree**2] == pytest.approx(expected, rel=1e-9)
     assert len(found) == (degree + 1) ** 2
 
 
 def test_the_functional_of_the_sphere_tends_to_its_operator():
-    exact = es.sphere_eigenvalues(100)
-    errors = [np.abs(es.sphere_functional_eigenvalues(100, t) - exact).max() for t in (1e-5, 5e-6)]
+    exact = es.shapes.sphere_eigenvalues(100)
+    errors = [np.abs(es.shapes.sphere_functional_eigenvalues(100, t) - exact).max() for t in (1e-5, 5e-6)]
     assert errors[1] == pytest.approx(errors[0] / 2, rel=0.01)
     with pytest.raises(es.InvalidParameterError, match="t must be positive"):
-        es.sphere_functional_eigenvalues(5, 0.0)
+        es.shapes.sphere_functional_eigenvalues(5, 0.0)

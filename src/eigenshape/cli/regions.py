@@ -9,7 +9,7 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape.deformation.handles import Rotation, Translation
-from eigenshape.deformation.region import Box, Brush, Region, region_boundary, region_mask
+from eigenshape.deformation.region import BoxRegion, BrushRegion, Region, region_boundary, region_mask
 from eigenshape.features.boundaries import smooth_boundaries
 from eigenshape.features.parts import PART_CONTRAST, facing_outward, find_parts
 from eigenshape.features.segmentation import segment
@@ -38,7 +38,7 @@ def told_region(text: str, mesh: TriangleMesh, progress: Progress) -> Region:
     if found := VERTEX.fullmatch(text):
         vertex = whole_number(int(found[1]), "A vertex of a region", 0, mesh.n_vertices - 1)
         radius = float(found[2]) * (surface_area(mesh) ** 0.5 / 100 if found[3] else 1.0)
-        return Brush(mesh.vertices[vertex], radius)
+        return BrushRegion(mesh.vertices[vertex], radius)
     if found := PART.fullmatch(text):
         return _part(mesh, int(found[1]), progress)
     conditions = [CONDITION.fullmatch(piece) for piece in text.split(",")]
@@ -49,14 +49,14 @@ def told_region(text: str, mesh: TriangleMesh, progress: Progress) -> Region:
     raise InvalidParameterError(f"A region is one of these: {REGIONS} It was given {text!r}.")
 
 
-def _box(conditions: list[re.Match[str]], mesh: TriangleMesh) -> Box:
+def _box(conditions: list[re.Match[str]], mesh: TriangleMesh) -> BoxRegion:
     ends = np.array([np.full(3, -np.inf), np.full(3, np.inf)])
     low, span = mesh.vertices.min(axis=0), np.ptp(mesh.vertices, axis=0)
     for found in conditions:
         axis, side = "xyz".index(found[1]), "><".index(found[2])
         value = float(found[3])
         ends[side, axis] = low[axis] + value / 100 * span[axis] if found[4] else value
-    return Box(*ends)
+    return BoxRegion(*ends)
 
 
 def _part(mesh: TriangleMesh, number: int, progress: Progress) -> Region:

@@ -17,7 +17,8 @@ from eigenshape.cli.console import (
 )
 from eigenshape.cli.info import mesh_facts
 from eigenshape.cli.outputs import require_mesh_path, save_like
-from eigenshape.geometry import repair as repairs
+from eigenshape.geometry.repair import REPAIRS
+from eigenshape.geometry.repair import repair as repair_mesh
 from eigenshape.io.mesh_files import read_mesh
 
 USUAL = "auto"
@@ -36,9 +37,7 @@ def repair(
         typer.Option(
             "--repair",
             metavar="NAMES",
-            help=(
-                f"Repairs to apply in this order, separated by commas: {', '.join(repairs.REPAIRS)}. '' only converts."
-            ),
+            help=(f"Repairs to apply in this order, separated by commas: {', '.join(REPAIRS)}. '' only converts."),
         ),
     ] = USUAL,
     cells: CellsOption = None,
@@ -51,7 +50,7 @@ def repair(
     require_mesh_path(output)
     chosen = repair_names(names)
     before = read_mesh(mesh, cells=cells)
-    done = repairs.repair(before, chosen)
+    done = repair_mesh(before, chosen)
     for line in done.report:
         err.print(f"[yellow]repair:[/] {shown(line)}")
     facts = {"before": mesh_facts(before), "after": mesh_facts(done.mesh)}

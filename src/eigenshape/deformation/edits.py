@@ -14,7 +14,7 @@ from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import Mode, bend, require_mode
 from eigenshape.deformation.handles import Handle, Rotation, Translation
-from eigenshape.deformation.region import Box, Brush, Region, kept_region, region_mask
+from eigenshape.deformation.region import BoxRegion, BrushRegion, Region, kept_region, region_mask
 from eigenshape.deformation.rig import EigenRig, posed
 from eigenshape.geometry.mesh import TriangleMesh
 
@@ -105,7 +105,7 @@ def carry_edit(edit: Edit, source: TriangleMesh, target: TriangleMesh) -> Edit:
     nearest = cKDTree(source.vertices).query(target.vertices)[1]
 
     def carried(region: Region) -> Region:
-        return region if isinstance(region, Box | Brush) else region_mask(source, region)[nearest]
+        return region if isinstance(region, BoxRegion | BrushRegion) else region_mask(source, region)[nearest]
 
     moves = tuple(Move(carried(move.region), move.handle) for move in edit.moves)
     return Edit(moves, None if edit.fixed is None else carried(edit.fixed), edit.n_modes, edit.mode)
@@ -130,10 +130,10 @@ def _edit_out(edit: Edit, mesh: TriangleMesh) -> dict[str, Any]:
 
 
 def _region_out(region: Region, mesh: TriangleMesh) -> dict[str, Any]:
-    if isinstance(region, Box):
+    if isinstance(region, BoxRegion):
         low, high = ([value if np.isfinite(value) else None for value in c.tolist()] for c in (region.low, region.high))
         return {"kind": "box", "low": low, "high": high}  # JSON has no infinity
-    if isinstance(region, Brush):
+    if isinstance(region, BrushRegion):
         return {"kind": "brush", "center": region.center.tolist(), "radius": region.radius}
     return {"kind": "vertices", "vertices": np.flatnonzero(region_mask(mesh, region)).tolist()}
 
@@ -197,8 +197,8 @@ def _edit_in(entry: Any, n_vertices: int) -> Edit:
 
 def _region_in(entry: Any, n_vertices: int) -> Region:
     readers: dict[str, Callable[[], Region]] = {
-        "box": lambda: Box(_numbers(entry["low"], "low", -np.inf), _numbers(entry["high"], "high", np.inf)),
-        "brush": lambda: Brush(_numbers(entry["center"], "center"), _number(entry["radius"], "radius")),
+        "box": lambda: BoxRegion(_numbers(entry["low"], "low", -np.inf), _numbers(entry["high"], "high", np.inf)),
+        "brush": lambda: BrushRegion(_numbers(entry["center"], "center"), _number(entry["radius"], "radius")),
         "vertices": lambda: np.array(
             [_whole(v, "A vertex", 0, n_vertices - 1) for v in _listed(entry["vertices"], "vertices")], dtype=np.int64
         ),

@@ -20,7 +20,7 @@ from eigenshape.geometry.topology import edge_table
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Box:
+class BoxRegion:
     """All vertices inside a box with sides along the axes.
 
     Parameters
@@ -46,7 +46,7 @@ class Box:
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Brush:
+class BrushRegion:
     """All vertices that lie within a length, along the surface, of the vertex next to a point.
 
     Parameters
@@ -65,12 +65,12 @@ class Brush:
         object.__setattr__(self, "radius", float(positive_values(radius, "radius")[0]))
 
 
-Region = Box | Brush | np.ndarray | Iterable[int]
+Region = BoxRegion | BrushRegion | np.ndarray | Iterable[int]
 
 
 def kept_region(region: Region) -> Region:
     """Return a region that can be asked again and again, and that nobody else changes."""
-    if isinstance(region, Box | Brush):
+    if isinstance(region, BoxRegion | BrushRegion):
         return region
     return frozen(_entries(region))
 
@@ -85,7 +85,7 @@ def _entries(region: np.ndarray | Iterable[int]) -> np.ndarray:
     except ValueError:  # rows that differ in length
         pass
     raise InvalidParameterError(
-        f"A region must be a Box, a Brush, a mask, or a list of vertices; it is {named_value(region)}. "
+        f"A region must be a BoxRegion, a BrushRegion, a mask, or a list of vertices; it is {named_value(region)}. "
         "Pass region_mask(mesh, region)."
     )
 
@@ -96,7 +96,7 @@ def region_mask(mesh: MeshLike, region: Region) -> Bool[np.ndarray, " n"]:
     Parameters
     ----------
     mesh : MeshLike
-    region : (n,) bool, (k,) int, Box or Brush
+    region : (n,) bool, (k,) int, BoxRegion or BrushRegion
         A mask, indices of vertices, or a place in space.
 
     Returns
@@ -109,10 +109,10 @@ def region_mask(mesh: MeshLike, region: Region) -> Bool[np.ndarray, " n"]:
         If a mask is of another length, or an index is no vertex.
     """
     mesh = as_mesh(mesh)
-    if isinstance(region, Box):
+    if isinstance(region, BoxRegion):
         inside = (mesh.vertices >= region.low) & (mesh.vertices <= region.high)
         return np.asarray(inside.all(axis=1))
-    if isinstance(region, Brush):
+    if isinstance(region, BrushRegion):
         nearest = int(cKDTree(mesh.vertices).query(region.center)[1])
         return np.asarray(geodesic_distance_to_set(mesh, [nearest], reach=region.radius) <= region.radius)
     chosen = _entries(region)

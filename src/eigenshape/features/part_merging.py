@@ -10,7 +10,7 @@ from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, positive_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape.features.merge_tree import merge_tree
-from eigenshape.features.part_tree import PartTree
+from eigenshape.features.part_hierarchy import PartTree
 from eigenshape.features.segmentation import Segmentation, segment, touching_parts
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas

@@ -8,8 +8,8 @@ from jaxtyping import Float
 from eigenshape._arrays import frozen, whole_number
 from eigenshape._progress import Progress
 from eigenshape.features.boundaries import CONCAVITY, smooth_boundaries
+from eigenshape.features.part_hierarchy import PartTree
 from eigenshape.features.part_merging import SEED_TIME, part_tree
-from eigenshape.features.part_tree import PartTree
 from eigenshape.features.segmentation import Segmentation, segment
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.fragments import fragment_vertices

@@ -9,7 +9,7 @@ from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.features.merge_tree import MergeTree, merged_regions
-from eigenshape.features.part_tree import PartTree
+from eigenshape.features.part_hierarchy import PartTree
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.topology import edge_table, face_pairs
 

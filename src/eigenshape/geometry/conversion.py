@@ -123,7 +123,7 @@ def as_shape(value: object, name: str = "shape") -> Shape:
     Examples
     --------
     >>> import eigenshape as es
-    >>> es.as_shape(([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]]))
+    >>> es.geometry.as_shape(([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]]))
     SimplicialMesh(3 points in R^2, 1 simplices of dimension 2)
     """
     if isinstance(value, TriangleMesh | SimplicialMesh | PointCloud):

@@ -16,7 +16,7 @@ Support = list[int]
 
 
 @dataclass(frozen=True, eq=False)
-class Ball:
+class EnclosingBall:
     """A Euclidean ball in R^d.
 
     Attributes
@@ -31,7 +31,7 @@ class Ball:
     radius: float
 
 
-def enclosing_ball(points: ArrayLike) -> Ball:
+def enclosing_ball(points: ArrayLike) -> EnclosingBall:
     """Find the smallest ball that holds all points.
 
     It is the smallest ball of some d + 1 of them at most. Starting with one, the farthest point outside the ball joins
@@ -45,7 +45,7 @@ def enclosing_ball(points: ArrayLike) -> Ball:
 
     Returns
     -------
-    Ball
+    EnclosingBall
 
     Raises
     ------
@@ -60,7 +60,7 @@ def enclosing_ball(points: ArrayLike) -> Ball:
     unit, inner = size_one(unit - middle)
     center = _center(unit)
     radius = np.sqrt(((unit - center) ** 2).sum(axis=1).max())
-    return Ball(frozen(scale * (middle + inner * center)), float(scale * inner * radius))
+    return EnclosingBall(frozen(scale * (middle + inner * center)), float(scale * inner * radius))
 
 
 def _center(points: Points) -> Float[np.ndarray, " d"]:

@@ -15,7 +15,7 @@ from eigenshape.geometry.enclosing_ball import enclosing_ball
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import require_volumes, size_one, volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.stability.perturbation import Perturbation, perturbation, vertex_pairs
+from eigenshape.stability.perturbation import Perturbation, measure_perturbation, vertex_pairs
 
 Limit = Literal["nothing", "displacement", "Jacobian", "ball", "volume"]
 
@@ -141,7 +141,7 @@ def map_closeness(mesh: MeshLike, images: ArrayLike) -> Closeness:
             f"A map must have one image a vertex; there are {len(places)} images of {mesh.n_points} vertices."
         )
     kind = TriangleMesh if isinstance(mesh, TriangleMesh) else SimplicialMesh
-    return measure_closeness(perturbation(mesh, kind(places, mesh.simplices)))
+    return measure_closeness(measure_perturbation(mesh, kind(places, mesh.simplices)))
 
 
 def _scaled(perturbation: Perturbation) -> tuple[Float[np.ndarray, "n d"], Float[np.ndarray, "k d"], float]:

@@ -56,7 +56,7 @@ class Perturbation:
         return np.flatnonzero(self.regions_two == OUTSIDE)
 
 
-def perturbation(
+def measure_perturbation(
     one: MeshLike, two: MeshLike, *, regions_one: ArrayLike | None = None, regions_two: ArrayLike | None = None
 ) -> Perturbation:
     """Say how one shape became another: by a map, and by anything at all in some regions.

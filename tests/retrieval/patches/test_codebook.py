@@ -99,7 +99,7 @@ def test_a_view_counts_by_half():
 
 def test_a_scan_is_nearest_to_the_view_from_its_side(creatures, book):
     mesh = es.make_creature("hand", 1, n_vertices=1200)
-    views = es.describe_patch_views(mesh, n_views=3)
+    views = es.retrieval.describe_patch_views(mesh, n_views=3)
     codes = np.array([encode_patches(view, book) for view in views])
     for place in range(3):
         scan = es.partial_scan(mesh, viewpoint(place)).mesh
@@ -107,7 +107,7 @@ def test_a_scan_is_nearest_to_the_view_from_its_side(creatures, book):
         assert found.argmin() == place
         assert found[place] == pytest.approx(0, abs=1e-5)
         assert set(views[place].vertices) <= set(range(mesh.n_vertices))
-    assert es.describe_patch_views(scan) == []
+    assert es.retrieval.describe_patch_views(scan) == []
 
 
 def test_the_same_again(creatures):

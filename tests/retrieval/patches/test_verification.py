@@ -19,7 +19,9 @@ KINDS = ("quadruped", "hand", "octopus", "biped")
 
 @pytest.fixture(scope="module")
 def book():
-    return es.train_codebook([es.describe_patches(es.make_creature(kind, 3, n_vertices=1200)) for kind in KINDS])
+    return es.retrieval.train_codebook(
+        [es.retrieval.describe_patches(es.make_creature(kind, 3, n_vertices=1200)) for kind in KINDS]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +40,7 @@ def floats(codes):
 
 
 def known(mesh, book):
-    return es.in_words(es.seen_patches(mesh, n_views=3), es.PatchRecipe(book))
+    return es.retrieval.in_words(es.retrieval.seen_patches(mesh, n_views=3), es.retrieval.PatchRecipe(book))
 
 
 @pytest.mark.long
@@ -85,7 +87,7 @@ def test_many_shapes_are_scored_some_at_a_time(wholes, scan, monkeypatch):
 
 def test_a_descriptor_takes_patches(book, scan):
     with pytest.raises(es.InvalidParameterError, match="takes patches of a shape, then of its views; there are none"):
-        es.in_words([], es.PatchRecipe(book))
+        es.retrieval.in_words([], es.retrieval.PatchRecipe(book))
     assert len(scan.points) == len(scan.codes) == 1
     assert not scan.codes.flags.writeable
 
@@ -93,7 +95,7 @@ def test_a_descriptor_takes_patches(book, scan):
 @pytest.mark.long
 def test_noise_and_inward_faces_hardly_matter(wholes):
     mesh = es.make_creature("hand", 2, n_vertices=1500)
-    noise = 0.1 * es.edge_lengths(mesh).mean() * np.random.default_rng(0).standard_normal(mesh.vertices.shape)
+    noise = 0.1 * es.geometry.edge_lengths(mesh).mean() * np.random.default_rng(0).standard_normal(mesh.vertices.shape)
     spoilt = es.TriangleMesh(mesh.vertices + noise, mesh.faces[:, ::-1])
     recipe = wholes[0].recipe
-    assert patch_scores(es.describe_shape(spoilt, recipe), wholes).argmin() == 1
+    assert patch_scores(es.retrieval.describe_shape(spoilt, recipe), wholes).argmin() == 1

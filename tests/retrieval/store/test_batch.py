@@ -164,8 +164,8 @@ from describers import RECIPE, by_content
 import eigenshape as es
 
 index = es.ShapeIndex.open_or_create("index")
-items = [es.Item(name, Path(name)) for name in "abc"]
-print(es.build_index(index, items, by_content, recipes=(RECIPE,)))
+items = [es.retrieval.Item(name, Path(name)) for name in "abc"]
+print(es.retrieval.build_index(index, items, by_content, recipes=(RECIPE,)))
 """
 
 

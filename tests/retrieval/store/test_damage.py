@@ -12,7 +12,7 @@ import eigenshape as es
 
 HAND = es.make_creature("hand", 1, n_vertices=500)
 KINDS = ("hand", "octopus")
-PATCHES = es.PatchRecipe(es.made_codebook())
+PATCHES = es.retrieval.PatchRecipe(es.retrieval.made_codebook())
 
 
 @pytest.fixture(scope="module")
@@ -24,9 +24,9 @@ def sound(tmp_path_factory):
         index.add(name, [descriptor(seed)], label=label, source=f"/meshes/{seed}.ply", digest=64 * "d")
     for kind in KINDS:
         mesh = es.make_creature(kind, 1, n_vertices=500)
-        index.add(kind, es.describe_to_keep(mesh, PATCHES, n_views=0), label=kind)
+        index.add(kind, es.retrieval.describe_to_keep(mesh, PATCHES, n_views=0), label=kind)
     index.add("hand", [descriptor(99)], digest="new", replace=True)
-    index.add("hand", es.describe_to_keep(HAND, PATCHES, n_views=0), digest="new")
+    index.add("hand", es.retrieval.describe_to_keep(HAND, PATCHES, n_views=0), digest="new")
     with closing(sqlite3.connect(index.folder / "index.sqlite")) as reader:
         reader.execute("BEGIN")
         reader.execute("SELECT * FROM shape").fetchone()
@@ -36,7 +36,7 @@ def sound(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def hand():
-    return es.describe_shape(HAND, PATCHES)
+    return es.retrieval.describe_shape(HAND, PATCHES)
 
 
 def answers(folder, hand):

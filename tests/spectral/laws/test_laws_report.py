@@ -28,7 +28,7 @@ from eigenshape.spectral.laws import laplacian_laws, operator_laws
 from eigenshape.spectral.laws import transformations as changes
 from eigenshape.spectral.laws.laplacian_laws import check_laplacian
 from eigenshape.spectral.laws.operator_laws import check_operator
-from eigenshape.spectral.laws.report import USUAL, Law, NotJudged, OperatorReport, known_promises
+from eigenshape.spectral.laws.report import DEFAULT_PROMISES, Law, NotJudged, OperatorReport, known_promises
 
 
 def bumpy(mesh: TriangleMesh, size: float = 0.03, seed: int = 1) -> TriangleMesh:
@@ -38,7 +38,7 @@ def bumpy(mesh: TriangleMesh, size: float = 0.03, seed: int = 1) -> TriangleMesh
 
 SPHERE = bumpy(icosphere(2))
 PAIR = disjoint_union(bumpy(icosphere(1)), TriangleMesh(bumpy(torus(9, 6)).vertices + 5, torus(9, 6).faces))
-DEFINITE = (USUAL - {"constants"}) | {"definite"}
+DEFINITE = (DEFAULT_PROMISES - {"constants"}) | {"definite"}
 
 
 def broken(report: OperatorReport) -> set[str]:
@@ -89,7 +89,7 @@ def extra_entry(laplacian: Laplacian, i: int, j: int, value: float) -> Laplacian
 @pytest.mark.parametrize("mass", ["lumped", "consistent", "averaged"])
 @pytest.mark.parametrize("mesh", [SPHERE, PAIR, bumpy(grid(7, 5))], ids=["sphere", "two components", "sheet"])
 def test_the_cotangent_laplacian_keeps_every_law(mesh, mass):
-    report = check_operator(partial(cotangent_laplacian, mass=mass), mesh, promises=USUAL | {"volume"})
+    report = check_operator(partial(cotangent_laplacian, mass=mass), mesh, promises=DEFAULT_PROMISES | {"volume"})
     assert report.passed, report.explain()
     assert len(report.laws) == 16
     assert [law.name for law in report.not_judged] == ["definite", "nonnegative weights"]
@@ -149,7 +149,7 @@ def test_a_row_sum_is_found_at_its_row(mesh):
 
 def test_a_mass_off_by_a_hundredth_is_found():
     report = check_operator(
-        lambda mesh: with_mass(cotangent_laplacian(mesh), 1.01), SPHERE, promises=USUAL | {"volume"}
+        lambda mesh: with_mass(cotangent_laplacian(mesh), 1.01), SPHERE, promises=DEFAULT_PROMISES | {"volume"}
     )
     assert broken(report) == {"volume"}
     assert law(report, "volume").measured == pytest.approx(0.01)
@@ -176,7 +176,7 @@ def test_a_second_zero_is_found_though_the_graph_is_whole():
 
 def test_a_link_between_components_is_found_at_its_place():
     laplacian = cotangent_laplacian(PAIR)
-    report = check_laplacian(extra_entry(laplacian, 3, 60, 1e-3), PAIR, promises=USUAL | {"volume"})
+    report = check_laplacian(extra_entry(laplacian, 3, 60, 1e-3), PAIR, promises=DEFAULT_PROMISES | {"volume"})
     assert broken(report) == {"components"}
     assert "the shape has 2; entry (3, 60) of W joins two of them" in law(report, "components").says
     linked = laplacian.mass + sp.coo_array(([1e-3, 1e-3], ([3, 60], [60, 3])), shape=laplacian.mass.shape)
@@ -266,7 +266,9 @@ DEPENDENT = {
 @settings(deadline=None, max_examples=4)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_an_operator_that_depends_on_what_it_should_not_breaks_that_law_alone(name, seed):
-    promises = USUAL - {"rigid_motion"} if name == "union" else USUAL  # a box along the axes is not turned with it
+    promises = (
+        DEFAULT_PROMISES - {"rigid_motion"} if name == "union" else DEFAULT_PROMISES
+    )  # a box along the axes is not turned with it
     mesh = bumpy(icosphere(1 + seed % 2), 0.05, seed)
     report = check_operator(DEPENDENT[name], mesh, promises=promises, rng=np.random.default_rng(seed))
     assert broken(report) == {name}, report.explain()
@@ -334,7 +336,7 @@ def test_rows_may_be_anything_that_the_shape_has():
         upper = sp.coo_array((np.ones(ends.shape[1]), ends), shape=(mesh.n_faces,) * 2)
         return from_weights(upper + upper.T, sp.diags_array(face_areas(mesh)).tocsr())
 
-    report = check_operator(joined_faces, PAIR, promises=USUAL - {"scaling"})
+    report = check_operator(joined_faces, PAIR, promises=DEFAULT_PROMISES - {"scaling"})
     assert report.passed, report.explain()
     assert law(report, "components").says == "the shape has 2, and W has 2."
     assert "of the 20 lowest eigenvalues" in law(report, "point order").says
@@ -345,7 +347,9 @@ def test_what_drowns_in_rounding_is_not_judged():
     a, b, c = SPHERE.faces[7]
     middle = (points[a] + points[b]) / 2
     points[c] = middle + 1e-10 * (points[c] - middle)
-    report = check_operator(cotangent_laplacian, TriangleMesh(points, SPHERE.faces), promises=USUAL | {"volume"})
+    report = check_operator(
+        cotangent_laplacian, TriangleMesh(points, SPHERE.faces), promises=DEFAULT_PROMISES | {"volume"}
+    )
     assert report.passed, report.explain()
     silent = [law for law in report.not_judged if law.reason != "not promised"]
     assert {law.name for law in silent} == {"rigid motion", "union", "simplex order", "orientation", "reflection"}
@@ -414,7 +418,7 @@ def test_a_graph_has_no_place_and_a_cloud_no_simplices():
     assert {"rigid motion", "reflection", "orientation", "simplex order"} <= silent
     assert law(report, "components").measured == 0
     cloud = check_operator(
-        lambda cloud: complete(cloud.points), PointCloud(SPHERE.vertices), promises=USUAL | {"volume"}
+        lambda cloud: complete(cloud.points), PointCloud(SPHERE.vertices), promises=DEFAULT_PROMISES | {"volume"}
     )
     assert cloud.passed, cloud.explain()
     assert NotJudged("components", "no mesh or graph says what belongs together") in cloud.not_judged

@@ -17,7 +17,7 @@ from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.laplacian import ASYMMETRY, Laplacian
 from eigenshape.spectral.laws.comparison import sizes_of
 from eigenshape.spectral.laws.report import (
-    USUAL,
+    DEFAULT_PROMISES,
     Law,
     NotJudged,
     OperatorReport,
@@ -45,7 +45,7 @@ NUDGES = (1.0, 1.07, 0.93, 1.15)
 
 @one_blas_thread()
 def check_laplacian(
-    laplacian: Laplacian, shape: ShapeLike | sp.sparray | None = None, *, promises: Iterable[Promise] = USUAL
+    laplacian: Laplacian, shape: ShapeLike | sp.sparray | None = None, *, promises: Iterable[Promise] = DEFAULT_PROMISES
 ) -> OperatorReport:
     """Judge the laws that can be read off the two matrices.
 

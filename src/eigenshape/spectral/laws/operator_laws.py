@@ -25,7 +25,7 @@ from eigenshape.spectral.laws.comparison import (
 )
 from eigenshape.spectral.laws.laplacian_laws import check_laplacian
 from eigenshape.spectral.laws.report import (
-    USUAL,
+    DEFAULT_PROMISES,
     Law,
     NotJudged,
     OperatorReport,
@@ -86,7 +86,7 @@ def check_operator(
     build: Build,
     shape: ShapeLike | sp.sparray,
     *,
-    promises: Iterable[Promise] = USUAL,
+    promises: Iterable[Promise] = DEFAULT_PROMISES,
     by_points: bool | None = None,
     rng: np.random.Generator | None = None,
 ) -> OperatorReport:

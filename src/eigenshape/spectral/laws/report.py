@@ -20,7 +20,7 @@ Promise = Literal[
 ]
 
 # What every Laplace operator of a shape is expected to keep, whatever it was made from.
-USUAL: frozenset[Promise] = frozenset(
+DEFAULT_PROMISES: frozenset[Promise] = frozenset(
     ("constants", "components", "rigid_motion", "reflection", "orientation", "scaling", "union")
 )
 
