@@ -44,7 +44,14 @@ STEPS = {
     "igl_ready": "libigl, preparation",
     "igl": "ARAP, libigl",
 }
-COLUMNS = ("vertices, region", "modes", "free", *STEPS.values(), "MiB", "the thesis, then: 1 and 2; 3")
+COLUMNS = (
+    "vertices, region",
+    "modes",
+    "free",
+    *STEPS.values(),
+    "MiB",
+    "the thesis, then: 1 and 2; 3",
+)
 
 
 def region_of(mesh: es.TriangleMesh, name: str) -> np.ndarray:
@@ -53,11 +60,15 @@ def region_of(mesh: es.TriangleMesh, name: str) -> np.ndarray:
         return mesh.vertices[:, 2] < np.median(mesh.vertices[:, 2])
     height = np.ptp(mesh.vertices[:, 1])
     foot = int(np.argmin(mesh.vertices[:, 1] + 1e-3 * mesh.vertices[:, 2]))
-    return es.deformation.region_mask(mesh, es.deformation.BrushRegion(mesh.vertices[foot], 0.25 * height))
+    return es.deformation.region_mask(
+        mesh, es.deformation.BrushRegion(mesh.vertices[foot], 0.25 * height)
+    )
 
 
 def by_libigl(
-    binding: es.deformation.Binding, goal: np.ndarray, timed: Callable[[str, Callable[[], object]], object]
+    binding: es.deformation.Binding,
+    goal: np.ndarray,
+    timed: Callable[[str, Callable[[], object]], object],
 ) -> None:
     """Measure libigl's preparation and rounds."""
     mesh = binding.rig.mesh
@@ -105,7 +116,9 @@ def bent(saved: str, region: str) -> Row:
     return row | {"modes": int(binding.n_modes[0]), "free": free, "memory": peak_memory() - before}
 
 
-def measure(sizes: dict[tuple[int, int, str], tuple[str, int | None, int | None]], report: Report) -> None:
+def measure(
+    sizes: dict[tuple[int, int, str], tuple[str, int | None, int | None]], report: Report
+) -> None:
     """Measure shapes of several sizes."""
     for (base, splits, region), printed in sizes.items():
         mesh = surface(base, splits)
@@ -122,7 +135,14 @@ def cells(row: Row) -> list[str]:
     name, early, late = row["printed"]
     then = f"{early}; {late} ({name})" if name else ""
     times = [f"{row[step]:,.0f}" if row[step] >= 100 else f"{row[step]:.3g}" for step in STEPS]
-    return [row["what"], f"{row['modes']}", f"{100 * row['free']:.0f} %", *times, f"{row['memory']:.0f}", then]
+    return [
+        row["what"],
+        f"{row['modes']}",
+        f"{100 * row['free']:.0f} %",
+        *times,
+        f"{row['memory']:.0f}",
+        then,
+    ]
 
 
 def main() -> None:

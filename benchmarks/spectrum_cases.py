@@ -53,14 +53,22 @@ FULL = {
     "armadillo": real("armadillo", "classics/armadillo.obj"),
     "dragon": real("dragon", "classics/dragon.off"),
     "graph-sphere": Case(
-        "10 neighbours, sphere", lambda: np.array(es.shapes.fibonacci_sphere(10_000).vertices), 50, 10
+        "10 neighbours, sphere",
+        lambda: np.array(es.shapes.fibonacci_sphere(10_000).vertices),
+        50,
+        10,
     ),
     "graph-bunny": Case(
-        "10 neighbours, bunny", lambda: np.asarray(es.read_points(DATA / "points" / "bunny16k.pts").points), 50, 10
+        "10 neighbours, bunny",
+        lambda: np.asarray(es.read_points(DATA / "points" / "bunny16k.pts").points),
+        50,
+        10,
     ),
 }
 QUICK = {
     "sphere": Case("icosphere", lambda: es.icosphere(3), 30),
     "torus": Case("torus", lambda: es.shapes.torus(36, 24), 30),
-    "graph": Case("8 neighbours, sphere", lambda: np.array(es.shapes.fibonacci_sphere(800).vertices), 20, 8),
+    "graph": Case(
+        "8 neighbours, sphere", lambda: np.array(es.shapes.fibonacci_sphere(800).vertices), 20, 8
+    ),
 }

@@ -56,13 +56,23 @@ def measured(
     state = library.build(shape)
     built = time.process_time()
     values, vectors = library.solve(state, k)
-    took = {"cpu": time.process_time() - cpu, "wall": time.perf_counter() - wall, "cpu_build": built - cpu}
+    took = {
+        "cpu": time.process_time() - cpu,
+        "wall": time.perf_counter() - wall,
+        "cpu_build": built - cpu,
+    }
     peak = peak_memory()
     stiffness, mass = pencil(library, state)
     if values is None:  # vectors only: their Rayleigh quotients
-        values = (vectors * (stiffness @ vectors)).sum(axis=0) / (vectors * (mass @ vectors)).sum(axis=0)
+        values = (vectors * (stiffness @ vectors)).sum(axis=0) / (vectors * (mass @ vectors)).sum(
+            axis=0
+        )
     order = np.argsort(values)
-    return took | {"memory": peak - level, "memory_peak": peak}, (values[order], vectors[:, order]), (stiffness, mass)
+    return (
+        took | {"memory": peak - level, "memory_peak": peak},
+        (values[order], vectors[:, order]),
+        (stiffness, mass),
+    )
 
 
 def worst_residual(values: np.ndarray, vectors: np.ndarray, matrices: Matrices) -> float:

@@ -9,10 +9,13 @@ import eigenshape as es
 def inverse_length_laplacian(mesh: es.TriangleMesh) -> es.Laplacian:
     """Weigh each edge by one over its length, as somebody might who wants an operator of their own."""
     edges = es.geometry.edge_table(mesh).edges
-    half = sp.coo_array((1 / es.geometry.edge_lengths(mesh), edges.T), shape=(mesh.n_vertices,) * 2).tocsr()
+    half = sp.coo_array(
+        (1 / es.geometry.edge_lengths(mesh), edges.T), shape=(mesh.n_vertices,) * 2
+    ).tocsr()
     weights = half + half.T
     return es.Laplacian(
-        sp.diags_array(weights.sum(axis=1)) - weights, sp.diags_array(es.geometry.dual_volumes(mesh)).tocsr()
+        sp.diags_array(weights.sum(axis=1)) - weights,
+        sp.diags_array(es.geometry.dual_volumes(mesh)).tocsr(),
     )
 
 
@@ -25,7 +28,10 @@ def main() -> dict[str, np.ndarray]:
         "interval": es.shapes.interval(100),
         "points": es.PointCloud(sphere.vertices, dim=2),
     }
-    spectra = {name: es.solve_spectrum(es.build_laplacian(shape), 4).eigenvalues for name, shape in shapes.items()}
+    spectra = {
+        name: es.solve_spectrum(es.build_laplacian(shape), 4).eigenvalues
+        for name, shape in shapes.items()
+    }
     noisy = es.mesh_laplacian(sphere, correct="log", form="random-walk")
     spectra["sphere, by a kernel"] = es.solve_spectrum(noisy, 4).eigenvalues
 

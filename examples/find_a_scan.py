@@ -19,7 +19,11 @@ def main(folder: Path) -> list[es.retrieval.Match]:
     index = es.ShapeIndex.create(folder / "creatures")
     for kind in ("biped", "octopus", "fish"):
         for pose in range(2):
-            index.add(f"{kind}-{pose}", es.retrieval.describe_to_keep(es.make_creature(kind, pose), recipe), label=kind)
+            index.add(
+                f"{kind}-{pose}",
+                es.retrieval.describe_to_keep(es.make_creature(kind, pose), recipe),
+                label=kind,
+            )
 
     rng = np.random.default_rng(1)
     seen = es.partial_scan(es.make_creature("octopus", 7), rng).mesh
@@ -31,4 +35,6 @@ def main(folder: Path) -> list[es.retrieval.Match]:
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as temporary:
         for match in main(Path(temporary)):
-            print(f"{match.name:12} {match.score:8.3f}  {len(match.correspondences)} corresponding points")
+            print(
+                f"{match.name:12} {match.score:8.3f}  {len(match.correspondences)} corresponding points"
+            )

@@ -17,10 +17,14 @@ def main(folder: Path) -> dict[str, es.stability.StabilityReport]:
     """Compare a giraffe with a noisy one and with one that stands otherwise."""
     giraffe = es.make_creature("giraffe", 0, n_vertices=1500)
     heights = (
-        0.2 * es.geometry.mean_side_length(giraffe) * np.random.default_rng(0).standard_normal((giraffe.n_vertices, 1))
+        0.2
+        * es.geometry.mean_side_length(giraffe)
+        * np.random.default_rng(0).standard_normal((giraffe.n_vertices, 1))
     )
     others = {
-        "noisy": es.TriangleMesh(giraffe.vertices + heights * es.geometry.vertex_normals(giraffe), giraffe.faces),
+        "noisy": es.TriangleMesh(
+            giraffe.vertices + heights * es.geometry.vertex_normals(giraffe), giraffe.faces
+        ),
         "posed": es.make_creature("giraffe", 1, n_vertices=1500),
     }
     reports = {name: es.compare_shapes(giraffe, other, PLAN) for name, other in others.items()}

@@ -20,7 +20,9 @@ def main(folder: Path) -> list[es.retrieval.Match]:
             spectrum = es.solve_spectrum(es.cotangent_laplacian(mesh), k=300)
             heat = es.heat_kernel_signature(spectrum, [0.004 * es.geometry.surface_area(mesh)])
             parts = es.segment(es.merge_tree(mesh, heat[:, 0]), n_regions=15)
-            views = es.retrieval.describe_views(mesh)  # what single viewpoints see, so that a scan meets its like
+            views = es.retrieval.describe_views(
+                mesh
+            )  # what single viewpoints see, so that a scan meets its like
             index.add(f"{kind}-{pose}", [es.describe(spectrum, parts.features), *views], label=kind)
 
     scan = es.partial_scan(es.make_creature("octopus", 7), np.random.default_rng(1)).mesh
@@ -30,4 +32,6 @@ def main(folder: Path) -> list[es.retrieval.Match]:
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as temporary:
         for match in main(Path(temporary)):
-            print(f"{match.name:12} {match.score:8.3f}  {len(match.correspondences)} corresponding features")
+            print(
+                f"{match.name:12} {match.score:8.3f}  {len(match.correspondences)} corresponding features"
+            )

@@ -9,7 +9,9 @@ import numpy as np
 
 import eigenshape as es
 
-DATA = Path(os.environ.get("EIGENSHAPE_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+DATA = Path(
+    os.environ.get("EIGENSHAPE_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")
+)
 
 
 def manifest() -> list[dict[str, str]]:

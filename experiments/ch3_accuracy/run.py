@@ -32,7 +32,10 @@ LINEAR: dict[str, Build] = {
     "cotangent, consistent": lambda mesh: es.cotangent_laplacian(mesh, "consistent"),
     "cotangent, averaged": lambda mesh: es.cotangent_laplacian(mesh, "averaged"),
 }
-HIGHER: dict[str, Build] = {"P2": es.operators.fem_laplacian, "P3": lambda mesh: es.operators.fem_laplacian(mesh, 3)}
+HIGHER: dict[str, Build] = {
+    "P2": es.operators.fem_laplacian,
+    "P3": lambda mesh: es.operators.fem_laplacian(mesh, 3),
+}
 KERNELS: dict[str, Build] = {
     "mesh, literal": es.mesh_laplacian,
     "mesh, corrected": lambda mesh: es.mesh_laplacian(mesh, correct="log"),
@@ -43,11 +46,17 @@ SURFACES: dict[str, Build] = {
     "mesh, geodesic": lambda mesh: es.mesh_laplacian(mesh, correct="log", distance="geodesic"),
 }
 POINTS: dict[str, Build] = {
-    "point cloud": lambda mesh: es.point_cloud_laplacian(es.PointCloud(mesh.points, mesh.dim), correct="log"),
+    "point cloud": lambda mesh: es.point_cloud_laplacian(
+        es.PointCloud(mesh.points, mesh.dim), correct="log"
+    ),
 }
 CLOSED = LINEAR | {"P2": es.operators.fem_laplacian} | SURFACES | KERNELS | POINTS
 FLAT = LINEAR | HIGHER | {"mesh, corrected": KERNELS["mesh, corrected"]} | POINTS
-SOLID = LINEAR | {"P2": es.operators.fem_laplacian, "mesh, corrected": KERNELS["mesh, corrected"]} | POINTS
+SOLID = (
+    LINEAR
+    | {"P2": es.operators.fem_laplacian, "mesh, corrected": KERNELS["mesh, corrected"]}
+    | POINTS
+)
 
 
 def icosphere(n: int) -> es.TriangleMesh:
@@ -77,7 +86,10 @@ def square(n: int) -> es.TriangleMesh:
 
 
 Case = tuple[
-    Callable[[int], "es.TriangleMesh | es.SimplicialMesh"], Callable[[int], np.ndarray], dict[str, Build], bool
+    Callable[[int], "es.TriangleMesh | es.SimplicialMesh"],
+    Callable[[int], np.ndarray],
+    dict[str, Build],
+    bool,
 ]
 CASES: dict[str, Case] = {
     "sphere, Fibonacci": (es.shapes.fibonacci_sphere, es.shapes.sphere_eigenvalues, CLOSED, False),
@@ -102,17 +114,37 @@ CASES: dict[str, Case] = {
         LINEAR | KERNELS,
         False,
     ),
-    "interval": (lambda n: es.shapes.interval(n // 4), lambda k: es.shapes.box_eigenvalues(k, [1.0]), FLAT, False),
+    "interval": (
+        lambda n: es.shapes.interval(n // 4),
+        lambda k: es.shapes.box_eigenvalues(k, [1.0]),
+        FLAT,
+        False,
+    ),
     "square": (square, es.shapes.box_eigenvalues, FLAT | SURFACES, False),
-    "disc": (lambda n: es.shapes.disc(int((n / 3) ** 0.5)), es.shapes.disc_eigenvalues, FLAT | SURFACES, False),
+    "disc": (
+        lambda n: es.shapes.disc(int((n / 3) ** 0.5)),
+        es.shapes.disc_eigenvalues,
+        FLAT | SURFACES,
+        False,
+    ),
     "box": (
         lambda n: es.shapes.box(*[int((n / 4) ** (1 / 3))] * 3),
         lambda k: es.shapes.box_eigenvalues(k, (1, 1, 1)),
         SOLID,
         False,
     ),
-    "ball": (lambda n: es.shapes.ball(int((n / 4) ** (1 / 3))), es.shapes.ball_eigenvalues, SOLID, False),
-    "square, Dirichlet": (square, lambda k: es.shapes.box_eigenvalues(k, (1, 1), "dirichlet"), LINEAR | HIGHER, True),
+    "ball": (
+        lambda n: es.shapes.ball(int((n / 4) ** (1 / 3))),
+        es.shapes.ball_eigenvalues,
+        SOLID,
+        False,
+    ),
+    "square, Dirichlet": (
+        square,
+        lambda k: es.shapes.box_eigenvalues(k, (1, 1), "dirichlet"),
+        LINEAR | HIGHER,
+        True,
+    ),
     "disc, Dirichlet": (
         lambda n: es.shapes.disc(int((n / 3) ** 0.5)),
         lambda k: es.shapes.disc_eigenvalues(k, "dirichlet"),
@@ -135,7 +167,9 @@ CASES: dict[str, Case] = {
 ORDERS = {"P2": 2, "P3": 3}
 
 
-def solved(mesh: es.TriangleMesh | es.SimplicialMesh, name: str, build: Build, k: int, held: bool) -> dict[str, object]:
+def solved(
+    mesh: es.TriangleMesh | es.SimplicialMesh, name: str, build: Build, k: int, held: bool
+) -> dict[str, object]:
     """Build and solve, and return eigenvalues, size and seconds."""
     start = time.perf_counter()
     laplacian = build(mesh)
@@ -187,24 +221,33 @@ def markdown(table: dict[str, dict[str, dict]]) -> str:
     for case, rows in table.items():
         for name, row in rows.items():
             errors = " | ".join(f"{row[key][-1]:.2e}" for key in ("median", "worst"))
-            lines.append(f"| {case} | {name} | {row['n'][-1]} | {errors} | {row['order']:.2f} | {row['row']:.1f} |")
+            lines.append(
+                f"| {case} | {name} | {row['n'][-1]} | {errors} | {row['order']:.2f} | {row['row']:.1f} |"
+            )
     return "\n".join(lines) + "\n"
 
 
 def draw(path: Path, n: int) -> None:
     """Draw the error of 300 eigenvalues on the unit sphere, an operator a line, the copies of one as one."""
     mesh, exact = es.shapes.fibonacci_sphere(n), es.shapes.sphere_eigenvalues(300)
-    operators = {name: build for name, build in CLOSED.items() if name not in ("robust", "mesh, random-walk")}
+    operators = {
+        name: build for name, build in CLOSED.items() if name not in ("robust", "mesh, random-walk")
+    }
     figure = Figure(figsize=(9, 5.2), layout="constrained")
     axes = figure.subplots()
     colors = mpl.colormaps["tab10"].colors
-    for color, (name, build) in zip(colors, track(operators.items(), description="picture"), strict=False):
+    for color, (name, build) in zip(
+        colors, track(operators.items(), description="picture"), strict=False
+    ):
         values = solved(mesh, name, build, 300, held=False)["values"]
         squares = (values[1:] / exact[1:] - 1) ** 2
         degrees = np.floor(np.sqrt(np.arange(1, 300))).astype(int)
         errors = np.sqrt(np.bincount(degrees, squares)[1:] / np.bincount(degrees)[1:])
         axes.semilogy(np.arange(1, len(errors) + 1), errors, ".-", color=color, lw=1.4, label=name)
-    axes.set(xlabel="degree l of the eigenvalue l(l + 1), which comes 2l + 1 times", ylabel="relative error, RMS")
+    axes.set(
+        xlabel="degree l of the eigenvalue l(l + 1), which comes 2l + 1 times",
+        ylabel="relative error, RMS",
+    )
     axes.set_title(f"The unit sphere heard by {n} points")
     axes.set_ylim(1e-4, 1)
     axes.grid(alpha=0.3)

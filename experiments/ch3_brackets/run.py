@@ -48,7 +48,9 @@ def flat_torus(n: int) -> Case:
     i, j = np.divmod(np.arange(n * n), n)
     turns = 2 * np.pi / n * np.column_stack([i, j])
     points = np.column_stack([np.cos(turns), np.sin(turns)])
-    return Case(es.SimplicialMesh(points, es.shapes.torus(n, n).faces), period=2 * n * np.sin(np.pi / n))
+    return Case(
+        es.SimplicialMesh(points, es.shapes.torus(n, n).faces), period=2 * n * np.sin(np.pi / n)
+    )
 
 
 def skin(solid: es.SimplicialMesh) -> es.TriangleMesh:
@@ -104,7 +106,9 @@ def solved(mesh: Mesh, order: int, k: int, condition: str) -> np.ndarray:
     laplacian = es.operators.fem_laplacian(mesh, order)
     if condition == "neumann":
         return es.solve_spectrum(laplacian, k).eigenvalues
-    return es.spectral.solve_dirichlet(laplacian, k, es.operators.fem_boundary_nodes(mesh, order)).eigenvalues
+    return es.spectral.solve_dirichlet(
+        laplacian, k, es.operators.fem_boundary_nodes(mesh, order)
+    ).eigenvalues
 
 
 def truth(case: Case, k: int, condition: str) -> tuple[np.ndarray, np.ndarray]:
@@ -113,9 +117,13 @@ def truth(case: Case, k: int, condition: str) -> tuple[np.ndarray, np.ndarray]:
         return es.shapes.box_eigenvalues(k, case.sides, condition), np.zeros(k)
     if case.period:
         return es.shapes.flat_torus_eigenvalues(k, case.period * np.eye(2)), np.zeros(k)
-    if case.edge:  # a torus of twice the edge with opposite points made one, which keep every cosine
+    if (
+        case.edge
+    ):  # a torus of twice the edge with opposite points made one, which keep every cosine
         periods = case.edge * np.array([[2, 0], [1, 3**0.5]])
-        return es.shapes.flat_torus_eigenvalues(2 * k, periods)[np.r_[0, 1 : 2 * k - 1 : 2]], np.zeros(k)
+        return es.shapes.flat_torus_eigenvalues(2 * k, periods)[
+            np.r_[0, 1 : 2 * k - 1 : 2]
+        ], np.zeros(k)
     levels = case.refined - 1, case.refined
     coarse, fine = (solved(finer(case.mesh, level), 3, k, condition) for level in levels)
     return fine, np.abs(fine - coarse)
@@ -167,7 +175,9 @@ def markdown(table: dict[str, dict]) -> str:
         sure = f"{row['moved / width']:.1e}" if row["room / moved"] else "exact"
         wide = ", ".join(f"{row[key]:.3f}" for key in ("first", "median", "last"))
         orders = f"{row['order'][0]:.2f} to {row['order'][1]:.2f}" if row["order"] else "–"
-        lines.append(f"| {name} | {row['points']} | {row['held']} of {K} | {sure} | {wide} | {orders} |")
+        lines.append(
+            f"| {name} | {row['points']} | {row['held']} of {K} | {sure} | {wide} | {orders} |"
+        )
     return "\n".join(lines) + "\n"
 
 
@@ -181,9 +191,15 @@ def main() -> None:
     arguments = parser.parse_args()
     chosen = arguments.only or (QUICK if arguments.quick else None)
     cases = {name: case for name, case in (made() | real()).items() if not chosen or name in chosen}
-    open_ones = {name for name, case in cases.items() if es.geometry.facet_table(case.mesh).boundary.size}
+    open_ones = {
+        name for name, case in cases.items() if es.geometry.facet_table(case.mesh).boundary.size
+    }
     tasks = [(name, condition) for name in cases for condition in ("neumann", "dirichlet")]
-    tasks = [(name, condition) for name, condition in tasks if condition == "neumann" or name in open_ones]
+    tasks = [
+        (name, condition)
+        for name, condition in tasks
+        if condition == "neumann" or name in open_ones
+    ]
     table = {}
     for name, condition in track(tasks, description="shapes"):
         label = f"{name}, {condition.capitalize()}" if name in open_ones else name

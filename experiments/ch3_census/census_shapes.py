@@ -40,7 +40,9 @@ def octasphere(level: int) -> es.TriangleMesh:
     mesh = es.TriangleMesh(corners, np.array(faces))
     for _ in range(level):
         mesh = es.shapes.subdivide(mesh)
-        mesh = es.TriangleMesh(mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True), mesh.faces)
+        mesh = es.TriangleMesh(
+            mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True), mesh.faces
+        )
     return mesh
 
 
@@ -48,7 +50,9 @@ def cube_surface(level: int) -> es.TriangleMesh:
     """Subdivide the surface of the unit cube: its sides are the boundary of a box of one cell."""
     solid = es.shapes.box(1, 1, 1)
     sides = np.concatenate([np.delete(solid.simplices, corner, axis=1) for corner in range(4)])
-    _, first, counts = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)
+    _, first, counts = np.unique(
+        np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True
+    )
     mesh = es.TriangleMesh(solid.points, sides[first[counts == 1]])
     for _ in range(level):
         mesh = es.shapes.subdivide(mesh)
@@ -57,7 +61,10 @@ def cube_surface(level: int) -> es.TriangleMesh:
 
 def flat_torus(n_u: int, n_v: int) -> es.SimplicialMesh:
     """Return the product of two circles in R⁴ on a regular lattice."""
-    u, v = (2 * np.pi * place.ravel() / n for place, n in zip(np.indices((n_u, n_v)), (n_u, n_v), strict=True))
+    u, v = (
+        2 * np.pi * place.ravel() / n
+        for place, n in zip(np.indices((n_u, n_v)), (n_u, n_v), strict=True)
+    )
     points = np.column_stack([np.cos(u), np.sin(u), np.cos(v), np.sin(v)])
     return es.SimplicialMesh(points, es.shapes.torus(n_u, n_v).faces)
 
@@ -142,7 +149,9 @@ def cases(*, quick: bool) -> Iterator[Case]:
 
 
 def _families() -> dict[str, dict[str, Callable[[], Mesh]]]:
-    real = {path: lambda path=path: es.read_mesh(DATA / path) for path in REAL if (DATA / path).exists()}
+    real = {
+        path: lambda path=path: es.read_mesh(DATA / path) for path in REAL if (DATA / path).exists()
+    }
     return SHAPES | ({"real shapes": real} if real else {})
 
 
@@ -150,7 +159,13 @@ def _of_mesh(family: str, name: str, mesh: Mesh) -> Iterator[Case]:
     flat = mesh if isinstance(mesh, es.TriangleMesh) else None
     for mass in MASSES:
         same = flat if mass != "averaged" else None
-        yield Case(family, f"{name}, {mass}", es.cotangent_laplacian(mesh, mass), same, mass if same else "")
+        yield Case(
+            family,
+            f"{name}, {mass}",
+            es.cotangent_laplacian(mesh, mass),
+            same,
+            mass if same else "",
+        )
     if flat is not None:
         yield Case(family, f"{name}, robust", es.robust_laplacian(flat))
     yield Case(family, f"{name}, graph", es.operators.graph_laplacian(mesh))

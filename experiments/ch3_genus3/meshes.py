@@ -35,7 +35,9 @@ def denser(mesh: es.TriangleMesh, chosen: np.ndarray) -> es.TriangleMesh:
 
 def pieces(face: list[int], middles: list[int]) -> list[tuple[int, int, int]]:
     """Cut a face at the middles that it has; `middles[i]` lies across from corner i, -1 where its edge stays whole."""
-    while sum(middle >= 0 for middle in middles) in (1, 2) and not (middles[0] >= 0 and middles[1] < 0):
+    while sum(middle >= 0 for middle in middles) in (1, 2) and not (
+        middles[0] >= 0 and middles[1] < 0
+    ):
         face, middles = face[1:] + face[:1], middles[1:] + middles[:1]
     (a, b, c), (at_a, at_b, at_c) = face, middles
     if at_a < 0:
@@ -95,7 +97,9 @@ def coarser(mesh: es.TriangleMesh, n_vertices: int) -> es.TriangleMesh:
 
 def squared_length(points: np.ndarray, one: int, other: int) -> int:
     """Return the squared length of an edge between points of whole numbers, exactly."""
-    return sum((a - b) ** 2 for a, b in zip(points[one].tolist(), points[other].tolist(), strict=True))
+    return sum(
+        (a - b) ** 2 for a, b in zip(points[one].tolist(), points[other].tolist(), strict=True)
+    )
 
 
 def neighbors(faces: dict[int, tuple[int, ...]], rings: list[set[int]], vertex: int) -> set[int]:
@@ -119,7 +123,10 @@ def may_collapse(
     before = points[around]
     after = np.where(np.isin(around, edge)[..., None], middle, before)
     # whole numbers of Python: products of four coordinates and more do not fit into 64 bits
-    one, two = (np.cross(each[:, 1] - each[:, 0], each[:, 2] - each[:, 0]).astype(object) for each in (before, after))
+    one, two = (
+        np.cross(each[:, 1] - each[:, 0], each[:, 2] - each[:, 0]).astype(object)
+        for each in (before, after)
+    )
     product = (one * two).sum(axis=1)
     squares = (one * one).sum(axis=1) * (two * two).sum(axis=1)
     # the cosine of the turn, product / √squares, lies above that of 60 degrees, 1/2

@@ -93,7 +93,9 @@ def moved_points(setup: dict) -> list[dict[str, float]]:
 def matched_samples(setup: dict) -> list[dict[str, float]]:
     """Compare independent samples, as Theorem 4.1.1 has them: δ is what the best one-to-one correspondence leaves."""
     mesh, t, rows = torus_of_area_one(96, 48), setup["times"][-1], []
-    for n, seed in track(list(product(setup["samples"], range(setup["seeds"]))), description="samples matched"):
+    for n, seed in track(
+        list(product(setup["samples"], range(setup["seeds"]))), description="samples matched"
+    ):
         rng = np.random.default_rng(seed)
         one, two = (es.geometry.sample_surface(mesh, n, rng=rng).points for _ in range(2))
         delta = es.stability.bottleneck_matching(one, two).distance
@@ -108,7 +110,9 @@ def waved(mesh: es.TriangleMesh, height: float) -> es.TriangleMesh:
     """Move a surface along its normals by a smooth function of size `height`."""
     x, y, z = (4 * np.pi * mesh.vertices).T
     waves = np.sin(x) * np.cos(y) + np.sin(z + x) ** 2
-    return es.TriangleMesh(mesh.vertices + height / 2 * waves[:, None] * es.geometry.vertex_normals(mesh), mesh.faces)
+    return es.TriangleMesh(
+        mesh.vertices + height / 2 * waves[:, None] * es.geometry.vertex_normals(mesh), mesh.faces
+    )
 
 
 def moved_surfaces(setup: dict) -> list[dict[str, object]]:
@@ -146,7 +150,9 @@ def summarise(points: list[dict], samples: list[dict], surfaces: list[dict]) -> 
     """Gather exponents and constants beside those that are proven."""
     allowed = [row for row in points if row["t"] >= SHORT * row["delta"] ** 2]
     forbidden = [row for row in points if row["t"] <= row["delta"] ** 2 / SHORT]
-    law, ours, dense = (es.stability.theorem_rate(name, DIM) for name in ("4.3.1", "lipschitz", "dense"))
+    law, ours, dense = (
+        es.stability.theorem_rate(name, DIM) for name in ("4.3.1", "lipschitz", "dense")
+    )
     told = columns(points, "delta", "t", "change")
     at_samples = columns(samples, "delta", "t")
     return {
@@ -158,16 +164,24 @@ def summarise(points: list[dict], samples: list[dict], surfaces: list[dict]) -> 
             law, *columns(allowed, "delta", "t", "change")
         ).constant,
         "largest share of our bound": float((told[2] / ours.at(*told[:2])).max()),
-        "largest share of our bound for dense samples": float((told[2] / dense.at(*told[:2])).max()),
+        "largest share of our bound for dense samples": float(
+            (told[2] / dense.at(*told[:2])).max()
+        ),
         "largest share of Weyl's norm": float(np.max(told[2] / columns(points, "weyl")[0])),
         "lowest ten, relative, t ≥ 4δ²": float(np.mean(columns(allowed, "lowest")[0])),
         "lowest ten, relative, t ≤ δ²/4": float(np.mean(columns(forbidden, "lowest")[0])),
         "samples": {
-            str(n): _sample_row([row for row in samples if row["n"] == n]) for n in {r["n"]: 0 for r in samples}
+            str(n): _sample_row([row for row in samples if row["n"] == n])
+            for n in {r["n"]: 0 for r in samples}
         },
-        "samples, largest share of our bound": float(np.max(columns(samples, "change")[0] / ours.at(*at_samples))),
+        "samples, largest share of our bound": float(
+            np.max(columns(samples, "change")[0] / ours.at(*at_samples))
+        ),
         "functional": functional_errors(),
-        "surfaces": {name: _surface_row([row for row in surfaces if row["operator"] == name]) for name in OPERATORS},
+        "surfaces": {
+            name: _surface_row([row for row in surfaces if row["operator"] == name])
+            for name in OPERATORS
+        },
     }
 
 
@@ -195,7 +209,12 @@ def functional_errors() -> dict[str, float]:
     """Fit how far the first eigenvalues of 𝓛_t on the unit sphere are from those of Δ, where theorem 3.1.1 holds."""
     exact = es.shapes.sphere_eigenvalues(N_FUNCTIONAL)
     times = np.geomspace(1e-6, 1 / (2 * exact[-1]), 20)
-    errors = np.array([np.abs(es.shapes.sphere_functional_eigenvalues(N_FUNCTIONAL, t) - exact).max() for t in times])
+    errors = np.array(
+        [
+            np.abs(es.shapes.sphere_functional_eigenvalues(N_FUNCTIONAL, t) - exact).max()
+            for t in times
+        ]
+    )
     ones = np.ones(len(times))
     proven = es.stability.theorem_rate("3.1.1", DIM)
     return {
@@ -214,7 +233,10 @@ def markdown(results: dict) -> dict[str, str]:
         "our bound for dense samples": "expected (dense)",
     }
     points = ["| largest change | power of δ | power of t |", "|---|---|---|"]
-    points += [f"| {name} | {results[key]['delta']:.2f} | {results[key]['t']:.2f} |" for name, key in laws.items()]
+    points += [
+        f"| {name} | {results[key]['delta']:.2f} | {results[key]['t']:.2f} |"
+        for name, key in laws.items()
+    ]
     samples = ["| points | δ | largest change | of eigenvalues 1 to 10 |", "|---|---|---|---|"]
     for n, row in results["samples"].items():
         samples.append(f"| {n} | {row['delta']:.3f} | {row['change']:.2f} | {row['lowest']:.2f} |")
@@ -225,8 +247,13 @@ def markdown(results: dict) -> dict[str, str]:
     for name, row in results["surfaces"].items():
         *powers, constant, most = row.values()
         told = f"{constant:.1e} (theorem {list(row)[4].split()[-1]})"
-        surfaces.append(f"| {name} | " + " | ".join(f"{x:.2f}" for x in powers) + f" | {told} | {most:.3f} |")
-    return {name: "\n".join(rows) for name, rows in (("points", points), ("samples", samples), ("surfaces", surfaces))}
+        surfaces.append(
+            f"| {name} | " + " | ".join(f"{x:.2f}" for x in powers) + f" | {told} | {most:.3f} |"
+        )
+    return {
+        name: "\n".join(rows)
+        for name, rows in (("points", points), ("samples", samples), ("surfaces", surfaces))
+    }
 
 
 def main() -> None:

@@ -46,16 +46,25 @@ def main() -> None:
     arguments = parse_arguments(__doc__, FOLDER)
     radii = RADII[::3] if arguments.quick else RADII
     surgeries = bridged_tori(radii)
-    runs = sample_all(surgeries, QUICK if arguments.quick else RUNS, 100 if arguments.quick else 300)
+    runs = sample_all(
+        surgeries, QUICK if arguments.quick else RUNS, 100 if arguments.quick else 300
+    )
     meshes = {} if arguments.quick else mesh_spectra({name: surgeries[name] for name in MESHED})
     results = {
-        "surfaces": {name: soundness(surgery, close=not arguments.quick) for name, surgery in surgeries.items()},
+        "surfaces": {
+            name: soundness(surgery, close=not arguments.quick)
+            for name, surgery in surgeries.items()
+        },
         "samples": {name: run["changes"] for name, run in runs.items()},
         "meshes": mesh_changes(meshes),
     }
     pictures = {
-        "variants": figure_variants(surgeries, "Two tori (M) and bridges of radius r; the diameter of M is 1"),
-        "changes": figure_changes(runs, radii, "radius of the bridge (diameter of M: 1)", shown=next(iter(runs))),
+        "variants": figure_variants(
+            surgeries, "Two tori (M) and bridges of radius r; the diameter of M is 1"
+        ),
+        "changes": figure_changes(
+            runs, radii, "radius of the bridge (diameter of M: 1)", shown=next(iter(runs))
+        ),
     }
     if meshes:
         pictures["meshes"] = figure_meshes(meshes, ("cotangent", "mesh, corrected"))

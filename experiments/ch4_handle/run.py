@@ -51,20 +51,27 @@ def main() -> None:
     arguments = parse_arguments(__doc__, FOLDER)
     sizes = SIZES[3:] if arguments.quick else SIZES
     surgeries = attached_tori(sizes, coarser=2 if arguments.quick else 1)
-    runs = sample_all(surgeries, QUICK if arguments.quick else RUNS, 100 if arguments.quick else 300)
+    runs = sample_all(
+        surgeries, QUICK if arguments.quick else RUNS, 100 if arguments.quick else 300
+    )
     meshes = {}
     if not arguments.quick:
         meshes = mesh_spectra({name: surgeries[name] for name in MESHED}, kernel=False)
     results = {
         "surfaces": {
-            name: soundness(surgery, close=not arguments.quick, widen=False) for name, surgery in surgeries.items()
+            name: soundness(surgery, close=not arguments.quick, widen=False)
+            for name, surgery in surgeries.items()
         },
         "samples": {name: run["changes"] for name, run in runs.items()},
         "meshes": mesh_changes(meshes),
     }
     pictures = {
-        "variants": figure_variants(surgeries, "A torus (M, diameter 1) and another of s times its size, attached"),
-        "changes": figure_changes(runs, sizes, "size s of the attached torus", shown=next(iter(runs))),
+        "variants": figure_variants(
+            surgeries, "A torus (M, diameter 1) and another of s times its size, attached"
+        ),
+        "changes": figure_changes(
+            runs, sizes, "size s of the attached torus", shown=next(iter(runs))
+        ),
     }
     if meshes:
         pictures["meshes"] = figure_meshes(meshes, ("cotangent",))

@@ -37,7 +37,8 @@ def throw(
     streams = np.random.default_rng([n, seed]).spawn(3)
     shapes = (pair.one, pair.two, pair.one)
     one, two, again = (
-        es.geometry.sample_surface(shape, n, rng=rng) for shape, rng in zip(shapes, streams, strict=True)
+        es.geometry.sample_surface(shape, n, rng=rng)
+        for shape, rng in zip(shapes, streams, strict=True)
     )
     return one, two, again
 
@@ -55,7 +56,9 @@ def least_reach(
 
     def suffices(reach: float) -> bool:
         # Reach is all that counts of δ and ρ once nodes are chosen.
-        graph = es.stability.correspondence_graph(pair, *points, nodes=nodes, delta=reach / 2, rho=1.0)
+        graph = es.stability.correspondence_graph(
+            pair, *points, nodes=nodes, delta=reach / 2, rho=1.0
+        )
         return es.stability.maximum_matching(graph).is_perfect
 
     low, high = ends
@@ -66,7 +69,10 @@ def least_reach(
 
 
 def measure(
-    pair: es.stability.Perturbation, nodes: dict[float, es.stability.AnchorNodes], n: int, plan: Namespace
+    pair: es.stability.Perturbation,
+    nodes: dict[float, es.stability.AnchorNodes],
+    n: int,
+    plan: Namespace,
 ) -> dict[str, object]:
     """Return bottleneck distances of samples, and the least reach for each δ: of fewer where that is dear."""
     closeness = es.stability.measure_closeness(pair)
@@ -106,15 +112,22 @@ def rates(rows: dict[int, dict[str, object]]) -> dict[str, object]:
     fits = {}
     for name, power in laws.items():
         constants = medians * np.sqrt(counts) / np.log(counts) ** power
-        fits[name] = {"constant": float(np.median(constants)), "unequal": float(constants.max() / constants.min() - 1)}
+        fits[name] = {
+            "constant": float(np.median(constants)),
+            "unequal": float(constants.max() / constants.min() - 1),
+        }
     fits["slope"] = float(np.polyfit(np.log(counts), np.log(medians), 1)[0])
     return fits
 
 
-def check(pair: es.stability.Perturbation, nodes: es.stability.AnchorNodes, delta: float, n: int) -> dict[str, float]:
+def check(
+    pair: es.stability.Perturbation, nodes: es.stability.AnchorNodes, delta: float, n: int
+) -> dict[str, float]:
     """Build the theorem's graph once, match it, and return the longest edge and move over δ."""
     one, two, _ = throw(pair, n, 0)
-    graph = es.stability.correspondence_graph(pair, one, two, nodes=nodes.points, delta=delta, rho=RHO)
+    graph = es.stability.correspondence_graph(
+        pair, one, two, nodes=nodes.points, delta=delta, rho=RHO
+    )
     found, ends = es.stability.maximum_matching(graph), graph.tocoo()
     edges = np.linalg.norm(one.points[ends.row] - two.points[ends.col], axis=1)
     moves = np.linalg.norm(one.points - two.points[found.partners], axis=1)
@@ -138,7 +151,10 @@ def run(plan: Namespace) -> tuple[dict[str, object], es.stability.Perturbation]:
         "decided by": closeness.limited_by,
         "genus": 1 - es.geometry.euler_characteristic(pair.two) // 2,
         "ρ": RHO,
-        "nodes": {delta: {"number": len(some.vertices), "cover": some.cover} for delta, some in nodes.items()},
+        "nodes": {
+            delta: {"number": len(some.vertices), "cover": some.cover}
+            for delta, some in nodes.items()
+        },
         "points": rows,
         "rate": rates(rows),
         "the graph itself": check(pair, nodes[plan.shown[0]], *plan.shown),
@@ -158,9 +174,19 @@ def draw_probability(results: dict[str, object]) -> Figure:
     counts = list(rows)
     for color, delta in zip(COLORS, results["nodes"], strict=False):
         cells = [rows[n][f"δ = {delta}"] for n in counts]
-        left.semilogx(counts, [cell["probability"] for cell in cells], "o-", color=color, label=f"δ = {delta}")
-        right.loglog(counts, [cell["least reach / δ"] for cell in cells], "o-", color=color, label=f"δ = {delta}")
-    right.axhline(RHO + 1, color="black", linestyle="--", label=f"the theorem's reach, ρ + 1 = {RHO + 1:.2f}")
+        left.semilogx(
+            counts, [cell["probability"] for cell in cells], "o-", color=color, label=f"δ = {delta}"
+        )
+        right.loglog(
+            counts,
+            [cell["least reach / δ"] for cell in cells],
+            "o-",
+            color=color,
+            label=f"δ = {delta}",
+        )
+    right.axhline(
+        RHO + 1, color="black", linestyle="--", label=f"the theorem's reach, ρ + 1 = {RHO + 1:.2f}"
+    )
     left.set_ylim(-0.03, 1.03)
     samples = [row["searches"] for row in rows.values()]
     for panel in (left, right):
@@ -187,10 +213,15 @@ def draw_bottleneck(results: dict[str, object]) -> Figure:
         axes.fill_between(counts, low, high, color=color, alpha=0.15, label="5 to 95 % of samples")
     fit = results["rate"][LAW]["constant"]
     axes.loglog(
-        counts, fit * np.log(counts) ** 0.75 / np.sqrt(counts), "k:", label=f"{fit:.2f} · {LAW} (Leighton, Shor)"
+        counts,
+        fit * np.log(counts) ** 0.75 / np.sqrt(counts),
+        "k:",
+        label=f"{fit:.2f} · {LAW} (Leighton, Shor)",
     )
     for color, delta in zip(COLORS[2:], results["nodes"], strict=False):
-        axes.axhline((RHO + 3) * delta, color=color, linestyle="--", label=f"(ρ + 3) δ for δ = {delta}")
+        axes.axhline(
+            (RHO + 3) * delta, color=color, linestyle="--", label=f"(ρ + 3) δ for δ = {delta}"
+        )
     plain_ticks(axes, list(results["points"]))
     axes.set_yticks([0.02, 0.05, 0.1, 0.2, 0.5], ["0.02", "0.05", "0.1", "0.2", "0.5"])
     axes.minorticks_off()
@@ -208,7 +239,8 @@ def region_of(mesh: es.TriangleMesh, labels: np.ndarray) -> es.TriangleMesh:
     across = np.cross(up, [1.0, 0.0, 0.0])
     across /= np.linalg.norm(across)
     return es.TriangleMesh(
-        (points - center) @ np.column_stack([np.cross(across, up), across, up]), numbers.reshape(-1, 3)
+        (points - center) @ np.column_stack([np.cross(across, up), across, up]),
+        numbers.reshape(-1, 3),
     )
 
 
@@ -229,12 +261,21 @@ def draw_shapes(pair: es.stability.Perturbation) -> Figure:
         )
     ):
         axes = figure.add_subplot(1, 3, place + 1, projection="3d", computed_zorder=False)
-        near = np.linalg.norm((mesh.vertices - middle)[mesh.faces].mean(axis=1)[:, :2], axis=1) <= reach
+        near = (
+            np.linalg.norm((mesh.vertices - middle)[mesh.faces].mean(axis=1)[:, :2], axis=1)
+            <= reach
+        )
         axes.plot_trisurf(
-            *mesh.vertices.T, triangles=mesh.faces[near], color="#9ecae1", edgecolor="#1f4e79", linewidth=0.2
+            *mesh.vertices.T,
+            triangles=mesh.faces[near],
+            color="#9ecae1",
+            edgecolor="#1f4e79",
+            linewidth=0.2,
         )
         axes.set_box_aspect((1, 1, 0.45), zoom=1.35)
-        axes.set(xlim=middle[0] + np.array([-reach, reach]), ylim=middle[1] + np.array([-reach, reach]))
+        axes.set(
+            xlim=middle[0] + np.array([-reach, reach]), ylim=middle[1] + np.array([-reach, reach])
+        )
         axes.set_zlim(middle[2] + 0.45 * np.array([-reach, reach]))
         axes.view_init(elev=32, azim=side + 20)
         axes.set_axis_off()

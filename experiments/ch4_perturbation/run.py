@@ -35,10 +35,14 @@ def giraffe() -> es.TriangleMesh:
 def shaken(mesh: es.TriangleMesh, noise: tuple[float, ...]) -> dict[str, es.TriangleMesh]:
     """Move the vertices of a mesh by one draw of noise of each size."""
     draw = np.random.default_rng(0).standard_normal(mesh.vertices.shape)
-    return {f"ε = {size:g}": es.TriangleMesh(mesh.vertices + size * draw, mesh.faces) for size in noise}
+    return {
+        f"ε = {size:g}": es.TriangleMesh(mesh.vertices + size * draw, mesh.faces) for size in noise
+    }
 
 
-def measure(mesh: es.TriangleMesh, t: float, n: int, k: int, seeds: int, noise: tuple[float, ...]) -> dict:
+def measure(
+    mesh: es.TriangleMesh, t: float, n: int, k: int, seeds: int, noise: tuple[float, ...]
+) -> dict:
     """Measure how the spectra of points change when they are moved by noise of each size; one draw a seed."""
     volume = es.geometry.surface_area(mesh)
     rows: dict[str, list[dict[str, float]]] = {f"ε = {size:g}": [] for size in noise}
@@ -63,7 +67,10 @@ def growth(measured: dict, noise: tuple[float, ...]) -> dict[str, float]:
     """Fit the power of δ with which changes grow, over the four smallest noises."""
     rows = [measured[f"ε = {size:g}"] for size in noise][:4]
     log_delta = np.log([row["δ"]["mean"] for row in rows])
-    return {key: np.polyfit(log_delta, np.log([row[key]["mean"] for row in rows]), 1)[0] for key in ("largest", "mean")}
+    return {
+        key: np.polyfit(log_delta, np.log([row[key]["mean"] for row in rows]), 1)[0]
+        for key in ("largest", "mean")
+    }
 
 
 def main() -> None:
@@ -87,7 +94,11 @@ def main() -> None:
     pictures = {
         "variants": es.plot.figure_poses(poses, camera=es.plot.three_quarter_view(mesh, size=300)),
         "changes": figure_changes(
-            runs, noise, "ε, standard deviation of the noise (diameter: 1)", shown=next(iter(runs)), log=(True, True)
+            runs,
+            noise,
+            "ε, standard deviation of the noise (diameter: 1)",
+            shown=next(iter(runs)),
+            log=(True, True),
         ),
     }
     if meshes:

@@ -81,7 +81,9 @@ def half_of(everything: Sequence[Shape], half: str) -> list[Shape]:
     for label in sorted({shape.label for shape in everything}):
         names = sorted({shape.identity for shape in everything if shape.label == label})
         in_class = Counter[str]()
-        for name in sorted((names[place] for place in rng.permutation(len(names))), key=lambda name: -sizes[name]):
+        for name in sorted(
+            (names[place] for place in rng.permutation(len(names))), key=lambda name: -sizes[name]
+        ):
             side[name] = min(HALVES, key=lambda half: (in_class[half], total[half]))
             in_class[side[name]] += sizes[name]
             total[side[name]] += sizes[name]
@@ -151,14 +153,18 @@ def incomplete(whole: es.TriangleMesh, rng: np.random.Generator) -> es.TriangleM
     """Cut by one to three planes until the largest piece has a share of the area within `KEPT`."""
     area = es.geometry.surface_area(whole)
     for _ in range(TRIALS):
-        planes = es.scans.random_planes(whole, rng, n_planes=int(rng.integers(1, 4)), share=rng.uniform(0.05, 0.4))
+        planes = es.scans.random_planes(
+            whole, rng, n_planes=int(rng.integers(1, 4)), share=rng.uniform(0.05, 0.4)
+        )
         try:
             piece = es.geometry.largest_component(es.scans.cut_by_planes(whole, planes).mesh).mesh
         except es.InvalidShapeError:
             continue
         if KEPT[0] <= es.geometry.surface_area(piece) / area <= KEPT[1]:
             return piece
-    raise es.InvalidShapeError(f"An incomplete version must keep {KEPT} of the area; {TRIALS} trials left none such.")
+    raise es.InvalidShapeError(
+        f"An incomplete version must keep {KEPT} of the area; {TRIALS} trials left none such."
+    )
 
 
 def rotation(rng: np.random.Generator) -> np.ndarray:

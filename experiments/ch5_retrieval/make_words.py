@@ -14,7 +14,14 @@ import eigenshape as es
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from outputs import output_file
 
-PLACE = Path(__file__).resolve().parents[2] / "src" / "eigenshape" / "retrieval" / "patches" / "made_words.npz"
+PLACE = (
+    Path(__file__).resolve().parents[2]
+    / "src"
+    / "eigenshape"
+    / "retrieval"
+    / "patches"
+    / "made_words.npz"
+)
 INDIVIDUALS, SIZES, VIEWS = 6, (2000, 5000), 3
 
 
@@ -22,7 +29,10 @@ def lesson(what: tuple[str, int]) -> list[es.retrieval.Patches]:
     """Return the patches of one creature, in a pose of its own, and of views of it."""
     kind, number = what
     mesh = es.make_creature(kind, number, individual=number, n_vertices=SIZES[number % len(SIZES)])
-    return [es.retrieval.describe_patches(mesh), *es.retrieval.describe_patch_views(mesh, n_views=VIEWS)]
+    return [
+        es.retrieval.describe_patches(mesh),
+        *es.retrieval.describe_patch_views(mesh, n_views=VIEWS),
+    ]
 
 
 def main() -> None:

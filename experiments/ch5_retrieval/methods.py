@@ -36,7 +36,9 @@ class Trainable(Protocol):
 @lru_cache(maxsize=1)  # methods that share a spectrum describe one shape after the other
 def cotangent_spectrum(mesh: es.TriangleMesh) -> es.Spectrum:
     """Return the eigenpairs that the thesis' recipe takes, of the mesh as the draw has scaled it."""
-    return es.solve_spectrum(es.cotangent_laplacian(mesh), min(es.retrieval.THESIS.n_modes, mesh.n_vertices))
+    return es.solve_spectrum(
+        es.cotangent_laplacian(mesh), min(es.retrieval.THESIS.n_modes, mesh.n_vertices)
+    )
 
 
 def kernel_spectrum(mesh: es.TriangleMesh) -> es.Spectrum:
@@ -47,7 +49,9 @@ def kernel_spectrum(mesh: es.TriangleMesh) -> es.Spectrum:
 
 def early_heat(mesh: es.TriangleMesh, spectrum: es.Spectrum) -> np.ndarray:
     """Return the heat whose maxima the thesis takes: at 5 τ."""
-    return es.heat_kernel_signature(spectrum, [es.retrieval.THESIS.feature_scale * es.retrieval.THESIS.time_unit])[:, 0]
+    return es.heat_kernel_signature(
+        spectrum, [es.retrieval.THESIS.feature_scale * es.retrieval.THESIS.time_unit]
+    )[:, 0]
 
 
 def average_distance(mesh: es.TriangleMesh, spectrum: es.Spectrum) -> np.ndarray:
@@ -80,7 +84,9 @@ class ThesisRecipe:
         spectrum = globals()[self.spectrum](mesh)
         tree = es.merge_tree(mesh, globals()[self.function](mesh, spectrum))
         return es.describe(
-            spectrum, es.segment(tree, n_regions=es.retrieval.THESIS.n_features).features, es.retrieval.THESIS
+            spectrum,
+            es.segment(tree, n_regions=es.retrieval.THESIS.n_features).features,
+            es.retrieval.THESIS,
         )
 
     def distances(
@@ -122,7 +128,9 @@ class Global:
 
     def distances(self, query: Any, described: Sequence[Any]) -> np.ndarray:
         """Return its distances."""
-        distance: Callable[[Any], float] = partial(getattr(es.retrieval.baselines, self.measure), query)
+        distance: Callable[[Any], float] = partial(
+            getattr(es.retrieval.baselines, self.measure), query
+        )
         return np.array([distance(other) for other in described])
 
 
@@ -142,7 +150,11 @@ class Patches:
         """Learn words, or take those that come with the library."""
         if self.teachers == "made creatures":
             return replace(self, recipe=es.retrieval.PatchRecipe(es.retrieval.made_codebook()))
-        lessons = [patches for mesh in meshes for patches in es.retrieval.seen_patches(mesh, n_views=TEACHING_VIEWS)]
+        lessons = [
+            patches
+            for mesh in meshes
+            for patches in es.retrieval.seen_patches(mesh, n_views=TEACHING_VIEWS)
+        ]
         return replace(self, recipe=es.retrieval.PatchRecipe(es.retrieval.train_codebook(lessons)))
 
     def describe(self, mesh: es.TriangleMesh) -> Any:

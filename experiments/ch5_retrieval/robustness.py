@@ -68,7 +68,10 @@ def measure(found: dict[str, dict[str, list[Outcome]]]) -> dict[str, Any]:
     """Return rates and losses by change and cure; what is lost is counted from clean queries as they are."""
     clean = found[CLEAN]["as it is"]
     return {
-        change: {cure: {**rates(each)[GROUP], "loss": loss(each, clean, change)} for cure, each in row.items()}
+        change: {
+            cure: {**rates(each)[GROUP], "loss": loss(each, clean, change)}
+            for cure, each in row.items()
+        }
         for change, row in found.items()
     }
 
@@ -78,7 +81,10 @@ def table(results: dict[str, Any]) -> str:
     lines = ["| query | " + " | ".join(CURES) + " |", "|" + "---|" * (len(CURES) + 1)]
     return "\n".join(
         lines
-        + [f"| {change} | " + " | ".join(cell(row[cure]) for cure in CURES) + " |" for change, row in results.items()]
+        + [
+            f"| {change} | " + " | ".join(cell(row[cure]) for cure in CURES) + " |"
+            for change, row in results.items()
+        ]
     )
 
 
@@ -92,12 +98,16 @@ def cell(measures: dict[str, list[float]]) -> str:
 def arguments() -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help=f"classes {', '.join(QUICK_CLASSES)}, one draw")
+    parser.add_argument(
+        "--quick", action="store_true", help=f"classes {', '.join(QUICK_CLASSES)}, one draw"
+    )
     parser.add_argument("--half", choices=HALVES, default="reporting")
     parser.add_argument("--draws", type=int, nargs="*", default=SEEDS, help="seeds of the draws")
     parser.add_argument("--changes", nargs="*", choices=CHANGES, help="all; quickly, three")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--cache", type=output_folder, default="ch5-descriptors", help="folder of descriptors, kept")
+    parser.add_argument(
+        "--cache", type=output_folder, default="ch5-descriptors", help="folder of descriptors, kept"
+    )
     parser.add_argument("--out", type=output_file, default="ch5-robustness.json")
     chosen = parser.parse_args()
     if chosen.changes is None:
@@ -126,7 +136,9 @@ def main() -> None:
     found = {
         change: {
             cure.name: [
-                one for each in draws for one in outcomes(method, store, queries(each, change), each.mixed, cure)
+                one
+                for each in draws
+                for one in outcomes(method, store, queries(each, change), each.mixed, cure)
             ]
             for cure in cures
         }
@@ -136,7 +148,9 @@ def main() -> None:
         measure(found),
         {"shapes": len(some), "queries": len(found[CLEAN]["as it is"]), "draws": len(draws)},
     )
-    print(f"{counts['queries']} queries in {counts['draws']} draws of {counts['shapes']} shapes\n\n{table(results)}")
+    print(
+        f"{counts['queries']} queries in {counts['draws']} draws of {counts['shapes']} shapes\n\n{table(results)}"
+    )
     give_out({"counts": counts, "without descriptor": failed, "rates": results}, chosen.out)
 
 

@@ -34,7 +34,9 @@ def by_all_methods(scene: Scene, path: Path) -> None:
         bent = es.TriangleMesh(method(binding, handles), scene.mesh.faces)
         error = es.deformation.measure_distortion(scene.mesh, bent).edge_error
         poses[f"{name}: edges off by {100 * error:.1f} %"] = bent
-    es.save_figure(es.plot.figure_poses(poses, binding.shares.sum(axis=0), camera=view(scene)), path)
+    es.save_figure(
+        es.plot.figure_poses(poses, binding.shares.sum(axis=0), camera=view(scene)), path
+    )
 
 
 def skeletons(folder: Path) -> None:
@@ -46,9 +48,16 @@ def skeletons(folder: Path) -> None:
     whole = binding.regions[0].astype(float)
     cut += handles[0].carry(cut, whole)
     moved = es.deformation.moved_skeleton(grip, handles)
-    poses = {"shape": scene.mesh.vertices, "skeleton, 8 modes": grip.skeleton, "region turned": cut, "fitted": moved}
+    poses = {
+        "shape": scene.mesh.vertices,
+        "skeleton, 8 modes": grip.skeleton,
+        "region turned": cut,
+        "fitted": moved,
+    }
     meshes = {title: es.TriangleMesh(points, faces) for title, points in poses.items()}
-    es.save_figure(es.plot.figure_poses(meshes, whole, camera=view(scene)), folder / "figure_6_6.png")
+    es.save_figure(
+        es.plot.figure_poses(meshes, whole, camera=view(scene)), folder / "figure_6_6.png"
+    )
     once = es.deformation.detail_skeleton(binding, second_pass=False)
     ways = {
         "details by local frames": es.deformation.eigen_deformed(once, handles, details="frames"),
@@ -59,7 +68,9 @@ def skeletons(folder: Path) -> None:
         ),
     }
     meshes = {title: es.TriangleMesh(points, faces) for title, points in ways.items()}
-    es.save_figure(es.plot.figure_poses(meshes, whole, camera=view(scene)), folder / "figure_6_7_and_6_9.png")
+    es.save_figure(
+        es.plot.figure_poses(meshes, whole, camera=view(scene)), folder / "figure_6_7_and_6_9.png"
+    )
 
 
 def heads(path: Path) -> None:
@@ -68,7 +79,9 @@ def heads(path: Path) -> None:
     rig = es.rig_shape(mesh)
     poses = {"shape": mesh}
     for n_modes in (300, 50, 8):
-        poses[f"skeleton, {n_modes} modes"] = es.TriangleMesh(es.deformation.eigen_skeleton(rig, n_modes), mesh.faces)
+        poses[f"skeleton, {n_modes} modes"] = es.TriangleMesh(
+            es.deformation.eigen_skeleton(rig, n_modes), mesh.faces
+        )
     es.save_figure(es.plot.figure_poses(poses), path)
 
 

@@ -17,18 +17,26 @@ from rich.progress import track
 
 import eigenshape as es
 
-THESIS = {"arm stretched": (0.0023, 0.0022), "knee 60°": (0.001, 0.0007), "combined": (0.0052, 0.0021)}
+THESIS = {
+    "arm stretched": (0.0023, 0.0022),
+    "knee 60°": (0.001, 0.0007),
+    "combined": (0.0052, 0.0021),
+}
 THESIS["plane 90°"] = (0.0028, 0.0022)  # ARAP, the thesis' own; of the box, as printed in table 6.2
 
 
 def bound(scene: Scene) -> tuple[es.deformation.Binding, list[es.Rotation | es.Translation]]:
     """Rig a scene, and bind its regions."""
     regions = [move.region for move in scene.moves]
-    binding = es.deformation.bind(es.rig_shape(scene.mesh), regions, fixed=scene.fixed, n_modes=scene.n_modes)
+    binding = es.deformation.bind(
+        es.rig_shape(scene.mesh), regions, fixed=scene.fixed, n_modes=scene.n_modes
+    )
     return binding, [move.handle for move in scene.moves]
 
 
-def measures(scene: Scene, vertices: np.ndarray, held: np.ndarray, goal: np.ndarray) -> dict[str, float]:
+def measures(
+    scene: Scene, vertices: np.ndarray, held: np.ndarray, goal: np.ndarray
+) -> dict[str, float]:
     """Return what a method did to a shape."""
     bent = es.TriangleMesh(vertices, scene.mesh.faces)
     found = es.deformation.measure_distortion(scene.mesh, bent)
@@ -62,19 +70,40 @@ def compared(scene: Scene) -> dict[str, Any]:
 
 def printed(results: dict[str, Any]) -> str:
     """Return the tables in Markdown."""
-    lines = ["| edges, RMS of relative changes | " + " | ".join(METHODS) + " |", "|---|" + "---|" * len(METHODS)]
-    lines += [
-        f"| {name} | " + " | ".join(f"{row[m]['edges']:.4f}" for m in METHODS) + " |" for name, row in results.items()
+    lines = [
+        "| edges, RMS of relative changes | " + " | ".join(METHODS) + " |",
+        "|---|" + "---|" * len(METHODS),
     ]
-    lines += ["", "| of the box's diagonal | " + " | ".join(METHODS) + " | thesis' ARAP, printed | thesis, printed |"]
+    lines += [
+        f"| {name} | " + " | ".join(f"{row[m]['edges']:.4f}" for m in METHODS) + " |"
+        for name, row in results.items()
+    ]
+    lines += [
+        "",
+        "| of the box's diagonal | "
+        + " | ".join(METHODS)
+        + " | thesis' ARAP, printed | thesis, printed |",
+    ]
     lines += ["|---|" + "---|" * (len(METHODS) + 2)]
     for name, row in results.items():
         theirs = [f"{value}" for value in THESIS.get(name, ("", ""))]
-        lines.append(f"| {name} | " + " | ".join([f"{row[m]['of the box']:.5f}" for m in METHODS] + theirs) + " |")
-    lines += ["", "| least area, after over before; flipped faces; pairs that cross | " + " | ".join(METHODS) + " |"]
+        lines.append(
+            f"| {name} | "
+            + " | ".join([f"{row[m]['of the box']:.5f}" for m in METHODS] + theirs)
+            + " |"
+        )
+    lines += [
+        "",
+        "| least area, after over before; flipped faces; pairs that cross | "
+        + " | ".join(METHODS)
+        + " |",
+    ]
     lines += ["|---|" + "---|" * len(METHODS)]
     for name, row in results.items():
-        cells = [f"{row[m]['least area']:.2f}; {row[m]['flipped']}; {row[m]['crossing']:,}" for m in METHODS]
+        cells = [
+            f"{row[m]['least area']:.2f}; {row[m]['flipped']}; {row[m]['crossing']:,}"
+            for m in METHODS
+        ]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 

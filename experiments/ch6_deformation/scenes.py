@@ -35,21 +35,29 @@ def box_surface(counts: tuple[int, int, int], sides: tuple[float, float, float])
             i, j = np.meshgrid(np.arange(size[one] + 1), np.arange(size[two] + 1), indexing="ij")
             nodes = np.zeros((*i.shape, 3), dtype=np.int64)
             nodes[..., one], nodes[..., two], nodes[..., axis] = i, j, side
-            quads = np.stack([nodes[:-1, :-1], nodes[1:, :-1], nodes[1:, 1:], nodes[:-1, 1:]], axis=2).reshape(-1, 4, 3)
+            quads = np.stack(
+                [nodes[:-1, :-1], nodes[1:, :-1], nodes[1:, 1:], nodes[:-1, 1:]], axis=2
+            ).reshape(-1, 4, 3)
             grids.append(quads if side else quads[:, ::-1])
     corners = np.concatenate(grids)
     nodes, numbers = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
     quads = numbers.reshape(-1, 4)
     odd = (corners.sum(axis=(1, 2)) // 4 % 2).astype(bool)
-    quads[odd] = np.roll(quads[odd], 1, axis=1)  # so that diagonals alternate and prefer no way to turn
-    return es.TriangleMesh(nodes / size * sides, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
+    quads[odd] = np.roll(
+        quads[odd], 1, axis=1
+    )  # so that diagonals alternate and prefer no way to turn
+    return es.TriangleMesh(
+        nodes / size * sides, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    )
 
 
 def bumpy_plane(n: int) -> es.TriangleMesh:
     """Return a square of side 2 with smooth bumps on it."""
     flat = es.shapes.grid(n, n, width=2.0, height=2.0)
     x, y, _ = flat.vertices.T
-    return es.TriangleMesh(np.column_stack([x, y, 0.03 * np.sin(6 * np.pi * x) * np.sin(6 * np.pi * y)]), flat.faces)
+    return es.TriangleMesh(
+        np.column_stack([x, y, 0.03 * np.sin(6 * np.pi * x) * np.sin(6 * np.pi * y)]), flat.faces
+    )
 
 
 @cache
@@ -66,10 +74,14 @@ def about_rim(
 ) -> es.deformation.Move:
     """Turn a region about the middle of its boundary."""
     rim = es.deformation.region_boundary(mesh, es.deformation.region_mask(mesh, region))
-    return es.deformation.Move(region, es.Rotation(mesh.vertices[rim].mean(axis=0), axis, np.deg2rad(degrees)))
+    return es.deformation.Move(
+        region, es.Rotation(mesh.vertices[rim].mean(axis=0), axis, np.deg2rad(degrees))
+    )
 
 
-def around(mesh: es.TriangleMesh, direction: list[float], radius: float) -> es.deformation.BrushRegion:
+def around(
+    mesh: es.TriangleMesh, direction: list[float], radius: float
+) -> es.deformation.BrushRegion:
     """Return what lies along the surface within a length of the vertex farthest in a direction."""
     return es.deformation.BrushRegion(mesh.vertices[np.argmax(mesh.vertices @ direction)], radius)
 
@@ -90,7 +102,9 @@ def arm(mesh: es.TriangleMesh) -> es.deformation.Move:
     """Stretch the armadillo's right arm by a tenth of its height, away from the body."""
     region = around(mesh, [-1.0, 0.0, 0.0], 0.30)
     mask = es.deformation.region_mask(mesh, region)
-    out = mesh.vertices[mask].mean(axis=0) - mesh.vertices[es.deformation.region_boundary(mesh, mask)].mean(axis=0)
+    out = mesh.vertices[mask].mean(axis=0) - mesh.vertices[
+        es.deformation.region_boundary(mesh, mask)
+    ].mean(axis=0)
     return es.deformation.Move(region, es.Translation(0.1 * out / np.linalg.norm(out)))
 
 
@@ -125,7 +139,9 @@ def _waist() -> Scene:
 
 def _elk() -> Scene:
     mesh = real("elk.off")
-    return Scene("elk", mesh, (about_rim(mesh, around(mesh, [1.0, -0.5, -1.0], 75.0), [1, 0, 1], -40),))
+    return Scene(
+        "elk", mesh, (about_rim(mesh, around(mesh, [1.0, -0.5, -1.0], 75.0), [1, 0, 1], -40),)
+    )
 
 
 def _dragon() -> Scene:
@@ -144,7 +160,9 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "coarse plane 90°": lambda: _plane("coarse plane 90°", 41),
     "bar bent 90°": lambda: _bar("bar bent 90°", [1, 0, 0], 90, 24),
     "bar twisted 180°": lambda: _bar("bar twisted 180°", [0, 0, 1], 180, 24),
-    "bar twisted 180°, ends held": lambda: _bar("bar twisted 180°, ends held", [0, 0, 1], 180, 24, fixed=True),
+    "bar twisted 180°, ends held": lambda: _bar(
+        "bar twisted 180°, ends held", [0, 0, 1], 180, 24, fixed=True
+    ),
     "elk": _elk,
     "dragon": _dragon,
 }

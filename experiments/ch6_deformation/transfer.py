@@ -49,15 +49,25 @@ def main() -> None:
     parser.add_argument("--out", type=output_file, default="ch6-transfer.json")
     chosen = parser.parse_args()
     require_data()
-    give_out({name: transferred(name, pair, chosen.folder) for name, pair in PAIRS.items()}, chosen.out)
+    give_out(
+        {name: transferred(name, pair, chosen.folder) for name, pair in PAIRS.items()}, chosen.out
+    )
 
 
 def transferred(name: str, pair: Pair, folder: Path) -> dict[str, dict[str, float]]:
     """Give all poses of the source to the target, at several scales."""
     source, target = (es.read_mesh(DATA / path) for path in (pair.source, pair.target))
     spectra = [es.solve_spectrum(es.cotangent_laplacian(mesh), START) for mesh in (source, target)]
-    mapping = es.spectral.refine_map(es.functional_map(*spectra, np.column_stack(pair.landmarks)), max(SCALES))
-    results, rows = {}, [{f"{name.split(maxsplit=1)[0]}": source}, {f"{name.rsplit(maxsplit=1)[-1]}, as given": target}]
+    mapping = es.spectral.refine_map(
+        es.functional_map(*spectra, np.column_stack(pair.landmarks)), max(SCALES)
+    )
+    results, rows = (
+        {},
+        [
+            {f"{name.split(maxsplit=1)[0]}": source},
+            {f"{name.rsplit(maxsplit=1)[-1]}, as given": target},
+        ],
+    )
     for path in pair.poses:
         pose = es.read_mesh(DATA / path)
         rows[0][Path(path).stem] = pose

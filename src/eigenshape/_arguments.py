@@ -94,7 +94,11 @@ def require_each(values: object, kind: type | UnionType, name: str) -> None:
     InvalidParameterError
         If it is none, or a value in it is no instance of `kind`.
     """
-    if isinstance(values, kind) or not isinstance(values, Iterable) or isinstance(values, str | bytes):
+    if (
+        isinstance(values, kind)
+        or not isinstance(values, Iterable)
+        or isinstance(values, str | bytes)
+    ):
         remedy = f"Pass [{name}]." if isinstance(values, kind) else instead(values, kind)
         raise InvalidParameterError(
             f"{name} must be a list, each entry {named_kind(kind)}; it is {named_value(values)}. {remedy}"
@@ -105,7 +109,10 @@ def require_each(values: object, kind: type | UnionType, name: str) -> None:
 
 def named_kind(kind: type | UnionType) -> str:
     """Return the name of a type with its article, or those of several joined by "or"."""
-    names = ["None" if each is type(None) else f"{_article(each.__name__)} {each.__name__}" for each in _kinds(kind)]
+    names = [
+        "None" if each is type(None) else f"{_article(each.__name__)} {each.__name__}"
+        for each in _kinds(kind)
+    ]
     return " or ".join(names)
 
 
@@ -126,7 +133,9 @@ def instead(value: object, kind: type | UnionType) -> str:
         return f"Pass its attribute {part}."
     wanted = [each.__name__ for each in _kinds(kind) if each is not type(None)]
     if isinstance(value, str | os.PathLike):
-        readers = [READERS[name].format(path=repr(os.fspath(value))) for name in wanted if name in READERS]
+        readers = [
+            READERS[name].format(path=repr(os.fspath(value))) for name in wanted if name in READERS
+        ]
         if readers:
             return f"Pass {readers[0]}."
     given = "sparse" if hasattr(value, "tocsr") else type(value).__name__
@@ -137,7 +146,9 @@ def instead(value: object, kind: type | UnionType) -> str:
 def attribute_of(value: object, kind: type | UnionType) -> str | None:
     """Return the name of the first attribute of a value that is of some kind, as `mesh` is of a Repaired."""
     parts = fields(value) if is_dataclass(value) else ()
-    return next((part.name for part in parts if isinstance(getattr(value, part.name, None), kind)), None)
+    return next(
+        (part.name for part in parts if isinstance(getattr(value, part.name, None), kind)), None
+    )
 
 
 def _kinds(kind: type | UnionType) -> tuple[type, ...]:

@@ -90,4 +90,6 @@ def make_private(folder: Path) -> None:
     found = folder.lstat()
     mine = not hasattr(os, "getuid") or (found.st_uid == os.getuid() and not found.st_mode & 0o077)
     if not (stat.S_ISDIR(found.st_mode) and mine):
-        raise PermissionError(f"A folder of compiled loops must belong to its user alone; {folder} does not.")
+        raise PermissionError(
+            f"A folder of compiled loops must belong to its user alone; {folder} does not."
+        )

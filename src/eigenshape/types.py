@@ -12,4 +12,14 @@ from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.boundary import Condition
 from eigenshape.spectral.laws.report import Promise
 
-__all__ = ["Condition", "Handle", "Mesh", "MeshLike", "Progress", "Promise", "Region", "Shape", "ShapeLike"]
+__all__ = [
+    "Condition",
+    "Handle",
+    "Mesh",
+    "MeshLike",
+    "Progress",
+    "Promise",
+    "Region",
+    "Shape",
+    "ShapeLike",
+]

@@ -30,7 +30,8 @@ def fitted_order(errors, steps):
 @pytest.mark.parametrize("order", [1, 2, 3])
 @pytest.mark.parametrize("condition", ["neumann", "dirichlet"])
 @pytest.mark.parametrize(
-    ("make", "sides"), [(lambda n: interval(2 * n), [1.0]), (lambda n: grid(n, n, width=2.0), [2.0, 1.0])]
+    ("make", "sides"),
+    [(lambda n: interval(2 * n), [1.0]), (lambda n: grid(n, n, width=2.0), [2.0, 1.0])],
 )
 def test_flat_domains_converge_with_twice_the_order(make, sides, condition, order):
     eigenvalues = exact.box_eigenvalues(8, sides, condition)
@@ -53,7 +54,12 @@ def test_irregular_triangles_keep_the_order(order):
     eigenvalues, errors, steps = exact.box_eigenvalues(8), [], (6, 9, 13)
     for n in steps:
         errors.append(
-            worst(irregular_grid(n, n, jitter=0.25, rng=np.random.default_rng(n)), order, eigenvalues, "neumann")
+            worst(
+                irregular_grid(n, n, jitter=0.25, rng=np.random.default_rng(n)),
+                order,
+                eigenvalues,
+                "neumann",
+            )
         )
     assert fitted_order(errors, steps) == pytest.approx(2 * order, abs=0.7)
 
@@ -63,7 +69,11 @@ def test_irregular_triangles_keep_the_order(order):
     [
         (disc, (8, 12, 18), exact.disc_eigenvalues),
         (ball, (6, 9, 12), exact.ball_eigenvalues),
-        (lambda n: box(n, n, n), (5, 8, 11), lambda k, condition: exact.box_eigenvalues(k, (1, 1, 1), condition)),
+        (
+            lambda n: box(n, n, n),
+            (5, 8, 11),
+            lambda k, condition: exact.box_eigenvalues(k, (1, 1, 1), condition),
+        ),
     ],
 )
 @pytest.mark.parametrize("condition", ["neumann", "dirichlet"])
@@ -93,5 +103,7 @@ def test_held_points_may_be_a_part_of_the_boundary():
     left = np.flatnonzero(mesh.vertices[:, 0] == 0)
     assert set(left) < set(boundary_vertices(mesh))
     found = solve_dirichlet(cotangent_laplacian(mesh, "averaged"), 4, left).eigenvalues
-    modes = np.add.outer((np.arange(4) + 0.5) ** 2, np.arange(4) ** 2)  # a sine of odd quarters across, cosines along
+    modes = np.add.outer(
+        (np.arange(4) + 0.5) ** 2, np.arange(4) ** 2
+    )  # a sine of odd quarters across, cosines along
     np.testing.assert_allclose(found, np.pi**2 * np.sort(modes, axis=None)[:4], rtol=0.01)

@@ -16,7 +16,9 @@ TURN = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
 
 
 def mapped(target, k):
-    return FunctionalMap(np.eye(k), *(solve_spectrum(cotangent_laplacian(mesh), k) for mesh in (lump(), target)))
+    return FunctionalMap(
+        np.eye(k), *(solve_spectrum(cotangent_laplacian(mesh), k) for mesh in (lump(), target))
+    )
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +39,9 @@ def test_a_creature_is_given_its_own_pose():
 def test_few_modes_carry_less(bent):
     mapping = mapped(lump(), 100)
     off = [
-        np.linalg.norm(transfer_deformation(lump(), bent, lump(), mapping, n_modes=k).vertices - bent.vertices)
+        np.linalg.norm(
+            transfer_deformation(lump(), bent, lump(), mapping, n_modes=k).vertices - bent.vertices
+        )
         for k in (100, 20, 5)
     ]
     assert off[0] < off[1] < off[2]
@@ -62,7 +66,9 @@ def test_what_does_not_fit_is_refused(bent):
     other = TriangleMesh(np.vstack([lump().vertices, [[9.0, 9, 9]]]), lump().faces)
     with pytest.raises(InvalidParameterError, match="Poses of one mesh must have the same faces"):
         transfer_deformation(lump(), cut, lump(), mapping)
-    with pytest.raises(InvalidParameterError, match="The map's target has 642 vertices, and the mesh has 643"):
+    with pytest.raises(
+        InvalidParameterError, match="The map's target has 642 vertices, and the mesh has 643"
+    ):
         transfer_deformation(lump(), bent, other, mapping)
     with pytest.raises(InvalidParameterError, match=r"n_modes must lie in 1\.\.20"):
         transfer_deformation(lump(), bent, lump(), mapping, n_modes=21)

@@ -27,7 +27,12 @@ MESHES = [  # several components, boundary loops, non-manifold edges, four verti
 def regions(mesh):
     along = mesh.vertices[:, int(np.argmax(np.ptp(mesh.vertices, axis=0)))]
     numbers = np.arange(mesh.n_vertices)
-    return [along > np.median(along), numbers % 2 == 0, numbers == 0, np.unique(boundary_edges(mesh)).astype(int)]
+    return [
+        along > np.median(along),
+        numbers % 2 == 0,
+        numbers == 0,
+        np.unique(boundary_edges(mesh)).astype(int),
+    ]
 
 
 @pytest.mark.parametrize("mode", ["graded", "thesis"])
@@ -37,7 +42,9 @@ def test_each_bend_is_finite_or_refused_by_name(name, mode, data):
     rig, bent = rig_shape(mesh), 0
     for region in regions(mesh):
         try:
-            found = deform(rig, region, Rotation(mesh.vertices.mean(axis=0), [1, 2, 3], 1.0), mode=mode)
+            found = deform(
+                rig, region, Rotation(mesh.vertices.mean(axis=0), [1, 2, 3], 1.0), mode=mode
+            )
         except EigenshapeError:
             continue
         assert np.isfinite(found.vertices).all()

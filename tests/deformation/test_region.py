@@ -57,7 +57,22 @@ def test_the_boundary_of_a_square_is_its_ring():
     square = region_mask(GRID, BoxRegion([1, 1, 0], [3, 3, 0]))
     assert region_boundary(GRID, square).tolist() == [6, 7, 8, 11, 13, 16, 17, 18]
     assert region_boundary(GRID, ~square).tolist() == [
-        *(0, 1, 2, 3, 5, 9, 10, 14, 15, 19, 21, 22, 23, 24)  # not 4 and 20: no diagonal leads from there inside
+        *(
+            0,
+            1,
+            2,
+            3,
+            5,
+            9,
+            10,
+            14,
+            15,
+            19,
+            21,
+            22,
+            23,
+            24,
+        )  # not 4 and 20: no diagonal leads from there inside
     ]
 
 
@@ -74,18 +89,29 @@ def test_regions_without_a_boundary_are_refused():
         (np.ones(54, dtype=bool), "region 2 holds 54 of 54 vertices, whole components"),
         (np.arange(54) < 12, "region 2 holds 12 of 54 vertices, whole components"),
     ):
-        with pytest.raises(InvalidParameterError, match=f"A region must have a boundary on the shape.*{what}"):
+        with pytest.raises(
+            InvalidParameterError, match=f"A region must have a boundary on the shape.*{what}"
+        ):
             require_boundary(mesh, mask, 2)
 
 
 def test_bad_regions_are_refused_by_name():
-    with pytest.raises(InvalidParameterError, match=r"A mask must have one entry a vertex, shape \(25,\); .* \(24,\)"):
+    with pytest.raises(
+        InvalidParameterError,
+        match=r"A mask must have one entry a vertex, shape \(25,\); .* \(24,\)",
+    ):
         region_mask(GRID, np.ones(24, dtype=bool))
-    with pytest.raises(InvalidParameterError, match=r"A vertex of a region must lie in 0\.\.24; it is 25"):
+    with pytest.raises(
+        InvalidParameterError, match=r"A vertex of a region must lie in 0\.\.24; it is 25"
+    ):
         region_mask(GRID, [3, 25])
-    with pytest.raises(InvalidParameterError, match=r"low must lie below high; along axis 1 they are 2\.0 and 1\.0"):
+    with pytest.raises(
+        InvalidParameterError, match=r"low must lie below high; along axis 1 they are 2\.0 and 1\.0"
+    ):
         BoxRegion([0, 2, 0], [1, 1, 1])
-    with pytest.raises(InvalidParameterError, match=r"high must be three numbers; it is \[1\.0, nan, 1\.0\]"):
+    with pytest.raises(
+        InvalidParameterError, match=r"high must be three numbers; it is \[1\.0, nan, 1\.0\]"
+    ):
         BoxRegion([0, 0, 0], [1, np.nan, 1])
     with pytest.raises(InvalidParameterError, match="radius must be positive and finite"):
         BrushRegion([0, 0, 0], 0.0)

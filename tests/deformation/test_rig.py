@@ -41,7 +41,9 @@ def test_the_factor_of_fewer_modes_is_the_leading_part():
 
 def test_projection_finds_the_coefficients_of_a_sum_of_modes():
     rig, wanted = lump_rig(), np.random.default_rng(0).standard_normal((20, 2))
-    np.testing.assert_allclose(projected(rig, rig.eigenvectors[:, :20] @ wanted, 20), wanted, atol=1e-12)
+    np.testing.assert_allclose(
+        projected(rig, rig.eigenvectors[:, :20] @ wanted, 20), wanted, atol=1e-12
+    )
 
 
 def test_there_is_one_more_mode_for_each_further_component():
@@ -81,7 +83,9 @@ def test_a_pose_keeps_all_but_the_vertices():
 
 def test_what_cannot_be_rigged_is_refused():
     spectrum = solve_spectrum(cotangent_laplacian(icosphere(1)), 5)
-    with pytest.raises(InvalidParameterError, match="The spectrum is of 42 vertices, the shape has 642"):
+    with pytest.raises(
+        InvalidParameterError, match="The spectrum is of 42 vertices, the shape has 642"
+    ):
         rig_shape(lump(), spectrum)
     with pytest.raises(InvalidParameterError, match=r"n_modes must lie in 1\.\.300; it is 301"):
         eigen_skeleton(lump_rig(), 301)

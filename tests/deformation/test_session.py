@@ -33,7 +33,9 @@ def test_a_commit_bends_as_it_was_dragged_last(session):
     session.drag(HEAD, PULL)
     session.drag(HEAD, TURN, n_modes=40)
     session.commit()
-    np.testing.assert_array_equal(session.mesh.vertices, deform(lump_rig(), HEAD, TURN, n_modes=40).vertices)
+    np.testing.assert_array_equal(
+        session.mesh.vertices, deform(lump_rig(), HEAD, TURN, n_modes=40).vertices
+    )
     (edit,) = session.edits
     assert (edit.moves[0].handle, edit.n_modes, edit.mode) == (TURN, 40, "graded")
 
@@ -70,7 +72,9 @@ def test_a_new_commit_forgets_what_was_undone(session):
     assert session.undone == 0
     assert [edit.moves[0].handle for edit in session.edits] == [TURN, PULL]
     assert session.edits[1].moves[0].region.dtype == bool  # the tail's
-    with pytest.raises(InvalidParameterError, match="An edit must have been undone to be redone; none was"):
+    with pytest.raises(
+        InvalidParameterError, match="An edit must have been undone to be redone; none was"
+    ):
         session.redo()
 
 
@@ -80,7 +84,9 @@ def test_what_is_not_there_cannot_be_done(session):
     with pytest.raises(InvalidParameterError, match="An edit must have been undone to be redone"):
         session.redo()
     for action in (session.commit, lambda: session.grip):
-        with pytest.raises(InvalidParameterError, match="A region must be dragged first; nothing is"):
+        with pytest.raises(
+            InvalidParameterError, match="A region must be dragged first; nothing is"
+        ):
             action()
     with pytest.raises(InvalidParameterError, match=r"n_modes must lie in 1\.\.300; it is 0"):
         session.drag(HEAD, TURN, n_modes=0)

@@ -58,7 +58,9 @@ def test_a_missing_copy_is_counted(census):
     assert verdict(right + 1e-7 * right[-1]) == "wrong"
     assert verdict(np.delete(longer, 1)) == "absent"
     assert verdict(np.full(9, np.nan)) == "absent"
-    assert census["verdict"](lambda *_: 1 / 0, case, 9, 0, values)[0] == "refused: ZeroDivisionError"
+    assert (
+        census["verdict"](lambda *_: 1 / 0, case, 9, 0, values)[0] == "refused: ZeroDivisionError"
+    )
 
 
 def test_numbers_k_cut_clusters_and_keep_them(census):

@@ -21,7 +21,10 @@ def test_the_readme_shows_the_expected_figures():
         assert f"| {name} | " + " | ".join(cells) + " |" in README
     for name, row in FULL["meshes"].items():
         numbers = f"{row['n']} | {row['edge / e']:.3f} | {row['area']:.3f} | {row['volume']:.3f}"
-        assert f"| {name} | {numbers} | {row['longest / shortest edge']:.1f} | {row['crossings']} |" in README
+        assert (
+            f"| {name} | {numbers} | {row['longest / shortest edge']:.1f} | {row['crossings']} |"
+            in README
+        )
 
 
 @pytest.mark.long
@@ -47,8 +50,12 @@ def test_faces_are_cut_without_a_gap_and_nothing_moves():
         cut = OTHER["denser"](sphere, np.random.default_rng(seed).random(len(sphere.faces)) < 0.3)
         assert es.geometry.is_manifold(cut)
         assert es.geometry.is_closed(cut)
-        assert es.geometry.surface_area(cut) == pytest.approx(es.geometry.surface_area(sphere), rel=1e-12)
-        assert es.geometry.enclosed_volume(cut) == pytest.approx(es.geometry.enclosed_volume(sphere), rel=1e-12)
+        assert es.geometry.surface_area(cut) == pytest.approx(
+            es.geometry.surface_area(sphere), rel=1e-12
+        )
+        assert es.geometry.enclosed_volume(cut) == pytest.approx(
+            es.geometry.enclosed_volume(sphere), rel=1e-12
+        )
 
 
 @pytest.mark.long
@@ -59,7 +66,9 @@ def test_a_collapsed_torus_is_still_a_torus():
     assert es.geometry.is_manifold(coarse)
     assert es.geometry.is_closed(coarse)
     assert es.geometry.euler_characteristic(coarse) == 0
-    assert es.geometry.enclosed_volume(coarse) == pytest.approx(es.geometry.enclosed_volume(torus), rel=0.1)
+    assert es.geometry.enclosed_volume(coarse) == pytest.approx(
+        es.geometry.enclosed_volume(torus), rel=0.1
+    )
     assert len(es.geometry.self_intersections(coarse)) == 0
 
 

@@ -33,7 +33,9 @@ def test_resolutions_are_half_and_double():
     assert half.n_faces == BALL.n_faces // 2
     assert es.geometry.is_closed(half)
     double = perturbing.changed_whole(BALL, perturbing.DOUBLE)
-    assert es.geometry.mean_side_length(double) == pytest.approx(es.geometry.mean_side_length(BALL) / 2)
+    assert es.geometry.mean_side_length(double) == pytest.approx(
+        es.geometry.mean_side_length(BALL) / 2
+    )
 
 
 def test_turned_over_faces_in():
@@ -70,12 +72,16 @@ def test_losses_are_of_the_same_queries():
     assert robustness.loss([changed[0], changed[2]], clean, "scanner")[0] == 50.0
     results = robustness.measure({"clean": {"as it is": clean}, "noise .1": {"as it is": changed}})
     assert results["noise .1"]["as it is"]["loss"][0] == 33.3
-    assert robustness.cell(results["noise .1"]["as it is"]).startswith("33.3 / 33.3 / 33.3, -33.3 [")
+    assert robustness.cell(results["noise .1"]["as it is"]).startswith(
+        "33.3 / 33.3 / 33.3, -33.3 ["
+    )
 
 
 @pytest.mark.long
 def test_queries_are_described_as_they_are_or_as_the_method_takes_them():
-    method = methods.Patches("patches", recipe=es.retrieval.PatchRecipe(es.retrieval.made_codebook()))
+    method = methods.Patches(
+        "patches", recipe=es.retrieval.PatchRecipe(es.retrieval.made_codebook())
+    )
     flipped = es.TriangleMesh(BALL.vertices, BALL.faces[:, ::-1])
     asking = [robustness.Asking(method, cure).describe(flipped) for cure in robustness.CURES]
     outward = es.retrieval.describe_shape(BALL, method.recipe)

@@ -16,13 +16,21 @@ from topological import coupled_points
 @pytest.fixture(scope="module")
 def spheres():
     ball = es.icosphere(3)
-    return es.shapes.disjoint_union(ball, es.TriangleMesh(ball.vertices + np.array([2.3, 0, 0]), ball.faces))
+    return es.shapes.disjoint_union(
+        ball, es.TriangleMesh(ball.vertices + np.array([2.3, 0, 0]), ball.faces)
+    )
 
 
 def facing(mesh, radius, **options):
     x = mesh.vertices[:, 0]
     one = int(np.where(x <= 1, x, -9).argmax())
-    return bridge(mesh, one, int(np.linalg.norm(mesh.vertices - [1.3, 0, 0], axis=1).argmin()), radius, **options)
+    return bridge(
+        mesh,
+        one,
+        int(np.linalg.norm(mesh.vertices - [1.3, 0, 0], axis=1).argmin()),
+        radius,
+        **options,
+    )
 
 
 def test_a_disc_is_one_disc(spheres):
@@ -55,12 +63,17 @@ def test_a_bridge_joins_two_spheres_into_one(spheres, radius, bulge):
     assert es.geometry.vertex_components(joined.two)[0] == 1
     assert not len(es.geometry.self_intersections(joined.two))
     volume = es.geometry.enclosed_volume(joined.two)
-    assert volume > es.geometry.enclosed_volume(spheres)  # which neighbours turned against each other would not give
+    assert volume > es.geometry.enclosed_volume(
+        spheres
+    )  # which neighbours turned against each other would not give
 
 
 def test_a_bridge_on_one_surface_is_a_handle():
     plates = es.shapes.torus(60, 40, inner=0.35)
-    top, bottom = (int(np.linalg.norm(plates.vertices - [side, 0, 0], axis=1).argmin()) for side in (0.65, -0.65))
+    top, bottom = (
+        int(np.linalg.norm(plates.vertices - [side, 0, 0], axis=1).argmin())
+        for side in (0.65, -0.65)
+    )
     joined = bridge(plates, top, bottom, 0.15)
     assert es.geometry.is_closed(joined.two)
     assert es.geometry.is_manifold(joined.two)
@@ -78,11 +91,17 @@ def test_faces_outside_correspond(spheres):
     for surgery in (facing(spheres, 0.3), widened(facing(spheres, 0.3), 0.2)):
         one, two = (
             mesh.vertices[mesh.faces[regions < 0]]
-            for mesh, regions in ((surgery.one, surgery.regions_one), (surgery.two, surgery.regions_two))
+            for mesh, regions in (
+                (surgery.one, surgery.regions_one),
+                (surgery.two, surgery.regions_two),
+            )
         )
         np.testing.assert_array_equal(one, two)
         pair = es.stability.measure_perturbation(
-            surgery.one, surgery.two, regions_one=surgery.regions_one, regions_two=surgery.regions_two
+            surgery.one,
+            surgery.two,
+            regions_one=surgery.regions_one,
+            regions_two=surgery.regions_two,
         )
         assert es.stability.measure_closeness(pair).displacement.max() == 0
 
@@ -115,7 +134,10 @@ def test_coupled_points_are_uniform_on_both_surfaces(spheres):
     same = (one == two).all(axis=1)
     share_one, share_two = (
         es.geometry.face_areas(mesh)[regions < 0].sum() / es.geometry.surface_area(mesh)
-        for mesh, regions in ((surgery.one, surgery.regions_one), (surgery.two, surgery.regions_two))
+        for mesh, regions in (
+            (surgery.one, surgery.regions_one),
+            (surgery.two, surgery.regions_two),
+        )
     )
     assert same.mean() == pytest.approx(min(share_one, share_two), abs=4 * 0.5 / n**0.5)
     for points, mesh in ((one, surgery.one), (two, surgery.two)):

@@ -14,7 +14,9 @@ def pairs_of(pairs):
 def path(values):
     """A curve whose vertices have these heights."""
     ends = np.column_stack([np.arange(len(values) - 1), np.arange(1, len(values))])
-    return es.SimplicialMesh(np.arange(len(values), dtype=float)[:, None], ends), np.array(values, dtype=float)
+    return es.SimplicialMesh(np.arange(len(values), dtype=float)[:, None], ends), np.array(
+        values, dtype=float
+    )
 
 
 @pytest.mark.long
@@ -56,13 +58,21 @@ def test_points_are_joined_to_their_neighbours():
     assert len(found.components.births) == 1
     assert found.loops is None
     apart = es.PointCloud(np.vstack([cloud.points, cloud.points + 9]), dim=1)
-    assert len(es.features.persistence_diagram(apart, np.tile(np.cos(3 * angles), 2)).components.births) == 2
+    assert (
+        len(
+            es.features.persistence_diagram(apart, np.tile(np.cos(3 * angles), 2)).components.births
+        )
+        == 2
+    )
 
 
 def test_minima_are_the_maxima_of_minus_the_function():
     mesh = es.shapes.torus(20, 12)
     values = np.random.default_rng(0).standard_normal(mesh.n_vertices)
-    one, two = es.features.persistence_diagram(mesh, values), es.features.persistence_diagram(mesh, -values)
+    one, two = (
+        es.features.persistence_diagram(mesh, values),
+        es.features.persistence_diagram(mesh, -values),
+    )
     assert pairs_of(one.minima) == pairs_of(two.maxima)
     assert pairs_of(one.maxima) == pairs_of(two.minima)
     assert sorted(pairs_of(one.loops)) == sorted((b, a) for a, b in pairs_of(two.loops))
@@ -74,7 +84,10 @@ def test_diagrams_scale_with_the_function(scale):
     mesh = es.shapes.torus(16, 10)
     rng = np.random.default_rng(0)
     values, others = rng.random((2, mesh.n_vertices))
-    one, two = es.features.persistence_diagram(mesh, values), es.features.persistence_diagram(mesh, others)
+    one, two = (
+        es.features.persistence_diagram(mesh, values),
+        es.features.persistence_diagram(mesh, others),
+    )
     big, large = (
         es.features.persistence_diagram(mesh, scale * values),
         es.features.persistence_diagram(mesh, scale * others),
@@ -87,7 +100,9 @@ def test_diagrams_scale_with_the_function(scale):
 
 def test_the_distance_by_hand():
     one = es.features.persistence_diagram(*path([0, 9, 4, 6, 1]))
-    two = es.features.persistence_diagram(*path([0, 9, 4, 4.5, 1]))  # the peak of 2 over its saddle is but .5 high
+    two = es.features.persistence_diagram(
+        *path([0, 9, 4, 4.5, 1])
+    )  # the peak of 2 over its saddle is but .5 high
     assert es.features.bottleneck_distance(one, two) == 1.0  # rather to the diagonal than 1.5 down
     assert es.features.bottleneck_distance(one, one) == 0.0
     lifted = es.features.persistence_diagram(*path([3, 12, 7, 9, 4]))
@@ -104,7 +119,10 @@ def test_loops_are_compared_with_loops():
     assert es.features.bottleneck_distance(torus, sphere) == np.inf
     with pytest.raises(InvalidParameterError, match="Diagrams must both have loops, or neither"):
         es.features.bottleneck_distance(torus, replace(sphere, loops=None))
-    assert es.features.bottleneck_distance(replace(torus, loops=None), replace(sphere, loops=None)) < 1.0
+    assert (
+        es.features.bottleneck_distance(replace(torus, loops=None), replace(sphere, loops=None))
+        < 1.0
+    )
 
 
 def test_bad_input_is_named():
@@ -119,7 +137,9 @@ def test_bad_input_is_named():
 
 def test_results_are_read_only_and_sorted():
     mesh = es.shapes.torus(20, 12)
-    found = es.features.persistence_diagram(mesh, np.random.default_rng(0).standard_normal(mesh.n_vertices))
+    found = es.features.persistence_diagram(
+        mesh, np.random.default_rng(0).standard_normal(mesh.n_vertices)
+    )
     for pairs in (found.maxima, found.minima, found.components, found.loops):
         assert (np.diff(pairs.persistence) <= 0).all()
         for array in vars(pairs).values():

@@ -131,7 +131,9 @@ def test_a_human_has_a_head_four_limbs_and_a_torso(human):
 @pytest.mark.parametrize(("kind", "count"), [("biped", 7), ("quadruped", 6)])
 def test_as_many_parts_are_the_same_ones_in_another_pose(kind, count):
     found = [find_parts(make_creature(kind, pose, n_vertices=2000)) for pose in (0, 3)]
-    one, two = (smooth_boundaries(each.mesh, segment(each.tree, n_regions=count)).labels for each in found)
+    one, two = (
+        smooth_boundaries(each.mesh, segment(each.tree, n_regions=count)).labels for each in found
+    )
     assert disagreement(one, two) < 0.05
 
 
@@ -173,7 +175,9 @@ def cut_length(mesh, labels):
 
 def two_halves(mesh, ragged):
     centres = mesh.vertices[mesh.faces].mean(axis=1)
-    labels = (centres[:, 0] > ragged * np.sin(5 * np.arctan2(centres[:, 2], centres[:, 1]))).astype(np.int64)
+    labels = (centres[:, 0] > ragged * np.sin(5 * np.arctan2(centres[:, 2], centres[:, 1]))).astype(
+        np.int64
+    )
     tips = np.array([mesh.vertices[:, 0].argmin(), mesh.vertices[:, 0].argmax()])
     return Segmentation(labels, FeaturePoints(tips, np.ones(2), np.array([np.inf, 0.5])))
 
@@ -210,20 +214,29 @@ def test_smooth_parts_stay_whole_and_keep_their_feature_points(human):
     raw = segment(human.tree, n_regions=12)
     smooth = smooth_boundaries(human.mesh, raw)
     for part in range(12):
-        assert n_pieces(human.mesh, smooth.labels == part) == n_pieces(human.mesh, raw.labels == part) == 1
+        assert (
+            n_pieces(human.mesh, smooth.labels == part)
+            == n_pieces(human.mesh, raw.labels == part)
+            == 1
+        )
         around = (human.mesh.faces == smooth.features.vertices[part]).any(axis=1)
         assert (smooth.labels[around & (raw.labels == part)] == part).all()
 
 
 def test_touching_parts_of_a_strip():
     mesh = grid(7, 2)
-    labels = np.minimum((mesh.vertices[mesh.faces].mean(axis=1)[:, 0] * 3.0001 / np.ptp(mesh.vertices[:, 0])), 2)
+    labels = np.minimum(
+        (mesh.vertices[mesh.faces].mean(axis=1)[:, 0] * 3.0001 / np.ptp(mesh.vertices[:, 0])), 2
+    )
     assert touching_parts(mesh, labels.astype(np.int64)).tolist() == [[0, 1], [1, 2]]
 
 
 def test_a_spectrum_of_another_shape_is_refused():
     spectrum = solve_spectrum(cotangent_laplacian(icosphere(1)), 5)
-    with pytest.raises(InvalidParameterError, match=r"spectrum must be of the mesh; it has 42 points for 162 vertices"):
+    with pytest.raises(
+        InvalidParameterError,
+        match=r"spectrum must be of the mesh; it has 42 points for 162 vertices",
+    ):
         part_tree(icosphere(2), spectrum)
 
 
@@ -238,6 +251,8 @@ def test_times_widths_and_modes_must_be_positive():
 
 
 def test_a_face_without_area_is_refused():
-    flat = TriangleMesh(np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 1, 3]]))
+    flat = TriangleMesh(
+        np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 1, 3]])
+    )
     with pytest.raises(InvalidShapeError, match="area"):
         find_parts(flat)

@@ -35,7 +35,10 @@ def test_on_a_square_it_is_the_mean_of_straight_lines():
 def test_a_sample_of_bases_comes_near():
     mesh = es.shapes.torus(60, 30)
     exact = es.geometry.average_geodesic_distance(mesh, n_bases=mesh.n_vertices)
-    errors = [np.abs(es.geometry.average_geodesic_distance(mesh, n_bases=n) / exact - 1).max() for n in (20, 150)]
+    errors = [
+        np.abs(es.geometry.average_geodesic_distance(mesh, n_bases=n) / exact - 1).max()
+        for n in (20, 150)
+    ]
     assert errors[1] < errors[0]
     assert errors[1] < 0.02
 
@@ -44,7 +47,8 @@ def test_it_scales_exactly():
     mesh = es.shapes.torus(12, 8)
     scaled = es.TriangleMesh(mesh.vertices * 2.0**300, mesh.faces)
     assert np.array_equal(
-        es.geometry.average_geodesic_distance(scaled), es.geometry.average_geodesic_distance(mesh) * 2.0**300
+        es.geometry.average_geodesic_distance(scaled),
+        es.geometry.average_geodesic_distance(mesh) * 2.0**300,
     )
 
 

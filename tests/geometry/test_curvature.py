@@ -75,14 +75,19 @@ def test_a_sphere_has_its_curvature_but_where_five_faces_meet():
 def test_it_scales_exactly(exponent):
     mesh = es.shapes.torus(12, 8)
     scaled = es.TriangleMesh(mesh.vertices * 2.0**exponent, mesh.faces)
-    assert np.array_equal(es.geometry.gaussian_curvature(scaled), es.geometry.gaussian_curvature(mesh) * 4.0**-exponent)
+    assert np.array_equal(
+        es.geometry.gaussian_curvature(scaled),
+        es.geometry.gaussian_curvature(mesh) * 4.0**-exponent,
+    )
 
 
 def test_bending_without_stretching_leaves_it():
     flat = es.shapes.grid(12, 12)
     x, y, _ = flat.vertices.T
     # Folded along grid lines, no length changes.
-    bent = es.TriangleMesh(np.column_stack([np.minimum(x, 0.5), y, np.maximum(x - 0.5, 0)]), flat.faces)
+    bent = es.TriangleMesh(
+        np.column_stack([np.minimum(x, 0.5), y, np.maximum(x - 0.5, 0)]), flat.faces
+    )
     inside = ~np.isin(np.arange(flat.n_vertices), es.geometry.boundary_vertices(flat))
     np.testing.assert_allclose(es.geometry.gaussian_curvature(bent)[inside], 0, atol=1e-10)
 

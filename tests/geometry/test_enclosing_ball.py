@@ -36,7 +36,9 @@ def test_by_hand():
     ball = es.geometry.enclosing_ball([[0, 0], [2, 0], [1, 0.5]])
     np.testing.assert_allclose(ball.center, [1, 0], atol=1e-15)
     assert ball.radius == pytest.approx(1)
-    corners = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T  # all eight lie on the sphere
+    corners = (
+        np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
+    )  # all eight lie on the sphere
     ball = es.geometry.enclosing_ball(corners)
     np.testing.assert_allclose(ball.center, 0.5)
     assert ball.radius == pytest.approx(np.sqrt(3) / 2)
@@ -45,7 +47,9 @@ def test_by_hand():
 
 
 @some
-@given(st.integers(0, 2**32 - 1), st.integers(1, 4), st.integers(1, 9), st.sampled_from([2, 5, 10**6]))
+@given(
+    st.integers(0, 2**32 - 1), st.integers(1, 4), st.integers(1, 9), st.sampled_from([2, 5, 10**6])
+)
 def test_it_is_the_least_of_all_balls(seed, dim, n, spread):
     points = np.random.default_rng(seed).integers(0, spread, (n, dim)).astype(float)
     ball = es.geometry.enclosing_ball(points)
@@ -56,7 +60,10 @@ def test_it_is_the_least_of_all_balls(seed, dim, n, spread):
 @pytest.mark.parametrize("scale", [1e-300, 1e-100, 1.0, 1e100, 1e300])
 def test_it_scales_and_moves_with_the_points(scale):
     points = np.random.default_rng(0).standard_normal((200, 3))
-    plain, moved = es.geometry.enclosing_ball(points), es.geometry.enclosing_ball(scale * (points + 7))
+    plain, moved = (
+        es.geometry.enclosing_ball(points),
+        es.geometry.enclosing_ball(scale * (points + 7)),
+    )
     assert moved.radius == pytest.approx(scale * plain.radius, rel=1e-12)
     np.testing.assert_allclose(moved.center, scale * (plain.center + 7), rtol=1e-12)
 
@@ -89,7 +96,9 @@ def test_many_points_in_many_dimensions():
     assert away.max() == pytest.approx(ball.radius, rel=1e-14)
     # The centre of the smallest ball is a convex combination of the points on its boundary.
     touching = points[away > ball.radius * (1 - 1e-9)]
-    weights = np.linalg.lstsq(np.vstack([touching.T, np.ones(len(touching))]), np.append(ball.center, 1), rcond=None)[0]
+    weights = np.linalg.lstsq(
+        np.vstack([touching.T, np.ones(len(touching))]), np.append(ball.center, 1), rcond=None
+    )[0]
     assert (weights > 0).all()
     np.testing.assert_allclose(weights @ touching, ball.center, atol=1e-9)
 

@@ -14,7 +14,9 @@ def mesh_of_two():
 
 def test_faces_are_met_by_area():
     found = es.geometry.sample_surface(mesh_of_two(), 20_000, rng=np.random.default_rng(0))
-    assert np.mean(found.simplices == 0) == pytest.approx(0.75, abs=4 * np.sqrt(0.75 * 0.25 / 20_000))
+    assert np.mean(found.simplices == 0) == pytest.approx(
+        0.75, abs=4 * np.sqrt(0.75 * 0.25 / 20_000)
+    )
 
 
 def test_points_are_spread_evenly_inside_a_face():
@@ -35,7 +37,9 @@ def test_points_lie_where_their_weights_say():
 def test_the_same_generator_throws_the_same_points_at_every_size():
     mesh = es.shapes.torus(12, 8)
     small = es.TriangleMesh(mesh.vertices * 1e-100, mesh.faces)
-    one, two = (es.geometry.sample_surface(each, 50, rng=np.random.default_rng(3)) for each in (mesh, small))
+    one, two = (
+        es.geometry.sample_surface(each, 50, rng=np.random.default_rng(3)) for each in (mesh, small)
+    )
     np.testing.assert_array_equal(one.simplices, two.simplices)
     np.testing.assert_allclose(one.points, two.points * 1e100)
 

@@ -19,7 +19,11 @@ print(es.geometry.geodesic_distances(es.icosphere(1), [0]).max())
 
 
 def test_every_loop_is_compiled_in_one_way():
-    users = [path for path in SOURCE.rglob("*.py") if re.search(r"numba(\.| import )njit", path.read_text())]
+    users = [
+        path
+        for path in SOURCE.rglob("*.py")
+        if re.search(r"numba(\.| import )njit", path.read_text())
+    ]
     assert [path.name for path in users] == ["_compile.py"]
 
 
@@ -38,9 +42,17 @@ def run_without_home(code, installed):
     """Run code from a package and with a home in which nothing can be kept."""
     temporary = installed.parent / "temporary"
     settings = {"PYTHONPATH": str(installed), "HOME": os.devnull, "TMPDIR": str(temporary)}
-    kept = {name: value for name, value in os.environ.items() if name not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
+    kept = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")
+    }
     done = subprocess.run(
-        [sys.executable, "-B", "-c", code], check=False, env=kept | settings, capture_output=True, text=True
+        [sys.executable, "-B", "-c", code],
+        check=False,
+        env=kept | settings,
+        capture_output=True,
+        text=True,
     )
     assert done.returncode == 0, done.stderr
     return done
@@ -58,7 +70,9 @@ def test_a_private_folder_keeps_loops_where_the_package_and_the_home_cannot(clos
 @pytest.mark.long
 def test_without_any_folder_loops_are_compiled_each_time_and_it_is_said_once(closed_copy):
     (closed_copy.parent / "temporary" / temporary_folder().name).write_text("in the way")
-    done = run_without_home(f"import warnings; warnings.simplefilter('always')\n{MEASURE}", closed_copy)
+    done = run_without_home(
+        f"import warnings; warnings.simplefilter('always')\n{MEASURE}", closed_copy
+    )
     assert done.stderr.count("Set NUMBA_CACHE_DIR to such a folder") == 1
 
 

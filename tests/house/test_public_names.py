@@ -26,7 +26,9 @@ HEAVY = {"matplotlib", "meshio", "numba", "numpy", "rich", "scipy", "sqlite3"}
 
 
 def test_the_short_door_holds_what_people_come_for():
-    names = {name for name in es.__all__ if not inspect.ismodule(getattr(es, name))} - {"__version__"}
+    names = {name for name in es.__all__ if not inspect.ismodule(getattr(es, name))} - {
+        "__version__"
+    }
     assert names >= PROMISED
     assert len(names) <= 50
 
@@ -38,7 +40,11 @@ def test_the_rooms_are_these():
 def test_every_name_of_the_short_door_stands_in_a_room_too():
     in_rooms = {name for room in rooms().values() for name in room.__all__}
     left = {name for name in es.__all__ if not inspect.ismodule(getattr(es, name))} - in_rooms
-    errors = {name for name in left if isinstance(getattr(es, name), type) and issubclass(getattr(es, name), Exception)}
+    errors = {
+        name
+        for name in left
+        if isinstance(getattr(es, name), type) and issubclass(getattr(es, name), Exception)
+    }
     assert left - errors == {"__version__"}
 
 
@@ -55,7 +61,10 @@ def test_a_name_of_a_room_is_the_object_and_never_a_module_of_that_name():
 
 def test_a_name_that_is_not_there_is_named():
     done = subprocess.run(
-        [sys.executable, "-c", "import eigenshape as es; es.solve_spectra"], capture_output=True, text=True, check=False
+        [sys.executable, "-c", "import eigenshape as es; es.solve_spectra"],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert "solve_spectra" in done.stderr
 

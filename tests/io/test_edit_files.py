@@ -13,8 +13,17 @@ from eigenshape.shapes.surfaces import icosphere
 
 BALL = icosphere(2)
 EDITS = [
-    Edit((Move(BALL.vertices[:, 2] > 0.5, Rotation([0, 0, 0.5], [1, 1 / 3, 0], 0.7)),), mode="thesis"),
-    Edit((Move(BoxRegion([-np.inf, -np.inf, -9], [np.inf, np.inf, -0.5]), Translation([0, 0.1, -1 / 3])),)),
+    Edit(
+        (Move(BALL.vertices[:, 2] > 0.5, Rotation([0, 0, 0.5], [1, 1 / 3, 0], 0.7)),), mode="thesis"
+    ),
+    Edit(
+        (
+            Move(
+                BoxRegion([-np.inf, -np.inf, -9], [np.inf, np.inf, -0.5]),
+                Translation([0, 0.1, -1 / 3]),
+            ),
+        )
+    ),
 ]
 
 

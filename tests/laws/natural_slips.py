@@ -95,7 +95,9 @@ def labels() -> np.ndarray:
 
 @cache
 def mapping() -> es.spectral.FunctionalMap:
-    return es.spectral.map_from_points(spectrum(), spectrum(), np.arange(body().n_vertices), n_modes=10)
+    return es.spectral.map_from_points(
+        spectrum(), spectrum(), np.arange(body().n_vertices), n_modes=10
+    )
 
 
 @cache
@@ -104,7 +106,9 @@ def report() -> es.stability.StabilityReport:
 
 
 def written_edits() -> Path:
-    es.io.write_edits([es.deformation.Edit((es.deformation.Move(HEAD, TURN),))], body(), FOLDER / "edits.json")
+    es.io.write_edits(
+        [es.deformation.Edit((es.deformation.Move(HEAD, TURN),))], body(), FOLDER / "edits.json"
+    )
     return FOLDER / "edits.json"
 
 
@@ -127,7 +131,9 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.retrieval.PatchCodebook: es.retrieval.made_codebook,
     es.retrieval.PatchDescriptor: patched,
     es.retrieval.Patches: patches,
-    es.retrieval.PatchPoints: lambda: es.retrieval.patch_points(patches(), es.retrieval.made_codebook()),
+    es.retrieval.PatchPoints: lambda: es.retrieval.patch_points(
+        patches(), es.retrieval.made_codebook()
+    ),
     es.features.PersistenceDiagram: lambda: es.features.persistence_diagram(body(), height()),
     es.deformation.EigenRig: rig,
     es.deformation.Binding: binding,
@@ -139,7 +145,9 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.deformation.DetailedSkeleton: lambda: es.deformation.detail_skeleton(binding()),
     es.spectral.FunctionalMap: mapping,
     es.stability.Perturbation: lambda: es.stability.measure_perturbation(body(), bent()),
-    es.geometry.SurfacePoints: lambda: es.geometry.sample_surface(body(), 60, rng=np.random.default_rng(0)),
+    es.geometry.SurfacePoints: lambda: es.geometry.sample_surface(
+        body(), 60, rng=np.random.default_rng(0)
+    ),
     es.geometry.Quadrature: lambda: es.geometry.mesh_quadrature(body()),
     es.spectral.Brackets: lambda: es.bracket_eigenvalues(body(), 10),
     es.stability.Rate: lambda: es.stability.Rate(1.0, -1.0),
@@ -243,13 +251,20 @@ SLIPS: dict[str, Callable[[], Any]] = {
     "number": lambda: 3,
 }
 DEAR = 0.5  # seconds, beyond which one of the forms of a mesh must do
-OF_ITS_OWN_KIND = {("subdivide", "SimplicialMesh")}  # a SimplicialMesh is cut in another order than a TriangleMesh
+OF_ITS_OWN_KIND = {
+    ("subdivide", "SimplicialMesh")
+}  # a SimplicialMesh is cut in another order than a TriangleMesh
 MESHES = {es.TriangleMesh, es.SimplicialMesh, es.PointCloud}
 
 
 def kinds(annotation: Any) -> Iterator[Any]:
     """Yield the types that a union is of, and what its lists and mappings are of."""
-    if get_origin(annotation) in (Union, UnionType) or get_origin(annotation) in (Sequence, Iterable, Mapping, tuple):
+    if get_origin(annotation) in (Union, UnionType) or get_origin(annotation) in (
+        Sequence,
+        Iterable,
+        Mapping,
+        tuple,
+    ):
         for part in get_args(annotation):
             yield from kinds(part)
     else:
@@ -302,7 +317,9 @@ def same(one: Any, two: Any) -> bool:
     if isinstance(one, list | tuple):
         return len(one) == len(two) and all(map(same, one, two))
     if is_dataclass(one):
-        return type(one) is type(two) and all(same(value, vars(two)[key]) for key, value in vars(one).items())
+        return type(one) is type(two) and all(
+            same(value, vars(two)[key]) for key, value in vars(one).items()
+        )
     return type(one) is type(two)
 
 
@@ -310,10 +327,14 @@ def unnamed(value: Any, message: str) -> str | None:
     """Return a message that does not name what was given: its type, or that of the first where a list is meant."""
     first = value[:1] if isinstance(value, tuple) else ()
     names = ["None"] if value is None else [type(each).__name__ for each in (value, *first)]
-    return None if any(name in message for name in names) else f"does not name {names[0]}: {message}"
+    return (
+        None if any(name in message for name in names) else f"does not name {names[0]}: {message}"
+    )
 
 
-def right_arguments(function: str, code: Callable[..., Any], owner: type | None) -> tuple[dict[str, Any], set[str]]:
+def right_arguments(
+    function: str, code: Callable[..., Any], owner: type | None
+) -> tuple[dict[str, Any], set[str]]:
     """Return arguments that a function takes, and the names of those whose type is ours.
 
     Raises
@@ -323,9 +344,13 @@ def right_arguments(function: str, code: Callable[..., Any], owner: type | None)
     """
     hints = get_type_hints(code)
     given: dict[str, Any] = {}
-    ours = {name for name, hint in hints.items() if set(kinds(hint)) & (VALUES.keys() | MESHES)} - {"return"}
+    ours = {name for name, hint in hints.items() if set(kinds(hint)) & (VALUES.keys() | MESHES)} - {
+        "return"
+    }
     for name, parameter in inspect.signature(code).parameters.items():
-        needed = parameter.default is parameter.empty and parameter.kind is not parameter.VAR_KEYWORD
+        needed = (
+            parameter.default is parameter.empty and parameter.kind is not parameter.VAR_KEYWORD
+        )
         if name == "self":
             given[name] = VALUES[owner]() if ours else None
         elif ours and (needed or f"{function}.{name}" in NAMED):
@@ -344,10 +369,17 @@ def is_accepted(slip: str, value: Any, allowed: set[Any]) -> bool:
     return any(isinstance(value, kind) for kind in allowed if isinstance(kind, type))
 
 
-def complaints_about(function: str, code: Callable[..., Any], owner: type | None) -> Iterator[tuple[str, str]]:
+def complaints_about(
+    function: str, code: Callable[..., Any], owner: type | None
+) -> Iterator[tuple[str, str]]:
     """Yield what goes wrong where one argument of a function is a slip and the others are right."""
     starred = next(
-        (name for name, each in inspect.signature(code).parameters.items() if each.kind is each.VAR_POSITIONAL), None
+        (
+            name
+            for name, each in inspect.signature(code).parameters.items()
+            if each.kind is each.VAR_POSITIONAL
+        ),
+        None,
     )
 
     def call(**arguments: Any) -> Any:
@@ -369,7 +401,9 @@ def complaints_about(function: str, code: Callable[..., Any], owner: type | None
             value = made()
             accepted = is_accepted(slip, value, allowed)
             is_the_mesh = es.SimplicialMesh in allowed and slip in SAME_MESH
-            if (function, slip) in OF_ITS_OWN_KIND or (accepted and (slip == "mesh" or (dear and slip != "trimesh"))):
+            if (function, slip) in OF_ITS_OWN_KIND or (
+                accepted and (slip == "mesh" or (dear and slip != "trimesh"))
+            ):
                 continue
             try:
                 answer = call(**{**given, name: value})
@@ -378,7 +412,11 @@ def complaints_about(function: str, code: Callable[..., Any], owner: type | None
             except Exception as error:  # noqa: BLE001 - the law is that there is none
                 found = f"{type(error).__name__}: {error}"
             else:
-                wrong = "another answer than for the mesh" if is_the_mesh and not same(right, answer) else None
+                wrong = (
+                    "another answer than for the mesh"
+                    if is_the_mesh and not same(right, answer)
+                    else None
+                )
                 found = wrong if accepted else "took it"
             if found:
                 yield f"{function}({name}={slip})", found

@@ -32,7 +32,10 @@ def columns(pairs):
 def test_diagrams_are_at_most_as_far_apart_as_their_functions(seed, spread, change):
     shape, values, rng = shape_and_values(seed, spread)
     others = values + rng.integers(-change, change + 1, shape.n_points) / 8
-    one, two = es.features.persistence_diagram(shape, values), es.features.persistence_diagram(shape, others)
+    one, two = (
+        es.features.persistence_diagram(shape, values),
+        es.features.persistence_diagram(shape, others),
+    )
     distance = es.features.bottleneck_distance(one, two)
     assert distance <= np.abs(values - others).max()
     assert distance == es.features.bottleneck_distance(two, one)
@@ -43,7 +46,8 @@ def test_diagrams_are_at_most_as_far_apart_as_their_functions(seed, spread, chan
 def test_the_triangle_inequality(seed, spread):
     shape, values, rng = shape_and_values(seed, spread)
     one, two, three = (
-        es.features.persistence_diagram(shape, values + rng.integers(0, spread, shape.n_points) / 8) for _ in range(3)
+        es.features.persistence_diagram(shape, values + rng.integers(0, spread, shape.n_points) / 8)
+        for _ in range(3)
     )
     assert es.features.bottleneck_distance(one, three) <= es.features.bottleneck_distance(
         one, two
@@ -58,7 +62,10 @@ def test_names_of_points_do_not_matter(seed, spread):
     points, named = np.empty_like(shape.points), np.empty_like(values)
     points[new_of_old], named[new_of_old] = shape.points, values
     other = es.SimplicialMesh(points, new_of_old[shape.simplices])
-    one, two = es.features.persistence_diagram(shape, values), es.features.persistence_diagram(other, named)
+    one, two = (
+        es.features.persistence_diagram(shape, values),
+        es.features.persistence_diagram(other, named),
+    )
     for kind in ("maxima", "minima", "components", "loops"):
         assert columns(getattr(one, kind)) == columns(getattr(two, kind))
 
@@ -68,7 +75,10 @@ def test_names_of_points_do_not_matter(seed, spread):
 def test_pairs_alive_at_a_level_are_the_components_there(seed, spread, level):
     shape, values, _ = shape_and_values(seed, spread)
     found, graph = es.features.persistence_diagram(shape, values), es.operators.edge_graph(shape)
-    for pairs, ends, sign in ((found.minima, found.components.births, 1), (found.maxima, found.components.deaths, -1)):
+    for pairs, ends, sign in (
+        (found.minima, found.components.births, 1),
+        (found.maxima, found.components.deaths, -1),
+    ):
         inside = sign * values <= sign * level / 8
         alive = (sign * pairs.births <= sign * level / 8) & (sign * pairs.deaths > sign * level / 8)
         count = alive.sum() + (sign * ends <= sign * level / 8).sum()

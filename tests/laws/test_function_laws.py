@@ -17,7 +17,10 @@ FUNCTIONS = {  # and the power of length that each is in
     "heat": (spectral(lambda s: es.heat_kernel_signature(s, es.spectral.default_times(s, 8))), -2),
     "scale-invariant heat": (spectral(es.spectral.scale_invariant_heat_kernel_signature), 0),
     "waves": (spectral(es.wave_kernel_signature), -2),
-    "average geodesic distance": (lambda mesh: es.geometry.average_geodesic_distance(mesh, n_bases=mesh.n_vertices), 1),
+    "average geodesic distance": (
+        lambda mesh: es.geometry.average_geodesic_distance(mesh, n_bases=mesh.n_vertices),
+        1,
+    ),
     "Gaussian curvature": (es.geometry.gaussian_curvature, -2),
     "mean curvature": (es.operators.mean_curvature, -1),
 }
@@ -39,7 +42,9 @@ def test_a_fold_leaves_what_is_within_the_surface(name):
     function, _ = FUNCTIONS[name]
     flat = sheet()
     x, y, _ = flat.vertices.T
-    bent = es.TriangleMesh(np.column_stack([np.minimum(x, 0.5), y, np.maximum(x - 0.5, 0)]), flat.faces)
+    bent = es.TriangleMesh(
+        np.column_stack([np.minimum(x, 0.5), y, np.maximum(x - 0.5, 0)]), flat.faces
+    )
     assert_same(function(flat), function(bent))
 
 

@@ -22,13 +22,25 @@ class Shared:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.ball, self.grid, self.torus = es.icosphere(2), es.shapes.grid(8, 8), es.shapes.torus(24, 12)
+        self.ball, self.grid, self.torus = (
+            es.icosphere(2),
+            es.shapes.grid(8, 8),
+            es.shapes.torus(24, 12),
+        )
         self.solid, self.cloud = es.shapes.box(3, 3, 3), es.PointCloud(es.icosphere(3).vertices, 2)
-        self.animal, self.pose = (es.make_creature("quadruped", pose, n_vertices=700) for pose in (0, 1))
+        self.animal, self.pose = (
+            es.make_creature("quadruped", pose, n_vertices=700) for pose in (0, 1)
+        )
         self.camera = es.plot.Camera(np.eye(3), 60)
         self.labels = (self.animal.vertices[self.animal.faces[:, 0], 1] > 0).astype(np.int64)
-        self.laplacian, self.other = es.cotangent_laplacian(self.animal), es.cotangent_laplacian(self.pose)
-        self.spectrum, self.spectrum2 = es.solve_spectrum(self.laplacian, 30), es.solve_spectrum(self.other, 30)
+        self.laplacian, self.other = (
+            es.cotangent_laplacian(self.animal),
+            es.cotangent_laplacian(self.pose),
+        )
+        self.spectrum, self.spectrum2 = (
+            es.solve_spectrum(self.laplacian, 30),
+            es.solve_spectrum(self.other, 30),
+        )
         self.times = es.spectral.default_times(self.spectrum, 5)
         self.heat = es.heat_kernel_signature(self.spectrum, self.times)
         self.tree = es.merge_tree(self.animal, self.heat[:, -1])
@@ -43,7 +55,9 @@ class Shared:
         self.many = es.shapes.fibonacci_sphere(10_500)
         self.many_laplacian = es.cotangent_laplacian(self.many)
         self.many_spectrum = es.spectral.approximate_spectrum(self.many_laplacian, 9)
-        self.many_map = es.functional_map(self.many_spectrum, self.many_spectrum, [[0, 0], [99, 99]], n_modes=4)
+        self.many_map = es.functional_map(
+            self.many_spectrum, self.many_spectrum, [[0, 0], [99, 99]], n_modes=4
+        )
         self.transfer = es.transfer_labels(self.animal, self.labels, self.pose)
         self._make_files()
 
@@ -57,7 +71,9 @@ class Shared:
         self.binding = es.deformation.bind(self.rig, [self.region], fixed=self.fixed, n_modes=12)
         self.grip = es.deformation.grip_skeleton(self.binding)
         self.detailed = es.deformation.detail_skeleton(self.binding)
-        self.edit = es.deformation.Edit((es.deformation.Move(self.region, self.handle),), self.fixed, 12)
+        self.edit = es.deformation.Edit(
+            (es.deformation.Move(self.region, self.handle),), self.fixed, 12
+        )
 
     def _make_maps(self) -> None:
         pairs = np.repeat(np.arange(0, 700, 70), 2).reshape(-1, 2)
@@ -70,19 +86,28 @@ class Shared:
             es.retrieval.describe_patches(self.torus, n_samples=40),
         )
         self.animal_patches = es.retrieval.describe_patches(self.animal)
-        self.points = tuple(es.retrieval.patch_points(patches, self.codebook) for patches in self.patches)
-        self.codes = np.stack([es.retrieval.encode_patches(patches, self.codebook) for patches in self.patches])
+        self.points = tuple(
+            es.retrieval.patch_points(patches, self.codebook) for patches in self.patches
+        )
+        self.codes = np.stack(
+            [es.retrieval.encode_patches(patches, self.codebook) for patches in self.patches]
+        )
         self.recipe = es.retrieval.PatchRecipe(self.codebook)
-        self.in_words = tuple(es.retrieval.in_words([patches], self.recipe) for patches in self.patches)
+        self.in_words = tuple(
+            es.retrieval.in_words([patches], self.recipe) for patches in self.patches
+        )
         self.described = tuple(
             es.describe(spectrum, es.segment(self.tree, n_regions=6).features)
             for spectrum in (self.spectrum, self.spectrum2)
         )
         self.light = tuple(
-            es.retrieval.baselines.light_field(mesh, n_fields=1, size=32) for mesh in (self.ball, self.torus)
+            es.retrieval.baselines.light_field(mesh, n_fields=1, size=32)
+            for mesh in (self.ball, self.torus)
         )
         self.index = es.ShapeIndex.create(self.folder / "index")
-        for number, (by_heat, by_patches) in enumerate(zip(self.described, self.in_words, strict=True)):
+        for number, (by_heat, by_patches) in enumerate(
+            zip(self.described, self.in_words, strict=True)
+        ):
             self.index.add(f"shape {number}", [by_heat])
             self.index.add(f"in words {number}", [by_patches])
 
@@ -90,9 +115,14 @@ class Shared:
         moved = es.TriangleMesh(self.ball.vertices * [1.0, 1.02, 1.0], self.ball.faces)
         self.change = es.stability.measure_perturbation(self.ball, moved)
         self.nodes = es.stability.anchor_nodes(self.ball, 0.5)
-        self.on_one, self.on_two = (es.geometry.sample_surface(mesh, 60, rng=rng()) for mesh in (self.ball, moved))
+        self.on_one, self.on_two = (
+            es.geometry.sample_surface(mesh, 60, rng=rng()) for mesh in (self.ball, moved)
+        )
         self.report = es.compare_shapes(
-            self.ball, moved, es.stability.StabilityPlan(k=5, n_samples=200, times=(0.05,)), partners=None
+            self.ball,
+            moved,
+            es.stability.StabilityPlan(k=5, n_samples=200, times=(0.05,)),
+            partners=None,
         )
 
     def _make_files(self) -> None:
@@ -154,7 +184,13 @@ def answers(v: Shared) -> tuple[object, ...]:
     index = es.ShapeIndex.open(v.index.folder)
     by_heat, by_patches = v.described[0], v.in_words[0]
     found = [index.query(asked, n_matches=2) for asked in (by_heat, by_patches)]
-    return found, index.records(), index.recipes(), len(index), index.descriptor("shape 0", by_heat.recipe)
+    return (
+        found,
+        index.records(),
+        index.recipes(),
+        len(index),
+        index.descriptor("shape 0", by_heat.recipe),
+    )
 
 
 def cached(v: Shared) -> es.Spectrum:
@@ -164,10 +200,16 @@ def cached(v: Shared) -> es.Spectrum:
 
 CALLS: dict[str, Callable[[Shared], object]] = {
     "DeformationSession": session_of,
-    "DepthCamera": lambda v: es.scans.simulate_scan(v.ball, rng(), camera=es.scans.DepthCamera(resolution=40)),
+    "DepthCamera": lambda v: es.scans.simulate_scan(
+        v.ball, rng(), camera=es.scans.DepthCamera(resolution=40)
+    ),
     "Rate.at": lambda v: es.stability.theorem_rate("lipschitz", 2).at([0.1, 0.2], 0.01),
-    "Rotation.carry": lambda v: v.handle.carry(v.ball.vertices, np.linspace(0, 1, v.ball.n_vertices)),
-    "Translation.carry": lambda v: v.move.carry(v.ball.vertices, np.linspace(0, 1, v.ball.n_vertices)),
+    "Rotation.carry": lambda v: v.handle.carry(
+        v.ball.vertices, np.linspace(0, 1, v.ball.n_vertices)
+    ),
+    "Translation.carry": lambda v: v.move.carry(
+        v.ball.vertices, np.linspace(0, 1, v.ball.n_vertices)
+    ),
     "ShapeIndex": answers,
     "ShapeIndex.add": index_of,
     "Spectrum.save": lambda v: written(v.folder, ".npz", v.spectrum.save),
@@ -186,19 +228,26 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         v.many_laplacian, 8, [0.5, 1.0]
     ),
     "approximate_spectrum": lambda v: es.spectral.approximate_spectrum(v.many_laplacian, 4),
-    "as_rigid_as_possible": lambda v: es.deformation.as_rigid_as_possible(v.binding, [v.handle], n_rounds=20),
+    "as_rigid_as_possible": lambda v: es.deformation.as_rigid_as_possible(
+        v.binding, [v.handle], n_rounds=20
+    ),
     "as_mesh": lambda v: es.as_mesh((v.ball.vertices, v.ball.faces)),
     "as_shape": lambda v: es.geometry.as_shape((v.ball.vertices, v.ball.faces)),
-    "average_geodesic_distance": lambda v: es.geometry.average_geodesic_distance(v.animal, n_bases=40),
+    "average_geodesic_distance": lambda v: es.geometry.average_geodesic_distance(
+        v.animal, n_bases=40
+    ),
     "ball": lambda v: es.shapes.ball(3),
     "ball_eigenvalues": lambda v: es.shapes.ball_eigenvalues(9),
     "bend": lambda v: [
-        es.deformation.bend(v.binding, [v.handle], mode=mode) for mode in ("graded", "uncrossed", "thesis")
+        es.deformation.bend(v.binding, [v.handle], mode=mode)
+        for mode in ("graded", "uncrossed", "thesis")
     ],
     "biharmonic_blend": lambda v: es.deformation.biharmonic_blend(v.binding, [v.handle]),
     "bind": lambda v: es.deformation.bind(v.rig, [v.region], fixed=v.fixed).shares,
     "bottleneck_distance": lambda v: es.features.bottleneck_distance(v.diagram, v.diagram2),
-    "bottleneck_matching": lambda v: es.stability.bottleneck_matching(v.on_one.points, v.on_two.points),
+    "bottleneck_matching": lambda v: es.stability.bottleneck_matching(
+        v.on_one.points, v.on_two.points
+    ),
     "boundary_edges": lambda v: es.geometry.boundary_edges(v.grid),
     "boundary_loops": lambda v: es.geometry.boundary_loops(v.grid),
     "boundary_vertices": lambda v: es.geometry.boundary_vertices(v.grid),
@@ -211,7 +260,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         for name, entry in es.operators.OPERATORS.items()
         if es.TriangleMesh in entry.takes
     ],
-    "certify": lambda v: es.spectral.certify(v.laplacian, v.spectrum.eigenvalues, v.spectrum.eigenvectors),
+    "certify": lambda v: es.spectral.certify(
+        v.laplacian, v.spectrum.eigenvalues, v.spectrum.eigenvectors
+    ),
     "check_laplacian": lambda v: es.spectral.check_laplacian(v.laplacian, v.animal),
     "check_operator": lambda v: es.check_operator(es.cotangent_laplacian, v.ball),
     "cheeger_estimate": lambda v: es.stability.cheeger_estimate(v.animal, v.spectrum),
@@ -248,7 +299,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "describe_to_keep": lambda v: es.retrieval.describe_to_keep(v.animal, es.retrieval.THESIS),
     "describe_views": lambda v: es.retrieval.describe_views(v.animal, n_views=1),
     "detail_skeleton": lambda v: es.deformation.detail_skeleton(v.binding).fine,
-    "dirichlet_laplacian": lambda v: es.operators.dirichlet_laplacian(v.laplacian, np.array([0, 5])),
+    "dirichlet_laplacian": lambda v: es.operators.dirichlet_laplacian(
+        v.laplacian, np.array([0, 5])
+    ),
     "disc": lambda v: es.shapes.disc(4),
     "disc_eigenvalues": lambda v: es.shapes.disc_eigenvalues(9),
     "disjoint_union": lambda v: es.shapes.disjoint_union(v.ball, v.torus),
@@ -265,7 +318,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "eigen_skeleton": lambda v: es.deformation.eigen_skeleton(v.rig, 9),
     "eigenspace_angles": lambda v: es.spectral.eigenspace_angles(v.many_spectrum, v.many_spectrum),
     "eigenspace_errors": lambda v: es.spectral.eigenspace_errors(
-        v.many_spectrum, es.shapes.sphere_eigenvalues(9), es.shapes.sphere_harmonics(v.many.vertices, 4)
+        v.many_spectrum,
+        es.shapes.sphere_eigenvalues(9),
+        es.shapes.sphere_harmonics(v.many.vertices, 4),
     ),
     "enclosed_volume": lambda v: es.geometry.enclosed_volume(v.many),
     "enclosing_ball": lambda v: es.geometry.enclosing_ball(v.animal.vertices),
@@ -280,32 +335,49 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "fem_nodes": lambda v: es.operators.fem_nodes(v.solid, 3),
     "fibonacci_sphere": lambda v: es.shapes.fibonacci_sphere(300),
     "figure_contact_sheet": lambda v: drawn(
-        es.plot.figure_contact_sheet(es.plot.Panel(v.ball, "ball", np.zeros(v.ball.n_faces, int), np.array([0])), [])
+        es.plot.figure_contact_sheet(
+            es.plot.Panel(v.ball, "ball", np.zeros(v.ball.n_faces, int), np.array([0])), []
+        )
     ),
     "figure_diagram": lambda v: drawn(es.plot.figure_diagram(v.diagram)),
-    "figure_eigenfunctions": lambda v: drawn(es.plot.figure_eigenfunctions(v.animal, v.spectrum, [1], camera=v.camera)),
-    "figure_field": lambda v: drawn(es.figure_field(v.ball, v.ball.vertices[:, 0], r"$x_1$", camera=v.camera)),
-    "figure_label_transfer": lambda v: drawn(es.plot.figure_label_transfer(v.animal, v.pose, v.transfer)),
+    "figure_eigenfunctions": lambda v: drawn(
+        es.plot.figure_eigenfunctions(v.animal, v.spectrum, [1], camera=v.camera)
+    ),
+    "figure_field": lambda v: drawn(
+        es.figure_field(v.ball, v.ball.vertices[:, 0], r"$x_1$", camera=v.camera)
+    ),
+    "figure_label_transfer": lambda v: drawn(
+        es.plot.figure_label_transfer(v.animal, v.pose, v.transfer)
+    ),
     "figure_merge_tree": lambda v: drawn(es.plot.figure_merge_tree(v.tree)),
     "figure_poses": lambda v: drawn(
-        es.plot.figure_poses({"rest": v.ball}, np.linspace(0, 1, v.ball.n_vertices), camera=v.camera)
+        es.plot.figure_poses(
+            {"rest": v.ball}, np.linspace(0, 1, v.ball.n_vertices), camera=v.camera
+        )
     ),
     "figure_segments": lambda v: drawn(
         es.figure_segments(v.ball, v.ball.faces[:, 0] % 3, np.array([0]), camera=v.camera)
     ),
-    "figure_spectra": lambda v: drawn(es.plot.figure_spectra({"rest": v.spectrum, "pose": v.spectrum2})),
+    "figure_spectra": lambda v: drawn(
+        es.plot.figure_spectra({"rest": v.spectrum, "pose": v.spectrum2})
+    ),
     "figure_spectrum": lambda v: drawn(es.plot.figure_spectrum(v.spectrum)),
     "figure_stability": lambda v: drawn(es.plot.figure_stability(v.report, v.cloud, v.cloud)),
     "find_parts": lambda v: es.find_parts(v.animal).parts,
-    "fit_rate": lambda v: es.stability.fit_rate([0.1, 0.2, 0.4], [0.01, 0.02, 0.03], [1.0, 2.0, 5.0]),
+    "fit_rate": lambda v: es.stability.fit_rate(
+        [0.1, 0.2, 0.4], [0.01, 0.02, 0.03], [1.0, 2.0, 5.0]
+    ),
     "flat_torus_eigenvalues": lambda v: es.shapes.flat_torus_eigenvalues(9, np.eye(2)),
     "from_arrays": lambda v: es.from_arrays(v.ball.vertices, v.ball.faces),
     "from_pyvista": lambda v: es.io.from_pyvista(es.io.to_pyvista(v.ball)),
     "from_trimesh": lambda v: es.io.from_trimesh(es.io.to_trimesh(v.ball)),
     "functional_laplacian": lambda v: (
-        es.operators.functional_laplacian(es.geometry.mesh_quadrature(v.animal), 0.01) @ v.animal.vertices[:, 0]
+        es.operators.functional_laplacian(es.geometry.mesh_quadrature(v.animal), 0.01)
+        @ v.animal.vertices[:, 0]
     ),
-    "functional_map": lambda v: es.functional_map(v.spectrum, v.spectrum2, [[0, 0], [99, 99]], n_modes=8),
+    "functional_map": lambda v: es.functional_map(
+        v.spectrum, v.spectrum2, [[0, 0], [99, 99]], n_modes=8
+    ),
     "gaussian_curvature": lambda v: es.geometry.gaussian_curvature(v.animal),
     "gaussian_laplacian": lambda v: es.operators.gaussian_laplacian(v.cloud.points, 0.02, 2),
     "geodesic_balls": lambda v: es.geometry.geodesic_balls(v.ball, 0.5),
@@ -335,14 +407,18 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "match_patches": lambda v: es.retrieval.match_patches(*v.points),
     "matching_reach": lambda v: es.stability.matching_reach(2.0),
     "matching_score": lambda v: es.retrieval.matching_score(*v.described),
-    "maximum_matching": lambda v: es.stability.maximum_matching(sp.csr_array(np.eye(5)[[4, 2, 0, 1, 3]])),
+    "maximum_matching": lambda v: es.stability.maximum_matching(
+        sp.csr_array(np.eye(5)[[4, 2, 0, 1, 3]])
+    ),
     "mean_curvature": lambda v: es.operators.mean_curvature(v.many),
     "mean_side_length": lambda v: es.geometry.mean_side_length(v.many),
     "measure_closeness": lambda v: es.stability.measure_closeness(v.change),
     "measure_distortion": lambda v: es.deformation.measure_distortion(v.animal, v.pose),
     "merge_targets": lambda v: es.features.merge_targets(v.tree),
     "merge_tree": lambda v: es.merge_tree(v.animal, v.heat[:, 0]),
-    "mesh_laplacian": lambda v: [es.mesh_laplacian(v.torus, distance=d) for d in ("euclidean", "geodesic")],
+    "mesh_laplacian": lambda v: [
+        es.mesh_laplacian(v.torus, distance=d) for d in ("euclidean", "geodesic")
+    ],
     "mesh_quadrature": lambda v: es.geometry.mesh_quadrature(v.many),
     "moved_skeleton": lambda v: es.deformation.moved_skeleton(v.grip, [v.handle]),
     "neighbor_graph": lambda v: es.operators.neighbor_graph(v.cloud.points, 6),
@@ -365,7 +441,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "point_map": lambda v: es.spectral.point_map(v.map),
     "projective_plane": lambda v: es.shapes.projective_plane(1),
     "projective_plane_eigenvalues": lambda v: es.shapes.projective_plane_eigenvalues(9),
-    "quadrature_laplacian": lambda v: es.operators.quadrature_laplacian(es.geometry.mesh_quadrature(v.torus), 0.05),
+    "quadrature_laplacian": lambda v: es.operators.quadrature_laplacian(
+        es.geometry.mesh_quadrature(v.torus), 0.05
+    ),
     "random_planes": lambda v: es.scans.random_planes(v.animal, rng()),
     "random_sphere": lambda v: es.shapes.random_sphere(90, rng=rng()),
     "read_codebook": lambda v: es.retrieval.read_codebook(v.bytes),
@@ -378,16 +456,22 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         v.many_spectrum, v.many_spectrum, [0.3]
     ),
     "region_boundary": lambda v: es.deformation.region_boundary(v.animal, v.region),
-    "region_mask": lambda v: es.deformation.region_mask(v.animal, es.deformation.BoxRegion([-1, 0, -1], [1, 1, 1])),
+    "region_mask": lambda v: es.deformation.region_mask(
+        v.animal, es.deformation.BoxRegion([-1, 0, -1], [1, 1, 1])
+    ),
     "repair": lambda v: es.repair(v.animal, ["weld", "drop_unreferenced"]),
     "replay": lambda v: es.deformation.replay(v.rig, [v.edit]).mesh,
     "rig_shape": lambda v: es.rig_shape(v.many, v.many_spectrum).factor,
     "robust_laplacian": lambda v: es.robust_laplacian(v.animal),
     "rotation_by_drag": lambda v: es.deformation.rotation_by_drag([0, 0, 0], [1, 0, 0], [0, 1, 0]),
     "sample_surface": lambda v: es.geometry.sample_surface(v.animal, 50, rng=rng()),
-    "save_figure": lambda v: [saved(v, ".png"), saved(v, ".pdf"), len(saved(v, ".svg"))],  # random names in SVG
-    "scale_invariant_heat_kernel_signature": lambda v: es.spectral.scale_invariant_heat_kernel_signature(
-        v.many_spectrum
+    "save_figure": lambda v: [
+        saved(v, ".png"),
+        saved(v, ".pdf"),
+        len(saved(v, ".svg")),
+    ],  # random names in SVG
+    "scale_invariant_heat_kernel_signature": lambda v: (
+        es.spectral.scale_invariant_heat_kernel_signature(v.many_spectrum)
     ),
     "seal_holes": lambda v: es.geometry.seal_holes(v.grid),
     "seen_patches": lambda v: es.retrieval.seen_patches(v.torus, n_views=1),
@@ -399,14 +483,22 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         v.spectrum.eigenvalues, v.spectrum2.eigenvalues
     ),
     "simplex_volumes": lambda v: es.geometry.simplex_volumes(v.solid),
-    "simulate_scan": lambda v: es.scans.simulate_scan(v.ball, rng(), camera=es.scans.DepthCamera(resolution=40)),
+    "simulate_scan": lambda v: es.scans.simulate_scan(
+        v.ball, rng(), camera=es.scans.DepthCamera(resolution=40)
+    ),
     "smooth_boundaries": lambda v: es.features.smooth_boundaries(v.animal, v.parts),
     "solve_dirichlet": lambda v: es.spectral.solve_dirichlet(v.laplacian, 5, np.array([0, 5])),
-    "solve_spectrum": lambda v: [es.solve_spectrum(v.laplacian, 40), es.solve_spectrum(v.many_laplacian, 3), cached(v)],
+    "solve_spectrum": lambda v: [
+        es.solve_spectrum(v.laplacian, 40),
+        es.solve_spectrum(v.many_laplacian, 3),
+        cached(v),
+    ],
     "spectral_hausdorff_distance": lambda v: es.spectral.spectral_hausdorff_distance(
         v.spectrum.eigenvalues, v.spectrum2.eigenvalues
     ),
-    "spectral_rigid": lambda v: es.deformation.spectral_rigid(v.binding, [v.handle], n_modes=20, n_rounds=5),
+    "spectral_rigid": lambda v: es.deformation.spectral_rigid(
+        v.binding, [v.handle], n_modes=20, n_rounds=5
+    ),
     "sphere_eigenvalues": lambda v: es.shapes.sphere_eigenvalues(9),
     "sphere_functional_eigenvalues": lambda v: es.shapes.sphere_functional_eigenvalues(9, 0.01),
     "sphere_harmonics": lambda v: es.shapes.sphere_harmonics(v.ball.vertices, 3),
@@ -426,7 +518,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "torus_quadrature": lambda v: es.geometry.torus_quadrature(9, 7),
     "touching_parts": lambda v: es.features.touching_parts(v.animal, v.labels),
     "train_codebook": lambda v: es.retrieval.train_codebook([v.animal_patches]),
-    "transfer_deformation": lambda v: es.deformation.transfer_deformation(v.animal, v.pose, v.pose, v.map),
+    "transfer_deformation": lambda v: es.deformation.transfer_deformation(
+        v.animal, v.pose, v.pose, v.map
+    ),
     "transfer_function": lambda v: es.spectral.transfer_function(v.many_map, v.many.vertices),
     "transfer_labels": lambda v: es.transfer_labels(v.animal, v.labels, v.pose),
     "trusted_times": lambda v: es.stability.trusted_times(delta=0.01, spacing=0.02, eigenvalue=9.0),
@@ -435,19 +529,29 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "vertex_components": lambda v: es.geometry.vertex_components(v.animal),
     "vertex_normals": lambda v: es.geometry.vertex_normals(v.many),
     "vertex_pairs": lambda v: es.stability.vertex_pairs(v.change),
-    "view_distances": lambda v: es.retrieval.view_distances(v.codes[0], v.codes, v.codes[1:], np.array([1])),
+    "view_distances": lambda v: es.retrieval.view_distances(
+        v.codes[0], v.codes, v.codes[1:], np.array([1])
+    ),
     "wave_kernel_signature": lambda v: es.wave_kernel_signature(
         v.many_spectrum, es.spectral.default_energies(v.many_spectrum, 4)[0]
     ),
     "weld": lambda v: es.geometry.weld(v.animal),
     "weld_seams": lambda v: es.geometry.weld_seams(v.animal),
     "weyl_bound": lambda v: es.stability.weyl_bound(v.laplacian, v.other),
-    "witness_region": lambda v: es.stability.witness_region(v.change, v.on_two, v.nodes.points, 0.5, rho=3.0),
-    "word_distances": lambda v: es.retrieval.word_distances(v.in_words[0].codes, [words.codes for words in v.in_words]),
+    "witness_region": lambda v: es.stability.witness_region(
+        v.change, v.on_two, v.nodes.points, 0.5, rho=3.0
+    ),
+    "word_distances": lambda v: es.retrieval.word_distances(
+        v.in_words[0].codes, [words.codes for words in v.in_words]
+    ),
     "write_codebook": lambda v: es.retrieval.write_codebook(v.codebook),
-    "write_edits": lambda v: written(v.folder, ".json", lambda path: es.io.write_edits([v.edit], v.animal, path)),
+    "write_edits": lambda v: written(
+        v.folder, ".json", lambda path: es.io.write_edits([v.edit], v.animal, path)
+    ),
     "write_mesh": lambda v: written(v.folder, ".ply", lambda path: es.write_mesh(v.animal, path)),
-    "write_points": lambda v: written(v.folder, ".ply", lambda path: es.io.write_points(v.cloud, path)),
+    "write_points": lambda v: written(
+        v.folder, ".ply", lambda path: es.io.write_points(v.cloud, path)
+    ),
 }
 
 LEFT_OUT = {

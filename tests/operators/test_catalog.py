@@ -28,7 +28,10 @@ def test_each_takes_what_it_says_and_refuses_the_rest(shape, name):
         ones = np.ones(laplacian.n_points)
         assert np.abs(laplacian.stiffness @ ones).max() < 1e-11 * laplacian.stiffness.max()
     else:
-        with pytest.raises(InvalidParameterError, match=rf"The {name} operator takes .*; the shape is a .* It is for"):
+        with pytest.raises(
+            InvalidParameterError,
+            match=rf"The {name} operator takes .*; the shape is a .* It is for",
+        ):
             build_laplacian(SHAPES[shape], name)
 
 
@@ -40,9 +43,15 @@ def test_without_a_name_the_shape_decides():
 
 
 def test_unknown_names_and_options_are_refused():
-    with pytest.raises(InvalidParameterError, match=r"operator must be one of cotangent, p2, .*; it is 'heat'"):
+    with pytest.raises(
+        InvalidParameterError, match=r"operator must be one of cotangent, p2, .*; it is 'heat'"
+    ):
         build_laplacian(SHAPES["triangles"], "heat")
-    with pytest.raises(InvalidParameterError, match="The cotangent operator takes mass; it was given t"):
+    with pytest.raises(
+        InvalidParameterError, match="The cotangent operator takes mass; it was given t"
+    ):
         build_laplacian(SHAPES["triangles"], "cotangent", t=1.0)
-    with pytest.raises(InvalidParameterError, match="The p2 operator takes no option; it was given mass"):
+    with pytest.raises(
+        InvalidParameterError, match="The p2 operator takes no option; it was given mass"
+    ):
         build_laplacian(SHAPES["triangles"], "p2", mass="lumped")

@@ -21,7 +21,9 @@ def test_a_sphere_that_faces_outward_has_one_over_its_radius(radius):
 def test_turned_inside_out_it_changes_sign():
     mesh = es.shapes.torus(16, 10)
     inward = es.TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
-    np.testing.assert_allclose(es.operators.mean_curvature(inward), -es.operators.mean_curvature(mesh), rtol=1e-9)
+    np.testing.assert_allclose(
+        es.operators.mean_curvature(inward), -es.operators.mean_curvature(mesh), rtol=1e-9
+    )
 
 
 def test_a_torus_is_approached_with_the_square_of_the_edges():

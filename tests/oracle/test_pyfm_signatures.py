@@ -13,7 +13,9 @@ import eigenshape as es
 def mesh(request):
     if request.param == "torus":
         return es.shapes.torus(24, 12)
-    return es.read_mesh(request.getfixturevalue("data") / "retrieval" / "horse" / "sumner_horse-02.ply")
+    return es.read_mesh(
+        request.getfixturevalue("data") / "retrieval" / "horse" / "sumner_horse-02.ply"
+    )
 
 
 @pytest.fixture(scope="module")
@@ -30,11 +32,15 @@ def test_heat(spectrum):
 def test_waves(spectrum):
     energies, sigma = es.spectral.default_energies(spectrum, 30)
     theirs = WKS(spectrum.eigenvalues, spectrum.eigenvectors, energies, sigma, scaled=True)
-    np.testing.assert_allclose(es.wave_kernel_signature(spectrum, energies, sigma=sigma), theirs, rtol=1e-9)
+    np.testing.assert_allclose(
+        es.wave_kernel_signature(spectrum, energies, sigma=sigma), theirs, rtol=1e-9
+    )
 
 
 def test_gaussian_curvature(mesh):
     inside = ~np.isin(np.arange(mesh.n_vertices), es.geometry.boundary_vertices(mesh))
-    theirs = igl.gaussian_curvature(np.array(mesh.vertices), np.array(mesh.faces))  # the angle defect
+    theirs = igl.gaussian_curvature(
+        np.array(mesh.vertices), np.array(mesh.faces)
+    )  # the angle defect
     ours = es.geometry.gaussian_curvature(mesh) * es.geometry.dual_volumes(mesh)
     np.testing.assert_allclose(ours[inside], theirs[inside], atol=1e-9)

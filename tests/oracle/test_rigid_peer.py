@@ -21,7 +21,9 @@ def energy(edges, rest, posed):
     turns = fitted_turns(edges, rest, posed)
     one = np.repeat(np.arange(len(rest)), np.diff(edges.starts))
     arms, after = rest[edges.others] - rest[one], posed[edges.others] - posed[one]
-    return edges.weights @ ((np.einsum("eij,ej->ei", turns[one], arms) - after) ** 2).sum(axis=1) / 2
+    return (
+        edges.weights @ ((np.einsum("eij,ej->ei", turns[one], arms) - after) ** 2).sum(axis=1) / 2
+    )
 
 
 @pytest.mark.parametrize("kind", ["SPOKES", "SPOKES_AND_RIMS"])

@@ -18,7 +18,9 @@ def figures(title):
     yield es.figure_field(BALL, BALL.vertices[:, 0], title)
     yield es.plot.figure_poses({title: BALL})
     yield es.plot.figure_spectra(spectra)
-    yield es.plot.figure_contact_sheet(es.plot.Panel(BALL, title, LABELS, np.array([0])), [], caption=title)
+    yield es.plot.figure_contact_sheet(
+        es.plot.Panel(BALL, title, LABELS, np.array([0])), [], caption=title
+    )
     yield es.plot.figure_merge_tree(es.merge_tree(BALL, BALL.vertices[:, 0]), label=title)
 
 

@@ -13,7 +13,9 @@ def twice(mesh):
 
 
 def pictures(figure, count):
-    return [np.asarray(axes.get_images()[0].get_array(), dtype=float) for axes in figure.axes[:count]]
+    return [
+        np.asarray(axes.get_images()[0].get_array(), dtype=float) for axes in figure.axes[:count]
+    ]
 
 
 def drawn_width(picture):
@@ -49,7 +51,10 @@ def test_more_poses_than_columns_go_on_in_another_row():
 
 @pytest.mark.long
 def test_what_moves_more_is_redder():
-    cold, warm = (pictures(es.plot.figure_poses({"": BALL}, np.full(162, share)), 1)[0] for share in (0.0, 1.0))
+    cold, warm = (
+        pictures(es.plot.figure_poses({"": BALL}, np.full(162, share)), 1)[0]
+        for share in (0.0, 1.0)
+    )
     seen = np.abs(cold - warm).max(axis=2) > 1e-3
     assert seen.any()
     grey, red = (np.mean(picture[seen], axis=0) for picture in (cold, warm))

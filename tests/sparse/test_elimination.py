@@ -12,8 +12,12 @@ from eigenshape.sparse.elimination import analyse, factorise
 
 def random_symmetric(n, density, seed):
     rng = np.random.default_rng(seed)
-    half = sp.random_array((n, n), density=density, rng=rng, data_sampler=lambda size: rng.normal(size=size))
-    matrix = sp.csc_array(half + half.T + sp.diags_array(rng.normal(size=n) + 3 * np.sign(rng.normal(size=n))))
+    half = sp.random_array(
+        (n, n), density=density, rng=rng, data_sampler=lambda size: rng.normal(size=size)
+    )
+    matrix = sp.csc_array(
+        half + half.T + sp.diags_array(rng.normal(size=n) + 3 * np.sign(rng.normal(size=n)))
+    )
     matrix.sort_indices()
     return matrix
 
@@ -31,10 +35,17 @@ def test_any_pattern_is_factored_counted_and_solved(n, density, seed):
     factor, right, found = solved(matrix)
     assert sorted(factor.elimination.order) == list(range(n))
     dense = matrix.toarray()
-    growth = np.abs(factor.pivots).max() / np.abs(dense).max() + np.abs(dense).max() / np.abs(factor.pivots).min()
+    growth = (
+        np.abs(factor.pivots).max() / np.abs(dense).max()
+        + np.abs(dense).max() / np.abs(factor.pivots).min()
+    )
     if growth < 1e5:  # without pivoting, growth is bad luck
-        assert np.count_nonzero(factor.pivots < 0) == np.count_nonzero(np.linalg.eigvalsh(dense) < 0)
-        np.testing.assert_allclose(dense @ found, right, atol=1e-7 * np.abs(found).max() * np.abs(dense).max())
+        assert np.count_nonzero(factor.pivots < 0) == np.count_nonzero(
+            np.linalg.eigvalsh(dense) < 0
+        )
+        np.testing.assert_allclose(
+            dense @ found, right, atol=1e-7 * np.abs(found).max() * np.abs(dense).max()
+        )
 
 
 @pytest.mark.parametrize("mesh", [fibonacci_sphere(5000), box(9, 9, 9)])
@@ -86,13 +97,17 @@ def test_an_arrow_is_eliminated_from_its_feathers():
 
 @pytest.mark.parametrize("bad", [0.0, np.nan, np.inf])
 def test_a_pivot_that_is_none(bad):
-    chain = sp.csc_array(sp.diags_array([-np.ones(9), np.full(10, 2.0), -np.ones(9)], offsets=[-1, 0, 1]))
+    chain = sp.csc_array(
+        sp.diags_array([-np.ones(9), np.full(10, 2.0), -np.ones(9)], offsets=[-1, 0, 1])
+    )
     assert factorise(analyse(chain), chain.data) is not None
     alone = sp.csc_array(sp.eye_array(4))
     assert factorise(analyse(alone), np.array([1.0, bad, 1.0, 1.0])) is None
 
 
 def test_nothing_depends_on_the_run():
-    matrix = sp.csc_array(cotangent_laplacian(fibonacci_sphere(2000)).stiffness + 0.1 * sp.eye_array(2000))
+    matrix = sp.csc_array(
+        cotangent_laplacian(fibonacci_sphere(2000)).stiffness + 0.1 * sp.eye_array(2000)
+    )
     one, two = (factorise(analyse(matrix), matrix.data) for _ in range(2))
     np.testing.assert_array_equal(one.panels, two.panels)

@@ -11,7 +11,9 @@ import eigenshape as es
 
 
 def eigenvalues(laplacian):
-    return scipy.linalg.eigh(laplacian.stiffness.toarray(), laplacian.mass.toarray(), eigvals_only=True)
+    return scipy.linalg.eigh(
+        laplacian.stiffness.toarray(), laplacian.mass.toarray(), eigvals_only=True
+    )
 
 
 def moved_points(n, delta, seed):
@@ -38,7 +40,9 @@ def test_no_eigenvalue_moves_further_than_weyl_and_ours_allow(seed, delta, t):
 def test_dense_samples_move_by_no_more_than_their_integrals(dim):
     """Points of a flat torus of volume 1 (a grid in R^2m) that all move outward and inward by turns."""
     n, t = {1: 4000, 2: 60, 3: 14}[dim], {1: 2e-4, 2: 4e-3, 3: 2e-2}[dim]
-    angles = np.stack(np.meshgrid(*[2 * np.pi * np.arange(n) / n] * dim, indexing="ij")).reshape(dim, -1)
+    angles = np.stack(np.meshgrid(*[2 * np.pi * np.arange(n) / n] * dim, indexing="ij")).reshape(
+        dim, -1
+    )
     points = np.concatenate([np.cos(angles), np.sin(angles)]).T / (2 * np.pi)
     delta = 0.02 * t**0.5
     steps = np.random.default_rng(0).standard_normal(points.shape)
@@ -56,7 +60,9 @@ def test_the_norm_is_that_of_the_dense_difference():
     points, moved = moved_points(200, 0.05, 1)
     one, two = (es.operators.gaussian_laplacian(each, 0.1, 2) for each in (points, moved))
     dense = 200 * (one.stiffness - two.stiffness).toarray()  # the mass is 1/n
-    assert es.stability.weyl_bound(one, two).norm == pytest.approx(np.linalg.norm(dense, 2), rel=1e-5)
+    assert es.stability.weyl_bound(one, two).norm == pytest.approx(
+        np.linalg.norm(dense, 2), rel=1e-5
+    )
     assert es.stability.weyl_bound(one, two).proven == pytest.approx(np.linalg.norm(dense, np.inf))
 
 
@@ -71,9 +77,15 @@ def test_masses_of_their_own_are_counted_in():
 def test_points_renumbered_are_the_same_points():
     points, _ = moved_points(100, 0.1, 2)
     order = np.random.default_rng(3).permutation(100)
-    one, two = es.operators.gaussian_laplacian(points, 0.1, 2), es.operators.gaussian_laplacian(points[order], 0.1, 2)
+    one, two = (
+        es.operators.gaussian_laplacian(points, 0.1, 2),
+        es.operators.gaussian_laplacian(points[order], 0.1, 2),
+    )
     back = np.argsort(order)
-    assert es.stability.weyl_bound(one, two, back).proven <= 1e-12 * es.stability.weyl_bound(one, two).proven
+    assert (
+        es.stability.weyl_bound(one, two, back).proven
+        <= 1e-12 * es.stability.weyl_bound(one, two).proven
+    )
     same = es.stability.weyl_bound(one, one)
     assert (same.norm, same.proven) == (0.0, 0.0)
 
@@ -90,10 +102,19 @@ def test_a_bound_follows_the_unit():
 
 def test_heat_times_are_trusted_between_the_change_and_the_last_eigenvalue():
     times = es.stability.trusted_times(delta=0.1, spacing=0.01, eigenvalue=20.0)
-    assert (times.low, times.high, times.low_by, times.empty) == (pytest.approx(0.01), 0.025, "closeness", False)
+    assert (times.low, times.high, times.low_by, times.empty) == (
+        pytest.approx(0.01),
+        0.025,
+        "closeness",
+        False,
+    )
     assert "from 0.01" in times.explain()
     times = es.stability.trusted_times(delta=0.0, spacing=0.1, eigenvalue=20.0, corrected=True)
-    assert (times.low, times.high, times.low_by) == (pytest.approx(0.1**2), pytest.approx(0.145), "spacing")
+    assert (times.low, times.high, times.low_by) == (
+        pytest.approx(0.1**2),
+        pytest.approx(0.145),
+        "spacing",
+    )
     none = es.stability.trusted_times(delta=0.5, spacing=0.1, eigenvalue=20.0)
     assert none.empty
     assert "No heat time serves" in none.explain()
@@ -125,7 +146,9 @@ def test_bad_input_is_named(monkeypatch):
     monkeypatch.setattr("eigenshape.stability.bounds.MOST_STEPS", 1)
     monkeypatch.setattr("eigenshape.stability.bounds.TOLERANCE", 0.0)
     n = 2000
-    path = sp.diags_array([np.r_[1, 2 * np.ones(n - 2), 1], -np.ones(n - 1), -np.ones(n - 1)], offsets=[0, 1, -1])
+    path = sp.diags_array(
+        [np.r_[1, 2 * np.ones(n - 2), 1], -np.ones(n - 1), -np.ones(n - 1)], offsets=[0, 1, -1]
+    )
     line = es.Laplacian(path.tocsr(), sp.eye_array(n).tocsr())
     half = es.Laplacian((path / 2).tocsr(), sp.eye_array(n).tocsr())
     with pytest.raises(es.ConvergenceError, match="not found in 1 steps"):

@@ -9,7 +9,9 @@ import eigenshape as es
 
 
 def estimate(mesh, **options):
-    return es.stability.cheeger_estimate(mesh, es.solve_spectrum(es.cotangent_laplacian(mesh), 8), **options)
+    return es.stability.cheeger_estimate(
+        mesh, es.solve_spectrum(es.cotangent_laplacian(mesh), 8), **options
+    )
 
 
 def test_the_sphere_is_cut_at_its_equator():
@@ -48,7 +50,9 @@ def test_a_neck_is_found(neck):
 def test_the_bounds_are_in_order_at_every_size(seed, exponent):
     rng = np.random.default_rng(seed)
     mesh = es.icosphere(2)
-    bumpy = es.TriangleMesh(mesh.vertices * (1 + 0.2 * rng.random((mesh.n_vertices, 1))), mesh.faces)
+    bumpy = es.TriangleMesh(
+        mesh.vertices * (1 + 0.2 * rng.random((mesh.n_vertices, 1))), mesh.faces
+    )
     scaled = es.TriangleMesh(bumpy.vertices * 10**exponent, mesh.faces)
     found, same = estimate(bumpy, least_curvature=-30.0), estimate(scaled)
     assert 0 < found.lower < found.upper

@@ -43,10 +43,16 @@ def test_a_changed_cap():
     found = closeness_of(mesh, other, labels, others)
     assert (found.displacement == 0).all()
     assert (found.jacobians == 1).all()
-    corners = np.concatenate([mesh.vertices[mesh.faces[labels == 0]], other.vertices[other.faces[others == 0]]])
-    assert found.radii[0] == pytest.approx(es.geometry.enclosing_ball(corners.reshape(-1, 3)).radius)
+    corners = np.concatenate(
+        [mesh.vertices[mesh.faces[labels == 0]], other.vertices[other.faces[others == 0]]]
+    )
+    assert found.radii[0] == pytest.approx(
+        es.geometry.enclosing_ball(corners.reshape(-1, 3)).radius
+    )
     areas = [es.geometry.simplex_volumes(each) for each in (mesh, other)]
-    assert found.volume_ratios[0] == pytest.approx(areas[1][others == 0].sum() / areas[0][labels == 0].sum())
+    assert found.volume_ratios[0] == pytest.approx(
+        areas[1][others == 0].sum() / areas[0][labels == 0].sum()
+    )
     assert found.delta == max(found.radii[0] / found.size, found.volume_ratios[0] - 1)
     assert found.limited_by == "volume"
     assert "the volume of a region" in found.explain()
@@ -87,7 +93,9 @@ def test_closeness_keeps_its_unit_and_delta_has_none(scale):
 def test_closeness_does_not_see_how_both_are_turned():
     mesh, other, labels, others = bumped()
     turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
-    turned = [es.TriangleMesh(each.vertices @ turn + [1, 2, 3], each.faces) for each in (mesh, other)]
+    turned = [
+        es.TriangleMesh(each.vertices @ turn + [1, 2, 3], each.faces) for each in (mesh, other)
+    ]
     assert closeness_of(*turned, labels, others).delta == pytest.approx(
         closeness_of(mesh, other, labels, others).delta, rel=1e-9
     )
@@ -114,7 +122,9 @@ def test_vertices_go_where_their_faces_go():
     mesh, other, labels, others = bumped()
     order = np.random.default_rng(0).permutation(other.n_vertices)
     renamed = es.TriangleMesh(other.vertices[order], np.argsort(order)[other.faces])
-    changed = es.stability.measure_perturbation(mesh, renamed, regions_one=labels, regions_two=others)
+    changed = es.stability.measure_perturbation(
+        mesh, renamed, regions_one=labels, regions_two=others
+    )
     pairs = es.stability.vertex_pairs(changed)
     assert len(pairs) == len(np.unique(mesh.faces[labels < 0]))
     np.testing.assert_array_equal(mesh.vertices[pairs[:, 0]], renamed.vertices[pairs[:, 1]])
@@ -128,20 +138,34 @@ def test_what_is_no_perturbation_is_named():
     mesh, other, labels, _ = bumped()
     square = es.shapes.grid(2, 2)
     turned = es.TriangleMesh(mesh.vertices, np.roll(mesh.faces, 1, axis=1))
-    with pytest.raises(es.InvalidParameterError, match=r"vertex 0 of `one` would be vertices \d+ and \d+ of `two`"):
+    with pytest.raises(
+        es.InvalidParameterError, match=r"vertex 0 of `one` would be vertices \d+ and \d+ of `two`"
+    ):
         es.stability.measure_perturbation(mesh, turned)
     glued = es.TriangleMesh(square.vertices, np.where(square.faces == 8, 0, square.faces))
-    with pytest.raises(es.InvalidParameterError, match="vertex 0 of `two` would be vertices 0 and 8 of `one`"):
+    with pytest.raises(
+        es.InvalidParameterError, match="vertex 0 of `two` would be vertices 0 and 8 of `one`"
+    ):
         es.stability.measure_perturbation(square, glued)
-    with pytest.raises(es.InvalidParameterError, match="must have the same dimensions to correspond"):
+    with pytest.raises(
+        es.InvalidParameterError, match="must have the same dimensions to correspond"
+    ):
         es.stability.measure_perturbation(mesh, es.shapes.box(1, 1, 1))
-    with pytest.raises(es.InvalidParameterError, match="must lie outside the regions; 320 and 292 do"):
-        es.stability.measure_perturbation(mesh, es.TriangleMesh(mesh.vertices, mesh.faces[labels < 0]))
+    with pytest.raises(
+        es.InvalidParameterError, match="must lie outside the regions; 320 and 292 do"
+    ):
+        es.stability.measure_perturbation(
+            mesh, es.TriangleMesh(mesh.vertices, mesh.faces[labels < 0])
+        )
     with pytest.raises(es.InvalidParameterError, match="regions_two has no face in region 0"):
         es.stability.measure_perturbation(mesh, other, regions_one=labels)
-    with pytest.raises(es.InvalidParameterError, match=r"regions_one must hold one whole number a face.*\(3,\)"):
+    with pytest.raises(
+        es.InvalidParameterError, match=r"regions_one must hold one whole number a face.*\(3,\)"
+    ):
         es.stability.measure_perturbation(mesh, other, regions_one=[0, 0, 0])
-    with pytest.raises(es.InvalidParameterError, match="must number regions from 0, with -1 outside; face 0 has -2"):
+    with pytest.raises(
+        es.InvalidParameterError, match="must number regions from 0, with -1 outside; face 0 has -2"
+    ):
         es.stability.measure_perturbation(mesh, mesh, regions_one=np.full(mesh.n_faces, -2))
 
 
@@ -149,18 +173,26 @@ def test_regions_must_be_apart_and_their_boundaries_correspond():
     mesh = es.shapes.grid(6, 6)
     touching = np.full(mesh.n_faces, -1)
     touching[[0, 1]] = [0, 1]
-    with pytest.raises(es.InvalidParameterError, match=r"must not touch; in regions_one, vertex \d+ is in"):
+    with pytest.raises(
+        es.InvalidParameterError, match=r"must not touch; in regions_one, vertex \d+ is in"
+    ):
         es.stability.measure_perturbation(mesh, mesh, regions_one=touching, regions_two=touching)
     one, two = np.full((2, mesh.n_faces), -1)
     one[0], one[5] = 0, 1
     two[0], two[5] = 1, 0
-    with pytest.raises(es.InvalidParameterError, match=r"mapped onto that of its counterpart \(C1\); for region 0"):
+    with pytest.raises(
+        es.InvalidParameterError, match=r"mapped onto that of its counterpart \(C1\); for region 0"
+    ):
         es.stability.measure_perturbation(mesh, mesh, regions_one=one, regions_two=two)
 
 
 def test_a_map_needs_an_image_of_each_vertex_and_areas():
     mesh = es.shapes.grid(2, 2)
-    with pytest.raises(es.InvalidParameterError, match="one image a vertex; there are 8 images of 9 vertices"):
+    with pytest.raises(
+        es.InvalidParameterError, match="one image a vertex; there are 8 images of 9 vertices"
+    ):
         es.stability.map_closeness(mesh, mesh.vertices[:8])
     with pytest.raises(es.InvalidShapeError, match="must have area"):
-        es.stability.map_closeness(es.TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]), np.zeros((3, 3)))
+        es.stability.map_closeness(
+            es.TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]), np.zeros((3, 3))
+        )

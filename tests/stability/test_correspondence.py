@@ -58,9 +58,14 @@ def test_laws_of_the_bottleneck(seed, n, scale):
     one, two, three = scale * rng.random((3, n, 2))
     found = es.stability.bottleneck_matching(one, two)
     assert found.distance == longest(one, two, found.partners)
-    assert found.distance == es.stability.bottleneck_matching(two, one).distance <= longest(one, two, np.arange(n))
+    assert (
+        found.distance
+        == es.stability.bottleneck_matching(two, one).distance
+        <= longest(one, two, np.arange(n))
+    )
     detour = (
-        es.stability.bottleneck_matching(one, three).distance + es.stability.bottleneck_matching(three, two).distance
+        es.stability.bottleneck_matching(one, three).distance
+        + es.stability.bottleneck_matching(three, two).distance
     )
     assert found.distance <= detour * (1 + 1e-12)
     order = rng.permutation(n)
@@ -88,7 +93,9 @@ def test_one_point_far_away_decides():
 
 
 def test_point_sets_that_do_not_correspond_are_named():
-    with pytest.raises(es.InvalidParameterError, match=r"same shape \(n, d\).*these are \(2, 1\) and \(1, 1\)"):
+    with pytest.raises(
+        es.InvalidParameterError, match=r"same shape \(n, d\).*these are \(2, 1\) and \(1, 1\)"
+    ):
         es.stability.bottleneck_matching([[0], [1]], [[0]])
     with pytest.raises(es.InvalidParameterError, match=r"these are \(1, 1\) and \(1, 2\)"):
         es.stability.bottleneck_matching([[0]], [[0, 1]])
@@ -102,7 +109,9 @@ def test_point_sets_that_do_not_correspond_are_named():
 
 
 def neighbours(graph, rows):
-    return np.unique(np.concatenate([graph.indices[graph.indptr[row] : graph.indptr[row + 1]] for row in rows]))
+    return np.unique(
+        np.concatenate([graph.indices[graph.indptr[row] : graph.indptr[row + 1]] for row in rows])
+    )
 
 
 @pytest.mark.long
@@ -156,7 +165,9 @@ def test_the_reach_of_the_theorem():
 @pytest.mark.parametrize("delta", [0.2, 0.5])
 def test_nodes_are_apart_and_cover(delta):
     mesh = es.icosphere(3)  # made uneven, so that no two vertices are equally far
-    mesh = es.TriangleMesh(mesh.vertices + 0.02 * np.random.default_rng(0).random(mesh.vertices.shape), mesh.faces)
+    mesh = es.TriangleMesh(
+        mesh.vertices + 0.02 * np.random.default_rng(0).random(mesh.vertices.shape), mesh.faces
+    )
     found = es.stability.anchor_nodes(mesh, delta, start=5)
     between = es.geometry.geodesic_distances(mesh, found.vertices)
     apart = between[:, found.vertices] + np.where(np.eye(len(found.vertices)), np.inf, 0)
@@ -166,7 +177,9 @@ def test_nodes_are_apart_and_cover(delta):
     assert found.vertices[0] == 5
     points = throw(mesh, 2000, 0).points
     assert np.linalg.norm(points[:, None] - found.points, axis=2).min(axis=1).max() <= found.cover
-    small = es.stability.anchor_nodes(es.TriangleMesh(mesh.vertices * 1e-100, mesh.faces), 1e-100 * delta, start=5)
+    small = es.stability.anchor_nodes(
+        es.TriangleMesh(mesh.vertices * 1e-100, mesh.faces), 1e-100 * delta, start=5
+    )
     np.testing.assert_array_equal(small.vertices, found.vertices)
 
 
@@ -202,7 +215,9 @@ PAIRS = {
 def swayed_pair(name):
     """A pair whose map moves points outside too."""
     mesh, other, labels, others = PAIRS[name]
-    swayed = es.TriangleMesh(other.vertices + 0.03 * np.sin(3 * other.vertices[:, ::-1]), other.faces)
+    swayed = es.TriangleMesh(
+        other.vertices + 0.03 * np.sin(3 * other.vertices[:, ::-1]), other.faces
+    )
     return es.stability.measure_perturbation(mesh, swayed, regions_one=labels, regions_two=others)
 
 
@@ -215,7 +230,9 @@ def test_no_edge_is_longer_than_the_claims_say(name, factor):
     delta, rho = factor * lengths.max(), 3.0
     nodes = es.stability.anchor_nodes(changed.one, delta)
     points, images = throw(changed.one, 400, 1), throw(changed.two, 400, 2)
-    graph = es.stability.correspondence_graph(changed, points, images, nodes=nodes.points, delta=delta, rho=rho)
+    graph = es.stability.correspondence_graph(
+        changed, points, images, nodes=nodes.points, delta=delta, rho=rho
+    )
     coo = graph.tocoo()
     lengths = np.linalg.norm(points.points[coo.row] - images.points[coo.col], axis=1)
     anomalous = changed.regions_two[images.simplices[coo.col]] >= 0
@@ -234,14 +251,19 @@ def test_the_region_of_a_set_is_that_of_its_nodes_and_the_graph_has_their_points
     delta, rho = 0.25, 1.2
     nodes = es.stability.anchor_nodes(changed.one, delta).points
     points, images = throw(changed.one, 200, 3), throw(changed.two, 300, 4)
-    each = np.array([es.stability.witness_region(changed, images, node[None], delta, rho=rho) for node in nodes])
+    each = np.array(
+        [es.stability.witness_region(changed, images, node[None], delta, rho=rho) for node in nodes]
+    )
     chosen = np.random.default_rng(0).random(len(nodes)) < 0.1
     np.testing.assert_array_equal(
-        es.stability.witness_region(changed, images, nodes[chosen], delta, rho=rho), each[chosen].any(axis=0)
+        es.stability.witness_region(changed, images, nodes[chosen], delta, rho=rho),
+        each[chosen].any(axis=0),
     )
     assert 0 < each.sum() < each.size
     nearest = np.linalg.norm(points.points[:, None] - nodes, axis=2).argmin(axis=1)
-    graph = es.stability.correspondence_graph(changed, points, images, nodes=nodes, delta=delta, rho=rho)
+    graph = es.stability.correspondence_graph(
+        changed, points, images, nodes=nodes, delta=delta, rho=rho
+    )
     np.testing.assert_array_equal(graph.todense() == 1, each[nearest])
     np.testing.assert_array_equal(
         es.stability.anchor_region(points.points, nodes[chosen], delta),
@@ -279,8 +301,12 @@ def test_observation_422_is_short_by_delta_inside_a_region():
     found = es.stability.witness_region(changed, images, node, delta, rho=rho)
     farthest = np.linalg.norm(images.points[found] - node, axis=1).max()
     assert (rho + 2) * delta + 0.7 < farthest <= (rho + 3) * delta
-    point = es.geometry.SurfacePoints(node - [[delta, 0, 0]], np.zeros(1, dtype=int), np.ones((1, 3)) / 3)
-    graph = es.stability.correspondence_graph(changed, point, images, nodes=node, delta=delta, rho=rho)
+    point = es.geometry.SurfacePoints(
+        node - [[delta, 0, 0]], np.zeros(1, dtype=int), np.ones((1, 3)) / 3
+    )
+    graph = es.stability.correspondence_graph(
+        changed, point, images, nodes=node, delta=delta, rho=rho
+    )
     longest_edge = np.linalg.norm(images.points[graph.indices] - point.points, axis=1).max()
     assert (rho + 3) * delta + 0.7 < longest_edge <= (rho + 4) * delta
 
@@ -290,11 +316,15 @@ def test_many_points_of_two_close_shapes_have_a_perfect_matching_and_few_have_no
     delta = float(es.stability.measure_closeness(changed).radii.max())
     nodes = es.stability.anchor_nodes(changed.one, delta).points
     points, images = throw(changed.one, 1000, 7), throw(changed.two, 1000, 8)
-    graph = es.stability.correspondence_graph(changed, points, images, nodes=nodes, delta=delta, rho=3.0)
+    graph = es.stability.correspondence_graph(
+        changed, points, images, nodes=nodes, delta=delta, rho=3.0
+    )
     found = es.stability.maximum_matching(graph)
     assert found.is_perfect
     assert longest(points.points, images.points, found.partners) <= 7 * delta
-    tight = es.stability.correspondence_graph(changed, points, images, nodes=nodes, delta=0.05, rho=0.2)
+    tight = es.stability.correspondence_graph(
+        changed, points, images, nodes=nodes, delta=0.05, rho=0.2
+    )
     assert not es.stability.maximum_matching(tight).is_perfect
 
 
@@ -302,5 +332,7 @@ def test_pairs_that_would_not_fit_are_refused(monkeypatch):
     monkeypatch.setattr("eigenshape.features.least_matching.machine_memory", lambda: 1e5)
     near, far = np.random.default_rng(0).random((2, 40, 3))
     es.stability.bottleneck_matching(near, near + 1e-3)  # few pairs
-    with pytest.raises(es.InvalidShapeError, match=r"Pairs of near points must fit .*; 1.6e\+03 pairs within"):
+    with pytest.raises(
+        es.InvalidShapeError, match=r"Pairs of near points must fit .*; 1.6e\+03 pairs within"
+    ):
         es.stability.bottleneck_matching(near, far + 100)

@@ -10,7 +10,9 @@ PLAN = es.stability.StabilityPlan(k=8, n_samples=300)
 
 def moved(mesh, height):
     waves = np.sin(3 * mesh.vertices[:, :1]) * np.cos(2 * mesh.vertices[:, 1:2])
-    return es.TriangleMesh(mesh.vertices + height * waves * es.geometry.vertex_normals(mesh), mesh.faces)
+    return es.TriangleMesh(
+        mesh.vertices + height * waves * es.geometry.vertex_normals(mesh), mesh.faces
+    )
 
 
 @pytest.fixture(scope="module")
@@ -38,8 +40,12 @@ def test_the_map_from_vertex_to_vertex_is_measured(torus, bulged):
     steps = np.linalg.norm(other.vertices - torus.vertices, axis=1)
     assert bulged.delta == pytest.approx(steps.max())
     assert bulged.distance <= steps.max() * (1 + 1e-9)
-    assert bulged.closeness.delta == pytest.approx(es.stability.map_closeness(torus, other.vertices).delta)
-    spectra = [es.solve_spectrum(es.cotangent_laplacian(mesh), 8).eigenvalues for mesh in (torus, other)]
+    assert bulged.closeness.delta == pytest.approx(
+        es.stability.map_closeness(torus, other.vertices).delta
+    )
+    spectra = [
+        es.solve_spectrum(es.cotangent_laplacian(mesh), 8).eigenvalues for mesh in (torus, other)
+    ]
     assert bulged.spectra.index_distance == pytest.approx(np.abs(spectra[0] - spectra[1]).max())
     assert bulged.spectra.told[1:].all()
     assert bulged.angles.angles.max() > 0
@@ -96,7 +102,9 @@ def test_a_report_follows_the_unit(torus):
     one, two = es.compare_shapes(torus, other, PLAN), es.compare_shapes(*small, PLAN)
     assert two.delta == pytest.approx(1e-40 * one.delta)
     assert two.times.low == pytest.approx(1e-80 * one.times.low)
-    assert [c.change for c in two.changes] == pytest.approx([c.change for c in one.changes], rel=1e-6)
+    assert [c.change for c in two.changes] == pytest.approx(
+        [c.change for c in one.changes], rel=1e-6
+    )
     assert two.angles.angles == pytest.approx(one.angles.angles, rel=1e-5, abs=1e-6)
 
 
@@ -118,7 +126,9 @@ def test_a_change_that_is_too_large_leaves_no_heat_time(torus):
     assert not any(change.trusted for change in found.changes)
     assert found.times.low_by == "closeness"
     assert "No heat time serves" in found.explain()
-    asked = es.compare_shapes(torus, away, es.stability.StabilityPlan(k=8, n_samples=300, times=(0.1,)))
+    asked = es.compare_shapes(
+        torus, away, es.stability.StabilityPlan(k=8, n_samples=300, times=(0.1,))
+    )
     assert [change.t for change in asked.changes] == [0.1]
     assert not asked.changes[0].trusted
 

@@ -41,11 +41,27 @@ def _print_version(wanted: bool) -> bool:
 def options(
     *,
     version: Annotated[
-        bool, typer.Option("--version", help="Show the version and exit.", is_eager=True, callback=_print_version)
+        bool,
+        typer.Option(
+            "--version", help="Show the version and exit.", is_eager=True, callback=_print_version
+        ),
     ] = False,
 ) -> None:
     """Spectral shape analysis: spectra with proof, heat, features and parts, similar shapes, bending."""
 
 
-for verb in (info, repair, spectrum, operators, features, segment, label, deform, stability, index, query, demo):
+for verb in (
+    info,
+    repair,
+    spectrum,
+    operators,
+    features,
+    segment,
+    label,
+    deform,
+    stability,
+    index,
+    query,
+    demo,
+):
     app.command(no_args_is_help=verb not in (demo, operators))(verb)

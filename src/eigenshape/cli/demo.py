@@ -35,7 +35,9 @@ Read next:
 
 def demo(
     *,
-    folder: Annotated[Path, typer.Option("--out", help="Folder to write meshes, index and pictures to.")] = FOLDER,
+    folder: Annotated[
+        Path, typer.Option("--out", help="Folder to write meshes, index and pictures to.")
+    ] = FOLDER,
     kind: Annotated[str, typer.Option(help=f"Creature to scan: {', '.join(CREATURES)}.")] = "biped",
     workers: WorkersOption = 2,
 ) -> None:
@@ -50,9 +52,13 @@ def demo(
     out.print(f"indexed {len(shelf)} shapes ({len(report.skipped)} known already)")
 
     scan_path = folder / "scan.ply"
-    scan = partial_scan(make_creature(kind, UNSEEN, n_vertices=N_VERTICES), np.array([0.9, 0.25, 0.45])).mesh
+    scan = partial_scan(
+        make_creature(kind, UNSEEN, n_vertices=N_VERTICES), np.array([0.9, 0.25, 0.45])
+    ).mesh
     write_mesh(scan, scan_path)
-    out.print(f"scanned a {kind} from one side, in a pose that the index has not seen: {shown(scan_path)}")
+    out.print(
+        f"scanned a {kind} from one side, in a pose that the index has not seen: {shown(scan_path)}"
+    )
     shape = asked(scan, recipe)
     matches = shelf.query(shape.descriptor, n_matches=6)
     print_matches(matches)
@@ -75,6 +81,8 @@ def _make(folder: Path) -> list[Item]:
             progress(done / len(items), item.name)
             if not item.path.exists():
                 item.path.parent.mkdir(parents=True, exist_ok=True)
-                write_mesh(make_creature(item.label or "", done % POSES, n_vertices=N_VERTICES), item.path)
+                write_mesh(
+                    make_creature(item.label or "", done % POSES, n_vertices=N_VERTICES), item.path
+                )
     out.print(f"made {len(CREATURES)} kinds of creatures in {POSES} poses each: {shown(folder)}")
     return items

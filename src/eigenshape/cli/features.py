@@ -40,7 +40,9 @@ COLUMNS = {
 def features(
     mesh: MeshArgument,
     *,
-    n_regions: Annotated[int, typer.Option("-n", "--n-regions", help="Largest number of regions.")] = 15,
+    n_regions: Annotated[
+        int, typer.Option("-n", "--n-regions", help="Largest number of regions.")
+    ] = 15,
     persistence: Annotated[
         float | None,
         typer.Option(
@@ -65,8 +67,12 @@ def features(
         ),
     ] = None,
     repair: RepairOption = "",
-    picture: Annotated[Path | None, typer.Option(help="Draw parts and feature points (PNG, SVG or PDF).")] = None,
-    ply: Annotated[Path | None, typer.Option(help="Write the mesh, coloured by its heat (PLY).")] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="Draw parts and feature points (PNG, SVG or PDF).")
+    ] = None,
+    ply: Annotated[
+        Path | None, typer.Option(help="Write the mesh, coloured by its heat (PLY).")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Find the feature points of a mesh and the parts around them, most persistent first.
@@ -80,24 +86,37 @@ def features(
         shape = _described(surface, recipe, accuracy, progress)
     error = shape.error if isinstance(shape, DescribedLargeShape) else None
     if error is not None:
-        err.print(f"{surface.n_vertices:,} vertices: their heat is approximate, off by about {100 * error:.2g} %")
+        err.print(
+            f"{surface.n_vertices:,} vertices: their heat is approximate, off by about {100 * error:.2g} %"
+        )
     n_fragments = int(np.isin(shape.tree.maxima, shape.fragments).sum())
     by_number = n_regions + n_fragments if persistence is None and not largest_gap else None
-    parts = segment(shape.tree, n_regions=by_number, persistence=persistence, largest_gap=largest_gap)
+    parts = segment(
+        shape.tree, n_regions=by_number, persistence=persistence, largest_gap=largest_gap
+    )
     if n_fragments:
-        err.print(f"{n_fragments} fragments with less than 1 % of the area each are one region each, without a feature")
-    rows = [row | {"heat": float(parts.features.values[i])} for i, row in enumerate(part_rows(shape.mesh, parts))]
+        err.print(
+            f"{n_fragments} fragments with less than 1 % of the area each are one region each, without a feature"
+        )
+    rows = [
+        row | {"heat": float(parts.features.values[i])}
+        for i, row in enumerate(part_rows(shape.mesh, parts))
+    ]
     loose = set(shape.fragments.tolist())
     if as_json:
         found = {"path": str(mesh), "recipe": recipe.name, "features": rows, "heat_error": error}
         print_json(found | {"face_labels": parts.labels})
     else:
-        features_alone = [row | {"feature": i} for i, row in enumerate(rows) if row["vertex"] not in loose]
+        features_alone = [
+            row | {"feature": i} for i, row in enumerate(rows) if row["vertex"] not in loose
+        ]
         print_rows("Feature points", COLUMNS, features_alone)
     if picture:
         save_picture(figure_segments(surface, parts.labels, parts.features.vertices), picture)
     if ply:
-        save_colors(surface, value_colors(np.log(np.maximum(shape.heat, np.finfo(np.float64).tiny))), ply)
+        save_colors(
+            surface, value_colors(np.log(np.maximum(shape.heat, np.finfo(np.float64).tiny))), ply
+        )
 
 
 def _described(
@@ -107,5 +126,8 @@ def _described(
     if accuracy is None and surface.n_vertices <= LARGE:
         return describe_mesh(surface, recipe, progress=progress)
     return describe_large_mesh(
-        surface, recipe, accuracy=USUAL_ACCURACY if accuracy is None else accuracy, progress=progress
+        surface,
+        recipe,
+        accuracy=USUAL_ACCURACY if accuracy is None else accuracy,
+        progress=progress,
     )

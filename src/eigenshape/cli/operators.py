@@ -3,7 +3,12 @@
 from eigenshape.cli.console import JsonOption, out, print_json
 from eigenshape.operators.catalog import OPERATORS
 
-NAMES = {"TriangleMesh": "triangles", "SimplicialMesh": "simplices", "PointCloud": "points", "sparray": "graphs"}
+NAMES = {
+    "TriangleMesh": "triangles",
+    "SimplicialMesh": "simplices",
+    "PointCloud": "points",
+    "sparray": "graphs",
+}
 
 
 def operators(*, as_json: JsonOption = False) -> None:

@@ -22,10 +22,15 @@ PATCHES = "patches"
 TEACHING_VIEWS = 2
 EVERY = (PATCHES, *PRESETS)
 
-HeatPresetOption = Annotated[str, typer.Option("--preset", help=f"How shapes are described: {' or '.join(PRESETS)}.")]
+HeatPresetOption = Annotated[
+    str, typer.Option("--preset", help=f"How shapes are described: {' or '.join(PRESETS)}.")
+]
 PresetOption = Annotated[
     str,
-    typer.Option("--preset", help=f"How shapes are described: {', '.join(EVERY)}; patches are best for partial scans."),
+    typer.Option(
+        "--preset",
+        help=f"How shapes are described: {', '.join(EVERY)}; patches are best for partial scans.",
+    ),
 ]
 HeldPresetOption = Annotated[
     str | None,
@@ -60,7 +65,9 @@ def recipe_to_fill(
     held = _patch_recipe(shelf)
     if held is None:
         with progress_bar("words") as progress:
-            book = learn_words(items, partial(teach, repairs=repairs), workers=workers, told=told_by(progress))
+            book = learn_words(
+                items, partial(teach, repairs=repairs), workers=workers, told=told_by(progress)
+            )
         err.print(
             "words of patches: those that come with eigenshape, since there are few shapes to learn from"
             if book == made_codebook()
@@ -68,7 +75,9 @@ def recipe_to_fill(
         )
         held = PatchRecipe(book)
         shelf.keep_recipe(held)
-        held = _patch_recipe(shelf) or held  # of several first writers, the words of the first serve all
+        held = (
+            _patch_recipe(shelf) or held
+        )  # of several first writers, the words of the first serve all
     return held
 
 
@@ -81,7 +90,9 @@ def recipe_to_ask(shelf: ShapeIndex, name: str | None) -> AnyRecipe:
     """Return the recipe of a preset in which an index can answer; without name, its own."""
     patches = _patch_recipe(shelf)
     if name == PATCHES and patches is None:
-        raise StoreError(f"An index answers in the recipes it holds; {shelf.folder} holds no patches.")
+        raise StoreError(
+            f"An index answers in the recipes it holds; {shelf.folder} holds no patches."
+        )
     if patches is not None and name in (None, PATCHES):
         return patches
     return PRESETS[name] if name else next(iter(shelf.recipes()), SCALE_FREE)

@@ -9,7 +9,13 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape.deformation.handles import Rotation, Translation
-from eigenshape.deformation.region import BoxRegion, BrushRegion, Region, region_boundary, region_mask
+from eigenshape.deformation.region import (
+    BoxRegion,
+    BrushRegion,
+    Region,
+    region_boundary,
+    region_mask,
+)
 from eigenshape.features.boundaries import smooth_boundaries
 from eigenshape.features.parts import PART_CONTRAST, facing_outward, find_parts
 from eigenshape.features.segmentation import segment
@@ -70,7 +76,9 @@ def _listed(path: Path) -> Region:
     try:
         return np.array([int(line) for line in path.read_text().split()], dtype=np.int64)
     except ValueError as err:
-        raise InvalidParameterError(f"{path} must hold one index of a vertex a line; {err}.") from err
+        raise InvalidParameterError(
+            f"{path} must hold one index of a vertex a line; {err}."
+        ) from err
 
 
 def told_rotation(text: str, mesh: TriangleMesh, region: Region) -> Rotation:
@@ -88,7 +96,9 @@ def told_rotation(text: str, mesh: TriangleMesh, region: Region) -> Rotation:
             f"it was given {text!r}."
         )
     named = {"x": [1, 0, 0], "y": [0, 1, 0], "z": [0, 0, 1]}
-    axis = np.array(named[found[1]], dtype=float) if found[1] in named else _three(found[1], "An axis")
+    axis = (
+        np.array(named[found[1]], dtype=float) if found[1] in named else _three(found[1], "An axis")
+    )
     if found[3]:
         return Rotation(_three(found[3], "A pivot"), axis, np.deg2rad(float(found[2])))
     rim = region_boundary(mesh, region_mask(mesh, region))
@@ -111,5 +121,7 @@ def _three(text: str, name: str) -> np.ndarray:
     try:
         x, y, z = (float(piece) for piece in text.split(","))
     except ValueError as err:
-        raise InvalidParameterError(f"{name} is three numbers with commas between; it was given {text!r}.") from err
+        raise InvalidParameterError(
+            f"{name} is three numbers with commas between; it was given {text!r}."
+        ) from err
     return np.array([x, y, z])

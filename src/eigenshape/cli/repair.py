@@ -31,13 +31,18 @@ ROWS = (
 def repair(
     mesh: MeshArgument,
     *,
-    output: Annotated[Path, typer.Option("-o", "--output", "--out", help="Mesh to write: OFF, OBJ, PLY, STL or GLB.")],
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", "--out", help="Mesh to write: OFF, OBJ, PLY, STL or GLB."),
+    ],
     names: Annotated[
         str,
         typer.Option(
             "--repair",
             metavar="NAMES",
-            help=(f"Repairs to apply in this order, separated by commas: {', '.join(REPAIRS)}. '' only converts."),
+            help=(
+                f"Repairs to apply in this order, separated by commas: {', '.join(REPAIRS)}. '' only converts."
+            ),
         ),
     ] = USUAL,
     cells: CellsOption = None,
@@ -58,7 +63,9 @@ def repair(
     if as_json:
         print_json({"path": str(mesh), "output": str(output), "report": list(done.report), **facts})
         return
-    rows = [[name.replace("_", " "), *(_shown(fact[name]) for fact in facts.values())] for name in ROWS]
+    rows = [
+        [name.replace("_", " "), *(_shown(fact[name]) for fact in facts.values())] for name in ROWS
+    ]
     print_table("Repaired", ["", *facts], rows)
 
 

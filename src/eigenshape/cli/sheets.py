@@ -58,11 +58,22 @@ def asked(mesh: TriangleMesh, recipe: AnyRecipe, progress: Progress | None = Non
     descriptor = describe_shape(mesh, recipe)
     distances = geodesic_distances(mesh, descriptor.vertices[:N_CELLS])
     cells = distances.argmin(axis=0)
-    return Asked(mesh, descriptor, cells[mesh.faces[:, 0]], cells[descriptor.vertices], np.arange(len(distances)))
+    return Asked(
+        mesh,
+        descriptor,
+        cells[mesh.faces[:, 0]],
+        cells[descriptor.vertices],
+        np.arange(len(distances)),
+    )
 
 
 def contact_sheet(
-    query: Asked, title: str, matches: Sequence[Match], *, repairs: tuple[str, ...] = (), caption: str = ""
+    query: Asked,
+    title: str,
+    matches: Sequence[Match],
+    *,
+    repairs: tuple[str, ...] = (),
+    caption: str = "",
 ) -> Figure:
     """Draw a query beside its matches, read from their files.
 
@@ -70,7 +81,9 @@ def contact_sheet(
     corresponds to, and is grey where there is none. A match whose file cannot be read is named on stderr, and its
     place stays empty.
     """
-    first = Panel(query.mesh, f"query: {title}", query.labels, query.descriptor.vertices[query.dots])
+    first = Panel(
+        query.mesh, f"query: {title}", query.labels, query.descriptor.vertices[query.dots]
+    )
     with progress_bar("draw") as progress:
         panels = []
         for done, match in enumerate(matches):
@@ -90,7 +103,9 @@ def _panel(query: Asked, match: Match, repairs: tuple[str, ...]) -> Panel:
     ours, theirs = match.correspondences.T
     recipe = query.descriptor.recipe
     if isinstance(recipe, Recipe):
-        colors = np.full(len(match.vertices) + 1, -1)  # the last one is for what no view of the match shows
+        colors = np.full(
+            len(match.vertices) + 1, -1
+        )  # the last one is for what no view of the match shows
         colors[theirs] = query.colors[ours]
         labels = colors[_parts(mesh, recipe, match)]
     else:
@@ -102,7 +117,9 @@ def _panel(query: Asked, match: Match, repairs: tuple[str, ...]) -> Panel:
 
 def _read_match(match: Match, repairs: tuple[str, ...]) -> TriangleMesh:
     if match.source is None:
-        raise StoreError("A match is drawn from its mesh file; it was added to the index without one.")
+        raise StoreError(
+            "A match is drawn from its mesh file; it was added to the index without one."
+        )
     mesh = read_repaired(Path(match.source), repairs)
     last = int(match.vertices.max(initial=-1))
     if last >= mesh.n_vertices:
@@ -117,7 +134,9 @@ def _parts(mesh: TriangleMesh, recipe: Recipe, match: Match) -> Int[np.ndarray, 
     """Find the parts of a match again, -1 on fragments and where the view that matched does not see its surface."""
     if match.view == 0:
         labels = describe_mesh(mesh, recipe).parts.labels
-        return np.where(labels < len(match.vertices), labels, -1)  # fragments, which come last, have no feature
+        return np.where(
+            labels < len(match.vertices), labels, -1
+        )  # fragments, which come last, have no feature
     part, seen = described_view(mesh, recipe, match.view - 1)
     labels = np.full(mesh.n_faces, -1)
     labels[part.source_faces] = seen.parts.labels

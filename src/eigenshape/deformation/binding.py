@@ -16,7 +16,11 @@ from eigenshape.deformation.rig import EigenRig
 from eigenshape.deformation.rigidity import FreePart, free_part, require_held
 from eigenshape.geometry.geodesic import geodesic_distance_to_set
 
-RULE = ((0.75, 8), (0.1, 50), (0.0, 300))  # least size of a region over that of the rest, and its modes (thesis 6.3.2)
+RULE = (
+    (0.75, 8),
+    (0.1, 50),
+    (0.0, 300),
+)  # least size of a region over that of the rest, and its modes (thesis 6.3.2)
 CLIPPED = 0.02  # of the best fit at either end: what follows less, or all but this, follows not at all, or wholly
 FLAT = 1e-9  # share of the best fit; modes that tell less of a region tell nothing of it
 SMOOTHNESS = 1e-3  # of the untold part, against the fit of what is told
@@ -50,7 +54,11 @@ class Binding:
 
 @one_blas_thread()
 def bind(
-    rig: EigenRig, regions: Sequence[Region], *, fixed: Region | None = None, n_modes: SupportsIndex | None = None
+    rig: EigenRig,
+    regions: Sequence[Region],
+    *,
+    fixed: Region | None = None,
+    n_modes: SupportsIndex | None = None,
 ) -> Binding:
     """Find by how much each vertex follows the handles of some regions.
 
@@ -81,18 +89,28 @@ def bind(
     """
     require_type(rig, EigenRig, "rig")
     if not isinstance(regions, Sequence) or isinstance(regions, str):
-        raise InvalidParameterError(f"regions must be a list of regions; it is {named_value(regions)}. Pass [region].")
-    masks = np.array([region_mask(rig.mesh, region) for region in regions]).reshape(-1, rig.mesh.n_vertices)
+        raise InvalidParameterError(
+            f"regions must be a list of regions; it is {named_value(regions)}. Pass [region]."
+        )
+    masks = np.array([region_mask(rig.mesh, region) for region in regions]).reshape(
+        -1, rig.mesh.n_vertices
+    )
     if not len(masks):
         raise InvalidParameterError("There must be a region; none was given.")
-    still = np.zeros(rig.mesh.n_vertices, dtype=bool) if fixed is None else region_mask(rig.mesh, fixed)
+    still = (
+        np.zeros(rig.mesh.n_vertices, dtype=bool) if fixed is None else region_mask(rig.mesh, fixed)
+    )
     _require_disjoint(np.vstack([masks, still]))
     told = masks.any(axis=0) | still if still.any() else np.ones_like(still)
     require_held(rig.edges, told)  # else nothing tells the modes that are constant there
     rims = [require_boundary(rig.mesh, mask, number) for number, mask in enumerate(masks)]
     distances = np.array([geodesic_distance_to_set(rig.mesh, rim) for rim in rims])
-    numbers = [_modes(rig, mask, away, n_modes) for mask, away in zip(masks, distances, strict=True)]
-    shares = np.array([_share(rig, mask, told, wanted) for mask, wanted in zip(masks, numbers, strict=True)])
+    numbers = [
+        _modes(rig, mask, away, n_modes) for mask, away in zip(masks, distances, strict=True)
+    ]
+    shares = np.array(
+        [_share(rig, mask, told, wanted) for mask, wanted in zip(masks, numbers, strict=True)]
+    )
     shares /= np.maximum(shares.sum(axis=0), 1)
     held = told & ((shares == 0).all(axis=0) | (shares == 1).any(axis=0))
     part = free_part(rig.edges, held)
@@ -119,11 +137,16 @@ def _require_disjoint(masks: Bool[np.ndarray, "r n"]) -> None:
 
 
 def _modes(
-    rig: EigenRig, mask: Bool[np.ndarray, " n"], away: Float[np.ndarray, " n"], wanted: SupportsIndex | None
+    rig: EigenRig,
+    mask: Bool[np.ndarray, " n"],
+    away: Float[np.ndarray, " n"],
+    wanted: SupportsIndex | None,
 ) -> int:
     if wanted is not None:
         return whole_number(wanted, "n_modes", 1, rig.n_modes)
-    inside, outside = (np.max(away[part & np.isfinite(away)], initial=0.0) for part in (mask, ~mask))
+    inside, outside = (
+        np.max(away[part & np.isfinite(away)], initial=0.0) for part in (mask, ~mask)
+    )
     by_rule = next(number for least, number in RULE if inside >= least * outside)
     return min(by_rule + int(rig.components.max()), rig.n_modes)
 
@@ -150,5 +173,10 @@ def _fit(
     if told.all():
         return modes @ goal
     gram = (modes[told] * rig.areas[told, None]).T @ modes[told]
-    stiff = SMOOTHNESS * rig.areas[told].sum() / rig.areas.sum() * (values / max(values[-1], np.finfo(float).tiny)) ** 2
+    stiff = (
+        SMOOTHNESS
+        * rig.areas[told].sum()
+        / rig.areas.sum()
+        * (values / max(values[-1], np.finfo(float).tiny)) ** 2
+    )
     return modes @ np.linalg.solve(gram + np.diag(stiff), goal)

@@ -101,5 +101,7 @@ def require_mode(mode: str) -> Mode:
     InvalidParameterError
     """
     if mode not in get_args(Mode):
-        raise InvalidParameterError(f"mode must be 'graded', 'uncrossed' or 'thesis'; it is {mode!r}.")
+        raise InvalidParameterError(
+            f"mode must be 'graded', 'uncrossed' or 'thesis'; it is {mode!r}."
+        )
     return cast(Mode, mode)

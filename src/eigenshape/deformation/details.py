@@ -49,7 +49,9 @@ def framed(faces: Int[np.ndarray, "f 3"], skeleton: Points, shape: Points) -> Fr
 def turned_by_frames(faces: Int[np.ndarray, "f 3"], kept: FramedDetails, moved: Points) -> Points:
     """Return details as the local frames of the moved skeleton hold them; unturned where a frame is not told."""
     frames, told = _frames(TriangleMesh(moved, faces), kept.partner)
-    return np.where((kept.told & told)[:, None], np.einsum("nji,nj->ni", frames, kept.local), kept.details)
+    return np.where(
+        (kept.told & told)[:, None], np.einsum("nji,nj->ni", frames, kept.local), kept.details
+    )
 
 
 def turned_by_handles(binding: Binding, handles: Sequence[Handle], details: Points) -> Points:
@@ -70,7 +72,8 @@ def blended(binding: Binding, by_frames: Points, by_handles: Points) -> Points:
         weight = np.maximum(weight, _near(away, away[mask & np.isfinite(away)].max()))
     lengths = np.linalg.norm(by_frames, axis=1, keepdims=True)
     one, other = (
-        np.divide(turned, lengths, out=np.zeros_like(turned), where=lengths > 0) for turned in (by_frames, by_handles)
+        np.divide(turned, lengths, out=np.zeros_like(turned), where=lengths > 0)
+        for turned in (by_frames, by_handles)
     )
     return (weight[:, None] * one + (1 - weight[:, None]) * other) * lengths
 

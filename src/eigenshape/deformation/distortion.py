@@ -84,4 +84,6 @@ def require_poses(before: TriangleMesh, after: TriangleMesh) -> None:
         If the faces differ.
     """
     if before.n_vertices != after.n_vertices or not np.array_equal(before.faces, after.faces):
-        raise InvalidParameterError(f"Poses of one mesh must have the same faces; these are {before} and {after}.")
+        raise InvalidParameterError(
+            f"Poses of one mesh must have the same faces; these are {before} and {after}."
+        )

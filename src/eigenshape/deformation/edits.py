@@ -93,7 +93,9 @@ def apply_edit(rig: EigenRig, edit: Edit) -> EigenRig:
     """
     require_type(rig, EigenRig, "rig")
     require_type(edit, Edit, "edit")
-    binding = bind(rig, [move.region for move in edit.moves], fixed=edit.fixed, n_modes=edit.n_modes)
+    binding = bind(
+        rig, [move.region for move in edit.moves], fixed=edit.fixed, n_modes=edit.n_modes
+    )
     return posed(rig, bend(binding, [move.handle for move in edit.moves], mode=edit.mode).vertices)
 
 
@@ -105,7 +107,11 @@ def carry_edit(edit: Edit, source: TriangleMesh, target: TriangleMesh) -> Edit:
     nearest = cKDTree(source.vertices).query(target.vertices)[1]
 
     def carried(region: Region) -> Region:
-        return region if isinstance(region, BoxRegion | BrushRegion) else region_mask(source, region)[nearest]
+        return (
+            region
+            if isinstance(region, BoxRegion | BrushRegion)
+            else region_mask(source, region)[nearest]
+        )
 
     moves = tuple(Move(carried(move.region), move.handle) for move in edit.moves)
     return Edit(moves, None if edit.fixed is None else carried(edit.fixed), edit.n_modes, edit.mode)
@@ -124,14 +130,20 @@ def edits_to_json(edits: Sequence[Edit], mesh: TriangleMesh) -> dict[str, Any]:
 
 
 def _edit_out(edit: Edit, mesh: TriangleMesh) -> dict[str, Any]:
-    moves = [{"region": _region_out(move.region, mesh), "handle": _handle_out(move.handle)} for move in edit.moves]
+    moves = [
+        {"region": _region_out(move.region, mesh), "handle": _handle_out(move.handle)}
+        for move in edit.moves
+    ]
     fixed = None if edit.fixed is None else _region_out(edit.fixed, mesh)
     return {"moves": moves, "fixed": fixed, "n_modes": edit.n_modes, "mode": edit.mode}
 
 
 def _region_out(region: Region, mesh: TriangleMesh) -> dict[str, Any]:
     if isinstance(region, BoxRegion):
-        low, high = ([value if np.isfinite(value) else None for value in c.tolist()] for c in (region.low, region.high))
+        low, high = (
+            [value if np.isfinite(value) else None for value in c.tolist()]
+            for c in (region.low, region.high)
+        )
         return {"kind": "box", "low": low, "high": high}  # JSON has no infinity
     if isinstance(region, BrushRegion):
         return {"kind": "brush", "center": region.center.tolist(), "radius": region.radius}
@@ -158,7 +170,9 @@ def edits_from_json(content: Any, mesh: TriangleMesh) -> list[Edit]:
     if not isinstance(content, Mapping) or content.get("kind") != KIND:
         raise FileFormatError(f"Edits are kept as a JSON object of kind {KIND!r}; this is none.")
     if content.get("version") != VERSION:
-        raise FileFormatError(f"Edits of version {VERSION} are read; this is version {content.get('version')!r}.")
+        raise FileFormatError(
+            f"Edits of version {VERSION} are read; this is version {content.get('version')!r}."
+        )
     found: list[Edit] = []
     try:
         made_on = _fingerprint_in(content["mesh"])
@@ -192,15 +206,25 @@ def _edit_in(entry: Any, n_vertices: int) -> Edit:
     ]
     fixed = None if entry["fixed"] is None else _region_in(entry["fixed"], n_vertices)
     n_modes = None if entry["n_modes"] is None else _whole(entry["n_modes"], "n_modes", 1)
-    return Edit(tuple(Move(*pair) for pair in moves), fixed, n_modes, require_mode(str(entry["mode"])))
+    return Edit(
+        tuple(Move(*pair) for pair in moves), fixed, n_modes, require_mode(str(entry["mode"]))
+    )
 
 
 def _region_in(entry: Any, n_vertices: int) -> Region:
     readers: dict[str, Callable[[], Region]] = {
-        "box": lambda: BoxRegion(_numbers(entry["low"], "low", -np.inf), _numbers(entry["high"], "high", np.inf)),
-        "brush": lambda: BrushRegion(_numbers(entry["center"], "center"), _number(entry["radius"], "radius")),
+        "box": lambda: BoxRegion(
+            _numbers(entry["low"], "low", -np.inf), _numbers(entry["high"], "high", np.inf)
+        ),
+        "brush": lambda: BrushRegion(
+            _numbers(entry["center"], "center"), _number(entry["radius"], "radius")
+        ),
         "vertices": lambda: np.array(
-            [_whole(v, "A vertex", 0, n_vertices - 1) for v in _listed(entry["vertices"], "vertices")], dtype=np.int64
+            [
+                _whole(v, "A vertex", 0, n_vertices - 1)
+                for v in _listed(entry["vertices"], "vertices")
+            ],
+            dtype=np.int64,
         ),
     }
     return readers[entry["kind"]]()
@@ -209,7 +233,9 @@ def _region_in(entry: Any, n_vertices: int) -> Region:
 def _handle_in(entry: Any) -> Handle:
     readers: dict[str, Callable[[], Handle]] = {
         "rotation": lambda: Rotation(
-            _numbers(entry["pivot"], "pivot"), _numbers(entry["axis"], "axis"), _number(entry["angle"], "angle")
+            _numbers(entry["pivot"], "pivot"),
+            _numbers(entry["axis"], "axis"),
+            _number(entry["angle"], "angle"),
         ),
         "translation": lambda: Translation(_numbers(entry["vector"], "vector")),
     }
@@ -236,4 +262,7 @@ def _number(value: Any, name: str) -> float:
 
 def _numbers(value: Any, name: str, end: float | None = None) -> list[float]:
     """Return numbers; where there is an end, it stands for null."""
-    return [end if end is not None and part is None else _number(part, name) for part in _listed(value, name)]
+    return [
+        end if end is not None and part is None else _number(part, name)
+        for part in _listed(value, name)
+    ]

@@ -13,10 +13,21 @@ from eigenshape.geometry.crossings import self_intersections
 from eigenshape.geometry.mesh import TriangleMesh
 
 N_ROUNDS = 12
-PULLS = (30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4, 1e5)  # a fold of a few edges gives way to about the number of vertices
+PULLS = (
+    30.0,
+    100.0,
+    300.0,
+    1e3,
+    3e3,
+    1e4,
+    3e4,
+    1e5,
+)  # a fold of a few edges gives way to about the number of vertices
 
 
-def graded(binding: Binding, handles: Sequence[Handle], *, n_rounds: int = N_ROUNDS) -> Float[np.ndarray, "n 3"]:
+def graded(
+    binding: Binding, handles: Sequence[Handle], *, n_rounds: int = N_ROUNDS
+) -> Float[np.ndarray, "n 3"]:
     """Return the vertices where handles take them.
 
     Each vertex turns and goes by its share s of a handle's motion, exp(s log r) for a rotation r, so that a twist

@@ -39,7 +39,9 @@ class Rotation:
         if largest == 0:
             raise InvalidParameterError("axis must have a direction; it is [0, 0, 0].")
         length = largest * np.linalg.norm(direction / largest)
-        if abs(length - 1) > 4 * np.finfo(float).eps:  # what is of length 1 is kept to the last digit
+        if (
+            abs(length - 1) > 4 * np.finfo(float).eps
+        ):  # what is of length 1 is kept to the last digit
             direction = direction / largest
             direction = direction / np.linalg.norm(direction)
         object.__setattr__(self, "pivot", frozen(vector(pivot, "pivot")))
@@ -51,7 +53,9 @@ class Rotation:
         """Axis times angle."""
         return self.axis * self.angle
 
-    def carry(self, points: Float[np.ndarray, "n 3"], share: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
+    def carry(
+        self, points: Float[np.ndarray, "n 3"], share: Float[np.ndarray, " n"]
+    ) -> Float[np.ndarray, "n 3"]:
         """Return how far each point goes by its share of the angle (Rodrigues' formula)."""
         from_pivot = points - self.pivot
         angle = share[:, None] * self.angle
@@ -84,7 +88,9 @@ class Translation:
         """Nothing turns."""
         return np.zeros(3)
 
-    def carry(self, points: Float[np.ndarray, "n 3"], share: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
+    def carry(
+        self, points: Float[np.ndarray, "n 3"], share: Float[np.ndarray, " n"]
+    ) -> Float[np.ndarray, "n 3"]:
         """Return the share of the vector by which each point goes."""
         return share[:, None] * self.vector
 
@@ -118,13 +124,17 @@ def rotation_by_drag(pivot: ArrayLike, start: ArrayLike, end: ArrayLike) -> Rota
     before, after = vector(start, "start") - center, vector(end, "end") - center
     for arm, name in ((before, "start"), (after, "end")):
         if not arm.any():
-            raise InvalidParameterError(f"{name} must be another point than the pivot; both are {center.tolist()}.")
+            raise InvalidParameterError(
+                f"{name} must be another point than the pivot; both are {center.tolist()}."
+            )
     before, after = (arm / np.abs(arm).max() for arm in (before, after))
     axis, along = np.cross(before, after), float(before @ after)
     across = float(np.linalg.norm(axis))
     if across <= 1e-12 * abs(along):
         if along < 0:
-            raise InvalidParameterError("start and end must not be opposite about the pivot: no axis is told then.")
+            raise InvalidParameterError(
+                "start and end must not be opposite about the pivot: no axis is told then."
+            )
         return Rotation(center, [0, 0, 1], 0.0)
     return Rotation(center, axis, float(np.arctan2(across, along)))
 
@@ -138,5 +148,7 @@ def vector(value: ArrayLike, name: str) -> Float[np.ndarray, " 3"]:
     """
     numbers = finite_values(value, name)
     if numbers.shape != (3,):
-        raise InvalidParameterError(f"{name} must have three numbers; the shape is {numbers.shape}.")
+        raise InvalidParameterError(
+            f"{name} must have three numbers; the shape is {numbers.shape}."
+        )
     return numbers

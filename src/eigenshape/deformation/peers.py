@@ -22,17 +22,23 @@ from eigenshape.deformation.rigidity_loops import fit_rotations, turned_edges
 from eigenshape.operators.cotangent import cotangent_laplacian
 
 Points = Float[np.ndarray, "n 3"]
-HOLD = 100.0  # of the mean diagonal of the reduced equations, for what the modes are to keep in place
+HOLD = (
+    100.0  # of the mean diagonal of the reduced equations, for what the modes are to keep in place
+)
 
 
-def as_rigid_as_possible(binding: Binding, handles: Sequence[Handle], *, n_rounds: int = 100) -> Points:
+def as_rigid_as_possible(
+    binding: Binding, handles: Sequence[Handle], *, n_rounds: int = 100
+) -> Points:
     """Bend as rigidly as possible from the shape as it stands (Sorkine and Alexa 2007), cotangents clamped."""
     require_type(binding, Binding, "binding")
     require_each(handles, Handle, "handles")
     rest = binding.rig.mesh.vertices
     start = shared_motion(binding, handles)
     start[binding.part.free] = rest[binding.part.free]
-    return relax(binding.rig.edges, binding.part, rest, start, quaternions(np.zeros_like(rest)), n_rounds)
+    return relax(
+        binding.rig.edges, binding.part, rest, start, quaternions(np.zeros_like(rest)), n_rounds
+    )
 
 
 @one_blas_thread()
@@ -45,7 +51,9 @@ def biharmonic_blend(binding: Binding, handles: Sequence[Handle]) -> Points:
     require_each(handles, Handle, "handles")
     rig, free = binding.rig, binding.part.free
     laplacian = cotangent_laplacian(rig.mesh)
-    twice = laplacian.stiffness @ sp.diags_array(1 / laplacian.mass.diagonal()) @ laplacian.stiffness
+    twice = (
+        laplacian.stiffness @ sp.diags_array(1 / laplacian.mass.diagonal()) @ laplacian.stiffness
+    )
     weights = binding.shares.T.copy()
     if len(free):
         rows = twice.tocsr()[free]
@@ -53,11 +61,15 @@ def biharmonic_blend(binding: Binding, handles: Sequence[Handle]) -> Points:
         weights[free] = factored(rows[:, free]).solve(-(rows @ weights))
     rest, moves = rig.mesh.vertices, zip(handles, weights.T, strict=True)
     whole = np.ones(len(rest))
-    return rest + sum((share[:, None] * handle.carry(rest, whole) for handle, share in moves), np.zeros(3))
+    return rest + sum(
+        (share[:, None] * handle.carry(rest, whole) for handle, share in moves), np.zeros(3)
+    )
 
 
 @one_blas_thread()
-def spectral_rigid(binding: Binding, handles: Sequence[Handle], *, n_modes: int = 100, n_rounds: int = 20) -> Points:
+def spectral_rigid(
+    binding: Binding, handles: Sequence[Handle], *, n_modes: int = 100, n_rounds: int = 20
+) -> Points:
     """Bend the skeleton of some modes as rigidly as they can, and turn details with it (after Rong and others 2008).
 
     The unknowns are the skeleton's coefficients alone. What is held is pulled to its places, and details turn with the
@@ -74,15 +86,23 @@ def spectral_rigid(binding: Binding, handles: Sequence[Handle], *, n_modes: int 
     weight = HOLD * np.trace(stiff) / max(np.trace(pull), np.finfo(float).tiny)
     factor = lu_factor(stiff + weight * pull)
     goal = (shared_motion(binding, handles) - rest)[held]
-    everyone, turns, sums = np.arange(len(rest)), quaternions(np.zeros_like(rest)), np.empty_like(rest)
+    everyone, turns, sums = (
+        np.arange(len(rest)),
+        quaternions(np.zeros_like(rest)),
+        np.empty_like(rest),
+    )
     moved = skeleton
     for _ in range(n_rounds):
         turned_edges(everyone, *links, skeleton, turns, sums)
         turned = _turned(turns[held], details[held]) - details[held]
-        moved = skeleton + modes @ lu_solve(factor, modes.T @ sums + weight * modes[held].T @ (goal - turned))
+        moved = skeleton + modes @ lu_solve(
+            factor, modes.T @ sums + weight * modes[held].T @ (goal - turned)
+        )
         fit_rotations(everyone, *links, skeleton, moved, turns)
     return moved + _turned(turns, details)
 
 
-def _turned(turns: Float[np.ndarray, "k 4"], vectors: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
+def _turned(
+    turns: Float[np.ndarray, "k 4"], vectors: Float[np.ndarray, "k 3"]
+) -> Float[np.ndarray, "k 3"]:
     return np.asarray(Rotation.from_quat(np.roll(turns, -1, axis=1)).apply(vectors))

@@ -33,14 +33,20 @@ class BoxRegion:
     high: Float[np.ndarray, " 3"]
 
     def __init__(self, low: ArrayLike, high: ArrayLike) -> None:
-        corners = [real_numbers(corner, "A corner of a box").astype(np.float64) for corner in (low, high)]
+        corners = [
+            real_numbers(corner, "A corner of a box").astype(np.float64) for corner in (low, high)
+        ]
         for corner, name in zip(corners, ("low", "high"), strict=True):
             if corner.shape != (3,) or np.isnan(corner).any():
-                raise InvalidParameterError(f"{name} must be three numbers; it is {corner.tolist()}.")
+                raise InvalidParameterError(
+                    f"{name} must be three numbers; it is {corner.tolist()}."
+                )
         axis = np.flatnonzero(corners[0] > corners[1])
         if axis.size:
             below, above = (corner[axis[0]] for corner in corners)
-            raise InvalidParameterError(f"low must lie below high; along axis {axis[0]} they are {below} and {above}.")
+            raise InvalidParameterError(
+                f"low must lie below high; along axis {axis[0]} they are {below} and {above}."
+            )
         object.__setattr__(self, "low", frozen(corners[0]))
         object.__setattr__(self, "high", frozen(corners[1]))
 
@@ -114,7 +120,9 @@ def region_mask(mesh: MeshLike, region: Region) -> Bool[np.ndarray, " n"]:
         return np.asarray(inside.all(axis=1))
     if isinstance(region, BrushRegion):
         nearest = int(cKDTree(mesh.vertices).query(region.center)[1])
-        return np.asarray(geodesic_distance_to_set(mesh, [nearest], reach=region.radius) <= region.radius)
+        return np.asarray(
+            geodesic_distance_to_set(mesh, [nearest], reach=region.radius) <= region.radius
+        )
     chosen = _entries(region)
     if chosen.dtype == bool:
         if chosen.shape != (mesh.n_vertices,):
@@ -135,7 +143,9 @@ def region_boundary(mesh: MeshLike, mask: Bool[np.ndarray, " n"]) -> Int[np.ndar
     return np.unique(across[mask[across]])
 
 
-def require_boundary(mesh: TriangleMesh, mask: Bool[np.ndarray, " n"], number: int) -> Int[np.ndarray, " b"]:
+def require_boundary(
+    mesh: TriangleMesh, mask: Bool[np.ndarray, " n"], number: int
+) -> Int[np.ndarray, " b"]:
     """Return the boundary of a region, and refuse one that has none.
 
     Raises
@@ -146,7 +156,11 @@ def require_boundary(mesh: TriangleMesh, mask: Bool[np.ndarray, " n"], number: i
     rim = region_boundary(mesh, mask)
     if len(rim):
         return rim
-    what = "holds no vertex" if not mask.any() else f"holds {mask.sum()} of {len(mask)} vertices, whole components"
+    what = (
+        "holds no vertex"
+        if not mask.any()
+        else f"holds {mask.sum()} of {len(mask)} vertices, whole components"
+    )
     raise InvalidParameterError(
         f"A region must have a boundary on the shape, where it bends; region {number} {what}. "
         "What is to move as a whole needs no deformation."

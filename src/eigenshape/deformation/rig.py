@@ -63,7 +63,9 @@ class EigenRig:
         return frozen(vertex_components(self.mesh)[1])
 
 
-def rig_shape(mesh: MeshLike, spectrum: Spectrum | None = None, *, progress: Progress | None = None) -> EigenRig:
+def rig_shape(
+    mesh: MeshLike, spectrum: Spectrum | None = None, *, progress: Progress | None = None
+) -> EigenRig:
     """Prepare a shape for many edits.
 
     Parameters
@@ -92,17 +94,26 @@ def rig_shape(mesh: MeshLike, spectrum: Spectrum | None = None, *, progress: Pro
     laplacian = cotangent_laplacian(mesh)
     if spectrum is None:
         n_components, _ = vertex_components(mesh)
-        spectrum = solve_spectrum(laplacian, min(N_MODES + n_components - 1, mesh.n_vertices), progress=progress)
+        spectrum = solve_spectrum(
+            laplacian, min(N_MODES + n_components - 1, mesh.n_vertices), progress=progress
+        )
     modes = spectrum.eigenvectors
     if len(modes) != mesh.n_vertices:
-        raise InvalidParameterError(f"The spectrum is of {len(modes)} vertices, the shape has {mesh.n_vertices}.")
+        raise InvalidParameterError(
+            f"The spectrum is of {len(modes)} vertices, the shape has {mesh.n_vertices}."
+        )
     with one_blas_thread():
         factor = np.asarray(
             np.linalg.qr(modes, mode="r")
         ).T  # of the Gram matrix too, without squaring how unequal areas are
     edges = edge_weights(laplacian.stiffness)
     return EigenRig(
-        mesh, modes, spectrum.eigenvalues, frozen(spectrum.mass @ np.ones(len(modes))), frozen(factor), edges
+        mesh,
+        modes,
+        spectrum.eigenvalues,
+        frozen(spectrum.mass @ np.ones(len(modes))),
+        frozen(factor),
+        edges,
     )
 
 
@@ -117,9 +128,13 @@ def posed(rig: EigenRig, vertices: ArrayLike) -> EigenRig:
     return replace(rig, mesh=TriangleMesh(finite_rows(vertices, "vertices", 3), rig.mesh.faces))
 
 
-def projected(rig: EigenRig, values: Float[np.ndarray, "n q"], n_modes: int) -> Float[np.ndarray, "m q"]:
+def projected(
+    rig: EigenRig, values: Float[np.ndarray, "n q"], n_modes: int
+) -> Float[np.ndarray, "m q"]:
     """Return the coefficients of the least-squares fit by the lowest modes (thesis eq. 6.1)."""
-    return cho_solve((rig.factor[:n_modes, :n_modes], True), rig.eigenvectors[:, :n_modes].T @ values)
+    return cho_solve(
+        (rig.factor[:n_modes, :n_modes], True), rig.eigenvectors[:, :n_modes].T @ values
+    )
 
 
 @one_blas_thread()

@@ -74,7 +74,9 @@ def edge_weights(stiffness: sp.csr_array) -> EdgeWeights:
     links.sort_indices()
     links.data = np.maximum(links.data, LEAST_WEIGHT * np.abs(links.data).mean())
     matrix = (sp.diags_array(links.sum(axis=1)) - links).tocsr()
-    return EdgeWeights(matrix, links.indptr.astype(np.int64), links.indices.astype(np.int64), links.data)
+    return EdgeWeights(
+        matrix, links.indptr.astype(np.int64), links.indices.astype(np.int64), links.data
+    )
 
 
 def free_part(
@@ -127,12 +129,19 @@ def factored(square: sp.csr_array) -> SymmetricFactor:
     with one_blas_thread():
         factor = factorise(analyse(matrix), matrix.data)
     if factor is None or not (factor.pivots > 0).all():
-        raise InvalidShapeError("A shape must have angles to be bent; some are too near to 0 for the equations.")
+        raise InvalidShapeError(
+            "A shape must have angles to be bent; some are too near to 0 for the equations."
+        )
     return factor
 
 
 def relax(
-    edges: EdgeWeights, part: FreePart, rest: Points, start: Points, turns: Float[np.ndarray, "n 4"], n_rounds: int
+    edges: EdgeWeights,
+    part: FreePart,
+    rest: Points,
+    start: Points,
+    turns: Float[np.ndarray, "n 4"],
+    n_rounds: int,
 ) -> Points:
     """Make edges as rigid as possible by moving what is free, in rounds of local fits and a global solve.
 
@@ -194,7 +203,9 @@ def relax(
 def fitted_turns(edges: EdgeWeights, rest: Points, posed: Points) -> Float[np.ndarray, "n 3 3"]:
     """Return the rotation of each vertex that fits its edges best, by singular values, from no start."""
     one, two = np.repeat(np.arange(len(rest)), np.diff(edges.starts)), edges.others
-    products = np.einsum("e,ei,ej->eij", edges.weights, posed[two] - posed[one], rest[two] - rest[one])
+    products = np.einsum(
+        "e,ei,ej->eij", edges.weights, posed[two] - posed[one], rest[two] - rest[one]
+    )
     return nearest_rotations(np.add.reduceat(products, edges.starts[:-1]))
 
 
@@ -209,6 +220,10 @@ def _mixed(steps: Sequence[Step]) -> Points:
     """Return the combination of solutions whose combined change is least (Anderson 1965)."""
     changes = np.array([change.ravel() for change, _ in steps])
     differences = changes[-1] - changes[:-1]
-    shares, *_ = np.linalg.lstsq(differences @ differences.T, differences @ changes[-1], rcond=1e-12)
+    shares, *_ = np.linalg.lstsq(
+        differences @ differences.T, differences @ changes[-1], rcond=1e-12
+    )
     last = steps[-1][1]
-    return last - sum((share * (last - old) for share, (_, old) in zip(shares, steps, strict=False)), np.zeros(3))
+    return last - sum(
+        (share * (last - old) for share, (_, old) in zip(shares, steps, strict=False)), np.zeros(3)
+    )

@@ -28,7 +28,11 @@ def fit_rotations(vertices, starts, others, weights, rest, posed, turns):
         lengths = 0.0
         for k in range(starts[i], starts[i + 1]):
             j, w = others[k], weights[k]
-            u, v, t = posed[j, 0] - posed[i, 0], posed[j, 1] - posed[i, 1], posed[j, 2] - posed[i, 2]
+            u, v, t = (
+                posed[j, 0] - posed[i, 0],
+                posed[j, 1] - posed[i, 1],
+                posed[j, 2] - posed[i, 2],
+            )
             lengths += w * (u * u + v * v + t * t)
             for a in range(3):
                 before = rest[j, a] - rest[i, a]
@@ -84,7 +88,9 @@ def _settle(covariance, turns, i):
             angle = np.sqrt(u * u + v * v + t * t)
             u, v, t = u / 2, v / 2, t / 2
         else:
-            along = (p00 * u * u + p11 * v * v + p22 * t * t - 2 * (d * u * v + e * u * t + f * v * t)) / size**2
+            along = (
+                p00 * u * u + p11 * v * v + p22 * t * t - 2 * (d * u * v + e * u * t + f * v * t)
+            ) / size**2
             angle = np.arctan2(size, p00 + p11 + p22 - along)  # the best about this axis
             half = np.tan(min(angle, HALFWAY) / 2) / size
             u, v, t = u * half, v * half, t * half

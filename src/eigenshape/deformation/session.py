@@ -75,7 +75,12 @@ class DeformationSession:
         return self._dragged()[2]
 
     def drag(
-        self, region: Region, handle: Handle, *, fixed: Region | None = None, n_modes: SupportsIndex | None = None
+        self,
+        region: Region,
+        handle: Handle,
+        *,
+        fixed: Region | None = None,
+        n_modes: SupportsIndex | None = None,
     ) -> Float[np.ndarray, "n 3"]:
         """Show where a region's handle would take the shape: the moved eigen-skeleton.
 
@@ -85,7 +90,11 @@ class DeformationSession:
         return self.drag_all([Move(region, handle)], fixed=fixed, n_modes=n_modes)
 
     def drag_all(
-        self, moves: Iterable[Move], *, fixed: Region | None = None, n_modes: SupportsIndex | None = None
+        self,
+        moves: Iterable[Move],
+        *,
+        fixed: Region | None = None,
+        n_modes: SupportsIndex | None = None,
     ) -> Float[np.ndarray, "n 3"]:
         """Show where the handles of several regions would take the shape.
 
@@ -110,17 +119,26 @@ class DeformationSession:
         require_each(moves, Move, "moves")
         edit = Edit(tuple(moves), fixed, number, self._mode)
         if self._pending is None or not self._binds_alike(edit, self._pending[0]):
-            binding = bind(self.rig, [move.region for move in edit.moves], fixed=fixed, n_modes=number)
+            binding = bind(
+                self.rig, [move.region for move in edit.moves], fixed=fixed, n_modes=number
+            )
             self._pending = edit, binding, grip_skeleton(binding)
         self._pending = edit, *self._pending[1:]
         return moved_skeleton(self.grip, [move.handle for move in edit.moves])
 
     def _binds_alike(self, one: Edit, two: Edit) -> bool:
-        if one.n_modes != two.n_modes or len(one.moves) != len(two.moves) or (one.fixed is None) != (two.fixed is None):
+        if (
+            one.n_modes != two.n_modes
+            or len(one.moves) != len(two.moves)
+            or (one.fixed is None) != (two.fixed is None)
+        ):
             return False
         pairs = [(a.region, b.region) for a, b in zip(one.moves, two.moves, strict=True)]
         pairs += [(one.fixed, two.fixed)] if one.fixed is not None and two.fixed is not None else []
-        return all(a is b or np.array_equal(region_mask(self.mesh, a), region_mask(self.mesh, b)) for a, b in pairs)
+        return all(
+            a is b or np.array_equal(region_mask(self.mesh, a), region_mask(self.mesh, b))
+            for a, b in pairs
+        )
 
     def _dragged(self) -> tuple[Edit, Binding, SkeletonGrip]:
         if self._pending is None:
@@ -191,7 +209,9 @@ class DeformationSession:
         return self.mesh
 
 
-def replay(rig: EigenRig, edits: Sequence[Edit], *, source: MeshLike | None = None) -> DeformationSession:
+def replay(
+    rig: EigenRig, edits: Sequence[Edit], *, source: MeshLike | None = None
+) -> DeformationSession:
     """Do edits again, on the same shape or on another mesh of it.
 
     Parameters

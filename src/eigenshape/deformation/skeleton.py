@@ -41,7 +41,9 @@ def grip_skeleton(binding: Binding) -> SkeletonGrip:
     skeleton = eigen_skeleton(rig, n_modes)
     ends = np.column_stack([skeleton, np.ones(len(skeleton))])
     cut = [projected(rig, ends * mask[:, None], n_modes) for mask in binding.regions]
-    return SkeletonGrip(skeleton, np.array([rig.eigenvectors[:, :n_modes] @ columns for columns in cut]))
+    return SkeletonGrip(
+        skeleton, np.array([rig.eigenvectors[:, :n_modes] @ columns for columns in cut])
+    )
 
 
 def moved_skeleton(grip: SkeletonGrip, handles: Sequence[Handle]) -> Float[np.ndarray, "n 3"]:
@@ -49,4 +51,6 @@ def moved_skeleton(grip: SkeletonGrip, handles: Sequence[Handle]) -> Float[np.nd
     require_type(grip, SkeletonGrip, "grip")
     require_each(handles, Handle, "handles")
     pairs = zip(grip.weights, handles, strict=True)
-    return grip.skeleton + sum((weights @ affine_offset(handle).T for weights, handle in pairs), np.zeros(3))
+    return grip.skeleton + sum(
+        (weights @ affine_offset(handle).T for weights, handle in pairs), np.zeros(3)
+    )

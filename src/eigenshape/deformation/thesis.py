@@ -10,7 +10,13 @@ from jaxtyping import Float
 from eigenshape._arguments import require_each, require_type
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.binding import Binding
-from eigenshape.deformation.details import FramedDetails, blended, framed, turned_by_frames, turned_by_handles
+from eigenshape.deformation.details import (
+    FramedDetails,
+    blended,
+    framed,
+    turned_by_frames,
+    turned_by_handles,
+)
 from eigenshape.deformation.handles import Handle
 from eigenshape.deformation.rig import eigen_skeleton, projected
 from eigenshape.deformation.skeleton import SkeletonGrip, grip_skeleton, moved_skeleton
@@ -56,11 +62,15 @@ def detail_skeleton(binding: Binding, *, second_pass: bool = True) -> DetailedSk
     rig, grip = binding.rig, grip_skeleton(binding)
     shape, faces, most = rig.mesh.vertices, rig.mesh.faces, min(SECOND_PASS, rig.n_modes)
     fine = eigen_skeleton(rig, most) if second_pass and binding.n_modes.max() < most else shape
-    return DetailedSkeleton(binding, grip, fine, framed(faces, grip.skeleton, fine), framed(faces, fine, shape))
+    return DetailedSkeleton(
+        binding, grip, fine, framed(faces, grip.skeleton, fine), framed(faces, fine, shape)
+    )
 
 
 @one_blas_thread()
-def eigen_deformed(skeleton: DetailedSkeleton, handles: Sequence[Handle], *, details: Details = "blended") -> Points:
+def eigen_deformed(
+    skeleton: DetailedSkeleton, handles: Sequence[Handle], *, details: Details = "blended"
+) -> Points:
     """Return the vertices where the thesis' algorithm takes them.
 
     Details are added up to the skeleton of 300 modes, which is fitted once more, and the rest by local frames alone;
@@ -83,7 +93,11 @@ def eigen_deformed(skeleton: DetailedSkeleton, handles: Sequence[Handle], *, det
     moved = moved_skeleton(skeleton.grip, handles)
     by_frames = turned_by_frames(faces, skeleton.first, moved)
     by_handles = turned_by_handles(skeleton.binding, handles, skeleton.first.details)
-    ways = {"frames": by_frames, "handle": by_handles, "blended": blended(skeleton.binding, by_frames, by_handles)}
+    ways = {
+        "frames": by_frames,
+        "handle": by_handles,
+        "blended": blended(skeleton.binding, by_frames, by_handles),
+    }
     found = moved + ways[details]
     if skeleton.fine is rig.mesh.vertices:
         return found

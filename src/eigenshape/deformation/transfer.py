@@ -66,7 +66,10 @@ def transfer_deformation(
     target = as_mesh(target, "target")
     require_type(mapping, FunctionalMap, "mapping")
     require_poses(before, after)
-    for mesh, spectrum, name in ((before, mapping.source, "source"), (target, mapping.target, "target")):
+    for mesh, spectrum, name in (
+        (before, mapping.source, "source"),
+        (target, mapping.target, "target"),
+    ):
         if mesh.n_vertices != len(spectrum.eigenvectors):
             raise InvalidParameterError(
                 f"The map's {name} has {len(spectrum.eigenvectors)} vertices, and the mesh has {mesh.n_vertices}."
@@ -74,23 +77,32 @@ def transfer_deformation(
     wanted = mapping.matrix.shape[1] if n_modes is None else n_modes
     k = whole_number(wanted, "n_modes", 1, mapping.matrix.shape[1])
     few = FunctionalMap(mapping.matrix[:, :k], mapping.source, mapping.target)
-    turns = fitted_turns(edge_weights(cotangent_laplacian(before).stiffness), before.vertices, after.vertices)
+    turns = fitted_turns(
+        edge_weights(cotangent_laplacian(before).stiffness), before.vertices, after.vertices
+    )
     carried = nearest_rotations(transfer_function(few, turns.reshape(-1, 9)).reshape(-1, 3, 3))
-    stand = _turn_between(transfer_function(mapping, before.vertices), target.vertices, point_areas(mapping.target))
+    stand = _turn_between(
+        transfer_function(mapping, before.vertices), target.vertices, point_areas(mapping.target)
+    )
     return TriangleMesh(
-        _turned_by(target, stand @ carried @ stand.T) + _step(before, after, target, stand), target.faces
+        _turned_by(target, stand @ carried @ stand.T) + _step(before, after, target, stand),
+        target.faces,
     )
 
 
 def _turn_between(
-    source: Float[np.ndarray, "n 3"], target: Float[np.ndarray, "n 3"], areas: Float[np.ndarray, " n"]
+    source: Float[np.ndarray, "n 3"],
+    target: Float[np.ndarray, "n 3"],
+    areas: Float[np.ndarray, " n"],
 ) -> Float[np.ndarray, "3 3"]:
     """Return the rotation that takes points to their partners best (Kabsch 1976)."""
     one, two = (size_one(points - _middle(points, areas))[0] for points in (source, target))
     return nearest_rotations((two.T @ (areas[:, None] / areas.sum() * one))[None])[0]
 
 
-def _middle(points: Float[np.ndarray, "n 3"], areas: Float[np.ndarray, " n"]) -> Float[np.ndarray, " 3"]:
+def _middle(
+    points: Float[np.ndarray, "n 3"], areas: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, " 3"]:
     return np.asarray((areas / areas.sum()) @ points)
 
 

@@ -22,7 +22,9 @@ CORE = 0.9  # of a part's depth: no band reaches deeper
 CAPACITY = 2.0**30  # of all edges together: what the flow counts with has 31 bits
 
 
-def smooth_boundaries(mesh: MeshLike, segmentation: Segmentation, *, width: float = WIDTH) -> Segmentation:
+def smooth_boundaries(
+    mesh: MeshLike, segmentation: Segmentation, *, width: float = WIDTH
+) -> Segmentation:
     """Move the boundary between each two parts to the least cut in a band around it.
 
     A cut costs the length of its edges times the conductivity across them, which is low in concave creases
@@ -93,7 +95,11 @@ def _faces_at(mesh: TriangleMesh, segmentation: Segmentation) -> Bool[np.ndarray
 
 
 def _move(
-    network: _Network, labels: Int[np.ndarray, " f"], parts: tuple[int, int], held: Bool[np.ndarray, " f"], share: float
+    network: _Network,
+    labels: Int[np.ndarray, " f"],
+    parts: tuple[int, int],
+    held: Bool[np.ndarray, " f"],
+    share: float,
 ) -> None:
     """Cut two parts anew, in place."""
     faces = np.flatnonzero(np.isin(labels, parts))
@@ -104,7 +110,13 @@ def _move(
     crossing = side[pairs[:, 0]] != side[pairs[:, 1]]
     if not crossing.any():  # an earlier cut has parted them
         return
-    band = _band(network.areas[faces], _graph(pairs, network.ways[inside], len(faces)), side, pairs[crossing], share)
+    band = _band(
+        network.areas[faces],
+        _graph(pairs, network.ways[inside], len(faces)),
+        side,
+        pairs[crossing],
+        share,
+    )
     band &= ~held[faces]
     if band[side].all() or band[~side].all():
         return
@@ -144,7 +156,9 @@ def _least_cut(
     kept = ends[:, 0] != ends[:, 1]
     capacities = np.int64(1) + np.floor(CAPACITY * costs[kept] / costs[kept].sum()).astype(np.int64)
     capacities[(ends[kept] < 2).all(axis=1)] = 0
-    graph = sp.csr_matrix(_graph(ends[kept], capacities, 2 + int(np.count_nonzero(band))).astype(np.int32))
+    graph = sp.csr_matrix(
+        _graph(ends[kept], capacities, 2 + int(np.count_nonzero(band))).astype(np.int32)
+    )
     residual = graph - maximum_flow(graph, 0, 1).flow
     residual.data = (residual.data > 0).astype(np.int8)
     residual.eliminate_zeros()
@@ -156,4 +170,8 @@ def _least_cut(
 def _pieces(pairs: Int[np.ndarray, "p 2"], side: Bool[np.ndarray, " k"]) -> int:
     """Count the pieces into which both sides fall."""
     whole = side[pairs[:, 0]] == side[pairs[:, 1]]
-    return int(connected_components(_graph(pairs[whole], np.ones(whole.sum()), len(side)), directed=False)[0])
+    return int(
+        connected_components(_graph(pairs[whole], np.ones(whole.sum()), len(side)), directed=False)[
+            0
+        ]
+    )

@@ -66,7 +66,9 @@ class PersistenceDiagram:
     loops: PersistencePairs | None
 
 
-def persistence_diagram(shape: ShapeLike, values: ArrayLike, *, n_neighbors: int = N_NEIGHBORS) -> PersistenceDiagram:
+def persistence_diagram(
+    shape: ShapeLike, values: ArrayLike, *, n_neighbors: int = N_NEIGHBORS
+) -> PersistenceDiagram:
     """Pair the maxima and minima of a function with the saddles where they merge.
 
     The function is that of the vertices, linear on simplices; what is connected, edges tell alone (Edelsbrunner and

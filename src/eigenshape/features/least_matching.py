@@ -75,7 +75,9 @@ def least_distance(one: Points, two: Points, reach_one: Reach, reach_two: Reach)
     """
 
     def suffices(distance: float) -> bool:
-        return _covers(one[reach_one > distance], two, distance) and _covers(two[reach_two > distance], one, distance)
+        return _covers(one[reach_one > distance], two, distance) and _covers(
+            two[reach_two > distance], one, distance
+        )
 
     if suffices(0.0):
         return 0.0
@@ -85,9 +87,17 @@ def least_distance(one: Points, two: Points, reach_one: Reach, reach_two: Reach)
         middle = low + (high - low) / 2
         low, high = (low, middle) if suffices(middle) else (middle, high)
     sides = [(one[reach_one > low], two), (two[reach_two > low], one)]
-    left = np.unique(np.concatenate([reaches, *(near_pairs(*side, high, np.inf).apart for side in sides), [high]]))
+    left = np.unique(
+        np.concatenate(
+            [reaches, *(near_pairs(*side, high, np.inf).apart for side in sides), [high]]
+        )
+    )
     left = left[(left > low) & (left <= high)]
-    return float(left[bisect_left(range(len(left) - 1), True, key=lambda place: suffices(float(left[place])))])
+    return float(
+        left[
+            bisect_left(range(len(left) - 1), True, key=lambda place: suffices(float(left[place])))
+        ]
+    )
 
 
 def _covers(some: Points, others: Points, distance: float) -> bool:
@@ -97,13 +107,17 @@ def _covers(some: Points, others: Points, distance: float) -> bool:
     return bool((match_within(some, others, distance, np.inf) >= 0).all())
 
 
-def match_within(some: Points, others: Points, distance: float, norm: float) -> Int[np.ndarray, " _"]:
+def match_within(
+    some: Points, others: Points, distance: float, norm: float
+) -> Int[np.ndarray, " _"]:
     """Match as many of some points as can be with another each within the distance; -1 where there is none."""
     return _matched(near_pairs(some, others, distance, norm), np.full(len(some), -1), len(others))
 
 
 def _matched(near: Pairs, first: Partners, n_others: int) -> Int[np.ndarray, " n"]:
-    graph = sp.csr_array((np.ones(len(near.i), dtype=np.int8), (near.i, near.j)), shape=(len(first), n_others))
+    graph = sp.csr_array(
+        (np.ones(len(near.i), dtype=np.int8), (near.i, near.j)), shape=(len(first), n_others)
+    )
     return match_rows(graph.indptr, graph.indices, n_others, first)[0]
 
 
@@ -143,7 +157,9 @@ def _require_room(one: cKDTree, two: cKDTree, reach: float, norm: float) -> None
 
 def _enclosed(one: Points, two: Points, norm: float) -> float:
     """Return a distance just below that at which each point has a neighbour."""
-    lonely = max(cKDTree(those).query(these, p=norm)[0].max() for these, those in ((one, two), (two, one)))
+    lonely = max(
+        cKDTree(those).query(these, p=norm)[0].max() for these, those in ((one, two), (two, one))
+    )
     return float(lonely) * (1 - SLACK)
 
 

@@ -55,7 +55,9 @@ def extended_loops(mesh: Mesh, order: Int[np.ndarray, " n"]) -> Int[np.ndarray, 
         pairs.append((rising.edges[row.bit_length() - 1], edge))
     place = np.argsort(order)
     ends = complex_.edges[np.array(pairs)]
-    return np.column_stack([order[place[ends[:, 0]].max(axis=1)], order[place[ends[:, 1]].min(axis=1)]])
+    return np.column_stack(
+        [order[place[ends[:, 0]].max(axis=1)], order[place[ends[:, 1]].min(axis=1)]]
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +86,9 @@ def _complex(mesh: Mesh) -> _Complex | None:
     return _Complex(edges, sides, len(edge_of))
 
 
-def _edges(mesh: Mesh) -> tuple[Int[np.ndarray, "e 2"], Int[np.ndarray, "f 3"], Int[np.ndarray, " e"]]:
+def _edges(
+    mesh: Mesh,
+) -> tuple[Int[np.ndarray, "e 2"], Int[np.ndarray, "f 3"], Int[np.ndarray, " e"]]:
     if isinstance(mesh, TriangleMesh):
         edges = edge_table(mesh)
         return edges.edges, edges.face_edges, edges.n_faces
@@ -134,7 +138,9 @@ def _rooted(ends: Int[np.ndarray, "e 2"], kept: Bool[np.ndarray, " e"], n: int) 
     one, two = ends[edges].T
     graph = sp.coo_array((np.ones(len(edges), dtype=np.int8), (one, two)), shape=(n + 1, n + 1))
     _, labels = connected_components(graph, directed=False)
-    _, firsts = np.unique(labels[:n], return_index=True)  # one of each tree, to hang from a root of all
+    _, firsts = np.unique(
+        labels[:n], return_index=True
+    )  # one of each tree, to hang from a root of all
     rows, columns = np.append(one, firsts), np.append(two, np.full(len(firsts), n))
     graph = sp.coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(n + 1, n + 1))
     order, parent = breadth_first_order(graph.tocsr(), n, directed=False)

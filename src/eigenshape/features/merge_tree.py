@@ -133,7 +133,9 @@ def _gather(height: Float[np.ndarray, " n"], joined: _Joined) -> MergeTree:
     )
 
 
-def merged_regions(neighbour: Int[np.ndarray, " m"], ends: Bool[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
+def merged_regions(
+    neighbour: Int[np.ndarray, " m"], ends: Bool[np.ndarray, " m"]
+) -> Int[np.ndarray, " m"]:
     """Merge each basin that ends into its neighbour's region: for each basin, the one of its region that stays."""
     m = len(neighbour)
     links = (np.flatnonzero(ends), neighbour[ends])

@@ -76,13 +76,19 @@ class _Rooms:
     touching: Int[np.ndarray, "p 2"]
 
 
-def _rooms(mesh: TriangleMesh, seeds: Segmentation, coordinates: Float[np.ndarray, "n k"]) -> _Rooms:
+def _rooms(
+    mesh: TriangleMesh, seeds: Segmentation, coordinates: Float[np.ndarray, "n k"]
+) -> _Rooms:
     count, areas = len(seeds.features.vertices), face_areas(mesh)
     weights = areas / areas.sum()
     region_areas = np.bincount(seeds.labels, weights=weights, minlength=count)
     corners = np.repeat(weights / 3, 3)
     sums = [
-        np.bincount(np.repeat(seeds.labels, 3), weights=corners * column[mesh.faces.ravel()], minlength=count)
+        np.bincount(
+            np.repeat(seeds.labels, 3),
+            weights=corners * column[mesh.faces.ravel()],
+            minlength=count,
+        )
         for column in coordinates.T
     ]
     means = np.column_stack(sums) * areas.sum() ** 0.5 / region_areas[:, None]
@@ -96,7 +102,9 @@ def _merged(rooms: _Rooms, heights: Float[np.ndarray, " r"]) -> list[tuple[int, 
     for one, two in rooms.touching.tolist():
         beside[one].add(two)
         beside[two].add(one)
-    age = np.zeros(len(areas), dtype=np.int64)  # how often a region has grown: older prices of it are void
+    age = np.zeros(
+        len(areas), dtype=np.int64
+    )  # how often a region has grown: older prices of it are void
 
     def priced(one: int, two: int) -> tuple[float, int, int, int, int]:
         weight = areas[one] * areas[two] / (areas[one] + areas[two])
@@ -111,7 +119,9 @@ def _merged(rooms: _Rooms, heights: Float[np.ndarray, " r"]) -> list[tuple[int, 
         if (age[one], age[two]) != (age_one, age_two):
             continue
         stays, ends = (one, two) if (heights[one], -one) > (heights[two], -two) else (two, one)
-        highest = max(highest, price)  # a merge may make the next one cheaper; persistence never falls on the way
+        highest = max(
+            highest, price
+        )  # a merge may make the next one cheaper; persistence never falls on the way
         merges.append((ends, stays, highest))
         total = areas[stays] + areas[ends]
         means[stays] = (areas[stays] * means[stays] + areas[ends] * means[ends]) / total
@@ -131,7 +141,9 @@ def _gather(seeds: Segmentation, merges: list[tuple[int, int, float]]) -> PartTr
         parent[ends], persistence[ends] = stays, price
     ended = np.array([ends for ends, _, _ in merges], dtype=np.int64)
     roots = np.flatnonzero(parent < 0)
-    order = np.concatenate([roots[np.argsort(-seeds.features.values[roots], kind="stable")], ended[::-1]])
+    order = np.concatenate(
+        [roots[np.argsort(-seeds.features.values[roots], kind="stable")], ended[::-1]]
+    )
     number = np.empty(count, dtype=np.int64)
     number[order] = np.arange(count)
     return PartTree(

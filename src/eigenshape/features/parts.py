@@ -50,7 +50,9 @@ class FoundParts:
     parts: Segmentation
 
 
-def find_parts(mesh: MeshLike, *, n_modes: int = N_MODES, progress: Progress | None = None) -> FoundParts:
+def find_parts(
+    mesh: MeshLike, *, n_modes: int = N_MODES, progress: Progress | None = None
+) -> FoundParts:
     """Find the parts of a surface: rooms between which heat flows badly, cut along concave creases.
 
     Heat flows slowly across concave creases (`curvature_tensors`, α = 10); regions around the maxima of early heat are
@@ -91,7 +93,9 @@ def find_parts(mesh: MeshLike, *, n_modes: int = N_MODES, progress: Progress | N
     return FoundParts(outward, spectrum, frozen(heat), tree, parts)
 
 
-def part_spectrum(mesh: MeshLike, *, n_modes: int = N_MODES, progress: Progress | None = None) -> Spectrum:
+def part_spectrum(
+    mesh: MeshLike, *, n_modes: int = N_MODES, progress: Progress | None = None
+) -> Spectrum:
     """Solve for the lowest modes of a Laplacian that conducts badly across concave creases, fragments left out.
 
     Parameters and errors are those of `find_parts`, the faces of the mesh being turned outward.

@@ -50,7 +50,11 @@ class Segmentation:
 
 
 def segment(
-    tree: Tree, *, n_regions: int | None = None, persistence: float | None = None, largest_gap: bool = False
+    tree: Tree,
+    *,
+    n_regions: int | None = None,
+    persistence: float | None = None,
+    largest_gap: bool = False,
 ) -> Segmentation:
     """Merge regions in the order of their persistence until so many are left, or all left persist so long.
 
@@ -87,14 +91,18 @@ def segment(
         )
     if n_regions is not None:
         return _cut(tree, _beyond_number(tree, n_regions))
-    return _cut(tree, _below(tree, _above_largest_gap(tree) if persistence is None else persistence))
+    return _cut(
+        tree, _below(tree, _above_largest_gap(tree) if persistence is None else persistence)
+    )
 
 
 def _cut(tree: Tree, ends: Bool[np.ndarray, " m"]) -> Segmentation:
     left = np.flatnonzero(~ends)
     regions = merged_regions(np.maximum(tree.parent, 0), ends)[tree.basins]
     features = FeaturePoints(
-        vertices=frozen(tree.maxima[left]), values=frozen(tree.values[left]), persistence=frozen(tree.persistence[left])
+        vertices=frozen(tree.maxima[left]),
+        values=frozen(tree.values[left]),
+        persistence=frozen(tree.persistence[left]),
     )
     return Segmentation(frozen(np.searchsorted(left, regions)), features)
 

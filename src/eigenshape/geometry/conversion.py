@@ -149,7 +149,11 @@ def _converted(value: object) -> Shape | None:
 
 def _refused(value: object, shape: Shape | None, needed: str, reader: str) -> InvalidParameterError:
     """Return the error that names a value, the shape it was taken for, and what to pass instead."""
-    given = named_value(value) if shape is None or shape is value else f"{named_value(value)} that is a {shape!r}"
+    given = (
+        named_value(value)
+        if shape is None or shape is value
+        else f"{named_value(value)} that is a {shape!r}"
+    )
     remedy = _remedy(value, reader) if shape is None else _use_of(shape)
     return InvalidParameterError(f"{needed}; it is {given}. {remedy}")
 
@@ -177,7 +181,11 @@ def _remedy(value: object, reader: str) -> str:
 
 
 def from_arrays(
-    points: ArrayLike, simplices: ArrayLike | None = None, *, dim: SupportsIndex = 2, cells: Cells | None = None
+    points: ArrayLike,
+    simplices: ArrayLike | None = None,
+    *,
+    dim: SupportsIndex = 2,
+    cells: Cells | None = None,
 ) -> Shape:
     """Return the shape that arrays describe: a TriangleMesh where they can be one.
 

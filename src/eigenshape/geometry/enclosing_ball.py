@@ -69,7 +69,10 @@ def _center(points: Points) -> Float[np.ndarray, " d"]:
         far = int(((points - center) ** 2).sum(axis=1).argmax())
         if far in support:
             return center
-        grown = max((_held(points, some) for some in _with(far, support, points.shape[1])), key=lambda held: held[0])
+        grown = max(
+            (_held(points, some) for some in _with(far, support, points.shape[1])),
+            key=lambda held: held[0],
+        )
         if grown[0] <= value:  # what is left is rounding
             return center
         value, center, support = grown
@@ -77,7 +80,11 @@ def _center(points: Points) -> Float[np.ndarray, " d"]:
 
 def _with(far: int, support: Support, dim: int) -> list[Support]:
     """List the sets of at most d + 1 points that may hold a ball, and have the new one."""
-    return [[*some, far] for size in range(min(dim, len(support)) + 1) for some in combinations(support, size)]
+    return [
+        [*some, far]
+        for size in range(min(dim, len(support)) + 1)
+        for some in combinations(support, size)
+    ]
 
 
 def _held(points: Points, support: Support) -> tuple[float, Float[np.ndarray, " d"], Support]:

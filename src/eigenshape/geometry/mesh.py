@@ -41,7 +41,9 @@ class TriangleMesh:
             raise InvalidShapeError("A mesh must have vertices; it has none.")
         corners = index_rows(faces, "faces", 3, len(points))
         if not len(corners):
-            raise InvalidShapeError(f"A mesh must have faces; it has {len(points)} vertices and no face.")
+            raise InvalidShapeError(
+                f"A mesh must have faces; it has {len(points)} vertices and no face."
+            )
         object.__setattr__(self, "vertices", frozen(points))
         object.__setattr__(self, "faces", frozen(corners))
 

@@ -48,20 +48,42 @@ class Operator:
 
 OPERATORS = {
     "cotangent": Operator(cotangent_laplacian, MESHES, ("mass",), "linear finite elements"),
-    "p2": Operator(partial(fem_laplacian, order=2), MESHES, (), "quadratic finite elements, nodes on edges too"),
-    "p3": Operator(partial(fem_laplacian, order=3), MESHES, (), "cubic finite elements, nodes inside triangles too"),
-    "robust": Operator(robust_laplacian, (TriangleMesh,), ("mollify",), "linear elements on intrinsic triangles"),
-    "mesh": Operator(mesh_laplacian, MESHES, (*KERNEL, "distance"), "Gaussian kernel, weighed by volumes"),
-    "point-cloud": Operator(point_cloud_laplacian, (PointCloud,), KERNEL, "Gaussian kernel, weighed in tangent planes"),
-    "combinatorial": Operator(partial(graph_laplacian, kind="combinatorial"), GRAPHS, (), "edges of weight 1"),
-    "weighted": Operator(
-        partial(graph_laplacian, kind="weighted"), GRAPHS, (), "edges weigh what they do, or 1/length"
+    "p2": Operator(
+        partial(fem_laplacian, order=2), MESHES, (), "quadratic finite elements, nodes on edges too"
     ),
-    "normalized": Operator(partial(graph_laplacian, kind="normalized"), GRAPHS, (), "eigenvalues in 0..2"),
+    "p3": Operator(
+        partial(fem_laplacian, order=3),
+        MESHES,
+        (),
+        "cubic finite elements, nodes inside triangles too",
+    ),
+    "robust": Operator(
+        robust_laplacian, (TriangleMesh,), ("mollify",), "linear elements on intrinsic triangles"
+    ),
+    "mesh": Operator(
+        mesh_laplacian, MESHES, (*KERNEL, "distance"), "Gaussian kernel, weighed by volumes"
+    ),
+    "point-cloud": Operator(
+        point_cloud_laplacian, (PointCloud,), KERNEL, "Gaussian kernel, weighed in tangent planes"
+    ),
+    "combinatorial": Operator(
+        partial(graph_laplacian, kind="combinatorial"), GRAPHS, (), "edges of weight 1"
+    ),
+    "weighted": Operator(
+        partial(graph_laplacian, kind="weighted"),
+        GRAPHS,
+        (),
+        "edges weigh what they do, or 1/length",
+    ),
+    "normalized": Operator(
+        partial(graph_laplacian, kind="normalized"), GRAPHS, (), "eigenvalues in 0..2"
+    ),
 }
 
 
-def build_laplacian(shape: ShapeLike | sp.sparray, operator: str | None = None, **options: Any) -> Laplacian:
+def build_laplacian(
+    shape: ShapeLike | sp.sparray, operator: str | None = None, **options: Any
+) -> Laplacian:
     """Build the operator of a name on a shape.
 
     Parameters
@@ -87,7 +109,9 @@ def build_laplacian(shape: ShapeLike | sp.sparray, operator: str | None = None, 
         shape = as_shape(shape)
     name = operator or default_operator(shape)
     if name not in OPERATORS:
-        raise InvalidParameterError(f"operator must be one of {', '.join(OPERATORS)}; it is {name!r}.")
+        raise InvalidParameterError(
+            f"operator must be one of {', '.join(OPERATORS)}; it is {name!r}."
+        )
     entry = OPERATORS[name]
     if not isinstance(shape, entry.takes):
         raise InvalidParameterError(

@@ -67,4 +67,6 @@ def require_mass(mass: str) -> None:
     InvalidParameterError
     """
     if mass not in ("lumped", "consistent", "averaged"):
-        raise InvalidParameterError(f"mass must be 'lumped', 'consistent' or 'averaged'; it is {mass!r}.")
+        raise InvalidParameterError(
+            f"mass must be 'lumped', 'consistent' or 'averaged'; it is {mass!r}."
+        )

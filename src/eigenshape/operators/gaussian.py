@@ -111,13 +111,19 @@ def mesh_laplacian(  # noqa: PLR0913 - one keyword for each choice that the meth
     """
     shape = as_simplicial(shape, "shape")
     if distance not in ("euclidean", "geodesic"):
-        raise InvalidParameterError(f"distance must be 'euclidean' or 'geodesic'; it is {distance!r}.")
+        raise InvalidParameterError(
+            f"distance must be 'euclidean' or 'geodesic'; it is {distance!r}."
+        )
     measure = mesh_quadrature(shape)
-    kernel = choose_kernel(KernelOptions(t, h, edge_factor, correct, form, cutoff), mean_side_length(shape))
+    kernel = choose_kernel(
+        KernelOptions(t, h, edge_factor, correct, form, cutoff), mean_side_length(shape)
+    )
     warn_of_narrow(kernel)
     warn_of_few(measure, kernel)
     laplacian = (
-        geodesic_laplacian(shape, measure, kernel) if distance == "geodesic" else kernel_laplacian(measure, kernel)
+        geodesic_laplacian(shape, measure, kernel)
+        if distance == "geodesic"
+        else kernel_laplacian(measure, kernel)
     )
     require_whole(laplacian, vertex_components(shape)[1], kernel)
     return laplacian
@@ -168,7 +174,9 @@ def gaussian_laplacian(
             "Weights of 1/n must be corrected in the random-walk form; form is 'literal', whose eigenvalues are over "
             "the unknown volume. Choose form='random-walk', or quadrature_laplacian with weights in length^m."
         )
-    laplacian = quadrature_laplacian(uniform_quadrature(points, dim), t, correct=correct, form=form, cutoff=cutoff)
+    laplacian = quadrature_laplacian(
+        uniform_quadrature(points, dim), t, correct=correct, form=form, cutoff=cutoff
+    )
     return laplacian if form == "random-walk" else _over_volume(laplacian, int(dim))
 
 
@@ -177,12 +185,19 @@ def _over_volume(laplacian: Laplacian, dim: int) -> Laplacian:
     kernel, n = laplacian.kernel, laplacian.n_points
     if kernel is None:
         return laplacian
-    degrees = kernel.t * laplacian.stiffness.diagonal() * n + (4 * np.pi * kernel.t) ** (-dim / 2) / n
+    degrees = (
+        kernel.t * laplacian.stiffness.diagonal() * n + (4 * np.pi * kernel.t) ** (-dim / 2) / n
+    )
     return replace(laplacian, kernel=replace(kernel, volume=float(1 / degrees.mean())))
 
 
 def quadrature_laplacian(
-    measure: Quadrature, t: float, *, correct: Correction | None = None, form: Form = "literal", cutoff: float = 4.0
+    measure: Quadrature,
+    t: float,
+    *,
+    correct: Correction | None = None,
+    form: Form = "literal",
+    cutoff: float = 4.0,
 ) -> Laplacian:
     """Build the Gaussian Laplacian of points with any weights: the functional approximation 𝓛_t as a pencil.
 
@@ -302,5 +317,8 @@ def functional_laplacian(measure: Quadrature, t: float, *, cutoff: float = 6.0) 
         return factor * gaussian_differences(grid, weights, time, columns) / weights[:, None]
 
     return LinearOperator(
-        (len(weights),) * 2, matvec=lambda f: product(f).ravel(), matmat=product, dtype=np.dtype(np.float64)
+        (len(weights),) * 2,
+        matvec=lambda f: product(f).ravel(),
+        matmat=product,
+        dtype=np.dtype(np.float64),
     )

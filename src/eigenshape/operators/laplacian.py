@@ -106,7 +106,12 @@ def _checked(name: str, value: sp.sparray) -> sp.csr_array:
 
 
 def _require_square(name: str, matrix: sp.sparray) -> None:
-    if not sp.issparse(matrix) or matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.shape[0]:
+    if (
+        not sp.issparse(matrix)
+        or matrix.ndim != 2
+        or matrix.shape[0] != matrix.shape[1]
+        or not matrix.shape[0]
+    ):
         raise InvalidParameterError(
             f"{name} must be a square sparse matrix; it is a {type(matrix).__name__} of shape {np.shape(matrix)}."
         )

@@ -16,7 +16,9 @@ from eigenshape.operators.graph import adjacency_matrix
 SPARE = 8  # neighbours asked for beyond those wanted, so that most ties are seen whole
 
 
-def neighbor_graph(points: ArrayLike, n_neighbors: SupportsIndex, *, t: float | None = None) -> sp.csr_array:
+def neighbor_graph(
+    points: ArrayLike, n_neighbors: SupportsIndex, *, t: float | None = None
+) -> sp.csr_array:
     """Join each point to its nearest ones: two are joined where either is among the nearest of the other.
 
     Weights are exp(-|x - y|²/4t) (Belkin and Niyogi 2003; thesis reference 5), or 1 where no t is given. Of points

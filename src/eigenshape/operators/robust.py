@@ -8,12 +8,24 @@ from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_different_simplices
-from eigenshape.geometry.simplices import degenerate_simplices, in_length, require_span, require_volumes, size_one
+from eigenshape.geometry.simplices import (
+    degenerate_simplices,
+    in_length,
+    require_span,
+    require_volumes,
+    size_one,
+)
 from eigenshape.geometry.topology import require_simplices_everywhere
 from eigenshape.operators import flip_loops
 from eigenshape.operators.graph import require_distinct_corners
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.operators.tufted import Triangulation, edge_keys, flipped_to_delaunay, mollified, tufted_cover
+from eigenshape.operators.tufted import (
+    Triangulation,
+    edge_keys,
+    flipped_to_delaunay,
+    mollified,
+    tufted_cover,
+)
 
 
 def robust_laplacian(mesh: MeshLike, *, mollify: float = 1e-5) -> Laplacian:
@@ -57,7 +69,9 @@ def robust_laplacian(mesh: MeshLike, *, mollify: float = 1e-5) -> Laplacian:
     require_simplices_everywhere(mesh)
     require_different_simplices(mesh)
     require_span(mesh.vertices, 2, "The vertices of a mesh")
-    if not mollify or len(degenerate_simplices(mesh)) == mesh.n_faces:  # no face: all area would be that of mollifying
+    if (
+        not mollify or len(degenerate_simplices(mesh)) == mesh.n_faces
+    ):  # no face: all area would be that of mollifying
         require_volumes(mesh)
     cover, scale = _cover(mesh, mollify)
     delaunay = flipped_to_delaunay(cover)
@@ -67,7 +81,9 @@ def robust_laplacian(mesh: MeshLike, *, mollify: float = 1e-5) -> Laplacian:
 
 def _cover(mesh: TriangleMesh, mollify: float) -> tuple[Triangulation, float]:
     points, scale = size_one(mesh.vertices)
-    lengths = np.linalg.norm(points[mesh.faces] - points[np.roll(mesh.faces, -1, axis=1)], axis=2).ravel()
+    lengths = np.linalg.norm(
+        points[mesh.faces] - points[np.roll(mesh.faces, -1, axis=1)], axis=2
+    ).ravel()
     lengths = mollified(lengths, edge_keys(mesh.faces, mesh.n_vertices), mollify)
     flat = np.flatnonzero(flip_loops.areas(lengths) == 0)
     if flat.size:
@@ -89,7 +105,9 @@ def _stiffness(cover: Triangulation, n: int) -> sp.csr_array:
     half = sp.coo_array((weights, ends), shape=(n, n)).tocsr()
     whole = (half + half.T).tocsr()
     whole.eliminate_zeros()
-    return (sp.diags_array(whole.sum(axis=1)) - whole).tocsr()  # an edge from a vertex to itself cancels here
+    return (
+        sp.diags_array(whole.sum(axis=1)) - whole
+    ).tocsr()  # an edge from a vertex to itself cancels here
 
 
 def _areas(cover: Triangulation, n: int) -> Float[np.ndarray, " n"]:

@@ -100,10 +100,14 @@ def transfer_labels(
     source = as_mesh(source, "source")
     target = as_mesh(target, "target")
     if labels.shape != (source.n_faces,):
-        raise InvalidParameterError(f"There must be one label a face, {source.n_faces}; there are {len(labels)}.")
+        raise InvalidParameterError(
+            f"There must be one label a face, {source.n_faces}; there are {len(labels)}."
+        )
     found = find_parts(source, progress=partly(progress, 0, 0.25))
     ours = found.parts if n_parts is None else _cut(found, n_parts)
-    theirs = _cut(find_parts(target, progress=partly(progress, 0.25, 0.5)), len(ours.features.vertices))
+    theirs = _cut(
+        find_parts(target, progress=partly(progress, 0.25, 0.5)), len(ours.features.vertices)
+    )
     one = _described(target, theirs.labels, partly(progress, 0.5, 0.75))
     two = _described(source, ours.labels, partly(progress, 0.75, 1))
     prices = _prices(one, two)
@@ -115,7 +119,9 @@ def transfer_labels(
         target=theirs,
         matches=frozen(matches),
         part_labels=frozen(named[matches]),
-        confidence=frozen(_confidence(prices + _displaced(one.apart, two.apart, matches), matches, named)),
+        confidence=frozen(
+            _confidence(prices + _displaced(one.apart, two.apart, matches), matches, named)
+        ),
     )
 
 
@@ -131,12 +137,16 @@ class _DescribedParts:
     apart: Float[np.ndarray, "m m"]
 
 
-def _described(mesh: TriangleMesh, parts: Int[np.ndarray, " f"], progress: Progress | None) -> _DescribedParts:
+def _described(
+    mesh: TriangleMesh, parts: Int[np.ndarray, " f"], progress: Progress | None
+) -> _DescribedParts:
     k = min(SCALE_FREE.n_modes, mesh.n_vertices)
     spectrum = solve_spectrum(cotangent_laplacian(mesh), k, progress=progress)
     ones = np.ones(mesh.n_vertices)
     everywhere = FeaturePoints(np.arange(mesh.n_vertices), ones, ones)
-    vectors = describe(spectrum, everywhere, replace(SCALE_FREE, n_features=mesh.n_vertices)).vectors
+    vectors = describe(
+        spectrum, everywhere, replace(SCALE_FREE, n_features=mesh.n_vertices)
+    ).vectors
     positive = spectrum.eigenvalues >= positive_eigenvalues(spectrum)[0]
     relative = spectrum.eigenvalues[positive] / spectrum.eigenvalues[positive][0]
     places = _means(mesh, parts, spectrum.eigenvectors[:, positive] / relative)
@@ -144,7 +154,9 @@ def _described(mesh: TriangleMesh, parts: Int[np.ndarray, " f"], progress: Progr
     return _DescribedParts(_means(mesh, parts, vectors), apart / (apart.mean() or 1.0))
 
 
-def _means(mesh: TriangleMesh, parts: Int[np.ndarray, " f"], values: Float[np.ndarray, "n q"]) -> np.ndarray:
+def _means(
+    mesh: TriangleMesh, parts: Int[np.ndarray, " f"], values: Float[np.ndarray, "n q"]
+) -> np.ndarray:
     """Average functions over each part, by area."""
     areas = face_areas(mesh)
     places = np.repeat(parts, 3), mesh.faces.ravel()
@@ -158,7 +170,9 @@ def _majority(
 ) -> Int[np.ndarray, " m"]:
     """Return the label that most of each part's area has, of equals the lower."""
     names, numbers = np.unique(labels, return_inverse=True)
-    shares = sp.coo_array((areas / areas.max(), (parts, numbers)), shape=(int(parts.max()) + 1, len(names)))
+    shares = sp.coo_array(
+        (areas / areas.max(), (parts, numbers)), shape=(int(parts.max()) + 1, len(names))
+    )
     return names[shares.toarray().argmax(axis=1)]
 
 
@@ -170,7 +184,9 @@ def _prices(one: _DescribedParts, two: _DescribedParts) -> Float[np.ndarray, "m 
 
 
 def _matched(
-    prices: Float[np.ndarray, "m r"], apart: Float[np.ndarray, "m m"], other_apart: Float[np.ndarray, "r r"]
+    prices: Float[np.ndarray, "m r"],
+    apart: Float[np.ndarray, "m m"],
+    other_apart: Float[np.ndarray, "r r"],
 ) -> Int[np.ndarray, " m"]:
     """Assign parts one to one, at first by their sorted distances to all others; then swap partners while it pays."""
     rows, columns = linear_sum_assignment(prices + _profiles_differ(apart, other_apart))
@@ -193,10 +209,14 @@ def _matched(
     return matches
 
 
-def _profiles_differ(one: Float[np.ndarray, "m m"], two: Float[np.ndarray, "r r"]) -> Float[np.ndarray, "m r"]:
+def _profiles_differ(
+    one: Float[np.ndarray, "m m"], two: Float[np.ndarray, "r r"]
+) -> Float[np.ndarray, "m r"]:
     """Return the mean difference of sorted distances, read at equally many ranks."""
     ranks = np.linspace(0, 1, min(len(one), len(two)))
-    return cdist(np.quantile(one, ranks, axis=1).T, np.quantile(two, ranks, axis=1).T, "cityblock") / len(ranks)
+    return cdist(
+        np.quantile(one, ranks, axis=1).T, np.quantile(two, ranks, axis=1).T, "cityblock"
+    ) / len(ranks)
 
 
 def _displaced(

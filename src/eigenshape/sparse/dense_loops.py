@@ -75,7 +75,9 @@ def _eliminate_narrow(front, start, end, pivots, times, trsm):
         for j in range(start, end):
             times[i, j] = front[i, j]
     rest, wide = height - end, times.shape[1]
-    solve_triangle(trsm, (rest, end - start), front, start * height + start, times, end * wide + start)
+    solve_triangle(
+        trsm, (rest, end - start), front, start * height + start, times, end * wide + start
+    )
     for i in range(end, height):
         for j in range(start, end):
             front[i, j] = times[i, j] / pivots[j]

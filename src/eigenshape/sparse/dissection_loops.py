@@ -23,7 +23,9 @@ def dissect(indptr, indices):
     n = len(indptr) - 1
     nodes = np.arange(n)
     place = np.arange(n)  # nodes[place[v]] = v
-    owner = np.zeros(n, dtype=np.int64)  # the segment that a point lies in; -1 when its place is final
+    owner = np.zeros(
+        n, dtype=np.int64
+    )  # the segment that a point lies in; -1 when its place is final
     one, two = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
     queue, key = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
     side = np.empty(n, dtype=np.int8)
@@ -52,10 +54,14 @@ def dissect(indptr, indices):
         _breadth_first(indptr, indices, far, owner, name, two, queue)
         _tell_apart(indptr, indices, nodes, start, stop, owner, name, one, two, key)
         level, above = _cheapest_cut(indptr, indices, nodes, start, stop, owner, name, key)
-        n_first, n_cut = _take_sides(indptr, indices, nodes, start, stop, owner, name, key, level, above, side)
+        n_first, n_cut = _take_sides(
+            indptr, indices, nodes, start, stop, owner, name, key, level, above, side
+        )
         parted = n_first > 0 and n_first + n_cut < stop - start
         full = not parted and _half_full(indptr, indices, nodes, start, stop, owner, name)
-        if n_cut == stop - start or n_cut == 0 or full:  # a clique or nearly, or nothing left to cut
+        if (
+            n_cut == stop - start or n_cut == 0 or full
+        ):  # a clique or nearly, or nothing left to cut
             for i in range(start, stop):
                 owner[nodes[i]] = -1
             continue
@@ -262,7 +268,9 @@ def _ones(words):
     for word in words:
         x = word
         x = x - ((x >> np.uint64(1)) & np.uint64(0x5555555555555555))
-        x = (x & np.uint64(0x3333333333333333)) + ((x >> np.uint64(2)) & np.uint64(0x3333333333333333))
+        x = (x & np.uint64(0x3333333333333333)) + (
+            (x >> np.uint64(2)) & np.uint64(0x3333333333333333)
+        )
         x = (x + (x >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
         total += np.int64((x * np.uint64(0x0101010101010101)) >> np.uint64(56))
     return total

@@ -67,7 +67,9 @@ class SymmetricFactor:
     panels: Float[np.ndarray, " e"]
     pivots: Float[np.ndarray, " n"]
 
-    def solve(self, right: Float[np.ndarray, "n b"], scratch: Scratch | None = None) -> Float[np.ndarray, "n b"]:
+    def solve(
+        self, right: Float[np.ndarray, "n b"], scratch: Scratch | None = None
+    ) -> Float[np.ndarray, "n b"]:
         """Solve A x = right, in memory of the caller or in fresh memory."""
         width, scratch = right.shape[1], scratch or self.scratch()
         solution, lanes = np.empty((len(right), width)), np.zeros((len(right), LANES))
@@ -86,7 +88,9 @@ class SymmetricFactor:
         e = self.elimination
         return np.empty((len(e.order), LANES)), np.empty((e.room[1], LANES))
 
-    def solve_lanes(self, right: Float[np.ndarray, "n 8"], out: Float[np.ndarray, "n 8"], scratch: Scratch) -> None:
+    def solve_lanes(
+        self, right: Float[np.ndarray, "n 8"], out: Float[np.ndarray, "n 8"], scratch: Scratch
+    ) -> None:
         """Solve A x = right for eight right-hand sides, arrays in C order, at once; `out` may be `right` itself."""
         e = self.elimination
         tree = e.order, e.first, e.begins, e.rows, e.places
@@ -102,14 +106,20 @@ class SymmetricFactor:
         sums of its sizes: |xᵀEx| ≤ Σ r_i x_i², and r is returned.
         """
         e = self.elimination
-        weights, sizes, terms = np.empty_like(self.pivots), np.empty_like(self.pivots), np.empty(len(e.order), np.int64)
+        weights, sizes, terms = (
+            np.empty_like(self.pivots),
+            np.empty_like(self.pivots),
+            np.empty(len(e.order), np.int64),
+        )
         fronts.column_sizes(e.first, e.begins, e.places, self.panels, weights)
         weights *= np.abs(self.pivots)
         fronts.row_sizes(e.first, e.begins, e.rows, e.places, self.panels, weights, sizes, terms)
         lengths = np.empty(len(e.above), dtype=np.int64)
         fronts.sum_lengths(e.first, e.begins, e.above, lengths)
         bounds = np.empty_like(sizes)
-        bounds[e.order] = EPS * (np.minimum(terms, np.repeat(lengths, np.diff(e.first))) + 4) * sizes
+        bounds[e.order] = (
+            EPS * (np.minimum(terms, np.repeat(lengths, np.diff(e.first))) + 4) * sizes
+        )
         return bounds
 
 
@@ -127,7 +137,9 @@ def analyse(pattern: sp.csc_array) -> Elimination:
     lower_ptr, lower_rows, source = _lower(indptr, indices, order)
     places = fronts.panel_places(first, begins)
     room = fronts.stack_size(first, begins, above)
-    return Elimination(order, first, begins, rows, above, places, room, lower_ptr, lower_rows, source)
+    return Elimination(
+        order, first, begins, rows, above, places, room, lower_ptr, lower_rows, source
+    )
 
 
 def _lower(indptr: Indices, indices: Indices, order: Indices) -> tuple[Indices, Indices, Indices]:
@@ -145,7 +157,9 @@ def factorise(
 ) -> SymmetricFactor | None:
     """Factor the matrix with these entries, in the room of a spent factor; None where a pivot is zero or not finite."""
     e = elimination
-    panels = np.empty(e.n_entries) if spent is None else spent.panels  # fresh pages cost half as much as a factor
+    panels = (
+        np.empty(e.n_entries) if spent is None else spent.panels
+    )  # fresh pages cost half as much as a factor
     pivots = np.empty(len(e.order))
     lower = e.lower_ptr, e.lower_rows, data[e.source]
     tree = e.first, e.begins, e.rows, e.above, e.places

@@ -71,7 +71,9 @@ def sum_lengths(first, begins, above, lengths):
 
 @njit
 @no_type_check
-def factor_fronts(lower_ptr, lower_rows, values, first, begins, rows, above, places, panels, pivots, room, blas):
+def factor_fronts(
+    lower_ptr, lower_rows, values, first, begins, rows, above, places, panels, pivots, room, blas
+):
     """Fill panels and pivots with L and D of a matrix whose lower triangle is given by columns; tell if it could be.
 
     Multifrontal (Duff and Reid 1983), pivots in their order: a front gathers the entries of its columns and what its
@@ -158,7 +160,9 @@ def solve_fronts(order, first, begins, rows, places, panels, pivots, right, solu
         for block in range((width - 1) // WIDE * WIDE, -1, -WIDE):
             columns = min(WIDE, width - block)
             at -= (height - block) * columns
-            _backward(panels, at, columns, rows[start + block : start + height], lanes, gathered, near)
+            _backward(
+                panels, at, columns, rows[start + block : start + height], lanes, gathered, near
+            )
     for i in range(n):
         for lane in range(LANES):
             solution[order[i], lane] = lanes[i, lane]
@@ -174,7 +178,9 @@ def _forward(panels, at, columns, rows, lanes, gathered):
     gathered[:rest] = 0.0
     four = rest // 4 * 4
     for i in range(0, four, 4):
-        subtract_four_sums(panels, at + (columns + i) * columns, 1, columns, lanes, mine, columns, gathered, i)
+        subtract_four_sums(
+            panels, at + (columns + i) * columns, 1, columns, lanes, mine, columns, gathered, i
+        )
     for i in range(four, rest):
         subtract_sum(panels, at + (columns + i) * columns, 1, 0, lanes, mine, columns, gathered, i)
     for i in range(rest):
@@ -203,7 +209,15 @@ def _backward(panels, at, columns, rows, lanes, gathered, near):
             subtract_sum(near, j, columns, 0, gathered, low, count, lanes, mine + j)
     for j in range(columns - 2, -1, -1):
         subtract_sum(
-            panels, at + (j + 1) * columns + j, columns, 0, lanes, mine + j + 1, columns - 1 - j, lanes, mine + j
+            panels,
+            at + (j + 1) * columns + j,
+            columns,
+            0,
+            lanes,
+            mine + j + 1,
+            columns - 1 - j,
+            lanes,
+            mine + j,
         )
 
 
@@ -230,7 +244,12 @@ def row_sizes(first, begins, rows, places, panels, weights, sizes, terms):
     sizes[:] = 0.0
     terms[:] = 0
     for s in range(len(first) - 1):
-        at, start, height, width = places[s], begins[s], begins[s + 1] - begins[s], first[s + 1] - first[s]
+        at, start, height, width = (
+            places[s],
+            begins[s],
+            begins[s + 1] - begins[s],
+            first[s + 1] - first[s],
+        )
         for block in range(0, width, WIDE):
             columns = min(WIDE, width - block)
             mine = weights[first[s] + block : first[s] + block + columns]

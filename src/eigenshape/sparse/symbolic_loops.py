@@ -103,7 +103,10 @@ def supernodes(parent, counts):
     for s in range(size):
         wide[s], tall[s] = first[s + 1] - first[s], counts[first[s]]
     for s in range(size - 2, -1, -1):  # s + 1 is by now the first of what it has joined
-        if parent[first[s + 1] - 1] < first[s + 1] or parent[first[s + 1] - 1] >= first[s + 1] + wide[s + 1]:
+        if (
+            parent[first[s + 1] - 1] < first[s + 1]
+            or parent[first[s + 1] - 1] >= first[s + 1] + wide[s + 1]
+        ):
             continue
         columns = wide[s] + wide[s + 1]
         rows = wide[s] + tall[s + 1]

@@ -94,7 +94,9 @@ class Certificate:
         if self.first:
             return f"These are the eigenvalues from number {self.first} to {self.first + self.n_pairs - 1}"
         return (
-            "This is the lowest eigenvalue" if self.n_pairs == 1 else f"These are the {self.n_pairs} lowest eigenvalues"
+            "This is the lowest eigenvalue"
+            if self.n_pairs == 1
+            else f"These are the {self.n_pairs} lowest eigenvalues"
         )
 
     def _how(self) -> str:

@@ -51,7 +51,11 @@ class Spectrum:
         OSError
             If the system cannot write there.
         """
-        arrays = {"eigenvalues": self.eigenvalues, "eigenvectors": self.eigenvectors, "residuals": self.residuals}
+        arrays = {
+            "eigenvalues": self.eigenvalues,
+            "eigenvectors": self.eigenvectors,
+            "residuals": self.residuals,
+        }
         write_archive(path, arrays, self.mass, self.certificate, key)
 
     @classmethod
@@ -73,7 +77,9 @@ class Spectrum:
             (numbers that are not finite, eigenvalues that descend or are negative), or its key is another.
         """
         parts = read_archive(path, key)
-        arrays = {name: frozen(parts[name]) for name in ("eigenvalues", "eigenvectors", "residuals")}
+        arrays = {
+            name: frozen(parts[name]) for name in ("eigenvalues", "eigenvectors", "residuals")
+        }
         return cls(**arrays, mass=parts["mass"], certificate=parts["certificate"])
 
 

@@ -72,9 +72,8 @@ class Closeness:
             "ball": "the size of the regions decides",
             "volume": "how much the volume of a region changes decides",
         }[self.limited_by]
-        return (
-            f"{outside}{inside if len(self.radii) else ''} The shapes are δ-close from δ = {self.delta:.3g}: {decides}."
-        )
+        regions = inside if len(self.radii) else ""
+        return f"{outside}{regions} The shapes are δ-close from δ = {self.delta:.3g}: {decides}."
 
 
 def measure_closeness(perturbation: Perturbation) -> Closeness:
@@ -101,7 +100,8 @@ def measure_closeness(perturbation: Perturbation) -> Closeness:
     here, there, scale = _scaled(perturbation)
     pairs = vertex_pairs(perturbation)
     volumes_one, volumes_two = (
-        volumes(points[mesh.simplices]) for points, mesh in ((here, perturbation.one), (there, perturbation.two))
+        volumes(points[mesh.simplices])
+        for points, mesh in ((here, perturbation.one), (there, perturbation.two))
     )
     regions = range(perturbation.n_regions)
     return _closeness(
@@ -144,7 +144,9 @@ def map_closeness(mesh: MeshLike, images: ArrayLike) -> Closeness:
     return measure_closeness(measure_perturbation(mesh, kind(places, mesh.simplices)))
 
 
-def _scaled(perturbation: Perturbation) -> tuple[Float[np.ndarray, "n d"], Float[np.ndarray, "k d"], float]:
+def _scaled(
+    perturbation: Perturbation,
+) -> tuple[Float[np.ndarray, "n d"], Float[np.ndarray, "k d"], float]:
     """Return the points of both shapes divided by one power of two, and that power."""
     n = perturbation.one.n_points
     points, scale = size_one(np.concatenate([perturbation.one.points, perturbation.two.points]))
@@ -152,11 +154,16 @@ def _scaled(perturbation: Perturbation) -> tuple[Float[np.ndarray, "n d"], Float
 
 
 def _radius(
-    perturbation: Perturbation, here: Float[np.ndarray, "n d"], there: Float[np.ndarray, "k d"], region: int
+    perturbation: Perturbation,
+    here: Float[np.ndarray, "n d"],
+    there: Float[np.ndarray, "k d"],
+    region: int,
 ) -> float:
     corners_one = perturbation.one.simplices[perturbation.regions_one == region]
     corners_two = perturbation.two.simplices[perturbation.regions_two == region]
-    return enclosing_ball(np.concatenate([here[np.unique(corners_one)], there[np.unique(corners_two)]])).radius
+    return enclosing_ball(
+        np.concatenate([here[np.unique(corners_one)], there[np.unique(corners_two)]])
+    ).radius
 
 
 def _parts(
@@ -195,7 +202,9 @@ def _closeness(
     )
 
 
-def _sums(values: Float[np.ndarray, " s"], labels: Int[np.ndarray, " s"]) -> Float[np.ndarray, " r"]:
+def _sums(
+    values: Float[np.ndarray, " s"], labels: Int[np.ndarray, " s"]
+) -> Float[np.ndarray, " r"]:
     """Sum the values of each region."""
     return np.bincount(labels + 1, weights=values, minlength=labels.max() + 2)[1:]
 

@@ -138,7 +138,9 @@ def _witnessed(
         rows.append(np.repeat(met, len(inside)))
         columns.append(np.tile(inside, len(met)))
     ends = np.concatenate(rows), np.concatenate(columns)
-    graph = sp.csr_array((np.ones(len(ends[0]), dtype=np.int8), ends), shape=(len(nodes), len(labels)))
+    graph = sp.csr_array(
+        (np.ones(len(ends[0]), dtype=np.int8), ends), shape=(len(nodes), len(labels))
+    )
     graph.sort_indices()
     return graph
 

@@ -57,7 +57,11 @@ class Perturbation:
 
 
 def measure_perturbation(
-    one: MeshLike, two: MeshLike, *, regions_one: ArrayLike | None = None, regions_two: ArrayLike | None = None
+    one: MeshLike,
+    two: MeshLike,
+    *,
+    regions_one: ArrayLike | None = None,
+    regions_two: ArrayLike | None = None,
 ) -> Perturbation:
     """Say how one shape became another: by a map, and by anything at all in some regions.
 
@@ -90,7 +94,10 @@ def measure_perturbation(
         raise InvalidParameterError(
             f"Two shapes must have the same dimensions to correspond; these have (m, d) = {dims[0]} and {dims[1]}."
         )
-    labels_one, labels_two = _labels(regions_one, one, "regions_one"), _labels(regions_two, two, "regions_two")
+    labels_one, labels_two = (
+        _labels(regions_one, one, "regions_one"),
+        _labels(regions_two, two, "regions_two"),
+    )
     _require_same_regions(labels_one, labels_two)
     found = Perturbation(one, two, frozen(labels_one), frozen(labels_two))
     _require_rims(found, vertex_pairs(found))

@@ -23,7 +23,9 @@ def test_with_all_points_they_are_the_eigenvalues_of_all_affinities():
     distances = np.minimum(distances, distances.T)
     affinity = np.exp(-(distances**2) / (2 * distances.max() ** 2))
     exact = np.linalg.eigvalsh(affinity)[::-1][:10] / len(affinity)
-    found = es.retrieval.baselines.affinity_eigenvalues(mesh, n_values=10, n_samples=mesh.n_vertices)
+    found = es.retrieval.baselines.affinity_eigenvalues(
+        mesh, n_values=10, n_samples=mesh.n_vertices
+    )
     np.testing.assert_allclose(found, exact, rtol=1e-9)
 
 
@@ -32,18 +34,25 @@ def test_with_all_points_they_are_the_eigenvalues_of_all_affinities():
 def test_size_and_place_drop_out(seed, power):
     mesh, rng = es.make_creature("hand", seed % 7, n_vertices=600), np.random.default_rng(seed)
     turn = Rotation.random(random_state=seed)
-    there = es.TriangleMesh(10.0**power * (mesh.vertices @ turn.as_matrix().T + rng.standard_normal(3)), mesh.faces)
-    one, two = es.retrieval.baselines.affinity_eigenvalues(mesh), es.retrieval.baselines.affinity_eigenvalues(there)
+    there = es.TriangleMesh(
+        10.0**power * (mesh.vertices @ turn.as_matrix().T + rng.standard_normal(3)), mesh.faces
+    )
+    one, two = (
+        es.retrieval.baselines.affinity_eigenvalues(mesh),
+        es.retrieval.baselines.affinity_eigenvalues(there),
+    )
     # Rounding may choose another of two equally far samples.
     np.testing.assert_allclose(two, one, rtol=1e-3, atol=1e-5)
 
 
 def test_resolution_drops_out():
     meshes = es.icosphere(3), es.icosphere(4), es.shapes.torus(40, 20)
-    one, two, other = (es.retrieval.baselines.affinity_eigenvalues(mesh, n_samples=100) for mesh in meshes)
-    assert es.retrieval.baselines.affinity_distance(one, two) < 0.1 * es.retrieval.baselines.affinity_distance(
-        one, other
+    one, two, other = (
+        es.retrieval.baselines.affinity_eigenvalues(mesh, n_samples=100) for mesh in meshes
     )
+    assert es.retrieval.baselines.affinity_distance(
+        one, two
+    ) < 0.1 * es.retrieval.baselines.affinity_distance(one, other)
 
 
 def test_pieces_without_a_way_between_them_have_no_affinity():
@@ -55,7 +64,9 @@ def test_pieces_without_a_way_between_them_have_no_affinity():
 
 
 def test_the_distance_by_hand():
-    found = es.retrieval.baselines.affinity_distance(np.array([4.0, 1.0, 0.0]), np.array([1.0, 1.0, 0.0]))
+    found = es.retrieval.baselines.affinity_distance(
+        np.array([4.0, 1.0, 0.0]), np.array([1.0, 1.0, 0.0])
+    )
     assert found == pytest.approx((2 - 1) ** 2 / (2 + 1) / 2)
 
 

@@ -15,7 +15,9 @@ few = settings(deadline=None, max_examples=10)
 def bumpy(seed):
     rng = np.random.default_rng(seed)
     mesh = es.shapes.torus(14, 9) if seed % 2 else es.icosphere(2)
-    return es.TriangleMesh(mesh.vertices + 0.03 * rng.standard_normal(mesh.vertices.shape), mesh.faces)
+    return es.TriangleMesh(
+        mesh.vertices + 0.03 * rng.standard_normal(mesh.vertices.shape), mesh.faces
+    )
 
 
 def test_on_a_sphere_it_is_known():
@@ -29,7 +31,9 @@ def test_lapy_divides_by_one_more():
     values = shapedna.compute_shapedna(fem, k=21, lump=True)["Eigenvalues"]
     theirs = shapedna.reweight_ev(shapedna.normalize_ev(fem, values))[1:]
     rank = np.arange(1, 21)
-    np.testing.assert_allclose(theirs, es.retrieval.baselines.shape_dna(mesh) * rank / (rank + 1), rtol=1e-6)
+    np.testing.assert_allclose(
+        theirs, es.retrieval.baselines.shape_dna(mesh) * rank / (rank + 1), rtol=1e-6
+    )
 
 
 @few
@@ -46,12 +50,18 @@ def test_size_place_and_numbering_drop_out(seed, power):
 
 
 def test_the_distance_is_euclidean():
-    assert es.retrieval.baselines.shape_dna_distance(np.array([1.0, 5.0]), np.array([4.0, 1.0])) == 5.0
+    assert (
+        es.retrieval.baselines.shape_dna_distance(np.array([1.0, 5.0]), np.array([4.0, 1.0])) == 5.0
+    )
 
 
 def test_poses_are_nearer_than_other_shapes():
-    one, two = (es.retrieval.baselines.shape_dna(es.make_creature("biped", seed)) for seed in (0, 1))
-    assert es.retrieval.baselines.shape_dna_distance(one, two) < es.retrieval.baselines.shape_dna_distance(
+    one, two = (
+        es.retrieval.baselines.shape_dna(es.make_creature("biped", seed)) for seed in (0, 1)
+    )
+    assert es.retrieval.baselines.shape_dna_distance(
+        one, two
+    ) < es.retrieval.baselines.shape_dna_distance(
         one, es.retrieval.baselines.shape_dna(es.icosphere(3))
     )
 
@@ -63,5 +73,8 @@ def test_bad_input_is_named():
     flat = es.TriangleMesh(np.zeros((4, 3)), [[0, 1, 2], [1, 2, 3]])
     with pytest.raises(InvalidShapeError):
         es.retrieval.baselines.shape_dna(flat, n_values=1)
-    with pytest.raises(InvalidParameterError, match="Only equal numbers of eigenvalues compare; the first shape has 2"):
+    with pytest.raises(
+        InvalidParameterError,
+        match="Only equal numbers of eigenvalues compare; the first shape has 2",
+    ):
         es.retrieval.baselines.shape_dna_distance(np.ones(2), np.ones(3))

@@ -5,7 +5,9 @@ import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 
 
-@pytest.mark.parametrize("function", [es.geometry.average_geodesic_distance, es.geometry.gaussian_curvature])
+@pytest.mark.parametrize(
+    "function", [es.geometry.average_geodesic_distance, es.geometry.gaussian_curvature]
+)
 def test_features_are_the_maxima_of_the_function_and_vectors_those_of_heat(function):
     mesh = es.make_creature("quadruped", 1, n_vertices=800)
     values = function(mesh)
@@ -15,10 +17,14 @@ def test_features_are_the_maxima_of_the_function_and_vectors_those_of_heat(funct
     assert np.array_equal(found.descriptor.vertices, expected.vertices)
     assert np.array_equal(found.descriptor.vectors, expected.vectors)
     assert np.array_equal(found.heat, values)
-    assert not np.array_equal(found.descriptor.vertices, es.retrieval.describe_mesh(mesh).descriptor.vertices)
+    assert not np.array_equal(
+        found.descriptor.vertices, es.retrieval.describe_mesh(mesh).descriptor.vertices
+    )
 
 
 def test_values_are_checked():
     mesh = es.icosphere(1)
-    with pytest.raises(InvalidParameterError, match=r"values must hold one number a vertex, shape \(42,\)"):
+    with pytest.raises(
+        InvalidParameterError, match=r"values must hold one number a vertex, shape \(42,\)"
+    ):
         es.retrieval.describe_mesh(mesh, values=np.ones(3))

@@ -48,19 +48,29 @@ def test_a_shape_finds_itself_nearly_at_zero(index, recipe, meshes):
     points = best.correspondences
     assert len(points) > 100
     assert np.array_equal(points[:, 0], points[:, 1])
-    assert np.array_equal(best.vertices, es.retrieval.describe_shape(meshes["hand"], recipe).vertices)
+    assert np.array_equal(
+        best.vertices, es.retrieval.describe_shape(meshes["hand"], recipe).vertices
+    )
 
 
 @pytest.mark.long
 def test_an_index_scores_as_the_function_does(index, recipe, meshes):
-    kept = [es.retrieval.describe_to_keep(meshes[kind], recipe, n_views=2)[0] for kind in sorted(KINDS)]
-    query = es.retrieval.describe_shape(es.partial_scan(meshes["biped"], np.array([1.0, 0.2, 0.1])).mesh, recipe)
+    kept = [
+        es.retrieval.describe_to_keep(meshes[kind], recipe, n_views=2)[0] for kind in sorted(KINDS)
+    ]
+    query = es.retrieval.describe_shape(
+        es.partial_scan(meshes["biped"], np.array([1.0, 0.2, 0.1])).mesh, recipe
+    )
     found = {match.name: match.score for match in index.query(query)}
-    assert [found[kind] for kind in sorted(KINDS)] == pytest.approx(es.retrieval.patch_scores(query, kept), abs=1e-6)
+    assert [found[kind] for kind in sorted(KINDS)] == pytest.approx(
+        es.retrieval.patch_scores(query, kept), abs=1e-6
+    )
 
 
 def test_rounding_hardly_turns_a_code(recipe, meshes):
-    codes = es.retrieval.encode_patches(es.retrieval.describe_patches(meshes["octopus"]), recipe.codebook)
+    codes = es.retrieval.encode_patches(
+        es.retrieval.describe_patches(meshes["octopus"]), recipe.codebook
+    )
     whole = rounded(codes).astype(float)
     assert (whole * codes).sum(axis=2) == pytest.approx(np.linalg.norm(whole, axis=2), rel=2e-3)
 
@@ -76,14 +86,17 @@ def test_words_survive_the_file_and_the_index(index, recipe):
 
 def other_words(book):
     return es.retrieval.PatchRecipe(
-        es.retrieval.PatchCodebook(**{**vars(book), "means": np.asarray(book.means + 1, dtype=np.float32)})
+        es.retrieval.PatchCodebook(
+            **{**vars(book), "means": np.asarray(book.means + 1, dtype=np.float32)}
+        )
     )
 
 
 @pytest.mark.long
 def test_other_words_are_another_recipe(index, recipe, meshes):
     query = es.retrieval.describe_shape(
-        meshes["hand"], other_words(es.retrieval.read_codebook(es.retrieval.write_codebook(recipe.codebook)))
+        meshes["hand"],
+        other_words(es.retrieval.read_codebook(es.retrieval.write_codebook(recipe.codebook))),
     )
     message = rf"holds patches {recipe.codebook.digest[:8]} and was asked in PatchRecipe\(codebook=PatchCodebook\("
     with pytest.raises(es.StoreError, match=message):
@@ -98,7 +111,10 @@ def test_an_index_keeps_heat_and_patches_side_by_side(tmp_path, recipe, meshes):
     index.keep_recipe(recipe)
     assert (index.recipes(), len(index)) == ([recipe], 0)
     for kind in KINDS[:2]:
-        shapes = [es.retrieval.describe_shape(meshes[kind], one) for one in (recipe, es.retrieval.SCALE_FREE)]
+        shapes = [
+            es.retrieval.describe_shape(meshes[kind], one)
+            for one in (recipe, es.retrieval.SCALE_FREE)
+        ]
         index.add(kind, shapes)
     assert index.recipes() == [recipe, es.retrieval.SCALE_FREE]
     for one in index.recipes():
@@ -136,7 +152,10 @@ def test_few_shapes_take_words_that_are_there(tmp_path, lessons, monkeypatch):
     teach = partial(taught, known=lessons)
     assert es.retrieval.learn_words(files(tmp_path, KINDS), teach) == es.retrieval.made_codebook()
     monkeypatch.setattr(batch, "FEWEST_TEACHERS", 3)
-    assert es.retrieval.learn_words(files(tmp_path, ["hand", "bad", "biped"]), teach) == es.retrieval.made_codebook()
+    assert (
+        es.retrieval.learn_words(files(tmp_path, ["hand", "bad", "biped"]), teach)
+        == es.retrieval.made_codebook()
+    )
 
 
 def test_odd_queries_are_answered_or_named(index, recipe):

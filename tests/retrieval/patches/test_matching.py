@@ -30,7 +30,9 @@ SYMMETRIC = {
     "icosahedron": lambda: es.icosphere(0),
     "box": lambda: BOX,
     "two spheres": lambda: es.shapes.disjoint_union(BALL, moved(BALL, 3)),
-    "twelve boxes": lambda: es.shapes.disjoint_union(*(moved(BOX, 2 * number) for number in range(12))),
+    "twelve boxes": lambda: es.shapes.disjoint_union(
+        *(moved(BOX, 2 * number) for number in range(12))
+    ),
 }
 KINDS = ("quadruped", "hand", "octopus", "biped")
 
@@ -38,7 +40,10 @@ KINDS = ("quadruped", "hand", "octopus", "biped")
 @pytest.fixture(scope="module")
 def book():
     return es.retrieval.train_codebook(
-        [es.retrieval.describe_patches(es.make_creature(kind, 3, n_vertices=1200)) for kind in KINDS]
+        [
+            es.retrieval.describe_patches(es.make_creature(kind, 3, n_vertices=1200))
+            for kind in KINDS
+        ]
     )
 
 
@@ -59,7 +64,9 @@ def test_a_shape_matches_itself_point_by_point(hand):
 def test_rigid_motion_and_size_change_no_match(hand, book):
     turn = np.diag([-1.0, -1.0, 1.0])  # keeps the box, whose sides are the unit
     moved = es.TriangleMesh(1e-50 * (HAND.vertices @ turn + [3, 0, 1]), HAND.faces)
-    match = es.retrieval.match_patches(hand, es.retrieval.patch_points(es.retrieval.describe_patches(moved), book))
+    match = es.retrieval.match_patches(
+        hand, es.retrieval.patch_points(es.retrieval.describe_patches(moved), book)
+    )
     assert len(match.points) > 100
     assert np.array_equal(match.vertices[:, 0], match.vertices[:, 1])
     assert match.agreement > 0.95
@@ -83,7 +90,9 @@ def test_other_vertex_numbers_change_little(hand, book):
     order = np.random.default_rng(1).permutation(HAND.n_vertices)
     places = np.argsort(order)
     shuffled = es.TriangleMesh(HAND.vertices[order], places[HAND.faces])
-    match = es.retrieval.match_patches(hand, es.retrieval.patch_points(es.retrieval.describe_patches(shuffled), book))
+    match = es.retrieval.match_patches(
+        hand, es.retrieval.patch_points(es.retrieval.describe_patches(shuffled), book)
+    )
     gaps = HAND.vertices[match.vertices[:, 0]] - shuffled.vertices[match.vertices[:, 1]]
     near = np.linalg.norm(gaps, axis=1) < 0.1 * np.sqrt(es.geometry.surface_area(HAND))
     assert len(near) > 60
@@ -97,12 +106,19 @@ def test_a_part_agrees_with_its_whole_more_than_with_another_kind(hand, book):
     other = es.retrieval.patch_points(
         es.retrieval.describe_patches(es.make_creature("biped", 1, n_vertices=1500)), book
     )
-    assert es.retrieval.match_patches(scan, hand).agreement > 1.5 * es.retrieval.match_patches(scan, other).agreement
+    assert (
+        es.retrieval.match_patches(scan, hand).agreement
+        > 1.5 * es.retrieval.match_patches(scan, other).agreement
+    )
 
 
 def test_larger_lengths_are_a_step(hand, monkeypatch):
-    radii = np.roll(hand.numbers, 1, axis=1)  # what one shape shows at a radius, the other shows at the next
-    larger = replace(hand, numbers=radii, distances=np.float32(patch_matching.SIZE_STEP) * hand.distances)
+    radii = np.roll(
+        hand.numbers, 1, axis=1
+    )  # what one shape shows at a radius, the other shows at the next
+    larger = replace(
+        hand, numbers=radii, distances=np.float32(patch_matching.SIZE_STEP) * hand.distances
+    )
     monkeypatch.setattr(patch_matching, "SLACK", 0.1)
     match = es.retrieval.match_patches(hand, larger)
     assert match.step == 1
@@ -170,5 +186,7 @@ def test_what_does_not_agree_is_no_match(hand):
 
 def test_other_codebooks_are_refused(hand):
     short = replace(hand, numbers=hand.numbers[:, :, :3])
-    with pytest.raises(es.InvalidParameterError, match=r"Only points of one codebook match; .* the second \(9, 3\)"):
+    with pytest.raises(
+        es.InvalidParameterError, match=r"Only points of one codebook match; .* the second \(9, 3\)"
+    ):
         es.retrieval.match_patches(hand, short)

@@ -19,7 +19,9 @@ def sheet(n=41):
     axis = np.linspace(0, 1, n)
     points = np.array([[x, y, 0.0] for y in axis for x in axis])
     a = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
-    faces = np.concatenate([np.column_stack([a, a + 1, a + n + 1]), np.column_stack([a, a + n + 1, a + n])])
+    faces = np.concatenate(
+        [np.column_stack([a, a + 1, a + n + 1]), np.column_stack([a, a + n + 1, a + n])]
+    )
     return es.TriangleMesh(points, faces)
 
 
@@ -31,9 +33,13 @@ def test_a_flat_disc():
     assert turns[..., :-1] == pytest.approx(0)
     assert heights[..., HEIGHT_BINS // 2 - 1 : HEIGHT_BINS // 2 + 1] == pytest.approx(np.sqrt(0.5))
     inner = np.abs(mesh.vertices[found.vertices, :2] - 0.5).max(axis=1) < 0.12
-    assert areas[inner][:, 3:, -1].ravel() == pytest.approx(0, abs=0.15)  # of a disc, but for whole vertices
+    assert areas[inner][:, 3:, -1].ravel() == pytest.approx(
+        0, abs=0.15
+    )  # of a disc, but for whole vertices
     assert straight[inner].ravel() == pytest.approx(1, abs=1e-4)
-    assert found.weights[inner] == pytest.approx(np.repeat(found.weights[inner, :1], len(RADII), axis=1))
+    assert found.weights[inner] == pytest.approx(
+        np.repeat(found.weights[inner, :1], len(RADII), axis=1)
+    )
     rim = (np.abs(mesh.vertices[found.vertices, :2] - 0.5) == 0.5).any(axis=1)
     assert rim.any()
     assert found.weights[rim].max() < 0.03 * found.weights[inner].max()
@@ -45,11 +51,17 @@ def test_discs_of_a_ball():
     ring, radius = 3, 5
     middle = RADII[radius] * np.linspace(0.75, 1, 9)  # on a ball of radius .5: angles of twice that
     cosines = (turns[:, radius, ring] ** 2) @ ((np.arange(TURN_BINS) + 0.5) / TURN_BINS)
-    height = (heights[:, radius, ring] ** 2) @ ((np.arange(HEIGHT_BINS) + 0.5) / HEIGHT_BINS * 2 - 1)
+    height = (heights[:, radius, ring] ** 2) @ (
+        (np.arange(HEIGHT_BINS) + 0.5) / HEIGHT_BINS * 2 - 1
+    )
     assert cosines == pytest.approx(np.cos(2 * middle).mean(), abs=0.02)
-    assert height == pytest.approx((0.5 * (np.cos(2 * middle) - 1) / RADII[radius]).mean(), abs=0.02)
+    assert height == pytest.approx(
+        (0.5 * (np.cos(2 * middle) - 1) / RADII[radius]).mean(), abs=0.02
+    )
     cap = 0.5 * np.pi * (1 - np.cos(2 * RADII[radius]))
-    assert areas[:, radius, ring, 0] == pytest.approx(np.log(1e-3 + cap / (np.pi * RADII[radius] ** 2)), abs=0.06)
+    assert areas[:, radius, ring, 0] == pytest.approx(
+        np.log(1e-3 + cap / (np.pi * RADII[radius] ** 2)), abs=0.06
+    )
     assert straight[:, radius, ring, 0] == pytest.approx((np.sin(middle) / middle).mean(), abs=0.01)
 
 
@@ -112,6 +124,7 @@ def test_bad_input_is_named():
         describe_patches(loose)
     line = es.TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
     with pytest.raises(
-        es.InvalidShapeError, match="must have an area to be described by patches; all its faces have none"
+        es.InvalidShapeError,
+        match="must have an area to be described by patches; all its faces have none",
     ):
         describe_patches(line)

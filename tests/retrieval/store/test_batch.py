@@ -31,7 +31,9 @@ def items(folder, **contents):
 
 
 def build(index, todo, timeout=60.0, told=None):
-    return build_index(index, todo, by_content, recipes=(RECIPE,), workers=Workers(2, timeout), told=told)
+    return build_index(
+        index, todo, by_content, recipes=(RECIPE,), workers=Workers(2, timeout), told=told
+    )
 
 
 BAD = {
@@ -50,7 +52,9 @@ BAD = {
 @pytest.mark.long
 def test_bad_shapes_are_named_and_the_others_go_on(index, tmp_path):
     good = {"a": "1", "d": "2", "g": "3", "vanish": "vanish", "h": "4"}
-    todo = items(tmp_path, a="1", **{word: word for word in BAD}, d="2", g="3", vanish="vanish", h="4")
+    todo = items(
+        tmp_path, a="1", **{word: word for word in BAD}, d="2", g="3", vanish="vanish", h="4"
+    )
     heard = []
     report = build(index, todo, timeout=4.0, told=lambda *news: heard.append(news))
     assert report.added == tuple(good)
@@ -174,7 +178,9 @@ def run_script(folder, text):
     paths = [str(Path(__file__).parents[2]), str(Path(eigenshape.__file__).parents[1])]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
     command = [sys.executable, "script.py"]
-    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
 
 
 @pytest.mark.long
@@ -182,7 +188,12 @@ def test_a_script_without_a_main_guard_is_told_so(tmp_path):
     items(tmp_path, a="1", b="2", c="3")
     done = run_script(tmp_path, UNGUARDED)
     assert done.returncode == 1
-    assert done.stderr.count("Put what the script does, from its first call of eigenshape on, under `if __name__") == 1
+    assert (
+        done.stderr.count(
+            "Put what the script does, from its first call of eigenshape on, under `if __name__"
+        )
+        == 1
+    )
     assert "bootstrapping" not in done.stderr
     assert len(ShapeIndex.open(tmp_path / "index")) == 0
     imports, _, body = UNGUARDED.partition("\n\n")
@@ -191,7 +202,9 @@ def test_a_script_without_a_main_guard_is_told_so(tmp_path):
 
 
 def test_what_a_batch_cannot_begin_with(index, tmp_path):
-    with pytest.raises(InvalidParameterError, match=r"Items must have different names; 'x' is both .*a and .*b"):
+    with pytest.raises(
+        InvalidParameterError, match=r"Items must have different names; 'x' is both .*a and .*b"
+    ):
         build(index, [Item("x", tmp_path / "a"), Item("x", tmp_path / "b")])
     with pytest.raises(InvalidParameterError, match="count must be at least 1; it is 0"):
         Workers(count=0)

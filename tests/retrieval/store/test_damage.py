@@ -21,7 +21,9 @@ def sound(tmp_path_factory):
     index = es.ShapeIndex.create(tmp_path_factory.mktemp("sound") / "index")
     for seed in range(60):
         name, label = f"shape {seed} " + 20 * "n", f"class {seed % 3}"
-        index.add(name, [descriptor(seed)], label=label, source=f"/meshes/{seed}.ply", digest=64 * "d")
+        index.add(
+            name, [descriptor(seed)], label=label, source=f"/meshes/{seed}.ply", digest=64 * "d"
+        )
     for kind in KINDS:
         mesh = es.make_creature(kind, 1, n_vertices=500)
         index.add(kind, es.retrieval.describe_to_keep(mesh, PATCHES, n_views=0), label=kind)
@@ -42,7 +44,12 @@ def hand():
 def answers(folder, hand):
     """Return what an index says to everything that one may ask it, in text."""
     index = es.ShapeIndex.open(folder)
-    facts = [len(index), index.recipes(), index.records(), index.descriptor("octopus", PATCHES).codes.tolist()]
+    facts = [
+        len(index),
+        index.recipes(),
+        index.records(),
+        index.descriptor("octopus", PATCHES).codes.tolist(),
+    ]
     matches = index.query(descriptor(3), n_matches=100) + index.query(hand)
     found = [(vars(match) | {"vertices": match.vertices.tolist()}) for match in matches]
     return repr((facts, found))

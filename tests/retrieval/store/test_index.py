@@ -39,7 +39,9 @@ def rounded(shape):
 
 def test_a_shape_finds_itself_first_with_score_zero(index):
     for seed in range(12):
-        index.add(f"s{seed:02}", [descriptor(seed)], label=f"class {seed % 3}", source=f"/{seed}.ply")
+        index.add(
+            f"s{seed:02}", [descriptor(seed)], label=f"class {seed % 3}", source=f"/{seed}.ply"
+        )
     for seed in range(12):
         best, *others = index.query(descriptor(seed), n_matches=4)
         assert (best.name, best.score, best.label) == (f"s{seed:02}", 0.0, f"class {seed % 3}")
@@ -54,7 +56,9 @@ def test_scores_equal_brute_force(index):
         index.add(name, [shape])
     query = descriptor(99, m=3)
     found = {match.name: match.score for match in index.query(query, n_matches=50)}
-    assert found == pytest.approx({n: matching_score(rounded(query), rounded(s)) for n, s in shapes.items()})
+    assert found == pytest.approx(
+        {n: matching_score(rounded(query), rounded(s)) for n, s in shapes.items()}
+    )
 
 
 def test_a_shape_in_the_index_can_ask_for_its_like(index):
@@ -62,7 +66,10 @@ def test_a_shape_in_the_index_can_ask_for_its_like(index):
     again = index.descriptor("one", RECIPE)
     assert np.array_equal(again.vectors, rounded(descriptor(1)).vectors)
     assert np.array_equal(again.vertices, descriptor(1).vertices)
-    with pytest.raises(StoreError, match="A shape must be described by the recipe asked for; 'two' is not described"):
+    with pytest.raises(
+        StoreError,
+        match="A shape must be described by the recipe asked for; 'two' is not described",
+    ):
         index.descriptor("two", RECIPE)
 
 
@@ -93,7 +100,9 @@ def test_the_same_digest_gains_recipes_and_keeps_the_rest(index):
     index.add("one", [descriptor(1)], digest="d")
     index.add("one", [descriptor(1), descriptor(3, OTHER)], digest="d")
     assert index.records()[0].recipes == (RECIPE, OTHER)
-    with pytest.raises(StoreError, match="A name stands for one shape; 'one' is in the index with digest d, not e"):
+    with pytest.raises(
+        StoreError, match="A name stands for one shape; 'one' is in the index with digest d, not e"
+    ):
         index.add("one", [descriptor(2)], digest="e")
 
 
@@ -101,7 +110,9 @@ def test_another_digest_gives_way_where_asked(index):
     index.add("one", [descriptor(1), descriptor(1, OTHER)], label="old")
     index.add("one", [descriptor(2)], digest="d", replace=True)
     index.add("one", [descriptor(3)], digest="e", label="new", replace=True)
-    assert [(record.label, record.digest, record.recipes) for record in index.records()] == [("new", "e", (RECIPE,))]
+    assert [(record.label, record.digest, record.recipes) for record in index.records()] == [
+        ("new", "e", (RECIPE,))
+    ]
     assert index.query(descriptor(3))[0].score == 0
     index.add("one", [descriptor(4)], digest="e", replace=True)
     assert index.query(descriptor(3))[0].score == 0
@@ -115,7 +126,9 @@ def test_remove(index):
     assert {match.name for match in index.query(descriptor(1))} == {"s0", "s2"}
     index.add("s1", [descriptor(7)])
     assert index.query(descriptor(7))[0].name == "s1"
-    with pytest.raises(StoreError, match="A shape must be in the index to be removed; 'nobody' is not"):
+    with pytest.raises(
+        StoreError, match="A shape must be in the index to be removed; 'nobody' is not"
+    ):
         index.remove("nobody")
 
 
@@ -144,18 +157,29 @@ def with_vertices(shape, vertices):
 def test_what_cannot_be_stored(index):
     bad = descriptor(1).vectors.copy()
     bad[1, 2] = np.nan
-    with pytest.raises(InvalidParameterError, match=r"finite single-precision numbers; of 'x' entry \[1, 2\] is nan"):
+    with pytest.raises(
+        InvalidParameterError,
+        match=r"finite single-precision numbers; of 'x' entry \[1, 2\] is nan",
+    ):
         index.add("x", [ShapeDescriptor(bad, np.arange(2), RECIPE)])
     with pytest.raises(InvalidParameterError, match=r"of 'x' entry \[0, 0\] is 1e\+300"):
         index.add("x", [ShapeDescriptor(np.full((2, 3), 1e300), np.arange(2), RECIPE)])
-    with pytest.raises(InvalidParameterError, match="A shape needs a descriptor to be found by; 'x' has none"):
+    with pytest.raises(
+        InvalidParameterError, match="A shape needs a descriptor to be found by; 'x' has none"
+    ):
         index.add("x", [])
-    with pytest.raises(InvalidParameterError, match="must name one vertex a feature; of 'x' 2 features have vertices"):
+    with pytest.raises(
+        InvalidParameterError,
+        match="must name one vertex a feature; of 'x' 2 features have vertices",
+    ):
         index.add("x", [with_vertices(descriptor(1), np.arange(2)[:, None])])
-    with pytest.raises(InvalidParameterError, match=r"beside numbers must be Unicode text; 'b\\udcff' is not"):
+    with pytest.raises(
+        InvalidParameterError, match=r"beside numbers must be Unicode text; 'b\\udcff' is not"
+    ):
         index.add("x", [descriptor(1)], source="b\udcff")
     with pytest.raises(
-        InvalidParameterError, match="must have equally many numbers; of 'test' they have 3, and here 5"
+        InvalidParameterError,
+        match="must have equally many numbers; of 'test' they have 3, and here 5",
     ):
         index.add("x", [descriptor(1), ShapeDescriptor(np.ones((2, 5)), np.arange(2), RECIPE)])
     assert len(index) == 0
@@ -191,8 +215,14 @@ def test_recipes_of_other_versions(index):
     assert "n_modes" not in fields
     assert index.query(descriptor(1))[0].score == 0
     edit_recipe(index, lambda fields: fields.update(colour="red"))
-    for ask in (index.records, lambda: index.query(descriptor(1)), lambda: index.add("two", [descriptor(2)])):
-        with pytest.raises(StoreError, match=r"must be known to this version of eigenshape; .* argument 'colour'"):
+    for ask in (
+        index.records,
+        lambda: index.query(descriptor(1)),
+        lambda: index.add("two", [descriptor(2)]),
+    ):
+        with pytest.raises(
+            StoreError, match=r"must be known to this version of eigenshape; .* argument 'colour'"
+        ):
             ask()
 
 
@@ -208,7 +238,10 @@ def test_a_query_in_a_recipe_that_is_not_there(index):
     with pytest.raises(StoreError, match="holds no shape and was asked in"):
         index.query(descriptor(1))
     index.add("one", [descriptor(1)])
-    with pytest.raises(StoreError, match=r"An index answers in the recipes it holds; .* holds test and was asked in"):
+    with pytest.raises(
+        StoreError,
+        match=r"An index answers in the recipes it holds; .* holds test and was asked in",
+    ):
         index.query(descriptor(1, Recipe()))
     index.remove("one")
     with pytest.raises(StoreError, match="holds no shape and was asked in"):
@@ -224,7 +257,9 @@ def test_folders_that_are_no_index(tmp_path, index):
     with pytest.raises(StoreError, match="must be empty to become an index"):
         ShapeIndex.create(index.folder)
     (tmp_path / "file").touch()
-    with pytest.raises(StoreError, match=r"An index needs a folder; .*file cannot be made: File exists"):
+    with pytest.raises(
+        StoreError, match=r"An index needs a folder; .*file cannot be made: File exists"
+    ):
         ShapeIndex.create(tmp_path / "file")
     assert not (tmp_path / store.LOCK).exists()
     foreign = tmp_path / "foreign"
@@ -244,7 +279,11 @@ def test_folders_that_are_no_index(tmp_path, index):
 
 def test_a_folder_that_is_gone_does_not_come_back(index):
     shutil.rmtree(index.folder)
-    for act in (lambda: len(index), lambda: index.add("one", [descriptor(1)]), lambda: index.remove("one")):
+    for act in (
+        lambda: len(index),
+        lambda: index.add("one", [descriptor(1)]),
+        lambda: index.remove("one"),
+    ):
         with pytest.raises(StoreError, match=r"must be an index; it has no index.sqlite"):
             act()
     assert not index.folder.exists()
@@ -282,7 +321,11 @@ def test_three_first_writers_share_one_index(tmp_path):
         for process, ours in writers:
             process.join()
             ours.close()
-        assert [record.name for record in ShapeIndex.open(folder).records()] == ["shape 0", "shape 1", "shape 2"]
+        assert [record.name for record in ShapeIndex.open(folder).records()] == [
+            "shape 0",
+            "shape 1",
+            "shape 2",
+        ]
 
 
 def test_a_folder_of_other_things_becomes_no_index(tmp_path):
@@ -313,10 +356,17 @@ def test_a_copy_without_its_log_is_named(index, tmp_path):
         reader.execute("SELECT * FROM shape").fetchone()
         index.add("two", [descriptor(2)])
         whole = shutil.copytree(index.folder, tmp_path / "whole")
-        part = shutil.copytree(index.folder, tmp_path / "part", ignore=shutil.ignore_patterns("*-wal"))
+        part = shutil.copytree(
+            index.folder, tmp_path / "part", ignore=shutil.ignore_patterns("*-wal")
+        )
     assert len(ShapeIndex.open(whole)) == 2
-    for act in (lambda: ShapeIndex.open(part), lambda: ShapeIndex(part).add("three", [descriptor(3)])):
-        with pytest.raises(StoreError, match="must hold all 2 changes that were committed; it holds 1"):
+    for act in (
+        lambda: ShapeIndex.open(part),
+        lambda: ShapeIndex(part).add("three", [descriptor(3)]),
+    ):
+        with pytest.raises(
+            StoreError, match="must hold all 2 changes that were committed; it holds 1"
+        ):
             act()
     (whole / store.COMMITTED).unlink()
     with pytest.raises(StoreError, match=r"committed.txt must hold a number twice; it holds b''"):
@@ -330,7 +380,10 @@ def test_a_second_writer_is_told(index, monkeypatch):
         pytest.raises(StoreError, match="An index has one writer; another process"),
     ):
         index.add("one", [descriptor(1)])
-    with store.writing(index.folder), pytest.raises(StoreError, match=r"one writer; process \d+ on .* has held"):
+    with (
+        store.writing(index.folder),
+        pytest.raises(StoreError, match=r"one writer; process \d+ on .* has held"),
+    ):
         index.add("one", [descriptor(1)])
     index.add("one", [descriptor(1)])
     assert len(index) == 1
@@ -402,12 +455,17 @@ def test_reading_needs_no_right_to_write(index, open_folder):
     reader.close()
     shutil.copytree(index.folder, open_folder / "whole")
     with read_only(open_folder / "whole") as folder:
-        assert {match.name for match in ShapeIndex.open(folder).query(descriptor(1))} == {"one", "two"}
+        assert {match.name for match in ShapeIndex.open(folder).query(descriptor(1))} == {
+            "one",
+            "two",
+        }
         with pytest.raises(StoreError, match="An index changes only where one may write"):
             ShapeIndex.open(folder).remove("one")
     with (
         read_only(open_folder / "with log") as folder,
-        pytest.raises(StoreError, match=r"must be writable to be read as long as index\.sqlite-wal holds"),
+        pytest.raises(
+            StoreError, match=r"must be writable to be read as long as index\.sqlite-wal holds"
+        ),
     ):
         ShapeIndex.open(folder)
 
@@ -458,7 +516,9 @@ def test_a_killed_writer_leaves_the_state_before_or_after(index):
         done = killed_at_random(writer.add_shapes, index.folder, rng)
         names = [record.name for record in index.records()]
         assert names == [f"shape-{number:05}" for number in range(len(names))]
-        assert done + 1 <= len(names) <= done + 2  # all that was called done, and at most the one under way
+        assert (
+            done + 1 <= len(names) <= done + 2
+        )  # all that was called done, and at most the one under way
         for number in {0, len(names) - 1} if names else ():
             assert index.query(descriptor(number))[0].name == f"shape-{number:05}"
     assert len(names) > 10

@@ -15,7 +15,9 @@ def moved(mesh, scale, to):
 
 def with_specks(body, n, scale=0.004):
     places = np.random.default_rng(0).standard_normal((n, 3))
-    return es.shapes.disjoint_union(body, *[moved(es.icosphere(0), scale, place) for place in places])
+    return es.shapes.disjoint_union(
+        body, *[moved(es.icosphere(0), scale, place) for place in places]
+    )
 
 
 BODY = es.make_creature("quadruped", 0, n_vertices=800)
@@ -26,22 +28,33 @@ DUST = es.shapes.disjoint_union(*[moved(es.icosphere(0), 1.0, [3 * i, 0, 0]) for
 
 def test_fragments_by_hand():
     mesh = es.shapes.disjoint_union(
-        es.icosphere(1), moved(es.icosphere(1), 0.09, [3, 0, 0]), moved(es.icosphere(1), 0.2, [5, 0, 0])
+        es.icosphere(1),
+        moved(es.icosphere(1), 0.09, [3, 0, 0]),
+        moved(es.icosphere(1), 0.2, [5, 0, 0]),
     )
-    assert fragment_vertices(mesh).tolist() == list(range(42, 84)), "0.8 % of the area; the last has 3.8 %"
+    assert fragment_vertices(mesh).tolist() == list(range(42, 84)), (
+        "0.8 % of the area; the last has 3.8 %"
+    )
     assert fragment_vertices(mesh, 10).tolist() == list(range(42, 126))
     assert not len(fragment_vertices(es.icosphere(1)))
     assert not len(fragment_vertices(SOUP))
-    assert fragment_vertices(DUST).tolist() == list(range(1200, 12000)), "of equal ones the first hundred stay"
+    assert fragment_vertices(DUST).tolist() == list(range(1200, 12000)), (
+        "of equal ones the first hundred stay"
+    )
 
 
 def test_specks_leave_the_features_of_a_body_as_they_are():
-    alone, found = es.retrieval.describe_mesh(BODY, RECIPE), es.retrieval.describe_mesh(SPECKED, RECIPE)
+    alone, found = (
+        es.retrieval.describe_mesh(BODY, RECIPE),
+        es.retrieval.describe_mesh(SPECKED, RECIPE),
+    )
     assert found.descriptor.vertices.tolist() == alone.descriptor.vertices.tolist()
     np.testing.assert_allclose(found.descriptor.vectors, alone.descriptor.vectors, rtol=1e-9)
     assert found.fragments.tolist() == list(range(800, SPECKED.n_vertices))
     n_features = len(alone.descriptor.vertices)
-    assert len(found.parts.features.vertices) == n_features + 70, "each fragment is a region of its own"
+    assert len(found.parts.features.vertices) == n_features + 70, (
+        "each fragment is a region of its own"
+    )
     assert found.parts.labels[: BODY.n_faces].tolist() == alone.parts.labels.tolist()
     assert found.parts.labels[BODY.n_faces :].min() == n_features
 
@@ -63,7 +76,9 @@ def test_forty_equal_parts_have_a_feature_each():
     assert parts.tolist() == list(range(40))
     assert len(found.spectrum.eigenvalues) == RECIPE.n_modes + 39
     large = es.retrieval.describe_large_mesh(SOUP, RECIPE)
-    assert es.retrieval.matching_score(large.descriptor, found.descriptor) < 0.05 * es.retrieval.matching_score(
+    assert es.retrieval.matching_score(
+        large.descriptor, found.descriptor
+    ) < 0.05 * es.retrieval.matching_score(
         large.descriptor, es.retrieval.describe_mesh(BODY, RECIPE).descriptor
     )
 
@@ -109,10 +124,16 @@ def test_each_component_is_a_part_at_least(mesh):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    "recipe", [RECIPE, es.retrieval.PatchRecipe(es.retrieval.made_codebook())], ids=["heat", "patches"]
+    "recipe",
+    [RECIPE, es.retrieval.PatchRecipe(es.retrieval.made_codebook())],
+    ids=["heat", "patches"],
 )
 def test_an_index_of_shapes_of_many_parts(tmp_path, recipe):
-    shapes = {"specked": SPECKED, "soup": SOUP, "other": es.make_creature("bird", 0, n_vertices=800)}
+    shapes = {
+        "specked": SPECKED,
+        "soup": SOUP,
+        "other": es.make_creature("bird", 0, n_vertices=800),
+    }
     index = es.ShapeIndex.create(tmp_path / "index")
     for name, mesh in shapes.items():
         index.add(name, es.retrieval.describe_to_keep(mesh, recipe, n_views=1))

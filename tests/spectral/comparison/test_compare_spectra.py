@@ -31,7 +31,9 @@ def scaled(scale):
 
 
 def test_by_hand():
-    found = compare_spectra(of([0, 1, 4, 10], [0, 0.1, 0.1, 0]), of([0, 1.15, 3, 10, 12], [0, 0.1, 0.1, 0, 0]))
+    found = compare_spectra(
+        of([0, 1, 4, 10], [0, 0.1, 0.1, 0]), of([0, 1.15, 3, 10, 12], [0, 0.1, 0.1, 0, 0])
+    )
     np.testing.assert_allclose(found.relative, [0, 0.15, 0.25, 0])
     assert found.told.tolist() == [False, False, True, False]  # .15 is within the two bars of .1
     assert found.index_distance == 1
@@ -49,7 +51,9 @@ def test_zeros_to_rounding_are_equal_and_a_lost_one_is_heard():
     np.testing.assert_array_equal(compare_spectra(whole, apart).relative, [0, np.inf, 0])
     np.testing.assert_array_equal(compare_spectra(apart, whole).relative, [0, np.inf, 0])
     assert compare_spectra(whole, apart).mean_relative == np.inf
-    assert compare_spectra(of([1e-17], [1e-16]), of([0.0])).median_relative == 0  # one eigenvalue, within its residual
+    assert (
+        compare_spectra(of([1e-17], [1e-16]), of([0.0])).median_relative == 0
+    )  # one eigenvalue, within its residual
 
 
 def test_two_spheres_have_one_zero_more():
@@ -77,7 +81,10 @@ def test_brackets_prove_changes_of_shapes_alone():
     cut = subdivide(SPHERE)
     fine = solve_spectrum(cotangent_laplacian(cut), 20)
     brackets = bracket_eigenvalues(SPHERE, 20), bracket_eigenvalues(cut, 20)
-    by_residuals, by_brackets = compare_spectra(SPECTRUM, fine), compare_spectra(SPECTRUM, fine, brackets=brackets)
+    by_residuals, by_brackets = (
+        compare_spectra(SPECTRUM, fine),
+        compare_spectra(SPECTRUM, fine, brackets=brackets),
+    )
     assert by_residuals.told[1:].all()
     assert not by_brackets.told.any()
     assert "brackets of the shapes' eigenvalues" in by_brackets.explain()
@@ -89,7 +96,9 @@ def test_brackets_prove_changes_of_shapes_alone():
 def test_hausdorff_by_hand():
     assert spectral_hausdorff_distance([0, 1, 4], [0, 2, 4]) == 1
     assert spectral_hausdorff_distance([0, 1, 4], [4, 1, 0, 0, 1]) == 0  # sets: copies do not count
-    assert spectral_hausdorff_distance([0, 5], [0, 1, 2]) == 2  # 5 may have a neighbour beyond 2; 2 has none
+    assert (
+        spectral_hausdorff_distance([0, 5], [0, 1, 2]) == 2
+    )  # 5 may have a neighbour beyond 2; 2 has none
     assert spectral_hausdorff_distance([0.0], [3.0]) == 3
 
 
@@ -101,7 +110,9 @@ def test_hausdorff_is_symmetric_and_below_the_index_distance(one, two):
     distance = spectral_hausdorff_distance(one, two)
     assert distance == spectral_hausdorff_distance(two, one)
     k = min(len(one), len(two))
-    assert spectral_hausdorff_distance(one[:k], two[:k]) <= np.abs(np.subtract(one[:k], two[:k])).max()
+    assert (
+        spectral_hausdorff_distance(one[:k], two[:k]) <= np.abs(np.subtract(one[:k], two[:k])).max()
+    )
 
 
 @given(sets, sets, st.integers(1, 12))
@@ -119,7 +130,8 @@ def test_what_is_told_of_cut_spectra_is_true_of_whole_ones(one, two, k):
 def test_bad_input():
     interval = solve_spectrum(cotangent_laplacian(SPHERE), above=1.0, below=3.0)
     with pytest.raises(
-        InvalidParameterError, match="one must begin with the lowest eigenvalue; it begins with number 1"
+        InvalidParameterError,
+        match="one must begin with the lowest eigenvalue; it begins with number 1",
     ):
         compare_spectra(interval, SPECTRUM)
     with pytest.raises(InvalidParameterError, match="two must begin with the lowest eigenvalue"):

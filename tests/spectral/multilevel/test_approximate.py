@@ -40,7 +40,9 @@ def require_near(laplacian, k, accuracy, expected=None):
     assert (found.residuals <= 1.01 * accuracy * found.eigenvalues[-1] + rounding).all()
     distances = np.abs(every[:, None] - found.eigenvalues).min(axis=0)
     assert (distances <= found.residuals + rounding).all()
-    np.testing.assert_allclose(found.eigenvalues, every[:k], atol=accuracy * every[k - 1] + rounding)
+    np.testing.assert_allclose(
+        found.eigenvalues, every[:k], atol=accuracy * every[k - 1] + rounding
+    )
     gram = found.eigenvectors.T @ (found.mass @ found.eigenvectors)
     np.testing.assert_allclose(gram, np.eye(k), atol=1e-10)
     return np.abs(found.eigenvalues - every[:k]).max() / every[k - 1]
@@ -50,7 +52,9 @@ def require_near(laplacian, k, accuracy, expected=None):
 @pytest.mark.parametrize("k", [4, 9, 12, 40])
 def test_the_accuracy_asked_for_is_reached_on_a_sphere(always_coarsen, k, accuracy):
     laplacian = cotangent_laplacian(icosphere(3))
-    assert require_near(laplacian, k, accuracy) < max(accuracy / 10, 1e-12)  # quotients err by the square of residuals
+    assert require_near(laplacian, k, accuracy) < max(
+        accuracy / 10, 1e-12
+    )  # quotients err by the square of residuals
 
 
 @pytest.mark.parametrize("accuracy", [0.1, 1e-2, 1e-4])
@@ -79,7 +83,17 @@ def test_the_estimate_is_not_below_the_error(always_coarsen, mesh, accuracy):
         graph(hypercube(10)),
         graph(np.ones((640, 640)) - np.eye(640)),
     ],
-    ids=["torus", "6 spheres", "tetrahedra", "held", "path", "cycle", "flat torus", "hypercube", "complete"],
+    ids=[
+        "torus",
+        "6 spheres",
+        "tetrahedra",
+        "held",
+        "path",
+        "cycle",
+        "flat torus",
+        "hypercube",
+        "complete",
+    ],
 )
 @pytest.mark.parametrize("k", [3, 11, 30])
 def test_operators_of_any_kind(always_coarsen, laplacian, k):
@@ -94,7 +108,9 @@ def test_operators_of_any_kind(always_coarsen, laplacian, k):
 def test_what_aggregates_cannot_see_is_found_by_a_last_look(always_coarsen, monkeypatch):
     laplacian = graph(hypercube(10))  # bits that change within aggregates only
     require_near(laplacian, 12, 1e-3)
-    monkeypatch.setattr(refinement, "_look_again", lambda tower, space, values, k, bound, seed: values)
+    monkeypatch.setattr(
+        refinement, "_look_again", lambda tower, space, values, k, bound, seed: values
+    )
     found = approximate_spectrum(laplacian, 12)
     assert abs(found.eigenvalues[10] - 2.0) > 0.1  # ten copies of 2, and one of them missing
     assert not found.certificate.complete
@@ -137,7 +153,9 @@ def test_the_certificate_says_that_nothing_was_counted(tmp_path):
     assert (proof.complete, proof.count, proof.n_missing, proof.n_pairs) == (False, None, 0, 6)
     text = proof.explain()
     assert text.startswith("These are approximations, 6 of them: by what the last round")
-    assert text.endswith("Whether one is missing was not counted; solve_spectrum proves that none is.")
+    assert text.endswith(
+        "Whether one is missing was not counted; solve_spectrum proves that none is."
+    )
     found.save(tmp_path / "rough.npz")
     assert Spectrum.load(tmp_path / "rough.npz").certificate == proof
 
@@ -152,10 +170,14 @@ def test_same_input_gives_the_same_bits():
 @pytest.mark.parametrize("scale", [1e-100, 1e100])
 def test_units_change_nothing(scale):
     mesh = torus(60, 40)
-    far = approximate_spectrum(cotangent_laplacian(TriangleMesh(mesh.vertices * scale, mesh.faces)), 12, bound=1e-3)
+    far = approximate_spectrum(
+        cotangent_laplacian(TriangleMesh(mesh.vertices * scale, mesh.faces)), 12, bound=1e-3
+    )
     one = approximate_spectrum(cotangent_laplacian(mesh), 12, bound=1e-3)
     assert not far.certificate.complete
-    np.testing.assert_allclose(far.eigenvalues * scale * scale, one.eigenvalues, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(
+        far.eigenvalues * scale * scale, one.eigenvalues, rtol=1e-6, atol=1e-9
+    )
     np.testing.assert_allclose(far.residuals.max() * scale * scale, one.residuals.max(), rtol=0.5)
 
 
@@ -163,7 +185,9 @@ def test_the_order_of_points_does_not_matter():
     laplacian = cotangent_laplacian(torus(60, 40))
     order = np.random.default_rng(0).permutation(laplacian.n_points)
     mixed = Laplacian(laplacian.stiffness[order][:, order], laplacian.mass[order][:, order])
-    one, two = (approximate_spectrum(each, 12, accuracy=1e-6, bound=1e-6) for each in (laplacian, mixed))
+    one, two = (
+        approximate_spectrum(each, 12, accuracy=1e-6, bound=1e-6) for each in (laplacian, mixed)
+    )
     np.testing.assert_allclose(two.eigenvalues, one.eigenvalues, rtol=1e-9, atol=1e-9)
 
 
@@ -172,9 +196,13 @@ def test_several_levels(monkeypatch):
     monkeypatch.setattr(climbing, "COARSEST_PER_PAIR", 1)
     laplacian = cotangent_laplacian(fibonacci_sphere(12000))
     said = []
-    found = approximate_spectrum(laplacian, 9, accuracy=1e-5, progress=lambda *parts: said.append(parts))
+    found = approximate_spectrum(
+        laplacian, 9, accuracy=1e-5, progress=lambda *parts: said.append(parts)
+    )
     exact = solve_spectrum(laplacian, 9)
-    np.testing.assert_allclose(found.eigenvalues, exact.eigenvalues, atol=1e-5 * exact.eigenvalues[-1])
+    np.testing.assert_allclose(
+        found.eigenvalues, exact.eigenvalues, atol=1e-5 * exact.eigenvalues[-1]
+    )
     shares, words = [share for share, _ in said], {each for _, each in said}
     assert shares == sorted(shares)
     assert (shares[0], shares[-1]) == (0.0, 1.0)
@@ -186,13 +214,17 @@ def test_bad_input_is_refused_by_name():
     with pytest.raises(InvalidParameterError, match="k must"):
         approximate_spectrum(laplacian, 0)
     for accuracy in (1e-11, 0.2, np.nan):
-        with pytest.raises(InvalidParameterError, match=r"accuracy must lie in 1e-10\.\.0\.1; it is"):
+        with pytest.raises(
+            InvalidParameterError, match=r"accuracy must lie in 1e-10\.\.0\.1; it is"
+        ):
             approximate_spectrum(laplacian, 3, accuracy=accuracy)
         with pytest.raises(InvalidParameterError, match=r"bound must lie in 1e-10\.\.0\.1; it is"):
             approximate_spectrum(laplacian, 3, bound=accuracy)
     with pytest.raises(InvalidParameterError, match="device must be 'cpu' or 'gpu'; it is 'tpu'"):
         approximate_spectrum(laplacian, 3, device="tpu")
-    with pytest.raises(InvalidParameterError, match=r"mass must be diagonal here; entry \(0, \d+\) is 0\.00"):
+    with pytest.raises(
+        InvalidParameterError, match=r"mass must be diagonal here; entry \(0, \d+\) is 0\.00"
+    ):
         approximate_spectrum(cotangent_laplacian(icosphere(3), "consistent"), 3)
 
 
@@ -200,16 +232,20 @@ def test_an_indefinite_stiffness_is_refused(always_coarsen):
     laplacian = cotangent_laplacian(icosphere(3))
     lowered = replace(laplacian, stiffness=sp.csr_array(laplacian.stiffness - 3.0 * laplacian.mass))
     with pytest.raises(
-        InvalidParameterError, match=r"stiffness must be positive semidefinite; eigenvalue 0 is -(3|2\.99)"
+        InvalidParameterError,
+        match=r"stiffness must be positive semidefinite; eigenvalue 0 is -(3|2\.99)",
     ):
         approximate_spectrum(lowered, 20)
 
 
 def test_what_does_not_converge_is_not_returned(always_coarsen, monkeypatch):
     with pytest.raises(
-        ConvergenceError, match=r"Smoothed eigenvectors must be independent; fewer than 24 are\. The weights"
+        ConvergenceError,
+        match=r"Smoothed eigenvectors must be independent; fewer than 24 are\. The weights",
     ):
-        approximate_spectrum(wild(), 12, bound=1e-3)  # weights over eight decades: the way to the exact solver
+        approximate_spectrum(
+            wild(), 12, bound=1e-3
+        )  # weights over eight decades: the way to the exact solver
     monkeypatch.setattr(approximate, "ROUNDS", 1)
     with pytest.raises(
         ConvergenceError,
@@ -221,15 +257,21 @@ def test_what_does_not_converge_is_not_returned(always_coarsen, monkeypatch):
 
 @pytest.mark.parametrize("which", ["smooth", "correct"])
 def test_corrections_that_overflow_are_refused(always_coarsen, monkeypatch, which):
-    monkeypatch.setattr(refinement, which, lambda tower, block, shifts, steps: np.full_like(block, np.inf))
-    with pytest.raises(ConvergenceError, match=r"Corrections must be finite; those of eigenvector [01] overflow\. The"):
+    monkeypatch.setattr(
+        refinement, which, lambda tower, block, shifts, steps: np.full_like(block, np.inf)
+    )
+    with pytest.raises(
+        ConvergenceError,
+        match=r"Corrections must be finite; those of eigenvector [01] overflow\. The",
+    ):
         approximate_spectrum(cotangent_laplacian(icosphere(4)), 12, accuracy=1e-10)
 
 
 def test_what_does_not_fit_is_refused_with_numbers(monkeypatch):
     monkeypatch.setattr("eigenshape._memory.machine_memory", lambda: 1e5)
     with pytest.raises(
-        InvalidParameterError, match=r"9 pairs of 2562 points take about bases 0\.0 GiB, levels of their"
+        InvalidParameterError,
+        match=r"9 pairs of 2562 points take about bases 0\.0 GiB, levels of their",
     ):
         approximate_spectrum(cotangent_laplacian(icosphere(4)), 9)
 
@@ -237,7 +279,9 @@ def test_what_does_not_fit_is_refused_with_numbers(monkeypatch):
 def test_without_a_gpu_the_cpu_computes_and_says_so(monkeypatch):
     monkeypatch.setitem(sys.modules, "cupy", None)
     laplacian = cotangent_laplacian(icosphere(4))
-    with pytest.warns(UserWarning, match=r"CuPy is missing .*Install it with pip install 'eigenshape\[gpu\]'"):
+    with pytest.warns(
+        UserWarning, match=r"CuPy is missing .*Install it with pip install 'eigenshape\[gpu\]'"
+    ):
         found = approximate_spectrum(laplacian, 6, device="gpu")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -262,5 +306,7 @@ def test_census_of_missing_eigenvalues(always_coarsen):
             for accuracy in (0.1, 1e-3):
                 found = approximate_spectrum(laplacian, k, accuracy=accuracy)
                 solves += 1
-                missed += bool((np.abs(found.eigenvalues - every[:k]) > accuracy * every[k - 1] + 1e-9).any())
+                missed += bool(
+                    (np.abs(found.eigenvalues - every[:k]) > accuracy * every[k - 1] + 1e-9).any()
+                )
     assert (solves, missed) == (396, 0)

@@ -16,7 +16,9 @@ from eigenshape.spectral.multilevel.approximate import approximate_spectrum
 def stand_in(count):
     """Numpy under the name of CuPy."""
     module = types.ModuleType("cupy")
-    module.__dict__.update({name: getattr(np, name) for name in dir(np) if not name.startswith("_")})
+    module.__dict__.update(
+        {name: getattr(np, name) for name in dir(np) if not name.startswith("_")}
+    )
     module.asnumpy = np.asarray
     module.cuda = types.SimpleNamespace(runtime=types.SimpleNamespace(getDeviceCount=count))
     return module
@@ -36,7 +38,9 @@ def cupy(monkeypatch):
 def test_another_pair_of_libraries_gives_the_same_bits(cupy, monkeypatch):
     monkeypatch.setattr(climbing, "COARSEST", 100)
     monkeypatch.setattr(climbing, "COARSEST_PER_PAIR", 1)
-    monkeypatch.setattr(device, "CPU", replace(device.CPU, rows=device.GPU_ROWS))  # sums in the same order
+    monkeypatch.setattr(
+        device, "CPU", replace(device.CPU, rows=device.GPU_ROWS)
+    )  # sums in the same order
     cupy(lambda: 1)
     laplacian = cotangent_laplacian(fibonacci_sphere(9000))
     one = approximate_spectrum(laplacian, 9, accuracy=1e-5)

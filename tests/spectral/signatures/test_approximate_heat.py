@@ -30,7 +30,9 @@ def poor_torus():
     rng = np.random.default_rng(3)
     edge = np.linalg.norm(np.diff(mesh.vertices[mesh.faces[:, :2]], axis=1), axis=2).mean()
     return es.cotangent_laplacian(
-        es.TriangleMesh(mesh.vertices + 0.2 * edge * rng.normal(size=mesh.vertices.shape), mesh.faces)
+        es.TriangleMesh(
+            mesh.vertices + 0.2 * edge * rng.normal(size=mesh.vertices.shape), mesh.faces
+        )
     )
 
 
@@ -60,7 +62,10 @@ def test_the_error_falls_with_the_accuracy():
     _, laplacian = creature()
     times = TIMES * laplacian.mass.sum()
     values = exact(laplacian, 30, times)
-    runs = [es.spectral.approximate_heat_kernel_signature(laplacian, 30, times, accuracy=most) for most in (1e-1, 1e-4)]
+    runs = [
+        es.spectral.approximate_heat_kernel_signature(laplacian, 30, times, accuracy=most)
+        for most in (1e-1, 1e-4)
+    ]
     true = [true_errors(laplacian, run, values)[0] for run in runs]
     assert true[0] > 5 * true[1]
     assert runs[0].errors[0] > 5 * runs[1].errors[0]
@@ -96,7 +101,9 @@ def test_several_components_and_a_loose_piece():
 
 def test_with_the_boundary_held():
     mesh = es.scans.cut_by_planes(creature()[0], [[0, 1, 0, 0.5]]).mesh
-    inner, _ = es.operators.dirichlet_laplacian(es.cotangent_laplacian(mesh), es.geometry.boundary_vertices(mesh))
+    inner, _ = es.operators.dirichlet_laplacian(
+        es.cotangent_laplacian(mesh), es.geometry.boundary_vertices(mesh)
+    )
     found = es.spectral.approximate_heat_kernel_signature(inner, 20, TIMES)
     off = true_errors(inner, found, exact(inner, 20, TIMES))
     assert off.max() < 0.02
@@ -104,7 +111,9 @@ def test_with_the_boundary_held():
 
 
 def test_graphs_without_geometry():
-    laplacian = es.operators.graph_laplacian(es.operators.neighbor_graph(es.shapes.fibonacci_sphere(4000).vertices, 8))
+    laplacian = es.operators.graph_laplacian(
+        es.operators.neighbor_graph(es.shapes.fibonacci_sphere(4000).vertices, 8)
+    )
     scale = es.solve_spectrum(laplacian, 2).eigenvalues[1]
     times = np.array([0.1, 1.0]) / scale
     found = es.spectral.approximate_heat_kernel_signature(laplacian, 20, times)
@@ -114,7 +123,9 @@ def test_graphs_without_geometry():
 @pytest.mark.long
 def test_the_same_again():
     _, laplacian = creature(3000)
-    one, two = (es.spectral.approximate_heat_kernel_signature(laplacian, 10, TIMES) for _ in range(2))
+    one, two = (
+        es.spectral.approximate_heat_kernel_signature(laplacian, 10, TIMES) for _ in range(2)
+    )
     assert np.array_equal(one.values, two.values)
     assert np.array_equal(one.errors, two.errors)
 
@@ -136,7 +147,9 @@ def test_points_in_another_order_have_the_same_heat_nearly():
     moved = es.Laplacian(laplacian.stiffness[order][:, order], laplacian.mass[order][:, order])
     one = es.spectral.approximate_heat_kernel_signature(laplacian, 10, TIMES)
     two = es.spectral.approximate_heat_kernel_signature(moved, 10, TIMES)
-    assert np.abs(two.values - one.values[order]).max(axis=0) == pytest.approx(0, abs=0.03 * one.values.max())
+    assert np.abs(two.values - one.values[order]).max(axis=0) == pytest.approx(
+        0, abs=0.03 * one.values.max()
+    )
 
 
 def test_few_points_are_solved_as_they_are():
@@ -149,7 +162,9 @@ def test_few_points_are_solved_as_they_are():
 def test_progress_runs_from_0_to_1():
     said = []
     _, laplacian = creature(3000)
-    es.spectral.approximate_heat_kernel_signature(laplacian, 10, TIMES, progress=lambda *what: said.append(what))
+    es.spectral.approximate_heat_kernel_signature(
+        laplacian, 10, TIMES, progress=lambda *what: said.append(what)
+    )
     shares = [share for share, _ in said]
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
@@ -161,7 +176,9 @@ def test_what_is_refused():
         es.spectral.approximate_heat_kernel_signature(laplacian, 0, TIMES)
     with pytest.raises(es.InvalidParameterError, match="times must be positive"):
         es.spectral.approximate_heat_kernel_signature(laplacian, 10, [0.0])
-    with pytest.raises(es.InvalidParameterError, match=r"accuracy must lie in 0\.0001\.\.0\.1; it is 1e-05"):
+    with pytest.raises(
+        es.InvalidParameterError, match=r"accuracy must lie in 0\.0001\.\.0\.1; it is 1e-05"
+    ):
         es.spectral.approximate_heat_kernel_signature(laplacian, 10, TIMES, accuracy=1e-5)
     full = replace(laplacian, mass=es.cotangent_laplacian(creature(3000)[0], "consistent").mass)
     with pytest.raises(es.InvalidParameterError, match="mass must be diagonal here"):

@@ -37,8 +37,12 @@ def test_a_narrow_band_is_one_eigenfunction():
     levels = np.log(spectrum.eigenvalues[[3, 7]])
     found = es.wave_kernel_signature(spectrum, levels, sigma=1e-4)
     np.testing.assert_allclose(found, spectrum.eigenvectors[:, [3, 7]] ** 2, rtol=1e-9, atol=1e-9)
-    beyond = es.wave_kernel_signature(spectrum, [50.0], sigma=1e-4)  # every weight underflows: the last counts
-    np.testing.assert_allclose(beyond[:, 0], spectrum.eigenvectors[:, -1] ** 2, rtol=1e-9, atol=1e-9)
+    beyond = es.wave_kernel_signature(
+        spectrum, [50.0], sigma=1e-4
+    )  # every weight underflows: the last counts
+    np.testing.assert_allclose(
+        beyond[:, 0], spectrum.eigenvectors[:, -1] ** 2, rtol=1e-9, atol=1e-9
+    )
 
 
 def test_default_energies_keep_two_deviations_from_both_ends(torus):
@@ -53,7 +57,9 @@ def test_default_energies_keep_two_deviations_from_both_ends(torus):
 @pytest.mark.parametrize("scale", [2.0**150, 2.0**-150])
 def test_the_product_with_the_area_has_no_scale(torus, scale):
     mesh, spectrum = torus
-    other = es.solve_spectrum(es.cotangent_laplacian(es.TriangleMesh(mesh.vertices * scale, mesh.faces)), 80)
+    other = es.solve_spectrum(
+        es.cotangent_laplacian(es.TriangleMesh(mesh.vertices * scale, mesh.faces)), 80
+    )
     one, two = (found.mass.sum() * es.wave_kernel_signature(found) for found in (spectrum, other))
     np.testing.assert_allclose(one, two, rtol=1e-8)
 
@@ -62,9 +68,13 @@ def test_bad_parameters_are_named(torus):
     _, spectrum = torus
     with pytest.raises(InvalidParameterError, match="energies must be finite; entry 1 is nan"):
         es.wave_kernel_signature(spectrum, [1.0, np.nan])
-    with pytest.raises(InvalidParameterError, match=r"energies must be a list of numbers; the shape is \(0,\)"):
+    with pytest.raises(
+        InvalidParameterError, match=r"energies must be a list of numbers; the shape is \(0,\)"
+    ):
         es.wave_kernel_signature(spectrum, [])
-    with pytest.raises(InvalidParameterError, match="sigma must be positive and finite; entry 0 is -1"):
+    with pytest.raises(
+        InvalidParameterError, match="sigma must be positive and finite; entry 0 is -1"
+    ):
         es.wave_kernel_signature(spectrum, sigma=-1.0)
     with pytest.raises(InvalidParameterError, match="n_energies must be at least 2; it is 1"):
         es.spectral.default_energies(spectrum, 1)
@@ -72,5 +82,7 @@ def test_bad_parameters_are_named(torus):
     with pytest.raises(InvalidParameterError, match="must have an eigenvalue above 0; its 1 are"):
         es.wave_kernel_signature(one)
     two = es.solve_spectrum(es.cotangent_laplacian(es.shapes.torus(9, 7)), 2)
-    with pytest.raises(InvalidParameterError, match="range of logarithms of eigenvalues must be positive"):
+    with pytest.raises(
+        InvalidParameterError, match="range of logarithms of eigenvalues must be positive"
+    ):
         es.spectral.default_energies(two)

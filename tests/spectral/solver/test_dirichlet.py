@@ -32,13 +32,18 @@ def test_the_lowest_mode_is_a_product_of_sines():
 
 def test_a_point_may_be_named_twice():
     laplacian = cotangent_laplacian(grid(4, 4))
-    one, two = (solve_dirichlet(laplacian, 3, np.array(fixed)).eigenvalues for fixed in ([3, 0], [0, 3, 3, 0]))
+    one, two = (
+        solve_dirichlet(laplacian, 3, np.array(fixed)).eigenvalues
+        for fixed in ([3, 0], [0, 3, 3, 0])
+    )
     np.testing.assert_array_equal(one, two)
 
 
 @pytest.mark.parametrize("bad", [-1, 25, 2**40])
 def test_points_out_of_range_are_refused(bad):
-    with pytest.raises(InvalidParameterError, match=rf"fixed must hold points 0\.\.24; entry 1 is {bad}"):
+    with pytest.raises(
+        InvalidParameterError, match=rf"fixed must hold points 0\.\.24; entry 1 is {bad}"
+    ):
         solve_dirichlet(cotangent_laplacian(grid(4, 4)), 1, np.array([0, bad]))
 
 

@@ -57,11 +57,19 @@ def affinity_eigenvalues(
     """
     mesh = as_mesh(mesh)
     most = mesh.n_vertices
-    samples = min(N_SAMPLES, most) if n_samples is None else whole_number(n_samples, "n_samples", 1, most)
-    count = min(N_VALUES, samples) if n_values is None else whole_number(n_values, "n_values", 1, samples)
+    samples = (
+        min(N_SAMPLES, most) if n_samples is None else whole_number(n_samples, "n_samples", 1, most)
+    )
+    count = (
+        min(N_VALUES, samples)
+        if n_values is None
+        else whole_number(n_values, "n_values", 1, samples)
+    )
     require_describable(mesh)
     points, rows, _ = farthest_points(mesh, samples)
-    between = np.minimum(rows[:, points], rows[:, points].T)  # the wave of one end may come a little later
+    between = np.minimum(
+        rows[:, points], rows[:, points].T
+    )  # the wave of one end may come a little later
     longest = between[np.isfinite(between)].max(initial=0.0)
     # Between infinitely far points the affinity is 0; of a single point it is 1.
     affinity = np.exp(-((between / (longest or 1.0)) ** 2) / 2)

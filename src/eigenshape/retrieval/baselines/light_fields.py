@@ -15,7 +15,12 @@ from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.retrieval.baselines.light_field_loops import least_difference, outline, power_sums, silhouette
+from eigenshape.retrieval.baselines.light_field_loops import (
+    least_difference,
+    outline,
+    power_sums,
+    silhouette,
+)
 from eigenshape.scans.partial import rotation_towards
 from eigenshape.scans.raster import EDGE_SLACK, THINNEST
 
@@ -23,7 +28,9 @@ N_FIELDS, N_VIEWS = 10, 10
 ORDER = 10  # of the Zernike moments: 35 numbers beside the area
 N_FOURIER = 10
 N_NUMBERS = 35 + N_FOURIER
-FOURIER_WEIGHT = 2.0  # the scale to which the authors' program quantises them, beside 1 for the moments
+FOURIER_WEIGHT = (
+    2.0  # the scale to which the authors' program quantises them, beside 1 for the moments
+)
 OUTLINE_POINTS = 256
 MARGIN = 1.0  # pixels left free around the sphere that holds the shape
 CANDIDATES = 2000
@@ -74,11 +81,15 @@ def light_field(
     for field, turn in enumerate(_turns(fields)):
         for view, axis in enumerate(_axes() @ turn.T):
             flat = (points @ rotation_towards(axis).T[:, :2]) * (pixels / 2 - MARGIN) + pixels / 2
-            found[field, view] = _described(silhouette(flat, mesh.faces, pixels, EDGE_SLACK, THINNEST))
+            found[field, view] = _described(
+                silhouette(flat, mesh.faces, pixels, EDGE_SLACK, THINNEST)
+            )
     return found
 
 
-def light_field_distance(first: Float[np.ndarray, "f v q"], second: Float[np.ndarray, "g w r"]) -> float:
+def light_field_distance(
+    first: Float[np.ndarray, "f v q"], second: Float[np.ndarray, "g w r"]
+) -> float:
     """Sum the L1 distances of ten pairs of silhouettes, at the relative turn that makes the sum least.
 
     Tried are, for each dodecahedron around one shape and each around the other, the 60 rotations that take a
@@ -106,7 +117,9 @@ def _in_unit_ball(mesh: TriangleMesh) -> Float[np.ndarray, "n 3"]:
     corners = points[mesh.faces]
     areas = np.linalg.norm(area_vectors(corners), axis=1)
     if not areas.sum() > 0:
-        raise InvalidShapeError(f"A shape must have area to be seen; all {mesh.n_faces} faces have none.")
+        raise InvalidShapeError(
+            f"A shape must have area to be seen; all {mesh.n_faces} faces have none."
+        )
     centre = areas @ corners.mean(axis=1) / areas.sum()
     return (points - centre) / np.linalg.norm(corners - centre, axis=2).max()
 
@@ -136,12 +149,16 @@ def _radial(n: int, m: int) -> tuple[int, ...]:
     """Return the coefficients of r^(m + 2j), j = 0, 1, ..., in R_n^m (Zernike 1934)."""
     half = (n - m) // 2
     return tuple(
-        (-1) ** (half - j) * factorial((n + m) // 2 + j) // (factorial(half - j) * factorial(m + j) * factorial(j))
+        (-1) ** (half - j)
+        * factorial((n + m) // 2 + j)
+        // (factorial(half - j) * factorial(m + j) * factorial(j))
         for j in range(half + 1)
     )
 
 
-def _fourier(image: Bool[np.ndarray, "h w"], centre: Float[np.ndarray, "2"]) -> Float[np.ndarray, "10"]:
+def _fourier(
+    image: Bool[np.ndarray, "h w"], centre: Float[np.ndarray, "2"]
+) -> Float[np.ndarray, "10"]:
     """Describe the outline of the largest piece by how its distance from the centre varies along it."""
     pieces, _ = label(image, np.ones((3, 3)))
     names, away = pieces[image] - 1, np.square(np.argwhere(image) - centre).sum(axis=1)
@@ -162,7 +179,9 @@ def _axes() -> Float[np.ndarray, "10 3"]:
     """Return one of each two opposite vertices of a dodecahedron, as unit vectors."""
     golden = (1 + np.sqrt(5)) / 2
     cube = [[1, one, two] for one in (1, -1) for two in (1, -1)]
-    others = [np.roll([0, 1 / golden, sign * golden], turn) for turn in range(3) for sign in (1, -1)]
+    others = [
+        np.roll([0, 1 / golden, sign * golden], turn) for turn in range(3) for sign in (1, -1)
+    ]
     return frozen(np.array([*cube, *others]) / np.sqrt(3))
 
 
@@ -189,7 +208,9 @@ def _turns(count: int) -> Float[np.ndarray, "count 3 3"]:
 
     They are chosen from a fixed list of random ones, so that more of them keep the first.
     """
-    candidates = Rotation.from_quat(np.random.default_rng(0).standard_normal((CANDIDATES, 4))).as_matrix()
+    candidates = Rotation.from_quat(
+        np.random.default_rng(0).standard_normal((CANDIDATES, 4))
+    ).as_matrix()
     axes = np.einsum("cij,aj->cai", candidates, _axes())
     chosen, nearest = [np.eye(3)], np.abs(axes @ _axes().T).max(axis=(1, 2))
     while len(chosen) < count:

@@ -60,7 +60,11 @@ class DescribedShape:
 
 
 def describe(
-    spectrum: Spectrum, features: FeaturePoints, recipe: Recipe = SCALE_FREE, *, dirichlet: Spectrum | None = None
+    spectrum: Spectrum,
+    features: FeaturePoints,
+    recipe: Recipe = SCALE_FREE,
+    *,
+    dirichlet: Spectrum | None = None,
 ) -> ShapeDescriptor:
     """Describe feature points by the heat that they keep at the recipe's times (thesis 5.3).
 
@@ -83,7 +87,9 @@ def describe(
     require_type(recipe, Recipe, "recipe")
     require_type(dirichlet, Spectrum | None, "dirichlet")
     unit, times = clock(float(spectrum.mass.sum()), recipe)
-    return _descriptor(_heat(spectrum, dirichlet, times[1:]), features.vertices[: recipe.n_features], recipe, unit)
+    return _descriptor(
+        _heat(spectrum, dirichlet, times[1:]), features.vertices[: recipe.n_features], recipe, unit
+    )
 
 
 def describe_mesh(
@@ -134,7 +140,11 @@ def describe_mesh(
         return solve_free(shape.laplacian, min(shape.n_modes, n_free), points, progress)
 
     spectrum = spectrum_without(shape.fragments)
-    fixed = spectrum_without(np.union1d(shape.fragments, shape.boundary)) if len(shape.boundary) else None
+    fixed = (
+        spectrum_without(np.union1d(shape.fragments, shape.boundary))
+        if len(shape.boundary)
+        else None
+    )
     unit, times = clock(shape.area, recipe)
     later = _heat(spectrum, fixed, times[1:])
     if height is None:
@@ -143,7 +153,9 @@ def describe_mesh(
     return DescribedShape(shape.mesh, spectrum, height, *found, shape.fragments)
 
 
-def describe_views(mesh: MeshLike, recipe: Recipe = SCALE_FREE, *, n_views: int = N_VIEWS) -> list[ShapeDescriptor]:
+def describe_views(
+    mesh: MeshLike, recipe: Recipe = SCALE_FREE, *, n_views: int = N_VIEWS
+) -> list[ShapeDescriptor]:
     """Describe what single viewpoints see of a closed shape, as partial scans of it will be.
 
     Parameters
@@ -164,13 +176,17 @@ def describe_views(mesh: MeshLike, recipe: Recipe = SCALE_FREE, *, n_views: int 
     return [replace(found, vertices=part.source_vertices[found.vertices]) for part, found in seen]
 
 
-def described_view(mesh: TriangleMesh, recipe: Recipe, view: int) -> tuple[MeshPart, DescribedShape]:
+def described_view(
+    mesh: TriangleMesh, recipe: Recipe, view: int
+) -> tuple[MeshPart, DescribedShape]:
     """Return what one of the viewpoints of `describe_views` sees, and its description."""
     part = partial_scan(mesh, viewpoint(view))
     return part, describe_mesh(part.mesh, recipe)
 
 
-def _heat(spectrum: Spectrum, dirichlet: Spectrum | None, times: Float[np.ndarray, " q"]) -> Float[np.ndarray, "n q"]:
+def _heat(
+    spectrum: Spectrum, dirichlet: Spectrum | None, times: Float[np.ndarray, " q"]
+) -> Float[np.ndarray, "n q"]:
     if dirichlet is None:
         return heat_kernel_signature(spectrum, times)
     return reflection_free_signature(spectrum, dirichlet, times)
@@ -219,10 +235,14 @@ def prepare(mesh: TriangleMesh, recipe: Recipe) -> PreparedShape:
     if loose:
         boundary = boundary[:0]
     area = float(laplacian.mass.sum()) - float(laplacian.mass.diagonal()[fragments].sum())
-    return PreparedShape(mesh, laplacian, boundary, fragments, n_components, area, recipe.n_modes + n_components - 1)
+    return PreparedShape(
+        mesh, laplacian, boundary, fragments, n_components, area, recipe.n_modes + n_components - 1
+    )
 
 
-def heat_with_fragments(shape: PreparedShape, heat: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+def heat_with_fragments(
+    shape: PreparedShape, heat: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, " n"]:
     """Give each fragment the heat of a body that has come to one temperature: 1 over its area."""
     if not len(shape.fragments):
         return heat
@@ -243,7 +263,11 @@ def clock(area: float, recipe: Recipe) -> tuple[float, Float[np.ndarray, " q"]]:
 
 
 def parts_and_descriptor(
-    shape: PreparedShape, heat: Float[np.ndarray, " n"], later: Float[np.ndarray, "n q"], recipe: Recipe, unit: float
+    shape: PreparedShape,
+    heat: Float[np.ndarray, " n"],
+    later: Float[np.ndarray, "n q"],
+    recipe: Recipe,
+    unit: float,
 ) -> tuple[MergeTree, Segmentation, ShapeDescriptor]:
     """Cut a shape around the maxima of heat, and describe those that are not on fragments by what they keep later."""
     tree = merge_tree(shape.mesh, heat)
@@ -259,7 +283,9 @@ def parts_and_descriptor(
 def _reordered(parts: Segmentation, order: Int[np.ndarray, " m"]) -> Segmentation:
     features, number = parts.features, np.argsort(order)
     columns = (features.vertices, features.values, features.persistence)
-    return Segmentation(frozen(number[parts.labels]), FeaturePoints(*(frozen(column[order]) for column in columns)))
+    return Segmentation(
+        frozen(number[parts.labels]), FeaturePoints(*(frozen(column[order]) for column in columns))
+    )
 
 
 def _descriptor(

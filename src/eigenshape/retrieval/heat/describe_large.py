@@ -12,7 +12,12 @@ from eigenshape.features.segmentation import Segmentation
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.boundary import dirichlet_laplacian
-from eigenshape.retrieval.heat.describe import clock, heat_with_fragments, parts_and_descriptor, prepare
+from eigenshape.retrieval.heat.describe import (
+    clock,
+    heat_with_fragments,
+    parts_and_descriptor,
+    prepare,
+)
 from eigenshape.retrieval.heat.descriptor import SCALE_FREE, Recipe, ShapeDescriptor
 from eigenshape.spectral.signatures.approximate_heat import (
     USUAL_ACCURACY,
@@ -89,7 +94,9 @@ def describe_large_mesh(
     def heat_without(points: Int[np.ndarray, " c"]) -> tuple[Float[np.ndarray, "n q"], float]:
         inner, free = dirichlet_laplacian(shape.laplacian, points)
         k = min(shape.n_modes, inner.n_points)
-        found = approximate_heat_kernel_signature(inner, k, times, accuracy=accuracy, progress=progress)
+        found = approximate_heat_kernel_signature(
+            inner, k, times, accuracy=accuracy, progress=progress
+        )
         columns = np.zeros((shape.mesh.n_vertices, len(times)))
         columns[free] = found.values
         return columns, float(found.errors[0])

@@ -9,7 +9,9 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.retrieval.heat.descriptor import Recipe, ShapeDescriptor
 
 NUMBERS_AT_ONCE = 4_000_000
-SHIFT_PRICE = 0.03  # of one step, for each number compared: cutting changes the area, but seldom for nothing
+SHIFT_PRICE = (
+    0.03  # of one step, for each number compared: cutting changes the area, but seldom for nothing
+)
 
 
 def matching_score(first: ShapeDescriptor, second: ShapeDescriptor) -> float:
@@ -33,7 +35,10 @@ def matching_score(first: ShapeDescriptor, second: ShapeDescriptor) -> float:
 
 
 def matching_scores(
-    query: Float[np.ndarray, "m q"], rows: Float[np.ndarray, "r q"], starts: Int[np.ndarray, " s"], recipe: Recipe
+    query: Float[np.ndarray, "m q"],
+    rows: Float[np.ndarray, "r q"],
+    starts: Int[np.ndarray, " s"],
+    recipe: Recipe,
 ) -> tuple[Float[np.ndarray, " s"], Int[np.ndarray, " s"]]:
     """Score one descriptor against many, whose rows stand below each other from `starts` on.
 
@@ -88,7 +93,9 @@ def _sums_of_nearest(
     return sums
 
 
-def _distances(first: Float[np.ndarray, "m c"], second: Float[np.ndarray, "r c"]) -> Float[np.ndarray, "m r"]:
+def _distances(
+    first: Float[np.ndarray, "m c"], second: Float[np.ndarray, "r c"]
+) -> Float[np.ndarray, "m r"]:
     return cdist(first, second, "cityblock")
 
 

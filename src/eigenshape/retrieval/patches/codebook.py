@@ -58,7 +58,9 @@ class PatchCodebook:
     @cached_property
     def digest(self) -> str:
         """Return the SHA-256 of all numbers."""
-        return sha256(b"".join(getattr(self, field.name).tobytes() for field in fields(self))).hexdigest()
+        return sha256(
+            b"".join(getattr(self, field.name).tobytes() for field in fields(self))
+        ).hexdigest()
 
     @property
     def code_shape(self) -> tuple[int, int, int]:
@@ -100,8 +102,12 @@ def train_codebook(shapes: Sequence[Patches], *, seed: int = 0) -> PatchCodebook
             f"A codebook takes at least {2 * N_WORDS} patches; {len(shapes)} shapes have {count}."
         )
     with one_blas_thread():
-        books = [_trained(np.concatenate([s.numbers[:, base] for s in shapes]), seed) for base in BASES]
-    return PatchCodebook(*(frozen(np.stack(parts).astype(np.float32)) for parts in zip(*books, strict=True)))
+        books = [
+            _trained(np.concatenate([s.numbers[:, base] for s in shapes]), seed) for base in BASES
+        ]
+    return PatchCodebook(
+        *(frozen(np.stack(parts).astype(np.float32)) for parts in zip(*books, strict=True))
+    )
 
 
 @lru_cache(maxsize=1)
@@ -117,7 +123,9 @@ def write_codebook(codebook: PatchCodebook) -> bytes:
     """Return a codebook as the bytes of an npz file, the same for the same numbers."""
     require_type(codebook, PatchCodebook, "codebook")
     file = BytesIO()
-    np.savez_compressed(file, **{field.name: getattr(codebook, field.name) for field in fields(codebook)})
+    np.savez_compressed(
+        file, **{field.name: getattr(codebook, field.name) for field in fields(codebook)}
+    )
     return file.getvalue()
 
 
@@ -137,12 +145,16 @@ def _trained(rows: Float32[np.ndarray, "p c"], seed: int) -> tuple[np.ndarray, .
 
 
 def _scaled(
-    numbers: Float[np.ndarray, "p c"], mean: Float[np.ndarray, " c"], spread: Float[np.ndarray, " c"]
+    numbers: Float[np.ndarray, "p c"],
+    mean: Float[np.ndarray, " c"],
+    spread: Float[np.ndarray, " c"],
 ) -> Float[np.ndarray, "p c"]:
     return np.clip((numbers - mean) / spread, -CLIPPED, CLIPPED)
 
 
-def _mixture(points: Float[np.ndarray, "p d"], seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _mixture(
+    points: Float[np.ndarray, "p d"], seed: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Fit shares, centres and variances of words by expectation and maximisation (Dempster, Laird and Rubin 1977)."""
     centers, labels = kmeans2(points, N_WORDS, minit="++", rng=np.random.default_rng(seed))
     belief, before = np.eye(N_WORDS)[labels], -np.inf
@@ -168,7 +180,9 @@ def _log_joint(
 ) -> Float[np.ndarray, "p w"]:
     """Return for each point and word the logarithm of its density times the word's share, but for a constant."""
     squares = (
-        points**2 @ (1 / variances).T - 2 * points @ (centers / variances).T + (centers**2 / variances).sum(axis=1)
+        points**2 @ (1 / variances).T
+        - 2 * points @ (centers / variances).T
+        + (centers**2 / variances).sum(axis=1)
     )
     return np.asarray(np.log(shares) - 0.5 * (squares + np.log(variances).sum(axis=1)))
 
@@ -195,14 +209,24 @@ def encode_patches(shape: Patches, codebook: PatchCodebook) -> Float32[np.ndarra
     return np.asarray(rooted / np.linalg.norm(rooted, axis=2, keepdims=True), dtype=np.float32)
 
 
-def whitened(shape: Patches, radius: int, codebook: PatchCodebook, place: int) -> Float[np.ndarray, "m d"]:
+def whitened(
+    shape: Patches, radius: int, codebook: PatchCodebook, place: int
+) -> Float[np.ndarray, "m d"]:
     """Turn the numbers at one radius into the whitened ones of a base radius."""
-    scaled = _scaled(shape.numbers[:, radius].astype(np.float64), codebook.means[place], codebook.spreads[place])
+    scaled = _scaled(
+        shape.numbers[:, radius].astype(np.float64), codebook.means[place], codebook.spreads[place]
+    )
     return scaled @ codebook.axes[place]
 
 
-def _fisher(shape: Patches, radius: int, codebook: PatchCodebook, place: int) -> Float[np.ndarray, " v"]:
-    shares, centers, variances = codebook.shares[place], codebook.centers[place], codebook.variances[place]
+def _fisher(
+    shape: Patches, radius: int, codebook: PatchCodebook, place: int
+) -> Float[np.ndarray, " v"]:
+    shares, centers, variances = (
+        codebook.shares[place],
+        codebook.centers[place],
+        codebook.variances[place],
+    )
     points = whitened(shape, radius, codebook, place)
     joint = _log_joint(points, shares, centers, variances)
     belief = np.exp(joint - logsumexp(joint, axis=1, keepdims=True))

@@ -17,7 +17,12 @@ from eigenshape.geometry.requirements import require_describable
 from eigenshape.operators.smoothing import denoise
 from eigenshape.retrieval.patches.codebook import PatchCodebook, encode_patches
 from eigenshape.retrieval.patches.matching import PatchPoints, patch_points
-from eigenshape.retrieval.patches.patches import N_VIEWS, Patches, describe_patch_views, describe_patches
+from eigenshape.retrieval.patches.patches import (
+    N_VIEWS,
+    Patches,
+    describe_patch_views,
+    describe_patches,
+)
 
 FULL = 127  # the largest entry of a code
 
@@ -90,7 +95,9 @@ def seen_patches(mesh: MeshLike, *, n_views: int = N_VIEWS) -> list[Patches]:
     return [describe_patches(clean), *describe_patch_views(clean, n_views=n_views)]
 
 
-def describe_by_patches(mesh: TriangleMesh, recipe: PatchRecipe, *, n_views: int = N_VIEWS) -> PatchDescriptor:
+def describe_by_patches(
+    mesh: TriangleMesh, recipe: PatchRecipe, *, n_views: int = N_VIEWS
+) -> PatchDescriptor:
     """Describe a surface by its patches; see `seen_patches`."""
     return in_words(seen_patches(mesh, n_views=n_views), recipe)
 
@@ -106,7 +113,9 @@ def in_words(patches: Sequence[Patches], recipe: PatchRecipe) -> PatchDescriptor
     require_type(recipe, PatchRecipe, "recipe")
     require_each(patches, Patches, "patches")
     if not patches:
-        raise InvalidParameterError("A descriptor takes patches of a shape, then of its views; there are none.")
+        raise InvalidParameterError(
+            "A descriptor takes patches of a shape, then of its views; there are none."
+        )
     with one_blas_thread():
         codes = np.stack([rounded(encode_patches(each, recipe.codebook)) for each in patches])
         points = tuple(patch_points(each, recipe.codebook) for each in patches)

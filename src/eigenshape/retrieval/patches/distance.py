@@ -22,9 +22,14 @@ def patch_distances(
     (k,) float
         0 for the same vectors, up to 2.
     """
-    cosines = others @ query.transpose(0, 2, 1) / (_lengths(others)[..., None] * _lengths(query)[:, None])
+    cosines = (
+        others @ query.transpose(0, 2, 1) / (_lengths(others)[..., None] * _lengths(query)[:, None])
+    )
     steps = range(1 - query.shape[1], query.shape[1])
-    means = [cosines[:, :, max(step, 0), max(-step, 0)].mean(axis=1) - SIZE_PRICE * abs(step) for step in steps]
+    means = [
+        cosines[:, :, max(step, 0), max(-step, 0)].mean(axis=1) - SIZE_PRICE * abs(step)
+        for step in steps
+    ]
     return 1.0 - np.max(means, axis=0).astype(np.float64)
 
 

@@ -84,13 +84,20 @@ def patch_points(shape: Patches, codebook: PatchCodebook) -> PatchPoints:
     require_type(shape, Patches, "shape")
     require_type(codebook, PatchCodebook, "codebook")
     rows = [
-        whitened(shape, base + size, codebook, place) for place, base in enumerate(BASES) for size in range(N_SIZES)
+        whitened(shape, base + size, codebook, place)
+        for place, base in enumerate(BASES)
+        for size in range(N_SIZES)
     ]
     whitened_rows = np.stack(rows, axis=1)[:, :, :N_MATCHED] / NUMBER_STEP
     numbers = NUMBER_STEP * np.clip(np.rint(whitened_rows), -LARGEST, LARGEST).astype(np.float32)
-    weights, distances = (part.astype(np.float16) for part in (shape.weights.max(axis=1), shape.distances))
+    weights, distances = (
+        part.astype(np.float16) for part in (shape.weights.max(axis=1), shape.distances)
+    )
     return PatchPoints(
-        frozen(numbers), frozen(weights.astype(np.float32)), frozen(distances.astype(np.float32)), shape.vertices
+        frozen(numbers),
+        frozen(weights.astype(np.float32)),
+        frozen(distances.astype(np.float32)),
+        shape.vertices,
     )
 
 
@@ -151,7 +158,9 @@ def _best_start(first: PatchPoints, second: PatchPoints) -> _Matches:
     return max(starts, key=lambda matches: matches.agreement)
 
 
-def _consistent(first: PatchPoints, second: PatchPoints, apart: Float32[np.ndarray, "m n"], step: int) -> _Matches:
+def _consistent(
+    first: PatchPoints, second: PatchPoints, apart: Float32[np.ndarray, "m n"], step: int
+) -> _Matches:
     """Match nearest points, and rate the matches piece by piece, since no distance leads to another piece.
 
     Each piece of the first is matched with one piece of the second, those that agree most first.

@@ -42,5 +42,9 @@ def unpack_points(data: bytes) -> tuple[PatchPoints, ...]:
         numbers = NUMBER_STEP * take(np.dtype("i1"), m * r * d).reshape(m, r, d).astype(np.float32)
         distances = np.zeros((m, m), dtype=np.float32)
         distances[np.triu_indices(m, 1)] = take(HALF, m * (m - 1) // 2)
-        found.append(PatchPoints(frozen(numbers), frozen(weights), frozen(distances + distances.T), frozen(vertices)))
+        found.append(
+            PatchPoints(
+                frozen(numbers), frozen(weights), frozen(distances + distances.T), frozen(vertices)
+            )
+        )
     return tuple(found)

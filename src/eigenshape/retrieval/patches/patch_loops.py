@@ -23,7 +23,14 @@ def describe_discs(rows, chosen, surface, radii, found):
         reach = np.flatnonzero(rows[sample] <= radii[-1])
         order = reach[np.argsort(rows[sample][reach], kind="mergesort")]
         for place in range(len(radii)):
-            _describe_disc(rows[sample], surface[0][chosen[sample]], order, surface, radii[place], found[sample, place])
+            _describe_disc(
+                rows[sample],
+                surface[0][chosen[sample]],
+                order,
+                surface,
+                radii[place],
+                found[sample, place],
+            )
 
 
 @njit
@@ -57,7 +64,11 @@ def _describe_disc(distances, center, order, surface, radius, found):
         kept[ring] += areas[i]
         straight[ring] += areas[i] * (np.sqrt(beeline) / distances[i] if distances[i] > 0 else 1.0)
         _add(found[first : first + TURN_BINS], turn, areas[i])
-        _add(found[first + TURN_BINS : first + TURN_BINS + HEIGHT_BINS], (height / radius + 1) / 2, areas[i])
+        _add(
+            found[first + TURN_BINS : first + TURN_BINS + HEIGHT_BINS],
+            (height / radius + 1) / 2,
+            areas[i],
+        )
     covered = 0.0
     for ring in range(RINGS):
         first = ring * RING_NUMBERS

@@ -98,7 +98,9 @@ def _describe_patches(mesh: TriangleMesh, n_samples: int) -> Patches:
     mesh = normalize_box(mesh)
     areas = dual_volumes(mesh)
     if not areas.sum() > 0:
-        raise InvalidShapeError("A surface must have an area to be described by patches; all its faces have none.")
+        raise InvalidShapeError(
+            "A surface must have an area to be described by patches; all its faces have none."
+        )
     chosen, rows, nearest = farthest_points(mesh, count, reach=RADII[-1])
     numbers = np.empty((len(chosen), len(RADII), NUMBERS), dtype=np.float32)
     describe_discs(rows, chosen, (mesh.vertices, mean_normals(mesh), areas), RADII, numbers)
@@ -107,7 +109,9 @@ def _describe_patches(mesh: TriangleMesh, n_samples: int) -> Patches:
     away = rows[:, rim].min(axis=1) if len(rim) else np.full(len(chosen), np.inf)
     weights = cells[:, None] * np.clip(away[:, None] / (AT_BOUNDARY * RADII), LEAST_WEIGHT, 1.0)
     between = _by_way(rows[:, chosen]).astype(np.float32)
-    return Patches(frozen(numbers), frozen(weights.astype(np.float32)), frozen(chosen), frozen(between))
+    return Patches(
+        frozen(numbers), frozen(weights.astype(np.float32)), frozen(chosen), frozen(between)
+    )
 
 
 def _by_way(near: Float[np.ndarray, "m m"]) -> Float[np.ndarray, "m m"]:
@@ -125,4 +129,7 @@ def describe_patch_views(mesh: MeshLike, *, n_views: int = N_VIEWS) -> list[Patc
     """
     mesh = as_mesh(mesh)
     seen = [(part, describe_patches(part.mesh)) for part in views_of(mesh, n_views)]
-    return [replace(patches, vertices=frozen(part.source_vertices[patches.vertices])) for part, patches in seen]
+    return [
+        replace(patches, vertices=frozen(part.source_vertices[patches.vertices]))
+        for part, patches in seen
+    ]

@@ -22,14 +22,19 @@ def word_distances(
     """Return `view_distances` of the codes of a shape and its views to those of k others."""
     ours = query.astype(np.float32)
     parts = [others[first : first + AT_ONCE] for first in range(0, len(others), AT_ONCE)]
-    return np.concatenate([_distances(ours, [codes.astype(np.float32) for codes in part]) for part in parts])
+    return np.concatenate(
+        [_distances(ours, [codes.astype(np.float32) for codes in part]) for part in parts]
+    )
 
 
 def _distances(
     query: Float[np.ndarray, "u b s v"], others: Sequence[Float[np.ndarray, "_ b s v"]]
 ) -> Float[np.ndarray, " k"]:
     of = np.repeat(np.arange(len(others)), [len(codes) - 1 for codes in others])
-    wholes, views = np.stack([codes[0] for codes in others]), np.concatenate([codes[1:] for codes in others])
+    wholes, views = (
+        np.stack([codes[0] for codes in others]),
+        np.concatenate([codes[1:] for codes in others]),
+    )
     return view_distances(query[0], wholes, views, of, query_views=query[1:])
 
 
@@ -67,7 +72,9 @@ def verified_scores(
     return (distances + WORTH * lacking) / (1 + WORTH)
 
 
-def patch_scores(query: PatchDescriptor, others: Sequence[PatchDescriptor]) -> Float[np.ndarray, " k"]:
+def patch_scores(
+    query: PatchDescriptor, others: Sequence[PatchDescriptor]
+) -> Float[np.ndarray, " k"]:
     """Score a query against described shapes as an index does: by words, the nearest 30 verified.
 
     Parameters
@@ -106,4 +113,8 @@ def shape_agreement(query: PatchDescriptor, other: PatchDescriptor) -> float:
 
 def _nearest_view(one: PatchDescriptor, seen: PatchDescriptor) -> int:
     """Return which view of a shape is nearest to another as a whole."""
-    return 1 + int(patch_distances(*(codes.astype(np.float32) for codes in (one.codes[0], seen.codes[1:]))).argmin())
+    return 1 + int(
+        patch_distances(
+            *(codes.astype(np.float32) for codes in (one.codes[0], seen.codes[1:]))
+        ).argmin()
+    )

@@ -173,7 +173,9 @@ def _require_names(items: Sequence[Item]) -> None:
 
 def _described(describe: Describe, recipes: tuple[AnyRecipe, ...], path: Path) -> _Described:
     """Describe a file, in a worker."""
-    digest = content_digest(path)  # before it is read: a file that changes meanwhile is done again next time
+    digest = content_digest(
+        path
+    )  # before it is read: a file that changes meanwhile is done again next time
     descriptors = tuple(describe(path))
     _require_described(descriptors, recipes)
     return _Described(digest, descriptors)
@@ -182,11 +184,15 @@ def _described(describe: Describe, recipes: tuple[AnyRecipe, ...], path: Path) -
 def _require_described(descriptors: tuple[Descriptor, ...], recipes: tuple[AnyRecipe, ...]) -> None:
     for found in descriptors:
         if not isinstance(found, get_args(Descriptor)):
-            raise InvalidParameterError(f"A describer must return descriptors; it returned {type(found).__name__}.")
+            raise InvalidParameterError(
+                f"A describer must return descriptors; it returned {type(found).__name__}."
+            )
     there = {found.recipe for found in descriptors}
     for recipe in recipes:
         if recipe not in there:
-            raise InvalidParameterError(f"A describer must follow every recipe; {recipe.name!r} has no descriptor.")
+            raise InvalidParameterError(
+                f"A describer must follow every recipe; {recipe.name!r} has no descriptor."
+            )
 
 
 def _keep(index: ShapeIndex, item: Item, found: _Described) -> str | None:

@@ -186,12 +186,22 @@ class ShapeIndex:
         _require_text(name, label, source, digest)
         rows = _packed(name, descriptors)
         with store.writing(self.folder) as before:
-            catalog, shape = _with_shape(before, ShapeRow(0, name, label, source, digest), replace=replace)
+            catalog, shape = _with_shape(
+                before, ShapeRow(0, name, label, source, digest), replace=replace
+            )
             for recipe in dict.fromkeys(descriptor.recipe for descriptor in descriptors):
-                views = [pair for pair in zip(descriptors, rows, strict=True) if pair[0].recipe == recipe]
+                views = [
+                    pair for pair in zip(descriptors, rows, strict=True) if pair[0].recipe == recipe
+                ]
                 self._put(catalog, shape, keep_recipe(catalog, recipe), views)
 
-    def _put(self, catalog: Catalog, shape: int, recipe: int, views: Sequence[tuple[Descriptor, np.ndarray]]) -> None:
+    def _put(
+        self,
+        catalog: Catalog,
+        shape: int,
+        recipe: int,
+        views: Sequence[tuple[Descriptor, np.ndarray]],
+    ) -> None:
         others = [kept for kept in catalog.descriptors if kept.recipe == recipe]
         n_columns = others[0].n_columns if others else views[0][1].shape[1]
         for descriptor, rows in views:
@@ -201,8 +211,19 @@ class ShapeIndex:
         for view, (descriptor, rows) in enumerate(views):
             details = kind_of(descriptor.recipe).details(descriptor)
             offset = store.append_rows(self.folder, catalog.database, recipe, rows)
-            entry = (shape, recipe, view, offset, *rows.shape, crc32(rows.tobytes()), crc32(details), details)
-            catalog.database.execute("INSERT INTO descriptor VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?)", entry)
+            entry = (
+                shape,
+                recipe,
+                view,
+                offset,
+                *rows.shape,
+                crc32(rows.tobytes()),
+                crc32(details),
+                details,
+            )
+            catalog.database.execute(
+                "INSERT INTO descriptor VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?)", entry
+            )
 
     def remove(self, name: str) -> None:
         """Remove a shape. The bytes of its rows stay in the file, so that a reader of the old state still finds them.
@@ -240,7 +261,9 @@ class ShapeIndex:
             _require_columns(descriptor, ours, held.entries[0].kept.n_columns)
             scores = kind.verified(asked, held.restored, kind.scored(asked, held.rows))
             order = np.argsort(scores, kind="stable")
-            firsts = np.unique([held.entries[place].shape.name for place in order], return_index=True)[1]
+            firsts = np.unique(
+                [held.entries[place].shape.name for place in order], return_index=True
+            )[1]
             best = order[np.sort(firsts)[:wanted]].tolist()
             return [_match(asked, held, place, float(scores[place])) for place in best]
 
@@ -258,7 +281,9 @@ class ShapeIndex:
             for place, entry in enumerate(held.entries):
                 if entry.shape.name == name:
                     return held.restored(place)
-        raise StoreError(f"A shape must be described by the recipe asked for; {name!r} is not described by {recipe}.")
+        raise StoreError(
+            f"A shape must be described by the recipe asked for; {name!r} is not described by {recipe}."
+        )
 
 
 def _match(asked: Descriptor, held: Held, place: int, score: float) -> Match:
@@ -269,14 +294,20 @@ def _match(asked: Descriptor, held: Held, place: int, score: float) -> Match:
 
 def _require_text(name: str, *others: str | None) -> None:
     for text in (name, *others):
-        if text is not None and (not isinstance(text, str) or text != text.encode(errors="replace").decode()):
-            raise InvalidParameterError(f"What an index keeps beside numbers must be Unicode text; {text!r} is not.")
+        if text is not None and (
+            not isinstance(text, str) or text != text.encode(errors="replace").decode()
+        ):
+            raise InvalidParameterError(
+                f"What an index keeps beside numbers must be Unicode text; {text!r} is not."
+            )
 
 
 def _packed(name: str, descriptors: Sequence[Descriptor]) -> list[np.ndarray]:
     """Return the rows of descriptors as they are kept, refusing what cannot be."""
     if not descriptors:
-        raise InvalidParameterError(f"A shape needs a descriptor to be found by; {name!r} has none.")
+        raise InvalidParameterError(
+            f"A shape needs a descriptor to be found by; {name!r} has none."
+        )
     return [kind_of(descriptor.recipe).rows(descriptor, name) for descriptor in descriptors]
 
 

@@ -16,7 +16,11 @@ from eigenshape.retrieval.heat.describe import N_VIEWS, describe_mesh, describe_
 from eigenshape.retrieval.heat.descriptor import Recipe, ShapeDescriptor
 from eigenshape.retrieval.heat.score import match_features, matching_scores
 from eigenshape.retrieval.patches.codebook import read_codebook, write_codebook
-from eigenshape.retrieval.patches.descriptor import PatchDescriptor, PatchRecipe, describe_by_patches
+from eigenshape.retrieval.patches.descriptor import (
+    PatchDescriptor,
+    PatchRecipe,
+    describe_by_patches,
+)
 from eigenshape.retrieval.patches.matching import match_patches
 from eigenshape.retrieval.patches.packing import pack_points, unpack_points
 from eigenshape.retrieval.patches.patches import N_VIEWS as N_PATCH_VIEWS
@@ -77,7 +81,9 @@ def _heat_rows(descriptor: ShapeDescriptor, name: str) -> np.ndarray:
     bad = np.argwhere(~np.isfinite(single))
     if bad.size or not rows.size:
         where = f"entry {bad[0].tolist()} is {rows[tuple(bad[0])]}" if bad.size else "it has none"
-        raise InvalidParameterError(f"A descriptor must hold finite single-precision numbers; of {name!r} {where}.")
+        raise InvalidParameterError(
+            f"A descriptor must hold finite single-precision numbers; of {name!r} {where}."
+        )
     if descriptor.vertices.shape != rows.shape[:1]:
         raise InvalidParameterError(
             f"A descriptor must name one vertex a feature; of {name!r} {len(rows)} features have vertices of shape "
@@ -88,14 +94,19 @@ def _heat_rows(descriptor: ShapeDescriptor, name: str) -> np.ndarray:
 
 def _heat_scored(query: ShapeDescriptor, rows: Sequence[np.ndarray]) -> Scores:
     starts = np.cumsum([0, *(len(each) for each in rows)])[:-1]
-    return matching_scores(query.vectors, np.concatenate(rows).astype(np.float64), starts, query.recipe)[0]
+    return matching_scores(
+        query.vectors, np.concatenate(rows).astype(np.float64), starts, query.recipe
+    )[0]
 
 
 HEAT = Kind(
     name="heat",
     n_views=N_VIEWS,
     to_ask=lambda mesh, recipe: describe_mesh(mesh, recipe).descriptor,
-    to_keep=lambda mesh, recipe, n: [describe_mesh(mesh, recipe).descriptor, *describe_views(mesh, recipe, n_views=n)],
+    to_keep=lambda mesh, recipe, n: [
+        describe_mesh(mesh, recipe).descriptor,
+        *describe_views(mesh, recipe, n_views=n),
+    ],
     row=np.dtype("<f4"),
     rows=_heat_rows,
     details=lambda descriptor: descriptor.vertices.astype(VERTEX).tobytes(),
@@ -120,8 +131,12 @@ PATCHES = Kind(
     row=np.dtype("i1"),
     rows=lambda descriptor, name: descriptor.codes.reshape(-1, descriptor.codes.shape[-1]),
     details=lambda descriptor: pack_points(descriptor.points),
-    restored=lambda rows, details, recipe: PatchDescriptor(_codes(rows, recipe), unpack_points(details), recipe),
-    scored=lambda query, rows: word_distances(query.codes, [_codes(each, query.recipe) for each in rows]),
+    restored=lambda rows, details, recipe: PatchDescriptor(
+        _codes(rows, recipe), unpack_points(details), recipe
+    ),
+    scored=lambda query, rows: word_distances(
+        query.codes, [_codes(each, query.recipe) for each in rows]
+    ),
     verified=verified_scores,
     paired=lambda first, second: match_patches(first.points[0], second.points[0]).points,
 )
@@ -154,7 +169,9 @@ def describe_shape(mesh: MeshLike, recipe: AnyRecipe) -> Descriptor:
     return kind_of(recipe).to_ask(mesh, recipe)
 
 
-def describe_to_keep(mesh: MeshLike, recipe: AnyRecipe, *, n_views: int | None = None) -> list[Descriptor]:
+def describe_to_keep(
+    mesh: MeshLike, recipe: AnyRecipe, *, n_views: int | None = None
+) -> list[Descriptor]:
     """Describe a surface as an index keeps it: with what single viewpoints see of it if it is closed.
 
     Parameters

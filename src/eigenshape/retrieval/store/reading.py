@@ -44,7 +44,9 @@ def held_by(folder: Path, catalog: Catalog, recipe: AnyRecipe) -> Held:
     """
     number = catalog.recipe_id(recipe)
     shapes = {shape.id: shape for shape in catalog.shapes}
-    entries = [Entry(shapes[kept.shape], kept) for kept in catalog.descriptors if kept.recipe == number]
+    entries = [
+        Entry(shapes[kept.shape], kept) for kept in catalog.descriptors if kept.recipe == number
+    ]
     if number is None or not entries:
         used = {kept.recipe for kept in catalog.descriptors}
         there = sorted(str(other.name) for number, other in catalog.recipes() if number in used)
@@ -56,4 +58,9 @@ def held_by(folder: Path, catalog: Catalog, recipe: AnyRecipe) -> Held:
     path = store.rows_path(folder, number)
     data = memoryview(path.read_bytes() if path.exists() else b"")
     row = kind_of(recipe).row
-    return Held(recipe, catalog, entries, [store.read_rows(data, entry.kept, row, path) for entry in entries])
+    return Held(
+        recipe,
+        catalog,
+        entries,
+        [store.read_rows(data, entry.kept, row, path) for entry in entries],
+    )

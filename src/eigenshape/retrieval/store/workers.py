@@ -74,7 +74,10 @@ def in_workers(
     try:
         with _sigint_deferred():
             _ = pool.active  # starts the processes, and the threads that replace those that die
-        futures = {pool.schedule(_work, args=[work, item.path], timeout=workers.timeout): item for item in items}
+        futures = {
+            pool.schedule(_work, args=[work, item.path], timeout=workers.timeout): item
+            for item in items
+        }
         for number, future in enumerate(as_completed(futures)):
             if number == 0:
                 _require_started(future)
@@ -133,7 +136,9 @@ def _require_main_guard() -> None:
 
     Quietly: the process that waits for it says why.
     """
-    if getattr(multiprocessing.current_process(), "_inheriting", False):  # as multiprocessing itself tells
+    if getattr(
+        multiprocessing.current_process(), "_inheriting", False
+    ):  # as multiprocessing itself tells
         raise SystemExit(1)
 
 

@@ -82,7 +82,11 @@ class Brackets:
 
 @one_blas_thread()
 def bracket_eigenvalues(
-    mesh: MeshLike, k: SupportsIndex, *, boundary: Condition = "neumann", progress: Progress | None = None
+    mesh: MeshLike,
+    k: SupportsIndex,
+    *,
+    boundary: Condition = "neumann",
+    progress: Progress | None = None,
 ) -> Brackets:
     """Bound each of the k lowest eigenvalues of a mesh from both sides, as the shape of flat simplices that it is.
 
@@ -159,7 +163,9 @@ def _upper_bounds(
     n_free = conforming.n_points - len(held)
     if boundary == "dirichlet" and not (len(held) and n_free):
         fact = f"{mesh!r} has {len(held)} points on its boundary and {n_free} inside"
-        raise InvalidParameterError(f"boundary='dirichlet' needs a boundary and points inside; {fact}.")
+        raise InvalidParameterError(
+            f"boundary='dirichlet' needs a boundary and points inside; {fact}."
+        )
     count = whole_number(k, "k", 1, n_free)
     laplacian = cotangent_laplacian(conforming, "consistent")
     found = solve_free(laplacian, count, held, partly(progress, 0.0, 0.3))
@@ -175,4 +181,6 @@ def _n_zero(table: FacetTable, held: Int[np.ndarray, " h"]) -> int:
 
 def _require_condition(boundary: str) -> None:
     if boundary not in ("neumann", "dirichlet"):
-        raise InvalidParameterError(f"boundary must be 'neumann' or 'dirichlet'; it is {boundary!r}.")
+        raise InvalidParameterError(
+            f"boundary must be 'neumann' or 'dirichlet'; it is {boundary!r}."
+        )

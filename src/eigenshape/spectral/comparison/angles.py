@@ -11,7 +11,12 @@ from eigenshape._arrays import frozen, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.spectral.comparison.eigenspaces import SEPARATED, orthonormal, outside, separated_groups
+from eigenshape.spectral.comparison.eigenspaces import (
+    SEPARATED,
+    orthonormal,
+    outside,
+    separated_groups,
+)
 from eigenshape.spectral.solver.certify import quality
 from eigenshape.spectral.solver.kernel_values import to_pencil
 from eigenshape.spectral.solver.pairs import Pairs, spread
@@ -124,7 +129,10 @@ def eigenspace_angles(
         angles[place] = _largest_angle(one, group, pulled)
         bounds[place] = np.pi / 2 if exact is None else _bound(*exact, group, pulled)
     steps = np.concatenate([[np.inf], np.diff(one.eigenvalues)])
-    starts, stops = (np.array([getattr(group, end) for group in groups], dtype=np.int64) for end in ("start", "stop"))
+    starts, stops = (
+        np.array([getattr(group, end) for group in groups], dtype=np.int64)
+        for end in ("start", "stop")
+    )
     return EigenspaceAngles(
         starts=frozen(starts),
         stops=frozen(stops),
@@ -141,9 +149,13 @@ def _partners(one: Spectrum, two: Spectrum, points: ArrayLike | None) -> Int[np.
             f"Spectra on different numbers of points, {n_one} and {n_two}, need to be told which point of two belongs "
             f"to each point of one. Pass points."
         )
-    partners = whole_numbers(np.arange(n_one) if points is None else points, "a point of two", 0, n_two - 1)
+    partners = whole_numbers(
+        np.arange(n_one) if points is None else points, "a point of two", 0, n_two - 1
+    )
     if len(partners) != n_one:
-        raise InvalidParameterError(f"points must name one for each of {n_one} points; there are {len(partners)}.")
+        raise InvalidParameterError(
+            f"points must name one for each of {n_one} points; there are {len(partners)}."
+        )
     return partners
 
 
@@ -164,7 +176,9 @@ def _unit_pairs(one: Spectrum, laplacian: Laplacian) -> tuple[Pencil, Pairs]:
             f"{len(one.eigenvectors)} points."
         )
     if one.certificate.count is None:
-        raise InvalidParameterError("Bounds of angles need a spectrum without gaps; one was not counted.")
+        raise InvalidParameterError(
+            "Bounds of angles need a spectrum without gaps; one was not counted."
+        )
     pencil = normalise(laplacian)
     values = np.ldexp(to_pencil(laplacian.kernel, one.eigenvalues), -pencil.value_exponent)
     vectors = np.ldexp(one.eigenvectors, -pencil.vector_exponent)
@@ -183,7 +197,9 @@ def _bound(pencil: Pencil, pairs: Pairs, group: slice, pulled: Vectors) -> float
     size = np.sqrt(max(np.linalg.eigvalsh(squares)[-1], 0.0) / pencil.mass_floor)
     own = float(np.linalg.norm(pairs.residuals[group]))
     turned = _sine_bound(float(size), _distance(pairs, group, np.linalg.eigvalsh(inner)))
-    return min(turned + _sine_bound(own, _distance(pairs, group, pairs.values[group])), float(np.pi / 2))
+    return min(
+        turned + _sine_bound(own, _distance(pairs, group, pairs.values[group])), float(np.pi / 2)
+    )
 
 
 def _distance(pairs: Pairs, group: slice, inside: Float[np.ndarray, " p"]) -> float:

@@ -60,8 +60,12 @@ def eigenspace_errors(
     for group in _equal_runs(values[: functions.shape[1]]):
         found = spectrum.eigenvectors[:, group.start : min(group.stop, count)]
         if found.shape[1]:
-            basis = orthonormal(functions[:, group], spectrum.mass, f"functions {group.start} to {group.stop - 1}")
-            errors[group.start : group.stop] = norms(outside(found, basis, spectrum.mass), spectrum.mass)
+            basis = orthonormal(
+                functions[:, group], spectrum.mass, f"functions {group.start} to {group.stop - 1}"
+            )
+            errors[group.start : group.stop] = norms(
+                outside(found, basis, spectrum.mass), spectrum.mass
+            )
     return np.minimum(errors, 1.0)
 
 
@@ -70,10 +74,14 @@ def _require_functions(
 ) -> None:
     n, shape = len(spectrum.eigenvectors), functions.shape
     if shape[0] != n or not shape[1]:
-        raise InvalidParameterError(f"functions must have one row for each of {n} points; the shape is {shape}.")
+        raise InvalidParameterError(
+            f"functions must have one row for each of {n} points; the shape is {shape}."
+        )
     bad = np.flatnonzero(~np.isfinite(functions).all(axis=1))
     if bad.size:
-        raise InvalidParameterError(f"functions must be finite; row {bad[0]} is not ({bad.size} such).")
+        raise InvalidParameterError(
+            f"functions must be finite; row {bad[0]} is not ({bad.size} such)."
+        )
     falling = np.flatnonzero(np.diff(values) < 0)
     if falling.size:
         i = int(falling[0])
@@ -149,7 +157,9 @@ def separated_groups(eigenvalues: ArrayLike, *, ratio: float = SEPARATED) -> lis
     return _slices(ends)
 
 
-def orthonormal(columns: Float[np.ndarray, "n p"], mass: sp.sparray, name: str) -> Float[np.ndarray, "n p"]:
+def orthonormal(
+    columns: Float[np.ndarray, "n p"], mass: sp.sparray, name: str
+) -> Float[np.ndarray, "n p"]:
     """Return a basis of the span of these columns that is orthonormal in B.
 
     Twice by Cholesky, of columns made of one length first: as orthonormal as rounding lets it be for all that pass

@@ -72,7 +72,11 @@ class SpectrumComparison:
 
     def explain(self) -> str:
         """Say in plain words how far the spectra are apart, and what of it is proved."""
-        k, n_told, worst = len(self.one), int(self.told.sum()), int(np.abs(self.one - self.two).argmax())
+        k, n_told, worst = (
+            len(self.one),
+            int(self.told.sum()),
+            int(np.abs(self.one - self.two).argmax()),
+        )
         bars = "brackets of the shapes'" if self.bracketed else "error bars of the operators'"
         return (
             f"Of the {k} lowest eigenvalues, number {worst} changes most, from {self.one[worst]:.6g} to "
@@ -113,7 +117,10 @@ def compare_spectra(
     zeros = bars[0][:, 0] <= 0, bars[1][:, 0] <= 0
     if brackets is not None:
         require_each(brackets, Brackets, "brackets")
-        bars = [within_brackets(each, k, name) for each, name in zip(brackets, ("one", "two"), strict=True)]
+        bars = [
+            within_brackets(each, k, name)
+            for each, name in zip(brackets, ("one", "two"), strict=True)
+        ]
     return SpectrumComparison(
         one=frozen(values[0]),
         two=frozen(values[1]),
@@ -196,4 +203,6 @@ def _farthest(values: Float[np.ndarray, " k"], others: Float[np.ndarray, " j"]) 
     told = values[values <= others[-1]]
     above = np.searchsorted(others, told)
     below = np.maximum(above - 1, 0)
-    return float(np.minimum(np.abs(others[above] - told), np.abs(told - others[below])).max(initial=0.0))
+    return float(
+        np.minimum(np.abs(others[above] - told), np.abs(told - others[below])).max(initial=0.0)
+    )

@@ -42,7 +42,9 @@ def distance(expected: Laplacian, found: Laplacian) -> tuple[float, str]:
 def _largest_change(name: str, expected: sp.csr_array, found: sp.csr_array) -> tuple[float, str]:
     change = (found - expected).tocoo()
     roots = sizes_of(expected)
-    relative = np.abs(change.data) / np.maximum(roots[change.row] * roots[change.col], np.finfo(float).tiny)
+    relative = np.abs(change.data) / np.maximum(
+        roots[change.row] * roots[change.col], np.finfo(float).tiny
+    )
     if not relative.any():
         return 0.0, f"no entry of {name} changes"
     worst = int(relative.argmax())
@@ -51,7 +53,9 @@ def _largest_change(name: str, expected: sp.csr_array, found: sp.csr_array) -> t
     return float(relative[worst]), f"{where}, {relative[worst]:.1e} of √({name}_ii {name}_jj)"
 
 
-def same_eigenvalues(name: str, found: Laplacian, spectrum: Spectrum, allowed: float, *, copies: int = 1) -> Outcome:
+def same_eigenvalues(
+    name: str, found: Laplacian, spectrum: Spectrum, allowed: float, *, copies: int = 1
+) -> Outcome:
     """Compare the lowest eigenvalues, whatever the order of the rows, with those of so many copies of an operator."""
     n_rows, k = copies * len(spectrum.eigenvectors), len(spectrum.eigenvalues)
     if found.n_points != n_rows:
@@ -62,9 +66,13 @@ def same_eigenvalues(name: str, found: Laplacian, spectrum: Spectrum, allowed: f
         return NotJudged(name, str(err))
     expected = np.repeat(spectrum.eigenvalues, copies)[:k]
     change, worst = spectral_distance(expected, lowest.eigenvalues)
-    allowed += float(spectrum.residuals.max() + lowest.residuals.max()) / (float(expected[-1]) or 1.0)
+    allowed += float(spectrum.residuals.max() + lowest.residuals.max()) / (
+        float(expected[-1]) or 1.0
+    )
     if allowed > MOST_ROUNDING:
-        return NotJudged(name, f"rounding may change eigenvalues by {allowed:.0e} of the last: elements are thin")
+        return NotJudged(
+            name, f"rounding may change eigenvalues by {allowed:.0e} of the last: elements are thin"
+        )
     says = (
         f"of the {len(expected)} lowest eigenvalues, {worst} changes most, from {expected[worst]:.6g} to "
         f"{lowest.eigenvalues[worst]:.6g}, {change:.1e} of the last; rounding takes up to {allowed:.1e}."
@@ -72,7 +80,9 @@ def same_eigenvalues(name: str, found: Laplacian, spectrum: Spectrum, allowed: f
     return judged(name, change, allowed, says)
 
 
-def spectral_distance(expected: Float[np.ndarray, " k"], found: Float[np.ndarray, " k"]) -> tuple[float, int]:
+def spectral_distance(
+    expected: Float[np.ndarray, " k"], found: Float[np.ndarray, " k"]
+) -> tuple[float, int]:
     """Return the largest change of an eigenvalue relative to the last, and its index."""
     change = np.abs(found - expected) / (float(expected[-1]) or 1.0)
     worst = int(change.argmax())
@@ -81,7 +91,9 @@ def spectral_distance(expected: Float[np.ndarray, " k"], found: Float[np.ndarray
 
 def lowest_eigenvalues(laplacian: Laplacian, k: int = N_EIGENVALUES) -> Spectrum:
     """Solve the pencil itself, whatever correction its kernel has."""
-    return solve_spectrum(Laplacian(laplacian.stiffness, laplacian.mass), min(k, laplacian.n_points))
+    return solve_spectrum(
+        Laplacian(laplacian.stiffness, laplacian.mass), min(k, laplacian.n_points)
+    )
 
 
 def permuted(laplacian: Laplacian, old_of_new: Int[np.ndarray, " n"]) -> Laplacian:

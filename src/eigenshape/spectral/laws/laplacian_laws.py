@@ -39,13 +39,18 @@ NEGATIVE = 1e-9  # of trace W / trace B
 # Shifts in trace W / trace B, from what rounding leaves of a zero upwards.
 LADDER = 10.0 ** np.arange(-12, 4)
 FIRST_LINE = 1e-14  # in the same unit: between zero and not zero
-LARGEST_ZERO = 1e-6  # up to where rounding, or constants that are not annihilated, may move that line
+LARGEST_ZERO = (
+    1e-6  # up to where rounding, or constants that are not annihilated, may move that line
+)
 NUDGES = (1.0, 1.07, 0.93, 1.15)
 
 
 @one_blas_thread()
 def check_laplacian(
-    laplacian: Laplacian, shape: ShapeLike | sp.sparray | None = None, *, promises: Iterable[Promise] = DEFAULT_PROMISES
+    laplacian: Laplacian,
+    shape: ShapeLike | sp.sparray | None = None,
+    *,
+    promises: Iterable[Promise] = DEFAULT_PROMISES,
 ) -> OperatorReport:
     """Judge the laws that can be read off the two matrices.
 
@@ -98,7 +103,12 @@ def _symmetry(name: str, matrix: sp.csr_array) -> Law:
     off = abs(matrix - matrix.T).tocoo()
     largest = float(np.abs(matrix.data).max(initial=0.0)) or 1.0
     worst = float(off.data.max(initial=0.0)) / largest
-    return judged(name, worst, ASYMMETRY, f"entries (i, j) and (j, i) differ by at most {worst:.1e} of the largest.")
+    return judged(
+        name,
+        worst,
+        ASYMMETRY,
+        f"entries (i, j) and (j, i) differ by at most {worst:.1e} of the largest.",
+    )
 
 
 def _mass(laplacian: Laplacian) -> tuple[Law, Pencil]:
@@ -108,9 +118,13 @@ def _mass(laplacian: Laplacian) -> tuple[Law, Pencil]:
         pencil = normalise(laplacian)
     except InvalidParameterError as err:
         diagonal = sp.diags_array(laplacian.mass.diagonal()).tocsr()
-        return Law(name, False, 1.0, 0.0, str(err)), normalise(Laplacian(laplacian.stiffness, diagonal))
+        return Law(name, False, 1.0, 0.0, str(err)), normalise(
+            Laplacian(laplacian.stiffness, diagonal)
+        )
     floor = pencil.mass_floor
-    return Law(name, True, 0.0, 0.0, f"B is positive definite: it is at least {floor:.3g} of its diagonal."), pencil
+    return Law(
+        name, True, 0.0, 0.0, f"B is positive definite: it is at least {floor:.3g} of its diagonal."
+    ), pencil
 
 
 def _factor(pencil: Pencil, share: float) -> Factor | None:
@@ -129,13 +143,20 @@ def _semidefinite(pencil: Pencil) -> Law:
     for share in LADDER:
         factor = _factor(pencil, -float(share))
         if factor and factor.count == 0:
-            return judged("positive semidefinite", float(share), NEGATIVE, _bounded_below(pencil, factor, float(share)))
+            return judged(
+                "positive semidefinite",
+                float(share),
+                NEGATIVE,
+                _bounded_below(pencil, factor, float(share)),
+            )
     says = f"eigenvalues lie below -{LADDER[-1]:.0e} trace W / trace B."
     return judged("positive semidefinite", np.inf, NEGATIVE, says)
 
 
 def _bounded_below(pencil: Pencil, factor: Factor, share: float) -> str:
-    bound = -factor.shift + float((rounding(factor) / pencil.mass_diagonal).max()) / pencil.mass_floor
+    bound = (
+        -factor.shift + float((rounding(factor) / pencil.mass_diagonal).max()) / pencil.mass_floor
+    )
     says = f"W + {share:.0e} (trace W / trace B) B has no negative pivot"
     if share > LADDER[0]:
         says = f"{says}, and some with {share / 10:.0e}"
@@ -164,7 +185,9 @@ def _kernel(laplacian: Laplacian, pencil: Pencil) -> Law:
     n_parts, labels = _graph_parts(laplacian.stiffness)
     energies = np.abs(np.bincount(labels, weights=pencil.stiffness.sum(axis=1)))
     masses = np.bincount(labels, weights=pencil.mass.sum(axis=1))
-    energy = float((energies / np.maximum(np.abs(masses), np.finfo(float).tiny)).max()) / pencil.level
+    energy = (
+        float((energies / np.maximum(np.abs(masses), np.finfo(float).tiny)).max()) / pencil.level
+    )
     line = min(max(FIRST_LINE, 4 * energy), LARGEST_ZERO)
     while (zeros := _zeros(pencil, line)) < n_parts and line < LARGEST_ZERO:
         line *= 10  # what rounding makes of a zero may lie farther out; a larger interval holds no fewer
@@ -188,7 +211,9 @@ def _graph_parts(matrix: sp.csr_array) -> tuple[int, Int[np.ndarray, " n"]]:
 def _components(laplacian: Laplacian, shape: Subject | None) -> Outcome:
     if shape is None or isinstance(shape, PointCloud):
         return NotJudged("components", "no mesh or graph says what belongs together")
-    n_parts, labels = _graph_parts(shape) if isinstance(shape, sp.csr_array) else vertex_components(shape)
+    n_parts, labels = (
+        _graph_parts(shape) if isinstance(shape, sp.csr_array) else vertex_components(shape)
+    )
     if len(labels) != laplacian.n_points:
         return _number_of_parts(laplacian, n_parts)
     worst, says = 0.0, "no entry of W or B joins two of them."
@@ -202,10 +227,14 @@ def _components(laplacian: Laplacian, shape: Subject | None) -> Outcome:
 
 def _number_of_parts(laplacian: Laplacian, n_parts: int) -> Law:
     found = _graph_parts(laplacian.stiffness)[0]
-    return judged("components", abs(found - n_parts), 0, f"the shape has {n_parts}, and W has {found}.")
+    return judged(
+        "components", abs(found - n_parts), 0, f"the shape has {n_parts}, and W has {found}."
+    )
 
 
-def _largest_link(matrix: sp.csr_array, labels: Int[np.ndarray, " n"]) -> tuple[float, tuple[int, int]]:
+def _largest_link(
+    matrix: sp.csr_array, labels: Int[np.ndarray, " n"]
+) -> tuple[float, tuple[int, int]]:
     entries, roots = matrix.tocoo(), sizes_of(matrix)
     scaled = np.abs(entries.data) / (roots[entries.row] * roots[entries.col])
     scaled[labels[entries.row] == labels[entries.col]] = 0.0
@@ -220,7 +249,9 @@ def _definite(pencil: Pencil) -> Law:
     count = _count(pencil, share)
     if count is None:
         return judged("definite", np.inf, 0, "no factor near zero has its pivots on the diagonal.")
-    return judged("definite", count, 0, f"below {share:.0e} trace W / trace B lie {count} of the eigenvalues.")
+    return judged(
+        "definite", count, 0, f"below {share:.0e} trace W / trace B lie {count} of the eigenvalues."
+    )
 
 
 def _volume(laplacian: Laplacian, shape: Subject | None) -> Outcome:

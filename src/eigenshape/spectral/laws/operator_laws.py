@@ -132,7 +132,9 @@ def check_operator(
     subject = changes.as_subject(shape)
     laplacian = build(subject)
     if not isinstance(laplacian, Laplacian):
-        raise InvalidParameterError(f"build must return a Laplacian; it returned a {type(laplacian).__name__}.")
+        raise InvalidParameterError(
+            f"build must return a Laplacian; it returned a {type(laplacian).__name__}."
+        )
     report = check_laplacian(laplacian, subject, promises=promised)
     rows_are_points = laplacian.n_points == _n_points(subject) if by_points is None else by_points
     spectrum = None if rows_are_points else _spectrum(laplacian)
@@ -169,10 +171,18 @@ def _attempt(name: str, law: Callable[[Trial], Outcome], trial: Trial) -> Outcom
     try:
         return law(trial)
     except (EigenshapeError, ValueError, ArithmeticError) as err:
-        return Law(name, False, np.inf, trial.allowed, f"told otherwise, the shape or its spectrum is refused: {err}")
+        return Law(
+            name,
+            False,
+            np.inf,
+            trial.allowed,
+            f"told otherwise, the shape or its spectrum is refused: {err}",
+        )
 
 
-def _rounding(build: Build, subject: Subject, expected: Laplacian | Spectrum, rng: np.random.Generator) -> float:
+def _rounding(
+    build: Build, subject: Subject, expected: Laplacian | Spectrum, rng: np.random.Generator
+) -> float:
     if isinstance(subject, sp.csr_array):
         return ROUNDING
     try:
@@ -192,14 +202,21 @@ def _jiggle(expected: Laplacian | Spectrum, other: Laplacian) -> float:
 def _repetition(trial: Trial) -> Outcome:
     again = trial.build(trial.subject)
     pairs = [(again.stiffness, trial.laplacian.stiffness), (again.mass, trial.laplacian.mass)]
-    n_changed = sum((one != two).nnz if one.shape == two.shape else max(one.nnz, two.nnz) for one, two in pairs)
+    n_changed = sum(
+        (one != two).nnz if one.shape == two.shape else max(one.nnz, two.nnz) for one, two in pairs
+    )
     return judged("repetition", n_changed, 0, f"built twice, {n_changed} entries differ.")
 
 
 def _point_order(trial: Trial) -> Outcome:
     old_of_new = trial.rng.permutation(_n_points(trial.subject))
     other = trial.build(changes.renumbered(trial.subject, old_of_new))
-    return _agree("point order", trial, other, permuted(trial.laplacian, old_of_new) if trial.by_points else None)
+    return _agree(
+        "point order",
+        trial,
+        other,
+        permuted(trial.laplacian, old_of_new) if trial.by_points else None,
+    )
 
 
 def _simplex_order(trial: Trial) -> Outcome:
@@ -235,7 +252,10 @@ def _scaling(trial: Trial) -> Outcome:
 def _doublings(trial: Trial) -> int:
     """Measure how W and B grow with the shape, and say how far it may."""
     few = 20
-    traces = [_unit_traces(trial.build(changes.rescaled(trial.subject, 2.0**power)))[2:] for power in (0, few)]
+    traces = [
+        _unit_traces(trial.build(changes.rescaled(trial.subject, 2.0**power)))[2:]
+        for power in (0, few)
+    ]
     growth = max(np.abs(np.log2(traces[1]) - np.log2(traces[0]))) / few
     return next((power for power in DOUBLINGS if growth * power <= LARGEST_EXPONENT), few)
 
@@ -244,7 +264,9 @@ def _scaled(trial: Trial, power: int) -> Law:
     """Compare W and B after division by their traces, and the ratio of the traces with 1/length²."""
     other = trial.build(changes.rescaled(trial.subject, 2.0**power))
     here, there = _unit_traces(trial.laplacian), _unit_traces(other)
-    law = same_entries("scaling", Laplacian(there[0], there[1]), Laplacian(here[0], here[1]), trial.allowed)
+    law = same_entries(
+        "scaling", Laplacian(there[0], there[1]), Laplacian(here[0], here[1]), trial.allowed
+    )
     unit = f"in a unit 2^{power} (1e{power * np.log10(2):+.0f}) times as large,"
     if not law.holds or isinstance(trial.subject, sp.csr_array):
         return judged("scaling", law.measured, law.allowed, f"{unit} {law.says}")
@@ -263,11 +285,15 @@ def _union(trial: Trial) -> Outcome:
     other = trial.build(changes.doubled(trial.subject))
     rounding = trial.rounding
     if not isinstance(trial.subject, sp.csr_array):
-        rounding *= changes.APART  # the coordinates of a copy that far away are so many times coarser
+        rounding *= (
+            changes.APART
+        )  # the coordinates of a copy that far away are so many times coarser
     if rounding > MOST_ROUNDING:
         return _drowned("union", rounding)
     if trial.by_points:
-        twice = Laplacian(*(sp.csr_array(sp.block_diag([matrix, matrix])) for matrix in matrices(trial.laplacian)))
+        twice = Laplacian(
+            *(sp.csr_array(sp.block_diag([matrix, matrix])) for matrix in matrices(trial.laplacian))
+        )
         return same_entries("union", other, twice, rounding)
     if trial.spectrum is None:
         return _unsolved("union")
@@ -276,7 +302,8 @@ def _union(trial: Trial) -> Outcome:
 
 def _drowned(name: str, rounding: float) -> NotJudged:
     return NotJudged(
-        name, f"rounding of coordinates may change W by {rounding:.0e}: simplices are thin, or the operator is unstable"
+        name,
+        f"rounding of coordinates may change W by {rounding:.0e}: simplices are thin, or the operator is unstable",
     )
 
 

@@ -69,9 +69,17 @@ class OperatorReport:
     def explain(self) -> str:
         """Say law by law what holds, what does not and what was not judged."""
         broken = sum(not law.holds for law in self.laws)
-        head = f"All {len(self.laws)} laws hold." if self.passed else f"{broken} of {len(self.laws)} laws are broken."
-        judged = [f"{'holds ' if law.holds else 'BROKEN'}  {law.name}: {law.says}" for law in self.laws]
-        return "\n".join([head, *judged, *(f"not judged  {law.name}: {law.reason}" for law in self.not_judged)])
+        head = (
+            f"All {len(self.laws)} laws hold."
+            if self.passed
+            else f"{broken} of {len(self.laws)} laws are broken."
+        )
+        judged = [
+            f"{'holds ' if law.holds else 'BROKEN'}  {law.name}: {law.says}" for law in self.laws
+        ]
+        return "\n".join(
+            [head, *judged, *(f"not judged  {law.name}: {law.reason}" for law in self.not_judged)]
+        )
 
 
 def judged(name: str, measured: float, allowed: float, says: str) -> Law:
@@ -94,7 +102,9 @@ def known_promises(promises: Iterable[Promise]) -> frozenset[Promise]:
     given = frozenset(promises)
     unknown = sorted(given - frozenset(get_args(Promise)), key=str)
     if unknown:
-        raise InvalidParameterError(f"promises must be among {', '.join(get_args(Promise))}; {unknown[0]!r} is not.")
+        raise InvalidParameterError(
+            f"promises must be among {', '.join(get_args(Promise))}; {unknown[0]!r} is not."
+        )
     return given
 
 

@@ -49,14 +49,18 @@ class FunctionalMap:
         require_one_constant(self.source, "source")
         require_one_constant(self.target, "target")
         most = len(self.target.eigenvalues), len(self.source.eigenvalues)
-        if self.matrix.ndim != 2 or not all(1 <= k <= n for k, n in zip(self.matrix.shape, most, strict=True)):
+        if self.matrix.ndim != 2 or not all(
+            1 <= k <= n for k, n in zip(self.matrix.shape, most, strict=True)
+        ):
             raise InvalidParameterError(
                 f"A functional map must have a row for each mode of the target and a column for each of the source, at "
                 f"most {most}; its shape is {self.matrix.shape}."
             )
         bad = np.argwhere(~np.isfinite(self.matrix))
         if len(bad):
-            raise InvalidParameterError(f"The matrix of a map must be finite; entry {bad[0].tolist()} is not.")
+            raise InvalidParameterError(
+                f"The matrix of a map must be finite; entry {bad[0].tolist()} is not."
+            )
         object.__setattr__(self, "matrix", frozen(self.matrix))
 
 
@@ -69,7 +73,9 @@ def require_one_constant(spectrum: Spectrum, name: str) -> None:
         For parts of a spectrum, fixed boundaries, disconnected shapes, and fewer than two modes.
     """
     if len(spectrum.eigenvalues) < 2:
-        raise InvalidParameterError(f"A map needs at least 2 modes of each shape; the {name} has 1. Solve for more.")
+        raise InvalidParameterError(
+            f"A map needs at least 2 modes of each shape; the {name} has 1. Solve for more."
+        )
     if spectrum.eigenvalues[1] <= NULL * spectrum.eigenvalues[-1]:
         raise InvalidParameterError(
             f"Maps are between connected shapes; the {name} has eigenvalues {spectrum.eigenvalues[0]:.3g} and "
@@ -94,7 +100,9 @@ def modes_of_both(source: Spectrum, target: Spectrum, n_modes: SupportsIndex) ->
     """
     for spectrum, name in ((source, "source"), (target, "target")):
         require_one_constant(spectrum, name)
-    return whole_number(n_modes, "n_modes", 2, min(len(source.eigenvalues), len(target.eigenvalues)))
+    return whole_number(
+        n_modes, "n_modes", 2, min(len(source.eigenvalues), len(target.eigenvalues))
+    )
 
 
 def point_areas(spectrum: Spectrum) -> Float[np.ndarray, " n"]:
@@ -149,18 +157,24 @@ def functional_map(
     ours, theirs = unit_modes(source, k)[ends[:, 0]], unit_modes(target, k)[ends[:, 1]]
     weights = (np.linalg.norm(ours, axis=1) * np.linalg.norm(theirs, axis=1))[:, None] ** -0.5
     return FunctionalMap(
-        _least_squares(weights * ours, weights * theirs, _commutators(source, target, k)), source, target
+        _least_squares(weights * ours, weights * theirs, _commutators(source, target, k)),
+        source,
+        target,
     )
 
 
 def _commutators(source: Spectrum, target: Spectrum, k: int) -> Float[np.ndarray, "k k"]:
     """Return λ'_i - λ_j, relative to the largest eigenvalue."""
-    ours, theirs = (spectrum.eigenvalues[:k] * point_areas(spectrum).sum() for spectrum in (source, target))
+    ours, theirs = (
+        spectrum.eigenvalues[:k] * point_areas(spectrum).sum() for spectrum in (source, target)
+    )
     return (theirs[:, None] - ours) / max(ours[-1], theirs[-1])
 
 
 def _least_squares(
-    ours: Float[np.ndarray, "p k"], theirs: Float[np.ndarray, "p k"], commutators: Float[np.ndarray, "k k"]
+    ours: Float[np.ndarray, "p k"],
+    theirs: Float[np.ndarray, "p k"],
+    commutators: Float[np.ndarray, "k k"],
 ) -> Float[np.ndarray, "k k"]:
     """Solve for each row of the map with its first column that of the identity."""
     matrix = np.eye(len(commutators))
@@ -209,12 +223,19 @@ def transfer_function(mapping: FunctionalMap, values: ArrayLike) -> Float[np.nda
         If there is not one finite row a vertex of the source.
     """
     require_type(mapping, FunctionalMap, "mapping")
-    functions, n = real_numbers(values, "Functions to be carried").astype(np.float64), len(mapping.source.eigenvectors)
+    functions, n = (
+        real_numbers(values, "Functions to be carried").astype(np.float64),
+        len(mapping.source.eigenvectors),
+    )
     if functions.ndim not in (1, 2) or len(functions) != n:
-        raise InvalidParameterError(f"Functions to be carried must have {n} rows; the shape is {functions.shape}.")
+        raise InvalidParameterError(
+            f"Functions to be carried must have {n} rows; the shape is {functions.shape}."
+        )
     bad = np.flatnonzero(~np.isfinite(functions.reshape(n, -1)).all(axis=1))
     if bad.size:
-        raise InvalidParameterError(f"Functions to be carried must be finite; row {bad[0]} is {functions[bad[0]]}.")
+        raise InvalidParameterError(
+            f"Functions to be carried must be finite; row {bad[0]} is {functions[bad[0]]}."
+        )
     k2, k1 = mapping.matrix.shape
     weighed = mapping.source.mass @ functions / point_areas(mapping.source).sum()
     coefficients = mapping.matrix @ (unit_modes(mapping.source, k1).T @ weighed)

@@ -13,7 +13,13 @@ from eigenshape._arrays import as_array, frozen, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
-from eigenshape.spectral.maps.functional_map import N_MODES, FunctionalMap, modes_of_both, point_areas, unit_modes
+from eigenshape.spectral.maps.functional_map import (
+    N_MODES,
+    FunctionalMap,
+    modes_of_both,
+    point_areas,
+    unit_modes,
+)
 from eigenshape.spectral.spectrum import Spectrum
 
 STEP = 5
@@ -44,9 +50,14 @@ def point_map(mapping: FunctionalMap) -> Int[np.ndarray, " n2"]:
     return frozen(_nearest(carried, unit_modes(mapping.target, k2)))
 
 
-def _nearest(points: Float[np.ndarray, "n k"], queries: Float[np.ndarray, "q k"]) -> Int[np.ndarray, " q"]:
+def _nearest(
+    points: Float[np.ndarray, "n k"], queries: Float[np.ndarray, "q k"]
+) -> Int[np.ndarray, " q"]:
     halves, rows = (points**2).sum(axis=1) / 2, max(AT_ONCE // len(points), 1)
-    found = [(halves - queries[i : i + rows] @ points.T).argmin(axis=1) for i in range(0, len(queries), rows)]
+    found = [
+        (halves - queries[i : i + rows] @ points.T).argmin(axis=1)
+        for i in range(0, len(queries), rows)
+    ]
     return np.concatenate(found)
 
 
@@ -80,7 +91,11 @@ def map_from_points(
     require_type(source, Spectrum, "source")
     require_type(target, Spectrum, "target")
     k = modes_of_both(source, target, n_modes)
-    places, n1, n2 = as_array(points, "A point map"), len(source.eigenvectors), len(target.eigenvectors)
+    places, n1, n2 = (
+        as_array(points, "A point map"),
+        len(source.eigenvectors),
+        len(target.eigenvectors),
+    )
     if places.shape != (n2,) or places.dtype.kind not in "iu":
         raise InvalidParameterError(
             f"A point map must hold one whole number a vertex of the target, shape ({n2},); the shape is "
@@ -143,22 +158,41 @@ def refine_map(
     """
     require_type(start, FunctionalMap, "start")
     ends, first = (start.source, start.target), start.matrix.shape
-    k = whole_number(n_modes, "n_modes", max(first), min(len(spectrum.eigenvalues) for spectrum in ends))
-    stride, n2, report = whole_number(step, "step", 1), len(start.target.eigenvectors), progress or silent
-    wanted = (
-        min(SAMPLES_A_MODE * k, n2) if n_samples is None else whole_number(n_samples, "n_samples", min(2 * k, n2), n2)
+    k = whole_number(
+        n_modes, "n_modes", max(first), min(len(spectrum.eigenvalues) for spectrum in ends)
     )
-    samples, modes, matrix = _samples(start.target, wanted, k), unit_modes(start.source, k), start.matrix
-    sizes = [tuple(min(size + more, k) for size in first) for more in range(stride, k - min(first) + stride, stride)]
+    stride, n2, report = (
+        whole_number(step, "step", 1),
+        len(start.target.eigenvectors),
+        progress or silent,
+    )
+    wanted = (
+        min(SAMPLES_A_MODE * k, n2)
+        if n_samples is None
+        else whole_number(n_samples, "n_samples", min(2 * k, n2), n2)
+    )
+    samples, modes, matrix = (
+        _samples(start.target, wanted, k),
+        unit_modes(start.source, k),
+        start.matrix,
+    )
+    sizes = [
+        tuple(min(size + more, k) for size in first)
+        for more in range(stride, k - min(first) + stride, stride)
+    ]
     for number, (k2, k1) in enumerate(sizes):
         report(number / len(sizes), f"{len(matrix)} modes")
-        nearest = _nearest(modes[:, : matrix.shape[1]] @ matrix.T, samples.modes[:, : matrix.shape[0]])
+        nearest = _nearest(
+            modes[:, : matrix.shape[1]] @ matrix.T, samples.modes[:, : matrix.shape[0]]
+        )
         matrix = _fitted(samples, modes[nearest, :k1], k2)
     report(1.0, f"{k} modes")
     return FunctionalMap(matrix, *ends)
 
 
-def _fitted(samples: _Samples, pulled: Float[np.ndarray, "s k1"], k2: int) -> Float[np.ndarray, "k2 k1"]:
+def _fitted(
+    samples: _Samples, pulled: Float[np.ndarray, "s k1"], k2: int
+) -> Float[np.ndarray, "k2 k1"]:
     weighed = samples.weighed[:, :k2].T
     return np.asarray(sl.lstsq(weighed @ samples.modes[:, :k2], weighed @ pulled)[0])
 
@@ -175,7 +209,9 @@ def _samples(spectrum: Spectrum, count: int, k: int) -> _Samples:
 def _spread(spectrum: Spectrum, count: int) -> tuple[Int[np.ndarray, " s"], Int[np.ndarray, " n"]]:
     """Choose vertices one by one, each farthest from those before in φ/√λ; tell which is nearest to each vertex."""
     k = min(SPREAD_MODES, len(spectrum.eigenvalues))
-    places = unit_modes(spectrum, k)[:, 1:] / np.sqrt(spectrum.eigenvalues[1:k] / spectrum.eigenvalues[1])
+    places = unit_modes(spectrum, k)[:, 1:] / np.sqrt(
+        spectrum.eigenvalues[1:k] / spectrum.eigenvalues[1]
+    )
     chosen, cells = np.empty(count, dtype=np.int64), np.zeros(len(places), dtype=np.int64)
     least, following = np.full(len(places), np.inf), int((places**2).sum(axis=1).argmax())
     for number in range(count):

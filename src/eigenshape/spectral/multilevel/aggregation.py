@@ -69,7 +69,9 @@ class Loaded:
         return int(self.weights.shape[0])
 
 
-def build_levels(stiffness: sp.csr_array, mass: sp.csr_array, n_coarsest: int, *, smooth: bool = True) -> list[Level]:
+def build_levels(
+    stiffness: sp.csr_array, mass: sp.csr_array, n_coarsest: int, *, smooth: bool = True
+) -> list[Level]:
     """Coarsen a pencil to about so many points; the last level has no way down.
 
     Without smoothing the columns of P are indicators of aggregates: rough, but never nearly dependent.
@@ -106,7 +108,10 @@ def load(device: Device, level: Level, dtype: type, *, lumped: bool) -> Loaded:
         mass=None if lumped else put_matrix(device, level.mass, np.float64),
         weights=put(device, diagonal),
         rough=put_matrix(device, level.stiffness, np.float32),
-        rough_scales=(put(device, scales[0].astype(np.float32)), put(device, scales[1].astype(np.float32))),
+        rough_scales=(
+            put(device, scales[0].astype(np.float32)),
+            put(device, scales[1].astype(np.float32)),
+        ),
         prolong=rough if dtype is np.float32 else put_matrix(device, level.down, dtype),
         rough_prolong=rough,
         rough_restrict=put_matrix(device, level.up, np.float32),
@@ -134,7 +139,10 @@ def _smoothed(stiffness: sp.csr_array, top: float, columns: sp.csr_array) -> sp.
     row = stiffness.nnz / stiffness.shape[0]
     degree = max(round(DEGREE * np.sqrt(size * MESH_ROW / row)), 1)
     low = top / max(size / PASSED, LEAST_RATIO)
-    matrix, inverse = (stiffness.indptr, stiffness.indices, stiffness.data), 1 / _positive(stiffness.diagonal())
+    matrix, inverse = (
+        (stiffness.indptr, stiffness.indices, stiffness.data),
+        1 / _positive(stiffness.diagonal()),
+    )
     rows = columns.indptr, columns.indices, columns.data
     for node in np.cos(np.pi * (2 * np.arange(degree) + 1) / (2 * degree)):
         step = 2 / (top + low + (top - low) * node)

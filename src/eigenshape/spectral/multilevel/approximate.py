@@ -89,7 +89,10 @@ def approximate_spectrum(
     """
     require_type(laplacian, Laplacian, "laplacian")
     wanted = whole_number(k, "k", 1, laplacian.n_points)
-    for name, value in (("accuracy", accuracy), ("bound", LEAST_ACCURATE if bound is None else bound)):
+    for name, value in (
+        ("accuracy", accuracy),
+        ("bound", LEAST_ACCURATE if bound is None else bound),
+    ):
         require_accuracy(name, value, ACCURATE)
     place, report = open_device(device), progress or silent
     require_lumped(laplacian)
@@ -103,7 +106,9 @@ def approximate_spectrum(
     return spectrum_of(laplacian, pencil, pairs, certificate)
 
 
-def _approximated(pencil: Pencil, goal: Goal, device: Device, report: Progress) -> tuple[Pairs, Certificate]:
+def _approximated(
+    pencil: Pencil, goal: Goal, device: Device, report: Progress
+) -> tuple[Pairs, Certificate]:
     dtype = np.float32 if goal.accuracy >= SINGLE and np.isinf(goal.bound) else np.float64
     start = climb(pencil, goal.k, device, report, dtype=dtype, kept=16 * pencil.n * goal.k)
     if start is None:
@@ -125,6 +130,8 @@ def _uncounted(pencil: Pencil, pairs: Pairs) -> Certificate:
         gap=(float(pairs.values[-1]), np.inf),
         resolution=float(pairs.residuals.max()),
         orthonormality=require_orthonormal(pencil, pairs.vectors),
-        max_residual=float(pairs.residuals.max() / max(float(np.abs(pairs.values).max()), pencil.level / pencil.n)),
+        max_residual=float(
+            pairs.residuals.max() / max(float(np.abs(pairs.values).max()), pencil.level / pencil.n)
+        ),
         n_split=0,
     )

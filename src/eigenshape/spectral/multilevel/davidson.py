@@ -21,7 +21,10 @@ from eigenshape.spectral.multilevel.vcycle import Tower, correct, smooth
 WIDTH = 32  # columns that are corrected at once
 STEPS = (8, 30)  # of smoothing, fewest and most
 FIRST_STEPS = 2.0  # of smoothing alone, times the root of what is to be smoothed
-DEPENDENT = {4: 1e-6, 8: 1e-13}  # of the largest eigenvalue of a Gram matrix of unit columns, by their bytes
+DEPENDENT = {
+    4: 1e-6,
+    8: 1e-13,
+}  # of the largest eigenvalue of a Gram matrix of unit columns, by their bytes
 NOTHING = 1e-6
 FIRST_SHARE = 0.3  # of the work, told while the columns are smoothed the first time
 PROBES = 8  # random columns of a last look
@@ -88,7 +91,9 @@ def refine(
     for done in range(goal.rounds + 1):
         residuals = norms_of_residuals(tower, space.columns, values)
         lowered = float(np.abs(before - values)[: goal.k].max())
-        standing = _standing(goal, values, residuals, standing.worst, lowered if done else UNSEEN * lowered)
+        standing = _standing(
+            goal, values, residuals, standing.worst, lowered if done else UNSEEN * lowered
+        )
         bound, worst = min(goal.bound, np.sqrt(goal.accuracy)), standing.worst
         reached = standing.left <= goal.accuracy and worst <= goal.bound
         if reached and not looked:
@@ -118,7 +123,9 @@ def settled(tower: Tower, columns: Array, values: np.ndarray) -> tuple[Array, np
     return columns, _ritz(tower, Space(columns, columns[:, :0]), values, slice(0, len(values)))
 
 
-def _standing(goal: Goal, values: np.ndarray, residuals: np.ndarray, before: float, lowered: float) -> Standing:
+def _standing(
+    goal: Goal, values: np.ndarray, residuals: np.ndarray, before: float, lowered: float
+) -> Standing:
     """Judge a round by what it did to the values and to the largest residual.
 
     Errors go with the squares of residuals. If they fell only as much as those did, by a factor q, then of what the
@@ -135,18 +142,25 @@ def _prolonged(tower: Tower, vectors: Array) -> Space:
     # M and A of the level below are PᵀMP and PᵀAP: P keeps orthonormality and Ritz values.
     level, shape = tower.levels[0], (tower.levels[0].n, vectors.shape[1])
     columns, added = (tower.device.arrays.empty(shape, dtype=level.prolong.dtype) for _ in range(2))
-    return Space(multiply(tower.device, level.prolong, vectors.astype(columns.dtype), columns), added)
+    return Space(
+        multiply(tower.device, level.prolong, vectors.astype(columns.dtype), columns), added
+    )
 
 
 def _smooth_all(
     tower: Tower, space: Space, values: np.ndarray, report: Callable[[float], None]
 ) -> Float[np.ndarray, " m"]:
     """Smooth the columns, and return the norms of the residuals that they had."""
-    steps, norms = int(np.ceil(FIRST_STEPS * np.sqrt(tower.levels[0].spread))), np.empty(len(values))
+    steps, norms = (
+        int(np.ceil(FIRST_STEPS * np.sqrt(tower.levels[0].spread))),
+        np.empty(len(values)),
+    )
     for start in range(0, len(values), WIDTH):
         report(FIRST_SHARE * start / len(values))
         some = np.arange(start, min(start + WIDTH, len(values)))
-        block, norms[some] = residual_block(tower, chosen(tower, space.columns, some), values[some], np.ones(len(some)))
+        block, norms[some] = residual_block(
+            tower, chosen(tower, space.columns, some), values[some], np.ones(len(some))
+        )
         corrections = smooth(tower, block, values[some].astype(np.float32), steps)
         _require_finite(tower, corrections, some)
         for rows in row_chunks(tower):
@@ -155,7 +169,11 @@ def _smooth_all(
 
 
 def _add_corrections(
-    tower: Tower, space: Space, state: tuple[np.ndarray, np.ndarray], late: np.ndarray, excess: float
+    tower: Tower,
+    space: Space,
+    state: tuple[np.ndarray, np.ndarray],
+    late: np.ndarray,
+    excess: float,
 ) -> None:
     """Add the corrections of late columns, which have these values and residuals.
 
@@ -164,11 +182,15 @@ def _add_corrections(
     ConvergenceError
         If they overflow.
     """
-    steps = int(np.clip(np.ceil(0.5 * np.sqrt(tower.levels[0].spread) * np.log(8 * excess)), *STEPS))
+    steps = int(
+        np.clip(np.ceil(0.5 * np.sqrt(tower.levels[0].spread) * np.log(8 * excess)), *STEPS)
+    )
     values, residuals = state
     for start in range(0, len(late), WIDTH):
         some = late[start : start + WIDTH]
-        block, _ = residual_block(tower, chosen(tower, space.columns, some), values[some], 1 / residuals[some])
+        block, _ = residual_block(
+            tower, chosen(tower, space.columns, some), values[some], 1 / residuals[some]
+        )
         corrections = correct(tower, block, values[some].astype(np.float32), steps)
         _require_finite(tower, corrections, some)
         for rows in row_chunks(tower):
@@ -178,7 +200,9 @@ def _add_corrections(
 def _require_finite(tower: Tower, corrections: Array, some: np.ndarray) -> None:
     # Far below zero, where single rows are next to nothing beside θM, smoothing makes columns grow.
     if not tower.device.arrays.isfinite(corrections.sum()):
-        raise ConvergenceError(f"Corrections must be finite; those of eigenvector {some[0]} overflow. {TOO_FAR}")
+        raise ConvergenceError(
+            f"Corrections must be finite; those of eigenvector {some[0]} overflow. {TOO_FAR}"
+        )
 
 
 def _look_again(
@@ -192,7 +216,9 @@ def _look_again(
     """
     level, device, m = tower.levels[0], tower.device, len(values)
     shifts = np.zeros(PROBES, dtype=np.float32)
-    block = put(device, np.random.default_rng(seed).standard_normal((level.n, PROBES), dtype=np.float32))
+    block = put(
+        device, np.random.default_rng(seed).standard_normal((level.n, PROBES), dtype=np.float32)
+    )
     for _ in range(PROBE_STEPS):
         block *= level.rough_scales[0] / device.arrays.abs(block).max(axis=0)
         block = correct(tower, block, shifts, STEPS[0])
@@ -225,7 +251,9 @@ def _combine(tower: Tower, space: Space, weights: Array) -> None:
         space.columns[rows] = part
 
 
-def _combination(tower: Tower, space: Space, values: np.ndarray, fresh: slice) -> tuple[np.ndarray, Array]:
+def _combination(
+    tower: Tower, space: Space, values: np.ndarray, fresh: slice
+) -> tuple[np.ndarray, Array]:
     """Return the lowest Ritz values of the columns up to the last fresh ones, and their vectors' coefficients."""
     arrays, known = tower.device.arrays, fresh.start
     gram, projected = _grams(tower, space, fresh)
@@ -235,7 +263,9 @@ def _combination(tower: Tower, space: Space, values: np.ndarray, fresh: slice) -
     sizes, axes = arrays.linalg.eigh(gram * scales * scales[:, None])
     kept = sizes > DEPENDENT[space.columns.dtype.itemsize] * sizes[-1]
     if np.count_nonzero(fetch(tower.device, kept)) < len(values):
-        raise ConvergenceError(f"Smoothed eigenvectors must be independent; fewer than {len(values)} are. {TOO_FAR}")
+        raise ConvergenceError(
+            f"Smoothed eigenvectors must be independent; fewer than {len(values)} are. {TOO_FAR}"
+        )
     axes = (scales[:, None] * axes[:, kept]) / arrays.sqrt(sizes[kept])
     found, weights = arrays.linalg.eigh(axes.T @ projected @ axes)
     m = len(values)

@@ -57,9 +57,13 @@ def open_device(name: str) -> Device:
         arrays, sparse = import_module("cupy"), import_module("cupyx.scipy.sparse")
         count = arrays.cuda.runtime.getDeviceCount()
     except ImportError as error:
-        return _without_gpu(f"CuPy is missing ({error}). Install it with pip install 'eigenshape[gpu]'")
+        return _without_gpu(
+            f"CuPy is missing ({error}). Install it with pip install 'eigenshape[gpu]'"
+        )
     except Exception as error:  # noqa: BLE001  (the driver's errors are CuPy's own classes)
-        return _without_gpu(f"CuPy finds no GPU that it can use ({error}). Install the driver of a CUDA GPU")
+        return _without_gpu(
+            f"CuPy finds no GPU that it can use ({error}). Install the driver of a CUDA GPU"
+        )
     return (
         Device("gpu", arrays, sparse, 2**20)
         if count
@@ -94,11 +98,15 @@ def put_matrix(device: Device, matrix: sp.sparray, dtype: type) -> Array:
     return device.sparse.csr_matrix(tuple(put(device, part) for part in parts), shape=rows.shape)
 
 
-def multiply(device: Device, matrix: Array, block: Array, product: Array, rows: slice | None = None) -> Array:
+def multiply(
+    device: Device, matrix: Array, block: Array, product: Array, rows: slice | None = None
+) -> Array:
     """Write matrix times block, or these rows of it, to `product`, and return it."""
     some = slice(0, matrix.shape[0]) if rows is None else rows
     if device is CPU:
-        loops.multiply(matrix.indptr[some.start : some.stop + 1], matrix.indices, matrix.data, block, product)
+        loops.multiply(
+            matrix.indptr[some.start : some.stop + 1], matrix.indices, matrix.data, block, product
+        )
     else:
         product[...] = (matrix if rows is None else matrix[some]) @ block
     return product

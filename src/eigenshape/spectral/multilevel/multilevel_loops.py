@@ -76,7 +76,10 @@ def smooth_columns(matrix, factors, sparse, n_columns):
     (starts, columns, values), (old_starts, old_columns, old_values) = matrix, sparse
     n = len(starts) - 1
     new_starts = np.zeros(n + 1, dtype=np.int32)
-    new_columns, new_values = np.empty(2 * len(old_values), dtype=np.int32), np.empty(2 * len(old_values))
+    new_columns, new_values = (
+        np.empty(2 * len(old_values), dtype=np.int32),
+        np.empty(2 * len(old_values)),
+    )
     places, height = np.full(n_columns, -1, dtype=np.int64), 0
     for i in range(n):
         first = height

@@ -30,7 +30,9 @@ def images(tower: Tower, columns: Array) -> Iterator[tuple[slice, Array, Array]]
         yield rows, image, weighed
 
 
-def _residual_rows(tower: Tower, columns: Array, values: np.ndarray) -> Iterator[tuple[slice, Array]]:
+def _residual_rows(
+    tower: Tower, columns: Array, values: np.ndarray
+) -> Iterator[tuple[slice, Array]]:
     """Give A S - M S θ some rows at a time."""
     known = put(tower.device, values)
     for rows, image, weighed in images(tower, columns):
@@ -55,7 +57,10 @@ def _squares(tower: Tower, rows: slice, rest: Array) -> Array:
 def chosen(tower: Tower, columns: Array, some: np.ndarray) -> Array:
     """Return some of the columns, beside each other."""
     arrays = tower.device.arrays
-    picked, places = arrays.empty((len(columns), len(some)), dtype=columns.dtype), put(tower.device, some)
+    picked, places = (
+        arrays.empty((len(columns), len(some)), dtype=columns.dtype),
+        put(tower.device, some),
+    )
     for rows in row_chunks(tower):
         picked[rows] = arrays.take(columns[rows], places, axis=1)
     return picked

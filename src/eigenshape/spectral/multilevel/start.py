@@ -55,7 +55,13 @@ class Start:
 
 
 def climb(
-    pencil: Pencil, k: int, device: Device, report: Progress, *, dtype: type = np.float32, kept: int = 0
+    pencil: Pencil,
+    k: int,
+    device: Device,
+    report: Progress,
+    *,
+    dtype: type = np.float32,
+    kept: int = 0,
 ) -> Start | None:
     """Make the levels of a pencil with diagonal mass, solve the coarsest, and refine its vectors up to the second.
 
@@ -75,16 +81,22 @@ def climb(
     require_memory(f"{k} pairs of {pencil.n} points", parts, "Ask for fewer pairs")
     report(0.01, "making coarser levels")
     order = reverse_cuthill_mckee(sp.csr_matrix(pencil.stiffness), symmetric_mode=True)
-    coarsened = _coarsened(_reordered(pencil.stiffness, order), _reordered(pencil.mass, order), k, m)
+    coarsened = _coarsened(
+        _reordered(pencil.stiffness, order), _reordered(pencil.mass, order), k, m
+    )
     if coarsened is None:
         return None
     levels, coarsest, values = coarsened
-    loaded = [load(device, level, dtype, lumped=place == 0) for place, level in enumerate(levels[:-1])]
+    loaded = [
+        load(device, level, dtype, lumped=place == 0) for place, level in enumerate(levels[:-1])
+    ]
     goal = Goal(k, np.inf, INNER_ACCURACY, pencil.level / pencil.n, INNER_ROUNDS, strict=False)
     vectors = put(device, coarsest.vectors)
     for place in range(len(loaded) - 1, 0, -1):
         tower = Tower(device, tuple(loaded[place:]), coarsest)
-        vectors, values, _ = refine(tower, (vectors, values), goal, _in_level(report, place, len(loaded)))
+        vectors, values, _ = refine(
+            tower, (vectors, values), goal, _in_level(report, place, len(loaded))
+        )
     return Start(order, Tower(device, tuple(loaded), coarsest), (vectors, values))
 
 
@@ -139,4 +151,6 @@ def _solved_coarsest(level: Level, k: int, m: int) -> tuple[Coarsest, Float[np.n
 
 def _in_level(report: Progress, place: int, n_levels: int) -> Callable[[float], None]:
     share = 0.15 / n_levels
-    return lambda done: report(0.35 + share * (done - place), f"refining on level {n_levels - place} of {n_levels}")
+    return lambda done: report(
+        0.35 + share * (done - place), f"refining on level {n_levels - place} of {n_levels}"
+    )

@@ -6,7 +6,14 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape.spectral.multilevel.aggregation import Loaded
-from eigenshape.spectral.multilevel.device import Array, Device, fetch, multiply, put, smoothing_step
+from eigenshape.spectral.multilevel.device import (
+    Array,
+    Device,
+    fetch,
+    multiply,
+    put,
+    smoothing_step,
+)
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.pencil import Pencil
 
@@ -46,8 +53,12 @@ def correct(tower: Tower, residual: Array, shifts: Float[np.ndarray, " b"], step
     empty = device.arrays.empty
     restricted = empty((level.rough_restrict.shape[0], residual.shape[1]), dtype=residual.dtype)
     multiply(device, level.rough_restrict, residual, restricted)
-    below = correct(Tower(device, tower.levels[1:], tower.coarsest), restricted, shifts, INNER_STEPS)
-    start = multiply(device, level.rough_prolong, below, empty(residual.shape, dtype=residual.dtype))
+    below = correct(
+        Tower(device, tower.levels[1:], tower.coarsest), restricted, shifts, INNER_STEPS
+    )
+    start = multiply(
+        device, level.rough_prolong, below, empty(residual.shape, dtype=residual.dtype)
+    )
     return _smoothed(device, level, (residual, put(device, shifts)), start, steps)
 
 
@@ -58,9 +69,14 @@ def smooth(tower: Tower, residual: Array, shifts: Float[np.ndarray, " b"], steps
     return _smoothed(device, level, terms, device.arrays.zeros_like(residual), steps)
 
 
-def _smoothed(device: Device, level: Loaded, terms: tuple[Array, Array], start: Array, steps: int) -> Array:
+def _smoothed(
+    device: Device, level: Loaded, terms: tuple[Array, Array], start: Array, steps: int
+) -> Array:
     """Chebyshev iteration for the eigenvalues from top / spread to top (Saad 2003, algorithm 12.1)."""
-    middle, half = (level.top + level.top / level.spread) / 2, (level.top - level.top / level.spread) / 2
+    middle, half = (
+        (level.top + level.top / level.spread) / 2,
+        (level.top - level.top / level.spread) / 2,
+    )
     sharpness = middle / half
     rho, old, new = 1 / sharpness, 0.0, 1 / middle
     state = [start, device.arrays.zeros_like(start), device.arrays.empty_like(start)]

@@ -14,7 +14,13 @@ from eigenshape._threads import one_blas_thread
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.multilevel.davidson import Goal, refine
 from eigenshape.spectral.multilevel.device import CPU, Array
-from eigenshape.spectral.multilevel.residuals import chosen, images, keep_outside, residual_block, row_chunks
+from eigenshape.spectral.multilevel.residuals import (
+    chosen,
+    images,
+    keep_outside,
+    residual_block,
+    row_chunks,
+)
 from eigenshape.spectral.multilevel.start import (
     ROUNDS,
     SINGLE,
@@ -120,10 +126,14 @@ def approximate_heat_kernel_signature(
         return _refined(pencil, start, goal, clock, report)
 
 
-def _proved(laplacian: Laplacian, k: int, times: Float[np.ndarray, " q"], report: Progress) -> ApproximateSignature:
+def _proved(
+    laplacian: Laplacian, k: int, times: Float[np.ndarray, " q"], report: Progress
+) -> ApproximateSignature:
     found = solve_spectrum(laplacian, k, progress=report)
     values, errors = heat_kernel_signature(found, times), np.full(len(times), ROUNDING)
-    return ApproximateSignature(frozen(values), frozen(times), frozen(errors), found.eigenvalues, complete=True)
+    return ApproximateSignature(
+        frozen(values), frozen(times), frozen(errors), found.eigenvalues, complete=True
+    )
 
 
 def _refined(
@@ -145,7 +155,11 @@ def _refined(
     values[start.order] = np.ldexp(heat, 2 * pencil.vector_exponent)
     report(1.0, "estimated")
     return ApproximateSignature(
-        frozen(values), frozen(times), frozen(errors / sizes + ROUNDING), frozen(lowest), complete=False
+        frozen(values),
+        frozen(times),
+        frozen(errors / sizes + ROUNDING),
+        frozen(lowest),
+        complete=False,
     )
 
 
@@ -162,8 +176,12 @@ def _errors(
     """
     k = len(decay)
     sample = np.unique(np.linspace(0, k - 1, min(k, SAMPLES)).round().astype(np.int64))
-    squares, falls = (np.interp(np.arange(k), sample, found) for found in _changes(tower, columns, ritz, sample))
-    return np.asarray(squares @ decay + times * (falls @ decay) / np.sqrt(tower.levels[0].weights.sum()))
+    squares, falls = (
+        np.interp(np.arange(k), sample, found) for found in _changes(tower, columns, ritz, sample)
+    )
+    return np.asarray(
+        squares @ decay + times * (falls @ decay) / np.sqrt(tower.levels[0].weights.sum())
+    )
 
 
 def _changes(

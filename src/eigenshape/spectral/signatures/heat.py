@@ -91,7 +91,9 @@ def heat_kernel_signature(spectrum: Spectrum, times: ArrayLike) -> Float[np.ndar
 
 
 @one_blas_thread()
-def reflection_free_signature(neumann: Spectrum, dirichlet: Spectrum, times: ArrayLike) -> Float[np.ndarray, "n q"]:
+def reflection_free_signature(
+    neumann: Spectrum, dirichlet: Spectrum, times: ArrayLike
+) -> Float[np.ndarray, "n q"]:
     """Measure the heat left at each point as if the surface went on beyond its boundary.
 
     A boundary throws heat back with the Neumann condition and swallows it with the Dirichlet condition: near a straight
@@ -119,7 +121,9 @@ def reflection_free_signature(neumann: Spectrum, dirichlet: Spectrum, times: Arr
     require_type(dirichlet, Spectrum, "dirichlet")
     sizes = len(neumann.eigenvectors), len(dirichlet.eigenvectors)
     if sizes[0] != sizes[1]:
-        raise InvalidParameterError(f"Both spectra must be of one surface; they have {sizes[0]} and {sizes[1]} points.")
+        raise InvalidParameterError(
+            f"Both spectra must be of one surface; they have {sizes[0]} and {sizes[1]} points."
+        )
     return (heat_kernel_signature(neumann, times) + heat_kernel_signature(dirichlet, times)) / 2
 
 

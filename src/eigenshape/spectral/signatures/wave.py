@@ -84,8 +84,13 @@ def wave_kernel_signature(
     values = positive_eigenvalues(spectrum)
     if energies is None or sigma is None:
         suggested, spread = default_energies(spectrum)
-        energies, sigma = suggested if energies is None else energies, spread if sigma is None else sigma
+        energies, sigma = (
+            suggested if energies is None else energies,
+            spread if sigma is None else sigma,
+        )
     levels, width = finite_values(energies, "energies"), positive_values(sigma, "sigma")[0]
     exponents = -((np.log(values)[:, None] - levels) ** 2) / (2 * width**2)
-    bands = np.exp(exponents - exponents.max(axis=0))  # far from all eigenvalues the nearest counts, not 0 / 0
+    bands = np.exp(
+        exponents - exponents.max(axis=0)
+    )  # far from all eigenvalues the nearest counts, not 0 / 0
     return np.asarray(spectrum.eigenvectors[:, -len(values) :] ** 2 @ (bands / bands.sum(axis=0)))

@@ -19,9 +19,15 @@ from eigenshape.spectral.spectrum import Spectrum
 def content_key(laplacian: Laplacian, request: tuple[str | float, ...]) -> str:
     """Return the SHA-256 of W and B to the last bit, the kernel, the request, the archive's format and our version."""
     kernel = astuple(laplacian.kernel) if laplacian.kernel else None
-    digest = hashlib.sha256(repr((FORMAT, version("eigenshape"), kernel, request, laplacian.n_points)).encode())
+    digest = hashlib.sha256(
+        repr((FORMAT, version("eigenshape"), kernel, request, laplacian.n_points)).encode()
+    )
     for matrix in (laplacian.stiffness, laplacian.mass):
-        for part, kind in ((matrix.indptr, np.int64), (matrix.indices, np.int64), (matrix.data, np.float64)):
+        for part, kind in (
+            (matrix.indptr, np.int64),
+            (matrix.indices, np.int64),
+            (matrix.data, np.float64),
+        ):
             array = np.ascontiguousarray(part, dtype=kind)
             digest.update(len(array).to_bytes(8, "little"))
             digest.update(array.data)
@@ -47,13 +53,18 @@ def remembered(folder: str | Path, key: str, compute: Callable[[], Spectrum]) ->
         try:
             return Spectrum.load(path, key=key)
         except FileFormatError as error:
-            warnings.warn(f"A spectrum in the cache cannot be used and is computed again: {error}", stacklevel=3)
+            warnings.warn(
+                f"A spectrum in the cache cannot be used and is computed again: {error}",
+                stacklevel=3,
+            )
     _require_writable(Path(folder))
     spectrum = compute()
     try:
         spectrum.save(path, key=key)
     except (OSError, FileFormatError) as error:
-        warnings.warn(f"A spectrum was computed and could not be kept in the cache: {error}", stacklevel=3)
+        warnings.warn(
+            f"A spectrum was computed and could not be kept in the cache: {error}", stacklevel=3
+        )
     return spectrum
 
 
@@ -63,4 +74,6 @@ def _require_writable(folder: Path) -> None:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise InvalidParameterError(f"cache must be a folder that can be written to; {folder}: {error}.") from error
+        raise InvalidParameterError(
+            f"cache must be a folder that can be written to; {folder}: {error}."
+        ) from error

@@ -25,7 +25,9 @@ FARTHER = 10.0
 
 
 def certify(
-    laplacian: Laplacian, eigenvalues: Float[np.ndarray, " k"], eigenvectors: Float[np.ndarray, "n k"]
+    laplacian: Laplacian,
+    eigenvalues: Float[np.ndarray, " k"],
+    eigenvectors: Float[np.ndarray, "n k"],
 ) -> Certificate:
     """Prove that these are the k lowest eigenpairs, or refuse them.
 
@@ -53,11 +55,16 @@ def certify(
         If the columns are not B-orthonormal eigenvectors, or more or fewer eigenvalues lie there.
     """
     require_type(laplacian, Laplacian, "laplacian")
-    values, vectors = _checked(laplacian, as_array(eigenvalues, "eigenvalues"), as_array(eigenvectors, "eigenvectors"))
+    values, vectors = _checked(
+        laplacian, as_array(eigenvalues, "eigenvalues"), as_array(eigenvectors, "eigenvectors")
+    )
     values = to_pencil(laplacian.kernel, values)
     with one_blas_thread():
         pencil = normalise(laplacian)
-        values, vectors = np.ldexp(values, -pencil.value_exponent), np.ldexp(vectors, -pencil.vector_exponent)
+        values, vectors = (
+            np.ldexp(values, -pencil.value_exponent),
+            np.ldexp(vectors, -pencil.vector_exponent),
+        )
         certificate = prove(pencil, Pairs(values, vectors, residual_norms(pencil, values, vectors)))
     last = float(np.ldexp(values[-1], pencil.value_exponent))
     certificate = reported(laplacian.kernel, in_user_units(pencil, certificate), last)
@@ -115,12 +122,16 @@ def in_user_units(pencil: Pencil, certificate: Certificate) -> Certificate:
     return replace(certificate, shift=shift, floor=floor, gap=(low, high), resolution=resolution)
 
 
-def part(pencil: Pencil, pairs: Pairs, certificate: Certificate, start: int, stop: int) -> tuple[Pairs, Certificate]:
+def part(
+    pencil: Pencil, pairs: Pairs, certificate: Certificate, start: int, stop: int
+) -> tuple[Pairs, Certificate]:
     """Return the pairs from one number to another; what proves them all proves these."""
     resolution = RESOLUTION * _scale(pencil, pairs)
     rest = pairs.values[stop:] - pairs.values[stop - 1]
     equal = int(np.count_nonzero(rest <= resolution))
-    fewer = Pairs(pairs.values[start:stop], pairs.vectors[:, start:stop], pairs.residuals[start:stop])
+    fewer = Pairs(
+        pairs.values[start:stop], pairs.vectors[:, start:stop], pairs.residuals[start:stop]
+    )
     return fewer, replace(
         certificate,
         first=certificate.first + start,
@@ -145,7 +156,11 @@ def _below_cluster(pencil: Pencil, pairs: Pairs, above: Certificate, beside: Fac
             f"Neighbouring eigenvalues must differ by more than rounding takes; the last {len(pairs.values) - first} "
             f"of {len(pairs.values)} do not. Repair nearly degenerate elements."
         )
-    return replace(_counted(above, pairs, factor), resolution=resolution, n_split=beside.count - len(pairs.values))
+    return replace(
+        _counted(above, pairs, factor),
+        resolution=resolution,
+        n_split=beside.count - len(pairs.values),
+    )
 
 
 def _counted(certificate: Certificate, pairs: Pairs, factor: Factor) -> Certificate:

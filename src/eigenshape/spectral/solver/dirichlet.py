@@ -60,7 +60,10 @@ def solve_dirichlet(
 
 
 def solve_free(
-    laplacian: Laplacian, k: SupportsIndex, held: Int[np.ndarray, " h"], progress: Progress | None = None
+    laplacian: Laplacian,
+    k: SupportsIndex,
+    held: Int[np.ndarray, " h"],
+    progress: Progress | None = None,
 ) -> Spectrum:
     """Compute the k lowest eigenpairs with some points held at zero, or none."""
     if not held.size:

@@ -112,19 +112,27 @@ def _asked(
 ) -> tuple[int, Float[np.ndarray, " 2"]]:
     """Return k, or 0 and the ends of an interval of the pencil's eigenvalues."""
     if (k is None) == (below is None):
-        raise InvalidParameterError(f"One of k and below says which pairs to compute; k is {k} and below is {below}.")
+        raise InvalidParameterError(
+            f"One of k and below says which pairs to compute; k is {k} and below is {below}."
+        )
     if below is None and above is not None:
-        raise InvalidParameterError(f"above needs below, the other end of an interval; above is {above}.")
+        raise InvalidParameterError(
+            f"above needs below, the other end of an interval; above is {above}."
+        )
     if k is not None:
         return whole_number(k, "k", 1, laplacian.n_points), np.zeros(2)
     high = float(positive_values(np.array([below], dtype=float), "below")[0])
     low = -np.inf if above is None or above == 0 else float(positive_values([above], "above")[0])
     if low >= high:
-        raise InvalidParameterError(f"above must be less than below; above is {above} and below is {below}.")
+        raise InvalidParameterError(
+            f"above must be less than below; above is {above} and below is {below}."
+        )
     return 0, to_pencil(laplacian.kernel, np.array([low, high]))
 
 
-def _proved_between(pencil: Pencil, low: float, high: float, report: Progress) -> tuple[Pairs, Certificate]:
+def _proved_between(
+    pencil: Pencil, low: float, high: float, report: Progress
+) -> tuple[Pairs, Certificate]:
     report(0.01, "counting eigenvalues")
     pairs, certificate = _far_up(pencil, low, high, report) or _lowest_below(pencil, high, report)
     start, stop = np.searchsorted(pairs.values, [low, high]).tolist()
@@ -133,7 +141,9 @@ def _proved_between(pencil: Pencil, low: float, high: float, report: Progress) -
     return part(pencil, pairs, certificate, start, stop)
 
 
-def _far_up(pencil: Pencil, low: float, high: float, report: Progress) -> tuple[Pairs, Certificate] | None:
+def _far_up(
+    pencil: Pencil, low: float, high: float, report: Progress
+) -> tuple[Pairs, Certificate] | None:
     """Solve for an interval by itself where it is less work than all eigenvalues below its upper end."""
     if low <= 0 or dense_serves(pencil, 1):
         return None
@@ -143,7 +153,9 @@ def _far_up(pencil: Pencil, low: float, high: float, report: Progress) -> tuple[
         return None
     require_memory_for_pairs(pencil, within)
     with suppress(ConvergenceError):
-        return solve_interval(pencil, interval, lambda done: report(0.05 + 0.9 * done, "slices of the interval"))
+        return solve_interval(
+            pencil, interval, lambda done: report(0.05 + 0.9 * done, "slices of the interval")
+        )
     return None
 
 
@@ -161,9 +173,8 @@ def _lowest_below(pencil: Pencil, limit: float, report: Progress) -> tuple[Pairs
 def _nothing(pencil: Pencil, pairs: Pairs, number: int, low: float, high: float) -> str:
     below, above = pencil.values_out(np.array([high, low])).tolist()
     if number == 0:
-        return (
-            f"below must exceed the lowest eigenvalue, {pencil.values_out(pairs.values[:1])[0]:.6g}; it is {below:.6g}."
-        )
+        lowest = pencil.values_out(pairs.values[:1])[0]
+        return f"below must exceed the lowest eigenvalue, {lowest:.6g}; it is {below:.6g}."
     return (
         f"above and below must have eigenvalues between them; {number} lie below {above:.6g} and none from there to "
         f"{below:.6g}."
