@@ -4,11 +4,12 @@ import operator
 from typing import Any, SupportsIndex, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from eigenshape._arguments import named_value
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._memory import machine_memory
+from eigenshape._typing import ArrayLike
 
 SINGULAR = {"vertices": "vertex", "faces": "face", "points": "point", "simplices": "simplex"}
 INDEXED = {"faces": "vertices", "simplices": "points"}

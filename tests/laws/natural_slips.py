@@ -21,6 +21,7 @@ import numpy as np
 import scipy.sparse as sp
 from matplotlib.figure import Figure
 from public_names import public_things
+from typing_extensions import TypeAliasType
 
 import eigenshape as es
 
@@ -259,12 +260,9 @@ MESHES = {es.TriangleMesh, es.SimplicialMesh, es.PointCloud}
 
 def kinds(annotation: Any) -> Iterator[Any]:
     """Yield the types that a union is of, and what its lists and mappings are of."""
-    if get_origin(annotation) in (Union, UnionType) or get_origin(annotation) in (
-        Sequence,
-        Iterable,
-        Mapping,
-        tuple,
-    ):
+    if isinstance(annotation, TypeAliasType):
+        yield from kinds(annotation.__value__)
+    elif get_origin(annotation) in (Union, UnionType, Sequence, Iterable, Mapping, tuple):
         for part in get_args(annotation):
             yield from kinds(part)
     else:

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from eigenshape._arrays import finite_values, frozen
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 
 
 @dataclass(frozen=True, eq=False, init=False)

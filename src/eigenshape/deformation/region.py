@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
-from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import named_value
 from eigenshape._arrays import as_array, frozen, positive_values, real_numbers, whole_numbers
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.deformation.handles import vector
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.geodesic import geodesic_distance_to_set

@@ -6,7 +6,6 @@ from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 from scipy.linalg import cho_solve
 
 from eigenshape._arguments import require_type
@@ -14,6 +13,7 @@ from eigenshape._arrays import finite_rows, frozen, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.deformation.rigidity import EdgeWeights, edge_weights
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arrays import frozen, vertex_values
+from eigenshape._typing import ArrayLike
 from eigenshape.features.loops import extended_loops
 from eigenshape.features.union_loops import join_points
 from eigenshape.geometry.cloud import PointCloud, Shape

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
-from numpy.typing import ArrayLike
 from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arrays import frozen, vertex_values
+from eigenshape._typing import ArrayLike
 from eigenshape.features.merge_loops import falling_corners, join_faces, sides_by_vertex
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh

@@ -5,11 +5,12 @@ from collections.abc import Sequence
 from typing import Any, Literal, Protocol, SupportsIndex, TypeAlias, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike
+from typing_extensions import TypeAliasType
 
 from eigenshape._arguments import attribute_of, named_value
 from eigenshape._arrays import as_array
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
@@ -48,8 +49,8 @@ class HasPolygons(Protocol):
 
 
 Pair: TypeAlias = tuple[ArrayLike, ArrayLike]
-MeshLike: TypeAlias = TriangleMesh | SimplicialMesh | HasFaces | HasPolygons | Pair
-ShapeLike: TypeAlias = MeshLike | PointCloud
+MeshLike = TypeAliasType("MeshLike", TriangleMesh | SimplicialMesh | HasFaces | HasPolygons | Pair)
+ShapeLike = TypeAliasType("ShapeLike", MeshLike | PointCloud)
 
 BRIDGES = {
     "trimesh": "Pass scene.to_mesh() of a scene, from_trimesh(cloud, dim=2) of points.",

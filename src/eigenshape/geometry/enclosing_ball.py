@@ -5,10 +5,10 @@ from itertools import combinations
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from eigenshape._arrays import finite_rows, frozen
 from eigenshape._errors import InvalidShapeError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.simplices import size_one
 
 Points = Float[np.ndarray, "n d"]

@@ -8,10 +8,10 @@ from itertools import islice
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arrays import positive_values, whole_numbers
 from eigenshape._errors import InvalidShapeError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.geodesic_loops import balls
 from eigenshape.geometry.simplices import in_length, scaled_corners

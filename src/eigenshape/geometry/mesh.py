@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arrays import finite_rows, frozen, index_rows
 from eigenshape._errors import InvalidShapeError
+from eigenshape._typing import ArrayLike
 
 
 @dataclass(frozen=True, eq=False, init=False)

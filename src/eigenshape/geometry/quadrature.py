@@ -5,10 +5,10 @@ from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from eigenshape._arrays import finite_rows, frozen, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import dual_volumes

@@ -5,10 +5,10 @@ from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arrays import finite_rows, frozen, index_rows
 from eigenshape._errors import InvalidShapeError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.mesh import TriangleMesh
 
 

@@ -4,13 +4,13 @@ from dataclasses import replace
 from typing import Literal, SupportsIndex, TypedDict, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import LinearOperator
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.cloud_measure import cloud_quadrature
 from eigenshape.geometry.conversion import MeshLike, as_simplicial

@@ -5,11 +5,11 @@ from typing import SupportsIndex
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from eigenshape._arrays import finite_rows, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.graph import adjacency_matrix
 

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import mean_normals, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh

@@ -7,13 +7,13 @@ from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.special import comb, eval_legendre, jn_zeros, jnp_zeros, spherical_jn
 
 from eigenshape._arrays import positive_values, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.operators.boundary import Condition
 
 GAUSS = 600  # nodes: enough for degree 300 over the whole sphere

@@ -5,10 +5,10 @@ from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from eigenshape._arrays import finite_rows, frozen, whole_number
 from eigenshape._errors import InvalidShapeError
+from eigenshape._typing import ArrayLike
 
 MOST = 10**5  # degrees up to 316; beyond 1400 the functions over (1 - z²)^{m/2} are no floats
 

@@ -4,12 +4,12 @@ from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull, QhullError
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_rows, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.shapes.surfaces import icosphere

@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import ArrayLike
 from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_numbers
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.operators.kernel import EDGE_FACTOR, LAST
 from eigenshape.operators.laplacian import Laplacian
 

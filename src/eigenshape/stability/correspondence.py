@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_rows, frozen, positive_values
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.features.least_matching import least_perfect, near_pairs
 from eigenshape.features.matching_loops import match_rows
 from eigenshape.geometry.simplices import size_one

@@ -6,11 +6,11 @@ from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 
 THEOREMS = ("3.1.1", "3.1.3", "3.1.4", "3.1.5", "4.1.1", "4.3.1", "lipschitz", "dense")
 MOST_DIM = 100

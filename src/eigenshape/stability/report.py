@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.simplicial import Mesh

@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, vertex_values
 from eigenshape._progress import Progress
+from eigenshape._typing import ArrayLike
 from eigenshape.features.merge_tree import MergeTree, merge_tree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment
 from eigenshape.geometry.conversion import MeshLike, as_mesh

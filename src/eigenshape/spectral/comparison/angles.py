@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.comparison.eigenspaces import (
     SEPARATED,

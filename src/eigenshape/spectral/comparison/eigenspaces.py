@@ -6,12 +6,12 @@ import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.spectral.spectrum import Spectrum, require_lowest
 
 EQUAL = 1e-9  # of the larger: exact eigenvalues that differ less are one

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import finite_values, frozen
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.spectral.bounds.brackets import Brackets
 from eigenshape.spectral.signatures.heat import NULL
 from eigenshape.spectral.spectrum import Spectrum, require_lowest

@@ -6,12 +6,12 @@ from typing import SupportsIndex
 import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import as_array, frozen, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.spectral.signatures.heat import NULL
 from eigenshape.spectral.spectrum import Spectrum
 

@@ -6,13 +6,13 @@ from typing import SupportsIndex
 import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import as_array, frozen, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.spectral.maps.functional_map import (
     N_MODES,
     FunctionalMap,

@@ -5,12 +5,12 @@ from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, positive_values, whole_number
 from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.multilevel.davidson import Goal, refine
 from eigenshape.spectral.multilevel.device import CPU, Array

@@ -4,12 +4,12 @@ from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.spectral.spectrum import Spectrum, require_lowest
 
 EVEN = 1e-9  # steps between logarithms of times that differ less are equal

@@ -4,11 +4,11 @@ from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_values, positive_values, whole_number
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.spectral.signatures.heat import positive_eigenvalues
 from eigenshape.spectral.spectrum import Spectrum
 
