@@ -2,7 +2,7 @@
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -48,7 +48,6 @@ from eigenshape.spectral.spectrum import Spectrum
 
 N_PICTURED = 8
 USUAL = 20  # pairs
-Device = Literal["cpu", "gpu"]
 ORDERS = {"p2": 2, "p3": 3}
 
 
@@ -90,10 +89,6 @@ def spectrum(
             )
         ),
     ] = None,
-    device: Annotated[
-        Device,
-        typer.Option(help="Where --accuracy computes; gpu needs `pip install eigenshape[gpu]`."),
-    ] = "cpu",
     boundary: Annotated[
         Condition,
         typer.Option(
@@ -187,7 +182,7 @@ def spectrum(
         progress(0.0, "building the operator")
         laplacian = build_laplacian(found, name, **options)
         n_pairs = _usual_pairs(laplacian, held) if k is None and below is None else k
-        wanted = _Wanted(n_pairs, above, below, held, accuracy, device, cache)
+        wanted = _Wanted(n_pairs, above, below, held, accuracy, cache)
         solved = _solved(laplacian, wanted, progress)
         count = solved.certificate.first + len(solved.eigenvalues)
         bounds = (
@@ -223,7 +218,6 @@ class _Wanted:
     below: float | None
     held: Int[np.ndarray, " c"] | None
     accuracy: float | None
-    device: str
     cache: Path | None
 
 
@@ -244,7 +238,7 @@ def _solved(laplacian: Laplacian, wanted: _Wanted, progress: Progress) -> Spectr
                 "--accuracy goes with -k alone; --below, --boundary dirichlet and --cache are of the exact solver."
             )
         return approximate_spectrum(
-            laplacian, wanted.k, accuracy=wanted.accuracy, device=wanted.device, progress=progress
+            laplacian, wanted.k, accuracy=wanted.accuracy, progress=progress
         )
     k, above, below = wanted.k, wanted.above, wanted.below
     if wanted.held is not None:

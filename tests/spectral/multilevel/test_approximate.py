@@ -1,5 +1,3 @@
-import sys
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -220,8 +218,6 @@ def test_bad_input_is_refused_by_name():
             approximate_spectrum(laplacian, 3, accuracy=accuracy)
         with pytest.raises(InvalidParameterError, match=r"bound must lie in 1e-10\.\.0\.1; it is"):
             approximate_spectrum(laplacian, 3, bound=accuracy)
-    with pytest.raises(InvalidParameterError, match="device must be 'cpu' or 'gpu'; it is 'tpu'"):
-        approximate_spectrum(laplacian, 3, device="tpu")
     with pytest.raises(
         InvalidParameterError, match=r"mass must be diagonal here; entry \(0, \d+\) is 0\.00"
     ):
@@ -274,18 +270,6 @@ def test_what_does_not_fit_is_refused_with_numbers(monkeypatch):
         match=r"9 pairs of 2562 points take about bases 0\.0 GiB, levels of their",
     ):
         approximate_spectrum(cotangent_laplacian(icosphere(4)), 9)
-
-
-def test_without_a_gpu_the_cpu_computes_and_says_so(monkeypatch):
-    monkeypatch.setitem(sys.modules, "cupy", None)
-    laplacian = cotangent_laplacian(icosphere(4))
-    with pytest.warns(
-        UserWarning, match=r"CuPy is missing .*Install it with pip install 'eigenshape\[gpu\]'"
-    ):
-        found = approximate_spectrum(laplacian, 6, device="gpu")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert np.array_equal(found.eigenvectors, approximate_spectrum(laplacian, 6).eigenvectors)
 
 
 @pytest.mark.long

@@ -12,7 +12,6 @@ from eigenshape._threads import one_blas_thread
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.multilevel.davidson import Goal, refine, settled
-from eigenshape.spectral.multilevel.device import Device, fetch, open_device
 from eigenshape.spectral.multilevel.start import (
     LEAST_ACCURATE,
     ROUNDS,
@@ -38,7 +37,6 @@ def approximate_spectrum(
     *,
     accuracy: float = 1e-3,
     bound: float | None = None,
-    device: str = "cpu",
     progress: Progress | None = None,
 ) -> Spectrum:
     """Compute approximations of the k lowest eigenpairs of W φ = λ B φ, without a factor of W - σB and without proof.
@@ -62,8 +60,6 @@ def approximate_spectrum(
     bound : float, optional
         Go on until every residual, relative to the k-th eigenvalue, is at most this too. It bounds the error for
         certain, and is far larger than the error: that goes with its square.
-    device : "cpu" or "gpu"
-        Where the largest products are computed. "gpu" takes CuPy (`pip install eigenshape[gpu]`).
     progress : callable, optional
         Called as progress(fraction_done, message) while the solver works.
 
@@ -77,7 +73,7 @@ def approximate_spectrum(
     Raises
     ------
     InvalidParameterError
-        If k is not in 1..n, the accuracy out of range, the device unknown, B not diagonal, W seen to have a negative
+        If k is not in 1..n, the accuracy out of range, B not diagonal, W seen to have a negative
         eigenvalue, a corrected eigenvalue 1/t or more, or the memory too small.
     ConvergenceError
         If the residuals do not come down to the accuracy.
@@ -85,7 +81,7 @@ def approximate_spectrum(
     Warns
     -----
     UserWarning
-        If there is no GPU to be used, or eigenvalues of a kernel lie too near to 1/t to tell those of the shape.
+        If eigenvalues of a kernel lie too near to 1/t to tell those of the shape.
     """
     require_type(laplacian, Laplacian, "laplacian")
     wanted = whole_number(k, "k", 1, laplacian.n_points)
@@ -94,29 +90,27 @@ def approximate_spectrum(
         ("bound", LEAST_ACCURATE if bound is None else bound),
     ):
         require_accuracy(name, value, ACCURATE)
-    place, report = open_device(device), progress or silent
+    report = progress or silent
     require_lumped(laplacian)
     with one_blas_thread():
         report(0.0, "scaling the operator")
         pencil = normalise(laplacian)
         limits = float(accuracy), np.inf if bound is None else float(bound)
         goal = Goal(wanted, *limits, pencil.level / pencil.n, ROUNDS, strict=True)
-        pairs, certificate = _approximated(pencil, goal, place, report)
+        pairs, certificate = _approximated(pencil, goal, report)
     report(1.0, "proved complete" if certificate.complete else "accurate enough")
     return spectrum_of(laplacian, pencil, pairs, certificate)
 
 
-def _approximated(
-    pencil: Pencil, goal: Goal, device: Device, report: Progress
-) -> tuple[Pairs, Certificate]:
+def _approximated(pencil: Pencil, goal: Goal, report: Progress) -> tuple[Pairs, Certificate]:
     dtype = np.float32 if goal.accuracy >= SINGLE and np.isinf(goal.bound) else np.float64
-    start = climb(pencil, goal.k, device, report, dtype=dtype, kept=16 * pencil.n * goal.k)
+    start = climb(pencil, goal.k, report, dtype=dtype, kept=16 * pencil.n * goal.k)
     if start is None:
         return proved(pencil, goal.k, report)
     columns, values, estimate = refine(start.tower, start.below, goal, on_finest(report, start))
     columns, values = settled(start.tower, columns[:, : goal.k], values[: goal.k])
     vectors = np.empty((pencil.n, goal.k))
-    vectors[start.order] = fetch(device, columns)
+    vectors[start.order] = columns
     pairs = Pairs(values, vectors, residual_norms(pencil, values, vectors))
     return pairs, replace(_uncounted(pencil, pairs), estimate=estimate)
 

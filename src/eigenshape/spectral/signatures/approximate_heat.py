@@ -13,7 +13,6 @@ from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.multilevel.davidson import Goal, refine
-from eigenshape.spectral.multilevel.device import CPU, Array
 from eigenshape.spectral.multilevel.residuals import (
     chosen,
     images,
@@ -119,7 +118,7 @@ def approximate_heat_kernel_signature(
     report = progress or silent
     with one_blas_thread():
         pencil = normalise(laplacian)
-        start = climb(pencil, wanted, CPU, report)
+        start = climb(pencil, wanted, report)
         if start is None:
             return _proved(laplacian, wanted, clock, report)
         goal = Goal(wanted, float(accuracy), np.inf, pencil.level / pencil.n, ROUNDS, strict=True)
@@ -165,7 +164,7 @@ def _refined(
 
 def _errors(
     tower: Tower,
-    columns: Array,
+    columns: np.ndarray,
     ritz: Float[np.ndarray, " m"],
     decay: Float[np.ndarray, "k q"],
     times: Float[np.ndarray, " q"],
@@ -185,7 +184,7 @@ def _errors(
 
 
 def _changes(
-    tower: Tower, columns: Array, ritz: Float[np.ndarray, " m"], sample: Int[np.ndarray, " s"]
+    tower: Tower, columns: np.ndarray, ritz: Float[np.ndarray, " m"], sample: Int[np.ndarray, " s"]
 ) -> tuple[Float[np.ndarray, " s"], Float[np.ndarray, " s"]]:
     """Return what some Ritz vectors become with their corrections: the norms of φ'² - φ² in M, and their values' fall.
 
