@@ -21,7 +21,6 @@ from .maps.functional_map import transfer_function as transfer_function
 from .maps.point_maps import map_from_points as map_from_points
 from .maps.point_maps import point_map as point_map
 from .maps.point_maps import refine_map as refine_map
-from .multilevel.approximate import approximate_spectrum as approximate_spectrum
 from .signatures.approximate_heat import ApproximateSignature as ApproximateSignature
 from .signatures.approximate_heat import (
     approximate_heat_kernel_signature as approximate_heat_kernel_signature,
@@ -34,7 +33,6 @@ from .signatures.heat import (
 )
 from .signatures.wave import default_energies as default_energies
 from .signatures.wave import wave_kernel_signature as wave_kernel_signature
+from .solve import solve_spectrum as solve_spectrum
 from .solver.certify import certify as certify
-from .solver.dirichlet import solve_dirichlet as solve_dirichlet
-from .solver.solve import solve_spectrum as solve_spectrum
 from .spectrum import Spectrum as Spectrum

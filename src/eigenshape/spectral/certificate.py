@@ -26,7 +26,7 @@ class Certificate:
     shift : float
         σ, in 1/length²; infinite where all n eigenvalues were computed, or nothing was counted.
     count : int or None
-        Eigenvalues below σ, and above `floor`, by inertia; None where they were not counted (`approximate_spectrum`).
+        Eigenvalues below σ, and above `floor`, by inertia; None where they were not counted (approximate method).
     n_found : int
         Eigenpairs found there; equal to `count`, or the spectrum is refused.
     gap : (float, float)
@@ -80,7 +80,7 @@ class Certificate:
                 f"These are approximations, {self.n_pairs} of them: by what the last round of refinement changed, each "
                 f"is off an eigenvalue by about {self.estimate or 0.0:.1e} of the largest, and for certain by at most "
                 f"{self.max_residual:.1e}. The eigenvectors are orthonormal to {self.orthonormality:.1e}. Whether one "
-                f"is missing was not counted; solve_spectrum proves that none is."
+                f"is missing was not counted; the certified method of solve_spectrum proves that none is."
             )
         if not self.complete:
             return (

@@ -11,7 +11,7 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import disjoint_union, icosphere, subdivide, torus
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
 from eigenshape.spectral.comparison.spectra import compare_spectra, spectral_hausdorff_distance
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 SPHERE = icosphere(2)
 SPECTRUM = solve_spectrum(cotangent_laplacian(SPHERE), 20)

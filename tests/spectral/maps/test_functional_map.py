@@ -238,7 +238,7 @@ def test_spectra_without_a_constant_are_refused(hand):
     inner = es.solve_spectrum(
         es.cotangent_laplacian(HAND), above=hand.eigenvalues[3] * 1.001, below=hand.eigenvalues[9]
     )
-    fixed = es.spectral.solve_dirichlet(es.cotangent_laplacian(HAND), 10, np.arange(10))
+    fixed = es.solve_spectrum(es.cotangent_laplacian(HAND), 10, fixed=np.arange(10))
     for spectrum in (inner, fixed):
         with pytest.raises(
             es.InvalidParameterError,

@@ -12,8 +12,7 @@ from eigenshape.spectral.signatures.heat import (
     reflection_free_signature,
     scale_invariant_heat_kernel_signature,
 )
-from eigenshape.spectral.solver.dirichlet import solve_dirichlet
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 TIMES = [0.01, 0.1, 1.0]
 
@@ -86,7 +85,7 @@ def test_a_straight_edge_leaves_no_trace_in_the_mean():
     mesh, t = grid(40, 40), 0.01
     laplacian = cotangent_laplacian(mesh, "averaged")
     neumann = solve_spectrum(laplacian, 110)
-    dirichlet = solve_dirichlet(laplacian, 110, np.unique(boundary_edges(mesh)))
+    dirichlet = solve_spectrum(laplacian, 110, fixed=np.unique(boundary_edges(mesh)))
     middle = mesh.vertices[:, 1] == 0.5
     free = reflection_free_signature(neumann, dirichlet, [t])[middle, 0] * 4 * np.pi * t
     reflected = heat_kernel_signature(neumann, [t])[middle, 0] * 4 * np.pi * t

@@ -21,7 +21,7 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import interpolation_constants, longest_edges
 from eigenshape.spectral.bounds.nonconforming import lower_bounds, partly
 from eigenshape.spectral.bounds.rounding import enclose, relative_rounding
-from eigenshape.spectral.solver.dirichlet import solve_free
+from eigenshape.spectral.solve import solve_spectrum
 
 LINEAR_FLOOR = 0.5  # consistent mass of linear elements over its diagonal, in any dimension
 NOTHING = np.empty(0, dtype=np.int64)
@@ -168,7 +168,7 @@ def _upper_bounds(
         )
     count = whole_number(k, "k", 1, n_free)
     laplacian = cotangent_laplacian(conforming, "consistent")
-    found = solve_free(laplacian, count, held, partly(progress, 0.0, 0.3))
+    found = solve_spectrum(laplacian, count, fixed=held, progress=partly(progress, 0.0, 0.3))
     ends = enclose(found, laplacian, LINEAR_FLOOR, relative_rounding(mesh))[1]
     return ends, float(1 - found.eigenvalues[-1] / ends[-1]) if ends[-1] else 0.0
 

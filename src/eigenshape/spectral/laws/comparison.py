@@ -8,7 +8,7 @@ from eigenshape._errors import ConvergenceError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.sparse.elimination import EPS
 from eigenshape.spectral.laws.report import Law, NotJudged, Outcome, judged
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 N_EIGENVALUES = 20

@@ -31,7 +31,9 @@ PROBE_STEPS = 4
 MOST_LEFT = 10.0  # times what a round has lowered
 EARLY = 0.5  # of the bound, or:
 EXACT = 0.01  # of the accuracy, under which a residual is left as it is
-TOO_FAR = "The weights of the operator spread too far for its diagonal: take solve_spectrum."
+TOO_FAR = (
+    "The weights of the operator spread too far for its diagonal: solve with method='certified'."
+)
 UNSEEN = 3.0  # times what is estimated, where only smoothing has been at work
 
 
@@ -112,7 +114,7 @@ def refine(
     raise ConvergenceError(
         f"The error must be estimated at no more than {goal.accuracy:.1e} of the last eigenvalue, and no residual be "
         f"above {goal.bound:.1e}; after {goal.rounds} rounds these are {standing.left:.1e} and {standing.worst:.1e}. "
-        f"Ask for less accuracy, or take solve_spectrum."
+        f"Ask for less accuracy, or solve with method='certified'."
     )
 
 

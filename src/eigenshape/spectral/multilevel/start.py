@@ -96,9 +96,11 @@ def require_lumped(laplacian: Laplacian) -> None:
     rows = laplacian.mass.tocoo()
     beside = np.flatnonzero((rows.row != rows.col) & (rows.data != 0))
     if beside.size:
+        first = beside[0]
         raise InvalidParameterError(
-            f"mass must be diagonal here; entry ({rows.row[beside[0]]}, {rows.col[beside[0]]}) is "
-            f"{rows.data[beside[0]]:.6g}. Lump the mass, or take solve_spectrum."
+            f"mass must be diagonal for approximate eigenpairs; entry ({rows.row[first]}, "
+            f"{rows.col[first]}) is {rows.data[first]:.6g}. "
+            f"Build the operator with a lumped mass, or solve with method='certified'."
         )
 
 

@@ -31,9 +31,9 @@ from eigenshape.spectral.multilevel.start import (
 )
 from eigenshape.spectral.multilevel.vcycle import Tower, correct
 from eigenshape.spectral.signatures.heat import heat_kernel_signature
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver.kernel_values import from_pencil, require_readable
 from eigenshape.spectral.solver.pencil import Pencil, normalise
-from eigenshape.spectral.solver.solve import solve_spectrum
 
 LARGE = 100_000  # points beyond which the command line takes approximate signatures
 USUAL_ACCURACY = 1e-2
@@ -78,8 +78,8 @@ def approximate_heat_kernel_signature(
     """Measure the heat left at each of very many points, nearly, with no factor of the whole operator.
 
     What `heat_kernel_signature` gives for the spectrum of k pairs. The thesis names an approximation for its large
-    models, HKS-simp, and does not print it (5.4); this one is ours. The eigenvectors are those of
-    `approximate_spectrum`, in single precision, and are summed up as they are, some points at a time.
+    models, HKS-simp, and does not print it (5.4); this one is ours. The eigenvectors are those of the approximate
+    method of `solve_spectrum`, in single precision, and are summed up as they are, some points at a time.
 
     The error is estimated, not bounded: some of the pairs are corrected once more, and what this changes in their
     squares, weighted by exp(-tλ), adds up to `errors`. On scans, made surfaces and poor triangles it was .8 to 4.5

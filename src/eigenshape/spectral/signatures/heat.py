@@ -103,7 +103,7 @@ def reflection_free_signature(
     Parameters
     ----------
     neumann, dirichlet : Spectrum
-        Of one surface, from `solve_spectrum` and `solve_dirichlet` with its boundary fixed.
+        Of one surface, from `solve_spectrum`, without and with its boundary fixed.
     times : (q,) float
         Diffusion times, in length^2, all > 0.
 
