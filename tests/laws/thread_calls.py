@@ -224,7 +224,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         v.ball, es.operators.curvature_tensors(v.ball, 2.0)
     ),
     "apply_edit": lambda v: es.deformation.apply_edit(v.rig, v.edit).mesh,
-    "approximate_heat_kernel_signature": lambda v: es.spectral.approximate_heat_kernel_signature(
+    "approximate_heat_signature": lambda v: es.spectral.approximate_heat_signature(
         v.many_laplacian, 8, [0.5, 1.0]
     ),
     "as_rigid_as_possible": lambda v: es.deformation.as_rigid_as_possible(
@@ -257,7 +257,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "build_laplacian": lambda v: [
         es.build_laplacian(v.torus, name)
         for name, entry in es.operators.OPERATORS.items()
-        if es.TriangleMesh in entry.takes
+        if es.TriangleMesh in entry.shapes
     ],
     "certify": lambda v: es.spectral.certify(
         v.laplacian, v.spectrum.eigenvalues, v.spectrum.eigenvectors
@@ -469,9 +469,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         saved(v, ".pdf"),
         len(saved(v, ".svg")),
     ],  # random names in SVG
-    "scale_invariant_heat_kernel_signature": lambda v: (
-        es.spectral.scale_invariant_heat_kernel_signature(v.many_spectrum)
-    ),
+    "scale_invariant_signature": lambda v: es.spectral.scale_invariant_signature(v.many_spectrum),
     "seal_holes": lambda v: es.geometry.seal_holes(v.grid),
     "seen_patches": lambda v: es.retrieval.seen_patches(v.torus, n_views=1),
     "segment": lambda v: es.segment(v.tree, n_regions=4),

@@ -22,7 +22,7 @@ SHAPES = {
 @pytest.mark.parametrize("name", OPERATORS)
 @pytest.mark.filterwarnings("ignore:A heat time")
 def test_each_takes_what_it_says_and_refuses_the_rest(shape, name):
-    takes = isinstance(SHAPES[shape], OPERATORS[name].takes)
+    takes = isinstance(SHAPES[shape], OPERATORS[name].shapes)
     if takes:
         laplacian = build_laplacian(SHAPES[shape], name)
         ones = np.ones(laplacian.n_points)

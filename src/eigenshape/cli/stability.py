@@ -131,7 +131,7 @@ def _facts(report: StabilityReport) -> dict[str, Any]:
     return {
         "spectra": {
             **asdict(compared),
-            "told": compared.told,
+            "told": compared.proved_changes,
             "hausdorff": compared.hausdorff,
             "index_distance": compared.index_distance,
             "mean_relative": compared.mean_relative,
@@ -160,7 +160,7 @@ def _print(report: StabilityReport) -> None:
     rows = [
         [str(number), f"{one:.6g}", f"{two:.6g}", f"{change:.2%}", "yes" if told else "no"]
         for number, ((one, two), change, told) in enumerate(
-            zip(pairs, compared.relative, compared.told, strict=True)
+            zip(pairs, compared.relative, compared.proved_changes, strict=True)
         )
     ]
     print_table("Eigenvalues, in 1/length²", ["i", "first", "second", "change", "proved"], rows)

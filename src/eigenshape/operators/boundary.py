@@ -9,11 +9,11 @@ from typing import Literal
 
 import numpy as np
 from jaxtyping import Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import as_array
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian
 
 Condition = Literal["neumann", "dirichlet"]

@@ -32,18 +32,18 @@ class Operator:
     ----------
     build : callable
         From a shape and options to a Laplacian.
-    takes : tuple of types
+    shapes : tuple of types
         Shapes that it is for.
     options : tuple of str
         Names of the options that it knows.
-    says : str
+    description : str
         What it is, in a line.
     """
 
     build: Callable[..., Laplacian]
-    takes: tuple[type, ...]
+    shapes: tuple[type, ...]
     options: tuple[str, ...]
-    says: str
+    description: str
 
 
 OPERATORS = {
@@ -113,9 +113,9 @@ def build_laplacian(
             f"operator must be one of {', '.join(OPERATORS)}; it is {name!r}."
         )
     entry = OPERATORS[name]
-    if not isinstance(shape, entry.takes):
+    if not isinstance(shape, entry.shapes):
         raise InvalidParameterError(
-            f"The {name} operator takes {' or '.join(kind.__name__ for kind in entry.takes)}; the shape is a "
+            f"The {name} operator takes {' or '.join(kind.__name__ for kind in entry.shapes)}; the shape is a "
             f"{type(shape).__name__}. {_instead(shape)}"
         )
     unknown = [option for option in options if option not in entry.options]
@@ -134,5 +134,5 @@ def default_operator(shape: Shape | sp.sparray) -> str:
 
 
 def _instead(shape: object) -> str:
-    names = [name for name, entry in OPERATORS.items() if isinstance(shape, entry.takes)]
+    names = [name for name, entry in OPERATORS.items() if isinstance(shape, entry.shapes)]
     return f"It is for {', '.join(names)}." if names else "No operator is for that."

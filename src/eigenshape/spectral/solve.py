@@ -6,13 +6,13 @@ from typing import Literal, SupportsIndex, get_args
 
 import numpy as np
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.multilevel.approximate import approximate_pairs

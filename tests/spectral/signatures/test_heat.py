@@ -10,7 +10,7 @@ from eigenshape.spectral.signatures.heat import (
     default_times,
     heat_kernel_signature,
     reflection_free_signature,
-    scale_invariant_heat_kernel_signature,
+    scale_invariant_signature,
 )
 from eigenshape.spectral.solve import solve_spectrum
 
@@ -128,9 +128,9 @@ def test_size_leaves_no_trace_in_the_scale_invariant_signature(scale):
         solve_spectrum(cotangent_laplacian(TriangleMesh(mesh.vertices * size, mesh.faces)), 60)
         for size in (1.0, scale)
     )
-    found = scale_invariant_heat_kernel_signature(one)
+    found = scale_invariant_signature(one)
     assert found.shape == (288, 6)
-    np.testing.assert_allclose(scale_invariant_heat_kernel_signature(two), found, rtol=1e-7)
+    np.testing.assert_allclose(scale_invariant_signature(two), found, rtol=1e-7)
     assert found.std(axis=0).max() > 0.01  # and points differ
 
 
@@ -142,7 +142,7 @@ def test_with_the_same_times_size_leaves_little_trace():
         for size in (1.0, 2.0)
     )
     times = np.geomspace(default_times(one)[0] / 1e6, default_times(two)[-1] * 100, 400)
-    found = [scale_invariant_heat_kernel_signature(spectrum, times) for spectrum in (one, two)]
+    found = [scale_invariant_signature(spectrum, times) for spectrum in (one, two)]
     plain = [heat_kernel_signature(spectrum, times) for spectrum in (one, two)]
     assert np.abs(found[1] / found[0] - 1).max() < 1e-3
     assert np.abs(plain[1] / plain[0] - 1).max() > 0.7
@@ -152,7 +152,7 @@ def test_the_first_frequency_is_the_whole_fall():
     spectrum = solve_spectrum(cotangent_laplacian(torus(12, 9)), 30)
     times = default_times(spectrum)
     heat = heat_kernel_signature(spectrum, times)
-    found = scale_invariant_heat_kernel_signature(spectrum, times, n_frequencies=1)
+    found = scale_invariant_signature(spectrum, times, n_frequencies=1)
     np.testing.assert_allclose(found[:, 0], np.log(heat[:, 0] / heat[:, -1]), rtol=1e-12)
 
 
@@ -161,10 +161,10 @@ def test_times_of_the_scale_invariant_signature_are_a_geometric_sequence():
     with pytest.raises(
         InvalidParameterError, match="times must be a geometric sequence of at least 3; there are 3"
     ):
-        scale_invariant_heat_kernel_signature(spectrum, [1.0, 2.0, 3.0])
+        scale_invariant_signature(spectrum, [1.0, 2.0, 3.0])
     with pytest.raises(
         InvalidParameterError, match="there are 1, with ratios of neighbours from 1 to 1"
     ):
-        scale_invariant_heat_kernel_signature(spectrum, [1.0])
+        scale_invariant_signature(spectrum, [1.0])
     with pytest.raises(InvalidParameterError, match=r"n_frequencies must lie in 1\.\.2; it is 3"):
-        scale_invariant_heat_kernel_signature(spectrum, [1.0, 2.0, 4.0, 8.0], n_frequencies=3)
+        scale_invariant_signature(spectrum, [1.0, 2.0, 4.0, 8.0], n_frequencies=3)

@@ -269,10 +269,10 @@ def test_below_scales_as_eigenvalues_do():
     assert len(solve_spectrum(cotangent_laplacian(small), below=5e200).eigenvalues) == 4
 
 
-def test_one_of_k_and_below_is_asked_for():
+def test_one_of_k_and_below_is_required():
     laplacian = cotangent_laplacian(icosphere(1))
     with pytest.raises(
-        InvalidParameterError, match="One of k and below says which pairs to compute; k is None"
+        InvalidParameterError, match="Exactly one of k and below must be given; k is None"
     ):
         solve_spectrum(laplacian)
     with pytest.raises(InvalidParameterError, match=r"k is 3 and below is 1\.0"):

@@ -42,7 +42,7 @@ class SpectrumComparison:
     bracketed: bool
 
     @property
-    def told(self) -> Bool[np.ndarray, " k"]:
+    def proved_changes(self) -> Bool[np.ndarray, " k"]:
         """Which changes are proved: the two intervals have no point in common."""
         (low_one, high_one), (low_two, high_two) = self.intervals_one.T, self.intervals_two.T
         return np.asarray((high_one < low_two) | (high_two < low_one))
@@ -72,9 +72,9 @@ class SpectrumComparison:
 
     def explain(self) -> str:
         """Say in plain words how far the spectra are apart, and what of it is proved."""
-        k, n_told, worst = (
+        k, n_proved, worst = (
             len(self.one),
-            int(self.told.sum()),
+            int(self.proved_changes.sum()),
             int(np.abs(self.one - self.two).argmax()),
         )
         bars = "brackets of the shapes'" if self.bracketed else "error bars of the operators'"
@@ -82,7 +82,7 @@ class SpectrumComparison:
             f"Of the {k} lowest eigenvalues, number {worst} changes most, from {self.one[worst]:.6g} to "
             f"{self.two[worst]:.6g} (1/length²). They change by {self.median_relative:.3g} of themselves in the median "
             f"and {self.mean_relative:.3g} in the mean, and the sets are {self.hausdorff:.3g} apart (Hausdorff). "
-            f"{n_told} of the {k} changes are proved: the {bars} eigenvalues do not overlap."
+            f"{n_proved} of the {k} changes are proved: the {bars} eigenvalues do not overlap."
         )
 
 

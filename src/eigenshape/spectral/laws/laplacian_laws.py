@@ -19,10 +19,10 @@ from eigenshape.spectral.laws.comparison import sizes_of
 from eigenshape.spectral.laws.report import (
     DEFAULT_PROMISES,
     Law,
-    NotJudged,
     OperatorReport,
     Outcome,
     Promise,
+    SkippedLaw,
     gathered,
     judged,
     known_promises,
@@ -95,7 +95,9 @@ def check_laplacian(
         _semidefinite(pencil),
     ]
     for name, laws in optional.items():
-        found += laws() if name in promised else [NotJudged(name.replace("_", " "), "not promised")]
+        found += (
+            laws() if name in promised else [SkippedLaw(name.replace("_", " "), "not promised")]
+        )
     return gathered(found)
 
 
@@ -149,19 +151,19 @@ def _semidefinite(pencil: Pencil) -> Law:
                 NEGATIVE,
                 _bounded_below(pencil, factor, float(share)),
             )
-    says = f"eigenvalues lie below -{LADDER[-1]:.0e} trace W / trace B."
-    return judged("positive semidefinite", np.inf, NEGATIVE, says)
+    explanation = f"eigenvalues lie below -{LADDER[-1]:.0e} trace W / trace B."
+    return judged("positive semidefinite", np.inf, NEGATIVE, explanation)
 
 
 def _bounded_below(pencil: Pencil, factor: Factor, share: float) -> str:
     bound = (
         -factor.shift + float((rounding(factor) / pencil.mass_diagonal).max()) / pencil.mass_floor
     )
-    says = f"W + {share:.0e} (trace W / trace B) B has no negative pivot"
+    explanation = f"W + {share:.0e} (trace W / trace B) B has no negative pivot"
     if share > LADDER[0]:
-        says = f"{says}, and some with {share / 10:.0e}"
+        explanation = f"{explanation}, and some with {share / 10:.0e}"
     proved = float(pencil.values_out(np.array([bound]))[0])
-    return f"{says}: rounding included, no eigenvalue lies below {-proved:.1e}."
+    return f"{explanation}: rounding included, no eigenvalue lies below {-proved:.1e}."
 
 
 def _row_sums(laplacian: Laplacian) -> Law:
@@ -172,8 +174,8 @@ def _row_sums(laplacian: Laplacian) -> Law:
     np.maximum.at(largest, rows, roots[W.indices])
     relative = np.abs(sums) / np.maximum(roots * largest, np.finfo(float).tiny)
     worst = int(relative.argmax())
-    says = f"the largest sum of a row is that of row {worst}, {sums[worst]:.3g} where W_ii is {W[worst, worst]:.3g}."
-    return judged("row sums", relative[worst], ROW_SUM, says)
+    explanation = f"the largest sum of a row is that of row {worst}, {sums[worst]:.3g} where W_ii is {W[worst, worst]:.3g}."
+    return judged("row sums", relative[worst], ROW_SUM, explanation)
 
 
 def _kernel(laplacian: Laplacian, pencil: Pencil) -> Law:
@@ -191,8 +193,8 @@ def _kernel(laplacian: Laplacian, pencil: Pencil) -> Law:
     line = min(max(FIRST_LINE, 4 * energy), LARGEST_ZERO)
     while (zeros := _zeros(pencil, line)) < n_parts and line < LARGEST_ZERO:
         line *= 10  # what rounding makes of a zero may lie farther out; a larger interval holds no fewer
-    says = f"within {line:.0e} trace W / trace B of zero lie {zeros} of the eigenvalues; components of W: {n_parts}."
-    return judged("kernel", abs(zeros - n_parts), 0, says)
+    explanation = f"within {line:.0e} trace W / trace B of zero lie {zeros} of the eigenvalues; components of W: {n_parts}."
+    return judged("kernel", abs(zeros - n_parts), 0, explanation)
 
 
 def _zeros(pencil: Pencil, line: float) -> int:
@@ -210,19 +212,19 @@ def _graph_parts(matrix: sp.csr_array) -> tuple[int, Int[np.ndarray, " n"]]:
 
 def _components(laplacian: Laplacian, shape: Subject | None) -> Outcome:
     if shape is None or isinstance(shape, PointCloud):
-        return NotJudged("components", "no mesh or graph says what belongs together")
+        return SkippedLaw("components", "no mesh or graph says what belongs together")
     n_parts, labels = (
         _graph_parts(shape) if isinstance(shape, sp.csr_array) else vertex_components(shape)
     )
     if len(labels) != laplacian.n_points:
         return _number_of_parts(laplacian, n_parts)
-    worst, says = 0.0, "no entry of W or B joins two of them."
+    worst, explanation = 0.0, "no entry of W or B joins two of them."
     for name, matrix in (("W", laplacian.stiffness), ("B", laplacian.mass)):
         size, place = _largest_link(matrix, labels)
         if size > worst:
             worst = size
-            says = f"entry {place} of {name} joins two of them: it is {size:.1e} of √({name}_ii {name}_jj)."
-    return judged("components", worst, LINK, f"the shape has {n_parts}; {says}")
+            explanation = f"entry {place} of {name} joins two of them: it is {size:.1e} of √({name}_ii {name}_jj)."
+    return judged("components", worst, LINK, f"the shape has {n_parts}; {explanation}")
 
 
 def _number_of_parts(laplacian: Laplacian, n_parts: int) -> Law:
@@ -256,10 +258,10 @@ def _definite(pencil: Pencil) -> Law:
 
 def _volume(laplacian: Laplacian, shape: Subject | None) -> Outcome:
     if shape is None or isinstance(shape, PointCloud | sp.csr_array):
-        return NotJudged("volume", "only a mesh has one to compare with")
+        return SkippedLaw("volume", "only a mesh has one to compare with")
     volume, total = float(simplex_volumes(shape).sum()), float(laplacian.mass.sum())
-    says = f"the entries of B sum to {total:.12g}, and the shape has volume {volume:.12g}."
-    return judged("volume", abs(total / volume - 1), VOLUME, says)
+    explanation = f"the entries of B sum to {total:.12g}, and the shape has volume {volume:.12g}."
+    return judged("volume", abs(total / volume - 1), VOLUME, explanation)
 
 
 def _weights(laplacian: Laplacian) -> Law:
@@ -270,5 +272,5 @@ def _weights(laplacian: Laplacian) -> Law:
     if not relative.size:
         return judged("nonnegative weights", 0, WEIGHT, "there is no pair of points to weigh.")
     worst = int(relative.argmax())
-    says = f"the lowest weight, {weights[worst]:.3g}, is that of points {rows[worst]} and {columns[worst]}."
-    return judged("nonnegative weights", max(relative[worst], 0.0), WEIGHT, says)
+    explanation = f"the lowest weight, {weights[worst]:.3g}, is that of points {rows[worst]} and {columns[worst]}."
+    return judged("nonnegative weights", max(relative[worst], 0.0), WEIGHT, explanation)

@@ -27,10 +27,10 @@ from eigenshape.spectral.laws.laplacian_laws import check_laplacian
 from eigenshape.spectral.laws.report import (
     DEFAULT_PROMISES,
     Law,
-    NotJudged,
     OperatorReport,
     Outcome,
     Promise,
+    SkippedLaw,
     gathered,
     judged,
     judgements,
@@ -163,7 +163,9 @@ def _rebuilt(trial: Trial, promised: frozenset[Promise]) -> Iterator[Outcome]:
     }
     for promise, law in optional.items():
         name = promise.replace("_", " ")
-        yield _attempt(name, law, trial) if promise in promised else NotJudged(name, "not promised")
+        yield (
+            _attempt(name, law, trial) if promise in promised else SkippedLaw(name, "not promised")
+        )
 
 
 def _attempt(name: str, law: Callable[[Trial], Outcome], trial: Trial) -> Outcome:
@@ -221,25 +223,25 @@ def _point_order(trial: Trial) -> Outcome:
 
 def _simplex_order(trial: Trial) -> Outcome:
     if isinstance(trial.subject, PointCloud | sp.csr_array):
-        return NotJudged("simplex order", "the shape has no simplices")
+        return SkippedLaw("simplex order", "the shape has no simplices")
     return _same("simplex order", trial, changes.reordered(trial.subject, trial.rng))
 
 
 def _orientation(trial: Trial) -> Outcome:
     if isinstance(trial.subject, PointCloud | sp.csr_array):
-        return NotJudged("orientation", "the shape has no simplices")
+        return SkippedLaw("orientation", "the shape has no simplices")
     return _same("orientation", trial, changes.turned_over(trial.subject, trial.rng))
 
 
 def _rigid_motion(trial: Trial) -> Outcome:
     if isinstance(trial.subject, sp.csr_array):
-        return NotJudged("rigid motion", "a graph lies nowhere")
+        return SkippedLaw("rigid motion", "a graph lies nowhere")
     return _same("rigid motion", trial, changes.moved(trial.subject, trial.rng))
 
 
 def _reflection(trial: Trial) -> Outcome:
     if isinstance(trial.subject, sp.csr_array):
-        return NotJudged("reflection", "a graph lies nowhere")
+        return SkippedLaw("reflection", "a graph lies nowhere")
     return _same("reflection", trial, changes.mirrored(trial.subject))
 
 
@@ -269,10 +271,10 @@ def _scaled(trial: Trial, power: int) -> Law:
     )
     unit = f"in a unit 2^{power} (1e{power * np.log10(2):+.0f}) times as large,"
     if not law.holds or isinstance(trial.subject, sp.csr_array):
-        return judged("scaling", law.measured, law.allowed, f"{unit} {law.says}")
+        return judged("scaling", law.measured, law.allowed, f"{unit} {law.explanation}")
     ratio = (there[2] / here[2]) / (there[3] / here[3]) * 2.0**power * 2.0**power
-    says = f"{unit} W and B change by one factor each, and eigenvalues times length² by {abs(ratio - 1):.1e}."
-    return judged("scaling", max(law.measured, abs(ratio - 1)), law.allowed, says)
+    explanation = f"{unit} W and B change by one factor each, and eigenvalues times length² by {abs(ratio - 1):.1e}."
+    return judged("scaling", max(law.measured, abs(ratio - 1)), law.allowed, explanation)
 
 
 def _unit_traces(laplacian: Laplacian) -> tuple[sp.csr_array, sp.csr_array, float, float]:
@@ -300,15 +302,15 @@ def _union(trial: Trial) -> Outcome:
     return same_eigenvalues("union", other, trial.spectrum, rounding, copies=2)
 
 
-def _drowned(name: str, rounding: float) -> NotJudged:
-    return NotJudged(
+def _drowned(name: str, rounding: float) -> SkippedLaw:
+    return SkippedLaw(
         name,
         f"rounding of coordinates may change W by {rounding:.0e}: simplices are thin, or the operator is unstable",
     )
 
 
-def _unsolved(name: str) -> NotJudged:
-    return NotJudged(name, "rows are no points, and the lowest eigenvalues cannot be proved")
+def _unsolved(name: str) -> SkippedLaw:
+    return SkippedLaw(name, "rows are no points, and the lowest eigenvalues cannot be proved")
 
 
 def _same(name: str, trial: Trial, subject: Subject) -> Outcome:

@@ -35,7 +35,7 @@ class Law:
     holds : bool
     measured, allowed : float
         The law holds where `measured` is at most `allowed`; neither has a unit.
-    says : str
+    explanation : str
         One plain sentence with the numbers, and the entry at fault where there is one.
     """
 
@@ -43,11 +43,11 @@ class Law:
     holds: bool
     measured: float
     allowed: float
-    says: str
+    explanation: str
 
 
 @dataclass(frozen=True)
-class NotJudged:
+class SkippedLaw:
     """A law that was not looked at, and why."""
 
     name: str
@@ -59,7 +59,7 @@ class OperatorReport:
     """Every law that was judged, in the order of the proof, and every one that was not."""
 
     laws: tuple[Law, ...]
-    not_judged: tuple[NotJudged, ...]
+    skipped: tuple[SkippedLaw, ...]
 
     @property
     def passed(self) -> bool:
@@ -75,26 +75,27 @@ class OperatorReport:
             else f"{broken} of {len(self.laws)} laws are broken."
         )
         judged = [
-            f"{'holds ' if law.holds else 'BROKEN'}  {law.name}: {law.says}" for law in self.laws
+            f"{'holds ' if law.holds else 'BROKEN'}  {law.name}: {law.explanation}"
+            for law in self.laws
         ]
         return "\n".join(
-            [head, *judged, *(f"not judged  {law.name}: {law.reason}" for law in self.not_judged)]
+            [head, *judged, *(f"not judged  {law.name}: {law.reason}" for law in self.skipped)]
         )
 
 
-def judged(name: str, measured: float, allowed: float, says: str) -> Law:
+def judged(name: str, measured: float, allowed: float, explanation: str) -> Law:
     """Return the law, which holds where what was measured is allowed."""
-    return Law(name, bool(measured <= allowed), float(measured), float(allowed), says)
+    return Law(name, bool(measured <= allowed), float(measured), float(allowed), explanation)
 
 
-Outcome: TypeAlias = Law | NotJudged
+Outcome: TypeAlias = Law | SkippedLaw
 
 
-def gathered(found: Iterable[Law | NotJudged]) -> OperatorReport:
+def gathered(found: Iterable[Law | SkippedLaw]) -> OperatorReport:
     """Sort what was judged from what was not."""
     rows = list(found)
     laws = tuple(law for law in rows if isinstance(law, Law))
-    return OperatorReport(laws, tuple(law for law in rows if isinstance(law, NotJudged)))
+    return OperatorReport(laws, tuple(law for law in rows if isinstance(law, SkippedLaw)))
 
 
 def known_promises(promises: Iterable[Promise]) -> frozenset[Promise]:
@@ -108,7 +109,7 @@ def known_promises(promises: Iterable[Promise]) -> frozenset[Promise]:
     return given
 
 
-def judgements(report: OperatorReport) -> Iterator[Law | NotJudged]:
+def judgements(report: OperatorReport) -> Iterator[Law | SkippedLaw]:
     """Return what was judged, then what was not."""
     yield from report.laws
-    yield from report.not_judged
+    yield from report.skipped

@@ -114,7 +114,7 @@ def refine(
     raise ConvergenceError(
         f"The error must be estimated at no more than {goal.accuracy:.1e} of the last eigenvalue, and no residual be "
         f"above {goal.bound:.1e}; after {goal.rounds} rounds these are {standing.left:.1e} and {standing.worst:.1e}. "
-        f"Ask for less accuracy, or solve with method='certified'."
+        f"Request less accuracy, or solve with method='certified'."
     )
 
 

@@ -67,7 +67,7 @@ class ApproximateSignature:
     complete: bool
 
 
-def approximate_heat_kernel_signature(
+def approximate_heat_signature(
     laplacian: Laplacian,
     k: SupportsIndex,
     times: ArrayLike,

@@ -128,7 +128,7 @@ def reflection_free_signature(
 
 
 @one_blas_thread()
-def scale_invariant_heat_kernel_signature(
+def scale_invariant_signature(
     spectrum: Spectrum, times: ArrayLike | None = None, *, n_frequencies: SupportsIndex = 6
 ) -> Float[np.ndarray, "n frequencies"]:
     """Measure how heat falls in time, blind to the size of the shape.
