@@ -22,15 +22,11 @@ from .maps.point_maps import map_from_points as map_from_points
 from .maps.point_maps import point_map as point_map
 from .maps.point_maps import refine_map as refine_map
 from .signatures.approximate_heat import ApproximateSignature as ApproximateSignature
-from .signatures.approximate_heat import (
-    approximate_heat_signature as approximate_heat_signature,
-)
+from .signatures.approximate_heat import approximate_heat_signature as approximate_heat_signature
 from .signatures.heat import default_times as default_times
 from .signatures.heat import heat_kernel_signature as heat_kernel_signature
 from .signatures.heat import reflection_free_signature as reflection_free_signature
-from .signatures.heat import (
-    scale_invariant_signature as scale_invariant_signature,
-)
+from .signatures.heat import scale_invariant_signature as scale_invariant_signature
 from .signatures.wave import default_energies as default_energies
 from .signatures.wave import wave_kernel_signature as wave_kernel_signature
 from .solve import solve_spectrum as solve_spectrum

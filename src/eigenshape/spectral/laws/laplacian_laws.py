@@ -174,7 +174,10 @@ def _row_sums(laplacian: Laplacian) -> Law:
     np.maximum.at(largest, rows, roots[W.indices])
     relative = np.abs(sums) / np.maximum(roots * largest, np.finfo(float).tiny)
     worst = int(relative.argmax())
-    explanation = f"the largest sum of a row is that of row {worst}, {sums[worst]:.3g} where W_ii is {W[worst, worst]:.3g}."
+    explanation = (
+        f"the largest sum of a row is that of row {worst}, {sums[worst]:.3g} where W_ii is "
+        f"{W[worst, worst]:.3g}."
+    )
     return judged("row sums", relative[worst], ROW_SUM, explanation)
 
 
@@ -193,7 +196,10 @@ def _kernel(laplacian: Laplacian, pencil: Pencil) -> Law:
     line = min(max(FIRST_LINE, 4 * energy), LARGEST_ZERO)
     while (zeros := _zeros(pencil, line)) < n_parts and line < LARGEST_ZERO:
         line *= 10  # what rounding makes of a zero may lie farther out; a larger interval holds no fewer
-    explanation = f"within {line:.0e} trace W / trace B of zero lie {zeros} of the eigenvalues; components of W: {n_parts}."
+    explanation = (
+        f"within {line:.0e} trace W / trace B of zero lie {zeros} of the eigenvalues; "
+        f"components of W: {n_parts}."
+    )
     return judged("kernel", abs(zeros - n_parts), 0, explanation)
 
 
