@@ -119,7 +119,7 @@ def test_a_report_explains_itself():
         "holds   kernel: within 1e-14 trace W / trace B of zero lie 1 of the eigenvalues; components of W: 1."
         in lines
     )
-    assert lines[-1] == "not judged  nonnegative weights: not promised"
+    assert lines[-1] == "skipped nonnegative weights: not promised"
     heavy = check_operator(
         lambda mesh: with_mass(cotangent_laplacian(mesh), 1.01), SPHERE, promises=["volume"]
     )

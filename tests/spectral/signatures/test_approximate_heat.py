@@ -179,7 +179,9 @@ def test_what_is_refused():
     ):
         es.spectral.approximate_heat_signature(laplacian, 10, TIMES, accuracy=1e-5)
     full = replace(laplacian, mass=es.cotangent_laplacian(creature(3000)[0], "consistent").mass)
-    with pytest.raises(es.InvalidParameterError, match="mass must be diagonal here"):
+    with pytest.raises(
+        es.InvalidParameterError, match="mass must be diagonal for approximate eigenpairs"
+    ):
         es.spectral.approximate_heat_signature(full, 10, TIMES)
 
 

@@ -101,7 +101,7 @@ def test_a_straight_edge_leaves_no_trace_in_the_mean():
 def test_spectra_of_two_surfaces_are_refused():
     one, two = (solve_spectrum(cotangent_laplacian(icosphere(level)), 3) for level in (0, 1))
     with pytest.raises(
-        InvalidParameterError, match="must be of one surface; they have 12 and 42 points"
+        InvalidParameterError, match="must be of the same surface; they have 12 and 42 points"
     ):
         reflection_free_signature(one, two, [1.0])
 

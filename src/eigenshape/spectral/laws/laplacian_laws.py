@@ -52,22 +52,24 @@ def check_laplacian(
     *,
     promises: Iterable[Promise] = DEFAULT_PROMISES,
 ) -> OperatorReport:
-    """Judge the laws that can be read off the two matrices.
+    """Check the laws that the two matrices of a Laplace operator must obey.
 
-    Symmetry of W and B, B positive definite and W positive semidefinite are always judged, the others where they are
-    promised. Signs of eigenvalues are counted by Sylvester's law of inertia (Parlett 1998, section 3.3), at any size:
-    a factor of W + δB without negative pivot shows that no eigenvalue lies below -δ.
+    Symmetry of W and B, B positive definite and W positive semidefinite are always checked, other
+    laws if they are promised. Signs of eigenvalues are counted by Sylvester's law of inertia
+    (Parlett 1998, section 3.3), at any size: a factor of W + δB without negative pivots shows that
+    no eigenvalue is below -δ.
 
     Parameters
     ----------
     laplacian : Laplacian
-    shape : ShapeLike or (n, n) sparse adjacency, optional
-        What the operator was made from; "volume" and "components" take a mesh.
+    shape : ShapeLike or (n, n) sparse, optional
+        The shape on which the operator was built; "volume" and "components" need a mesh.
     promises : iterable of str
-        "constants": zero row sums, and no more zeros among the eigenvalues than the graph of W has components.
-        "components": no entry of W or B joins two components of the shape, and W has one for each. "definite": no
-        eigenvalue is zero, in place of "constants" where a boundary condition holds points fixed. "volume": the
-        entries of B sum to the volume. "nonnegative_weights": w_ij = -W_ij ≥ 0. The others are for `check_operator`.
+        "constants": row sums are zero, and as many eigenvalues are zero as the graph of W has
+        components. "components": no entry of W or B joins two components of the shape, and W has as
+        many. "definite": no eigenvalue is zero, instead of "constants" if points are fixed.
+        "volume": the entries of B sum to the volume. "nonnegative_weights": w_ij = -W_ij ≥ 0. The
+        other promises are for `check_operator`.
 
     Returns
     -------
@@ -77,6 +79,14 @@ def check_laplacian(
     ------
     InvalidParameterError
         If a promise is unknown.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(1)
+    >>> report = es.spectral.check_laplacian(es.cotangent_laplacian(ball), ball)
+    >>> report.passed
+    True
     """
     require_type(laplacian, Laplacian, "laplacian")
     promised, subject = known_promises(promises), None if shape is None else as_subject(shape)

@@ -1,4 +1,4 @@
-"""The laws of a Laplace operator: which can be promised, what was measured, what holds."""
+"""Reports on the laws of a Laplace operator: which are promised, what was measured, which hold."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -27,16 +27,16 @@ DEFAULT_PROMISES: frozenset[Promise] = frozenset(
 
 @dataclass(frozen=True)
 class Law:
-    """One law and what was measured of it.
+    """One law, and what was measured.
 
     Attributes
     ----------
     name : str
     holds : bool
     measured, allowed : float
-        The law holds where `measured` is at most `allowed`; neither has a unit.
+        The law holds if `measured` is at most `allowed`; both are without unit.
     explanation : str
-        One plain sentence with the numbers, and the entry at fault where there is one.
+        One sentence with the numbers, and the worst entry if there is one.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Law:
 
 @dataclass(frozen=True)
 class SkippedLaw:
-    """A law that was not looked at, and why."""
+    """A law that was not checked, and the reason."""
 
     name: str
     reason: str
@@ -56,18 +56,25 @@ class SkippedLaw:
 
 @dataclass(frozen=True)
 class OperatorReport:
-    """Every law that was judged, in the order of the proof, and every one that was not."""
+    """The result of checking an operator: the laws that were checked, and those that were skipped.
+
+    Attributes
+    ----------
+    laws : tuple of Law
+        In the order in which they were checked.
+    skipped : tuple of SkippedLaw
+    """
 
     laws: tuple[Law, ...]
     skipped: tuple[SkippedLaw, ...]
 
     @property
     def passed(self) -> bool:
-        """Whether every law that was judged holds."""
+        """Whether every law that was checked holds."""
         return all(law.holds for law in self.laws)
 
     def explain(self) -> str:
-        """Say law by law what holds, what does not and what was not judged."""
+        """Return a text with one line for each law: whether it holds, is broken, or was skipped."""
         broken = sum(not law.holds for law in self.laws)
         head = (
             f"All {len(self.laws)} laws hold."
@@ -79,7 +86,7 @@ class OperatorReport:
             for law in self.laws
         ]
         return "\n".join(
-            [head, *judged, *(f"not judged  {law.name}: {law.reason}" for law in self.skipped)]
+            [head, *judged, *(f"skipped {law.name}: {law.reason}" for law in self.skipped)]
         )
 
 
