@@ -255,7 +255,7 @@ def test_slivers_in_which_rounding_leaves_nothing():
     assert (brackets.upper >= [0, *(np.pi / 1e8 * np.arange(1, 5)) ** 2]).all(), (
         "an interval's, with Neumann's condition"
     )
-    assert "Rounding in slivers leaves no lower end above 0" in brackets.explain()
+    assert "Rounding in slivers leaves no lower bound above 0" in brackets.explain()
 
 
 @pytest.mark.data

@@ -108,7 +108,8 @@ def require_one_constant(spectrum: Spectrum, name: str) -> None:
     if lost > LOST:
         raise InvalidParameterError(
             f"The first mode of a shape to be mapped must be constant; that of the {name} holds "
-            f"{100 * (1 - lost):.3g} % of the constant function. Solve from the lowest eigenvalue on, with no boundary fixed."
+            f"{100 * (1 - lost):.3g} % of the constant function. "
+            f"Solve from the lowest eigenvalue on, with no boundary fixed."
         )
 
 
