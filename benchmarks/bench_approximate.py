@@ -63,7 +63,7 @@ def solve(laplacian: es.Laplacian, k: int, accuracy: float | None) -> es.Spectru
     return (
         es.solve_spectrum(laplacian, k)
         if accuracy is None
-        else es.spectral.approximate_spectrum(laplacian, k, accuracy=accuracy)
+        else es.solve_spectrum(laplacian, k, method="approximate", accuracy=accuracy)
     )
 
 

@@ -125,7 +125,7 @@ def measured(method: str, saved: str, reference: str) -> Row:
     warnings.simplefilter("ignore")
     METHODS[method](es.make_creature("hand", n_vertices=1500))
     if method in OURS:
-        es.spectral.approximate_heat_kernel_signature(
+        es.spectral.approximate_heat_signature(
             es.cotangent_laplacian(es.shapes.torus(120, 80)), 9, [0.1]
         )
     with np.load(saved) as arrays:

@@ -68,7 +68,7 @@ def described(method: str, saved: str) -> Row:
     """Measure one description; run in a process of its own."""
     METHODS[method](es.make_creature("hand", n_vertices=1500))
     if method == "thesis":
-        es.spectral.approximate_heat_kernel_signature(
+        es.spectral.approximate_heat_signature(
             es.cotangent_laplacian(es.shapes.torus(120, 80)), 9, [0.1]
         )
     with np.load(saved) as arrays:

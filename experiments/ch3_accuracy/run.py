@@ -176,7 +176,7 @@ def solved(
     built = time.perf_counter()
     if held:
         boundary = es.operators.fem_boundary_nodes(mesh, ORDERS.get(name, 1))
-        values = es.spectral.solve_dirichlet(laplacian, k, boundary).eigenvalues
+        values = es.solve_spectrum(laplacian, k, fixed=boundary).eigenvalues
     else:
         values = es.solve_spectrum(laplacian, k).eigenvalues
     return {

@@ -106,9 +106,8 @@ def solved(mesh: Mesh, order: int, k: int, condition: str) -> np.ndarray:
     laplacian = es.operators.fem_laplacian(mesh, order)
     if condition == "neumann":
         return es.solve_spectrum(laplacian, k).eigenvalues
-    return es.spectral.solve_dirichlet(
-        laplacian, k, es.operators.fem_boundary_nodes(mesh, order)
-    ).eigenvalues
+    fixed = es.operators.fem_boundary_nodes(mesh, order)
+    return es.solve_spectrum(laplacian, k, fixed=fixed).eigenvalues
 
 
 def truth(case: Case, k: int, condition: str) -> tuple[np.ndarray, np.ndarray]:

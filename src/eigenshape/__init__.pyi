@@ -57,6 +57,6 @@ from .spectral.laws.operator_laws import check_operator as check_operator
 from .spectral.maps.functional_map import functional_map as functional_map
 from .spectral.signatures.heat import heat_kernel_signature as heat_kernel_signature
 from .spectral.signatures.wave import wave_kernel_signature as wave_kernel_signature
-from .spectral.solver.solve import solve_spectrum as solve_spectrum
+from .spectral.solve import solve_spectrum as solve_spectrum
 from .spectral.spectrum import Spectrum as Spectrum
 from .stability.report import compare_shapes as compare_shapes

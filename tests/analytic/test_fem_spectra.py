@@ -9,8 +9,7 @@ from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
 from eigenshape.shapes import exact
 from eigenshape.shapes.domains import ball, box, disc, interval, irregular_grid
 from eigenshape.shapes.surfaces import grid, subdivide
-from eigenshape.spectral.solver.dirichlet import solve_dirichlet
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 
 def worst(mesh, order, eigenvalues, condition):
@@ -18,7 +17,7 @@ def worst(mesh, order, eigenvalues, condition):
     if condition == "neumann":
         found = solve_spectrum(laplacian, k).eigenvalues
     else:
-        found = solve_dirichlet(laplacian, k, fem_boundary_nodes(mesh, order)).eigenvalues
+        found = solve_spectrum(laplacian, k, fixed=fem_boundary_nodes(mesh, order)).eigenvalues
     some = eigenvalues > 0
     return np.abs(found[some] / eigenvalues[some] - 1).max()
 
@@ -102,7 +101,7 @@ def test_held_points_may_be_a_part_of_the_boundary():
     mesh = grid(20, 20)
     left = np.flatnonzero(mesh.vertices[:, 0] == 0)
     assert set(left) < set(boundary_vertices(mesh))
-    found = solve_dirichlet(cotangent_laplacian(mesh, "averaged"), 4, left).eigenvalues
+    found = solve_spectrum(cotangent_laplacian(mesh, "averaged"), 4, fixed=left).eigenvalues
     modes = np.add.outer(
         (np.arange(4) + 0.5) ** 2, np.arange(4) ** 2
     )  # a sine of odd quarters across, cosines along

@@ -8,7 +8,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes.surfaces import grid, icosphere
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 MASSES = ["lumped", "consistent", "averaged"]
 

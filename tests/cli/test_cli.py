@@ -19,7 +19,7 @@ from eigenshape.retrieval.store.index import ShapeIndex
 from eigenshape.scans.partial import partial_scan
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import icosphere
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 PNG = b"\x89PNG\r\n\x1a\n"
 STOPPABLE = """

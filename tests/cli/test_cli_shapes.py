@@ -227,10 +227,17 @@ def test_roughly_and_kept(folder):
     first = run("spectrum", folder / "disc.off", "-k", 4, "--cache", kept).stdout
     assert len(list(kept.glob("*.npz"))) == 1
     assert run("spectrum", folder / "disc.off", "-k", 4, "--cache", kept).stdout == first
-    for wrong in (("--below", 15), ("--boundary", "dirichlet"), ("--cache", kept)):
-        refused = run("spectrum", folder / "disc.off", "--accuracy", 1e-3, *wrong, code=1)
-        assert "--accuracy goes with -k alone" in refused.stderr
-    refused = run(
-        "spectrum", folder / "disc.off", "--boundary", "dirichlet", "--cache", kept, code=1
-    )
-    assert "--cache goes with the Neumann condition" in refused.stderr
+    refused = run("spectrum", folder / "disc.off", "--accuracy", 1e-3, "--below", 15, code=1)
+    assert "--accuracy needs -k" in refused.stderr
+
+
+@pytest.mark.long
+def test_options_of_the_spectrum_combine(folder):
+    kept = folder / "combined"
+    options = ("-k", 4, "--boundary", "dirichlet", "--cache", kept)
+    fixed = run_json("spectrum", folder / "disc.off", *options)
+    assert run_json("spectrum", folder / "disc.off", *options) == fixed
+    assert len(list(kept.glob("*.npz"))) == 1
+    rough = run_json("spectrum", folder / "disc.off", *options, "--accuracy", 1e-3)
+    assert len(list(kept.glob("*.npz"))) == 2
+    np.testing.assert_allclose(rough["eigenvalues"], fixed["eigenvalues"], rtol=4e-3)

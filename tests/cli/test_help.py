@@ -30,7 +30,7 @@ def printed(*arguments):
 
 @pytest.mark.parametrize("verb", ["", *VERBS])
 def test_help_is_printed_to_the_letter(verb):
-    """Nothing in it is taken for markup, such as the brackets of `eigenshape[gpu]`."""
+    """Nothing in it is taken for markup, such as the brackets of `eigenshape[bridges]`."""
     command = COMMAND.commands[verb] if verb else COMMAND
     text = printed(verb) if verb else printed()
     written = [command.help, *(parameter.help for parameter in command.params)]
@@ -41,10 +41,6 @@ def test_help_is_printed_to_the_letter(verb):
         ]
     for sentence in filter(None, written):
         assert words(sentence) in text
-
-
-def test_the_extra_of_the_gpu_is_named():
-    assert "pip install eigenshape[gpu]" in printed("spectrum")
 
 
 @pytest.mark.parametrize("verb", VERBS)

@@ -11,7 +11,7 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.operators.graph import graph_laplacian
 from eigenshape.shapes.surfaces import disjoint_union, icosphere, torus
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 
 def test_all_modes_give_the_shape_back():

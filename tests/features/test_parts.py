@@ -16,7 +16,7 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
 from eigenshape.spectral.signatures.heat import heat_kernel_signature
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 
 def dumbbell(neck=0.25):

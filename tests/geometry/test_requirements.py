@@ -45,7 +45,7 @@ from eigenshape.scans.partial import partial_scan, viewpoint
 from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.shapes.surfaces import disjoint_union, icosphere
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 BALL = icosphere(2)
 OPERATORS = {

@@ -169,7 +169,6 @@ VALUES: dict[Any, Callable[[], Any]] = {
 # A right value of each argument whose type is not ours, by its name; "function.name" where a name has several meanings.
 NAMED: dict[str, Callable[[], Any]] = {
     "alpha": lambda: 1.0,
-    "approximate_spectrum.k": lambda: 5,
     "bind.regions": lambda: [HEAD],
     "boundary_surface.mesh": lambda: es.shapes.box(2, 2, 2),
     "build": lambda: es.cotangent_laplacian,

@@ -15,7 +15,7 @@ def spectral(signature):
 
 FUNCTIONS = {  # and the power of length that each is in
     "heat": (spectral(lambda s: es.heat_kernel_signature(s, es.spectral.default_times(s, 8))), -2),
-    "scale-invariant heat": (spectral(es.spectral.scale_invariant_heat_kernel_signature), 0),
+    "scale-invariant heat": (spectral(es.spectral.scale_invariant_signature), 0),
     "waves": (spectral(es.wave_kernel_signature), -2),
     "average geodesic distance": (
         lambda mesh: es.geometry.average_geodesic_distance(mesh, n_bases=mesh.n_vertices),

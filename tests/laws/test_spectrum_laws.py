@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import disjoint_union, icosphere, torus
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import strategy as roads
-from eigenshape.spectral.solver.solve import solve_spectrum
 
 seeds = st.integers(0, 2**32 - 1)
 masses = st.sampled_from(["lumped", "consistent", "averaged"])

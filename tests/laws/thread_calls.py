@@ -54,7 +54,7 @@ class Shared:
         # Dot products of more than 10,000 numbers are where BLAS begins to cut sums among its threads.
         self.many = es.shapes.fibonacci_sphere(10_500)
         self.many_laplacian = es.cotangent_laplacian(self.many)
-        self.many_spectrum = es.spectral.approximate_spectrum(self.many_laplacian, 9)
+        self.many_spectrum = es.solve_spectrum(self.many_laplacian, 9, method="approximate")
         self.many_map = es.functional_map(
             self.many_spectrum, self.many_spectrum, [[0, 0], [99, 99]], n_modes=4
         )
@@ -224,10 +224,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         v.ball, es.operators.curvature_tensors(v.ball, 2.0)
     ),
     "apply_edit": lambda v: es.deformation.apply_edit(v.rig, v.edit).mesh,
-    "approximate_heat_kernel_signature": lambda v: es.spectral.approximate_heat_kernel_signature(
+    "approximate_heat_signature": lambda v: es.spectral.approximate_heat_signature(
         v.many_laplacian, 8, [0.5, 1.0]
     ),
-    "approximate_spectrum": lambda v: es.spectral.approximate_spectrum(v.many_laplacian, 4),
     "as_rigid_as_possible": lambda v: es.deformation.as_rigid_as_possible(
         v.binding, [v.handle], n_rounds=20
     ),
@@ -258,7 +257,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "build_laplacian": lambda v: [
         es.build_laplacian(v.torus, name)
         for name, entry in es.operators.OPERATORS.items()
-        if es.TriangleMesh in entry.takes
+        if es.TriangleMesh in entry.shapes
     ],
     "certify": lambda v: es.spectral.certify(
         v.laplacian, v.spectrum.eigenvalues, v.spectrum.eigenvectors
@@ -470,9 +469,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         saved(v, ".pdf"),
         len(saved(v, ".svg")),
     ],  # random names in SVG
-    "scale_invariant_heat_kernel_signature": lambda v: (
-        es.spectral.scale_invariant_heat_kernel_signature(v.many_spectrum)
-    ),
+    "scale_invariant_signature": lambda v: es.spectral.scale_invariant_signature(v.many_spectrum),
     "seal_holes": lambda v: es.geometry.seal_holes(v.grid),
     "seen_patches": lambda v: es.retrieval.seen_patches(v.torus, n_views=1),
     "segment": lambda v: es.segment(v.tree, n_regions=4),
@@ -487,10 +484,11 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         v.ball, rng(), camera=es.scans.DepthCamera(resolution=40)
     ),
     "smooth_boundaries": lambda v: es.features.smooth_boundaries(v.animal, v.parts),
-    "solve_dirichlet": lambda v: es.spectral.solve_dirichlet(v.laplacian, 5, np.array([0, 5])),
     "solve_spectrum": lambda v: [
         es.solve_spectrum(v.laplacian, 40),
+        es.solve_spectrum(v.laplacian, 5, fixed=np.array([0, 5])),
         es.solve_spectrum(v.many_laplacian, 3),
+        es.solve_spectrum(v.many_laplacian, 4, method="approximate"),
         cached(v),
     ],
     "spectral_hausdorff_distance": lambda v: es.spectral.spectral_hausdorff_distance(

@@ -7,7 +7,7 @@ from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_te
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.domains import box
 from eigenshape.shapes.surfaces import grid, icosphere, torus
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 
 @pytest.mark.parametrize("mesh", [torus(8, 6), box(2, 2, 1)])

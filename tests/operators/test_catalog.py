@@ -22,7 +22,7 @@ SHAPES = {
 @pytest.mark.parametrize("name", OPERATORS)
 @pytest.mark.filterwarnings("ignore:A heat time")
 def test_each_takes_what_it_says_and_refuses_the_rest(shape, name):
-    takes = isinstance(SHAPES[shape], OPERATORS[name].takes)
+    takes = isinstance(SHAPES[shape], OPERATORS[name].shapes)
     if takes:
         laplacian = build_laplacian(SHAPES[shape], name)
         ones = np.ones(laplacian.n_points)
@@ -48,10 +48,10 @@ def test_unknown_names_and_options_are_refused():
     ):
         build_laplacian(SHAPES["triangles"], "heat")
     with pytest.raises(
-        InvalidParameterError, match="The cotangent operator takes mass; it was given t"
+        InvalidParameterError, match="The cotangent operator takes mass; the option t was given"
     ):
         build_laplacian(SHAPES["triangles"], "cotangent", t=1.0)
     with pytest.raises(
-        InvalidParameterError, match="The p2 operator takes no option; it was given mass"
+        InvalidParameterError, match="The p2 operator takes no options; the option mass was given"
     ):
         build_laplacian(SHAPES["triangles"], "p2", mass="lumped")

@@ -13,7 +13,7 @@ from eigenshape.operators.connection import connection_laplacian, flattened, tan
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.directions import vertex_directions
 from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 few = settings(deadline=None, max_examples=15)
 seeds = st.integers(0, 2**32 - 1)

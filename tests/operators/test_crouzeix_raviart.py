@@ -20,7 +20,7 @@ from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes import exact
 from eigenshape.shapes.domains import ball, box, circle, interval, irregular_grid
 from eigenshape.shapes.surfaces import grid, icosphere
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 RIGHT = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
 CORNER = SimplicialMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])

@@ -28,7 +28,7 @@ def test_a_matrix_that_is_not_square_is_refused(shape):
 
 def test_sizes_that_differ_are_refused():
     with pytest.raises(
-        InvalidParameterError, match=r"one shape; the shapes are \(2, 2\) and \(3, 3\)"
+        InvalidParameterError, match=r"the same shape; the shapes are \(2, 2\) and \(3, 3\)"
     ):
         Laplacian(matrix([1, -1], [-1, 1]), sp.csr_array(sp.eye_array(3)))
 

@@ -7,7 +7,7 @@ from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.operators.graph import graph_laplacian
 from eigenshape.operators.neighbors import neighbor_graph
 from eigenshape.shapes.surfaces import grid
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 few = settings(deadline=None, max_examples=15)
 seeds = st.integers(0, 2**32 - 1)

@@ -7,7 +7,7 @@ from eigenshape.geometry.cloud_measure import cloud_quadrature
 from eigenshape.operators.gaussian import gaussian_laplacian, point_cloud_laplacian
 from eigenshape.shapes.exact import sphere_eigenvalues
 from eigenshape.shapes.spheres import fibonacci_sphere, graded_sphere, three_sphere
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 
 @pytest.mark.parametrize("mesh", [fibonacci_sphere(1500), graded_sphere(1500)])

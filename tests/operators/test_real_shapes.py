@@ -39,7 +39,7 @@ def shapes(folder):
 def test_every_file_gives_a_sound_operator_or_a_named_error(data, name):
     built, refused = [], []
     for path, shape in shapes(data):
-        if not isinstance(shape, OPERATORS[name].takes):
+        if not isinstance(shape, OPERATORS[name].shapes):
             continue
         try:
             laplacian = build_laplacian(shape, name)

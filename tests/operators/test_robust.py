@@ -25,7 +25,7 @@ from eigenshape.operators.tufted import (
     tufted_cover,
 )
 from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 few = settings(deadline=None, max_examples=15)
 seeds = st.integers(0, 2**32 - 1)

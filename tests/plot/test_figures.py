@@ -13,7 +13,7 @@ from eigenshape.plot.spectra import figure_spectrum
 from eigenshape.scans.partial import partial_scan
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 SPHERE = icosphere(3)
 RED, BLUE = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])

@@ -9,7 +9,7 @@ from eigenshape.shapes.exact import sphere_eigenvalues
 from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
 from eigenshape.spectral.comparison.spectra import compare_spectra
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 SPHERE = icosphere(2)
 LUMPED, CONSISTENT = (

@@ -21,7 +21,7 @@ from eigenshape.cli.stability import stability
 
 app = typer.Typer(
     cls=Verbs,
-    rich_markup_mode="markdown",  # plain brackets stay: in rich markup, "eigenshape[gpu]" would lose the extra
+    rich_markup_mode="markdown",  # plain brackets stay: rich markup would read "eigenshape[bridges]" as a style
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},

@@ -1,15 +1,14 @@
 """eigenshape spectrum: the lowest eigenvalues of a shape by any operator, with their proof."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 from jaxtyping import Int
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape._progress import Progress
 from eigenshape.cli.console import (
     CellsOption,
     DimOption,
@@ -41,14 +40,11 @@ from eigenshape.plot.fields import figure_eigenfunctions
 from eigenshape.plot.save import require_picture_path
 from eigenshape.plot.spectra import figure_spectrum
 from eigenshape.spectral.bounds.brackets import Brackets, bracket_eigenvalues
-from eigenshape.spectral.multilevel.approximate import approximate_spectrum
-from eigenshape.spectral.solver.dirichlet import solve_dirichlet
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 N_PICTURED = 8
 USUAL = 20  # pairs
-Device = Literal["cpu", "gpu"]
 ORDERS = {"p2": 2, "p3": 3}
 
 
@@ -90,14 +86,10 @@ def spectrum(
             )
         ),
     ] = None,
-    device: Annotated[
-        Device,
-        typer.Option(help="Where --accuracy computes; gpu needs `pip install eigenshape[gpu]`."),
-    ] = "cpu",
     boundary: Annotated[
         Condition,
         typer.Option(
-            help="Boundary condition: neumann is free, dirichlet holds the boundary at 0."
+            help="Boundary condition: neumann leaves the boundary free, dirichlet fixes it at 0."
         ),
     ] = "neumann",
     brackets: Annotated[
@@ -168,6 +160,11 @@ def spectrum(
     """Compute the lowest eigenvalues of a shape and prove that none is missing."""
     for path in filter(None, (plot, picture)):
         require_picture_path(path)
+    if accuracy is not None and below is not None:
+        raise InvalidParameterError(
+            "--accuracy needs -k, because the approximate method cannot count the eigenvalues below a value. Pass -k "
+            "instead of --below, or leave out --accuracy."
+        )
     scale = {"t": t, "h": h, "edge_factor": edge_factor, "cutoff": cutoff}
     asked = {
         "mass": mass,
@@ -182,13 +179,22 @@ def spectrum(
     _require_drawable(found, picture)
     bounded = _require_mesh(found) if brackets else None
     name = operator or default_operator(found)
-    held = _held(found, ORDERS.get(name, 1)) if boundary == "dirichlet" else None
+    fixed = _boundary_points(found, ORDERS.get(name, 1)) if boundary == "dirichlet" else None
     with progress_bar("spectrum") as progress:
         progress(0.0, "building the operator")
         laplacian = build_laplacian(found, name, **options)
-        n_pairs = _usual_pairs(laplacian, held) if k is None and below is None else k
-        wanted = _Wanted(n_pairs, above, below, held, accuracy, device, cache)
-        solved = _solved(laplacian, wanted, progress)
+        n_pairs = _usual_pairs(laplacian, fixed) if k is None and below is None else k
+        solved = solve_spectrum(
+            laplacian,
+            n_pairs,
+            fixed=fixed,
+            above=above,
+            below=below,
+            method="certified" if accuracy is None else "approximate",
+            accuracy=accuracy,
+            progress=progress,
+            cache=cache,
+        )
         count = solved.certificate.first + len(solved.eigenvalues)
         bounds = (
             bracket_eigenvalues(bounded, count, boundary=boundary, progress=progress)
@@ -216,48 +222,14 @@ def spectrum(
         said(save)
 
 
-@dataclass(frozen=True)
-class _Wanted:
-    k: int | None
-    above: float | None
-    below: float | None
-    held: Int[np.ndarray, " c"] | None
-    accuracy: float | None
-    device: str
-    cache: Path | None
-
-
-def _usual_pairs(laplacian: Laplacian, held: Int[np.ndarray, " c"] | None) -> int:
-    """Return how many pairs to compute where nobody said, and tell on stderr where a shape has fewer than usual."""
-    most = laplacian.n_points - (0 if held is None else len(held))
+def _usual_pairs(laplacian: Laplacian, fixed: Int[np.ndarray, " c"] | None) -> int:
+    """Return the default number of pairs, with a note on stderr if the shape has fewer."""
+    most = laplacian.n_points - (0 if fixed is None else len(fixed))
     if most < USUAL:
         err.print(
             f"[yellow]note:[/] {USUAL} pairs are usual; this shape has {most}, and all are computed"
         )
     return max(1, min(USUAL, most))
-
-
-def _solved(laplacian: Laplacian, wanted: _Wanted, progress: Progress) -> Spectrum:
-    if wanted.accuracy is not None:
-        if wanted.k is None or wanted.held is not None or wanted.cache:
-            raise InvalidParameterError(
-                "--accuracy goes with -k alone; --below, --boundary dirichlet and --cache are of the exact solver."
-            )
-        return approximate_spectrum(
-            laplacian, wanted.k, accuracy=wanted.accuracy, device=wanted.device, progress=progress
-        )
-    k, above, below = wanted.k, wanted.above, wanted.below
-    if wanted.held is not None:
-        if wanted.cache:
-            raise InvalidParameterError(
-                "--cache goes with the Neumann condition; spectra with points held are not kept."
-            )
-        return solve_dirichlet(
-            laplacian, k, wanted.held, above=above, below=below, progress=progress
-        )
-    return solve_spectrum(
-        laplacian, k, above=above, below=below, progress=progress, cache=wanted.cache
-    )
 
 
 def _require_drawable(shape: Shape, picture: Path | None) -> None:
@@ -275,10 +247,10 @@ def _require_mesh(shape: Shape) -> Mesh:
     return shape
 
 
-def _held(shape: Shape, order: int) -> Int[np.ndarray, " c"]:
+def _boundary_points(shape: Shape, order: int) -> Int[np.ndarray, " c"]:
     if isinstance(shape, PointCloud):
         raise InvalidParameterError(
-            "--boundary dirichlet is for meshes; a cloud of points has no boundary to hold."
+            "--boundary dirichlet is for meshes; a cloud of points has no boundary."
         )
     nodes = fem_boundary_nodes(shape, order)
     if not nodes.size:

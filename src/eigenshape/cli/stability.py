@@ -131,7 +131,7 @@ def _facts(report: StabilityReport) -> dict[str, Any]:
     return {
         "spectra": {
             **asdict(compared),
-            "told": compared.told,
+            "proved": compared.proved_changes,
             "hausdorff": compared.hausdorff,
             "index_distance": compared.index_distance,
             "mean_relative": compared.mean_relative,
@@ -158,9 +158,9 @@ def _print(report: StabilityReport) -> None:
     compared = report.spectra
     pairs = np.where(compared.zero[:, None], 0.0, np.column_stack([compared.one, compared.two]))
     rows = [
-        [str(number), f"{one:.6g}", f"{two:.6g}", f"{change:.2%}", "yes" if told else "no"]
-        for number, ((one, two), change, told) in enumerate(
-            zip(pairs, compared.relative, compared.told, strict=True)
+        [str(number), f"{one:.6g}", f"{two:.6g}", f"{change:.2%}", "yes" if proved else "no"]
+        for number, ((one, two), change, proved) in enumerate(
+            zip(pairs, compared.relative, compared.proved_changes, strict=True)
         )
     ]
     print_table("Eigenvalues, in 1/length²", ["i", "first", "second", "change", "proved"], rows)

@@ -19,7 +19,7 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 N_MODES = 300

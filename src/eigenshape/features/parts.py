@@ -19,7 +19,7 @@ from eigenshape.geometry.requirements import require_describable
 from eigenshape.geometry.topology import is_closed, vertex_components
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
 from eigenshape.spectral.signatures.heat import heat_kernel_signature
-from eigenshape.spectral.solver.dirichlet import solve_free
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 N_MODES = 25  # beside one for each component
@@ -107,7 +107,8 @@ def part_spectrum(
     n_components = len(np.unique(np.delete(labels, fragments)))
     wanted = whole_number(n_modes, "n_modes", 2) + n_components
     laplacian = anisotropic_laplacian(mesh, curvature_tensors(mesh, CONCAVITY, concave=True))
-    return solve_free(laplacian, min(wanted, mesh.n_vertices - len(fragments)), fragments, progress)
+    n_pairs = min(wanted, mesh.n_vertices - len(fragments))
+    return solve_spectrum(laplacian, n_pairs, fixed=fragments, progress=progress)
 
 
 def facing_outward(mesh: TriangleMesh) -> TriangleMesh:

@@ -24,7 +24,7 @@ from eigenshape.retrieval.heat.descriptor import SCALE_FREE
 from eigenshape.retrieval.heat.score import matching_scores, shifted
 from eigenshape.spectral.bounds.nonconforming import partly
 from eigenshape.spectral.signatures.heat import positive_eigenvalues
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 LESS = 1e-12  # of the price: what a swap must save to be made
 

@@ -18,7 +18,7 @@ from eigenshape.operators.kernel import neighbor_distance
 from eigenshape.spectral.bounds.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.comparison.angles import EigenspaceAngles, eigenspace_angles
 from eigenshape.spectral.comparison.spectra import SpectrumComparison, compare_spectra
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.stability.bounds import TimeRange, trusted_times
 from eigenshape.stability.closeness import Closeness, map_closeness
 from eigenshape.stability.sampled import (

@@ -22,7 +22,7 @@ from eigenshape.operators.kernel import (
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.neighbors import neighbor_graph
 from eigenshape.spectral.comparison.angles import EigenspaceAngles, eigenspace_angles
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 from eigenshape.stability.bounds import TimeRange, weyl_bound
 from eigenshape.stability.correspondence import BottleneckMatching, bottleneck_matching

@@ -13,7 +13,7 @@ from eigenshape.operators.fem import fem_laplacian
 from eigenshape.shapes import exact
 from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 
 def test_parts_that_touch_in_a_point_are_apart():

@@ -18,8 +18,7 @@ from eigenshape.shapes import exact
 from eigenshape.shapes.domains import ball, box, circle, disc, interval, irregular_grid
 from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
-from eigenshape.spectral.solver.dirichlet import solve_dirichlet
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 
 def flat_torus(n):
@@ -111,7 +110,7 @@ def refined_truth(mesh, k, times, condition="neumann"):
         steps.append(
             solve_spectrum(laplacian, k)
             if condition == "neumann"
-            else solve_dirichlet(laplacian, k, nodes)
+            else solve_spectrum(laplacian, k, fixed=nodes)
         )
     return steps[1].eigenvalues.copy(), np.abs(steps[1].eigenvalues - steps[0].eigenvalues)
 
@@ -256,7 +255,7 @@ def test_slivers_in_which_rounding_leaves_nothing():
     assert (brackets.upper >= [0, *(np.pi / 1e8 * np.arange(1, 5)) ** 2]).all(), (
         "an interval's, with Neumann's condition"
     )
-    assert "Rounding in slivers leaves no lower end above 0" in brackets.explain()
+    assert "Rounding in slivers leaves no lower bound above 0" in brackets.explain()
 
 
 @pytest.mark.data

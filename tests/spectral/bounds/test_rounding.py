@@ -12,7 +12,7 @@ from eigenshape.shapes.domains import ball, interval
 from eigenshape.shapes.surfaces import grid, icosphere
 from eigenshape.sparse.elimination import EPS
 from eigenshape.spectral.bounds.rounding import enclose, relative_rounding
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 EQUILATERAL = TriangleMesh([[0, 0, 0], [1, 0, 0], [0.5, 0.75**0.5, 0]], [[0, 1, 2]])
 

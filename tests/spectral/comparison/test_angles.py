@@ -16,7 +16,7 @@ from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.comparison.angles import eigenspace_angles
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 SPHERE = icosphere(2)
 OPERATOR = cotangent_laplacian(SPHERE)

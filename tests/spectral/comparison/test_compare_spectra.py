@@ -11,7 +11,7 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import disjoint_union, icosphere, subdivide, torus
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
 from eigenshape.spectral.comparison.spectra import compare_spectra, spectral_hausdorff_distance
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 SPHERE = icosphere(2)
 SPECTRUM = solve_spectrum(cotangent_laplacian(SPHERE), 20)
@@ -35,7 +35,12 @@ def test_by_hand():
         of([0, 1, 4, 10], [0, 0.1, 0.1, 0]), of([0, 1.15, 3, 10, 12], [0, 0.1, 0.1, 0, 0])
     )
     np.testing.assert_allclose(found.relative, [0, 0.15, 0.25, 0])
-    assert found.told.tolist() == [False, False, True, False]  # .15 is within the two bars of .1
+    assert found.proved_changes.tolist() == [
+        False,
+        False,
+        True,
+        False,
+    ]  # .15 is within the two bars of .1
     assert found.index_distance == 1
     assert found.hausdorff == pytest.approx(1)
     assert found.median_relative == pytest.approx(0.15)
@@ -61,7 +66,7 @@ def test_two_spheres_have_one_zero_more():
     found = compare_spectra(SPECTRUM, two)
     assert found.relative[0] == 0
     assert found.relative[1] == np.inf
-    assert found.told[1]
+    assert found.proved_changes[1]
 
 
 @pytest.mark.parametrize("scale", [1e-100, 1e100])
@@ -71,7 +76,7 @@ def test_results_scale_with_the_shape(scale):
     other, here = (solve_spectrum(cotangent_laplacian(each), 20) for each in (far, mesh))
     there, near = compare_spectra(scaled(scale), other), compare_spectra(SPECTRUM, here)
     np.testing.assert_allclose(there.relative, near.relative, rtol=1e-8)
-    np.testing.assert_array_equal(there.told, near.told)
+    np.testing.assert_array_equal(there.proved_changes, near.proved_changes)
     assert there.hausdorff == pytest.approx(near.hausdorff / scale / scale, rel=1e-9)
     assert there.index_distance == pytest.approx(near.index_distance / scale / scale, rel=1e-9)
 
@@ -85,12 +90,12 @@ def test_brackets_prove_changes_of_shapes_alone():
         compare_spectra(SPECTRUM, fine),
         compare_spectra(SPECTRUM, fine, brackets=brackets),
     )
-    assert by_residuals.told[1:].all()
-    assert not by_brackets.told.any()
+    assert by_residuals.proved_changes[1:].all()
+    assert not by_brackets.proved_changes.any()
     assert "brackets of the shapes' eigenvalues" in by_brackets.explain()
     twice = TriangleMesh(2 * SPHERE.vertices, SPHERE.faces)
     pair = brackets[0], bracket_eigenvalues(twice, 20)
-    assert compare_spectra(SPECTRUM, scaled(2.0), brackets=pair).told[1:].all()
+    assert compare_spectra(SPECTRUM, scaled(2.0), brackets=pair).proved_changes[1:].all()
 
 
 def test_hausdorff_by_hand():

@@ -14,7 +14,7 @@ from eigenshape.shapes.harmonics import sphere_harmonics
 from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.comparison.eigenspaces import eigenspace_errors, separated_groups
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 SPHERE = icosphere(2)
 SPECTRUM = solve_spectrum(cotangent_laplacian(SPHERE, "consistent"), 16)

@@ -31,8 +31,8 @@ from eigenshape.spectral.laws.operator_laws import check_operator
 from eigenshape.spectral.laws.report import (
     DEFAULT_PROMISES,
     Law,
-    NotJudged,
     OperatorReport,
+    SkippedLaw,
     known_promises,
 )
 
@@ -107,7 +107,7 @@ def test_the_cotangent_laplacian_keeps_every_law(mesh, mass):
     )
     assert report.passed, report.explain()
     assert len(report.laws) == 16
-    assert [law.name for law in report.not_judged] == ["definite", "nonnegative weights"]
+    assert [law.name for law in report.skipped] == ["definite", "nonnegative weights"]
     assert max(law.measured for law in report.laws if law.name != "positive semidefinite") < 1e-12
 
 
@@ -119,7 +119,7 @@ def test_a_report_explains_itself():
         "holds   kernel: within 1e-14 trace W / trace B of zero lie 1 of the eigenvalues; components of W: 1."
         in lines
     )
-    assert lines[-1] == "not judged  nonnegative weights: not promised"
+    assert lines[-1] == "skipped nonnegative weights: not promised"
     heavy = check_operator(
         lambda mesh: with_mass(cotangent_laplacian(mesh), 1.01), SPHERE, promises=["volume"]
     )
@@ -166,7 +166,7 @@ def test_a_row_sum_is_found_at_its_row(mesh):
     report = check_laplacian(extra_entry(laplacian, 5, 5, 1e-6 * laplacian.stiffness[5, 5]), mesh)
     assert broken(report) == {"row sums"}
     assert law(report, "row sums").measured == pytest.approx(1e-6, rel=0.2)
-    assert "is that of row 5, 3" in law(report, "row sums").says
+    assert "is that of row 5, 3" in law(report, "row sums").explanation
 
 
 def test_a_mass_off_by_a_hundredth_is_found():
@@ -186,7 +186,7 @@ def test_a_mass_that_is_not_definite_is_found():
     extra = sp.coo_array(([size, size], ([i, j], [j, i])), shape=laplacian.mass.shape)
     report = check_laplacian(replace(laplacian, mass=laplacian.mass + extra), SPHERE)
     assert broken(report) == {"positive mass"}
-    assert "has a pivot that is not positive" in law(report, "positive mass").says
+    assert "has a pivot that is not positive" in law(report, "positive mass").explanation
 
 
 def test_a_second_zero_is_found_though_the_graph_is_whole():
@@ -204,13 +204,16 @@ def test_a_link_between_components_is_found_at_its_place():
         extra_entry(laplacian, 3, 60, 1e-3), PAIR, promises=DEFAULT_PROMISES | {"volume"}
     )
     assert broken(report) == {"components"}
-    assert "the shape has 2; entry (3, 60) of W joins two of them" in law(report, "components").says
+    assert (
+        "the shape has 2; entry (3, 60) of W joins two of them"
+        in law(report, "components").explanation
+    )
     linked = laplacian.mass + sp.coo_array(
         ([1e-3, 1e-3], ([3, 60], [60, 3])), shape=laplacian.mass.shape
     )
     assert (
         "(3, 60) of B"
-        in law(check_laplacian(replace(laplacian, mass=linked), PAIR), "components").says
+        in law(check_laplacian(replace(laplacian, mass=linked), PAIR), "components").explanation
     )
 
 
@@ -224,7 +227,7 @@ def test_negative_weights_are_found_at_their_edge():
     assert broken(report) == {"nonnegative weights"}
     assert (
         "the lowest weight, -1.88, is that of points 0 and 1"
-        in law(report, "nonnegative weights").says
+        in law(report, "nonnegative weights").explanation
     )
     assert check_laplacian(
         cotangent_laplacian(icosphere(2)), promises=["nonnegative_weights"]
@@ -244,12 +247,14 @@ def test_a_boundary_condition_is_definite_and_a_free_boundary_is_not():
     }
     assert (
         "lie 2 of the eigenvalues"
-        in law(check_laplacian(cotangent_laplacian(PAIR), promises=DEFINITE), "definite").says
+        in law(
+            check_laplacian(cotangent_laplacian(PAIR), promises=DEFINITE), "definite"
+        ).explanation
     )
     cut_in_two = check_laplacian(
         held(disjoint_union(grid(4, 4), grid(3, 3))), disjoint_union(grid(4, 4), grid(3, 3))
     )
-    assert law(cut_in_two, "components").says == "the shape has 2, and W has 2."
+    assert law(cut_in_two, "components").explanation == "the shape has 2, and W has 2."
     assert {"row sums"} <= broken(cut_in_two)
 
 
@@ -257,7 +262,9 @@ def test_where_no_factor_serves_nothing_is_taken_for_proved(monkeypatch):
     monkeypatch.setattr(laplacian_laws, "factorise", lambda *_: None)
     report = check_laplacian(cotangent_laplacian(SPHERE), promises=["constants", "definite"])
     assert broken(report) == {"positive semidefinite", "kernel", "definite"}
-    assert law(report, "definite").says == "no factor near zero has its pivots on the diagonal."
+    assert (
+        law(report, "definite").explanation == "no factor near zero has its pivots on the diagonal."
+    )
 
 
 def depends_on_vertex_order(mesh):
@@ -332,7 +339,7 @@ def test_the_unit_is_found_also_where_only_eigenvalues_betray_it():
 
     report = check_operator(metres, SPHERE, promises=["scaling"])
     assert broken(report) == {"scaling"}
-    assert "eigenvalues times length² by" in law(report, "scaling").says
+    assert "eigenvalues times length² by" in law(report, "scaling").explanation
 
 
 def test_an_operator_that_changes_from_call_to_call_is_found():
@@ -355,7 +362,7 @@ def test_an_operator_that_refuses_the_shape_in_another_unit_breaks_the_law():
 
     report = check_operator(choosy, SPHERE)
     assert broken(report) == {"scaling"}
-    assert law(report, "scaling").says.endswith("is refused: too large for me")
+    assert law(report, "scaling").explanation.endswith("is refused: too large for me")
 
 
 def test_rows_that_come_and_go_are_found():
@@ -368,7 +375,7 @@ def test_rows_that_come_and_go_are_found():
         without_the_first, SPHERE, promises=["definite", "reflection", "orientation"]
     )
     assert broken(report) == {"reflection"}
-    assert "rows where" in law(report, "reflection").says
+    assert "rows where" in law(report, "reflection").explanation
 
 
 def test_an_operator_that_cannot_be_jiggled_is_judged_all_the_same():
@@ -395,8 +402,8 @@ def test_rows_may_be_anything_that_the_shape_has():
 
     report = check_operator(joined_faces, PAIR, promises=DEFAULT_PROMISES - {"scaling"})
     assert report.passed, report.explain()
-    assert law(report, "components").says == "the shape has 2, and W has 2."
-    assert "of the 20 lowest eigenvalues" in law(report, "point order").says
+    assert law(report, "components").explanation == "the shape has 2, and W has 2."
+    assert "of the 20 lowest eigenvalues" in law(report, "point order").explanation
 
 
 def test_what_drowns_in_rounding_is_not_judged():
@@ -410,7 +417,7 @@ def test_what_drowns_in_rounding_is_not_judged():
         promises=DEFAULT_PROMISES | {"volume"},
     )
     assert report.passed, report.explain()
-    silent = [law for law in report.not_judged if law.reason != "not promised"]
+    silent = [law for law in report.skipped if law.reason != "not promised"]
     assert {law.name for law in silent} == {
         "rigid motion",
         "union",
@@ -422,7 +429,7 @@ def test_what_drowns_in_rounding_is_not_judged():
 
 
 def not_judged_for(report: OperatorReport, reason: str) -> set[str]:
-    return {law.name for law in report.not_judged if reason in law.reason}
+    return {law.name for law in report.skipped if reason in law.reason}
 
 
 BY_EIGENVALUES = {
@@ -490,7 +497,7 @@ def test_a_graph_has_no_place_and_a_cloud_no_simplices():
         lambda graph: from_weights(graph, sp.eye_array(graph.shape[0], format="csr")), ring
     )
     assert report.passed, report.explain()
-    silent = {law.name for law in report.not_judged}
+    silent = {law.name for law in report.skipped}
     assert {"rigid motion", "reflection", "orientation", "simplex order"} <= silent
     assert law(report, "components").measured == 0
     cloud = check_operator(
@@ -499,10 +506,8 @@ def test_a_graph_has_no_place_and_a_cloud_no_simplices():
         promises=DEFAULT_PROMISES | {"volume"},
     )
     assert cloud.passed, cloud.explain()
-    assert (
-        NotJudged("components", "no mesh or graph says what belongs together") in cloud.not_judged
-    )
-    assert NotJudged("volume", "only a mesh has one to compare with") in cloud.not_judged
+    assert SkippedLaw("components", "no mesh or graph says what belongs together") in cloud.skipped
+    assert SkippedLaw("volume", "only a mesh has one to compare with") in cloud.skipped
 
 
 def complete(points: np.ndarray) -> Laplacian:

@@ -224,12 +224,12 @@ def test_shapes_in_pieces_are_refused(hand):
     two = solve(es.shapes.disjoint_union(HAND, HAND), 30)
     with pytest.raises(
         es.InvalidParameterError,
-        match=r"Maps are between connected shapes; the target has eigenvalues",
+        match=r"Shapes to be mapped must be connected; the target has the eigenvalues",
     ):
         es.functional_map(hand, two, pairs())
     with pytest.raises(
         es.InvalidParameterError,
-        match=r"Maps are between connected shapes; the source has eigenvalues",
+        match=r"Shapes to be mapped must be connected; the source has the eigenvalues",
     ):
         es.spectral.map_from_points(two, hand, np.arange(HAND.n_vertices))
 
@@ -238,7 +238,7 @@ def test_spectra_without_a_constant_are_refused(hand):
     inner = es.solve_spectrum(
         es.cotangent_laplacian(HAND), above=hand.eigenvalues[3] * 1.001, below=hand.eigenvalues[9]
     )
-    fixed = es.spectral.solve_dirichlet(es.cotangent_laplacian(HAND), 10, np.arange(10))
+    fixed = es.solve_spectrum(es.cotangent_laplacian(HAND), 10, fixed=np.arange(10))
     for spectrum in (inner, fixed):
         with pytest.raises(
             es.InvalidParameterError,
@@ -266,19 +266,18 @@ def test_functions_of_other_shapes_are_refused(hand, bent):
     mapping = es.functional_map(hand, bent, pairs() % len(bent.eigenvectors))
     with pytest.raises(
         es.InvalidParameterError,
-        match=r"Functions to be carried must have \d+ rows; the shape is \(3,\)",
+        match=r"values must have one row for each of \d+ vertices of the source; the shape is \(3,\)",
     ):
         es.spectral.transfer_function(mapping, np.zeros(3))
-    with pytest.raises(
-        es.InvalidParameterError, match="Functions to be carried must be finite; row 2 is"
-    ):
+    with pytest.raises(es.InvalidParameterError, match="values must be finite; row 2 is"):
         es.spectral.transfer_function(mapping, np.where(np.arange(HAND.n_vertices) == 2, np.inf, 0))
 
 
 def test_maps_that_do_not_meet_are_refused(hand, bent):
     forth = es.functional_map(hand, bent, pairs() % len(bent.eigenvectors))
     with pytest.raises(
-        es.InvalidParameterError, match="Maps compose where the second begins at the shape"
+        es.InvalidParameterError,
+        match="The target of the first map must be the source of the second",
     ):
         es.spectral.compose_maps(forth, forth)
     turned = replace(forth, source=bent, target=hand)

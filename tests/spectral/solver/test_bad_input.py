@@ -11,9 +11,9 @@ from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes.surfaces import disjoint_union, icosphere
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver.diagnosis import require_solvable
 from eigenshape.spectral.solver.pencil import normalise
-from eigenshape.spectral.solver.solve import solve_spectrum
 
 TRIANGLE, PAIR = np.ones((3, 3)) - np.eye(3), np.ones((2, 2)) - np.eye(2)
 

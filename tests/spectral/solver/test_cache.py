@@ -13,10 +13,9 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes.surfaces import icosphere
-from eigenshape.spectral import archive
+from eigenshape.spectral import archive, solve
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import cache
-from eigenshape.spectral.solver import solve as solver
-from eigenshape.spectral.solver.solve import solve_spectrum
 
 
 @pytest.fixture
@@ -32,7 +31,7 @@ def nothing_computed(monkeypatch):
         message = "computed"
         raise AssertionError(message)
 
-    return lambda: monkeypatch.setattr(solver, "normalise", refuse)
+    return lambda: monkeypatch.setattr(solve, "normalise", refuse)
 
 
 def require_same(one, two):

@@ -5,10 +5,10 @@ from pencils import graph, path, tetrahedra, wild
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import icosphere, torus
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import certify as certify_module
 from eigenshape.spectral.solver import inertia as count
 from eigenshape.spectral.solver.certify import certify
-from eigenshape.spectral.solver.solve import solve_spectrum
 
 
 @pytest.fixture(scope="module")

@@ -9,11 +9,10 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
-from eigenshape.spectral.multilevel.approximate import approximate_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import strategy as roads
 from eigenshape.spectral.solver.certify import certify
 from eigenshape.spectral.solver.pencil import normalise
-from eigenshape.spectral.solver.solve import solve_spectrum
 
 
 def moved(mesh: TriangleMesh, scale: float, along: float) -> TriangleMesh:
@@ -149,6 +148,6 @@ def test_approximations_of_many_parts(k):
     """Specks become single points on the coarsest level, whose energy is rounding alone."""
     mesh = disjoint_union(icosphere(5), *[moved(icosphere(0), 0.02, 3.0 + i) for i in range(3000)])
     laplacian = cotangent_laplacian(mesh)
-    found = approximate_spectrum(laplacian, k, accuracy=1e-3)
+    found = solve_spectrum(laplacian, k, method="approximate")
     exact = solve_spectrum(laplacian, k).eigenvalues
     np.testing.assert_allclose(found.eigenvalues, exact, atol=max(1e-3 * exact[-1], 1e-9))

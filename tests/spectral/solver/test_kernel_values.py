@@ -4,8 +4,8 @@ import pytest
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.shapes.surfaces import icosphere, torus
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver.certify import certify
-from eigenshape.spectral.solver.solve import solve_spectrum
 
 
 def sphere_eigenvalues(k):

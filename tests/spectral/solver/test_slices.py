@@ -6,11 +6,11 @@ from eigenshape._errors import ConvergenceError
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.domains import irregular_grid
 from eigenshape.shapes.surfaces import icosphere, torus
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import slices
 from eigenshape.spectral.solver import strategy as roads
 from eigenshape.spectral.solver.pencil import normalise, rayleigh_residuals
 from eigenshape.spectral.solver.slices import walk
-from eigenshape.spectral.solver.solve import solve_spectrum
 
 
 @pytest.fixture

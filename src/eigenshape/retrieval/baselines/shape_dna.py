@@ -10,7 +10,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 N_VALUES = 20
 

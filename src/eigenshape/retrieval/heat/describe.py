@@ -22,7 +22,7 @@ from eigenshape.operators.laplacian import Laplacian
 from eigenshape.retrieval.heat.descriptor import SCALE_FREE, Recipe, ShapeDescriptor
 from eigenshape.scans.partial import MeshPart, partial_scan, viewpoint, views_of
 from eigenshape.spectral.signatures.heat import heat_kernel_signature, reflection_free_signature
-from eigenshape.spectral.solver.dirichlet import solve_free
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 N_VIEWS = 4
@@ -137,7 +137,8 @@ def describe_mesh(
 
     def spectrum_without(points: Int[np.ndarray, " c"]) -> Spectrum:
         n_free = shape.mesh.n_vertices - len(points)
-        return solve_free(shape.laplacian, min(shape.n_modes, n_free), points, progress)
+        n_modes = min(shape.n_modes, n_free)
+        return solve_spectrum(shape.laplacian, n_modes, fixed=points, progress=progress)
 
     spectrum = spectrum_without(shape.fragments)
     fixed = (

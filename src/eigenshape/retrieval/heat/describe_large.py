@@ -21,7 +21,7 @@ from eigenshape.retrieval.heat.describe import (
 from eigenshape.retrieval.heat.descriptor import SCALE_FREE, Recipe, ShapeDescriptor
 from eigenshape.spectral.signatures.approximate_heat import (
     USUAL_ACCURACY,
-    approximate_heat_kernel_signature,
+    approximate_heat_signature,
 )
 
 
@@ -62,7 +62,7 @@ def describe_large_mesh(
     accuracy: float = USUAL_ACCURACY,
     progress: Progress | None = None,
 ) -> DescribedLargeShape:
-    """Walk the road of `describe_mesh` with `approximate_heat_kernel_signature` in place of a spectrum.
+    """Walk the road of `describe_mesh` with `approximate_heat_signature` in place of a spectrum.
 
     A million vertices take about a minute on one core. Where vertices are few for the recipe's pairs the operator is
     solved as it is, and the result is that of `describe_mesh`.
@@ -73,7 +73,7 @@ def describe_large_mesh(
         A closed or open surface.
     recipe : Recipe
     accuracy : float
-        As of `approximate_heat_kernel_signature`.
+        As of `approximate_heat_signature`.
     progress : callable, optional
         Called as progress(fraction_done, message), twice from 0 to 1 where the boundary is held too.
 
@@ -94,9 +94,7 @@ def describe_large_mesh(
     def heat_without(points: Int[np.ndarray, " c"]) -> tuple[Float[np.ndarray, "n q"], float]:
         inner, free = dirichlet_laplacian(shape.laplacian, points)
         k = min(shape.n_modes, inner.n_points)
-        found = approximate_heat_kernel_signature(
-            inner, k, times, accuracy=accuracy, progress=progress
-        )
+        found = approximate_heat_signature(inner, k, times, accuracy=accuracy, progress=progress)
         columns = np.zeros((shape.mesh.n_vertices, len(times)))
         columns[free] = found.values
         return columns, float(found.errors[0])

@@ -7,8 +7,8 @@ from jaxtyping import Float, Int
 from eigenshape._errors import ConvergenceError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.sparse.elimination import EPS
-from eigenshape.spectral.laws.report import Law, NotJudged, Outcome, judged
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.laws.report import Law, Outcome, SkippedLaw, judged
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 N_EIGENVALUES = 20
@@ -25,8 +25,8 @@ def same_entries(name: str, found: Laplacian, expected: Laplacian, allowed: floa
     """Compare entry by entry."""
     if found.n_points != expected.n_points:
         return judged(name, np.inf, allowed, _other_rows(found.n_points, expected.n_points))
-    measured, says = distance(expected, found)
-    return judged(name, measured, allowed, f"{says}; rounding takes up to {allowed:.1e}.")
+    measured, explanation = distance(expected, found)
+    return judged(name, measured, allowed, f"{explanation}; rounding takes up to {allowed:.1e}.")
 
 
 def _other_rows(found: int, expected: int) -> str:
@@ -63,21 +63,21 @@ def same_eigenvalues(
     try:
         lowest = lowest_eigenvalues(found, k)
     except ConvergenceError as err:
-        return NotJudged(name, str(err))
+        return SkippedLaw(name, str(err))
     expected = np.repeat(spectrum.eigenvalues, copies)[:k]
     change, worst = spectral_distance(expected, lowest.eigenvalues)
     allowed += float(spectrum.residuals.max() + lowest.residuals.max()) / (
         float(expected[-1]) or 1.0
     )
     if allowed > MOST_ROUNDING:
-        return NotJudged(
+        return SkippedLaw(
             name, f"rounding may change eigenvalues by {allowed:.0e} of the last: elements are thin"
         )
-    says = (
+    explanation = (
         f"of the {len(expected)} lowest eigenvalues, {worst} changes most, from {expected[worst]:.6g} to "
         f"{lowest.eigenvalues[worst]:.6g}, {change:.1e} of the last; rounding takes up to {allowed:.1e}."
     )
-    return judged(name, change, allowed, says)
+    return judged(name, change, allowed, explanation)
 
 
 def spectral_distance(

@@ -7,7 +7,6 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._errors import ConvergenceError
-from eigenshape.spectral.multilevel.device import Array, fetch, multiply, put
 from eigenshape.spectral.multilevel.residuals import (
     chosen,
     images,
@@ -16,7 +15,7 @@ from eigenshape.spectral.multilevel.residuals import (
     residual_block,
     row_chunks,
 )
-from eigenshape.spectral.multilevel.vcycle import Tower, correct, smooth
+from eigenshape.spectral.multilevel.vcycle import Tower, correct, multiply, smooth
 
 WIDTH = 32  # columns that are corrected at once
 STEPS = (8, 30)  # of smoothing, fewest and most
@@ -32,7 +31,9 @@ PROBE_STEPS = 4
 MOST_LEFT = 10.0  # times what a round has lowered
 EARLY = 0.5  # of the bound, or:
 EXACT = 0.01  # of the accuracy, under which a residual is left as it is
-TOO_FAR = "The weights of the operator spread too far for its diagonal: take solve_spectrum."
+TOO_FAR = (
+    "The weights of the operator spread too far for its diagonal: solve with method='certified'."
+)
 UNSEEN = 3.0  # times what is estimated, where only smoothing has been at work
 
 
@@ -40,8 +41,8 @@ UNSEEN = 3.0  # times what is estimated, where only smoothing has been at work
 class Space:
     """Columns S of approximate eigenvectors, and room for as many that are added to them."""
 
-    columns: Array
-    added: Array
+    columns: np.ndarray
+    added: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -70,8 +71,8 @@ class Standing:
 
 
 def refine(
-    tower: Tower, below: tuple[Array, np.ndarray], goal: Goal, report: Callable[[float], None]
-) -> tuple[Array, np.ndarray, float]:
+    tower: Tower, below: tuple[np.ndarray, np.ndarray], goal: Goal, report: Callable[[float], None]
+) -> tuple[np.ndarray, np.ndarray, float]:
     """Return M-orthonormal Ritz vectors, their values and an estimate of these' error, refined until the goal.
 
     The vectors come from the next coarser level, which has no more to say about them, so they are smoothed first, and
@@ -113,11 +114,11 @@ def refine(
     raise ConvergenceError(
         f"The error must be estimated at no more than {goal.accuracy:.1e} of the last eigenvalue, and no residual be "
         f"above {goal.bound:.1e}; after {goal.rounds} rounds these are {standing.left:.1e} and {standing.worst:.1e}. "
-        f"Ask for less accuracy, or take solve_spectrum."
+        f"Request less accuracy, or solve with method='certified'."
     )
 
 
-def settled(tower: Tower, columns: Array, values: np.ndarray) -> tuple[Array, np.ndarray]:
+def settled(tower: Tower, columns: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return Ritz vectors and values of the columns in double precision."""
     columns = columns.astype(np.float64)
     return columns, _ritz(tower, Space(columns, columns[:, :0]), values, slice(0, len(values)))
@@ -138,13 +139,11 @@ def _standing(
     return Standing(scale, worst, lowered / scale * min(factor / max(1 - factor, 0.01), MOST_LEFT))
 
 
-def _prolonged(tower: Tower, vectors: Array) -> Space:
+def _prolonged(tower: Tower, vectors: np.ndarray) -> Space:
     # M and A of the level below are PᵀMP and PᵀAP: P keeps orthonormality and Ritz values.
     level, shape = tower.levels[0], (tower.levels[0].n, vectors.shape[1])
-    columns, added = (tower.device.arrays.empty(shape, dtype=level.prolong.dtype) for _ in range(2))
-    return Space(
-        multiply(tower.device, level.prolong, vectors.astype(columns.dtype), columns), added
-    )
+    columns, added = (np.empty(shape, dtype=level.prolong.dtype) for _ in range(2))
+    return Space(multiply(level.prolong, vectors.astype(columns.dtype), columns), added)
 
 
 def _smooth_all(
@@ -162,7 +161,7 @@ def _smooth_all(
             tower, chosen(tower, space.columns, some), values[some], np.ones(len(some))
         )
         corrections = smooth(tower, block, values[some].astype(np.float32), steps)
-        _require_finite(tower, corrections, some)
+        _require_finite(corrections, some)
         for rows in row_chunks(tower):
             space.columns[rows, start : start + len(some)] -= corrections[rows]
     return norms
@@ -192,14 +191,14 @@ def _add_corrections(
             tower, chosen(tower, space.columns, some), values[some], 1 / residuals[some]
         )
         corrections = correct(tower, block, values[some].astype(np.float32), steps)
-        _require_finite(tower, corrections, some)
+        _require_finite(corrections, some)
         for rows in row_chunks(tower):
             space.added[rows, start : start + len(some)] = corrections[rows]
 
 
-def _require_finite(tower: Tower, corrections: Array, some: np.ndarray) -> None:
+def _require_finite(corrections: np.ndarray, some: np.ndarray) -> None:
     # Far below zero, where single rows are next to nothing beside θM, smoothing makes columns grow.
-    if not tower.device.arrays.isfinite(corrections.sum()):
+    if not np.isfinite(corrections.sum()):
         raise ConvergenceError(
             f"Corrections must be finite; those of eigenvector {some[0]} overflow. {TOO_FAR}"
         )
@@ -214,13 +213,11 @@ def _look_again(
     of the first k values by half the bound or more, they are taken in, and the new values returned; else everything
     stays as it is.
     """
-    level, device, m = tower.levels[0], tower.device, len(values)
+    level, m = tower.levels[0], len(values)
     shifts = np.zeros(PROBES, dtype=np.float32)
-    block = put(
-        device, np.random.default_rng(seed).standard_normal((level.n, PROBES), dtype=np.float32)
-    )
+    block = np.random.default_rng(seed).standard_normal((level.n, PROBES), dtype=np.float32)
     for _ in range(PROBE_STEPS):
-        block *= level.rough_scales[0] / device.arrays.abs(block).max(axis=0)
+        block *= level.rough_scales[0] / np.abs(block).max(axis=0)
         block = correct(tower, block, shifts, STEPS[0])
         keep_outside(tower, space.columns, block)
     space = Space(space.columns, block)
@@ -241,7 +238,7 @@ def _ritz(tower: Tower, space: Space, values: np.ndarray, fresh: slice) -> np.nd
     return values
 
 
-def _combine(tower: Tower, space: Space, weights: Array) -> None:
+def _combine(tower: Tower, space: Space, weights: np.ndarray) -> None:
     m, weights = space.columns.shape[1], weights.astype(space.columns.dtype)
     late = len(weights) - m
     for rows in row_chunks(tower):
@@ -253,29 +250,29 @@ def _combine(tower: Tower, space: Space, weights: Array) -> None:
 
 def _combination(
     tower: Tower, space: Space, values: np.ndarray, fresh: slice
-) -> tuple[np.ndarray, Array]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest Ritz values of the columns up to the last fresh ones, and their vectors' coefficients."""
-    arrays, known = tower.device.arrays, fresh.start
+    known = fresh.start
     gram, projected = _grams(tower, space, fresh)
-    gram[:known, :known] = arrays.eye(known)
-    projected[:known, :known] = arrays.diag(put(tower.device, values[:known]))
-    scales = 1 / arrays.sqrt(arrays.diagonal(gram))
-    sizes, axes = arrays.linalg.eigh(gram * scales * scales[:, None])
+    gram[:known, :known] = np.eye(known)
+    projected[:known, :known] = np.diag(values[:known])
+    scales = 1 / np.sqrt(np.diagonal(gram))
+    sizes, axes = np.linalg.eigh(gram * scales * scales[:, None])
     kept = sizes > DEPENDENT[space.columns.dtype.itemsize] * sizes[-1]
-    if np.count_nonzero(fetch(tower.device, kept)) < len(values):
+    if np.count_nonzero(kept) < len(values):
         raise ConvergenceError(
             f"Smoothed eigenvectors must be independent; fewer than {len(values)} are. {TOO_FAR}"
         )
-    axes = (scales[:, None] * axes[:, kept]) / arrays.sqrt(sizes[kept])
-    found, weights = arrays.linalg.eigh(axes.T @ projected @ axes)
+    axes = (scales[:, None] * axes[:, kept]) / np.sqrt(sizes[kept])
+    found, weights = np.linalg.eigh(axes.T @ projected @ axes)
     m = len(values)
-    return np.array(fetch(tower.device, found[:m])), axes @ weights[:, :m]
+    return np.array(found[:m]), axes @ weights[:, :m]
 
 
-def _grams(tower: Tower, space: Space, fresh: slice) -> tuple[Array, Array]:
+def _grams(tower: Tower, space: Space, fresh: slice) -> tuple[np.ndarray, np.ndarray]:
     """Return SᵀMS and SᵀAS, without the block of the columns before the fresh ones."""
-    arrays, size, m = tower.device.arrays, fresh.stop, space.columns.shape[1]
-    gram, projected = arrays.zeros((size, size)), arrays.zeros((size, size))
+    size, m = fresh.stop, space.columns.shape[1]
+    gram, projected = np.zeros((size, size)), np.zeros((size, size))
     of = space.columns if fresh.start == 0 else space.added[:, : size - m]
     for rows, image, weighed in images(tower, of):
         for block, start in ((space.columns, 0), (space.added, m)):

@@ -1,4 +1,4 @@
-"""Compiled loops of `hierarchy` and `device`: aggregates of points, their smoothed indicators, and products."""
+"""Compiled loops of `aggregation` and `vcycle`: aggregates of points, their smoothed indicators, and products."""
 
 from typing import no_type_check
 
@@ -121,7 +121,7 @@ def _doubled(array, more):
 
 @njit
 @no_type_check
-def multiply(starts, columns, values, block, product):
+def multiply_rows(starts, columns, values, block, product):
     """Write a sparse matrix times a block of columns; `starts` may be that of some rows only."""
     for i in range(len(starts) - 1):
         _row_product(starts, columns, values, block, i, product)

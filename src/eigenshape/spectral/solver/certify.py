@@ -29,11 +29,11 @@ def certify(
     eigenvalues: Float[np.ndarray, " k"],
     eigenvectors: Float[np.ndarray, "n k"],
 ) -> Certificate:
-    """Prove that these are the k lowest eigenpairs, or refuse them.
+    """Prove that given eigenpairs are the k lowest ones of an operator, or raise an error.
 
-    Sylvester's law of inertia (Parlett 1998, section 3.3): W - σB = L D Lᵀ has as many negative entries in D as
-    there are eigenvalues below σ. σ stands just above the k-th eigenvalue, farther than the rounding of the factor
-    can move the count.
+    By Sylvester's law of inertia (Parlett 1998, section 3.3), D in W - σB = L D Lᵀ has as many negative
+    entries as there are eigenvalues below σ. σ is placed just above the k-th eigenvalue, farther away
+    than the rounding of the factor can change the count.
 
     Parameters
     ----------
@@ -50,9 +50,24 @@ def certify(
     Raises
     ------
     InvalidParameterError
-        If the arrays do not fit the operator, are not finite or not ascending.
+        If the arrays do not fit the operator, or are not finite or not ascending.
     ConvergenceError
-        If the columns are not B-orthonormal eigenvectors, or more or fewer eigenvalues lie there.
+        If the columns are not B-orthonormal eigenvectors, or the number of eigenvalues differs.
+
+    See Also
+    --------
+    solve_spectrum : Compute eigenpairs with their certificate.
+
+    Examples
+    --------
+    Certify the result of another solver:
+
+    >>> import eigenshape as es
+    >>> from scipy.linalg import eigh
+    >>> laplacian = es.cotangent_laplacian(es.icosphere(1))
+    >>> values, vectors = eigh(laplacian.stiffness.toarray(), laplacian.mass.toarray())
+    >>> es.spectral.certify(laplacian, values[:4], vectors[:, :4]).complete
+    True
     """
     require_type(laplacian, Laplacian, "laplacian")
     values, vectors = _checked(

@@ -207,7 +207,9 @@ def require_memory_for_pairs(pencil: Pencil, k: int, factors: int | None = None)
     bases = (
         8 * pencil.n * (3 * k + FEWEST_VECTORS + 2 * min(k, WHOLE))
     )  # a space of twice the pairs, results, a copy
-    advice = "Ask for fewer pairs, or for approximate_spectrum, which needs no factor"
+    advice = (
+        "Request fewer pairs, or pass method='approximate' to solve_spectrum, which needs no factor"
+    )
     require_memory(
         f"{k} pairs of {pencil.n} points",
         {"bases": bases, "factors of their operator": factors},

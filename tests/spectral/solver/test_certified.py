@@ -9,10 +9,10 @@ from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes.surfaces import disjoint_union, icosphere, torus
-from eigenshape.spectral.solver import solve as solver
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import strategy as roads
 from eigenshape.spectral.solver.certify import certify
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solver.pencil import normalise
 
 
 @pytest.fixture
@@ -122,7 +122,7 @@ def test_all_eigenvalues():
 def test_a_shift_on_an_eigenvalue_moves_away(monkeypatch):
     laplacian = cotangent_laplacian(icosphere(3))
     expected = solve_spectrum(laplacian, 40)
-    pencil = solver.normalise(laplacian)
+    pencil = normalise(laplacian)
     on_it = float(np.ldexp(expected.eigenvalues[25], -pencil.value_exponent))
     from eigenshape.spectral.solver.shift import factorise_near
 
@@ -269,10 +269,10 @@ def test_below_scales_as_eigenvalues_do():
     assert len(solve_spectrum(cotangent_laplacian(small), below=5e200).eigenvalues) == 4
 
 
-def test_one_of_k_and_below_is_asked_for():
+def test_one_of_k_and_below_is_required():
     laplacian = cotangent_laplacian(icosphere(1))
     with pytest.raises(
-        InvalidParameterError, match="One of k and below says which pairs to compute; k is None"
+        InvalidParameterError, match="Exactly one of k and below must be given; k is None"
     ):
         solve_spectrum(laplacian)
     with pytest.raises(InvalidParameterError, match=r"k is 3 and below is 1\.0"):
