@@ -10,7 +10,7 @@ from eigenshape.deformation.graded import shared_motion
 from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.region import region_boundary
 from eigenshape.deformation.rig import eigen_skeleton, rig_shape
-from eigenshape.deformation.skeleton import grip_skeleton, moved_skeleton
+from eigenshape.deformation.skeleton import move_skeleton, skeleton_response
 from eigenshape.geometry.crossings import self_intersections
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
@@ -73,10 +73,10 @@ def literal_skeleton(rig, regions, handles, n_modes):
 def test_the_moved_skeleton_is_the_least_squares_fit_of_the_thesis(n_modes):
     tail = lump().vertices[:, 0] < -0.7
     regions, handles = [HEAD, tail], [TURN, Translation([0, 0.4, 0])]
-    grip = grip_skeleton(bind(lump_rig(), regions, n_modes=n_modes))
+    response = skeleton_response(bind(lump_rig(), regions, n_modes=n_modes))
     before, after = literal_skeleton(lump_rig(), regions, handles, n_modes)
-    np.testing.assert_allclose(grip.skeleton, before, atol=1e-12)
-    np.testing.assert_allclose(moved_skeleton(grip, handles), after, atol=1e-12)
+    np.testing.assert_allclose(response.skeleton, before, atol=1e-12)
+    np.testing.assert_allclose(move_skeleton(response, handles), after, atol=1e-12)
     assert np.abs(after - before).max() > 0.1
 
 

@@ -10,7 +10,7 @@ from eigenshape.deformation.graded import graded, uncrossed
 from eigenshape.deformation.handles import Handle
 from eigenshape.deformation.region import Region
 from eigenshape.deformation.rig import EigenRig
-from eigenshape.deformation.thesis import detail_skeleton, eigen_deformed
+from eigenshape.deformation.thesis import detailed_skeleton, eigen_deformation
 from eigenshape.geometry.mesh import TriangleMesh
 
 Mode = Literal["graded", "uncrossed", "thesis"]
@@ -87,7 +87,7 @@ def bend(binding: Binding, handles: Sequence[Handle], *, mode: Mode = "graded") 
             f"Each region must have one handle; there are {len(binding.regions)} regions and {len(handles)} handles."
         )
     if require_mode(mode) == "thesis":
-        vertices = eigen_deformed(detail_skeleton(binding), handles)
+        vertices = eigen_deformation(detailed_skeleton(binding), handles)
     else:
         vertices = (uncrossed if mode == "uncrossed" else graded)(binding, handles)
     return TriangleMesh(vertices, binding.rig.mesh.faces)

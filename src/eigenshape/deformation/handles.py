@@ -107,7 +107,7 @@ def affine_offset(handle: Handle) -> Float[np.ndarray, "3 4"]:
     return np.column_stack([about_origin.carry(np.eye(3), np.ones(3)).T, shift])
 
 
-def rotation_by_drag(pivot: ArrayLike, start: ArrayLike, end: ArrayLike) -> Rotation:
+def rotation_from_drag(pivot: ArrayLike, start: ArrayLike, end: ArrayLike) -> Rotation:
     """Return the least rotation about a pivot that turns one point towards another (thesis 6.2.1).
 
     Parameters

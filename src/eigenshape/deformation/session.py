@@ -15,7 +15,7 @@ from eigenshape.deformation.edits import Edit, Move, apply_edit, carry_edit
 from eigenshape.deformation.handles import Handle
 from eigenshape.deformation.region import Region, region_mask
 from eigenshape.deformation.rig import EigenRig, posed
-from eigenshape.deformation.skeleton import SkeletonGrip, grip_skeleton, moved_skeleton
+from eigenshape.deformation.skeleton import SkeletonResponse, move_skeleton, skeleton_response
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 
@@ -41,7 +41,7 @@ class DeformationSession:
         self._poses = [rig]
         self._edits: list[Edit] = []
         self._place = 0  # how many edits count; those after it can be redone
-        self._pending: tuple[Edit, Binding, SkeletonGrip] | None = None
+        self._pending: tuple[Edit, Binding, SkeletonResponse] | None = None
 
     @property
     def rig(self) -> EigenRig:
@@ -64,7 +64,7 @@ class DeformationSession:
         return len(self._edits) - self._place
 
     @property
-    def grip(self) -> SkeletonGrip:
+    def response(self) -> SkeletonResponse:
         """What a viewer needs for the drag under way: places, and four numbers a vertex and region.
 
         Raises
@@ -107,7 +107,7 @@ class DeformationSession:
         Returns
         -------
         (n, 3) float
-            Vertices of the eigen-skeleton; `grip` has what a viewer needs to follow the handles by itself.
+            Vertices of the eigen-skeleton; `response` has what a viewer needs to follow the handles by itself.
 
         Raises
         ------
@@ -122,9 +122,9 @@ class DeformationSession:
             binding = bind(
                 self.rig, [move.region for move in edit.moves], fixed=fixed, n_modes=number
             )
-            self._pending = edit, binding, grip_skeleton(binding)
+            self._pending = edit, binding, skeleton_response(binding)
         self._pending = edit, *self._pending[1:]
-        return moved_skeleton(self.grip, [move.handle for move in edit.moves])
+        return move_skeleton(self.response, [move.handle for move in edit.moves])
 
     def _binds_alike(self, one: Edit, two: Edit) -> bool:
         if (
@@ -140,7 +140,7 @@ class DeformationSession:
             for a, b in pairs
         )
 
-    def _dragged(self) -> tuple[Edit, Binding, SkeletonGrip]:
+    def _dragged(self) -> tuple[Edit, Binding, SkeletonResponse]:
         if self._pending is None:
             raise InvalidParameterError("A region must be dragged first; nothing is.")
         return self._pending

@@ -14,7 +14,7 @@ from eigenshape.deformation.rig import eigen_skeleton, projected
 
 
 @dataclass(frozen=True, eq=False)
-class SkeletonGrip:
+class SkeletonResponse:
     """What a drag needs at each vertex: its place, and four numbers a region.
 
     Attributes
@@ -30,7 +30,7 @@ class SkeletonGrip:
 
 
 @one_blas_thread()
-def grip_skeleton(binding: Binding) -> SkeletonGrip:
+def skeleton_response(binding: Binding) -> SkeletonResponse:
     """Find the least-squares fit of moved regions by the low modes, for all motions at once (thesis eq. 6.1).
 
     A motion cuts a region of the skeleton out and moves it; the fit is Φ (ΦᵀΦ)⁻¹ Φ_Rᵀ [K_R, 1] times D, and so four
@@ -41,16 +41,18 @@ def grip_skeleton(binding: Binding) -> SkeletonGrip:
     skeleton = eigen_skeleton(rig, n_modes)
     ends = np.column_stack([skeleton, np.ones(len(skeleton))])
     cut = [projected(rig, ends * mask[:, None], n_modes) for mask in binding.regions]
-    return SkeletonGrip(
+    return SkeletonResponse(
         skeleton, np.array([rig.eigenvectors[:, :n_modes] @ columns for columns in cut])
     )
 
 
-def moved_skeleton(grip: SkeletonGrip, handles: Sequence[Handle]) -> Float[np.ndarray, "n 3"]:
+def move_skeleton(
+    response: SkeletonResponse, handles: Sequence[Handle]
+) -> Float[np.ndarray, "n 3"]:
     """Return K*, the skeleton where handles take it."""
-    require_type(grip, SkeletonGrip, "grip")
+    require_type(response, SkeletonResponse, "response")
     require_each(handles, Handle, "handles")
-    pairs = zip(grip.weights, handles, strict=True)
-    return grip.skeleton + sum(
+    pairs = zip(response.weights, handles, strict=True)
+    return response.skeleton + sum(
         (weights @ affine_offset(handle).T for weights, handle in pairs), np.zeros(3)
     )

@@ -19,7 +19,7 @@ from eigenshape.deformation.details import (
 )
 from eigenshape.deformation.handles import Handle
 from eigenshape.deformation.rig import eigen_skeleton, projected
-from eigenshape.deformation.skeleton import SkeletonGrip, grip_skeleton, moved_skeleton
+from eigenshape.deformation.skeleton import SkeletonResponse, move_skeleton, skeleton_response
 
 SECOND_PASS = 300  # modes
 
@@ -34,22 +34,22 @@ class DetailedSkeleton:
     Attributes
     ----------
     binding : Binding
-    grip : SkeletonGrip
+    response : SkeletonResponse
     fine : (n, 3) float
-        The skeleton of 300 modes; the shape itself where the grip has as many.
+        The skeleton of 300 modes; the shape itself where the response has as many.
     first, second : FramedDetails
-        From the grip's skeleton to the fine one, and from that to the shape.
+        From the response's skeleton to the fine one, and from that to the shape.
     """
 
     binding: Binding
-    grip: SkeletonGrip
+    response: SkeletonResponse
     fine: Points
     first: FramedDetails
     second: FramedDetails
 
 
 @one_blas_thread()
-def detail_skeleton(binding: Binding, *, second_pass: bool = True) -> DetailedSkeleton:
+def detailed_skeleton(binding: Binding, *, second_pass: bool = True) -> DetailedSkeleton:
     """Prepare a binding for the thesis' algorithm: for many positions of its handles.
 
     Parameters
@@ -59,16 +59,16 @@ def detail_skeleton(binding: Binding, *, second_pass: bool = True) -> DetailedSk
         Whether details come back by way of the skeleton of 300 modes (6.3.3); all at once otherwise.
     """
     require_type(binding, Binding, "binding")
-    rig, grip = binding.rig, grip_skeleton(binding)
+    rig, response = binding.rig, skeleton_response(binding)
     shape, faces, most = rig.mesh.vertices, rig.mesh.faces, min(SECOND_PASS, rig.n_modes)
     fine = eigen_skeleton(rig, most) if second_pass and binding.n_modes.max() < most else shape
     return DetailedSkeleton(
-        binding, grip, fine, framed(faces, grip.skeleton, fine), framed(faces, fine, shape)
+        binding, response, fine, framed(faces, response.skeleton, fine), framed(faces, fine, shape)
     )
 
 
 @one_blas_thread()
-def eigen_deformed(
+def eigen_deformation(
     skeleton: DetailedSkeleton, handles: Sequence[Handle], *, details: Details = "blended"
 ) -> Points:
     """Return the vertices where the thesis' algorithm takes them.
@@ -90,7 +90,7 @@ def eigen_deformed(
     require_type(skeleton, DetailedSkeleton, "skeleton")
     require_each(handles, Handle, "handles")
     rig, faces = skeleton.binding.rig, skeleton.binding.rig.mesh.faces
-    moved = moved_skeleton(skeleton.grip, handles)
+    moved = move_skeleton(skeleton.response, handles)
     by_frames = turned_by_frames(faces, skeleton.first, moved)
     by_handles = turned_by_handles(skeleton.binding, handles, skeleton.first.details)
     ways = {
