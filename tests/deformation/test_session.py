@@ -55,10 +55,10 @@ def test_undo_and_redo_go_back_and_forth_to_the_last_digit(session):
         poses.append(session.commit().vertices)
     for pose in poses[-2::-1]:
         np.testing.assert_array_equal(session.undo().vertices, pose)
-    assert (session.undone, len(session.edits)) == (3, 0)
+    assert (session.n_redoable, len(session.edits)) == (3, 0)
     for pose in poses[1:]:
         np.testing.assert_array_equal(session.redo().vertices, pose)
-    assert (session.undone, len(session.edits)) == (0, 3)
+    assert (session.n_redoable, len(session.edits)) == (0, 3)
     assert len({pose.tobytes() for pose in poses}) == 4
 
 
@@ -69,11 +69,11 @@ def test_a_new_commit_forgets_what_was_undone(session):
     session.undo()
     session.drag(TAIL, PULL)
     session.commit()
-    assert session.undone == 0
+    assert session.n_redoable == 0
     assert [edit.moves[0].handle for edit in session.edits] == [TURN, PULL]
     assert session.edits[1].moves[0].region.dtype == bool  # the tail's
     with pytest.raises(
-        InvalidParameterError, match="An edit must have been undone to be redone; none was"
+        InvalidParameterError, match="There must be an undone edit to redo; there is none"
     ):
         session.redo()
 
@@ -81,12 +81,10 @@ def test_a_new_commit_forgets_what_was_undone(session):
 def test_what_is_not_there_cannot_be_done(session):
     with pytest.raises(InvalidParameterError, match="There must be an edit to undo; there is none"):
         session.undo()
-    with pytest.raises(InvalidParameterError, match="An edit must have been undone to be redone"):
+    with pytest.raises(InvalidParameterError, match="There must be an undone edit to redo"):
         session.redo()
     for action in (session.commit, lambda: session.response):
-        with pytest.raises(
-            InvalidParameterError, match="A region must be dragged first; nothing is"
-        ):
+        with pytest.raises(InvalidParameterError, match="A region must be dragged first; none is"):
             action()
     with pytest.raises(InvalidParameterError, match=r"n_modes must lie in 1\.\.300; it is 0"):
         session.drag(HEAD, TURN, n_modes=0)
