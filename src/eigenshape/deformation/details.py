@@ -83,7 +83,7 @@ def blend_details(binding: Binding, by_frames: Points, by_handles: Points) -> Po
 
 
 def _near_boundary(distance: Float[np.ndarray, " n"], extent: float) -> Float[np.ndarray, " n"]:
-    """Return 1 within an eighth of a region's extent from its boundary, falling to 0 at a quarter."""
+    """Return 1 up to an eighth of the extent from the boundary, falling to 0 at a quarter."""
     if extent == 0:  # every vertex of the region lies on its boundary
         return (distance == 0).astype(float)
     return np.clip((extent / 4 - distance) / (extent / 8), 0, 1)
