@@ -104,11 +104,11 @@ def bent(saved: str, region: str) -> Row:
     before, mask = memory_now(), region_of(mesh, region)
     rig = timed("rig", lambda: es.rig_shape(mesh))
     binding = often("bind", lambda: es.deformation.bind(rig, [mask]))
-    skeleton = often("detail", lambda: es.deformation.detail_skeleton(binding))
+    skeleton = often("detail", lambda: es.deformation.detailed_skeleton(binding))
     pivot = mesh.vertices[es.deformation.region_boundary(mesh, mask)].mean(axis=0)
     handles = [es.Rotation(pivot, [1, 0, 0], np.pi / 3)]
-    often("drag", lambda: es.deformation.moved_skeleton(skeleton.grip, handles))
-    often("thesis", lambda: es.deformation.eigen_deformed(skeleton, handles))
+    often("drag", lambda: es.deformation.move_skeleton(skeleton.response, handles))
+    often("thesis", lambda: es.deformation.eigen_deformation(skeleton, handles))
     goal = often("graded", lambda: es.deformation.bend(binding, handles)).vertices
     often("arap", lambda: es.deformation.as_rigid_as_possible(binding, handles, n_rounds=ROUNDS))
     by_libigl(binding, goal, timed)

@@ -39,7 +39,7 @@ def figure_law(points: list[dict], samples: list[dict], setup: dict) -> Figure:
         left.plot(deltas, dense.at(deltas, t), "--", lw=1, color=color)
         left.plot(
             deltas,
-            es.stability.cover_by_rate(law, deltas[:1], [t], means[:1]).at(deltas, t),
+            es.stability.bounding_rate(law, deltas[:1], [t], means[:1]).at(deltas, t),
             ":",
             lw=1,
             color=color,

@@ -160,7 +160,7 @@ def summarise(points: list[dict], samples: list[dict], surfaces: list[dict]) -> 
         "proven (4.3.1)": {"delta": law.delta, "t": law.t},
         "proven (ours)": {"delta": ours.delta, "t": ours.t},
         "expected (dense)": {"delta": dense.delta, "t": dense.t},
-        "constant that 4.3.1 needs": es.stability.cover_by_rate(
+        "constant that 4.3.1 needs": es.stability.bounding_rate(
             law, *columns(allowed, "delta", "t", "change")
         ).constant,
         "largest share of our bound": float((told[2] / ours.at(*told[:2])).max()),
@@ -192,7 +192,7 @@ def _sample_row(rows: list[dict]) -> dict[str, float]:
 def _surface_row(rows: list[dict]) -> dict[str, float]:
     by_number, as_sets = exponents(rows, "change"), exponents(rows, "hausdorff")
     theorem = "3.1.5" if rows[0]["operator"].startswith("cotangent") else "3.1.4"
-    covering = es.stability.cover_by_rate(
+    covering = es.stability.bounding_rate(
         es.stability.theorem_rate(theorem, DIM), *columns(rows, "delta", "t", "hausdorff")
     )
     return {
@@ -220,7 +220,7 @@ def functional_errors() -> dict[str, float]:
     return {
         "t": es.stability.fit_rate(ones, times, errors).t,
         "t, proven": proven.t,
-        "constant of 3.1.1": es.stability.cover_by_rate(proven, ones, times, errors).constant,
+        "constant of 3.1.1": es.stability.bounding_rate(proven, ones, times, errors).constant,
     }
 
 

@@ -43,11 +43,11 @@ def skeletons(folder: Path) -> None:
     """Draw the dragon's skeleton, cut and fitted (figures 6.5, 6.6), and ways to put details back (6.7, 6.9)."""
     scene = SCENES["dragon"]()
     binding, handles = bound(scene)
-    grip, faces = es.deformation.grip_skeleton(binding), scene.mesh.faces
+    grip, faces = es.deformation.skeleton_response(binding), scene.mesh.faces
     cut = grip.skeleton.copy()
     whole = binding.regions[0].astype(float)
     cut += handles[0].carry(cut, whole)
-    moved = es.deformation.moved_skeleton(grip, handles)
+    moved = es.deformation.move_skeleton(grip, handles)
     poses = {
         "shape": scene.mesh.vertices,
         "skeleton, 8 modes": grip.skeleton,
@@ -58,13 +58,15 @@ def skeletons(folder: Path) -> None:
     es.save_figure(
         es.plot.figure_poses(meshes, whole, camera=view(scene)), folder / "figure_6_6.png"
     )
-    once = es.deformation.detail_skeleton(binding, second_pass=False)
+    once = es.deformation.detailed_skeleton(binding, second_pass=False)
     ways = {
-        "details by local frames": es.deformation.eigen_deformed(once, handles, details="frames"),
-        "details by the handle": es.deformation.eigen_deformed(once, handles, details="handle"),
-        "blended (6.3.1)": es.deformation.eigen_deformed(once, handles),
-        "blended, in two passes (6.3.3)": es.deformation.eigen_deformed(
-            es.deformation.detail_skeleton(binding), handles
+        "details by local frames": es.deformation.eigen_deformation(
+            once, handles, details="frames"
+        ),
+        "details by the handle": es.deformation.eigen_deformation(once, handles, details="handle"),
+        "blended (6.3.1)": es.deformation.eigen_deformation(once, handles),
+        "blended, in two passes (6.3.3)": es.deformation.eigen_deformation(
+            es.deformation.detailed_skeleton(binding), handles
         ),
     }
     meshes = {title: es.TriangleMesh(points, faces) for title, points in ways.items()}

@@ -5,12 +5,17 @@ from bent_shapes import bumpy, lump, lump_rig, tube, tube_rig
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import bend, deform, require_mode
-from eigenshape.deformation.details import blended, framed, turned_by_frames, turned_by_handles
-from eigenshape.deformation.graded import shared_motion
+from eigenshape.deformation.details import (
+    blend_details,
+    frame_details,
+    turn_by_frames,
+    turn_by_handles,
+)
+from eigenshape.deformation.graded_bend import move_by_shares
 from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.region import region_boundary
 from eigenshape.deformation.rig import eigen_skeleton, rig_shape
-from eigenshape.deformation.skeleton import grip_skeleton, moved_skeleton
+from eigenshape.deformation.skeleton import move_skeleton, skeleton_response
 from eigenshape.geometry.crossings import self_intersections
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
@@ -73,10 +78,10 @@ def literal_skeleton(rig, regions, handles, n_modes):
 def test_the_moved_skeleton_is_the_least_squares_fit_of_the_thesis(n_modes):
     tail = lump().vertices[:, 0] < -0.7
     regions, handles = [HEAD, tail], [TURN, Translation([0, 0.4, 0])]
-    grip = grip_skeleton(bind(lump_rig(), regions, n_modes=n_modes))
+    response = skeleton_response(bind(lump_rig(), regions, n_modes=n_modes))
     before, after = literal_skeleton(lump_rig(), regions, handles, n_modes)
-    np.testing.assert_allclose(grip.skeleton, before, atol=1e-12)
-    np.testing.assert_allclose(moved_skeleton(grip, handles), after, atol=1e-12)
+    np.testing.assert_allclose(response.skeleton, before, atol=1e-12)
+    np.testing.assert_allclose(move_skeleton(response, handles), after, atol=1e-12)
     assert np.abs(after - before).max() > 0.1
 
 
@@ -143,9 +148,9 @@ def test_details_are_those_of_the_thesis_vertex_by_vertex(small):
     rig, binding, handle = small
     before, after = literal_skeleton(rig, binding.regions, [handle], 40)
     faces, details = rig.mesh.faces, rig.mesh.vertices - before
-    turned = turned_by_frames(faces, framed(faces, before, rig.mesh.vertices), after)
+    turned = turn_by_frames(faces, frame_details(faces, before, rig.mesh.vertices), after)
     np.testing.assert_allclose(turned, literal_details(faces, before, after, details), atol=1e-11)
-    found = blended(binding, turned, turned_by_handles(binding, [handle], details))
+    found = blend_details(binding, turned, turn_by_handles(binding, [handle], details))
     np.testing.assert_allclose(found, literal_blend(binding, handle, turned, details), atol=1e-12)
     assert np.abs(found - turned).max() > 0.01
 
@@ -181,23 +186,23 @@ def test_details_of_no_length_stay_so():
     rig, details = lump_rig(), np.zeros((642, 3))
     binding = bind(rig, [HEAD])
     before, after = literal_skeleton(rig, [HEAD], [TURN], 50)
-    turned = turned_by_frames(rig.mesh.faces, framed(rig.mesh.faces, before, before), after)
+    turned = turn_by_frames(rig.mesh.faces, frame_details(rig.mesh.faces, before, before), after)
     np.testing.assert_array_equal(turned, 0)
     np.testing.assert_array_equal(
-        blended(binding, turned, turned_by_handles(binding, [TURN], details)), 0
+        blend_details(binding, turned, turn_by_handles(binding, [TURN], details)), 0
     )
 
 
-def test_where_a_skeleton_has_no_frame_details_are_not_turned():
+def test_details_are_not_turned_where_the_skeleton_has_no_frame():
     rig = lump_rig()
     details = np.random.default_rng(0).standard_normal((642, 3))
     point = np.zeros((642, 3))
     shape, faces = rig.mesh.vertices, rig.mesh.faces
     np.testing.assert_array_equal(
-        turned_by_frames(faces, framed(faces, point, details), shape), details
+        turn_by_frames(faces, frame_details(faces, point, details), shape), details
     )
     np.testing.assert_allclose(
-        turned_by_frames(faces, framed(faces, shape, shape + details), point), details
+        turn_by_frames(faces, frame_details(faces, shape, shape + details), point), details
     )
 
 
@@ -261,7 +266,7 @@ def test_the_start_of_a_graded_bend_is_each_vertex_by_its_share():
     binding = bind(lump_rig(), [HEAD])
     rest, (shares,) = lump().vertices, binding.shares
     np.testing.assert_allclose(
-        shared_motion(binding, [TURN]), rest + TURN.carry(rest, shares), atol=1e-15
+        move_by_shares(binding, [TURN]), rest + TURN.carry(rest, shares), atol=1e-15
     )
 
 
@@ -310,7 +315,7 @@ def test_what_no_pull_keeps_apart_is_said(halves):
     binding, turn = bind(rig, [left]), Rotation(pivot, [0, 1, 0], np.deg2rad(100))
     with pytest.warns(
         UserWarning,
-        match=r"No pull keeps all faces apart; \d+ pairs cross that did not before, faces",
+        match=r"Faces cross at every strength of the pull; \d+ pairs cross that did not before, ",
     ) as told:
         bent = bend(binding, [turn], mode="uncrossed")
     assert f" {len(self_intersections(bent))} pairs cross" in str(told[0].message)

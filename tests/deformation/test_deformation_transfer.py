@@ -66,9 +66,7 @@ def test_what_does_not_fit_is_refused(bent):
     other = TriangleMesh(np.vstack([lump().vertices, [[9.0, 9, 9]]]), lump().faces)
     with pytest.raises(InvalidParameterError, match="Poses of one mesh must have the same faces"):
         transfer_deformation(lump(), cut, lump(), mapping)
-    with pytest.raises(
-        InvalidParameterError, match="The map's target has 642 vertices, and the mesh has 643"
-    ):
+    with pytest.raises(InvalidParameterError, match="it has 642 vertices, and the mesh has 643"):
         transfer_deformation(lump(), bent, other, mapping)
     with pytest.raises(InvalidParameterError, match=r"n_modes must lie in 1\.\.20"):
         transfer_deformation(lump(), bent, lump(), mapping, n_modes=21)

@@ -148,7 +148,7 @@ def test_what_the_broken_ones_are_made_of_can_be_read():
     [
         (None, "Edit 1 cannot be read"),
         ([], "Edit 1 cannot be read"),
-        ({}, "Edit 1 cannot be read: 'moves' is missing, or not known"),
+        ({}, "Edit 1 cannot be read: 'moves' is missing or unknown"),
         ({**GOOD, "moves": {}}, "Edit 1 cannot be read: moves must be a list; it is {}"),
         ({**GOOD, "moves": [5]}, "Edit 1 cannot be read"),
         ({**GOOD, "fixed": 5}, "Edit 1 cannot be read"),
@@ -166,7 +166,7 @@ def test_what_the_broken_ones_are_made_of_can_be_read():
             {**GOOD, "n_modes": True},
             "Edit 1 cannot be read: n_modes must be a whole number; it is True",
         ),
-        (moving({"kind": "ball"}), "Edit 1 cannot be read: 'ball' is missing, or not known"),
+        (moving({"kind": "ball"}), "Edit 1 cannot be read: 'ball' is missing or unknown"),
         (moving({"kind": ["box"]}), "Edit 1 cannot be read"),
         (moving({"kind": "vertices"}), "Edit 1 cannot be read: 'vertices' is missing"),
         (
@@ -209,7 +209,7 @@ def test_what_the_broken_ones_are_made_of_can_be_read():
             moving({"kind": "brush", "center": [0, None, 0], "radius": 1}),
             "Edit 1 cannot be read: center must be a number",
         ),
-        (moving(handle={"kind": "spin"}), "Edit 1 cannot be read: 'spin' is missing, or not known"),
+        (moving(handle={"kind": "spin"}), "Edit 1 cannot be read: 'spin' is missing or unknown"),
         (
             moving(handle={"kind": "translation", "vector": [0, 0]}),
             "Edit 1 cannot be read: vector must have three",
@@ -242,9 +242,9 @@ def test_what_is_no_edit_is_refused_by_its_number(broken, message):
 @pytest.mark.parametrize(
     ("whole", "message"),
     [
-        ([], "Edits are kept as a JSON object of kind 'eigenshape edits'; this is none"),
-        ({"kind": "mesh"}, "Edits are kept as a JSON object of kind"),
-        (content(GOOD, version=1), "Edits of version 2 are read; this is version 1"),
+        ([], "Edits must be a JSON object of kind 'eigenshape edits'; this is a list"),
+        ({"kind": "mesh"}, "Edits must be a JSON object of kind .*; the kind is 'mesh'"),
+        (content(GOOD, version=1), "Edits must be of version 2; the version is 1"),
         (
             content(GOOD, mesh={"n_vertices": "5", "n_faces": 2, "digest": ""}),
             "Edit 0 cannot be read: n_vertices must be a whole number; it is '5'",

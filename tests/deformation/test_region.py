@@ -5,7 +5,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.region import (
     BoxRegion,
     BrushRegion,
-    kept_region,
+    copy_region,
     region_boundary,
     region_mask,
     require_boundary,
@@ -98,7 +98,7 @@ def test_regions_without_a_boundary_are_refused():
 def test_bad_regions_are_refused_by_name():
     with pytest.raises(
         InvalidParameterError,
-        match=r"A mask must have one entry a vertex, shape \(25,\); .* \(24,\)",
+        match=r"A mask must have one entry per vertex, shape \(25,\); .* \(24,\)",
     ):
         region_mask(GRID, np.ones(24, dtype=bool))
     with pytest.raises(
@@ -119,9 +119,9 @@ def test_bad_regions_are_refused_by_name():
 
 def test_a_kept_region_is_its_own():
     mask = np.zeros(25, dtype=bool)
-    kept = kept_region(mask)
+    kept = copy_region(mask)
     mask[:] = True
     assert chosen(kept) == []
-    assert chosen(kept_region(index for index in (1, 2))) == [1, 2]
+    assert chosen(copy_region(index for index in (1, 2))) == [1, 2]
     box = BoxRegion([0, 0, 0], [1, 1, 1])
-    assert kept_region(box) is box
+    assert copy_region(box) is box

@@ -6,9 +6,15 @@ from scipy.spatial.transform import Rotation as Turn
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.deformation import rigidity
 from eigenshape.deformation.binding import bind
-from eigenshape.deformation.graded import graded, quaternions, shared_motion
+from eigenshape.deformation.graded_bend import bend_graded, move_by_shares, quaternions
 from eigenshape.deformation.handles import Rotation
-from eigenshape.deformation.rigidity import edge_weights, factored, fitted_turns, free_part, relax
+from eigenshape.deformation.rigidity import (
+    edge_weights,
+    factor_equations,
+    fit_turns,
+    free_part,
+    relax,
+)
 from eigenshape.deformation.rigidity_loops import fit_rotations, turned_edges
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
@@ -122,7 +128,7 @@ def test_one_by_one_and_all_at_once_agree():
         np.arange(162), edges.starts, edges.others, edges.weights, mesh.vertices, posed, turns
     )
     found = Turn.from_quat(np.roll(turns, -1, axis=1)).as_matrix()
-    np.testing.assert_allclose(found, fitted_turns(edges, mesh.vertices, posed), atol=1e-11)
+    np.testing.assert_allclose(found, fit_turns(edges, mesh.vertices, posed), atol=1e-11)
 
 
 def test_weights_are_positive_and_on_every_edge():
@@ -173,7 +179,7 @@ def bent_tube():
 
 def total(binding, posed):
     edges, rest = binding.rig.edges, binding.rig.mesh.vertices
-    turns = fitted_turns(edges, rest, posed)
+    turns = fit_turns(edges, rest, posed)
     one = np.repeat(np.arange(len(rest)), np.diff(edges.starts))
     arms, after = rest[edges.others] - rest[one], posed[edges.others] - posed[one]
     return (
@@ -184,9 +190,9 @@ def total(binding, posed):
 @pytest.mark.long
 def test_more_rounds_are_more_rigid():
     binding, handle = bent_tube()
-    energies = [total(binding, shared_motion(binding, [handle]))]
+    energies = [total(binding, move_by_shares(binding, [handle]))]
     energies += [
-        total(binding, graded(binding, [handle], n_rounds=rounds))
+        total(binding, bend_graded(binding, [handle], n_rounds=rounds))
         for rounds in (1, 2, 3, 5, 10, 20)
     ]
     assert (np.diff(energies) <= 1e-12 * energies[0]).all()
@@ -200,20 +206,20 @@ def test_many_rounds_end_where_plain_alternation_does(monkeypatch):
     edges, rest, free = binding.rig.edges, binding.rig.mesh.vertices, binding.part.free
     matrix = edges.matrix.toarray()
     links = -matrix + np.diag(matrix.diagonal())
-    posed, solve = shared_motion(binding, [handle]), np.linalg.inv(matrix[np.ix_(free, free)])
+    posed, solve = move_by_shares(binding, [handle]), np.linalg.inv(matrix[np.ix_(free, free)])
     held = np.setdiff1d(np.arange(len(rest)), free)
     for _ in range(2000):
-        turns = fitted_turns(edges, rest, posed)
+        turns = fit_turns(edges, rest, posed)
         own = np.einsum("iab,ib->ia", turns, matrix @ rest)
         others = (links @ turns.reshape(-1, 9)).reshape(-1, 3, 3)
         theirs = np.einsum("iab,ib->ia", others, rest) - links @ np.einsum(
             "jab,jb->ja", turns, rest
         )
         posed[free] = solve @ ((own + theirs)[free] / 2 - matrix[np.ix_(free, held)] @ posed[held])
-    quick = graded(binding, [handle])
+    quick = bend_graded(binding, [handle])
     assert total(binding, quick) == pytest.approx(total(binding, posed), rel=3e-4)
     monkeypatch.setattr(rigidity, "SETTLED", 0.0)
-    patient = graded(binding, [handle], n_rounds=2000)
+    patient = bend_graded(binding, [handle], n_rounds=2000)
     assert np.abs(patient - posed).max() < 1e-9
 
 
@@ -235,7 +241,7 @@ def test_each_component_must_be_held():
     held = np.zeros(36, dtype=bool)
     held[3] = True
     with pytest.raises(
-        InvalidParameterError, match=r"held somewhere; that of vertex 12 is not \(2 such\)"
+        InvalidParameterError, match=r"the component of vertex 12 has none \(2 such\)"
     ):
         free_part(edges, held, np.zeros(36))
 
@@ -243,9 +249,10 @@ def test_each_component_must_be_held():
 def test_equations_that_are_not_definite_are_refused():
     edges = edge_weights(cotangent_laplacian(icosphere(0)).stiffness)
     with pytest.raises(
-        InvalidShapeError, match="A shape must have angles to be bent; some are too near to 0"
+        InvalidShapeError,
+        match="angles well above zero to be bent; the equations of the 5 free",
     ):
-        factored(-edges.matrix[:5][:, :5])
+        factor_equations(-edges.matrix[:5][:, :5])
 
 
 def test_quaternions_are_those_of_scipy():

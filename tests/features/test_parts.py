@@ -7,7 +7,7 @@ from eigenshape.features.boundaries import smooth_boundaries
 from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.part_merging import SEED_TIME, part_tree
 from eigenshape.features.parts import find_parts, part_spectrum
-from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment, touching_parts
+from eigenshape.features.segmentation import FeaturePoints, Segmentation, adjacent_parts, segment
 from eigenshape.geometry.facets import facet_components, facet_table
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
@@ -72,7 +72,7 @@ def brute_force_merging(mesh, spectrum, time):
     decay = np.exp(-time * area * spectrum.eigenvalues)
     faces = (spectrum.eigenvectors * decay)[mesh.faces].mean(axis=1)
     prices = []
-    while len(touching := touching_parts(mesh, labels)):
+    while len(touching := adjacent_parts(mesh, labels)):
 
         def price(pair):
             one, two = (labels == part for part in pair)
@@ -196,7 +196,7 @@ def test_no_cut_in_the_band_costs_less():
     mesh = dumbbell()
     before = two_halves(mesh, 0.25)
     after = smooth_boundaries(mesh, before).labels
-    network = boundaries._network(mesh)
+    network = boundaries._build_network(mesh)
 
     def cost(labels):
         return network.costs[labels[network.pairs[:, 0]] != labels[network.pairs[:, 1]]].sum()
@@ -223,12 +223,12 @@ def test_smooth_parts_stay_whole_and_keep_their_feature_points(human):
         assert (smooth.labels[around & (raw.labels == part)] == part).all()
 
 
-def test_touching_parts_of_a_strip():
+def test_adjacent_parts_of_a_strip():
     mesh = grid(7, 2)
     labels = np.minimum(
         (mesh.vertices[mesh.faces].mean(axis=1)[:, 0] * 3.0001 / np.ptp(mesh.vertices[:, 0])), 2
     )
-    assert touching_parts(mesh, labels.astype(np.int64)).tolist() == [[0, 1], [1, 2]]
+    assert adjacent_parts(mesh, labels.astype(np.int64)).tolist() == [[0, 1], [1, 2]]
 
 
 def test_a_spectrum_of_another_shape_is_refused():

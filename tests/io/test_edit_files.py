@@ -53,7 +53,7 @@ def test_the_file_is_plain_json(tmp_path):
         (b"\xff\xfe", "must hold JSON"),
         (b"[" * 100_000, "must hold JSON"),
         (b"1" * 5000, "must hold JSON"),
-        (b"[1, 2]", "Edits are kept as a JSON object"),
+        (b"[1, 2]", "Edits must be a JSON object"),
         (
             b'{"kind": "eigenshape edits", "version": 2, "mesh": {"n_vertices": 3, "n_faces": 1, "digest": ""}, '
             b'"edits": [{}]}',

@@ -69,8 +69,8 @@ class Shared:
         self.handle = es.Rotation(self.animal.vertices[self.region].mean(axis=0), [0, 0, 1], 0.6)
         self.move = es.Translation([0.1, 0.2, 0.0])
         self.binding = es.deformation.bind(self.rig, [self.region], fixed=self.fixed, n_modes=12)
-        self.grip = es.deformation.grip_skeleton(self.binding)
-        self.detailed = es.deformation.detail_skeleton(self.binding)
+        self.response = es.deformation.skeleton_response(self.binding)
+        self.detailed = es.deformation.detailed_skeleton(self.binding)
         self.edit = es.deformation.Edit(
             (es.deformation.Move(self.region, self.handle),), self.fixed, 12
         )
@@ -279,7 +279,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         v.change, v.on_one, v.on_two, nodes=v.nodes.points, delta=0.5, rho=3.0
     ),
     "cotangent_laplacian": lambda v: es.cotangent_laplacian(v.many),
-    "cover_by_rate": lambda v: es.stability.cover_by_rate(
+    "bounding_rate": lambda v: es.stability.bounding_rate(
         es.stability.theorem_rate("lipschitz", 2), [0.1, 0.2], [0.01, 0.01], [1.0, 2.0]
     ),
     "crouzeix_raviart_laplacian": lambda v: es.operators.crouzeix_raviart_laplacian(v.ball),
@@ -297,7 +297,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "describe_shape": lambda v: es.retrieval.describe_shape(v.animal, es.retrieval.SCALE_FREE),
     "describe_to_keep": lambda v: es.retrieval.describe_to_keep(v.animal, es.retrieval.THESIS),
     "describe_views": lambda v: es.retrieval.describe_views(v.animal, n_views=1),
-    "detail_skeleton": lambda v: es.deformation.detail_skeleton(v.binding).fine,
+    "detailed_skeleton": lambda v: es.deformation.detailed_skeleton(v.binding).fine,
     "dirichlet_laplacian": lambda v: es.operators.dirichlet_laplacian(
         v.laplacian, np.array([0, 5])
     ),
@@ -313,7 +313,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "edge_graph": lambda v: es.operators.edge_graph(v.animal),
     "edge_lengths": lambda v: es.geometry.edge_lengths(v.many),
     "edge_table": lambda v: es.geometry.edge_table(v.animal),
-    "eigen_deformed": lambda v: es.deformation.eigen_deformed(v.detailed, [v.handle]),
+    "eigen_deformation": lambda v: es.deformation.eigen_deformation(v.detailed, [v.handle]),
     "eigen_skeleton": lambda v: es.deformation.eigen_skeleton(v.rig, 9),
     "eigenspace_angles": lambda v: es.spectral.eigenspace_angles(v.many_spectrum, v.many_spectrum),
     "eigenspace_errors": lambda v: es.spectral.eigenspace_errors(
@@ -385,7 +385,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "graded_sphere": lambda v: es.shapes.graded_sphere(200),
     "graph_laplacian": lambda v: es.operators.graph_laplacian(v.animal, "normalized"),
     "grid": lambda v: es.shapes.grid(3, 4),
-    "grip_skeleton": lambda v: es.deformation.grip_skeleton(v.binding),
+    "skeleton_response": lambda v: es.deformation.skeleton_response(v.binding),
     "heat_kernel_signature": lambda v: es.heat_kernel_signature(v.many_spectrum, [0.3]),
     "icosphere": lambda v: es.icosphere(2),
     "in_words": lambda v: es.retrieval.in_words([v.patches[0]], v.recipe),
@@ -419,7 +419,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         es.mesh_laplacian(v.torus, distance=d) for d in ("euclidean", "geodesic")
     ],
     "mesh_quadrature": lambda v: es.geometry.mesh_quadrature(v.many),
-    "moved_skeleton": lambda v: es.deformation.moved_skeleton(v.grip, [v.handle]),
+    "move_skeleton": lambda v: es.deformation.move_skeleton(v.response, [v.handle]),
     "neighbor_graph": lambda v: es.operators.neighbor_graph(v.cloud.points, 6),
     "noise_level": lambda v: es.operators.noise_level(v.animal),
     "normalize_area": lambda v: es.geometry.normalize_area(v.animal),
@@ -462,7 +462,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "replay": lambda v: es.deformation.replay(v.rig, [v.edit]).mesh,
     "rig_shape": lambda v: es.rig_shape(v.many, v.many_spectrum).factor,
     "robust_laplacian": lambda v: es.robust_laplacian(v.animal),
-    "rotation_by_drag": lambda v: es.deformation.rotation_by_drag([0, 0, 0], [1, 0, 0], [0, 1, 0]),
+    "rotation_from_drag": lambda v: es.deformation.rotation_from_drag(
+        [0, 0, 0], [1, 0, 0], [0, 1, 0]
+    ),
     "sample_surface": lambda v: es.geometry.sample_surface(v.animal, 50, rng=rng()),
     "save_figure": lambda v: [
         saved(v, ".png"),
@@ -514,14 +516,16 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "to_trimesh": lambda v: np.asarray(es.io.to_trimesh(v.ball).vertices),
     "torus": lambda v: es.shapes.torus(9, 7),
     "torus_quadrature": lambda v: es.geometry.torus_quadrature(9, 7),
-    "touching_parts": lambda v: es.features.touching_parts(v.animal, v.labels),
+    "adjacent_parts": lambda v: es.features.adjacent_parts(v.animal, v.labels),
     "train_codebook": lambda v: es.retrieval.train_codebook([v.animal_patches]),
     "transfer_deformation": lambda v: es.deformation.transfer_deformation(
         v.animal, v.pose, v.pose, v.map
     ),
     "transfer_function": lambda v: es.spectral.transfer_function(v.many_map, v.many.vertices),
     "transfer_labels": lambda v: es.transfer_labels(v.animal, v.labels, v.pose),
-    "trusted_times": lambda v: es.stability.trusted_times(delta=0.01, spacing=0.02, eigenvalue=9.0),
+    "admissible_times": lambda v: es.stability.admissible_times(
+        delta=0.01, spacing=0.02, eigenvalue=9.0
+    ),
     "uniform_quadrature": lambda v: es.geometry.uniform_quadrature(v.cloud.points, 2),
     "value_colors": lambda v: es.plot.value_colors(v.heat[:, 0]),
     "vertex_components": lambda v: es.geometry.vertex_components(v.animal),

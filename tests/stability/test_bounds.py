@@ -101,21 +101,21 @@ def test_a_bound_follows_the_unit():
 
 
 def test_heat_times_are_trusted_between_the_change_and_the_last_eigenvalue():
-    times = es.stability.trusted_times(delta=0.1, spacing=0.01, eigenvalue=20.0)
-    assert (times.low, times.high, times.low_by, times.empty) == (
+    times = es.stability.admissible_times(delta=0.1, spacing=0.01, eigenvalue=20.0)
+    assert (times.low, times.high, times.low_reason, times.empty) == (
         pytest.approx(0.01),
         0.025,
         "closeness",
         False,
     )
     assert "from 0.01" in times.explain()
-    times = es.stability.trusted_times(delta=0.0, spacing=0.1, eigenvalue=20.0, corrected=True)
-    assert (times.low, times.high, times.low_by) == (
+    times = es.stability.admissible_times(delta=0.0, spacing=0.1, eigenvalue=20.0, corrected=True)
+    assert (times.low, times.high, times.low_reason) == (
         pytest.approx(0.1**2),
         pytest.approx(0.145),
         "spacing",
     )
-    none = es.stability.trusted_times(delta=0.5, spacing=0.1, eigenvalue=20.0)
+    none = es.stability.admissible_times(delta=0.5, spacing=0.1, eigenvalue=20.0)
     assert none.empty
     assert "No heat time serves" in none.explain()
 
@@ -140,9 +140,9 @@ def test_bad_input_is_named(monkeypatch):
     with pytest.raises(es.InvalidParameterError, match="diagonal mass; that of one is not"):
         es.stability.weyl_bound(full, es.cotangent_laplacian(mesh))
     with pytest.raises(es.InvalidParameterError, match="spacing and eigenvalue"):
-        es.stability.trusted_times(delta=0.1, spacing=0.0, eigenvalue=1.0)
+        es.stability.admissible_times(delta=0.1, spacing=0.0, eigenvalue=1.0)
     with pytest.raises(es.InvalidParameterError, match="delta must be positive"):
-        es.stability.trusted_times(delta=-0.1, spacing=0.1, eigenvalue=1.0)
+        es.stability.admissible_times(delta=-0.1, spacing=0.1, eigenvalue=1.0)
     monkeypatch.setattr("eigenshape.stability.bounds.MOST_STEPS", 1)
     monkeypatch.setattr("eigenshape.stability.bounds.TOLERANCE", 0.0)
     n = 2000

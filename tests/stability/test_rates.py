@@ -51,7 +51,7 @@ def test_what_does_not_vary_has_no_exponent():
 
 def test_the_least_constant_covers_all_and_touches_one():
     deltas, times, measured = [0.1, 0.2, 0.4], [0.01, 0.02, 0.01], [1.0, 5.0, 2.0]
-    law = es.stability.cover_by_rate(es.stability.theorem_rate("3.1.4", 2), deltas, times, measured)
+    law = es.stability.bounding_rate(es.stability.theorem_rate("3.1.4", 2), deltas, times, measured)
     ratios = np.array(measured) / law.at(deltas, times)
     assert ratios.max() == pytest.approx(1.0)
     assert (ratios <= 1 + 1e-12).all()
@@ -65,9 +65,9 @@ def test_bad_input_is_named():
     with pytest.raises(es.InvalidParameterError, match=r"dim must lie in 1\.\.100; it is 0"):
         es.stability.theorem_rate("3.1.1", 0)
     with pytest.raises(es.InvalidParameterError, match=r"equally many; they are \[2, 2, 1\]"):
-        es.stability.cover_by_rate(es.stability.Rate(1, 1), [1, 2], [1, 2], [1])
+        es.stability.bounding_rate(es.stability.Rate(1, 1), [1, 2], [1, 2], [1])
     with pytest.raises(es.InvalidParameterError, match="measured must be positive"):
-        es.stability.cover_by_rate(es.stability.Rate(1, 1), [1, 2], [1, 2], [1, 0])
+        es.stability.bounding_rate(es.stability.Rate(1, 1), [1, 2], [1, 2], [1, 0])
     with pytest.raises(es.InvalidParameterError, match="must vary, and not together"):
         es.stability.fit_rate([1, 2, 3], [1, 2, 3], [1, 2, 3])
     with pytest.raises(es.InvalidParameterError, match="must vary, and not together"):

@@ -30,7 +30,7 @@ def test_a_shape_is_as_itself(torus):
     assert found.spectra.index_distance == 0.0
     assert found.closeness.delta == found.delta == found.distance == 0.0
     assert found.angles.angles.max() < 1e-6
-    assert found.times.low_by == "spacing"
+    assert found.times.low_reason == "spacing"
     assert not any(change.change > 2 * change.floor for change in found.changes)
     assert not found.spectra.proved_changes.any()
 
@@ -124,7 +124,7 @@ def test_a_change_that_is_too_large_leaves_no_heat_time(torus):
     found = es.compare_shapes(torus, away, PLAN)
     assert found.times.empty
     assert not any(change.trusted for change in found.changes)
-    assert found.times.low_by == "closeness"
+    assert found.times.low_reason == "closeness"
     assert "No heat time serves" in found.explain()
     asked = es.compare_shapes(
         torus, away, es.stability.StabilityPlan(k=8, n_samples=300, times=(0.1,))

@@ -145,9 +145,11 @@ def _facts(report: StabilityReport) -> dict[str, Any]:
         "times": {
             **asdict(report.times),
             "empty": report.times.empty,
-            "low_by": report.times.low_by,
+            "low_reason": report.times.low_reason,
         },
-        "changes": [{**asdict(change), "seen": change.seen} for change in report.changes],
+        "changes": [
+            {**asdict(change), "significant": change.significant} for change in report.changes
+        ],
         "eigenspaces": asdict(angles),
         "n_samples": report.n_samples,
         "explanation": report.explain(),

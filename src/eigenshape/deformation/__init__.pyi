@@ -9,7 +9,7 @@ from .edits import Move as Move
 from .edits import apply_edit as apply_edit
 from .handles import Rotation as Rotation
 from .handles import Translation as Translation
-from .handles import rotation_by_drag as rotation_by_drag
+from .handles import rotation_from_drag as rotation_from_drag
 from .peers import as_rigid_as_possible as as_rigid_as_possible
 from .peers import biharmonic_blend as biharmonic_blend
 from .peers import spectral_rigid as spectral_rigid
@@ -22,10 +22,10 @@ from .rig import eigen_skeleton as eigen_skeleton
 from .rig import rig_shape as rig_shape
 from .session import DeformationSession as DeformationSession
 from .session import replay as replay
-from .skeleton import SkeletonGrip as SkeletonGrip
-from .skeleton import grip_skeleton as grip_skeleton
-from .skeleton import moved_skeleton as moved_skeleton
+from .skeleton import SkeletonResponse as SkeletonResponse
+from .skeleton import move_skeleton as move_skeleton
+from .skeleton import skeleton_response as skeleton_response
 from .thesis import DetailedSkeleton as DetailedSkeleton
-from .thesis import detail_skeleton as detail_skeleton
-from .thesis import eigen_deformed as eigen_deformed
+from .thesis import detailed_skeleton as detailed_skeleton
+from .thesis import eigen_deformation as eigen_deformation
 from .transfer import transfer_deformation as transfer_deformation

@@ -11,7 +11,7 @@ import numpy as np
 from eigenshape._compile import njit
 from eigenshape.features.union_loops import find_root
 
-FEW = 48  # sides of a vertex that insertion sorts faster than the general sort
+FEW = 48  # sides of a vertex up to which insertion sort is the faster one
 
 
 @njit

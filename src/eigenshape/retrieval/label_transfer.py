@@ -13,7 +13,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape._threads import one_blas_thread
 from eigenshape.features.boundaries import smooth_boundaries
-from eigenshape.features.parts import FoundParts, find_parts
+from eigenshape.features.parts import PartDecomposition, find_parts
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
@@ -125,7 +125,7 @@ def transfer_labels(
     )
 
 
-def _cut(found: FoundParts, count: int) -> Segmentation:
+def _cut(found: PartDecomposition, count: int) -> Segmentation:
     return smooth_boundaries(found.mesh, segment(found.tree, n_regions=count))
 
 

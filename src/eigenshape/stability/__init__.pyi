@@ -4,7 +4,7 @@ from .anchors import anchor_region as anchor_region
 from .anchors import witness_region as witness_region
 from .bounds import TimeRange as TimeRange
 from .bounds import WeylBound as WeylBound
-from .bounds import trusted_times as trusted_times
+from .bounds import admissible_times as admissible_times
 from .bounds import weyl_bound as weyl_bound
 from .cheeger import CheegerEstimate as CheegerEstimate
 from .cheeger import cheeger_estimate as cheeger_estimate
@@ -22,7 +22,7 @@ from .perturbation import measure_perturbation as measure_perturbation
 from .perturbation import vertex_pairs as vertex_pairs
 from .rates import THEOREMS as THEOREMS
 from .rates import Rate as Rate
-from .rates import cover_by_rate as cover_by_rate
+from .rates import bounding_rate as bounding_rate
 from .rates import fit_rate as fit_rate
 from .rates import theorem_rate as theorem_rate
 from .report import StabilityPlan as StabilityPlan

@@ -140,7 +140,7 @@ class TimeRange:
     reach: float
 
     @property
-    def low_by(self) -> str:
+    def low_reason(self) -> str:
         """What asks for the least: "closeness", t ≥ δ² (Theorem 4.1.1), or "spacing"."""
         return "closeness" if self.low > self.reach else "spacing"
 
@@ -154,7 +154,7 @@ class TimeRange:
         smaller = {
             "closeness": "smaller ones hear the change and not the shape, as t is under δ²",
             "spacing": "smaller ones do not reach from point to point",
-        }[self.low_by]
+        }[self.low_reason]
         low = f"{self.low:.3g} ({smaller})"
         high = f"{self.high:.3g} (larger ones press the last eigenvalues into what a kernel cannot tell apart)"
         if self.empty:
@@ -162,7 +162,7 @@ class TimeRange:
         return f"Trust heat times from {low} to {high}."
 
 
-def trusted_times(
+def admissible_times(
     *, delta: float, spacing: float, eigenvalue: float, corrected: bool = False
 ) -> TimeRange:
     """Say at which heat times the eigenvalues of a kernel up to a given one can be trusted.

@@ -79,7 +79,7 @@ def theorem_rate(theorem: str, dim: SupportsIndex) -> Rate:
     return rates[theorem]
 
 
-def cover_by_rate(rate: Rate, delta: ArrayLike, t: ArrayLike, measured: ArrayLike) -> Rate:
+def bounding_rate(rate: Rate, delta: ArrayLike, t: ArrayLike, measured: ArrayLike) -> Rate:
     """Give a law the least constant with which it covers all that was measured.
 
     Parameters

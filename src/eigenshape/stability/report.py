@@ -19,7 +19,7 @@ from eigenshape.spectral.bounds.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.comparison.angles import EigenspaceAngles, eigenspace_angles
 from eigenshape.spectral.comparison.spectra import SpectrumComparison, compare_spectra
 from eigenshape.spectral.solve import solve_spectrum
-from eigenshape.stability.bounds import TimeRange, trusted_times
+from eigenshape.stability.bounds import TimeRange, admissible_times
 from eigenshape.stability.closeness import Closeness, map_closeness
 from eigenshape.stability.sampled import (
     ChangeAtTime,
@@ -111,7 +111,7 @@ class StabilityReport:
             self._heard(),
             f"Eigenspaces, {where}: {self.angles.explain()}",
         ]
-        if not self.closeness and self.times.low_by == "closeness":
+        if not self.closeness and self.times.low_reason == "closeness":
             lines.append(
                 "Points were matched as the shapes lie. Of one shape in two poses that tells little: bring a map "
                 "between their vertices, or look at the eigenvalues alone."
@@ -126,7 +126,7 @@ class StabilityReport:
         )
 
     def _heard(self) -> str:
-        seen = [change for change in self.changes if change.seen]
+        seen = [change for change in self.changes if change.significant]
         if not seen:
             return "At no heat time do graph Laplacians of such samples tell the shapes apart: sampling does as much."
         worst = max(seen, key=lambda change: change.change / change.floor)
@@ -197,7 +197,7 @@ def compare_shapes(
     spacing = max(
         neighbor_distance(points, one.dim) for points in (samples.one, samples.two, samples.again)
     )
-    times = trusted_times(
+    times = admissible_times(
         delta=delta, spacing=spacing, eigenvalue=float(spectra[0].eigenvalues[-1])
     )
     changes, angles = changes_over_times(

@@ -67,7 +67,7 @@ class ChangeAtTime:
     trusted: bool
 
     @property
-    def seen(self) -> bool:
+    def significant(self) -> bool:
         """Whether the change stands out from what sampling does."""
         return self.change > ABOVE_SAMPLING * self.floor
 

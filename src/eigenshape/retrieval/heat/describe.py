@@ -9,7 +9,8 @@ from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, vertex_values
 from eigenshape._progress import Progress
 from eigenshape._typing import ArrayLike
-from eigenshape.features.merge_tree import MergeTree, merge_tree
+from eigenshape.features.merge_tree import merge_tree
+from eigenshape.features.region_tree import MergeTree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.fragments import fragment_vertices

@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
 from eigenshape._progress import Progress
-from eigenshape.features.merge_tree import MergeTree
+from eigenshape.features.region_tree import MergeTree
 from eigenshape.features.segmentation import Segmentation
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
