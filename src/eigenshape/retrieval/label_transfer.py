@@ -19,8 +19,8 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.retrieval.heat.describe import describe
 from eigenshape.retrieval.heat.descriptor import SCALE_FREE
+from eigenshape.retrieval.heat.features import heat_descriptor
 from eigenshape.retrieval.heat.score import matching_scores, shifted
 from eigenshape.spectral.bounds.nonconforming import partly
 from eigenshape.spectral.signatures.heat import positive_eigenvalues
@@ -144,9 +144,8 @@ def _described(
     spectrum = solve_spectrum(cotangent_laplacian(mesh), k, progress=progress)
     ones = np.ones(mesh.n_vertices)
     everywhere = FeaturePoints(np.arange(mesh.n_vertices), ones, ones)
-    vectors = describe(
-        spectrum, everywhere, replace(SCALE_FREE, n_features=mesh.n_vertices)
-    ).vectors
+    recipe = replace(SCALE_FREE, n_features=mesh.n_vertices)
+    vectors = heat_descriptor(spectrum, everywhere, recipe).vectors
     positive = spectrum.eigenvalues >= positive_eigenvalues(spectrum)[0]
     relative = spectrum.eigenvalues[positive] / spectrum.eigenvalues[positive][0]
     places = _means(mesh, parts, spectrum.eigenvectors[:, positive] / relative)
