@@ -37,7 +37,7 @@ def describe(mesh: MeshLike, recipe: AnyRecipe | None = None) -> Descriptor:
     Examples
     --------
     >>> import eigenshape as es
-    >>> fish = es.make_creature("fish", n_vertices=300)
+    >>> fish = es.make_creature("fish", n_vertices=500)
     >>> es.describe(fish).codes.shape  # the whole and six views of it
     (7, 3, 3, 1280)
     >>> es.describe(fish, es.retrieval.SCALE_FREE).vectors.shape  # 15 feature points

@@ -60,7 +60,7 @@ class HeatRecipe:
     --------
     >>> import eigenshape as es
     >>> recipe = es.retrieval.HeatRecipe("few", n_features=5)
-    >>> es.describe(es.make_creature("fish", n_vertices=300), recipe).vectors.shape
+    >>> es.describe(es.make_creature("fish", n_vertices=500), recipe).vectors.shape
     (5, 15)
     """
 

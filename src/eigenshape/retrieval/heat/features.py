@@ -105,7 +105,7 @@ def heat_descriptor(
     Examples
     --------
     >>> import eigenshape as es
-    >>> mesh = es.make_creature("fish", n_vertices=300)
+    >>> mesh = es.make_creature("fish", n_vertices=500)
     >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(mesh), k=50)
     >>> heat = es.heat_kernel_signature(spectrum, [0.01])
     >>> features = es.segment(es.merge_tree(mesh, heat[:, 0]), n_regions=4).features
@@ -173,7 +173,7 @@ def find_heat_features(
     Examples
     --------
     >>> import eigenshape as es
-    >>> found = es.retrieval.find_heat_features(es.make_creature("fish", n_vertices=300))
+    >>> found = es.retrieval.find_heat_features(es.make_creature("fish", n_vertices=500))
     >>> found.descriptor.vectors.shape
     (15, 15)
     >>> bool((found.descriptor.vertices == found.parts.features.vertices).all())

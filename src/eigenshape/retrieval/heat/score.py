@@ -45,7 +45,7 @@ def matching_score(first: HeatDescriptor, second: HeatDescriptor) -> float:
     --------
     >>> import eigenshape as es
     >>> fish, again, bird = (
-    ...     es.describe(es.make_creature(kind, pose, n_vertices=300), es.retrieval.SCALE_FREE)
+    ...     es.describe(es.make_creature(kind, pose, n_vertices=500), es.retrieval.SCALE_FREE)
     ...     for kind, pose in (("fish", 0), ("fish", 1), ("bird", 0))
     ... )
     >>> es.retrieval.matching_score(fish, fish)
@@ -150,7 +150,7 @@ def match_features(first: HeatDescriptor, second: HeatDescriptor) -> Int[np.ndar
     Examples
     --------
     >>> import eigenshape as es
-    >>> fish = es.describe(es.make_creature("fish", n_vertices=300), es.retrieval.SCALE_FREE)
+    >>> fish = es.describe(es.make_creature("fish", n_vertices=500), es.retrieval.SCALE_FREE)
     >>> pairs = es.retrieval.match_features(fish, fish)
     >>> bool((pairs[:, 0] == pairs[:, 1]).all())
     True

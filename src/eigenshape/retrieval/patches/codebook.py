@@ -118,7 +118,7 @@ def train_codebook(shapes: Sequence[Patches], *, seed: int = 0) -> PatchCodebook
     Examples
     --------
     >>> import eigenshape as es
-    >>> fish = es.make_creature("fish", n_vertices=300)
+    >>> fish = es.make_creature("fish", n_vertices=500)
     >>> codebook = es.retrieval.train_codebook(es.retrieval.extract_patches(fish, n_views=0))
     >>> codebook.centers.shape
     (3, 32, 20)

@@ -140,7 +140,7 @@ def match_patches(first: PatchPoints, second: PatchPoints) -> PatchMatch:
     Examples
     --------
     >>> import eigenshape as es
-    >>> points = es.describe(es.make_creature("fish", n_vertices=300)).points[0]
+    >>> points = es.describe(es.make_creature("fish", n_vertices=500)).points[0]
     >>> match = es.retrieval.match_patches(points, points)
     >>> bool((match.points[:, 0] == match.points[:, 1]).all())
     True

@@ -99,7 +99,7 @@ def patch_scores(
     --------
     >>> import eigenshape as es
     >>> fish, bird = (
-    ...     es.describe(es.make_creature(kind, n_vertices=300)) for kind in ("fish", "bird")
+    ...     es.describe(es.make_creature(kind, n_vertices=500)) for kind in ("fish", "bird")
     ... )
     >>> scores = es.retrieval.patch_scores(fish, [fish, bird])
     >>> bool(scores[0] < 0.01 < 0.5 < scores[1])

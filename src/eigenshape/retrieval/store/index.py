@@ -109,8 +109,8 @@ class ShapeIndex:
     >>> import eigenshape as es
     >>> index = es.ShapeIndex.create(mkdtemp())
     >>> for kind in ("fish", "bird"):
-    ...     index.add(kind, es.make_creature(kind, n_vertices=300), label="animal", n_views=1)
-    >>> match, other = index.query(es.make_creature("fish", 1, n_vertices=300))
+    ...     index.add(kind, es.make_creature(kind, n_vertices=500), label="animal", n_views=1)
+    >>> match, other = index.query(es.make_creature("fish", 1, n_vertices=500))
     >>> match.name, other.name
     ('fish', 'bird')
     >>> match.score < other.score
