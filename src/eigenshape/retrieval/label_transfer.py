@@ -210,9 +210,7 @@ def _majority_labels(
     return names[shares.toarray().argmax(axis=1)]
 
 
-def _descriptor_differences(
-    one: _DescribedParts, two: _DescribedParts
-) -> Float[np.ndarray, "m r"]:
+def _descriptor_differences(one: _DescribedParts, two: _DescribedParts) -> Float[np.ndarray, "m r"]:
     """Return the mean difference of descriptors, at the relative size of the best score."""
     _, shifts = matching_scores(one.vectors, two.vectors, np.array([0]), SCALE_FREE)
     ours, theirs = shifted(one.vectors, two.vectors, int(shifts[0]), SCALE_FREE)
