@@ -74,9 +74,9 @@ class PatchCodebook:
 
     @property
     def code_shape(self) -> tuple[int, int, int]:
-        """Return base radii, sizes, and numbers of a Fisher vector."""
-        n_bases, n_words, n_axes = self.centers.shape
-        return n_bases, N_SIZES, 2 * n_words * n_axes
+        """Return the numbers of base radii, of sizes, and of entries of a Fisher vector."""
+        n_bases, n_entries, n_axes = self.centers.shape
+        return n_bases, N_SIZES, 2 * n_entries * n_axes
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, PatchCodebook) and self.digest == other.digest
