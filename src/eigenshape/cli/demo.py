@@ -1,6 +1,5 @@
 """eigenshape demo: the whole road on made-up creatures."""
 
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -9,7 +8,7 @@ import typer
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import out, progress_bar, save_picture, shown
-from eigenshape.cli.index import WorkersOption, describe_all, describe_file
+from eigenshape.cli.index import WorkersOption, describe_all
 from eigenshape.cli.presets import PATCHES, recipe_to_fill
 from eigenshape.cli.query import print_matches
 from eigenshape.cli.sheets import CAPTION, asked, contact_sheet
@@ -47,8 +46,7 @@ def demo(
     items = _make(folder / "creatures")
     shelf = ShapeIndex.open_or_create(folder / "index")
     recipe = recipe_to_fill(shelf, PATCHES, items, (), Workers(workers))
-    describe = partial(describe_file, recipe=recipe, repairs=(), n_views=None)
-    report = describe_all(shelf, items, describe, recipe, Workers(workers))
+    report = describe_all(shelf, items, recipe, Workers(workers))
     out.print(f"indexed {len(shelf)} shapes ({len(report.skipped)} known already)")
 
     scan_path = folder / "scan.ply"

@@ -22,9 +22,9 @@ from eigenshape.cli.console import (
 )
 from eigenshape.cli.presets import PATCHES, PresetOption, recipe_to_fill, require_preset
 from eigenshape.io.parsing import MESH_FORMATS
-from eigenshape.retrieval.store.batch import BatchReport, Describe, build_index
+from eigenshape.retrieval.kinds import AnyRecipe
+from eigenshape.retrieval.store.batch import BatchReport, build_index
 from eigenshape.retrieval.store.index import ShapeIndex
-from eigenshape.retrieval.store.kinds import AnyRecipe, Descriptor, describe_to_keep
 from eigenshape.retrieval.store.workers import Item, Workers
 
 SOME_FAILED = 3
@@ -72,8 +72,7 @@ def index(
     items, repairs, processes = _items(sources), repair_names(repair), Workers(workers, timeout)
     shelf = ShapeIndex.open_or_create(db)
     recipe = recipe_to_fill(shelf, preset_name, items, repairs, processes)
-    describe = partial(describe_file, recipe=recipe, repairs=repairs, n_views=views)
-    report = describe_all(shelf, items, describe, recipe, processes)
+    report = describe_all(shelf, items, recipe, processes, repairs=repairs, n_views=views)
     if as_json:
         print_json({"db": str(db), "shapes": len(shelf), **vars(report)})
     else:
@@ -85,23 +84,23 @@ def index(
 def describe_all(
     shelf: ShapeIndex,
     items: Sequence[Item],
-    describe: Describe,
     recipe: AnyRecipe,
     workers: Workers,
+    *,
+    repairs: tuple[str, ...] = (),
+    n_views: int | None = None,
 ) -> BatchReport:
-    """Build an index with a progress bar, naming what cannot be taken as it comes."""
+    """Build an index with a progress bar, naming each file that fails as soon as it does."""
     with progress_bar("index") as progress:
         return build_index(
-            shelf, items, describe, recipes=(recipe,), workers=workers, told=told_by(progress)
+            shelf,
+            items,
+            partial(read_repaired, names=repairs),
+            recipes=(recipe,),
+            n_views=n_views,
+            workers=workers,
+            callback=told_by(progress),
         )
-
-
-def describe_file(
-    path: Path, *, recipe: AnyRecipe, repairs: tuple[str, ...], n_views: int | None
-) -> list[Descriptor]:
-    """Read a mesh, repair it as asked, and describe it, whole and as it is seen from some sides."""
-    mesh = read_repaired(path, repairs)
-    return describe_to_keep(mesh, recipe, n_views=n_views)
 
 
 def _items(sources: Sequence[Path]) -> list[Item]:
