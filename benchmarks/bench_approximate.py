@@ -1,19 +1,21 @@
-"""Approximate spectra beside exact ones and beside LOBPCG: CPU seconds, memory, what is promised and what is true.
+"""Approximate spectra beside exact ones and LOBPCG: CPU seconds, memory, errors promised and true.
 
     python benchmarks/bench_approximate.py                        all cases (a quarter of an hour)
     python benchmarks/bench_approximate.py --cases sphere-160k --accuracies 0.1 1e-6
     python benchmarks/bench_approximate.py --quick                a small one
     python benchmarks/bench_approximate.py --json approximate.json --markdown docs/spectra.md
-    python benchmarks/bench_approximate.py --peers --repeats 3 --markdown docs/benchmarks.md   beside pyamg (an hour)
+    python benchmarks/bench_approximate.py --peers --repeats 3 --markdown docs/benchmarks.md
+                                                                  beside pyamg (two hours)
 
 Each solve runs in a process of its own, on one core, after a small one that loads and compiles; the operator is built
 before the clock starts. MiB: the most that the process held during the solve, beyond what it held before. promised:
 largest residual over the last eigenvalue. true: largest difference to the certified eigenvalues, over the last one.
 
-The peer is `scipy.sparse.linalg.lobpcg`, with the aggregation hierarchy of pyamg as preconditioner and as many guard
-columns as ours. It has no estimate of the error of its eigenvalues, so it is stopped by the certified ones: a first run
-finds how many iterations it needs to come below the accuracy, and a second one of that length is timed, setup included.
-A user without the certified eigenvalues would have to iterate longer.
+The peer is `scipy.sparse.linalg.lobpcg`, with the aggregation hierarchy of pyamg as preconditioner
+and as many guard columns as ours. It has no estimate of the error of its eigenvalues, so it is
+stopped by the certified ones: a first run finds how many iterations it needs to come below the
+accuracy, and a second one of that length is timed, setup included. A user without the certified
+eigenvalues would have to iterate longer.
 """
 
 import statistics
@@ -50,7 +52,7 @@ def sphere(n: int) -> es.Laplacian:
 
 
 def refined(path: str, times: int) -> es.Laplacian:
-    """Return the cotangent Laplacian of a real mesh, each of whose triangles becomes four, so many times."""
+    """Return the cotangent Laplacian of a real mesh, subdivided some times."""
     mesh = es.read_mesh(DATA / path)
     for _ in range(times):
         mesh = es.shapes.subdivide(mesh)
@@ -92,7 +94,8 @@ QUICK_PEERS = {
     )
 }
 EVERY = CASES | QUICK | PEERS | QUICK_PEERS
-SHIFT = 1e-2  # of the last eigenvalue: W + shift B is definite, as the preconditioner must be; 1 took more iterations
+# Share of the last eigenvalue: W + shift B must be definite. With 1 LOBPCG took more iterations.
+SHIFT = 1e-2
 MOST_ITERATIONS = 20  # of the run that counts them
 
 
@@ -137,7 +140,7 @@ def timed(work: Callable[[], Any]) -> tuple[Any, Row]:
 
 
 def measured_peer(name: str, accuracy: float, known: list[float], needed: int | None) -> Row:
-    """Return what LOBPCG took to come below the accuracy, and what it found; run in a process of its own.
+    """Return what LOBPCG took to come below the accuracy, and what it found.
 
     `needed` is the number of iterations, which is counted where it is None.
     """
@@ -178,7 +181,7 @@ def measured_peer(name: str, accuracy: float, known: list[float], needed: int | 
 def lobpcg_pairs(
     laplacian: es.Laplacian, k: int, last: float, iterations: int, *, history: bool = False
 ) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    """Return k eigenvalues, eigenvectors and, if asked for, all columns' values before and after each iteration."""
+    """Return k eigenvalues, eigenvectors and, if requested, the values of each iteration."""
     from pyamg import smoothed_aggregation_solver
     from scipy.sparse.linalg import lobpcg
 
@@ -207,7 +210,7 @@ def lobpcg_pairs(
 
 
 def measure(name: str, report: Report) -> None:
-    """Measure a case exactly, at each accuracy and, where it has peers, by LOBPCG; the median of each.
+    """Measure a case exactly, at each accuracy and by the peer, if it has one; keep medians.
 
     The methods take turns, so that other work on the machine slows all of them alike.
     """

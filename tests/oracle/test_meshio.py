@@ -1,4 +1,4 @@
-"""Medit and gmsh files are read as meshio reads them, to the bit, whatever cells and precision they hold."""
+"""Medit and gmsh files are read as meshio reads them, to the bit."""
 
 import meshio
 import numpy as np
@@ -28,7 +28,7 @@ def cells_of(kind, count, rng):
 
 
 def written(path, name, options, points, cells):
-    """Write a file by meshio, which wants to know to what entities nodes and cells belong for gmsh 4.1."""
+    """Write a file by meshio, which needs the entities of nodes and cells for gmsh 4.1."""
     tags = {}
     if name == "gmsh":
         entities = np.array(

@@ -41,8 +41,8 @@ def require_splittable(others: Sequence[str]) -> None:
     """
     if others:
         raise FileFormatError(
-            f"A file must hold simplices (tetra, triangle or line) or quads, with straight sides; it holds "
-            f"{', '.join(others)}. Split them first."
+            "A file must hold simplices (tetra, triangle or line) or quads, with straight sides; "
+            f"it holds {', '.join(others)}. Split them first."
         )
 
 

@@ -1,5 +1,6 @@
-"""Gmsh files of version 2.2 and 4.1, text or binary: nodes and elements; all other sections are passed over.
+"""Gmsh files of version 2.2 and 4.1, text or binary: nodes and elements.
 
+All other sections are skipped. The format is described at
 https://gmsh.info/doc/texinfo/gmsh.html#MSH-file-format
 """
 
@@ -31,7 +32,13 @@ class _Numbers:
         self.source: bytes | list[bytes] = body.split() if is_text else body
 
     def take(self, kind: str, count: int) -> np.ndarray:
-        """Return the next numbers, of a type of numpy's where the file is binary; so many must be there."""
+        """Return the next `count` numbers; `kind` is their numpy type in a binary file.
+
+        Raises
+        ------
+        FileFormatError
+            If fewer are left, or a word of a text file is no number.
+        """
         size = 1 if self.is_text else np.dtype(kind).itemsize
         end = self.place + count * size
         if not self.place <= end <= len(self.source):
@@ -64,14 +71,15 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], dict[str, Int[np.ndarr
     Raises
     ------
     FileFormatError
-        If a section is missing or there twice, nodes and elements are not as declared, or an element is no simplex
-        and no quadrilateral.
+        If a section is missing or there twice, nodes and elements are not as declared, or an
+        element is neither a simplex nor a quadrilateral.
     """
     words, _, order = _section(data, b"MeshFormat").partition(b"\n")
     version, form, n_bytes = [*words.split(), b"", b"", b""][:3]
     if version not in VERSIONS or form not in (b"0", b"1") or n_bytes not in (b"4", b"8"):
         raise FileFormatError(
-            f"A gmsh file must be of version 2.2 or 4.1; its format is {shown((0, words))}. Save it anew."
+            "A gmsh file must be of version 2.2 or 4.1; its format is "
+            f"{shown((0, words))}. Save it anew."
         )
     is_text, size = form == b"0", f"<u{n_bytes.decode()}"
     if not is_text and order[:4] != b"\1\0\0\0":
@@ -122,7 +130,7 @@ def _counted(body: bytes) -> tuple[int, _Numbers]:
 
 
 def _listed_elements(body: bytes) -> Rows:
-    """Read text of version 2: for each element its tag, type, number of tags, these, and its nodes."""
+    """Read text of version 2: for each element tag, type, number of tags, tags, nodes."""
     numbers = _Numbers(body, is_text=True)
     count = numbers.count("<i8")
     flat = numbers.take("<i8", len(numbers.source) - 1)
@@ -145,7 +153,10 @@ def _listed_elements(body: bytes) -> Rows:
 
 
 def _plain_elements(body: bytes) -> Rows:
-    """Read blocks of version 2: type, number of elements and of their tags; each with its own tag before them."""
+    """Read blocks of binary version 2: a head with type, number of elements and number of tags.
+
+    Each element is its own tag, then its tags, then its nodes.
+    """
     count, numbers = _counted(body)
     rows: Rows = []
     while count > 0:
@@ -167,7 +178,7 @@ def _plain_elements(body: bytes) -> Rows:
 def _node_blocks(
     numbers: _Numbers, size: str
 ) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n 3"]]:
-    """Read nodes of version 4: four counts, then blocks of a head of four, the tags, and the coordinates."""
+    """Read nodes of version 4: four counts, then blocks of a head, tags and coordinates."""
     n_blocks, total, _, _ = (numbers.count(size) for _ in range(4))
     tags, points = [np.empty(0, dtype=np.int64)], [np.empty((0, 3))]
     for _ in range(n_blocks):
@@ -186,7 +197,7 @@ def _node_blocks(
 
 
 def _element_blocks(numbers: _Numbers, size: str) -> Rows:
-    """Read elements of version 4: four counts, then blocks of a head of four, and a tag and nodes an element."""
+    """Read elements of version 4: four counts, then blocks of a head and rows of tag and nodes."""
     n_blocks, total, _, _ = (numbers.count(size) for _ in range(4))
     rows: Rows = []
     for _ in range(n_blocks):
@@ -240,7 +251,8 @@ def _cells(tags: Int[np.ndarray, " n"], rows: Rows) -> dict[str, Int[np.ndarray,
     twice = np.flatnonzero(ascending[1:] == ascending[:-1])
     if twice.size:
         raise FileFormatError(
-            f"Nodes of a gmsh file must have tags of their own; two have the tag {ascending[twice[0]]}."
+            "Nodes of a gmsh file must have tags of their own; two have the tag "
+            f"{ascending[twice[0]]}."
         )
     blocks: dict[str, np.ndarray] = {}
     for kind, name in KINDS.items():

@@ -1,6 +1,7 @@
-"""Medit files, text (.mesh) or binary (.meshb): vertices, and simplices and quadrilaterals between them.
+"""Medit files, text (.mesh) or binary (.meshb): vertices, simplices and quadrilaterals.
 
-Keywords, their numbers and the binary layout are those of libMeshb (https://github.com/LoicMarechal/libMeshb).
+Keywords, their numbers and the binary layout are those of libMeshb:
+https://github.com/LoicMarechal/libMeshb
 """
 
 import re
@@ -33,10 +34,10 @@ SOLIDS = {
 # What a shape does not need. Another keyword is refused: it could be a misspelt section of cells.
 PASSED_OVER = {
     "End", "Corners", "Ridges", "Normals", "Tangents", "AngleOfCornerBound", "BoundingBox",
-    "RequiredVertices", "RequiredEdges", "RequiredTriangles", "RequiredQuadrilaterals", "RequiredTetrahedra",
-    "NormalAtVertices", "NormalAtTriangleVertices", "NormalAtQuadrilateralVertices", "TangentAtVertices",
-    "TangentAtEdges", "SubDomainFromMesh", "SubDomainFromGeom", "VertexOnGeometricVertex", "VertexOnGeometricEdge",
-    "EdgeOnGeometricEdge",
+    "RequiredVertices", "RequiredEdges", "RequiredTriangles", "RequiredQuadrilaterals",
+    "RequiredTetrahedra", "NormalAtVertices", "NormalAtTriangleVertices",
+    "NormalAtQuadrilateralVertices", "TangentAtVertices", "TangentAtEdges", "SubDomainFromMesh",
+    "SubDomainFromGeom", "VertexOnGeometricVertex", "VertexOnGeometricEdge", "EdgeOnGeometricEdge",
 }  # fmt: skip
 # Comments, and the line of free text after two keywords.
 NO_NUMBERS = re.compile(rb"#[^\n]*|^[ \t]*(?:Identifier|Geometry)[ \t]*\n[^\n]*", re.MULTILINE)
@@ -45,7 +46,8 @@ KEYWORD = re.compile(rb"^[ \t]*((?!nan|inf)[a-z]\w*)", re.MULTILINE | re.IGNOREC
 # The same keywords as numbers in a binary file.
 DIMENSION, VERTICES, END, LAST = 3, 4, 54, 198
 CODES = {
-    5: "Edges", 6: "Triangles", 7: "Quadrilaterals", 8: "Tetrahedra", 9: "Prisms", 10: "Hexahedra", 49: "Pyramids",
+    5: "Edges", 6: "Triangles", 7: "Quadrilaterals", 8: "Tetrahedra",
+    9: "Prisms", 10: "Hexahedra", 49: "Pyramids",
 }  # fmt: skip
 CURVED = {24, 25, 27, 30, 33, *range(86, 94), *range(96, 104)}  # cells of second to fourth order
 POLYTOPES = {46, 47}
@@ -59,7 +61,8 @@ def parse_text(data: bytes) -> Found:
     Raises
     ------
     FileFormatError
-        If a keyword is unknown, a section does not hold what it declares, or a cell is no simplex or quadrilateral.
+        If a keyword is unknown, a section does not hold what it declares, or a cell is neither a
+        simplex nor a quadrilateral.
     """
     text = NO_NUMBERS.sub(b"", data.replace(b"\r\n", b"\n").replace(b"\r", b"\n"))
     keywords = list(KEYWORD.finditer(text))
@@ -90,7 +93,8 @@ def parse_text(data: bytes) -> Found:
             )
     if b"End" not in text and "Tetrahedra" not in tables:
         raise FileFormatError(
-            "A Medit file must be whole; it has no End, and no tetrahedra, after which nothing is missed."
+            "A Medit file must be whole; it has no End, and no tetrahedra, after which nothing is "
+            "missed."
         )
     version = _single(single, "MeshVersionFormatted", (0, 4))
     dimension = _single(single, "Dimension", (1, 3))
@@ -115,7 +119,8 @@ def _single(found: dict[str, np.ndarray], name: str, limits: tuple[int, int]) ->
     least, most = limits
     if len(numbers) != 1 or numbers[0] not in range(least, most + 1):
         raise FileFormatError(
-            f"A Medit file must have one {name} of {least} to {most}; it has {numbers[:9].tolist()}."
+            f"A Medit file must have one {name} of {least} to {most}; "
+            f"it has {numbers[:9].tolist()}."
         )
     return int(numbers[0])
 
@@ -125,8 +130,8 @@ def _rows(numbers: Float[np.ndarray, " k"], width: int, name: str) -> Float[np.n
     declared = float(numbers[0]) if numbers.size else -1.0
     if not declared.is_integer() or declared * width != numbers.size - 1:
         raise FileFormatError(
-            f"A Medit file must hold what it declares; {name} declares {declared:.15g} rows of {width} numbers "
-            f"and holds {max(numbers.size - 1, 0)} numbers."
+            f"A Medit file must hold what it declares; {name} declares {declared:.15g} rows of "
+            f"{width} numbers and holds {max(numbers.size - 1, 0)} numbers."
         )
     return numbers[1:].reshape(-1, width)
 
@@ -193,8 +198,8 @@ def parse_binary(data: bytes) -> Found:
             )
             if not (0 < code <= LAST and place < following <= len(data)):
                 raise FileFormatError(
-                    f"Sections of a binary Medit file must have a keyword of 1 to {LAST} and the place of the next "
-                    f"section; one has keyword {code} and place {following} of {len(data)}."
+                    f"Sections of a binary Medit file must have a keyword of 1 to {LAST} and the "
+                    f"place of the next section; one has keyword {code} and place {following} of {len(data)}."
                 )
             place = following
     return points, _blocks(tables)
@@ -204,7 +209,7 @@ def _taken(data: bytes, place: int, kind: str | np.dtype, count: int) -> np.ndar
     size = count * np.dtype(kind).itemsize
     if not 0 <= size <= len(data) - place:
         raise FileFormatError(
-            f"A binary Medit file must hold what it declares; {count} items of {np.dtype(kind).itemsize} bytes "
-            f"at byte {place} do not fit into its {len(data)} bytes."
+            f"A binary Medit file must hold what it declares; {count} items of "
+            f"{np.dtype(kind).itemsize} bytes at byte {place} do not fit into its {len(data)} bytes."
         )
     return np.frombuffer(data, kind, count, place)
