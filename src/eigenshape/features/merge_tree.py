@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arrays import frozen, vertex_values
-from eigenshape.features.merge_loops import falling_corners, join_faces, sides_by_vertex
+from eigenshape.features.merge_loops import file_sides, find_corners, join_faces
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 
@@ -92,16 +92,24 @@ class _Joined:
 
 
 def _joined(mesh: TriangleMesh, height: Float[np.ndarray, " n"]) -> _Joined:
-    n, narrow = mesh.n_vertices, max(mesh.n_vertices, mesh.n_faces) < 2**31
+    n, n_faces = mesh.n_vertices, mesh.n_faces
+    kind = np.int32 if max(n, n_faces) < 2**31 else np.int64  # half the memory to wait for, where it fits
     vertex = np.argsort(height, kind="stable")
-    rank = np.empty(n, dtype=np.int32 if narrow else np.int64)
+    rank = np.empty(n, dtype=kind)
     rank[vertex] = np.arange(n)
-    corners = falling_corners(mesh.faces, rank)
-    climbs_to, ended = join_faces(corners, *sides_by_vertex(corners, n))
+    corners = np.empty((n_faces, 3), dtype=kind)
+    find_corners(mesh.faces, rank, corners)
+    # Each face has two sides whose higher vertex is its highest, and one whose higher vertex is its middle one.
+    n_sides = 2 * np.bincount(corners[:, 0], minlength=n) + np.bincount(corners[:, 1], minlength=n)
+    starts = np.concatenate([[0], np.cumsum(n_sides)])
+    lower, owner = np.empty(3 * n_faces, dtype=kind), np.empty(3 * n_faces, dtype=kind)
+    file_sides(corners, starts[:-1].copy(), lower, owner)
+    climbs_to, ended = np.arange(n_faces, dtype=kind), np.empty((n_faces, 4), dtype=kind)
+    n_ended = join_faces(corners, starts, lower, owner, climbs_to, climbs_to.copy(), ended)
+    ended = ended[:n_ended].astype(np.int64)
     roots = np.flatnonzero(climbs_to == np.arange(mesh.n_faces))
     highest, middle, lowest = corners[roots].T
     order = np.lexsort((lowest, middle, highest))
-    ended = ended.astype(np.int64)
     ended[:, 1:3] = vertex[ended[:, 1:3]]
     return _Joined(climbs_to, roots[order], vertex[highest[order]], ended)
 
