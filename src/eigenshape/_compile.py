@@ -7,6 +7,7 @@ import stat
 import sys
 import tempfile
 import warnings
+import weakref
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -15,6 +16,8 @@ from typing import Any
 import numba
 from numba.core import event
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserWideCacheLocator
+
+_LOOPS: weakref.WeakSet[Any] = weakref.WeakSet()  # all that `njit` has made, apart from loops of other packages
 
 
 def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
@@ -35,6 +38,7 @@ def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
         return lambda wanted: njit(wanted, **options)
     # Nothing calls our loops from C, and without the wrapper for it they compile 5 % faster.
     dispatcher = numba.njit(nogil=True, no_cfunc_wrapper=True, **options)(function)
+    _LOOPS.add(dispatcher)
     try:
         dispatcher._cache = _LoopCache(dispatcher.py_func)
     except RuntimeError:  # no locator found a folder
@@ -81,7 +85,7 @@ class _CompilationListener(event.Listener):  # type: ignore[misc]
 
 
 def _is_ours(event: Any) -> bool:
-    return bool(event.data["dispatcher"].py_func.__module__.startswith("eigenshape."))
+    return event.data["dispatcher"] in _LOOPS
 
 
 def _print_notice() -> None:

@@ -94,10 +94,8 @@ def count_cuts(indptr, indices, segment, owner, name, key, low, from_above, from
             other = indices[at]
             if owner[other] == name:
                 joined += 1
-                if key[other] < least:
-                    least = key[other]
-                if key[other] > most:
-                    most = key[other]
+                least = min(least, key[other])
+                most = max(most, key[other])
         # On the cut from above at values in (least, key], from below at values in (key, most].
         from_above[least - low + 1] += 1
         from_above[key[node] - low + 1] -= 1

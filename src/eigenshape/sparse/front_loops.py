@@ -24,13 +24,11 @@ def stack_size(first, begins, above, waiting):
     now = most = tallest = 0
     for s in range(len(above)):
         rows = begins[s + 1] - begins[s]
-        if rows > tallest:
-            tallest = rows
+        tallest = max(tallest, rows)
         now -= waiting[s]
         rest = rows - (first[s + 1] - first[s])
         now += rest * rest
-        if now > most:
-            most = now
+        most = max(most, now)
         if above[s] >= 0:
             waiting[above[s]] += rest * rest
     return most, tallest
@@ -54,8 +52,7 @@ def sum_lengths(first, begins, above, children, lengths):
         lengths[s] += own + children[s]
         if above[s] >= 0:
             children[above[s]] += 1
-            if lengths[above[s]] < lengths[s]:
-                lengths[above[s]] = lengths[s]
+            lengths[above[s]] = max(lengths[above[s]], lengths[s])
 
 
 @njit

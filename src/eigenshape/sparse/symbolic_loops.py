@@ -7,6 +7,7 @@ sort, takes longer than compiling the loop that uses it.
 from typing import no_type_check
 
 from eigenshape._compile import njit
+from eigenshape.sparse.sort_loops import sort_part
 
 # A supernode joins the next one while few of the entries are zeros that the factor would not have. The numbers are
 # columns of both together, and the largest share of such zeros; they are the defaults of CHOLMOD (`nrelax`, `zrelax`).
@@ -175,22 +176,4 @@ def find_front_rows(
                     rows[stop] = i
                     stop += 1
             child = sibling[child]
-        _sort(rows, begins[s] + high - low, stop)
-
-
-@njit
-@no_type_check
-def _sort(values, start, stop):
-    """Sort a part of an array in place, by insertion at gaps that shrink to 1 (Shell 1959, gaps of Knuth 1973)."""
-    gap = 1
-    while 3 * gap < stop - start:
-        gap = 3 * gap + 1
-    while gap:
-        for i in range(start + gap, stop):
-            value = values[i]
-            into = i
-            while into >= start + gap and values[into - gap] > value:
-                values[into] = values[into - gap]
-                into -= gap
-            values[into] = value
-        gap //= 3
+        sort_part(rows, begins[s] + high - low, stop)
