@@ -18,7 +18,7 @@ from eigenshape.geometry.normalize import normalize_box
 from eigenshape.geometry.requirements import require_describable, require_oriented
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import boundary_vertices, submesh
-from eigenshape.retrieval.patches.patch_loops import NUMBERS, describe_discs
+from eigenshape.retrieval.patches.patch_loops import NUMBERS, RINGS, describe_disc
 from eigenshape.scans.partial import views_of
 
 N_SAMPLES = 150
@@ -101,7 +101,13 @@ def _describe_patches(mesh: TriangleMesh, n_samples: int) -> Patches:
         raise InvalidShapeError("A surface must have an area to be described by patches; all its faces have none.")
     chosen, rows, nearest = farthest_points(mesh, count, reach=RADII[-1])
     numbers = np.empty((len(chosen), len(RADII), NUMBERS), dtype=np.float32)
-    describe_discs(rows, chosen, (mesh.vertices, mean_normals(mesh), areas), RADII, numbers)
+    surface = mesh.vertices, mean_normals(mesh), areas
+    scratch = np.empty(RINGS), np.empty(RINGS)
+    for point, distances, discs in zip(chosen, rows, numbers, strict=True):
+        reached = np.flatnonzero(distances <= RADII[-1])
+        order = reached[np.argsort(distances[reached], kind="stable")]
+        for radius, found in zip(RADII, discs, strict=True):
+            describe_disc(distances, mesh.vertices[point], order, surface, radius, *scratch, found)
     cells = np.bincount(nearest, weights=areas / areas.sum(), minlength=len(chosen))
     rim = boundary_vertices(mesh)
     away = rows[:, rim].min(axis=1) if len(rim) else np.full(len(chosen), np.inf)
