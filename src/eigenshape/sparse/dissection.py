@@ -7,7 +7,7 @@ from eigenshape.sparse.dissection_loops import (
     LEAF,
     WORD,
     breadth_first,
-    count_cuts,
+    cheapest_cut,
     find_pieces,
     order_leaf,
     take_sides,
@@ -60,8 +60,9 @@ def dissect(indptr: Indices, indices: Indices) -> Indices:
         reached = breadth_first(indptr, indices, segment[0], owner, name, one, queue)
         reached = breadth_first(indptr, indices, queue[reached - 1], owner, name, one, queue)
         breadth_first(indptr, indices, queue[reached - 1], owner, name, two, queue)
-        tell_apart(indptr, indices, segment, owner, name, one, two, key)
-        level, above, full = _cheapest_cut(indptr, indices, segment, owner, name, key)
+        low, high = tell_apart(indptr, indices, segment, owner, name, one, two, key)
+        scratch = np.zeros((3, high - low + 2), dtype=np.int64)
+        level, above, full = cheapest_cut(indptr, indices, segment, owner, name, key, low, *scratch)
         n_first, n_cut = take_sides(indptr, indices, segment, owner, name, key, level, above, side)
         parted = n_first > 0 and n_first + n_cut < size
         if n_cut in (0, size) or (full and not parted):  # a clique or nearly, or nothing left to cut
@@ -73,25 +74,3 @@ def dissect(indptr: Indices, indices: Indices) -> Indices:
         owner[nodes[cut:stop]] = -1
         waiting += [(first, last, False) for first, last in ((start, middle), (middle, cut)) if first < last]
     return nodes
-
-
-def _cheapest_cut(
-    indptr: Indices, indices: Indices, segment: Indices, owner: Indices, name: int, key: Indices
-) -> tuple[int, bool, bool]:
-    """Return the value to cut at, whether the cut is taken from above it (key < value | key ≥ value), and a warning.
-
-    The warning says that half of all pairs are joined: no order saves much then, and one point a cut takes long.
-    """
-    keys = key[segment]
-    low = int(keys.min())
-    width = int(keys.max()) - low + 2
-    changes = np.zeros((2, width), dtype=np.int64)
-    joined = count_cuts(indptr, indices, segment, owner, name, key, low, changes[0], changes[1])
-    cuts = np.cumsum(changes, axis=1)
-    below = np.cumsum(np.bincount(keys - low + 1, minlength=width))
-    smaller = np.minimum(below, len(segment) - below)
-    costs = np.where(smaller > 0, (cuts + 1) / np.maximum(smaller, 1), np.inf)
-    cheapest = int(np.argmin(costs.T))  # of equal ones the lowest value, and from above
-    if np.isinf(costs.T.flat[cheapest]):
-        cheapest = 2
-    return low + cheapest // 2, cheapest % 2 == 0, bool(2 * joined >= len(segment) ** 2)

@@ -62,7 +62,10 @@ def breadth_first(indptr, indices, root, owner, name, distance, queue):
 @njit
 @no_type_check
 def tell_apart(indptr, indices, segment, owner, name, one, two, key):
-    """Fill `key` with the difference of two distances, smoothed: a ragged cut is a long one. The first is used up."""
+    """Fill `key` with the difference of two distances, smoothed: a ragged cut is a long one. The first is used up.
+
+    Returns the least and the largest difference.
+    """
     for i in range(len(segment)):
         key[segment[i]] = FINE * (one[segment[i]] - two[segment[i]])
     for _ in range(SMOOTHINGS):
@@ -76,18 +79,27 @@ def tell_apart(indptr, indices, segment, owner, name, one, two, key):
             one[node] = (key[node] + total // degree) // 2
         for i in range(len(segment)):
             key[segment[i]] = one[segment[i]]
+    low = high = key[segment[0]]
+    for i in range(len(segment)):
+        low = min(low, key[segment[i]])
+        high = max(high, key[segment[i]])
+    return low, high
 
 
 @njit
 @no_type_check
-def count_cuts(indptr, indices, segment, owner, name, key, low, from_above, from_below):
-    """Fill by how many points a cut becomes larger from one value of `key` to the next; return the entries of all rows.
+def cheapest_cut(indptr, indices, segment, owner, name, key, low, below, from_above, from_below):
+    """Return the value to cut at, whether the cut is taken from above it (key < value | key ≥ value), and a warning.
 
-    `low` is the least key. The arrays come filled with 0: their sums up to place v - low are the points on the cut
-    between key < v and key ≥ v, if these are taken from above, or from below.
+    `low` is the least key. The arrays are scratch, filled with 0, a place for each value from there to one above the
+    largest: how many keys are less by 1, and how many points the cut has more than that before it if it is taken from
+    above or from below.
+
+    The warning says that half of all pairs are joined: no order saves much then, and one point a cut takes long.
     """
+    size = len(segment)
     joined = 0
-    for i in range(len(segment)):
+    for i in range(size):
         node = segment[i]
         least = most = key[node]
         for at in range(indptr[node], indptr[node + 1]):
@@ -96,12 +108,25 @@ def count_cuts(indptr, indices, segment, owner, name, key, low, from_above, from
                 joined += 1
                 least = min(least, key[other])
                 most = max(most, key[other])
+        below[key[node] - low + 1] += 1
         # On the cut from above at values in (least, key], from below at values in (key, most].
         from_above[least - low + 1] += 1
         from_above[key[node] - low + 1] -= 1
         from_below[key[node] - low + 1] += 1
         from_below[most - low + 1] -= 1
-    return joined
+    best, level, above = np.inf, low + 1, True
+    first = cut_above = cut_below = 0
+    for place in range(len(below)):
+        first += below[place]
+        cut_above += from_above[place]
+        cut_below += from_below[place]
+        smaller = min(first, size - first)
+        if smaller > 0:
+            if (cut_above + 1) / smaller < best:
+                best, level, above = (cut_above + 1) / smaller, low + place, True
+            if (cut_below + 1) / smaller < best:
+                best, level, above = (cut_below + 1) / smaller, low + place, False
+    return level, above, 2 * joined >= size * size
 
 
 @njit

@@ -277,12 +277,12 @@ def _residuals(
         scratch = np.empty((2, k)), np.zeros((3, k))
         if given is None:
             sums = np.zeros((3, k))
-            add_sums(*matrices, part, np.zeros(k), pencil.mass_diagonal, *scratch, sums)
+            add_sums(*matrices, part, values[columns], pencil.mass_diagonal, False, *scratch, sums)
             values[columns] = sums[0] / sums[1]
         else:
             values[columns] = given[columns]
         sums = np.zeros((3, k))
-        add_sums(*matrices, part, values[columns], pencil.mass_diagonal, *scratch, sums)
+        add_sums(*matrices, part, values[columns], pencil.mass_diagonal, True, *scratch, sums)
         norms[columns] = np.sqrt(sums[2] / pencil.mass_floor / sums[1])
     return values, norms
 

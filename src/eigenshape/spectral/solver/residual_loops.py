@@ -9,10 +9,11 @@ ROWS = 256  # whose sums are added up before they are added to those of others, 
 
 @njit
 @no_type_check
-def add_sums(stiffness, mass, vectors, values, weights, images, part, sums):
+def add_sums(stiffness, mass, vectors, values, weights, with_residuals, images, part, sums):
     """Add φᵀWφ, φᵀBφ and Σ (Wφ - λBφ)² / weights of each column to the rows of `sums`; W and B are symmetric.
 
-    W and B are given by int64 pointers and indices and by their entries, `values` are the λ. `images` (2, k) and `part`
+    W and B are given by int64 pointers and indices and by their entries, `values` are the λ. Without residuals these
+    do not matter, and the last row stays as it is. `images` (2, k) and `part`
     (3, k), filled with 0, are scratch: one loop for both uses compiles in half the time of two.
     """
     n, k = vectors.shape
@@ -20,10 +21,12 @@ def add_sums(stiffness, mass, vectors, values, weights, images, part, sums):
         _fill_image(stiffness, vectors, i, images[0])
         _fill_image(mass, vectors, i, images[1])
         for c in range(k):
-            rest = images[0, c] - values[c] * images[1, c]
             part[0, c] += vectors[i, c] * images[0, c]
             part[1, c] += vectors[i, c] * images[1, c]
-            part[2, c] += rest * rest / weights[i]
+        if with_residuals:
+            for c in range(k):
+                rest = images[0, c] - values[c] * images[1, c]
+                part[2, c] += rest * rest / weights[i]
         if (i + 1) % ROWS == 0 or i + 1 == n:
             for row in range(3):
                 for c in range(k):
