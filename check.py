@@ -1,12 +1,13 @@
 """Run the checks: format, lint, types, layers, tests. CI runs this same file.
 
 python check.py           all of it but the long tests; under three minutes on two cores
-python check.py --all     the long tests, too: quick forms of all experiments, large shapes, many examples
+python check.py --all     the long tests and the docs site, too
 python check.py --fast    without the tests
 """
 
 import subprocess
 import sys
+import tempfile
 
 CHECKS = {
     "format": ["-m", "ruff", "format", "--check", "."],
@@ -15,22 +16,27 @@ CHECKS = {
     "layers": ["-c", "from importlinter.cli import lint_imports_command as main; main()"],
 }
 TESTS = ["-m", "pytest", "-n", "2"]
+DOCS = ["-m", "sphinx", "-q", "-W", "--keep-going", "docs"]
 
 
 def main() -> int:
-    """Run the checks one after the other and say which failed."""
+    """Run the checks one after the other and print which failed."""
     options, checks = set(sys.argv[1:]), dict(CHECKS)
     if unknown := options - {"--all", "--fast"}:
         sys.exit(f"check.py takes --all or --fast; it was given {', '.join(sorted(unknown))}.")
-    if "--all" in options:
-        checks["all tests"] = TESTS
-    elif "--fast" not in options:
-        checks["tests"] = [*TESTS, "-m", "not long"]
-    failed = []
-    for name, command in checks.items():
-        print(f"== {name}", flush=True)
-        if subprocess.run([sys.executable, *command], check=False).returncode:
-            failed.append(name)
+    with tempfile.TemporaryDirectory() as site:
+        if "--all" in options:
+            checks["docs"] = [*DOCS, site]
+            checks["all tests"] = TESTS
+        elif "--fast" not in options:
+            checks["tests"] = [*TESTS, "-m", "not long"]
+        failed = []
+        for name, command in checks.items():
+            print(f"== {name}", flush=True)
+            if subprocess.run([sys.executable, *command], check=False).returncode:
+                failed.append(name)
+    print("== readability, for looking and not for enforcing", flush=True)
+    subprocess.run([sys.executable, "tests/house/readability.py"], check=True)
     print(f"failed: {', '.join(failed)}" if failed else f"passed: {', '.join(checks)}")
     return 1 if failed else 0
 

@@ -44,7 +44,14 @@ STEPS = {
     "igl_ready": "libigl, preparation",
     "igl": "ARAP, libigl",
 }
-COLUMNS = ("vertices, region", "modes", "free", *STEPS.values(), "MiB", "the thesis, then: 1 and 2; 3")
+COLUMNS = (
+    "vertices, region",
+    "modes",
+    "free",
+    *STEPS.values(),
+    "MiB",
+    "the thesis, then: 1 and 2; 3",
+)
 
 
 def region_of(mesh: es.TriangleMesh, name: str) -> np.ndarray:
@@ -53,10 +60,16 @@ def region_of(mesh: es.TriangleMesh, name: str) -> np.ndarray:
         return mesh.vertices[:, 2] < np.median(mesh.vertices[:, 2])
     height = np.ptp(mesh.vertices[:, 1])
     foot = int(np.argmin(mesh.vertices[:, 1] + 1e-3 * mesh.vertices[:, 2]))
-    return es.region_mask(mesh, es.Brush(mesh.vertices[foot], 0.25 * height))
+    return es.deformation.region_mask(
+        mesh, es.deformation.BrushRegion(mesh.vertices[foot], 0.25 * height)
+    )
 
 
-def by_libigl(binding: es.Binding, goal: np.ndarray, timed: Callable[[str, Callable[[], object]], object]) -> None:
+def by_libigl(
+    binding: es.deformation.Binding,
+    goal: np.ndarray,
+    timed: Callable[[str, Callable[[], object]], object],
+) -> None:
     """Measure libigl's preparation and rounds."""
     mesh = binding.rig.mesh
     vertices, faces = np.array(mesh.vertices), np.array(mesh.faces)
@@ -90,20 +103,22 @@ def bent(saved: str, region: str) -> Row:
 
     before, mask = memory_now(), region_of(mesh, region)
     rig = timed("rig", lambda: es.rig_shape(mesh))
-    binding = often("bind", lambda: es.bind(rig, [mask]))
-    skeleton = often("detail", lambda: es.detail_skeleton(binding))
-    pivot = mesh.vertices[es.region_boundary(mesh, mask)].mean(axis=0)
+    binding = often("bind", lambda: es.deformation.bind(rig, [mask]))
+    skeleton = often("detail", lambda: es.deformation.detailed_skeleton(binding))
+    pivot = mesh.vertices[es.deformation.region_boundary(mesh, mask)].mean(axis=0)
     handles = [es.Rotation(pivot, [1, 0, 0], np.pi / 3)]
-    often("drag", lambda: es.moved_skeleton(skeleton.grip, handles))
-    often("thesis", lambda: es.eigen_deformed(skeleton, handles))
-    goal = often("graded", lambda: es.bend(binding, handles)).vertices
-    often("arap", lambda: es.as_rigid_as_possible(binding, handles, n_rounds=ROUNDS))
+    often("drag", lambda: es.deformation.move_skeleton(skeleton.response, handles))
+    often("thesis", lambda: es.deformation.eigen_deformation(skeleton, handles))
+    goal = often("graded", lambda: es.deformation.bend(binding, handles)).vertices
+    often("arap", lambda: es.deformation.as_rigid_as_possible(binding, handles, n_rounds=ROUNDS))
     by_libigl(binding, goal, timed)
     free = len(binding.part.free) / mesh.n_vertices
     return row | {"modes": int(binding.n_modes[0]), "free": free, "memory": peak_memory() - before}
 
 
-def measure(sizes: dict[tuple[int, int, str], tuple[str, int | None, int | None]], report: Report) -> None:
+def measure(
+    sizes: dict[tuple[int, int, str], tuple[str, int | None, int | None]], report: Report
+) -> None:
     """Measure shapes of several sizes."""
     for (base, splits, region), printed in sizes.items():
         mesh = surface(base, splits)
@@ -120,7 +135,14 @@ def cells(row: Row) -> list[str]:
     name, early, late = row["printed"]
     then = f"{early}; {late} ({name})" if name else ""
     times = [f"{row[step]:,.0f}" if row[step] >= 100 else f"{row[step]:.3g}" for step in STEPS]
-    return [row["what"], f"{row['modes']}", f"{100 * row['free']:.0f} %", *times, f"{row['memory']:.0f}", then]
+    return [
+        row["what"],
+        f"{row['modes']}",
+        f"{100 * row['free']:.0f} %",
+        *times,
+        f"{row['memory']:.0f}",
+        then,
+    ]
 
 
 def main() -> None:

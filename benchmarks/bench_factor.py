@@ -23,7 +23,16 @@ from scipy.sparse.linalg import splu
 import eigenshape as es
 from eigenshape.sparse.elimination import analyse, factorise
 
-PACKAGES = ["eigenshape", "scipy", "cholespy", "scikit-sparse", "pypardiso", "mkl", "numpy", "numba"]
+PACKAGES = [
+    "eigenshape",
+    "scipy",
+    "cholespy",
+    "scikit-sparse",
+    "pypardiso",
+    "mkl",
+    "numpy",
+    "numba",
+]
 RIGHT = 8
 LEVELS = 10
 COLUMNS = (
@@ -38,13 +47,17 @@ COLUMNS = (
     "GF/s",
     "MiB",
 )
-Timed = tuple[float | None, float, float]  # seconds of analysis (None where it is part of the factor), factor, solve
+Timed = tuple[
+    float | None, float, float
+]  # seconds of analysis (None where it is part of the factor), factor, solve
 Method = Callable[[sp.csc_array, np.ndarray], tuple[Timed, np.ndarray, dict[str, float]]]
 
 
 def matrix(size: int) -> sp.csc_array:
     """Return W + σB of an icosphere of that level, or of a Fibonacci sphere of so many points."""
-    laplacian = es.cotangent_laplacian(es.icosphere(size) if size < LEVELS else es.fibonacci_sphere(size))
+    laplacian = es.cotangent_laplacian(
+        es.icosphere(size) if size < LEVELS else es.shapes.fibonacci_sphere(size)
+    )
     mean = laplacian.stiffness.diagonal().sum() / laplacian.mass.diagonal().sum()
     return sp.csc_array(laplacian.stiffness + 1e-3 * mean * laplacian.mass)
 
@@ -67,14 +80,20 @@ def ours(a: sp.csc_array, right: np.ndarray) -> tuple[Timed, np.ndarray, dict[st
     widths, heights = np.diff(elimination.first), np.diff(elimination.begins)
     columns = np.repeat(heights + elimination.first[:-1], widths) - np.arange(len(right))
     flops = float((columns.astype(float) ** 2).sum())
-    return (analysis, factoring, solving), solution, {"entries": elimination.n_entries, "flops": flops}
+    return (
+        (analysis, factoring, solving),
+        solution,
+        {"entries": elimination.n_entries, "flops": flops},
+    )
 
 
 def superlu(a: sp.csc_array, right: np.ndarray) -> tuple[Timed, np.ndarray, dict[str, float]]:
     """SuperLU as its manual has it for symmetric patterns."""
     options = {"SymmetricMode": True}
     factoring, factor = clock(
-        lambda: splu(sp.csc_matrix(a), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+        lambda: splu(
+            sp.csc_matrix(a), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options
+        )
     )
     solving, solution = clock(lambda: factor.solve(right))
     return (None, factoring, solving), solution, {"entries": float(factor.L.nnz)}
@@ -85,7 +104,9 @@ def cholespy(a: sp.csc_array, right: np.ndarray) -> tuple[Timed, np.ndarray, dic
     from cholespy import CholeskySolverD, MatrixType  # noqa: PLC0415
 
     pointers, indices = a.indptr.astype(np.int32), a.indices.astype(np.int32)
-    factoring, solver = clock(lambda: CholeskySolverD(a.shape[0], pointers, indices, a.data, MatrixType.CSC))
+    factoring, solver = clock(
+        lambda: CholeskySolverD(a.shape[0], pointers, indices, a.data, MatrixType.CSC)
+    )
     solution = np.zeros_like(right)
     solving, _ = clock(lambda: solver.solve(right, solution))
     return (None, factoring, solving), solution, {}
@@ -101,14 +122,21 @@ def scikit_sparse(a: sp.csc_array, right: np.ndarray) -> tuple[Timed, np.ndarray
     return (analysis, factoring, solving), solution, {"entries": float(factor.L().nnz)}
 
 
-def pardiso(kind: int, a: sp.csc_array, right: np.ndarray) -> tuple[Timed, np.ndarray, dict[str, float]]:
+def pardiso(
+    kind: int, a: sp.csc_array, right: np.ndarray
+) -> tuple[Timed, np.ndarray, dict[str, float]]:
     """Call the MKL's PARDISO: type 2 is L Lᵀ, -2 is L D Lᵀ, which tells the signs of pivots as ours does."""
     from pypardiso import PyPardisoSolver  # noqa: PLC0415
 
     upper, right = sp.csr_matrix(sp.triu(a)), np.asfortranarray(right)
     upper.sort_indices()
     solver = PyPardisoSolver(mtype=kind)
-    for place, value in ((1, 1), (2, 2), (18, -1), (19, -1)):  # own settings: METIS; count entries and Mflops
+    for place, value in (
+        (1, 1),
+        (2, 2),
+        (18, -1),
+        (19, -1),
+    ):  # own settings: METIS; count entries and Mflops
         solver.set_iparm(place, value)
     seconds = []
     for phase in (11, 22, 33):
@@ -188,7 +216,13 @@ def with_ratios(row: Row, mine: Row) -> Row:
 def main() -> None:
     """Measure, print, and write what was asked for."""
     parser = options_of(__doc__)
-    parser.add_argument("--sizes", type=int, nargs="+", default=[5, 6, 7, 160_000], help="levels of icospheres, points")
+    parser.add_argument(
+        "--sizes",
+        type=int,
+        nargs="+",
+        default=[5, 6, 7, 160_000],
+        help="levels of icospheres, points",
+    )
     options = parser.parse_args()
     report = Report(__file__, PACKAGES, options, COLUMNS, cells)
     for size in [3] if options.quick else options.sizes:

@@ -26,43 +26,58 @@ from report import Report, Row, in_process, options_of
 
 import eigenshape as es
 
-FULL = ((15_000, 0), (25_000, 1), (62_500, 2), (93_750, 2))  # vertices of a creature, and how often faces are split
+FULL = (
+    (15_000, 0),
+    (25_000, 1),
+    (62_500, 2),
+    (93_750, 2),
+)  # vertices of a creature, and how often faces are split
 QUICK = ((2_500, 0),)
 LIMIT, MEMORY = 600.0, 10_000  # seconds and MiB
 ONCE = 20.0  # seconds, from which one run is enough
 K, N_FEATURES = 300, 15
 OURS = ("eigenshape", "eigenshape, 1e-3")
 PACKAGES = ["eigenshape", "pyfmaps", "lapy", "gudhi", "numpy", "scipy", "numba"]
-COLUMNS = ("vertices", "method", "CPU s", "wall s", "MiB", "true error", "stated error", "features off", "same")
+COLUMNS = (
+    "vertices",
+    "method",
+    "CPU s",
+    "wall s",
+    "MiB",
+    "true error",
+    "stated error",
+    "features off",
+    "same",
+)
 
 
 def surface(base: int, splits: int) -> es.TriangleMesh:
     """Return a giraffe in a unit box, each face split in four so often."""
     mesh = es.make_creature("giraffe", 1, n_vertices=base)
     for _ in range(splits):
-        table = es.edge_table(mesh)
+        table = es.geometry.edge_table(mesh)
         a, b, c = mesh.faces.T
         x, y, z = (mesh.n_vertices + table.face_edges).T
         corners = [(a, z, y), (z, b, x), (y, x, c), (x, y, z)]
         points = np.concatenate([mesh.vertices, mesh.vertices[table.edges].mean(axis=1)])
         mesh = es.TriangleMesh(points, np.concatenate([np.column_stack(face) for face in corners]))
-    return es.normalize_box(mesh)
+    return es.geometry.normalize_box(mesh)
 
 
 def times() -> np.ndarray:
     """Return the thesis' times."""
-    return es.THESIS.time_unit * np.array(es.THESIS.scales)
+    return es.retrieval.THESIS.time_unit * np.array(es.retrieval.THESIS.scales)
 
 
 def ours(mesh: es.TriangleMesh, accuracy: float = 1e-2) -> tuple[np.ndarray, np.ndarray, float]:
     """Return the heat at the first time, the features, and the stated error; the accuracy is the usual one."""
-    found = es.describe_large_mesh(mesh, es.THESIS, accuracy=accuracy)
+    found = es.retrieval.find_heat_features(mesh, es.retrieval.THESIS, accuracy=accuracy)
     return found.heat, found.descriptor.vertices, found.error
 
 
 def exact(mesh: es.TriangleMesh) -> tuple[np.ndarray, np.ndarray, float]:
     """Take the certified spectrum."""
-    found = es.describe_mesh(mesh, es.THESIS)
+    found = es.retrieval.find_heat_features(mesh, es.retrieval.THESIS)
     return found.heat, found.descriptor.vertices, 0.0
 
 
@@ -87,9 +102,11 @@ def lapy(mesh: es.TriangleMesh) -> tuple[np.ndarray, np.ndarray, float]:
 
 def tomato(mesh: es.TriangleMesh, heat: np.ndarray) -> np.ndarray:
     """Return the vertices of the most persistent maxima, highest first in each of ToMATo's clusters."""
-    graph = sp.csr_array(es.edge_graph(mesh))
+    graph = sp.csr_array(es.operators.edge_graph(mesh))
     neighbours = np.split(graph.indices, graph.indptr[1:-1])
-    found = Tomato(graph_type="manual", density_type="manual", n_clusters=N_FEATURES).fit(neighbours, weights=heat)
+    found = Tomato(graph_type="manual", density_type="manual", n_clusters=N_FEATURES).fit(
+        neighbours, weights=heat
+    )
     order = np.lexsort((-heat, found.labels_))
     return order[np.unique(found.labels_[order], return_index=True)[1]]
 
@@ -108,12 +125,18 @@ def measured(method: str, saved: str, reference: str) -> Row:
     warnings.simplefilter("ignore")
     METHODS[method](es.make_creature("hand", n_vertices=1500))
     if method in OURS:
-        es.approximate_heat_kernel_signature(es.cotangent_laplacian(es.torus(120, 80)), 9, [0.1])
+        es.spectral.approximate_heat_signature(
+            es.cotangent_laplacian(es.shapes.torus(120, 80)), 9, [0.1]
+        )
     with np.load(saved) as arrays:
         mesh = es.TriangleMesh(arrays["vertices"], arrays["faces"])
     before, wall, cpu = memory_now(), time.perf_counter(), time.process_time()
     heat, features, stated = METHODS[method](mesh)
-    row = {"wall": time.perf_counter() - wall, "cpu": time.process_time() - cpu, "memory": peak_memory() - before}
+    row = {
+        "wall": time.perf_counter() - wall,
+        "cpu": time.process_time() - cpu,
+        "memory": peak_memory() - before,
+    }
     if method == "eigenshape, certified":
         np.savez(reference, heat=heat, features=features)
     return row | {"stated": stated} | compared(mesh, heat, features, reference)
@@ -125,11 +148,17 @@ def compared(mesh: es.TriangleMesh, heat: np.ndarray, features: np.ndarray, refe
         return {}
     with np.load(reference) as arrays:
         known, points = arrays["heat"], arrays["features"]
-    mass = es.dual_volumes(mesh)
-    apart = np.linalg.norm(mesh.vertices[features][:, None] - mesh.vertices[points], axis=2).min(axis=1)
-    off = apart > 0.02 * np.sqrt(es.surface_area(mesh))
+    mass = es.geometry.dual_volumes(mesh)
+    apart = np.linalg.norm(mesh.vertices[features][:, None] - mesh.vertices[points], axis=2).min(
+        axis=1
+    )
+    off = apart > 0.02 * np.sqrt(es.geometry.surface_area(mesh))
     true = float(np.sqrt(mass @ (heat - known) ** 2 / (mass @ known**2)))
-    return {"true": true, "features_off": int(off.sum()), "same": len(np.intersect1d(features, points))}
+    return {
+        "true": true,
+        "features_off": int(off.sum()),
+        "same": len(np.intersect1d(features, points)),
+    }
 
 
 def measure(base: int, splits: int, last: dict[str, np.ndarray], report: Report) -> None:
@@ -152,7 +181,9 @@ def median_of(method: str, saved: str, reference: str, repeats: int) -> Row:
     runs: list[Row] = []
     while len(runs) < repeats and not (runs and runs[0]["cpu"] > ONCE):
         runs.append(in_process(measured, method, saved, reference))
-    medians = {key: statistics.median(run[key] for run in runs) for key in ("cpu", "wall", "memory")}
+    medians = {
+        key: statistics.median(run[key] for run in runs) for key in ("cpu", "wall", "memory")
+    }
     return {"runs": len(runs)} | runs[0] | medians
 
 
@@ -166,7 +197,16 @@ def cells(row: Row) -> list[str]:
     true = f"{row['true']:.1e}" if "true" in row else "not known"
     off, same = (str(row.get(key, "not known")) for key in ("features_off", "same"))
     stated = f"{row['stated']:.1e}" if row["stated"] else ""
-    return [*name, f"{row['cpu']:.1f}{runs}", f"{row['wall']:.1f}", f"{row['memory']:.0f}", true, stated, off, same]
+    return [
+        *name,
+        f"{row['cpu']:.1f}{runs}",
+        f"{row['wall']:.1f}",
+        f"{row['memory']:.0f}",
+        true,
+        stated,
+        off,
+        same,
+    ]
 
 
 def main() -> None:

@@ -20,7 +20,16 @@ from pathlib import Path
 
 from report import THREADS, Report, Row, options_of, ratio_text
 
-COLUMNS = ("call", "library", "import, CPU s", "first call", "ratio", "both", "first call, kept loops", "second call")
+COLUMNS = (
+    "call",
+    "library",
+    "import, CPU s",
+    "first call",
+    "ratio",
+    "both",
+    "first call, kept loops",
+    "second call",
+)
 N_VERTICES = 5000
 QUICK = ("solve", 600)  # the call, and vertices of its mesh
 
@@ -28,7 +37,10 @@ QUICK = ("solve", 600)  # the call, and vertices of its mesh
 OURS = "import eigenshape as es"
 CALLS = {
     "solve": {
-        "eigenshape": (OURS, "es.solve_spectrum(es.cotangent_laplacian(es.TriangleMesh(v, f)), 100)"),
+        "eigenshape": (
+            OURS,
+            "es.solve_spectrum(es.cotangent_laplacian(es.TriangleMesh(v, f)), 100)",
+        ),
         "LaPy": ("import lapy", "lapy.Solver(lapy.TriaMesh(v, f), lump=True).eigs(100)"),
         "robust_laplacian": (
             "import robust_laplacian; from scipy.sparse.linalg import eigsh",
@@ -43,7 +55,10 @@ CALLS = {
         ),
     },
     "describe by patches": {
-        "eigenshape": (OURS, "es.describe_shape(es.TriangleMesh(v, f), es.PatchRecipe(es.made_codebook()))"),
+        "eigenshape": (
+            OURS,
+            "es.describe_shape(es.TriangleMesh(v, f), es.PatchRecipe(es.made_codebook()))",
+        ),
     },
     "find_parts": {"eigenshape": (OURS, "es.find_parts(es.TriangleMesh(v, f))")},
     "mesh_laplacian": {
@@ -90,7 +105,15 @@ def rows_of(name: str, mesh: Path, repeats: int) -> list[Row]:
             with tempfile.TemporaryDirectory() as cache:
                 loaded, first, again = run_once(*CALLS[name][library], mesh, cache)
                 _, kept, _ = run_once(*CALLS[name][library], mesh, cache)
-            done.append({"import": loaded, "first": first, "both": loaded + first, "kept": kept, "second": again})
+            done.append(
+                {
+                    "import": loaded,
+                    "first": first,
+                    "both": loaded + first,
+                    "kept": kept,
+                    "second": again,
+                }
+            )
     rows = []
     for library, done in runs.items():
         medians = {key: statistics.median(run[key] for run in done) for key in done[0]}

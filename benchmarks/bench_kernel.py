@@ -23,7 +23,7 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 from sklearn.neighbors import radius_neighbors_graph
 
-from eigenshape import gaussian_laplacian
+from eigenshape.operators import gaussian_laplacian
 
 SIZES = {"mesh Laplacian, t = e²": (160_000, 247), "graph, 100 neighbours": (1_000_000, 100)}
 CUTOFF = 4.0
@@ -53,7 +53,9 @@ def kd_tree(points: np.ndarray, t: float) -> sp.csr_array:
 
 def scikit_learn(points: np.ndarray, t: float) -> sp.csr_array:
     """Take all distances from scikit-learn's neighbour graph, on two processes' worth of threads."""
-    graph = sp.csr_array(radius_neighbors_graph(points, CUTOFF * 2 * t**0.5, mode="distance", n_jobs=2))
+    graph = sp.csr_array(
+        radius_neighbors_graph(points, CUTOFF * 2 * t**0.5, mode="distance", n_jobs=2)
+    )
     graph.data = np.exp(-(graph.data**2) / (4 * t))
     return _stiffness(graph, t)
 
@@ -89,13 +91,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=3)
     repeats = parser.parse_args().repeats
-    sys.stdout.write(f"{'':<26} {'n':>8} {'entries':>10} {'seconds':>8} {'ratio':>6} {'peak GiB':>9} {'trace':>14}\n")
+    sys.stdout.write(
+        f"{'':<26} {'n':>8} {'entries':>10} {'seconds':>8} {'ratio':>6} {'peak GiB':>9} {'trace':>14}\n"
+    )
     context = multiprocessing.get_context("spawn")
     for size, (n, neighbours) in SIZES.items():
         base = 0.0
         for method in METHODS:
             with context.Pool(1) as pool:
-                seconds, peak, checksum, entries = pool.apply(measured, (method, n, neighbours, repeats))
+                seconds, peak, checksum, entries = pool.apply(
+                    measured, (method, n, neighbours, repeats)
+                )
             base = base or seconds
             sys.stdout.write(
                 f"{method:<26} {n:>8} {entries:>10} {seconds:>8.2f} {seconds / base:>6.2f} {peak:>9.2f} "

@@ -31,7 +31,7 @@ COLUMNS = ("vertices, function", "method", "CPU s", "ratio", "wall s", "MiB", "m
 def surface(n: int) -> es.TriangleMesh:
     """Return a torus of about n vertices."""
     around = round((3 * n) ** 0.5)
-    return es.torus(around, max(n // around, 3))
+    return es.shapes.torus(around, max(n // around, 3))
 
 
 def values(mesh: es.TriangleMesh, function: str) -> np.ndarray:
@@ -52,7 +52,10 @@ def gudhi_mesh(mesh: es.TriangleMesh, height: np.ndarray) -> np.ndarray:
     complex_ = _complex(mesh, height)
     complex_.insert_batch(np.ascontiguousarray(mesh.faces.T), height[mesh.faces].max(axis=1))
     complex_.compute_persistence(homology_coeff_field=2, persistence_dim_max=True)
-    pairs = complex_.persistence_intervals_in_dimension(1), complex_.persistence_intervals_in_dimension(2)
+    pairs = (
+        complex_.persistence_intervals_in_dimension(1),
+        complex_.persistence_intervals_in_dimension(2),
+    )
     finite = pairs[0][np.isfinite(pairs[0][:, 1])]
     return np.sort(np.concatenate([finite[:, 1] - finite[:, 0], pairs[1][:, 1]]))[::-1]
 
@@ -66,7 +69,7 @@ def gudhi_graph(mesh: es.TriangleMesh, height: np.ndarray) -> np.ndarray:
 
 
 def _complex(mesh: es.TriangleMesh, height: np.ndarray) -> gudhi.SimplexTree:
-    edges = es.edge_table(mesh).edges
+    edges = es.geometry.edge_table(mesh).edges
     complex_ = gudhi.SimplexTree()
     complex_.insert_batch(np.arange(mesh.n_vertices)[None], height)
     complex_.insert_batch(np.ascontiguousarray(edges.T), height[edges].max(axis=1))
@@ -75,11 +78,13 @@ def _complex(mesh: es.TriangleMesh, height: np.ndarray) -> gudhi.SimplexTree:
 
 def gudhi_tomato(mesh: es.TriangleMesh, height: np.ndarray) -> np.ndarray:
     """Let ToMATo climb and merge on the graph of edges."""
-    graph = sp.csr_array(es.edge_graph(mesh))
+    graph = sp.csr_array(es.operators.edge_graph(mesh))
     neighbours = np.split(graph.indices, graph.indptr[1:-1])
     found = Tomato(graph_type="manual", density_type="manual").fit(neighbours, weights=height)
     finite = -np.diff(found.diagram_, axis=1)[:, 0]
-    return np.sort(np.append(finite[finite > 0], np.full(len(found.max_weight_per_cc_), np.inf)))[::-1]
+    return np.sort(np.append(finite[finite > 0], np.full(len(found.max_weight_per_cc_), np.inf)))[
+        ::-1
+    ]
 
 
 METHODS: dict[str, Callable[[es.TriangleMesh, np.ndarray], np.ndarray]] = {
@@ -99,7 +104,11 @@ def measured(method: str, n: int, function: str) -> Row:
     height, before = values(mesh, function), memory_now()
     wall, cpu = time.perf_counter(), time.process_time()
     persistence = METHODS[method](mesh, height)
-    found = {"wall": time.perf_counter() - wall, "cpu": time.process_time() - cpu, "memory": peak_memory() - before}
+    found = {
+        "wall": time.perf_counter() - wall,
+        "cpu": time.process_time() - cpu,
+        "memory": peak_memory() - before,
+    }
     equal = method == "GUDHI, whole mesh" and np.array_equal(persistence, ours(mesh, height))
     return found | {"n": mesh.n_vertices, "maxima": len(persistence), "equals_ours": bool(equal)}
 
@@ -112,7 +121,9 @@ def rows_of(n: int, function: str, repeats: int) -> list[Row]:
             done.append(in_process(measured, method, n, function))
     rows = []
     for method, done in runs.items():
-        medians = {key: statistics.median(run[key] for run in done) for key in ("cpu", "wall", "memory")}
+        medians = {
+            key: statistics.median(run[key] for run in done) for key in ("cpu", "wall", "memory")
+        }
         rows.append({"method": method, "function": function, "runs": len(done)} | done[0] | medians)
     return [row | {"ratio": row["cpu"] / rows[0]["cpu"]} for row in rows]
 
@@ -133,7 +144,9 @@ def cells(row: Row) -> list[str]:
 def main() -> None:
     """Measure, print, and write what was asked for."""
     options = options_of(__doc__).parse_args()
-    report = Report(__file__, ["eigenshape", "gudhi", "numpy", "scipy", "numba"], options, COLUMNS, cells)
+    report = Report(
+        __file__, ["eigenshape", "gudhi", "numpy", "scipy", "numba"], options, COLUMNS, cells
+    )
     for n in QUICK if options.quick else FULL:
         for function in ("waves", "noise"):
             for row in rows_of(n, function, options.repeats):

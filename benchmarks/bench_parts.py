@@ -30,35 +30,48 @@ COLUMNS = ("shape", "part", "calls", "CPU s", "share", "bound s", "set by", "tim
 REAL = 8  # bytes
 CASES: dict[str, tuple[Callable[[], es.TriangleMesh], int]] = {
     "icosphere": (lambda: es.icosphere(6), 300),
-    "Fibonacci sphere": (lambda: es.fibonacci_sphere(160_000), 50),
+    "Fibonacci sphere": (lambda: es.shapes.fibonacci_sphere(160_000), 50),
 }
-QUICK: dict[str, tuple[Callable[[], es.TriangleMesh], int]] = {"icosphere": (lambda: es.icosphere(4), 40)}
+QUICK: dict[str, tuple[Callable[[], es.TriangleMesh], int]] = {
+    "icosphere": (lambda: es.icosphere(4), 40)
+}
 Work = tuple[float, float]  # bytes that must move, floating-point operations
 
 
 def _analysis(pattern: Any, **_: object) -> Work:
-    return REAL * 3.0 * pattern.nnz, 0.0  # the pattern read, its triangle and the places of its entries written
+    return (
+        REAL * 3.0 * pattern.nnz,
+        0.0,
+    )  # the pattern read, its triangle and the places of its entries written
 
 
 def _factor(elimination: Any, *_: object) -> Work:
     widths, heights = np.diff(elimination.first), np.diff(elimination.begins)
-    columns = np.repeat(heights + elimination.first[:-1], widths) - np.arange(len(elimination.order))
+    columns = np.repeat(heights + elimination.first[:-1], widths) - np.arange(
+        len(elimination.order)
+    )
     return REAL * float(elimination.n_entries), float((columns.astype(float) ** 2).sum())
 
 
 def _solve(mine: SymmetricFactor, right: np.ndarray, *_: object) -> Work:
     entries = mine.elimination.n_entries
-    return REAL * (2.0 * entries + 6.0 * right.size), 4.0 * entries * right.shape[1]  # L there and back
+    return REAL * (2.0 * entries + 6.0 * right.size), 4.0 * entries * right.shape[
+        1
+    ]  # L there and back
 
 
 def _orthogonal(_inner: object, space: np.ndarray, columns: np.ndarray, _rng: object) -> Work:
-    width = columns.shape[0] * columns.shape[2]  # what is known is read to project on it, and again to take that away
+    width = (
+        columns.shape[0] * columns.shape[2]
+    )  # what is known is read to project on it, and again to take that away
     space = space[: -len(columns)]
     return 2.0 * space.nbytes, 4.0 * (space.size / columns.shape[1]) * columns.shape[1] * width
 
 
 def _eigh(krylov: Any, _shift: float) -> Work:
-    return 0.0, 10 / 3 * float(len(krylov.projected)) ** 3  # to a tridiagonal matrix and back; in between it is cheap
+    return 0.0, 10 / 3 * float(
+        len(krylov.projected)
+    ) ** 3  # to a tridiagonal matrix and back; in between it is cheap
 
 
 def _combine(krylov: Any, _ritz: object, chosen: np.ndarray) -> Work:
@@ -99,7 +112,9 @@ def counted() -> Iterator[dict[str, list[float]]]:
     totals: dict[str, list[float]] = {name: [0.0, 0.0, 0.0, 0.0] for name, *_ in PARTS}
     inside = [0.0]
 
-    def wrapped(name: str, function: Callable[..., Any], work: Callable[..., Work]) -> Callable[..., Any]:
+    def wrapped(
+        name: str, function: Callable[..., Any], work: Callable[..., Work]
+    ) -> Callable[..., Any]:
         def call(*args: object, **options: object) -> object:
             moved, operations = work(*args, **options)
             inside.append(0.0)
@@ -116,7 +131,9 @@ def counted() -> Iterator[dict[str, list[float]]]:
 
     with ExitStack() as stack:
         for name, home, attribute, work in PARTS:
-            stack.enter_context(patch.object(home, attribute, wrapped(name, getattr(home, attribute), work)))
+            stack.enter_context(
+                patch.object(home, attribute, wrapped(name, getattr(home, attribute), work))
+            )
         yield totals
 
 
@@ -138,7 +155,10 @@ def rates(size: int) -> dict[str, float]:
         start = time.perf_counter()
         square @ square
         product.append(time.perf_counter() - start)
-    return {"bandwidth": 4 * REAL * size / min(triad), "dgemm": 2 * 1200**3 / min(product)}  # a line written is read
+    return {
+        "bandwidth": 4 * REAL * size / min(triad),
+        "dgemm": 2 * 1200**3 / min(product),
+    }  # a line written is read
 
 
 def measured(mesh: es.TriangleMesh, k: int, repeats: int, speed: dict[str, float]) -> list[Row]:
@@ -156,9 +176,12 @@ def measured(mesh: es.TriangleMesh, k: int, repeats: int, speed: dict[str, float
         bytes_bound, flop_bound = moved / speed["bandwidth"], operations / speed["dgemm"]
         bound = max(bytes_bound, flop_bound)
         by = "bytes" if bytes_bound >= flop_bound else "operations"
-        rows.append({"part": name, "calls": int(calls), "seconds": seconds, "bound": bound, "by": by})
+        rows.append(
+            {"part": name, "calls": int(calls), "seconds": seconds, "bound": bound, "by": by}
+        )
     rest = statistics.median(
-        total - sum(part[0] for part in run.values()) for total, run in zip(whole, runs, strict=True)
+        total - sum(part[0] for part in run.values())
+        for total, run in zip(whole, runs, strict=True)
     )
     rows.append({"part": "the rest", "calls": 0, "seconds": rest, "bound": None, "by": ""})
     total = statistics.median(whole)
@@ -167,7 +190,13 @@ def measured(mesh: es.TriangleMesh, k: int, repeats: int, speed: dict[str, float
 
 def cells(row: Row) -> list[str]:
     """Return the texts of a row."""
-    texts = [row["case"], row["part"], str(row["calls"] or ""), f"{row['seconds']:.3f}", f"{100 * row['share']:.0f} %"]
+    texts = [
+        row["case"],
+        row["part"],
+        str(row["calls"] or ""),
+        f"{row['seconds']:.3f}",
+        f"{100 * row['share']:.0f} %",
+    ]
     if row["bound"] is None:
         return [*texts, "", "", ""]
     ratio = f"{row['seconds'] / row['bound']:.1f}" if row["bound"] else ""
@@ -180,7 +209,9 @@ def main() -> None:
     one_core()
     with threadpool_limits(1):
         es.solve_spectrum(es.cotangent_laplacian(es.icosphere(4)), 20)  # loads and compiles
-        report = Report(__file__, ["eigenshape", "numpy", "scipy", "numba"], options, COLUMNS, cells)
+        report = Report(
+            __file__, ["eigenshape", "numpy", "scipy", "numba"], options, COLUMNS, cells
+        )
         speed = rates(2**20 if options.quick else 2**25)
         told = f"triad {speed['bandwidth'] / 1e9:.1f} GB/s, dgemm {speed['dgemm'] / 1e9:.0f} GF/s"
         report.figures["settings"] |= {"speed": told, "rates": speed}

@@ -44,20 +44,20 @@ COLUMNS = ("vertices", "method", "CPU s", "wall s", "MiB", "the thesis, then")
 
 def patches(mesh: es.TriangleMesh) -> Any:
     """Describe by patches, with views where the shape is closed."""
-    return es.describe_shape(mesh, es.PatchRecipe(es.made_codebook()))
+    return es.describe(mesh, es.retrieval.PatchRecipe())
 
 
-def thesis(mesh: es.TriangleMesh) -> es.ShapeDescriptor:
+def thesis(mesh: es.TriangleMesh) -> es.retrieval.HeatDescriptor:
     """Describe by the thesis' recipe, exactly where it does."""
-    describe = es.describe_mesh if mesh.n_vertices <= EXACT else es.describe_large_mesh
-    return describe(mesh, es.THESIS).descriptor
+    accuracy = None if mesh.n_vertices <= EXACT else 0.01
+    return es.retrieval.find_heat_features(mesh, es.retrieval.THESIS, accuracy=accuracy).descriptor
 
 
 METHODS: dict[str, Callable[[es.TriangleMesh], Any]] = {
     "patches": patches,
     "thesis": thesis,
-    "EVD": es.affinity_eigenvalues,
-    "LFD": es.light_field,
+    "EVD": es.retrieval.baselines.affinity_eigenvalues,
+    "LFD": es.retrieval.baselines.light_field,
 }
 PRINTED = {"thesis": 0, "EVD": 1, "LFD": 2}
 
@@ -66,7 +66,9 @@ def described(method: str, saved: str) -> Row:
     """Measure one description; run in a process of its own."""
     METHODS[method](es.make_creature("hand", n_vertices=1500))
     if method == "thesis":
-        es.approximate_heat_kernel_signature(es.cotangent_laplacian(es.torus(120, 80)), 9, [0.1])
+        es.spectral.approximate_heat_signature(
+            es.cotangent_laplacian(es.shapes.torus(120, 80)), 9, [0.1]
+        )
     with np.load(saved) as arrays:
         mesh = es.TriangleMesh(arrays["vertices"], arrays["faces"])
     return measured(partial(METHODS[method], mesh))
@@ -76,25 +78,44 @@ def measured(work: Callable[[], Any]) -> Row:
     """Return seconds and MiB of a call."""
     before, wall, cpu = memory_now(), time.perf_counter(), time.process_time()
     work()
-    return {"wall": time.perf_counter() - wall, "cpu": time.process_time() - cpu, "memory": peak_memory() - before}
+    return {
+        "wall": time.perf_counter() - wall,
+        "cpu": time.process_time() - cpu,
+        "memory": peak_memory() - before,
+    }
 
 
 def asked(method: str, n_shapes: int) -> Row:
     """Measure one query among some shapes; run in a process of its own."""
-    poses = [es.make_creature(kind, pose, n_vertices=2500) for kind in es.CREATURES for pose in (1, 2)]
-    scan = es.partial_scan(es.make_creature("biped", 5, n_vertices=5000), np.array([0.9, 0.25, 0.45])).mesh
+    poses = [
+        es.make_creature(kind, pose, n_vertices=2500)
+        for kind in es.shapes.CREATURES
+        for pose in (1, 2)
+    ]
+    scan = es.partial_scan(
+        es.make_creature("biped", 5, n_vertices=5000), np.array([0.9, 0.25, 0.45])
+    ).mesh
     if method in {"EVD", "LFD"}:
         known = [METHODS[method](mesh) for mesh in poses]
-        distance = es.affinity_distance if method == "EVD" else es.light_field_distance
+        distance = (
+            es.retrieval.baselines.affinity_distance
+            if method == "EVD"
+            else es.retrieval.baselines.light_field_distance
+        )
         query = METHODS[method](scan)
-        return measured(lambda: [distance(query, known[number % len(known)]) for number in range(n_shapes)])
-    recipe = es.THESIS if method == "thesis" else es.PatchRecipe(es.made_codebook())
-    views = [es.describe_to_keep(mesh, recipe) for mesh in poses]
+        return measured(
+            lambda: [distance(query, known[number % len(known)]) for number in range(n_shapes)]
+        )
+    recipe = es.retrieval.THESIS if method == "thesis" else es.retrieval.PatchRecipe()
     with tempfile.TemporaryDirectory() as folder:
         index = es.ShapeIndex.create(Path(folder) / "index")
-        for number in range(n_shapes):
-            index.add(f"shape {number}", views[number % len(views)])
-        query = es.describe_shape(scan, recipe)
+        for number in range(n_shapes):  # some poses, and copies of them
+            name, copied = f"shape {number}", f"shape {number % len(poses)}"
+            if number < len(poses):
+                index.add(name, poses[number], recipe=recipe)
+            else:
+                index.add_descriptors(name, index.descriptors(copied, recipe))
+        query = es.describe(scan, recipe)
         index.query(query)
         return measured(lambda: index.query(query))
 
@@ -104,7 +125,9 @@ def median_of(repeats: int, work: Callable[..., Row], *arguments: object) -> Row
     runs: list[Row] = []
     while len(runs) < repeats and not (runs and runs[0]["cpu"] > 20):
         runs.append(in_process(work, *arguments))
-    return {key: statistics.median(run[key] for run in runs) for key in runs[0]} | {"runs": len(runs)}
+    return {key: statistics.median(run[key] for run in runs) for key in runs[0]} | {
+        "runs": len(runs)
+    }
 
 
 def measure(sizes: dict[tuple[int, int], tuple[float, ...]], n_shapes: int, report: Report) -> None:
@@ -125,7 +148,11 @@ def measure(sizes: dict[tuple[int, int], tuple[float, ...]], n_shapes: int, repo
 def cells(row: Row) -> list[str]:
     """Return the texts of one row."""
     runs = "" if row["runs"] >= 3 else f" ({row['runs']} run{'s' * (row['runs'] > 1)})"
-    printed = f"{row['printed'][PRINTED[row['method']]]}" if row["printed"] and row["method"] in PRINTED else ""
+    printed = (
+        f"{row['printed'][PRINTED[row['method']]]}"
+        if row["printed"] and row["method"] in PRINTED
+        else ""
+    )
     return [
         row["what"],
         row["method"],

@@ -39,10 +39,16 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     parser = options_of(__doc__)
     parser.add_argument("meshes", nargs="*", type=Path, help="mesh files, instead of the cases")
     parser.add_argument("--cases", help=f"of {', '.join(FULL)}; with --quick of {', '.join(QUICK)}")
-    parser.add_argument("--libraries", help="parts of names, separated by commas; ours is always there")
+    parser.add_argument(
+        "--libraries", help="parts of names, separated by commas; ours is always there"
+    )
     parser.add_argument("-k", type=int, help="eigenpairs, instead of what the case has")
-    parser.add_argument("--limit", type=float, default=900.0, help="seconds after which a process is stopped")
-    parser.add_argument("--no-run", action="store_true", help="measure nothing, write the table of the JSON")
+    parser.add_argument(
+        "--limit", type=float, default=900.0, help="seconds after which a process is stopped"
+    )
+    parser.add_argument(
+        "--no-run", action="store_true", help="measure nothing, write the table of the JSON"
+    )
     return parser.parse_args(argv)
 
 
@@ -64,7 +70,11 @@ def chosen_cases(options: argparse.Namespace) -> dict[str, Case]:
 def chosen_libraries(options: argparse.Namespace, takes: str) -> list[str]:
     """Return ours first, then the others that take such a shape."""
     parts = options.libraries.lower().split(",") if options.libraries else [""]
-    fitting = [name for name, library in LIBRARIES.items() if library.takes == takes and name != OURS[takes]]
+    fitting = [
+        name
+        for name, library in LIBRARIES.items()
+        if library.takes == takes and name != OURS[takes]
+    ]
     return [OURS[takes], *(name for name in fitting if any(part in name.lower() for part in parts))]
 
 
@@ -73,7 +83,9 @@ def run_worker(task: Row, limit: float) -> Row:
     environment = os.environ | dict.fromkeys(THREADS, "1")
     command = [sys.executable, str(WORKER), json.dumps(task)]
     try:
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=limit, check=False)
+        done = subprocess.run(
+            command, env=environment, capture_output=True, text=True, timeout=limit, check=False
+        )
     except subprocess.TimeoutExpired:
         return {"status": "over the limit", "reason": f"stopped after {limit:g} s"}
     if done.returncode:
@@ -97,14 +109,22 @@ def run_case(name: str, case: Case, options: argparse.Namespace, console: Consol
         path = Path(folder) / "shape.npz"
         n = case.save(path)
         k = min(options.k or case.k, n - 1)
-        runs: dict[str, list[Row]] = {library: [] for library in chosen_libraries(options, case.takes)}
+        runs: dict[str, list[Row]] = {
+            library: [] for library in chosen_libraries(options, case.takes)
+        }
         core = max(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 0
         for repeat in range(options.repeats):
             for library, done in runs.items():
                 if done and done[-1]["status"] != "ok":
                     continue
                 with console.status(f"{name}: {library}, {repeat + 1} of {options.repeats}"):
-                    task = {"shape": str(path), "library": library, "k": k, "core": core, "check": repeat == 0}
+                    task = {
+                        "shape": str(path),
+                        "library": library,
+                        "k": k,
+                        "core": core,
+                        "check": repeat == 0,
+                    }
                     done.append(run_worker(task, options.limit))
     rows = [
         {"case": name, "title": case.title, "n": n, "k": k, "library": library} | summary(done)
@@ -141,7 +161,10 @@ def measure(options: argparse.Namespace) -> Row:
     console, cases = Console(), chosen_cases(options)
     packages = sorted({library.package for library in LIBRARIES.values()})
     report = new_figures([*packages, *ALSO], repeats=options.repeats, limit=options.limit)
-    report |= {"calls": {name: library.call for name, library in LIBRARIES.items()}, "rows": kept(options.json, cases)}
+    report |= {
+        "calls": {name: library.call for name, library in LIBRARIES.items()},
+        "rows": kept(options.json, cases),
+    }
     for name, case in cases.items():
         rows = run_case(name, case, options, console)
         console.print(printed(rows))

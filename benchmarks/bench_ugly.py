@@ -63,7 +63,9 @@ def write_off(path: Path, vertices: np.ndarray, faces: np.ndarray) -> None:
 
 def ugly_files(folder: Path, options: Any) -> Iterator[tuple[str, Path]]:
     """Write the broken variants, and list them and the files found elsewhere with the name of their damage."""
-    for name, (vertices, faces) in broken_variants(sound_meshes(1 if options.quick else options.classes)):
+    for name, (vertices, faces) in broken_variants(
+        sound_meshes(1 if options.quick else options.classes)
+    ):
         shape, damage = name.rsplit("-", 1)
         path = folder / damage / f"{shape}.off"
         path.parent.mkdir(exist_ok=True)
@@ -141,7 +143,11 @@ def index_all(paths: list[Path], index: Path) -> dict[Path, Row]:
     share = done["seconds"] / len(paths)
     row: Row = {"verb": "index", "code": 0, "seconds": share, "printed": ""}
     answers = {path: row | {"path": str(path)} for path in paths}
-    failed = json.loads(done["printed"])["failed"] if done["printed"] else [[name, done["words"]] for name in links]
+    failed = (
+        json.loads(done["printed"])["failed"]
+        if done["printed"]
+        else [[name, done["words"]] for name in links]
+    )
     for name, words in failed:
         answers[links[name]] |= {"code": 3, "words": words}
     return {path: with_remedy(dict(answer), path, index) for path, answer in answers.items()}
@@ -157,7 +163,9 @@ def main() -> None:
     """Try all files, print the table, and name what was refused."""
     parser = options_of(__doc__)
     parser.add_argument("--more", type=Path, nargs="*", default=[], help="folders of further files")
-    parser.add_argument("--classes", type=int, default=N_CLASSES, help="classes whose smallest shape is broken")
+    parser.add_argument(
+        "--classes", type=int, default=N_CLASSES, help="classes whose smallest shape is broken"
+    )
     parser.add_argument("--only", help="only damages whose name holds this")
     options = parser.parse_args()
     report = Report(__file__, ["numpy", "scipy"], options, COLUMNS, cells)
@@ -168,7 +176,9 @@ def main() -> None:
         answers = try_all(files, index)
         refused = summarize(files, answers, report)
     for row in refused:
-        print(f"{row['verb']:9} {row['path']}: {row.get('remedy')} {row.get('remedy works', '')}\n    {row['words']}")
+        print(
+            f"{row['verb']:9} {row['path']}: {row.get('remedy')} {row.get('remedy works', '')}\n    {row['words']}"
+        )
     report.figures["refused"] = refused
     if options.json:
         dump(options.json, report.figures)
@@ -212,7 +222,9 @@ def try_all(files: list[tuple[str, Path]], index: Path) -> dict[tuple[str, Path]
     return answers
 
 
-def summarize(files: list[tuple[str, Path]], answers: dict[tuple[str, Path], Row], report: Report) -> list[Row]:
+def summarize(
+    files: list[tuple[str, Path]], answers: dict[tuple[str, Path], Row], report: Report
+) -> list[Row]:
     """Count answers by damage, of files that hold a surface, and return all refusals."""
     surfaces = {path: holds_a_surface(path) for _, path in files}
     totals: Counter[str] = Counter()
@@ -221,12 +233,16 @@ def summarize(files: list[tuple[str, Path]], answers: dict[tuple[str, Path], Row
         row: Row = {"damage": damage, "files": len(paths)}
         for verb in VERBS:
             row[verb] = sum(answers[verb, path]["code"] == 0 for path in paths)
-        row["slowest"] = max((answers[verb, path]["seconds"] for path in paths for verb in VERBS), default=0)
+        row["slowest"] = max(
+            (answers[verb, path]["seconds"] for path in paths for verb in VERBS), default=0
+        )
         totals.update({name: row[name] for name in ("files", *VERBS)})
         totals["slowest"] = max(totals["slowest"], row["slowest"])
         report.add(row)
     report.add({"damage": "all", **totals})
-    refused = [row | {"surface": surfaces[Path(row["path"])]} for row in answers.values() if row["code"]]
+    refused = [
+        row | {"surface": surfaces[Path(row["path"])]} for row in answers.values() if row["code"]
+    ]
     print(f"{sum(not held for held in surfaces.values())} files hold no face with an area.")
     return refused
 

@@ -17,7 +17,9 @@ def describe(packages: list[str]) -> dict[str, object]:
     """Name the processor, its cores, memory and load, the BLAS, and the versions of these packages."""
     np.ones((2, 2)) @ np.ones((2, 2))  # a BLAS is listed once it is loaded
     return {
-        "cpu": _field("/proc/cpuinfo", r"model name\s*:\s*(.+)") or platform.processor() or platform.machine(),
+        "cpu": _field("/proc/cpuinfo", r"model name\s*:\s*(.+)")
+        or platform.processor()
+        or platform.machine(),
         "cores": os.cpu_count(),
         "memory_gib": round(int(_field("/proc/meminfo", r"MemTotal:\s*(\d+)") or 0) / 2**20, 1),
         "load": [round(load, 2) for load in os.getloadavg()],

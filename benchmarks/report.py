@@ -13,7 +13,13 @@ from machine import describe
 
 TIE = 1.4
 END = "<!-- end -->\n"
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "IGL_NUM_THREADS")
+THREADS = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+    "IGL_NUM_THREADS",
+)
 Row = dict[str, Any]
 
 
@@ -21,9 +27,13 @@ def options_of(text: str | None, **settings: Any) -> argparse.ArgumentParser:
     """Return a parser with what every benchmark takes, and the first line of the script's text as its help."""
     parser = argparse.ArgumentParser(description=(text or "").splitlines()[0], **settings)
     parser.add_argument("--quick", action="store_true", help="something small, in seconds")
-    parser.add_argument("--repeats", type=int, default=3, help="runs of each, of which the median is taken")
+    parser.add_argument(
+        "--repeats", type=int, default=3, help="runs of each, of which the median is taken"
+    )
     parser.add_argument("--json", type=Path, help="write all figures")
-    parser.add_argument("--markdown", type=Path, help="write the table; into a page between its two marks")
+    parser.add_argument(
+        "--markdown", type=Path, help="write the table; into a page between its two marks"
+    )
     return parser
 
 
@@ -57,7 +67,12 @@ class Report:
         cells: Callable[[Row], Sequence[str]],
     ) -> None:
         """Take the script's `__file__`, and how it makes texts of a row; the first names what rows have in common."""
-        self.script, self.options, self.columns, self.cells = Path(script).name, options, columns, cells
+        self.script, self.options, self.columns, self.cells = (
+            Path(script).name,
+            options,
+            columns,
+            cells,
+        )
         self.figures = new_figures(packages, repeats=options.repeats)
 
     def add(self, row: Row) -> None:
@@ -71,7 +86,11 @@ class Report:
         """Write the table, if one was asked for."""
         if self.options.markdown:
             rows = [self.cells(row) for row in self.figures["rows"]]
-            put(self.options.markdown, f"{measured_on(self.figures)}\n\n{table(self.columns, rows)}", self.script)
+            put(
+                self.options.markdown,
+                f"{measured_on(self.figures)}\n\n{table(self.columns, rows)}",
+                self.script,
+            )
 
 
 def new_figures(packages: list[str], **settings: object) -> dict[str, Any]:

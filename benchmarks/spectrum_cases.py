@@ -33,7 +33,7 @@ class Case:
             mesh = self.make()
             np.savez(path, vertices=mesh.vertices, faces=mesh.faces)
             return mesh.n_points
-        graph = es.neighbor_graph(self.make(), self.neighbors).tocoo()
+        graph = es.operators.neighbor_graph(self.make(), self.neighbors).tocoo()
         np.savez(path, n=graph.shape[0], rows=graph.row, columns=graph.col, weights=graph.data)
         return graph.shape[0]
 
@@ -46,19 +46,29 @@ def real(title: str, path: str, k: int = 300) -> Case:
 FULL = {
     "sphere-10k": Case("icosphere", lambda: es.icosphere(5), 300),
     "sphere-40k": Case("icosphere", lambda: es.icosphere(6), 300),
-    "sphere-160k": Case("Fibonacci sphere", lambda: es.fibonacci_sphere(160_000), 50),
+    "sphere-160k": Case("Fibonacci sphere", lambda: es.shapes.fibonacci_sphere(160_000), 50),
     "glasses": real("glasses (psb58)", "retrieval/glasses/psb58.ply"),
     "octopus": real("octopus (psb124)", "retrieval/octopus/psb124.ply"),
     "airplane": real("airplane (psb66)", "retrieval/airplane/psb66.ply"),
     "armadillo": real("armadillo", "classics/armadillo.obj"),
     "dragon": real("dragon", "classics/dragon.off"),
-    "graph-sphere": Case("10 neighbours, sphere", lambda: np.array(es.fibonacci_sphere(10_000).vertices), 50, 10),
+    "graph-sphere": Case(
+        "10 neighbours, sphere",
+        lambda: np.array(es.shapes.fibonacci_sphere(10_000).vertices),
+        50,
+        10,
+    ),
     "graph-bunny": Case(
-        "10 neighbours, bunny", lambda: np.asarray(es.read_points(DATA / "points" / "bunny16k.pts").points), 50, 10
+        "10 neighbours, bunny",
+        lambda: np.asarray(es.read_points(DATA / "points" / "bunny16k.pts").points),
+        50,
+        10,
     ),
 }
 QUICK = {
     "sphere": Case("icosphere", lambda: es.icosphere(3), 30),
-    "torus": Case("torus", lambda: es.torus(36, 24), 30),
-    "graph": Case("8 neighbours, sphere", lambda: np.array(es.fibonacci_sphere(800).vertices), 20, 8),
+    "torus": Case("torus", lambda: es.shapes.torus(36, 24), 30),
+    "graph": Case(
+        "8 neighbours, sphere", lambda: np.array(es.shapes.fibonacci_sphere(800).vertices), 20, 8
+    ),
 }

@@ -55,7 +55,7 @@ def _our_mesh(shape: Shape) -> es.Laplacian:
 
 
 def _our_graph(shape: Shape) -> es.Laplacian:
-    return es.graph_laplacian(shape["adjacency"], "normalized")
+    return es.operators.graph_laplacian(shape["adjacency"], "normalized")
 
 
 def _our_solve(laplacian: es.Laplacian, k: int) -> tuple[np.ndarray, np.ndarray]:
@@ -98,13 +98,17 @@ def _igl(shape: Shape) -> tuple[sp.sparray, sp.sparray]:
     import igl
 
     vertices, faces = shape["vertices"], shape["faces"]
-    return -igl.cotmatrix(vertices, faces), igl.massmatrix(vertices, faces, igl.MASSMATRIX_TYPE_VORONOI)
+    return -igl.cotmatrix(vertices, faces), igl.massmatrix(
+        vertices, faces, igl.MASSMATRIX_TYPE_VORONOI
+    )
 
 
 def _igl_eigs(state: tuple[sp.sparray, sp.sparray], k: int) -> tuple[np.ndarray, np.ndarray]:
     from igl import spectra
 
-    vectors, values = spectra.eigs(sp.csc_matrix(state[0]), sp.csc_matrix(state[1]), k, spectra.EIGS_TYPE_SM)
+    vectors, values = spectra.eigs(
+        sp.csc_matrix(state[0]), sp.csc_matrix(state[1]), k, spectra.EIGS_TYPE_SM
+    )
     order = np.argsort(np.ravel(values))  # it returns them descending
     return np.ravel(values)[order], vectors[:, order]
 
@@ -122,28 +126,52 @@ def _pyfm_solve(mesh: Any, k: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _sklearn(shape: Shape) -> sp.csr_matrix:
     adjacency = sp.csr_matrix(shape["adjacency"])
-    adjacency.indices, adjacency.indptr = adjacency.indices.astype(np.int32), adjacency.indptr.astype(np.int32)
+    adjacency.indices, adjacency.indptr = (
+        adjacency.indices.astype(np.int32),
+        adjacency.indptr.astype(np.int32),
+    )
     return adjacency  # the indices that it takes
 
 
 def _sklearn_solve(adjacency: sp.csr_array, k: int) -> tuple[None, np.ndarray]:
     from sklearn.manifold import spectral_embedding
 
-    return None, spectral_embedding(adjacency, n_components=k, eigen_solver="arpack", random_state=0, drop_first=False)
+    return None, spectral_embedding(
+        adjacency, n_components=k, eigen_solver="arpack", random_state=0, drop_first=False
+    )
 
 
 def _normalized(adjacency: sp.csr_array) -> tuple[sp.sparray, sp.sparray]:
-    return _our_matrices(es.graph_laplacian(adjacency, "normalized"))
+    return _our_matrices(es.operators.graph_laplacian(adjacency, "normalized"))
 
 
 LIBRARIES = {
     "eigenshape": Library(
-        _our_mesh, _our_solve, _our_matrices, "mesh", "eigenshape", "solve_spectrum(cotangent_laplacian(mesh), k)"
+        _our_mesh,
+        _our_solve,
+        _our_matrices,
+        "mesh",
+        "eigenshape",
+        "solve_spectrum(cotangent_laplacian(mesh), k)",
     ),
-    "scipy ARPACK": Library(_our_mesh, _arpack, _our_matrices, "mesh", "scipy", "eigsh(W, k, B, sigma=-0.01)"),
-    "LaPy": Library(_lapy(lump=False), _lapy_solve, _lapy_matrices, "mesh", "lapy", "Solver(TriaMesh(v, f)).eigs(k)"),
+    "scipy ARPACK": Library(
+        _our_mesh, _arpack, _our_matrices, "mesh", "scipy", "eigsh(W, k, B, sigma=-0.01)"
+    ),
+    "LaPy": Library(
+        _lapy(lump=False),
+        _lapy_solve,
+        _lapy_matrices,
+        "mesh",
+        "lapy",
+        "Solver(TriaMesh(v, f)).eigs(k)",
+    ),
     "LaPy, lumped": Library(
-        _lapy(lump=True), _lapy_solve, _lapy_matrices, "mesh", "lapy", "Solver(TriaMesh(v, f), lump=True).eigs(k)"
+        _lapy(lump=True),
+        _lapy_solve,
+        _lapy_matrices,
+        "mesh",
+        "lapy",
+        "Solver(TriaMesh(v, f), lump=True).eigs(k)",
     ),
     "robust_laplacian": Library(
         _robust,
@@ -161,7 +189,9 @@ LIBRARIES = {
         "libigl",
         'eigsh(-cotmatrix(v, f), k, massmatrix(v, f), sigma=0, which="LM")',
     ),
-    "libigl, eigs": Library(_igl, _igl_eigs, lambda state: state, "mesh", "libigl", "spectra.eigs(W, M, k, SM)"),
+    "libigl, eigs": Library(
+        _igl, _igl_eigs, lambda state: state, "mesh", "libigl", "spectra.eigs(W, M, k, SM)"
+    ),
     "pyFM": Library(
         _pyfm,
         _pyfm_solve,
@@ -171,7 +201,12 @@ LIBRARIES = {
         "TriMesh(v, f).process(k=k)",
     ),
     "eigenshape, graph": Library(
-        _our_graph, _our_solve, _our_matrices, "graph", "eigenshape", 'solve_spectrum(graph_laplacian(A, "normalized"))'
+        _our_graph,
+        _our_solve,
+        _our_matrices,
+        "graph",
+        "eigenshape",
+        'solve_spectrum(graph_laplacian(A, "normalized"))',
     ),
     "scipy ARPACK, graph": Library(
         _our_graph, _arpack, _our_matrices, "graph", "scipy", "eigsh(D - A, k, D, sigma=-0.01)"

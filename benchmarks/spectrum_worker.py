@@ -39,7 +39,7 @@ def warm_up(library: Library) -> None:
     """Solve something small, by the road that large ones take."""
     sphere = es.icosphere(3)
     shape = {"vertices": np.array(sphere.vertices), "faces": np.array(sphere.faces)}
-    shape["adjacency"] = es.neighbor_graph(sphere.vertices, 6)
+    shape["adjacency"] = es.operators.neighbor_graph(sphere.vertices, 6)
     try:
         library.solve(library.build(shape), 20)
     except Exception as err:  # noqa: BLE001  (what fails on the real shape is reported there)
@@ -56,13 +56,23 @@ def measured(
     state = library.build(shape)
     built = time.process_time()
     values, vectors = library.solve(state, k)
-    took = {"cpu": time.process_time() - cpu, "wall": time.perf_counter() - wall, "cpu_build": built - cpu}
+    took = {
+        "cpu": time.process_time() - cpu,
+        "wall": time.perf_counter() - wall,
+        "cpu_build": built - cpu,
+    }
     peak = peak_memory()
     stiffness, mass = pencil(library, state)
     if values is None:  # vectors only: their Rayleigh quotients
-        values = (vectors * (stiffness @ vectors)).sum(axis=0) / (vectors * (mass @ vectors)).sum(axis=0)
+        values = (vectors * (stiffness @ vectors)).sum(axis=0) / (vectors * (mass @ vectors)).sum(
+            axis=0
+        )
     order = np.argsort(values)
-    return took | {"memory": peak - level, "memory_peak": peak}, (values[order], vectors[:, order]), (stiffness, mass)
+    return (
+        took | {"memory": peak - level, "memory_peak": peak},
+        (values[order], vectors[:, order]),
+        (stiffness, mass),
+    )
 
 
 def worst_residual(values: np.ndarray, vectors: np.ndarray, matrices: Matrices) -> float:

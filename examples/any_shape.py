@@ -8,22 +8,30 @@ import eigenshape as es
 
 def inverse_length_laplacian(mesh: es.TriangleMesh) -> es.Laplacian:
     """Weigh each edge by one over its length, as somebody might who wants an operator of their own."""
-    edges = es.edge_table(mesh).edges
-    half = sp.coo_array((1 / es.edge_lengths(mesh), edges.T), shape=(mesh.n_vertices,) * 2).tocsr()
+    edges = es.geometry.edge_table(mesh).edges
+    half = sp.coo_array(
+        (1 / es.geometry.edge_lengths(mesh), edges.T), shape=(mesh.n_vertices,) * 2
+    ).tocsr()
     weights = half + half.T
-    return es.Laplacian(sp.diags_array(weights.sum(axis=1)) - weights, sp.diags_array(es.dual_volumes(mesh)).tocsr())
+    return es.Laplacian(
+        sp.diags_array(weights.sum(axis=1)) - weights,
+        sp.diags_array(es.geometry.dual_volumes(mesh)).tocsr(),
+    )
 
 
 def main() -> dict[str, np.ndarray]:
     """Solve four shapes by their usual operators, and ask which laws an operator of our own keeps."""
-    sphere = es.fibonacci_sphere(1000)
+    sphere = es.shapes.fibonacci_sphere(1000)
     shapes = {
         "sphere": sphere,
-        "box": es.box(6, 6, 6),
-        "interval": es.interval(100),
+        "box": es.shapes.box(6, 6, 6),
+        "interval": es.shapes.interval(100),
         "points": es.PointCloud(sphere.vertices, dim=2),
     }
-    spectra = {name: es.solve_spectrum(es.build_laplacian(shape), 4).eigenvalues for name, shape in shapes.items()}
+    spectra = {
+        name: es.solve_spectrum(es.build_laplacian(shape), 4).eigenvalues
+        for name, shape in shapes.items()
+    }
     noisy = es.mesh_laplacian(sphere, correct="log", form="random-walk")
     spectra["sphere, by a kernel"] = es.solve_spectrum(noisy, 4).eigenvalues
 

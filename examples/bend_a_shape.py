@@ -15,25 +15,37 @@ def main(folder: Path) -> dict[str, es.TriangleMesh]:
     """Edit a giraffe in a session, and replay the edits on a mesh with four times the faces."""
     giraffe = es.make_creature("giraffe", 1, n_vertices=3000)
     low, high = giraffe.vertices.min(axis=0), giraffe.vertices.max(axis=0)
-    head = es.Box([-np.inf, low[1] + 0.8 * (high - low)[1], -np.inf], [np.inf] * 3)
-    rim = es.region_boundary(giraffe, es.region_mask(giraffe, head))
+    head = es.deformation.BoxRegion(
+        [-np.inf, low[1] + 0.8 * (high - low)[1], -np.inf], [np.inf] * 3
+    )
+    rim = es.deformation.region_boundary(giraffe, es.deformation.region_mask(giraffe, head))
 
     session = es.DeformationSession(es.rig_shape(giraffe))
-    for degrees in (10, 20, 30):  # as a hand would drag: each shows the eigen-skeleton, and costs a millisecond
-        session.drag(head, es.Rotation(giraffe.vertices[rim].mean(axis=0), [1, 0, 0], np.deg2rad(degrees)))
+    for degrees in (
+        10,
+        20,
+        30,
+    ):  # as a hand would drag: each shows the eigen-skeleton, and costs a millisecond
+        session.drag(
+            head, es.Rotation(giraffe.vertices[rim].mean(axis=0), [1, 0, 0], np.deg2rad(degrees))
+        )
     nodding = session.commit()
 
     foot = int(np.argmin(nodding.vertices @ [0.0, 1.0, -0.2]))
-    session.drag(es.Brush(nodding.vertices[foot], 0.15 * (high - low)[1]), es.Translation([0, 0.05, 0.05]))
+    session.drag(
+        es.deformation.BrushRegion(nodding.vertices[foot], 0.15 * (high - low)[1]),
+        es.Translation([0, 0.05, 0.05]),
+    )
     lifted = session.commit()
     session.undo()
     session.redo()
 
-    es.write_edits(session.edits, giraffe, folder / "edits.json")
-    edits = es.read_edits(folder / "edits.json", giraffe)
-    again = es.replay(es.rig_shape(es.subdivide(giraffe)), edits).mesh
+    es.io.write_edits(session.edits, giraffe, folder / "edits.json")
+    edits = es.io.read_edits(folder / "edits.json", giraffe)
+    again = es.deformation.replay(es.rig_shape(es.shapes.subdivide(giraffe)), edits).mesh
     es.save_figure(
-        es.figure_poses({"as made": giraffe, "bent": lifted}, session_shares(giraffe, lifted)), folder / "giraffe.png"
+        es.plot.figure_poses({"as made": giraffe, "bent": lifted}, session_shares(giraffe, lifted)),
+        folder / "giraffe.png",
     )
     return {"as made": giraffe, "nodding": nodding, "lifted": lifted, "again, finer": again}
 
@@ -47,4 +59,6 @@ def session_shares(before: es.TriangleMesh, after: es.TriangleMesh) -> np.ndarra
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as temporary:
         for name, mesh in main(Path(temporary)).items():
-            print(f"{name:14} {mesh.n_vertices:6,} vertices, head at {mesh.vertices[:, 1].max():.3f}")
+            print(
+                f"{name:14} {mesh.n_vertices:6,} vertices, head at {mesh.vertices[:, 1].max():.3f}"
+            )

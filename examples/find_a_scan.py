@@ -1,6 +1,6 @@
 """Find the kind of a noisy scan from one side, in a pose that the index has not seen, and which points correspond.
 
-Made-up creatures stand in for a folder of scans; `read_mesh("scan.ply")` takes their place with real files.
+Synthetic creatures stand in for a folder of scans; with files, read each by `es.read_mesh("scan.ply")`.
 """
 
 import tempfile
@@ -11,22 +11,23 @@ import numpy as np
 import eigenshape as es
 
 
-def main(folder: Path) -> list[es.Match]:
+def main(folder: Path) -> list[es.retrieval.Match]:
     """Index two poses of three creatures by patches, and ask for what one side of a third pose shows, with noise."""
-    recipe = es.PatchRecipe(es.made_codebook())  # es.train_codebook learns words from shapes of yours
     index = es.ShapeIndex.create(folder / "creatures")
     for kind in ("biped", "octopus", "fish"):
         for pose in range(2):
-            index.add(f"{kind}-{pose}", es.describe_to_keep(es.make_creature(kind, pose), recipe), label=kind)
+            index.add(f"{kind}-{pose}", es.make_creature(kind, pose), label=kind)
 
     rng = np.random.default_rng(1)
     seen = es.partial_scan(es.make_creature("octopus", 7), rng).mesh
-    noise = 0.2 * es.edge_lengths(seen).mean() * rng.standard_normal(seen.vertices.shape)
+    noise = 0.2 * es.geometry.edge_lengths(seen).mean() * rng.standard_normal(seen.vertices.shape)
     scan = es.TriangleMesh(seen.vertices + noise, seen.faces)
-    return index.query(es.describe_shape(scan, recipe), n_matches=3)
+    return index.query(scan, n_matches=3)
 
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as temporary:
         for match in main(Path(temporary)):
-            print(f"{match.name:12} {match.score:8.3f}  {len(match.correspondences)} corresponding points")
+            print(
+                f"{match.name:12} {match.score:8.3f}  {len(match.correspondences)} corresponding points"
+            )

@@ -10,20 +10,26 @@ import numpy as np
 
 import eigenshape as es
 
-PLAN = es.StabilityPlan(k=12, n_samples=500)
+PLAN = es.stability.StabilityPlan(k=12, n_samples=500)
 
 
-def main(folder: Path) -> dict[str, es.StabilityReport]:
+def main(folder: Path) -> dict[str, es.stability.StabilityReport]:
     """Compare a giraffe with a noisy one and with one that stands otherwise."""
     giraffe = es.make_creature("giraffe", 0, n_vertices=1500)
-    heights = 0.2 * es.mean_side_length(giraffe) * np.random.default_rng(0).standard_normal((giraffe.n_vertices, 1))
+    heights = (
+        0.2
+        * es.geometry.mean_side_length(giraffe)
+        * np.random.default_rng(0).standard_normal((giraffe.n_vertices, 1))
+    )
     others = {
-        "noisy": es.TriangleMesh(giraffe.vertices + heights * es.vertex_normals(giraffe), giraffe.faces),
+        "noisy": es.TriangleMesh(
+            giraffe.vertices + heights * es.geometry.vertex_normals(giraffe), giraffe.faces
+        ),
         "posed": es.make_creature("giraffe", 1, n_vertices=1500),
     }
     reports = {name: es.compare_shapes(giraffe, other, PLAN) for name, other in others.items()}
     for name, report in reports.items():
-        figure = es.figure_stability(report, giraffe, others[name], titles=("giraffe", name))
+        figure = es.plot.figure_stability(report, giraffe, others[name], titles=("giraffe", name))
         es.save_figure(figure, folder / f"{name}.png")
     return reports
 

@@ -19,7 +19,11 @@ def parse_arguments(doc: str, folder: Path) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=doc.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="a smaller form, in seconds")
     parser.add_argument("--out", type=output_file, help="write the figures as JSON")
-    parser.add_argument("--figures", type=output_folder, help="folder for the pictures; by default this experiment's")
+    parser.add_argument(
+        "--figures",
+        type=output_folder,
+        help="folder for the pictures; by default this experiment's",
+    )
     arguments = parser.parse_args()
     if arguments.figures is None and not arguments.quick:
         arguments.figures = folder
@@ -35,7 +39,9 @@ def finish(results: object, pictures: Mapping[str, Figure], arguments: argparse.
                 es.save_figure(figure, arguments.figures / f"{name}.{suffix}")
 
 
-def chart(width: float = 7.5, height: float = 4.6, *, columns: int = 1) -> tuple[Figure, np.ndarray]:
+def chart(
+    width: float = 7.5, height: float = 4.6, *, columns: int = 1
+) -> tuple[Figure, np.ndarray]:
     """Return a figure and its panels, side by side."""
     figure = Figure(figsize=(width, height), layout="constrained", dpi=110)
     panels = figure.subplots(1, columns, squeeze=False)[0]

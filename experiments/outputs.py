@@ -13,7 +13,9 @@ def output_folder(text: str) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as err:
-        raise argparse.ArgumentTypeError(f"the folder {folder} cannot be made: {err.strerror}") from err
+        raise argparse.ArgumentTypeError(
+            f"the folder {folder} cannot be made: {err.strerror}"
+        ) from err
     if not os.access(folder, os.W_OK):
         raise argparse.ArgumentTypeError(f"the folder {folder} cannot be written to")
     return folder

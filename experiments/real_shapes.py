@@ -9,7 +9,9 @@ import numpy as np
 
 import eigenshape as es
 
-DATA = Path(os.environ.get("EIGENSHAPE_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+DATA = Path(
+    os.environ.get("EIGENSHAPE_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")
+)
 
 
 def manifest() -> list[dict[str, str]]:
@@ -26,6 +28,6 @@ def require_data() -> None:
 
 def inner_curvature(mesh: es.TriangleMesh) -> np.ndarray:
     """Return the Gaussian curvature; on a boundary, where it is none, the least inside."""
-    values, edge = es.gaussian_curvature(mesh), es.boundary_vertices(mesh)
+    values, edge = es.geometry.gaussian_curvature(mesh), es.geometry.boundary_vertices(mesh)
     values[edge] = np.delete(values, edge).min()
     return values

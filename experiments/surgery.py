@@ -44,17 +44,21 @@ def disc_of_faces(mesh: es.TriangleMesh, vertex: int, radius: float) -> np.ndarr
     """
     away = np.linalg.norm(mesh.vertices - mesh.vertices[vertex], axis=1)
     inside = _at_vertex(mesh, (away[mesh.faces] <= radius).all(axis=1), vertex)
-    component = es.vertex_components(mesh)[1][mesh.faces[:, 0]]
+    component = es.geometry.vertex_components(mesh)[1][mesh.faces[:, 0]]
     outside = ~inside & (component == component[inside][0])
     if outside.any():
         pieces = _pieces(mesh, outside)
         inside |= outside & (pieces != np.bincount(pieces[outside]).argmax())
     part = es.TriangleMesh(mesh.vertices, mesh.faces[inside])
-    loops = es.boundary_loops(part)
-    if es.euler_characteristic(part) != 1 or len(loops) != 1 or not es.is_manifold(part):
+    loops = es.geometry.boundary_loops(part)
+    if (
+        es.geometry.euler_characteristic(part) != 1
+        or len(loops) != 1
+        or not es.geometry.is_manifold(part)
+    ):
         raise es.InvalidParameterError(
             f"Faces within the radius must form a disc; those within {radius:.4g} of vertex {vertex} have Euler "
-            f"characteristic {es.euler_characteristic(part)} and {len(loops)} rims. Choose another radius."
+            f"characteristic {es.geometry.euler_characteristic(part)} and {len(loops)} rims. Choose another radius."
         )
     return inside
 
@@ -72,13 +76,17 @@ def _at_vertex(mesh: es.TriangleMesh, near: np.ndarray, vertex: int) -> np.ndarr
 
 def _pieces(mesh: es.TriangleMesh, chosen: np.ndarray) -> np.ndarray:
     """Tell apart the pieces, joined across edges, that chosen faces form: give each face the number of its piece."""
-    table = es.edge_table(mesh)
+    table = es.geometry.edge_table(mesh)
     faces, edges = np.repeat(np.flatnonzero(chosen), 3), table.face_edges[chosen].ravel()
-    touch = sp.coo_array((np.ones(len(faces)), (faces, edges)), shape=(mesh.n_faces, len(table.edges))).tocsr()
+    touch = sp.coo_array(
+        (np.ones(len(faces)), (faces, edges)), shape=(mesh.n_faces, len(table.edges))
+    ).tocsr()
     return connected_components(touch @ touch.T, directed=False)[1]
 
 
-def bridge(mesh: es.TriangleMesh, vertex_a: int, vertex_b: int, radius: float, *, bulge: float = 0.0) -> Surgery:
+def bridge(
+    mesh: es.TriangleMesh, vertex_a: int, vertex_b: int, radius: float, *, bulge: float = 0.0
+) -> Surgery:
     """Cut a disc out around each of two vertices and put a straight tube between the rims.
 
     The ends may lie on two surfaces, which are joined, or on one, which gains a handle. Both discs are X_0, the tube
@@ -90,7 +98,10 @@ def bridge(mesh: es.TriangleMesh, vertex_a: int, vertex_b: int, radius: float, *
         If a disc cannot be cut out, or the discs share a vertex.
     """
     discs = [disc_of_faces(mesh, vertex, radius) for vertex in (vertex_a, vertex_b)]
-    rim_a, rim_b = (es.boundary_loops(es.TriangleMesh(mesh.vertices, mesh.faces[disc]))[0] for disc in discs)
+    rim_a, rim_b = (
+        es.geometry.boundary_loops(es.TriangleMesh(mesh.vertices, mesh.faces[disc]))[0]
+        for disc in discs
+    )
     shared = np.intersect1d(*(mesh.faces[disc] for disc in discs))
     if len(shared):
         raise es.InvalidParameterError(
@@ -105,9 +116,11 @@ def bridge(mesh: es.TriangleMesh, vertex_a: int, vertex_b: int, radius: float, *
     return Surgery(mesh, two, np.where(gone, 0, -1), regions_two)
 
 
-def attach(mesh: es.TriangleMesh, other: es.TriangleMesh, vertex: int, end: int, radius: float) -> Surgery:
+def attach(
+    mesh: es.TriangleMesh, other: es.TriangleMesh, vertex: int, end: int, radius: float
+) -> Surgery:
     """Join another surface to one by a bridge between their vertices: N grew out of a disc of M, which is X_0."""
-    joined = bridge(es.disjoint_union(mesh, other), vertex, mesh.n_vertices + end, radius)
+    joined = bridge(es.shapes.disjoint_union(mesh, other), vertex, mesh.n_vertices + end, radius)
     regions_one = joined.regions_one[: mesh.n_faces]
     kept = int((regions_one < 0).sum())
     regions_two = np.where(np.arange(joined.two.n_faces) < kept, -1, 0)
@@ -133,7 +146,9 @@ def widened(surgery: Surgery, by: float) -> Surgery:
     return Surgery(one, surgery.two, np.where(wider, 0, -1), regions_two)
 
 
-def _tube(vertices: np.ndarray, rim_a: np.ndarray, rim_b: np.ndarray, bulge: float) -> tuple[np.ndarray, np.ndarray]:
+def _tube(
+    vertices: np.ndarray, rim_a: np.ndarray, rim_b: np.ndarray, bulge: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the new points of a tube and its faces; rims run as in the discs that they bounded."""
     start, far = vertices[rim_a], rim_b[::-1]
     far = np.roll(far, -_best_start(start, vertices[far]))
@@ -148,7 +163,10 @@ def _tube(vertices: np.ndarray, rim_a: np.ndarray, rim_b: np.ndarray, bulge: flo
     numbers = np.vstack([rim_a, len(vertices) + np.arange((layers - 1) * n).reshape(-1, n)])
     here, there = numbers[:-1], numbers[1:]
     ahead, across = np.roll(here, -1, axis=1), np.roll(there, -1, axis=1)
-    bands = [np.stack(corners, axis=-1).reshape(-1, 3) for corners in ((here, ahead, across), (here, across, there))]
+    bands = [
+        np.stack(corners, axis=-1).reshape(-1, 3)
+        for corners in ((here, ahead, across), (here, across, there))
+    ]
     last = rings[-1] if layers > 1 else start
     zipped = _zip(numbers[-1], far, (_shares(last), _shares(vertices[far])))
     return rings.reshape(-1, 3), np.vstack([*bands, zipped])
@@ -168,7 +186,10 @@ def _resampled(loop: np.ndarray, shares: np.ndarray) -> np.ndarray:
 def _best_start(near: np.ndarray, far: np.ndarray) -> int:
     """Return from which point on the far loop runs closest to the near one, both seen from their middles."""
     near, far, shares = near - near.mean(axis=0), far - far.mean(axis=0), _shares(near)
-    costs = [((_resampled(np.roll(far, -first, axis=0), shares) - near) ** 2).sum() for first in range(len(far))]
+    costs = [
+        ((_resampled(np.roll(far, -first, axis=0), shares) - near) ** 2).sum()
+        for first in range(len(far))
+    ]
     return int(np.argmin(costs))
 
 

@@ -50,7 +50,9 @@ def with_slivers(mesh, rng, count=1):
     a, b, c = mesh.faces[split].T
     share = rng.uniform(0.1, 0.9, (count, 1))
     new = mesh.n_vertices + np.arange(count)
-    points = np.concatenate([mesh.vertices, (1 - share) * mesh.vertices[a] + share * mesh.vertices[b]])
+    points = np.concatenate(
+        [mesh.vertices, (1 - share) * mesh.vertices[a] + share * mesh.vertices[b]]
+    )
     pieces = [np.column_stack(corners) for corners in ((a, new, c), (new, b, c), (a, b, new))]
     return TriangleMesh(points, np.concatenate([np.delete(mesh.faces, split, axis=0), *pieces]))
 
@@ -65,7 +67,9 @@ def with_specks(mesh, rng, count=5):
     """Add tiny closed pieces around a mesh."""
     speck = icosphere(0)
     places = 5 + 9 * rng.random((count, 3))
-    return disjoint_union(mesh, *[TriangleMesh(0.01 * speck.vertices + place, speck.faces) for place in places])
+    return disjoint_union(
+        mesh, *[TriangleMesh(0.01 * speck.vertices + place, speck.faces) for place in places]
+    )
 
 
 def cut_open(mesh, rng):
@@ -80,13 +84,19 @@ def cut_open(mesh, rng):
 
 def moebius(n=24, n_across=3):
     """Build a strip with a half turn, its last column glued to the first upside down."""
-    u, v = np.meshgrid(2 * np.pi * np.arange(n) / n, np.linspace(-0.3, 0.3, n_across + 1), indexing="ij")
+    u, v = np.meshgrid(
+        2 * np.pi * np.arange(n) / n, np.linspace(-0.3, 0.3, n_across + 1), indexing="ij"
+    )
     rim = 1 + v * np.cos(u / 2)
     points = np.stack([rim * np.cos(u), rim * np.sin(u), v * np.sin(u / 2)], axis=-1).reshape(-1, 3)
     at = np.arange(n * (n_across + 1)).reshape(n, -1)
     at = np.vstack([at, at[0, ::-1]])
-    here, below, right, across = (part.ravel() for part in (at[:-1, :-1], at[1:, :-1], at[:-1, 1:], at[1:, 1:]))
-    faces = np.concatenate([np.column_stack([here, below, across]), np.column_stack([here, across, right])])
+    here, below, right, across = (
+        part.ravel() for part in (at[:-1, :-1], at[1:, :-1], at[:-1, 1:], at[1:, 1:])
+    )
+    faces = np.concatenate(
+        [np.column_stack([here, below, across]), np.column_stack([here, across, right])]
+    )
     return TriangleMesh(points, faces)
 
 

@@ -31,7 +31,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     # unless CI asks for them to be there
     if DATA.is_dir() or os.environ.get("EIGENSHAPE_REQUIRE_DATA"):
         return
-    skip = pytest.mark.skip(reason=f"real shapes are absent: {DATA} is not a folder (set EIGENSHAPE_DATA)")
+    skip = pytest.mark.skip(
+        reason=f"real shapes are absent: {DATA} is not a folder (set EIGENSHAPE_DATA)"
+    )
     for item in items:
         if "data" in item.keywords:
             item.add_marker(skip)

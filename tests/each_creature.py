@@ -5,4 +5,6 @@ import pytest
 from eigenshape.shapes.creatures import CREATURES
 
 QUICK = ("octopus", "quadruped")
-KINDS = [kind if kind in QUICK else pytest.param(kind, marks=pytest.mark.long) for kind in CREATURES]
+KINDS = [
+    kind if kind in QUICK else pytest.param(kind, marks=pytest.mark.long) for kind in CREATURES
+]

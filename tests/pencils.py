@@ -23,7 +23,8 @@ def graph(adjacency, mass=None) -> Laplacian:
     adjacency = sp.csr_array(adjacency, dtype=np.float64)
     masses = np.ones(adjacency.shape[0]) if mass is None else mass
     return Laplacian(
-        sp.csr_array(sp.diags_array(adjacency.sum(axis=1)) - adjacency), sp.csr_array(sp.diags_array(masses))
+        sp.csr_array(sp.diags_array(adjacency.sum(axis=1)) - adjacency),
+        sp.csr_array(sp.diags_array(masses)),
     )
 
 

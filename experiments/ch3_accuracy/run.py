@@ -32,7 +32,10 @@ LINEAR: dict[str, Build] = {
     "cotangent, consistent": lambda mesh: es.cotangent_laplacian(mesh, "consistent"),
     "cotangent, averaged": lambda mesh: es.cotangent_laplacian(mesh, "averaged"),
 }
-HIGHER: dict[str, Build] = {"P2": es.fem_laplacian, "P3": lambda mesh: es.fem_laplacian(mesh, 3)}
+HIGHER: dict[str, Build] = {
+    "P2": es.operators.fem_laplacian,
+    "P3": lambda mesh: es.operators.fem_laplacian(mesh, 3),
+}
 KERNELS: dict[str, Build] = {
     "mesh, literal": es.mesh_laplacian,
     "mesh, corrected": lambda mesh: es.mesh_laplacian(mesh, correct="log"),
@@ -43,11 +46,17 @@ SURFACES: dict[str, Build] = {
     "mesh, geodesic": lambda mesh: es.mesh_laplacian(mesh, correct="log", distance="geodesic"),
 }
 POINTS: dict[str, Build] = {
-    "point cloud": lambda mesh: es.point_cloud_laplacian(es.PointCloud(mesh.points, mesh.dim), correct="log"),
+    "point cloud": lambda mesh: es.point_cloud_laplacian(
+        es.PointCloud(mesh.points, mesh.dim), correct="log"
+    ),
 }
-CLOSED = LINEAR | {"P2": es.fem_laplacian} | SURFACES | KERNELS | POINTS
+CLOSED = LINEAR | {"P2": es.operators.fem_laplacian} | SURFACES | KERNELS | POINTS
 FLAT = LINEAR | HIGHER | {"mesh, corrected": KERNELS["mesh, corrected"]} | POINTS
-SOLID = LINEAR | {"P2": es.fem_laplacian, "mesh, corrected": KERNELS["mesh, corrected"]} | POINTS
+SOLID = (
+    LINEAR
+    | {"P2": es.operators.fem_laplacian, "mesh, corrected": KERNELS["mesh, corrected"]}
+    | POINTS
+)
 
 
 def icosphere(n: int) -> es.TriangleMesh:
@@ -58,7 +67,7 @@ def icosphere(n: int) -> es.TriangleMesh:
 def flat_torus(n: int) -> es.SimplicialMesh:
     """Return the product of two circles in R⁴, its vertices moved about at random in the flat plane."""
     side = int(n**0.5)
-    sheet = es.irregular_grid(side, side, rng=np.random.default_rng(0))
+    sheet = es.shapes.irregular_grid(side, side, rng=np.random.default_rng(0))
     u, v = 2 * np.pi * sheet.vertices[:, :2].T
     points = np.column_stack([np.cos(u), np.sin(u), np.cos(v), np.sin(v)])
     _, first, names = np.unique(np.round(points, 9), axis=0, return_index=True, return_inverse=True)
@@ -67,77 +76,107 @@ def flat_torus(n: int) -> es.SimplicialMesh:
 
 def random_sphere(n: int) -> es.TriangleMesh:
     """Return random points on the sphere, the same at every run."""
-    return es.random_sphere(n, rng=np.random.default_rng(1))
+    return es.shapes.random_sphere(n, rng=np.random.default_rng(1))
 
 
 def square(n: int) -> es.TriangleMesh:
     """Return the unit square in irregular triangles."""
     side = int(n**0.5)
-    return es.irregular_grid(side, side, rng=np.random.default_rng(0))
+    return es.shapes.irregular_grid(side, side, rng=np.random.default_rng(0))
 
 
 Case = tuple[
-    Callable[[int], "es.TriangleMesh | es.SimplicialMesh"], Callable[[int], np.ndarray], dict[str, Build], bool
+    Callable[[int], "es.TriangleMesh | es.SimplicialMesh"],
+    Callable[[int], np.ndarray],
+    dict[str, Build],
+    bool,
 ]
 CASES: dict[str, Case] = {
-    "sphere, Fibonacci": (es.fibonacci_sphere, es.sphere_eigenvalues, CLOSED, False),
-    "sphere, icosphere": (icosphere, es.sphere_eigenvalues, CLOSED, False),
-    "sphere, 4:1 density": (es.graded_sphere, es.sphere_eigenvalues, CLOSED, False),
-    "sphere, random": (random_sphere, es.sphere_eigenvalues, CLOSED, False),
+    "sphere, Fibonacci": (es.shapes.fibonacci_sphere, es.shapes.sphere_eigenvalues, CLOSED, False),
+    "sphere, icosphere": (icosphere, es.shapes.sphere_eigenvalues, CLOSED, False),
+    "sphere, 4:1 density": (es.shapes.graded_sphere, es.shapes.sphere_eigenvalues, CLOSED, False),
+    "sphere, random": (random_sphere, es.shapes.sphere_eigenvalues, CLOSED, False),
     "flat torus in R⁴": (
         flat_torus,
-        lambda k: es.flat_torus_eigenvalues(k, 2 * np.pi * np.eye(2)),
+        lambda k: es.shapes.flat_torus_eigenvalues(k, 2 * np.pi * np.eye(2)),
         LINEAR | KERNELS | POINTS,
         False,
     ),
     "3-sphere in R⁴": (
-        lambda n: es.three_sphere(n // 3),
-        lambda k: es.sphere_eigenvalues(k, 3),
+        lambda n: es.shapes.three_sphere(n // 3),
+        lambda k: es.shapes.sphere_eigenvalues(k, 3),
         LINEAR | KERNELS | POINTS,
         False,
     ),
     "projective plane in R⁵": (
-        lambda n: es.projective_plane(max(1, round(float(np.log(n / 5) / np.log(4))))),
-        es.projective_plane_eigenvalues,
+        lambda n: es.shapes.projective_plane(max(1, round(float(np.log(n / 5) / np.log(4))))),
+        es.shapes.projective_plane_eigenvalues,
         LINEAR | KERNELS,
         False,
     ),
-    "interval": (lambda n: es.interval(n // 4), lambda k: es.box_eigenvalues(k, [1.0]), FLAT, False),
-    "square": (square, es.box_eigenvalues, FLAT | SURFACES, False),
-    "disc": (lambda n: es.disc(int((n / 3) ** 0.5)), es.disc_eigenvalues, FLAT | SURFACES, False),
-    "box": (lambda n: es.box(*[int((n / 4) ** (1 / 3))] * 3), lambda k: es.box_eigenvalues(k, (1, 1, 1)), SOLID, False),
-    "ball": (lambda n: es.ball(int((n / 4) ** (1 / 3))), es.ball_eigenvalues, SOLID, False),
-    "square, Dirichlet": (square, lambda k: es.box_eigenvalues(k, (1, 1), "dirichlet"), LINEAR | HIGHER, True),
+    "interval": (
+        lambda n: es.shapes.interval(n // 4),
+        lambda k: es.shapes.box_eigenvalues(k, [1.0]),
+        FLAT,
+        False,
+    ),
+    "square": (square, es.shapes.box_eigenvalues, FLAT | SURFACES, False),
+    "disc": (
+        lambda n: es.shapes.disc(int((n / 3) ** 0.5)),
+        es.shapes.disc_eigenvalues,
+        FLAT | SURFACES,
+        False,
+    ),
+    "box": (
+        lambda n: es.shapes.box(*[int((n / 4) ** (1 / 3))] * 3),
+        lambda k: es.shapes.box_eigenvalues(k, (1, 1, 1)),
+        SOLID,
+        False,
+    ),
+    "ball": (
+        lambda n: es.shapes.ball(int((n / 4) ** (1 / 3))),
+        es.shapes.ball_eigenvalues,
+        SOLID,
+        False,
+    ),
+    "square, Dirichlet": (
+        square,
+        lambda k: es.shapes.box_eigenvalues(k, (1, 1), "dirichlet"),
+        LINEAR | HIGHER,
+        True,
+    ),
     "disc, Dirichlet": (
-        lambda n: es.disc(int((n / 3) ** 0.5)),
-        lambda k: es.disc_eigenvalues(k, "dirichlet"),
+        lambda n: es.shapes.disc(int((n / 3) ** 0.5)),
+        lambda k: es.shapes.disc_eigenvalues(k, "dirichlet"),
         LINEAR | HIGHER,
         True,
     ),
     "box, Dirichlet": (
-        lambda n: es.box(*[int((n / 4) ** (1 / 3))] * 3),
-        lambda k: es.box_eigenvalues(k, (1, 1, 1), "dirichlet"),
-        LINEAR | {"P2": es.fem_laplacian},
+        lambda n: es.shapes.box(*[int((n / 4) ** (1 / 3))] * 3),
+        lambda k: es.shapes.box_eigenvalues(k, (1, 1, 1), "dirichlet"),
+        LINEAR | {"P2": es.operators.fem_laplacian},
         True,
     ),
     "ball, Dirichlet": (
-        lambda n: es.ball(int((n / 4) ** (1 / 3))),
-        lambda k: es.ball_eigenvalues(k, "dirichlet"),
-        LINEAR | {"P2": es.fem_laplacian},
+        lambda n: es.shapes.ball(int((n / 4) ** (1 / 3))),
+        lambda k: es.shapes.ball_eigenvalues(k, "dirichlet"),
+        LINEAR | {"P2": es.operators.fem_laplacian},
         True,
     ),
 }
 ORDERS = {"P2": 2, "P3": 3}
 
 
-def solved(mesh: es.TriangleMesh | es.SimplicialMesh, name: str, build: Build, k: int, held: bool) -> dict[str, object]:
+def solved(
+    mesh: es.TriangleMesh | es.SimplicialMesh, name: str, build: Build, k: int, held: bool
+) -> dict[str, object]:
     """Build and solve, and return eigenvalues, size and seconds."""
     start = time.perf_counter()
     laplacian = build(mesh)
     built = time.perf_counter()
     if held:
-        boundary = es.fem_boundary_nodes(mesh, ORDERS.get(name, 1))
-        values = es.solve_dirichlet(laplacian, k, boundary).eigenvalues
+        boundary = es.operators.fem_boundary_nodes(mesh, ORDERS.get(name, 1))
+        values = es.solve_spectrum(laplacian, k, fixed=boundary).eigenvalues
     else:
         values = es.solve_spectrum(laplacian, k).eigenvalues
     return {
@@ -156,7 +195,7 @@ def measured(case: Case, name: str, sizes: tuple[int, ...]) -> dict[str, object]
         mesh = make(size)
         k = min(K, mesh.n_points // 4)
         if held:  # a small solid has few points inside, and no more eigenvalues than these
-            k = min(k, (mesh.n_points - len(es.fem_boundary_nodes(mesh, 1))) // 2)
+            k = min(k, (mesh.n_points - len(es.operators.fem_boundary_nodes(mesh, 1))) // 2)
         found, exact = solved(mesh, name, operators[name], k, held), eigenvalues(k)
         errors = np.abs(found["values"][exact > 0] / exact[exact > 0] - 1)
         medians.append(float(np.median(errors)))
@@ -182,24 +221,33 @@ def markdown(table: dict[str, dict[str, dict]]) -> str:
     for case, rows in table.items():
         for name, row in rows.items():
             errors = " | ".join(f"{row[key][-1]:.2e}" for key in ("median", "worst"))
-            lines.append(f"| {case} | {name} | {row['n'][-1]} | {errors} | {row['order']:.2f} | {row['row']:.1f} |")
+            lines.append(
+                f"| {case} | {name} | {row['n'][-1]} | {errors} | {row['order']:.2f} | {row['row']:.1f} |"
+            )
     return "\n".join(lines) + "\n"
 
 
 def draw(path: Path, n: int) -> None:
     """Draw the error of 300 eigenvalues on the unit sphere, an operator a line, the copies of one as one."""
-    mesh, exact = es.fibonacci_sphere(n), es.sphere_eigenvalues(300)
-    operators = {name: build for name, build in CLOSED.items() if name not in ("robust", "mesh, random-walk")}
+    mesh, exact = es.shapes.fibonacci_sphere(n), es.shapes.sphere_eigenvalues(300)
+    operators = {
+        name: build for name, build in CLOSED.items() if name not in ("robust", "mesh, random-walk")
+    }
     figure = Figure(figsize=(9, 5.2), layout="constrained")
     axes = figure.subplots()
     colors = mpl.colormaps["tab10"].colors
-    for color, (name, build) in zip(colors, track(operators.items(), description="picture"), strict=False):
+    for color, (name, build) in zip(
+        colors, track(operators.items(), description="picture"), strict=False
+    ):
         values = solved(mesh, name, build, 300, held=False)["values"]
         squares = (values[1:] / exact[1:] - 1) ** 2
         degrees = np.floor(np.sqrt(np.arange(1, 300))).astype(int)
         errors = np.sqrt(np.bincount(degrees, squares)[1:] / np.bincount(degrees)[1:])
         axes.semilogy(np.arange(1, len(errors) + 1), errors, ".-", color=color, lw=1.4, label=name)
-    axes.set(xlabel="degree l of the eigenvalue l(l + 1), which comes 2l + 1 times", ylabel="relative error, RMS")
+    axes.set(
+        xlabel="degree l of the eigenvalue l(l + 1), which comes 2l + 1 times",
+        ylabel="relative error, RMS",
+    )
     axes.set_title(f"The unit sphere heard by {n} points")
     axes.set_ylim(1e-4, 1)
     axes.grid(alpha=0.3)

@@ -48,12 +48,14 @@ def flat_torus(n: int) -> Case:
     i, j = np.divmod(np.arange(n * n), n)
     turns = 2 * np.pi / n * np.column_stack([i, j])
     points = np.column_stack([np.cos(turns), np.sin(turns)])
-    return Case(es.SimplicialMesh(points, es.torus(n, n).faces), period=2 * n * np.sin(np.pi / n))
+    return Case(
+        es.SimplicialMesh(points, es.shapes.torus(n, n).faces), period=2 * n * np.sin(np.pi / n)
+    )
 
 
 def skin(solid: es.SimplicialMesh) -> es.TriangleMesh:
     """Return the boundary of a solid."""
-    table = es.facet_table(solid)
+    table = es.geometry.facet_table(solid)
     used, faces = np.unique(table.facets[table.boundary], return_inverse=True)
     return es.TriangleMesh(solid.points[used], faces.reshape(-1, 3))
 
@@ -68,13 +70,13 @@ def made() -> dict[str, Case]:
     """Return the shapes that need no file."""
     rng = np.random.default_rng(0)
     return {
-        "square, irregular": Case(es.irregular_grid(20, 20, rng=rng), sides=(1.0, 1.0)),
-        "polygon of 24 sides": Case(es.disc(4), bracketed=2, refined=3, followed=2),
+        "square, irregular": Case(es.shapes.irregular_grid(20, 20, rng=rng), sides=(1.0, 1.0)),
+        "polygon of 24 sides": Case(es.shapes.disc(4), bracketed=2, refined=3, followed=2),
         "flat torus in R⁴": flat_torus(20),
         "tetrahedron": Case(tetrahedron(), bracketed=4, followed=4, edge=1.0),
-        "cube": Case(skin(es.box(2, 2, 2)), bracketed=3, refined=4, followed=3),
+        "cube": Case(skin(es.shapes.box(2, 2, 2)), bracketed=3, refined=4, followed=3),
         "polyhedron of 80 faces": Case(es.icosphere(1), bracketed=2, refined=3, followed=3),
-        "box of tetrahedra": Case(es.box(4, 4, 4), bracketed=1, sides=(1.0, 1.0, 1.0)),
+        "box of tetrahedra": Case(es.shapes.box(4, 4, 4), bracketed=1, sides=(1.0, 1.0, 1.0)),
     }
 
 
@@ -95,27 +97,32 @@ def real() -> dict[str, Case]:
 def finer(mesh: Mesh, times: int) -> Mesh:
     """Split simplices at the middles of their edges, where they lie."""
     for _ in range(times):
-        mesh = es.subdivide(mesh)
+        mesh = es.shapes.subdivide(mesh)
     return mesh
 
 
 def solved(mesh: Mesh, order: int, k: int, condition: str) -> np.ndarray:
     """Return eigenvalues of elements of an order."""
-    laplacian = es.fem_laplacian(mesh, order)
+    laplacian = es.operators.fem_laplacian(mesh, order)
     if condition == "neumann":
         return es.solve_spectrum(laplacian, k).eigenvalues
-    return es.solve_dirichlet(laplacian, k, es.fem_boundary_nodes(mesh, order)).eigenvalues
+    fixed = es.operators.fem_boundary_nodes(mesh, order)
+    return es.solve_spectrum(laplacian, k, fixed=fixed).eigenvalues
 
 
 def truth(case: Case, k: int, condition: str) -> tuple[np.ndarray, np.ndarray]:
     """Return eigenvalues and how far the last refinement moved them, 0 where they are known by formula."""
     if case.sides:
-        return es.box_eigenvalues(k, case.sides, condition), np.zeros(k)
+        return es.shapes.box_eigenvalues(k, case.sides, condition), np.zeros(k)
     if case.period:
-        return es.flat_torus_eigenvalues(k, case.period * np.eye(2)), np.zeros(k)
-    if case.edge:  # a torus of twice the edge with opposite points made one, which keep every cosine
+        return es.shapes.flat_torus_eigenvalues(k, case.period * np.eye(2)), np.zeros(k)
+    if (
+        case.edge
+    ):  # a torus of twice the edge with opposite points made one, which keep every cosine
         periods = case.edge * np.array([[2, 0], [1, 3**0.5]])
-        return es.flat_torus_eigenvalues(2 * k, periods)[np.r_[0, 1 : 2 * k - 1 : 2]], np.zeros(k)
+        return es.shapes.flat_torus_eigenvalues(2 * k, periods)[
+            np.r_[0, 1 : 2 * k - 1 : 2]
+        ], np.zeros(k)
     levels = case.refined - 1, case.refined
     coarse, fine = (solved(finer(case.mesh, level), 3, k, condition) for level in levels)
     return fine, np.abs(fine - coarse)
@@ -167,7 +174,9 @@ def markdown(table: dict[str, dict]) -> str:
         sure = f"{row['moved / width']:.1e}" if row["room / moved"] else "exact"
         wide = ", ".join(f"{row[key]:.3f}" for key in ("first", "median", "last"))
         orders = f"{row['order'][0]:.2f} to {row['order'][1]:.2f}" if row["order"] else "–"
-        lines.append(f"| {name} | {row['points']} | {row['held']} of {K} | {sure} | {wide} | {orders} |")
+        lines.append(
+            f"| {name} | {row['points']} | {row['held']} of {K} | {sure} | {wide} | {orders} |"
+        )
     return "\n".join(lines) + "\n"
 
 
@@ -181,9 +190,15 @@ def main() -> None:
     arguments = parser.parse_args()
     chosen = arguments.only or (QUICK if arguments.quick else None)
     cases = {name: case for name, case in (made() | real()).items() if not chosen or name in chosen}
-    open_ones = {name for name, case in cases.items() if es.facet_table(case.mesh).boundary.size}
+    open_ones = {
+        name for name, case in cases.items() if es.geometry.facet_table(case.mesh).boundary.size
+    }
     tasks = [(name, condition) for name in cases for condition in ("neumann", "dirichlet")]
-    tasks = [(name, condition) for name, condition in tasks if condition == "neumann" or name in open_ones]
+    tasks = [
+        (name, condition)
+        for name, condition in tasks
+        if condition == "neumann" or name in open_ones
+    ]
     table = {}
     for name, condition in track(tasks, description="shapes"):
         label = f"{name}, {condition.capitalize()}" if name in open_ones else name

@@ -39,32 +39,39 @@ def octasphere(level: int) -> es.TriangleMesh:
     faces = [(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)]
     mesh = es.TriangleMesh(corners, np.array(faces))
     for _ in range(level):
-        mesh = es.subdivide(mesh)
-        mesh = es.TriangleMesh(mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True), mesh.faces)
+        mesh = es.shapes.subdivide(mesh)
+        mesh = es.TriangleMesh(
+            mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True), mesh.faces
+        )
     return mesh
 
 
 def cube_surface(level: int) -> es.TriangleMesh:
     """Subdivide the surface of the unit cube: its sides are the boundary of a box of one cell."""
-    solid = es.box(1, 1, 1)
+    solid = es.shapes.box(1, 1, 1)
     sides = np.concatenate([np.delete(solid.simplices, corner, axis=1) for corner in range(4)])
-    _, first, counts = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)
+    _, first, counts = np.unique(
+        np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True
+    )
     mesh = es.TriangleMesh(solid.points, sides[first[counts == 1]])
     for _ in range(level):
-        mesh = es.subdivide(mesh)
+        mesh = es.shapes.subdivide(mesh)
     return mesh
 
 
 def flat_torus(n_u: int, n_v: int) -> es.SimplicialMesh:
     """Return the product of two circles in R⁴ on a regular lattice."""
-    u, v = (2 * np.pi * place.ravel() / n for place, n in zip(np.indices((n_u, n_v)), (n_u, n_v), strict=True))
+    u, v = (
+        2 * np.pi * place.ravel() / n
+        for place, n in zip(np.indices((n_u, n_v)), (n_u, n_v), strict=True)
+    )
     points = np.column_stack([np.cos(u), np.sin(u), np.cos(v), np.sin(v)])
-    return es.SimplicialMesh(points, es.torus(n_u, n_v).faces)
+    return es.SimplicialMesh(points, es.shapes.torus(n_u, n_v).faces)
 
 
 def copies(mesh: es.TriangleMesh, count: int) -> es.TriangleMesh:
     """Return equal components, all in one place."""
-    return es.disjoint_union(*[mesh] * count)
+    return es.shapes.disjoint_union(*[mesh] * count)
 
 
 def cycle(n: int) -> sp.csr_array:
@@ -90,34 +97,34 @@ SHAPES: dict[str, dict[str, Callable[[], Mesh]]] = {
         "octasphere 3": lambda: octasphere(3),
     },
     "tori": {
-        "torus 24 x 16": lambda: es.torus(24, 16),
-        "torus 20 x 20": lambda: es.torus(20, 20),
-        "torus 36 x 24": lambda: es.torus(36, 24),
-        "torus 48 x 24": lambda: es.torus(48, 24),
+        "torus 24 x 16": lambda: es.shapes.torus(24, 16),
+        "torus 20 x 20": lambda: es.shapes.torus(20, 20),
+        "torus 36 x 24": lambda: es.shapes.torus(36, 24),
+        "torus 48 x 24": lambda: es.shapes.torus(48, 24),
         "flat torus 20 x 20": lambda: flat_torus(20, 20),
         "flat torus 32 x 24": lambda: flat_torus(32, 24),
     },
     "boxes": {
         "cube surface 3": lambda: cube_surface(3),
-        "square": lambda: es.grid(20, 20),
-        "box 6 x 6 x 6": lambda: es.box(6, 6, 6),
-        "box 5 x 5 x 12": lambda: es.box(5, 5, 12, sides=(1.0, 1.0, 2.4)),
-        "box 8 x 8 x 8": lambda: es.box(8, 8, 8),
-        "ball 8": lambda: es.ball(8),
+        "square": lambda: es.shapes.grid(20, 20),
+        "box 6 x 6 x 6": lambda: es.shapes.box(6, 6, 6),
+        "box 5 x 5 x 12": lambda: es.shapes.box(5, 5, 12, sides=(1.0, 1.0, 2.4)),
+        "box 8 x 8 x 8": lambda: es.shapes.box(8, 8, 8),
+        "ball 8": lambda: es.shapes.ball(8),
     },
     "equal components": {
         "10 icospheres 1": lambda: copies(es.icosphere(1), 10),
         "30 icosahedra": lambda: copies(es.icosphere(0), 30),
-        "20 tori 6 x 5": lambda: copies(es.torus(6, 5), 20),
+        "20 tori 6 x 5": lambda: copies(es.shapes.torus(6, 5), 20),
         "6 icospheres 2": lambda: copies(es.icosphere(2), 6),
         "2 icospheres 3": lambda: copies(es.icosphere(3), 2),
-        "3 tori 16 x 12": lambda: copies(es.torus(16, 12), 3),
+        "3 tori 16 x 12": lambda: copies(es.shapes.torus(16, 12), 3),
     },
     "discs": {
-        "disc 10": lambda: es.disc(10),
-        "disc 13": lambda: es.disc(13),
-        "disc 16": lambda: es.disc(16),
-        "disc 20": lambda: es.disc(20),
+        "disc 10": lambda: es.shapes.disc(10),
+        "disc 13": lambda: es.shapes.disc(13),
+        "disc 16": lambda: es.shapes.disc(16),
+        "disc 20": lambda: es.shapes.disc(20),
     },
 }
 GRAPHS: dict[str, Callable[[], sp.csr_array]] = {
@@ -125,7 +132,7 @@ GRAPHS: dict[str, Callable[[], sp.csr_array]] = {
     "lattice 20 x 20": lambda: product(cycle(20), cycle(20)),
     "hypercube 9": lambda: product(*[sp.csr_array(np.ones((2, 2)) - np.eye(2))] * 9),
     "lattice 8 x 8 x 8": lambda: product(cycle(8), cycle(8), cycle(8)),
-    "8 neighbours, icosphere": lambda: es.neighbor_graph(es.icosphere(3).vertices, 8),
+    "8 neighbours, icosphere": lambda: es.operators.neighbor_graph(es.icosphere(3).vertices, 8),
     "complete 320": lambda: sp.csr_array(np.ones((320, 320)) - np.eye(320)),
 }
 MASSES = ("lumped", "consistent", "averaged")
@@ -138,11 +145,13 @@ def cases(*, quick: bool) -> Iterator[Case]:
             yield from list(_of_mesh(family, name, make()))[:: 2 if quick else 1]
     for name, make in list(GRAPHS.items())[: 2 if quick else None]:
         for kind in ("combinatorial", "normalized"):
-            yield Case("graphs", f"{name}, {kind}", es.graph_laplacian(make(), kind))
+            yield Case("graphs", f"{name}, {kind}", es.operators.graph_laplacian(make(), kind))
 
 
 def _families() -> dict[str, dict[str, Callable[[], Mesh]]]:
-    real = {path: lambda path=path: es.read_mesh(DATA / path) for path in REAL if (DATA / path).exists()}
+    real = {
+        path: lambda path=path: es.read_mesh(DATA / path) for path in REAL if (DATA / path).exists()
+    }
     return SHAPES | ({"real shapes": real} if real else {})
 
 
@@ -150,7 +159,13 @@ def _of_mesh(family: str, name: str, mesh: Mesh) -> Iterator[Case]:
     flat = mesh if isinstance(mesh, es.TriangleMesh) else None
     for mass in MASSES:
         same = flat if mass != "averaged" else None
-        yield Case(family, f"{name}, {mass}", es.cotangent_laplacian(mesh, mass), same, mass if same else "")
+        yield Case(
+            family,
+            f"{name}, {mass}",
+            es.cotangent_laplacian(mesh, mass),
+            same,
+            mass if same else "",
+        )
     if flat is not None:
         yield Case(family, f"{name}, robust", es.robust_laplacian(flat))
-    yield Case(family, f"{name}, graph", es.graph_laplacian(mesh))
+    yield Case(family, f"{name}, graph", es.operators.graph_laplacian(mesh))

@@ -40,7 +40,9 @@ class Ours:
     def __call__(self, case: Case, k: int, seed: int) -> np.ndarray:
         """Return k certified eigenvalues."""
         messages: list[str] = []
-        spectrum = es.solve_spectrum(case.laplacian, k, progress=lambda done, message: messages.append(message))
+        spectrum = es.solve_spectrum(
+            case.laplacian, k, progress=lambda done, message: messages.append(message)
+        )
         self.dense += any("dense" in message for message in messages)
         return spectrum.eigenvalues
 
@@ -50,7 +52,9 @@ def arpack(sigma: float) -> Callable[[Case, int, int], np.ndarray]:
 
     def solve(case: Case, k: int, seed: int) -> np.ndarray:
         stiffness, mass = case.laplacian.stiffness.tocsc(), case.laplacian.mass.tocsc()
-        return spl.eigsh(stiffness, k, mass, sigma=sigma, **_start(case.laplacian.n_points, seed))[0]
+        return spl.eigsh(stiffness, k, mass, sigma=sigma, **_start(case.laplacian.n_points, seed))[
+            0
+        ]
 
     return solve
 
@@ -77,14 +81,20 @@ def has_lapy(case: Case) -> bool:
         return False
     solver = _lapy_solver(case)
     pairs = (solver.stiffness, case.laplacian.stiffness), (solver.mass, case.laplacian.mass)
-    return all(abs(sp.csr_array(theirs) - ours).max() <= 1e-12 * abs(ours).max() for theirs, ours in pairs)
+    return all(
+        abs(sp.csr_array(theirs) - ours).max() <= 1e-12 * abs(ours).max() for theirs, ours in pairs
+    )
 
 
 def dense(case: Case) -> np.ndarray:
     """Return all eigenvalues, by LAPACK."""
     roots = np.sqrt(case.laplacian.mass.diagonal())
     scale = np.outer(roots, roots)  # unit diagonal: the least rounding
-    return sl.eigh(case.laplacian.stiffness.toarray() / scale, case.laplacian.mass.toarray() / scale, eigvals_only=True)
+    return sl.eigh(
+        case.laplacian.stiffness.toarray() / scale,
+        case.laplacian.mass.toarray() / scale,
+        eigvals_only=True,
+    )
 
 
 SOLVERS: dict[str, Callable[[Case, int, int], np.ndarray]] = {

@@ -74,7 +74,9 @@ def census(*, quick: bool) -> dict[str, object]:
     every, worst, failures = list(cases(quick=quick)), 0.0, []
     for case in track(every, description="operators"):
         values = dense(case)
-        solvers = {name: solve for name, solve in SOLVERS.items() if name != "LaPy" or has_lapy(case)}
+        solvers = {
+            name: solve for name, solve in SOLVERS.items() if name != "LaPy" or has_lapy(case)
+        }
         for k in sizes(values, TARGETS[::2] if quick else TARGETS):
             for name, solve in solvers.items():
                 start = time.process_time()
@@ -102,7 +104,9 @@ def markdown(result: dict[str, object]) -> str:
     for family in families:
         cells = [_cell([rows[family]]) if family in rows else "–" for rows in table.values()]
         lines.append(f"| {family} | {' | '.join(cells)} |")
-    lines.append(f"| **all** | {' | '.join(_cell(list(rows.values())) for rows in table.values())} |")
+    lines.append(
+        f"| **all** | {' | '.join(_cell(list(rows.values())) for rows in table.values())} |"
+    )
     for what, meaning in (("absent", "an eigenvalue left out"), ("refused", "an exception")):
         totals = [str(sum(row[what] for row in rows.values())) for rows in table.values()]
         lines.append(f"| of these {meaning} | {' | '.join(totals)} |")
@@ -117,7 +121,9 @@ def _cell(rows: list[dict[str, int]]) -> str:
 def main() -> None:
     """Count, print, and write what was asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="two shapes a family, fewer k; about a minute")
+    parser.add_argument(
+        "--quick", action="store_true", help="two shapes a family, fewer k; about a minute"
+    )
     parser.add_argument("--out", type=output_file, help="write the figures as JSON")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")

@@ -24,13 +24,21 @@ from shape_panels import show_shape  # noqa: E402
 import eigenshape as es  # noqa: E402
 
 K = 30
-SIDE, ALONG = 1.5, 0.75  # of the field v: how quickly rings thicken, and move along z, in 1/diameter
-CLASSES = ("even in x, even in y", "even in x, odd in y", "odd in x, even in y", "odd in x, odd in y")
+SIDE, ALONG = (
+    1.5,
+    0.75,
+)  # of the field v: how quickly rings thicken, and move along z, in 1/diameter
+CLASSES = (
+    "even in x, even in y",
+    "even in x, odd in y",
+    "odd in x, even in y",
+    "odd in x, odd in y",
+)
 
 
 def eight() -> es.TriangleMesh:
     """Return the loop with diameter 1, its middle at the origin, its rings along z."""
-    mesh = es.normalize_diameter(es.read_mesh(DATA / "classics" / "eight.off"))
+    mesh = es.geometry.normalize_diameter(es.read_mesh(DATA / "classics" / "eight.off"))
     middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
     return es.TriangleMesh(mesh.vertices - middle, mesh.faces)
 
@@ -38,7 +46,9 @@ def eight() -> es.TriangleMesh:
 def moved(mesh: es.TriangleMesh, s: float) -> es.TriangleMesh:
     """Return x + s v(x) with v = (1.5 x z, 1.5 y z, .75 z²), which keeps both mirror planes of the loop."""
     x, y, z = mesh.vertices.T
-    return es.TriangleMesh(mesh.vertices + s * np.column_stack([SIDE * x * z, SIDE * y * z, ALONG * z * z]), mesh.faces)
+    return es.TriangleMesh(
+        mesh.vertices + s * np.column_stack([SIDE * x * z, SIDE * y * z, ALONG * z * z]), mesh.faces
+    )
 
 
 def symmetric_matrix(laplacian: es.Laplacian) -> np.ndarray:
@@ -80,11 +90,11 @@ def mirror_classes(mesh: es.TriangleMesh, spectrum: es.Spectrum) -> np.ndarray:
 def tracks(n_steps: int) -> dict[str, np.ndarray]:
     """Return what is known at each of n + 1 moments, and at each of the n steps between them."""
     start = eight()
-    t = es.mean_side_length(start) ** 2
+    t = es.geometry.mean_side_length(start) ** 2
     meshes = [moved(start, s) for s in np.linspace(0, 1, n_steps + 1)]
     kernel, linear, classes, matrices, crossing = [], [], [], [], 0
     for mesh in track(meshes, description="moments"):
-        crossing += len(es.self_intersections(mesh))
+        crossing += len(es.geometry.self_intersections(mesh))
         literal = es.mesh_laplacian(mesh, t=t)
         matrices.append(symmetric_matrix(literal))
         kernel.append(es.solve_spectrum(literal, K + 1).eigenvalues[1:])
@@ -110,8 +120,14 @@ def continuity(found: dict[str, np.ndarray], every: int) -> dict[str, float]:
     for name in ("mesh", "cotangent"):
         values = found[name][::every]
         change = np.abs(np.diff(values, axis=0) / values[:-1]).max(axis=1)
-        row |= {f"{name}: largest change": change.max(), f"{name}: change / δ": (change / delta).max()}
-    weyl = [np.abs(np.linalg.eigvalsh(b - a)[[0, -1]]).max() for a, b in pairwise(found["matrices"][::every])]
+        row |= {
+            f"{name}: largest change": change.max(),
+            f"{name}: change / δ": (change / delta).max(),
+        }
+    weyl = [
+        np.abs(np.linalg.eigvalsh(b - a)[[0, -1]]).max()
+        for a, b in pairwise(found["matrices"][::every])
+    ]
     absolute = np.abs(np.diff(found["mesh"][::every], axis=0)).max(axis=1)
     row["mesh: change / Weyl's bound"] = (absolute / weyl).max()
     values = found["cotangent"][::every]
@@ -135,7 +151,9 @@ def measure(found: dict[str, np.ndarray], most: int) -> dict[str, object]:
     return {
         "steps": rows,
         "faces that cross": int(found["crossing"]),
-        "largest change on the way": {n: np.abs(found[n][-1] / found[n][0] - 1).max() for n in names},
+        "largest change on the way": {
+            n: np.abs(found[n][-1] / found[n][0] - 1).max() for n in names
+        },
         "exchanges": handovers(found["classes"]),
         "smallest gap": gaps.min(),
     }
@@ -149,18 +167,37 @@ def figure_tracks(found: dict[str, np.ndarray]) -> Figure:
     moments = np.linspace(0, 1, n)
     for axes, place in zip(above.subplots(1, 6), np.linspace(0, n - 1, 6).astype(int), strict=True):
         mesh = es.TriangleMesh(found["points"][place], start.faces)
-        show_shape(axes, mesh, es.three_quarter_view(mesh, up="z"), color="#d9c9a3", edges=0.15, reach=0.62)
+        show_shape(
+            axes,
+            mesh,
+            es.plot.three_quarter_view(mesh, up="z"),
+            color="#d9c9a3",
+            edges=0.15,
+            reach=0.62,
+        )
         axes.set_title(f"s = {moments[place]:.1f}", fontsize=9)
     left, right = below.subplots(1, 2)
     left.plot(moments, found["mesh"], color="#1f77b4", lw=1)
-    label(left, "s (no unit)", "λᵢ in 1/diameter²", "mesh Laplacian as printed; n = 766, t = e² = 0.0018", legend=False)
+    label(
+        left,
+        "s (no unit)",
+        "λᵢ in 1/diameter²",
+        "mesh Laplacian as printed; n = 766, t = e² = 0.0018",
+        legend=False,
+    )
     right.plot(moments, found["cotangent"], color="#bbbbbb", lw=0.8, zorder=1)
     places = np.broadcast_to(moments[:, None], found["cotangent"].shape)
     for number, (name, color) in enumerate(zip(CLASSES, COLORS, strict=False)):
         kind = found["classes"] == number
-        right.scatter(places[kind], found["cotangent"][kind], s=4, color=color, label=name, zorder=2)
+        right.scatter(
+            places[kind], found["cotangent"][kind], s=4, color=color, label=name, zorder=2
+        )
     label(
-        right, "s (no unit)", "λᵢ in 1/diameter²", "cotangent, averaged; n = 766, no t; by mirror class", legend=False
+        right,
+        "s (no unit)",
+        "λᵢ in 1/diameter²",
+        "cotangent, averaged; n = 766, no t; by mirror class",
+        legend=False,
     )
     right.legend(frameon=True, fontsize=8, loc="upper left", markerscale=3)
     for axes in (left, right):
@@ -173,7 +210,9 @@ def main() -> None:
     """Measure, print, and draw."""
     arguments = parse_arguments(__doc__, HERE)
     require_data()
-    warnings.simplefilter("ignore")  # of thirty eigenvalues twenty are told apart from 1/t: the README says so
+    warnings.simplefilter(
+        "ignore"
+    )  # of thirty eigenvalues twenty are told apart from 1/t: the README says so
     most = 8 if arguments.quick else 80
     found = tracks(most)
     pictures = {} if arguments.quick else {"tracks": figure_tracks(found)}

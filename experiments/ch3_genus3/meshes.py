@@ -9,9 +9,9 @@ import eigenshape as es
 
 def noisy(mesh: es.TriangleMesh, edges: float, rng: np.random.Generator) -> es.TriangleMesh:
     """Move vertices along their normals by Gaussian noise of so many mean edge lengths."""
-    size = edges * es.mean_side_length(mesh)
+    size = edges * es.geometry.mean_side_length(mesh)
     heights = size * rng.standard_normal((mesh.n_vertices, 1))
-    return es.TriangleMesh(mesh.vertices + heights * es.vertex_normals(mesh), mesh.faces)
+    return es.TriangleMesh(mesh.vertices + heights * es.geometry.vertex_normals(mesh), mesh.faces)
 
 
 def denser(mesh: es.TriangleMesh, chosen: np.ndarray) -> es.TriangleMesh:
@@ -19,7 +19,7 @@ def denser(mesh: es.TriangleMesh, chosen: np.ndarray) -> es.TriangleMesh:
 
     Nothing moves: it is the same surface.
     """
-    table = es.edge_table(mesh)
+    table = es.geometry.edge_table(mesh)
     cut = np.zeros(len(table.edges), dtype=bool)
     cut[table.face_edges[chosen]] = True
     number = np.full(len(cut), -1)
@@ -35,7 +35,9 @@ def denser(mesh: es.TriangleMesh, chosen: np.ndarray) -> es.TriangleMesh:
 
 def pieces(face: list[int], middles: list[int]) -> list[tuple[int, int, int]]:
     """Cut a face at the middles that it has; `middles[i]` lies across from corner i, -1 where its edge stays whole."""
-    while sum(middle >= 0 for middle in middles) in (1, 2) and not (middles[0] >= 0 and middles[1] < 0):
+    while sum(middle >= 0 for middle in middles) in (1, 2) and not (
+        middles[0] >= 0 and middles[1] < 0
+    ):
         face, middles = face[1:] + face[:1], middles[1:] + middles[:1]
     (a, b, c), (at_a, at_b, at_c) = face, middles
     if at_a < 0:
@@ -66,7 +68,7 @@ def coarser(mesh: es.TriangleMesh, n_vertices: int) -> es.TriangleMesh:
     for number, face in faces.items():
         for vertex in face:
             rings[vertex].add(number)
-    edges = es.edge_table(mesh).edges.tolist()
+    edges = es.geometry.edge_table(mesh).edges.tolist()
     heap = [(squared_length(points, *edge), *edge) for edge in edges]
     heapq.heapify(heap)
     left = mesh.n_vertices
@@ -95,7 +97,9 @@ def coarser(mesh: es.TriangleMesh, n_vertices: int) -> es.TriangleMesh:
 
 def squared_length(points: np.ndarray, one: int, other: int) -> int:
     """Return the squared length of an edge between points of whole numbers, exactly."""
-    return sum((a - b) ** 2 for a, b in zip(points[one].tolist(), points[other].tolist(), strict=True))
+    return sum(
+        (a - b) ** 2 for a, b in zip(points[one].tolist(), points[other].tolist(), strict=True)
+    )
 
 
 def neighbors(faces: dict[int, tuple[int, ...]], rings: list[set[int]], vertex: int) -> set[int]:
@@ -119,7 +123,10 @@ def may_collapse(
     before = points[around]
     after = np.where(np.isin(around, edge)[..., None], middle, before)
     # whole numbers of Python: products of four coordinates and more do not fit into 64 bits
-    one, two = (np.cross(each[:, 1] - each[:, 0], each[:, 2] - each[:, 0]).astype(object) for each in (before, after))
+    one, two = (
+        np.cross(each[:, 1] - each[:, 0], each[:, 2] - each[:, 0]).astype(object)
+        for each in (before, after)
+    )
     product = (one * two).sum(axis=1)
     squares = (one * one).sum(axis=1) * (two * two).sum(axis=1)
     # the cosine of the turn, product / √squares, lies above that of 60 degrees, 1/2

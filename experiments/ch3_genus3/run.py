@@ -31,11 +31,11 @@ def meshes_of(n_first: int | None, n_coarse: int) -> dict[str, es.TriangleMesh]:
     raw = es.read_mesh(DATA / "classics" / "genus3.off")
     if n_first:
         raw = coarser(raw, n_first)
-    mesh = es.normalize_diameter(raw)
+    mesh = es.geometry.normalize_diameter(raw)
     # made coarser as it was read: what the last digit of a diameter touches is not the same on every CPU
     coarse = coarser(raw, n_coarse)
     right = coarse.vertices[coarse.faces].mean(axis=1)[:, 0] > raw.vertices[:, 0].mean()
-    size = es.mean_side_length(mesh) / es.mean_side_length(raw)
+    size = es.geometry.mean_side_length(mesh) / es.geometry.mean_side_length(raw)
     coarse = es.TriangleMesh(size * coarse.vertices, coarse.faces)
     return {
         ORIGINAL: mesh,
@@ -56,23 +56,27 @@ def spectra(mesh: es.TriangleMesh, t: float, k: int) -> dict[str, np.ndarray]:
             es.cotangent_laplacian(mesh, "averaged"),
         )
     )
-    printed = -np.expm1(-t * corrected) / t  # the eigenvalues of the pencil, which the correction started from
+    printed = (
+        -np.expm1(-t * corrected) / t
+    )  # the eigenvalues of the pencil, which the correction started from
     return dict(zip(OPERATORS, (printed, corrected, random_walk, linear), strict=True))
 
 
 def about(mesh: es.TriangleMesh, original: es.TriangleMesh) -> dict[str, object]:
     """Return what a mesh has kept of the original, and how much longer its edges are."""
-    lengths = es.edge_lengths(mesh)
+    lengths = es.geometry.edge_lengths(mesh)
     return {
         "n": mesh.n_vertices,
-        "edge / e": es.mean_side_length(mesh) / es.mean_side_length(original),
-        "area": es.surface_area(mesh) / es.surface_area(original),
-        "volume": es.enclosed_volume(mesh) / es.enclosed_volume(original),
+        "edge / e": es.geometry.mean_side_length(mesh) / es.geometry.mean_side_length(original),
+        "area": es.geometry.surface_area(mesh) / es.geometry.surface_area(original),
+        "volume": es.geometry.enclosed_volume(mesh) / es.geometry.enclosed_volume(original),
         "longest / shortest edge": lengths.max() / lengths.min(),
         "closed manifold of genus 3": bool(
-            es.is_manifold(mesh) and es.is_closed(mesh) and es.euler_characteristic(mesh) == -4
+            es.geometry.is_manifold(mesh)
+            and es.geometry.is_closed(mesh)
+            and es.geometry.euler_characteristic(mesh) == -4
         ),
-        "crossings": len(es.self_intersections(mesh)),
+        "crossings": len(es.geometry.self_intersections(mesh)),
     }
 
 
@@ -90,8 +94,10 @@ def errors(found: dict[str, dict[str, np.ndarray]]) -> dict[str, dict[str, list[
 def figure_meshes(meshes: dict[str, es.TriangleMesh]) -> Figure:
     """Draw the meshes with their edges, from one side, in the colours of their curves."""
     figure = Figure(figsize=(11, 3.1), layout="constrained", dpi=75)
-    camera = es.three_quarter_view(meshes[ORIGINAL], up="x")
-    for axes, (name, mesh), color in zip(figure.subplots(1, len(meshes)), meshes.items(), COLORS, strict=False):
+    camera = es.plot.three_quarter_view(meshes[ORIGINAL], up="x")
+    for axes, (name, mesh), color in zip(
+        figure.subplots(1, len(meshes)), meshes.items(), COLORS, strict=False
+    ):
         show_shape(axes, mesh, camera, color="#e6e2d8", edges=0.15)
         axes.set_title(f"{name}\nn = {mesh.n_vertices:,}", fontsize=10, color=color)
     return figure
@@ -109,8 +115,20 @@ def figure_spectra(found: dict[str, dict[str, np.ndarray]], t: float) -> Figure:
                 relative = np.abs(rows[form] / found[ORIGINAL][form] - 1)
                 panels[1, column].semilogy(index, np.maximum(relative, 1e-4), color=color, lw=0.8)
         caption = f"{form}" + (f", t = e² = {t:.2g}" if form.startswith("mesh") else ", no t")
-        label(panels[0, column], "", "λᵢ in 1/diameter²" if column == 0 else "", caption, legend=column == 0)
-        label(panels[1, column], "index i", "|λᵢ / λᵢ of the original - 1|" if column == 0 else "", "", legend=False)
+        label(
+            panels[0, column],
+            "",
+            "λᵢ in 1/diameter²" if column == 0 else "",
+            caption,
+            legend=column == 0,
+        )
+        label(
+            panels[1, column],
+            "index i",
+            "|λᵢ / λᵢ of the original - 1|" if column == 0 else "",
+            "",
+            legend=False,
+        )
     for axes in panels.flat:
         axes.spines[["top", "right"]].set_visible(False)
     return figure
@@ -120,17 +138,25 @@ def main() -> None:
     """Measure, print, and draw."""
     arguments = parse_arguments(__doc__, HERE)
     require_data()
-    warnings.simplefilter("ignore")  # of the form as printed only the first are told from 1/t: the README says so
+    warnings.simplefilter(
+        "ignore"
+    )  # of the form as printed only the first are told from 1/t: the README says so
     n_first, n_coarse, k = (1800, 1000, 50) if arguments.quick else (None, 3700, 300)
     meshes = meshes_of(n_first, n_coarse)
-    t = es.mean_side_length(meshes[ORIGINAL]) ** 2
-    found = {name: spectra(mesh, t, k) for name, mesh in track(meshes.items(), description="meshes")}
+    t = es.geometry.mean_side_length(meshes[ORIGINAL]) ** 2
+    found = {
+        name: spectra(mesh, t, k) for name, mesh in track(meshes.items(), description="meshes")
+    }
     results = {
         "t": t,
         "meshes": {name: about(mesh, meshes[ORIGINAL]) for name, mesh in meshes.items()},
         "errors": errors(found),
     }
-    pictures = {} if arguments.quick else {"meshes": figure_meshes(meshes), "spectra": figure_spectra(found, t)}
+    pictures = (
+        {}
+        if arguments.quick
+        else {"meshes": figure_meshes(meshes), "spectra": figure_spectra(found, t)}
+    )
     finish(rounded(results), pictures, arguments)
 
 

@@ -30,7 +30,7 @@ OPERATORS: dict[str, Callable[[es.TriangleMesh], es.Laplacian]] = {
     "cotangent": es.cotangent_laplacian,
     "robust": es.robust_laplacian,
     "mesh": es.mesh_laplacian,
-    "P2": partial(es.fem_laplacian, order=2),
+    "P2": partial(es.operators.fem_laplacian, order=2),
 }
 COLUMNS = ("scaled", "scaled by 2ᵖ", "shifted", "renumbered", "threads")
 
@@ -44,7 +44,9 @@ def shapes(*, quick: bool) -> Iterator[tuple[str, es.TriangleMesh]]:
             yield name, es.read_mesh(DATA / "retrieval" / path)
 
 
-def eigenvalues(operator: Callable[[es.TriangleMesh], es.Laplacian], mesh: es.TriangleMesh) -> np.ndarray:
+def eigenvalues(
+    operator: Callable[[es.TriangleMesh], es.Laplacian], mesh: es.TriangleMesh
+) -> np.ndarray:
     """Return the lowest ones."""
     return es.solve_spectrum(operator(mesh), K).eigenvalues
 
@@ -68,30 +70,42 @@ def scaled_error(values: np.ndarray, scaled: np.ndarray, factor: float) -> float
     return float(np.abs(scaled[1:] * factor**2 / values[1:] - 1).max())
 
 
-def threaded(operator: Callable[[es.TriangleMesh], es.Laplacian], mesh: es.TriangleMesh, count: int) -> es.Spectrum:
+def threaded(
+    operator: Callable[[es.TriangleMesh], es.Laplacian], mesh: es.TriangleMesh, count: int
+) -> es.Spectrum:
     """Solve with so many threads of BLAS and of our own loops."""
     numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))
     with threadpool_limits(count):
         return es.solve_spectrum(operator(mesh), K)
 
 
-def measured(operator: Callable[[es.TriangleMesh], es.Laplacian], mesh: es.TriangleMesh) -> dict[str, float]:
+def measured(
+    operator: Callable[[es.TriangleMesh], es.Laplacian], mesh: es.TriangleMesh
+) -> dict[str, float]:
     """Return the worst of each error."""
     values, points = eigenvalues(operator, mesh), np.array(mesh.vertices)
-    powers = [np.ldexp(eigenvalues(operator, moved(mesh, np.ldexp(points, p))), 2 * p) for p in EXPONENTS]
+    powers = [
+        np.ldexp(eigenvalues(operator, moved(mesh, np.ldexp(points, p))), 2 * p) for p in EXPONENTS
+    ]
     diameter = float(np.linalg.norm(np.ptp(points, axis=0)))
     off = points + DIAMETERS * diameter * np.array([1.0, -1.0, 0.5])
     one, two = (threaded(operator, mesh, count) for count in (1, 2))
     last = values[-1]
     return {
-        "scaled": max(scaled_error(values, eigenvalues(operator, moved(mesh, s * points)), s) for s in SCALES),
+        "scaled": max(
+            scaled_error(values, eigenvalues(operator, moved(mesh, s * points)), s) for s in SCALES
+        ),
         "scaled by 2ᵖ": max(float(np.abs(found - values).max() / last) for found in powers),
         "shifted": float(np.abs(eigenvalues(operator, moved(mesh, off)) - values).max() / last),
         "renumbered": float(
-            np.abs(eigenvalues(operator, renumbered(mesh, np.random.default_rng(0))) - values).max() / last
+            np.abs(eigenvalues(operator, renumbered(mesh, np.random.default_rng(0))) - values).max()
+            / last
         ),
         "threads": float(
-            max(np.abs(one.eigenvalues - two.eigenvalues).max(), np.abs(one.eigenvectors - two.eigenvectors).max())
+            max(
+                np.abs(one.eigenvalues - two.eigenvalues).max(),
+                np.abs(one.eigenvectors - two.eigenvectors).max(),
+            )
         ),
     }
 
@@ -99,7 +113,10 @@ def measured(operator: Callable[[es.TriangleMesh], es.Laplacian], mesh: es.Trian
 def markdown(table: dict[str, dict[str, float]]) -> str:
     """Return the table of the README."""
     head = f"| shape, operator | {' | '.join(COLUMNS)} |\n|{'---|' * (len(COLUMNS) + 1)}\n"
-    rows = [f"| {name} | " + " | ".join(f"{row[key]:.0e}" for key in COLUMNS) + " |" for name, row in table.items()]
+    rows = [
+        f"| {name} | " + " | ".join(f"{row[key]:.0e}" for key in COLUMNS) + " |"
+        for name, row in table.items()
+    ]
     return head + "\n".join(rows) + "\n"
 
 
@@ -118,7 +135,9 @@ def main() -> None:
     table = {}
     for name, operator, mesh in track(tasks, description="invariance"):
         table[name] = measured(operator, mesh)
-        print(f"{name:<22}" + "".join(f"{key}: {value:.1e}   " for key, value in table[name].items()))
+        print(
+            f"{name:<22}" + "".join(f"{key}: {value:.1e}   " for key, value in table[name].items())
+        )
     save_figures(table, arguments.out)
 
 

@@ -18,7 +18,13 @@ FAMILIES = {
     "second horse": "horse/sumner_horse",
     "lion": "lion/sumner_lion",
 }
-SPECIES = {"david": "human", "michael": "human", "victoria": "human", "second cat": "cat", "second horse": "horse"}
+SPECIES = {
+    "david": "human",
+    "michael": "human",
+    "victoria": "human",
+    "second cat": "cat",
+    "second horse": "horse",
+}
 KINDS = ("poses of one shape", "other individuals", "other species")
 
 
@@ -43,7 +49,9 @@ def mean_differences(families: dict[str, np.ndarray]) -> dict[tuple[str, str], n
     """Return the mean difference of each pair of shapes, by the names of their families in the order of the table."""
     names, found = list(families), {}
     for place, one in enumerate(names):
-        found[one, one] = np.array([difference(*pair).mean() for pair in combinations(families[one], 2)])
+        found[one, one] = np.array(
+            [difference(*pair).mean() for pair in combinations(families[one], 2)]
+        )
         for other in names[place + 1 :]:
             pairs = [difference(a, b).mean() for a in families[one] for b in families[other]]
             found[one, other] = np.array(pairs)
@@ -53,7 +61,10 @@ def mean_differences(families: dict[str, np.ndarray]) -> dict[tuple[str, str], n
 def by_kind(found: dict[tuple[str, str], np.ndarray]) -> dict[str, np.ndarray]:
     """Put together the pairs of each kind."""
     return {
-        name: np.concatenate([[], *(values for pair, values in found.items() if kind(*pair) == name)]) for name in KINDS
+        name: np.concatenate(
+            [[], *(values for pair, values in found.items() if kind(*pair) == name)]
+        )
+        for name in KINDS
     }
 
 
@@ -96,7 +107,13 @@ def separation(found: dict[tuple[str, str], np.ndarray]) -> dict[str, object]:
     """Return how pairs of each kind spread, and how well a threshold tells poses from other species."""
     kinds = by_kind(found)
     rows: dict[str, object] = {
-        name: {"pairs": len(v), "least": v.min(), "median": np.median(v), "mean": v.mean(), "most": v.max()}
+        name: {
+            "pairs": len(v),
+            "least": v.min(),
+            "median": np.median(v),
+            "mean": v.mean(),
+            "most": v.max(),
+        }
         for name, v in kinds.items()
         if len(v)
     }

@@ -10,7 +10,15 @@ from itertools import combinations
 from pathlib import Path
 
 import numpy as np
-from families import FAMILIES, by_kind, difference, family_rows, mean_differences, paths_of, separation
+from families import (
+    FAMILIES,
+    by_kind,
+    difference,
+    family_rows,
+    mean_differences,
+    paths_of,
+    separation,
+)
 from matplotlib.figure import Figure
 from rich.progress import track
 
@@ -31,7 +39,10 @@ OPERATORS = {
     "mesh, geodesic": lambda mesh: es.mesh_laplacian(mesh, correct="log", distance="geodesic"),
 }
 KERNELS = ("mesh, Euclidean", "mesh, geodesic")
-SOME = {"david": 3, "horse": 2}  # poses that kernels hear beside the cat's: they take ten times as long
+SOME = {
+    "david": 3,
+    "horse": 2,
+}  # poses that kernels hear beside the cat's: they take ten times as long
 DRAWN = ("michael0", "michael2", "michael5", "michael10", "michael16", "cat0", "horse0")
 
 
@@ -41,7 +52,7 @@ def spectra(paths: list[Path], name: str, n_values: int) -> np.ndarray:
     for path in track(paths, description=f"{name}: {paths[0].stem}"):
         mesh = es.read_mesh(path)
         values = es.solve_spectrum(OPERATORS[name](mesh), n_values + 1).eigenvalues[1:]
-        rows.append(values * es.surface_area(mesh))
+        rows.append(values * es.geometry.surface_area(mesh))
     return np.array(rows)
 
 
@@ -70,7 +81,10 @@ def by_kernels(cats: dict[str, np.ndarray]) -> dict[str, dict[str, float]]:
     """Return what kernels hear of poses of a man and of a horse, and between man and cat."""
     table = {}
     for name in KERNELS:
-        heard = {family: spectra(paths_of(family, SHAPES, most), name, 100) for family, most in SOME.items()}
+        heard = {
+            family: spectra(paths_of(family, SHAPES, most), name, 100)
+            for family, most in SOME.items()
+        }
         found = mean_differences({"cat": cats[name], "david": heard["david"]})
         table[name] = {
             "cat": found["cat", "cat"].mean(),
@@ -93,7 +107,7 @@ def figure_classical(rows: dict[str, np.ndarray]) -> Figure:
     above, below = figure.subfigures(2, 1, height_ratios=[1, 1.9])
     for axes, path, color in zip(above.subplots(1, len(paths)), paths, COLORS, strict=False):
         mesh = es.read_mesh(path)
-        show_shape(axes, mesh, es.three_quarter_view(mesh, up="z"), color=color)
+        show_shape(axes, mesh, es.plot.three_quarter_view(mesh, up="z"), color=color)
         axes.set_title(path.stem.removeprefix("tosca_"), fontsize=9)
     left, right = below.subplots(1, 2)
     index = np.arange(1, 101)
@@ -101,9 +115,17 @@ def figure_classical(rows: dict[str, np.ndarray]) -> Figure:
         style = {"color": color, "lw": 1.2, "ls": "-" if name.startswith("michael") else "--"}
         left.plot(index, rows[name], label=name, **style)
         if name != DRAWN[0]:
-            right.semilogy(index, np.maximum(difference(rows[name], rows[DRAWN[0]]), 1e-4), label=name, **style)
+            right.semilogy(
+                index, np.maximum(difference(rows[name], rows[DRAWN[0]]), 1e-4), label=name, **style
+            )
     label(left, "index i", "λᵢ · area (no unit)", "five poses (solid), two other shapes (dashed)")
-    label(right, "index i", f"|λᵢ/λ'ᵢ - 1| to {DRAWN[0]}", "cotangent, averaged; n = 5,000; no t", legend=False)
+    label(
+        right,
+        "index i",
+        f"|λᵢ/λ'ᵢ - 1| to {DRAWN[0]}",
+        "cotangent, averaged; n = 5,000; no t",
+        legend=False,
+    )
     right.set_ylim(1e-4, 1)
     return figure
 
@@ -115,18 +137,36 @@ def figure_separation(found: dict[tuple[str, str], np.ndarray]) -> Figure:
     bins = np.geomspace(0.004, 0.2, 45)
     for (name, values), color in zip(by_kind(found).items(), COLORS, strict=False):
         weights = np.full(len(values), 100 / len(values))
-        left.hist(values, bins, weights=weights, color=color, alpha=0.6, label=f"{name} ({len(values):,} pairs)")
+        left.hist(
+            values,
+            bins,
+            weights=weights,
+            color=color,
+            alpha=0.6,
+            label=f"{name} ({len(values):,} pairs)",
+        )
     left.set_xscale("log")
-    left.set_xticks([0.005, 0.01, 0.02, 0.05, 0.1, 0.2], ["0.005", "0.01", "0.02", "0.05", "0.1", "0.2"])
+    left.set_xticks(
+        [0.005, 0.01, 0.02, 0.05, 0.1, 0.2], ["0.005", "0.01", "0.02", "0.05", "0.1", "0.2"]
+    )
     left.minorticks_off()
     left.spines[["top", "right"]].set_visible(False)
-    label(left, "mean |λᵢ/λ'ᵢ - 1| of 100 eigenvalues", "% of the pairs of a kind", "cotangent, averaged; 108 shapes")
+    label(
+        left,
+        "mean |λᵢ/λ'ᵢ - 1| of 100 eigenvalues",
+        "% of the pairs of a kind",
+        "cotangent, averaged; 108 shapes",
+    )
     names = list(FAMILIES)
-    means = np.array([[found[(a, b) if (a, b) in found else (b, a)].mean() for b in names] for a in names])
+    means = np.array(
+        [[found[(a, b) if (a, b) in found else (b, a)].mean() for b in names] for a in names]
+    )
     picture = right.imshow(means, cmap="viridis_r", vmin=0)
     for (row, column), value in np.ndenumerate(means):
         color = "white" if value > 0.08 else "black"
-        right.text(column, row, f"{100 * value:.1f}", ha="center", va="center", fontsize=7, color=color)
+        right.text(
+            column, row, f"{100 * value:.1f}", ha="center", va="center", fontsize=7, color=color
+        )
     right.set_xticks(range(len(names)), names, rotation=60, ha="right")
     right.set_yticks(range(len(names)), names)
     right.set_title("mean over the pairs of two families, in %", fontsize=10, loc="left")
@@ -137,8 +177,10 @@ def figure_separation(found: dict[tuple[str, str], np.ndarray]) -> Figure:
 def figure_leak(paths: list[Path], shares: dict[str, float]) -> Figure:
     """Draw where the Euclidean kernel of the worst pose leaks."""
     worst = es.read_mesh(max(paths, key=lambda path: shares[path.stem]))
-    camera = es.three_quarter_view(worst, up="z")
-    figure = es.figure_field(worst, leaks(worst), "share of the kernel out of reach along the surface", camera=camera)
+    camera = es.plot.three_quarter_view(worst, up="z")
+    figure = es.figure_field(
+        worst, leaks(worst), "share of the kernel out of reach along the surface", camera=camera
+    )
     figure.set_dpi(70)
     return figure
 
@@ -146,17 +188,24 @@ def figure_leak(paths: list[Path], shares: dict[str, float]) -> Figure:
 def quick() -> dict[str, object]:
     """Compare two poses each of a cat, a man and a horse by thirty eigenvalues."""
     names, operator = ("cat", "david", "horse"), "cotangent, averaged"
-    found = mean_differences({name: spectra(paths_of(name, SHAPES, 2), operator, 30) for name in names})
+    found = mean_differences(
+        {name: spectra(paths_of(name, SHAPES, 2), operator, 30) for name in names}
+    )
     return {"families": family_rows(found), "separation": separation(found)}
 
 
 def full() -> tuple[dict[str, object], dict[str, Figure]]:
     """Compare the cats by all operators and all families by linear elements; draw three pictures."""
-    averaged = {name: spectra(paths_of(name, SHAPES), "cotangent, averaged", 100) for name in FAMILIES}
+    averaged = {
+        name: spectra(paths_of(name, SHAPES), "cotangent, averaged", 100) for name in FAMILIES
+    }
     paths = paths_of("cat", SHAPES)
     cats = {"cotangent, averaged": averaged["cat"]}
     cats |= {name: spectra(paths, name, 100) for name in OPERATORS if name not in cats}
-    shares = {path.stem: float(np.mean(leaks(es.read_mesh(path)) > 0.1)) for path in track(paths, description="leaks")}
+    shares = {
+        path.stem: float(np.mean(leaks(es.read_mesh(path)) > 0.1))
+        for path in track(paths, description="leaks")
+    }
     found = mean_differences(averaged)
     rows = {
         path.stem.removeprefix("tosca_"): row

@@ -34,23 +34,28 @@ def operators(mesh: es.TriangleMesh, t: float) -> dict[str, es.Laplacian]:
     found[LITERAL] = es.mesh_laplacian(mesh, t=t)
     found[CORRECTED] = es.mesh_laplacian(mesh, t=t, correct="log")
     found[RANDOM_WALK] = es.mesh_laplacian(mesh, t=t, correct="log", form="random-walk")
-    found["points, corrected"] = es.point_cloud_laplacian(es.PointCloud(mesh.vertices, 2), t=t, correct="log")
-    found["graph of points"] = es.gaussian_laplacian(mesh.vertices, t, 2)
+    found["points, corrected"] = es.point_cloud_laplacian(
+        es.PointCloud(mesh.vertices, 2), t=t, correct="log"
+    )
+    found["graph of points"] = es.operators.gaussian_laplacian(mesh.vertices, t, 2)
     return found
 
 
 def errors(mesh: es.TriangleMesh, k: int) -> dict:
     """Return n, and by operator the errors of eigenvalues 1 to k - 1, and of eigenvectors in whole eigenspaces."""
     whole = isqrt(k) ** 2  # degrees up to √k - 1 have so many eigenfunctions
-    exact, harmonics = es.sphere_eigenvalues(k + 1), es.sphere_harmonics(mesh.vertices, whole)
+    exact, harmonics = (
+        es.shapes.sphere_eigenvalues(k + 1),
+        es.shapes.sphere_harmonics(mesh.vertices, whole),
+    )
     table: dict = {"n": mesh.n_vertices}
-    for name, operator in operators(mesh, es.mean_side_length(mesh) ** 2).items():
+    for name, operator in operators(mesh, es.geometry.mean_side_length(mesh) ** 2).items():
         spectrum = es.solve_spectrum(operator, k)
         values = spectrum.eigenvalues * (AREA if name == "graph of points" else 1)
         table[name] = {
             "values": np.abs(values - exact[:k])[1:],
             "relative": np.abs(values[1:] / exact[1:k] - 1),
-            "vectors": es.eigenspace_errors(spectrum, exact[: whole + 1], harmonics)[1:],
+            "vectors": es.spectral.eigenspace_errors(spectrum, exact[: whole + 1], harmonics)[1:],
             "plain": plain_errors(spectrum.eigenvectors, harmonics)[1:],
         }
     return table
@@ -69,27 +74,34 @@ def plain_errors(vectors: np.ndarray, harmonics: np.ndarray) -> np.ndarray:
 
 def noisy_sphere(n: int) -> es.TriangleMesh:
     """Return a sphere whose vertices are moved along the radius, by half an edge length (standard deviation)."""
-    mesh = es.fibonacci_sphere(n)
-    heights = 1 + 0.5 * es.mean_side_length(mesh) * np.random.default_rng(0).standard_normal((n, 1))
+    mesh = es.shapes.fibonacci_sphere(n)
+    heights = 1 + 0.5 * es.geometry.mean_side_length(mesh) * np.random.default_rng(
+        0
+    ).standard_normal((n, 1))
     return es.TriangleMesh(mesh.vertices * heights, mesh.faces)
 
 
 def noise_errors(n: int, k: int) -> dict[str, np.ndarray]:
     """Return relative errors of eigenvalues 1 to k - 1 on the noisy sphere, at t of the clean one."""
-    mesh, t = noisy_sphere(n), es.mean_side_length(es.fibonacci_sphere(n)) ** 2
+    mesh, t = noisy_sphere(n), es.geometry.mean_side_length(es.shapes.fibonacci_sphere(n)) ** 2
     heard = {
         CORRECTED: es.mesh_laplacian(mesh, t=t, correct="log"),
         RANDOM_WALK: es.mesh_laplacian(mesh, t=t, correct="log", form="random-walk"),
         LUMPED: es.cotangent_laplacian(mesh),
     }
-    exact = es.sphere_eigenvalues(k)[1:]
-    return {name: np.abs(es.solve_spectrum(each, k).eigenvalues[1:] / exact - 1) for name, each in heard.items()}
+    exact = es.shapes.sphere_eigenvalues(k)[1:]
+    return {
+        name: np.abs(es.solve_spectrum(each, k).eigenvalues[1:] / exact - 1)
+        for name, each in heard.items()
+    }
 
 
 def scatter(mesh: es.TriangleMesh) -> list[float]:
     """Return how far the weights A_j, and those of Voronoi cells, scatter: standard deviation over mean."""
-    cells = es.cloud_quadrature(es.PointCloud(mesh.vertices, 2)).weights
-    return [float(weights.std() / weights.mean()) for weights in (es.dual_volumes(mesh), cells)]
+    cells = es.geometry.cloud_quadrature(es.PointCloud(mesh.vertices, 2)).weights
+    return [
+        float(weights.std() / weights.mean()) for weights in (es.geometry.dual_volumes(mesh), cells)
+    ]
 
 
 def order(edges: list[float], medians: list[float]) -> float:
@@ -110,7 +122,10 @@ def summary(edges: list[float], found: list[dict]) -> dict[str, dict]:
             for each in found
         }
         table[name] = rows | {
-            "order": {what: order(edges, [row[what][0] for row in rows.values()]) for what in ("values", "vectors")}
+            "order": {
+                what: order(edges, [row[what][0] for row in rows.values()])
+                for what in ("values", "vectors")
+            }
         }
     return table
 
@@ -118,7 +133,10 @@ def summary(edges: list[float], found: list[dict]) -> dict[str, dict]:
 def markdown(table: dict[str, dict], what: str) -> str:
     """Return medians by size, the worst at the largest, and the order, one row an operator."""
     sizes = [key for key in next(iter(table.values())) if key != "order"]
-    lines = [f"| operator | {' | '.join(sizes)} | worst there | order |", "|---" * (len(sizes) + 3) + "|"]
+    lines = [
+        f"| operator | {' | '.join(sizes)} | worst there | order |",
+        "|---" * (len(sizes) + 3) + "|",
+    ]
     for name, rows in table.items():
         cells = [f"{rows[size][what][0]:.3g}" for size in sizes]
         cells += [f"{rows[sizes[-1]][what][1]:.3g}", f"{rows['order'][what]:.2f}"]
@@ -129,7 +147,11 @@ def markdown(table: dict[str, dict], what: str) -> str:
 def by_number(panels: dict[str, str], edges: list[float], found: list[dict], what: str) -> Figure:
     """Draw errors by number, one line a size, one panel an operator."""
     figure, axes = chart(10, 4.4, columns=len(panels))
-    unit = "$|\\lambda_i - \\lambda_i^D|$, 1/length²" if what == "values" else "distance to exact eigenspace, 0 to 1"
+    unit = (
+        "$|\\lambda_i - \\lambda_i^D|$, 1/length²"
+        if what == "values"
+        else "distance to exact eigenspace, 0 to 1"
+    )
     for panel, (name, caption) in zip(axes, panels.items(), strict=True):
         for edge, each, color in zip(edges, found, COLORS, strict=False):
             numbers = np.arange(1, 1 + len(each[name][what]))
@@ -139,7 +161,9 @@ def by_number(panels: dict[str, str], edges: list[float], found: list[dict], wha
     axes[-1].legend(frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     figure.suptitle("Unit sphere, Fibonacci points, mean edge length e, t = e²")
     for panel in axes:
-        panel.set_ylim(min(axis.get_ylim()[0] for axis in axes), max(axis.get_ylim()[1] for axis in axes))
+        panel.set_ylim(
+            min(axis.get_ylim()[0] for axis in axes), max(axis.get_ylim()[1] for axis in axes)
+        )
     return figure
 
 
@@ -161,7 +185,9 @@ def orders(edges: list[float], table: dict[str, dict]) -> Figure:
         panel.xaxis.set_minor_formatter("{x:g}")
         title = f"Unit sphere, t = e², {caption}"
         label(panel, "mean edge length e, in radii", "error", title, legend=False)
-        panel.legend(frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
+        panel.legend(
+            frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2
+        )
     return figure
 
 
@@ -180,30 +206,44 @@ def main() -> None:
     arguments = parse_arguments(__doc__, HERE)
     chosen = QUICK if arguments.quick else FULL
     warnings.simplefilter("ignore")
-    meshes, k = [es.fibonacci_sphere(size) for size in chosen["sizes"]], chosen["k"]
-    edges = [es.mean_side_length(mesh) for mesh in meshes]
+    meshes, k = [es.shapes.fibonacci_sphere(size) for size in chosen["sizes"]], chosen["k"]
+    edges = [es.geometry.mean_side_length(mesh) for mesh in meshes]
     found = [errors(mesh, k) for mesh in track(meshes, description="sizes")]
     table = summary(edges, found)
     n = chosen["noisy"]
     noise = noise_errors(n, k)
     medians = {name: [np.median(relative), relative.max()] for name, relative in noise.items()}
     results = rounded(
-        {"operators": table, "noise": medians, "edges": edges, "scatter": [scatter(mesh) for mesh in meshes]}
+        {
+            "operators": table,
+            "noise": medians,
+            "edges": edges,
+            "scatter": [scatter(mesh) for mesh in meshes],
+        }
     )
     pictures = {
         "figure_eigenvalues": by_number(
-            {LITERAL: "mesh Laplacian as printed", CORRECTED: "mesh Laplacian, corrected"}, edges, found, "values"
+            {LITERAL: "mesh Laplacian as printed", CORRECTED: "mesh Laplacian, corrected"},
+            edges,
+            found,
+            "values",
         ),
         "figure_eigenvectors": by_number(
-            {CORRECTED: "mesh Laplacian, as printed or corrected", LUMPED: "cotangent Laplacian, lumped mass"},
+            {
+                CORRECTED: "mesh Laplacian, as printed or corrected",
+                LUMPED: "cotangent Laplacian, lumped mass",
+            },
             edges,
             found,
             "vectors",
         ),
         "figure_orders": orders(edges, table),
         "figure_noise": noise_by_number(n, noise),
-        "figure_noisy_sphere": es.figure_poses(
-            {f"n = {n:,}, clean": es.fibonacci_sphere(n), "moved by half an edge along the radius": noisy_sphere(n)}
+        "figure_noisy_sphere": es.plot.figure_poses(
+            {
+                f"n = {n:,}, clean": es.shapes.fibonacci_sphere(n),
+                "moved by half an edge along the radius": noisy_sphere(n),
+            }
         ),
     }
     finish(results, pictures, arguments)

@@ -41,7 +41,7 @@ def nearest(mesh: es.TriangleMesh, place: tuple[float, ...]) -> int:
 
 def shares(mesh: es.TriangleMesh, tip: int, reach: float) -> np.ndarray:
     """Return by how much vertices follow a fingertip: smoothly from 1 there to 0 a reach away along the surface."""
-    rest = np.clip(1 - es.geodesic_distance_to_set(mesh, [tip]) / reach, 0, 1)
+    rest = np.clip(1 - es.geometry.geodesic_distance_to_set(mesh, [tip]) / reach, 0, 1)
     return rest**2 * (3 - 2 * rest)
 
 
@@ -55,14 +55,19 @@ def touching(mesh: es.TriangleMesh, tips: tuple[int, int]) -> np.ndarray:
     least, most = 0.0, 1.0
     for _ in range(12):
         middle = (least + most) / 2
-        crosses = len(es.self_intersections(es.TriangleMesh(mesh.vertices + middle * way, hand)))
+        crosses = len(
+            es.geometry.self_intersections(es.TriangleMesh(mesh.vertices + middle * way, hand))
+        )
         least, most = (least, middle) if crosses else (middle, most)
     return mesh.vertices + least * way
 
 
 def facing(mesh: es.TriangleMesh, tips: tuple[int, int]) -> tuple[int, int]:
     """Return the vertices by which two fingers are nearest to each other, close to their tips."""
-    one, two = (np.flatnonzero(es.geodesic_distance_to_set(mesh, [tip]) < 0.4 * FINGER) for tip in tips)
+    one, two = (
+        np.flatnonzero(es.geometry.geodesic_distance_to_set(mesh, [tip]) < 0.4 * FINGER)
+        for tip in tips
+    )
     away, place = cKDTree(mesh.vertices[two]).query(mesh.vertices[one])
     return int(one[away.argmin()]), int(two[place[away.argmin()]])
 
@@ -78,7 +83,10 @@ def variants(mesh: es.TriangleMesh) -> dict[str, Surgery]:
     to_nose = touch + stretch * shares(mesh, index, FINGER)[:, None] * way
     x, y = mesh.vertices[:, 0], mesh.vertices[:, 1]
     level = np.abs(y - LEG) < 0.01
-    legs = (np.where(level & (x < 0), x, -np.inf).argmax(), np.where(level & (x > 0), x, np.inf).argmin())
+    legs = (
+        np.where(level & (x < 0), x, -np.inf).argmax(),
+        np.where(level & (x > 0), x, np.inf).argmin(),
+    )
     return {
         "two touch": moved(mesh, touch),
         "two joined": bridge(mesh, *facing(mesh, tips), BRIDGE),
@@ -111,37 +119,47 @@ def draw_variants(surgeries: dict[str, Surgery]) -> Figure:
     before = Surgery(first, first, *(np.full(first.n_faces, -1),) * 2)
     panels = [_crop(before, hand, "M: the left hand")]
     panels += [_crop(surgery, crops[name], name) for name, surgery in surgeries.items()]
-    sheet = es.figure_contact_sheet(_crop(before, lambda p: p[:, 1] > -1, "M"), panels, caption="Changes in green")
+    sheet = es.plot.figure_contact_sheet(
+        _crop(before, lambda p: p[:, 1] > -1, "M"), panels, caption="Changes in green"
+    )
     sheet.set_size_inches(10.8, 5.4)
     return sheet
 
 
-def _crop(surgery: Surgery, keep: object, name: str) -> es.Panel:
+def _crop(surgery: Surgery, keep: object, name: str) -> es.plot.Panel:
     mesh = surgery.two
     inside = keep(mesh.vertices)[mesh.faces].all(axis=1)
     colors = np.where(surgery.regions_two[inside] < 0, -1, 2)
     used, corners = np.unique(mesh.faces[inside], return_inverse=True)
     part = es.TriangleMesh(mesh.vertices[used], corners.reshape(-1, 3))
-    return es.Panel(part, name, colors, np.array([], dtype=np.int64))
+    return es.plot.Panel(part, name, colors, np.array([], dtype=np.int64))
 
 
 def main() -> None:
     """Measure, draw and print."""
     arguments = parse_arguments(__doc__, FOLDER)
     require_data()
-    surgeries = variants(es.normalize_diameter(es.read_mesh(DATA / "classics" / "armadillo.obj")))
-    runs = sample_all(surgeries, QUICK if arguments.quick else RUNS, 100 if arguments.quick else 300)
+    surgeries = variants(
+        es.geometry.normalize_diameter(es.read_mesh(DATA / "classics" / "armadillo.obj"))
+    )
+    runs = sample_all(
+        surgeries, QUICK if arguments.quick else RUNS, 100 if arguments.quick else 300
+    )
     meshes = {} if arguments.quick else mesh_spectra(surgeries, kernel=False)
     results = {
         "surfaces": {
-            name: soundness(surgery, close=not arguments.quick, widen=False) for name, surgery in surgeries.items()
+            name: soundness(surgery, close=not arguments.quick, widen=False)
+            for name, surgery in surgeries.items()
         },
         "samples": {name: run["changes"] for name, run in runs.items()},
         "meshes": mesh_changes(meshes),
     }
     pictures = {}
     if arguments.figures:
-        pictures = {"variants": draw_variants(surgeries), "changes": figure_bars(runs, shown=next(iter(runs)))}
+        pictures = {
+            "variants": draw_variants(surgeries),
+            "changes": figure_bars(runs, shown=next(iter(runs))),
+        }
     if meshes:
         pictures["meshes"] = figure_meshes(meshes, ("cotangent",))
     finish(rounded(results), pictures, arguments)

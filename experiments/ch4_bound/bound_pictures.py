@@ -21,17 +21,29 @@ def columns(rows: list[dict], *names: str) -> list[np.ndarray]:
 def figure_law(points: list[dict], samples: list[dict], setup: dict) -> Figure:
     """Draw the change against δ at each t with the bounds, and all of them on one curve of δ/√t."""
     figure, (left, right) = chart(12, 5, columns=2)
-    law, ours, dense = (es.theorem_rate(name, DIM) for name in ("4.3.1", "lipschitz", "dense"))
+    law, ours, dense = (
+        es.stability.theorem_rate(name, DIM) for name in ("4.3.1", "lipschitz", "dense")
+    )
     for t, color in zip(setup["times"], COLORS, strict=False):
         here = [row for row in points if row["t"] == t]
         deltas = np.unique(columns(here, "delta")[0])
-        by_delta = [columns([row for row in here if row["delta"] == d], "change")[0] for d in deltas]
+        by_delta = [
+            columns([row for row in here if row["delta"] == d], "change")[0] for d in deltas
+        ]
         means = np.array([each.mean() for each in by_delta])
         spans = np.abs([[each.min(), each.max()] for each in by_delta] - means[:, None]).T
-        left.errorbar(deltas, means, spans, fmt="o", ms=4, color=color, label=f"measured, t = {t:g}")
+        left.errorbar(
+            deltas, means, spans, fmt="o", ms=4, color=color, label=f"measured, t = {t:g}"
+        )
         left.plot(deltas, ours.at(deltas, t), "-", lw=1, color=color)
         left.plot(deltas, dense.at(deltas, t), "--", lw=1, color=color)
-        left.plot(deltas, es.cover_by_rate(law, deltas[:1], [t], means[:1]).at(deltas, t), ":", lw=1, color=color)
+        left.plot(
+            deltas,
+            es.stability.bounding_rate(law, deltas[:1], [t], means[:1]).at(deltas, t),
+            ":",
+            lw=1,
+            color=color,
+        )
         right.plot(deltas / t**0.5, means * t, "o-", ms=4, lw=0.8, color=color, label=f"t = {t:g}")
     left.plot([], [], "-", color="grey", label="our bound, δ t$^{-5/2}$ with its constant")
     left.plot([], [], "--", color="grey", label="our bound for dense samples, 3.54 δ t$^{-3/2}$")
@@ -40,8 +52,12 @@ def figure_law(points: list[dict], samples: list[dict], setup: dict) -> Figure:
     deltas, changes = columns(samples, "delta", "change")
     right.plot(deltas / t**0.5, changes * t, "k^", ms=4, label="independent samples, matched")
     ends = np.array(right.get_xlim())
-    right.plot(ends, dense.constant * ends, "--", lw=1, color="grey", label="our bound for dense samples")
-    right.axvspan(1, right.get_xlim()[1], color="#f5e3df", zorder=0, label="t < δ², which the theorem forbids")
+    right.plot(
+        ends, dense.constant * ends, "--", lw=1, color="grey", label="our bound for dense samples"
+    )
+    right.axvspan(
+        1, right.get_xlim()[1], color="#f5e3df", zorder=0, label="t < δ², which the theorem forbids"
+    )
     for axes in (left, right):
         axes.set_xscale("log")
         axes.set_yscale("log")
@@ -64,7 +80,9 @@ def figure_forbidden(points: list[dict], setup: dict) -> Figure:
         axes.plot(ratio / t**0.5, low, "o", ms=4, color=color, label=f"t = {t:g}")
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.axvspan(1, axes.get_xlim()[1], color="#f5e3df", zorder=0, label="t < δ², which the theorem forbids")
+    axes.axvspan(
+        1, axes.get_xlim()[1], color="#f5e3df", zorder=0, label="t < δ², which the theorem forbids"
+    )
     axes.axhline(1, color="grey", lw=0.8, ls="--")
     label(
         axes,
@@ -96,5 +114,11 @@ def figure_surfaces(surfaces: list[dict], setup: dict) -> Figure:
     what = f"First {setup['k']} eigenvalues of a mesh that moves smoothly, n = {n}"
     x = "δ_H, displacement or change of area (area 1)"
     label(panels[0], x, "largest |λ$_i$ - ω$_i$|, 1/length²", what)
-    label(panels[1], x, "Hausdorff distance, 1/length²", "The same, as sets: gaps are about 12", legend=False)
+    label(
+        panels[1],
+        x,
+        "Hausdorff distance, 1/length²",
+        "The same, as sets: gaps are about 12",
+        legend=False,
+    )
     return figure

@@ -53,7 +53,7 @@ OPERATORS = {
 
 def torus_of_area_one(n_around: int, n_across: int) -> es.TriangleMesh:
     """Return the torus on whose surface everything happens."""
-    return es.normalize_area(es.torus(n_around, n_across))
+    return es.geometry.normalize_area(es.shapes.torus(n_around, n_across))
 
 
 def all_eigenvalues(laplacian: es.Laplacian) -> np.ndarray:
@@ -63,7 +63,7 @@ def all_eigenvalues(laplacian: es.Laplacian) -> np.ndarray:
 
 def laplacians(one: np.ndarray, two: np.ndarray, t: float) -> list[es.Laplacian]:
     """Return the graph Laplacians of two sets of points."""
-    return [es.gaussian_laplacian(points, t, DIM) for points in (one, two)]
+    return [es.operators.gaussian_laplacian(points, t, DIM) for points in (one, two)]
 
 
 def moved_points(setup: dict) -> list[dict[str, float]]:
@@ -72,7 +72,7 @@ def moved_points(setup: dict) -> list[dict[str, float]]:
     cases = list(product(setup["times"], setup["deltas"], range(setup["seeds"])))
     for t, delta, seed in track(cases, description="points moved"):
         rng = np.random.default_rng(seed)
-        points = es.sample_surface(mesh, setup["points"], rng=rng).points
+        points = es.geometry.sample_surface(mesh, setup["points"], rng=rng).points
         steps = rng.standard_normal(points.shape)
         there = points + delta * steps / np.linalg.norm(steps, axis=1, keepdims=True)
         one, two = laplacians(points, there, t)
@@ -84,7 +84,7 @@ def moved_points(setup: dict) -> list[dict[str, float]]:
                 "delta": delta,
                 "change": float(np.abs(after - before).max()),
                 "lowest": float((np.abs(after - before)[low] / before[low]).mean()),
-                "weyl": es.weyl_bound(one, two).norm,
+                "weyl": es.stability.weyl_bound(one, two).norm,
             }
         )
     return rows
@@ -93,10 +93,12 @@ def moved_points(setup: dict) -> list[dict[str, float]]:
 def matched_samples(setup: dict) -> list[dict[str, float]]:
     """Compare independent samples, as Theorem 4.1.1 has them: δ is what the best one-to-one correspondence leaves."""
     mesh, t, rows = torus_of_area_one(96, 48), setup["times"][-1], []
-    for n, seed in track(list(product(setup["samples"], range(setup["seeds"]))), description="samples matched"):
+    for n, seed in track(
+        list(product(setup["samples"], range(setup["seeds"]))), description="samples matched"
+    ):
         rng = np.random.default_rng(seed)
-        one, two = (es.sample_surface(mesh, n, rng=rng).points for _ in range(2))
-        delta = es.bottleneck_matching(one, two).distance
+        one, two = (es.geometry.sample_surface(mesh, n, rng=rng).points for _ in range(2))
+        delta = es.stability.bottleneck_matching(one, two).distance
         values = [all_eigenvalues(laplacian) for laplacian in laplacians(one, two, t)]
         change = float(np.abs(values[0] - values[1]).max())
         low = float(np.abs(values[0] - values[1])[1:11].max())
@@ -108,7 +110,9 @@ def waved(mesh: es.TriangleMesh, height: float) -> es.TriangleMesh:
     """Move a surface along its normals by a smooth function of size `height`."""
     x, y, z = (4 * np.pi * mesh.vertices).T
     waves = np.sin(x) * np.cos(y) + np.sin(z + x) ** 2
-    return es.TriangleMesh(mesh.vertices + height / 2 * waves[:, None] * es.vertex_normals(mesh), mesh.faces)
+    return es.TriangleMesh(
+        mesh.vertices + height / 2 * waves[:, None] * es.geometry.vertex_normals(mesh), mesh.faces
+    )
 
 
 def moved_surfaces(setup: dict) -> list[dict[str, object]]:
@@ -122,12 +126,12 @@ def moved_surfaces(setup: dict) -> list[dict[str, object]]:
         for height in setup["heights"]:
             there = waved(mesh, height)
             after = es.solve_spectrum(OPERATORS[name](there, t), setup["k"])
-            compared = es.compare_spectra(before, after)
+            compared = es.spectral.compare_spectra(before, after)
             rows.append(
                 {
                     "operator": name,
                     "t": t,
-                    "delta": es.map_closeness(mesh, there.vertices).delta,
+                    "delta": es.stability.map_closeness(mesh, there.vertices).delta,
                     "hausdorff": compared.hausdorff,
                     "change": compared.index_distance,
                     "relative": compared.median_relative,
@@ -138,7 +142,7 @@ def moved_surfaces(setup: dict) -> list[dict[str, object]]:
 
 def exponents(rows: list[dict], measured: str = "change") -> dict[str, float]:
     """Fit powers of δ and t."""
-    law = es.fit_rate(*columns(rows, "delta", "t", measured))
+    law = es.stability.fit_rate(*columns(rows, "delta", "t", measured))
     return {"delta": law.delta, "t": law.t, "constant": law.constant}
 
 
@@ -146,7 +150,9 @@ def summarise(points: list[dict], samples: list[dict], surfaces: list[dict]) -> 
     """Gather exponents and constants beside those that are proven."""
     allowed = [row for row in points if row["t"] >= SHORT * row["delta"] ** 2]
     forbidden = [row for row in points if row["t"] <= row["delta"] ** 2 / SHORT]
-    law, ours, dense = (es.theorem_rate(name, DIM) for name in ("4.3.1", "lipschitz", "dense"))
+    law, ours, dense = (
+        es.stability.theorem_rate(name, DIM) for name in ("4.3.1", "lipschitz", "dense")
+    )
     told = columns(points, "delta", "t", "change")
     at_samples = columns(samples, "delta", "t")
     return {
@@ -154,18 +160,28 @@ def summarise(points: list[dict], samples: list[dict], surfaces: list[dict]) -> 
         "proven (4.3.1)": {"delta": law.delta, "t": law.t},
         "proven (ours)": {"delta": ours.delta, "t": ours.t},
         "expected (dense)": {"delta": dense.delta, "t": dense.t},
-        "constant that 4.3.1 needs": es.cover_by_rate(law, *columns(allowed, "delta", "t", "change")).constant,
+        "constant that 4.3.1 needs": es.stability.bounding_rate(
+            law, *columns(allowed, "delta", "t", "change")
+        ).constant,
         "largest share of our bound": float((told[2] / ours.at(*told[:2])).max()),
-        "largest share of our bound for dense samples": float((told[2] / dense.at(*told[:2])).max()),
+        "largest share of our bound for dense samples": float(
+            (told[2] / dense.at(*told[:2])).max()
+        ),
         "largest share of Weyl's norm": float(np.max(told[2] / columns(points, "weyl")[0])),
         "lowest ten, relative, t ≥ 4δ²": float(np.mean(columns(allowed, "lowest")[0])),
         "lowest ten, relative, t ≤ δ²/4": float(np.mean(columns(forbidden, "lowest")[0])),
         "samples": {
-            str(n): _sample_row([row for row in samples if row["n"] == n]) for n in {r["n"]: 0 for r in samples}
+            str(n): _sample_row([row for row in samples if row["n"] == n])
+            for n in {r["n"]: 0 for r in samples}
         },
-        "samples, largest share of our bound": float(np.max(columns(samples, "change")[0] / ours.at(*at_samples))),
+        "samples, largest share of our bound": float(
+            np.max(columns(samples, "change")[0] / ours.at(*at_samples))
+        ),
         "functional": functional_errors(),
-        "surfaces": {name: _surface_row([row for row in surfaces if row["operator"] == name]) for name in OPERATORS},
+        "surfaces": {
+            name: _surface_row([row for row in surfaces if row["operator"] == name])
+            for name in OPERATORS
+        },
     }
 
 
@@ -176,7 +192,9 @@ def _sample_row(rows: list[dict]) -> dict[str, float]:
 def _surface_row(rows: list[dict]) -> dict[str, float]:
     by_number, as_sets = exponents(rows, "change"), exponents(rows, "hausdorff")
     theorem = "3.1.5" if rows[0]["operator"].startswith("cotangent") else "3.1.4"
-    covering = es.cover_by_rate(es.theorem_rate(theorem, DIM), *columns(rows, "delta", "t", "hausdorff"))
+    covering = es.stability.bounding_rate(
+        es.stability.theorem_rate(theorem, DIM), *columns(rows, "delta", "t", "hausdorff")
+    )
     return {
         "δ, by number": by_number["delta"],
         "t, by number": by_number["t"],
@@ -189,15 +207,20 @@ def _surface_row(rows: list[dict]) -> dict[str, float]:
 
 def functional_errors() -> dict[str, float]:
     """Fit how far the first eigenvalues of 𝓛_t on the unit sphere are from those of Δ, where theorem 3.1.1 holds."""
-    exact = es.sphere_eigenvalues(N_FUNCTIONAL)
+    exact = es.shapes.sphere_eigenvalues(N_FUNCTIONAL)
     times = np.geomspace(1e-6, 1 / (2 * exact[-1]), 20)
-    errors = np.array([np.abs(es.sphere_functional_eigenvalues(N_FUNCTIONAL, t) - exact).max() for t in times])
+    errors = np.array(
+        [
+            np.abs(es.shapes.sphere_functional_eigenvalues(N_FUNCTIONAL, t) - exact).max()
+            for t in times
+        ]
+    )
     ones = np.ones(len(times))
-    proven = es.theorem_rate("3.1.1", DIM)
+    proven = es.stability.theorem_rate("3.1.1", DIM)
     return {
-        "t": es.fit_rate(ones, times, errors).t,
+        "t": es.stability.fit_rate(ones, times, errors).t,
         "t, proven": proven.t,
-        "constant of 3.1.1": es.cover_by_rate(proven, ones, times, errors).constant,
+        "constant of 3.1.1": es.stability.bounding_rate(proven, ones, times, errors).constant,
     }
 
 
@@ -210,7 +233,10 @@ def markdown(results: dict) -> dict[str, str]:
         "our bound for dense samples": "expected (dense)",
     }
     points = ["| largest change | power of δ | power of t |", "|---|---|---|"]
-    points += [f"| {name} | {results[key]['delta']:.2f} | {results[key]['t']:.2f} |" for name, key in laws.items()]
+    points += [
+        f"| {name} | {results[key]['delta']:.2f} | {results[key]['t']:.2f} |"
+        for name, key in laws.items()
+    ]
     samples = ["| points | δ | largest change | of eigenvalues 1 to 10 |", "|---|---|---|---|"]
     for n, row in results["samples"].items():
         samples.append(f"| {n} | {row['delta']:.3f} | {row['change']:.2f} | {row['lowest']:.2f} |")
@@ -221,8 +247,13 @@ def markdown(results: dict) -> dict[str, str]:
     for name, row in results["surfaces"].items():
         *powers, constant, most = row.values()
         told = f"{constant:.1e} (theorem {list(row)[4].split()[-1]})"
-        surfaces.append(f"| {name} | " + " | ".join(f"{x:.2f}" for x in powers) + f" | {told} | {most:.3f} |")
-    return {name: "\n".join(rows) for name, rows in (("points", points), ("samples", samples), ("surfaces", surfaces))}
+        surfaces.append(
+            f"| {name} | " + " | ".join(f"{x:.2f}" for x in powers) + f" | {told} | {most:.3f} |"
+        )
+    return {
+        name: "\n".join(rows)
+        for name, rows in (("points", points), ("samples", samples), ("surfaces", surfaces))
+    }
 
 
 def main() -> None:

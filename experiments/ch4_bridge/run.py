@@ -34,9 +34,9 @@ MESHED = ("r = 0.014", "r = 0.045", "r = 0.1")
 
 def bridged_tori(radii: tuple[float, ...]) -> dict[str, Surgery]:
     """Return two tori side by side, diameter 1, joined by a bridge of each radius where they are nearest."""
-    left = es.torus(AROUND, ACROSS)
+    left = es.shapes.torus(AROUND, ACROSS)
     right = es.TriangleMesh(left.vertices + np.array([2.8 + GAP, 0, 0]), left.faces)
-    tori = es.normalize_diameter(es.disjoint_union(left, right))
+    tori = es.geometry.normalize_diameter(es.shapes.disjoint_union(left, right))
     across = left.n_vertices + AROUND // 2 * ACROSS
     return {f"r = {radius:g}": bridge(tori, 0, across, radius) for radius in radii}
 
@@ -46,16 +46,25 @@ def main() -> None:
     arguments = parse_arguments(__doc__, FOLDER)
     radii = RADII[::3] if arguments.quick else RADII
     surgeries = bridged_tori(radii)
-    runs = sample_all(surgeries, QUICK if arguments.quick else RUNS, 100 if arguments.quick else 300)
+    runs = sample_all(
+        surgeries, QUICK if arguments.quick else RUNS, 100 if arguments.quick else 300
+    )
     meshes = {} if arguments.quick else mesh_spectra({name: surgeries[name] for name in MESHED})
     results = {
-        "surfaces": {name: soundness(surgery, close=not arguments.quick) for name, surgery in surgeries.items()},
+        "surfaces": {
+            name: soundness(surgery, close=not arguments.quick)
+            for name, surgery in surgeries.items()
+        },
         "samples": {name: run["changes"] for name, run in runs.items()},
         "meshes": mesh_changes(meshes),
     }
     pictures = {
-        "variants": figure_variants(surgeries, "Two tori (M) and bridges of radius r; the diameter of M is 1"),
-        "changes": figure_changes(runs, radii, "radius of the bridge (diameter of M: 1)", shown=next(iter(runs))),
+        "variants": figure_variants(
+            surgeries, "Two tori (M) and bridges of radius r; the diameter of M is 1"
+        ),
+        "changes": figure_changes(
+            runs, radii, "radius of the bridge (diameter of M: 1)", shown=next(iter(runs))
+        ),
     }
     if meshes:
         pictures["meshes"] = figure_meshes(meshes, ("cotangent", "mesh, corrected"))

@@ -33,12 +33,12 @@ MESHED = ("s = 0.15", "s = 0.5", "s = 1")
 def attached_tori(sizes: tuple[float, ...], *, coarser: int = 1) -> dict[str, Surgery]:
     """Return a torus of diameter 1 with another of each size attached at its outer side."""
     n_around, n_across = AROUND // coarser, ACROSS // coarser
-    first = es.normalize_diameter(es.torus(n_around, n_across))
+    first = es.geometry.normalize_diameter(es.shapes.torus(n_around, n_across))
     found = {}
     for size in sizes:
         finer = max(size, 0.4)
         around = 4 * round(n_around * finer / 4)
-        other = es.normalize_diameter(es.torus(around, round(n_across * finer)))
+        other = es.geometry.normalize_diameter(es.shapes.torus(around, round(n_across * finer)))
         shift = 0.5 + size * (0.5 + REACH)
         placed = es.TriangleMesh(size * other.vertices + [shift, 0, 0], other.faces)
         end = around // 2 * (other.n_vertices // around)
@@ -51,20 +51,27 @@ def main() -> None:
     arguments = parse_arguments(__doc__, FOLDER)
     sizes = SIZES[3:] if arguments.quick else SIZES
     surgeries = attached_tori(sizes, coarser=2 if arguments.quick else 1)
-    runs = sample_all(surgeries, QUICK if arguments.quick else RUNS, 100 if arguments.quick else 300)
+    runs = sample_all(
+        surgeries, QUICK if arguments.quick else RUNS, 100 if arguments.quick else 300
+    )
     meshes = {}
     if not arguments.quick:
         meshes = mesh_spectra({name: surgeries[name] for name in MESHED}, kernel=False)
     results = {
         "surfaces": {
-            name: soundness(surgery, close=not arguments.quick, widen=False) for name, surgery in surgeries.items()
+            name: soundness(surgery, close=not arguments.quick, widen=False)
+            for name, surgery in surgeries.items()
         },
         "samples": {name: run["changes"] for name, run in runs.items()},
         "meshes": mesh_changes(meshes),
     }
     pictures = {
-        "variants": figure_variants(surgeries, "A torus (M, diameter 1) and another of s times its size, attached"),
-        "changes": figure_changes(runs, sizes, "size s of the attached torus", shown=next(iter(runs))),
+        "variants": figure_variants(
+            surgeries, "A torus (M, diameter 1) and another of s times its size, attached"
+        ),
+        "changes": figure_changes(
+            runs, sizes, "size s of the attached torus", shown=next(iter(runs))
+        ),
     }
     if meshes:
         pictures["meshes"] = figure_meshes(meshes, ("cotangent",))

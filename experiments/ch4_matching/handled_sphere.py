@@ -7,13 +7,17 @@ import numpy as np
 import eigenshape as es
 
 RADIUS = 0.5 / np.pi**0.5  # of the sphere of area 1
-MU = 2 * np.pi**0.5  # its isoperimetric constant: no region has less boundary for its area than half of it
+MU = (
+    2 * np.pi**0.5
+)  # its isoperimetric constant: no region has less boundary for its area than half of it
 SPREAD = 0.5  # rad: how far around a region the mesh is drawn together
 WAIST = 0.4  # of a handle
 RINGS = 12  # along a handle
 
 
-def make_pair(level: int, *, region: float, handle: float, stretch: float) -> es.Perturbation:
+def make_pair(
+    level: int, *, region: float, handle: float, stretch: float
+) -> es.stability.Perturbation:
     """Return a sphere and its perturbation.
 
     `region` is the radius of the twelve regions, in length; `handle` the mesh's edge there over that elsewhere;
@@ -29,10 +33,12 @@ def make_pair(level: int, *, region: float, handle: float, stretch: float) -> es
     points, faces, others = [sphere.vertices], sphere.faces, labels
     for number, center in enumerate(RADIUS * centers):
         around = sorted(np.argsort(np.linalg.norm(sphere.vertices - center, axis=1))[:40].tolist())
-        added, faces, others = add_handle(sphere, faces, others, number, feet(sphere, around), sum(map(len, points)))
+        added, faces, others = add_handle(
+            sphere, faces, others, number, feet(sphere, around), sum(map(len, points))
+        )
         points.append(added)
     other = es.TriangleMesh(np.concatenate(points) * [1 + stretch, 1, 1 / (1 + stretch)], faces)
-    return es.perturbation(sphere, other, regions_one=labels, regions_two=others)
+    return es.stability.measure_perturbation(sphere, other, regions_one=labels, regions_two=others)
 
 
 def draw_together(points: np.ndarray, centers: np.ndarray, share: float) -> np.ndarray:
@@ -91,7 +97,9 @@ def add_handle(
     across = np.cross(above, between)
     here = (mesh.vertices[one] - mesh.vertices[middle_one]) @ np.array([between, across, above]).T
     # Going over the arch turns what points forward back: seen from above, the second rim is met in a mirror.
-    mirrored = (mesh.vertices[two] - mesh.vertices[middle_two]) @ np.array([-between, across, -above]).T
+    mirrored = (mesh.vertices[two] - mesh.vertices[middle_two]) @ np.array(
+        [-between, across, -above]
+    ).T
     turns = [np.roll(np.arange(6)[::-1], turn) for turn in range(6)]
     turn = min(turns, key=lambda order: np.linalg.norm(here - mirrored[order]))
     there, two = mirrored[turn], np.array(two)[turn]
@@ -107,7 +115,11 @@ def add_handle(
     numbers = [np.array(one), *(first + 6 * k + np.arange(6) for k in range(RINGS - 1)), two]
     tube = [strip(a, b) for a, b in pairwise(numbers)]
     added = np.concatenate(tube)
-    return np.concatenate(rings), np.concatenate([faces[kept], added]), np.append(labels[kept], [number] * len(added))
+    return (
+        np.concatenate(rings),
+        np.concatenate([faces[kept], added]),
+        np.append(labels[kept], [number] * len(added)),
+    )
 
 
 def frame(one: np.ndarray, two: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -119,4 +131,6 @@ def frame(one: np.ndarray, two: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def strip(one: np.ndarray, two: np.ndarray) -> np.ndarray:
     """Return the triangles between two rings, which look outward as the faces around the first do."""
     following, beside = np.roll(one, -1), np.roll(two, -1)
-    return np.concatenate([np.column_stack([one, following, two]), np.column_stack([following, beside, two])])
+    return np.concatenate(
+        [np.column_stack([one, following, two]), np.column_stack([following, beside, two])]
+    )

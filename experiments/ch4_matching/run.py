@@ -20,7 +20,7 @@ sys.path.append(str(HERE.parent))
 from frame import COLORS, chart, finish, label, parse_arguments, rounded  # noqa: E402
 from handled_sphere import MU, make_pair  # noqa: E402
 
-RHO = es.matching_reach(MU)
+RHO = es.stability.matching_reach(MU)
 STEPS = 6  # of the search for the least reach
 FULL = Namespace(level=6, region=0.0098, stretch=0.003, deltas=(0.04, 0.02, 0.01), shown=(0.04, 2000),
                  counts=(31, 125, 250, 500, 1000, 2000, 4000, 8000), samples=20, searches=40_000)  # fmt: skip
@@ -30,16 +30,24 @@ HANDLE = 0.07
 LAW = "(log n)^(3/4) / √n"
 
 
-def throw(pair: es.Perturbation, n: int, seed: int) -> tuple[es.SurfacePoints, es.SurfacePoints, es.SurfacePoints]:
+def throw(
+    pair: es.stability.Perturbation, n: int, seed: int
+) -> tuple[es.geometry.SurfacePoints, es.geometry.SurfacePoints, es.geometry.SurfacePoints]:
     """Throw n points on the sphere, on the one with handles, and again on the sphere."""
     streams = np.random.default_rng([n, seed]).spawn(3)
     shapes = (pair.one, pair.two, pair.one)
-    one, two, again = (es.sample_surface(shape, n, rng=rng) for shape, rng in zip(shapes, streams, strict=True))
+    one, two, again = (
+        es.geometry.sample_surface(shape, n, rng=rng)
+        for shape, rng in zip(shapes, streams, strict=True)
+    )
     return one, two, again
 
 
 def least_reach(
-    pair: es.Perturbation, points: tuple[es.SurfacePoints, es.SurfacePoints], nodes: np.ndarray, ends: tuple
+    pair: es.stability.Perturbation,
+    points: tuple[es.geometry.SurfacePoints, es.geometry.SurfacePoints],
+    nodes: np.ndarray,
+    ends: tuple,
 ) -> float:
     """Search for the reach (ρ+1)δ of witness regions from which on the graph has a perfect matching, to 1/64 of ends.
 
@@ -48,8 +56,10 @@ def least_reach(
 
     def suffices(reach: float) -> bool:
         # Reach is all that counts of δ and ρ once nodes are chosen.
-        graph = es.correspondence_graph(pair, *points, nodes=nodes, delta=reach / 2, rho=1.0)
-        return es.maximum_matching(graph).is_perfect
+        graph = es.stability.correspondence_graph(
+            pair, *points, nodes=nodes, delta=reach / 2, rho=1.0
+        )
+        return es.stability.maximum_matching(graph).is_perfect
 
     low, high = ends
     for _ in range(STEPS):
@@ -58,15 +68,20 @@ def least_reach(
     return high
 
 
-def measure(pair: es.Perturbation, nodes: dict[float, es.AnchorNodes], n: int, plan: Namespace) -> dict[str, object]:
+def measure(
+    pair: es.stability.Perturbation,
+    nodes: dict[float, es.stability.AnchorNodes],
+    n: int,
+    plan: Namespace,
+) -> dict[str, object]:
     """Return bottleneck distances of samples, and the least reach for each δ: of fewer where that is dear."""
-    closeness = es.measure_closeness(pair)
+    closeness = es.stability.measure_closeness(pair)
     changed, same = [], []
     reaches = {delta: [] for delta in nodes}
     for seed in track(range(plan.samples), description=f"{n} points"):
         one, two, again = throw(pair, n, seed)
-        changed.append(es.bottleneck_matching(one.points, two.points).distance)
-        same.append(es.bottleneck_matching(one.points, again.points).distance)
+        changed.append(es.stability.bottleneck_matching(one.points, two.points).distance)
+        same.append(es.stability.bottleneck_matching(one.points, again.points).distance)
         for delta, chosen in nodes.items() if seed < plan.searches // n else ():
             # A point is near its node, and near its partner's place before the change.
             margin = chosen.cover + closeness.displacement.max() + 2 * closeness.radii.max()
@@ -97,39 +112,49 @@ def rates(rows: dict[int, dict[str, object]]) -> dict[str, object]:
     fits = {}
     for name, power in laws.items():
         constants = medians * np.sqrt(counts) / np.log(counts) ** power
-        fits[name] = {"constant": float(np.median(constants)), "unequal": float(constants.max() / constants.min() - 1)}
+        fits[name] = {
+            "constant": float(np.median(constants)),
+            "unequal": float(constants.max() / constants.min() - 1),
+        }
     fits["slope"] = float(np.polyfit(np.log(counts), np.log(medians), 1)[0])
     return fits
 
 
-def check(pair: es.Perturbation, nodes: es.AnchorNodes, delta: float, n: int) -> dict[str, float]:
+def check(
+    pair: es.stability.Perturbation, nodes: es.stability.AnchorNodes, delta: float, n: int
+) -> dict[str, float]:
     """Build the theorem's graph once, match it, and return the longest edge and move over δ."""
     one, two, _ = throw(pair, n, 0)
-    graph = es.correspondence_graph(pair, one, two, nodes=nodes.points, delta=delta, rho=RHO)
-    found, ends = es.maximum_matching(graph), graph.tocoo()
+    graph = es.stability.correspondence_graph(
+        pair, one, two, nodes=nodes.points, delta=delta, rho=RHO
+    )
+    found, ends = es.stability.maximum_matching(graph), graph.tocoo()
     edges = np.linalg.norm(one.points[ends.row] - two.points[ends.col], axis=1)
     moves = np.linalg.norm(one.points - two.points[found.partners], axis=1)
-    best = es.bottleneck_matching(one.points, two.points).distance
+    best = es.stability.bottleneck_matching(one.points, two.points).distance
     return {
         "δ": delta, "n": n, "unmatched": n - found.n_matched, "longest edge / δ": float(edges.max() / delta),
         "longest move / δ": float(moves.max() / delta), "bottleneck / δ": best / delta,
     }  # fmt: skip
 
 
-def run(plan: Namespace) -> tuple[dict[str, object], es.Perturbation]:
+def run(plan: Namespace) -> tuple[dict[str, object], es.stability.Perturbation]:
     """Measure everything."""
     pair = make_pair(plan.level, region=plan.region, handle=HANDLE, stretch=plan.stretch)
-    closeness = es.measure_closeness(pair)
-    nodes = {delta: es.anchor_nodes(pair.one, delta) for delta in plan.deltas}
+    closeness = es.stability.measure_closeness(pair)
+    nodes = {delta: es.stability.anchor_nodes(pair.one, delta) for delta in plan.deltas}
     rows = {}
     for n in plan.counts:
         rows[n] = summary(measure(pair, nodes, n, plan))
     return {
         "δ of the pair": closeness.delta,
         "decided by": closeness.limited_by,
-        "genus": 1 - es.euler_characteristic(pair.two) // 2,
+        "genus": 1 - es.geometry.euler_characteristic(pair.two) // 2,
         "ρ": RHO,
-        "nodes": {delta: {"number": len(some.vertices), "cover": some.cover} for delta, some in nodes.items()},
+        "nodes": {
+            delta: {"number": len(some.vertices), "cover": some.cover}
+            for delta, some in nodes.items()
+        },
         "points": rows,
         "rate": rates(rows),
         "the graph itself": check(pair, nodes[plan.shown[0]], *plan.shown),
@@ -149,9 +174,19 @@ def draw_probability(results: dict[str, object]) -> Figure:
     counts = list(rows)
     for color, delta in zip(COLORS, results["nodes"], strict=False):
         cells = [rows[n][f"δ = {delta}"] for n in counts]
-        left.semilogx(counts, [cell["probability"] for cell in cells], "o-", color=color, label=f"δ = {delta}")
-        right.loglog(counts, [cell["least reach / δ"] for cell in cells], "o-", color=color, label=f"δ = {delta}")
-    right.axhline(RHO + 1, color="black", linestyle="--", label=f"the theorem's reach, ρ + 1 = {RHO + 1:.2f}")
+        left.semilogx(
+            counts, [cell["probability"] for cell in cells], "o-", color=color, label=f"δ = {delta}"
+        )
+        right.loglog(
+            counts,
+            [cell["least reach / δ"] for cell in cells],
+            "o-",
+            color=color,
+            label=f"δ = {delta}",
+        )
+    right.axhline(
+        RHO + 1, color="black", linestyle="--", label=f"the theorem's reach, ρ + 1 = {RHO + 1:.2f}"
+    )
     left.set_ylim(-0.03, 1.03)
     samples = [row["searches"] for row in rows.values()]
     for panel in (left, right):
@@ -178,10 +213,15 @@ def draw_bottleneck(results: dict[str, object]) -> Figure:
         axes.fill_between(counts, low, high, color=color, alpha=0.15, label="5 to 95 % of samples")
     fit = results["rate"][LAW]["constant"]
     axes.loglog(
-        counts, fit * np.log(counts) ** 0.75 / np.sqrt(counts), "k:", label=f"{fit:.2f} · {LAW} (Leighton, Shor)"
+        counts,
+        fit * np.log(counts) ** 0.75 / np.sqrt(counts),
+        "k:",
+        label=f"{fit:.2f} · {LAW} (Leighton, Shor)",
     )
     for color, delta in zip(COLORS[2:], results["nodes"], strict=False):
-        axes.axhline((RHO + 3) * delta, color=color, linestyle="--", label=f"(ρ + 3) δ for δ = {delta}")
+        axes.axhline(
+            (RHO + 3) * delta, color=color, linestyle="--", label=f"(ρ + 3) δ for δ = {delta}"
+        )
     plain_ticks(axes, list(results["points"]))
     axes.set_yticks([0.02, 0.05, 0.1, 0.2, 0.5], ["0.02", "0.05", "0.1", "0.2", "0.5"])
     axes.minorticks_off()
@@ -194,16 +234,17 @@ def region_of(mesh: es.TriangleMesh, labels: np.ndarray) -> es.TriangleMesh:
     """Return the faces of region 0 with its middle at the origin and z up, in units of 0.01."""
     used, numbers = np.unique(mesh.faces[labels == 0], return_inverse=True)
     points = 100 * mesh.vertices[used]
-    center = np.array(es.enclosing_ball(points).center)
+    center = np.array(es.geometry.enclosing_ball(points).center)
     up = center / np.linalg.norm(center)
     across = np.cross(up, [1.0, 0.0, 0.0])
     across /= np.linalg.norm(across)
     return es.TriangleMesh(
-        (points - center) @ np.column_stack([np.cross(across, up), across, up]), numbers.reshape(-1, 3)
+        (points - center) @ np.column_stack([np.cross(across, up), across, up]),
+        numbers.reshape(-1, 3),
     )
 
 
-def draw_shapes(pair: es.Perturbation) -> Figure:
+def draw_shapes(pair: es.stability.Perturbation) -> Figure:
     """Draw one region before and after, and the middle of it after, large."""
     before, after = region_of(pair.one, pair.regions_one), region_of(pair.two, pair.regions_two)
     top = after.vertices[after.vertices[:, 2].argmax()]
@@ -220,12 +261,21 @@ def draw_shapes(pair: es.Perturbation) -> Figure:
         )
     ):
         axes = figure.add_subplot(1, 3, place + 1, projection="3d", computed_zorder=False)
-        near = np.linalg.norm((mesh.vertices - middle)[mesh.faces].mean(axis=1)[:, :2], axis=1) <= reach
+        near = (
+            np.linalg.norm((mesh.vertices - middle)[mesh.faces].mean(axis=1)[:, :2], axis=1)
+            <= reach
+        )
         axes.plot_trisurf(
-            *mesh.vertices.T, triangles=mesh.faces[near], color="#9ecae1", edgecolor="#1f4e79", linewidth=0.2
+            *mesh.vertices.T,
+            triangles=mesh.faces[near],
+            color="#9ecae1",
+            edgecolor="#1f4e79",
+            linewidth=0.2,
         )
         axes.set_box_aspect((1, 1, 0.45), zoom=1.35)
-        axes.set(xlim=middle[0] + np.array([-reach, reach]), ylim=middle[1] + np.array([-reach, reach]))
+        axes.set(
+            xlim=middle[0] + np.array([-reach, reach]), ylim=middle[1] + np.array([-reach, reach])
+        )
         axes.set_zlim(middle[2] + 0.45 * np.array([-reach, reach]))
         axes.view_init(elev=32, azim=side + 20)
         axes.set_axis_off()

@@ -29,23 +29,27 @@ MESHED = ("ε = 0.0005", "ε = 0.002", "ε = 0.004")
 
 def giraffe() -> es.TriangleMesh:
     """Return the surface, its diameter 1."""
-    return es.normalize_diameter(es.make_creature("giraffe", n_vertices=6000))
+    return es.geometry.normalize_diameter(es.make_creature("giraffe", n_vertices=6000))
 
 
 def shaken(mesh: es.TriangleMesh, noise: tuple[float, ...]) -> dict[str, es.TriangleMesh]:
     """Move the vertices of a mesh by one draw of noise of each size."""
     draw = np.random.default_rng(0).standard_normal(mesh.vertices.shape)
-    return {f"ε = {size:g}": es.TriangleMesh(mesh.vertices + size * draw, mesh.faces) for size in noise}
+    return {
+        f"ε = {size:g}": es.TriangleMesh(mesh.vertices + size * draw, mesh.faces) for size in noise
+    }
 
 
-def measure(mesh: es.TriangleMesh, t: float, n: int, k: int, seeds: int, noise: tuple[float, ...]) -> dict:
+def measure(
+    mesh: es.TriangleMesh, t: float, n: int, k: int, seeds: int, noise: tuple[float, ...]
+) -> dict:
     """Measure how the spectra of points change when they are moved by noise of each size; one draw a seed."""
-    volume = es.surface_area(mesh)
+    volume = es.geometry.surface_area(mesh)
     rows: dict[str, list[dict[str, float]]] = {f"ε = {size:g}": [] for size in noise}
     again, spectra = [], {}
     for seed in range(seeds):
         rng = np.random.default_rng([seed, n])
-        points, others = (es.sample_surface(mesh, n, rng=rng).points for _ in range(2))
+        points, others = (es.geometry.sample_surface(mesh, n, rng=rng).points for _ in range(2))
         draw = rng.standard_normal(points.shape)
         before = eigenvalues(points, t, k, volume)
         again.append(changes(before, eigenvalues(others, t, k, volume)))
@@ -63,7 +67,10 @@ def growth(measured: dict, noise: tuple[float, ...]) -> dict[str, float]:
     """Fit the power of δ with which changes grow, over the four smallest noises."""
     rows = [measured[f"ε = {size:g}"] for size in noise][:4]
     log_delta = np.log([row["δ"]["mean"] for row in rows])
-    return {key: np.polyfit(log_delta, np.log([row[key]["mean"] for row in rows]), 1)[0] for key in ("largest", "mean")}
+    return {
+        key: np.polyfit(log_delta, np.log([row[key]["mean"] for row in rows]), 1)[0]
+        for key in ("largest", "mean")
+    }
 
 
 def main() -> None:
@@ -85,9 +92,13 @@ def main() -> None:
     }
     poses = {"M": mesh, **shaken(mesh, noise[-4:-1])}
     pictures = {
-        "variants": es.figure_poses(poses, camera=es.three_quarter_view(mesh, size=300)),
+        "variants": es.plot.figure_poses(poses, camera=es.plot.three_quarter_view(mesh, size=300)),
         "changes": figure_changes(
-            runs, noise, "ε, standard deviation of the noise (diameter: 1)", shown=next(iter(runs)), log=(True, True)
+            runs,
+            noise,
+            "ε, standard deviation of the noise (diameter: 1)",
+            shown=next(iter(runs)),
+            log=(True, True),
         ),
     }
     if meshes:

@@ -24,7 +24,12 @@ from real_shapes import DATA, manifest, require_data
 
 QUICK = ("ant", "armadillo", "human", "table", "teddy")
 N_TUNED = 5  # first members of each class: constants were chosen on them
-COUNTS = (4, 6, 8, 10)  # clusters tried for the baselines, of which the best on the tuning half is shown
+COUNTS = (
+    4,
+    6,
+    8,
+    10,
+)  # clusters tried for the baselines, of which the best on the tuning half is shown
 N_COORDINATES = 8
 DEFAULT = "default"
 
@@ -34,7 +39,9 @@ Labels = np.ndarray
 def shapes(quick: bool) -> list[tuple[str, str, Path]]:
     """List name, class and file of the labelled shapes by class and number, or two of each of some classes."""
     found = [(row["cls"], Path(row["path"])) for row in manifest()]
-    labelled = [(cls, path) for cls, path in found if (DATA / "parts" / f"{cls}-{path.stem}.npy").exists()]
+    labelled = [
+        (cls, path) for cls, path in found if (DATA / "parts" / f"{cls}-{path.stem}.npy").exists()
+    ]
     labelled.sort(key=lambda one: (one[0], int(one[1].stem.removeprefix("psb"))))
     if quick:
         members = {cls: [one for one in labelled if one[0] == cls] for cls in QUICK}
@@ -46,12 +53,16 @@ def tuning_names() -> set[str]:
     """Return the half on which constants were chosen: the first members of each class."""
     everyone = shapes(quick=False)
     classes = sorted({cls for _, cls, _ in everyone})
-    return {name for cls in classes for name, own, _ in [one for one in everyone if one[1] == cls][:N_TUNED]}
+    return {
+        name
+        for cls in classes
+        for name, own, _ in [one for one in everyone if one[1] == cls][:N_TUNED]
+    }
 
 
 def face_neighbours(mesh: es.TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
     """Return the pairs of faces at an edge, and the edge."""
-    table = es.edge_table(mesh)
+    table = es.geometry.edge_table(mesh)
     order = np.argsort(table.face_edges.ravel(), kind="stable")
     edges = table.face_edges.ravel()[order]
     same = np.flatnonzero(edges[1:] == edges[:-1])
@@ -70,7 +81,10 @@ def rand_error(one: Labels, two: Labels) -> float:
     """Return the share of pairs of faces that are together in one and apart in the other: 1 - Rand index."""
     table = sp.coo_array((np.ones(len(one)), (one, two))).tocsr()
     table.sum_duplicates()
-    alone = sum((counts**2).sum() for counts in (np.bincount(one).astype(float), np.bincount(two).astype(float)))
+    alone = sum(
+        (counts**2).sum()
+        for counts in (np.bincount(one).astype(float), np.bincount(two).astype(float))
+    )
     return float((alone - 2 * (table.data**2).sum()) / (len(one) * (len(one) - 1.0)))
 
 
@@ -90,11 +104,11 @@ def spectral_coordinates(mesh: es.TriangleMesh) -> np.ndarray:
 def cut_affinity(mesh: es.TriangleMesh) -> sp.csr_array:
     """Return how strongly faces hang together: edge length / (1 + bend / mean bend), convex bends a fifth."""
     pairs, edges = face_neighbours(mesh)
-    normals, centres = es.face_normals(mesh), mesh.vertices[mesh.faces].mean(axis=1)
+    normals, centres = es.geometry.face_normals(mesh), mesh.vertices[mesh.faces].mean(axis=1)
     one, two = normals[pairs[:, 0]], normals[pairs[:, 1]]
     concave = np.einsum("pi,pi->p", two - one, centres[pairs[:, 1]] - centres[pairs[:, 0]]) < 0
     bend = np.where(concave, 1.0, 0.2) * (1 - np.einsum("pi,pi->p", one, two))
-    lengths = es.edge_lengths(mesh)[edges]
+    lengths = es.geometry.edge_lengths(mesh)[edges]
     weights = lengths / lengths.mean() / (1 + bend / bend.mean())
     both = np.concatenate([pairs, pairs[:, ::-1]]).T
     return sp.coo_array((np.tile(weights, 2), both), shape=(mesh.n_faces,) * 2).tocsr()
@@ -114,16 +128,27 @@ def segmentations(mesh: es.TriangleMesh) -> dict[str, Callable[[], Labels]]:
     count = len(found.parts.features.vertices)
     ways: dict[str, Callable[[], Labels]] = {
         DEFAULT: lambda: found.parts.labels,
-        "default, boundaries not smoothed": lambda: es.segment(found.tree, persistence=es.PART_CONTRAST).labels,
-        "heat, scale-free preset": lambda: es.describe_mesh(mesh).parts.labels,
-        "thesis preset": lambda: es.describe_mesh(mesh, es.THESIS).parts.labels,
+        "default, boundaries not smoothed": lambda: (
+            es.segment(found.tree, persistence=es.features.PART_CONTRAST).labels
+        ),
+        "heat, scale-free preset": lambda: es.retrieval.find_heat_features(mesh).parts.labels,
+        "thesis preset": lambda: (
+            es.retrieval.find_heat_features(mesh, es.retrieval.THESIS).parts.labels
+        ),
     }
-    for name, coordinates in (("k-means", spectral_coordinates), ("normalised cut", normalised_cut_coordinates)):
+    for name, coordinates in (
+        ("k-means", spectral_coordinates),
+        ("normalised cut", normalised_cut_coordinates),
+    ):
         place = coordinates(mesh)
         for clusters in COUNTS:
             width = clusters if name == "normalised cut" else N_COORDINATES
-            ways[f"{name}, {clusters}"] = lambda place=place, k=clusters, w=width: clustered(place[:, :w], k)
-        ways[f"{name}, as many as the default"] = lambda place=place: clustered(place[:, :N_COORDINATES], count)
+            ways[f"{name}, {clusters}"] = lambda place=place, k=clusters, w=width: clustered(
+                place[:, :w], k
+            )
+        ways[f"{name}, as many as the default"] = lambda place=place: clustered(
+            place[:, :N_COORDINATES], count
+        )
     return ways
 
 
@@ -153,7 +178,10 @@ def kept(folder: Path, name: str, path: Path) -> dict[str, dict[str, float]]:
 
 def summary(rows: dict[str, dict[str, dict[str, float]]], tuning: set[str]) -> dict[str, object]:
     """Average over halves and classes; of each baseline the number of clusters that is best on the tuning half."""
-    halves = {"tuning": [n for n in rows if n in tuning], "reporting": [n for n in rows if n not in tuning]}
+    halves = {
+        "tuning": [n for n in rows if n in tuning],
+        "reporting": [n for n in rows if n not in tuning],
+    }
     halves["all"] = list(rows)
     ways = list(next(iter(rows.values())))
 
@@ -162,17 +190,35 @@ def summary(rows: dict[str, dict[str, dict[str, float]]], tuning: set[str]) -> d
 
     shown = [way for way in ways if not way.split(", ")[-1].isdigit()]
     for baseline in ("k-means", "normalised cut"):
-        shown.append(min((f"{baseline}, {count}" for count in COUNTS), key=lambda way: mean(way, halves["tuning"])))
+        shown.append(
+            min(
+                (f"{baseline}, {count}" for count in COUNTS),
+                key=lambda way: mean(way, halves["tuning"]),
+            )
+        )
     classes = sorted({name.split("-")[0] for name in rows})
     return {
-        "error": {way: {half: round(mean(way, names), 4) for half, names in halves.items()} for way in shown},
+        "error": {
+            way: {half: round(mean(way, names), 4) for half, names in halves.items()}
+            for way in shown
+        },
         "parts": {way: round(mean(way, halves["all"], "parts"), 1) for way in shown},
         "by class": {
-            cls: {way: round(mean(way, [n for n in rows if n.startswith(f"{cls}-")]), 3) for way in shown}
+            cls: {
+                way: round(mean(way, [n for n in rows if n.startswith(f"{cls}-")]), 3)
+                for way in shown
+            }
             for cls in classes
         },
         "largest part of the default, median": {
-            cls: round(float(np.median([rows[n][DEFAULT]["largest"] for n in rows if n.startswith(f"{cls}-")])), 2)
+            cls: round(
+                float(
+                    np.median(
+                        [rows[n][DEFAULT]["largest"] for n in rows if n.startswith(f"{cls}-")]
+                    )
+                ),
+                2,
+            )
             for cls in classes
         },
     }
@@ -181,8 +227,12 @@ def summary(rows: dict[str, dict[str, dict[str, float]]], tuning: set[str]) -> d
 def main() -> None:
     """Measure every shape, print and save the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help=f"two members of the classes {', '.join(QUICK)}")
-    parser.add_argument("--db", type=output_folder, default="ch5-parts", help="folder of what is done, kept")
+    parser.add_argument(
+        "--quick", action="store_true", help=f"two members of the classes {', '.join(QUICK)}"
+    )
+    parser.add_argument(
+        "--db", type=output_folder, default="ch5-parts", help="folder of what is done, kept"
+    )
     parser.add_argument("--out", type=output_file, default="ch5-parts.json")
     arguments = parser.parse_args()
     require_data()

@@ -17,7 +17,10 @@ def map_between(one: es.TriangleMesh, two: es.TriangleMesh) -> np.ndarray:
     more and more eigenfunctions (Melzi and others 2019). On symmetric shapes left and right may change places.
     """
     (values_one, phi_one, mass_one), (values_two, phi_two, mass_two) = _basis(one), _basis(two)
-    down_one, down_two = _signatures(values_one, phi_one, mass_one), _signatures(values_two, phi_two, mass_two)
+    down_one, down_two = (
+        _signatures(values_one, phi_one, mass_one),
+        _signatures(values_two, phi_two, mass_two),
+    )
     known, wanted = down_two[:START], down_one[:START]
     gaps = np.abs(values_one[:START, None] - values_two[None, :START]) / values_one[START - 1]
     functional = np.zeros((START, START))  # coefficients on the second shape to those on the first
@@ -40,7 +43,11 @@ def _basis(mesh: es.TriangleMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return eigenvalues, eigenfunctions and masses on a shape of area 1."""
     laplacian = es.cotangent_laplacian(mesh)
     spectrum, area = es.solve_spectrum(laplacian, END), laplacian.mass.sum()
-    return spectrum.eigenvalues * area, spectrum.eigenvectors * np.sqrt(area), laplacian.mass.diagonal() / area
+    return (
+        spectrum.eigenvalues * area,
+        spectrum.eigenvectors * np.sqrt(area),
+        laplacian.mass.diagonal() / area,
+    )
 
 
 def _signatures(values: np.ndarray, phi: np.ndarray, mass: np.ndarray) -> np.ndarray:

@@ -22,14 +22,17 @@ from outputs import give_out, output_file, output_folder
 from real_shapes import DATA, inner_curvature, require_data
 
 NEAR, N_FEATURES = 0.05, 15
-KINDS, REAL = ("biped", "giraffe", "hand", "quadruped"), ("human/tosca_david", "human/tosca_victoria", "cat/tosca_cat")
+KINDS, REAL = (
+    ("biped", "giraffe", "hand", "quadruped"),
+    ("human/tosca_david", "human/tosca_victoria", "cat/tosca_cat"),
+)
 N_POSES, N_VERTICES = 4, 3000
 PICTURES = {"humans": ("human/tosca_michael", 3), "animals": ("cat/tosca_cat", 3)}
 
 
-def by_heat(recipe: es.Recipe) -> object:
+def by_heat(recipe: es.retrieval.HeatRecipe) -> object:
     """Return the features of a recipe as they are described."""
-    return lambda mesh: es.describe_mesh(mesh, recipe).parts
+    return lambda mesh: es.retrieval.find_heat_features(mesh, recipe).parts
 
 
 def by_values(function: object) -> object:
@@ -38,9 +41,9 @@ def by_values(function: object) -> object:
 
 
 FUNCTIONS = {
-    "HKS, scale-free": by_heat(es.SCALE_FREE),
-    "HKS, thesis": by_heat(es.THESIS),
-    "AGD": by_values(es.average_geodesic_distance),
+    "HKS, scale-free": by_heat(es.retrieval.SCALE_FREE),
+    "HKS, thesis": by_heat(es.retrieval.THESIS),
+    "AGD": by_values(es.geometry.average_geodesic_distance),
     "GC": by_values(inner_curvature),
 }
 
@@ -67,64 +70,78 @@ def found_on(mesh: es.TriangleMesh) -> dict[str, np.ndarray]:
     return {name: find(mesh).features.vertices[:N_FEATURES] for name, find in FUNCTIONS.items()}
 
 
-def parts_of(mesh: es.TriangleMesh, seed: int) -> dict[str, es.MeshPart]:
+def parts_of(mesh: es.TriangleMesh, seed: int) -> dict[str, es.scans.MeshPart]:
     """Return what one side shows, and what one or two planes leave in its largest piece."""
     rng = np.random.default_rng([5, seed])
-    planes = es.random_planes(mesh, rng, n_planes=int(rng.integers(1, 3)), share=0.2)
-    cut = es.cut_by_planes(mesh, planes)
+    planes = es.scans.random_planes(mesh, rng, n_planes=int(rng.integers(1, 3)), share=0.2)
+    cut = es.scans.cut_by_planes(mesh, planes)
     return {"partial": es.partial_scan(mesh, rng), "incomplete": largest_piece(cut)}
 
 
-def largest_piece(part: es.MeshPart) -> es.MeshPart:
+def largest_piece(part: es.scans.MeshPart) -> es.scans.MeshPart:
     """Keep the piece of most vertices: between pieces there are no distances."""
-    _, labels = es.vertex_components(part.mesh)
+    _, labels = es.geometry.vertex_components(part.mesh)
     kept = np.flatnonzero(labels[part.mesh.faces[:, 0]] == np.bincount(labels).argmax())
     vertices, corners = np.unique(part.mesh.faces[kept], return_inverse=True)
     piece = es.TriangleMesh(part.mesh.vertices[vertices], corners.reshape(-1, 3))
-    return es.MeshPart(piece, part.source_vertices[vertices], part.source_faces[kept])
+    return es.scans.MeshPart(piece, part.source_vertices[vertices], part.source_faces[kept])
 
 
 def shape_of(mesh: es.TriangleMesh, seed: int) -> Shape:
     """Find everything on a mesh and on its parts."""
     parts = {}
     for name, part in parts_of(mesh, seed).items():
-        found = {key: part.source_vertices[vertices] for key, vertices in found_on(part.mesh).items()}
+        found = {
+            key: part.source_vertices[vertices] for key, vertices in found_on(part.mesh).items()
+        }
         parts[name] = Part(found, part.source_vertices)
     return Shape(mesh, found_on(mesh), parts)
 
 
 def share_near(mesh: es.TriangleMesh, some: np.ndarray, others: np.ndarray) -> float:
     """Return the share of some vertices with one of the others within 5 % of √area along the surface."""
-    distances = es.geodesic_distances(mesh, others)[:, some].min(axis=0)
-    return float(np.mean(distances <= NEAR * np.sqrt(es.surface_area(mesh))))
+    distances = es.geometry.geodesic_distances(mesh, others)[:, some].min(axis=0)
+    return float(np.mean(distances <= NEAR * np.sqrt(es.geometry.surface_area(mesh))))
 
 
 def chance(mesh: es.TriangleMesh, features: np.ndarray) -> float:
     """Return the share of the area within 5 % of √area of a feature: what points at random would reach."""
-    near = es.geodesic_distances(mesh, features).min(axis=0) <= NEAR * np.sqrt(es.surface_area(mesh))
-    areas = es.dual_volumes(mesh)
+    near = es.geometry.geodesic_distances(mesh, features).min(axis=0) <= NEAR * np.sqrt(
+        es.geometry.surface_area(mesh)
+    )
+    areas = es.geometry.dual_volumes(mesh)
     return float(areas[near].sum() / areas.sum())
 
 
-def measured(shapes: list[Shape], maps: dict[tuple[int, int], np.ndarray]) -> dict[str, dict[str, list[float]]]:
+def measured(
+    shapes: list[Shape], maps: dict[tuple[int, int], np.ndarray]
+) -> dict[str, dict[str, list[float]]]:
     """Return all shares of one individual, by function: between poses, of its parts, and of points at random."""
     rows: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     for name in FUNCTIONS:
         for (one, two), to in maps.items():
             there = to[shapes[one].features[name]]
-            rows[name]["poses"].append(share_near(shapes[two].mesh, there, shapes[two].features[name]))
+            rows[name]["poses"].append(
+                share_near(shapes[two].mesh, there, shapes[two].features[name])
+            )
         for shape in shapes:
             for kind, part in shape.parts.items():
-                rows[name][kind].append(share_near(shape.mesh, part.features[name], shape.features[name]))
+                rows[name][kind].append(
+                    share_near(shape.mesh, part.features[name], shape.features[name])
+                )
                 shown = np.intersect1d(shape.features[name], part.shown)
                 if len(shown):
-                    rows[name][f"{kind}, kept"].append(share_near(shape.mesh, shown, part.features[name]))
+                    rows[name][f"{kind}, kept"].append(
+                        share_near(shape.mesh, shown, part.features[name])
+                    )
             rows[name]["chance"].append(chance(shape.mesh, shape.features[name]))
             rows[name]["number"].append(len(shape.features[name]) / 100)
     return rows
 
 
-def made(kind: str, n_poses: int, n_vertices: int) -> tuple[list[Shape], dict[tuple[int, int], np.ndarray]]:
+def made(
+    kind: str, n_poses: int, n_vertices: int
+) -> tuple[list[Shape], dict[tuple[int, int], np.ndarray]]:
     """Return poses of a creature with their exact maps."""
     meshes = [es.make_creature(kind, pose, n_vertices=n_vertices) for pose in range(1, n_poses + 1)]
     same = np.arange(meshes[0].n_vertices)
@@ -137,7 +154,9 @@ def real(stem: str, n_poses: int) -> tuple[list[Shape], dict[tuple[int, int], np
     paths = sorted((DATA / "retrieval").glob(f"{stem}*.ply"))[:n_poses]
     shapes = [shape_of(es.read_mesh(path), pose) for pose, path in enumerate(paths)]
     pairs = permutations(range(len(shapes)), 2)
-    return shapes, {(one, two): map_between(shapes[one].mesh, shapes[two].mesh) for one, two in pairs}
+    return shapes, {
+        (one, two): map_between(shapes[one].mesh, shapes[two].mesh) for one, two in pairs
+    }
 
 
 def quality_of_maps(kind: str, n_vertices: int) -> dict[str, float]:
@@ -145,16 +164,29 @@ def quality_of_maps(kind: str, n_vertices: int) -> dict[str, float]:
     one, two = (es.make_creature(kind, pose, n_vertices=n_vertices) for pose in (1, 2))
     to = map_between(one, two)
     some = np.arange(0, len(to), 25)
-    off = np.array([es.geodesic_distances(two, [vertex])[0, to[vertex]] for vertex in some])
-    off /= np.sqrt(es.surface_area(two))
+    off = np.array(
+        [es.geometry.geodesic_distances(two, [vertex])[0, to[vertex]] for vertex in some]
+    )
+    off /= np.sqrt(es.geometry.surface_area(two))
     return {"median": float(np.median(off)), "within 5 %": float(np.mean(off <= NEAR))}
 
 
 def table(rows: list[dict[str, dict[str, list[float]]]]) -> dict[str, dict[str, float]]:
     """Return the means over all individuals, in per cent; and how many features there are."""
-    columns = ("poses", "partial", "partial, kept", "incomplete", "incomplete, kept", "chance", "number")
+    columns = (
+        "poses",
+        "partial",
+        "partial, kept",
+        "incomplete",
+        "incomplete, kept",
+        "chance",
+        "number",
+    )
     return {
-        name: {key: round(100 * float(np.mean([x for row in rows for x in row[name][key]])), 1) for key in columns}
+        name: {
+            key: round(100 * float(np.mean([x for row in rows for x in row[name][key]])), 1)
+            for key in columns
+        }
         for name in FUNCTIONS
     }
 
@@ -170,22 +202,36 @@ def picture(stem: str, n_poses: int) -> object:
     meshes = [upright(es.read_mesh(path)) for path in paths]
     find = FUNCTIONS["HKS, scale-free"]
     known = find(meshes[0])
-    panels = [es.Panel(meshes[0], f"{paths[0].stem}: 15 maxima", known.labels, known.features.vertices)]
+    panels = [
+        es.plot.Panel(
+            meshes[0], f"{paths[0].stem}: 15 maxima", known.labels, known.features.vertices
+        )
+    ]
     for mesh, path in zip(meshes[1:], paths[1:], strict=True):
         panels.append(panel(mesh, path.stem, map_between(mesh, meshes[0]), (meshes[0], known)))
     for name, part in parts_of(meshes[0], 1).items():
-        panels.append(panel(part.mesh, f"the first, {name}", part.source_vertices, (meshes[0], known)))
-    return es.figure_contact_sheet(panels[0], panels[1:], caption="grey: no partner within 5 % of √area")
+        panels.append(
+            panel(part.mesh, f"the first, {name}", part.source_vertices, (meshes[0], known))
+        )
+    return es.plot.figure_contact_sheet(
+        panels[0], panels[1:], caption="grey: no partner within 5 % of √area"
+    )
 
 
-def panel(mesh: es.TriangleMesh, title: str, to: np.ndarray, reference: tuple[es.TriangleMesh, object]) -> es.Panel:
+def panel(
+    mesh: es.TriangleMesh, title: str, to: np.ndarray, reference: tuple[es.TriangleMesh, object]
+) -> es.plot.Panel:
     """Colour each part by the reference's feature nearest to its own, where one is near."""
     whole, known = reference
     parts = FUNCTIONS["HKS, scale-free"](mesh)
-    distances = es.geodesic_distances(whole, known.features.vertices)[:, to[parts.features.vertices]]
-    near = distances.min(axis=0) <= NEAR * np.sqrt(es.surface_area(whole))
+    distances = es.geometry.geodesic_distances(whole, known.features.vertices)[
+        :, to[parts.features.vertices]
+    ]
+    near = distances.min(axis=0) <= NEAR * np.sqrt(es.geometry.surface_area(whole))
     colors = np.where(near, distances.argmin(axis=0), -1)
-    return es.Panel(mesh, f"{title}: {near.sum()} of {len(near)}", colors[parts.labels], parts.features.vertices)
+    return es.plot.Panel(
+        mesh, f"{title}: {near.sum()} of {len(near)}", colors[parts.labels], parts.features.vertices
+    )
 
 
 def main() -> None:
@@ -193,14 +239,22 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="two poses of two small creatures")
     parser.add_argument("--out", type=output_file, help="write the figures as JSON")
-    parser.add_argument("--pictures", type=output_folder, help="folder for pictures after figure 5.2")
+    parser.add_argument(
+        "--pictures", type=output_folder, help="folder for pictures after figure 5.2"
+    )
     arguments = parser.parse_args()
     if not arguments.quick:
         require_data()
-    kinds, size = (("biped", "quadruped"), (2, 1500)) if arguments.quick else (KINDS, (N_POSES, N_VERTICES))
-    results = {"made": table([measured(*made(kind, *size)) for kind in track(kinds, "made creatures")])}
+    kinds, size = (
+        (("biped", "quadruped"), (2, 1500)) if arguments.quick else (KINDS, (N_POSES, N_VERTICES))
+    )
+    results = {
+        "made": table([measured(*made(kind, *size)) for kind in track(kinds, "made creatures")])
+    }
     if not arguments.quick:
-        results["real"] = table([measured(*real(stem, N_POSES)) for stem in track(REAL, "real shapes")])
+        results["real"] = table(
+            [measured(*real(stem, N_POSES)) for stem in track(REAL, "real shapes")]
+        )
         results["maps"] = {kind: quality_of_maps(kind, N_VERTICES) for kind in KINDS}
     for name, (stem, n_poses) in PICTURES.items() if arguments.pictures else ():
         es.save_figure(picture(stem, n_poses), arguments.pictures / f"{name}.png")

@@ -48,7 +48,9 @@ class Store:
         what = (*sources, method, version.kind, version.seed, version.shape.number, version.change)
         return self.folder / hashlib.sha256(repr(what).encode()).hexdigest()
 
-    def lesson(self, method: Trainable, shapes: Sequence[Shape], learn: Callable[[], Method]) -> Method:
+    def lesson(
+        self, method: Trainable, shapes: Sequence[Shape], learn: Callable[[], Method]
+    ) -> Method:
         """Return a method that has learnt from complete shapes, as it was kept; else let it learn, and keep it."""
         sources = [digest(DATA / shape.path) for shape in shapes]
         what = ("lesson", *sources, *map(digest, MAKING), version_of("eigenshape"), method)
@@ -74,15 +76,20 @@ def keep(path: Path, what: Any) -> None:
     beside.replace(path)
 
 
-def describe_all(store: Store, methods: Sequence[Method], versions: Sequence[Version], workers: int) -> dict[str, str]:
+def describe_all(
+    store: Store, methods: Sequence[Method], versions: Sequence[Version], workers: int
+) -> dict[str, str]:
     """Describe what the store lacks, side by side, and name whatever cannot be made or described, with the reason."""
     store.folder.mkdir(parents=True, exist_ok=True)
     lacking = {
-        version: [method for method in methods if not store.path(method, version).exists()] for version in versions
+        version: [method for method in methods if not store.path(method, version).exists()]
+        for version in versions
     }
     todo = {version: missing for version, missing in lacking.items() if missing}
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(max(min(workers, len(todo)), 1), context, initializer=threadpool_limits, initargs=(1,))
+    pool = ProcessPoolExecutor(
+        max(min(workers, len(todo)), 1), context, initializer=threadpool_limits, initargs=(1,)
+    )
     with Progress() as bar, pool:
         task = bar.add_task("describing", total=len(versions), completed=len(versions) - len(todo))
         futures: list[Future[None]] = [
@@ -95,7 +102,9 @@ def describe_all(store: Store, methods: Sequence[Method], versions: Sequence[Ver
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-    found = ((version, method, store.load(method, version)) for version in versions for method in methods)
+    found = (
+        (version, method, store.load(method, version)) for version in versions for method in methods
+    )
     return {
         f"{version.name} (draw {version.seed}), {method.name}": entry.reason
         for version, method, entry in found

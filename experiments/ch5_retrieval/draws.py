@@ -81,7 +81,9 @@ def half_of(everything: Sequence[Shape], half: str) -> list[Shape]:
     for label in sorted({shape.label for shape in everything}):
         names = sorted({shape.identity for shape in everything if shape.label == label})
         in_class = Counter[str]()
-        for name in sorted((names[place] for place in rng.permutation(len(names))), key=lambda name: -sizes[name]):
+        for name in sorted(
+            (names[place] for place in rng.permutation(len(names))), key=lambda name: -sizes[name]
+        ):
             side[name] = min(HALVES, key=lambda half: (in_class[half], total[half]))
             in_class[side[name]] += sizes[name]
             total[side[name]] += sizes[name]
@@ -136,12 +138,12 @@ def make(version: Version, *, turned: bool = True) -> es.TriangleMesh:
     mesh = changed_whole(es.read_mesh(DATA / version.shape.path), version.change)
     if version.change in SCANS:
         view, all_pieces = rng.standard_normal(3), SCANS[version.change]
-        mesh = es.simulate_scan(mesh, own, view=view, all_pieces=all_pieces).mesh
+        mesh = es.scans.simulate_scan(mesh, own, view=view, all_pieces=all_pieces).mesh
     elif version.kind == "partial":
         mesh = es.partial_scan(mesh, rng).mesh
     elif version.kind == "incomplete":
         mesh = incomplete(mesh, rng)
-    boxed = es.normalize_box(changed_part(mesh, version.change, own))
+    boxed = es.geometry.normalize_box(changed_part(mesh, version.change, own))
     if not turned:
         return boxed
     return es.TriangleMesh(boxed.vertices @ rotation(rng).T, boxed.faces)
@@ -149,16 +151,20 @@ def make(version: Version, *, turned: bool = True) -> es.TriangleMesh:
 
 def incomplete(whole: es.TriangleMesh, rng: np.random.Generator) -> es.TriangleMesh:
     """Cut by one to three planes until the largest piece has a share of the area within `KEPT`."""
-    area = es.surface_area(whole)
+    area = es.geometry.surface_area(whole)
     for _ in range(TRIALS):
-        planes = es.random_planes(whole, rng, n_planes=int(rng.integers(1, 4)), share=rng.uniform(0.05, 0.4))
+        planes = es.scans.random_planes(
+            whole, rng, n_planes=int(rng.integers(1, 4)), share=rng.uniform(0.05, 0.4)
+        )
         try:
-            piece = es.largest_component(es.cut_by_planes(whole, planes).mesh).mesh
+            piece = es.geometry.largest_component(es.scans.cut_by_planes(whole, planes).mesh).mesh
         except es.InvalidShapeError:
             continue
-        if KEPT[0] <= es.surface_area(piece) / area <= KEPT[1]:
+        if KEPT[0] <= es.geometry.surface_area(piece) / area <= KEPT[1]:
             return piece
-    raise es.InvalidShapeError(f"An incomplete version must keep {KEPT} of the area; {TRIALS} trials left none such.")
+    raise es.InvalidShapeError(
+        f"An incomplete version must keep {KEPT} of the area; {TRIALS} trials left none such."
+    )
 
 
 def rotation(rng: np.random.Generator) -> np.ndarray:

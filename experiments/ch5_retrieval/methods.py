@@ -36,23 +36,27 @@ class Trainable(Protocol):
 @lru_cache(maxsize=1)  # methods that share a spectrum describe one shape after the other
 def cotangent_spectrum(mesh: es.TriangleMesh) -> es.Spectrum:
     """Return the eigenpairs that the thesis' recipe takes, of the mesh as the draw has scaled it."""
-    return es.solve_spectrum(es.cotangent_laplacian(mesh), min(es.THESIS.n_modes, mesh.n_vertices))
+    return es.solve_spectrum(
+        es.cotangent_laplacian(mesh), min(es.retrieval.THESIS.n_modes, mesh.n_vertices)
+    )
 
 
 def kernel_spectrum(mesh: es.TriangleMesh) -> es.Spectrum:
     """Return those of the mesh Laplacian at the thesis' τ."""
-    laplacian = es.mesh_laplacian(mesh, t=es.THESIS.time_unit)
-    return es.solve_spectrum(laplacian, min(es.THESIS.n_modes, mesh.n_vertices))
+    laplacian = es.mesh_laplacian(mesh, t=es.retrieval.THESIS.time_unit)
+    return es.solve_spectrum(laplacian, min(es.retrieval.THESIS.n_modes, mesh.n_vertices))
 
 
 def early_heat(mesh: es.TriangleMesh, spectrum: es.Spectrum) -> np.ndarray:
     """Return the heat whose maxima the thesis takes: at 5 τ."""
-    return es.heat_kernel_signature(spectrum, [es.THESIS.feature_scale * es.THESIS.time_unit])[:, 0]
+    return es.heat_kernel_signature(
+        spectrum, [es.retrieval.THESIS.feature_scale * es.retrieval.THESIS.time_unit]
+    )[:, 0]
 
 
 def average_distance(mesh: es.TriangleMesh, spectrum: es.Spectrum) -> np.ndarray:
     """Return the average geodesic distance."""
-    return es.average_geodesic_distance(mesh)
+    return es.geometry.average_geodesic_distance(mesh)
 
 
 def curvature(mesh: es.TriangleMesh, spectrum: es.Spectrum) -> np.ndarray:
@@ -60,9 +64,11 @@ def curvature(mesh: es.TriangleMesh, spectrum: es.Spectrum) -> np.ndarray:
     return inner_curvature(mesh)
 
 
-def matching_scores(query: es.ShapeDescriptor, described: Sequence[es.ShapeDescriptor]) -> np.ndarray:
+def matching_scores(
+    query: es.retrieval.HeatDescriptor, described: Sequence[es.retrieval.HeatDescriptor]
+) -> np.ndarray:
     """Return the thesis' score of a query with each of many."""
-    return np.array([es.matching_score(query, other) for other in described])
+    return np.array([es.retrieval.matching_score(query, other) for other in described])
 
 
 @dataclass(frozen=True)
@@ -73,13 +79,19 @@ class ThesisRecipe:
     function: str = "early_heat"
     spectrum: str = "cotangent_spectrum"
 
-    def describe(self, mesh: es.TriangleMesh) -> es.ShapeDescriptor:
+    def describe(self, mesh: es.TriangleMesh) -> es.retrieval.HeatDescriptor:
         """Return the heat vectors."""
         spectrum = globals()[self.spectrum](mesh)
         tree = es.merge_tree(mesh, globals()[self.function](mesh, spectrum))
-        return es.describe(spectrum, es.segment(tree, n_regions=es.THESIS.n_features).features, es.THESIS)
+        return es.retrieval.heat_descriptor(
+            spectrum,
+            es.segment(tree, n_regions=es.retrieval.THESIS.n_features).features,
+            es.retrieval.THESIS,
+        )
 
-    def distances(self, query: es.ShapeDescriptor, described: Sequence[es.ShapeDescriptor]) -> np.ndarray:
+    def distances(
+        self, query: es.retrieval.HeatDescriptor, described: Sequence[es.retrieval.HeatDescriptor]
+    ) -> np.ndarray:
         """Return matching scores."""
         return matching_scores(query, described)
 
@@ -90,11 +102,13 @@ class ScaleFree:
 
     name: str = "scale-free"
 
-    def describe(self, mesh: es.TriangleMesh) -> es.ShapeDescriptor:
+    def describe(self, mesh: es.TriangleMesh) -> es.retrieval.HeatDescriptor:
         """Return the heat vectors, without units."""
-        return es.describe_mesh(mesh, es.SCALE_FREE).descriptor
+        return es.retrieval.find_heat_features(mesh, es.retrieval.SCALE_FREE).descriptor
 
-    def distances(self, query: es.ShapeDescriptor, described: Sequence[es.ShapeDescriptor]) -> np.ndarray:
+    def distances(
+        self, query: es.retrieval.HeatDescriptor, described: Sequence[es.retrieval.HeatDescriptor]
+    ) -> np.ndarray:
         """Return matching scores."""
         return matching_scores(query, described)
 
@@ -110,11 +124,13 @@ class Global:
 
     def describe(self, mesh: es.TriangleMesh) -> Any:
         """Return what the library's function makes of it."""
-        return getattr(es, self.describer)(mesh, **dict(self.options))
+        return getattr(es.retrieval.baselines, self.describer)(mesh, **dict(self.options))
 
     def distances(self, query: Any, described: Sequence[Any]) -> np.ndarray:
         """Return its distances."""
-        distance: Callable[[Any], float] = partial(getattr(es, self.measure), query)
+        distance: Callable[[Any], float] = partial(
+            getattr(es.retrieval.baselines, self.measure), query
+        )
         return np.array([distance(other) for other in described])
 
 
@@ -123,29 +139,31 @@ TEACHING_VIEWS = 2
 
 @dataclass(frozen=True)
 class Patches:
-    """Patches as an index keeps and asks them, in words that the other half or made creatures have taught."""
+    """Patches as an index stores and compares them, with a codebook of the other half or of synthetic creatures."""
 
     name: str
-    teachers: Literal["other half", "made creatures"] = "other half"
+    teachers: Literal["other half", "synthetic creatures"] = "other half"
     verified: bool = True
-    recipe: es.PatchRecipe | None = None
+    recipe: es.retrieval.PatchRecipe | None = None
 
     def train(self, meshes: Iterable[es.TriangleMesh]) -> "Patches":
-        """Learn words, or take those that come with the library."""
-        if self.teachers == "made creatures":
-            return replace(self, recipe=es.PatchRecipe(es.made_codebook()))
-        lessons = [patches for mesh in meshes for patches in es.seen_patches(mesh, n_views=TEACHING_VIEWS)]
-        return replace(self, recipe=es.PatchRecipe(es.train_codebook(lessons)))
+        """Learn a codebook, or take the one that comes with the library."""
+        if self.teachers == "synthetic creatures":
+            return replace(self, recipe=es.retrieval.PatchRecipe())
+        lessons = [
+            patches
+            for mesh in meshes
+            for patches in es.retrieval.extract_patches(mesh, n_views=TEACHING_VIEWS)
+        ]
+        return replace(self, recipe=es.retrieval.PatchRecipe(es.retrieval.train_codebook(lessons)))
 
     def describe(self, mesh: es.TriangleMesh) -> Any:
         """Return the descriptor, with six views of what is closed."""
-        return es.describe_shape(mesh, self.recipe)
+        return es.describe(mesh, self.recipe)
 
     def distances(self, query: Any, described: Sequence[Any]) -> np.ndarray:
-        """Return scores, or distances by words alone."""
-        if self.verified:
-            return es.patch_scores(query, described)
-        return es.word_distances(query.codes, [each.codes for each in described])
+        """Return scores, or distances by codes alone."""
+        return es.retrieval.patch_scores(query, described, verify=self.verified)
 
 
 METHODS: dict[str, Method] = {
@@ -153,7 +171,7 @@ METHODS: dict[str, Method] = {
     for method in (
         Patches("patches"),
         Patches("patches, not verified", verified=False),
-        Patches("patches, made words", "made creatures"),
+        Patches("patches, default codebook", "synthetic creatures"),
         ThesisRecipe("thesis, cotangent"),
         ThesisRecipe("thesis, mesh Laplacian", spectrum="kernel_spectrum"),
         ScaleFree(),

@@ -6,7 +6,11 @@ import eigenshape as es
 
 CLEAN, FLIPPED, HALF, DOUBLE = "clean", "flipped", "half resolution", "double resolution"
 SCANS = {"scanner": False, "scanner, all pieces": True}
-NOISES = {"noise .1": 0.1, "noise .25": 0.25, "noise .5": 0.5}  # of the mean edge, in each coordinate
+NOISES = {
+    "noise .1": 0.1,
+    "noise .25": 0.25,
+    "noise .5": 0.5,
+}  # of the mean edge, in each coordinate
 CHANGES = (CLEAN, *NOISES, HALF, DOUBLE, *SCANS, FLIPPED)
 
 
@@ -14,7 +18,7 @@ def changed_whole(mesh: es.TriangleMesh, change: str) -> es.TriangleMesh:
     """Return a whole shape, before it is cut, with half the faces or with edges half as long, if that is the change."""
     if change == HALF:
         return halved(mesh)
-    return es.subdivide(mesh) if change == DOUBLE else mesh
+    return es.shapes.subdivide(mesh) if change == DOUBLE else mesh
 
 
 def changed_part(mesh: es.TriangleMesh, change: str, rng: np.random.Generator) -> es.TriangleMesh:
@@ -26,8 +30,10 @@ def changed_part(mesh: es.TriangleMesh, change: str, rng: np.random.Generator) -
 
 def noisy(mesh: es.TriangleMesh, share: float, rng: np.random.Generator) -> es.TriangleMesh:
     """Move each vertex by Gaussian noise whose deviation in each coordinate is a share of the mean edge."""
-    deviation = share * es.edge_lengths(mesh).mean()
-    return es.TriangleMesh(mesh.vertices + deviation * rng.standard_normal(mesh.vertices.shape), mesh.faces)
+    deviation = share * es.geometry.edge_lengths(mesh).mean()
+    return es.TriangleMesh(
+        mesh.vertices + deviation * rng.standard_normal(mesh.vertices.shape), mesh.faces
+    )
 
 
 def turned_over(mesh: es.TriangleMesh) -> es.TriangleMesh:
@@ -40,5 +46,7 @@ def halved(mesh: es.TriangleMesh) -> es.TriangleMesh:
     import igl  # noqa: PLC0415 - of the extra "test"; all other changes do without
 
     found = igl.decimate(np.array(mesh.vertices), np.array(mesh.faces), mesh.n_faces // 2)
-    points, faces = found[:2] if isinstance(found[0], np.ndarray) else found[1:3]  # older ones say first if it is done
-    return es.drop_unreferenced(es.TriangleMesh(points, faces)).mesh
+    points, faces = (
+        found[:2] if isinstance(found[0], np.ndarray) else found[1:3]
+    )  # older ones say first if it is done
+    return es.geometry.drop_unreferenced(es.TriangleMesh(points, faces)).mesh

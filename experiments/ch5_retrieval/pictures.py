@@ -42,26 +42,35 @@ class Asked:
         return sum(answer.shape.label == self.query.shape.label for answer in self.answers)
 
 
-def ask(method: Method, store: Store, queries: Sequence[Version], database: Sequence[Version]) -> list[Asked]:
+def ask(
+    method: Method, store: Store, queries: Sequence[Version], database: Sequence[Version]
+) -> list[Asked]:
     """Return the first answers to queries."""
     ranked = answers(method, store, queries, database)
-    return [Asked(method.name, query, found[:N_ANSWERS]) for query, found in zip(queries, ranked, strict=True)]
+    return [
+        Asked(method.name, query, found[:N_ANSWERS])
+        for query, found in zip(queries, ranked, strict=True)
+    ]
 
 
-def panel(version: Version, title: str, color: int) -> es.Panel:
+def panel(version: Version, title: str, color: int) -> es.plot.Panel:
     """Return a shape in one colour, as it stood before it was turned."""
     mesh = make(version, turned=False)
-    return es.Panel(mesh, title, np.full(mesh.n_faces, color), np.empty(0, dtype=np.int64))
+    return es.plot.Panel(mesh, title, np.full(mesh.n_faces, color), np.empty(0, dtype=np.int64))
 
 
 def sheet(asked: Asked) -> Figure:
     """Draw a query and its answers."""
     query = panel(asked.query, f"query: {asked.query.shape.label},\n{asked.query.kind}", QUERY)
     answers = [
-        panel(version, f"{place}: {version.shape.label},\n{version.kind}", right_or_wrong(version, asked))
+        panel(
+            version,
+            f"{place}: {version.shape.label},\n{version.kind}",
+            right_or_wrong(version, asked),
+        )
         for place, version in enumerate(asked.answers, 1)
     ]
-    return es.figure_contact_sheet(query, answers, caption=asked.method)
+    return es.plot.figure_contact_sheet(query, answers, caption=asked.method)
 
 
 def right_or_wrong(version: Version, asked: Asked) -> int:
@@ -94,8 +103,12 @@ def one_a_class(some: Sequence[Asked], count: int) -> list[Asked]:
 def main() -> None:
     """Ask, and draw three pictures."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--method", choices=sorted(METHODS), default="patches", help="of table 5.1 and the failures")
-    parser.add_argument("--methods", nargs="*", choices=sorted(METHODS), default=["thesis, cotangent", "EVD", "LFD"])
+    parser.add_argument(
+        "--method", choices=sorted(METHODS), default="patches", help="of table 5.1 and the failures"
+    )
+    parser.add_argument(
+        "--methods", nargs="*", choices=sorted(METHODS), default=["thesis, cotangent", "EVD", "LFD"]
+    )
     parser.add_argument("--seed", type=int, default=0, help="of the draw")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--cache", type=output_folder, default="ch5-descriptors")
@@ -104,7 +117,10 @@ def main() -> None:
     require_data()
     some, others = (half_of(shapes(), half) for half in ("reporting", "tuning"))
     drawn, store = draw(some, chosen.seed), Store(chosen.cache)
-    methods = [ready(METHODS[name], others, store) for name in dict.fromkeys([chosen.method, *chosen.methods])]
+    methods = [
+        ready(METHODS[name], others, store)
+        for name in dict.fromkeys([chosen.method, *chosen.methods])
+    ]
     describe_all(store, methods, [*drawn.queries, *drawn.mixed], chosen.workers)
     all_pictures(drawn, store, methods, chosen.folder)
 
@@ -113,11 +129,18 @@ def all_pictures(drawn: Draw, store: Store, methods: Sequence[Method], folder: P
     """Draw queries of seven classes, an octopus by all methods, and queries without a hit."""
     found = ask(methods[0], store, drawn.queries, drawn.mixed)
     save_stack(one_a_class([asked for asked in found if asked.hits], 7), folder / "table_5_1.png")
-    octopuses = [version for version in (*drawn.queries, *drawn.mixed) if version.shape.label == "octopus"]
+    octopuses = [
+        version for version in (*drawn.queries, *drawn.mixed) if version.shape.label == "octopus"
+    ]
     cut = max(octopuses, key=lambda version: version.kind == "incomplete")
     rest = [version for version in drawn.mixed if version != cut]
-    save_stack([one for method in methods for one in ask(method, store, [cut], rest)], folder / "figure_5_4.png")
-    save_stack(one_a_class([asked for asked in found if not asked.hits], 8), folder / "failures.png")
+    save_stack(
+        [one for method in methods for one in ask(method, store, [cut], rest)],
+        folder / "figure_5_4.png",
+    )
+    save_stack(
+        one_a_class([asked for asked in found if not asked.hits], 8), folder / "failures.png"
+    )
 
 
 if __name__ == "__main__":

@@ -45,7 +45,8 @@ class Asking:
         """Return the descriptor."""
         if self.cure == CURES[1]:
             return self.method.describe(mesh)
-        return es.in_words([es.describe_patches(mesh)], self.method.recipe)
+        patches = es.retrieval.extract_patches(mesh, n_views=0, clean=False)
+        return es.retrieval.patch_descriptor(patches, self.method.recipe)
 
     def distances(self, query: Any, described: Sequence[Any]) -> np.ndarray:
         """Return the method's scores."""
@@ -68,7 +69,10 @@ def measure(found: dict[str, dict[str, list[Outcome]]]) -> dict[str, Any]:
     """Return rates and losses by change and cure; what is lost is counted from clean queries as they are."""
     clean = found[CLEAN]["as it is"]
     return {
-        change: {cure: {**rates(each)[GROUP], "loss": loss(each, clean, change)} for cure, each in row.items()}
+        change: {
+            cure: {**rates(each)[GROUP], "loss": loss(each, clean, change)}
+            for cure, each in row.items()
+        }
         for change, row in found.items()
     }
 
@@ -78,7 +82,10 @@ def table(results: dict[str, Any]) -> str:
     lines = ["| query | " + " | ".join(CURES) + " |", "|" + "---|" * (len(CURES) + 1)]
     return "\n".join(
         lines
-        + [f"| {change} | " + " | ".join(cell(row[cure]) for cure in CURES) + " |" for change, row in results.items()]
+        + [
+            f"| {change} | " + " | ".join(cell(row[cure]) for cure in CURES) + " |"
+            for change, row in results.items()
+        ]
     )
 
 
@@ -92,12 +99,16 @@ def cell(measures: dict[str, list[float]]) -> str:
 def arguments() -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help=f"classes {', '.join(QUICK_CLASSES)}, one draw")
+    parser.add_argument(
+        "--quick", action="store_true", help=f"classes {', '.join(QUICK_CLASSES)}, one draw"
+    )
     parser.add_argument("--half", choices=HALVES, default="reporting")
     parser.add_argument("--draws", type=int, nargs="*", default=SEEDS, help="seeds of the draws")
     parser.add_argument("--changes", nargs="*", choices=CHANGES, help="all; quickly, three")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--cache", type=output_folder, default="ch5-descriptors", help="folder of descriptors, kept")
+    parser.add_argument(
+        "--cache", type=output_folder, default="ch5-descriptors", help="folder of descriptors, kept"
+    )
     parser.add_argument("--out", type=output_file, default="ch5-robustness.json")
     chosen = parser.parse_args()
     if chosen.changes is None:
@@ -114,9 +125,9 @@ def main() -> None:
     seeds, numbers = (chosen.draws[:1], QUICK_QUERIES) if chosen.quick else (chosen.draws, (18, 32))
     draws = [draw(some, seed, *numbers) for seed in seeds]
     store = Store(chosen.cache)
-    # made words are there already, while those of the other half take a minute to learn
-    words = METHODS["patches, made words" if chosen.quick else "patches"]
-    method = ready(words, [shape for shape in everything if shape not in some], store)
+    # The default codebook is there already; that of the other half takes a minute to learn.
+    patches = METHODS["patches, default codebook" if chosen.quick else "patches"]
+    method = ready(patches, [shape for shape in everything if shape not in some], store)
     cures = [Asking(method, cure) for cure in CURES]
     changes = list(dict.fromkeys([CLEAN, *chosen.changes]))
     database = [version for each in draws for version in each.mixed]
@@ -126,7 +137,9 @@ def main() -> None:
     found = {
         change: {
             cure.name: [
-                one for each in draws for one in outcomes(method, store, queries(each, change), each.mixed, cure)
+                one
+                for each in draws
+                for one in outcomes(method, store, queries(each, change), each.mixed, cure)
             ]
             for cure in cures
         }
@@ -136,7 +149,9 @@ def main() -> None:
         measure(found),
         {"shapes": len(some), "queries": len(found[CLEAN]["as it is"]), "draws": len(draws)},
     )
-    print(f"{counts['queries']} queries in {counts['draws']} draws of {counts['shapes']} shapes\n\n{table(results)}")
+    print(
+        f"{counts['queries']} queries in {counts['draws']} draws of {counts['shapes']} shapes\n\n{table(results)}"
+    )
     give_out({"counts": counts, "without descriptor": failed, "rates": results}, chosen.out)
 
 

@@ -24,7 +24,7 @@ from tables import PROTOCOLS, printed
 
 SEEDS = (0, 1, 2)
 QUICK_CLASSES, QUICK_QUERIES = ("glasses", "octopus", "teddy"), (2, 4)
-QUICK_METHODS = ("patches, made words", "thesis, cotangent", "ShapeDNA")
+QUICK_METHODS = ("patches, default codebook", "thesis, cotangent", "ShapeDNA")
 
 
 def ready(method: Method, some: Sequence[Shape], store: Store) -> Method:
@@ -32,11 +32,17 @@ def ready(method: Method, some: Sequence[Shape], store: Store) -> Method:
     if not isinstance(method, Trainable):
         return method
     with Status(f"{method.name}: learning"):
-        return store.lesson(method, some, lambda: method.train(make(complete(shape)) for shape in some))
+        return store.lesson(
+            method, some, lambda: method.train(make(complete(shape)) for shape in some)
+        )
 
 
 def outcomes(
-    method: Method, store: Store, queries: Sequence[Version], database: Sequence[Version], asking: Method | None = None
+    method: Method,
+    store: Store,
+    queries: Sequence[Version],
+    database: Sequence[Version],
+    asking: Method | None = None,
 ) -> list[Outcome]:
     """Ask for each query; a shape without descriptor is no answer, and a query without has none."""
     ranked = answers(method, store, queries, database, asking)
@@ -47,7 +53,11 @@ def outcomes(
 
 
 def answers(
-    method: Method, store: Store, queries: Sequence[Version], database: Sequence[Version], asking: Method | None = None
+    method: Method,
+    store: Store,
+    queries: Sequence[Version],
+    database: Sequence[Version],
+    asking: Method | None = None,
 ) -> list[tuple[Version, ...]]:
     """Return for each query what was described of other poses, nearest first; another method may describe queries."""
     entries = [(version, store.load(method, version)) for version in database]
@@ -57,7 +67,9 @@ def answers(
         entry, order = store.load(asking or method, query), np.empty(0, dtype=np.int64)
         if not isinstance(entry, Failure):
             order = method.distances(entry, [other for _, other in known]).argsort(kind="stable")
-        found.append(tuple(known[place][0] for place in order if known[place][0].shape != query.shape))
+        found.append(
+            tuple(known[place][0] for place in order if known[place][0].shape != query.shape)
+        )
     return found
 
 
@@ -70,7 +82,11 @@ def among_all(one: Draw, some: Sequence[Shape]) -> Draw:
 def asked(method: Method, store: Store, draws: Sequence[Draw]) -> dict[str, list[Outcome]]:
     """Return the outcomes of all draws in both protocols."""
     return {
-        protocol: [one for each in draws for one in outcomes(method, store, each.queries, getattr(each, protocol))]
+        protocol: [
+            one
+            for each in draws
+            for one in outcomes(method, store, each.queries, getattr(each, protocol))
+        ]
         for protocol in PROTOCOLS
     }
 
@@ -80,8 +96,13 @@ def measure(found: dict[str, dict[str, list[Outcome]]], reference: str) -> dict[
     results: dict[str, object] = {}
     for protocol in PROTOCOLS:
         results[protocol] = {name: rates(each[protocol]) for name, each in found.items()}
-        one = {name: [four_legged_as_one(outcome) for outcome in each[protocol]] for name, each in found.items()}
-        results[f"{protocol}, four-legged as one"] = {name: rates(each) for name, each in one.items()}
+        one = {
+            name: [four_legged_as_one(outcome) for outcome in each[protocol]]
+            for name, each in found.items()
+        }
+        results[f"{protocol}, four-legged as one"] = {
+            name: rates(each) for name, each in one.items()
+        }
         if reference in found:
             others = {name: each[protocol] for name, each in found.items() if name != reference}
             results[f"{protocol}, less {reference}"] = {
@@ -93,19 +114,38 @@ def measure(found: dict[str, dict[str, list[Outcome]]], reference: str) -> dict[
 def arguments() -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help=f"classes {', '.join(QUICK_CLASSES)}, one draw")
+    parser.add_argument(
+        "--quick", action="store_true", help=f"classes {', '.join(QUICK_CLASSES)}, one draw"
+    )
     parser.add_argument("--half", choices=HALVES, default="reporting")
-    parser.add_argument("--source", default="", help="how the names of files must begin: psb for shapes of one source")
-    parser.add_argument("--among-all", action="store_true", help="leave the poses of other queries in the database")
+    parser.add_argument(
+        "--source",
+        default="",
+        help="how the names of files must begin: psb for shapes of one source",
+    )
+    parser.add_argument(
+        "--among-all", action="store_true", help="leave the poses of other queries in the database"
+    )
     parser.add_argument("--draws", type=int, nargs="*", default=SEEDS, help="seeds of the draws")
-    parser.add_argument("--methods", nargs="*", choices=sorted(METHODS), help="all but the slowest; quickly, three")
-    parser.add_argument("--against", choices=sorted(METHODS), default="thesis, cotangent", help="of paired differences")
+    parser.add_argument(
+        "--methods", nargs="*", choices=sorted(METHODS), help="all but the slowest; quickly, three"
+    )
+    parser.add_argument(
+        "--against",
+        choices=sorted(METHODS),
+        default="thesis, cotangent",
+        help="of paired differences",
+    )
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--cache", type=output_folder, default="ch5-descriptors", help="folder of descriptors, kept")
+    parser.add_argument(
+        "--cache", type=output_folder, default="ch5-descriptors", help="folder of descriptors, kept"
+    )
     parser.add_argument("--out", type=output_file, default="ch5-results.json")
     chosen = parser.parse_args()
     if chosen.methods is None:
-        chosen.methods = QUICK_METHODS if chosen.quick else [name for name in METHODS if name not in SLOW]
+        chosen.methods = (
+            QUICK_METHODS if chosen.quick else [name for name in METHODS if name not in SLOW]
+        )
     return chosen
 
 
@@ -114,7 +154,11 @@ def main() -> None:
     chosen = arguments()
     require_data()
     everything = [shape for shape in shapes() if not chosen.quick or shape.label in QUICK_CLASSES]
-    some = [shape for shape in half_of(everything, chosen.half) if Path(shape.path).stem.startswith(chosen.source)]
+    some = [
+        shape
+        for shape in half_of(everything, chosen.half)
+        if Path(shape.path).stem.startswith(chosen.source)
+    ]
     rest = half_of(everything, HALVES[1 - HALVES.index(chosen.half)])
     seeds, numbers = (chosen.draws[:1], QUICK_QUERIES) if chosen.quick else (chosen.draws, (18, 32))
     draws = [draw(some, seed, *numbers) for seed in seeds]
@@ -122,11 +166,22 @@ def main() -> None:
         draws = [among_all(one, some) for one in draws]
     store = Store(chosen.cache)
     methods = {name: ready(METHODS[name], rest, store) for name in chosen.methods}
-    versions = [version for each in draws for part in (each.queries, each.mixed, each.complete) for version in part]
-    failed = describe_all(store, list(methods.values()), list(dict.fromkeys(versions)), chosen.workers)
+    versions = [
+        version
+        for each in draws
+        for part in (each.queries, each.mixed, each.complete)
+        for version in part
+    ]
+    failed = describe_all(
+        store, list(methods.values()), list(dict.fromkeys(versions)), chosen.workers
+    )
     found = {name: asked(method, store, draws) for name, method in track(methods.items(), "asking")}
     results = measure(found, chosen.against)
-    counts = {"shapes": len(some), "queries": sum(len(each.queries) for each in draws), "draws": len(draws)}
+    counts = {
+        "shapes": len(some),
+        "queries": sum(len(each.queries) for each in draws),
+        "draws": len(draws),
+    }
     print(printed(results, counts))
     give_out({"counts": counts, "without descriptor": failed, **results}, chosen.out)
 

@@ -32,7 +32,9 @@ def merged(label: str) -> str:
 
 def four_legged_as_one(outcome: Outcome) -> Outcome:
     """Return an outcome with classes merged."""
-    return Outcome(outcome.kind, merged(outcome.label), tuple(merged(label) for label in outcome.ranking))
+    return Outcome(
+        outcome.kind, merged(outcome.label), tuple(merged(label) for label in outcome.ranking)
+    )
 
 
 def measured(outcome: Outcome) -> np.ndarray:
@@ -52,7 +54,9 @@ def rates(outcomes: Sequence[Outcome]) -> dict[str, dict[str, list[float]]]:
     return by_group(np.array([measured(outcome) for outcome in outcomes]), outcomes)
 
 
-def differences(outcomes: Sequence[Outcome], reference: Sequence[Outcome]) -> dict[str, dict[str, list[float]]]:
+def differences(
+    outcomes: Sequence[Outcome], reference: Sequence[Outcome]
+) -> dict[str, dict[str, list[float]]]:
     """Return the same of the differences to another method, query by query."""
     pairs = zip(outcomes, reference, strict=True)
     return by_group(np.array([measured(one) - measured(two) for one, two in pairs]), outcomes)
@@ -68,12 +72,17 @@ def by_group(table: np.ndarray, outcomes: Sequence[Outcome]) -> dict[str, dict[s
 
 def groups(outcomes: Sequence[Outcome]) -> dict[str, np.ndarray]:
     """Return the places of the queries in each group that has any."""
-    found = {name: np.flatnonzero([belongs(outcome.kind) for outcome in outcomes]) for name, belongs in GROUPS.items()}
+    found = {
+        name: np.flatnonzero([belongs(outcome.kind) for outcome in outcomes])
+        for name, belongs in GROUPS.items()
+    }
     return {name: rows for name, rows in found.items() if len(rows)}
 
 
 def interval(values: np.ndarray) -> list[float]:
     """Return the mean of values and the 2.5th and 97.5th percentile of means of resamples, in per cent."""
-    places = np.random.default_rng(RESAMPLE_SEED).integers(len(values), size=(RESAMPLES, len(values)))
+    places = np.random.default_rng(RESAMPLE_SEED).integers(
+        len(values), size=(RESAMPLES, len(values))
+    )
     low, high = np.percentile(values[places].mean(axis=1), [2.5, 97.5])
     return [round(100 * float(number), 1) for number in (values.mean(), low, high)]

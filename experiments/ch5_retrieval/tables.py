@@ -24,7 +24,9 @@ def printed(results: dict[str, Any], counts: dict[str, int]) -> str:
     parts = [f"{counts['queries']} queries in {counts['draws']} draws of {counts['shapes']} shapes"]
     for name, rows in results.items():
         protocol = name.split(",")[0]
-        parts.append(f"{TITLES[protocol]}{name[len(protocol) :]}\n\n{table(rows, signed='less' in name)}")
+        parts.append(
+            f"{TITLES[protocol]}{name[len(protocol) :]}\n\n{table(rows, signed='less' in name)}"
+        )
     parts.append(f"as printed in the thesis\n\n{thesis_table()}\n\n{NOT_OURS}")
     return "\n\n".join(parts)
 
@@ -34,7 +36,8 @@ def table(rows: dict[str, Any], *, signed: bool = False) -> str:
     heads = [column for column in COLUMNS if all(column in row for row in rows.values())]
     lines = ["| method | " + " | ".join(heads) + " |", "|" + "---|" * (len(heads) + 1)]
     lines += [
-        f"| {name} | " + " | ".join(cell(row[head], signed) for head in heads) + " |" for name, row in rows.items()
+        f"| {name} | " + " | ".join(cell(row[head], signed) for head in heads) + " |"
+        for name, row in rows.items()
     ]
     return "\n".join(lines)
 
@@ -42,15 +45,21 @@ def table(rows: dict[str, Any], *, signed: bool = False) -> str:
 def cell(measures: dict[str, list[float]], signed: bool) -> str:
     """Return hit rates; of Top-3 with the interval that resampled queries give; and mean average precision."""
     sign = "+" if signed else ""
-    one, three, five, precision = (f"{measures[name][0]:{sign}.1f}" for name in ("top1", "top3", "top5", "map"))
+    one, three, five, precision = (
+        f"{measures[name][0]:{sign}.1f}" for name in ("top1", "top3", "top5", "map")
+    )
     low, high = (f"{end:{sign}.0f}" for end in measures["top3"][1:])
     return f"{one} / {three} [{low}, {high}] / {five}, {precision}"
 
 
 def thesis_table() -> str:
     """Return tables 5.2 and 5.4 as one."""
-    lines = ["| method, Top-3 / Top-5 | 32 incomplete | 18 complete | 50 together |", "|---|---|---|---|"]
+    lines = [
+        "| method, Top-3 / Top-5 | 32 incomplete | 18 complete | 50 together |",
+        "|---|---|---|---|",
+    ]
     lines += [
-        f"| {name} | " + " | ".join(f"{three} / {five}" for three, five in row) + " |" for name, row in THESIS.items()
+        f"| {name} | " + " | ".join(f"{three} / {five}" for three, five in row) + " |"
+        for name, row in THESIS.items()
     ]
     return "\n".join(lines)

@@ -7,15 +7,20 @@ import numpy as np
 
 import eigenshape as es
 
-Method = Callable[[es.Binding, Sequence[es.Rotation | es.Translation]], np.ndarray]
+Method = Callable[[es.deformation.Binding, Sequence[es.Rotation | es.Translation]], np.ndarray]
 PEER_ROUNDS = 100
 
 
-def libigl(binding: es.Binding, handles: Sequence[es.Rotation | es.Translation]) -> np.ndarray:
+def libigl(
+    binding: es.deformation.Binding, handles: Sequence[es.Rotation | es.Translation]
+) -> np.ndarray:
     """Bend as rigidly as possible by libigl, whose energy is that of spokes and rims, from the shape at rest."""
     mesh, free = binding.rig.mesh, np.zeros(binding.rig.mesh.n_vertices, dtype=bool)
     free[binding.part.free] = True
-    held, goal = np.flatnonzero(~free), es.as_rigid_as_possible(binding, handles, n_rounds=1)
+    held, goal = (
+        np.flatnonzero(~free),
+        es.deformation.as_rigid_as_possible(binding, handles, n_rounds=1),
+    )
     data = igl.ARAPData()
     data.max_iter = PEER_ROUNDS
     vertices, faces = np.array(mesh.vertices), np.array(mesh.faces)
@@ -26,11 +31,17 @@ def libigl(binding: es.Binding, handles: Sequence[es.Rotation | es.Translation])
 
 
 METHODS: dict[str, Method] = {
-    "graded": lambda binding, handles: es.bend(binding, handles).vertices,
-    "uncrossed": lambda binding, handles: es.bend(binding, handles, mode="uncrossed").vertices,
-    "thesis": lambda binding, handles: es.bend(binding, handles, mode="thesis").vertices,
-    "ARAP": lambda binding, handles: es.as_rigid_as_possible(binding, handles, n_rounds=PEER_ROUNDS),
+    "graded": lambda binding, handles: es.deformation.bend(binding, handles).vertices,
+    "uncrossed": lambda binding, handles: (
+        es.deformation.bend(binding, handles, mode="uncrossed").vertices
+    ),
+    "thesis": lambda binding, handles: (
+        es.deformation.bend(binding, handles, mode="thesis").vertices
+    ),
+    "ARAP": lambda binding, handles: es.deformation.as_rigid_as_possible(
+        binding, handles, n_rounds=PEER_ROUNDS
+    ),
     "ARAP (libigl)": libigl,
-    "biharmonic": es.biharmonic_blend,
-    "spectral": es.spectral_rigid,
+    "biharmonic": es.deformation.biharmonic_blend,
+    "spectral": es.deformation.spectral_rigid,
 }

@@ -20,10 +20,10 @@ FROM_THE_SIDE = {"waist 90°", "knee 60°", "combined"}
 SIDE = np.array([[0.0, 0.0, -1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])  # from +x, y upward
 
 
-def view(scene: Scene) -> es.Camera:
+def view(scene: Scene) -> es.plot.Camera:
     """Return where a scene is looked at from."""
-    usual = es.three_quarter_view(scene.mesh, up=scene.up)
-    return es.Camera(SIDE, usual.size) if scene.name in FROM_THE_SIDE else usual
+    usual = es.plot.three_quarter_view(scene.mesh, up=scene.up)
+    return es.plot.Camera(SIDE, usual.size) if scene.name in FROM_THE_SIDE else usual
 
 
 def by_all_methods(scene: Scene, path: Path) -> None:
@@ -32,32 +32,47 @@ def by_all_methods(scene: Scene, path: Path) -> None:
     poses = {"at rest": scene.mesh}
     for name, method in METHODS.items():
         bent = es.TriangleMesh(method(binding, handles), scene.mesh.faces)
-        error = es.measure_distortion(scene.mesh, bent).edge_error
+        error = es.deformation.measure_distortion(scene.mesh, bent).edge_error
         poses[f"{name}: edges off by {100 * error:.1f} %"] = bent
-    es.save_figure(es.figure_poses(poses, binding.shares.sum(axis=0), camera=view(scene)), path)
+    es.save_figure(
+        es.plot.figure_poses(poses, binding.shares.sum(axis=0), camera=view(scene)), path
+    )
 
 
 def skeletons(folder: Path) -> None:
     """Draw the dragon's skeleton, cut and fitted (figures 6.5, 6.6), and ways to put details back (6.7, 6.9)."""
     scene = SCENES["dragon"]()
     binding, handles = bound(scene)
-    grip, faces = es.grip_skeleton(binding), scene.mesh.faces
+    grip, faces = es.deformation.skeleton_response(binding), scene.mesh.faces
     cut = grip.skeleton.copy()
     whole = binding.regions[0].astype(float)
     cut += handles[0].carry(cut, whole)
-    moved = es.moved_skeleton(grip, handles)
-    poses = {"shape": scene.mesh.vertices, "skeleton, 8 modes": grip.skeleton, "region turned": cut, "fitted": moved}
+    moved = es.deformation.move_skeleton(grip, handles)
+    poses = {
+        "shape": scene.mesh.vertices,
+        "skeleton, 8 modes": grip.skeleton,
+        "region turned": cut,
+        "fitted": moved,
+    }
     meshes = {title: es.TriangleMesh(points, faces) for title, points in poses.items()}
-    es.save_figure(es.figure_poses(meshes, whole, camera=view(scene)), folder / "figure_6_6.png")
-    once = es.detail_skeleton(binding, second_pass=False)
+    es.save_figure(
+        es.plot.figure_poses(meshes, whole, camera=view(scene)), folder / "figure_6_6.png"
+    )
+    once = es.deformation.detailed_skeleton(binding, second_pass=False)
     ways = {
-        "details by local frames": es.eigen_deformed(once, handles, details="frames"),
-        "details by the handle": es.eigen_deformed(once, handles, details="handle"),
-        "blended (6.3.1)": es.eigen_deformed(once, handles),
-        "blended, in two passes (6.3.3)": es.eigen_deformed(es.detail_skeleton(binding), handles),
+        "details by local frames": es.deformation.eigen_deformation(
+            once, handles, details="frames"
+        ),
+        "details by the handle": es.deformation.eigen_deformation(once, handles, details="handle"),
+        "blended (6.3.1)": es.deformation.eigen_deformation(once, handles),
+        "blended, in two passes (6.3.3)": es.deformation.eigen_deformation(
+            es.deformation.detailed_skeleton(binding), handles
+        ),
     }
     meshes = {title: es.TriangleMesh(points, faces) for title, points in ways.items()}
-    es.save_figure(es.figure_poses(meshes, whole, camera=view(scene)), folder / "figure_6_7_and_6_9.png")
+    es.save_figure(
+        es.plot.figure_poses(meshes, whole, camera=view(scene)), folder / "figure_6_7_and_6_9.png"
+    )
 
 
 def heads(path: Path) -> None:
@@ -66,8 +81,10 @@ def heads(path: Path) -> None:
     rig = es.rig_shape(mesh)
     poses = {"shape": mesh}
     for n_modes in (300, 50, 8):
-        poses[f"skeleton, {n_modes} modes"] = es.TriangleMesh(es.eigen_skeleton(rig, n_modes), mesh.faces)
-    es.save_figure(es.figure_poses(poses), path)
+        poses[f"skeleton, {n_modes} modes"] = es.TriangleMesh(
+            es.deformation.eigen_skeleton(rig, n_modes), mesh.faces
+        )
+    es.save_figure(es.plot.figure_poses(poses), path)
 
 
 def main() -> None:

@@ -17,21 +17,29 @@ from rich.progress import track
 
 import eigenshape as es
 
-THESIS = {"arm stretched": (0.0023, 0.0022), "knee 60°": (0.001, 0.0007), "combined": (0.0052, 0.0021)}
+THESIS = {
+    "arm stretched": (0.0023, 0.0022),
+    "knee 60°": (0.001, 0.0007),
+    "combined": (0.0052, 0.0021),
+}
 THESIS["plane 90°"] = (0.0028, 0.0022)  # ARAP, the thesis' own; of the box, as printed in table 6.2
 
 
-def bound(scene: Scene) -> tuple[es.Binding, list[es.Rotation | es.Translation]]:
+def bound(scene: Scene) -> tuple[es.deformation.Binding, list[es.Rotation | es.Translation]]:
     """Rig a scene, and bind its regions."""
     regions = [move.region for move in scene.moves]
-    binding = es.bind(es.rig_shape(scene.mesh), regions, fixed=scene.fixed, n_modes=scene.n_modes)
+    binding = es.deformation.bind(
+        es.rig_shape(scene.mesh), regions, fixed=scene.fixed, n_modes=scene.n_modes
+    )
     return binding, [move.handle for move in scene.moves]
 
 
-def measures(scene: Scene, vertices: np.ndarray, held: np.ndarray, goal: np.ndarray) -> dict[str, float]:
+def measures(
+    scene: Scene, vertices: np.ndarray, held: np.ndarray, goal: np.ndarray
+) -> dict[str, float]:
     """Return what a method did to a shape."""
     bent = es.TriangleMesh(vertices, scene.mesh.faces)
-    found = es.measure_distortion(scene.mesh, bent)
+    found = es.deformation.measure_distortion(scene.mesh, bent)
     diagonal = np.linalg.norm(np.ptp(scene.mesh.vertices, axis=0))
     away = np.linalg.norm((vertices - goal)[held], axis=1)
     height = scene.mesh.vertices[:, "xyz".index(scene.up)]
@@ -42,7 +50,7 @@ def measures(scene: Scene, vertices: np.ndarray, held: np.ndarray, goal: np.ndar
         "of the box": found.edge_error_of_box,
         "least area": float(found.area_ratios.min()),
         "flipped": len(found.flipped),
-        "crossing": len(es.self_intersections(bent)),
+        "crossing": len(es.geometry.self_intersections(bent)),
         "handles": float(np.sqrt(np.mean(away**2)) / diagonal),
         "feet": float(step / diagonal),
     }
@@ -51,7 +59,7 @@ def measures(scene: Scene, vertices: np.ndarray, held: np.ndarray, goal: np.ndar
 def compared(scene: Scene) -> dict[str, Any]:
     """Return the measures of all methods on a scene."""
     binding, handles = bound(scene)
-    goal = es.as_rigid_as_possible(binding, handles, n_rounds=1)
+    goal = es.deformation.as_rigid_as_possible(binding, handles, n_rounds=1)
     held = np.setdiff1d(np.arange(scene.mesh.n_vertices), binding.part.free)
     rows: dict[str, Any] = {"vertices": scene.mesh.n_vertices, "modes": binding.n_modes.tolist()}
     rows["held"] = len(held) / scene.mesh.n_vertices
@@ -62,19 +70,40 @@ def compared(scene: Scene) -> dict[str, Any]:
 
 def printed(results: dict[str, Any]) -> str:
     """Return the tables in Markdown."""
-    lines = ["| edges, RMS of relative changes | " + " | ".join(METHODS) + " |", "|---|" + "---|" * len(METHODS)]
-    lines += [
-        f"| {name} | " + " | ".join(f"{row[m]['edges']:.4f}" for m in METHODS) + " |" for name, row in results.items()
+    lines = [
+        "| edges, RMS of relative changes | " + " | ".join(METHODS) + " |",
+        "|---|" + "---|" * len(METHODS),
     ]
-    lines += ["", "| of the box's diagonal | " + " | ".join(METHODS) + " | thesis' ARAP, printed | thesis, printed |"]
+    lines += [
+        f"| {name} | " + " | ".join(f"{row[m]['edges']:.4f}" for m in METHODS) + " |"
+        for name, row in results.items()
+    ]
+    lines += [
+        "",
+        "| of the box's diagonal | "
+        + " | ".join(METHODS)
+        + " | thesis' ARAP, printed | thesis, printed |",
+    ]
     lines += ["|---|" + "---|" * (len(METHODS) + 2)]
     for name, row in results.items():
         theirs = [f"{value}" for value in THESIS.get(name, ("", ""))]
-        lines.append(f"| {name} | " + " | ".join([f"{row[m]['of the box']:.5f}" for m in METHODS] + theirs) + " |")
-    lines += ["", "| least area, after over before; flipped faces; pairs that cross | " + " | ".join(METHODS) + " |"]
+        lines.append(
+            f"| {name} | "
+            + " | ".join([f"{row[m]['of the box']:.5f}" for m in METHODS] + theirs)
+            + " |"
+        )
+    lines += [
+        "",
+        "| least area, after over before; flipped faces; pairs that cross | "
+        + " | ".join(METHODS)
+        + " |",
+    ]
     lines += ["|---|" + "---|" * len(METHODS)]
     for name, row in results.items():
-        cells = [f"{row[m]['least area']:.2f}; {row[m]['flipped']}; {row[m]['crossing']:,}" for m in METHODS]
+        cells = [
+            f"{row[m]['least area']:.2f}; {row[m]['flipped']}; {row[m]['crossing']:,}"
+            for m in METHODS
+        ]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 

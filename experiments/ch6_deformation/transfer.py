@@ -49,21 +49,31 @@ def main() -> None:
     parser.add_argument("--out", type=output_file, default="ch6-transfer.json")
     chosen = parser.parse_args()
     require_data()
-    give_out({name: transferred(name, pair, chosen.folder) for name, pair in PAIRS.items()}, chosen.out)
+    give_out(
+        {name: transferred(name, pair, chosen.folder) for name, pair in PAIRS.items()}, chosen.out
+    )
 
 
 def transferred(name: str, pair: Pair, folder: Path) -> dict[str, dict[str, float]]:
     """Give all poses of the source to the target, at several scales."""
     source, target = (es.read_mesh(DATA / path) for path in (pair.source, pair.target))
     spectra = [es.solve_spectrum(es.cotangent_laplacian(mesh), START) for mesh in (source, target)]
-    mapping = es.refine_map(es.functional_map(*spectra, np.column_stack(pair.landmarks)), max(SCALES))
-    results, rows = {}, [{f"{name.split(maxsplit=1)[0]}": source}, {f"{name.rsplit(maxsplit=1)[-1]}, as given": target}]
+    mapping = es.spectral.refine_map(
+        es.functional_map(*spectra, np.column_stack(pair.landmarks)), max(SCALES)
+    )
+    results, rows = (
+        {},
+        [
+            {f"{name.split(maxsplit=1)[0]}": source},
+            {f"{name.rsplit(maxsplit=1)[-1]}, as given": target},
+        ],
+    )
     for path in pair.poses:
         pose = es.read_mesh(DATA / path)
         rows[0][Path(path).stem] = pose
         for scale in SCALES:
-            bent = es.transfer_deformation(source, pose, target, mapping, n_modes=scale)
-            found = es.measure_distortion(target, bent)
+            bent = es.deformation.transfer_deformation(source, pose, target, mapping, n_modes=scale)
+            found = es.deformation.measure_distortion(target, bent)
             results[f"{Path(path).stem}, {scale} modes"] = {
                 "edges": round(found.edge_error, 3),
                 "least area": round(float(found.area_ratios.min()), 2),
@@ -71,7 +81,7 @@ def transferred(name: str, pair: Pair, folder: Path) -> dict[str, dict[str, floa
             }
         rows[1][f"as {Path(path).stem}"] = bent
     for row, which in zip(rows, ("source", "target"), strict=True):
-        es.save_figure(es.figure_poses(row), folder / f"{name.replace(' ', '_')}_{which}.png")
+        es.save_figure(es.plot.figure_poses(row), folder / f"{name.replace(' ', '_')}_{which}.png")
     return results
 
 

@@ -10,65 +10,65 @@ from eigenshape._errors import InvalidParameterError
 
 # The call that makes each value, from a mesh where one can.
 MAKERS = {
-    "Binding": "bind(rig, [region])",
-    "Brackets": "bracket_eigenvalues(mesh, k)",
-    "Camera": "three_quarter_view(mesh)",
-    "DepthCamera": "DepthCamera()",
-    "DetailedSkeleton": "detail_skeleton(binding)",
-    "Edit": "Edit((Move(region, handle),))",
-    "EigenRig": "rig_shape(mesh)",
-    "FeaturePoints": "segment(tree).features",
-    "Figure": "figure_spectrum(spectrum)",
-    "FunctionalMap": "functional_map(source, target, pairs)",
+    "Binding": "es.deformation.bind(rig, [region])",
+    "Brackets": "es.bracket_eigenvalues(mesh, k)",
+    "Camera": "es.plot.three_quarter_view(mesh)",
+    "DepthCamera": "es.scans.DepthCamera()",
+    "DetailedSkeleton": "es.deformation.detailed_skeleton(binding)",
+    "Edit": "es.deformation.Edit((es.deformation.Move(region, handle),))",
+    "EigenRig": "es.rig_shape(mesh)",
+    "FeaturePoints": "es.segment(tree).features",
+    "Figure": "es.plot.figure_spectrum(spectrum)",
+    "FunctionalMap": "es.functional_map(source, target, pairs)",
     "Generator": "numpy.random.default_rng(0)",
-    "Item": "Item(name, path)",
-    "LabelTransfer": "transfer_labels(source, labels, target)",
-    "Laplacian": "cotangent_laplacian(mesh)",
+    "HeatDescriptor": "es.describe(mesh, es.retrieval.SCALE_FREE)",
+    "HeatRecipe": "es.retrieval.SCALE_FREE",
+    "Item": "es.retrieval.Item(name, path)",
+    "LabelTransfer": "es.transfer_labels(source, labels, target)",
+    "Laplacian": "es.cotangent_laplacian(mesh)",
     "Mapping": "{title: value}",
-    "MergeTree": "merge_tree(mesh, values)",
-    "Move": "Move(region, handle)",
-    "Panel": "Panel(mesh, title, labels, vertices)",
-    "PartTree": "find_parts(mesh).tree",
-    "PatchCodebook": "made_codebook()",
-    "PatchDescriptor": "describe_shape(mesh, PatchRecipe(made_codebook()))",
-    "PatchPoints": "patch_points(describe_patches(mesh), made_codebook())",
-    "PatchRecipe": "PatchRecipe(made_codebook())",
-    "Patches": "describe_patches(mesh)",
-    "PersistenceDiagram": "persistence_diagram(shape, values)",
-    "Perturbation": "perturbation(one, two)",
-    "PointCloud": "PointCloud(points, dim=2)",
-    "Quadrature": "mesh_quadrature(mesh)",
-    "Rate": "theorem_rate(theorem, dim)",
-    "Recipe": "SCALE_FREE",
-    "Rotation": "Rotation(pivot, axis, angle)",
-    "Segmentation": "segment(tree)",
-    "ShapeDescriptor": "describe_mesh(mesh).descriptor",
-    "ShapeIndex": "ShapeIndex.open(folder)",
-    "SkeletonGrip": "grip_skeleton(binding)",
-    "Spectrum": "solve_spectrum(laplacian, k)",
-    "SpectrumComparison": "compare_spectra(one, two)",
-    "StabilityPlan": "StabilityPlan()",
-    "StabilityReport": "compare_shapes(one, two)",
-    "SurfacePoints": "sample_surface(mesh, n)",
-    "Translation": "Translation(vector)",
-    "TriangleMesh": "TriangleMesh(vertices, faces)",
-    "Workers": "Workers()",
+    "MergeTree": "es.merge_tree(mesh, values)",
+    "Move": "es.deformation.Move(region, handle)",
+    "Panel": "es.plot.Panel(mesh, title, labels, vertices)",
+    "PartTree": "es.find_parts(mesh).tree",
+    "PatchCodebook": "es.retrieval.default_codebook()",
+    "PatchDescriptor": "es.describe(mesh)",
+    "PatchPoints": "es.describe(mesh).points[0]",
+    "PatchRecipe": "es.retrieval.PatchRecipe()",
+    "Patches": "es.retrieval.extract_patches(mesh)[0]",
+    "PersistenceDiagram": "es.features.persistence_diagram(shape, values)",
+    "Perturbation": "es.stability.measure_perturbation(one, two)",
+    "PointCloud": "es.PointCloud(points, dim=2)",
+    "Quadrature": "es.geometry.mesh_quadrature(mesh)",
+    "Rate": "es.stability.theorem_rate(theorem, dim)",
+    "Rotation": "es.Rotation(pivot, axis, angle)",
+    "Segmentation": "es.segment(tree)",
+    "ShapeIndex": "es.ShapeIndex.open(folder)",
+    "SkeletonResponse": "es.deformation.skeleton_response(binding)",
+    "Spectrum": "es.solve_spectrum(laplacian, k)",
+    "SpectrumComparison": "es.spectral.compare_spectra(one, two)",
+    "StabilityPlan": "es.stability.StabilityPlan()",
+    "StabilityReport": "es.compare_shapes(one, two)",
+    "SurfacePoints": "es.geometry.sample_surface(mesh, n)",
+    "Translation": "es.Translation(vector)",
+    "TriangleMesh": "es.TriangleMesh(vertices, faces)",
+    "Workers": "es.retrieval.Workers()",
 }
 # What reads a value of each kind from a file.
 READERS = {
-    "PatchCodebook": "read_codebook(Path({path}).read_bytes())",
-    "PointCloud": "read_points({path}, dim=2)",
-    "ShapeIndex": "ShapeIndex.open({path})",
-    "Spectrum": "Spectrum.load({path})",
+    "PatchCodebook": "es.retrieval.read_codebook(Path({path}).read_bytes())",
+    "PointCloud": "es.read_points({path}, dim=2)",
+    "ShapeIndex": "es.ShapeIndex.open({path})",
+    "Spectrum": "es.Spectrum.load({path})",
 }
 # What makes a value of one kind from one of another, where that is not the usual call.
 CONVERSIONS = {
-    ("PointCloud", "Laplacian"): "point_cloud_laplacian(cloud)",
-    ("PointCloud", "Quadrature"): "cloud_quadrature(cloud)",
-    ("TriangleMesh", "PointCloud"): "PointCloud(mesh.points)",
-    ("SimplicialMesh", "PointCloud"): "PointCloud(mesh.points, dim)",
-    ("ndarray", "Laplacian"): "Laplacian(csr_array(stiffness), csr_array(mass))",
-    ("sparse", "Laplacian"): "Laplacian(stiffness, mass)",
+    ("PointCloud", "Laplacian"): "es.point_cloud_laplacian(cloud)",
+    ("PointCloud", "Quadrature"): "es.geometry.cloud_quadrature(cloud)",
+    ("TriangleMesh", "PointCloud"): "es.PointCloud(mesh.points)",
+    ("SimplicialMesh", "PointCloud"): "es.PointCloud(mesh.points, dim)",
+    ("ndarray", "Laplacian"): "es.Laplacian(csr_array(stiffness), csr_array(mass))",
+    ("sparse", "Laplacian"): "es.Laplacian(stiffness, mass)",
 }
 
 
@@ -94,7 +94,11 @@ def require_each(values: object, kind: type | UnionType, name: str) -> None:
     InvalidParameterError
         If it is none, or a value in it is no instance of `kind`.
     """
-    if isinstance(values, kind) or not isinstance(values, Iterable) or isinstance(values, str | bytes):
+    if (
+        isinstance(values, kind)
+        or not isinstance(values, Iterable)
+        or isinstance(values, str | bytes)
+    ):
         remedy = f"Pass [{name}]." if isinstance(values, kind) else instead(values, kind)
         raise InvalidParameterError(
             f"{name} must be a list, each entry {named_kind(kind)}; it is {named_value(values)}. {remedy}"
@@ -105,7 +109,10 @@ def require_each(values: object, kind: type | UnionType, name: str) -> None:
 
 def named_kind(kind: type | UnionType) -> str:
     """Return the name of a type with its article, or those of several joined by "or"."""
-    names = ["None" if each is type(None) else f"{_article(each.__name__)} {each.__name__}" for each in _kinds(kind)]
+    names = [
+        "None" if each is type(None) else f"{_article(each.__name__)} {each.__name__}"
+        for each in _kinds(kind)
+    ]
     return " or ".join(names)
 
 
@@ -126,7 +133,9 @@ def instead(value: object, kind: type | UnionType) -> str:
         return f"Pass its attribute {part}."
     wanted = [each.__name__ for each in _kinds(kind) if each is not type(None)]
     if isinstance(value, str | os.PathLike):
-        readers = [READERS[name].format(path=repr(os.fspath(value))) for name in wanted if name in READERS]
+        readers = [
+            READERS[name].format(path=repr(os.fspath(value))) for name in wanted if name in READERS
+        ]
         if readers:
             return f"Pass {readers[0]}."
     given = "sparse" if hasattr(value, "tocsr") else type(value).__name__
@@ -137,7 +146,9 @@ def instead(value: object, kind: type | UnionType) -> str:
 def attribute_of(value: object, kind: type | UnionType) -> str | None:
     """Return the name of the first attribute of a value that is of some kind, as `mesh` is of a Repaired."""
     parts = fields(value) if is_dataclass(value) else ()
-    return next((part.name for part in parts if isinstance(getattr(value, part.name, None), kind)), None)
+    return next(
+        (part.name for part in parts if isinstance(getattr(value, part.name, None), kind)), None
+    )
 
 
 def _kinds(kind: type | UnionType) -> tuple[type, ...]:

@@ -4,11 +4,12 @@ import operator
 from typing import Any, SupportsIndex, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from eigenshape._arguments import named_value
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._memory import machine_memory
+from eigenshape._typing import ArrayLike
 
 SINGULAR = {"vertices": "vertex", "faces": "face", "points": "point", "simplices": "simplex"}
 INDEXED = {"faces": "vertices", "simplices": "points"}
@@ -27,7 +28,9 @@ def frozen(array: ArrayT) -> ArrayT:
 
 
 def as_array(
-    value: ArrayLike, name: str, error: type[InvalidShapeError | InvalidParameterError] = InvalidParameterError
+    value: ArrayLike,
+    name: str,
+    error: type[InvalidShapeError | InvalidParameterError] = InvalidParameterError,
 ) -> NDArray[Any]:
     """Return `value` as an array; every array that a caller hands over comes through here.
 
@@ -39,7 +42,9 @@ def as_array(
     ValueError
         If rows differ in length.
     """
-    nested = isinstance(value, list | tuple) and any(isinstance(row, np.ma.MaskedArray) for row in value)
+    nested = isinstance(value, list | tuple) and any(
+        isinstance(row, np.ma.MaskedArray) for row in value
+    )
     array = np.ma.asarray(value) if nested else np.asanyarray(value)
     masked = np.ma.getmask(array)
     if np.any(masked):
@@ -75,10 +80,14 @@ def finite_rows(value: ArrayLike, name: str, columns: int | None = None) -> NDAr
     return rows
 
 
-def index_rows(value: ArrayLike, name: str, columns: int | None, n_vertices: int) -> NDArray[np.int64]:
+def index_rows(
+    value: ArrayLike, name: str, columns: int | None, n_vertices: int
+) -> NDArray[np.int64]:
     """Return `value` as (f, columns) int64 indices below `n_vertices`, refusing the first bad row."""
     rows = _table(value, name, columns)
-    huge = rows.dtype.kind == "O" and all(isinstance(entry, int | np.integer) for entry in rows.flat)
+    huge = rows.dtype.kind == "O" and all(
+        isinstance(entry, int | np.integer) for entry in rows.flat
+    )
     if rows.dtype.kind not in "iuf" and not huge:
         raise InvalidShapeError(f"{name} must be integers; the type is {rows.dtype}.")
     if rows.dtype.kind == "f" and (rows != np.floor(rows)).any():
@@ -87,7 +96,9 @@ def index_rows(value: ArrayLike, name: str, columns: int | None, n_vertices: int
     outside = (rows < 0) | (rows >= n_vertices)
     if outside.any():
         indexed = INDEXED[name]
-        raise InvalidShapeError(f"{name} must index {indexed} 0..{n_vertices - 1}; {_first(name, rows, outside)}.")
+        raise InvalidShapeError(
+            f"{name} must index {indexed} 0..{n_vertices - 1}; {_first(name, rows, outside)}."
+        )
     return rows.astype(np.int64)
 
 
@@ -98,12 +109,16 @@ def _table(value: ArrayLike, name: str, columns: int | None) -> NDArray[Any]:
     except InvalidShapeError:
         raise
     except ValueError as err:
-        raise InvalidShapeError(f"{name} must have shape {wanted}; the rows differ in length.") from err
+        raise InvalidShapeError(
+            f"{name} must have shape {wanted}; the rows differ in length."
+        ) from err
     if rows.size == 0:
         return np.empty((0, columns or 0), dtype=np.int64)
     if rows.ndim != 2 or columns not in (None, rows.shape[1]):
         hint = " Transpose it." if rows.ndim == 2 and rows.shape[0] == columns else ""
-        raise InvalidShapeError(f"{name} must have shape {wanted}; the shape is {rows.shape}.{hint}")
+        raise InvalidShapeError(
+            f"{name} must have shape {wanted}; the shape is {rows.shape}.{hint}"
+        )
     if len(rows) > 1 and rows.strides[0] == 0:
         raise InvalidShapeError(
             f"{name} must have a place in memory for each row; all {len(rows)} are one row, {rows[0].tolist()}, that "
@@ -122,7 +137,9 @@ def positive_values(value: ArrayLike, name: str) -> NDArray[np.float64]:
     values = _list_of_numbers(value, name)
     bad = np.flatnonzero(~(np.isfinite(values) & (values > 0)))
     if bad.size:
-        raise InvalidParameterError(f"{name} must be positive and finite; entry {bad[0]} is {values[bad[0]]}.")
+        raise InvalidParameterError(
+            f"{name} must be positive and finite; entry {bad[0]} is {values[bad[0]]}."
+        )
     return values
 
 
@@ -154,7 +171,9 @@ def _require_finite(values: NDArray[np.float64], name: str) -> None:
 def _list_of_numbers(value: ArrayLike, name: str) -> NDArray[np.float64]:
     values = np.atleast_1d(real_numbers(value, name))
     if values.ndim != 1 or not values.size:
-        raise InvalidParameterError(f"{name} must be a list of numbers; the shape is {values.shape}.")
+        raise InvalidParameterError(
+            f"{name} must be a list of numbers; the shape is {values.shape}."
+        )
     return values.astype(np.float64)
 
 
@@ -171,7 +190,9 @@ def real_numbers(value: ArrayLike, name: str) -> NDArray[Any]:
     except InvalidParameterError:
         raise
     except ValueError as err:
-        raise InvalidParameterError(f"{name} must be a list of numbers; its entries differ in length.") from err
+        raise InvalidParameterError(
+            f"{name} must be a list of numbers; its entries differ in length."
+        ) from err
     if numbers.dtype.kind not in "biuf":
         is_array = isinstance(value, list | tuple | np.ndarray)
         given = f"the type is {numbers.dtype}" if is_array else f"it is {named_value(value)}"

@@ -17,7 +17,9 @@ import numba
 from numba.core import event
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserWideCacheLocator
 
-_LOOPS: weakref.WeakSet[Any] = weakref.WeakSet()  # all that `njit` has made, apart from loops of other packages
+_LOOPS: weakref.WeakSet[Any] = (
+    weakref.WeakSet()
+)  # all that `njit` has made, apart from loops of other packages
 
 
 def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
@@ -91,7 +93,9 @@ def _is_ours(event: Any) -> bool:
 def _print_notice() -> None:
     """Print to a terminal that compilation takes some seconds; only in the process that the user started."""
     if multiprocessing.parent_process() is None and sys.stderr is not None and sys.stderr.isatty():
-        sys.stderr.write("eigenshape compiles its loops the first time that they run; this takes some seconds.\n")
+        sys.stderr.write(
+            "eigenshape compiles its loops the first time that they run; this takes some seconds.\n"
+        )
         sys.stderr.flush()
 
 
@@ -145,7 +149,9 @@ def make_private(folder: Path) -> None:
     found = folder.lstat()
     mine = not hasattr(os, "getuid") or (found.st_uid == os.getuid() and not found.st_mode & 0o077)
     if not (stat.S_ISDIR(found.st_mode) and mine):
-        raise PermissionError(f"A folder of compiled loops must belong to its user alone; {folder} does not.")
+        raise PermissionError(
+            f"A folder of compiled loops must belong to its user alone; {folder} does not."
+        )
 
 
 event.register("numba:compile", _CompilationListener())

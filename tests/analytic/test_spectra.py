@@ -8,7 +8,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes.surfaces import grid, icosphere
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 MASSES = ["lumped", "consistent", "averaged"]
 
@@ -29,12 +29,16 @@ def flat_torus(n: int, periods: np.ndarray, mass: str) -> Laplacian:
     mesh = TriangleMesh(np.pad(square.vertices[:, :2] @ periods, ((0, 0), (0, 1))), square.faces)
     whole = cotangent_laplacian(mesh, mass)
     glue = sp.csr_array((np.ones(mesh.n_vertices), (np.arange(mesh.n_vertices), steps @ [n, 1])))
-    return Laplacian(sp.csr_array(glue.T @ whole.stiffness @ glue), sp.csr_array(glue.T @ whole.mass @ glue))
+    return Laplacian(
+        sp.csr_array(glue.T @ whole.stiffness @ glue), sp.csr_array(glue.T @ whole.mass @ glue)
+    )
 
 
 def flat_torus_eigenvalues(periods, k):
     """4π² |ξ|² over the lattice of frequencies ξ that are whole on both periods."""
-    modes = np.stack(np.meshgrid(np.arange(-k, k + 1), np.arange(-k, k + 1)), axis=-1).reshape(-1, 2)
+    modes = np.stack(np.meshgrid(np.arange(-k, k + 1), np.arange(-k, k + 1)), axis=-1).reshape(
+        -1, 2
+    )
     frequencies = modes @ np.linalg.inv(periods).T
     return np.sort(4 * np.pi**2 * (frequencies**2).sum(axis=1))[:k]
 
@@ -71,7 +75,11 @@ def test_sphere_multiplicities_are_seen_as_clusters():
         (RIGHT, "averaged", 2),
         (EQUILATERAL, "lumped", 2),
         (EQUILATERAL, "consistent", 2),
-        (EQUILATERAL, "averaged", 4),  # here the two leading errors are opposite in every direction, and cancel
+        (
+            EQUILATERAL,
+            "averaged",
+            4,
+        ),  # here the two leading errors are opposite in every direction, and cancel
     ],
 )
 def test_flat_torus_converges(periods, mass, order):
@@ -96,8 +104,12 @@ def test_flat_torus_multiplicities_are_exact(n):
 @pytest.mark.parametrize("mass", MASSES)
 def test_rectangle_with_free_boundary(mass):
     modes = np.arange(8)
-    exact = np.sort(((np.pi * modes / 1.0) ** 2)[:, None] + (np.pi * modes / 0.6) ** 2, axis=None)[:12]
-    found = solve_spectrum(cotangent_laplacian(grid(50, 30, width=1.0, height=0.6), mass), 12).eigenvalues
+    exact = np.sort(((np.pi * modes / 1.0) ** 2)[:, None] + (np.pi * modes / 0.6) ** 2, axis=None)[
+        :12
+    ]
+    found = solve_spectrum(
+        cotangent_laplacian(grid(50, 30, width=1.0, height=0.6), mass), 12
+    ).eigenvalues
     np.testing.assert_allclose(found, exact, rtol=0.01, atol=1e-9)
 
 
@@ -114,7 +126,9 @@ def test_path_graph(n):
     adjacency = sp.diags_array([np.ones(n - 1), np.ones(n - 1)], offsets=[1, -1])
     stiffness = sp.csr_array(sp.diags_array(adjacency.sum(axis=1)) - adjacency)
     found = solve_spectrum(Laplacian(stiffness, sp.csr_array(sp.eye_array(n))), 20).eigenvalues
-    np.testing.assert_allclose(found, 4 * np.sin(np.pi * np.arange(20) / (2 * n)) ** 2, rtol=1e-9, atol=1e-14)
+    np.testing.assert_allclose(
+        found, 4 * np.sin(np.pi * np.arange(20) / (2 * n)) ** 2, rtol=1e-9, atol=1e-14
+    )
 
 
 def test_regular_tetrahedron_by_hand():
@@ -122,5 +136,7 @@ def test_regular_tetrahedron_by_hand():
     corners = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(8)
     mesh = TriangleMesh(corners, np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]))
     np.testing.assert_allclose(
-        solve_spectrum(cotangent_laplacian(mesh), 4).eigenvalues, [0, 16 / 3, 16 / 3, 16 / 3], atol=1e-14
+        solve_spectrum(cotangent_laplacian(mesh), 4).eigenvalues,
+        [0, 16 / 3, 16 / 3, 16 / 3],
+        atol=1e-14,
     )

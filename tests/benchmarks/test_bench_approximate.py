@@ -2,7 +2,9 @@
 
 
 def test_the_quick_case_has_an_exact_row_and_one_for_each_accuracy(run_quick):
-    (exact, *rough), printed, page = run_quick("bench_approximate.py", "--accuracies", "0.1", "1e-4")
+    (exact, *rough), printed, page = run_quick(
+        "bench_approximate.py", "--accuracies", "0.1", "1e-4"
+    )
     assert printed.count("icosphere, n = 2,562, k = 20") == 3
     assert page.count("| icosphere, n = 2,562, k = 20 | exact |") == 1
     assert exact["complete"]

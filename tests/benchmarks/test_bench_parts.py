@@ -35,7 +35,9 @@ def test_parts_sum_to_the_whole_and_none_beats_its_bound(run_quick):
     assert calls["solves"] > calls["orthogonalisation"] / 2 > 1
     assert calls["factors"] >= 2
     for row in rows:
-        assert row["bound"] is None or row["seconds"] > 0.2 * row["bound"], row["part"]  # caches are faster than memory
+        assert row["bound"] is None or row["seconds"] > 0.2 * row["bound"], row[
+            "part"
+        ]  # caches are faster than memory
     assert f"| icosphere, n = 2,562, k = 40 | {rows[0]['part']} |" in text
 
 

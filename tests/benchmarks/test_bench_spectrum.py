@@ -44,13 +44,21 @@ def shape_of(mesh, n_neighbors=8):
     return {
         "vertices": np.array(mesh.vertices),
         "faces": np.array(mesh.faces),
-        "adjacency": es.neighbor_graph(mesh.vertices, n_neighbors),
+        "adjacency": es.operators.neighbor_graph(mesh.vertices, n_neighbors),
     }
 
 
 def test_the_script_runs_and_its_json_has_what_it_should(tmp_path):
     report, page = tmp_path / "report.json", tmp_path / "page.md"
-    command = [sys.executable, BENCHMARKS / "bench_spectrum.py", "--quick", "--cases", "torus", "-k", "12"]
+    command = [
+        sys.executable,
+        BENCHMARKS / "bench_spectrum.py",
+        "--quick",
+        "--cases",
+        "torus",
+        "-k",
+        "12",
+    ]
     more = ["--libraries", "lumped", "--repeats", "2", "--json", report, "--markdown", page]
     wide = {**os.environ, "COLUMNS": "200"}  # so that no name is broken
     done = subprocess.run([*command, *more], capture_output=True, text=True, check=True, env=wide)
@@ -76,7 +84,7 @@ def test_the_script_runs_and_its_json_has_what_it_should(tmp_path):
 
 
 def test_every_library_solves_the_pencil_that_it_says(modules):
-    shape = shape_of(es.torus(24, 16))
+    shape = shape_of(es.shapes.torus(24, 16))
     shape["vertices"] *= [1.0, 1.1, 0.9]  # no symmetry left: nothing to be missed
     for name, library in modules["libraries"].LIBRARIES.items():
         found, (values, vectors), matrices = modules["worker"].measured(library, shape, 10)
@@ -88,7 +96,7 @@ def test_every_library_solves_the_pencil_that_it_says(modules):
 
 def test_a_wrong_list_is_counted(modules):
     worker = modules["worker"]
-    laplacian = es.cotangent_laplacian(es.torus(16, 12))
+    laplacian = es.cotangent_laplacian(es.shapes.torus(16, 12))
     matrices = laplacian.stiffness.tocsc(), laplacian.mass.tocsc()
     spectrum = es.solve_spectrum(laplacian, 20)
     np.testing.assert_allclose(worker.reference(matrices, 20), spectrum.eigenvalues, atol=1e-12)
@@ -112,16 +120,23 @@ def test_a_library_that_fails_or_never_ends_is_shown(modules, tmp_path, monkeypa
     assert failed["status"] == "failed"
     assert "faces must index vertices 0..2" in failed["reason"]
     assert bench.run_worker(task, 0.01)["status"] == "over the limit"
-    row = bench.with_ratios([{"library": "eigenshape", "case": "a", "title": "A", "n": 3, "k": 1} | failed])[0]
+    row = bench.with_ratios(
+        [{"library": "eigenshape", "case": "a", "title": "A", "n": 3, "k": 1} | failed]
+    )[0]
     assert "failed" in modules["tables"].cells(row)[1]
     monkeypatch.setattr(bench, "WORKER", tmp_path / "absent.py")
     assert "process ended with 2" in bench.run_worker(task, 60.0)["reason"]
 
 
 def test_the_residual_is_relative_to_the_last_eigenvalue(modules):
-    matrices = sp.csc_array(np.diag([0.0, 4.0])), sp.csc_array(np.diag([1.0, 4.0]))  # eigenvalues 0 and 1
+    matrices = (
+        sp.csc_array(np.diag([0.0, 4.0])),
+        sp.csc_array(np.diag([1.0, 4.0])),
+    )  # eigenvalues 0 and 1
     assert modules["worker"].worst_residual(np.array([0.0, 1.0]), np.eye(2), matrices) == 0.0
-    assert modules["worker"].worst_residual(np.array([0.0, 2.0]), np.eye(2), matrices) == pytest.approx(0.5)
+    assert modules["worker"].worst_residual(
+        np.array([0.0, 2.0]), np.eye(2), matrices
+    ) == pytest.approx(0.5)
 
 
 def test_the_memory_of_a_call_is_seen(modules):
@@ -155,7 +170,7 @@ def test_a_graph_comes_back_from_its_file(modules, tmp_path):
     case = modules["cases"].QUICK["graph"]
     n = case.save(tmp_path / "graph.npz")
     adjacency = modules["worker"].load(tmp_path / "graph.npz")["adjacency"]
-    assert (adjacency != es.neighbor_graph(case.make(), case.neighbors)).nnz == 0
+    assert (adjacency != es.operators.neighbor_graph(case.make(), case.neighbors)).nnz == 0
     assert n == adjacency.shape[0] == 800
 
 

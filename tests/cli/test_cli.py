@@ -14,12 +14,12 @@ from eigenshape.cli import app
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.retrieval.heat.describe import describe_mesh
+from eigenshape.retrieval.heat.features import find_heat_features
 from eigenshape.retrieval.store.index import ShapeIndex
 from eigenshape.scans.partial import partial_scan
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import icosphere
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 PNG = b"\x89PNG\r\n\x1a\n"
 STOPPABLE = """
@@ -53,7 +53,9 @@ def zoo(tmp_path_factory):
     for kind in ("fish", "snake"):
         (folder / kind).mkdir()
         for pose in range(2):
-            write_mesh(make_creature(kind, pose, n_vertices=800), folder / kind / f"{kind}{pose}.ply")
+            write_mesh(
+                make_creature(kind, pose, n_vertices=800), folder / kind / f"{kind}{pose}.ply"
+            )
     (folder / "broken.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 nan\n3 0 1 2\n")
     return folder
 
@@ -70,14 +72,29 @@ def database(zoo, tmp_path_factory):
 
 def test_help_names_the_verbs():
     text = run("--help").stdout
-    for verb in ("info", "spectrum", "operators", "features", "segment", "label", "index", "query", "demo"):
+    for verb in (
+        "info",
+        "spectrum",
+        "operators",
+        "features",
+        "segment",
+        "label",
+        "index",
+        "query",
+        "demo",
+    ):
         assert verb in text
         assert "--help" in run(verb, "--help").stdout
 
 
 def test_info(sphere):
     facts = run_json("info", sphere)
-    assert (facts["vertices"], facts["faces"], facts["components"], facts["closed"]) == (162, 320, 1, True)
+    assert (facts["vertices"], facts["faces"], facts["components"], facts["closed"]) == (
+        162,
+        320,
+        1,
+        True,
+    )
     assert facts["euler_characteristic"] == 2
     assert facts["area"] == pytest.approx(4 * np.pi, rel=0.02)
     assert facts["repairs_to_try"] == []
@@ -93,7 +110,12 @@ def test_info_says_which_repairs_would_help_and_they_do(tmp_path):
     path = tmp_path / "soup.obj"
     write_mesh(soup, path)
     facts = run_json("info", path)
-    assert facts["repairs_to_try"] == ["drop_duplicate_faces", "weld_seams", "drop_degenerate", "drop_unreferenced"]
+    assert facts["repairs_to_try"] == [
+        "drop_duplicate_faces",
+        "weld_seams",
+        "drop_degenerate",
+        "drop_unreferenced",
+    ]
     run("spectrum", path, code=1)
     mended = run("info", path, "--json", "--repair", ",".join(facts["repairs_to_try"]))
     assert json.loads(mended.stdout)["vertices"] == ball.n_vertices
@@ -111,7 +133,9 @@ def test_spectrum(sphere, tmp_path):
     assert plot.read_bytes()[:8] == picture.read_bytes()[:8] == PNG
     with np.load(saved) as arrays:
         assert arrays["eigenvectors"].shape == (162, 9)
-    assert run_json("spectrum", sphere, "-k", 162)["certificate"]["shift"] is None  # all there are: no upper end
+    assert (
+        run_json("spectrum", sphere, "-k", 162)["certificate"]["shift"] is None
+    )  # all there are: no upper end
     text = run("spectrum", sphere, "-k", 9).stdout
     assert "none is missing" in text
 
@@ -133,7 +157,9 @@ def test_features(zoo, tmp_path):
     widest = int(np.argmax(np.subtract(lengths, [*lengths[1:], 0])))
     assert len(run_json("features", path, "--largest-gap")["features"]) == widest + 2
     refused = run("features", path, "--largest-gap", "--persistence", 1, code=1)
-    assert "exactly one of n_regions, persistence and largest_gap" in " ".join(refused.stderr.split())
+    assert "exactly one of n_regions, persistence and largest_gap" in " ".join(
+        refused.stderr.split()
+    )
 
 
 @pytest.mark.long
@@ -162,7 +188,9 @@ def test_a_stopped_index_goes_on_without_doing_a_shape_twice(tmp_path, how):
         "--workers",
         "1",
     ]
-    running = subprocess.Popen([*command, "--views", "0", "--preset", "scale-free"], stderr=subprocess.PIPE, text=True)
+    running = subprocess.Popen(
+        [*command, "--views", "0", "--preset", "scale-free"], stderr=subprocess.PIPE, text=True
+    )
     while running.poll() is None and not (db / "rows-1.bin").exists():
         time.sleep(0.01)
     running.send_signal(getattr(signal, how))
@@ -170,7 +198,9 @@ def test_a_stopped_index_goes_on_without_doing_a_shape_twice(tmp_path, how):
     if how == "SIGINT":
         assert (running.returncode, told) == (130, "stopped; what was finished is kept\n")
     before = {record.name for record in ShapeIndex.open(db).records()}
-    report = run_json("index", folder, "--db", db, "--workers", 1, "--views", 0, "--preset", "scale-free")
+    report = run_json(
+        "index", folder, "--db", db, "--workers", 1, "--views", 0, "--preset", "scale-free"
+    )
     assert set(report["skipped"]) == before
     assert len(before) < 6
     assert set(report["added"]) | before == {f"fish{number}" for number in range(6)}
@@ -198,7 +228,10 @@ def test_query_finds_the_kind_and_draws_it(zoo, database, tmp_path):
         (("spectrum", "{sphere}", "-k", "0"), "k must lie in 1..162; it is 0"),
         (("spectrum", "{sphere}", "-k", "163"), "k must lie in 1..162; it is 163"),
         (("spectrum", "{sphere}", "--plot", "plot.bmp"), "A picture must end in"),
-        (("features", "{sphere}", "--preset", "best"), "--preset takes scale-free or thesis; it was given 'best'"),
+        (
+            ("features", "{sphere}", "--preset", "best"),
+            "--preset takes scale-free or thesis; it was given 'best'",
+        ),
         (("info", "{sphere}", "--repair", "everything"), "--repair takes auto, weld"),
         (("query", "nowhere", "{sphere}"), "must be an index"),
         (("index", "{folder}", "--db", "{folder}/db"), "There must be meshes"),
@@ -221,7 +254,9 @@ def test_names_that_come_twice_are_refused(zoo, tmp_path):
 
 
 @pytest.mark.long
-def test_a_sheet_is_drawn_from_another_folder_than_the_index_was_made_in(zoo, tmp_path, monkeypatch):
+def test_a_sheet_is_drawn_from_another_folder_than_the_index_was_made_in(
+    zoo, tmp_path, monkeypatch
+):
     monkeypatch.chdir(zoo)
     run("index", "fish", "--db", tmp_path / "index", "--views", 0, "--preset", "scale-free")
     scan = zoo / "fish" / "fish0.ply"
@@ -233,11 +268,20 @@ def test_a_sheet_is_drawn_from_another_folder_than_the_index_was_made_in(zoo, tm
 
 @pytest.mark.long
 def test_a_match_without_its_file_leaves_its_place_empty(zoo, tmp_path):
-    path, moved, changed = zoo / "fish" / "fish0.ply", tmp_path / "moved.ply", tmp_path / "changed.ply"
+    path, moved, changed = (
+        zoo / "fish" / "fish0.ply",
+        tmp_path / "moved.ply",
+        tmp_path / "changed.ply",
+    )
     index = ShapeIndex.create(tmp_path / "index")
-    descriptor = describe_mesh(read_mesh(path)).descriptor
+    descriptor = find_heat_features(read_mesh(path)).descriptor
     write_mesh(icosphere(0), changed)
-    for name, source in {"loose": None, "moved": str(moved), "changed": str(changed), "there": str(path)}.items():
+    for name, source in {
+        "loose": None,
+        "moved": str(moved),
+        "changed": str(changed),
+        "there": str(path),
+    }.items():
         index.add(name, [descriptor], source=source)
     done = run("query", index.folder, path, "--sheet", tmp_path / "sheet.png")
     for said in (
@@ -264,5 +308,7 @@ def test_features_of_large_meshes_say_how_far_heat_is_off(tmp_path, monkeypatch)
     small = tmp_path / "small.ply"
     write_mesh(make_creature("hand", n_vertices=900), small)
     assert run_json("features", small)["heat_error"] is None
-    rough, fine = (run_json("features", small, "--accuracy", share)["heat_error"] for share in ("0.1", "1e-4"))
+    rough, fine = (
+        run_json("features", small, "--accuracy", share)["heat_error"] for share in ("0.1", "1e-4")
+    )
     assert rough > fine > 0

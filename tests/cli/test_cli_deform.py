@@ -10,7 +10,7 @@ from eigenshape.cli import app
 from eigenshape.cli.regions import told_region, told_rotation, told_translation
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import bend
-from eigenshape.deformation.region import Box, Brush, region_boundary, region_mask
+from eigenshape.deformation.region import BoxRegion, BrushRegion, region_boundary, region_mask
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.features.parts import find_parts
 from eigenshape.geometry.measure import surface_area
@@ -39,7 +39,18 @@ def giraffe(tmp_path_factory):
 def test_a_head_nods(giraffe, tmp_path):
     bent, picture, edits = tmp_path / "bent.ply", tmp_path / "bent.png", tmp_path / "edits.json"
     words = ["--region", "y>70%", "--rotate", "x by 40"]
-    done = run("deform", giraffe, *words, "--out", bent, "--picture", picture, "--save-edits", edits, "--json")
+    done = run(
+        "deform",
+        giraffe,
+        *words,
+        "--out",
+        bent,
+        "--picture",
+        picture,
+        "--save-edits",
+        edits,
+        "--json",
+    )
     found = json.loads(done.stdout)
     mesh = read_mesh(giraffe)
     region = told_region("y>70%", mesh, QUIET)
@@ -54,7 +65,9 @@ def test_a_head_nods(giraffe, tmp_path):
     again = tmp_path / "again.ply"
     run("deform", giraffe, "--edits", edits, "-o", again)
     np.testing.assert_array_equal(read_mesh(again).vertices, expected.vertices)
-    more = json.loads(run("deform", giraffe, "--edits", edits, *words[:2], "--move", "0,0.1,0", "--json").stdout)
+    more = json.loads(
+        run("deform", giraffe, "--edits", edits, *words[:2], "--move", "0,0.1,0", "--json").stdout
+    )
     assert more["edits"] == 2
 
 
@@ -68,7 +81,10 @@ def test_edits_of_another_mesh_are_refused_or_carried(giraffe, tmp_path):
     run("deform", giraffe, "--region", listed, "--move", "0,0.05,0", "--save-edits", edits)
     write_mesh(subdivide(mesh), finer)
     refused = " ".join(run("deform", finer, "--edits", edits, "-o", bent, code=1).stderr.split())
-    assert "edits.json: Edits name vertices of the mesh that they were made on; that has 900 vertices" in refused
+    assert (
+        "edits.json: Edits name vertices of the mesh that they were made on; that has 900 vertices"
+        in refused
+    )
     assert "Here --carry PATH names it." in refused
     assert not bent.exists()
     run("deform", finer, "--edits", edits, "--carry", giraffe, "-o", bent)
@@ -79,7 +95,9 @@ def test_edits_of_another_mesh_are_refused_or_carried(giraffe, tmp_path):
     assert np.isclose(new, 0.05, rtol=1e-6).sum() > len(head)
     assert np.median(moved) < 1e-3
     alone = " ".join(
-        run("deform", finer, *("--carry", giraffe, "--region", "y>70%", "--move", "0,0.1,0"), code=1).stderr.split()
+        run(
+            "deform", finer, *("--carry", giraffe, "--region", "y>70%", "--move", "0,0.1,0"), code=1
+        ).stderr.split()
     )
     assert "--carry names the mesh that --edits were made on" in alone
 
@@ -92,8 +110,13 @@ def test_a_bent_mesh_goes_to_every_format(giraffe, tmp_path, suffix):
 
 
 def test_people_see_a_table(giraffe):
-    printed = run("deform", giraffe, "--region", "y>70%", "--move", "0,0.02,0", "--mode", "thesis").stdout
-    assert all(words in printed for words in ("vertices that moved", "edges stretched", "pairs of faces that cross"))
+    printed = run(
+        "deform", giraffe, "--region", "y>70%", "--move", "0,0.02,0", "--mode", "thesis"
+    ).stdout
+    assert all(
+        words in printed
+        for words in ("vertices that moved", "edges stretched", "pairs of faces that cross")
+    )
 
 
 @pytest.mark.long
@@ -101,18 +124,20 @@ def test_words_for_regions(giraffe, tmp_path):
     mesh = read_mesh(giraffe)
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     box = told_region("y > 25%, x<0.5", mesh, QUIET)
-    assert isinstance(box, Box)
+    assert isinstance(box, BoxRegion)
     np.testing.assert_allclose(box.low, [-np.inf, low[1] + 0.25 * (high - low)[1], -np.inf])
     np.testing.assert_allclose(box.high, [0.5, np.inf, np.inf])
     brush = told_region("vertex 7 within 10%", mesh, QUIET)
-    assert isinstance(brush, Brush)
+    assert isinstance(brush, BrushRegion)
     assert brush.radius == pytest.approx(0.1 * surface_area(mesh) ** 0.5)
     assert told_region("vertex 7 within 0.25", mesh, QUIET).radius == 0.25
     listed = tmp_path / "some.txt"
     listed.write_text("3\n1\n4\n")
     assert told_region(str(listed), mesh, QUIET).tolist() == [3, 1, 4]
     n_parts = len(find_parts(mesh).parts.features.vertices)
-    masks = [region_mask(mesh, told_region(f"part {number}", mesh, QUIET)) for number in range(n_parts)]
+    masks = [
+        region_mask(mesh, told_region(f"part {number}", mesh, QUIET)) for number in range(n_parts)
+    ]
     assert np.all(np.any(masks, axis=0))
     assert all(0 < mask.sum() < mesh.n_vertices for mask in masks)
 
@@ -137,18 +162,30 @@ def test_words_for_handles(giraffe):
             ["--region", "head", "--move", "0,1,0", "-o", "a.txt"],
             "A mesh goes to .off, .obj, .ply, .stl, .glb; a.txt ends in '.txt'",
         ),
-        (["--region", "head", "--move", "0,1,0", "-o", "nowhere/a.obj"], "A mesh needs a folder to lie in"),
+        (
+            ["--region", "head", "--move", "0,1,0", "-o", "nowhere/a.obj"],
+            "A mesh needs a folder to lie in",
+        ),
         (["--region", "y>500", "--move", "0,1,0"], "must have a boundary on the shape"),
         (["--region", "y>70%", "--move", "0,1"], "A move is three numbers with commas between"),
         (["--region", "y>70%", "--rotate", "x 90"], "A rotation is 'x by 90'"),
         (["--region", "y>70%", "--rotate", "a,b,c by 3"], "An axis is three numbers"),
         (["--region", "y>70%", "--rotate", "x by 3 @ 1,2"], "A pivot is three numbers"),
-        (["--region", "vertex 99999 within 1", "--move", "0,1,0"], "A vertex of a region must lie in 0"),
+        (
+            ["--region", "vertex 99999 within 1", "--move", "0,1,0"],
+            "A vertex of a region must lie in 0",
+        ),
         (["--region", "part 99", "--move", "0,1,0"], "A part must lie in 0"),
         (["--region", "y>70%"], "Give --region with either --rotate or --move"),
         (["--move", "0,1,0"], "Give --region with either --rotate or --move"),
-        (["--region", "y>70%", "--move", "0,1,0", "--rotate", "x by 3"], "Give --region with either"),
-        (["--region", "y>70%", "--move", "0,1,0", "--mode", "soft"], "mode must be 'graded', 'uncrossed'"),
+        (
+            ["--region", "y>70%", "--move", "0,1,0", "--rotate", "x by 3"],
+            "Give --region with either",
+        ),
+        (
+            ["--region", "y>70%", "--move", "0,1,0", "--mode", "soft"],
+            "mode must be 'graded', 'uncrossed'",
+        ),
         (["--region", "y>70%", "--move", "0,1,0", "-n", "999"], "n_modes must lie in 1"),
     ],
 )

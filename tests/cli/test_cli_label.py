@@ -33,7 +33,15 @@ def poses(tmp_path_factory):
 
 
 def command(poses, *more):
-    return ("label", poses / "posed.ply", "--like", poses / "rest.ply", "--labels", poses / "rest.seg", *more)
+    return (
+        "label",
+        poses / "posed.ply",
+        "--like",
+        poses / "rest.ply",
+        "--labels",
+        poses / "rest.seg",
+        *more,
+    )
 
 
 @pytest.mark.long
@@ -45,7 +53,9 @@ def test_label_gives_what_transfer_labels_gives(poses, tmp_path):
     expected = transfer_labels(rest, read_labels(poses / "rest.seg"), posed)
     assert found["face_labels"] == expected.labels.tolist() == read_labels(saved).tolist()
     assert [row["label"] for row in found["parts"]] == expected.part_labels.tolist()
-    assert [row["confidence"] for row in found["parts"]] == pytest.approx(expected.confidence.tolist())
+    assert [row["confidence"] for row in found["parts"]] == pytest.approx(
+        expected.confidence.tolist()
+    )
     assert [row["like_part"] for row in found["parts"]] == expected.matches.tolist()
     assert sum(row["area_share"] for row in found["parts"]) == pytest.approx(1)
     assert np.array_equal(read_mesh(colored).vertices, posed.vertices)
@@ -83,7 +93,11 @@ def test_label_prints_a_table_and_takes_what_segment_prints(poses, tmp_path):
     ],
 )
 def test_label_names_what_is_wrong(poses, tmp_path, options, message):
-    files = {"short": tmp_path / "short.seg", "bad": tmp_path / "bad.seg", "none": tmp_path / "none.seg"}
+    files = {
+        "short": tmp_path / "short.seg",
+        "bad": tmp_path / "bad.seg",
+        "none": tmp_path / "none.seg",
+    }
     files["short"].write_text("1\n2\n")
     files["bad"].write_text("1\nhead\n")
     filled = [str(word).format(**files, seg=poses / "rest.seg") for word in options]

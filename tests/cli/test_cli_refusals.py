@@ -41,19 +41,39 @@ def test_a_broken_file_is_named_with_what_is_wrong_in_it(tmp_path, verb):
     path.write_text(BROKEN)
     done = run(verb, path, "--json", code=1)
     assert done.stdout == ""
-    assert done.stderr.startswith(f"error: {path}: faces must index vertices 0..2; face 0 is [0, 1, 7]")
+    assert done.stderr.startswith(
+        f"error: {path}: faces must index vertices 0..2; face 0 is [0, 1, 7]"
+    )
     assert done.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("spectrum", "{missing}", "--plot", "{folder}/a.bmp"), "A picture must end in .png, .svg, .pdf"),
-        (("spectrum", "{missing}", "--picture", "{folder}/a"), "A picture must end in .png, .svg, .pdf"),
-        (("spectrum", "{missing}", "--plot", "{missing}/a.png"), "A picture needs a folder to lie in"),
-        (("features", "{missing}", "--picture", "{folder}/a.bmp"), "A picture must end in .png, .svg, .pdf"),
-        (("features", "{missing}", "--preset", "best"), "--preset takes scale-free or thesis; it was given 'best'"),
-        (("query", "{missing}", "{missing}", "--sheet", "{folder}/a.bmp"), "A picture must end in .png, .svg, .pdf"),
+        (
+            ("spectrum", "{missing}", "--plot", "{folder}/a.bmp"),
+            "A picture must end in .png, .svg, .pdf",
+        ),
+        (
+            ("spectrum", "{missing}", "--picture", "{folder}/a"),
+            "A picture must end in .png, .svg, .pdf",
+        ),
+        (
+            ("spectrum", "{missing}", "--plot", "{missing}/a.png"),
+            "A picture needs a folder to lie in",
+        ),
+        (
+            ("features", "{missing}", "--picture", "{folder}/a.bmp"),
+            "A picture must end in .png, .svg, .pdf",
+        ),
+        (
+            ("features", "{missing}", "--preset", "best"),
+            "--preset takes scale-free or thesis; it was given 'best'",
+        ),
+        (
+            ("query", "{missing}", "{missing}", "--sheet", "{folder}/a.bmp"),
+            "A picture must end in .png, .svg, .pdf",
+        ),
         (
             ("index", "{missing}", "--db", "{folder}/db", "--preset", "best"),
             "--preset takes patches or scale-free or th",
@@ -64,13 +84,18 @@ def test_a_broken_file_is_named_with_what_is_wrong_in_it(tmp_path, verb):
 def test_a_bad_option_is_refused_before_any_file_is_looked_at(tmp_path, arguments, message):
     folder = tmp_path / "folder"
     folder.mkdir()
-    done = run(*(text.format(missing=tmp_path / "missing.ply", folder=folder) for text in arguments), code=1)
+    done = run(
+        *(text.format(missing=tmp_path / "missing.ply", folder=folder) for text in arguments),
+        code=1,
+    )
     assert done.stderr.startswith("error: ")
     assert message in done.stderr
     assert list(folder.iterdir()) == []
 
 
-@pytest.mark.parametrize(("suffix", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
+@pytest.mark.parametrize(
+    ("suffix", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")]
+)
 def test_pictures_of_every_kind_are_more_than_a_frame(fish, tmp_path, suffix, magic):
     plot = tmp_path / f"plot.{suffix}"
     done = run("spectrum", fish, "-k", 5, "--plot", plot, "--json", code=0)
@@ -94,7 +119,9 @@ def test_index_names_the_broken_file_takes_the_rest_and_knows_it_again(fish, tmp
     assert (again["shapes"], again["added"], sorted(again["skipped"])) == (2, [], ["ball", "fish"])
     (folder / "broken.off").unlink()
     assert json.loads(run(*command, "--json", code=0).stdout)["failed"] == []
-    best = json.loads(run("query", tmp_path / "db", fish, "-n", 1, "--json", code=0).stdout)["matches"]
+    best = json.loads(run("query", tmp_path / "db", fish, "-n", 1, "--json", code=0).stdout)[
+        "matches"
+    ]
     assert [match["name"] for match in best] == ["fish"]
     done = run("query", tmp_path / "db", tmp_path / "none.ply", code=1)
     assert done.stderr.startswith("error: ")

@@ -17,7 +17,9 @@ from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.spheres import icosphere
 
 BALL = icosphere(2)
-SOUP = TriangleMesh(BALL.vertices[BALL.faces].reshape(-1, 3), np.arange(3 * BALL.n_faces).reshape(-1, 3))
+SOUP = TriangleMesh(
+    BALL.vertices[BALL.faces].reshape(-1, 3), np.arange(3 * BALL.n_faces).reshape(-1, 3)
+)
 
 
 def run(*arguments, code=0):
@@ -29,7 +31,9 @@ def run(*arguments, code=0):
 @pytest.mark.parametrize("suffix", [".ply", ".off", ".obj", ".stl", ".glb"])
 def test_a_soup_is_welded_and_written_in_every_format(tmp_path, suffix):
     write_mesh(SOUP, tmp_path / "soup.ply")
-    done = run("repair", tmp_path / "soup.ply", "--repair", "weld", "-o", tmp_path / f"ball{suffix}")
+    done = run(
+        "repair", tmp_path / "soup.ply", "--repair", "weld", "-o", tmp_path / f"ball{suffix}"
+    )
     assert "repair: weld joined 798 vertices to others at the same place" in done.stderr
     assert "wrote " in done.stderr
     assert "480" not in done.stderr
@@ -79,13 +83,18 @@ def test_without_repairs_it_converts(tmp_path):
     ("options", "message"),
     [
         (("--repair", "polish", "-o", "{folder}/b.ply"), "--repair takes "),
-        (("--repair", "weld", "-o", "{folder}/b.vtk"), "A mesh goes to .off, .obj, .ply, .stl, .glb; "),
+        (
+            ("--repair", "weld", "-o", "{folder}/b.vtk"),
+            "A mesh goes to .off, .obj, .ply, .stl, .glb; ",
+        ),
         (("--repair", "weld", "-o", "{folder}/no/b.ply"), "A mesh needs a folder to lie in; "),
     ],
 )
 def test_what_is_wrong_is_named_and_nothing_written(tmp_path, options, message):
     write_mesh(BALL, tmp_path / "a.ply")
-    done = run("repair", tmp_path / "a.ply", *(word.format(folder=tmp_path) for word in options), code=1)
+    done = run(
+        "repair", tmp_path / "a.ply", *(word.format(folder=tmp_path) for word in options), code=1
+    )
     assert message in " ".join(done.stderr.split())
     assert [path.name for path in tmp_path.iterdir()] == ["a.ply"]
 
@@ -105,7 +114,12 @@ def write_quads(path):
     angle = 2 * np.pi * np.arange(turns) / turns
     points = [(float(np.cos(a)), float(np.sin(a)), 0.6 * z) for z in range(rings) for a in angle]
     quads = [
-        [z * turns + i, z * turns + (i + 1) % turns, (z + 1) * turns + (i + 1) % turns, (z + 1) * turns + i]
+        [
+            z * turns + i,
+            z * turns + (i + 1) % turns,
+            (z + 1) * turns + (i + 1) % turns,
+            (z + 1) * turns + i,
+        ]
         for z in range(rings - 1)
         for i in range(turns)
     ]
@@ -117,14 +131,32 @@ def write_quads(path):
 
 def test_quads_and_textures_stay_on_the_way_through_repair_and_deform(tmp_path):
     write_quads(tmp_path / "tube.obj")
-    faces = [line for line in (tmp_path / "tube.obj").read_text().splitlines() if line.startswith("f ")]
-    run("repair", tmp_path / "tube.obj", "--repair", "drop_unreferenced", "-o", tmp_path / "clean.obj")
+    faces = [
+        line for line in (tmp_path / "tube.obj").read_text().splitlines() if line.startswith("f ")
+    ]
+    run(
+        "repair",
+        tmp_path / "tube.obj",
+        "--repair",
+        "drop_unreferenced",
+        "-o",
+        tmp_path / "clean.obj",
+    )
     clean = (tmp_path / "clean.obj").read_text().splitlines()
     assert [line for line in clean if line.startswith("f ")] == faces
     assert sum(line.startswith("v ") for line in clean) == 120
     assert sum(line.startswith("vt ") for line in clean) == 120
     assert "usemtl skin" in clean
-    arguments = ("--region", "z>80%", "--move", "0.5,0,0", "--fixed", "z<20%", "--repair", "drop_unreferenced")
+    arguments = (
+        "--region",
+        "z>80%",
+        "--move",
+        "0.5,0,0",
+        "--fixed",
+        "z<20%",
+        "--repair",
+        "drop_unreferenced",
+    )
     run("deform", tmp_path / "tube.obj", *arguments, "-o", tmp_path / "bent.obj")
     bent = (tmp_path / "bent.obj").read_text().splitlines()
     assert [line for line in bent if line.startswith("f ")] == faces
@@ -133,7 +165,9 @@ def test_quads_and_textures_stay_on_the_way_through_repair_and_deform(tmp_path):
     low, high = z.min(), z.max()
     region, fixed = z > low + 0.8 * (high - low), z < low + 0.2 * (high - low)
     expected = deform(rig_shape(mesh), region, Translation([0.5, 0, 0]), fixed=fixed)
-    np.testing.assert_allclose(read_mesh(tmp_path / "bent.obj").vertices, expected.vertices, atol=1e-9)
+    np.testing.assert_allclose(
+        read_mesh(tmp_path / "bent.obj").vertices, expected.vertices, atol=1e-9
+    )
     run("deform", tmp_path / "tube.obj", *arguments, "-o", tmp_path / "bent.stl")
     assert read_mesh(tmp_path / "bent.stl").n_faces == expected.n_faces
 
@@ -145,7 +179,14 @@ def test_labels_are_a_property_of_faces_that_label_reads(tmp_path):
     done = run("segment", tmp_path / "a.ply", "-o", tmp_path / "parts.ply", "--json")
     labels = json.loads(done.stdout)["face_labels"]
     assert read_labels(tmp_path / "parts.ply").tolist() == labels
-    arguments = ("label", tmp_path / "a.ply", "--like", tmp_path / "a.ply", "--labels", tmp_path / "parts.ply")
+    arguments = (
+        "label",
+        tmp_path / "a.ply",
+        "--like",
+        tmp_path / "a.ply",
+        "--labels",
+        tmp_path / "parts.ply",
+    )
     run(*arguments, "-o", tmp_path / "again.ply", "--save", tmp_path / "again.seg")
     again = read_labels(tmp_path / "again.ply")
     assert again.tolist() == read_labels(tmp_path / "again.seg").tolist()
@@ -157,7 +198,9 @@ def test_labels_are_a_property_of_faces_that_label_reads(tmp_path):
 def test_triangles_of_other_formats_serve_verbs_for_meshes(tmp_path, suffix):
     kinds = {".msh": "gmsh", ".mesh": "medit"}
     path = tmp_path / f"ball{suffix}"
-    meshio.write_points_cells(path, BALL.vertices, [("triangle", BALL.faces)], file_format=kinds.get(suffix))
+    meshio.write_points_cells(
+        path, BALL.vertices, [("triangle", BALL.faces)], file_format=kinds.get(suffix)
+    )
     done = run("features", path, "--json", "-n", 3)
     assert len(json.loads(done.stdout)["face_labels"]) == BALL.n_faces
     run("repair", path, "--repair", "", "-o", tmp_path / "again.ply")
@@ -167,12 +210,24 @@ def test_triangles_of_other_formats_serve_verbs_for_meshes(tmp_path, suffix):
 
 def test_cells_say_what_polygons_of_four_corners_are(tmp_path):
     polygon = "POINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 1\nPOLYGONS 1 5\n4 0 1 2 3\n"
-    (tmp_path / "a.vtk").write_text(f"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\n{polygon}")
+    (tmp_path / "a.vtk").write_text(
+        f"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\n{polygon}"
+    )
     done = run("info", tmp_path / "a.vtk", code=1)
     assert "--cells in the commands info, spectrum and repair" in " ".join(done.stderr.split())
-    assert json.loads(run("info", tmp_path / "a.vtk", "--cells", "tetrahedra", "--json").stdout)["simplices"] == 1
-    assert json.loads(run("info", tmp_path / "a.vtk", "--cells", "quads", "--json").stdout)["faces"] == 2
+    assert (
+        json.loads(run("info", tmp_path / "a.vtk", "--cells", "tetrahedra", "--json").stdout)[
+            "simplices"
+        ]
+        == 1
+    )
+    assert (
+        json.loads(run("info", tmp_path / "a.vtk", "--cells", "quads", "--json").stdout)["faces"]
+        == 2
+    )
     run("repair", tmp_path / "a.vtk", "--cells", "quads", "--repair", "", "-o", tmp_path / "a.ply")
     assert read_mesh(tmp_path / "a.ply").n_faces == 2
-    done = json.loads(run("spectrum", tmp_path / "a.vtk", "--cells", "tetrahedra", "-k", 3, "--json").stdout)
+    done = json.loads(
+        run("spectrum", tmp_path / "a.vtk", "--cells", "tetrahedra", "-k", 3, "--json").stdout
+    )
     assert len(done["eigenvalues"]) == 3

@@ -41,7 +41,10 @@ def folder(tmp_path_factory):
     whole, rng = make_creature("quadruped", n_vertices=500), np.random.default_rng(0)
     write_mesh(whole, folder / "whole.ply")
     write_mesh(soup(whole), folder / "soup.ply")
-    write_mesh(with_loose_points(with_flat_simplices(with_duplicates(whole, rng), rng), rng, 40), folder / "ugly.ply")
+    write_mesh(
+        with_loose_points(with_flat_simplices(with_duplicates(whole, rng), rng), rng, 40),
+        folder / "ugly.ply",
+    )
     write_mesh(flipped(whole, rng), folder / "flipped.ply")
     return folder
 
@@ -54,11 +57,26 @@ def test_a_broken_shape_is_found_once_it_is_repaired(folder, tmp_path, name, pre
     run("index", whole, "--db", db, "--preset", preset, "--views", 0, "--workers", 1)
     if (name, preset) != ("flipped", "scale-free"):  # heat has no side
         assert "--repair auto on the command line" in run("query", db, broken, code=1).stderr
-        refused = run("index", broken, "--db", db, "--preset", preset, "--views", 0, "--workers", 1, code=3)
+        refused = run(
+            "index", broken, "--db", db, "--preset", preset, "--views", 0, "--workers", 1, code=3
+        )
         assert "--repair auto on the command line" in refused.stderr
     found = json.loads(run("query", db, broken, "--json", "--repair", "auto").stdout)
     assert found["matches"][0]["name"] == "whole"
-    added = run("index", broken, "--db", db, "--preset", preset, "--repair", "auto", "--views", 0, "--workers", 1)
+    added = run(
+        "index",
+        broken,
+        "--db",
+        db,
+        "--preset",
+        preset,
+        "--repair",
+        "auto",
+        "--views",
+        0,
+        "--workers",
+        1,
+    )
     assert "1 described" in added.stdout
 
 
@@ -68,9 +86,10 @@ def test_parts_of_a_broken_shape_are_found_once_it_is_repaired(folder, verb, nam
     assert "--repair auto on the command line" in run(verb, folder / f"{name}.ply", code=1).stderr
     done = run(verb, folder / f"{name}.ply", "--json", "--repair", "auto")
     assert "repair: " in done.stderr
-    assert sum(row["area_share"] for row in json.loads(done.stdout)["features" if verb == "features" else "parts"]) == (
-        pytest.approx(1)
-    )
+    assert sum(
+        row["area_share"]
+        for row in json.loads(done.stdout)["features" if verb == "features" else "parts"]
+    ) == (pytest.approx(1))
 
 
 def test_loose_vertices_are_called_so_and_not_components(folder):
@@ -85,7 +104,10 @@ def test_info_proposes_all_that_helps(tmp_path):
     cases = {
         "flipped": (flipped(ball, rng), ["orient"]),
         "inward": (TriangleMesh(ball.vertices, ball.faces[:, ::-1]), ["orient"]),
-        "holes": (TriangleMesh(ball.vertices, np.delete(ball.faces, np.arange(0, 1140, 30), axis=0)), ["seal_holes"]),
+        "holes": (
+            TriangleMesh(ball.vertices, np.delete(ball.faces, np.arange(0, 1140, 30), axis=0)),
+            ["seal_holes"],
+        ),
         "specks": (with_specks(ball, rng, 200), ["largest_component"]),
         "soup": (soup(ball), ["weld_seams"]),
     }
@@ -105,7 +127,10 @@ def test_info_proposes_all_that_helps(tmp_path):
 def test_copies_of_points_and_tetrahedra(tmp_path):
     points = fibonacci_sphere(300).vertices
     write_points(PointCloud(np.concatenate([points, points[:5]])), tmp_path / "copies.xyz")
-    assert 'Try repair(cloud, ["auto"]), or --repair auto' in run("spectrum", tmp_path / "copies.xyz", code=1).stderr
+    assert (
+        'Try repair(cloud, ["auto"]), or --repair auto'
+        in run("spectrum", tmp_path / "copies.xyz", code=1).stderr
+    )
     done = run("spectrum", tmp_path / "copies.xyz", "-k", 4, "--json", "--repair", "auto")
     assert "repair: drop_copies removed 5 points at the places of others" in done.stderr
     assert info(tmp_path / "copies.xyz")["repairs_to_try"] == ["drop_copies"]
@@ -117,7 +142,9 @@ def test_copies_of_points_and_tetrahedra(tmp_path):
         f"MeshVersionFormatted 1\nDimension 3\nVertices\n{mesh.n_points}\n{rows}\n"
         f"Tetrahedra\n{mesh.n_simplices}\n{cells}\nEnd\n"
     )
-    assert "Simplices must differ" in run("spectrum", tmp_path / "twice.mesh", "-k", 3, code=1).stderr
+    assert (
+        "Simplices must differ" in run("spectrum", tmp_path / "twice.mesh", "-k", 3, code=1).stderr
+    )
     run("spectrum", tmp_path / "twice.mesh", "-k", 3, "--repair", "auto")
     assert info(tmp_path / "twice.mesh")["repairs_to_try"] == ["drop_duplicate_faces"]
 

@@ -52,7 +52,9 @@ def test_segment_gives_the_default_parts(biped, tmp_path):
     assert sum(row["area_share"] for row in found["parts"]) == pytest.approx(1)
     assert max(row["area_share"] for row in found["parts"]) < 0.5
     assert sum(row["faces"] for row in found["parts"]) == mesh.n_faces
-    assert [row["splits_from"] is None for row in found["parts"]] == [True] + [False] * (len(found["parts"]) - 1)
+    assert [row["splits_from"] is None for row in found["parts"]] == [True] + [False] * (
+        len(found["parts"]) - 1
+    )
     assert all(row["splits_from"] < row["part"] for row in found["parts"][1:])
     assert picture.read_bytes()[:8] == PNG
     assert np.array_equal(read_mesh(colored).vertices, mesh.vertices)
@@ -81,7 +83,10 @@ def test_segment_smooths_parts_and_leaves_regions_of_heat_as_they_are(biped):
     assert len(thesis["parts"]) == 15
     features = run_json("features", biped, "--preset", "thesis")
     assert thesis["face_labels"] == features["face_labels"]
-    assert thesis["face_labels"] != run_json("segment", biped, "--method", "thesis", "--smooth")["face_labels"]
+    assert (
+        thesis["face_labels"]
+        != run_json("segment", biped, "--method", "thesis", "--smooth")["face_labels"]
+    )
 
 
 def test_segment_prints_a_table(biped):
@@ -93,12 +98,21 @@ def test_segment_prints_a_table(biped):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("segment", "{missing}", "--method", "best"), "--method takes parts, scale-free, thesis; it was given 'best'"),
-        (("segment", "{missing}", "-o", "a.obj"), "Colours go to a .ply file; a.obj ends in '.obj'"),
+        (
+            ("segment", "{missing}", "--method", "best"),
+            "--method takes parts, scale-free, thesis; it was given 'best'",
+        ),
+        (
+            ("segment", "{missing}", "-o", "a.obj"),
+            "Colours go to a .ply file; a.obj ends in '.obj'",
+        ),
         (("segment", "{missing}", "-o", "{missing}/a.ply"), "A mesh needs a folder to lie in"),
         (("segment", "{missing}", "--picture", "a.bmp"), "A picture must end in"),
         (("features", "{missing}", "--ply", "a.obj"), "Colours go to a .ply file"),
-        (("segment", "{mesh}", "-n", 3, "--largest-gap"), "exactly one of n_regions, persistence and largest_gap"),
+        (
+            ("segment", "{mesh}", "-n", 3, "--largest-gap"),
+            "exactly one of n_regions, persistence and largest_gap",
+        ),
         (("segment", "{mesh}", "-n", 0), "n_regions must be at least 1; it is 0"),
         (("segment", "{mesh}", "--persistence", -1), "persistence must be at least 0"),
     ],

@@ -45,7 +45,12 @@ def folder(tmp_path_factory):
 def test_info_of_a_tetrahedral_mesh(folder):
     facts = run_json("info", folder / "cube.mesh")
     assert facts["kind"] == "tetrahedral mesh"
-    assert (facts["points"], facts["simplices"], facts["boundary_points"], facts["components"]) == (125, 384, 98, 1)
+    assert (facts["points"], facts["simplices"], facts["boundary_points"], facts["components"]) == (
+        125,
+        384,
+        98,
+        1,
+    )
     assert facts["volume"] == pytest.approx(1)
     assert "tetrahedral mesh" in run("info", folder / "cube.mesh").stdout
 
@@ -59,7 +64,12 @@ def test_info_of_points(folder):
 def test_info_of_a_curve_and_of_few_points(tmp_path):
     (tmp_path / "curve.obj").write_text("v 0 0 0\nv 3 4 0\nv 3 4 2\nl 1 2 3\n")
     facts = run_json("info", tmp_path / "curve.obj")
-    assert (facts["kind"], facts["simplices"], facts["boundary_points"], facts["length"]) == ("curve", 2, 2, 7)
+    assert (facts["kind"], facts["simplices"], facts["boundary_points"], facts["length"]) == (
+        "curve",
+        2,
+        2,
+        7,
+    )
     assert "volume" not in facts
     (tmp_path / "few.xyz").write_text("0 0 0\n1 2 3\n")
     facts = run_json("info", tmp_path / "few.xyz")
@@ -67,12 +77,18 @@ def test_info_of_a_curve_and_of_few_points(tmp_path):
 
 
 def test_spectra_by_other_operators(folder):
-    found = run_json("spectrum", folder / "cube.mesh", "-k", 4, "--operator", "p2", "--boundary", "dirichlet")
-    np.testing.assert_allclose(found["eigenvalues"], box_eigenvalues(4, (1, 1, 1), "dirichlet"), rtol=0.04)
+    found = run_json(
+        "spectrum", folder / "cube.mesh", "-k", 4, "--operator", "p2", "--boundary", "dirichlet"
+    )
+    np.testing.assert_allclose(
+        found["eigenvalues"], box_eigenvalues(4, (1, 1, 1), "dirichlet"), rtol=0.04
+    )
     assert (found["operator"], found["boundary"]) == ("p2", "dirichlet")
     drum = run_json("spectrum", folder / "disc.off", "-k", 4, "-o", "p3", "--boundary", "dirichlet")
     np.testing.assert_allclose(drum["eigenvalues"], disc_eigenvalues(4, "dirichlet"), rtol=0.01)
-    points = run_json("spectrum", folder / "sphere.xyz", "-k", 4, "--correct", "log", "--edge-factor", 1.8)
+    points = run_json(
+        "spectrum", folder / "sphere.xyz", "-k", 4, "--correct", "log", "--edge-factor", 1.8
+    )
     np.testing.assert_allclose(points["eigenvalues"], [0, 2, 2, 2], rtol=0.03, atol=1e-9)
     assert points["operator"] == "point-cloud"
     assert points["edge_factor"] == 1.8
@@ -80,7 +96,9 @@ def test_spectra_by_other_operators(folder):
 
 def test_brackets(folder):
     known = box_eigenvalues(6, (1, 1, 1), "dirichlet")
-    found = run_json("spectrum", folder / "cube.mesh", "-k", 6, "--brackets", "--boundary", "dirichlet")["brackets"]
+    found = run_json(
+        "spectrum", folder / "cube.mesh", "-k", 6, "--brackets", "--boundary", "dirichlet"
+    )["brackets"]
     assert (np.array(found["lower"]) <= known).all()
     assert (known <= np.array(found["upper"])).all()
     assert (found["boundary"], found["n_zero"]) == ("dirichlet", 0)
@@ -91,12 +109,16 @@ def test_brackets(folder):
 
 
 def test_an_interval(folder):
-    found = run_json("spectrum", folder / "cube.mesh", "--above", 5.0, "--below", 25.0, "--brackets")
+    found = run_json(
+        "spectrum", folder / "cube.mesh", "--above", 5.0, "--below", 25.0, "--brackets"
+    )
     first, count = found["certificate"]["first"], len(found["eigenvalues"])
     assert first == 1
     assert 5 <= found["eigenvalues"][0] <= found["eigenvalues"][-1] < 25
     assert len(found["brackets"]["upper"]) == first + count
-    text = run("spectrum", folder / "cube.mesh", "--above", 5.0, "--below", 25.0, "--brackets").stdout
+    text = run(
+        "spectrum", folder / "cube.mesh", "--above", 5.0, "--below", 25.0, "--brackets"
+    ).stdout
     assert f"eigenvalues from number 1 to {count}" in " ".join(text.split())
     wrong = run("spectrum", folder / "cube.mesh", "--above", 5.0, code=1)
     assert "above needs below" in wrong.stderr
@@ -104,7 +126,9 @@ def test_an_interval(folder):
 
 def test_all_below_a_value(folder):
     found = run_json("spectrum", folder / "cube.mesh", "--below", 25.0)
-    assert len(found["eigenvalues"]) == sum(found["certificate"]["clusters"]) == 7  # 0, three π², three 2π²
+    assert (
+        len(found["eigenvalues"]) == sum(found["certificate"]["clusters"]) == 7
+    )  # 0, three π², three 2π²
     held = run_json("spectrum", folder / "disc.off", "--below", 15, "--boundary", "dirichlet")
     assert len(held["eigenvalues"]) == 3
     wrong = run("spectrum", folder / "disc.off", "--below", 15, "-k", 3, code=1)
@@ -112,7 +136,16 @@ def test_all_below_a_value(folder):
 
 
 def test_a_plot_of_any_spectrum(folder, tmp_path):
-    run("spectrum", folder / "cube.mesh", "-k", 4, "--plot", tmp_path / "a.png", "--save", tmp_path / "a.npz")
+    run(
+        "spectrum",
+        folder / "cube.mesh",
+        "-k",
+        4,
+        "--plot",
+        tmp_path / "a.png",
+        "--save",
+        tmp_path / "a.npz",
+    )
     assert (tmp_path / "a.png").stat().st_size > 1000
 
 
@@ -135,10 +168,22 @@ def test_operators_are_listed():
             ("spectrum", "disc.off", "-o", "p2", "--mass", "lumped"),
             "p2 operator takes no option; it was given mass",
         ),
-        (("spectrum", "sphere.xyz", "--boundary", "dirichlet"), "--boundary dirichlet is for meshes; a cloud"),
-        (("spectrum", "sphere.xyz", "--brackets"), "--brackets is for meshes; a cloud of points has no flat pieces"),
-        (("spectrum", "sphere.xyz", "--picture", "a.png"), "--picture draws triangle meshes; the shape is PointCloud"),
-        (("info", "sphere.xyz", "--repair", "weld"), "must be among auto, drop_copies; name 0 is 'weld'"),
+        (
+            ("spectrum", "sphere.xyz", "--boundary", "dirichlet"),
+            "--boundary dirichlet is for meshes; a cloud",
+        ),
+        (
+            ("spectrum", "sphere.xyz", "--brackets"),
+            "--brackets is for meshes; a cloud of points has no flat pieces",
+        ),
+        (
+            ("spectrum", "sphere.xyz", "--picture", "a.png"),
+            "--picture draws triangle meshes; the shape is PointCloud",
+        ),
+        (
+            ("info", "sphere.xyz", "--repair", "weld"),
+            "must be among auto, drop_copies; name 0 is 'weld'",
+        ),
         (("features", "sphere.xyz"), "must be of a known format, .off, .obj"),
         (("info", "sphere.xyz", "--dim", "4"), "dim must lie in 1..3; it is 4"),
     ],
@@ -164,7 +209,10 @@ def test_a_warning_is_one_line_and_no_error(folder):
 def test_a_closed_mesh_has_no_boundary_to_hold(folder, tmp_path):
     write_mesh(fibonacci_sphere(50), tmp_path / "closed.off")
     said = run("spectrum", tmp_path / "closed.off", "--boundary", "dirichlet", code=1).stderr
-    assert "--boundary dirichlet needs a boundary; TriangleMesh(50 vertices, 96 faces) is closed" in said
+    assert (
+        "--boundary dirichlet needs a boundary; TriangleMesh(50 vertices, 96 faces) is closed"
+        in said
+    )
 
 
 @pytest.mark.long
@@ -179,8 +227,17 @@ def test_roughly_and_kept(folder):
     first = run("spectrum", folder / "disc.off", "-k", 4, "--cache", kept).stdout
     assert len(list(kept.glob("*.npz"))) == 1
     assert run("spectrum", folder / "disc.off", "-k", 4, "--cache", kept).stdout == first
-    for wrong in (("--below", 15), ("--boundary", "dirichlet"), ("--cache", kept)):
-        refused = run("spectrum", folder / "disc.off", "--accuracy", 1e-3, *wrong, code=1)
-        assert "--accuracy goes with -k alone" in refused.stderr
-    refused = run("spectrum", folder / "disc.off", "--boundary", "dirichlet", "--cache", kept, code=1)
-    assert "--cache goes with the Neumann condition" in refused.stderr
+    refused = run("spectrum", folder / "disc.off", "--accuracy", 1e-3, "--below", 15, code=1)
+    assert "--accuracy needs -k" in refused.stderr
+
+
+@pytest.mark.long
+def test_options_of_the_spectrum_combine(folder):
+    kept = folder / "combined"
+    options = ("-k", 4, "--boundary", "dirichlet", "--cache", kept)
+    fixed = run_json("spectrum", folder / "disc.off", *options)
+    assert run_json("spectrum", folder / "disc.off", *options) == fixed
+    assert len(list(kept.glob("*.npz"))) == 1
+    rough = run_json("spectrum", folder / "disc.off", *options, "--accuracy", 1e-3)
+    assert len(list(kept.glob("*.npz"))) == 2
+    np.testing.assert_allclose(rough["eigenvalues"], fixed["eigenvalues"], rtol=4e-3)

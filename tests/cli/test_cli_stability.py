@@ -22,10 +22,10 @@ def run(*arguments, code=0):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     place = tmp_path_factory.mktemp("stability")
-    mesh = es.torus(30, 15)
+    mesh = es.shapes.torus(30, 15)
     es.write_mesh(mesh, place / "one.ply")
     es.write_mesh(es.TriangleMesh(mesh.vertices * [1, 1, 1.3], mesh.faces), place / "two.ply")
-    es.write_mesh(es.subdivide(mesh), place / "finer.ply")
+    es.write_mesh(es.shapes.subdivide(mesh), place / "finer.ply")
     (place / "map.txt").write_text("".join(f"{vertex}\n" for vertex in range(mesh.n_vertices)))
     return place
 
@@ -33,29 +33,60 @@ def folder(tmp_path_factory):
 @pytest.mark.long
 def test_people_see_tables_words_and_a_picture(folder, tmp_path):
     picture = tmp_path / "report.png"
-    printed = run("stability", folder / "one.ply", folder / "two.ply", *FEW, "--picture", picture).stdout
-    for words in ("Eigenvalues, in 1/length²", "heat time t", "Weyl's bound", "heat time serves", "δ-close"):
+    printed = run(
+        "stability", folder / "one.ply", folder / "two.ply", *FEW, "--picture", picture
+    ).stdout
+    for words in (
+        "Eigenvalues, in 1/length²",
+        "heat time t",
+        "Weyl's bound",
+        "heat time serves",
+        "δ-close",
+    ):
         assert words in printed
     assert picture.read_bytes()[:8] == PNG
 
 
 def test_machines_read_json(folder):
-    found = json.loads(run("stability", folder / "one.ply", folder / "two.ply", *FEW, "--json").stdout)
+    found = json.loads(
+        run("stability", folder / "one.ply", folder / "two.ply", *FEW, "--json").stdout
+    )
     report = es.compare_shapes(
-        *(es.read_mesh(folder / name) for name in ("one.ply", "two.ply")), es.StabilityPlan(k=6, n_samples=200)
+        *(es.read_mesh(folder / name) for name in ("one.ply", "two.ply")),
+        es.stability.StabilityPlan(k=6, n_samples=200),
     )
     assert found["delta"] == report.delta
     assert found["spectra"]["one"] == report.spectra.one.tolist()
     assert found["spectra"]["hausdorff"] == report.spectra.hausdorff
-    assert [row["change"] for row in found["changes"]] == [change.change for change in report.changes]
+    assert [row["change"] for row in found["changes"]] == [
+        change.change for change in report.changes
+    ]
     assert found["explanation"] == report.explain()
 
 
 @pytest.mark.long
 def test_a_map_and_a_scale_can_be_given(folder):
-    same = run("stability", folder / "one.ply", folder / "finer.ply", *FEW, "--map", folder / "map.txt", "--json")
+    same = run(
+        "stability",
+        folder / "one.ply",
+        folder / "finer.ply",
+        *FEW,
+        "--map",
+        folder / "map.txt",
+        "--json",
+    )
     assert json.loads(same.stdout)["delta_of_the_map"] == 0.0
-    told = run("stability", folder / "one.ply", folder / "two.ply", *FEW, "--scale", "area", "-t", "0.01", "--json")
+    told = run(
+        "stability",
+        folder / "one.ply",
+        folder / "two.ply",
+        *FEW,
+        "--scale",
+        "area",
+        "-t",
+        "0.01",
+        "--json",
+    )
     assert [row["t"] for row in json.loads(told.stdout)["changes"]] == [0.01]
 
 
@@ -65,11 +96,16 @@ def test_what_cannot_be_compared_is_named(folder, tmp_path):
     done = run("stability", one, one, "--map", wrong, code=1)
     assert "A vertex must be a whole number; line 2" in done.stderr
     wrong.write_text("0 1\n2 3\n")
-    assert "number of one vertex; line 1" in run("stability", one, one, "--map", wrong, code=1).stderr
+    assert (
+        "number of one vertex; line 1" in run("stability", one, one, "--map", wrong, code=1).stderr
+    )
     wrong.write_text("0\n1\n")
     assert "there are 2 for 450" in run("stability", one, one, "--map", wrong, code=1).stderr
     points = tmp_path / "points.xyz"
     np.savetxt(points, np.random.default_rng(0).random((300, 3)))
-    assert "--scale is for triangle meshes" in run("stability", points, one, "--scale", "area", code=1).stderr
+    assert (
+        "--scale is for triangle meshes"
+        in run("stability", points, one, "--scale", "area", code=1).stderr
+    )
     assert "A picture must end" in run("stability", one, one, "--picture", "a.gif", code=1).stderr
     assert run("stability", one, code=2)

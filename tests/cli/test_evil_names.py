@@ -33,7 +33,9 @@ def wide_terminal(monkeypatch):
 
 
 def run(*arguments, code=0):
-    done = CliRunner().invoke(app, [str(argument) for argument in arguments], env={"COLUMNS": "300"})
+    done = CliRunner().invoke(
+        app, [str(argument) for argument in arguments], env={"COLUMNS": "300"}
+    )
     assert done.exit_code == code, done.output
     for line in (done.stdout + done.stderr).split("\n"):
         assert line.isprintable(), repr(line)
@@ -57,8 +59,22 @@ def test_a_mesh(zoo, tmp_path):
     run("features", mesh, "--picture", picture, "--ply", colored)
     run("segment", mesh, "-o", colored)
     run("label", mesh, "--like", mesh, "--labels", labels, "--save", tmp_path / f"{EVIL}2.seg")
-    run("deform", mesh, "--region", "y>70%", "--move", "0,0.02,0", "-o", colored, "--save-edits", edits)
-    assert f"{SPELLED}.json: Edits name vertices" in run("deform", mesh, "--edits", changed(edits), code=1).stderr
+    run(
+        "deform",
+        mesh,
+        "--region",
+        "y>70%",
+        "--move",
+        "0,0.02,0",
+        "-o",
+        colored,
+        "--save-edits",
+        edits,
+    )
+    assert (
+        f"{SPELLED}.json: Edits name vertices"
+        in run("deform", mesh, "--edits", changed(edits), code=1).stderr
+    )
     run("repair", mesh, "-o", colored)
     run("stability", mesh, colored, "-k", 4, "-n", 100, "--picture", picture)
     assert SPELLED in parse(picture)
@@ -82,7 +98,9 @@ def test_an_index(zoo, tmp_path):
     assert f"query: {SPELLED}0" in text
     assert f"<!-- {SPELLED}1 -->" in text
     foreign = es.ShapeIndex.create(tmp_path / "foreign")
-    descriptor = es.describe_mesh(es.make_creature("fish", 0, n_vertices=500)).descriptor
+    descriptor = es.retrieval.find_heat_features(
+        es.make_creature("fish", 0, n_vertices=500)
+    ).descriptor
     foreign.add(EVIL, [descriptor], label=EVIL, source=EVIL)
     done = run("query", foreign.folder, zoo / f"{EVIL}0.ply", "--sheet", sheet)
     assert done.stdout.count(SPELLED) == 2
@@ -114,7 +132,17 @@ def test_progress_bars(monkeypatch):
         (["deform", "{zoo}/{evil}0.ply", "--region", EVIL, "--move", "0,1,0"], 1),
         (["deform", "{zoo}/{evil}0.ply", "--region", "y>0", "--rotate", EVIL], 1),
         (["deform", "{zoo}/{evil}0.ply", "--edits", "{zoo}/{evil}.off"], 1),
-        (["label", "{zoo}/{evil}0.ply", "--like", "{zoo}/{evil}0.ply", "--labels", "{zoo}/{evil}.off"], 1),
+        (
+            [
+                "label",
+                "{zoo}/{evil}0.ply",
+                "--like",
+                "{zoo}/{evil}0.ply",
+                "--labels",
+                "{zoo}/{evil}.off",
+            ],
+            1,
+        ),
         (["query", EVIL, EVIL], 1),
         (["index", "{zoo}", "--db", "{zoo}", "--repair", EVIL], 1),
         (["demo", "--kind", EVIL], 1),
@@ -124,7 +152,9 @@ def test_progress_bars(monkeypatch):
     ],
 )
 def test_messages(zoo, arguments, code):
-    done = run(*(text.replace("{zoo}", str(zoo)).replace("{evil}", EVIL) for text in arguments), code=code)
+    done = run(
+        *(text.replace("{zoo}", str(zoo)).replace("{evil}", EVIL) for text in arguments), code=code
+    )
     if code == 1:
         assert done.stderr.count("\n") == 1
 

@@ -30,18 +30,17 @@ def printed(*arguments):
 
 @pytest.mark.parametrize("verb", ["", *VERBS])
 def test_help_is_printed_to_the_letter(verb):
-    """Nothing in it is taken for markup, such as the brackets of `eigenshape[gpu]`."""
+    """Nothing in it is taken for markup, such as the brackets of `eigenshape[bridges]`."""
     command = COMMAND.commands[verb] if verb else COMMAND
     text = printed(verb) if verb else printed()
     written = [command.help, *(parameter.help for parameter in command.params)]
     if not verb:
-        written += [COMMAND.epilog, *(other.help.split("\n\n")[0] for other in COMMAND.commands.values())]
+        written += [
+            COMMAND.epilog,
+            *(other.help.split("\n\n")[0] for other in COMMAND.commands.values()),
+        ]
     for sentence in filter(None, written):
         assert words(sentence) in text
-
-
-def test_the_extra_of_the_gpu_is_named():
-    assert "pip install eigenshape[gpu]" in printed("spectrum")
 
 
 @pytest.mark.parametrize("verb", VERBS)
@@ -61,9 +60,14 @@ def test_the_version():
 @pytest.mark.parametrize("module", ["eigenshape", "eigenshape_command"])
 def test_the_command_is_a_module_too(module):
     done = subprocess.run(
-        [sys.executable, "-m", module, "info", "nowhere.ply"], capture_output=True, text=True, check=False
+        [sys.executable, "-m", module, "info", "nowhere.ply"],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 1
     assert done.stderr == "error: [Errno 2] No such file or directory: 'nowhere.ply'\n"
-    usage = subprocess.run([sys.executable, "-m", module, "info", "-h"], capture_output=True, text=True, check=True)
+    usage = subprocess.run(
+        [sys.executable, "-m", module, "info", "-h"], capture_output=True, text=True, check=True
+    )
     assert "Usage: eigenshape info" in usage.stdout

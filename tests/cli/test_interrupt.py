@@ -13,7 +13,9 @@ from eigenshape.retrieval.store.index import ShapeIndex
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import icosphere
 
-pytestmark = pytest.mark.skipif(not hasattr(os, "killpg"), reason="groups of processes are a Unix thing")
+pytestmark = pytest.mark.skipif(
+    not hasattr(os, "killpg"), reason="groups of processes are a Unix thing"
+)
 
 # A background job has Ctrl-C ignored and hands that on, also to this test and from here to the command.
 RESTORE = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
@@ -104,7 +106,9 @@ def test_while_loops_are_compiled(ball, tmp_path, n_files):
 def test_while_workers_start_and_work(herd, tmp_path, sign):
     """The first sign comes before the workers' own imports, the second with the first shape."""
     db = tmp_path / "db"
-    running = start("index", herd, "--db", db, "--workers", 2, "--views", 0, "--preset", "scale-free")
+    running = start(
+        "index", herd, "--db", db, "--workers", 2, "--views", 0, "--preset", "scale-free"
+    )
     wait_until((db / sign).exists, running)
     assert press_ctrl_c(running) == (130, "stopped; what was finished is kept\n")
     assert len(ShapeIndex.open(db)) < 4
@@ -113,7 +117,9 @@ def test_while_workers_start_and_work(herd, tmp_path, sign):
 @pytest.mark.long
 def test_after_everything_is_done(ball):
     """What an exit handler waits for, a thread say, ends at once."""
-    at_exit = "import atexit; atexit.register(lambda: print('reached', flush=True) or signal.pause())\n"
+    at_exit = (
+        "import atexit; atexit.register(lambda: print('reached', flush=True) or signal.pause())\n"
+    )
     running = start("info", ball, "--json", before=RESTORE + at_exit)
     while running.stdout.readline() != "reached\n":
         assert running.poll() is None

@@ -23,12 +23,16 @@ def test_what_moves_nothing_leaves_all_in_place(peer, handle):
 
 
 @pytest.mark.parametrize(
-    ("peer", "within"), [(as_rigid_as_possible, 0), (biharmonic_blend, 1e-15), (spectral_rigid, 0.02)]
+    ("peer", "within"),
+    [(as_rigid_as_possible, 0), (biharmonic_blend, 1e-15), (spectral_rigid, 0.02)],
 )
 def test_what_is_held_is_where_it_belongs(peer, within):
     rest, binding = lump().vertices, bind(lump_rig(), [HEAD, TAIL])
     found = peer(binding, [TURN, PULL])
-    expected = rest + sum(handle.carry(rest, share) for handle, share in zip((TURN, PULL), binding.shares, strict=True))
+    expected = rest + sum(
+        handle.carry(rest, share)
+        for handle, share in zip((TURN, PULL), binding.shares, strict=True)
+    )
     held = np.setdiff1d(np.arange(642), binding.part.free)
     assert np.abs(found[held] - expected[held]).max() <= within
 
@@ -39,7 +43,9 @@ def test_one_motion_for_all_is_that_motion(peer):
     rest, binding = lump().vertices, bind(lump_rig(), [HEAD, ~HEAD])
     found = peer(binding, [PULL, PULL])
     np.testing.assert_allclose(
-        found - rest, np.tile(PULL.vector, (642, 1)), atol=1e-6 if peer is not biharmonic_blend else 1e-11
+        found - rest,
+        np.tile(PULL.vector, (642, 1)),
+        atol=1e-6 if peer is not biharmonic_blend else 1e-11,
     )
 
 

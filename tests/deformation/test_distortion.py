@@ -22,8 +22,12 @@ def test_twice_the_size_is_twice_the_edges_and_four_times_the_areas(unit):
     found, edges = measure_distortion(small, large), np.ptp(lump().vertices, axis=0)
     assert found.edge_error == pytest.approx(1)
     np.testing.assert_allclose(found.area_ratios, 4)
-    lengths = np.linalg.norm(np.diff(lump().vertices[lump().faces[:, [0, 1, 2, 0]]], axis=1), axis=2)
-    assert found.edge_error_of_box == pytest.approx(np.sqrt(np.mean(lengths**2)) / np.linalg.norm(edges))
+    lengths = np.linalg.norm(
+        np.diff(lump().vertices[lump().faces[:, [0, 1, 2, 0]]], axis=1), axis=2
+    )
+    assert found.edge_error_of_box == pytest.approx(
+        np.sqrt(np.mean(lengths**2)) / np.linalg.norm(edges)
+    )
 
 
 def test_a_face_that_is_turned_over_among_others_is_flipped():

@@ -16,7 +16,7 @@ from eigenshape.deformation.edits import (
     mesh_fingerprint,
 )
 from eigenshape.deformation.handles import Rotation, Translation
-from eigenshape.deformation.region import Box, Brush, region_mask
+from eigenshape.deformation.region import BoxRegion, BrushRegion, region_mask
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.shapes.surfaces import subdivide
 
@@ -33,7 +33,11 @@ def there_and_back(edits, mesh=None):
 def test_edits_come_back_to_the_last_digit(seed):
     rng = np.random.default_rng(seed)
     turn = Rotation(rng.standard_normal(3), rng.standard_normal(3), rng.standard_normal())
-    edit = Edit((Move(HEAD, turn), Move(np.flatnonzero(TAIL), PULL)), n_modes=30, mode=["graded", "thesis"][seed % 2])
+    edit = Edit(
+        (Move(HEAD, turn), Move(np.flatnonzero(TAIL), PULL)),
+        n_modes=30,
+        mode=["graded", "thesis"][seed % 2],
+    )
     (back,) = there_and_back([edit])
     one, two = apply_edit(lump_rig(), edit), apply_edit(lump_rig(), back)
     np.testing.assert_array_equal(one.mesh.vertices, two.mesh.vertices)
@@ -41,8 +45,13 @@ def test_edits_come_back_to_the_last_digit(seed):
 
 
 def test_open_boxes_and_brushes_come_back():
-    box, brush = Box([-np.inf, 0.1, -np.inf], [np.inf, np.inf, 1 / 3]), Brush([1, 2, 1 / 3], 0.1)
-    (back,) = there_and_back([Edit((Move(box, PULL), Move(brush, PULL)), fixed=Box([0] * 3, [1] * 3))])
+    box, brush = (
+        BoxRegion([-np.inf, 0.1, -np.inf], [np.inf, np.inf, 1 / 3]),
+        BrushRegion([1, 2, 1 / 3], 0.1),
+    )
+    (back,) = there_and_back(
+        [Edit((Move(box, PULL), Move(brush, PULL)), fixed=BoxRegion([0] * 3, [1] * 3))]
+    )
     found = back.moves[0].region
     np.testing.assert_array_equal([found.low, found.high], [box.low, box.high])
     np.testing.assert_array_equal(back.moves[1].region.center, brush.center)
@@ -50,7 +59,9 @@ def test_open_boxes_and_brushes_come_back():
     np.testing.assert_array_equal(back.fixed.high, [1, 1, 1])
 
 
-@pytest.mark.parametrize("region", [{7, 3}, range(3, 8, 4), [3, 7, 7], (v for v in (7, 3)), np.arange(642) % 642 == 3])
+@pytest.mark.parametrize(
+    "region", [{7, 3}, range(3, 8, 4), [3, 7, 7], (v for v in (7, 3)), np.arange(642) % 642 == 3]
+)
 def test_any_region_of_vertices_is_kept(region):
     edit = Edit((Move(region, PULL),), fixed=iter([9]))
     (back,) = there_and_back([edit])
@@ -69,16 +80,23 @@ def test_a_region_of_no_vertex_comes_back_and_is_refused_where_it_bends():
 
 def test_regions_of_another_mesh_are_refused():
     edit = Edit((Move([641], PULL),))
-    for attempt in (lambda: edits_to_json([edit], tube()), lambda: carry_edit(edit, tube(), lump())):
-        with pytest.raises(InvalidParameterError, match=r"A vertex of a region must lie in 0\.\.491; it is 641"):
+    for attempt in (
+        lambda: edits_to_json([edit], tube()),
+        lambda: carry_edit(edit, tube(), lump()),
+    ):
+        with pytest.raises(
+            InvalidParameterError, match=r"A vertex of a region must lie in 0\.\.491; it is 641"
+        ):
             attempt()
 
 
 def test_a_finer_mesh_asks_its_nearest_vertices():
     fine = subdivide(tube())
     rows = np.arange(492) // 12
-    box = Box([0, 0, 0], [1, 1, 1])
-    carried = carry_edit(Edit((Move(rows >= 30, PULL),), fixed=box, n_modes=9, mode="thesis"), tube(), fine)
+    box = BoxRegion([0, 0, 0], [1, 1, 1])
+    carried = carry_edit(
+        Edit((Move(rows >= 30, PULL),), fixed=box, n_modes=9, mode="thesis"), tube(), fine
+    )
     mask = carried.moves[0].region
     np.testing.assert_array_equal(mask[:492], rows >= 30)
     height = fine.vertices[:, 2]
@@ -89,7 +107,10 @@ def test_a_finer_mesh_asks_its_nearest_vertices():
 
 GOOD = {
     "moves": [
-        {"region": {"kind": "vertices", "vertices": [1]}, "handle": {"kind": "translation", "vector": [0, 0, 1]}}
+        {
+            "region": {"kind": "vertices", "vertices": [1]},
+            "handle": {"kind": "translation", "vector": [0, 0, 1]},
+        }
     ],
     "fixed": None,
     "n_modes": None,
@@ -112,7 +133,10 @@ def content(*edits, **changes):
 
 def moving(region=None, handle=None):
     move = GOOD["moves"][0]
-    return {**GOOD, "moves": [{"region": region or move["region"], "handle": handle or move["handle"]}]}
+    return {
+        **GOOD,
+        "moves": [{"region": region or move["region"], "handle": handle or move["handle"]}],
+    }
 
 
 def test_what_the_broken_ones_are_made_of_can_be_read():
@@ -124,7 +148,7 @@ def test_what_the_broken_ones_are_made_of_can_be_read():
     [
         (None, "Edit 1 cannot be read"),
         ([], "Edit 1 cannot be read"),
-        ({}, "Edit 1 cannot be read: 'moves' is missing, or not known"),
+        ({}, "Edit 1 cannot be read: 'moves' is missing or unknown"),
         ({**GOOD, "moves": {}}, "Edit 1 cannot be read: moves must be a list; it is {}"),
         ({**GOOD, "moves": [5]}, "Edit 1 cannot be read"),
         ({**GOOD, "fixed": 5}, "Edit 1 cannot be read"),
@@ -134,21 +158,45 @@ def test_what_the_broken_ones_are_made_of_can_be_read():
         ),
         ({**GOOD, "mode": ["graded"]}, "Edit 1 cannot be read: mode must be"),
         ({**GOOD, "n_modes": 0}, "Edit 1 cannot be read: n_modes must be at least 1; it is 0"),
-        ({**GOOD, "n_modes": 2.5}, r"Edit 1 cannot be read: n_modes must be a whole number; it is 2\.5"),
-        ({**GOOD, "n_modes": True}, "Edit 1 cannot be read: n_modes must be a whole number; it is True"),
-        (moving({"kind": "ball"}), "Edit 1 cannot be read: 'ball' is missing, or not known"),
+        (
+            {**GOOD, "n_modes": 2.5},
+            r"Edit 1 cannot be read: n_modes must be a whole number; it is 2\.5",
+        ),
+        (
+            {**GOOD, "n_modes": True},
+            "Edit 1 cannot be read: n_modes must be a whole number; it is True",
+        ),
+        (moving({"kind": "ball"}), "Edit 1 cannot be read: 'ball' is missing or unknown"),
         (moving({"kind": ["box"]}), "Edit 1 cannot be read"),
         (moving({"kind": "vertices"}), "Edit 1 cannot be read: 'vertices' is missing"),
-        (moving({"kind": "vertices", "vertices": [5]}), r"Edit 1 cannot be read: A vertex must lie in 0\.\.4; it is 5"),
+        (
+            moving({"kind": "vertices", "vertices": [5]}),
+            r"Edit 1 cannot be read: A vertex must lie in 0\.\.4; it is 5",
+        ),
         (
             moving({"kind": "vertices", "vertices": [-1]}),
             r"Edit 1 cannot be read: A vertex must lie in 0\.\.4; it is -1",
         ),
-        (moving({"kind": "vertices", "vertices": "1"}), "Edit 1 cannot be read: vertices must be a list; it is '1'"),
-        (moving({"kind": "vertices", "vertices": ["1"]}), "Edit 1 cannot be read: A vertex must be a whole number"),
-        (moving({"kind": "box", "low": [0, 0], "high": [1, 1, 1]}), "Edit 1 cannot be read: low must be three numbers"),
-        (moving({"kind": "box", "low": ["0", 0, 0], "high": [1, 1, 1]}), "Edit 1 cannot be read: low must be a number"),
-        (moving({"kind": "box", "low": [10**400, 0, 0], "high": [1, 1, 1]}), "Edit 1 cannot be read: .*too large"),
+        (
+            moving({"kind": "vertices", "vertices": "1"}),
+            "Edit 1 cannot be read: vertices must be a list; it is '1'",
+        ),
+        (
+            moving({"kind": "vertices", "vertices": ["1"]}),
+            "Edit 1 cannot be read: A vertex must be a whole number",
+        ),
+        (
+            moving({"kind": "box", "low": [0, 0], "high": [1, 1, 1]}),
+            "Edit 1 cannot be read: low must be three numbers",
+        ),
+        (
+            moving({"kind": "box", "low": ["0", 0, 0], "high": [1, 1, 1]}),
+            "Edit 1 cannot be read: low must be a number",
+        ),
+        (
+            moving({"kind": "box", "low": [10**400, 0, 0], "high": [1, 1, 1]}),
+            "Edit 1 cannot be read: .*too large",
+        ),
         (
             moving({"kind": "box", "low": [2, 0, 0], "high": [1, 1, 1]}),
             "Edit 1 cannot be read: low must lie below high",
@@ -161,8 +209,11 @@ def test_what_the_broken_ones_are_made_of_can_be_read():
             moving({"kind": "brush", "center": [0, None, 0], "radius": 1}),
             "Edit 1 cannot be read: center must be a number",
         ),
-        (moving(handle={"kind": "spin"}), "Edit 1 cannot be read: 'spin' is missing, or not known"),
-        (moving(handle={"kind": "translation", "vector": [0, 0]}), "Edit 1 cannot be read: vector must have three"),
+        (moving(handle={"kind": "spin"}), "Edit 1 cannot be read: 'spin' is missing or unknown"),
+        (
+            moving(handle={"kind": "translation", "vector": [0, 0]}),
+            "Edit 1 cannot be read: vector must have three",
+        ),
         (
             moving(handle={"kind": "translation", "vector": [0, 0, np.nan]}),
             "Edit 1 cannot be read: vector must be finite",
@@ -172,7 +223,9 @@ def test_what_the_broken_ones_are_made_of_can_be_read():
             "Edit 1 cannot be read: axis must have a direction",
         ),
         (
-            moving(handle={"kind": "rotation", "pivot": [0, 0, 0], "axis": [0, 0, 1], "angle": [1, 2]}),
+            moving(
+                handle={"kind": "rotation", "pivot": [0, 0, 0], "axis": [0, 0, 1], "angle": [1, 2]}
+            ),
             r"Edit 1 cannot be read: angle must be a number; it is \[1, 2\]",
         ),
         (
@@ -189,9 +242,9 @@ def test_what_is_no_edit_is_refused_by_its_number(broken, message):
 @pytest.mark.parametrize(
     ("whole", "message"),
     [
-        ([], "Edits are kept as a JSON object of kind 'eigenshape edits'; this is none"),
-        ({"kind": "mesh"}, "Edits are kept as a JSON object of kind"),
-        (content(GOOD, version=1), "Edits of version 2 are read; this is version 1"),
+        ([], "Edits must be a JSON object of kind 'eigenshape edits'; this is a list"),
+        ({"kind": "mesh"}, "Edits must be a JSON object of kind .*; the kind is 'mesh'"),
+        (content(GOOD, version=1), "Edits must be of version 2; the version is 1"),
         (
             content(GOOD, mesh={"n_vertices": "5", "n_faces": 2, "digest": ""}),
             "Edit 0 cannot be read: n_vertices must be a whole number; it is '5'",

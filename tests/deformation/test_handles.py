@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.deformation.handles import Rotation, Translation, affine_offset, rotation_by_drag
+from eigenshape.deformation.handles import Rotation, Translation, affine_offset, rotation_from_drag
 
 QUARTER = np.pi / 2
 POINTS = np.array([[1.0, 0.0, 0.0], [2.0, 0.0, 5.0], [1.0, 3.0, 0.0]])
@@ -15,23 +15,35 @@ def moved(handle, points, share=1.0):
 
 def test_a_quarter_turn_by_hand():
     about_z = Rotation([0, 0, 0], [0, 0, 7], QUARTER)
-    np.testing.assert_allclose(moved(about_z, POINTS), [[0, 1, 0], [0, 2, 5], [-3, 1, 0]], atol=1e-15)
+    np.testing.assert_allclose(
+        moved(about_z, POINTS), [[0, 1, 0], [0, 2, 5], [-3, 1, 0]], atol=1e-15
+    )
     about_x = Rotation([0, 1, 0], [1, 0, 0], QUARTER)
-    np.testing.assert_allclose(moved(about_x, [[4, 1, 2], [4, 3, 0]]), [[4, -1, 0], [4, 1, 2]], atol=1e-15)
+    np.testing.assert_allclose(
+        moved(about_x, [[4, 1, 2], [4, 3, 0]]), [[4, -1, 0], [4, 1, 2]], atol=1e-15
+    )
 
 
 def test_by_a_share_of_it_a_point_turns_by_that_share_of_the_angle():
     pivot, axis, shares = [0.3, -1, 2], [1, 2, 3], np.array([0.0, 0.25, 1.0])
     found = Rotation(pivot, axis, 2.0).carry(POINTS, shares)
-    alone = [Rotation(pivot, axis, 2.0 * share).carry(POINTS[[i]], np.ones(1))[0] for i, share in enumerate(shares)]
+    alone = [
+        Rotation(pivot, axis, 2.0 * share).carry(POINTS[[i]], np.ones(1))[0]
+        for i, share in enumerate(shares)
+    ]
     np.testing.assert_allclose(found, alone, atol=1e-15)
     assert (found[0] == 0).all()
 
 
 def test_beyond_a_whole_turn_it_goes_on_turning():
-    one, more = Rotation([0, 0, 0], [0, 0, 1], QUARTER), Rotation([0, 0, 0], [0, 0, 1], QUARTER + 4 * np.pi)
+    one, more = (
+        Rotation([0, 0, 0], [0, 0, 1], QUARTER),
+        Rotation([0, 0, 0], [0, 0, 1], QUARTER + 4 * np.pi),
+    )
     np.testing.assert_allclose(moved(one, POINTS), moved(more, POINTS), atol=1e-14)
-    np.testing.assert_allclose(moved(more, [[1, 0, 0]], 2 / 9), [[-1, 0, 0]], atol=1e-14)  # 2/9 of 9/2 π
+    np.testing.assert_allclose(
+        moved(more, [[1, 0, 0]], 2 / 9), [[-1, 0, 0]], atol=1e-14
+    )  # 2/9 of 9/2 π
     np.testing.assert_allclose(more.turn, [0, 0, 4.5 * np.pi])
 
 
@@ -44,7 +56,9 @@ def test_a_translation_goes_by_its_share_and_turns_nothing():
 @pytest.mark.parametrize("handle", [Rotation([1, -2, 3], [1, 1, -2], 5.0), Translation([1, 2, 3])])
 def test_the_matrix_says_what_carry_does(handle):
     ends = np.column_stack([POINTS, np.ones(3)])
-    np.testing.assert_allclose(ends @ affine_offset(handle).T, handle.carry(POINTS, np.ones(3)), atol=1e-14)
+    np.testing.assert_allclose(
+        ends @ affine_offset(handle).T, handle.carry(POINTS, np.ones(3)), atol=1e-14
+    )
 
 
 def test_a_far_pivot_costs_no_digits_of_the_matrix():
@@ -62,7 +76,7 @@ def test_an_axis_of_length_one_is_kept_to_the_last_digit():
 
 
 def test_a_drag_tells_the_least_rotation():
-    found = rotation_by_drag([1, 1, 0], [3, 1, 0], [1, 6, 0])  # 2 long before, 5 after
+    found = rotation_from_drag([1, 1, 0], [3, 1, 0], [1, 6, 0])  # 2 long before, 5 after
     np.testing.assert_array_equal(found.axis, [0, 0, 1])
     assert found.angle == pytest.approx(QUARTER, abs=1e-15)
     np.testing.assert_allclose(moved(found, [[3, 1, 0]]), [[1, 3, 0]], atol=1e-15)
@@ -72,28 +86,38 @@ def test_a_drag_tells_the_least_rotation():
 def test_a_drag_takes_its_start_towards_its_end(degrees):
     angle = np.radians(degrees)
     end = [np.cos(angle), np.sin(angle) * 0.6, np.sin(angle) * 0.8]
-    found = rotation_by_drag([0, 0, 0], [1, 0, 0], np.multiply(end, 1e-80))
+    found = rotation_from_drag([0, 0, 0], [1, 0, 0], np.multiply(end, 1e-80))
     assert found.angle == pytest.approx(angle, rel=1e-9)
     np.testing.assert_allclose(moved(found, [[1, 0, 0]]), [end], atol=1e-14)
 
 
 def test_a_drag_straight_away_turns_nothing():
-    assert rotation_by_drag([0, 0, 0], [1, 2, 3], [2, 4, 6]).angle == 0
+    assert rotation_from_drag([0, 0, 0], [1, 2, 3], [2, 4, 6]).angle == 0
 
 
 def test_drags_that_tell_no_axis_are_refused():
-    with pytest.raises(InvalidParameterError, match="start and end must not be opposite about the pivot"):
-        rotation_by_drag([1, 0, 0], [2, 0, 0], [-4, 0, 0])
-    with pytest.raises(InvalidParameterError, match="start must be another point than the pivot; both are"):
-        rotation_by_drag([1, 0, 0], [1, 0, 0], [2, 0, 0])
-    with pytest.raises(InvalidParameterError, match="end must be another point than the pivot; both are"):
-        rotation_by_drag([1, 0, 0], [2, 0, 0], [1, 0, 0])
+    with pytest.raises(
+        InvalidParameterError, match="start and end must not be opposite about the pivot"
+    ):
+        rotation_from_drag([1, 0, 0], [2, 0, 0], [-4, 0, 0])
+    with pytest.raises(
+        InvalidParameterError, match="start must be another point than the pivot; both are"
+    ):
+        rotation_from_drag([1, 0, 0], [1, 0, 0], [2, 0, 0])
+    with pytest.raises(
+        InvalidParameterError, match="end must be another point than the pivot; both are"
+    ):
+        rotation_from_drag([1, 0, 0], [2, 0, 0], [1, 0, 0])
 
 
 def test_bad_numbers_are_refused_by_name():
-    with pytest.raises(InvalidParameterError, match=r"axis must have a direction; it is \[0, 0, 0\]"):
+    with pytest.raises(
+        InvalidParameterError, match=r"axis must have a direction; it is \[0, 0, 0\]"
+    ):
         Rotation([0, 0, 0], [0, 0, 0], 1.0)
-    with pytest.raises(InvalidParameterError, match=r"pivot must have three numbers; the shape is \(2,\)"):
+    with pytest.raises(
+        InvalidParameterError, match=r"pivot must have three numbers; the shape is \(2,\)"
+    ):
         Rotation([0, 0], [0, 0, 1], 1.0)
     with pytest.raises(InvalidParameterError, match="angle must be finite; entry 0 is inf"):
         Rotation([0, 0, 0], [0, 0, 1], np.inf)

@@ -2,7 +2,14 @@ import numpy as np
 import pytest
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.deformation.region import Box, Brush, kept_region, region_boundary, region_mask, require_boundary
+from eigenshape.deformation.region import (
+    BoxRegion,
+    BrushRegion,
+    copy_region,
+    region_boundary,
+    region_mask,
+    require_boundary,
+)
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
 
@@ -24,15 +31,15 @@ def test_masks_and_indices_hold_what_they_say():
 
 
 def test_a_box_holds_what_lies_in_it_and_on_it():
-    assert chosen(Box([1, 1, 0], [2, 3, 0])) == [6, 7, 8, 11, 12, 13]
-    assert chosen(Box([3.5, -np.inf, -np.inf], [np.inf] * 3)) == [20, 21, 22, 23, 24]
-    assert chosen(Box([0, 0, 1], [9, 9, 9])) == []
+    assert chosen(BoxRegion([1, 1, 0], [2, 3, 0])) == [6, 7, 8, 11, 12, 13]
+    assert chosen(BoxRegion([3.5, -np.inf, -np.inf], [np.inf] * 3)) == [20, 21, 22, 23, 24]
+    assert chosen(BoxRegion([0, 0, 1], [9, 9, 9])) == []
 
 
 def test_a_brush_reaches_as_far_along_the_surface():
-    assert chosen(Brush([2.2, 1.9, 0.3], 1.0)) == [7, 11, 12, 13, 17]
-    assert chosen(Brush([2, 2, 0], 1.4)) == [7, 11, 12, 13, 17]
-    assert chosen(Brush([2, 2, 0], 1.42)) == [6, 7, 8, 11, 12, 13, 16, 17, 18]
+    assert chosen(BrushRegion([2.2, 1.9, 0.3], 1.0)) == [7, 11, 12, 13, 17]
+    assert chosen(BrushRegion([2, 2, 0], 1.4)) == [7, 11, 12, 13, 17]
+    assert chosen(BrushRegion([2, 2, 0], 1.42)) == [6, 7, 8, 11, 12, 13, 16, 17, 18]
 
 
 def test_a_brush_does_not_jump_to_a_near_sheet():
@@ -40,22 +47,37 @@ def test_a_brush_does_not_jump_to_a_near_sheet():
     folded = np.array([[x, y, 0.0] if x <= 0.5 else [1 - x, y, 0.01] for x, y, _ in sheet.vertices])
     mesh = TriangleMesh(folded, sheet.faces)
     below, above = 1 * 9 + 4, 7 * 9 + 4  # opposite each other, .01 apart, .75 along the sheet
-    held = chosen(Brush(folded[below], 0.4), mesh)
+    held = chosen(BrushRegion(folded[below], 0.4), mesh)
     assert below in held
     assert above not in held
-    assert above in chosen(Box(folded[below] - 0.1, folded[below] + 0.1), mesh)
+    assert above in chosen(BoxRegion(folded[below] - 0.1, folded[below] + 0.1), mesh)
 
 
 def test_the_boundary_of_a_square_is_its_ring():
-    square = region_mask(GRID, Box([1, 1, 0], [3, 3, 0]))
+    square = region_mask(GRID, BoxRegion([1, 1, 0], [3, 3, 0]))
     assert region_boundary(GRID, square).tolist() == [6, 7, 8, 11, 13, 16, 17, 18]
     assert region_boundary(GRID, ~square).tolist() == [
-        *(0, 1, 2, 3, 5, 9, 10, 14, 15, 19, 21, 22, 23, 24)  # not 4 and 20: no diagonal leads from there inside
+        *(
+            0,
+            1,
+            2,
+            3,
+            5,
+            9,
+            10,
+            14,
+            15,
+            19,
+            21,
+            22,
+            23,
+            24,
+        )  # not 4 and 20: no diagonal leads from there inside
     ]
 
 
 def test_along_the_rim_of_the_surface_there_is_no_boundary():
-    left = region_mask(GRID, Box([0, 0, 0], [1, 4, 0]))
+    left = region_mask(GRID, BoxRegion([0, 0, 0], [1, 4, 0]))
     assert region_boundary(GRID, left).tolist() == [5, 6, 7, 8, 9]
     assert require_boundary(GRID, left, 0).tolist() == [5, 6, 7, 8, 9]
 
@@ -67,28 +89,39 @@ def test_regions_without_a_boundary_are_refused():
         (np.ones(54, dtype=bool), "region 2 holds 54 of 54 vertices, whole components"),
         (np.arange(54) < 12, "region 2 holds 12 of 54 vertices, whole components"),
     ):
-        with pytest.raises(InvalidParameterError, match=f"A region must have a boundary on the shape.*{what}"):
+        with pytest.raises(
+            InvalidParameterError, match=f"A region must have a boundary on the shape.*{what}"
+        ):
             require_boundary(mesh, mask, 2)
 
 
 def test_bad_regions_are_refused_by_name():
-    with pytest.raises(InvalidParameterError, match=r"A mask must have one entry a vertex, shape \(25,\); .* \(24,\)"):
+    with pytest.raises(
+        InvalidParameterError,
+        match=r"A mask must have one entry per vertex, shape \(25,\); .* \(24,\)",
+    ):
         region_mask(GRID, np.ones(24, dtype=bool))
-    with pytest.raises(InvalidParameterError, match=r"A vertex of a region must lie in 0\.\.24; it is 25"):
+    with pytest.raises(
+        InvalidParameterError, match=r"A vertex of a region must lie in 0\.\.24; it is 25"
+    ):
         region_mask(GRID, [3, 25])
-    with pytest.raises(InvalidParameterError, match=r"low must lie below high; along axis 1 they are 2\.0 and 1\.0"):
-        Box([0, 2, 0], [1, 1, 1])
-    with pytest.raises(InvalidParameterError, match=r"high must be three numbers; it is \[1\.0, nan, 1\.0\]"):
-        Box([0, 0, 0], [1, np.nan, 1])
+    with pytest.raises(
+        InvalidParameterError, match=r"low must lie below high; along axis 1 they are 2\.0 and 1\.0"
+    ):
+        BoxRegion([0, 2, 0], [1, 1, 1])
+    with pytest.raises(
+        InvalidParameterError, match=r"high must be three numbers; it is \[1\.0, nan, 1\.0\]"
+    ):
+        BoxRegion([0, 0, 0], [1, np.nan, 1])
     with pytest.raises(InvalidParameterError, match="radius must be positive and finite"):
-        Brush([0, 0, 0], 0.0)
+        BrushRegion([0, 0, 0], 0.0)
 
 
 def test_a_kept_region_is_its_own():
     mask = np.zeros(25, dtype=bool)
-    kept = kept_region(mask)
+    kept = copy_region(mask)
     mask[:] = True
     assert chosen(kept) == []
-    assert chosen(kept_region(index for index in (1, 2))) == [1, 2]
-    box = Box([0, 0, 0], [1, 1, 1])
-    assert kept_region(box) is box
+    assert chosen(copy_region(index for index in (1, 2))) == [1, 2]
+    box = BoxRegion([0, 0, 0], [1, 1, 1])
+    assert copy_region(box) is box

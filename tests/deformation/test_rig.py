@@ -4,14 +4,14 @@ from bent_shapes import bumpy, lump, lump_rig
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.deformation.binding import bind
-from eigenshape.deformation.rig import eigen_skeleton, posed, projected, rig_shape
+from eigenshape.deformation.rig import eigen_skeleton, pose_rig, project_on_modes, rig_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.operators.graph import graph_laplacian
 from eigenshape.shapes.surfaces import disjoint_union, icosphere, torus
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 
 def test_all_modes_give_the_shape_back():
@@ -41,7 +41,9 @@ def test_the_factor_of_fewer_modes_is_the_leading_part():
 
 def test_projection_finds_the_coefficients_of_a_sum_of_modes():
     rig, wanted = lump_rig(), np.random.default_rng(0).standard_normal((20, 2))
-    np.testing.assert_allclose(projected(rig, rig.eigenvectors[:, :20] @ wanted, 20), wanted, atol=1e-12)
+    np.testing.assert_allclose(
+        project_on_modes(rig, rig.eigenvectors[:, :20] @ wanted, 20), wanted, atol=1e-12
+    )
 
 
 def test_there_is_one_more_mode_for_each_further_component():
@@ -72,16 +74,19 @@ def test_areas_are_those_of_the_vertices():
 
 def test_a_pose_keeps_all_but_the_vertices():
     rig = lump_rig()
-    other = posed(rig, 2 * rig.mesh.vertices)
+    other = pose_rig(rig, 2 * rig.mesh.vertices)
     assert other.eigenvectors is rig.eigenvectors
     np.testing.assert_array_equal(other.mesh.vertices, 2 * rig.mesh.vertices)
     with pytest.raises(InvalidShapeError, match="vertices must be finite; vertex 0"):
-        posed(rig, np.full_like(rig.mesh.vertices, np.nan))
+        pose_rig(rig, np.full_like(rig.mesh.vertices, np.nan))
 
 
 def test_what_cannot_be_rigged_is_refused():
     spectrum = solve_spectrum(cotangent_laplacian(icosphere(1)), 5)
-    with pytest.raises(InvalidParameterError, match="The spectrum is of 42 vertices, the shape has 642"):
+    with pytest.raises(
+        InvalidParameterError,
+        match="spectrum must be of the shape; it has 42 points for 642 vertices",
+    ):
         rig_shape(lump(), spectrum)
     with pytest.raises(InvalidParameterError, match=r"n_modes must lie in 1\.\.300; it is 301"):
         eigen_skeleton(lump_rig(), 301)

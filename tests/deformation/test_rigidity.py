@@ -6,9 +6,15 @@ from scipy.spatial.transform import Rotation as Turn
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.deformation import rigidity
 from eigenshape.deformation.binding import bind
-from eigenshape.deformation.graded import graded, quaternions, shared_motion
+from eigenshape.deformation.graded_bend import bend_graded, move_by_shares, quaternions
 from eigenshape.deformation.handles import Rotation
-from eigenshape.deformation.rigidity import edge_weights, factored, fitted_turns, free_part, relax
+from eigenshape.deformation.rigidity import (
+    edge_weights,
+    factor_equations,
+    fit_turns,
+    free_part,
+    relax,
+)
 from eigenshape.deformation.rigidity_loops import fit_rotations, turned_edges
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
@@ -103,7 +109,10 @@ def test_where_edges_tell_no_rotation_it_is_kept():
 def test_edges_along_one_line_are_fitted_by_the_nearest_turn():
     """About the line nothing is told, and so nothing turns about it."""
     found, left = fitted(
-        np.array([[1.0, 0, 0], [-2.0, 0, 0]]), np.array([[0, 1.0, 0], [0, -2.0, 0]]), np.ones(2), [1, 0, 0, 0]
+        np.array([[1.0, 0, 0], [-2.0, 0, 0]]),
+        np.array([[0, 1.0, 0], [0, -2.0, 0]]),
+        np.ones(2),
+        [1, 0, 0, 0],
     )
     assert left == pytest.approx(0, abs=1e-15)
     np.testing.assert_allclose(found, [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-6)
@@ -111,11 +120,15 @@ def test_edges_along_one_line_are_fitted_by_the_nearest_turn():
 
 def test_one_by_one_and_all_at_once_agree():
     mesh, edges = lump(2), edge_weights(cotangent_laplacian(lump(2)).stiffness)
-    posed = mesh.vertices @ Turn.from_rotvec([0.1, 0.4, -0.2]).as_matrix().T + 0.02 * RNG.standard_normal((162, 3))
+    posed = mesh.vertices @ Turn.from_rotvec(
+        [0.1, 0.4, -0.2]
+    ).as_matrix().T + 0.02 * RNG.standard_normal((162, 3))
     turns = quaternions(np.zeros((162, 3)))
-    fit_rotations(np.arange(162), edges.starts, edges.others, edges.weights, mesh.vertices, posed, turns)
+    fit_rotations(
+        np.arange(162), edges.starts, edges.others, edges.weights, mesh.vertices, posed, turns
+    )
     found = Turn.from_quat(np.roll(turns, -1, axis=1)).as_matrix()
-    np.testing.assert_allclose(found, fitted_turns(edges, mesh.vertices, posed), atol=1e-11)
+    np.testing.assert_allclose(found, fit_turns(edges, mesh.vertices, posed), atol=1e-11)
 
 
 def test_weights_are_positive_and_on_every_edge():
@@ -143,11 +156,16 @@ def test_turned_edges_are_the_sum_that_they_say():
     turns = np.roll(Turn.random(42, random_state=RNG).as_quat(), 1, axis=1)
     spin = Turn.from_quat(np.roll(turns, -1, axis=1)).as_matrix() - np.eye(3)
     found = np.empty((42, 3))
-    turned_edges(np.arange(42), edges.starts, edges.others, edges.weights, mesh.vertices, turns, found)
+    turned_edges(
+        np.arange(42), edges.starts, edges.others, edges.weights, mesh.vertices, turns, found
+    )
     dense = -edges.matrix.toarray()
     np.fill_diagonal(dense, 0)
     plain = [
-        sum(dense[i, j] * (spin[i] + spin[j]) @ (mesh.vertices[i] - mesh.vertices[j]) / 2 for j in range(42))
+        sum(
+            dense[i, j] * (spin[i] + spin[j]) @ (mesh.vertices[i] - mesh.vertices[j]) / 2
+            for j in range(42)
+        )
         for i in range(42)
     ]
     np.testing.assert_allclose(found, plain, atol=1e-13)
@@ -161,17 +179,22 @@ def bent_tube():
 
 def total(binding, posed):
     edges, rest = binding.rig.edges, binding.rig.mesh.vertices
-    turns = fitted_turns(edges, rest, posed)
+    turns = fit_turns(edges, rest, posed)
     one = np.repeat(np.arange(len(rest)), np.diff(edges.starts))
     arms, after = rest[edges.others] - rest[one], posed[edges.others] - posed[one]
-    return edges.weights @ ((np.einsum("eij,ej->ei", turns[one], arms) - after) ** 2).sum(axis=1) / 2
+    return (
+        edges.weights @ ((np.einsum("eij,ej->ei", turns[one], arms) - after) ** 2).sum(axis=1) / 2
+    )
 
 
 @pytest.mark.long
 def test_more_rounds_are_more_rigid():
     binding, handle = bent_tube()
-    energies = [total(binding, shared_motion(binding, [handle]))]
-    energies += [total(binding, graded(binding, [handle], n_rounds=rounds)) for rounds in (1, 2, 3, 5, 10, 20)]
+    energies = [total(binding, move_by_shares(binding, [handle]))]
+    energies += [
+        total(binding, bend_graded(binding, [handle], n_rounds=rounds))
+        for rounds in (1, 2, 3, 5, 10, 20)
+    ]
     assert (np.diff(energies) <= 1e-12 * energies[0]).all()
     assert energies[-1] < 0.6 * energies[0]
 
@@ -183,18 +206,20 @@ def test_many_rounds_end_where_plain_alternation_does(monkeypatch):
     edges, rest, free = binding.rig.edges, binding.rig.mesh.vertices, binding.part.free
     matrix = edges.matrix.toarray()
     links = -matrix + np.diag(matrix.diagonal())
-    posed, solve = shared_motion(binding, [handle]), np.linalg.inv(matrix[np.ix_(free, free)])
+    posed, solve = move_by_shares(binding, [handle]), np.linalg.inv(matrix[np.ix_(free, free)])
     held = np.setdiff1d(np.arange(len(rest)), free)
     for _ in range(2000):
-        turns = fitted_turns(edges, rest, posed)
+        turns = fit_turns(edges, rest, posed)
         own = np.einsum("iab,ib->ia", turns, matrix @ rest)
         others = (links @ turns.reshape(-1, 9)).reshape(-1, 3, 3)
-        theirs = np.einsum("iab,ib->ia", others, rest) - links @ np.einsum("jab,jb->ja", turns, rest)
+        theirs = np.einsum("iab,ib->ia", others, rest) - links @ np.einsum(
+            "jab,jb->ja", turns, rest
+        )
         posed[free] = solve @ ((own + theirs)[free] / 2 - matrix[np.ix_(free, held)] @ posed[held])
-    quick = graded(binding, [handle])
+    quick = bend_graded(binding, [handle])
     assert total(binding, quick) == pytest.approx(total(binding, posed), rel=3e-4)
     monkeypatch.setattr(rigidity, "SETTLED", 0.0)
-    patient = graded(binding, [handle], n_rounds=2000)
+    patient = bend_graded(binding, [handle], n_rounds=2000)
     assert np.abs(patient - posed).max() < 1e-9
 
 
@@ -203,21 +228,31 @@ def test_nothing_free_is_nothing_to_relax():
     part = free_part(rig.edges, np.ones(642, dtype=bool), np.zeros(642))
     assert part.factor is None
     start = RNG.standard_normal((642, 3))
-    assert relax(rig.edges, part, rig.mesh.vertices, start, quaternions(np.zeros((642, 3))), 5) is start
+    assert (
+        relax(rig.edges, part, rig.mesh.vertices, start, quaternions(np.zeros((642, 3))), 5)
+        is start
+    )
 
 
 def test_each_component_must_be_held():
-    edges = edge_weights(cotangent_laplacian(disjoint_union(icosphere(0), icosphere(0), icosphere(0))).stiffness)
+    edges = edge_weights(
+        cotangent_laplacian(disjoint_union(icosphere(0), icosphere(0), icosphere(0))).stiffness
+    )
     held = np.zeros(36, dtype=bool)
     held[3] = True
-    with pytest.raises(InvalidParameterError, match=r"held somewhere; that of vertex 12 is not \(2 such\)"):
+    with pytest.raises(
+        InvalidParameterError, match=r"the component of vertex 12 has none \(2 such\)"
+    ):
         free_part(edges, held, np.zeros(36))
 
 
 def test_equations_that_are_not_definite_are_refused():
     edges = edge_weights(cotangent_laplacian(icosphere(0)).stiffness)
-    with pytest.raises(InvalidShapeError, match="A shape must have angles to be bent; some are too near to 0"):
-        factored(-edges.matrix[:5][:, :5])
+    with pytest.raises(
+        InvalidShapeError,
+        match="angles well above zero to be bent; the equations of the 5 free",
+    ):
+        factor_equations(-edges.matrix[:5][:, :5])
 
 
 def test_quaternions_are_those_of_scipy():

@@ -6,10 +6,10 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.deform import deform
 from eigenshape.deformation.edits import Edit, Move
 from eigenshape.deformation.handles import Rotation, Translation
-from eigenshape.deformation.region import Box, Brush
+from eigenshape.deformation.region import BoxRegion, BrushRegion
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.deformation.session import DeformationSession, replay
-from eigenshape.deformation.skeleton import moved_skeleton
+from eigenshape.deformation.skeleton import move_skeleton
 from eigenshape.shapes.surfaces import subdivide
 
 HEAD = np.flatnonzero(lump().vertices[:, 0] > 0.6)
@@ -24,7 +24,7 @@ def session():
 
 def test_a_drag_shows_the_skeleton_and_changes_nothing(session):
     shown = session.drag(HEAD, TURN)
-    np.testing.assert_array_equal(shown, moved_skeleton(session.grip, [TURN]))
+    np.testing.assert_array_equal(shown, move_skeleton(session.response, [TURN]))
     np.testing.assert_array_equal(session.mesh.vertices, lump().vertices)
     assert session.edits == ()
 
@@ -33,7 +33,9 @@ def test_a_commit_bends_as_it_was_dragged_last(session):
     session.drag(HEAD, PULL)
     session.drag(HEAD, TURN, n_modes=40)
     session.commit()
-    np.testing.assert_array_equal(session.mesh.vertices, deform(lump_rig(), HEAD, TURN, n_modes=40).vertices)
+    np.testing.assert_array_equal(
+        session.mesh.vertices, deform(lump_rig(), HEAD, TURN, n_modes=40).vertices
+    )
     (edit,) = session.edits
     assert (edit.moves[0].handle, edit.n_modes, edit.mode) == (TURN, 40, "graded")
 
@@ -53,10 +55,10 @@ def test_undo_and_redo_go_back_and_forth_to_the_last_digit(session):
         poses.append(session.commit().vertices)
     for pose in poses[-2::-1]:
         np.testing.assert_array_equal(session.undo().vertices, pose)
-    assert (session.undone, len(session.edits)) == (3, 0)
+    assert (session.n_redoable, len(session.edits)) == (3, 0)
     for pose in poses[1:]:
         np.testing.assert_array_equal(session.redo().vertices, pose)
-    assert (session.undone, len(session.edits)) == (0, 3)
+    assert (session.n_redoable, len(session.edits)) == (0, 3)
     assert len({pose.tobytes() for pose in poses}) == 4
 
 
@@ -67,50 +69,52 @@ def test_a_new_commit_forgets_what_was_undone(session):
     session.undo()
     session.drag(TAIL, PULL)
     session.commit()
-    assert session.undone == 0
+    assert session.n_redoable == 0
     assert [edit.moves[0].handle for edit in session.edits] == [TURN, PULL]
     assert session.edits[1].moves[0].region.dtype == bool  # the tail's
-    with pytest.raises(InvalidParameterError, match="An edit must have been undone to be redone; none was"):
+    with pytest.raises(
+        InvalidParameterError, match="There must be an undone edit to redo; there is none"
+    ):
         session.redo()
 
 
 def test_what_is_not_there_cannot_be_done(session):
     with pytest.raises(InvalidParameterError, match="There must be an edit to undo; there is none"):
         session.undo()
-    with pytest.raises(InvalidParameterError, match="An edit must have been undone to be redone"):
+    with pytest.raises(InvalidParameterError, match="There must be an undone edit to redo"):
         session.redo()
-    for action in (session.commit, lambda: session.grip):
-        with pytest.raises(InvalidParameterError, match="A region must be dragged first; nothing is"):
+    for action in (session.commit, lambda: session.response):
+        with pytest.raises(InvalidParameterError, match="A region must be dragged first; none is"):
             action()
     with pytest.raises(InvalidParameterError, match=r"n_modes must lie in 1\.\.300; it is 0"):
         session.drag(HEAD, TURN, n_modes=0)
 
 
 def test_a_drag_that_goes_on_binds_nothing_anew(session):
-    box = Box([0.6, -9, -9], [9, 9, 9])
+    box = BoxRegion([0.6, -9, -9], [9, 9, 9])
     session.drag(HEAD, TURN)
-    grip = session.grip
+    response = session.response
     for again in (HEAD, HEAD.tolist(), lump().vertices[:, 0] > 0.6, box):
         session.drag(again, PULL)
-        assert session.grip is grip
+        assert session.response is response
     session.drag(HEAD, PULL, n_modes=30)
-    assert session.grip is not grip
-    grip = session.grip
+    assert session.response is not response
+    response = session.response
     session.drag(HEAD, PULL, n_modes=30, fixed=TAIL)
-    assert session.grip is not grip
+    assert session.response is not response
     session.drag(HEAD[1:], PULL)
-    assert session.grip.weights.shape == (1, 642, 4)
+    assert session.response.weights.shape == (1, 642, 4)
 
 
 def test_a_mask_that_changes_between_drags_is_bound_anew_and_the_edit_keeps_the_first(session):
     mask = lump().vertices[:, 0] > 0.6
     session.drag(mask, TURN)
     session.commit()
-    grip = None
+    response = None
     for _ in range(2):
         session.drag(mask, TURN)
-        assert session.grip is not grip
-        grip = session.grip
+        assert session.response is not response
+        response = session.response
         mask[HEAD[:5]] = False
     assert np.sum(session.edits[0].moves[0].region) == len(HEAD)
 
@@ -131,7 +135,7 @@ def test_a_drag_counts_no_more_once_it_is_done_or_dropped(session):
 
 def test_several_regions_are_dragged_at_once(session):
     session.drag_all(Move(region, handle) for region, handle in ((HEAD, TURN), (TAIL, PULL)))
-    assert session.grip.weights.shape == (2, 642, 4)
+    assert session.response.weights.shape == (2, 642, 4)
     moved = np.abs(session.commit().vertices - lump().vertices).max(axis=1)
     assert (moved[HEAD] > 0).all()
     assert (moved[TAIL] > 0.1).all()
@@ -140,8 +144,8 @@ def test_several_regions_are_dragged_at_once(session):
 def test_boxes_and_brushes_are_looked_up_where_the_shape_is_now(session):
     session.drag(HEAD, Translation([5, 0, 0]))
     session.commit()
-    beyond = Box([4, -9, -9], [9, 9, 9])
-    tip = Brush(session.mesh.vertices[HEAD[0]], 0.2)
+    beyond = BoxRegion([4, -9, -9], [9, 9, 9])
+    tip = BrushRegion(session.mesh.vertices[HEAD[0]], 0.2)
     for region in (beyond, tip):
         session.drag(region, PULL)
         session.commit()

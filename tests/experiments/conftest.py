@@ -25,7 +25,9 @@ def quick_form(tmp_path_factory, worker_id):
             if not out.exists():
                 folder.mkdir(exist_ok=True)
                 command = [sys.executable, EXPERIMENTS / script, "--quick", "--out", out]
-                done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+                done = subprocess.run(
+                    command, cwd=folder, capture_output=True, text=True, check=False
+                )
                 assert done.returncode == 0, done.stderr[-3000:]
         return json.loads(out.read_text(encoding="utf-8"))
 

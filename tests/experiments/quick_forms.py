@@ -45,7 +45,11 @@ def change_rows(samples):
     names = dict.fromkeys(name for run in samples.values() for name in run)
     for name in names:
         rows = [run.get(name) for run in samples.values()]
-        yield f"| {name} | " + " | ".join(CELL.format(**row["largest"]) if row else "" for row in rows) + " |"
+        yield (
+            f"| {name} | "
+            + " | ".join(CELL.format(**row["largest"]) if row else "" for row in rows)
+            + " |"
+        )
 
 
 def largest(rows, part="mean"):

@@ -46,7 +46,7 @@ def test_ours_is_never_wrong_and_peers_are(quick_form):
 
 
 def test_a_missing_copy_is_counted(census):
-    case = census["Case"]("one", "one", es.cotangent_laplacian(es.torus(12, 8)))
+    case = census["Case"]("one", "one", es.cotangent_laplacian(es.shapes.torus(12, 8)))
     values = census["dense"](case)
     right = es.solve_spectrum(case.laplacian, 9).eigenvalues
     longer = es.solve_spectrum(case.laplacian, 10).eigenvalues
@@ -58,7 +58,9 @@ def test_a_missing_copy_is_counted(census):
     assert verdict(right + 1e-7 * right[-1]) == "wrong"
     assert verdict(np.delete(longer, 1)) == "absent"
     assert verdict(np.full(9, np.nan)) == "absent"
-    assert census["verdict"](lambda *_: 1 / 0, case, 9, 0, values)[0] == "refused: ZeroDivisionError"
+    assert (
+        census["verdict"](lambda *_: 1 / 0, case, 9, 0, values)[0] == "refused: ZeroDivisionError"
+    )
 
 
 def test_numbers_k_cut_clusters_and_keep_them(census):

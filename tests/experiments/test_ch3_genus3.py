@@ -21,7 +21,10 @@ def test_the_readme_shows_the_expected_figures():
         assert f"| {name} | " + " | ".join(cells) + " |" in README
     for name, row in FULL["meshes"].items():
         numbers = f"{row['n']} | {row['edge / e']:.3f} | {row['area']:.3f} | {row['volume']:.3f}"
-        assert f"| {name} | {numbers} | {row['longest / shortest edge']:.1f} | {row['crossings']} |" in README
+        assert (
+            f"| {name} | {numbers} | {row['longest / shortest edge']:.1f} | {row['crossings']} |"
+            in README
+        )
 
 
 @pytest.mark.long
@@ -45,26 +48,32 @@ def test_faces_are_cut_without_a_gap_and_nothing_moves():
     sphere = es.icosphere(2)
     for seed in range(3):
         cut = OTHER["denser"](sphere, np.random.default_rng(seed).random(len(sphere.faces)) < 0.3)
-        assert es.is_manifold(cut)
-        assert es.is_closed(cut)
-        assert es.surface_area(cut) == pytest.approx(es.surface_area(sphere), rel=1e-12)
-        assert es.enclosed_volume(cut) == pytest.approx(es.enclosed_volume(sphere), rel=1e-12)
+        assert es.geometry.is_manifold(cut)
+        assert es.geometry.is_closed(cut)
+        assert es.geometry.surface_area(cut) == pytest.approx(
+            es.geometry.surface_area(sphere), rel=1e-12
+        )
+        assert es.geometry.enclosed_volume(cut) == pytest.approx(
+            es.geometry.enclosed_volume(sphere), rel=1e-12
+        )
 
 
 @pytest.mark.long
 def test_a_collapsed_torus_is_still_a_torus():
-    torus = es.torus(60, 30)
+    torus = es.shapes.torus(60, 30)
     coarse = OTHER["coarser"](torus, 900)
     assert coarse.n_vertices == 900
-    assert es.is_manifold(coarse)
-    assert es.is_closed(coarse)
-    assert es.euler_characteristic(coarse) == 0
-    assert es.enclosed_volume(coarse) == pytest.approx(es.enclosed_volume(torus), rel=0.1)
-    assert len(es.self_intersections(coarse)) == 0
+    assert es.geometry.is_manifold(coarse)
+    assert es.geometry.is_closed(coarse)
+    assert es.geometry.euler_characteristic(coarse) == 0
+    assert es.geometry.enclosed_volume(coarse) == pytest.approx(
+        es.geometry.enclosed_volume(torus), rel=0.1
+    )
+    assert len(es.geometry.self_intersections(coarse)) == 0
 
 
 def test_last_digits_do_not_choose_the_edges_that_collapse():
-    torus = es.torus(60, 30)  # full of edges of one length
+    torus = es.shapes.torus(60, 30)  # full of edges of one length
     signs = np.random.default_rng(0).choice([-1.0, 1.0], torus.vertices.shape)
     nudged = es.TriangleMesh(np.nextafter(torus.vertices, np.inf * signs), torus.faces)
     one, other = OTHER["coarser"](torus, 900), OTHER["coarser"](nudged, 900)

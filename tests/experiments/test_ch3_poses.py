@@ -16,7 +16,9 @@ KINDS = ("poses of one shape", "other individuals", "other species")
 
 def test_the_readme_shows_the_cats():
     for name, row in FULL["differences"].items():
-        assert f"| {name} | " + " | ".join(f"{value:.4f}" for value in row.values()) + " |" in README
+        assert (
+            f"| {name} | " + " | ".join(f"{value:.4f}" for value in row.values()) + " |" in README
+        )
 
 
 def test_the_readme_shows_the_families():
@@ -26,7 +28,10 @@ def test_the_readme_shows_the_families():
     separation = FULL["separation"]
     for name in KINDS:
         number, *values = separation[name].values()
-        assert f"| {name} | {number} | " + " | ".join(f"{value:.4f}" for value in values) + " |" in README
+        assert (
+            f"| {name} | {number} | " + " | ".join(f"{value:.4f}" for value in values) + " |"
+            in README
+        )
     assert f"threshold of {separation['threshold']:.4f}" in README
     assert f"{100 * separation['right']:.2f} %" in README
     assert f"{separation['AUC, individuals']:.4f}" in README
@@ -34,7 +39,9 @@ def test_the_readme_shows_the_families():
 
 def test_the_readme_shows_the_kernels():
     for name, row in FULL["kernels"].items():
-        assert f"| {name} | " + " | ".join(f"{value:.4f}" for value in row.values()) + " |" in README
+        assert (
+            f"| {name} | " + " | ".join(f"{value:.4f}" for value in row.values()) + " |" in README
+        )
 
 
 @pytest.mark.long

@@ -31,7 +31,9 @@ def test_claims_about_operators_on_the_sphere(quick_form):
     assert medians("mesh, literal", "values")[-1] > 0.15
     assert medians("mesh, corrected", "values")[-1] < 0.01
     # the correction leaves eigenvectors as they are
-    assert medians("mesh, corrected", "vectors") == pytest.approx(medians("mesh, literal", "vectors"), rel=1e-3)
+    assert medians("mesh, corrected", "vectors") == pytest.approx(
+        medians("mesh, literal", "vectors"), rel=1e-3
+    )
     # only the random-walk form bears noise
     assert noise["mesh, random-walk"][0] < 0.03
     assert min(noise["cotangent, lumped"][0], noise["mesh, corrected"][0]) > 0.2
@@ -41,5 +43,7 @@ def test_claims_about_operators_on_the_sphere(quick_form):
     for of_triangles, of_cells in found["scatter"]:
         assert of_triangles > 5 * of_cells
     for name in ("mesh, literal", "mesh, corrected", "mesh, random-walk"):
-        for mesh, points in zip(medians(name, "vectors"), medians("points, corrected", "vectors"), strict=True):
+        for mesh, points in zip(
+            medians(name, "vectors"), medians("points, corrected", "vectors"), strict=True
+        ):
             assert mesh > 5 * points

@@ -29,4 +29,7 @@ def test_orders_are_those_of_theory(quick_form):
         assert table[case]["P3"]["order"] == pytest.approx(6, abs=0.6), case
     for case in ("square", "disc", "flat torus in R⁴"):
         for mass in ("lumped", "consistent"):
-            assert table[case][f"cotangent, {mass}"]["order"] == pytest.approx(2, abs=0.25), (case, mass)
+            assert table[case][f"cotangent, {mass}"]["order"] == pytest.approx(2, abs=0.25), (
+                case,
+                mass,
+            )

@@ -16,7 +16,10 @@ def test_the_readme_shows_the_expected_figures(monkeypatch):
     monkeypatch.syspath_prepend(FOLDER)
     for table in runpy.run_path(str(FOLDER / "run.py"))["markdown"](FULL).values():
         assert table in README
-    assert f"{100 * FULL['largest share of our bound for dense samples']:.0f} % of it is used" in README
+    assert (
+        f"{100 * FULL['largest share of our bound for dense samples']:.0f} % of it is used"
+        in README
+    )
     assert f"change by {100 * FULL['lowest ten, relative, t ≤ δ²/4']:.0f} % where" in README
     assert f"fitted as {FULL['functional']['t']:.2f};" in README
 
@@ -24,10 +27,16 @@ def test_the_readme_shows_the_expected_figures(monkeypatch):
 @pytest.mark.long
 def test_no_change_exceeds_a_bound_and_powers_are_those_of_dense_samples(quick_form):
     found = quick_form("ch4_bound/run.py")
-    for name in ("largest share of our bound", "largest share of Weyl's norm", "samples, largest share of our bound"):
+    for name in (
+        "largest share of our bound",
+        "largest share of Weyl's norm",
+        "samples, largest share of our bound",
+    ):
         assert 0 < found[name] < 1, name
     assert found["largest share of our bound for dense samples"] < 1
-    measured, dense, proven = (found[name] for name in ("points, t ≥ 4δ²", "expected (dense)", "proven (4.3.1)"))
+    measured, dense, proven = (
+        found[name] for name in ("points, t ≥ 4δ²", "expected (dense)", "proven (4.3.1)")
+    )
     assert measured["delta"] == pytest.approx(dense["delta"], abs=0.2)
     assert measured["t"] == pytest.approx(dense["t"], abs=0.35)
     assert measured["t"] > proven["t"] + 0.5

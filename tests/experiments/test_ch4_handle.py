@@ -29,7 +29,9 @@ def test_changes_are_large_and_grow_with_the_torus(quick_form):
         assert (row["closed manifold"], row["Euler characteristic"]) == (True, -2)
         assert (row["components"], row["crossing faces"]) == (1, 0)
         assert row["area of X"] < 0.02 * row["area of Y"]
-    coupled, independent = (found["samples"][f"t = 0.01, n = 500, {form}"] for form in ("coupled", "independent"))
+    coupled, independent = (
+        found["samples"][f"t = 0.01, n = 500, {form}"] for form in ("coupled", "independent")
+    )
     small, large = largest(coupled)
     assert 0.2 < small < large
     assert largest(independent, "least").min() > independent["M again"]["largest"]["most"]

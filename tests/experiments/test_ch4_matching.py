@@ -18,7 +18,10 @@ def test_the_readme_shows_the_expected_figures():
         cells = [row["bottleneck"][0], row["bottleneck, unchanged"][0]]
         line = f"| {n} | " + " | ".join(f"{cell:.4f}" for cell in cells) + " | "
         line += " | ".join(f"{row[f'δ = {d}']['probability']:.2f}" for d in DELTAS) + " | "
-        assert line + " | ".join(f"{row[f'δ = {d}']['least reach / δ']:.2f}" for d in DELTAS) + " |" in text
+        assert (
+            line + " | ".join(f"{row[f'δ = {d}']['least reach / δ']:.2f}" for d in DELTAS) + " |"
+            in text
+        )
     for law in (LAW, LESS, LEAST):
         fit = FULL["rate"][law]
         assert f"| {law} | {fit['constant']:.2f} | {100 * fit['unequal']:.0f} % |" in text
@@ -45,4 +48,9 @@ def test_close_surfaces_of_another_topology_correspond_from_few_points_on(quick_
     assert -0.55 < found["rate"]["slope"] < -0.35
     graph = found["the graph itself"]
     assert graph["unmatched"] == 0
-    assert graph["bottleneck / δ"] < graph["longest move / δ"] <= graph["longest edge / δ"] <= found["ρ"] + 4
+    assert (
+        graph["bottleneck / δ"]
+        < graph["longest move / δ"]
+        <= graph["longest edge / δ"]
+        <= found["ρ"] + 4
+    )

@@ -19,7 +19,10 @@ def test_the_readme_shows_the_expected_figures():
     for name, row in FULL["power of δ"].items():
         assert f"| {name} | {row['largest']:.2f} | {row['mean']:.2f} |" in text
     for name in FULL["meshes"]["cotangent"]:
-        cells = [f"{rows[name]['λ_2']:.2f} | {rows[name]['largest/λ']:.4f}" for rows in FULL["meshes"].values()]
+        cells = [
+            f"{rows[name]['λ_2']:.2f} | {rows[name]['largest/λ']:.4f}"
+            for rows in FULL["meshes"].values()
+        ]
         assert f"| {name} | " + " | ".join(cells) + " |" in text
 
 

@@ -13,7 +13,9 @@ def test_the_readme_shows_the_expected_figures():
     text = (FOLDER / "README.md").read_text()
     for what in ("made", "real"):
         for name, row in FULL[what].items():
-            assert f"| {name} | " + " | ".join(f"{value:.1f}" for value in row.values()) + " |" in text
+            assert (
+                f"| {name} | " + " | ".join(f"{value:.1f}" for value in row.values()) + " |" in text
+            )
     for kind, row in FULL["maps"].items():
         assert f"{kind} {100 * row['median']:.1f} % and {100 * row['within 5 %']:.0f} %" in text
 

@@ -109,12 +109,14 @@ def test_versions_are_what_they_are_called():
         version = draws.Version(one, kind, 1)
         mesh = draws.make(version)
         assert np.array_equal(mesh.vertices, draws.make(version).vertices)
-        assert es.is_closed(mesh) == (kind == "complete")
-        assert es.vertex_components(mesh)[0] == 1
+        assert es.geometry.is_closed(mesh) == (kind == "complete")
+        assert es.geometry.vertex_components(mesh)[0] == 1
         upright = draws.make(version, turned=False)
         assert np.ptp(upright.vertices, axis=0).max() == pytest.approx(1)
         assert not np.allclose(mesh.vertices, upright.vertices)
-        np.testing.assert_allclose(es.edge_lengths(mesh), es.edge_lengths(upright), rtol=1e-9)
+        np.testing.assert_allclose(
+            es.geometry.edge_lengths(mesh), es.geometry.edge_lengths(upright), rtol=1e-9
+        )
 
 
 @pytest.mark.long
@@ -122,8 +124,12 @@ def test_planes_keep_a_piece_of_the_wanted_size():
     whole = es.make_creature("quadruped", n_vertices=900)
     for seed in range(5):
         piece = draws.incomplete(whole, np.random.default_rng(seed))
-        assert draws.KEPT[0] <= es.surface_area(piece) / es.surface_area(whole) <= draws.KEPT[1]
-        assert es.vertex_components(piece)[0] == 1
+        assert (
+            draws.KEPT[0]
+            <= es.geometry.surface_area(piece) / es.geometry.surface_area(whole)
+            <= draws.KEPT[1]
+        )
+        assert es.geometry.vertex_components(piece)[0] == 1
     with pytest.raises(es.InvalidShapeError, match="An incomplete version must keep"):
         draws.incomplete(es.TriangleMesh(np.eye(3), [[0, 1, 2]]), np.random.default_rng(0))
 
@@ -141,7 +147,10 @@ def test_scores_by_hand():
     found = scores.rates([outcome, scores.Outcome("complete", "cat", ("lion",))])
     assert found["all"]["top3"] == [50.0, 0.0, 100.0]
     assert found["incomplete"]["top3"] == [100.0, 100.0, 100.0]
-    assert scores.measured(scores.four_legged_as_one(scores.Outcome("complete", "cat", ("lion",))))[0] == 1
+    assert (
+        scores.measured(scores.four_legged_as_one(scores.Outcome("complete", "cat", ("lion",))))[0]
+        == 1
+    )
 
 
 def test_differences_pair_the_queries():
@@ -170,11 +179,16 @@ def test_a_version_that_cannot_be_made_is_named(made, monkeypatch):
 
     monkeypatch.setattr(describing, "make", refuse)
     found = describing.describe_all(made, [Size()], [draws.Version(shape(1), "incomplete", 2)], 1)
-    assert found == {"ant/1, incomplete (draw 2), size": "there is no such version: No planes will do."}
+    assert found == {
+        "ant/1, incomplete (draw 2), size": "there is no such version: No planes will do."
+    }
 
 
 def test_outcomes_are_in_order_of_distance_and_failures_no_answers(made):
-    database = [draws.complete(shape(number, label)) for number, label in ((1, "cat"), (2, "ant"), (3, "cup"))]
+    database = [
+        draws.complete(shape(number, label))
+        for number, label in ((1, "cat"), (2, "ant"), (3, "cup"))
+    ]
     query, lost = draws.complete(shape(5, "ant")), draws.complete(shape(6, "ant"))
     describing.describe_all(made, [Size()], [*database, query, lost], 1)
     found = run.outcomes(Size(), made, [query, lost], database)
@@ -221,15 +235,24 @@ def test_the_number_of_workers_changes_no_descriptor(tmp_path):
 @pytest.mark.data
 def test_patches_find_parts_better_than_the_thesis_recipe(quick_form):
     rates = quick_form("ch5_retrieval/run.py")["mixed"]
-    assert rates["patches, made words"]["all"]["top3"][0] >= rates["thesis, cotangent"]["all"]["top3"][0]
+    assert (
+        rates["patches, default codebook"]["all"]["top3"][0]
+        >= rates["thesis, cotangent"]["all"]["top3"][0]
+    )
 
 
 def test_each_is_asked_for_among_all_others(made):
     some = [shape(number, "ant") for number in (1, 2, 4, 5)]
     one = run.among_all(draws.Draw(0, (), (), ()), some)
-    assert [version.shape for version in one.mixed] == [version.shape for version in one.complete] == some
+    assert (
+        [version.shape for version in one.mixed]
+        == [version.shape for version in one.complete]
+        == some
+    )
     assert one.mixed == draws.draw(some, 0, 0, 0).mixed
     database = [draws.complete(each) for each in some]
     describing.describe_all(made, [Size()], database, 1)
     for found, asked in zip(run.answers(Size(), made, database, database), some, strict=True):
-        assert sorted(version.shape.number for version in found) == [n for n in (1, 2, 4, 5) if n != asked.number]
+        assert sorted(version.shape.number for version in found) == [
+            n for n in (1, 2, 4, 5) if n != asked.number
+        ]

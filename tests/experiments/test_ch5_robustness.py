@@ -23,7 +23,7 @@ BALL = es.icosphere(3)
 
 def test_noise_is_a_share_of_the_mean_edge():
     found = perturbing.changed_part(BALL, "noise .25", np.random.default_rng(0))
-    moved = (found.vertices - BALL.vertices).std() / es.edge_lengths(BALL).mean()
+    moved = (found.vertices - BALL.vertices).std() / es.geometry.edge_lengths(BALL).mean()
     assert moved == pytest.approx(0.25, rel=0.05)
     assert np.array_equal(found.faces, BALL.faces)
 
@@ -31,14 +31,16 @@ def test_noise_is_a_share_of_the_mean_edge():
 def test_resolutions_are_half_and_double():
     half = perturbing.changed_whole(BALL, perturbing.HALF)
     assert half.n_faces == BALL.n_faces // 2
-    assert es.is_closed(half)
+    assert es.geometry.is_closed(half)
     double = perturbing.changed_whole(BALL, perturbing.DOUBLE)
-    assert es.mean_side_length(double) == pytest.approx(es.mean_side_length(BALL) / 2)
+    assert es.geometry.mean_side_length(double) == pytest.approx(
+        es.geometry.mean_side_length(BALL) / 2
+    )
 
 
 def test_turned_over_faces_in():
     rng = np.random.default_rng(0)
-    assert es.enclosed_volume(perturbing.changed_part(BALL, perturbing.FLIPPED, rng)) < 0
+    assert es.geometry.enclosed_volume(perturbing.changed_part(BALL, perturbing.FLIPPED, rng)) < 0
     for change in (perturbing.CLEAN, perturbing.DOUBLE, *perturbing.SCANS):
         assert perturbing.changed_part(BALL, change, rng) is BALL
     for change in (perturbing.CLEAN, *perturbing.NOISES, perturbing.FLIPPED, *perturbing.SCANS):
@@ -56,8 +58,8 @@ def test_a_change_keeps_side_planes_and_turn():
         flipped = draws.make(draws.Version(one, kind, 1, perturbing.FLIPPED))
         assert np.array_equal(flipped.vertices, clean.vertices)
     scan = draws.make(draws.Version(one, "partial", 1, "scanner"))
-    assert es.vertex_components(scan)[0] == 1
-    assert not es.is_closed(scan)
+    assert es.geometry.vertex_components(scan)[0] == 1
+    assert not es.geometry.is_closed(scan)
 
 
 def test_losses_are_of_the_same_queries():
@@ -70,15 +72,17 @@ def test_losses_are_of_the_same_queries():
     assert robustness.loss([changed[0], changed[2]], clean, "scanner")[0] == 50.0
     results = robustness.measure({"clean": {"as it is": clean}, "noise .1": {"as it is": changed}})
     assert results["noise .1"]["as it is"]["loss"][0] == 33.3
-    assert robustness.cell(results["noise .1"]["as it is"]).startswith("33.3 / 33.3 / 33.3, -33.3 [")
+    assert robustness.cell(results["noise .1"]["as it is"]).startswith(
+        "33.3 / 33.3 / 33.3, -33.3 ["
+    )
 
 
 @pytest.mark.long
 def test_queries_are_described_as_they_are_or_as_the_method_takes_them():
-    method = methods.Patches("patches", recipe=es.PatchRecipe(es.made_codebook()))
+    method = methods.Patches("patches", recipe=es.retrieval.PatchRecipe())
     flipped = es.TriangleMesh(BALL.vertices, BALL.faces[:, ::-1])
     asking = [robustness.Asking(method, cure).describe(flipped) for cure in robustness.CURES]
-    outward = es.describe_shape(BALL, method.recipe)
+    outward = es.describe(BALL, method.recipe)
     assert np.array_equal(asking[1].codes, outward.codes)
     assert not np.array_equal(asking[0].codes[0], outward.codes[0])
 

@@ -13,23 +13,35 @@ def test_the_readme_shows_the_expected_figures():
     text = (FOLDER / "README.md").read_text()
     methods = ("graded", "uncrossed", "thesis", "ARAP", "ARAP (libigl)", "biharmonic", "spectral")
     for scene, row in FULL.items():
-        assert f"| {scene} | " + " | ".join(f"{row[m]['edges']:.4f}" for m in methods) + " |" in text
-        assert f"| {scene} | " + " | ".join(f"{row[m]['of the box']:.5f}" for m in methods) + " |" in text
-        cells = [f"{row[m]['least area']:.2f}; {row[m]['flipped']}; {row[m]['crossing']:,}" for m in methods]
+        assert (
+            f"| {scene} | " + " | ".join(f"{row[m]['edges']:.4f}" for m in methods) + " |" in text
+        )
+        assert (
+            f"| {scene} | " + " | ".join(f"{row[m]['of the box']:.5f}" for m in methods) + " |"
+            in text
+        )
+        cells = [
+            f"{row[m]['least area']:.2f}; {row[m]['flipped']}; {row[m]['crossing']:,}"
+            for m in methods
+        ]
         assert f"| {scene} | " + " | ".join(cells) + " |" in text
 
 
 @pytest.mark.long
 def test_ours_is_as_rigid_as_its_peers_at_equal_handles(quick_form):
     plane = quick_form("ch6_deformation/run.py")["coarse plane 90°"]
-    assert plane["graded"]["edges"] <= 1.1 * min(plane[peer]["edges"] for peer in ("ARAP", "ARAP (libigl)"))
+    assert plane["graded"]["edges"] <= 1.1 * min(
+        plane[peer]["edges"] for peer in ("ARAP", "ARAP (libigl)")
+    )
     assert plane["graded"]["handles"] == 0
 
 
 @pytest.mark.long
 def test_half_a_turn_keeps_every_triangle_and_uncrossed_leaves_no_crossing(quick_form):
     found = quick_form("ch6_deformation/run.py")
-    assert all(row[mode]["flipped"] == 0 for row in found.values() for mode in ("graded", "uncrossed"))
+    assert all(
+        row[mode]["flipped"] == 0 for row in found.values() for mode in ("graded", "uncrossed")
+    )
     assert all(row["uncrossed"]["crossing"] == 0 for row in found.values())
     twisted = found["bar twisted 180°"]
     assert min(twisted[mode]["least area"] for mode in ("graded", "uncrossed")) > 0.5

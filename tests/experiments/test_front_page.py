@@ -7,8 +7,11 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 README = " ".join((ROOT / "README.md").read_text().split())
-METHODS = ("patches", "patches, made words", "scale-free", "thesis, cotangent", "LFD", "EVD")
-QUERIES = {"complete": "a complete shape, often in another pose", "incomplete": "what one side shows, or planes leave"}
+METHODS = ("patches", "patches, default codebook", "scale-free", "thesis, cotangent", "LFD", "EVD")
+QUERIES = {
+    "complete": "a complete shape, often in another pose",
+    "incomplete": "what one side shows, or planes leave",
+}
 DATABASES = {"complete": "complete shapes", "mixed": "complete, partial and cut ones"}
 
 
@@ -20,7 +23,10 @@ def full(name):
 @pytest.mark.parametrize("database", DATABASES)
 def test_rates_of_retrieval(query, database):
     rows = full("ch5_retrieval/expected.json")[database]
-    cells = [" / ".join(f"{rows[m][query][top][0]:.1f}" for top in ("top1", "top3", "top5")) for m in METHODS]
+    cells = [
+        " / ".join(f"{rows[m][query][top][0]:.1f}" for top in ("top1", "top3", "top5"))
+        for m in METHODS
+    ]
     assert f"| {QUERIES[query]} | {DATABASES[database]} | " + " | ".join(cells) + " |" in README
 
 
@@ -31,20 +37,33 @@ def test_losses_of_changed_queries():
         for change in ("noise .25", "half resolution", "double resolution", "flipped", "scanner")
     )
     assert flipped == 0
-    assert f"costs {noise} points of that, half or double the resolution {half} and {double}, faces that look" in README
+    assert (
+        f"costs {noise} points of that, half or double the resolution {half} and {double}, faces that look"
+        in README
+    )
     assert f"frame of a depth camera {scanner}." in README
 
 
 def test_errors_of_parts():
-    errors = {way: f"{100 * row['reporting']:.1f} %" for way, row in full("ch5_parts/expected.json")["error"].items()}
+    errors = {
+        way: f"{100 * row['reporting']:.1f} %"
+        for way, row in full("ch5_parts/expected.json")["error"].items()
+    }
     assert f"disagree with people on {errors['default']} of pairs" in README
-    cuts, means = (errors[f"{way}, as many as the default"] for way in ("normalised cut", "k-means"))
-    assert f"thesis preset {errors['thesis preset']}, normalised cuts {cuts}, k-means {means};" in README
+    cuts, means = (
+        errors[f"{way}, as many as the default"] for way in ("normalised cut", "k-means")
+    )
+    assert (
+        f"thesis preset {errors['thesis preset']}, normalised cuts {cuts}, k-means {means};"
+        in README
+    )
 
 
 def test_bending_beside_as_rigid_as_possible():
     rows = full("ch6_deformation/expected.json").values()
-    *most, last_but_one, last = sorted(row["graded"]["edges"] / row["ARAP"]["edges"] for row in rows)
+    *most, last_but_one, last = sorted(
+        row["graded"]["edges"] / row["ARAP"]["edges"] for row in rows
+    )
     assert f"({most[0]:.2f} to {most[-1]:.2f} times in nine of eleven scenes, " in README
     assert f"{last_but_one:.1f} and {last:.1f} in two;" in README
     assert len(most) == 9

@@ -42,7 +42,12 @@ def test_a_closed_folder_is_refused(outputs, tmp_path, monkeypatch):
 @pytest.mark.long
 def test_an_experiment_refuses_before_it_works(tmp_path):
     (tmp_path / "file").write_text("")
-    command = [sys.executable, EXPERIMENTS / "ch5_repeatability" / "run.py", "--pictures", tmp_path / "file"]
+    command = [
+        sys.executable,
+        EXPERIMENTS / "ch5_repeatability" / "run.py",
+        "--pictures",
+        tmp_path / "file",
+    ]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "argument --pictures: the folder" in done.stderr

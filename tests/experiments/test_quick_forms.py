@@ -26,7 +26,8 @@ MADE_UP = (  # what needs no real shapes
 # Figures that count things, of which a near tie may turn one: by how much one more moves a figure.
 ONE_MORE = {
     "ch5_parts/run.py": 0.01,  # a face of a thousand
-    "ch5_repeatability/run.py": 100 / 60 + 0.1,  # per cent, of sixty feature points; rounded to a tenth
+    "ch5_repeatability/run.py": 100 / 60
+    + 0.1,  # per cent, of sixty feature points; rounded to a tenth
     "ch5_retrieval/run.py": 100 / 6 + 0.1,  # per cent, of six queries
     "ch5_retrieval/robustness.py": 100 / 4 + 0.1,  # per cent, of four queries
 }
@@ -34,7 +35,11 @@ ONE_MORE = {
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    "script", [pytest.param(script, marks=[] if script in MADE_UP else pytest.mark.data) for script in FIGURES]
+    "script",
+    [
+        pytest.param(script, marks=[] if script in MADE_UP else pytest.mark.data)
+        for script in FIGURES
+    ],
 )
 def test_the_quick_form_gives_the_expected_figures(script, quick_form):
     expected = json.loads((EXPERIMENTS / FIGURES[script]).read_text(encoding="utf-8"))

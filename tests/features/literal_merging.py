@@ -58,7 +58,13 @@ class LiteralMerging:
         edge = max(self.border[region])
         other = next(self.region[face] for face in self.sides[edge] if self.region[face] != region)
         assert self.keys[self.central[other]] > self.keys[self.central[region]]
-        self.pairs.append((self.vertex[self.keys[self.central[region]][0]], self.vertex[edge[0]], self.vertex[edge[1]]))
+        self.pairs.append(
+            (
+                self.vertex[self.keys[self.central[region]][0]],
+                self.vertex[edge[0]],
+                self.vertex[edge[1]],
+            )
+        )
         for face in self.members.pop(region):
             self.region[face] = other
             self.members[other].append(face)

@@ -14,12 +14,14 @@ def pairs_of(pairs):
 def path(values):
     """A curve whose vertices have these heights."""
     ends = np.column_stack([np.arange(len(values) - 1), np.arange(1, len(values))])
-    return es.SimplicialMesh(np.arange(len(values), dtype=float)[:, None], ends), np.array(values, dtype=float)
+    return es.SimplicialMesh(np.arange(len(values), dtype=float)[:, None], ends), np.array(
+        values, dtype=float
+    )
 
 
 @pytest.mark.long
 def test_a_mountain_range_by_hand():
-    found = es.persistence_diagram(*path([0, 5, 2, 3, 1, 9, 4]))
+    found = es.features.persistence_diagram(*path([0, 5, 2, 3, 1, 9, 4]))
     assert pairs_of(found.maxima) == [(1, 4), (3, 2)]
     assert pairs_of(found.minima) == [(6, 5), (4, 1), (2, 3)]
     assert pairs_of(found.components) == [(0, 5)]
@@ -31,8 +33,8 @@ def test_a_mountain_range_by_hand():
 
 def test_the_loops_of_a_standing_torus_are_born_and_die_at_its_saddles():
     # Height along x of a ring around z: the hole is seen between x = -0.6 and 0.6, and both loops last there.
-    mesh = es.torus(24, 12, outer=1.0, inner=0.4)
-    found = es.persistence_diagram(mesh, mesh.vertices[:, 0])
+    mesh = es.shapes.torus(24, 12, outer=1.0, inner=0.4)
+    found = es.features.persistence_diagram(mesh, mesh.vertices[:, 0])
     assert found.components.births == pytest.approx(-1.4)
     assert found.components.deaths == pytest.approx(1.4)
     ends = sorted(zip(found.loops.births, found.loops.deaths, strict=True))
@@ -40,8 +42,8 @@ def test_the_loops_of_a_standing_torus_are_born_and_die_at_its_saddles():
 
 
 def test_a_constant_function_has_its_components_alone():
-    mesh = es.disjoint_union(es.icosphere(0), es.grid(2, 2))
-    found = es.persistence_diagram(mesh, np.full(mesh.n_vertices, 3.0))
+    mesh = es.shapes.disjoint_union(es.icosphere(0), es.shapes.grid(2, 2))
+    found = es.features.persistence_diagram(mesh, np.full(mesh.n_vertices, 3.0))
     assert not len(found.maxima.births)
     assert not len(found.minima.births)
     assert found.components.births.tolist() == found.components.deaths.tolist() == [3.0, 3.0]
@@ -50,19 +52,27 @@ def test_a_constant_function_has_its_components_alone():
 def test_points_are_joined_to_their_neighbours():
     angles = 2 * np.pi * np.arange(40) / 40
     cloud = es.PointCloud(np.column_stack([np.cos(angles), np.sin(angles)]), dim=1)
-    found = es.persistence_diagram(cloud, np.cos(3 * angles), n_neighbors=2)
+    found = es.features.persistence_diagram(cloud, np.cos(3 * angles), n_neighbors=2)
     assert len(found.maxima.births) == 2
     assert len(found.minima.births) == 2
     assert len(found.components.births) == 1
     assert found.loops is None
     apart = es.PointCloud(np.vstack([cloud.points, cloud.points + 9]), dim=1)
-    assert len(es.persistence_diagram(apart, np.tile(np.cos(3 * angles), 2)).components.births) == 2
+    assert (
+        len(
+            es.features.persistence_diagram(apart, np.tile(np.cos(3 * angles), 2)).components.births
+        )
+        == 2
+    )
 
 
 def test_minima_are_the_maxima_of_minus_the_function():
-    mesh = es.torus(20, 12)
+    mesh = es.shapes.torus(20, 12)
     values = np.random.default_rng(0).standard_normal(mesh.n_vertices)
-    one, two = es.persistence_diagram(mesh, values), es.persistence_diagram(mesh, -values)
+    one, two = (
+        es.features.persistence_diagram(mesh, values),
+        es.features.persistence_diagram(mesh, -values),
+    )
     assert pairs_of(one.minima) == pairs_of(two.maxima)
     assert pairs_of(one.maxima) == pairs_of(two.minima)
     assert sorted(pairs_of(one.loops)) == sorted((b, a) for a, b in pairs_of(two.loops))
@@ -71,50 +81,65 @@ def test_minima_are_the_maxima_of_minus_the_function():
 @pytest.mark.long
 @pytest.mark.parametrize("scale", [1e-150, 1e150])
 def test_diagrams_scale_with_the_function(scale):
-    mesh = es.torus(16, 10)
+    mesh = es.shapes.torus(16, 10)
     rng = np.random.default_rng(0)
     values, others = rng.random((2, mesh.n_vertices))
-    one, two = es.persistence_diagram(mesh, values), es.persistence_diagram(mesh, others)
-    big, large = es.persistence_diagram(mesh, scale * values), es.persistence_diagram(mesh, scale * others)
+    one, two = (
+        es.features.persistence_diagram(mesh, values),
+        es.features.persistence_diagram(mesh, others),
+    )
+    big, large = (
+        es.features.persistence_diagram(mesh, scale * values),
+        es.features.persistence_diagram(mesh, scale * others),
+    )
     assert pairs_of(big.maxima) == pairs_of(one.maxima)
-    assert es.bottleneck_distance(big, large) == pytest.approx(scale * es.bottleneck_distance(one, two), rel=1e-12)
+    assert es.features.bottleneck_distance(big, large) == pytest.approx(
+        scale * es.features.bottleneck_distance(one, two), rel=1e-12
+    )
 
 
 def test_the_distance_by_hand():
-    one = es.persistence_diagram(*path([0, 9, 4, 6, 1]))
-    two = es.persistence_diagram(*path([0, 9, 4, 4.5, 1]))  # the peak of 2 over its saddle is but .5 high
-    assert es.bottleneck_distance(one, two) == 1.0  # rather to the diagonal than 1.5 down
-    assert es.bottleneck_distance(one, one) == 0.0
-    lifted = es.persistence_diagram(*path([3, 12, 7, 9, 4]))
-    assert es.bottleneck_distance(one, lifted) == 3.0  # the component must move
-    pieces = es.disjoint_union(es.grid(1, 1), es.grid(1, 1))
-    apart = es.persistence_diagram(pieces, np.zeros(8))
-    assert es.bottleneck_distance(one, apart) == np.inf
+    one = es.features.persistence_diagram(*path([0, 9, 4, 6, 1]))
+    two = es.features.persistence_diagram(
+        *path([0, 9, 4, 4.5, 1])
+    )  # the peak of 2 over its saddle is but .5 high
+    assert es.features.bottleneck_distance(one, two) == 1.0  # rather to the diagonal than 1.5 down
+    assert es.features.bottleneck_distance(one, one) == 0.0
+    lifted = es.features.persistence_diagram(*path([3, 12, 7, 9, 4]))
+    assert es.features.bottleneck_distance(one, lifted) == 3.0  # the component must move
+    pieces = es.shapes.disjoint_union(es.shapes.grid(1, 1), es.shapes.grid(1, 1))
+    apart = es.features.persistence_diagram(pieces, np.zeros(8))
+    assert es.features.bottleneck_distance(one, apart) == np.inf
 
 
 def test_loops_are_compared_with_loops():
-    mesh = es.torus(9, 7)
-    torus = es.persistence_diagram(mesh, mesh.vertices[:, 0])
-    sphere = es.persistence_diagram(es.icosphere(1), es.icosphere(1).vertices[:, 0])
-    assert es.bottleneck_distance(torus, sphere) == np.inf
+    mesh = es.shapes.torus(9, 7)
+    torus = es.features.persistence_diagram(mesh, mesh.vertices[:, 0])
+    sphere = es.features.persistence_diagram(es.icosphere(1), es.icosphere(1).vertices[:, 0])
+    assert es.features.bottleneck_distance(torus, sphere) == np.inf
     with pytest.raises(InvalidParameterError, match="Diagrams must both have loops, or neither"):
-        es.bottleneck_distance(torus, replace(sphere, loops=None))
-    assert es.bottleneck_distance(replace(torus, loops=None), replace(sphere, loops=None)) < 1.0
+        es.features.bottleneck_distance(torus, replace(sphere, loops=None))
+    assert (
+        es.features.bottleneck_distance(replace(torus, loops=None), replace(sphere, loops=None))
+        < 1.0
+    )
 
 
 def test_bad_input_is_named():
-    mesh = es.grid(1, 1)
+    mesh = es.shapes.grid(1, 1)
     with pytest.raises(InvalidParameterError, match="entry 2 is nan"):
-        es.persistence_diagram(mesh, [0, 1, np.nan, 2])
+        es.features.persistence_diagram(mesh, [0, 1, np.nan, 2])
     with pytest.raises(InvalidParameterError, match=r"n_neighbors must lie in 1\.\.3; it is 10"):
-        es.persistence_diagram(es.PointCloud(mesh.vertices), [0, 1, 2, 3])
+        es.features.persistence_diagram(es.PointCloud(mesh.vertices), [0, 1, 2, 3])
     with pytest.raises(InvalidShapeError, match=r"face 0 is \[0, 0, 1\]"):
-        es.persistence_diagram(es.TriangleMesh(mesh.vertices, [[0, 0, 1]]), [0, 1, 2, 3])
+        es.features.persistence_diagram(es.TriangleMesh(mesh.vertices, [[0, 0, 1]]), [0, 1, 2, 3])
 
 
 def test_results_are_read_only_and_sorted():
-    mesh = es.torus(20, 12)
-    found = es.persistence_diagram(mesh, np.random.default_rng(0).standard_normal(mesh.n_vertices))
+    mesh = es.shapes.torus(20, 12)
+    found = es.features.persistence_diagram(
+        mesh, np.random.default_rng(0).standard_normal(mesh.n_vertices)
+    )
     for pairs in (found.maxima, found.minima, found.components, found.loops):
         assert (np.diff(pairs.persistence) <= 0).all()
         for array in vars(pairs).values():

@@ -77,10 +77,14 @@ def test_pairs_equal_literal_merging(name, step):
 @pytest.mark.long
 @pytest.mark.data
 @pytest.mark.parametrize("step", [0.0, 0.125])
-@pytest.mark.parametrize("path", ["horse/sumner_horse-02.ply", "octopus/psb122.ply", "fish/psb222.ply"])
+@pytest.mark.parametrize(
+    "path", ["horse/sumner_horse-02.ply", "octopus/psb122.ply", "fish/psb222.ply"]
+)
 def test_labels_of_real_shapes_equal_literal_merging(data, path, step):
     mesh = read_mesh(data / "retrieval" / path)
-    values = wavy(TriangleMesh(2 * mesh.vertices / np.ptp(mesh.vertices, axis=0).max(), mesh.faces), step)
+    values = wavy(
+        TriangleMesh(2 * mesh.vertices / np.ptp(mesh.vertices, axis=0).max(), mesh.faces), step
+    )
     tree = merge_tree(mesh, values)
     assert len(tree.maxima) > 3
     parts = segment(tree, n_regions=3)
@@ -116,7 +120,14 @@ def test_number_of_regions_is_at_most_that_of_maxima_and_at_least_that_of_compon
 def test_results_are_int64_and_read_only():
     tree = merge_tree(MESHES["two pieces"], wavy(MESHES["two pieces"]))
     parts = segment(tree, n_regions=4)
-    for array in (tree.maxima, tree.saddles, tree.parent, tree.basins, parts.labels, parts.features.vertices):
+    for array in (
+        tree.maxima,
+        tree.saddles,
+        tree.parent,
+        tree.basins,
+        parts.labels,
+        parts.features.vertices,
+    ):
         assert array.dtype == np.int64
     for owner in (tree, parts.features):
         for array in vars(owner).values():
@@ -194,7 +205,9 @@ def test_segment_wants_exactly_one_rule():
         segment(tree, persistence=-1.0)
     with pytest.raises(InvalidParameterError, match="n_regions must be at least 1; it is 0"):
         segment(tree, n_regions=0)
-    with pytest.raises(InvalidParameterError, match="exactly one of n_regions, persistence and largest_gap"):
+    with pytest.raises(
+        InvalidParameterError, match="exactly one of n_regions, persistence and largest_gap"
+    ):
         segment(tree, persistence=1.0, largest_gap=True)
 
 
@@ -210,7 +223,10 @@ def peaks(*heights):
     ("heights", "left"),
     [
         ((9, 10, 8.5, 1, 0.5), [10, 9, 8.5]),  # the gap from 8.5 to 1
-        ((10, 1, 0.9, 0.8), [10, 1, 0.9, 0.8]),  # from .8 to 0: the one that never ends does not count
+        (
+            (10, 1, 0.9, 0.8),
+            [10, 1, 0.9, 0.8],
+        ),  # from .8 to 0: the one that never ends does not count
         ((10, 6, 3), [10, 6]),  # two equal gaps, the first is taken
         ((10,), [10]),
         ((5, 5, 2), [5, 5]),
@@ -223,7 +239,9 @@ def test_the_largest_gap_of_persistence(heights, left, unit):
     assert set(parts.labels.tolist()) == set(range(len(left)))
 
 
-@pytest.mark.parametrize("rule", [{"n_regions": 1}, {"n_regions": 99}, {"persistence": 0.0}, {"largest_gap": True}])
+@pytest.mark.parametrize(
+    "rule", [{"n_regions": 1}, {"n_regions": 99}, {"persistence": 0.0}, {"largest_gap": True}]
+)
 def test_a_constant_function_has_one_region_a_component(rule):
     mesh = disjoint_union(icosphere(1), torus(9, 7), grid(3, 2))
     parts = segment(merge_tree(mesh, np.full(mesh.n_vertices, -2.5)), **rule)
@@ -233,7 +251,9 @@ def test_a_constant_function_has_one_region_a_component(rule):
 
 def test_a_bow_tie_is_two_regions_that_no_edge_joins():
     # Two squares that share their one corner, the highest vertex of both: faces meet over edges alone.
-    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 1, 0], [2, 2, 0], [1, 2, 0]], dtype=float)
+    corners = np.array(
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 1, 0], [2, 2, 0], [1, 2, 0]], dtype=float
+    )
     mesh = TriangleMesh(corners, [[0, 1, 2], [0, 2, 3], [2, 4, 5], [2, 5, 6]])
     parts = segment(merge_tree(mesh, [0.0, 1, 9, 2, 3, 4, 5]), n_regions=1)
     assert parts.labels.tolist() == [1, 1, 0, 0]
@@ -245,7 +265,9 @@ def test_a_bow_tie_is_two_regions_that_no_edge_joins():
 def test_a_boundary_that_passes_a_vertex_twice(step):
     sheet = grid(8, 8)
     centre = sheet.vertices[sheet.faces].mean(axis=1) - [0.5, 0.5, 0.0]
-    around = np.flatnonzero((sheet.vertices[sheet.faces] == [0.5, 0.5, 0.0]).all(axis=2).any(axis=1))
+    around = np.flatnonzero(
+        (sheet.vertices[sheet.faces] == [0.5, 0.5, 0.0]).all(axis=2).any(axis=1)
+    )
     around = around[np.argsort(np.arctan2(centre[around, 1], centre[around, 0]))]
     mesh = submesh(sheet, ~np.isin(np.arange(sheet.n_faces), around[[0, 3]]))[0]
     assert len(non_manifold_vertices(mesh)) == 1

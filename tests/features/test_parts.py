@@ -7,7 +7,7 @@ from eigenshape.features.boundaries import smooth_boundaries
 from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.part_merging import SEED_TIME, part_tree
 from eigenshape.features.parts import find_parts, part_spectrum
-from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment, touching_parts
+from eigenshape.features.segmentation import FeaturePoints, Segmentation, adjacent_parts, segment
 from eigenshape.geometry.facets import facet_components, facet_table
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
@@ -16,7 +16,7 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
 from eigenshape.spectral.signatures.heat import heat_kernel_signature
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 
 def dumbbell(neck=0.25):
@@ -72,7 +72,7 @@ def brute_force_merging(mesh, spectrum, time):
     decay = np.exp(-time * area * spectrum.eigenvalues)
     faces = (spectrum.eigenvectors * decay)[mesh.faces].mean(axis=1)
     prices = []
-    while len(touching := touching_parts(mesh, labels)):
+    while len(touching := adjacent_parts(mesh, labels)):
 
         def price(pair):
             one, two = (labels == part for part in pair)
@@ -131,7 +131,9 @@ def test_a_human_has_a_head_four_limbs_and_a_torso(human):
 @pytest.mark.parametrize(("kind", "count"), [("biped", 7), ("quadruped", 6)])
 def test_as_many_parts_are_the_same_ones_in_another_pose(kind, count):
     found = [find_parts(make_creature(kind, pose, n_vertices=2000)) for pose in (0, 3)]
-    one, two = (smooth_boundaries(each.mesh, segment(each.tree, n_regions=count)).labels for each in found)
+    one, two = (
+        smooth_boundaries(each.mesh, segment(each.tree, n_regions=count)).labels for each in found
+    )
     assert disagreement(one, two) < 0.05
 
 
@@ -173,7 +175,9 @@ def cut_length(mesh, labels):
 
 def two_halves(mesh, ragged):
     centres = mesh.vertices[mesh.faces].mean(axis=1)
-    labels = (centres[:, 0] > ragged * np.sin(5 * np.arctan2(centres[:, 2], centres[:, 1]))).astype(np.int64)
+    labels = (centres[:, 0] > ragged * np.sin(5 * np.arctan2(centres[:, 2], centres[:, 1]))).astype(
+        np.int64
+    )
     tips = np.array([mesh.vertices[:, 0].argmin(), mesh.vertices[:, 0].argmax()])
     return Segmentation(labels, FeaturePoints(tips, np.ones(2), np.array([np.inf, 0.5])))
 
@@ -192,7 +196,7 @@ def test_no_cut_in_the_band_costs_less():
     mesh = dumbbell()
     before = two_halves(mesh, 0.25)
     after = smooth_boundaries(mesh, before).labels
-    network = boundaries._network(mesh)
+    network = boundaries._build_network(mesh)
 
     def cost(labels):
         return network.costs[labels[network.pairs[:, 0]] != labels[network.pairs[:, 1]]].sum()
@@ -210,20 +214,29 @@ def test_smooth_parts_stay_whole_and_keep_their_feature_points(human):
     raw = segment(human.tree, n_regions=12)
     smooth = smooth_boundaries(human.mesh, raw)
     for part in range(12):
-        assert n_pieces(human.mesh, smooth.labels == part) == n_pieces(human.mesh, raw.labels == part) == 1
+        assert (
+            n_pieces(human.mesh, smooth.labels == part)
+            == n_pieces(human.mesh, raw.labels == part)
+            == 1
+        )
         around = (human.mesh.faces == smooth.features.vertices[part]).any(axis=1)
         assert (smooth.labels[around & (raw.labels == part)] == part).all()
 
 
-def test_touching_parts_of_a_strip():
+def test_adjacent_parts_of_a_strip():
     mesh = grid(7, 2)
-    labels = np.minimum((mesh.vertices[mesh.faces].mean(axis=1)[:, 0] * 3.0001 / np.ptp(mesh.vertices[:, 0])), 2)
-    assert touching_parts(mesh, labels.astype(np.int64)).tolist() == [[0, 1], [1, 2]]
+    labels = np.minimum(
+        (mesh.vertices[mesh.faces].mean(axis=1)[:, 0] * 3.0001 / np.ptp(mesh.vertices[:, 0])), 2
+    )
+    assert adjacent_parts(mesh, labels.astype(np.int64)).tolist() == [[0, 1], [1, 2]]
 
 
 def test_a_spectrum_of_another_shape_is_refused():
     spectrum = solve_spectrum(cotangent_laplacian(icosphere(1)), 5)
-    with pytest.raises(InvalidParameterError, match=r"spectrum must be of the mesh; it has 42 points for 162 vertices"):
+    with pytest.raises(
+        InvalidParameterError,
+        match=r"spectrum must be of the mesh; it has 42 points for 162 vertices",
+    ):
         part_tree(icosphere(2), spectrum)
 
 
@@ -238,6 +251,8 @@ def test_times_widths_and_modes_must_be_positive():
 
 
 def test_a_face_without_area_is_refused():
-    flat = TriangleMesh(np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 1, 3]]))
+    flat = TriangleMesh(
+        np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 1, 3]])
+    )
     with pytest.raises(InvalidShapeError, match="area"):
         find_parts(flat)

@@ -6,23 +6,23 @@ from eigenshape._errors import InvalidParameterError, InvalidShapeError
 
 
 def test_on_a_sphere_it_is_a_quarter_turn():
-    found = es.average_geodesic_distance(es.icosphere(4))
+    found = es.geometry.average_geodesic_distance(es.icosphere(4))
     np.testing.assert_allclose(found, np.pi / 2, rtol=0.006)
     assert found.std() < 0.002
 
 
 def test_with_all_bases_it_is_the_weighted_mean_of_all_distances():
-    mesh = es.torus(14, 9)
-    areas = es.dual_volumes(mesh)
-    rows = es.geodesic_distances(mesh, np.arange(mesh.n_vertices))
-    found = es.average_geodesic_distance(mesh, n_bases=10**6)
+    mesh = es.shapes.torus(14, 9)
+    areas = es.geometry.dual_volumes(mesh)
+    rows = es.geometry.geodesic_distances(mesh, np.arange(mesh.n_vertices))
+    found = es.geometry.average_geodesic_distance(mesh, n_bases=10**6)
     np.testing.assert_allclose(found, areas @ rows / areas.sum(), rtol=1e-12)
 
 
 def test_on_a_square_it_is_the_mean_of_straight_lines():
     # From the centre of a unit square (√2 + ln(1 + √2)) / 6, from a corner twice that.
-    mesh = es.grid(24, 24)
-    found = es.average_geodesic_distance(mesh, n_bases=mesh.n_vertices)
+    mesh = es.shapes.grid(24, 24)
+    found = es.geometry.average_geodesic_distance(mesh, n_bases=mesh.n_vertices)
     exact = (np.sqrt(2) + np.log(1 + np.sqrt(2))) / 6
     centre = np.abs(mesh.vertices[:, :2] - 0.5).max(axis=1) < 1e-9
     corner = (mesh.vertices[:, :2] == 0).all(axis=1)
@@ -33,22 +33,28 @@ def test_on_a_square_it_is_the_mean_of_straight_lines():
 
 @pytest.mark.long
 def test_a_sample_of_bases_comes_near():
-    mesh = es.torus(60, 30)
-    exact = es.average_geodesic_distance(mesh, n_bases=mesh.n_vertices)
-    errors = [np.abs(es.average_geodesic_distance(mesh, n_bases=n) / exact - 1).max() for n in (20, 150)]
+    mesh = es.shapes.torus(60, 30)
+    exact = es.geometry.average_geodesic_distance(mesh, n_bases=mesh.n_vertices)
+    errors = [
+        np.abs(es.geometry.average_geodesic_distance(mesh, n_bases=n) / exact - 1).max()
+        for n in (20, 150)
+    ]
     assert errors[1] < errors[0]
     assert errors[1] < 0.02
 
 
 def test_it_scales_exactly():
-    mesh = es.torus(12, 8)
+    mesh = es.shapes.torus(12, 8)
     scaled = es.TriangleMesh(mesh.vertices * 2.0**300, mesh.faces)
-    assert np.array_equal(es.average_geodesic_distance(scaled), es.average_geodesic_distance(mesh) * 2.0**300)
+    assert np.array_equal(
+        es.geometry.average_geodesic_distance(scaled),
+        es.geometry.average_geodesic_distance(mesh) * 2.0**300,
+    )
 
 
 def test_distances_from_sources():
-    mesh = es.disjoint_union(es.grid(6, 6), es.icosphere(1))
-    found = es.geodesic_distances(mesh, [0, 48])
+    mesh = es.shapes.disjoint_union(es.shapes.grid(6, 6), es.icosphere(1))
+    found = es.geometry.geodesic_distances(mesh, [0, 48])
     flat = mesh.vertices[:49]
     np.testing.assert_allclose(found[0, :49], np.linalg.norm(flat - flat[0], axis=1), rtol=1e-12)
     assert np.isinf(found[:, 49:]).all()
@@ -56,12 +62,12 @@ def test_distances_from_sources():
 
 
 def test_bad_input_is_named():
-    pieces = es.disjoint_union(es.grid(1, 1), es.icosphere(0))
+    pieces = es.shapes.disjoint_union(es.shapes.grid(1, 1), es.icosphere(0))
     with pytest.raises(InvalidShapeError, match="need one piece; the mesh has 2 components"):
-        es.average_geodesic_distance(pieces)
+        es.geometry.average_geodesic_distance(pieces)
     with pytest.raises(InvalidParameterError, match="n_bases must be at least 1; it is 0"):
-        es.average_geodesic_distance(es.grid(1, 1), n_bases=0)
+        es.geometry.average_geodesic_distance(es.shapes.grid(1, 1), n_bases=0)
     with pytest.raises(InvalidParameterError, match=r"A source must lie in 0\.\.3; it is 4"):
-        es.geodesic_distances(es.grid(1, 1), [4])
+        es.geometry.geodesic_distances(es.shapes.grid(1, 1), [4])
     with pytest.raises(InvalidShapeError, match="this mesh has dimension 1"):
-        es.geodesic_distances(es.interval(3), [0])
+        es.geometry.geodesic_distances(es.shapes.interval(3), [0])

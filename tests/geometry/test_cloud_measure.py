@@ -45,7 +45,9 @@ def test_the_sphere_has_its_area_and_each_point_its_cell(mesh, lost, spread):
 def test_flat_torus_three_sphere_and_a_curve():
     angles = 2 * np.pi * np.random.default_rng(0).random((3000, 2))
     torus = np.column_stack([np.cos(angles), np.sin(angles)])
-    assert cloud_quadrature(PointCloud(torus)).weights.sum() == pytest.approx(4 * np.pi**2, rel=0.01)
+    assert cloud_quadrature(PointCloud(torus)).weights.sum() == pytest.approx(
+        4 * np.pi**2, rel=0.01
+    )
     volume = cloud_quadrature(PointCloud(three_sphere(600).points, 3)).weights.sum()
     assert volume == pytest.approx(2 * np.pi**2, rel=0.06)
     turn = np.sort(2 * np.pi * np.random.default_rng(0).random(500))
@@ -63,7 +65,9 @@ def test_units_scale_exactly(size):
 
 def test_neighbours_that_do_not_span_are_named():
     line = np.column_stack([np.arange(40.0), np.zeros(40), np.zeros(40)])
-    with pytest.raises(InvalidShapeError, match=r"must span 2 dimensions; those of point 0 at \[0\.0, 0"):
+    with pytest.raises(
+        InvalidShapeError, match=r"must span 2 dimensions; those of point 0 at \[0\.0, 0"
+    ):
         cloud_quadrature(PointCloud(line))
 
 
@@ -71,20 +75,24 @@ def test_equal_points_are_named():
     points = np.random.default_rng(0).random((50, 3))
     points[40] = points[7]
     with pytest.raises(
-        InvalidShapeError, match=r"Points must differ; points 7 and 40 are both .* \(2 such\)\. Try repair\(cloud,"
+        InvalidShapeError,
+        match=r"Points must differ; points 7 and 40 are both .* \(2 such\)\. Try repair\(cloud,",
     ):
         cloud_quadrature(PointCloud(points))
 
 
 def test_too_few_points_and_neighbours_are_refused():
-    with pytest.raises(InvalidShapeError, match="A cloud of dimension 2 needs over 3 points; it has 3"):
+    with pytest.raises(
+        InvalidShapeError, match="A cloud of dimension 2 needs over 3 points; it has 3"
+    ):
         cloud_quadrature(PointCloud(np.eye(3)))
     with pytest.raises(InvalidParameterError, match=r"n_neighbors must lie in 3\.\.49; it is 2"):
         cloud_quadrature(PointCloud(np.random.default_rng(0).random((50, 3))), n_neighbors=2)
 
 
 @pytest.mark.parametrize(
-    ("dim", "n"), [(1, 12), (1, 24), (2, 12), (2, 24), (3, 12), pytest.param(3, 24, marks=pytest.mark.long)]
+    ("dim", "n"),
+    [(1, 12), (1, 24), (2, 12), (2, 24), (3, 12), pytest.param(3, 24, marks=pytest.mark.long)],
 )
 def test_regular_lattices_have_the_measure_of_their_torus(n, dim):
     turns = np.stack(np.meshgrid(*[2 * np.pi * np.arange(n) / n] * dim), axis=-1).reshape(-1, dim)

@@ -54,10 +54,16 @@ def test_a_shape_stays_what_it_is():
     [
         ("cat.ply", r"it is a str \('cat\.ply'\)\. Pass read_mesh\('cat\.ply'\)\."),
         (Path("cat.ply"), r"it is a PosixPath \('cat\.ply'\)\. Pass read_mesh\('cat\.ply'\)\."),
-        (PointCloud(MESH.vertices), r"it is a PointCloud\. A cloud has no faces; point_cloud_laplacian\(cloud\)"),
+        (
+            PointCloud(MESH.vertices),
+            r"it is a PointCloud\. A cloud has no faces; point_cloud_laplacian\(cloud\)",
+        ),
         (box(1, 1, 1), r"it is a SimplicialMesh\. Pass boundary_surface\(mesh\)"),
         (FLAT, r"it is a SimplicialMesh\. Pass TriangleMesh\(numpy\.pad"),
-        (circle(5), r"it is a SimplicialMesh\. cotangent_laplacian\(mesh\) and edge_graph\(mesh\) take"),
+        (
+            circle(5),
+            r"it is a SimplicialMesh\. cotangent_laplacian\(mesh\) and edge_graph\(mesh\) take",
+        ),
         (weld(MESH), r"it is a Repaired\. Pass its attribute mesh\."),
         (MESH.vertices, r"it is an ndarray\. Pass PointCloud\(points, dim=2\) if it is points"),
         (trimesh.Scene(to_trimesh(MESH)), r"it is a Scene\. Pass scene\.to_mesh\(\)"),
@@ -74,11 +80,20 @@ def test_everything_else_is_refused_by_its_type_with_what_to_pass(value, fact):
 
 
 def test_shapes_of_other_kinds_are_refused():
-    with pytest.raises(InvalidParameterError, match=r"mesh must be a mesh; it is a PointCloud\. A cloud has no faces"):
+    with pytest.raises(
+        InvalidParameterError,
+        match=r"mesh must be a mesh; it is a PointCloud\. A cloud has no faces",
+    ):
         as_simplicial(PointCloud(MESH.vertices))
-    with pytest.raises(InvalidParameterError, match=r"mesh must be a mesh; it is a str \('a\.msh'\)\. Pass read_shape"):
+    with pytest.raises(
+        InvalidParameterError,
+        match=r"mesh must be a mesh; it is a str \('a\.msh'\)\. Pass read_shape",
+    ):
         as_simplicial("a.msh")
-    with pytest.raises(InvalidParameterError, match=r"shape must be a mesh or a cloud of points; it is None\. Pass a"):
+    with pytest.raises(
+        InvalidParameterError,
+        match=r"shape must be a mesh or a cloud of points; it is None\. Pass a",
+    ):
         as_shape(None)
 
 
@@ -92,7 +107,8 @@ def test_what_the_messages_tell_to_pass_is_a_mesh():
 
 def test_rows_of_four_indices_must_be_said_to_be_tetrahedra_or_quads():
     with pytest.raises(
-        InvalidParameterError, match=r"Rows of four .* it must be said which; .*cells='tetrahedra'\) or"
+        InvalidParameterError,
+        match=r"Rows of four .* it must be said which; .*cells='tetrahedra'\) or",
     ):
         from_arrays(SQUARE, [[0, 1, 2, 3]])
     with pytest.raises(InvalidParameterError, match="Rows of four indices are tetrahedra or quads"):
@@ -107,9 +123,14 @@ def test_rows_of_four_indices_must_be_said_to_be_tetrahedra_or_quads():
 
 
 def test_cells_are_said_of_rows_of_four_alone():
-    with pytest.raises(InvalidParameterError, match=r"cells is for rows of four indices; cells is 'quads' and rows of"):
+    with pytest.raises(
+        InvalidParameterError,
+        match=r"cells is for rows of four indices; cells is 'quads' and rows of",
+    ):
         from_arrays(MESH.vertices, MESH.faces, cells="quads")
-    with pytest.raises(InvalidParameterError, match="cells must be 'tetrahedra' or 'quads'; it is 'prisms'"):
+    with pytest.raises(
+        InvalidParameterError, match="cells must be 'tetrahedra' or 'quads'; it is 'prisms'"
+    ):
         es.geometry.conversion.from_arrays.__wrapped__(SQUARE, [[0, 1, 2, 3]], cells="prisms")
     with pytest.raises(InvalidShapeError, match="the rows differ in length"):
         from_arrays(SQUARE, [[0, 1, 2, 3], [0, 1, 2]])
@@ -118,13 +139,20 @@ def test_cells_are_said_of_rows_of_four_alone():
 @pytest.mark.parametrize("scale", [1.0, 1e-90, 1e90])
 def test_the_surface_around_tetrahedra_looks_outward(scale):
     solid = box(3, 2, 4)
-    turned = np.where(np.arange(len(solid.simplices))[:, None] % 2, solid.simplices, solid.simplices[:, ::-1])
+    turned = np.where(
+        np.arange(len(solid.simplices))[:, None] % 2, solid.simplices, solid.simplices[:, ::-1]
+    )
     surface = boundary_surface(SimplicialMesh(scale * solid.points, turned))
     assert is_closed(surface)
-    assert enclosed_volume(TriangleMesh(surface.vertices / scale, surface.faces)) == pytest.approx(1)
+    assert enclosed_volume(TriangleMesh(surface.vertices / scale, surface.faces)) == pytest.approx(
+        1
+    )
     assert surface.n_vertices == 4 * 3 * 5 - 2 * 1 * 3
 
 
 def test_only_tetrahedra_have_a_surface_around_them():
-    with pytest.raises(InvalidShapeError, match=r"Only tetrahedra in R\^3 have a surface around them; the mesh is a"):
+    with pytest.raises(
+        InvalidShapeError,
+        match=r"Only tetrahedra in R\^3 have a surface around them; the mesh is a",
+    ):
         boundary_surface(MESH)

@@ -35,7 +35,10 @@ def pairs(vertices, faces):
 
 def half(corners, normal, level):
     """Cut a polygon to the side of a plane where normal · x >= level, exactly."""
-    kept, heights = [], [sum(n * x for n, x in zip(normal, corner, strict=True)) - level for corner in corners]
+    kept, heights = (
+        [],
+        [sum(n * x for n, x in zip(normal, corner, strict=True)) - level for corner in corners],
+    )
     for k, (p, at_p) in enumerate(zip(corners, heights, strict=True)):
         q, at_q = corners[k - 1], heights[k - 1]
         if at_p * at_q < 0:
@@ -145,7 +148,9 @@ def test_lattices_and_rounded_lattices_do_cross_and_do_not():
     turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
     for _ in range(10):
         vertices, faces = rng.integers(-1, 2, (12, 3)), rng.integers(0, 12, (14, 3))
-        found += assert_as_by_fractions(vertices, faces) + assert_as_by_fractions(vertices @ turn, faces)
+        found += assert_as_by_fractions(vertices, faces) + assert_as_by_fractions(
+            vertices @ turn, faces
+        )
     assert 100 < found < 20 * 91 - 100
 
 
@@ -169,7 +174,8 @@ def test_boxes_that_touch_and_boxes_that_overlap():
     inside = cube(0.25, 0.75)
     assert not self_intersections(disjoint_union(cube(), inside)).size
     at_corner, at_side, beside = (
-        TriangleMesh(cube().vertices + move, CUBE_FACES) for move in ([1, 1, 1], [1, 1, 0], [1, 0.5, 0])
+        TriangleMesh(cube().vertices + move, CUBE_FACES)
+        for move in ([1, 1, 1], [1, 1, 0], [1, 0.5, 0])
     )
     assert not self_intersections(disjoint_union(cube(), at_corner)).size
     assert not self_intersections(disjoint_union(cube(), at_side)).size
@@ -214,7 +220,9 @@ def test_faces_at_one_vertex():
     faces = [[0, 1, 2], [0, 3, 4]]
     assert pairs([*a, [1, 0, 1], [1, 0, -1]], faces) == [[0, 1]]  # the side across goes through
     assert not pairs([*a, [3, 0, 1], [3, 3, 0]], faces)
-    assert pairs([*a, [3, 0, 1], [3, 0, -1]], faces) == [[0, 1]]  # its side across goes through the other
+    assert pairs([*a, [3, 0, 1], [3, 0, -1]], faces) == [
+        [0, 1]
+    ]  # its side across goes through the other
     assert pairs([*a, [1, 0, 1], [1, 0, 0]], faces) == [[0, 1]]  # a side within
     assert not pairs([*a, [1, 0.5, 1], [1, 0.5, 0]], faces)  # a side upon a side
     assert pairs([*a, [1, 0, 0], [1, 3, 0]], faces) == [[0, 1]]  # folded into one plane
@@ -240,7 +248,9 @@ def test_faces_without_area_cross_what_they_reach_the_inside_of():
     assert not pairs([*floor, [-1, 0, 0], [9, 0, 0], [2, 0, 0]], faces)
     assert not pairs([*floor, [0, 0, 0], [0, 0, 0], [0, 0, 0]], faces)
     assert not pairs([[0, 0, 0], [1, 1, 1], [2, 2, 2]], [[0, 1, 2], [1, 2, 0], [0, 0, 0]])
-    assert not pairs([*floor, [2, 0, 0]], [[0, 3, 2], [3, 1, 2], [0, 1, 3]])  # a sliver between others at one side
+    assert not pairs(
+        [*floor, [2, 0, 0]], [[0, 3, 2], [3, 1, 2], [0, 1, 3]]
+    )  # a sliver between others at one side
 
 
 def test_a_face_twice_is_an_overlap():
@@ -252,7 +262,9 @@ def test_a_face_twice_is_an_overlap():
 @pytest.mark.parametrize("shape", [icosphere(3), torus(40, 20), torus(41, 3), grid(30, 20), cube()])
 def test_clean_shapes_have_none_nor_have_their_loose_faces(shape):
     assert self_intersections(shape).shape == (0, 2)
-    loose = TriangleMesh(shape.vertices[shape.faces].reshape(-1, 3), np.arange(3 * shape.n_faces).reshape(-1, 3))
+    loose = TriangleMesh(
+        shape.vertices[shape.faces].reshape(-1, 3), np.arange(3 * shape.n_faces).reshape(-1, 3)
+    )
     assert self_intersections(loose).shape == (0, 2)
 
 
@@ -303,7 +315,9 @@ def test_names_change_nothing_on_a_lattice(seed):
     vertices, faces = rng.integers(-2, 3, (40, 3)).astype(float), rng.integers(0, 40, (60, 3))
     order = rng.permutation(60)
     shuffled = TriangleMesh(vertices, np.stack([rng.permutation(face) for face in faces[order]]))
-    assert as_set(order[self_intersections(shuffled)]) == as_set(self_intersections(TriangleMesh(vertices, faces)))
+    assert as_set(order[self_intersections(shuffled)]) == as_set(
+        self_intersections(TriangleMesh(vertices, faces))
+    )
 
 
 @settings(max_examples=10, deadline=None)
@@ -332,7 +346,9 @@ def test_pairs_are_ascending_and_once():
 
 
 def test_loose_vertices_and_one_face_are_no_matter():
-    assert self_intersections(TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])).shape == (0, 2)
+    assert self_intersections(
+        TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    ).shape == (0, 2)
     mesh = crossed()
     far = TriangleMesh(np.concatenate([mesh.vertices, [[1e300, 0, 0]]]), mesh.faces)
     np.testing.assert_array_equal(self_intersections(far), self_intersections(mesh))

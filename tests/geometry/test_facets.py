@@ -8,11 +8,15 @@ from eigenshape.geometry.topology import boundary_facets, edge_table
 from eigenshape.shapes.domains import ball, box, interval
 from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
 
-BOWTIE = TriangleMesh([[0, 0, 0], [1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]], [[0, 1, 2], [4, 3, 0]])
+BOWTIE = TriangleMesh(
+    [[0, 0, 0], [1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]], [[0, 1, 2], [4, 3, 0]]
+)
 
 
 def test_two_triangles_by_hand():
-    table = facet_table(TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [3, 0, 2]]))
+    table = facet_table(
+        TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [3, 0, 2]])
+    )
     assert table.facets.tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [2, 3]]
     assert table.simplex_facets.tolist() == [[3, 1, 0], [1, 4, 2]]
     assert table.n_simplices.tolist() == [1, 2, 1, 1, 1]
@@ -38,7 +42,9 @@ def test_a_facet_lies_opposite_to_its_corner(mesh):
 
 
 def test_three_triangles_may_share_a_facet():
-    book = TriangleMesh([[0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0]], [[0, 1, 2], [0, 1, 3], [0, 1, 4]])
+    book = TriangleMesh(
+        [[0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0]], [[0, 1, 2], [0, 1, 3], [0, 1, 4]]
+    )
     table = facet_table(book)
     assert table.n_simplices.tolist() == [3, 1, 1, 1, 1, 1, 1]
     assert facet_components(table)[0] == 1
@@ -59,7 +65,9 @@ def test_what_touches_in_an_edge_of_tetrahedra_is_apart():
     assert without_pinches(mesh).n_points == 8
 
 
-@pytest.mark.parametrize("mesh", [interval(4), icosphere(1), ball(4), disjoint_union(grid(2, 2), icosphere(0))])
+@pytest.mark.parametrize(
+    "mesh", [interval(4), icosphere(1), ball(4), disjoint_union(grid(2, 2), icosphere(0))]
+)
 def test_sound_meshes_keep_their_points(mesh):
     opened = without_pinches(mesh)
     np.testing.assert_array_equal(opened.points, mesh.points)

@@ -6,7 +6,11 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import Delaunay
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape.geometry.geodesic import geodesic_balls, geodesic_distance_to_set, geodesic_distances
+from eigenshape.geometry.geodesic import (
+    geodesic_balls,
+    geodesic_distance_to_set,
+    geodesic_distances,
+)
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
@@ -64,7 +68,9 @@ def _edge_lengths(mesh):
     lengths = np.full((mesh.n_vertices,) * 2, np.inf)
     for a, b in ((0, 1), (1, 2), (2, 0)):
         ends = mesh.faces[:, a], mesh.faces[:, b]
-        lengths[ends] = lengths[ends[::-1]] = np.linalg.norm(mesh.vertices[ends[0]] - mesh.vertices[ends[1]], axis=1)
+        lengths[ends] = lengths[ends[::-1]] = np.linalg.norm(
+            mesh.vertices[ends[0]] - mesh.vertices[ends[1]], axis=1
+        )
     return lengths
 
 
@@ -87,7 +93,9 @@ def test_it_is_symmetric_and_the_same_in_five_dimensions():
 
 
 def test_curves_and_bad_radii_are_refused():
-    with pytest.raises(InvalidShapeError, match="are measured on surfaces; this mesh has dimension 1"):
+    with pytest.raises(
+        InvalidShapeError, match="are measured on surfaces; this mesh has dimension 1"
+    ):
         geodesic_balls(SimplicialMesh([[0.0], [1.0]], [[0, 1]]), 1.0)
     with pytest.raises(InvalidParameterError, match="radius must be positive and finite"):
         geodesic_balls(icosphere(1), 0.0)
@@ -103,7 +111,9 @@ def test_from_a_line_on_a_grid_the_way_is_straight(place):
 
 def test_from_a_line_through_irregular_triangles_it_is_straight_up_to_few_per_cent():
     rng = np.random.default_rng(0)
-    flat = np.vstack([rng.random((2000, 2)), np.column_stack([np.full(60, 0.5), np.linspace(0, 1, 60)])])
+    flat = np.vstack(
+        [rng.random((2000, 2)), np.column_stack([np.full(60, 0.5), np.linspace(0, 1, 60)])]
+    )
     mesh = TriangleMesh(np.pad(flat, ((0, 0), (0, 1))), Delaunay(flat).simplices)
     away = np.abs(flat[:2000, 0] - 0.5)
     ratio = geodesic_distance_to_set(mesh, np.arange(2000, 2060))[:2000] / away
@@ -114,21 +124,31 @@ def test_from_a_line_through_irregular_triangles_it_is_straight_up_to_few_per_ce
 
 def test_one_source_is_a_set():
     mesh = icosphere(3)
-    np.testing.assert_array_equal(geodesic_distance_to_set(mesh, [7]), geodesic_distances(mesh, [7])[0])
+    np.testing.assert_array_equal(
+        geodesic_distance_to_set(mesh, [7]), geodesic_distances(mesh, [7])[0]
+    )
 
 
 def test_from_far_sources_it_is_the_least_of_their_distances():
     mesh = icosphere(3)
     sources = [0, 1, 2, 3]  # corners of the icosahedron
-    found, least = geodesic_distance_to_set(mesh, sources), geodesic_distances(mesh, sources).min(axis=0)
+    found, least = (
+        geodesic_distance_to_set(mesh, sources),
+        geodesic_distances(mesh, sources).min(axis=0),
+    )
     assert (found[sources] == 0).all()
-    np.testing.assert_allclose(found, least, rtol=0.03)  # half-way between two the front counts as straight
+    np.testing.assert_allclose(
+        found, least, rtol=0.03
+    )  # half-way between two the front counts as straight
     np.testing.assert_array_equal(found, geodesic_distance_to_set(mesh, [3, 2, 2, 1, 0]))
 
 
 def test_beyond_the_reach_it_is_infinite():
     mesh = icosphere(3)
-    whole, near = geodesic_distance_to_set(mesh, [0, 9]), geodesic_distance_to_set(mesh, [0, 9], reach=0.5)
+    whole, near = (
+        geodesic_distance_to_set(mesh, [0, 9]),
+        geodesic_distance_to_set(mesh, [0, 9], reach=0.5),
+    )
     np.testing.assert_array_equal(near, np.where(whole <= 0.5, whole, np.inf))
     assert 2 < np.isfinite(near).sum() < mesh.n_vertices
 
@@ -150,7 +170,9 @@ def test_units_change_no_distance_from_a_set(size):
 def test_sources_must_be_vertices_of_a_surface():
     with pytest.raises(InvalidParameterError, match=r"A source must lie in 0\.\.41; it is 42"):
         geodesic_distance_to_set(icosphere(1), [3, 42])
-    with pytest.raises(InvalidShapeError, match="are measured on surfaces; this mesh has dimension 1"):
+    with pytest.raises(
+        InvalidShapeError, match="are measured on surfaces; this mesh has dimension 1"
+    ):
         geodesic_distance_to_set(SimplicialMesh([[0.0], [1.0]], [[0, 1]]), [0])
 
 

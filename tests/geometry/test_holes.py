@@ -27,7 +27,8 @@ def capped(level, height, scale=1.0):
     """Cut caps off a sphere, above and below."""
     ball = icosphere(level)
     return without(
-        TriangleMesh(scale * ball.vertices, ball.faces), np.abs(ball.vertices[ball.faces, 2]).max(1) < height
+        TriangleMesh(scale * ball.vertices, ball.faces),
+        np.abs(ball.vertices[ball.faces, 2]).max(1) < height,
     )
 
 
@@ -56,7 +57,11 @@ def test_caps_are_flat(scale):
     caps = surface_area(TriangleMesh(done.mesh.vertices / scale, done.mesh.faces[open_.n_faces :]))
     disc = np.pi * (1 - (open_.vertices[open_.faces, 2].max() / scale) ** 2)
     ball = icosphere(4)
-    assert 2 * disc < caps < surface_area(ball) - surface_area(TriangleMesh(ball.vertices, open_.faces))
+    assert (
+        2 * disc
+        < caps
+        < surface_area(ball) - surface_area(TriangleMesh(ball.vertices, open_.faces))
+    )
 
 
 def test_one_face_comes_back():
@@ -89,8 +94,12 @@ def test_what_is_left_is_told():
     done = seal_holes(both, most_edges=12)
     assert "left 2 of more than 12 edges" in done.report[0]
     triangle = TriangleMesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-    flat = seal_holes(TriangleMesh([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]], [[0, 1, 3], [1, 2, 3]]))
-    assert flat.report == ("seal_holes closed 0 holes with 0 faces, left 1 that good faces do not close",)
+    flat = seal_holes(
+        TriangleMesh([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]], [[0, 1, 3], [1, 2, 3]])
+    )
+    assert flat.report == (
+        "seal_holes closed 0 holes with 0 faces, left 1 that good faces do not close",
+    )
     assert seal_holes(triangle).mesh.n_faces == 1  # the second would be the same face, turned over
     assert seal_holes(torus(8, 6)).report == ("seal_holes closed 0 holes with 0 faces",)
 
@@ -105,7 +114,10 @@ def test_turned_faces_leave_open_chains_alone():
 
 def test_it_is_a_repair_by_name_and_refuses_nonsense():
     assert repair(capped(2, 0.9), ["seal_holes"]).report[0].startswith("seal_holes closed 2 holes")
-    with pytest.raises(InvalidParameterError, match="most_edges must be at least 3, the sides of a triangle; it is 2"):
+    with pytest.raises(
+        InvalidParameterError,
+        match="most_edges must be at least 3, the sides of a triangle; it is 2",
+    ):
         seal_holes(icosphere(1), most_edges=2)
 
 

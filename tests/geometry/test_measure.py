@@ -45,7 +45,9 @@ def test_a_cube_at_any_scale(scale):
 @pytest.mark.parametrize("scale", SCALES)
 def test_normals_of_a_cube_point_outward(scale):
     cube = scaled(CUBE, scale)
-    expected = np.repeat([[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]], 2, axis=0)
+    expected = np.repeat(
+        [[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]], 2, axis=0
+    )
     np.testing.assert_allclose(face_normals(cube), expected, atol=1e-15)
     # Corners 0 and 7 have two faces on each side; corner 4 = (1, 0, 0) has areas 2, 1, 1 at x, y, z.
     normals = vertex_normals(cube)
@@ -87,7 +89,9 @@ def test_all_points_equal_have_no_size():
 
 
 def test_the_box_is_around_loose_vertices_too():
-    low, high = bounding_box(TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [-5, 0, 7]], [[0, 1, 2]]))
+    low, high = bounding_box(
+        TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [-5, 0, 7]], [[0, 1, 2]])
+    )
     assert low.tolist() == [-5, 0, 0]
     assert high.tolist() == [1, 1, 7]
 
@@ -100,7 +104,12 @@ def test_normals_are_zero_where_there_is_no_area():
 
 @pytest.mark.parametrize("scale", SCALES)
 def test_a_face_without_area_is_refused(scale):
-    mesh = scaled(TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 0, 0]], [[0, 1, 2], [0, 1, 3], [1, 1, 2]]), scale)
+    mesh = scaled(
+        TriangleMesh(
+            [[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 0, 0]], [[0, 1, 2], [0, 1, 3], [1, 1, 2]]
+        ),
+        scale,
+    )
     assert degenerate_simplices(mesh).tolist() == [1, 2]
     with pytest.raises(
         InvalidShapeError,
@@ -111,22 +120,33 @@ def test_a_face_without_area_is_refused(scale):
 
 @pytest.mark.parametrize("points", [np.ones((3, 3)), [[0, 0, 0], [1, 1, 1], [3, 3, 3]]])
 def test_a_mesh_without_any_area_is_refused(points):
-    with pytest.raises(InvalidShapeError, match="all 1 have none: their points are equal or on a line"):
+    with pytest.raises(
+        InvalidShapeError, match="all 1 have none: their points are equal or on a line"
+    ):
         require_volumes(TriangleMesh(points, [[0, 1, 2]]))
 
 
 def test_a_thin_face_still_has_area():
-    assert degenerate_simplices(TriangleMesh([[0, 0, 0], [1, 0, 0], [0.5, 1e-13, 0]], [[0, 1, 2]])).size == 0
+    assert (
+        degenerate_simplices(
+            TriangleMesh([[0, 0, 0], [1, 0, 0], [0.5, 1e-13, 0]], [[0, 1, 2]])
+        ).size
+        == 0
+    )
 
 
 @pytest.mark.parametrize("size", [1e300, 1e160, 1e-160, 1e-300])
 def test_areas_and_volumes_that_floats_cannot_hold_are_refused(size):
     cube = scaled(CUBE, size)
     with pytest.raises(
-        InvalidShapeError, match=r"areas the largest coordinate must lie within 1e-150\.\.1e150; it is about [79]e[+-]"
+        InvalidShapeError,
+        match=r"areas the largest coordinate must lie within 1e-150\.\.1e150; it is about [79]e[+-]",
     ):
         face_areas(cube)
-    with pytest.raises(InvalidShapeError, match=r"volumes .* must lie within 1e-100\.\.1e100; it is about [79]e[+-]"):
+    with pytest.raises(
+        InvalidShapeError,
+        match=r"volumes .* must lie within 1e-100\.\.1e100; it is about [79]e[+-]",
+    ):
         enclosed_volume(cube)
     np.testing.assert_allclose(edge_lengths(cube).min(), size, rtol=1e-14)
     np.testing.assert_array_equal(face_normals(cube), face_normals(CUBE))
@@ -135,7 +155,10 @@ def test_areas_and_volumes_that_floats_cannot_hold_are_refused(size):
 
 def test_lengths_that_floats_cannot_hold_are_refused():
     wide = TriangleMesh([[1.7e308, 0, 0], [-1.7e308, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-    with pytest.raises(InvalidShapeError, match=r"To measure lengths .* 1e-301\.\.1e301; it is about 9e\+307\. Choose"):
+    with pytest.raises(
+        InvalidShapeError,
+        match=r"To measure lengths .* 1e-301\.\.1e301; it is about 9e\+307\. Choose",
+    ):
         edge_lengths(wide)
 
 
@@ -143,7 +166,9 @@ def test_a_face_is_measured_by_its_corners_alone():
     rng = np.random.default_rng(0)
     points = rng.random((9, 3))
     alone = TriangleMesh(points[:3], [[0, 1, 2]])
-    among = TriangleMesh(np.concatenate([points, [[1e300, 0, 0]]]), [[6, 7, 8], [0, 1, 2], [3, 4, 5]])
+    among = TriangleMesh(
+        np.concatenate([points, [[1e300, 0, 0]]]), [[6, 7, 8], [0, 1, 2], [3, 4, 5]]
+    )
     np.testing.assert_array_equal(face_areas(among)[1], face_areas(alone)[0])
     np.testing.assert_array_equal(face_normals(among)[1], face_normals(alone)[0])
 
@@ -152,5 +177,7 @@ def test_small_faces_on_a_slanted_line_are_found_in_a_large_mesh():
     rng = np.random.default_rng(0)
     for _ in range(300):
         corners, step = rng.integers(-500, 500, (4, 3)), rng.integers(1, 4, 3)
-        mesh = TriangleMesh([*corners, corners[3] + step, corners[3] + 3 * step], [[0, 1, 2], [3, 4, 5]])
+        mesh = TriangleMesh(
+            [*corners, corners[3] + step, corners[3] + 3 * step], [[0, 1, 2], [3, 4, 5]]
+        )
         assert degenerate_simplices(scaled(mesh, 0.1)).tolist() == [1]

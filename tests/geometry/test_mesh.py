@@ -44,7 +44,10 @@ def test_whole_numbers_of_any_type_index(kind):
 def test_coordinates_that_are_not_finite_are_refused(bad, shown, row):
     vertices = np.array(CORNERS)
     vertices[row, 1] = bad
-    refused(rf"vertices must be finite; vertex {row} is \[{vertices[row, 0]}, {shown}, .* \(1 such\)", vertices)
+    refused(
+        rf"vertices must be finite; vertex {row} is \[{vertices[row, 0]}, {shown}, .* \(1 such\)",
+        vertices,
+    )
 
 
 def test_all_rows_that_are_not_finite_are_counted():
@@ -66,12 +69,18 @@ def test_all_rows_that_are_not_finite_are_counted():
     ],
 )
 def test_an_index_out_of_range_is_refused(index, shown):
-    refused(rf"faces must index vertices 0\.\.3; face 1 is .*, {shown}\]", faces=[[0, 1, 2], [0, 1, index]])
+    refused(
+        rf"faces must index vertices 0\.\.3; face 1 is .*, {shown}\]",
+        faces=[[0, 1, 2], [0, 1, index]],
+    )
 
 
 @pytest.mark.parametrize(("entry", "shown"), [(1.5, r"1\.5"), (float("nan"), "nan")])
 def test_a_fraction_is_no_index(entry, shown):
-    refused(rf"faces must be whole numbers; face 1 is \[0\.0, 1\.0, {shown}\]", faces=[[0, 1, 2], [0, 1, entry]])
+    refused(
+        rf"faces must be whole numbers; face 1 is \[0\.0, 1\.0, {shown}\]",
+        faces=[[0, 1, 2], [0, 1, entry]],
+    )
 
 
 @pytest.mark.parametrize("empty", [[], np.empty((0, 3)), np.empty((3, 0))])
@@ -124,4 +133,6 @@ def test_whole_numbers_of_mixed_types_are_refused_by_value():
 
 @pytest.mark.parametrize("size", [1e300, 1e-300, 5e-324])
 def test_any_finite_size_is_a_mesh(size):
-    np.testing.assert_array_equal(TriangleMesh(np.array(CORNERS) * size, FACE).vertices, np.array(CORNERS) * size)
+    np.testing.assert_array_equal(
+        TriangleMesh(np.array(CORNERS) * size, FACE).vertices, np.array(CORNERS) * size
+    )

@@ -50,7 +50,10 @@ def test_powers_of_two_do_not_change_a_bit(normalize):
 
 @pytest.mark.parametrize("normalize", ALL)
 def test_a_point_has_no_size(normalize):
-    with pytest.raises(InvalidShapeError, match=r"must have a size to be normalised; its 3 vertices span 0\.0 of it"):
+    with pytest.raises(
+        InvalidShapeError,
+        match=r"must have a size to be normalised; its 3 vertices span 0\.0 of it",
+    ):
         normalize(POINT)
 
 
@@ -63,7 +66,9 @@ def test_a_line_has_length_and_no_area():
 
 def test_a_slanted_line_has_no_area():
     along = np.cumsum(np.random.default_rng(1).random(30))
-    slanted = TriangleMesh(np.outer(along, [0.345, 0.822, 0.331]), [[i, i + 1, i + 2] for i in range(28)])
+    slanted = TriangleMesh(
+        np.outer(along, [0.345, 0.822, 0.331]), [[i, i + 1, i + 2] for i in range(28)]
+    )
     with pytest.raises(InvalidShapeError, match=r"its 30 vertices span 0\.0 of it"):
         normalize_area(slanted)
     assert pdist(normalize_diameter(slanted).vertices).max() == pytest.approx(1, rel=1e-14)

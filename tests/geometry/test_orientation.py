@@ -9,8 +9,14 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.repair import orient, repair
 from eigenshape.operators.curvature import mean_curvature
-from eigenshape.retrieval.patches.patches import describe_patches
-from eigenshape.scans.partial import cut_by_planes, partial_scan, random_planes, rotation_towards, viewpoint
+from eigenshape.retrieval.patches.patches import surface_patches
+from eigenshape.scans.partial import (
+    cut_by_planes,
+    partial_scan,
+    random_planes,
+    rotation_towards,
+    viewpoint,
+)
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
 
@@ -54,7 +60,9 @@ def test_what_is_flat_has_no_outside():
     assert orient_outward(everted(flat)).faces.tolist() == everted(flat).faces.tolist()
 
 
-@pytest.mark.parametrize("mesh", [icosphere(2), torus(), make_creature("quadruped", n_vertices=1000)])
+@pytest.mark.parametrize(
+    "mesh", [icosphere(2), torus(), make_creature("quadruped", n_vertices=1000)]
+)
 @pytest.mark.parametrize("seed", range(3))
 def test_faces_turned_at_random_are_turned_back(mesh, seed):
     done = orient(flipped(mesh, np.random.default_rng(seed))).mesh
@@ -62,14 +70,19 @@ def test_faces_turned_at_random_are_turned_back(mesh, seed):
 
 
 def test_a_cavity_turns_with_what_is_around_it():
-    hollow = disjoint_union(icosphere(2), everted(TriangleMesh(0.5 * icosphere(1).vertices, icosphere(1).faces)))
+    hollow = disjoint_union(
+        icosphere(2), everted(TriangleMesh(0.5 * icosphere(1).vertices, icosphere(1).faces))
+    )
     assert orient(hollow).report == ("orient turned 0 faces over",)
     np.testing.assert_array_equal(orient(everted(hollow)).mesh.faces, hollow.faces)
     assert enclosed_volume(hollow) < enclosed_volume(icosphere(2)) - 0.4
 
 
 def test_pieces_beside_each_other_all_face_out():
-    ball, far = icosphere(2), TriangleMesh(icosphere(1).vertices + np.array([2.5, 0, 0]), icosphere(1).faces)
+    ball, far = (
+        icosphere(2),
+        TriangleMesh(icosphere(1).vertices + np.array([2.5, 0, 0]), icosphere(1).faces),
+    )
     done = orient(disjoint_union(everted(ball), far))
     np.testing.assert_array_equal(done.mesh.faces, disjoint_union(ball, far).faces)
     assert done.report == ("orient turned 320 faces over",)
@@ -79,15 +92,23 @@ def test_a_speck_of_any_size_has_a_side():
     ball = icosphere(1)
     speck = TriangleMesh(1e-110 * ball.vertices + np.array([3.0, 0, 0]) * 1e-110, ball.faces)
     done = orient(disjoint_union(ball, everted(speck)))
-    np.testing.assert_array_equal(done.mesh.faces, disjoint_union(ball, everted(speck)).faces)  # inside: a cavity
-    alone = orient(disjoint_union(TriangleMesh(ball.vertices + np.array([5.0, 0, 0]), ball.faces), everted(speck)))
+    np.testing.assert_array_equal(
+        done.mesh.faces, disjoint_union(ball, everted(speck)).faces
+    )  # inside: a cavity
+    alone = orient(
+        disjoint_union(
+            TriangleMesh(ball.vertices + np.array([5.0, 0, 0]), ball.faces), everted(speck)
+        )
+    )
     assert alone.report == ("orient turned 80 faces over",)
 
 
 def test_an_open_piece_is_turned_only_where_its_faces_disagreed():
     cap = cut_by_planes(icosphere(3), [[0, 0, -1, 0.2]]).mesh
     assert orient(everted(cap)).report == ("orient turned 0 faces over",)
-    np.testing.assert_array_equal(orient(flipped(everted(cap), np.random.default_rng(0))).mesh.faces, cap.faces)
+    np.testing.assert_array_equal(
+        orient(flipped(everted(cap), np.random.default_rng(0))).mesh.faces, cap.faces
+    )
 
 
 def test_a_pillow_without_volume_is_left():
@@ -98,9 +119,19 @@ def test_a_pillow_without_volume_is_left():
 
 def test_faces_that_disagree_have_no_outside():
     ball = flipped(icosphere(2), np.random.default_rng(0))
-    for needs in (orient_outward, enclosed_volume, vertex_normals, mean_curvature, describe_patches):
-        with pytest.raises(InvalidShapeError, match=r"Faces must be turned one way; .* Try repair\(mesh,"):
+    for needs in (
+        orient_outward,
+        enclosed_volume,
+        vertex_normals,
+        mean_curvature,
+        surface_patches,
+    ):
+        with pytest.raises(
+            InvalidShapeError, match=r"Faces must be turned one way; .* Try repair\(mesh,"
+        ):
             needs(ball)
         needs(repair(ball, ["auto"]).mesh)
-    with pytest.raises(InvalidShapeError, match="No repair helps: the piece of face 0 has one side only"):
+    with pytest.raises(
+        InvalidShapeError, match="No repair helps: the piece of face 0 has one side only"
+    ):
         vertex_normals(moebius())

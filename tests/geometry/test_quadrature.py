@@ -20,8 +20,12 @@ def test_polynomials_on_the_sphere_are_integrated_exactly():
     measure = sphere_quadrature(6)
     x, y, z = measure.points.T
     assert integral(measure, np.ones_like(x)) == pytest.approx(4 * np.pi, rel=1e-14)
-    assert integral(measure, x**2 * y**2 * z**4) == pytest.approx(4 * np.pi * 3 / (3 * 5 * 7 * 9), rel=1e-13)
-    assert integral(measure, x**4 * y**6) == pytest.approx(4 * np.pi * 3 * 15 / (3 * 5 * 7 * 9 * 11), rel=1e-13)
+    assert integral(measure, x**2 * y**2 * z**4) == pytest.approx(
+        4 * np.pi * 3 / (3 * 5 * 7 * 9), rel=1e-13
+    )
+    assert integral(measure, x**4 * y**6) == pytest.approx(
+        4 * np.pi * 3 * 15 / (3 * 5 * 7 * 9 * 11), rel=1e-13
+    )
 
 
 def test_the_torus_has_its_area():
@@ -32,7 +36,9 @@ def test_the_torus_has_its_area():
 def test_a_mesh_integrates_linear_functions_exactly():
     mesh = grid(3, 4, width=2.0)
     measure = mesh_quadrature(mesh)
-    assert integral(measure, mesh.vertices @ [1.0, 3.0, 0.0]) == pytest.approx(2 * (1.0 + 1.5), rel=1e-14)
+    assert integral(measure, mesh.vertices @ [1.0, 3.0, 0.0]) == pytest.approx(
+        2 * (1.0 + 1.5), rel=1e-14
+    )
 
 
 def test_uniform_points_share_one():
@@ -45,8 +51,20 @@ def test_uniform_points_share_one():
     ("points", "weights", "dim", "error", "match"),
     [
         ([], [1.0], 1, InvalidShapeError, "A quadrature must have points; it has none"),
-        (np.eye(2), [1.0], 1, InvalidParameterError, "weights must be one a point; there are 1 for 2 points"),
-        (np.eye(2), [1.0, 0.0], 1, InvalidParameterError, "weights must be positive and finite; entry 1 is 0.0"),
+        (
+            np.eye(2),
+            [1.0],
+            1,
+            InvalidParameterError,
+            "weights must be one a point; there are 1 for 2 points",
+        ),
+        (
+            np.eye(2),
+            [1.0, 0.0],
+            1,
+            InvalidParameterError,
+            "weights must be positive and finite; entry 1 is 0.0",
+        ),
         (np.eye(2), [1.0, 1.0], 3, InvalidParameterError, r"dim must lie in 1\.\.2; it is 3"),
     ],
 )

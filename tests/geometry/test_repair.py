@@ -51,14 +51,19 @@ def test_welding_keeps_the_order_of_first_appearance():
 
 @pytest.mark.parametrize("tolerance", [0.0, 1e-6])
 def test_minus_zero_is_zero(tolerance):
-    done = weld(TriangleMesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-0.0, -0.0, 0]], [[0, 1, 2], [3, 2, 1]]))
+    done = weld(
+        TriangleMesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-0.0, -0.0, 0]], [[0, 1, 2], [3, 2, 1]])
+    )
     assert done.mesh.n_vertices == 3
 
 
 @pytest.mark.parametrize("scale", [1e-100, 1.0, 1e100])
 def test_a_tolerance_joins_chains(scale):
     # Box 1 by 1: the diagonal is 1.414, the tolerance 0.0141; steps of 0.01 chain three points over 0.02.
-    points = np.array([[0, 0, 0], [0.01, 0, 0], [0.02, 0, 0], [1, 0, 0], [0, 1, 0], [0.04, 0, 0]]) * scale
+    points = (
+        np.array([[0, 0, 0], [0.01, 0, 0], [0.02, 0, 0], [1, 0, 0], [0, 1, 0], [0.04, 0, 0]])
+        * scale
+    )
     mesh = TriangleMesh(points, [[0, 3, 4], [1, 3, 4], [2, 3, 4], [5, 3, 4]])
     done = weld(mesh, tolerance=0.01)
     assert done.source_vertices.tolist() == [0, 3, 4, 5]
@@ -69,7 +74,9 @@ def test_a_tolerance_joins_chains(scale):
 
 @pytest.mark.parametrize("tolerance", [-1e-9, 0.11, float("nan"), float("inf")])
 def test_a_tolerance_out_of_range_is_refused(tolerance):
-    with pytest.raises(InvalidParameterError, match=rf"tolerance must lie in 0\.\.0\.1 .* it is {tolerance}"):
+    with pytest.raises(
+        InvalidParameterError, match=rf"tolerance must lie in 0\.\.0\.1 .* it is {tolerance}"
+    ):
         weld(icosphere(0), tolerance=tolerance)
 
 
@@ -123,7 +130,16 @@ def test_repairs_follow_one_another_and_remember_where_vertices_were():
     ball = soup(icosphere(1))
     tiny = TriangleMesh(0.01 * icosphere(0).vertices, icosphere(0).faces)
     mesh = disjoint_union(tiny, ball)
-    done = repair(mesh, ["weld", "drop_degenerate", "drop_duplicate_faces", "largest_component", "drop_unreferenced"])
+    done = repair(
+        mesh,
+        [
+            "weld",
+            "drop_degenerate",
+            "drop_duplicate_faces",
+            "largest_component",
+            "drop_unreferenced",
+        ],
+    )
     assert (done.mesh.n_vertices, is_closed(done.mesh)) == (42, True)
     assert [line.split()[0] for line in done.report] == [
         "weld",
@@ -144,7 +160,9 @@ def test_no_repair_changes_nothing():
 
 
 def test_an_unknown_repair_is_refused_before_any_is_done():
-    with pytest.raises(InvalidParameterError, match=r"must be among auto, weld, .*; name 1 is 'polish'"):
+    with pytest.raises(
+        InvalidParameterError, match=r"must be among auto, weld, .*; name 1 is 'polish'"
+    ):
         repair(icosphere(0), ["weld", "polish"])
 
 
@@ -170,16 +188,22 @@ def test_a_loose_vertex_is_no_component_of_a_mesh_without_area():
 
 def test_a_tolerance_that_reaches_nobody_joins_only_what_is_equal():
     points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0]]
-    assert weld(TriangleMesh(points, [[0, 1, 2], [0, 3, 2]]), tolerance=1e-9).source_vertices.tolist() == [0, 1, 2]
+    assert weld(
+        TriangleMesh(points, [[0, 1, 2], [0, 3, 2]]), tolerance=1e-9
+    ).source_vertices.tolist() == [0, 1, 2]
 
 
 def test_seams_are_welded_and_touching_pieces_stay_apart():
-    cut = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0]], [[0, 1, 2], [3, 4, 5]])
+    cut = TriangleMesh(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0]], [[0, 1, 2], [3, 4, 5]]
+    )
     done = weld_seams(cut)
     assert done.mesh.faces.tolist() == [[0, 1, 2], [2, 1, 3]]
     assert done.source_vertices.tolist() == [0, 1, 2, 5]
     assert done.report == ("weld_seams joined 2 vertices along seams",)
-    bow = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0], [-1, 0, 0], [0, -1, 0]], [[0, 1, 2], [3, 4, 5]])
+    bow = TriangleMesh(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0], [-1, 0, 0], [0, -1, 0]], [[0, 1, 2], [3, 4, 5]]
+    )
     assert weld_seams(bow).mesh.n_vertices == 6
     ball = icosphere(1)
     touching = disjoint_union(ball, TriangleMesh(ball.vertices + 2 * ball.vertices[0], ball.faces))
@@ -206,7 +230,9 @@ def test_tetrahedra_are_repaired_too():
         "drop_unreferenced removed 1 vertices without a simplex",
     )
     np.testing.assert_array_equal(done.mesh.points, ugly.points[done.source_vertices])
-    with pytest.raises(InvalidParameterError, match=r"must be among auto, weld, .*; name 0 is 'orient'"):
+    with pytest.raises(
+        InvalidParameterError, match=r"must be among auto, weld, .*; name 0 is 'orient'"
+    ):
         repair(mesh, ["orient"])
 
 
@@ -219,7 +245,9 @@ def test_copies_of_points_go():
     assert done.report == ("drop_copies removed 2 points at the places of others",)
     assert suggest_repairs(done.cloud) == ()
     assert repair(cloud, []).cloud is cloud
-    with pytest.raises(InvalidParameterError, match="must be among auto, drop_copies; name 1 is 'weld'"):
+    with pytest.raises(
+        InvalidParameterError, match="must be among auto, drop_copies; name 1 is 'weld'"
+    ):
         repair(cloud, ["auto", "weld"])
 
 
@@ -227,10 +255,15 @@ def test_a_strip_with_one_side_is_named_and_left():
     strip = moebius()
     both = disjoint_union(icosphere(0), strip)
     done = orient(both)
-    assert done.report == ("orient turned 0 faces over, left 1 piece with one side only, of face 20",)
+    assert done.report == (
+        "orient turned 0 faces over, left 1 piece with one side only, of face 20",
+    )
     np.testing.assert_array_equal(done.mesh.faces, both.faces)
     many = orient(disjoint_union(*[moebius(6, 1)] * 11))
-    assert "left 11 pieces with one side only, of face 0, 12, 24, 36, 48, 60, 72, 84, 96 and others" in many.report[0]
+    assert (
+        "left 11 pieces with one side only, of face 0, 12, 24, 36, 48, 60, 72, 84, 96 and others"
+        in many.report[0]
+    )
     assert suggest_repairs(both) == ()
 
 
@@ -243,11 +276,22 @@ def test_what_is_left_of_nothing():
 
 def test_specks_and_holes_are_suggested_up_to_a_share_of_the_area():
     ball = icosphere(3)
-    for radius, count, few in ((0.09, 1, True), (0.12, 1, False), (0.09, 20, True), (0.09, 40, False)):
-        specks = [TriangleMesh(radius * ball.vertices + 5 * i, ball.faces) for i in range(1, count + 1)]
-        assert suggest_repairs(disjoint_union(ball, *specks)) == (("largest_component",) if few else ())
+    for radius, count, few in (
+        (0.09, 1, True),
+        (0.12, 1, False),
+        (0.09, 20, True),
+        (0.09, 40, False),
+    ):
+        specks = [
+            TriangleMesh(radius * ball.vertices + 5 * i, ball.faces) for i in range(1, count + 1)
+        ]
+        assert suggest_repairs(disjoint_union(ball, *specks)) == (
+            ("largest_component",) if few else ()
+        )
     for height, few in ((0.95, True), (0.7, False)):
-        open_ball = TriangleMesh(ball.vertices, ball.faces[ball.vertices[ball.faces, 2].max(axis=1) < height])
+        open_ball = TriangleMesh(
+            ball.vertices, ball.faces[ball.vertices[ball.faces, 2].max(axis=1) < height]
+        )
         assert ("seal_holes" in suggest_repairs(open_ball)) == few
     assert suggest_repairs(grid(4, 4)) == ()
 
@@ -257,7 +301,12 @@ def test_a_face_without_area_leaves_no_slit():
     points = [[0, 0, 0], [2, 0, 0], [1, 1, 0], [1, 0, 0], [1, -1, 0]]
     mesh = TriangleMesh(points, [[0, 3, 2], [3, 1, 2], [0, 1, 3], [1, 0, 4]])
     done = drop_degenerate(mesh)
-    assert sorted(map(sorted, done.mesh.faces.tolist())) == [[0, 2, 3], [0, 3, 4], [1, 2, 3], [1, 3, 4]]
+    assert sorted(map(sorted, done.mesh.faces.tolist())) == [
+        [0, 2, 3],
+        [0, 3, 4],
+        [1, 2, 3],
+        [1, 3, 4],
+    ]
     assert inconsistent_edges(done.mesh).size == 0
     assert len(boundary_edges(done.mesh)) == 4
     report = "drop_degenerate removed 1 faces without area, and split 1 neighbor at their vertices"
@@ -275,7 +324,9 @@ def test_needles_collapse_to_the_face_that_they_were_cut_from(share):
     np.testing.assert_array_equal(np.sort(done.mesh.faces[0]), np.sort(ball.faces[0]))
     np.testing.assert_array_equal(done.mesh.faces[1:], ball.faces[1:])
     np.testing.assert_array_equal(done.mesh.vertices, ball.vertices)
-    assert done.report == ("collapse_needles joined 1 vertices to others beside them, and removed 2 faces",)
+    assert done.report == (
+        "collapse_needles joined 1 vertices to others beside them, and removed 2 faces",
+    )
 
 
 def test_what_is_no_needle_or_nothing_else_stays():

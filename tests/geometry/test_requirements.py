@@ -1,5 +1,7 @@
 """What a mesh must be, and that each remedy a message names helps."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from broken_meshes import (
@@ -33,19 +35,18 @@ from eigenshape.operators.robust import robust_laplacian
 from eigenshape.operators.smoothing import noise_level
 from eigenshape.retrieval.baselines.affinity import affinity_eigenvalues
 from eigenshape.retrieval.baselines.shape_dna import shape_dna
-from eigenshape.retrieval.heat.describe import describe_mesh
-from eigenshape.retrieval.heat.describe_large import describe_large_mesh
+from eigenshape.retrieval.description import describe
 from eigenshape.retrieval.heat.descriptor import SCALE_FREE
+from eigenshape.retrieval.heat.features import find_heat_features
 from eigenshape.retrieval.label_transfer import transfer_labels
-from eigenshape.retrieval.patches.codebook import made_codebook
-from eigenshape.retrieval.patches.descriptor import PatchRecipe, seen_patches
-from eigenshape.retrieval.patches.patches import describe_patches
-from eigenshape.retrieval.store.kinds import describe_shape, describe_to_keep
+from eigenshape.retrieval.patches.descriptor import PatchRecipe
+from eigenshape.retrieval.patches.patches import extract_patches, surface_patches
+from eigenshape.retrieval.store.index import describe_to_store
 from eigenshape.scans.partial import partial_scan, viewpoint
 from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.shapes.surfaces import disjoint_union, icosphere
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 BALL = icosphere(2)
 OPERATORS = {
@@ -60,16 +61,18 @@ OPERATORS = {
     "gaussian_curvature": gaussian_curvature,
 }
 DESCRIBERS = {
-    "describe_mesh": describe_mesh,
-    "describe_large_mesh": describe_large_mesh,
-    "describe_shape by heat": lambda mesh: describe_shape(mesh, SCALE_FREE),
-    "describe_shape by patches": lambda mesh: describe_shape(mesh, PatchRecipe(made_codebook())),
-    "describe_to_keep by heat": lambda mesh: describe_to_keep(mesh, SCALE_FREE, n_views=1),
-    "describe_to_keep by patches": lambda mesh: describe_to_keep(mesh, PatchRecipe(made_codebook()), n_views=1),
-    "describe_patches": describe_patches,
-    "seen_patches": lambda mesh: seen_patches(mesh, n_views=1),
+    "find_heat_features": find_heat_features,
+    "find_heat_features, approximately": partial(find_heat_features, accuracy=0.01),
+    "describe by heat": lambda mesh: describe(mesh, SCALE_FREE),
+    "describe by patches": describe,
+    "describe_to_store by heat": lambda mesh: describe_to_store(mesh, SCALE_FREE, 1),
+    "describe_to_store by patches": lambda mesh: describe_to_store(mesh, PatchRecipe(), 1),
+    "surface_patches": surface_patches,
+    "extract_patches": lambda mesh: extract_patches(mesh, n_views=1),
     "find_parts": find_parts,
-    "transfer_labels": lambda mesh: transfer_labels(BALL, np.zeros(BALL.n_faces, dtype=np.int64), mesh),
+    "transfer_labels": lambda mesh: transfer_labels(
+        BALL, np.zeros(BALL.n_faces, dtype=np.int64), mesh
+    ),
     "shape_dna": shape_dna,
     "affinity_eigenvalues": affinity_eigenvalues,
     "average_geodesic_distance": average_geodesic_distance,
@@ -82,22 +85,29 @@ def rng():
 
 def require_remedy(needs, mesh, fault):
     """A call is refused with a remedy, which lets it pass."""
-    with pytest.raises(InvalidShapeError, match=fault + r".* Try repair\(mesh, \[\"auto\"\]\), or --repair auto"):
+    with pytest.raises(
+        InvalidShapeError, match=fault + r".* Try repair\(mesh, \[\"auto\"\]\), or --repair auto"
+    ):
         needs(mesh)
     needs(repair(mesh, ["auto"]).mesh)
 
 
 @pytest.mark.parametrize("name", OPERATORS)
 def test_a_face_does_not_count_twice(name):
-    require_remedy(OPERATORS[name], with_duplicates(BALL, rng()), "Faces must differ, or they count twice; ")
+    require_remedy(
+        OPERATORS[name], with_duplicates(BALL, rng()), "Faces must differ, or they count twice; "
+    )
 
 
 def test_twenty_of_320_faces_do_not_move_eigenvalues():
     doubled = with_duplicates(BALL, np.random.default_rng(0), 20)
-    with pytest.raises(InvalidShapeError, match=r"; faces 272 and 320 both have .* \[4, 64, 66\] \(20 such\)"):
+    with pytest.raises(
+        InvalidShapeError, match=r"; faces 272 and 320 both have .* \[4, 64, 66\] \(20 such\)"
+    ):
         cotangent_laplacian(doubled)
     found, expected = (
-        solve_spectrum(cotangent_laplacian(mesh), 9).eigenvalues for mesh in (repair(doubled, ["auto"]).mesh, BALL)
+        solve_spectrum(cotangent_laplacian(mesh), 9).eigenvalues
+        for mesh in (repair(doubled, ["auto"]).mesh, BALL)
     )
     np.testing.assert_array_equal(found, expected)
 
@@ -105,30 +115,50 @@ def test_twenty_of_320_faces_do_not_move_eigenvalues():
 @pytest.mark.parametrize("name", ["cotangent", "p2", "crouzeix_raviart", "brackets", "quadrature"])
 def test_a_tetrahedron_does_not_count_twice(name):
     mesh = tetrahedra()
-    require_remedy(OPERATORS[name], with_duplicates(mesh, rng(), 1), "Simplices must differ, or they count twice; ")
-    require_remedy(OPERATORS[name], with_loose_points(mesh, rng()), "Every point must belong to a simplex; ")
-    require_remedy(OPERATORS[name], with_flat_simplices(mesh, rng()), "Tetrahedra must have volume; ")
+    require_remedy(
+        OPERATORS[name],
+        with_duplicates(mesh, rng(), 1),
+        "Simplices must differ, or they count twice; ",
+    )
+    require_remedy(
+        OPERATORS[name], with_loose_points(mesh, rng()), "Every point must belong to a simplex; "
+    )
+    require_remedy(
+        OPERATORS[name], with_flat_simplices(mesh, rng()), "Tetrahedra must have volume; "
+    )
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", DESCRIBERS)
 def test_a_soup_is_not_described(name):
-    require_remedy(DESCRIBERS[name], soup(BALL), "Pieces that lie edge on edge must share their vertices; ")
+    require_remedy(
+        DESCRIBERS[name], soup(BALL), "Pieces that lie edge on edge must share their vertices; "
+    )
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", DESCRIBERS)
 def test_what_hides_a_shape_has_one_remedy(name):
-    require_remedy(DESCRIBERS[name], with_loose_points(BALL, rng(), 30), "Every vertex must belong to a face; ")
-    require_remedy(DESCRIBERS[name], with_duplicates(BALL, rng()), "Faces must differ, or they count twice; ")
+    require_remedy(
+        DESCRIBERS[name], with_loose_points(BALL, rng(), 30), "Every vertex must belong to a face; "
+    )
+    require_remedy(
+        DESCRIBERS[name], with_duplicates(BALL, rng()), "Faces must differ, or they count twice; "
+    )
     require_remedy(DESCRIBERS[name], cut_open(BALL, rng()), "Pieces that lie edge on edge ")
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["describe_shape by patches", "describe_patches", "find_parts", "transfer_labels"])
+@pytest.mark.parametrize(
+    "name", ["describe by patches", "surface_patches", "find_parts", "transfer_labels"]
+)
 def test_what_looks_from_outside_needs_an_orientation(name):
     require_remedy(DESCRIBERS[name], flipped(BALL, rng()), "Faces must be turned one way; ")
-    require_remedy(lambda mesh: curvature_tensors(mesh, 1.0), flipped(BALL, rng()), "Faces must be turned one way; ")
+    require_remedy(
+        lambda mesh: curvature_tensors(mesh, 1.0),
+        flipped(BALL, rng()),
+        "Faces must be turned one way; ",
+    )
 
 
 def test_where_no_side_matters_none_is_asked_for():
@@ -141,7 +171,11 @@ def test_where_no_side_matters_none_is_asked_for():
 
 @pytest.mark.parametrize("kind", ["combinatorial", "weighted", "normalized"])
 def test_graphs_of_flat_faces(kind):
-    require_remedy(lambda mesh: graph_laplacian(mesh, kind), with_flat_simplices(BALL, rng()), "distinct corners; ")
+    require_remedy(
+        lambda mesh: graph_laplacian(mesh, kind),
+        with_flat_simplices(BALL, rng()),
+        "distinct corners; ",
+    )
     points = np.concatenate([BALL.vertices, BALL.vertices[:1]])
     flat = TriangleMesh(points, [*BALL.faces, [0, len(points) - 1, 1]])
     if kind == "weighted":
@@ -151,7 +185,9 @@ def test_graphs_of_flat_faces(kind):
 def test_copies_of_points():
     points = fibonacci_sphere(100).vertices
     cloud = PointCloud(np.concatenate([points, points[:3]]))
-    with pytest.raises(InvalidShapeError, match=r"Points must differ; .* \(6 such\)\. Try repair\(cloud, "):
+    with pytest.raises(
+        InvalidShapeError, match=r"Points must differ; .* \(6 such\)\. Try repair\(cloud, "
+    ):
         cloud_quadrature(cloud)
     assert cloud_quadrature(repair(cloud, ["auto"]).cloud).n_points == 100
 

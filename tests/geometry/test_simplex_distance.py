@@ -19,7 +19,9 @@ TRIANGLE = np.array([[[0.0, 0, 0], [2, 0, 0], [0, 2, 0]]])
     ],
 )
 def test_a_triangle_by_hand(point, distance):
-    assert squared_distances(np.array([point]), TRIANGLE)[0, 0] == pytest.approx(distance**2, rel=1e-14, abs=1e-30)
+    assert squared_distances(np.array([point]), TRIANGLE)[0, 0] == pytest.approx(
+        distance**2, rel=1e-14, abs=1e-30
+    )
 
 
 @pytest.mark.parametrize("dim", [0, 1, 2, 3])

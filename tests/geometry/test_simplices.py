@@ -15,7 +15,11 @@ from eigenshape.geometry.simplices import (
     simplex_volumes,
 )
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.topology import boundary_vertices, require_simplices_everywhere, vertex_components
+from eigenshape.geometry.topology import (
+    boundary_vertices,
+    require_simplices_everywhere,
+    vertex_components,
+)
 
 
 def corner_simplex(dim, ambient=None):
@@ -36,7 +40,9 @@ def test_the_corner_of_a_cube(dim, more):
 
 
 @settings(max_examples=25, deadline=None)
-@given(st.integers(1, 4), st.integers(0, 3), st.integers(0, 2**31), st.sampled_from([1e-60, 1.0, 1e60]))
+@given(
+    st.integers(1, 4), st.integers(0, 3), st.integers(0, 2**31), st.sampled_from([1e-60, 1.0, 1e60])
+)
 def test_volumes_are_gram_determinants(dim, more, seed, size):
     rng = np.random.default_rng(seed)
     points = rng.normal(size=(dim + 1, dim + more))
@@ -47,9 +53,13 @@ def test_volumes_are_gram_determinants(dim, more, seed, size):
 
 
 def test_lengths_beyond_floats_are_refused_with_their_powers():
-    with pytest.raises(InvalidShapeError, match=r"measure 4-volumes the largest .* within 1e-75\.\.1e75"):
+    with pytest.raises(
+        InvalidShapeError, match=r"measure 4-volumes the largest .* within 1e-75\.\.1e75"
+    ):
         simplex_volumes(SimplicialMesh(1e80 * corner_simplex(4).points, [np.arange(5)]))
-    with pytest.raises(InvalidShapeError, match=r"To measure -1-volumes the largest .* 1e-301\.\.1e301"):
+    with pytest.raises(
+        InvalidShapeError, match=r"To measure -1-volumes the largest .* 1e-301\.\.1e301"
+    ):
         in_length(np.ones(1), 2.0**1010, -1)
 
 
@@ -73,7 +83,9 @@ def test_flat_simplices_are_named(dim, match):
 @pytest.mark.parametrize(("dim", "where"), [(2, "on a line"), (3, "in a flat of lower dimension")])
 def test_a_mesh_without_any_volume_is_refused(dim, where):
     points = np.arange(dim + 1.0)[:, None] * np.ones(3)
-    with pytest.raises(InvalidShapeError, match=f"all 1 have none: their points are equal or {where}"):
+    with pytest.raises(
+        InvalidShapeError, match=f"all 1 have none: their points are equal or {where}"
+    ):
         require_volumes(SimplicialMesh(points, [np.arange(dim + 1)]))
 
 
@@ -83,7 +95,10 @@ def test_two_tetrahedra_and_a_loose_point():
     count, labels = vertex_components(mesh)
     assert (count, labels.tolist()) == (2, [0, 0, 0, 0, 0, 1])
     assert boundary_vertices(mesh).tolist() == [0, 1, 2, 3, 4]
-    with pytest.raises(InvalidShapeError, match=r"Every point must belong to a simplex; point 5 at \[5.0, 5.0, 5.0\]"):
+    with pytest.raises(
+        InvalidShapeError,
+        match=r"Every point must belong to a simplex; point 5 at \[5.0, 5.0, 5.0\]",
+    ):
         require_simplices_everywhere(mesh)
 
 

@@ -30,7 +30,11 @@ def test_a_triangle_mesh_has_the_same_names():
     [
         ([], [[0, 1]], "A mesh must have points; it has none"),
         (CUBE, [], "A mesh must have simplices; it has 4 points and no simplex"),
-        (CUBE, [[0], [1]], r"Simplices in R\^3 must have dimension 1\.\.3; these have 1 corners, which is dimension 0"),
+        (
+            CUBE,
+            [[0], [1]],
+            r"Simplices in R\^3 must have dimension 1\.\.3; these have 1 corners, which is dimension 0",
+        ),
         (
             [[0.0, 0], [1, 0], [0, 1], [1, 1]],
             [[0, 1, 2, 3]],

@@ -30,11 +30,14 @@ def test_the_pieces_are_2_to_the_m_of_equal_volume(dim):
     whole = SimplicialMesh(points, [list(range(dim + 1))])
     halved = subdivide(whole)
     assert halved.n_simplices == 2**dim
-    np.testing.assert_allclose(simplex_volumes(halved), simplex_volumes(whole)[0] / 2**dim, rtol=1e-12)
+    np.testing.assert_allclose(
+        simplex_volumes(halved), simplex_volumes(whole)[0] / 2**dim, rtol=1e-12
+    )
 
 
 @pytest.mark.parametrize(
-    "mesh", [circle(5), SimplicialMesh(grid(3, 2).vertices, grid(3, 2).faces), ball(4), subdivide(ball(2))]
+    "mesh",
+    [circle(5), SimplicialMesh(grid(3, 2).vertices, grid(3, 2).faces), ball(4), subdivide(ball(2))],
 )
 def test_neighbours_match(mesh):
     rng = np.random.default_rng(0)

@@ -35,14 +35,21 @@ FINS = mesh_of((0, 1, 2), (1, 0, 3), (0, 1, 4))
 
 def sides_of(loops):
     """The directed sides of chains; one more for each chain that closes."""
-    return [pair for loop in loops for pair in zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)]
+    return [
+        pair
+        for loop in loops
+        for pair in zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
+    ]
 
 
 def test_edges_of_a_square():
     table = edge_table(SQUARE)
     assert table.edges.tolist() == [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]]
     assert table.n_faces.tolist() == [1, 1, 2, 1, 1]
-    assert table.face_edges.tolist() == [[2, 1, 0], [3, 4, 2]]  # opposite to the corners 0, 1, 2 of each
+    assert table.face_edges.tolist() == [
+        [2, 1, 0],
+        [3, 4, 2],
+    ]  # opposite to the corners 0, 1, 2 of each
 
 
 def test_half_edges_run_with_their_faces():
@@ -64,9 +71,14 @@ def test_loops_are_sorted_by_length_then_by_vertex():
     assert [loop.tolist() for loop in boundary_loops(union)] == [[3, 4, 6, 5], [0, 1, 2], [7, 8, 9]]
 
 
-@pytest.mark.parametrize("faces", [[(3, 4, 2), (0, 1, 2)], [(0, 1, 2), (3, 4, 2)], [(2, 3, 4), (1, 2, 0)]])
+@pytest.mark.parametrize(
+    "faces", [[(3, 4, 2), (0, 1, 2)], [(0, 1, 2), (3, 4, 2)], [(2, 3, 4), (1, 2, 0)]]
+)
 def test_loops_that_touch_in_a_vertex_stay_apart(faces):
-    assert sorted(sorted(loop.tolist()) for loop in boundary_loops(mesh_of(*faces))) == [[0, 1, 2], [2, 3, 4]]
+    assert sorted(sorted(loop.tolist()) for loop in boundary_loops(mesh_of(*faces))) == [
+        [0, 1, 2],
+        [2, 3, 4],
+    ]
 
 
 def test_a_ring_of_bow_ties_comes_apart_into_simple_loops():
@@ -87,7 +99,9 @@ def test_loops_end_and_use_each_side_once_however_faces_are_turned(seed):
     given = sorted(map(tuple, boundary_edges(mixed).tolist()))
     loops = boundary_loops(mixed)
     # A chain that stays open has no side from its end to its beginning.
-    within = [pair for loop in loops for pair in zip(loop[:-1].tolist(), loop[1:].tolist(), strict=True)]
+    within = [
+        pair for loop in loops for pair in zip(loop[:-1].tolist(), loop[1:].tolist(), strict=True)
+    ]
     closing = [(int(loop[-1]), int(loop[0])) for loop in loops]
     for pair in within:
         given.remove(pair)
@@ -127,7 +141,12 @@ def test_closed_surfaces_that_touch_in_a_vertex_are_no_manifold():
 
 @pytest.mark.parametrize(
     ("mesh", "euler", "closed"),
-    [(icosphere(0), 2, True), (icosphere(2), 2, True), (torus(6, 5), 0, True), (grid(4, 3), 1, False)],
+    [
+        (icosphere(0), 2, True),
+        (icosphere(2), 2, True),
+        (torus(6, 5), 0, True),
+        (grid(4, 3), 1, False),
+    ],
 )
 def test_euler_characteristic(mesh, euler, closed):
     assert euler_characteristic(mesh) == euler
@@ -166,11 +185,20 @@ def has_several_fans(faces, vertex):
 def test_fans_and_loops_of_any_faces(seed):
     rng = np.random.default_rng(seed)
     n = int(rng.integers(3, 9))
-    mesh = TriangleMesh(rng.random((n, 3)), [rng.choice(n, 3, replace=False) for _ in range(rng.integers(1, 12))])
+    mesh = TriangleMesh(
+        rng.random((n, 3)), [rng.choice(n, 3, replace=False) for _ in range(rng.integers(1, 12))]
+    )
     faces = mesh.faces.tolist()
-    assert non_manifold_vertices(mesh).tolist() == [v for v in range(n) if has_several_fans(faces, v)]
+    assert non_manifold_vertices(mesh).tolist() == [
+        v for v in range(n) if has_several_fans(faces, v)
+    ]
     counts = Counter(tuple(sorted(side)) for side in half_edges(mesh).tolist())
-    assert dict(zip(map(tuple, edge_table(mesh).edges.tolist()), edge_table(mesh).n_faces, strict=True)) == counts
+    assert (
+        dict(
+            zip(map(tuple, edge_table(mesh).edges.tolist()), edge_table(mesh).n_faces, strict=True)
+        )
+        == counts
+    )
     alone = [tuple(side) for side in half_edges(mesh).tolist() if counts[tuple(sorted(side))] == 1]
     loops = boundary_loops(mesh)
     assert all(len(set(loop.tolist())) == len(loop) for loop in loops)

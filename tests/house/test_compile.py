@@ -17,12 +17,16 @@ from eigenshape._compile import make_private, njit, temporary_folder
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 MEASURE = """
 import eigenshape as es
-print(es.geodesic_distances(es.icosphere(1), [0]).max())
+print(es.geometry.geodesic_distances(es.icosphere(1), [0]).max())
 """
 
 
 def test_every_loop_is_compiled_in_one_way():
-    users = [path for path in SOURCE.rglob("*.py") if re.search(r"numba(\.| import )njit", path.read_text())]
+    users = [
+        path
+        for path in SOURCE.rglob("*.py")
+        if re.search(r"numba(\.| import )njit", path.read_text())
+    ]
     assert [path.name for path in users] == ["_compile.py"]
 
 
@@ -41,9 +45,17 @@ def run_without_home(code, installed):
     """Run code from a package and with a home in which nothing can be kept."""
     temporary = installed.parent / "temporary"
     settings = {"PYTHONPATH": str(installed), "HOME": os.devnull, "TMPDIR": str(temporary)}
-    kept = {name: value for name, value in os.environ.items() if name not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
+    kept = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")
+    }
     done = subprocess.run(
-        [sys.executable, "-B", "-c", code], check=False, env=kept | settings, capture_output=True, text=True
+        [sys.executable, "-B", "-c", code],
+        check=False,
+        env=kept | settings,
+        capture_output=True,
+        text=True,
     )
     assert done.returncode == 0, done.stderr
     return done
@@ -61,7 +73,9 @@ def test_a_private_folder_keeps_loops_where_the_package_and_the_home_cannot(clos
 @pytest.mark.long
 def test_without_any_folder_loops_are_compiled_each_time_and_it_is_said_once(closed_copy):
     (closed_copy.parent / "temporary" / temporary_folder().name).write_text("in the way")
-    done = run_without_home(f"import warnings; warnings.simplefilter('always')\n{MEASURE}", closed_copy)
+    done = run_without_home(
+        f"import warnings; warnings.simplefilter('always')\n{MEASURE}", closed_copy
+    )
     assert done.stderr.count("Set NUMBA_CACHE_DIR to such a folder") == 1
 
 
@@ -79,7 +93,9 @@ class CollectorRecorder(event.Listener):
 
 
 @pytest.mark.parametrize("collects", [True, False])
-def test_the_garbage_collector_pauses_while_loops_compile_and_not_longer(tmp_path, monkeypatch, collects):
+def test_the_garbage_collector_pauses_while_loops_compile_and_not_longer(
+    tmp_path, monkeypatch, collects
+):
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
 
     @njit
@@ -116,7 +132,9 @@ def stderr_on_a_terminal(code, cache):
     ours, theirs = os.openpty()
     settings = {"PYTHONPATH": str(SOURCE), "NUMBA_CACHE_DIR": str(cache)}
     try:
-        done = subprocess.run([sys.executable, "-c", code], check=False, env=os.environ | settings, stderr=theirs)
+        done = subprocess.run(
+            [sys.executable, "-c", code], check=False, env=os.environ | settings, stderr=theirs
+        )
         assert done.returncode == 0
         os.write(theirs, b"END")
         written = b""
@@ -145,7 +163,9 @@ with ThreadPoolExecutor(2) as pool:
 @pytest.mark.long
 def test_nothing_is_written_about_compiling_where_there_is_no_terminal(tmp_path):
     settings = {"PYTHONPATH": str(SOURCE), "NUMBA_CACHE_DIR": str(tmp_path)}
-    done = subprocess.run([sys.executable, "-c", MEASURE], check=True, env=os.environ | settings, capture_output=True)
+    done = subprocess.run(
+        [sys.executable, "-c", MEASURE], check=True, env=os.environ | settings, capture_output=True
+    )
     assert list(tmp_path.rglob("*.nbi"))
     assert done.stderr == b""
 

@@ -18,7 +18,9 @@ def test_main_road_finds_the_octopus(tmp_path):
 
 @pytest.mark.long
 def test_a_noisy_scan_is_found(tmp_path):
-    best, second, other = runpy.run_path(str(ROOT / "examples" / "find_a_scan.py"))["main"](tmp_path)
+    best, second, other = runpy.run_path(str(ROOT / "examples" / "find_a_scan.py"))["main"](
+        tmp_path
+    )
     assert [best.label, second.label] == ["octopus"] * 2
     assert best.score < second.score < other.score
     assert len(best.correspondences) > 10
@@ -27,7 +29,9 @@ def test_a_noisy_scan_is_found(tmp_path):
 @pytest.mark.long
 def test_a_bent_shape_is_bent_again_on_a_finer_mesh(tmp_path):
     poses = runpy.run_path(str(ROOT / "examples" / "bend_a_shape.py"))["main"](tmp_path)
-    made, nodding, lifted, finer = (poses[name].vertices for name in ("as made", "nodding", "lifted", "again, finer"))
+    made, nodding, lifted, finer = (
+        poses[name].vertices for name in ("as made", "nodding", "lifted", "again, finer")
+    )
     assert nodding[:, 1].max() < made[:, 1].max() - 0.05
     assert np.abs(lifted - nodding).max() > 0.05
     np.testing.assert_allclose(finer[: len(made)], lifted, atol=0.03)
@@ -38,7 +42,9 @@ def test_any_shape_has_its_spectrum(capsys):
     spectra = runpy.run_path(str(ROOT / "examples" / "any_shape.py"))["main"]()
     np.testing.assert_allclose(spectra["sphere"], [0, 2, 2, 2], atol=0.02)
     np.testing.assert_allclose(spectra["points"], [0, 2, 2, 2], atol=0.05)
-    np.testing.assert_allclose(spectra["interval"], [0, np.pi**2, 4 * np.pi**2, 9 * np.pi**2], rtol=0.002, atol=1e-9)
+    np.testing.assert_allclose(
+        spectra["interval"], [0, np.pi**2, 4 * np.pi**2, 9 * np.pi**2], rtol=0.002, atol=1e-9
+    )
     assert "All 11 laws hold." in capsys.readouterr().out
 
 

@@ -1,29 +1,96 @@
+"""Two doors: a short one, and the rooms. Both are exact, and cost what is used."""
+
 import ast
+import inspect
+import re
+import subprocess
+import sys
+from collections import Counter
 from pathlib import Path
 
-import eigenshape
+from public_names import public_things, rooms
 
-HERE = Path(eigenshape.__file__)
-PROMISED = {
-    "read_mesh", "write_mesh", "TriangleMesh", "partial_scan", "cut_by_planes", "make_creature", "cotangent_laplacian",
-    "solve_spectrum", "heat_kernel_signature", "merge_tree", "segment", "describe", "matching_score", "ShapeIndex",
+import eigenshape as es
+
+SOURCE = Path(es.__file__).parent
+ROOMS = {
+    "deformation", "features", "geometry", "io", "operators", "plot", "retrieval", "retrieval.baselines", "scans",
+    "shapes", "spectral", "stability", "types",
 }  # fmt: skip
+PROMISED = {
+    "read_mesh", "write_mesh", "TriangleMesh", "partial_scan", "make_creature", "cotangent_laplacian",
+    "solve_spectrum", "heat_kernel_signature", "merge_tree", "segment", "find_parts", "describe", "ShapeIndex",
+    "deform",
+}  # fmt: skip
+HEAVY = {"matplotlib", "meshio", "numba", "numpy", "rich", "scipy", "sqlite3"}
 
 
-def test_all_names_what_is_imported_and_nothing_else():
-    tree = ast.parse(HERE.read_text())
-    imported = {name.name for node in tree.body if isinstance(node, ast.ImportFrom) for name in node.names}
-    assert set(eigenshape.__all__) == imported
-    assert len(set(eigenshape.__all__)) == len(eigenshape.__all__)
+def test_the_short_door_holds_what_people_come_for():
+    names = {name for name in es.__all__ if not inspect.ismodule(getattr(es, name))} - {
+        "__version__"
+    }
+    assert names >= PROMISED
+    assert len(names) <= 50
 
 
-def test_promised_names_are_there():
-    assert set(eigenshape.__all__) >= PROMISED
+def test_the_rooms_are_these():
+    assert rooms().keys() == ROOMS
+
+
+def test_every_name_of_the_short_door_stands_in_a_room_too():
+    in_rooms = {name for room in rooms().values() for name in room.__all__}
+    left = {name for name in es.__all__ if not inspect.ismodule(getattr(es, name))} - in_rooms
+    errors = {
+        name
+        for name in left
+        if isinstance(getattr(es, name), type) and issubclass(getattr(es, name), Exception)
+    }
+    assert left - errors == {"__version__"}
+
+
+def test_names_are_unlike_each_other():
+    spelt = Counter(name.lower() for name in public_things())
+    assert not [name for name, count in spelt.items() if count > 1]
+
+
+def test_a_name_of_a_room_is_the_object_and_never_a_module_of_that_name():
+    code = "import eigenshape.features.merge_tree, eigenshape.geometry.repair, eigenshape as es\n"
+    code += "assert callable(es.features.merge_tree) and callable(es.geometry.repair)"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_name_that_is_not_there_is_named():
+    done = subprocess.run(
+        [sys.executable, "-c", "import eigenshape as es; es.solve_spectra"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "solve_spectra" in done.stderr
+
+
+def test_importing_loads_nothing_that_is_not_used():
+    code = f"import eigenshape, sys; print(sorted({HEAVY} & sys.modules.keys()))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+def test_every_room_is_lazy_in_the_same_way():
+    for path in SOURCE.rglob("__init__.pyi"):
+        code = path.with_suffix(".py").read_text()
+        assert "__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)" in code
+
+
+def test_stubs_hand_names_on_and_hold_nothing_else():
+    for path in SOURCE.rglob("__init__.pyi"):
+        for line in path.read_text().splitlines():
+            assert re.fullmatch(r"from \.[\w.]* import (\w+) as \1", line), f"{path}: {line}"
 
 
 def test_every_error_stands_in_the_tree():
-    module = ast.parse((HERE.parent / "_errors.py").read_text())
+    module = ast.parse((SOURCE / "_errors.py").read_text())
     drawn = ast.get_docstring(module)
     classes = [node.name for node in module.body if isinstance(node, ast.ClassDef)]
     assert classes
     assert all(name in drawn for name in classes)
+    assert set(classes) <= set(es.__all__)

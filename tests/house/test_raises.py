@@ -5,7 +5,13 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-ERRORS = {"InvalidShapeError", "InvalidParameterError", "FileFormatError", "ConvergenceError", "StoreError"}
+ERRORS = {
+    "InvalidShapeError",
+    "InvalidParameterError",
+    "FileFormatError",
+    "ConvergenceError",
+    "StoreError",
+}
 HOLE = "\0"
 
 
@@ -21,14 +27,20 @@ def text_of(node):
     if isinstance(node, ast.Constant):
         return str(node.value)
     if isinstance(node, ast.JoinedStr):
-        return "".join(text_of(part) if isinstance(part, ast.Constant) else HOLE for part in node.values)
+        return "".join(
+            text_of(part) if isinstance(part, ast.Constant) else HOLE for part in node.values
+        )
     return HOLE
 
 
 def expectations():
     for path in sorted((ROOT / "tests").rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Constant) and isinstance(node.value, str) and len(node.value) >= 10:
+            if (
+                isinstance(node, ast.Constant)
+                and isinstance(node.value, str)
+                and len(node.value) >= 10
+            ):
                 yield node.value
 
 

@@ -116,16 +116,36 @@ BOMBS = {
         lambda: vtu(array(bytes(GIGABYTES // 8), declared=96)),
         "the size it declares, 96; it unpacks to more",
     ),
-    "lzf.pcd": (lambda: pcd_of_zeros(GIGABYTES), "must unpack to at most 40 times the size of its file"),
+    "lzf.pcd": (
+        lambda: pcd_of_zeros(GIGABYTES),
+        "must unpack to at most 40 times the size of its file",
+    ),
     "header.pcd": (
-        lambda: b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 4000000000\nDATA binary\n" + bytes(500),
+        lambda: (
+            b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 4000000000\nDATA binary\n" + bytes(500)
+        ),
         "it declares 4000000000 of 12 bytes and holds 500 bytes",
     ),
-    "copies.gltf": (lambda: gltf_of_copies(1000), "must stay within 4194304 vertices and faces; its copies make more"),
-    "points.vtk": (lambda: LEGACY.replace("POINTS 4", "POINTS 400000000").encode(), "1200000000 numbers do not fit"),
-    "types.vtk": (lambda: LEGACY.replace("TYPES 1", "TYPES 400000000").encode(), "400000000 numbers do not fit"),
-    "vertices.mesh": (lambda: MEDIT.replace("Vertices\n4", "Vertices\n400000000").encode(), "'400000000' do not fit"),
-    "cells.mesh": (lambda: MEDIT.replace("Tetrahedra\n1", "Tetrahedra\n40000000").encode(), "'40000000' do not fit"),
+    "copies.gltf": (
+        lambda: gltf_of_copies(1000),
+        "must stay within 4194304 vertices and faces; its copies make more",
+    ),
+    "points.vtk": (
+        lambda: LEGACY.replace("POINTS 4", "POINTS 400000000").encode(),
+        "1200000000 numbers do not fit",
+    ),
+    "types.vtk": (
+        lambda: LEGACY.replace("TYPES 1", "TYPES 400000000").encode(),
+        "400000000 numbers do not fit",
+    ),
+    "vertices.mesh": (
+        lambda: MEDIT.replace("Vertices\n4", "Vertices\n400000000").encode(),
+        "'400000000' do not fit",
+    ),
+    "cells.mesh": (
+        lambda: MEDIT.replace("Tetrahedra\n1", "Tetrahedra\n40000000").encode(),
+        "'40000000' do not fit",
+    ),
     "vertices.meshb": (lambda: medit_binary(100_000_000), r"vertices.meshb must be"),
 }
 
@@ -134,7 +154,9 @@ BOMBS = {
 def outcomes(tmp_path_factory):
     """Read all bombs in one process; for each, the MiB by which the process has grown, and what it said."""
     folder = tmp_path_factory.mktemp("bombs")
-    files = {name: make() for name, (make, _) in BOMBS.items()} | {"unread.vtu": vtu(extra=zeros(GIGABYTES))}
+    files = {name: make() for name, (make, _) in BOMBS.items()} | {
+        "unread.vtu": vtu(extra=zeros(GIGABYTES))
+    }
     for name, data in files.items():
         (folder / name).write_bytes(data)
     command = [sys.executable, "-c", MEASURE, *(str(folder / name) for name in files)]
@@ -163,9 +185,13 @@ def test_what_nobody_reads_is_not_unpacked(outcomes):
 def test_blocks_unpack_to_what_they_declare_or_not_at_all(compressor):
     block = PACK[compressor](bytes(1000))
     assert unpacked_block(block, 1000, compressor) == bytes(1000)
-    with pytest.raises(FileFormatError, match="unpack to the size it declares, 999; it unpacks to more"):
+    with pytest.raises(
+        FileFormatError, match="unpack to the size it declares, 999; it unpacks to more"
+    ):
         unpacked_block(block, 999, compressor)
-    with pytest.raises(FileFormatError, match="unpack to the size it declares, 1001; it unpacks to 1000"):
+    with pytest.raises(
+        FileFormatError, match="unpack to the size it declares, 1001; it unpacks to 1000"
+    ):
         unpacked_block(block, 1001, compressor)
     with pytest.raises(FileFormatError, match="A compressed block must be whole; one is damaged"):
         unpacked_block(b"nonsense", 1000, compressor)
@@ -178,5 +204,7 @@ def test_too_little_memory_has_a_name(tmp_path, monkeypatch):
     write_mesh(TETRAHEDRON, tmp_path / "a.off")
     monkeypatch.setitem(parsing.PARSERS, ".off", fail)
     for read in (read_shape, read_mesh):
-        with pytest.raises(FileFormatError, match=r"a\.off must fit into memory; there is too little to read it"):
+        with pytest.raises(
+            FileFormatError, match=r"a\.off must fit into memory; there is too little to read it"
+        ):
             read(tmp_path / "a.off")

@@ -24,17 +24,31 @@ def same(one, two):
 
 
 @pytest.mark.parametrize(
-    "shape", [icosphere(1), box(1, 2, 1), interval(4), projective_plane(1), PointCloud(icosphere(1).vertices)]
+    "shape",
+    [
+        icosphere(1),
+        box(1, 2, 1),
+        interval(4),
+        projective_plane(1),
+        PointCloud(icosphere(1).vertices),
+    ],
 )
 def test_arrays_there_and_back(shape):
     points, simplices = to_arrays(shape)
-    same(from_arrays(points, simplices, cells="tetrahedra" if np.shape(simplices)[1:] == (4,) else None), shape)
+    same(
+        from_arrays(
+            points, simplices, cells="tetrahedra" if np.shape(simplices)[1:] == (4,) else None
+        ),
+        shape,
+    )
     points[0] = 7
     assert shape.points[0, 0] != 7
 
 
 def test_trimesh_there_and_back():
-    seam = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0], [5, 5, 5]], [[0, 1, 2], [3, 1, 2]])
+    seam = TriangleMesh(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0], [5, 5, 5]], [[0, 1, 2], [3, 1, 2]]
+    )
     for shape in (icosphere(1), seam, PointCloud(icosphere(1).vertices)):
         same(from_trimesh(to_trimesh(shape)), shape)  # nothing is merged or dropped
     assert isinstance(to_trimesh(seam), trimesh.Trimesh)
@@ -53,21 +67,33 @@ def test_curves_and_flat_shapes_in_pyvista():
 
 
 def test_what_does_not_fit_is_refused():
-    with pytest.raises(InvalidShapeError, match=r"Only triangle meshes and clouds in R\^3 fit into trimesh"):
+    with pytest.raises(
+        InvalidShapeError, match=r"Only triangle meshes and clouds in R\^3 fit into trimesh"
+    ):
         to_trimesh(box(1, 1, 1))
-    with pytest.raises(InvalidShapeError, match=r"Only shapes in R\^3 fit into PyVista; this one lies in R\^5"):
+    with pytest.raises(
+        InvalidShapeError, match=r"Only shapes in R\^3 fit into PyVista; this one lies in R\^5"
+    ):
         to_pyvista(projective_plane(1))
-    with pytest.raises(InvalidShapeError, match="A Trimesh or PointCloud of trimesh is taken; this is a list"):
+    with pytest.raises(
+        InvalidShapeError, match="A Trimesh or PointCloud of trimesh is taken; this is a list"
+    ):
         from_trimesh([])
-    with pytest.raises(InvalidShapeError, match="A PolyData or UnstructuredGrid is taken; this is a list"):
+    with pytest.raises(
+        InvalidShapeError, match="A PolyData or UnstructuredGrid is taken; this is a list"
+    ):
         from_pyvista([])
-    with pytest.raises(InvalidShapeError, match=r"Cells must be simplices; 1 are of VTK's type 1[12]\. Triangulate"):
+    with pytest.raises(
+        InvalidShapeError, match=r"Cells must be simplices; 1 are of VTK's type 1[12]\. Triangulate"
+    ):
         from_pyvista(pyvista.ImageData(dimensions=(2, 2, 2)).cast_to_unstructured_grid())
 
 
 def test_a_missing_package_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
-    with pytest.raises(MissingExtraError, match=r"trimesh must be installed; .* pip install 'eigenshape\[bridges\]"):
+    with pytest.raises(
+        MissingExtraError, match=r"trimesh must be installed; .* pip install 'eigenshape\[bridges\]"
+    ):
         to_trimesh(icosphere(1))
 
 

@@ -57,7 +57,11 @@ def test_whole_files_give_one_tetrahedron(tmp_path, name):
     ("name", "change", "match"),
     [
         # Tags that meshio takes for other nodes, tables as long as the largest tag, points from unused memory.
-        ("a.msh", ("\n1 0 0 0", "\n0 0 0 0"), r"tags of a gmsh file must lie in 1\.\.10000000; they go from 0 to 9"),
+        (
+            "a.msh",
+            ("\n1 0 0 0", "\n0 0 0 0"),
+            r"tags of a gmsh file must lie in 1\.\.10000000; they go from 0 to 9",
+        ),
         ("a.msh", ("\n9 0 0 1", "\n3 0 0 1"), "must have tags of their own; 2 have the tag 3"),
         ("a.msh", ("9 ", "2000000000 "), "they go from 1 to 2000000000"),
         ("b.msh", ("9\n0 0 0", "4000000000\n0 0 0"), "they go from 1 to 4000000000"),
@@ -65,23 +69,51 @@ def test_whole_files_give_one_tetrahedron(tmp_path, name):
         ("b.msh", ("3 1 0 4\n1", "3 1 0 -4\n1"), "a block declares -4 nodes"),
         ("b.msh", ("3 1 0 4\n1", "3 1 0 3\n1"), "it declares 20 words of nodes and holds 24"),
         ("b.msh", ("3 1 0 4\n1", "3 1 0 x\n1"), "a number is missing, or not whole"),
-        ("b.msh", ("$Elements\n1 1 1 1", "$Elements\n1 2 1 1"), "it declares 2 cells, of which meshio reads 1"),
+        (
+            "b.msh",
+            ("$Elements\n1 1 1 1", "$Elements\n1 2 1 1"),
+            "it declares 2 cells, of which meshio reads 1",
+        ),
         ("a.msh", ("$Elements\n2", "$Elements\n1"), "it declares 1 elements and holds 2"),
         ("a.msh", ("$Nodes\n4", "$Nodes\n5"), "it declares 20 words of nodes and holds 16"),
-        ("a.msh", ("2.2 0 8", "4.0 0 8"), r"must be of version 2\.2 or 4\.1; its format is '4\.0 0 8'"),
-        ("a.msh", ("$Elements", "$Nodes\n0\n$EndNodes\n$Elements"), "must have one section Nodes; it has 2"),
+        (
+            "a.msh",
+            ("2.2 0 8", "4.0 0 8"),
+            r"must be of version 2\.2 or 4\.1; its format is '4\.0 0 8'",
+        ),
+        (
+            "a.msh",
+            ("$Elements", "$Nodes\n0\n$EndNodes\n$Elements"),
+            "must have one section Nodes; it has 2",
+        ),
         ("a.msh", ("$EndMeshFormat", "$EndFormat"), r"must be whole; it has no \$EndMeshFormat"),
         # A count that meshio passes over line by line, for days.
-        ("a.mesh", ("Ridges\n1", "Ridges\n1000000000000"), "must hold the lines it declares; '1000000000000' do not"),
+        (
+            "a.mesh",
+            ("Ridges\n1", "Ridges\n1000000000000"),
+            "must hold the lines it declares; '1000000000000' do not",
+        ),
         # Endless loops, and cells of which meshio keeps those of the last piece alone.
-        ("a.vtu", (PIECE, PIECE + PIECE), "must hold one piece; it holds 2 that have cells. Merge them first"),
+        (
+            "a.vtu",
+            (PIECE, PIECE + PIECE),
+            "must hold one piece; it holds 2 that have cells. Merge them first",
+        ),
         (
             "a.vtu",
             ('Name="types"', 'Name="faces"'),
             "must have connectivity, offsets and types; it has connectivity, offsets, faces",
         ),
-        ("a.vtu", ('version="0.1"', 'version="0.1" header_type="Int32"'), "must be UInt32 or UInt64; it is 'Int32'"),
-        ("a.vtu", ('Cells="1"', 'Cells="x"'), r"pieces that count points and cells; the counts are \[\('4', 'x'\)\]"),
+        (
+            "a.vtu",
+            ('version="0.1"', 'version="0.1" header_type="Int32"'),
+            "must be UInt32 or UInt64; it is 'Int32'",
+        ),
+        (
+            "a.vtu",
+            ('Cells="1"', 'Cells="x"'),
+            r"pieces that count points and cells; the counts are \[\('4', 'x'\)\]",
+        ),
         ("a.vtu", (">10<", ">13<"), "must be simplices, quads or polylines; it holds wedge"),
         # A grid of any size in a few bytes.
         (
@@ -90,7 +122,11 @@ def test_whole_files_give_one_tetrahedron(tmp_path, name):
             "UNSTRUCTURED_GRID or POLYDATA; its line is 'DATASET STRUCTURED_POINTS'",
         ),
         ("a.vtk", ("DATASET UNSTRUCTURED_GRID\n", ""), "its line is 'POINTS 4 double'"),
-        ("a.vtk", (f"POINTS 4 double\n{PLACES}", ""), "A VTK file must have a section POINTS; it has none"),
+        (
+            "a.vtk",
+            (f"POINTS 4 double\n{PLACES}", ""),
+            "A VTK file must have a section POINTS; it has none",
+        ),
     ],
 )
 def test_what_meshio_would_get_wrong_is_named(tmp_path, capfd, name, change, match):
@@ -125,7 +161,9 @@ def test_a_binary_medit_file_reads_by_any_name_and_must_have_its_end(tmp_path):
     (tmp_path / "a.bin").write_bytes(whole)
     assert read_shape(tmp_path / "a.bin", file_format="meshb").n_simplices == CUBE.n_simplices
     path.write_bytes(whole[: whole.rindex(struct.pack("<i", 54))])
-    with pytest.raises(FileFormatError, match=r"a\.meshb must be whole; meshio says '.*End-of-file"):
+    with pytest.raises(
+        FileFormatError, match=r"a\.meshb must be whole; meshio says '.*End-of-file"
+    ):
         read_shape(path)
 
 
@@ -153,7 +191,9 @@ def test_fields_of_several_values_before_the_coordinates():
     head = "FIELDS fpfh x y z\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 3 1 1 1\nPOINTS 1\nDATA ascii\n"
     assert parse_pcd(f"{head}9 9 9 1 2 3\n".encode()).tolist() == [[1, 2, 3]]
     assert parse_pcd(f"{head}9 9 nan 1 2 3\n".encode()).tolist() == [[1, 2, 3]]
-    with pytest.raises(FileFormatError, match="A point must have all fields and no more; line 7 is '9 9 9 1 2 3 4'"):
+    with pytest.raises(
+        FileFormatError, match="A point must have all fields and no more; line 7 is '9 9 9 1 2 3 4'"
+    ):
         parse_pcd(f"{head}9 9 9 1 2 3 4\n".encode())
 
 
@@ -166,5 +206,7 @@ def test_polylines_of_obj_files(tmp_path):
     (tmp_path / "a.obj").write_text(f"{rows}l 1 2\nf 1 2 3\n")
     assert isinstance(read_shape(tmp_path / "a.obj"), TriangleMesh)
     (tmp_path / "a.obj").write_text(f"{rows}l 1\n")
-    with pytest.raises(FileFormatError, match="A polyline must have two points or more; line 5 is '1'"):
+    with pytest.raises(
+        FileFormatError, match="A polyline must have two points or more; line 5 is '1'"
+    ):
         read_shape(tmp_path / "a.obj")

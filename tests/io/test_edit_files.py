@@ -4,7 +4,7 @@ import pytest
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape.deformation.edits import Edit, Move, mesh_fingerprint
 from eigenshape.deformation.handles import Rotation, Translation
-from eigenshape.deformation.region import Box
+from eigenshape.deformation.region import BoxRegion
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.deformation.session import replay
 from eigenshape.geometry.mesh import TriangleMesh
@@ -13,8 +13,17 @@ from eigenshape.shapes.surfaces import icosphere
 
 BALL = icosphere(2)
 EDITS = [
-    Edit((Move(BALL.vertices[:, 2] > 0.5, Rotation([0, 0, 0.5], [1, 1 / 3, 0], 0.7)),), mode="thesis"),
-    Edit((Move(Box([-np.inf, -np.inf, -9], [np.inf, np.inf, -0.5]), Translation([0, 0.1, -1 / 3])),)),
+    Edit(
+        (Move(BALL.vertices[:, 2] > 0.5, Rotation([0, 0, 0.5], [1, 1 / 3, 0], 0.7)),), mode="thesis"
+    ),
+    Edit(
+        (
+            Move(
+                BoxRegion([-np.inf, -np.inf, -9], [np.inf, np.inf, -0.5]),
+                Translation([0, 0.1, -1 / 3]),
+            ),
+        )
+    ),
 ]
 
 
@@ -44,7 +53,7 @@ def test_the_file_is_plain_json(tmp_path):
         (b"\xff\xfe", "must hold JSON"),
         (b"[" * 100_000, "must hold JSON"),
         (b"1" * 5000, "must hold JSON"),
-        (b"[1, 2]", "Edits are kept as a JSON object"),
+        (b"[1, 2]", "Edits must be a JSON object"),
         (
             b'{"kind": "eigenshape edits", "version": 2, "mesh": {"n_vertices": 3, "n_faces": 1, "digest": ""}, '
             b'"edits": [{}]}',

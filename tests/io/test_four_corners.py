@@ -6,7 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lapy import TetMesh
 
-from eigenshape import FileFormatError, InvalidParameterError, SimplicialMesh, TriangleMesh, read_mesh, read_shape
+from eigenshape import (
+    FileFormatError,
+    InvalidParameterError,
+    SimplicialMesh,
+    TriangleMesh,
+    read_mesh,
+    read_shape,
+)
 from eigenshape.io.cells import four_cornered, require_kind
 from eigenshape.io.obj import parse as parse_obj
 from eigenshape.shapes.domains import box
@@ -16,7 +23,9 @@ CUBE = box(3, 2, 2)
 
 def grid(n, height):
     """Return a sheet of n by n quads, bent by `height`."""
-    x, y = (part.ravel() for part in np.meshgrid(np.arange(n + 1.0), np.arange(n + 1.0), indexing="ij"))
+    x, y = (
+        part.ravel() for part in np.meshgrid(np.arange(n + 1.0), np.arange(n + 1.0), indexing="ij")
+    )
     first = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
     points = np.column_stack([x, y, height * np.sin(x + 0.3 * y * y)])
     return points, np.column_stack([first, first + 1, first + n + 2, first + n + 1])
@@ -25,7 +34,14 @@ def grid(n, height):
 def write_polygons(path, points, polygons):
     rows = [" ".join(map(repr, row)) for row in points.tolist()]
     cells = [f"{len(row)} {' '.join(map(str, row))}" for row in polygons.tolist()]
-    text = ["# vtk DataFile Version 3.0", "any", "ASCII", "DATASET POLYDATA", f"POINTS {len(points)} double", *rows]
+    text = [
+        "# vtk DataFile Version 3.0",
+        "any",
+        "ASCII",
+        "DATASET POLYDATA",
+        f"POINTS {len(points)} double",
+        *rows,
+    ]
     path.write_text("\n".join([*text, f"POLYGONS {len(cells)} {5 * len(cells)}", *cells]) + "\n")
     return path
 
@@ -37,7 +53,8 @@ def test_tetrahedra_that_lapy_writes_come_back_as_tetrahedra(tmp_path):
     np.testing.assert_array_equal(found.simplices, CUBE.simplices)
     np.testing.assert_allclose(found.points, CUBE.points, rtol=1e-7)
     with pytest.raises(
-        FileFormatError, match=r"must hold triangles in R\^3; it holds .* tetrahedra in R\^3, which read"
+        FileFormatError,
+        match=r"must hold triangles in R\^3; it holds .* tetrahedra in R\^3, which read",
     ):
         read_mesh(tmp_path / "a.vtk")
 
@@ -61,10 +78,13 @@ def test_where_it_could_be_either_the_caller_says_it(tmp_path):
     assert read_shape(path, cells="quads").faces.tolist() == [[0, 1, 2], [0, 2, 3]]
     assert read_mesh(path, cells="quads").n_faces == 2
     with pytest.raises(
-        InvalidParameterError, match="cells must be triangles, quads, tetrahedra or None; it is 'hexes'"
+        InvalidParameterError,
+        match="cells must be triangles, quads, tetrahedra or None; it is 'hexes'",
     ):
         require_kind("hexes")
-    with pytest.raises(FileFormatError, match="read with cells='triangles' must hold triangles; it holds quads"):
+    with pytest.raises(
+        FileFormatError, match="read with cells='triangles' must hold triangles; it holds quads"
+    ):
         read_shape(path, cells="triangles")
 
 
@@ -103,6 +123,8 @@ def test_no_cells_and_cells_beyond_the_points_are_left_to_who_makes_the_mesh():
 def test_quads_of_a_real_surface(data, tmp_path):
     text = (data / "nasty" / "geometrycentral" / "moebius.obj").read_bytes()
     lines = [line.split()[1:] for line in text.decode().splitlines() if line.startswith("f ")]
-    quads = np.array([[int(word.split("/")[0]) - 1 for word in line] for line in lines if len(line) == 4])
+    quads = np.array(
+        [[int(word.split("/")[0]) - 1 for word in line] for line in lines if len(line) == 4]
+    )
     assert len(quads) == len(lines) == 224
     assert four_cornered(parse_obj(text)[0], quads) == "quads"

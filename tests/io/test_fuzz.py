@@ -62,7 +62,9 @@ def test_any_piece_cut_out_doubled_or_put_in(name, data):
     parse, good = FILES[name]
     start, stop = sorted(data.draw(st.tuples(*[st.integers(0, len(good))] * 2)))
     piece = data.draw(
-        st.sampled_from([b"", good[start:stop] * 2, b"\n", b"-", b"9" * 30, b"\0\xff", b"1e999 nan _ #\\"])
+        st.sampled_from(
+            [b"", good[start:stop] * 2, b"\n", b"-", b"9" * 30, b"\0\xff", b"1e999 nan _ #\\"]
+        )
     )
     read_or_refuse(parse, good[:start] + piece + good[stop:])
 

@@ -7,7 +7,8 @@ import pytest
 import trimesh
 from tetrahedra import FACES, FILES, TETRAHEDRON, VERTICES, read
 
-from eigenshape import FileFormatError, InvalidShapeError, TriangleMesh, enclosed_volume, read_mesh, write_mesh
+from eigenshape import FileFormatError, InvalidShapeError, TriangleMesh, read_mesh, write_mesh
+from eigenshape.geometry import enclosed_volume
 from eigenshape.io.glb import format_mesh, parse
 from eigenshape.io.gltf import Gltf, placed_triangles
 
@@ -65,7 +66,12 @@ def test_we_understand_another_writer():
 
 
 def test_nodes_move_turn_and_scale_in_this_order():
-    node = {"mesh": 0, "translation": [10, 0, 0], "rotation": [0, 0, 0.5**0.5, 0.5**0.5], "scale": [2, 1e-3, -3]}
+    node = {
+        "mesh": 0,
+        "translation": [10, 0, 0],
+        "rotation": [0, 0, 0.5**0.5, 0.5**0.5],
+        "scale": [2, 1e-3, -3],
+    }
     tree, binary = unpacked()
     tree["nodes"] = [{"children": [1], "translation": [0, 0, 100]}, node]
     mesh = read(parse, packed(tree, binary))
@@ -78,7 +84,10 @@ def test_nodes_move_turn_and_scale_in_this_order():
 
 
 def test_mirror_is_seen_however_small():
-    assert read(parse, changed("nodes", 0, "scale", to=[-1e-120] * 3)).faces[0].tolist() == FACES[0][::-1]
+    assert (
+        read(parse, changed("nodes", 0, "scale", to=[-1e-120] * 3)).faces[0].tolist()
+        == FACES[0][::-1]
+    )
 
 
 def test_without_scenes_all_nodes_count_and_with_them_those_of_the_chosen():
@@ -101,7 +110,13 @@ def primitive(mode, n_corners, indices=range(6)):
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "mode": mode}]}],
         "accessors": [
             {"bufferView": 0, "componentType": 5126, "count": 6, "type": "VEC3"},
-            {"bufferView": 0, "byteOffset": 72, "componentType": 5123, "count": len(corners), "type": "SCALAR"},
+            {
+                "bufferView": 0,
+                "byteOffset": 72,
+                "componentType": 5123,
+                "count": len(corners),
+                "type": "SCALAR",
+            },
         ],
         "bufferViews": [{"buffer": 0, "byteLength": 72 + corners.nbytes}],
         "buffers": [{"byteLength": 72 + corners.nbytes}],
@@ -135,12 +150,16 @@ def test_parts_of_one_mesh_share_the_vertices_they_share_in_the_file():
 
 
 def test_interleaved_and_normalised_numbers_and_data_uris():
-    rows = b"".join(struct.pack("<hhhH", *row, 77) for row in [(0, 0, 0), (32767, 0, 0), (0, -32768, 0)])
+    rows = b"".join(
+        struct.pack("<hhhH", *row, 77) for row in [(0, 0, 0), (32767, 0, 0), (0, -32768, 0)]
+    )
     uri = "data:application/octet-stream;base64," + base64.b64encode(rows).decode()
     tree = {
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
         "nodes": [{"mesh": 0}],
-        "accessors": [{"bufferView": 0, "componentType": 5122, "normalized": True, "count": 3, "type": "VEC3"}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5122, "normalized": True, "count": 3, "type": "VEC3"}
+        ],
         "bufferViews": [{"buffer": 0, "byteLength": 24, "byteStride": 8}],
         "buffers": [{"byteLength": 24, "uri": uri}],
         "extensionsRequired": ["KHR_mesh_quantization"],
@@ -150,7 +169,10 @@ def test_interleaved_and_normalised_numbers_and_data_uris():
 
 def test_unknown_chunks_are_passed_over():
     tree, binary = unpacked()
-    assert read(parse, packed(tree, binary, extra=struct.pack("<I4s", 4, b"WHAT") + b"else")).n_faces == 4
+    assert (
+        read(parse, packed(tree, binary, extra=struct.pack("<I4s", 4, b"WHAT") + b"else")).n_faces
+        == 4
+    )
 
 
 DEEP = b"[" * 100_000
@@ -211,7 +233,9 @@ def test_copies_are_bounded(copied):
     else:
         tree["meshes"][0]["primitives"] *= 10
     assert len(placed_triangles(Gltf(tree, [binary], most=100))[1]) == 40
-    with pytest.raises(FileFormatError, match="must stay within 50 vertices and faces; its copies make more"):
+    with pytest.raises(
+        FileFormatError, match="must stay within 50 vertices and faces; its copies make more"
+    ):
         placed_triangles(Gltf(tree, [binary], most=50))
 
 
@@ -224,5 +248,7 @@ def test_not_finite_coordinates_are_refused(tmp_path):
 
 
 def test_single_precision_refuses_what_it_cannot_hold():
-    with pytest.raises(FileFormatError, match=r"GLB holds single precision, up to 3.4e38; vertex 1"):
+    with pytest.raises(
+        FileFormatError, match=r"GLB holds single precision, up to 3.4e38; vertex 1"
+    ):
         format_mesh(TriangleMesh(TETRAHEDRON.vertices * 1e39, FACES))

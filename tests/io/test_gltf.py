@@ -32,7 +32,9 @@ def folder(tmp_path):
     return inner
 
 
-@pytest.mark.parametrize("uri", ["a.bin", "./a.bin", "sub%20dir/b%20%C3%BC.bin", "sub dir/../a.bin"])
+@pytest.mark.parametrize(
+    "uri", ["a.bin", "./a.bin", "sub%20dir/b%20%C3%BC.bin", "sub dir/../a.bin"]
+)
 def test_buffers_in_the_folder_and_below(folder, uri):
     (folder / "a.gltf").write_bytes(text(uri))
     for read in (read_mesh, read_shape):
@@ -42,7 +44,9 @@ def test_buffers_in_the_folder_and_below(folder, uri):
 
 
 def test_what_another_program_writes(tmp_path):
-    for name, data in trimesh.exchange.gltf.export_gltf(trimesh.Trimesh(VERTICES, FACES).scene()).items():
+    for name, data in trimesh.exchange.gltf.export_gltf(
+        trimesh.Trimesh(VERTICES, FACES).scene()
+    ).items():
         (tmp_path / name).write_bytes(data)
     path = next(tmp_path.glob("*.gltf"))
     other = trimesh.load_mesh(path, process=False)
@@ -73,17 +77,24 @@ def test_nothing_outside_of_the_folder_is_opened(folder, uri):
     (folder / "link.bin").symlink_to(folder.parent / "outside.bin")
     (folder / "loop.bin").symlink_to(folder / "loop.bin")
     (folder / "a.gltf").write_bytes(text(uri.format(folder=folder)))
-    expected = "must lie in its folder" if uri != "loop.bin" else "must lie in its folder|Too many levels"
+    expected = (
+        "must lie in its folder" if uri != "loop.bin" else "must lie in its folder|Too many levels"
+    )
     with pytest.raises((FileFormatError, OSError), match=expected):
         read_mesh(folder / "a.gltf")
 
 
 def test_sizes_and_kinds_of_buffers(folder):
     (folder / "a.gltf").write_bytes(text(size=len(BINARY) + 1))
-    with pytest.raises(FileFormatError, match=rf"buffers\[0\] must have {len(BINARY) + 1} bytes; the file 'a.bin' has"):
+    with pytest.raises(
+        FileFormatError,
+        match=rf"buffers\[0\] must have {len(BINARY) + 1} bytes; the file 'a.bin' has",
+    ):
         read_mesh(folder / "a.gltf")
     (folder / "a.gltf").write_bytes(text(size=-1))
-    with pytest.raises(FileFormatError, match="byteLength in a glTF file must be a whole number from 0; it is '-1'"):
+    with pytest.raises(
+        FileFormatError, match="byteLength in a glTF file must be a whole number from 0; it is '-1'"
+    ):
         read_mesh(folder / "a.gltf")
     os.mkfifo(folder / "pipe.bin")
     (folder / "a.gltf").write_bytes(text("pipe.bin"))

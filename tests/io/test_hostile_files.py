@@ -77,10 +77,14 @@ def test_a_header_of_many_lines_is_read_in_proportion(line):
     for count in (5_000, 40_000):
         data = many_declarations(line, count)
         began = time.process_time()
-        with pytest.raises(FileFormatError, match="must declare an element vertex with the numbers x, y and z"):
+        with pytest.raises(
+            FileFormatError, match="must declare an element vertex with the numbers x, y and z"
+        ):
             ply.parse(data)
         spent.append(time.process_time() - began)
-    assert spent[1] < 24 * spent[0]  # eight times the lines; 64 times the work when each looked at all before it
+    assert (
+        spent[1] < 24 * spent[0]
+    )  # eight times the lines; 64 times the work when each looked at all before it
 
 
 @pytest.mark.parametrize("place", ["buffers", "images"])
@@ -103,7 +107,9 @@ def test_nothing_outside_a_glb_file_is_opened(tmp_path, monkeypatch, place):
     for module, name in ((io, "open"), (builtins, "open"), (os, "open")):
         monkeypatch.setattr(module, name, spy(getattr(module, name)))
     if place == "buffers":
-        with pytest.raises(FileFormatError, match=r"a\.glb: .* buffers\[0\] points outside, to 'outside\.bin'"):
+        with pytest.raises(
+            FileFormatError, match=r"a\.glb: .* buffers\[0\] points outside, to 'outside\.bin'"
+        ):
             read_mesh(path)
     else:
         assert read_mesh(path).n_faces == 4  # how a surface is painted is passed over
@@ -117,10 +123,14 @@ def test_a_stride_between_fewer_than_two_rows_is_never_taken(count):
         tree["bufferViews"][0]["byteStride"] = stride
         tree["accessors"][0]["count"] = count
         tree["accessors"][1] = {**tree["accessors"][0], "componentType": 5121, "type": "SCALAR"}
-        with pytest.raises(FileFormatError, match=r"must have three corners each|must hold triangles"):
+        with pytest.raises(
+            FileFormatError, match=r"must have three corners each|must hold triangles"
+        ):
             glb.parse(packed(tree, binary))
     tree["accessors"][0]["byteOffset"] = 500
-    with pytest.raises(FileFormatError, match=rf"accessors\[0\] must lie in its buffer; {count} rows do not fit"):
+    with pytest.raises(
+        FileFormatError, match=rf"accessors\[0\] must lie in its buffer; {count} rows do not fit"
+    ):
         glb.parse(packed(tree, binary))
 
 
@@ -136,7 +146,9 @@ def test_indices_that_are_no_whole_numbers_are_refused(value):
 
 
 def test_names_of_odd_things_are_cut_short_and_plain():
-    with pytest.raises(FileFormatError, match=r"it names meshes\['\\ud800x+\] and holds none\.") as caught:
+    with pytest.raises(
+        FileFormatError, match=r"it names meshes\['\\ud800x+\] and holds none\."
+    ) as caught:
         glb.parse(changed("nodes", 0, "mesh", to="\ud800" + "x" * 5000))
     assert str(caught.value).isascii()
     assert len(str(caught.value)) < 150
@@ -144,7 +156,9 @@ def test_names_of_odd_things_are_cut_short_and_plain():
 
 def test_list_of_a_plain_row_that_goes_beyond_its_end():
     text = simple(rows="100 0 1 2 7\n").replace("end_header", "property int kind\nend_header")
-    with pytest.raises(FileFormatError, match="A row must hold all its columns; line 14 lacks vertex_indices"):
+    with pytest.raises(
+        FileFormatError, match="A row must hold all its columns; line 14 lacks vertex_indices"
+    ):
         ply.parse(text.encode())
     text = text.replace("100 0 1 2 7", "3 0 1 2 7")
     assert ply.parse(text.encode())[1].tolist() == [[0, 1, 2]]
@@ -153,17 +167,42 @@ def test_list_of_a_plain_row_that_goes_beyond_its_end():
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
 def test_lines_after_joined_lines_keep_their_numbers(newline):
     text = "v 0 0 0\nv 1 \\\n0 \\\n0\nv 0 1 0\nf 1 \\\n2 3\nf 1 2 x\n".replace("\n", newline)
-    with pytest.raises(FileFormatError, match="A corner must be a whole number; line 8 has 'x' in '1 2 x'"):
+    with pytest.raises(
+        FileFormatError, match="A corner must be a whole number; line 8 has 'x' in '1 2 x'"
+    ):
         obj.parse(text.encode())
 
 
 RICH = {
     **FILES,
-    "ply rich text": (ply.parse, HEADER.format(order="ascii", remark="x").encode() + TEXT_ROWS.encode()),
-    "ply rich big": (ply.parse, HEADER.format(order="binary_big_endian", remark="x").encode() + binary_rows(">")),
-    "obj rich": (obj.parse, b"v 0 0 0 1\nv 1 0 \\\n0\nvt 0 0\nv 0 1 0\nf 1/1 2//2 -1/1/1\nf 1 2 3 2\n"),
+    "ply rich text": (
+        ply.parse,
+        HEADER.format(order="ascii", remark="x").encode() + TEXT_ROWS.encode(),
+    ),
+    "ply rich big": (
+        ply.parse,
+        HEADER.format(order="binary_big_endian", remark="x").encode() + binary_rows(">"),
+    ),
+    "obj rich": (
+        obj.parse,
+        b"v 0 0 0 1\nv 1 0 \\\n0\nvt 0 0\nv 0 1 0\nf 1/1 2//2 -1/1/1\nf 1 2 3 2\n",
+    ),
 }
-WORDS = [b"-1", b"0", b"100", b"255", b"256", b"2147483648", b"9" * 20, b"1e999", b"nan", b"1.5", b"", b"#", b"\\\n"]
+WORDS = [
+    b"-1",
+    b"0",
+    b"100",
+    b"255",
+    b"256",
+    b"2147483648",
+    b"9" * 20,
+    b"1e999",
+    b"nan",
+    b"1.5",
+    b"",
+    b"#",
+    b"\\\n",
+]
 
 
 @pytest.mark.long
@@ -181,8 +220,16 @@ def test_any_word_put_in_place_of_another(name, data):
 
 def places(tree, path=()):
     """List the paths of all values of a JSON tree."""
-    entries = tree.items() if isinstance(tree, dict) else enumerate(tree) if isinstance(tree, list) else ()
-    return [found for key, value in entries for found in [(*path, key), *places(value, (*path, key))]]
+    entries = (
+        tree.items()
+        if isinstance(tree, dict)
+        else enumerate(tree)
+        if isinstance(tree, list)
+        else ()
+    )
+    return [
+        found for key, value in entries for found in [(*path, key), *places(value, (*path, key))]
+    ]
 
 
 ODD = st.one_of(
@@ -203,9 +250,13 @@ def test_any_value_anywhere_in_the_tree_of_a_glb_file(where, to):
 @pytest.mark.long
 @settings(max_examples=200, deadline=None)
 @given(
-    st.dictionaries(st.sampled_from(["count", "byteOffset", "componentType", "normalized", "sparse"]), ODD),
+    st.dictionaries(
+        st.sampled_from(["count", "byteOffset", "componentType", "normalized", "sparse"]), ODD
+    ),
     st.dictionaries(st.sampled_from(["buffer", "byteOffset", "byteLength", "byteStride"]), ODD),
-    st.dictionaries(st.sampled_from(["matrix", "rotation", "scale", "translation", "children", "mesh"]), ODD),
+    st.dictionaries(
+        st.sampled_from(["matrix", "rotation", "scale", "translation", "children", "mesh"]), ODD
+    ),
 )
 def test_any_accessor_view_and_node(accessor, view, node):
     tree, binary = unpacked()

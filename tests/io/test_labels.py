@@ -14,7 +14,9 @@ def read(tmp_path, text, name="a.seg"):
     return read_labels(path)
 
 
-@pytest.mark.parametrize("text", ["3\n-1\n7\n", " 3 \r\n-1\r\n\r\n7", "# parts\n3 # head\n-1\n+7\n"])
+@pytest.mark.parametrize(
+    "text", ["3\n-1\n7\n", " 3 \r\n-1\r\n\r\n7", "# parts\n3 # head\n-1\n+7\n"]
+)
 def test_a_whole_number_a_line(tmp_path, text):
     found = read(tmp_path, text)
     assert found.dtype == np.int64
@@ -34,16 +36,32 @@ def test_labels_out_of_json(tmp_path):
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("a.seg", "1\nhead\n", r"a\.seg: A label must be a whole number; line 2 has 'head' in 'head'"),
+        (
+            "a.seg",
+            "1\nhead\n",
+            r"a\.seg: A label must be a whole number; line 2 has 'head' in 'head'",
+        ),
         ("a.seg", "1\n\n2.5\n", r"a\.seg: A label must be a whole number; line 3 has '2\.5'"),
         ("a.seg", "1 2\n3 4\n", r"a\.seg: A line must hold the label of one face; line 1 is '1 2'"),
         ("a.seg", "1\n2 3\n", r"a\.seg: A line must hold the label of one face; line 2 is '2 3'"),
-        ("a.seg", f"{2**63}\n", r"a\.seg: A label must fit into 64 bits; line 1 has '9223372036854775808'"),
+        (
+            "a.seg",
+            f"{2**63}\n",
+            r"a\.seg: A label must fit into 64 bits; line 1 has '9223372036854775808'",
+        ),
         ("a.seg", "", r"a\.seg must hold labels; it is empty"),
-        ("a.json", "{", r"a\.json: A \.json file of labels must hold JSON; it does not: Expecting property name"),
+        (
+            "a.json",
+            "{",
+            r"a\.json: A \.json file of labels must hold JSON; it does not: Expecting property name",
+        ),
         ("a.json", "[" * 10**6, r"a\.json: A \.json file of labels must hold JSON"),
         ("a.json", "[1, 2]", r'a\.json: A \.json file of labels must have a list "face_labels"'),
-        ("a.json", '{"face_labels": 3}', r'a\.json: A \.json file of labels must have a list "face_labels"'),
+        (
+            "a.json",
+            '{"face_labels": 3}',
+            r'a\.json: A \.json file of labels must have a list "face_labels"',
+        ),
         (
             "a.json",
             '{"face_labels": [1, "x"]}',
@@ -75,22 +93,34 @@ def test_labels_of_polygons_are_those_of_their_triangles(tmp_path):
     head = "ply\nformat ascii 1.0\nelement vertex 5\n"
     head += "property float x\nproperty float y\nproperty float z\nelement face 2\n"
     rows = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n"
-    for kind, of_faces in (("int", "6 4 0 1 2 3\n9 3 0 1 4\n"), ("uchar", "6 4 0 1 2 3\n9 3 0 1 4\n")):
+    for kind, of_faces in (
+        ("int", "6 4 0 1 2 3\n9 3 0 1 4\n"),
+        ("uchar", "6 4 0 1 2 3\n9 3 0 1 4\n"),
+    ):
         columns = f"property {kind} label\nproperty list uchar int vertex_indices\nend_header\n"
         (tmp_path / "a.ply").write_text(head + columns + rows + of_faces)
         assert read_labels(tmp_path / "a.ply").tolist() == [6, 6, 9]
     columns = "property float label\nproperty list uchar int vertex_indices\nend_header\n"
     (tmp_path / "a.ply").write_text(head + columns + rows + "6.5 4 0 1 2 3\nnan 3 0 1 4\n")
-    with pytest.raises(FileFormatError, match=r"a\.ply: The property label of faces must be a whole number"):
+    with pytest.raises(
+        FileFormatError, match=r"a\.ply: The property label of faces must be a whole number"
+    ):
         read_labels(tmp_path / "a.ply")
 
 
 def test_labels_that_do_not_fit_are_refused(tmp_path):
-    with pytest.raises(InvalidParameterError, match=r"face_labels must be \(4,\) and go to a PLY file; .* go to \.off"):
+    with pytest.raises(
+        InvalidParameterError,
+        match=r"face_labels must be \(4,\) and go to a PLY file; .* go to \.off",
+    ):
         write_mesh(TETRAHEDRON, tmp_path / "a.off", face_labels=np.zeros(4, int))
-    with pytest.raises(InvalidParameterError, match=r"face_labels must be \(4,\) .* they are \(3,\)"):
+    with pytest.raises(
+        InvalidParameterError, match=r"face_labels must be \(4,\) .* they are \(3,\)"
+    ):
         write_mesh(TETRAHEDRON, tmp_path / "a.ply", face_labels=np.zeros(3, int))
-    with pytest.raises(InvalidParameterError, match="must fit into 32 bits; that of face 1 is 2147483648"):
+    with pytest.raises(
+        InvalidParameterError, match="must fit into 32 bits; that of face 1 is 2147483648"
+    ):
         write_mesh(TETRAHEDRON, tmp_path / "a.ply", face_labels=np.array([0, 2**31, 0, 0]))
     write_mesh(TETRAHEDRON, tmp_path / "a.ply")
     with pytest.raises(FileFormatError, match="must have a property label; they have none"):

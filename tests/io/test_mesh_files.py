@@ -9,7 +9,14 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from tetrahedra import FACES, FILES, TETRAHEDRON, VERTICES
 
-from eigenshape import FileFormatError, InvalidParameterError, InvalidShapeError, TriangleMesh, read_mesh, write_mesh
+from eigenshape import (
+    FileFormatError,
+    InvalidParameterError,
+    InvalidShapeError,
+    TriangleMesh,
+    read_mesh,
+    write_mesh,
+)
 
 EXACT = [("a.off", False), ("a.obj", False), ("a.ply", False), ("a.ply", True)]
 ALL = [*EXACT, ("a.stl", False), ("a.stl", True), ("a.glb", True)]
@@ -33,10 +40,14 @@ def test_format_can_be_named(tmp_path, file_format):
     assert read_mesh(path, file_format=file_format).n_faces == 4
 
 
-coordinates = arrays(np.float64, (4, 3), elements=st.floats(allow_nan=False, allow_infinity=False, width=64))
+coordinates = arrays(
+    np.float64, (4, 3), elements=st.floats(allow_nan=False, allow_infinity=False, width=64)
+)
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(vertices=coordinates)
 @pytest.mark.parametrize(("name", "binary"), EXACT)
 def test_every_double_reads_back_exactly(tmp_path, name, binary, vertices):
@@ -75,7 +86,9 @@ def test_binary_or_text_as_asked(tmp_path, name, binary):
 
 @pytest.mark.parametrize(("name", "binary"), [("a.off", True), ("a.obj", True), ("a.glb", False)])
 def test_binary_where_there_is_none_is_refused(tmp_path, name, binary):
-    with pytest.raises(InvalidParameterError, match=rf"binary={binary} is for .*; the suffix is \.{name[2:]}"):
+    with pytest.raises(
+        InvalidParameterError, match=rf"binary={binary} is for .*; the suffix is \.{name[2:]}"
+    ):
         write_mesh(TETRAHEDRON, tmp_path / name, binary=binary)
 
 
@@ -86,18 +99,26 @@ def test_colours(tmp_path):
         np.testing.assert_array_equal(read_mesh(tmp_path / "a.ply").vertices, VERTICES)
         assert b"property uchar green" in (tmp_path / "a.ply").read_bytes()
     with pytest.raises(
-        InvalidParameterError, match=r"colors must be \(4, 3\) uint8 and go to a PLY file; .* go to \.off"
+        InvalidParameterError,
+        match=r"colors must be \(4, 3\) uint8 and go to a PLY file; .* go to \.off",
     ):
         write_mesh(TETRAHEDRON, tmp_path / "a.off", colors=colors)
-    with pytest.raises(InvalidParameterError, match=r"colors must be \(4, 3\) uint8 .* they are \(3, 3\) uint8"):
+    with pytest.raises(
+        InvalidParameterError, match=r"colors must be \(4, 3\) uint8 .* they are \(3, 3\) uint8"
+    ):
         write_mesh(TETRAHEDRON, tmp_path / "a.ply", colors=colors[:3])
 
 
 @pytest.mark.parametrize("name", ["a.xyz", "a", "a.gl", ".ply"])
 def test_unknown_suffix_is_refused_with_the_list_of_known_ones(tmp_path, name):
-    with pytest.raises(FileFormatError, match=r"must be of a known format, \.off, .*, \.glb, \.gltf, .*, \.msh; it is"):
+    with pytest.raises(
+        FileFormatError,
+        match=r"must be of a known format, \.off, .*, \.glb, \.gltf, .*, \.msh; it is",
+    ):
         read_mesh(tmp_path / name)
-    with pytest.raises(FileFormatError, match=r"known format, \.off, \.obj, \.ply, \.stl, \.glb; it is"):
+    with pytest.raises(
+        FileFormatError, match=r"known format, \.off, \.obj, \.ply, \.stl, \.glb; it is"
+    ):
         write_mesh(TETRAHEDRON, tmp_path / name)
     assert not names(tmp_path)
 
@@ -110,7 +131,9 @@ def test_what_is_no_regular_file_is_refused_at_once(tmp_path, suffix):
     (tmp_path / f"empty{suffix}").touch()
     for kind in ("folder", "device", "pipe"):
         path = tmp_path / f"{kind}{suffix}"
-        with pytest.raises(FileFormatError, match=rf"{kind}{suffix} must be a regular file; it is a {kind}"):
+        with pytest.raises(
+            FileFormatError, match=rf"{kind}{suffix} must be a regular file; it is a {kind}"
+        ):
             read_mesh(path)
         with pytest.raises(FileFormatError, match=f"must be a regular file; it is a {kind}"):
             write_mesh(TETRAHEDRON, path)
@@ -133,11 +156,15 @@ def test_a_file_that_may_not_be_read(tmp_path):
 def test_errors_name_the_file_and_keep_their_cause(tmp_path):
     path = tmp_path / "a.off"
     path.write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n")
-    with pytest.raises(InvalidShapeError, match=r"a\.off: faces must index vertices 0\.\.2; face 0 is") as caught:
+    with pytest.raises(
+        InvalidShapeError, match=r"a\.off: faces must index vertices 0\.\.2; face 0 is"
+    ) as caught:
         read_mesh(path)
     assert isinstance(caught.value.__cause__, InvalidShapeError)
     path.write_text("OFF\n3 1 0\n")
-    with pytest.raises(FileFormatError, match=r"a\.off: An OFF file must hold the rows it declares") as caught:
+    with pytest.raises(
+        FileFormatError, match=r"a\.off: An OFF file must hold the rows it declares"
+    ) as caught:
         read_mesh(path)
     assert isinstance(caught.value.__cause__, FileFormatError)
 
@@ -161,7 +188,9 @@ def test_an_interrupted_write_leaves_the_old_file_and_nothing_else(tmp_path, mon
 def test_what_does_not_fit_is_refused_and_the_old_file_stays(tmp_path):
     path = tmp_path / "a.stl"
     write_mesh(TETRAHEDRON, path)
-    with pytest.raises(FileFormatError, match=r"a\.stl cannot hold the mesh\. Binary STL holds single precision"):
+    with pytest.raises(
+        FileFormatError, match=r"a\.stl cannot hold the mesh\. Binary STL holds single precision"
+    ):
         write_mesh(TriangleMesh(TETRAHEDRON.vertices * 1e39, FACES), path)
     assert read_mesh(path).n_faces == 4
 

@@ -14,11 +14,16 @@ TRIANGLES = "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
     [
         POINTS + TRIANGLES,
         TRIANGLES + POINTS,
-        "mtllib none.mtl\no f 1 2 3\ng v\ns off\n" + POINTS + "vt 0 0\nvn 0 0 1\nvp 1\nl 1 2\np 1\n" + TRIANGLES,
+        "mtllib none.mtl\no f 1 2 3\ng v\ns off\n"
+        + POINTS
+        + "vt 0 0\nvn 0 0 1\nvp 1\nl 1 2\np 1\n"
+        + TRIANGLES,
         POINTS + "vt 0 0\nvt 1 1\nf 1/1 3/2 2/1\nf 1/2 2/2 4/1\nf 2/1 3/1 4/2\nf 1/1 4/1 3/1\n",
         POINTS + "f 1/1/1 3/2/1 2/1/1\nf 1//1 2//2 4//1\nf 2// 3// 4//\nf 1/1/ 4/1/ 3/1/\n",
         POINTS + "f -4 -2 -3\nf -4 -3 -1\nf -3/1 -2/-1 -1/-1\nf 1 -1 -2\n",
-        POINTS.replace("v ", "v\t ").replace(" 0\n", " 0  # end\n") + "\n" + TRIANGLES.replace("f ", "  f   "),
+        POINTS.replace("v ", "v\t ").replace(" 0\n", " 0  # end\n")
+        + "\n"
+        + TRIANGLES.replace("f ", "  f   "),
         POINTS.replace("1\n", "1 0.5\n") + TRIANGLES,
         POINTS.replace("v 1 0 0", "v 1 0 0 0.5 nan 0") + TRIANGLES,
         POINTS + "f 1 \\\n3 \\\r\n2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n",
@@ -54,13 +59,19 @@ def test_polygons_become_fans_in_order():
         (POINTS + "f 1 2\n", "A face must have three corners or more; line 5 is '1 2'"),
         (POINTS + "f\n", "A face must have three corners or more; line 5 is ''"),
         (POINTS + "f\n" + TRIANGLES, "A face must have three corners or more; line 5 is ''"),
-        (POINTS + "f 1 2 3\nf 0 1 2\n", "A corner must count vertices from 1, or back from -1; line 6 is '0 1 2'"),
+        (
+            POINTS + "f 1 2 3\nf 0 1 2\n",
+            "A corner must count vertices from 1, or back from -1; line 6 is '0 1 2'",
+        ),
         (POINTS + "f -5 1 2\n", "back from -1; line 5 is '-5 1 2' after 4 vertices"),
         (POINTS + "f 1 2 3.0\n", r"A corner must be a whole number; line 5 has '3\.0'"),
         (POINTS + "f 1 2 /3\n", "A corner must be a whole number; line 5 has '/3'"),
         (POINTS + "f 1 2 3 \\", "A corner must be a whole number; line 5"),
         (POINTS + "f 1 2 x/3\n", "A corner must be a whole number; line 5 has 'x/3'"),
-        (POINTS.replace("v 1 0 0", "v 1 0,5 0") + TRIANGLES, "A coordinate must be a number; line 2 has '0,5'"),
+        (
+            POINTS.replace("v 1 0 0", "v 1 0,5 0") + TRIANGLES,
+            "A coordinate must be a number; line 2 has '0,5'",
+        ),
     ],
 )
 def test_broken_files_are_refused(text, message):

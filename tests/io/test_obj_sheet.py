@@ -84,8 +84,13 @@ def test_welded_and_dropped_vertices_are_renumbered():
 def test_polygons_turn_over_shrink_to_triangles_and_holes_are_sealed():
     vertices, faces = parse(CUBE)
     flipped = np.vstack([faces[:2, ::-1], faces[2:]])
-    assert lines(format_sheet(read_sheet(CUBE), TriangleMesh(vertices, flipped)), "f")[0] == "f 1/1 2/2 3/3 4/4"
-    half = format_sheet(read_sheet(CUBE), TriangleMesh(vertices, np.vstack([faces[1:], [[0, 1, 9]]])))
+    assert (
+        lines(format_sheet(read_sheet(CUBE), TriangleMesh(vertices, flipped)), "f")[0]
+        == "f 1/1 2/2 3/3 4/4"
+    )
+    half = format_sheet(
+        read_sheet(CUBE), TriangleMesh(vertices, np.vstack([faces[1:], [[0, 1, 9]]]))
+    )
     assert lines(half, "f")[0] == "f 1/1 3/3 2/2"
     assert lines(half, "f")[-1] == "f 1 2 10"
     one_turned = np.vstack([faces[:1, ::-1], faces[1:]])
@@ -104,9 +109,13 @@ def test_what_is_written_reads_back_as_the_mesh_whatever_was_repaired(data):
     sizes = data.draw(st.lists(st.integers(3, 6), min_size=1, max_size=8))
     polygons = [rng.integers(1, n_points + 1, size=size) for size in sizes]
     text = "".join(f"v {x} {y} {z}\n" for x, y, z in points)
-    text += "vt 0 0\nvt 1 0\n" + "".join("f " + " ".join(f"{c}/{1 + c % 2}" for c in row) + "\n" for row in polygons)
+    text += "vt 0 0\nvt 1 0\n" + "".join(
+        "f " + " ".join(f"{c}/{1 + c % 2}" for c in row) + "\n" for row in polygons
+    )
     mesh = TriangleMesh(*parse(text.encode()))
-    for name in data.draw(st.lists(st.sampled_from(sorted({*REPAIRS} - {"seal_holes"})), max_size=3)):
+    for name in data.draw(
+        st.lists(st.sampled_from(sorted({*REPAIRS} - {"seal_holes"})), max_size=3)
+    ):
         try:
             mesh = repair(mesh, [name]).mesh
         except ValueError:  # no face was left
@@ -135,5 +144,7 @@ def test_real_files_come_back(data):
 
 
 def test_a_texture_that_is_no_number_is_named():
-    with pytest.raises(FileFormatError, match="A texture coordinate must be a whole number; line 4 has 'x'"):
+    with pytest.raises(
+        FileFormatError, match="A texture coordinate must be a whole number; line 4 has 'x'"
+    ):
         read_sheet(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/x 2 3\n")

@@ -22,7 +22,9 @@ COLUMNS = "0 0 0 9 9 9\n1 0 0 9 9 9\n0 1 0 9 9 9\n0 0 1 9 9 9\n3 0 2 1\n3 0 1 3\
         f"NOFF\n4 4 6\n{COLUMNS}",
         f"COFF\n4 4 6\n{COLUMNS}",
         f"STCNOFF\n4 4 6\n{COLUMNS}",
-        f"OFF\n4 4 6\n{ROWS}".replace("3 0 2 1\n", "3 0 2 1 255 0 0\n").replace("3 0 1 3\n", "3 0 1 3 .5 .5 .5 1\n"),
+        f"OFF\n4 4 6\n{ROWS}".replace("3 0 2 1\n", "3 0 2 1 255 0 0\n").replace(
+            "3 0 1 3\n", "3 0 1 3 .5 .5 .5 1\n"
+        ),
         f"OFF\n4 4 6\n{ROWS}".replace("1 0 0", "\t1. +0 -0e-5"),
     ],
 )
@@ -33,10 +35,13 @@ def test_variants_give_the_tetrahedron(text):
 
 
 @pytest.mark.parametrize(
-    "remark", ["Ångström…".encode(), "é".encode("latin-1"), bytes(range(128, 256)) + b"\x0b\x0c\x1c"]
+    "remark",
+    ["Ångström…".encode(), "é".encode("latin-1"), bytes(range(128, 256)) + b"\x0b\x0c\x1c"],
 )
 def test_comments_in_any_encoding_do_no_harm(remark):
-    data = b"OFF # " + remark + b"\n# " + remark + b"\n4 4 6\n" + ROWS.replace("\n", "\n#\n").encode()
+    data = (
+        b"OFF # " + remark + b"\n# " + remark + b"\n4 4 6\n" + ROWS.replace("\n", "\n#\n").encode()
+    )
     np.testing.assert_array_equal(parse(data)[1], FACES)
     np.testing.assert_array_equal(parse(b"\xef\xbb\xbf" + data)[1], FACES)
 
@@ -63,17 +68,44 @@ def test_polygons_become_fans_in_order():
         ("OFF\n4 4_0 6\n" + ROWS, "A count must be a whole number; line 2 has '4_0'"),
         ("OFF\n4 4 6\n" + ROWS + "3 0 1 2\n", "declares 4 vertices and 4 faces and holds 9 rows"),
         ("OFF\n4 4 6\n" + ROWS[:-9], "declares 4 vertices and 4 faces and holds 7 rows"),
-        ("OFF\n2147483648 2147483648 6\n" + ROWS, "declares 2147483648 vertices and 2147483648 faces"),
+        (
+            "OFF\n2147483648 2147483648 6\n" + ROWS,
+            "declares 2147483648 vertices and 2147483648 faces",
+        ),
         ("OFF\n5 3 6\n" + ROWS, "equally many columns; the first has 3 and line 7 is '3 0 2 1'"),
         ("OFF\n3 5 6\n" + ROWS, "three corners or more, as many as it says; line 6 is '0 0 1'"),
-        ("OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", "2 0 2 1"), "three corners or more, as many as it says; line 7"),
-        ("OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", "4 0 2 1"), "three corners or more, as many as it says; line 7"),
-        ("OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", "3. 0 2 1"), r"A number of corners must be a whole number; line 7"),
-        ("OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", "3 0 2 1.5"), r"A corner must be a whole number; line 7 has '1\.5'"),
-        ("OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", "3 0 2 1e0"), "A corner must be a whole number; line 7 has '1e0'"),
-        ("OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", f"3 0 2 {10**30}"), "A corner must fit into 64 bits; line 7 has '10"),
-        ("OFF\n4 4 6\n" + ROWS.replace("1 0 0", "1 0 zero"), "A coordinate must be a number; line 4 has 'zero'"),
-        ("OFF\n4 4 6\n" + ROWS.replace("1 0 0", "1 0 1_0"), "A coordinate must be a number; line 4 has '1_0'"),
+        (
+            "OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", "2 0 2 1"),
+            "three corners or more, as many as it says; line 7",
+        ),
+        (
+            "OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", "4 0 2 1"),
+            "three corners or more, as many as it says; line 7",
+        ),
+        (
+            "OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", "3. 0 2 1"),
+            r"A number of corners must be a whole number; line 7",
+        ),
+        (
+            "OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", "3 0 2 1.5"),
+            r"A corner must be a whole number; line 7 has '1\.5'",
+        ),
+        (
+            "OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", "3 0 2 1e0"),
+            "A corner must be a whole number; line 7 has '1e0'",
+        ),
+        (
+            "OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", f"3 0 2 {10**30}"),
+            "A corner must fit into 64 bits; line 7 has '10",
+        ),
+        (
+            "OFF\n4 4 6\n" + ROWS.replace("1 0 0", "1 0 zero"),
+            "A coordinate must be a number; line 4 has 'zero'",
+        ),
+        (
+            "OFF\n4 4 6\n" + ROWS.replace("1 0 0", "1 0 1_0"),
+            "A coordinate must be a number; line 4 has '1_0'",
+        ),
         ("OFF\n1 1 0\n0 0\n3 0 0 0\n", "A vertex must have three numbers; line 3 is '0 0'"),
     ],
 )
@@ -85,12 +117,27 @@ def test_broken_files_are_refused(text, message):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("OFF\n4 4 6\n" + ROWS.replace("1 0 0", "1 nan 0"), r"must be finite; vertex 1 is \[1\.0, nan, 0\.0\]"),
+        (
+            "OFF\n4 4 6\n" + ROWS.replace("1 0 0", "1 nan 0"),
+            r"must be finite; vertex 1 is \[1\.0, nan, 0\.0\]",
+        ),
         ("OFF\n4 4 6\n" + ROWS.replace("1 0 0", "1 0 1e999"), "must be finite; vertex 1"),
-        ("OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", "3 0 2 4"), r"index vertices 0\.\.3; face 0 is \[0, 2, 4\]"),
-        ("OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", "3 0 2 -1"), r"index vertices 0\.\.3; face 0 is \[0, 2, -1\]"),
-        ("OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", "3 0 2 4294967296"), r"face 0 is \[0, 2, 4294967296\]"),
-        ("OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", f"3 0 2 {2**62}"), rf"face 0 is \[0, 2, {2**62}\]"),
+        (
+            "OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", "3 0 2 4"),
+            r"index vertices 0\.\.3; face 0 is \[0, 2, 4\]",
+        ),
+        (
+            "OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", "3 0 2 -1"),
+            r"index vertices 0\.\.3; face 0 is \[0, 2, -1\]",
+        ),
+        (
+            "OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", "3 0 2 4294967296"),
+            r"face 0 is \[0, 2, 4294967296\]",
+        ),
+        (
+            "OFF\n4 4 6\n" + ROWS.replace("3 0 2 1", f"3 0 2 {2**62}"),
+            rf"face 0 is \[0, 2, {2**62}\]",
+        ),
         ("OFF\n0 0 0\n", "must have vertices; it has none"),
         ("OFF\n1 0 0\n1 2 3\n", "it has 1 vertices and no face"),
     ],
@@ -142,7 +189,9 @@ def test_binary_files_of_both_orders_with_and_without_counts_of_colors(order, co
     for face in FACES:
         body += np.array([3, *face], f"{order}i4").tobytes()
         if colors is not None:
-            body += np.array([colors], f"{order}i4").tobytes() + np.ones(colors, f"{order}f4").tobytes()
+            body += (
+                np.array([colors], f"{order}i4").tobytes() + np.ones(colors, f"{order}f4").tobytes()
+            )
     vertices, faces = parse(b"OFF BINARY\n" + body)
     np.testing.assert_array_equal(vertices, VERTICES)
     np.testing.assert_array_equal(faces, FACES)

@@ -80,8 +80,9 @@ def test_plain_text_with_colours_of_faces():
 
 def simple(rows="3 0 1 2\n", corners="list uchar int vertex_indices", axes="xyz", count=1):
     properties = "".join(f"property float {axis}\n" for axis in axes)
+    vertices = f"element vertex 3\n{properties}"
     head = (
-        f"ply\nformat ascii 1.0\nelement vertex 3\n{properties}element face {count}\nproperty {corners}\nend_header\n"
+        f"ply\nformat ascii 1.0\n{vertices}element face {count}\nproperty {corners}\nend_header\n"
     )
     return head + "0 0 0\n1 0 0\n0 1 0\n" + rows
 
@@ -93,34 +94,79 @@ def simple(rows="3 0 1 2\n", corners="list uchar int vertex_indices", axes="xyz"
         ("plyx\n", "A PLY file must begin with ply; it begins with 'plyx'"),
         ("ply\nformat ascii 1.0\n", "must end with end_header; the file has no such line"),
         ("ply\nelement vertex 3\nend_header\n", "must name its format; it has no such line"),
-        ("ply\nformat morse 1.0\nend_header\n", "format, elements and properties; line 2 is 'format morse 1.0'"),
-        ("ply\nformat ascii 1.0\nend_header\n", "must declare an element vertex with the numbers x, y and z"),
+        (
+            "ply\nformat morse 1.0\nend_header\n",
+            "format, elements and properties; line 2 is 'format morse 1.0'",
+        ),
+        (
+            "ply\nformat ascii 1.0\nend_header\n",
+            "must declare an element vertex with the numbers x, y and z",
+        ),
         (simple(axes="xyw"), "must declare an element vertex with the numbers x, y and z"),
-        (simple().replace("float x", "list uchar float x"), "must declare an element vertex with the numbers x, y"),
+        (
+            simple().replace("float x", "list uchar float x"),
+            "must declare an element vertex with the numbers x, y",
+        ),
         (simple(axes="xyzx"), "format, elements and properties; line 7 is 'property float x'"),
         (simple().replace("face 1", "vertex 1"), "line 7 is 'element vertex 1'"),
         (simple().replace("face 1", "face -1"), "line 7 is 'element face -1'"),
         (simple().replace("face 1", "face"), "line 7 is 'element face'"),
         (simple().replace("element vertex 3\n", ""), "line 3 is 'property float x'"),
-        (simple(corners="list float int vertex_indices"), "line 8 is 'property list float int vertex_indices'"),
-        (simple().replace("property float y", "propriety float y"), "line 5 is 'propriety float y'"),
-        (simple(corners="list uchar float vertex_indices"), "must declare a list of whole vertex_indices"),
+        (
+            simple(corners="list float int vertex_indices"),
+            "line 8 is 'property list float int vertex_indices'",
+        ),
+        (
+            simple().replace("property float y", "propriety float y"),
+            "line 5 is 'propriety float y'",
+        ),
+        (
+            simple(corners="list uchar float vertex_indices"),
+            "must declare a list of whole vertex_indices",
+        ),
         (simple(corners="int vertex_indices"), "must declare a list of whole vertex_indices"),
         (simple(corners="list uchar int corners"), "must declare a list of whole vertex_indices"),
-        (simple(corners="int vertex_indices").replace("face 1", "tristrips 1"), "element tristrips of a PLY file must"),
+        (
+            simple(corners="int vertex_indices").replace("face 1", "tristrips 1"),
+            "element tristrips of a PLY file must",
+        ),
         (simple(rows=""), "it declares 4 in all and holds 3"),
         (simple(rows="3 0 1 2\n3 0 1 2\n"), "it declares 4 in all and holds 5"),
-        (simple(count=2**31), "2147483648 rows of face take 4294967296 bytes or more and 2[0-9] follow"),
+        (
+            simple(count=2**31),
+            "2147483648 rows of face take 4294967296 bytes or more and 2[0-9] follow",
+        ),
         (simple(count=10**4299), "line 7 is 'element face 10"),
         (simple(rows="2 0 1\n"), r"A face must have three corners or more; face 0 is \[0, 1\]"),
-        (simple(rows="3 0 1 2\n2 0 1\n", count=2), r"A face must have three corners or more; face 1 is \[0, 1\]"),
-        (simple(rows="3 0 1\n"), "A row must hold all its columns; line 13 lacks vertex_indices: '3 0 1'"),
-        (simple(rows="-3 0 1 2\n"), "A row must hold all its columns; line 13 lacks vertex_indices"),
-        (simple(rows="3 0 1 2 4\n"), "A row of face must end with its columns; line 13 goes on with '4'"),
+        (
+            simple(rows="3 0 1 2\n2 0 1\n", count=2),
+            r"A face must have three corners or more; face 1 is \[0, 1\]",
+        ),
+        (
+            simple(rows="3 0 1\n"),
+            "A row must hold all its columns; line 13 lacks vertex_indices: '3 0 1'",
+        ),
+        (
+            simple(rows="-3 0 1 2\n"),
+            "A row must hold all its columns; line 13 lacks vertex_indices",
+        ),
+        (
+            simple(rows="3 0 1 2 4\n"),
+            "A row of face must end with its columns; line 13 goes on with '4'",
+        ),
         (simple(rows="3 0 1 2.0\n"), r"A corner must be a whole number; line 13 has '2\.0'"),
-        (simple(rows="3. 0 1 2\n"), r"The length of a list must be a whole number; line 13 has '3\.'"),
-        (simple().replace("1 0 0", "1 0 zero"), "A coordinate must be a number; line 11 has 'zero'"),
-        (simple().replace("1 0 0", "1 0"), "A row must hold all its columns; line 11 lacks z: '1 0'"),
+        (
+            simple(rows="3. 0 1 2\n"),
+            r"The length of a list must be a whole number; line 13 has '3\.'",
+        ),
+        (
+            simple().replace("1 0 0", "1 0 zero"),
+            "A coordinate must be a number; line 11 has 'zero'",
+        ),
+        (
+            simple().replace("1 0 0", "1 0"),
+            "A row must hold all its columns; line 11 lacks z: '1 0'",
+        ),
     ],
 )
 def test_broken_text_is_refused(text, message):
@@ -135,14 +181,32 @@ def swapped(old, new):
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (FILES["ply little"][1][:-1], "4 rows of face take 4 bytes|vertex_indices of face 3 does not fit"),
+        (
+            FILES["ply little"][1][:-1],
+            "4 rows of face take 4 bytes|vertex_indices of face 3 does not fit",
+        ),
         (FILES["ply big"][1][:-20], "vertex_indices of face 2 does not fit"),
-        (FILES["ply little"][1] + b"\x03\x00\x00", "must end with its last row; 3 more bytes follow"),
+        (
+            FILES["ply little"][1] + b"\x03\x00\x00",
+            "must end with its last row; 3 more bytes follow",
+        ),
         (swapped(b"face 4", b"face 5"), "vertex_indices of face 4 does not fit"),
-        (swapped(b"face 4", b"face 2147483648"), "2147483648 rows of face take 2147483648 bytes or more"),
-        (swapped(b"vertex 4", b"vertex 99"), "99 rows of vertex take 2376 bytes or more and 148 follow"),
-        (swapped(b"list uchar int", b"list char int").replace(b"\x03\0\0\0\0", b"\xfd\0\0\0\0"), "face 0 does not fit"),
-        (swapped(b"list uchar int", b"list uchar float"), "must declare a list of whole vertex_indices"),
+        (
+            swapped(b"face 4", b"face 2147483648"),
+            "2147483648 rows of face take 2147483648 bytes or more",
+        ),
+        (
+            swapped(b"vertex 4", b"vertex 99"),
+            "99 rows of vertex take 2376 bytes or more and 148 follow",
+        ),
+        (
+            swapped(b"list uchar int", b"list char int").replace(b"\x03\0\0\0\0", b"\xfd\0\0\0\0"),
+            "face 0 does not fit",
+        ),
+        (
+            swapped(b"list uchar int", b"list uchar float"),
+            "must declare a list of whole vertex_indices",
+        ),
     ],
 )
 def test_broken_binary_is_refused(data, message):
@@ -164,7 +228,9 @@ def test_colours_stand_with_the_vertices(write):
     colors = np.arange(12, dtype=np.uint8).reshape(4, 3)
     data = write(TETRAHEDRON, colors=colors)
     assert b"property uchar red\nproperty uchar green\nproperty uchar blue\nelement face" in data
-    assert (b"0.0 0.0 1.0 9 10 11\n" in data) or (struct.pack("<dddBBB", 0, 0, 1, 9, 10, 11) in data)
+    assert (b"0.0 0.0 1.0 9 10 11\n" in data) or (
+        struct.pack("<dddBBB", 0, 0, 1, 9, 10, 11) in data
+    )
     np.testing.assert_array_equal(parse(data)[0], VERTICES)
     np.testing.assert_array_equal(parse(data)[1], FACES)
 
@@ -179,7 +245,9 @@ def test_colours_stand_with_the_vertices(write):
     ],
 )
 def test_strips_of_triangles(strips, faces):
-    text = simple(rows=f"{strips}\n").replace("face 1", "tristrips 1").replace("uchar int", "int int")
+    text = (
+        simple(rows=f"{strips}\n").replace("face 1", "tristrips 1").replace("uchar int", "int int")
+    )
     text = text.replace("vertex 3", "vertex 4").replace("0 0 0\n", "0 0 0\n0 0 1\n")
     assert turned(parse(text.encode())[1]) == turned(faces)
 

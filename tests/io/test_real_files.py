@@ -147,7 +147,9 @@ CLASSICS = {
 
 def test_every_awkward_file_gives_the_right_mesh_or_a_named_error(data):
     files = {
-        path.relative_to(data / "nasty").as_posix(): path for path in (data / "nasty").rglob("*") if path.is_file()
+        path.relative_to(data / "nasty").as_posix(): path
+        for path in (data / "nasty").rglob("*")
+        if path.is_file()
     }
     assert files.keys() == MESHES.keys() | REFUSED.keys()
     for name, counts in MESHES.items():
@@ -168,7 +170,9 @@ def test_classics(data):
 
 
 def test_point_sets_are_no_meshes(data):
-    with pytest.raises(EigenshapeError, match=r"fragment_000\.ply: .* it holds 5028 points and no face"):
+    with pytest.raises(
+        EigenshapeError, match=r"fragment_000\.ply: .* it holds 5028 points and no face"
+    ):
         read_mesh(data / "points" / "fragment_000.ply")
     for name in ("bunny16k.pts", "chameleon4k.pts", "milk.pcd"):
         with pytest.raises(EigenshapeError, match=rf"{name} must be of a known format"):
@@ -181,4 +185,6 @@ def test_all_shapes_of_the_retrieval_set_have_the_counts_of_its_list(data):
     assert len(rows) == 296
     for row in rows:
         mesh = read_mesh(data / row["path"])
-        assert (mesh.n_vertices, mesh.n_faces) == (int(row["vertices"]), int(row["faces"])), row["path"]
+        assert (mesh.n_vertices, mesh.n_faces) == (int(row["vertices"]), int(row["faces"])), row[
+            "path"
+        ]

@@ -32,7 +32,12 @@ SIMPLICIAL = {
     "sphere.mesh": (4505, 24013, 3),
     "track1.binary.vtk": (16267, 16266, 1),
 }
-SCANS = {"bunny16k.pts": 16130, "chameleon4k.pts": 4594, "fragment_000.ply": 5028, "milk.pcd": 12575}
+SCANS = {
+    "bunny16k.pts": 16130,
+    "chameleon4k.pts": 4594,
+    "fragment_000.ply": 5028,
+    "milk.pcd": 12575,
+}
 
 
 def test_every_awkward_file_is_a_shape_or_a_named_error_soon(data, capfd):
@@ -44,7 +49,11 @@ def test_every_awkward_file_is_a_shape_or_a_named_error_soon(data, capfd):
             assert name in REFUSED.keys() - CLOUDS.keys() - CURVES.keys(), name
             assert name in str(error)  # noqa: PT017 - either way the outcome is checked
         else:
-            counts = (shape.n_points, *shape.simplices.shape[:1]) if not isinstance(shape, PointCloud) else None
+            counts = (
+                (shape.n_points, *shape.simplices.shape[:1])
+                if not isinstance(shape, PointCloud)
+                else None
+            )
             if name in MESHES:
                 assert isinstance(shape, TriangleMesh), name
             assert counts == (MESHES | CURVES).get(name), name
@@ -58,7 +67,9 @@ def test_tetrahedra_and_curves(data):
         shape = read_shape(data / "tets" / name)
         assert isinstance(shape, SimplicialMesh)
         assert (shape.n_points, shape.n_simplices, shape.dim) == counts, name
-    with pytest.raises(FileFormatError, match=r"ellipsoid\.mesh must hold simplices .* it holds hexahedron"):
+    with pytest.raises(
+        FileFormatError, match=r"ellipsoid\.mesh must hold simplices .* it holds hexahedron"
+    ):
         read_shape(data / "tets" / "ellipsoid.mesh")
 
 

@@ -4,7 +4,12 @@ import meshio
 import numpy as np
 import pytest
 
-from eigenshape._errors import EigenshapeError, FileFormatError, InvalidParameterError, InvalidShapeError
+from eigenshape._errors import (
+    EigenshapeError,
+    FileFormatError,
+    InvalidParameterError,
+    InvalidShapeError,
+)
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
@@ -42,7 +47,9 @@ def test_a_surface_is_a_triangle_mesh(tmp_path, suffix):
 
 def test_of_several_dimensions_the_highest_counts(tmp_path):
     cells = [("triangle", CUBE.simplices[:4, :3]), ("tetra", CUBE.simplices), ("vertex", [[0]])]
-    assert read_shape(written(tmp_path / "a.vtu", CUBE.points, cells)).n_simplices == CUBE.n_simplices
+    assert (
+        read_shape(written(tmp_path / "a.vtu", CUBE.points, cells)).n_simplices == CUBE.n_simplices
+    )
 
 
 BESIDE = (
@@ -60,7 +67,8 @@ def test_the_triangles_beside_tetrahedra_are_read_where_they_are_asked_for(tmp_p
         cells = [("triangle", [[0, 2, 1]]), ("tetra", [[0, 1, 2, 3]])]
         written(path, np.vstack([np.zeros(3), np.eye(3)]), cells)
     with pytest.raises(
-        FileFormatError, match=r"it holds 1 tetrahedra in R\^3, .* cells=\"triangles\" reads the triangles"
+        FileFormatError,
+        match=r"it holds 1 tetrahedra in R\^3, .* cells=\"triangles\" reads the triangles",
     ):
         read_mesh(path)
     assert read_shape(path).simplices.tolist() == [[0, 1, 2, 3]]
@@ -73,22 +81,29 @@ def test_the_triangles_beside_tetrahedra_are_read_where_they_are_asked_for(tmp_p
 def test_a_flat_mesh_is_no_triangle_mesh(tmp_path):
     path = written(tmp_path / "a.mesh", DISC.vertices[:, :2], [("triangle", DISC.faces)])
     assert read_shape(path).points.shape[1] == 2
-    with pytest.raises(FileFormatError, match=r"must hold triangles in R\^3; it holds \d+ triangles in R\^2"):
+    with pytest.raises(
+        FileFormatError, match=r"must hold triangles in R\^3; it holds \d+ triangles in R\^2"
+    ):
         read_mesh(path)
 
 
 def test_a_curve_and_bare_points(tmp_path):
     found = read_shape(written(tmp_path / "a.vtu", CURVE, [("line", [[0, 1], [1, 2], [2, 3]])]))
     assert (found.dim, found.n_simplices) == (1, 3)
-    cloud = read_shape(written(tmp_path / "b.vtk", CURVE, [("vertex", [[0], [1], [2], [3]])]), dim=1)
+    cloud = read_shape(
+        written(tmp_path / "b.vtk", CURVE, [("vertex", [[0], [1], [2], [3]])]), dim=1
+    )
     assert isinstance(cloud, PointCloud)
     assert cloud.dim == 1
 
 
 def test_other_cells_are_named(tmp_path):
-    path = written(tmp_path / "a.vtk", CUBE.points[:8], [("hexahedron", [[0, 1, 2, 3, 4, 5, 6, 7]])])
+    path = written(
+        tmp_path / "a.vtk", CUBE.points[:8], [("hexahedron", [[0, 1, 2, 3, 4, 5, 6, 7]])]
+    )
     with pytest.raises(
-        FileFormatError, match=r"must be simplices, quads or polylines; it holds hexahedron\. Split them first"
+        FileFormatError,
+        match=r"must be simplices, quads or polylines; it holds hexahedron\. Split them first",
     ):
         read_shape(path)
 
@@ -116,7 +131,9 @@ def test_polylines(tmp_path, kind):
 
 def test_polygons_become_fans(tmp_path):
     flat = (
-        POLYDATA["text"].replace(b"LINES 2 7\n2 0 1\n3 1 2 3", b"POLYGONS 1 5\n4 0 1 2 3").replace(b" 5\nP", b" 0\nP")
+        POLYDATA["text"]
+        .replace(b"LINES 2 7\n2 0 1\n3 1 2 3", b"POLYGONS 1 5\n4 0 1 2 3")
+        .replace(b" 5\nP", b" 0\nP")
     )
     (tmp_path / "a.vtk").write_bytes(flat)
     assert read_shape(tmp_path / "a.vtk").faces.tolist() == [[0, 1, 2], [0, 2, 3]]
@@ -125,16 +142,28 @@ def test_polygons_become_fans(tmp_path):
 @pytest.mark.parametrize(
     ("change", "match"),
     [
-        ((b"LINES 2 7\n2 0 1", b"LINES 2 7\n9 0 1"), "Cells of a VTK file must fill 7 numbers; cell 0 of 2 does not"),
+        (
+            (b"LINES 2 7\n2 0 1", b"LINES 2 7\n9 0 1"),
+            "Cells of a VTK file must fill 7 numbers; cell 0 of 2 does not",
+        ),
         ((b"POINTS 4 float", b"POINTS 4000 float"), "12000 numbers do not fit into it"),
         ((b"POINTS 4 float", b"POINTS 8 float"), "A VTK file must hold 24 numbers at byte"),
-        ((b"POINTS 4 float", b"POINTS 4 half"), r"Numbers of a VTK file must be float, .* they are b'half'"),
-        ((b"LINES 2 7", b"LINES two 7"), "A VTK file must count its cells by whole numbers; it says b'two'"),
+        (
+            (b"POINTS 4 float", b"POINTS 4 half"),
+            r"Numbers of a VTK file must be float, .* they are b'half'",
+        ),
+        (
+            (b"LINES 2 7", b"LINES two 7"),
+            "A VTK file must count its cells by whole numbers; it says b'two'",
+        ),
         (
             (b"LINES 2 7\n2 0 1\n3 1 2 3\nPOINT_DATA 4\nSCALARS a float\n", b"LINES 2 9\n2 0"),
             "it ends within 9 numbers",
         ),
-        ((b"LINES", b"TRIANGLE_STRIPS"), "A cell of TRIANGLE_STRIPS must have 3 points or more; cell 0 has 2"),
+        (
+            (b"LINES", b"TRIANGLE_STRIPS"),
+            "A cell of TRIANGLE_STRIPS must have 3 points or more; cell 0 has 2",
+        ),
         ((b"3 1 2 3", b"3 1 2 9"), r"simplices must index points 0\.\.3; simplex 2 is \[2, 9\]"),
     ],
 )
@@ -154,7 +183,9 @@ def test_binary_polydata_that_ends_early(tmp_path):
 def test_files_that_lack_cells_or_their_end_are_named(tmp_path):
     path = written(tmp_path / "a.vtk", CUBE.points, [("tetra", CUBE.simplices)])
     path.write_bytes(path.read_bytes().replace(b"CELLS 13", b"CELLS 23"))
-    with pytest.raises(FileFormatError, match=r"a\.vtk: Cells of a VTK file must be whole numbers; number 13 is"):
+    with pytest.raises(
+        FileFormatError, match=r"a\.vtk: Cells of a VTK file must be whole numbers; number 13 is"
+    ):
         read_shape(path)
     path = written(tmp_path / "a.msh", CUBE.points, [("tetra", CUBE.simplices)])
     path.write_bytes(path.read_bytes().replace(b"$EndElements", b"$EndElement"))
@@ -166,7 +197,10 @@ def test_files_that_lack_cells_or_their_end_are_named(tmp_path):
         read_shape(path)
     path = written(tmp_path / "b.vtk", CUBE.points, [("tetra", CUBE.simplices)], binary=False)
     path.write_bytes(path.read_bytes().rstrip())
-    with pytest.raises(FileFormatError, match=r"b\.vtk: A VTK file must be whole; its last number has no line break"):
+    with pytest.raises(
+        FileFormatError,
+        match=r"b\.vtk: A VTK file must be whole; its last number has no line break",
+    ):
         read_shape(path)
 
 
@@ -181,13 +215,17 @@ def test_what_meshio_cannot_read_is_named_and_nothing_is_printed(tmp_path, capfd
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kind", ["medit", "gmsh", "gmsh22", "gmsh text", "vtk", "vtk text", "vtu", "vtu text"])
+@pytest.mark.parametrize(
+    "kind", ["medit", "gmsh", "gmsh22", "gmsh text", "vtk", "vtk text", "vtu", "vtu text"]
+)
 def test_truncated_files_are_refused_or_whole(tmp_path, capfd, kind):
     name, _, text = kind.partition(" ")
     suffix = {"medit": ".mesh", "gmsh": ".msh", "gmsh22": ".msh"}.get(name, f".{name}")
     path = tmp_path / f"whole{suffix}"
     options = {"binary": False} if text else {}
-    meshio.write_points_cells(path, CUBE.points, [("tetra", CUBE.simplices)], file_format=name, **options)
+    meshio.write_points_cells(
+        path, CUBE.points, [("tetra", CUBE.simplices)], file_format=name, **options
+    )
     capfd.readouterr()
     whole, n_refused = path.read_bytes(), 0
     for end in range(1, len(whole)):
@@ -221,7 +259,9 @@ def test_tables_of_points(tmp_path, name):
 
 def test_a_binary_point_set(tmp_path):
     rows = b"".join(struct.pack("<ffff", *row, 9.0) for row in EXPECTED)
-    head = b"[Expe/PointSet/Binary/0.1]\nproperty position 12\nproperty radius 4\nnofpoints 3\ndata\n"
+    head = (
+        b"[Expe/PointSet/Binary/0.1]\nproperty position 12\nproperty radius 4\nnofpoints 3\ndata\n"
+    )
     (tmp_path / "a.pts").write_bytes(head + rows)
     assert read_points(tmp_path / "a.pts").points.tolist() == EXPECTED
     for change, match in (
@@ -244,11 +284,17 @@ FIELDS = np.column_stack([np.array([7, 8, 9], np.float32), np.array(EXPECTED, np
 
 def pcd(kind):
     if kind == "ascii":
-        return PCD + b"DATA ascii\n" + "\n".join(" ".join(map(str, row)) for row in FIELDS.tolist()).encode()
+        return (
+            PCD
+            + b"DATA ascii\n"
+            + "\n".join(" ".join(map(str, row)) for row in FIELDS.tolist()).encode()
+        )
     if kind == "binary":
         return PCD + b"DATA binary\n" + FIELDS.astype("<f4").tobytes()
     plain = FIELDS.T.astype("<f4").tobytes()
-    packed = b"".join(bytes([len(plain[i : i + 32]) - 1]) + plain[i : i + 32] for i in range(0, len(plain), 32))
+    packed = b"".join(
+        bytes([len(plain[i : i + 32]) - 1]) + plain[i : i + 32] for i in range(0, len(plain), 32)
+    )
     return PCD + b"DATA binary_compressed\n" + struct.pack("<II", len(packed), len(plain)) + packed
 
 
@@ -264,7 +310,9 @@ def test_lzf_repeats_what_it_points_back_to():
     )  # three plain bytes, five from three back, ten from one back
     found = decompress(np.frombuffer(packed, np.uint8), 18).tolist()
     assert found == [1, 2, 3, 1, 2, 3, 1, 2, *[2] * 10]
-    assert decompress(np.frombuffer(bytes([32, 9]), np.uint8), 5).size == 0  # points before the beginning
+    assert (
+        decompress(np.frombuffer(bytes([32, 9]), np.uint8), 5).size == 0
+    )  # points before the beginning
 
 
 @pytest.mark.parametrize(
@@ -273,10 +321,18 @@ def test_lzf_repeats_what_it_points_back_to():
         ("ascii", (b"POINTS 3", b"POINTS 4"), "declares 4 and holds 3"),
         ("binary", (b"POINTS 3", b"POINTS 4"), "declares 4 of 16 bytes and holds 48 bytes"),
         ("binary_compressed", (b"POINTS 3", b"POINTS 4"), "4 points take 64"),
-        ("binary", (b"DATA binary", b"DATA octal"), "must be ascii, binary or binary_compressed; it is 'octal'"),
+        (
+            "binary",
+            (b"DATA binary", b"DATA octal"),
+            "must be ascii, binary or binary_compressed; it is 'octal'",
+        ),
         ("binary", (b"DATA binary", b"DATUM"), "A PCD file must have a line DATA; it has none"),
         ("binary", (b"SIZE 4 4 4 4", b"SIZE 4 4 4"), "must be of one length; they are not"),
-        ("binary", (b"FIELDS rgb x y z", b"FIELDS rgb x y w"), "must have the fields x, y and z; z is missing"),
+        (
+            "binary",
+            (b"FIELDS rgb x y z", b"FIELDS rgb x y w"),
+            "must have the fields x, y and z; z is missing",
+        ),
         ("binary", (b"TYPE U F F F", b"TYPE U F F U"), "must be floats of 4 or 8 bytes; z is not"),
         ("binary", (b"POINTS 3", b"POINTS 0"), "A PCD file must hold points; it declares 0"),
         ("binary", (b"TYPE U F F F\n", b""), "A PCD file must have a line TYPE; it has none"),
@@ -298,15 +354,22 @@ def test_broken_point_cloud_data_is_named(tmp_path, kind, change, match):
 def test_compressed_points_that_end_early(tmp_path):
     data = pcd("binary_compressed")
     (tmp_path / "a.pcd").write_bytes(data[: data.index(b"compressed\n") + 15])
-    with pytest.raises(FileFormatError, match="must begin with two sizes; the file ends after 4 bytes"):
+    with pytest.raises(
+        FileFormatError, match="must begin with two sizes; the file ends after 4 bytes"
+    ):
         read_points(tmp_path / "a.pcd")
 
 
 def test_missing_returns_are_refused_or_dropped_when_asked(tmp_path):
     (tmp_path / "a.xyz").write_text("0 0 0\nnan nan nan\n1 1 1\n")
-    with pytest.raises(InvalidShapeError, match=r"a\.xyz: points must be finite; point 1 is \[nan, .* \(1 such\)"):
+    with pytest.raises(
+        InvalidShapeError, match=r"a\.xyz: points must be finite; point 1 is \[nan, .* \(1 such\)"
+    ):
         read_points(tmp_path / "a.xyz")
-    assert read_points(tmp_path / "a.xyz", drop_missing=True).points.tolist() == [[0, 0, 0], [1, 1, 1]]
+    assert read_points(tmp_path / "a.xyz", drop_missing=True).points.tolist() == [
+        [0, 0, 0],
+        [1, 1, 1],
+    ]
 
 
 @pytest.mark.parametrize(
@@ -328,15 +391,21 @@ def test_points_are_written_exactly(tmp_path):
     for name in ("a.xyz", "a.pts", "a.ply"):
         write_points(cloud, tmp_path / name)
         np.testing.assert_array_equal(read_points(tmp_path / name).points, cloud.points)
-    with pytest.raises(FileFormatError, match=r"a\.csv must end in \.xyz, \.pts, \.ply to hold points"):
+    with pytest.raises(
+        FileFormatError, match=r"a\.csv must end in \.xyz, \.pts, \.ply to hold points"
+    ):
         write_points(cloud, tmp_path / "a.csv")
-    with pytest.raises(InvalidShapeError, match="Files of points hold three coordinates; these points have 2"):
+    with pytest.raises(
+        InvalidShapeError, match="Files of points hold three coordinates; these points have 2"
+    ):
         write_points(PointCloud(np.eye(2)), tmp_path / "a.xyz")
 
 
 def test_unknown_formats_and_dimensions(tmp_path):
     (tmp_path / "a.abc").write_text("0 0 0\n")
-    with pytest.raises(FileFormatError, match=r"a\.abc must be of a known format, \.off, .*; it is '\.abc'"):
+    with pytest.raises(
+        FileFormatError, match=r"a\.abc must be of a known format, \.off, .*; it is '\.abc'"
+    ):
         read_shape(tmp_path / "a.abc")
     assert read_shape(tmp_path / "a.abc", file_format="xyz").n_points == 1
     with pytest.raises(InvalidParameterError, match=r"dim must lie in 1\.\.3; it is 5"):

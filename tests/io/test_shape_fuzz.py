@@ -27,12 +27,16 @@ def files(tmp_path_factory):
         ("b.vtk", "vtk", {"binary": False}),
         ("a.vtu", "vtu", {}),
     ):
-        meshio.write_points_cells(folder / name, CUBE.points, [("tetra", CUBE.simplices)], file_format=kind, **options)
+        meshio.write_points_cells(
+            folder / name, CUBE.points, [("tetra", CUBE.simplices)], file_format=kind, **options
+        )
         contents[name] = (folder / name).read_bytes()
     return folder, contents
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(st.data())
 def test_a_changed_file_is_a_shape_or_a_named_error(files, capfd, data):
     folder, contents = files

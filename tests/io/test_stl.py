@@ -44,15 +44,27 @@ def test_normals_point_outwards():
         (BINARY[:80], "84 bytes of header; it has 80 in all"),
         (BINARY[:-1], "4 take 284 bytes and it has 283"),
         (BINARY + b"\0", "4 take 284 bytes and it has 285"),
-        (BINARY[:80] + b"\0\0\0\x80" + BINARY[84:], "2147483648 take 107374182484 bytes and it has 284"),
+        (
+            BINARY[:80] + b"\0\0\0\x80" + BINARY[84:],
+            "2147483648 take 107374182484 bytes and it has 284",
+        ),
         (TEXT[:-14].encode(), "must close what it opens; it has 1 solid, 0 endsolid"),
         (
             TEXT.replace("endfacet\nendsolid", "endsolid").encode(),
             "must end with a whole facet; its last line is 'endloop'",
         ),
-        (TEXT.replace("vertex 0.0 0.0 0.0\n", "", 1).encode(), "vertex endloop endfacet; line 6 is 'endloop'"),
-        (TEXT.replace("vertex 0.0 0.0 0.0\n", "vertex 0.0 0.0\n", 1).encode(), "three numbers; line 4 is '0.0 0.0'"),
-        (TEXT.replace("1.0\n", "one\n").encode(), "A coordinate must be a number; line [0-9]+ has 'one'"),
+        (
+            TEXT.replace("vertex 0.0 0.0 0.0\n", "", 1).encode(),
+            "vertex endloop endfacet; line 6 is 'endloop'",
+        ),
+        (
+            TEXT.replace("vertex 0.0 0.0 0.0\n", "vertex 0.0 0.0\n", 1).encode(),
+            "three numbers; line 4 is '0.0 0.0'",
+        ),
+        (
+            TEXT.replace("1.0\n", "one\n").encode(),
+            "A coordinate must be a number; line [0-9]+ has 'one'",
+        ),
         (b"garbage\n" * 20, "must hold the triangles it declares"),
     ],
 )
@@ -75,7 +87,9 @@ def scaled(factor):
 def test_single_precision_refuses_what_it_cannot_hold():
     with pytest.raises(FileFormatError, match=r"up to 3.4e38; vertex 1 is \[1e\+100, 0.0, 0.0\]"):
         format_binary(scaled(1e100))
-    with pytest.raises(FileFormatError, match=r"down to 1.2e-38; no coordinate is larger than 1e-100"):
+    with pytest.raises(
+        FileFormatError, match=r"down to 1.2e-38; no coordinate is larger than 1e-100"
+    ):
         format_binary(scaled(1e-100))
     largest = float(np.finfo(np.float32).max)
     assert np.isfinite(single_precision(scaled(largest), "STL")).all()
@@ -84,5 +98,7 @@ def test_single_precision_refuses_what_it_cannot_hold():
 @pytest.mark.parametrize("factor", [1e-300, 1e-100, 1.0, 1e100, 1e300])
 def test_text_keeps_full_precision_and_unit_normals(factor):
     data = format_text(scaled(factor / 3))
-    np.testing.assert_array_equal(read(parse, data).vertices, TETRAHEDRON.vertices[[0, 2, 1, 3]] * (factor / 3))
+    np.testing.assert_array_equal(
+        read(parse, data).vertices, TETRAHEDRON.vertices[[0, 2, 1, 3]] * (factor / 3)
+    )
     assert b"facet normal 0.0 0.0 -1.0" in data

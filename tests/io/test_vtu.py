@@ -17,7 +17,12 @@ def binaries(tmp_path_factory):
     """Write a grid appended in base64 and raw, uncompressed, and compressed by LZ4."""
     folder = tmp_path_factory.mktemp("vtu")
     found = {}
-    for name, encoded, compressor in (("base64", True, 0), ("raw", False, 0), ("zlib", True, 1), ("lz4", True, 2)):
+    for name, encoded, compressor in (
+        ("base64", True, 0),
+        ("raw", False, 0),
+        ("zlib", True, 1),
+        ("lz4", True, 2),
+    ):
         writer = _vtk.vtkXMLUnstructuredGridWriter()
         writer.SetFileName(str(folder / name))
         writer.SetInputData(pv.UnstructuredGrid({10: CUBE.simplices}, CUBE.points))
@@ -31,13 +36,31 @@ def binaries(tmp_path_factory):
 @pytest.mark.parametrize(
     ("change", "match"),
     [
-        (("<VTKFile", "<!DOCTYPE a [<!ENTITY b 'c'>]><VTKFile"), "must be plain XML; it has a DOCTYPE"),
+        (
+            ("<VTKFile", "<!DOCTYPE a [<!ENTITY b 'c'>]><VTKFile"),
+            "must be plain XML; it has a DOCTYPE",
+        ),
         (("</VTKFile>", ""), "must be whole XML; no element found"),
-        (("UnstructuredGrid", "PolyData"), "of the type UnstructuredGrid; it is a VTKFile of 'PolyData'"),
-        (("LittleEndian", "Middle"), "byte_order of a VTU file must be LittleEndian or BigEndian; it is 'Middle'"),
-        (('NumberOfPoints="4"', 'NumberOfPoints="-4"'), "must hold pieces that count points and cells"),
-        (('NumberOfPoints="4"', 'NumberOfPoints="5"'), "'an array' must have 15 numbers and has 12"),
-        (('NumberOfComponents="3"', 'NumberOfComponents="4"'), "must have 1 to 3 coordinates each; they have '4'"),
+        (
+            ("UnstructuredGrid", "PolyData"),
+            "of the type UnstructuredGrid; it is a VTKFile of 'PolyData'",
+        ),
+        (
+            ("LittleEndian", "Middle"),
+            "byte_order of a VTU file must be LittleEndian or BigEndian; it is 'Middle'",
+        ),
+        (
+            ('NumberOfPoints="4"', 'NumberOfPoints="-4"'),
+            "must hold pieces that count points and cells",
+        ),
+        (
+            ('NumberOfPoints="4"', 'NumberOfPoints="5"'),
+            "'an array' must have 15 numbers and has 12",
+        ),
+        (
+            ('NumberOfComponents="3"', 'NumberOfComponents="4"'),
+            "must have 1 to 3 coordinates each; they have '4'",
+        ),
         (("<Points>", "<Pointy>"), "must be whole XML"),
         (("Points>", "Pointy>"), "A VTU file must have points; it has none"),
         (('type="Float64"', 'type="String"'), "must be of numbers; 'an array' is of 'String'"),
@@ -45,11 +68,23 @@ def binaries(tmp_path_factory):
         (("1 0 0", "1 0 1_0"), "must be of numbers; 'an array' is not: could not convert"),
         ((">4<", ">-4<"), r"must rise from 0; they begin with \[-4\]"),
         ((">4<", ">5<"), "'connectivity' must have 5 numbers and has 4"),
-        (("0 1 2 3", "0 1 2 3.5"), r"connectivity of a VTU file must be whole numbers; number 3 is 3\.5"),
+        (
+            ("0 1 2 3", "0 1 2 3.5"),
+            r"connectivity of a VTU file must be whole numbers; number 3 is 3\.5",
+        ),
         ((">10<", ">5<"), "A VTK cell of type 5 must have 3 corners; cell 0 has 4"),
-        (('"connectivity" format="ascii"', '"connectivity" format="appended"'), "must have an offset; that of 'conne"),
+        (
+            ('"connectivity" format="ascii"', '"connectivity" format="appended"'),
+            "must have an offset; that of 'conne",
+        ),
         ((">0 1 2 3<", 'format="binary">?!<'), "must be whole XML|must be in base64"),
-        (('"connectivity" format="ascii">0 1 2 3', '"connectivity" format="binary">?!??!?!?!?!?'), "must be in base64"),
+        (
+            (
+                '"connectivity" format="ascii">0 1 2 3',
+                '"connectivity" format="binary">?!??!?!?!?!?',
+            ),
+            "must be in base64",
+        ),
     ],
 )
 def test_broken_tags_and_texts_are_named(change, match):
@@ -62,11 +97,15 @@ def test_broken_binaries_are_named(binaries):
     assert parse(binaries["raw"])[1]["tetrahedra"].tolist() == CUBE.simplices.tolist()
     with pytest.raises(FileFormatError, match="'Points' takes 240 bytes, not"):
         parse(binaries["raw"].replace(b'NumberOfPoints="12"', b'NumberOfPoints="10"'))
-    with pytest.raises(FileFormatError, match="A VTU file must hold what it declares; 'Points' takes 240 bytes"):
+    with pytest.raises(
+        FileFormatError, match="A VTU file must hold what it declares; 'Points' takes 240 bytes"
+    ):
         parse(binaries["zlib"].replace(b'NumberOfPoints="12"', b'NumberOfPoints="10"'))
     for name in ("base64", "raw", "zlib"):
         end = binaries[name].rindex(b"</AppendedData")
-        with pytest.raises(FileFormatError, match=r"must hold what it declares; '.*' lacks|must be in base64"):
+        with pytest.raises(
+            FileFormatError, match=r"must hold what it declares; '.*' lacks|must be in base64"
+        ):
             parse(binaries[name][: end - 60] + binaries[name][end:])
     with pytest.raises(FileFormatError, match="or not at all; it is by 'vtkLZ4DataCompressor'"):
         parse(binaries["lz4"])

@@ -14,8 +14,31 @@ BIG_ENDIAN = BIG_ENDIAN[: BIG_ENDIAN.index(b"end_header\n") + 11]
 BIG_ENDIAN += TETRAHEDRON.vertices.astype(">f8").tobytes()
 BIG_ENDIAN += b"".join(b"\x03" + row.astype(">i4").tobytes() for row in TETRAHEDRON.faces)
 
-OFF_NUMBERS = [3, 0, 2, 1, 0, 3, 0, 1, 3, 0, 3, 1, 2, 3, 0, 3, 0, 3, 2, 0]  # a count of colors after each face
-OFF_BINARY = b"OFF BINARY\n" + np.array([4, 4, 6], ">i4").tobytes() + np.array(VERTICES, ">f4").tobytes()
+OFF_NUMBERS = [
+    3,
+    0,
+    2,
+    1,
+    0,
+    3,
+    0,
+    1,
+    3,
+    0,
+    3,
+    1,
+    2,
+    3,
+    0,
+    3,
+    0,
+    3,
+    2,
+    0,
+]  # a count of colors after each face
+OFF_BINARY = (
+    b"OFF BINARY\n" + np.array([4, 4, 6], ">i4").tobytes() + np.array(VERTICES, ">f4").tobytes()
+)
 OFF_BINARY += np.array(OFF_NUMBERS, ">i4").tobytes()
 STRIP = ply.format_text(TETRAHEDRON).replace(b"element face 4", b"element tristrips 1")
 STRIP = STRIP[: STRIP.index(b"3 0 2 1")] + b"6 0 2 1 3 0 2\n"
@@ -25,7 +48,9 @@ FILES = {
     "off binary": (off.parse, OFF_BINARY),
     "off broken": (
         off.parse,
-        off.format_mesh(TETRAHEDRON).replace(b" 2 1\n3", b"\n2 1 3").replace(b"0.0 1.0", b"0.0\n1.0"),
+        off.format_mesh(TETRAHEDRON)
+        .replace(b" 2 1\n3", b"\n2 1 3")
+        .replace(b"0.0 1.0", b"0.0\n1.0"),
     ),
     "obj": (obj.parse, obj.format_mesh(TETRAHEDRON)),
     "ply text": (ply.parse, ply.format_text(TETRAHEDRON)),

@@ -20,6 +20,8 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 import scipy.sparse as sp
 from matplotlib.figure import Figure
+from public_names import public_things
+from typing_extensions import TypeAliasType
 
 import eigenshape as es
 
@@ -47,43 +49,43 @@ def spectrum() -> es.Spectrum:
 
 
 @cache
-def rig() -> es.EigenRig:
+def rig() -> es.deformation.EigenRig:
     return es.rig_shape(body())
 
 
-HEAD = es.Box([-9.0, 0.8, -9.0], [9.0, 9.0, 9.0])
+HEAD = es.deformation.BoxRegion([-9.0, 0.8, -9.0], [9.0, 9.0, 9.0])
 TURN = es.Rotation([0, 0.5, 0], [1, 0, 0], 0.2)
 
 
 @cache
-def binding() -> es.Binding:
-    return es.bind(rig(), [HEAD])
+def binding() -> es.deformation.Binding:
+    return es.deformation.bind(rig(), [HEAD])
 
 
 @cache
-def described() -> es.DescribedShape:
-    return es.describe_mesh(body())
+def described() -> es.retrieval.HeatFeatures:
+    return es.retrieval.find_heat_features(body())
 
 
 @cache
-def recipe() -> es.PatchRecipe:
-    return es.PatchRecipe(es.made_codebook())
+def recipe() -> es.retrieval.PatchRecipe:
+    return es.retrieval.PatchRecipe()
 
 
 @cache
-def patches() -> es.Patches:
-    return es.describe_patches(body())
+def patches() -> es.retrieval.Patches:
+    return es.retrieval.extract_patches(body(), n_views=0)[0]
 
 
 @cache
-def patched() -> es.PatchDescriptor:
-    return es.in_words([patches()], recipe())
+def patched() -> es.retrieval.PatchDescriptor:
+    return es.retrieval.patch_descriptor([patches()], recipe())
 
 
 @cache
 def shelf() -> es.ShapeIndex:
     index = es.ShapeIndex.create(FOLDER / "index")
-    index.add("body", [described().descriptor])
+    index.add_descriptors("body", [described().descriptor])
     return index
 
 
@@ -93,17 +95,21 @@ def labels() -> np.ndarray:
 
 
 @cache
-def mapping() -> es.FunctionalMap:
-    return es.map_from_points(spectrum(), spectrum(), np.arange(body().n_vertices), n_modes=10)
+def mapping() -> es.spectral.FunctionalMap:
+    return es.spectral.map_from_points(
+        spectrum(), spectrum(), np.arange(body().n_vertices), n_modes=10
+    )
 
 
 @cache
-def report() -> es.StabilityReport:
-    return es.compare_shapes(body(), bent(), es.StabilityPlan(k=5, n_samples=100))
+def report() -> es.stability.StabilityReport:
+    return es.compare_shapes(body(), bent(), es.stability.StabilityPlan(k=5, n_samples=100))
 
 
 def written_edits() -> Path:
-    es.write_edits([es.Edit((es.Move(HEAD, TURN),))], body(), FOLDER / "edits.json")
+    es.io.write_edits(
+        [es.deformation.Edit((es.deformation.Move(HEAD, TURN),))], body(), FOLDER / "edits.json"
+    )
     return FOLDER / "edits.json"
 
 
@@ -117,62 +123,62 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.PointCloud: lambda: es.PointCloud(body().vertices),
     es.Laplacian: lambda: es.cotangent_laplacian(body()),
     es.Spectrum: spectrum,
-    es.MergeTree: lambda: es.merge_tree(body(), height()),
-    es.Segmentation: lambda: described().parts,
-    es.FeaturePoints: lambda: described().parts.features,
-    es.ShapeDescriptor: lambda: described().descriptor,
-    es.Recipe: lambda: es.SCALE_FREE,
-    es.PatchRecipe: recipe,
-    es.PatchCodebook: es.made_codebook,
-    es.PatchDescriptor: patched,
-    es.Patches: patches,
-    es.PatchPoints: lambda: es.patch_points(patches(), es.made_codebook()),
-    es.PersistenceDiagram: lambda: es.persistence_diagram(body(), height()),
-    es.EigenRig: rig,
-    es.Binding: binding,
+    es.features.MergeTree: lambda: es.merge_tree(body(), height()),
+    es.features.Segmentation: lambda: described().parts,
+    es.features.FeaturePoints: lambda: described().parts.features,
+    es.retrieval.HeatDescriptor: lambda: described().descriptor,
+    es.retrieval.HeatRecipe: lambda: es.retrieval.SCALE_FREE,
+    es.retrieval.PatchRecipe: recipe,
+    es.retrieval.PatchCodebook: es.retrieval.default_codebook,
+    es.retrieval.PatchDescriptor: patched,
+    es.retrieval.Patches: patches,
+    es.retrieval.PatchPoints: lambda: patched().points[0],
+    es.features.PersistenceDiagram: lambda: es.features.persistence_diagram(body(), height()),
+    es.deformation.EigenRig: rig,
+    es.deformation.Binding: binding,
     es.Rotation: lambda: TURN,
-    es.Move: lambda: es.Move(HEAD, TURN),
-    es.Edit: lambda: es.Edit((es.Move(HEAD, TURN),)),
-    es.Box: lambda: HEAD,
-    es.SkeletonGrip: lambda: es.grip_skeleton(binding()),
-    es.DetailedSkeleton: lambda: es.detail_skeleton(binding()),
-    es.FunctionalMap: mapping,
-    es.Perturbation: lambda: es.perturbation(body(), bent()),
-    es.SurfacePoints: lambda: es.sample_surface(body(), 60, rng=np.random.default_rng(0)),
-    es.Quadrature: lambda: es.mesh_quadrature(body()),
-    es.Brackets: lambda: es.bracket_eigenvalues(body(), 10),
-    es.Rate: lambda: es.Rate(1.0, -1.0),
-    es.Camera: lambda: es.three_quarter_view(body()),
-    es.DepthCamera: es.DepthCamera,
-    es.Panel: lambda: es.Panel(body(), "body", labels(), np.arange(3)),
-    es.LabelTransfer: lambda: es.transfer_labels(body(), labels(), body()),
-    es.StabilityPlan: es.StabilityPlan,
-    es.StabilityReport: report,
-    es.SpectrumComparison: lambda: es.compare_spectra(spectrum(), spectrum()),
+    es.deformation.Move: lambda: es.deformation.Move(HEAD, TURN),
+    es.deformation.Edit: lambda: es.deformation.Edit((es.deformation.Move(HEAD, TURN),)),
+    es.deformation.BoxRegion: lambda: HEAD,
+    es.deformation.SkeletonResponse: lambda: es.deformation.skeleton_response(binding()),
+    es.deformation.DetailedSkeleton: lambda: es.deformation.detailed_skeleton(binding()),
+    es.spectral.FunctionalMap: mapping,
+    es.stability.Perturbation: lambda: es.stability.measure_perturbation(body(), bent()),
+    es.geometry.SurfacePoints: lambda: es.geometry.sample_surface(
+        body(), 60, rng=np.random.default_rng(0)
+    ),
+    es.geometry.Quadrature: lambda: es.geometry.mesh_quadrature(body()),
+    es.spectral.Brackets: lambda: es.bracket_eigenvalues(body(), 10),
+    es.stability.Rate: lambda: es.stability.Rate(1.0, -1.0),
+    es.plot.Camera: lambda: es.plot.three_quarter_view(body()),
+    es.scans.DepthCamera: es.scans.DepthCamera,
+    es.plot.Panel: lambda: es.plot.Panel(body(), "body", labels(), np.arange(3)),
+    es.retrieval.LabelTransfer: lambda: es.transfer_labels(body(), labels(), body()),
+    es.stability.StabilityPlan: es.stability.StabilityPlan,
+    es.stability.StabilityReport: report,
+    es.spectral.SpectrumComparison: lambda: es.spectral.compare_spectra(spectrum(), spectrum()),
     es.ShapeIndex: shelf,
     es.DeformationSession: lambda: es.DeformationSession(rig()),
-    es.Workers: es.Workers,
-    es.Item: lambda: es.Item("body", FOLDER / "body.ply"),
+    es.retrieval.Workers: es.retrieval.Workers,
+    es.retrieval.Item: lambda: es.retrieval.Item("body", FOLDER / "body.ply"),
     Figure: Figure,
     np.random.Generator: lambda: np.random.default_rng(0),
 }
 # A right value of each argument whose type is not ours, by its name; "function.name" where a name has several meanings.
 NAMED: dict[str, Callable[[], Any]] = {
     "alpha": lambda: 1.0,
-    "approximate_spectrum.k": lambda: 5,
     "bind.regions": lambda: [HEAD],
-    "boundary_surface.mesh": lambda: es.box(2, 2, 2),
+    "boundary_surface.mesh": lambda: es.shapes.box(2, 2, 2),
     "build": lambda: es.cotangent_laplacian,
-    "build_index.describe": lambda: len,
     "caption": lambda: "",
     "certify.eigenvalues": lambda: spectrum().eigenvalues,
     "certify.eigenvectors": lambda: spectrum().eigenvectors,
     "check_laplacian.shape": body,
-    "compare_shapes.plan": lambda: es.StabilityPlan(k=5, n_samples=100),
+    "compare_shapes.plan": lambda: es.stability.StabilityPlan(k=5, n_samples=100),
     "count": lambda: 4,
-    "cover_by_rate.delta": lambda: [0.1, 0.2],
-    "cover_by_rate.measured": lambda: [0.1, 0.2],
-    "cover_by_rate.t": lambda: [1.0, 2.0],
+    "bounding_rate.delta": lambda: [0.1, 0.2],
+    "bounding_rate.measured": lambda: [0.1, 0.2],
+    "bounding_rate.t": lambda: [1.0, 2.0],
     "delta": lambda: 0.3,
     "eigenspace_errors.eigenvalues": lambda: spectrum().eigenvalues[:8],
     "eigenspace_errors.functions": lambda: spectrum().eigenvectors[:, :6],
@@ -185,7 +191,7 @@ NAMED: dict[str, Callable[[], Any]] = {
     "label": lambda: "height",
     "labels": labels,
     "map_from_points.points": lambda: np.arange(body().n_vertices),
-    "mask": lambda: es.region_mask(body(), HEAD),
+    "mask": lambda: es.deformation.region_mask(body(), HEAD),
     "n": lambda: 50,
     "n_features": lambda: 3,
     "n_modes": lambda: 10,
@@ -198,18 +204,20 @@ NAMED: dict[str, Callable[[], Any]] = {
     "point_map.mapping": mapping,
     "poses": lambda: {"rest": body()},
     "radius": lambda: 0.4,
+    "read": lambda: es.read_mesh,
     "read_edits.path": written_edits,
     "region": lambda: HEAD,
     "rho": lambda: 3.0,
     "save_figure.path": lambda: FOLDER / "written.png",
+    "ShapeIndex.add.n_views": lambda: 0,
     "ShapeIndex.add.replace": lambda: True,
+    "ShapeIndex.add_descriptors.replace": lambda: True,
     "segment.n_regions": lambda: 3,
     "solve_spectrum.k": lambda: 5,
     "sources": lambda: [0, 5],
     "spectra": lambda: {"one": spectrum(), "two": spectrum()},
     "t": lambda: 0.05,
-    "teach": lambda: len,
-    "tensors": lambda: es.curvature_tensors(body(), 1.0),
+    "tensors": lambda: es.operators.curvature_tensors(body(), 1.0),
     "times": lambda: [0.1, 0.2],
     "transfer_function.values": height,
     "up": lambda: "y",
@@ -221,8 +229,8 @@ NAMED: dict[str, Callable[[], Any]] = {
 }
 # What a mesh is in all but type: an answer must be that of the mesh.
 SAME_MESH: dict[str, Callable[[], Any]] = {
-    "trimesh": lambda: es.to_trimesh(body()),
-    "pyvista": lambda: es.to_pyvista(body()),
+    "trimesh": lambda: es.io.to_trimesh(body()),
+    "pyvista": lambda: es.io.to_pyvista(body()),
     "pair": lambda: (body().vertices, body().faces),
     "SimplicialMesh": lambda: es.SimplicialMesh(body().points, body().simplices),
 }
@@ -232,9 +240,9 @@ SLIPS: dict[str, Callable[[], Any]] = {
     "text": lambda: "cat.ply",
     "path": lambda: Path("cat.ply"),
     "cloud": lambda: es.PointCloud(body().vertices),
-    "tetrahedra": lambda: es.box(2, 2, 2),
+    "tetrahedra": lambda: es.shapes.box(2, 2, 2),
     "points": lambda: body().vertices,
-    "repaired": lambda: es.weld(body()),
+    "repaired": lambda: es.geometry.weld(body()),
     "laplacian": lambda: es.cotangent_laplacian(body()),
     "matrix": lambda: sp.eye_array(3, format="csr"),
     "spectrum": spectrum,
@@ -242,13 +250,17 @@ SLIPS: dict[str, Callable[[], Any]] = {
     "number": lambda: 3,
 }
 DEAR = 0.5  # seconds, beyond which one of the forms of a mesh must do
-OF_ITS_OWN_KIND = {("subdivide", "SimplicialMesh")}  # a SimplicialMesh is cut in another order than a TriangleMesh
+OF_ITS_OWN_KIND = {
+    ("subdivide", "SimplicialMesh")
+}  # a SimplicialMesh is cut in another order than a TriangleMesh
 MESHES = {es.TriangleMesh, es.SimplicialMesh, es.PointCloud}
 
 
 def kinds(annotation: Any) -> Iterator[Any]:
     """Yield the types that a union is of, and what its lists and mappings are of."""
-    if get_origin(annotation) in (Union, UnionType) or get_origin(annotation) in (Sequence, Iterable, Mapping, tuple):
+    if isinstance(annotation, TypeAliasType):
+        yield from kinds(annotation.__value__)
+    elif get_origin(annotation) in (Union, UnionType, Sequence, Iterable, Mapping, tuple):
         for part in get_args(annotation):
             yield from kinds(part)
     else:
@@ -257,8 +269,7 @@ def kinds(annotation: Any) -> Iterator[Any]:
 
 def public_callables() -> Iterator[tuple[str, Callable[..., Any], type | None]]:
     """Yield public functions, and public methods of public classes with their class."""
-    for name in es.__all__:
-        thing = getattr(es, name)
+    for name, thing in public_things().items():
         if inspect.isfunction(thing):
             yield name, thing, None
         elif inspect.isclass(thing):
@@ -302,7 +313,9 @@ def same(one: Any, two: Any) -> bool:
     if isinstance(one, list | tuple):
         return len(one) == len(two) and all(map(same, one, two))
     if is_dataclass(one):
-        return type(one) is type(two) and all(same(value, vars(two)[key]) for key, value in vars(one).items())
+        return type(one) is type(two) and all(
+            same(value, vars(two)[key]) for key, value in vars(one).items()
+        )
     return type(one) is type(two)
 
 
@@ -310,10 +323,14 @@ def unnamed(value: Any, message: str) -> str | None:
     """Return a message that does not name what was given: its type, or that of the first where a list is meant."""
     first = value[:1] if isinstance(value, tuple) else ()
     names = ["None"] if value is None else [type(each).__name__ for each in (value, *first)]
-    return None if any(name in message for name in names) else f"does not name {names[0]}: {message}"
+    return (
+        None if any(name in message for name in names) else f"does not name {names[0]}: {message}"
+    )
 
 
-def right_arguments(function: str, code: Callable[..., Any], owner: type | None) -> tuple[dict[str, Any], set[str]]:
+def right_arguments(
+    function: str, code: Callable[..., Any], owner: type | None
+) -> tuple[dict[str, Any], set[str]]:
     """Return arguments that a function takes, and the names of those whose type is ours.
 
     Raises
@@ -323,9 +340,13 @@ def right_arguments(function: str, code: Callable[..., Any], owner: type | None)
     """
     hints = get_type_hints(code)
     given: dict[str, Any] = {}
-    ours = {name for name, hint in hints.items() if set(kinds(hint)) & (VALUES.keys() | MESHES)} - {"return"}
+    ours = {name for name, hint in hints.items() if set(kinds(hint)) & (VALUES.keys() | MESHES)} - {
+        "return"
+    }
     for name, parameter in inspect.signature(code).parameters.items():
-        needed = parameter.default is parameter.empty and parameter.kind is not parameter.VAR_KEYWORD
+        needed = (
+            parameter.default is parameter.empty and parameter.kind is not parameter.VAR_KEYWORD
+        )
         if name == "self":
             given[name] = VALUES[owner]() if ours else None
         elif ours and (needed or f"{function}.{name}" in NAMED):
@@ -344,10 +365,17 @@ def is_accepted(slip: str, value: Any, allowed: set[Any]) -> bool:
     return any(isinstance(value, kind) for kind in allowed if isinstance(kind, type))
 
 
-def complaints_about(function: str, code: Callable[..., Any], owner: type | None) -> Iterator[tuple[str, str]]:
+def complaints_about(
+    function: str, code: Callable[..., Any], owner: type | None
+) -> Iterator[tuple[str, str]]:
     """Yield what goes wrong where one argument of a function is a slip and the others are right."""
     starred = next(
-        (name for name, each in inspect.signature(code).parameters.items() if each.kind is each.VAR_POSITIONAL), None
+        (
+            name
+            for name, each in inspect.signature(code).parameters.items()
+            if each.kind is each.VAR_POSITIONAL
+        ),
+        None,
     )
 
     def call(**arguments: Any) -> Any:
@@ -369,7 +397,9 @@ def complaints_about(function: str, code: Callable[..., Any], owner: type | None
             value = made()
             accepted = is_accepted(slip, value, allowed)
             is_the_mesh = es.SimplicialMesh in allowed and slip in SAME_MESH
-            if (function, slip) in OF_ITS_OWN_KIND or (accepted and (slip == "mesh" or (dear and slip != "trimesh"))):
+            if (function, slip) in OF_ITS_OWN_KIND or (
+                accepted and (slip == "mesh" or (dear and slip != "trimesh"))
+            ):
                 continue
             try:
                 answer = call(**{**given, name: value})
@@ -378,7 +408,11 @@ def complaints_about(function: str, code: Callable[..., Any], owner: type | None
             except Exception as error:  # noqa: BLE001 - the law is that there is none
                 found = f"{type(error).__name__}: {error}"
             else:
-                wrong = "another answer than for the mesh" if is_the_mesh and not same(right, answer) else None
+                wrong = (
+                    "another answer than for the mesh"
+                    if is_the_mesh and not same(right, answer)
+                    else None
+                )
                 found = wrong if accepted else "took it"
             if found:
                 yield f"{function}({name}={slip})", found

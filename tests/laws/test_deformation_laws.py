@@ -24,7 +24,9 @@ few = settings(deadline=None, max_examples=6, derandomize=True)
 @lru_cache
 def bumpy_torus(seed):
     mesh = torus(18, 10)
-    return TriangleMesh(mesh.vertices + 0.04 * np.random.default_rng(seed).standard_normal((180, 3)), mesh.faces)
+    return TriangleMesh(
+        mesh.vertices + 0.04 * np.random.default_rng(seed).standard_normal((180, 3)), mesh.faces
+    )
 
 
 def task(seed):
@@ -47,9 +49,16 @@ def test_a_shape_that_was_moved_bends_alike(mode, seed):
     mesh, regions, (turn, shift) = task(seed)
     rng = np.random.default_rng(seed + 1)
     motion, goes = Turn.random(random_state=rng), 3 * rng.standard_normal(3)
-    handles = [Rotation(motion.apply(turn.pivot.copy()) + goes, motion.apply(turn.axis.copy()), turn.angle)]
+    handles = [
+        Rotation(motion.apply(turn.pivot.copy()) + goes, motion.apply(turn.axis.copy()), turn.angle)
+    ]
     handles.append(Translation(motion.apply(shift.vector.copy())))
-    other = bent(TriangleMesh(motion.apply(np.array(mesh.vertices)) + goes, mesh.faces), regions, handles, mode)
+    other = bent(
+        TriangleMesh(motion.apply(np.array(mesh.vertices)) + goes, mesh.faces),
+        regions,
+        handles,
+        mode,
+    )
     expected = motion.apply(bent(mesh, regions, [turn, shift], mode).copy()) + goes
     np.testing.assert_allclose(other, expected, atol=1e-9)
 
@@ -72,8 +81,18 @@ def test_names_of_vertices_and_faces_change_nothing(mode, seed):
     rng = np.random.default_rng(seed + 1)
     order = rng.permutation(180)
     faces = rng.permutation(np.argsort(order)[mesh.faces])
-    faces = np.array([np.roll(face, turn) for face, turn in zip(faces, rng.integers(0, 3, len(faces)), strict=True)])
-    other = bent(TriangleMesh(mesh.vertices[order], faces), [region[order] for region in regions], handles, mode)
+    faces = np.array(
+        [
+            np.roll(face, turn)
+            for face, turn in zip(faces, rng.integers(0, 3, len(faces)), strict=True)
+        ]
+    )
+    other = bent(
+        TriangleMesh(mesh.vertices[order], faces),
+        [region[order] for region in regions],
+        handles,
+        mode,
+    )
     np.testing.assert_allclose(other, bent(mesh, regions, handles, mode)[order], atol=1e-9)
 
 

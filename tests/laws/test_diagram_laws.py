@@ -10,8 +10,9 @@ import eigenshape as es
 some = settings(deadline=None, max_examples=60)
 seeds = st.integers(0, 2**32 - 1)
 SHAPES = (
-    es.icosphere(1), es.torus(6, 5), es.grid(5, 4), es.disjoint_union(es.icosphere(0), es.torus(4, 3)),
-    es.projective_plane(1),
+    es.icosphere(1), es.shapes.torus(6, 5), es.shapes.grid(5, 4),
+    es.shapes.disjoint_union(es.icosphere(0), es.shapes.torus(4, 3)),
+    es.shapes.projective_plane(1),
 )  # fmt: skip
 
 
@@ -31,10 +32,13 @@ def columns(pairs):
 def test_diagrams_are_at_most_as_far_apart_as_their_functions(seed, spread, change):
     shape, values, rng = shape_and_values(seed, spread)
     others = values + rng.integers(-change, change + 1, shape.n_points) / 8
-    one, two = es.persistence_diagram(shape, values), es.persistence_diagram(shape, others)
-    distance = es.bottleneck_distance(one, two)
+    one, two = (
+        es.features.persistence_diagram(shape, values),
+        es.features.persistence_diagram(shape, others),
+    )
+    distance = es.features.bottleneck_distance(one, two)
     assert distance <= np.abs(values - others).max()
-    assert distance == es.bottleneck_distance(two, one)
+    assert distance == es.features.bottleneck_distance(two, one)
 
 
 @some
@@ -42,9 +46,12 @@ def test_diagrams_are_at_most_as_far_apart_as_their_functions(seed, spread, chan
 def test_the_triangle_inequality(seed, spread):
     shape, values, rng = shape_and_values(seed, spread)
     one, two, three = (
-        es.persistence_diagram(shape, values + rng.integers(0, spread, shape.n_points) / 8) for _ in range(3)
+        es.features.persistence_diagram(shape, values + rng.integers(0, spread, shape.n_points) / 8)
+        for _ in range(3)
     )
-    assert es.bottleneck_distance(one, three) <= es.bottleneck_distance(one, two) + es.bottleneck_distance(two, three)
+    assert es.features.bottleneck_distance(one, three) <= es.features.bottleneck_distance(
+        one, two
+    ) + es.features.bottleneck_distance(two, three)
 
 
 @some
@@ -55,7 +62,10 @@ def test_names_of_points_do_not_matter(seed, spread):
     points, named = np.empty_like(shape.points), np.empty_like(values)
     points[new_of_old], named[new_of_old] = shape.points, values
     other = es.SimplicialMesh(points, new_of_old[shape.simplices])
-    one, two = es.persistence_diagram(shape, values), es.persistence_diagram(other, named)
+    one, two = (
+        es.features.persistence_diagram(shape, values),
+        es.features.persistence_diagram(other, named),
+    )
     for kind in ("maxima", "minima", "components", "loops"):
         assert columns(getattr(one, kind)) == columns(getattr(two, kind))
 
@@ -64,8 +74,11 @@ def test_names_of_points_do_not_matter(seed, spread):
 @given(seeds, st.sampled_from([2, 20, 1000]), st.integers(0, 1000))
 def test_pairs_alive_at_a_level_are_the_components_there(seed, spread, level):
     shape, values, _ = shape_and_values(seed, spread)
-    found, graph = es.persistence_diagram(shape, values), es.edge_graph(shape)
-    for pairs, ends, sign in ((found.minima, found.components.births, 1), (found.maxima, found.components.deaths, -1)):
+    found, graph = es.features.persistence_diagram(shape, values), es.operators.edge_graph(shape)
+    for pairs, ends, sign in (
+        (found.minima, found.components.births, 1),
+        (found.maxima, found.components.deaths, -1),
+    ):
         inside = sign * values <= sign * level / 8
         alive = (sign * pairs.births <= sign * level / 8) & (sign * pairs.deaths > sign * level / 8)
         count = alive.sum() + (sign * ends <= sign * level / 8).sum()

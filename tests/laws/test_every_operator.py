@@ -32,7 +32,7 @@ from eigenshape.operators.robust import robust_laplacian
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
 from eigenshape.spectral.laws.operator_laws import check_operator
-from eigenshape.spectral.laws.report import USUAL
+from eigenshape.spectral.laws.report import DEFAULT_PROMISES
 from eigenshape.spectral.laws.transformations import random_rotation
 
 seeds = st.integers(0, 2**32 - 1)
@@ -42,12 +42,16 @@ many = settings(deadline=None, max_examples=150)
 
 def turned(points, rng, noise):
     """Shake points, move them off the origin and turn them."""
-    shaken = points + noise * rng.standard_normal(points.shape) + rng.standard_normal(points.shape[1])
+    shaken = (
+        points + noise * rng.standard_normal(points.shape) + rng.standard_normal(points.shape[1])
+    )
     return shaken @ random_rotation(points.shape[1], rng)
 
 
 def surface(rng, small=False):
-    mesh = (icosphere(1), torus(10, 7), grid(6, 5), pair(), creature())[rng.integers(4 if small else 5)]
+    mesh = (icosphere(1), torus(10, 7), grid(6, 5), pair(), creature())[
+        rng.integers(4 if small else 5)
+    ]
     return TriangleMesh(turned(mesh.vertices, rng, 0.02), mesh.faces)
 
 
@@ -75,7 +79,9 @@ def slivers(rng, small=False, thinnest=1e-9):
 def soup(rng):
     """Different faces over random points, with edges and vertices that are no manifold."""
     points = rng.standard_normal((9, 3))
-    used, faces = np.unique([rng.choice(9, 3, replace=False) for _ in range(20)], return_inverse=True)
+    used, faces = np.unique(
+        [rng.choice(9, 3, replace=False) for _ in range(20)], return_inverse=True
+    )
     return drop_duplicate_faces(TriangleMesh(points[used], faces.reshape(-1, 3))).mesh
 
 
@@ -97,7 +103,9 @@ def solid(rng, codimension=None, sizes=(12, 5, 3, 2)):
 @cache
 def box(n, dim):
     """Cut the cubes of a box along their diagonals (Kuhn): simplex by simplex from corner to opposite corner."""
-    corners = np.stack(np.meshgrid(*[np.arange(n + 1)] * dim, indexing="ij"), axis=-1).reshape(-1, dim)
+    corners = np.stack(np.meshgrid(*[np.arange(n + 1)] * dim, indexing="ij"), axis=-1).reshape(
+        -1, dim
+    )
     strides = (n + 1) ** np.arange(dim)[::-1]
     first = corners[(corners < n).all(axis=1)] @ strides
     steps = [np.cumsum([0, *strides[list(order)]]) for order in permutations(range(dim))]
@@ -109,14 +117,18 @@ def curve(rng):
     n, d = 40, int(rng.integers(2, 5))
     angles = 2 * np.pi * (np.arange(n) + rng.uniform(-0.3, 0.3, n)) / n
     points = np.pad(np.column_stack([np.cos(angles), np.sin(angles)]), ((0, 0), (0, d - 2)))
-    return SimplicialMesh(turned(points, rng, 0.01), np.column_stack([np.arange(n), (np.arange(n) + 1) % n]))
+    return SimplicialMesh(
+        turned(points, rng, 0.01), np.column_stack([np.arange(n), (np.arange(n) + 1) % n])
+    )
 
 
 def cloud(rng):
     """Points on a shaken sphere, or on a shaken circle in four dimensions."""
     if rng.random() < 0.5:
         points = rng.standard_normal((150, 3))
-        return PointCloud(turned(points / np.linalg.norm(points, axis=1, keepdims=True), rng, 0.01), 2)
+        return PointCloud(
+            turned(points / np.linalg.norm(points, axis=1, keepdims=True), rng, 0.01), 2
+        )
     angles = 2 * np.pi * (np.arange(60) + rng.uniform(-0.3, 0.3, 60)) / 60
     points = np.column_stack([np.cos(angles), np.sin(angles), np.zeros((60, 2))])
     return PointCloud(turned(points, rng, 0.005), 1)
@@ -124,7 +136,11 @@ def cloud(rng):
 
 def graph(rng):
     """One or two rings with chords, weights over four decades."""
-    ends = [(start + i, start + (i + 1) % 12) for start in (0, 12)[: rng.integers(1, 3)] for i in range(12)]
+    ends = [
+        (start + i, start + (i + 1) % 12)
+        for start in (0, 12)[: rng.integers(1, 3)]
+        for i in range(12)
+    ]
     ends += [tuple(rng.choice(12, 2, replace=False)) for _ in range(8)]
     ends = np.unique(np.sort(ends, axis=1), axis=0)
     upper = sp.coo_array((10 ** rng.uniform(-2, 2, len(ends)), ends.T), shape=(ends.max() + 1,) * 2)
@@ -154,33 +170,89 @@ def anisotropic(mesh):
 SURFACES = (surface, slivers, soup)
 MESHES = (*SURFACES, solid, curve)
 LITTLE = partial(solid, sizes=(8, 3, 2, 1))
-SMALL = (partial(surface, small=True), partial(slivers, small=True, thinnest=1e-4), soup, LITTLE, curve)
-FLAT = USUAL | {"volume"}
+SMALL = (
+    partial(surface, small=True),
+    partial(slivers, small=True, thinnest=1e-4),
+    soup,
+    LITTLE,
+    curve,
+)
+FLAT = DEFAULT_PROMISES | {"volume"}
 MONOTONE = FLAT | {"nonnegative_weights"}
-GRAPH = (USUAL - {"scaling"}) | {"nonnegative_weights"}
-VECTORS = frozenset({"rigid_motion", "reflection", "scaling", "union"})  # whose faces are all turned one way
+GRAPH = (DEFAULT_PROMISES - {"scaling"}) | {"nonnegative_weights"}
+VECTORS = frozenset(
+    {"rigid_motion", "reflection", "scaling", "union"}
+)  # whose faces are all turned one way
 
 TABLE = [
     *[
-        Row(f"cotangent {mass}", partial(cotangent_laplacian, mass=mass), MESHES, FLAT, boundary_vertices)
+        Row(
+            f"cotangent {mass}",
+            partial(cotangent_laplacian, mass=mass),
+            MESHES,
+            FLAT,
+            boundary_vertices,
+        )
         for mass in ("lumped", "consistent", "averaged")
     ],
-    *[Row(f"P{p}", partial(fem_laplacian, order=p), SMALL, FLAT, partial(fem_boundary_nodes, order=p)) for p in (2, 3)],
-    Row("anisotropic", anisotropic, (surface, slivers), FLAT - {"orientation", "union"}, boundary_vertices),
+    *[
+        Row(
+            f"P{p}",
+            partial(fem_laplacian, order=p),
+            SMALL,
+            FLAT,
+            partial(fem_boundary_nodes, order=p),
+        )
+        for p in (2, 3)
+    ],
+    Row(
+        "anisotropic",
+        anisotropic,
+        (surface, slivers),
+        FLAT - {"orientation", "union"},
+        boundary_vertices,
+    ),
     Row("robust", robust_laplacian, SURFACES, MONOTONE - {"volume"}, boundary_vertices),
     Row("robust, not mollified", partial(robust_laplacian, mollify=0.0), (surface, soup), MONOTONE),
     Row("mesh", mesh_laplacian, (surface, solid, curve), MONOTONE, boundary_vertices),
-    Row("mesh, random walk", partial(mesh_laplacian, form="random-walk"), (surface, solid), MONOTONE - {"volume"}),
+    Row(
+        "mesh, random walk",
+        partial(mesh_laplacian, form="random-walk"),
+        (surface, solid),
+        MONOTONE - {"volume"},
+    ),
     Row("mesh, geodesic", partial(mesh_laplacian, distance="geodesic"), (surface,), MONOTONE),
-    Row("gaussian", partial(gaussian, form="literal"), (cloud,), USUAL - {"scaling", "union"}),
-    Row("gaussian, random walk", partial(gaussian, form="random-walk"), (cloud,), USUAL - {"union"}),
-    Row("point cloud", point_cloud_laplacian, (cloud,), USUAL | {"nonnegative_weights"}),
+    Row(
+        "gaussian",
+        partial(gaussian, form="literal"),
+        (cloud,),
+        DEFAULT_PROMISES - {"scaling", "union"},
+    ),
+    Row(
+        "gaussian, random walk",
+        partial(gaussian, form="random-walk"),
+        (cloud,),
+        DEFAULT_PROMISES - {"union"},
+    ),
+    Row("point cloud", point_cloud_laplacian, (cloud,), DEFAULT_PROMISES | {"nonnegative_weights"}),
     Row("connection", connection_laplacian, (surface,), VECTORS),
-    Row("connection consistent", partial(connection_laplacian, mass="consistent"), (surface,), VECTORS),
+    Row(
+        "connection consistent",
+        partial(connection_laplacian, mass="consistent"),
+        (surface,),
+        VECTORS,
+    ),
     Row("combinatorial", graph_laplacian, (surface, solid, curve), GRAPH, boundary_vertices),
-    Row("inverse length", partial(graph_laplacian, kind="weighted"), (surface, solid, curve), GRAPH),
+    Row(
+        "inverse length", partial(graph_laplacian, kind="weighted"), (surface, solid, curve), GRAPH
+    ),
     *[
-        Row(f"{kind} of a graph", partial(graph_laplacian, kind=kind), (graph,), USUAL | {"nonnegative_weights"})
+        Row(
+            f"{kind} of a graph",
+            partial(graph_laplacian, kind=kind),
+            (graph,),
+            DEFAULT_PROMISES | {"nonnegative_weights"},
+        )
         for kind in ("combinatorial", "weighted", "normalized")
     ],
 ]
@@ -216,7 +288,9 @@ def held(row, shape):
 
 pytestmark = pytest.mark.filterwarnings("ignore:A heat time of t", "ignore:A kernel of width")
 every = pytest.mark.parametrize("row", TABLE, ids=lambda row: row.name)
-with_boundary = pytest.mark.parametrize("row", [row for row in TABLE if row.boundary], ids=lambda row: row.name)
+with_boundary = pytest.mark.parametrize(
+    "row", [row for row in TABLE if row.boundary], ids=lambda row: row.name
+)
 
 
 @every

@@ -14,19 +14,22 @@ def spectral(signature):
 
 
 FUNCTIONS = {  # and the power of length that each is in
-    "heat": (spectral(lambda s: es.heat_kernel_signature(s, es.default_times(s, 8))), -2),
-    "scale-invariant heat": (spectral(es.scale_invariant_heat_kernel_signature), 0),
+    "heat": (spectral(lambda s: es.heat_kernel_signature(s, es.spectral.default_times(s, 8))), -2),
+    "scale-invariant heat": (spectral(es.spectral.scale_invariant_signature), 0),
     "waves": (spectral(es.wave_kernel_signature), -2),
-    "average geodesic distance": (lambda mesh: es.average_geodesic_distance(mesh, n_bases=mesh.n_vertices), 1),
-    "Gaussian curvature": (es.gaussian_curvature, -2),
-    "mean curvature": (es.mean_curvature, -1),
+    "average geodesic distance": (
+        lambda mesh: es.geometry.average_geodesic_distance(mesh, n_bases=mesh.n_vertices),
+        1,
+    ),
+    "Gaussian curvature": (es.geometry.gaussian_curvature, -2),
+    "mean curvature": (es.operators.mean_curvature, -1),
 }
 INTRINSIC = [name for name in FUNCTIONS if name != "mean curvature"]
 
 
 def sheet():
     """A grid of unequal sides with one corner cut, so that nothing is symmetric and no eigenvalue double."""
-    mesh = es.grid(14, 11)
+    mesh = es.shapes.grid(14, 11)
     return es.TriangleMesh(mesh.vertices * [1.0, 0.77, 1.0], mesh.faces[3:])
 
 
@@ -39,7 +42,9 @@ def test_a_fold_leaves_what_is_within_the_surface(name):
     function, _ = FUNCTIONS[name]
     flat = sheet()
     x, y, _ = flat.vertices.T
-    bent = es.TriangleMesh(np.column_stack([np.minimum(x, 0.5), y, np.maximum(x - 0.5, 0)]), flat.faces)
+    bent = es.TriangleMesh(
+        np.column_stack([np.minimum(x, 0.5), y, np.maximum(x - 0.5, 0)]), flat.faces
+    )
     assert_same(function(flat), function(bent))
 
 
@@ -47,7 +52,7 @@ def test_a_fold_leaves_what_is_within_the_surface(name):
 def test_moving_and_naming_leave_all(name):
     function, _ = FUNCTIONS[name]
     rng = np.random.default_rng(0)
-    mesh = es.torus(16, 11)
+    mesh = es.shapes.torus(16, 11)
     mesh = es.TriangleMesh(mesh.vertices * [1.0, 1.3, 0.8], mesh.faces)
     turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
     new_of_old = rng.permutation(mesh.n_vertices)

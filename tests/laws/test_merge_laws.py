@@ -16,7 +16,13 @@ seeds = st.integers(0, 2**32 - 1)
 spreads = st.sampled_from([1, 3, 10, 1000])
 some = settings(deadline=None, max_examples=40)
 
-SHAPES = (icosphere(0), icosphere(1), torus(5, 4), grid(4, 3), disjoint_union(icosphere(0), torus(4, 3), grid(2, 2)))
+SHAPES = (
+    icosphere(0),
+    icosphere(1),
+    torus(5, 4),
+    grid(4, 3),
+    disjoint_union(icosphere(0), torus(4, 3), grid(2, 2)),
+)
 
 
 def tiny(seed, spread):
@@ -45,7 +51,9 @@ def in_order(mesh, values):
 
 def lasting(pairs, values):
     """Maximum and saddle of the pairs that persist, by vertex; (-1, -1) for no saddle."""
-    return sorted((top, *edge) for top, edge in pairs if edge == (-1, -1) or values[top] > values[edge[0]])
+    return sorted(
+        (top, *edge) for top, edge in pairs if edge == (-1, -1) or values[top] > values[edge[0]]
+    )
 
 
 def pairs_of(tree):
@@ -97,7 +105,9 @@ def within(one, two, eps):
     size = len(one) + len(two)
     fits = np.ones((size, size), dtype=bool)
     fits[: len(one), : len(two)] = near.all(axis=2)
-    fits[: len(one), len(two) :] = np.eye(len(one), dtype=bool) & (one[:, 0] - one[:, 1] <= 2 * eps)[:, None]
+    fits[: len(one), len(two) :] = (
+        np.eye(len(one), dtype=bool) & (one[:, 0] - one[:, 1] <= 2 * eps)[:, None]
+    )
     fits[len(one) :, : len(two)] = np.eye(len(two), dtype=bool) & (two[:, 0] - two[:, 1] <= 2 * eps)
     return bool((maximum_bipartite_matching(csr_array(fits)) >= 0).all())
 

@@ -12,22 +12,34 @@ import pytest
 import eigenshape as es
 from eigenshape._arguments import CONVERSIONS, MAKERS, READERS
 
-SCRIPT = Path(__file__).parent / "natural_slips.py"
+TESTS = Path(__file__).resolve().parents[1]
 
 
 def test_every_public_function_answers_or_names_what_it_was_given():
     # In a process of its own: the type checks of these tests would speak before ours.
-    done = subprocess.run([sys.executable, str(SCRIPT)], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-m", "laws.natural_slips"],
+        cwd=TESTS,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert found["functions"] > 180
-    assert not found["complaints"], "\n".join(f"{where}: {what}" for where, what in found["complaints"])
+    assert not found["complaints"], "\n".join(
+        f"{where}: {what}" for where, what in found["complaints"]
+    )
 
 
 @pytest.mark.parametrize("call", [*MAKERS.values(), *READERS.values(), *CONVERSIONS.values()])
 def test_what_messages_tell_to_call_is_there(call):
     # Each name before a bracket, methods of a class too; what is not ours is from the standard library or scipy.
     names = re.findall(r"[A-Za-z_][A-Za-z_.]*(?=\()", call) or [call] * call.isidentifier()
-    ours = [name for name in names if name not in ("Path", "read_bytes", "csr_array", "numpy.random.default_rng")]
+    ours = [
+        name
+        for name in names
+        if name not in ("Path", "read_bytes", "csr_array", "numpy.random.default_rng")
+    ]
     for name in ours:
-        assert attrgetter(name.lstrip("."))(es) is not None
+        assert attrgetter(name.removeprefix("es.").lstrip("."))(es) is not None

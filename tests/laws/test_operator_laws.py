@@ -63,14 +63,18 @@ def test_stiffness_is_symmetric_semidefinite_and_blind_to_constants(seed, mass):
 @given(seeds, masses)
 def test_mass_sums_to_the_area(seed, mass):
     mesh = shape(seed)
-    np.testing.assert_allclose(cotangent_laplacian(mesh, mass).mass.sum(), surface_area(mesh), rtol=1e-13)
+    np.testing.assert_allclose(
+        cotangent_laplacian(mesh, mass).mass.sum(), surface_area(mesh), rtol=1e-13
+    )
 
 
 @few
 @given(seeds)
 def test_all_masses_have_the_same_row_sums(seed):
     mesh = shape(seed)
-    lumped, consistent, averaged = (dense(mesh, mass)[1] for mass in ("lumped", "consistent", "averaged"))
+    lumped, consistent, averaged = (
+        dense(mesh, mass)[1] for mass in ("lumped", "consistent", "averaged")
+    )
     np.testing.assert_allclose(consistent.sum(axis=1), np.diag(lumped), rtol=1e-13)
     np.testing.assert_allclose(averaged, (lumped + consistent) / 2, rtol=1e-14, atol=0)
 
@@ -100,7 +104,11 @@ def test_relabelling_permutes(seed, mass):
 def test_orientation_does_not_matter(seed, mass):
     mesh = shape(seed)
     flip = np.random.default_rng(seed).random(mesh.n_faces) < 0.5
-    require_same(mesh, TriangleMesh(mesh.vertices, np.where(flip[:, None], mesh.faces[:, ::-1], mesh.faces)), mass)
+    require_same(
+        mesh,
+        TriangleMesh(mesh.vertices, np.where(flip[:, None], mesh.faces[:, ::-1], mesh.faces)),
+        mass,
+    )
 
 
 @few
@@ -124,7 +132,9 @@ def test_powers_of_two_scale_bit_for_bit(seed, mass, power):
     np.testing.assert_array_equal(weights, two * scale * scale)
     np.testing.assert_array_equal(face_areas(far), face_areas(mesh) * scale * scale)
     if not len(inconsistent_edges(mesh)):  # a soup encloses nothing, and is refused
-        np.testing.assert_array_equal(enclosed_volume(far), enclosed_volume(mesh) * scale * scale * scale)
+        np.testing.assert_array_equal(
+            enclosed_volume(far), enclosed_volume(mesh) * scale * scale * scale
+        )
 
 
 @few
@@ -133,7 +143,10 @@ def test_a_disjoint_union_is_block_diagonal(seed, mass):
     parts = [shape(seed), shape(seed + 1)]
     n = parts[0].n_vertices
     for whole, one, two in zip(
-        dense(disjoint_union(*parts), mass), dense(parts[0], mass), dense(parts[1], mass), strict=True
+        dense(disjoint_union(*parts), mass),
+        dense(parts[0], mass),
+        dense(parts[1], mass),
+        strict=True,
     ):
         np.testing.assert_allclose(whole[:n, :n], one, rtol=0, atol=1e-11 * np.abs(one).max())
         np.testing.assert_allclose(whole[n:, n:], two, rtol=0, atol=1e-11 * np.abs(two).max())

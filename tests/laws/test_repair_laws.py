@@ -31,7 +31,9 @@ BASES = {
     "torus": torus(9, 6),
     "sheet": grid(4, 3),
     "creature": make_creature("quadruped", n_vertices=500),
-    "hollow": disjoint_union(icosphere(1), TriangleMesh(0.4 * icosphere(0).vertices, icosphere(0).faces[:, ::-1])),
+    "hollow": disjoint_union(
+        icosphere(1), TriangleMesh(0.4 * icosphere(0).vertices, icosphere(0).faces[:, ::-1])
+    ),
     "pair": disjoint_union(icosphere(1), TriangleMesh(torus(7, 5).vertices + 9, torus(7, 5).faces)),
 }
 DAMAGES = {
@@ -65,7 +67,9 @@ def build(case):
 
 @settings(deadline=None, max_examples=60)
 @given(broken)
-@example(("ball", ["soup", "flipped", "duplicates", "loose", "flat", "specks", "holes", "everted"], 0))
+@example(
+    ("ball", ["soup", "flipped", "duplicates", "loose", "flat", "specks", "holes", "everted"], 0)
+)
 @example(("ball", ["holes", "everted"], 1))  # inward once it is closed
 @example(("ball", ["holes", "holes"], 0))  # of different numbers of edges
 def test_what_is_suggested_leaves_nothing_to_suggest(case):
@@ -98,7 +102,9 @@ def test_auto_gives_back_a_closed_mesh(base, seed):
     found = repair(build((base, damages.tolist(), seed)), ["auto"]).mesh
     assert (found.n_vertices, found.n_faces) == (mesh.n_vertices, mesh.n_faces)
     expected = {frozenset(map(tuple, corners)) for corners in mesh.vertices[mesh.faces].tolist()}
-    assert {frozenset(map(tuple, corners)) for corners in found.vertices[found.faces].tolist()} == expected
+    assert {
+        frozenset(map(tuple, corners)) for corners in found.vertices[found.faces].tolist()
+    } == expected
 
 
 @settings(deadline=None, max_examples=30)
@@ -106,7 +112,10 @@ def test_auto_gives_back_a_closed_mesh(base, seed):
 def test_auto_leaves_no_slit(base, seed):
     """A face without area goes and the surface stays closed, whatever else is broken."""
     mesh, rng = BASES[base], np.random.default_rng(seed)
-    damages = ["slivers", *rng.permutation(["soup", "flipped", "duplicates", "loose", "flat", "cut"])]
+    damages = [
+        "slivers",
+        *rng.permutation(["soup", "flipped", "duplicates", "loose", "flat", "cut"]),
+    ]
     found = repair(build((base, damages, seed)), ["auto"]).mesh
     assert (found.n_vertices, found.n_faces) == (mesh.n_vertices + 1, mesh.n_faces + 2)
     assert is_closed(found)

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import disjoint_union, icosphere, torus
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import strategy as roads
-from eigenshape.spectral.solver.solve import solve_spectrum
 
 seeds = st.integers(0, 2**32 - 1)
 masses = st.sampled_from(["lumped", "consistent", "averaged"])
@@ -40,7 +40,9 @@ def test_eigenvectors_are_orthonormal_and_diagonalise(seed, mass, k):
     phi = spectrum.eigenvectors
     np.testing.assert_allclose(phi.T @ (laplacian.mass @ phi), np.eye(k), atol=1e-11)
     np.testing.assert_allclose(
-        phi.T @ (laplacian.stiffness @ phi), np.diag(spectrum.eigenvalues), atol=1e-10 * (spectrum.eigenvalues[-1] + 1)
+        phi.T @ (laplacian.stiffness @ phi),
+        np.diag(spectrum.eigenvalues),
+        atol=1e-10 * (spectrum.eigenvalues[-1] + 1),
     )
     assert (np.diff(spectrum.eigenvalues) >= 0).all()
     assert (spectrum.eigenvalues >= 0).all()
@@ -52,12 +54,18 @@ def test_eigenvectors_are_orthonormal_and_diagonalise(seed, mass, k):
 def test_eigenvalues_scale_as_inverse_area(seed, mass, power):
     mesh, scale = shape(seed), 10.0**power
     one = solve_spectrum(cotangent_laplacian(mesh, mass), 12)
-    far = solve_spectrum(cotangent_laplacian(TriangleMesh(scale * mesh.vertices, mesh.faces), mass), 12)
+    far = solve_spectrum(
+        cotangent_laplacian(TriangleMesh(scale * mesh.vertices, mesh.faces), mass), 12
+    )
     expected = one.eigenvalues / scale / scale
     np.testing.assert_allclose(far.eigenvalues, expected, rtol=1e-9, atol=1e-12 * expected[-1])
-    np.testing.assert_allclose(np.abs(far.eigenvectors * scale), np.abs(one.eigenvectors), atol=1e-6)
+    np.testing.assert_allclose(
+        np.abs(far.eigenvectors * scale), np.abs(one.eigenvectors), atol=1e-6
+    )
     assert far.certificate.count == one.certificate.count
-    np.testing.assert_allclose(far.certificate.shift * scale * scale, one.certificate.shift, rtol=1e-9)
+    np.testing.assert_allclose(
+        far.certificate.shift * scale * scale, one.certificate.shift, rtol=1e-9
+    )
 
 
 @few
@@ -69,7 +77,9 @@ def test_relabelling_permutes_the_rows(seed, mass):
     vertices[new_of_old] = mesh.vertices
     renamed = TriangleMesh(vertices, new_of_old[mesh.faces])
     one, two = (solve_spectrum(cotangent_laplacian(m, mass), 10) for m in (mesh, renamed))
-    np.testing.assert_allclose(two.eigenvalues, one.eigenvalues, rtol=1e-10, atol=1e-12 * one.eigenvalues[-1])
+    np.testing.assert_allclose(
+        two.eigenvalues, one.eigenvalues, rtol=1e-10, atol=1e-12 * one.eigenvalues[-1]
+    )
     _require_same_space(one, two.eigenvectors[new_of_old])
 
 
@@ -78,15 +88,22 @@ def test_relabelling_permutes_the_rows(seed, mass):
 def test_rigid_motion_changes_nothing(seed, mass):
     mesh, rng = shape(seed), np.random.default_rng(seed)
     turned = mesh.vertices @ Rotation.random(rng=rng).as_matrix().T + rng.standard_normal(3)
-    one, two = (solve_spectrum(cotangent_laplacian(m, mass), 10) for m in (mesh, TriangleMesh(turned, mesh.faces)))
-    np.testing.assert_allclose(two.eigenvalues, one.eigenvalues, rtol=1e-9, atol=1e-11 * one.eigenvalues[-1])
+    one, two = (
+        solve_spectrum(cotangent_laplacian(m, mass), 10)
+        for m in (mesh, TriangleMesh(turned, mesh.faces))
+    )
+    np.testing.assert_allclose(
+        two.eigenvalues, one.eigenvalues, rtol=1e-9, atol=1e-11 * one.eigenvalues[-1]
+    )
 
 
 @few
 @given(seeds, masses, st.integers(1, 25))
 def test_a_disjoint_union_merges_spectra(seed, mass, k):
     one, two = shape(seed), shape(seed + 1)
-    parts = [solve_spectrum(cotangent_laplacian(part, mass), k).eigenvalues for part in (one, two, two)]
+    parts = [
+        solve_spectrum(cotangent_laplacian(part, mass), k).eigenvalues for part in (one, two, two)
+    ]
     merged = np.sort(np.concatenate(parts))[:k]
     union = solve_spectrum(cotangent_laplacian(disjoint_union(one, two, two), mass), k)
     np.testing.assert_allclose(union.eigenvalues, merged, rtol=1e-9, atol=1e-11)
@@ -95,7 +112,9 @@ def test_a_disjoint_union_merges_spectra(seed, mass, k):
 @few
 @given(seeds, st.integers(1, 20), masses)
 def test_zeros_count_the_components(seed, copies, mass):
-    union = disjoint_union(*[TriangleMesh((1 + i) * icosphere(1).vertices, icosphere(1).faces) for i in range(copies)])
+    union = disjoint_union(
+        *[TriangleMesh((1 + i) * icosphere(1).vertices, icosphere(1).faces) for i in range(copies)]
+    )
     values = solve_spectrum(cotangent_laplacian(union, mass), copies + 2).eigenvalues
     assert np.count_nonzero(values < 1e-9 * values[-1]) == copies
 
@@ -104,5 +123,7 @@ def _require_same_space(spectrum, vectors):
     overlaps = spectrum.eigenvectors.T @ (spectrum.mass @ vectors)
     jumps = np.diff(spectrum.eigenvalues) > 1e-3 * spectrum.eigenvalues[-1]
     ends = np.flatnonzero(np.append(jumps, False)) + 1
-    for start, stop in zip(np.append(0, ends[:-1]), ends, strict=True):  # the last cluster may be cut
+    for start, stop in zip(
+        np.append(0, ends[:-1]), ends, strict=True
+    ):  # the last cluster may be cut
         np.testing.assert_allclose(np.linalg.svd(overlaps[start:stop, start:stop])[1], 1, atol=1e-7)

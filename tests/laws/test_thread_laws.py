@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from public_names import public_things
 from thread_calls import CALLS, LEFT_OUT, Shared
 from threadpoolctl import threadpool_info, threadpool_limits
 
@@ -49,7 +50,9 @@ def bits(value: Any) -> object:
     elif isinstance(value, frozenset):
         told = sorted(map(repr, value))
     else:
-        assert value is None or isinstance(value, bool | int | float | str | bytes | slice | Path), type(value)
+        assert value is None or isinstance(
+            value, bool | int | float | str | bytes | slice | Path
+        ), type(value)
         told = repr(value)
     return told
 
@@ -57,7 +60,9 @@ def bits(value: Any) -> object:
 def names_of(value: Any) -> list[str]:
     """Return the fields and the public properties of a value."""
     fields = [field.name for field in dataclasses.fields(value)]
-    shown = inspect.getmembers(type(value), lambda member: isinstance(member, property | cached_property))
+    shown = inspect.getmembers(
+        type(value), lambda member: isinstance(member, property | cached_property)
+    )
     return fields + [name for name, _ in shown if not name.startswith("_")]
 
 
@@ -86,29 +91,38 @@ def in_threads(calls: list[Callable[[], object]]) -> list[object]:
 
 
 def test_every_public_function_is_called_or_has_a_reason():
-    functions = {name for name in es.__all__ if inspect.isfunction(inspect.unwrap(getattr(es, name)))}
+    things = public_things()
+    functions = {
+        name for name, thing in things.items() if inspect.isfunction(inspect.unwrap(thing))
+    }
     assert functions <= CALLS.keys() | LEFT_OUT.keys()
-    assert {name.split(".")[0] for name in CALLS} | LEFT_OUT.keys() <= set(es.__all__)
+    assert {name.split(".")[0] for name in CALLS} | LEFT_OUT.keys() <= things.keys()
 
 
 def test_every_method_that_takes_something_is_called():
     # What takes nothing, `explain` and properties, is called for each value that comes up.
+    classes = {
+        name: thing
+        for name, thing in public_things().items()
+        if inspect.isclass(thing) and not issubclass(thing, Exception)
+    }
     methods = {
         f"{name}.{method}"
-        for name in es.__all__
-        if inspect.isclass(kind := getattr(es, name)) and not issubclass(kind, Exception)
+        for name, kind in classes.items()
         for method, function in vars(kind).items()
         if not method.startswith("_")
         and not isinstance(function, property | cached_property)
         and callable(getattr(kind, method))
     }
-    grouped = {name for name in CALLS if inspect.isclass(getattr(es, name, None))}  # one call for all methods
+    grouped = CALLS.keys() & classes.keys()  # one call for all methods
     left = {name for name in methods - CALLS.keys() if name.split(".")[0] not in grouped}
     assert {name.split(".")[1] for name in left} <= {"explain"}
 
 
 def test_four_threads_get_what_one_gets_bit_for_bit(tmp_path, monkeypatch):
-    monkeypatch.setattr("eigenshape.plot.render.FINER", 1)  # pictures without smooth edges, in a quarter of the time
+    monkeypatch.setattr(
+        "eigenshape.plot.render.FINER", 1
+    )  # pictures without smooth edges, in a quarter of the time
     values = Shared(tmp_path)
     before = {name: digest(value) for name, value in vars(values).items()}
     with threadpool_limits(1, user_api="blas"):
@@ -126,15 +140,21 @@ def test_four_threads_get_what_one_gets_bit_for_bit(tmp_path, monkeypatch):
 
 def test_two_threads_bend_one_binding(tmp_path):
     values = Shared(tmp_path)
-    handles = [es.Rotation(values.handle.pivot, [0, 0, 1], 0.05 * number) for number in range(1, 21)]
-    alone = [es.bend(values.binding, [handle]).vertices for handle in handles]
+    handles = [
+        es.Rotation(values.handle.pivot, [0, 0, 1], 0.05 * number) for number in range(1, 21)
+    ]
+    alone = [es.deformation.bend(values.binding, [handle]).vertices for handle in handles]
     with many_threads(), ThreadPoolExecutor(2) as pool:
-        together = list(pool.map(lambda handle: es.bend(values.binding, [handle]).vertices, handles))
+        together = list(
+            pool.map(lambda handle: es.deformation.bend(values.binding, [handle]).vertices, handles)
+        )
     np.testing.assert_array_equal(together, alone)
 
 
 def blas_threads() -> set[int]:
-    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+    return {
+        library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"
+    }
 
 
 def test_the_first_computation_to_end_leaves_the_others_their_one_blas_thread():
@@ -171,7 +191,9 @@ class FakeLibrary:
 
 
 @pytest.mark.parametrize("layer", ["pthreads", "openmp"])
-def test_each_thread_has_its_limit_whatever_the_library_and_gets_its_number_back(monkeypatch, layer):
+def test_each_thread_has_its_limit_whatever_the_library_and_gets_its_number_back(
+    monkeypatch, layer
+):
     library = FakeLibrary(layer)
     monkeypatch.setattr("eigenshape._threads._blas_libraries", lambda: [library])
     entered = Barrier(2)
@@ -212,7 +234,9 @@ def test_threads_that_read_files_leave_the_streams_alone(tmp_path, capsys):
         list(pool.map(print_and_read, range(60)))
     assert (sys.stdout, sys.stderr) == streams
     captured = capsys.readouterr()
-    assert sorted((captured.out + captured.err).split("\n")) == sorted(["", *(f"line {n}" for n in range(60))])
+    assert sorted((captured.out + captured.err).split("\n")) == sorted(
+        ["", *(f"line {n}" for n in range(60))]
+    )
 
 
 def test_no_comparison_silences_the_warnings_of_another_thread(tmp_path, monkeypatch):

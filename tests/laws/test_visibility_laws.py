@@ -23,7 +23,11 @@ seeds = st.integers(0, 2**32 - 1)
 def sphere_in_pixels(size, *, stretch=(1, 1, 1), rotation=None):
     points = SPHERE.vertices * stretch @ (np.eye(3) if rotation is None else rotation)
     low, high = points.min(axis=0), points.max(axis=0)
-    return (points - low) * (0.9 * size / (high - low)[:2].max()) + [0.05 * size, 0.05 * size, 0], SPHERE.faces
+    return (points - low) * (0.9 * size / (high - low)[:2].max()) + [
+        0.05 * size,
+        0.05 * size,
+        0,
+    ], SPHERE.faces
 
 
 def holes(seen):
@@ -42,7 +46,11 @@ def test_slivers_leave_no_pinhole(stretch):
 @given(seeds)
 def test_edges_through_pixel_middles_leave_no_gap(seed):
     rng = np.random.default_rng(seed)
-    lines = np.sort(np.concatenate([[2.5, 40.5], rng.integers(3, 40, 8) + rng.choice([0.5, 0.0, 1e-7, 1e-3], 8)]))
+    lines = np.sort(
+        np.concatenate(
+            [[2.5, 40.5], rng.integers(3, 40, 8) + rng.choice([0.5, 0.0, 1e-7, 1e-3], 8)]
+        )
+    )
     across, down = np.meshgrid(lines, lines)
     points = np.column_stack([across.ravel(), down.ravel(), rng.standard_normal(100)])
     corner = (np.arange(9)[:, None] * 10 + np.arange(9)).ravel()
@@ -58,7 +66,9 @@ def nearest_by_hand(points, faces, column, row):
     here = [Fraction(2 * column + 1, 2), Fraction(2 * row + 1, 2)]
     heights = []
     for face in faces.tolist():
-        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = ([Fraction(x) for x in points[i].tolist()] for i in face)
+        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = (
+            [Fraction(x) for x in points[i].tolist()] for i in face
+        )
         area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
         if area:
             v = ((here[0] - ax) * (cy - ay) - (here[1] - ay) * (cx - ax)) / area
@@ -97,14 +107,21 @@ def test_the_size_of_the_chunks_changes_nothing(monkeypatch, at_once):
     assert np.array_equal(usual.face, other.face)
     assert np.allclose(usual.weights, other.weights, rtol=0, atol=1e-12)
     assert np.array_equal(np.isfinite(usual.depth), np.isfinite(other.depth))
-    assert np.allclose(usual.depth[usual.face >= 0], other.depth[usual.face >= 0], rtol=0, atol=1e-9)
+    assert np.allclose(
+        usual.depth[usual.face >= 0], other.depth[usual.face >= 0], rtol=0, atol=1e-9
+    )
 
 
 def test_memory_is_bounded_also_for_one_huge_face(monkeypatch):
     monkeypatch.setattr(raster, "CANDIDATES_AT_ONCE", 20_000)
     tracemalloc.start()
     try:
-        seen = rasterize(np.array([[-1e4, -1e4, 0.0], [1e4, -1e4, 1], [0, 1e4, 2]]), np.array([[0, 1, 2]]), 700, 700)
+        seen = rasterize(
+            np.array([[-1e4, -1e4, 0.0], [1e4, -1e4, 1], [0, 1e4, 2]]),
+            np.array([[0, 1, 2]]),
+            700,
+            700,
+        )
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
@@ -116,7 +133,9 @@ def test_memory_is_bounded_also_for_one_huge_face(monkeypatch):
 def is_part_of(part, mesh):
     """Whether every vertex, face and corner of the part is where its source index says."""
     same_points = np.array_equal(part.mesh.vertices, mesh.vertices[part.source_vertices])
-    same_faces = np.array_equal(part.source_vertices[part.mesh.faces], mesh.faces[part.source_faces])
+    same_faces = np.array_equal(
+        part.source_vertices[part.mesh.faces], mesh.faces[part.source_faces]
+    )
     return same_points and same_faces and not len(unreferenced_vertices(part.mesh))
 
 
@@ -124,7 +143,10 @@ def is_part_of(part, mesh):
 @given(seeds)
 def test_parts_know_where_they_are_from(seed):
     rng = np.random.default_rng(seed)
-    for part in (partial_scan(torus(), rng), cut_by_planes(torus(), random_planes(torus(), rng, n_planes=2))):
+    for part in (
+        partial_scan(torus(), rng),
+        cut_by_planes(torus(), random_planes(torus(), rng, n_planes=2)),
+    ):
         assert is_part_of(part, torus())
 
 
@@ -143,7 +165,9 @@ def test_what_stands_in_front_hides_no_more_than_its_shadow():
     seen = partial_scan(disjoint_union(near, far), [0.0, 0, 1], all_pieces=True).source_faces
     x, y, z = far.vertices[far.faces].mean(axis=1).T
     off_axis = np.where(z > 0.5, np.hypot(x, y), np.inf)
-    hidden, in_sight = (np.flatnonzero(mask) + near.n_faces for mask in (off_axis < 0.85, abs(off_axis - 1.5) < 0.3))
+    hidden, in_sight = (
+        np.flatnonzero(mask) + near.n_faces for mask in (off_axis < 0.85, abs(off_axis - 1.5) < 0.3)
+    )
     assert hidden.size
     assert not np.isin(hidden, seen).any()
     assert np.isin(in_sight, seen).all()

@@ -22,28 +22,42 @@ class Shared:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.ball, self.grid, self.torus = es.icosphere(2), es.grid(8, 8), es.torus(24, 12)
-        self.solid, self.cloud = es.box(3, 3, 3), es.PointCloud(es.icosphere(3).vertices, 2)
-        self.animal, self.pose = (es.make_creature("quadruped", pose, n_vertices=700) for pose in (0, 1))
-        self.camera = es.Camera(np.eye(3), 60)
+        self.ball, self.grid, self.torus = (
+            es.icosphere(2),
+            es.shapes.grid(8, 8),
+            es.shapes.torus(24, 12),
+        )
+        self.solid, self.cloud = es.shapes.box(3, 3, 3), es.PointCloud(es.icosphere(3).vertices, 2)
+        self.animal, self.pose = (
+            es.make_creature("quadruped", pose, n_vertices=700) for pose in (0, 1)
+        )
+        self.camera = es.plot.Camera(np.eye(3), 60)
         self.labels = (self.animal.vertices[self.animal.faces[:, 0], 1] > 0).astype(np.int64)
-        self.laplacian, self.other = es.cotangent_laplacian(self.animal), es.cotangent_laplacian(self.pose)
-        self.spectrum, self.spectrum2 = es.solve_spectrum(self.laplacian, 30), es.solve_spectrum(self.other, 30)
-        self.times = es.default_times(self.spectrum, 5)
+        self.laplacian, self.other = (
+            es.cotangent_laplacian(self.animal),
+            es.cotangent_laplacian(self.pose),
+        )
+        self.spectrum, self.spectrum2 = (
+            es.solve_spectrum(self.laplacian, 30),
+            es.solve_spectrum(self.other, 30),
+        )
+        self.times = es.spectral.default_times(self.spectrum, 5)
         self.heat = es.heat_kernel_signature(self.spectrum, self.times)
         self.tree = es.merge_tree(self.animal, self.heat[:, -1])
         self.parts = es.segment(self.tree, n_regions=5)
-        self.diagram = es.persistence_diagram(self.animal, self.heat[:, -1])
-        self.diagram2 = es.persistence_diagram(self.pose, self.heat[:, -1])
+        self.diagram = es.features.persistence_diagram(self.animal, self.heat[:, -1])
+        self.diagram2 = es.features.persistence_diagram(self.pose, self.heat[:, -1])
         self._make_bends()
         self._make_maps()
         self._make_descriptors()
         self._make_perturbation()
         # Dot products of more than 10,000 numbers are where BLAS begins to cut sums among its threads.
-        self.many = es.fibonacci_sphere(10_500)
+        self.many = es.shapes.fibonacci_sphere(10_500)
         self.many_laplacian = es.cotangent_laplacian(self.many)
-        self.many_spectrum = es.approximate_spectrum(self.many_laplacian, 9)
-        self.many_map = es.functional_map(self.many_spectrum, self.many_spectrum, [[0, 0], [99, 99]], n_modes=4)
+        self.many_spectrum = es.solve_spectrum(self.many_laplacian, 9, method="approximate")
+        self.many_map = es.functional_map(
+            self.many_spectrum, self.many_spectrum, [[0, 0], [99, 99]], n_modes=4
+        )
         self.transfer = es.transfer_labels(self.animal, self.labels, self.pose)
         self._make_files()
 
@@ -54,52 +68,67 @@ class Shared:
         self.rig = es.rig_shape(self.animal, self.spectrum)
         self.handle = es.Rotation(self.animal.vertices[self.region].mean(axis=0), [0, 0, 1], 0.6)
         self.move = es.Translation([0.1, 0.2, 0.0])
-        self.binding = es.bind(self.rig, [self.region], fixed=self.fixed, n_modes=12)
-        self.grip = es.grip_skeleton(self.binding)
-        self.detailed = es.detail_skeleton(self.binding)
-        self.edit = es.Edit((es.Move(self.region, self.handle),), self.fixed, 12)
+        self.binding = es.deformation.bind(self.rig, [self.region], fixed=self.fixed, n_modes=12)
+        self.response = es.deformation.skeleton_response(self.binding)
+        self.detailed = es.deformation.detailed_skeleton(self.binding)
+        self.edit = es.deformation.Edit(
+            (es.deformation.Move(self.region, self.handle),), self.fixed, 12
+        )
 
     def _make_maps(self) -> None:
         pairs = np.repeat(np.arange(0, 700, 70), 2).reshape(-1, 2)
         self.map = es.functional_map(self.spectrum, self.spectrum2, pairs, n_modes=8)
 
     def _make_descriptors(self) -> None:
-        self.codebook = es.made_codebook()
-        self.patches = es.describe_patches(self.ball, n_samples=40), es.describe_patches(self.torus, n_samples=40)
-        self.animal_patches = es.describe_patches(self.animal)
-        self.points = tuple(es.patch_points(patches, self.codebook) for patches in self.patches)
-        self.codes = np.stack([es.encode_patches(patches, self.codebook) for patches in self.patches])
-        self.recipe = es.PatchRecipe(self.codebook)
-        self.in_words = tuple(es.in_words([patches], self.recipe) for patches in self.patches)
-        self.described = tuple(
-            es.describe(spectrum, es.segment(self.tree, n_regions=6).features)
+        self.codebook = es.retrieval.default_codebook()
+        self.patches = (
+            es.retrieval.extract_patches(self.ball, n_samples=40, n_views=0)[0],
+            es.retrieval.extract_patches(self.torus, n_samples=40, n_views=0)[0],
+        )
+        self.animal_patches = es.retrieval.extract_patches(self.animal, n_views=0)
+        self.recipe = es.retrieval.PatchRecipe(self.codebook)
+        self.by_patches = tuple(
+            es.retrieval.patch_descriptor([patches], self.recipe) for patches in self.patches
+        )
+        self.by_heat = tuple(
+            es.retrieval.heat_descriptor(spectrum, es.segment(self.tree, n_regions=6).features)
             for spectrum in (self.spectrum, self.spectrum2)
         )
-        self.light = tuple(es.light_field(mesh, n_fields=1, size=32) for mesh in (self.ball, self.torus))
+        self.light = tuple(
+            es.retrieval.baselines.light_field(mesh, n_fields=1, size=32)
+            for mesh in (self.ball, self.torus)
+        )
         self.index = es.ShapeIndex.create(self.folder / "index")
-        for number, (by_heat, by_patches) in enumerate(zip(self.described, self.in_words, strict=True)):
-            self.index.add(f"shape {number}", [by_heat])
-            self.index.add(f"in words {number}", [by_patches])
+        for number, (by_heat, by_patches) in enumerate(
+            zip(self.by_heat, self.by_patches, strict=True)
+        ):
+            self.index.add_descriptors(f"shape {number}", [by_heat])
+            self.index.add_descriptors(f"by patches {number}", [by_patches])
 
     def _make_perturbation(self) -> None:
         moved = es.TriangleMesh(self.ball.vertices * [1.0, 1.02, 1.0], self.ball.faces)
-        self.change = es.perturbation(self.ball, moved)
-        self.nodes = es.anchor_nodes(self.ball, 0.5)
-        self.on_one, self.on_two = (es.sample_surface(mesh, 60, rng=rng()) for mesh in (self.ball, moved))
+        self.change = es.stability.measure_perturbation(self.ball, moved)
+        self.nodes = es.stability.anchor_nodes(self.ball, 0.5)
+        self.on_one, self.on_two = (
+            es.geometry.sample_surface(mesh, 60, rng=rng()) for mesh in (self.ball, moved)
+        )
         self.report = es.compare_shapes(
-            self.ball, moved, es.StabilityPlan(k=5, n_samples=200, times=(0.05,)), partners=None
+            self.ball,
+            moved,
+            es.stability.StabilityPlan(k=5, n_samples=200, times=(0.05,)),
+            partners=None,
         )
 
     def _make_files(self) -> None:
         es.write_mesh(self.ball, self.folder / "ball.ply")
-        es.write_points(self.cloud, self.folder / "cloud.ply")
-        es.write_edits([self.edit], self.animal, self.folder / "edits.json")
+        es.io.write_points(self.cloud, self.folder / "cloud.ply")
+        es.io.write_edits([self.edit], self.animal, self.folder / "edits.json")
         self.spectrum.save(self.folder / "spectrum.npz")
         (self.folder / "square.mesh").write_text(
             "MeshVersionFormatted 2\nDimension 3\nVertices\n4\n0 0 0 0\n1 0 0 0\n1 1 0 0\n0 1 0 0\n"
             "Triangles\n2\n1 2 3 0\n1 3 4 0\nEnd\n"
         )
-        self.bytes = es.write_codebook(self.codebook)
+        self.bytes = es.retrieval.write_codebook(self.codebook)
 
 
 def drawn(figure: Any) -> bytes:
@@ -118,7 +147,7 @@ def written(folder: Path, suffix: str, write: Callable[[Path], object]) -> bytes
 
 def saved(v: Shared, suffix: str) -> bytes:
     """Return a figure of this call alone as the bytes of a file."""
-    figure = es.figure_diagram(v.diagram)
+    figure = es.plot.figure_diagram(v.diagram)
     return written(v.folder, suffix, lambda path: es.save_figure(figure, path))
 
 
@@ -126,7 +155,7 @@ def session_of(v: Shared) -> tuple[object, ...]:
     """Drive a session of this thread alone over a shared rig: a session is the one mutable object."""
     session = es.DeformationSession(v.rig)
     dragged = session.drag(v.region, v.handle, fixed=v.fixed, n_modes=12)
-    session.drag_all([es.Move(v.region, v.move)], fixed=v.fixed, n_modes=12)
+    session.drag_all([es.deformation.Move(v.region, v.move)], fixed=v.fixed, n_modes=12)
     bent = session.commit()
     back, forth = session.undo(), session.redo()
     session.cancel()
@@ -137,9 +166,10 @@ def session_of(v: Shared) -> tuple[object, ...]:
 def index_of(v: Shared) -> tuple[object, ...]:
     """Write an index of this call alone: one writer at a time is what an index allows."""
     index = es.ShapeIndex.create(v.folder / secrets.token_hex(8))
-    index.add("one", [v.described[0]])
+    index.add_descriptors("one", [v.by_heat[0]])
     index.keep_recipe(v.recipe)
-    index.add("two", [v.described[1]])
+    index.add_descriptors("two", [v.by_heat[1]])
+    index.add("three", v.ball, n_views=0)
     index.remove("one")
     return index.records(), index.recipes()
 
@@ -147,9 +177,15 @@ def index_of(v: Shared) -> tuple[object, ...]:
 def answers(v: Shared) -> tuple[object, ...]:
     """Query the index that all threads read."""
     index = es.ShapeIndex.open(v.index.folder)
-    by_heat, by_patches = v.described[0], v.in_words[0]
+    by_heat, by_patches = v.by_heat[0], v.by_patches[0]
     found = [index.query(asked, n_matches=2) for asked in (by_heat, by_patches)]
-    return found, index.records(), index.recipes(), len(index), index.descriptor("shape 0", by_heat.recipe)
+    return (
+        found,
+        index.records(),
+        index.recipes(),
+        len(index),
+        index.descriptors("shape 0", by_heat.recipe),
+    )
 
 
 def cached(v: Shared) -> es.Spectrum:
@@ -159,273 +195,352 @@ def cached(v: Shared) -> es.Spectrum:
 
 CALLS: dict[str, Callable[[Shared], object]] = {
     "DeformationSession": session_of,
-    "DepthCamera": lambda v: es.simulate_scan(v.ball, rng(), camera=es.DepthCamera(resolution=40)),
-    "Rate.at": lambda v: es.theorem_rate("lipschitz", 2).at([0.1, 0.2], 0.01),
-    "Rotation.carry": lambda v: v.handle.carry(v.ball.vertices, np.linspace(0, 1, v.ball.n_vertices)),
-    "Translation.carry": lambda v: v.move.carry(v.ball.vertices, np.linspace(0, 1, v.ball.n_vertices)),
+    "DepthCamera": lambda v: es.scans.simulate_scan(
+        v.ball, rng(), camera=es.scans.DepthCamera(resolution=40)
+    ),
+    "Rate.at": lambda v: es.stability.theorem_rate("lipschitz", 2).at([0.1, 0.2], 0.01),
+    "Rotation.carry": lambda v: v.handle.carry(
+        v.ball.vertices, np.linspace(0, 1, v.ball.n_vertices)
+    ),
+    "Translation.carry": lambda v: v.move.carry(
+        v.ball.vertices, np.linspace(0, 1, v.ball.n_vertices)
+    ),
     "ShapeIndex": answers,
     "ShapeIndex.add": index_of,
     "Spectrum.save": lambda v: written(v.folder, ".npz", v.spectrum.save),
     "Spectrum.load": lambda v: es.Spectrum.load(v.folder / "spectrum.npz"),
-    "affinity_distance": lambda v: es.affinity_distance(v.spectrum.eigenvalues, v.spectrum2.eigenvalues),
-    "affinity_eigenvalues": lambda v: es.affinity_eigenvalues(v.animal),
-    "anchor_nodes": lambda v: es.anchor_nodes(v.ball, 0.5),
-    "anchor_region": lambda v: es.anchor_region(v.on_one.points, v.nodes.points, 0.5),
-    "anisotropic_laplacian": lambda v: es.anisotropic_laplacian(v.ball, es.curvature_tensors(v.ball, 2.0)),
-    "apply_edit": lambda v: es.apply_edit(v.rig, v.edit).mesh,
-    "approximate_heat_kernel_signature": lambda v: es.approximate_heat_kernel_signature(
+    "affinity_distance": lambda v: es.retrieval.baselines.affinity_distance(
+        v.spectrum.eigenvalues, v.spectrum2.eigenvalues
+    ),
+    "affinity_eigenvalues": lambda v: es.retrieval.baselines.affinity_eigenvalues(v.animal),
+    "anchor_nodes": lambda v: es.stability.anchor_nodes(v.ball, 0.5),
+    "anchor_region": lambda v: es.stability.anchor_region(v.on_one.points, v.nodes.points, 0.5),
+    "anisotropic_laplacian": lambda v: es.operators.anisotropic_laplacian(
+        v.ball, es.operators.curvature_tensors(v.ball, 2.0)
+    ),
+    "apply_edit": lambda v: es.deformation.apply_edit(v.rig, v.edit).mesh,
+    "approximate_heat_signature": lambda v: es.spectral.approximate_heat_signature(
         v.many_laplacian, 8, [0.5, 1.0]
     ),
-    "approximate_spectrum": lambda v: es.approximate_spectrum(v.many_laplacian, 4),
-    "as_rigid_as_possible": lambda v: es.as_rigid_as_possible(v.binding, [v.handle], n_rounds=20),
+    "as_rigid_as_possible": lambda v: es.deformation.as_rigid_as_possible(
+        v.binding, [v.handle], n_rounds=20
+    ),
     "as_mesh": lambda v: es.as_mesh((v.ball.vertices, v.ball.faces)),
-    "as_shape": lambda v: es.as_shape((v.ball.vertices, v.ball.faces)),
-    "average_geodesic_distance": lambda v: es.average_geodesic_distance(v.animal, n_bases=40),
-    "ball": lambda v: es.ball(3),
-    "ball_eigenvalues": lambda v: es.ball_eigenvalues(9),
-    "bend": lambda v: [es.bend(v.binding, [v.handle], mode=mode) for mode in ("graded", "uncrossed", "thesis")],
-    "biharmonic_blend": lambda v: es.biharmonic_blend(v.binding, [v.handle]),
-    "bind": lambda v: es.bind(v.rig, [v.region], fixed=v.fixed).shares,
-    "bottleneck_distance": lambda v: es.bottleneck_distance(v.diagram, v.diagram2),
-    "bottleneck_matching": lambda v: es.bottleneck_matching(v.on_one.points, v.on_two.points),
-    "boundary_edges": lambda v: es.boundary_edges(v.grid),
-    "boundary_loops": lambda v: es.boundary_loops(v.grid),
-    "boundary_vertices": lambda v: es.boundary_vertices(v.grid),
-    "boundary_surface": lambda v: es.boundary_surface(v.solid),
-    "box": lambda v: es.box(2, 2, 2),
-    "box_eigenvalues": lambda v: es.box_eigenvalues(9),
+    "as_shape": lambda v: es.geometry.as_shape((v.ball.vertices, v.ball.faces)),
+    "average_geodesic_distance": lambda v: es.geometry.average_geodesic_distance(
+        v.animal, n_bases=40
+    ),
+    "ball": lambda v: es.shapes.ball(3),
+    "ball_eigenvalues": lambda v: es.shapes.ball_eigenvalues(9),
+    "bend": lambda v: [
+        es.deformation.bend(v.binding, [v.handle], mode=mode)
+        for mode in ("graded", "uncrossed", "thesis")
+    ],
+    "biharmonic_blend": lambda v: es.deformation.biharmonic_blend(v.binding, [v.handle]),
+    "bind": lambda v: es.deformation.bind(v.rig, [v.region], fixed=v.fixed).shares,
+    "bottleneck_distance": lambda v: es.features.bottleneck_distance(v.diagram, v.diagram2),
+    "bottleneck_matching": lambda v: es.stability.bottleneck_matching(
+        v.on_one.points, v.on_two.points
+    ),
+    "boundary_edges": lambda v: es.geometry.boundary_edges(v.grid),
+    "boundary_loops": lambda v: es.geometry.boundary_loops(v.grid),
+    "boundary_vertices": lambda v: es.geometry.boundary_vertices(v.grid),
+    "boundary_surface": lambda v: es.geometry.boundary_surface(v.solid),
+    "box": lambda v: es.shapes.box(2, 2, 2),
+    "box_eigenvalues": lambda v: es.shapes.box_eigenvalues(9),
     "bracket_eigenvalues": lambda v: es.bracket_eigenvalues(v.ball, 5),
     "build_laplacian": lambda v: [
-        es.build_laplacian(v.torus, name) for name, entry in es.OPERATORS.items() if es.TriangleMesh in entry.takes
+        es.build_laplacian(v.torus, name)
+        for name, entry in es.operators.OPERATORS.items()
+        if es.TriangleMesh in entry.shapes
     ],
-    "certify": lambda v: es.certify(v.laplacian, v.spectrum.eigenvalues, v.spectrum.eigenvectors),
-    "check_laplacian": lambda v: es.check_laplacian(v.laplacian, v.animal),
+    "certify": lambda v: es.spectral.certify(
+        v.laplacian, v.spectrum.eigenvalues, v.spectrum.eigenvectors
+    ),
+    "check_laplacian": lambda v: es.spectral.check_laplacian(v.laplacian, v.animal),
     "check_operator": lambda v: es.check_operator(es.cotangent_laplacian, v.ball),
-    "cheeger_estimate": lambda v: es.cheeger_estimate(v.animal, v.spectrum),
-    "circle": lambda v: es.circle(9),
-    "cloud_quadrature": lambda v: es.cloud_quadrature(v.cloud),
-    "compare_shapes": lambda v: es.compare_shapes(v.ball, v.torus, es.StabilityPlan(k=3, n_samples=150, times=(0.05,))),
-    "compare_spectra": lambda v: es.compare_spectra(v.spectrum, v.spectrum2),
-    "compose_maps": lambda v: es.compose_maps(v.map, es.map_from_points(v.spectrum2, v.spectrum, np.arange(700))),
-    "connection_laplacian": lambda v: es.connection_laplacian(v.ball),
-    "correspondence_graph": lambda v: es.correspondence_graph(
+    "cheeger_estimate": lambda v: es.stability.cheeger_estimate(v.animal, v.spectrum),
+    "circle": lambda v: es.shapes.circle(9),
+    "cloud_quadrature": lambda v: es.geometry.cloud_quadrature(v.cloud),
+    "compare_shapes": lambda v: es.compare_shapes(
+        v.ball, v.torus, es.stability.StabilityPlan(k=3, n_samples=150, times=(0.05,))
+    ),
+    "compare_spectra": lambda v: es.spectral.compare_spectra(v.spectrum, v.spectrum2),
+    "compose_maps": lambda v: es.spectral.compose_maps(
+        v.map, es.spectral.map_from_points(v.spectrum2, v.spectrum, np.arange(700))
+    ),
+    "connection_laplacian": lambda v: es.operators.connection_laplacian(v.ball),
+    "correspondence_graph": lambda v: es.stability.correspondence_graph(
         v.change, v.on_one, v.on_two, nodes=v.nodes.points, delta=0.5, rho=3.0
     ),
     "cotangent_laplacian": lambda v: es.cotangent_laplacian(v.many),
-    "cover_by_rate": lambda v: es.cover_by_rate(es.theorem_rate("lipschitz", 2), [0.1, 0.2], [0.01, 0.01], [1.0, 2.0]),
-    "crouzeix_raviart_laplacian": lambda v: es.crouzeix_raviart_laplacian(v.ball),
-    "curvature_tensors": lambda v: es.curvature_tensors(v.animal, 2.0),
-    "cut_by_planes": lambda v: es.cut_by_planes(v.animal, [[0, 1, 0, 0.3]]),
-    "default_energies": lambda v: es.default_energies(v.spectrum),
-    "default_times": lambda v: es.default_times(v.spectrum),
+    "bounding_rate": lambda v: es.stability.bounding_rate(
+        es.stability.theorem_rate("lipschitz", 2), [0.1, 0.2], [0.01, 0.01], [1.0, 2.0]
+    ),
+    "crouzeix_raviart_laplacian": lambda v: es.operators.crouzeix_raviart_laplacian(v.ball),
+    "curvature_tensors": lambda v: es.operators.curvature_tensors(v.animal, 2.0),
+    "cut_by_planes": lambda v: es.scans.cut_by_planes(v.animal, [[0, 1, 0, 0.3]]),
+    "default_energies": lambda v: es.spectral.default_energies(v.spectrum),
+    "default_times": lambda v: es.spectral.default_times(v.spectrum),
     "deform": lambda v: es.deform(v.rig, v.region, v.move, fixed=v.fixed),
-    "denoise": lambda v: es.denoise(v.animal, reach=0.02),
-    "describe": lambda v: es.describe(v.spectrum, v.parts.features),
-    "describe_large_mesh": lambda v: es.describe_large_mesh(v.animal),
-    "describe_mesh": lambda v: es.describe_mesh(v.animal),
-    "describe_patch_views": lambda v: es.describe_patch_views(v.ball, n_views=1),
-    "describe_patches": lambda v: es.describe_patches(v.torus, n_samples=40),
-    "describe_shape": lambda v: es.describe_shape(v.animal, es.SCALE_FREE),
-    "describe_to_keep": lambda v: es.describe_to_keep(v.animal, es.THESIS),
-    "describe_views": lambda v: es.describe_views(v.animal, n_views=1),
-    "detail_skeleton": lambda v: es.detail_skeleton(v.binding).fine,
-    "dirichlet_laplacian": lambda v: es.dirichlet_laplacian(v.laplacian, np.array([0, 5])),
-    "disc": lambda v: es.disc(4),
-    "disc_eigenvalues": lambda v: es.disc_eigenvalues(9),
-    "disjoint_union": lambda v: es.disjoint_union(v.ball, v.torus),
-    "drop_copies": lambda v: es.drop_copies(v.cloud),
-    "collapse_needles": lambda v: es.collapse_needles(v.animal),
-    "drop_degenerate": lambda v: es.drop_degenerate(v.animal),
-    "drop_duplicate_faces": lambda v: es.drop_duplicate_faces(v.animal),
-    "drop_unreferenced": lambda v: es.drop_unreferenced(v.animal),
-    "dual_volumes": lambda v: es.dual_volumes(v.many),
-    "edge_graph": lambda v: es.edge_graph(v.animal),
-    "edge_lengths": lambda v: es.edge_lengths(v.many),
-    "edge_table": lambda v: es.edge_table(v.animal),
-    "eigen_deformed": lambda v: es.eigen_deformed(v.detailed, [v.handle]),
-    "eigen_skeleton": lambda v: es.eigen_skeleton(v.rig, 9),
-    "eigenspace_angles": lambda v: es.eigenspace_angles(v.many_spectrum, v.many_spectrum),
-    "eigenspace_errors": lambda v: es.eigenspace_errors(
-        v.many_spectrum, es.sphere_eigenvalues(9), es.sphere_harmonics(v.many.vertices, 4)
+    "denoise": lambda v: es.operators.denoise(v.animal, reach=0.02),
+    "describe": lambda v: [es.describe(v.animal), es.describe(v.animal, es.retrieval.SCALE_FREE)],
+    "detailed_skeleton": lambda v: es.deformation.detailed_skeleton(v.binding).fine,
+    "dirichlet_laplacian": lambda v: es.operators.dirichlet_laplacian(
+        v.laplacian, np.array([0, 5])
     ),
-    "enclosed_volume": lambda v: es.enclosed_volume(v.many),
-    "enclosing_ball": lambda v: es.enclosing_ball(v.animal.vertices),
-    "encode_patches": lambda v: es.encode_patches(v.patches[0], v.codebook),
-    "euler_characteristic": lambda v: es.euler_characteristic(v.animal),
-    "face_areas": lambda v: es.face_areas(v.many),
-    "face_normals": lambda v: es.face_normals(v.many),
-    "facet_table": lambda v: es.facet_table(v.solid),
-    "farthest_points": lambda v: es.farthest_points(v.animal, 20),
-    "fem_boundary_nodes": lambda v: es.fem_boundary_nodes(v.grid),
-    "fem_laplacian": lambda v: es.fem_laplacian(v.solid, 3),
-    "fem_nodes": lambda v: es.fem_nodes(v.solid, 3),
-    "fibonacci_sphere": lambda v: es.fibonacci_sphere(300),
+    "disc": lambda v: es.shapes.disc(4),
+    "disc_eigenvalues": lambda v: es.shapes.disc_eigenvalues(9),
+    "disjoint_union": lambda v: es.shapes.disjoint_union(v.ball, v.torus),
+    "drop_copies": lambda v: es.geometry.drop_copies(v.cloud),
+    "collapse_needles": lambda v: es.geometry.collapse_needles(v.animal),
+    "drop_degenerate": lambda v: es.geometry.drop_degenerate(v.animal),
+    "drop_duplicate_faces": lambda v: es.geometry.drop_duplicate_faces(v.animal),
+    "drop_unreferenced": lambda v: es.geometry.drop_unreferenced(v.animal),
+    "dual_volumes": lambda v: es.geometry.dual_volumes(v.many),
+    "edge_graph": lambda v: es.operators.edge_graph(v.animal),
+    "edge_lengths": lambda v: es.geometry.edge_lengths(v.many),
+    "edge_table": lambda v: es.geometry.edge_table(v.animal),
+    "eigen_deformation": lambda v: es.deformation.eigen_deformation(v.detailed, [v.handle]),
+    "eigen_skeleton": lambda v: es.deformation.eigen_skeleton(v.rig, 9),
+    "eigenspace_angles": lambda v: es.spectral.eigenspace_angles(v.many_spectrum, v.many_spectrum),
+    "eigenspace_errors": lambda v: es.spectral.eigenspace_errors(
+        v.many_spectrum,
+        es.shapes.sphere_eigenvalues(9),
+        es.shapes.sphere_harmonics(v.many.vertices, 4),
+    ),
+    "enclosed_volume": lambda v: es.geometry.enclosed_volume(v.many),
+    "enclosing_ball": lambda v: es.geometry.enclosing_ball(v.animal.vertices),
+    "euler_characteristic": lambda v: es.geometry.euler_characteristic(v.animal),
+    "extract_patches": lambda v: es.retrieval.extract_patches(v.torus, n_views=1),
+    "face_areas": lambda v: es.geometry.face_areas(v.many),
+    "face_normals": lambda v: es.geometry.face_normals(v.many),
+    "facet_table": lambda v: es.geometry.facet_table(v.solid),
+    "farthest_points": lambda v: es.geometry.farthest_points(v.animal, 20),
+    "fem_boundary_nodes": lambda v: es.operators.fem_boundary_nodes(v.grid),
+    "fem_laplacian": lambda v: es.operators.fem_laplacian(v.solid, 3),
+    "fem_nodes": lambda v: es.operators.fem_nodes(v.solid, 3),
+    "fibonacci_sphere": lambda v: es.shapes.fibonacci_sphere(300),
     "figure_contact_sheet": lambda v: drawn(
-        es.figure_contact_sheet(es.Panel(v.ball, "ball", np.zeros(v.ball.n_faces, int), np.array([0])), [])
+        es.plot.figure_contact_sheet(
+            es.plot.Panel(v.ball, "ball", np.zeros(v.ball.n_faces, int), np.array([0])), []
+        )
     ),
-    "figure_diagram": lambda v: drawn(es.figure_diagram(v.diagram)),
-    "figure_eigenfunctions": lambda v: drawn(es.figure_eigenfunctions(v.animal, v.spectrum, [1], camera=v.camera)),
-    "figure_field": lambda v: drawn(es.figure_field(v.ball, v.ball.vertices[:, 0], r"$x_1$", camera=v.camera)),
-    "figure_label_transfer": lambda v: drawn(es.figure_label_transfer(v.animal, v.pose, v.transfer)),
-    "figure_merge_tree": lambda v: drawn(es.figure_merge_tree(v.tree)),
+    "figure_diagram": lambda v: drawn(es.plot.figure_diagram(v.diagram)),
+    "figure_eigenfunctions": lambda v: drawn(
+        es.plot.figure_eigenfunctions(v.animal, v.spectrum, [1], camera=v.camera)
+    ),
+    "figure_field": lambda v: drawn(
+        es.figure_field(v.ball, v.ball.vertices[:, 0], r"$x_1$", camera=v.camera)
+    ),
+    "figure_label_transfer": lambda v: drawn(
+        es.plot.figure_label_transfer(v.animal, v.pose, v.transfer)
+    ),
+    "figure_merge_tree": lambda v: drawn(es.plot.figure_merge_tree(v.tree)),
     "figure_poses": lambda v: drawn(
-        es.figure_poses({"rest": v.ball}, np.linspace(0, 1, v.ball.n_vertices), camera=v.camera)
+        es.plot.figure_poses(
+            {"rest": v.ball}, np.linspace(0, 1, v.ball.n_vertices), camera=v.camera
+        )
     ),
     "figure_segments": lambda v: drawn(
         es.figure_segments(v.ball, v.ball.faces[:, 0] % 3, np.array([0]), camera=v.camera)
     ),
-    "figure_spectra": lambda v: drawn(es.figure_spectra({"rest": v.spectrum, "pose": v.spectrum2})),
-    "figure_spectrum": lambda v: drawn(es.figure_spectrum(v.spectrum)),
-    "figure_stability": lambda v: drawn(es.figure_stability(v.report, v.cloud, v.cloud)),
-    "find_parts": lambda v: es.find_parts(v.animal).parts,
-    "fit_rate": lambda v: es.fit_rate([0.1, 0.2, 0.4], [0.01, 0.02, 0.03], [1.0, 2.0, 5.0]),
-    "flat_torus_eigenvalues": lambda v: es.flat_torus_eigenvalues(9, np.eye(2)),
-    "from_arrays": lambda v: es.from_arrays(v.ball.vertices, v.ball.faces),
-    "from_pyvista": lambda v: es.from_pyvista(es.to_pyvista(v.ball)),
-    "from_trimesh": lambda v: es.from_trimesh(es.to_trimesh(v.ball)),
-    "functional_laplacian": lambda v: (
-        es.functional_laplacian(es.mesh_quadrature(v.animal), 0.01) @ v.animal.vertices[:, 0]
+    "figure_spectra": lambda v: drawn(
+        es.plot.figure_spectra({"rest": v.spectrum, "pose": v.spectrum2})
     ),
-    "functional_map": lambda v: es.functional_map(v.spectrum, v.spectrum2, [[0, 0], [99, 99]], n_modes=8),
-    "gaussian_curvature": lambda v: es.gaussian_curvature(v.animal),
-    "gaussian_laplacian": lambda v: es.gaussian_laplacian(v.cloud.points, 0.02, 2),
-    "geodesic_balls": lambda v: es.geodesic_balls(v.ball, 0.5),
-    "geodesic_distance_to_set": lambda v: es.geodesic_distance_to_set(v.animal, [0, 9]),
-    "geodesic_distances": lambda v: es.geodesic_distances(v.animal, [0, 9]),
-    "graded_sphere": lambda v: es.graded_sphere(200),
-    "graph_laplacian": lambda v: es.graph_laplacian(v.animal, "normalized"),
-    "grid": lambda v: es.grid(3, 4),
-    "grip_skeleton": lambda v: es.grip_skeleton(v.binding),
+    "figure_spectrum": lambda v: drawn(es.plot.figure_spectrum(v.spectrum)),
+    "figure_stability": lambda v: drawn(es.plot.figure_stability(v.report, v.cloud, v.cloud)),
+    "find_heat_features": lambda v: [
+        es.retrieval.find_heat_features(v.animal),
+        es.retrieval.find_heat_features(v.animal, accuracy=0.01),
+    ],
+    "find_parts": lambda v: es.find_parts(v.animal).parts,
+    "fit_rate": lambda v: es.stability.fit_rate(
+        [0.1, 0.2, 0.4], [0.01, 0.02, 0.03], [1.0, 2.0, 5.0]
+    ),
+    "flat_torus_eigenvalues": lambda v: es.shapes.flat_torus_eigenvalues(9, np.eye(2)),
+    "from_arrays": lambda v: es.from_arrays(v.ball.vertices, v.ball.faces),
+    "from_pyvista": lambda v: es.io.from_pyvista(es.io.to_pyvista(v.ball)),
+    "from_trimesh": lambda v: es.io.from_trimesh(es.io.to_trimesh(v.ball)),
+    "functional_laplacian": lambda v: (
+        es.operators.functional_laplacian(es.geometry.mesh_quadrature(v.animal), 0.01)
+        @ v.animal.vertices[:, 0]
+    ),
+    "functional_map": lambda v: es.functional_map(
+        v.spectrum, v.spectrum2, [[0, 0], [99, 99]], n_modes=8
+    ),
+    "gaussian_curvature": lambda v: es.geometry.gaussian_curvature(v.animal),
+    "gaussian_laplacian": lambda v: es.operators.gaussian_laplacian(v.cloud.points, 0.02, 2),
+    "geodesic_balls": lambda v: es.geometry.geodesic_balls(v.ball, 0.5),
+    "geodesic_distance_to_set": lambda v: es.geometry.geodesic_distance_to_set(v.animal, [0, 9]),
+    "geodesic_distances": lambda v: es.geometry.geodesic_distances(v.animal, [0, 9]),
+    "graded_sphere": lambda v: es.shapes.graded_sphere(200),
+    "graph_laplacian": lambda v: es.operators.graph_laplacian(v.animal, "normalized"),
+    "grid": lambda v: es.shapes.grid(3, 4),
+    "heat_descriptor": lambda v: es.retrieval.heat_descriptor(v.spectrum, v.parts.features),
+    "skeleton_response": lambda v: es.deformation.skeleton_response(v.binding),
     "heat_kernel_signature": lambda v: es.heat_kernel_signature(v.many_spectrum, [0.3]),
     "icosphere": lambda v: es.icosphere(2),
-    "in_words": lambda v: es.in_words([v.patches[0]], v.recipe),
-    "interval": lambda v: es.interval(9),
-    "irregular_grid": lambda v: es.irregular_grid(4, 5, rng=rng()),
-    "is_closed": lambda v: es.is_closed(v.animal),
-    "is_manifold": lambda v: es.is_manifold(v.animal),
-    "largest_component": lambda v: es.largest_component(v.animal),
-    "light_field": lambda v: es.light_field(v.ball, n_fields=1, size=32),
-    "light_field_distance": lambda v: es.light_field_distance(*v.light),
-    "made_codebook": lambda v: es.made_codebook(),
+    "interval": lambda v: es.shapes.interval(9),
+    "irregular_grid": lambda v: es.shapes.irregular_grid(4, 5, rng=rng()),
+    "is_closed": lambda v: es.geometry.is_closed(v.animal),
+    "is_manifold": lambda v: es.geometry.is_manifold(v.animal),
+    "largest_component": lambda v: es.geometry.largest_component(v.animal),
+    "light_field": lambda v: es.retrieval.baselines.light_field(v.ball, n_fields=1, size=32),
+    "light_field_distance": lambda v: es.retrieval.baselines.light_field_distance(*v.light),
+    "default_codebook": lambda v: es.retrieval.default_codebook(),
     "make_creature": lambda v: es.make_creature("quadruped", 3, n_vertices=700),
-    "map_closeness": lambda v: es.map_closeness(v.ball, 1.01 * v.ball.vertices),
-    "map_from_points": lambda v: es.map_from_points(
+    "map_closeness": lambda v: es.stability.map_closeness(v.ball, 1.01 * v.ball.vertices),
+    "map_from_points": lambda v: es.spectral.map_from_points(
         v.many_spectrum, v.many_spectrum, np.arange(v.many.n_vertices), n_modes=6
     ),
-    "match_features": lambda v: es.match_features(*v.described),
-    "match_patches": lambda v: es.match_patches(*v.points),
-    "matching_reach": lambda v: es.matching_reach(2.0),
-    "matching_score": lambda v: es.matching_score(*v.described),
-    "maximum_matching": lambda v: es.maximum_matching(sp.csr_array(np.eye(5)[[4, 2, 0, 1, 3]])),
-    "mean_curvature": lambda v: es.mean_curvature(v.many),
-    "mean_side_length": lambda v: es.mean_side_length(v.many),
-    "measure_closeness": lambda v: es.measure_closeness(v.change),
-    "measure_distortion": lambda v: es.measure_distortion(v.animal, v.pose),
-    "merge_targets": lambda v: es.merge_targets(v.tree),
+    "match_features": lambda v: es.retrieval.match_features(*v.by_heat),
+    "match_patches": lambda v: es.retrieval.match_patches(*v.points),
+    "matching_reach": lambda v: es.stability.matching_reach(2.0),
+    "matching_score": lambda v: es.retrieval.matching_score(*v.by_heat),
+    "maximum_matching": lambda v: es.stability.maximum_matching(
+        sp.csr_array(np.eye(5)[[4, 2, 0, 1, 3]])
+    ),
+    "mean_curvature": lambda v: es.operators.mean_curvature(v.many),
+    "mean_side_length": lambda v: es.geometry.mean_side_length(v.many),
+    "measure_closeness": lambda v: es.stability.measure_closeness(v.change),
+    "measure_distortion": lambda v: es.deformation.measure_distortion(v.animal, v.pose),
+    "merge_targets": lambda v: es.features.merge_targets(v.tree),
     "merge_tree": lambda v: es.merge_tree(v.animal, v.heat[:, 0]),
-    "mesh_laplacian": lambda v: [es.mesh_laplacian(v.torus, distance=d) for d in ("euclidean", "geodesic")],
-    "mesh_quadrature": lambda v: es.mesh_quadrature(v.many),
-    "moved_skeleton": lambda v: es.moved_skeleton(v.grip, [v.handle]),
-    "neighbor_graph": lambda v: es.neighbor_graph(v.cloud.points, 6),
-    "noise_level": lambda v: es.noise_level(v.animal),
-    "normalize_area": lambda v: es.normalize_area(v.animal),
-    "normalize_box": lambda v: es.normalize_box(v.animal),
-    "normalize_diameter": lambda v: es.normalize_diameter(v.ball),
-    "orient": lambda v: es.orient(v.animal),
-    "orient_outward": lambda v: es.orient_outward(v.many),
-    "part_colors": lambda v: es.part_colors(v.animal, v.labels),
-    "part_spectrum": lambda v: es.part_spectrum(v.animal),
-    "part_tree": lambda v: es.part_tree(v.animal, v.spectrum),
+    "mesh_laplacian": lambda v: [
+        es.mesh_laplacian(v.torus, distance=d) for d in ("euclidean", "geodesic")
+    ],
+    "mesh_quadrature": lambda v: es.geometry.mesh_quadrature(v.many),
+    "move_skeleton": lambda v: es.deformation.move_skeleton(v.response, [v.handle]),
+    "neighbor_graph": lambda v: es.operators.neighbor_graph(v.cloud.points, 6),
+    "noise_level": lambda v: es.operators.noise_level(v.animal),
+    "normalize_area": lambda v: es.geometry.normalize_area(v.animal),
+    "normalize_box": lambda v: es.geometry.normalize_box(v.animal),
+    "normalize_diameter": lambda v: es.geometry.normalize_diameter(v.ball),
+    "orient": lambda v: es.geometry.orient(v.animal),
+    "orient_outward": lambda v: es.geometry.orient_outward(v.many),
+    "part_colors": lambda v: es.plot.part_colors(v.animal, v.labels),
+    "part_spectrum": lambda v: es.features.part_spectrum(v.animal),
+    "part_tree": lambda v: es.features.part_tree(v.animal, v.spectrum),
     "partial_scan": lambda v: es.partial_scan(v.many, [0, 0, 1], resolution=100),
-    "patch_distances": lambda v: es.patch_distances(v.codes[0], v.codes),
-    "patch_points": lambda v: es.patch_points(v.patches[0], v.codebook),
-    "patch_scores": lambda v: es.patch_scores(v.in_words[0], v.in_words),
-    "persistence_diagram": lambda v: es.persistence_diagram(v.solid, v.solid.points[:, 0]),
-    "perturbation": lambda v: es.perturbation(v.ball, v.ball),
+    "patch_descriptor": lambda v: es.retrieval.patch_descriptor([v.patches[0]], v.recipe),
+    "patch_scores": lambda v: es.retrieval.patch_scores(v.by_patches[0], v.by_patches),
+    "persistence_diagram": lambda v: es.features.persistence_diagram(v.solid, v.solid.points[:, 0]),
+    "measure_perturbation": lambda v: es.stability.measure_perturbation(v.ball, v.ball),
     "point_cloud_laplacian": lambda v: es.point_cloud_laplacian(v.cloud),
-    "point_map": lambda v: es.point_map(v.map),
-    "projective_plane": lambda v: es.projective_plane(1),
-    "projective_plane_eigenvalues": lambda v: es.projective_plane_eigenvalues(9),
-    "quadrature_laplacian": lambda v: es.quadrature_laplacian(es.mesh_quadrature(v.torus), 0.05),
-    "random_planes": lambda v: es.random_planes(v.animal, rng()),
-    "random_sphere": lambda v: es.random_sphere(90, rng=rng()),
-    "read_codebook": lambda v: es.read_codebook(v.bytes),
-    "read_edits": lambda v: es.read_edits(v.folder / "edits.json", v.animal),
+    "point_map": lambda v: es.spectral.point_map(v.map),
+    "projective_plane": lambda v: es.shapes.projective_plane(1),
+    "projective_plane_eigenvalues": lambda v: es.shapes.projective_plane_eigenvalues(9),
+    "quadrature_laplacian": lambda v: es.operators.quadrature_laplacian(
+        es.geometry.mesh_quadrature(v.torus), 0.05
+    ),
+    "random_planes": lambda v: es.scans.random_planes(v.animal, rng()),
+    "random_sphere": lambda v: es.shapes.random_sphere(90, rng=rng()),
+    "read_codebook": lambda v: es.retrieval.read_codebook(v.bytes),
+    "read_edits": lambda v: es.io.read_edits(v.folder / "edits.json", v.animal),
     "read_mesh": lambda v: es.read_mesh(v.folder / "ball.ply"),
     "read_points": lambda v: es.read_points(v.folder / "cloud.ply"),
     "read_shape": lambda v: es.read_shape(v.folder / "square.mesh"),
-    "refine_map": lambda v: es.refine_map(v.many_map, 8),
-    "reflection_free_signature": lambda v: es.reflection_free_signature(v.many_spectrum, v.many_spectrum, [0.3]),
-    "region_boundary": lambda v: es.region_boundary(v.animal, v.region),
-    "region_mask": lambda v: es.region_mask(v.animal, es.Box([-1, 0, -1], [1, 1, 1])),
+    "refine_map": lambda v: es.spectral.refine_map(v.many_map, 8),
+    "reflection_free_signature": lambda v: es.spectral.reflection_free_signature(
+        v.many_spectrum, v.many_spectrum, [0.3]
+    ),
+    "region_boundary": lambda v: es.deformation.region_boundary(v.animal, v.region),
+    "region_mask": lambda v: es.deformation.region_mask(
+        v.animal, es.deformation.BoxRegion([-1, 0, -1], [1, 1, 1])
+    ),
     "repair": lambda v: es.repair(v.animal, ["weld", "drop_unreferenced"]),
-    "replay": lambda v: es.replay(v.rig, [v.edit]).mesh,
+    "replay": lambda v: es.deformation.replay(v.rig, [v.edit]).mesh,
     "rig_shape": lambda v: es.rig_shape(v.many, v.many_spectrum).factor,
     "robust_laplacian": lambda v: es.robust_laplacian(v.animal),
-    "rotation_by_drag": lambda v: es.rotation_by_drag([0, 0, 0], [1, 0, 0], [0, 1, 0]),
-    "sample_surface": lambda v: es.sample_surface(v.animal, 50, rng=rng()),
-    "save_figure": lambda v: [saved(v, ".png"), saved(v, ".pdf"), len(saved(v, ".svg"))],  # random names in SVG
-    "scale_invariant_heat_kernel_signature": lambda v: es.scale_invariant_heat_kernel_signature(v.many_spectrum),
-    "seal_holes": lambda v: es.seal_holes(v.grid),
-    "seen_patches": lambda v: es.seen_patches(v.torus, n_views=1),
+    "rotation_from_drag": lambda v: es.deformation.rotation_from_drag(
+        [0, 0, 0], [1, 0, 0], [0, 1, 0]
+    ),
+    "sample_surface": lambda v: es.geometry.sample_surface(v.animal, 50, rng=rng()),
+    "save_figure": lambda v: [
+        saved(v, ".png"),
+        saved(v, ".pdf"),
+        len(saved(v, ".svg")),
+    ],  # random names in SVG
+    "scale_invariant_signature": lambda v: es.spectral.scale_invariant_signature(v.many_spectrum),
+    "seal_holes": lambda v: es.geometry.seal_holes(v.grid),
     "segment": lambda v: es.segment(v.tree, n_regions=4),
-    "self_intersections": lambda v: es.self_intersections(v.animal),
-    "separated_groups": lambda v: es.separated_groups(v.spectrum.eigenvalues),
-    "shape_dna": lambda v: es.shape_dna(v.animal),
-    "shape_dna_distance": lambda v: es.shape_dna_distance(v.spectrum.eigenvalues, v.spectrum2.eigenvalues),
-    "simplex_volumes": lambda v: es.simplex_volumes(v.solid),
-    "simulate_scan": lambda v: es.simulate_scan(v.ball, rng(), camera=es.DepthCamera(resolution=40)),
-    "smooth_boundaries": lambda v: es.smooth_boundaries(v.animal, v.parts),
-    "solve_dirichlet": lambda v: es.solve_dirichlet(v.laplacian, 5, np.array([0, 5])),
-    "solve_spectrum": lambda v: [es.solve_spectrum(v.laplacian, 40), es.solve_spectrum(v.many_laplacian, 3), cached(v)],
-    "spectral_hausdorff_distance": lambda v: es.spectral_hausdorff_distance(
+    "self_intersections": lambda v: es.geometry.self_intersections(v.animal),
+    "separated_groups": lambda v: es.spectral.separated_groups(v.spectrum.eigenvalues),
+    "shape_dna": lambda v: es.retrieval.baselines.shape_dna(v.animal),
+    "shape_dna_distance": lambda v: es.retrieval.baselines.shape_dna_distance(
         v.spectrum.eigenvalues, v.spectrum2.eigenvalues
     ),
-    "spectral_rigid": lambda v: es.spectral_rigid(v.binding, [v.handle], n_modes=20, n_rounds=5),
-    "sphere_eigenvalues": lambda v: es.sphere_eigenvalues(9),
-    "sphere_functional_eigenvalues": lambda v: es.sphere_functional_eigenvalues(9, 0.01),
-    "sphere_harmonics": lambda v: es.sphere_harmonics(v.ball.vertices, 3),
-    "sphere_hull": lambda v: es.sphere_hull(v.ball.vertices),
-    "sphere_quadrature": lambda v: es.sphere_quadrature(90),
-    "subdivide": lambda v: [es.subdivide(v.solid), es.subdivide(v.ball)],
-    "suggest_repairs": lambda v: es.suggest_repairs(v.animal),
-    "surface_area": lambda v: es.surface_area(v.many),
-    "tangent_frames": lambda v: es.tangent_frames(v.animal),
-    "theorem_rate": lambda v: es.theorem_rate("lipschitz", 2),
-    "three_quarter_view": lambda v: es.three_quarter_view(v.many),
-    "three_sphere": lambda v: es.three_sphere(60),
-    "to_arrays": lambda v: es.to_arrays(v.ball),
-    "to_pyvista": lambda v: np.asarray(es.to_pyvista(v.ball).points),
-    "to_trimesh": lambda v: np.asarray(es.to_trimesh(v.ball).vertices),
-    "torus": lambda v: es.torus(9, 7),
-    "torus_quadrature": lambda v: es.torus_quadrature(9, 7),
-    "touching_parts": lambda v: es.touching_parts(v.animal, v.labels),
-    "train_codebook": lambda v: es.train_codebook([v.animal_patches]),
-    "transfer_deformation": lambda v: es.transfer_deformation(v.animal, v.pose, v.pose, v.map),
-    "transfer_function": lambda v: es.transfer_function(v.many_map, v.many.vertices),
-    "transfer_labels": lambda v: es.transfer_labels(v.animal, v.labels, v.pose),
-    "trusted_times": lambda v: es.trusted_times(delta=0.01, spacing=0.02, eigenvalue=9.0),
-    "uniform_quadrature": lambda v: es.uniform_quadrature(v.cloud.points, 2),
-    "value_colors": lambda v: es.value_colors(v.heat[:, 0]),
-    "vertex_components": lambda v: es.vertex_components(v.animal),
-    "vertex_normals": lambda v: es.vertex_normals(v.many),
-    "vertex_pairs": lambda v: es.vertex_pairs(v.change),
-    "view_distances": lambda v: es.view_distances(v.codes[0], v.codes, v.codes[1:], np.array([1])),
-    "wave_kernel_signature": lambda v: es.wave_kernel_signature(
-        v.many_spectrum, es.default_energies(v.many_spectrum, 4)[0]
+    "simplex_volumes": lambda v: es.geometry.simplex_volumes(v.solid),
+    "simulate_scan": lambda v: es.scans.simulate_scan(
+        v.ball, rng(), camera=es.scans.DepthCamera(resolution=40)
     ),
-    "weld": lambda v: es.weld(v.animal),
-    "weld_seams": lambda v: es.weld_seams(v.animal),
-    "weyl_bound": lambda v: es.weyl_bound(v.laplacian, v.other),
-    "witness_region": lambda v: es.witness_region(v.change, v.on_two, v.nodes.points, 0.5, rho=3.0),
-    "word_distances": lambda v: es.word_distances(v.in_words[0].codes, [words.codes for words in v.in_words]),
-    "write_codebook": lambda v: es.write_codebook(v.codebook),
-    "write_edits": lambda v: written(v.folder, ".json", lambda path: es.write_edits([v.edit], v.animal, path)),
+    "smooth_boundaries": lambda v: es.features.smooth_boundaries(v.animal, v.parts),
+    "solve_spectrum": lambda v: [
+        es.solve_spectrum(v.laplacian, 40),
+        es.solve_spectrum(v.laplacian, 5, fixed=np.array([0, 5])),
+        es.solve_spectrum(v.many_laplacian, 3),
+        es.solve_spectrum(v.many_laplacian, 4, method="approximate"),
+        cached(v),
+    ],
+    "spectral_hausdorff_distance": lambda v: es.spectral.spectral_hausdorff_distance(
+        v.spectrum.eigenvalues, v.spectrum2.eigenvalues
+    ),
+    "spectral_rigid": lambda v: es.deformation.spectral_rigid(
+        v.binding, [v.handle], n_modes=20, n_rounds=5
+    ),
+    "sphere_eigenvalues": lambda v: es.shapes.sphere_eigenvalues(9),
+    "sphere_functional_eigenvalues": lambda v: es.shapes.sphere_functional_eigenvalues(9, 0.01),
+    "sphere_harmonics": lambda v: es.shapes.sphere_harmonics(v.ball.vertices, 3),
+    "sphere_hull": lambda v: es.shapes.sphere_hull(v.ball.vertices),
+    "sphere_quadrature": lambda v: es.geometry.sphere_quadrature(90),
+    "subdivide": lambda v: [es.shapes.subdivide(v.solid), es.shapes.subdivide(v.ball)],
+    "suggest_repairs": lambda v: es.suggest_repairs(v.animal),
+    "surface_area": lambda v: es.geometry.surface_area(v.many),
+    "tangent_frames": lambda v: es.operators.tangent_frames(v.animal),
+    "theorem_rate": lambda v: es.stability.theorem_rate("lipschitz", 2),
+    "three_quarter_view": lambda v: es.plot.three_quarter_view(v.many),
+    "three_sphere": lambda v: es.shapes.three_sphere(60),
+    "to_arrays": lambda v: es.io.to_arrays(v.ball),
+    "to_pyvista": lambda v: np.asarray(es.io.to_pyvista(v.ball).points),
+    "to_trimesh": lambda v: np.asarray(es.io.to_trimesh(v.ball).vertices),
+    "torus": lambda v: es.shapes.torus(9, 7),
+    "torus_quadrature": lambda v: es.geometry.torus_quadrature(9, 7),
+    "adjacent_parts": lambda v: es.features.adjacent_parts(v.animal, v.labels),
+    "train_codebook": lambda v: es.retrieval.train_codebook(v.animal_patches),
+    "transfer_deformation": lambda v: es.deformation.transfer_deformation(
+        v.animal, v.pose, v.pose, v.map
+    ),
+    "transfer_function": lambda v: es.spectral.transfer_function(v.many_map, v.many.vertices),
+    "transfer_labels": lambda v: es.transfer_labels(v.animal, v.labels, v.pose),
+    "admissible_times": lambda v: es.stability.admissible_times(
+        delta=0.01, spacing=0.02, eigenvalue=9.0
+    ),
+    "uniform_quadrature": lambda v: es.geometry.uniform_quadrature(v.cloud.points, 2),
+    "value_colors": lambda v: es.plot.value_colors(v.heat[:, 0]),
+    "vertex_components": lambda v: es.geometry.vertex_components(v.animal),
+    "vertex_normals": lambda v: es.geometry.vertex_normals(v.many),
+    "vertex_pairs": lambda v: es.stability.vertex_pairs(v.change),
+    "wave_kernel_signature": lambda v: es.wave_kernel_signature(
+        v.many_spectrum, es.spectral.default_energies(v.many_spectrum, 4)[0]
+    ),
+    "weld": lambda v: es.geometry.weld(v.animal),
+    "weld_seams": lambda v: es.geometry.weld_seams(v.animal),
+    "weyl_bound": lambda v: es.stability.weyl_bound(v.laplacian, v.other),
+    "witness_region": lambda v: es.stability.witness_region(
+        v.change, v.on_two, v.nodes.points, 0.5, rho=3.0
+    ),
+    "write_codebook": lambda v: es.retrieval.write_codebook(v.codebook),
+    "write_edits": lambda v: written(
+        v.folder, ".json", lambda path: es.io.write_edits([v.edit], v.animal, path)
+    ),
     "write_mesh": lambda v: written(v.folder, ".ply", lambda path: es.write_mesh(v.animal, path)),
-    "write_points": lambda v: written(v.folder, ".ply", lambda path: es.write_points(v.cloud, path)),
+    "write_points": lambda v: written(
+        v.folder, ".ply", lambda path: es.io.write_points(v.cloud, path)
+    ),
 }
 
 LEFT_OUT = {
     "build_index": "It starts processes, which take seconds to import; it writes to an index, which admits one writer.",
-    "learn_words": "It starts processes, which take seconds to import.",
+    "train_codebook_from_files": "It starts processes, which take seconds to import.",
 }

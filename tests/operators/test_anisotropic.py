@@ -7,13 +7,16 @@ from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_te
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.domains import box
 from eigenshape.shapes.surfaces import grid, icosphere, torus
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 
 @pytest.mark.parametrize("mesh", [torus(8, 6), box(2, 2, 1)])
 def test_with_the_identity_it_is_the_cotangent_laplacian(mesh):
     tensors = np.tile(np.eye(3), (len(mesh.simplices), 1, 1))
-    one, two = anisotropic_laplacian(mesh, tensors, "averaged"), cotangent_laplacian(mesh, "averaged")
+    one, two = (
+        anisotropic_laplacian(mesh, tensors, "averaged"),
+        cotangent_laplacian(mesh, "averaged"),
+    )
     np.testing.assert_allclose(one.stiffness.toarray(), two.stiffness.toarray(), atol=1e-13)
     np.testing.assert_allclose(one.mass.toarray(), two.mass.toarray(), rtol=1e-14)
 
@@ -26,8 +29,12 @@ def test_a_square_that_conducts_four_times_better_along_x():
 
 
 def tube(n_around=60, n_along=40, radius=0.5):
-    angle, height = np.meshgrid(2 * np.pi * np.arange(n_around) / n_around, np.linspace(0, 3, n_along), indexing="ij")
-    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=-1).reshape(-1, 3)
+    angle, height = np.meshgrid(
+        2 * np.pi * np.arange(n_around) / n_around, np.linspace(0, 3, n_along), indexing="ij"
+    )
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=-1).reshape(
+        -1, 3
+    )
     i, j = (index.ravel() for index in np.indices((n_around, n_along - 1)))
     here, across = i * n_along + j, (i + 1) % n_around * n_along + j
     low, high = [here, across, across + 1], [here, across + 1, here + 1]
@@ -49,13 +56,17 @@ def test_on_a_tube_heat_is_slowed_around_and_not_along():
 def test_without_alpha_nothing_is_slowed():
     mesh = icosphere(1)
     one = anisotropic_laplacian(mesh, curvature_tensors(mesh, 0.0))
-    np.testing.assert_allclose(one.stiffness.toarray(), cotangent_laplacian(mesh).stiffness.toarray(), atol=1e-13)
+    np.testing.assert_allclose(
+        one.stiffness.toarray(), cotangent_laplacian(mesh).stiffness.toarray(), atol=1e-13
+    )
 
 
 def test_curvature_has_no_unit():
     mesh = icosphere(2)
     far = TriangleMesh(1e50 * mesh.vertices, mesh.faces)
-    np.testing.assert_allclose(curvature_tensors(far, 1.0), curvature_tensors(mesh, 1.0), atol=1e-12)
+    np.testing.assert_allclose(
+        curvature_tensors(far, 1.0), curvature_tensors(mesh, 1.0), atol=1e-12
+    )
 
 
 @pytest.mark.parametrize(
@@ -64,7 +75,10 @@ def test_curvature_has_no_unit():
         ((slice(None, 5),), r"tensors must have shape \(20, 3, 3\); the shape is \(5, 3, 3\)"),
         ((3, 0, 0, np.nan), r"tensors must be finite; that of face 3 is \[\[nan"),
         ((4, 0, 1, 0.5), r"tensors must be symmetric; that of face 4 is \[\[1\.0, 0\.5"),
-        ((5, 2, 2, -1.0), r"tensors must be positive semidefinite; that of face 5 has the eigenvalue -1 \(1 such\)"),
+        (
+            (5, 2, 2, -1.0),
+            r"tensors must be positive semidefinite; that of face 5 has the eigenvalue -1 \(1 such\)",
+        ),
     ],
 )
 def test_bad_tensors_are_refused(change, match):
@@ -78,13 +92,18 @@ def test_bad_tensors_are_refused(change, match):
 
 
 def test_a_negative_alpha_is_refused():
-    with pytest.raises(InvalidParameterError, match=r"alpha must be finite and not negative; it is -1\.0"):
+    with pytest.raises(
+        InvalidParameterError, match=r"alpha must be finite and not negative; it is -1\.0"
+    ):
         curvature_tensors(icosphere(1), -1.0)
 
 
 def test_concave_bends_alone_slow_diffusion_down_where_only_they_count():
     ball = icosphere(2)
     inside_out = TriangleMesh(ball.vertices, ball.faces[:, ::-1])
-    free, slow = curvature_tensors(ball, 5.0, concave=True), curvature_tensors(inside_out, 5.0, concave=True)
+    free, slow = (
+        curvature_tensors(ball, 5.0, concave=True),
+        curvature_tensors(inside_out, 5.0, concave=True),
+    )
     np.testing.assert_allclose(free, curvature_tensors(ball, 0.0), atol=1e-12)
     np.testing.assert_allclose(slow, curvature_tensors(ball, 5.0), atol=1e-12)

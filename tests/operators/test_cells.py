@@ -5,13 +5,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eigenshape.operators import cells
-from eigenshape.operators.cells import cell_grid, count_partners, gaussian_differences, gaussian_rows
+from eigenshape.operators.cells import (
+    cell_grid,
+    count_partners,
+    gaussian_differences,
+    gaussian_rows,
+)
 from eigenshape.operators.csr_loops import component_labels, worst_asymmetry
 
 
 def dense_kernel(points, weights, t, reach):
     squares = ((points[:, None] - points) ** 2).sum(axis=2)
-    return np.where(squares <= reach**2, np.outer(weights, weights) * np.exp(-squares / (4 * t)), 0.0)
+    return np.where(
+        squares <= reach**2, np.outer(weights, weights) * np.exp(-squares / (4 * t)), 0.0
+    )
 
 
 def sparse_kernel(points, weights, t, reach):
@@ -33,7 +40,9 @@ def test_the_kernel_is_that_of_all_pairs(dim, n, reach, seed):
     assert (found.toarray() == found.toarray().T).all()  # to the last digit
     fields = rng.normal(size=(n, 2))
     product = gaussian_differences(cell_grid(points, reach), weights, 0.1, fields)
-    np.testing.assert_allclose(product, expected.sum(axis=1)[:, None] * fields - expected @ fields, atol=1e-12)
+    np.testing.assert_allclose(
+        product, expected.sum(axis=1)[:, None] * fields - expected @ fields, atol=1e-12
+    )
 
 
 def test_equal_points_lie_in_one_cell():
@@ -84,5 +93,8 @@ def test_components_are_numbered_by_their_first_rows():
 @pytest.mark.parametrize("scale", [2.0**-300, 2.0**300])
 def test_powers_of_two_change_no_digit(scale):
     points = np.random.default_rng(2).random((50, 3))
-    one, other = count_partners(cell_grid(points, 0.3)), count_partners(cell_grid(points * scale, 0.3 * scale))
+    one, other = (
+        count_partners(cell_grid(points, 0.3)),
+        count_partners(cell_grid(points * scale, 0.3 * scale)),
+    )
     np.testing.assert_array_equal(one, other)

@@ -13,7 +13,7 @@ from eigenshape.operators.connection import connection_laplacian, flattened, tan
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.directions import vertex_directions
 from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 few = settings(deadline=None, max_examples=15)
 seeds = st.integers(0, 2**32 - 1)
@@ -57,7 +57,9 @@ def test_matrices_are_symmetric_and_definite_on_any_mesh(seed, mass, size):
 @pytest.mark.parametrize(("mass", "order"), [("lumped", 2), ("consistent", 2), ("averaged", 2)])
 def test_the_sphere_has_vector_harmonics(mass, order):
     # Gradients and turned gradients of the harmonics of degree l: l(l+1) - 1, each 2(2l+1) times.
-    assert sphere_order([icosphere(level) for level in (2, 3, 4)], mass) == pytest.approx(order, abs=0.15)
+    assert sphere_order([icosphere(level) for level in (2, 3, 4)], mass) == pytest.approx(
+        order, abs=0.15
+    )
 
 
 def test_a_sphere_that_is_not_delaunay_has_them_too():
@@ -76,7 +78,9 @@ def sphere_order(meshes, mass):
 
 def jittered_sphere(level: int) -> TriangleMesh:
     mesh = icosphere(level)
-    moved = mesh.vertices + 0.15 * 2.0**-level * np.random.default_rng(0).standard_normal(mesh.vertices.shape)
+    moved = mesh.vertices + 0.15 * 2.0**-level * np.random.default_rng(0).standard_normal(
+        mesh.vertices.shape
+    )
     return TriangleMesh(moved / np.linalg.norm(moved, axis=1, keepdims=True), mesh.faces)
 
 
@@ -100,7 +104,9 @@ def test_around_a_flattened_face_a_vector_comes_back():
 
 @pytest.mark.parametrize("mesh", [icosphere(2), TETRAHEDRON, torus(30, 10)])
 def test_on_a_delaunay_mesh_it_is_the_published_form(mesh):
-    np.testing.assert_allclose(connection_laplacian(mesh).stiffness.toarray(), by_the_book(mesh), atol=1e-12)
+    np.testing.assert_allclose(
+        connection_laplacian(mesh).stiffness.toarray(), by_the_book(mesh), atol=1e-12
+    )
 
 
 def by_the_book(mesh: TriangleMesh) -> np.ndarray:
@@ -142,7 +148,9 @@ def test_a_rolled_sheet_is_flat():
 def test_the_axis_of_a_sphere_turns_into_a_field_of_energy_one():
     # Rotation about z is an eigenfield of l = 1: in coordinates it is z × x, with Rayleigh quotient 1.
     mesh = icosphere(4)
-    field = np.einsum("nij,nj->ni", tangent_frames(mesh), np.cross([0, 0, 1.0], mesh.vertices)).ravel()
+    field = np.einsum(
+        "nij,nj->ni", tangent_frames(mesh), np.cross([0, 0, 1.0], mesh.vertices)
+    ).ravel()
     laplacian = connection_laplacian(mesh)
     quotient = field @ (laplacian.stiffness @ field) / (field @ (laplacian.mass @ field))
     assert quotient == pytest.approx(1, abs=5e-3)
@@ -163,7 +171,16 @@ def test_the_regular_tetrahedron_by_hand():
 
 def test_directions_around_a_vertex_by_hand():
     # Six triangles around the middle of an L: 270° at the inner corner, a boundary vertex, unscaled.
-    points = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [-1, 1, 0], [-1, 0, 0], [-1, -1, 0], [0, -1, 0]]
+    points = [
+        [0, 0, 0],
+        [1, 0, 0],
+        [1, 1, 0],
+        [0, 1, 0],
+        [-1, 1, 0],
+        [-1, 0, 0],
+        [-1, -1, 0],
+        [0, -1, 0],
+    ]
     faces = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5], [0, 5, 6], [0, 6, 7]]
     found = vertex_directions(TriangleMesh(points, faces))
     np.testing.assert_allclose(np.degrees(found.at_tail[::3]), np.arange(0, 270, 45))
@@ -185,7 +202,9 @@ def test_rigid_motion_and_the_choice_of_frames_change_no_eigenvalue(seed, mass):
     expected = spectrum(mesh, mass)
     moved = mesh.vertices @ Rotation.random(rng=rng).as_matrix().T + rng.standard_normal(3)
     for other in (TriangleMesh(moved, mesh.faces), shuffled(mesh, seed)):
-        np.testing.assert_allclose(spectrum(other, mass), expected, rtol=0, atol=1e-10 * expected[-1])
+        np.testing.assert_allclose(
+            spectrum(other, mass), expected, rtol=0, atol=1e-10 * expected[-1]
+        )
 
 
 @few
@@ -212,7 +231,9 @@ def test_powers_of_two_scale_bit_for_bit(seed, mass, power):
 def test_vectors_weigh_what_their_points_weigh(seed):
     mesh = noisy(seed)
     scalar = cotangent_laplacian(mesh).mass.diagonal()
-    np.testing.assert_allclose(connection_laplacian(mesh).mass.toarray(), np.diag(np.repeat(scalar, 2)), rtol=1e-15)
+    np.testing.assert_allclose(
+        connection_laplacian(mesh).mass.toarray(), np.diag(np.repeat(scalar, 2)), rtol=1e-15
+    )
     assert connection_laplacian(mesh).mass.sum() == pytest.approx(2 * surface_area(mesh), rel=1e-13)
 
 
@@ -223,14 +244,17 @@ def test_frames_are_orthonormal_and_face_outward(seed):
     frames = tangent_frames(mesh)
     products = frames @ frames.transpose(0, 2, 1)
     np.testing.assert_allclose(products, np.broadcast_to(np.eye(2), products.shape), atol=1e-14)
-    np.testing.assert_allclose(np.cross(frames[:, 0], frames[:, 1]), vertex_normals(mesh), atol=1e-14)
+    np.testing.assert_allclose(
+        np.cross(frames[:, 0], frames[:, 1]), vertex_normals(mesh), atol=1e-14
+    )
 
 
 def test_frames_do_not_depend_on_the_unit():
     mesh = noisy(1)
     for power in (-900, -300, 300, 900):
         np.testing.assert_array_equal(
-            tangent_frames(TriangleMesh(mesh.vertices * 2.0**power, mesh.faces)), tangent_frames(mesh)
+            tangent_frames(TriangleMesh(mesh.vertices * 2.0**power, mesh.faces)),
+            tangent_frames(mesh),
         )
 
 
@@ -244,19 +268,25 @@ def test_an_edge_with_three_faces_is_refused():
     points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]]
     mesh = TriangleMesh(points, [[0, 1, 2], [1, 0, 3], [0, 1, 4]])
     for build in (connection_laplacian, tangent_frames):
-        with pytest.raises(InvalidShapeError, match=r"manifold; more than two faces share edge \(0, 1\) \(1 such\)"):
+        with pytest.raises(
+            InvalidShapeError, match=r"manifold; more than two faces share edge \(0, 1\) \(1 such\)"
+        ):
             build(mesh)
 
 
 def test_two_fans_at_a_vertex_are_refused():
     points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]]
-    with pytest.raises(InvalidShapeError, match=r"the faces at vertex 0 at \[0\.0, .* form more than one fan"):
+    with pytest.raises(
+        InvalidShapeError, match=r"the faces at vertex 0 at \[0\.0, .* form more than one fan"
+    ):
         connection_laplacian(TriangleMesh(points, [[0, 1, 2], [0, 3, 4]]))
 
 
 def test_faces_turned_against_each_other_are_refused():
     points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]
-    with pytest.raises(InvalidShapeError, match=r"turned one way; the two at edge \(1, 2\) are turned against"):
+    with pytest.raises(
+        InvalidShapeError, match=r"turned one way; the two at edge \(1, 2\) are turned against"
+    ):
         connection_laplacian(TriangleMesh(points, [[0, 1, 2], [1, 2, 3]]))
 
 
@@ -271,8 +301,12 @@ def test_a_vertex_without_tangent_plane_has_no_frame_and_yet_a_laplacian():
     # Three triangles around a point and their backs around another: the normals cancel at the corners of both.
     front = np.array([[0, 1, 3], [1, 2, 3], [2, 0, 3]])
     back = np.where(front == 3, 4, front)[:, ::-1]
-    pillow = TriangleMesh([[0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 1, 0], [1, 1, 0]], np.concatenate([front, back]))
-    with pytest.raises(InvalidShapeError, match=r"must have a tangent plane; at vertex 0 at \[0\.0, .* cancel"):
+    pillow = TriangleMesh(
+        [[0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 1, 0], [1, 1, 0]], np.concatenate([front, back])
+    )
+    with pytest.raises(
+        InvalidShapeError, match=r"must have a tangent plane; at vertex 0 at \[0\.0, .* cancel"
+    ):
         tangent_frames(pillow)
     assert np.linalg.eigvalsh(connection_laplacian(pillow).stiffness.toarray())[0] > -1e-15
 

@@ -19,10 +19,16 @@ def test_one_right_triangle_by_hand():
 
 
 def test_masses_of_one_triangle_by_hand():
-    full = np.array([[2, 1, 1], [1, 2, 1], [1, 1, 2]]) / 6  # area 2: 2/6 on the diagonal, 2/12 off it
-    np.testing.assert_allclose(cotangent_laplacian(RIGHT, "consistent").mass.toarray(), full, atol=1e-15)
+    full = (
+        np.array([[2, 1, 1], [1, 2, 1], [1, 1, 2]]) / 6
+    )  # area 2: 2/6 on the diagonal, 2/12 off it
+    np.testing.assert_allclose(
+        cotangent_laplacian(RIGHT, "consistent").mass.toarray(), full, atol=1e-15
+    )
     mean = (full + np.eye(3) * 2 / 3) / 2
-    np.testing.assert_allclose(cotangent_laplacian(RIGHT, "averaged").mass.toarray(), mean, atol=1e-15)
+    np.testing.assert_allclose(
+        cotangent_laplacian(RIGHT, "averaged").mass.toarray(), mean, atol=1e-15
+    )
 
 
 def test_a_regular_grid_has_the_five_point_stencil():
@@ -51,7 +57,9 @@ def test_the_energy_of_a_linear_function_is_its_slope_times_area():
 def test_an_edge_with_three_faces_sums_over_all():
     # Three equal right triangles on the edge 0-1, whose opposite angles are 45°.
     points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]]
-    stiffness = cotangent_laplacian(TriangleMesh(points, [[0, 1, 2], [1, 0, 3], [0, 1, 4]])).stiffness
+    stiffness = cotangent_laplacian(
+        TriangleMesh(points, [[0, 1, 2], [1, 0, 3], [0, 1, 4]])
+    ).stiffness
     assert stiffness[0, 1] == pytest.approx(-1.5, rel=1e-14)
 
 
@@ -59,7 +67,9 @@ def test_an_edge_with_three_faces_sums_over_all():
 @pytest.mark.parametrize("scale", [1e-100, 1e100])
 def test_any_unit_will_do(mass, scale):
     mesh = torus(7, 5)
-    near, far = (cotangent_laplacian(TriangleMesh(mesh.vertices * s, mesh.faces), mass) for s in (1.0, scale))
+    near, far = (
+        cotangent_laplacian(TriangleMesh(mesh.vertices * s, mesh.faces), mass) for s in (1.0, scale)
+    )
     np.testing.assert_allclose(far.stiffness.toarray(), near.stiffness.toarray(), atol=1e-13)
     np.testing.assert_allclose(far.mass.toarray() / scale / scale, near.mass.toarray(), rtol=1e-13)
 
@@ -80,13 +90,20 @@ def test_a_vertex_without_face_is_refused():
 
 
 def test_an_unknown_mass_is_refused():
-    with pytest.raises(InvalidParameterError, match=r"mass must be 'lumped', 'consistent' or 'averaged'; it is 'full'"):
-        cotangent_laplacian.__wrapped__(RIGHT, "full")  # past the check of types, which only tests have
+    with pytest.raises(
+        InvalidParameterError,
+        match=r"mass must be 'lumped', 'consistent' or 'averaged'; it is 'full'",
+    ):
+        cotangent_laplacian.__wrapped__(
+            RIGHT, "full"
+        )  # past the check of types, which only tests have
 
 
 @pytest.mark.parametrize("scale", [1e300, 1e160, 1e-160, 1e-300])
 def test_areas_that_floats_cannot_hold_are_refused(scale):
-    with pytest.raises(InvalidShapeError, match=r"To measure areas .* within 1e-150\.\.1e150; .* normalize_box"):
+    with pytest.raises(
+        InvalidShapeError, match=r"To measure areas .* within 1e-150\.\.1e150; .* normalize_box"
+    ):
         cotangent_laplacian(TriangleMesh(RIGHT.vertices * scale, RIGHT.faces))
 
 

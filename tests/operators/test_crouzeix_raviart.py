@@ -20,7 +20,7 @@ from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes import exact
 from eigenshape.shapes.domains import ball, box, circle, interval, irregular_grid
 from eigenshape.shapes.surfaces import grid, icosphere
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 RIGHT = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
 CORNER = SimplicialMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
@@ -30,7 +30,9 @@ REGULAR = SimplicialMesh([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], [[0
 def test_the_right_triangle_by_hand():
     # Facets (0,1), (0,2), (1,2) lie opposite to corners 2, 1, 0 with gradients (0,1), (1,0), (-1,-1); 4 V = 2.
     laplacian = crouzeix_raviart_laplacian(RIGHT)
-    np.testing.assert_allclose(laplacian.stiffness.toarray(), [[2, 0, -2], [0, 2, -2], [-2, -2, 4]], atol=1e-15)
+    np.testing.assert_allclose(
+        laplacian.stiffness.toarray(), [[2, 0, -2], [0, 2, -2], [-2, -2, 4]], atol=1e-15
+    )
     np.testing.assert_allclose(laplacian.mass.toarray(), np.eye(3) / 6, rtol=1e-15)
     assert laplacian.mass.nnz == 3
 
@@ -66,9 +68,13 @@ def test_in_four_dimensions_the_mass_is_that_of_the_functions():
     rng = np.random.default_rng(0)
     mesh = SimplicialMesh(np.concatenate([np.zeros((1, 4)), np.eye(4)]), [[0, 1, 2, 3, 4]])
     barycentric = rng.dirichlet(np.ones(5), 400_000)
-    functions = 1 - 4 * barycentric[:, ::-1]  # facets come in the order of the corners that they lack, from the last
+    functions = (
+        1 - 4 * barycentric[:, ::-1]
+    )  # facets come in the order of the corners that they lack, from the last
     np.testing.assert_allclose(
-        crouzeix_raviart_laplacian(mesh).mass.toarray(), functions.T @ functions / 400_000 / 24, atol=2e-4
+        crouzeix_raviart_laplacian(mesh).mass.toarray(),
+        functions.T @ functions / 400_000 / 24,
+        atol=2e-4,
     )
 
 
@@ -92,7 +98,9 @@ def subdivided(corners, n):
         cells = [(i, j) for i in range(n) for j in range(n - i)]
         up = [((i, j), (i + 1, j), (i, j + 1)) for i, j in cells]
         down = [((i + 1, j), (i + 1, j + 1), (i, j + 1)) for i, j in cells if i + j < n - 1]
-        names, simplices = np.unique(np.array(up + down).reshape(-1, 2), axis=0, return_inverse=True)
+        names, simplices = np.unique(
+            np.array(up + down).reshape(-1, 2), axis=0, return_inverse=True
+        )
         inner = names / n
     else:
         cube = box(n, n, n)
@@ -149,16 +157,22 @@ def test_constants_by_hand():
     assert interpolation_constants(REGULAR) == pytest.approx([REGULAR_TETRAHEDRON * 8**0.5])
     long = SimplicialMesh([[0, 0, 0], [9, 0, 0], [0, 0.1, 0], [0, 0, 0.1]], [[0, 1, 2, 3]])
     edges = np.array([9, 0.1, 0.1, 81.01**0.5, 81.01**0.5, 0.02**0.5])
-    assert interpolation_constants(long) <= np.sqrt(81.01 / np.pi**2 + (edges**2).sum() / 720) * (1 + 1e-12)
+    assert interpolation_constants(long) <= np.sqrt(81.01 / np.pi**2 + (edges**2).sum() / 720) * (
+        1 + 1e-12
+    )
 
 
 def test_constants_scale_and_turn_with_the_mesh():
     mesh, turn = ball(4), np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
     turned = SimplicialMesh(1e90 * mesh.points @ turn, mesh.simplices[:, [2, 0, 3, 1]])
-    np.testing.assert_allclose(interpolation_constants(turned), 1e90 * interpolation_constants(mesh), rtol=1e-12)
+    np.testing.assert_allclose(
+        interpolation_constants(turned), 1e90 * interpolation_constants(mesh), rtol=1e-12
+    )
 
 
-@pytest.mark.parametrize("mesh", [irregular_grid(6, 6, rng=np.random.default_rng(2)), ball(4), circle(9)])
+@pytest.mark.parametrize(
+    "mesh", [irregular_grid(6, 6, rng=np.random.default_rng(2)), ball(4), circle(9)]
+)
 def test_no_function_breaks_the_constant(mesh):
     # ‖u - Πu‖ ≤ C ‖∇(u - Πu)‖ for u = |x|², simplex by simplex, by a quadrature of degree 4.
     rng, corners = np.random.default_rng(1), mesh.points[mesh.simplices]
@@ -166,7 +180,9 @@ def test_no_function_breaks_the_constant(mesh):
     places = rng.dirichlet(np.ones(m + 1), 4000)
     sides = corners[:, 1:] - corners[:, :1]
     to_gradient = np.linalg.pinv(sides)
-    for side, gradient, simplex, bound in zip(sides, to_gradient, corners, interpolation_constants(mesh), strict=True):
+    for side, gradient, simplex, bound in zip(
+        sides, to_gradient, corners, interpolation_constants(mesh), strict=True
+    ):
         values = ((places @ simplex) ** 2).sum(axis=1)
         means = [_mean_of_square(np.delete(simplex, corner, axis=0)) for corner in range(m + 1)]
         at_corners = np.sum(means) - m * np.array(means)
@@ -183,7 +199,9 @@ def _mean_of_square(points):
 
 
 def test_flat_simplices_and_loose_points_are_refused():
-    with pytest.raises(InvalidShapeError, match=r"Faces must have area; face 0 is \[0, 1, 1\]|all 1 have none"):
+    with pytest.raises(
+        InvalidShapeError, match=r"Faces must have area; face 0 is \[0, 1, 1\]|all 1 have none"
+    ):
         crouzeix_raviart_laplacian(TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]))
     with pytest.raises(InvalidShapeError, match="Every vertex must belong to a face"):
         crouzeix_raviart_laplacian(TriangleMesh([*RIGHT.vertices, [5, 5, 5]], [[0, 1, 2]]))

@@ -23,15 +23,22 @@ def corner_simplex(dim):
 def test_quadratic_elements_of_a_segment_by_hand():
     laplacian = fem_laplacian(interval(1), 2)  # nodes 0, 1 and the middle
     np.testing.assert_allclose(
-        laplacian.stiffness.toarray() * 3, [[7, 1, -8], [1, 7, -8], [-8, -8, 16]], rtol=1e-13, atol=1e-13
+        laplacian.stiffness.toarray() * 3,
+        [[7, 1, -8], [1, 7, -8], [-8, -8, 16]],
+        rtol=1e-13,
+        atol=1e-13,
     )
-    np.testing.assert_allclose(laplacian.mass.toarray() * 30, [[4, -1, 2], [-1, 4, 2], [2, 2, 16]], atol=1e-13)
+    np.testing.assert_allclose(
+        laplacian.mass.toarray() * 30, [[4, -1, 2], [-1, 4, 2], [2, 2, 16]], atol=1e-13
+    )
 
 
 def test_quadratic_mass_of_a_triangle_from_the_textbook():
     mass = fem_laplacian(corner_simplex(2), 2).mass.toarray() * 360
     np.testing.assert_allclose(np.diag(mass), [6] * 3 + [32] * 3, rtol=1e-12)
-    np.testing.assert_allclose(mass[:3, :3] - np.diag([6] * 3), -np.ones((3, 3)) + np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(
+        mass[:3, :3] - np.diag([6] * 3), -np.ones((3, 3)) + np.eye(3), atol=1e-12
+    )
     np.testing.assert_allclose(np.sort(mass[:3, 3:], axis=1), [[-4, 0, 0]] * 3, atol=1e-12)
     np.testing.assert_allclose(mass[3:, 3:], 16 + 16 * np.eye(3), rtol=1e-12)
 
@@ -58,7 +65,9 @@ def test_polynomials_of_the_order_have_their_exact_norm_and_energy(dim, order):
     for axis in range(dim):
         values = nodes[:, axis] ** order
         powers = [2 * order if a == axis else 0 for a in range(dim)]
-        assert values @ laplacian.mass @ values == pytest.approx(float(monomial_integral(powers)), rel=1e-11)
+        assert values @ laplacian.mass @ values == pytest.approx(
+            float(monomial_integral(powers)), rel=1e-11
+        )
         powers[axis] -= 2
         energy = order**2 * float(monomial_integral(powers))
         assert values @ laplacian.stiffness @ values == pytest.approx(energy, rel=1e-11)
@@ -72,15 +81,22 @@ def test_linear_functions_are_harmonic_inside_irregular_meshes(order):
     np.testing.assert_allclose(residual[inside], 0, atol=1e-13)
 
 
-@pytest.mark.parametrize("mesh", [interval(3), torus(6, 5), irregular_grid(4, 4, rng=RNG(1)), box(2, 1, 2), ball(3)])
+@pytest.mark.parametrize(
+    "mesh", [interval(3), torus(6, 5), irregular_grid(4, 4, rng=RNG(1)), box(2, 1, 2), ball(3)]
+)
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_the_mass_is_the_volume_and_constants_have_no_energy(mesh, order):
     laplacian = fem_laplacian(mesh, order)
     ones = np.ones(laplacian.n_points)
     assert ones @ laplacian.mass @ ones == pytest.approx(simplex_volumes(mesh).sum(), rel=1e-12)
-    np.testing.assert_allclose(laplacian.stiffness @ ones, 0, atol=1e-12 * laplacian.stiffness.max())
+    np.testing.assert_allclose(
+        laplacian.stiffness @ ones, 0, atol=1e-12 * laplacian.stiffness.max()
+    )
     if laplacian.n_points < 400:
-        assert np.linalg.eigvalsh(laplacian.stiffness.toarray())[0] > -1e-12 * laplacian.stiffness.max()
+        assert (
+            np.linalg.eigvalsh(laplacian.stiffness.toarray())[0]
+            > -1e-12 * laplacian.stiffness.max()
+        )
         assert np.linalg.eigvalsh(laplacian.mass.toarray())[0] > 0
 
 
@@ -88,7 +104,9 @@ def test_linear_elements_are_the_cotangent_laplacian():
     mesh = torus(8, 6)
     one, two = fem_laplacian(mesh, 1), cotangent_laplacian(mesh, "consistent")
     for name in ("stiffness", "mass"):
-        np.testing.assert_allclose(getattr(one, name).toarray(), getattr(two, name).toarray(), atol=1e-14)
+        np.testing.assert_allclose(
+            getattr(one, name).toarray(), getattr(two, name).toarray(), atol=1e-14
+        )
 
 
 def test_nodes_are_counted_as_euler_says():
@@ -115,10 +133,17 @@ def test_boundary_nodes():
 @pytest.mark.parametrize("size", [1e-100, 1e100])
 @pytest.mark.parametrize("mesh", [interval(4), torus(6, 5), box(1, 2, 1)])
 def test_units_scale_exactly(size, mesh):
-    one, other = fem_laplacian(mesh, 2), fem_laplacian(SimplicialMesh(size * mesh.points, mesh.simplices), 2)
-    np.testing.assert_allclose(other.mass.toarray() / size**mesh.dim, one.mass.toarray(), rtol=1e-10, atol=1e-15)
+    one, other = (
+        fem_laplacian(mesh, 2),
+        fem_laplacian(SimplicialMesh(size * mesh.points, mesh.simplices), 2),
+    )
+    np.testing.assert_allclose(
+        other.mass.toarray() / size**mesh.dim, one.mass.toarray(), rtol=1e-10, atol=1e-15
+    )
     expected = one.stiffness.toarray() * size ** (mesh.dim - 2)
-    np.testing.assert_allclose(other.stiffness.toarray(), expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
+    np.testing.assert_allclose(
+        other.stiffness.toarray(), expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max()
+    )
 
 
 def test_many_points_get_keys_that_fit():

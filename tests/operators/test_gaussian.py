@@ -50,14 +50,20 @@ def test_the_graph_laplacian_is_the_one_of_the_book():
     points = np.random.default_rng(0).random((80, 3))
     found = gaussian_laplacian(points, 0.05, 2, cutoff=30.0)
     expected = by_the_book(points, np.full(80, 1 / 80), 0.05, 2)
-    np.testing.assert_allclose(found.stiffness.toarray() * 80, expected, rtol=1e-11, atol=1e-12 * expected.max())
+    np.testing.assert_allclose(
+        found.stiffness.toarray() * 80, expected, rtol=1e-11, atol=1e-12 * expected.max()
+    )
     assert found.mass.diagonal().tolist() == [1 / 80] * 80
 
 
 def test_a_scale_has_three_names():
     mesh = icosphere(2)
     e = mean_side_length(mesh)
-    one, two, three = mesh_laplacian(mesh), mesh_laplacian(mesh, h=2 * e), mesh_laplacian(mesh, t=e**2)
+    one, two, three = (
+        mesh_laplacian(mesh),
+        mesh_laplacian(mesh, h=2 * e),
+        mesh_laplacian(mesh, t=e**2),
+    )
     for other in (two, three):
         assert other.kernel.t == pytest.approx(one.kernel.t, rel=1e-14)
         assert other.kernel.edge_factor == pytest.approx(2, rel=1e-14)
@@ -71,14 +77,18 @@ def test_the_random_walk_form_changes_the_mass_alone():
     assert (literal.stiffness != walk.stiffness).nnz == 0
     weights, t = dual_volumes(mesh), literal.kernel.t
     squares = ((mesh.vertices[:, None] - mesh.vertices) ** 2).sum(axis=2)
-    gaussian = np.exp(-squares / (4 * t)) / (4 * np.pi * t) * (squares <= (4 * literal.kernel.width) ** 2)
+    gaussian = (
+        np.exp(-squares / (4 * t)) / (4 * np.pi * t) * (squares <= (4 * literal.kernel.width) ** 2)
+    )
     np.testing.assert_allclose(walk.mass.diagonal(), weights * (gaussian @ weights), rtol=1e-12)
     np.testing.assert_array_equal(literal.mass.diagonal(), weights)
 
 
 def test_on_flat_ground_both_distances_are_one():
     mesh = grid(16, 16)
-    straight, along = (mesh_laplacian(mesh, distance=distance) for distance in ("euclidean", "geodesic"))
+    straight, along = (
+        mesh_laplacian(mesh, distance=distance) for distance in ("euclidean", "geodesic")
+    )
     np.testing.assert_allclose(along.stiffness.toarray(), straight.stiffness.toarray(), atol=1e-12)
     np.testing.assert_allclose(along.mass.diagonal(), straight.mass.diagonal())
 
@@ -104,7 +114,9 @@ def test_units_scale_exactly(size, options):
 
 
 def test_curves_and_volumes_have_one_too():
-    line = SimplicialMesh(np.linspace(0, 1, 40)[:, None], np.column_stack([np.arange(39), np.arange(1, 40)]))
+    line = SimplicialMesh(
+        np.linspace(0, 1, 40)[:, None], np.column_stack([np.arange(39), np.arange(1, 40)])
+    )
     found = mesh_laplacian(line)
     x = line.points[:, 0]
     middle = (found.stiffness @ x**2 / found.mass.diagonal())[15:25]
@@ -113,7 +125,9 @@ def test_curves_and_volumes_have_one_too():
 
 def test_entries_beyond_floats_are_refused():
     points = 1e-90 * np.random.default_rng(0).random((30, 3))
-    with pytest.raises(InvalidShapeError, match=r"Entries of a kernel matrix must be floats; theirs are about 2\^1"):
+    with pytest.raises(
+        InvalidShapeError, match=r"Entries of a kernel matrix must be floats; theirs are about 2\^1"
+    ):
         gaussian_laplacian(points, 1e-180, 3)
 
 
@@ -123,15 +137,22 @@ def test_the_functional_approximation_on_the_sphere_is_exact(degree, t):
     measure = sphere_quadrature(48)
     harmonic = eval_legendre(degree, measure.points[:, 2])
     found = functional_laplacian(measure, t) @ harmonic
-    np.testing.assert_allclose(found, es.sphere_functional_eigenvalues(degree**2 + 1, t)[-1] * harmonic, atol=1e-9)
+    np.testing.assert_allclose(
+        found, es.shapes.sphere_functional_eigenvalues(degree**2 + 1, t)[-1] * harmonic, atol=1e-9
+    )
 
 
 @pytest.mark.long
 def test_the_functional_tends_to_the_operator_as_t_shrinks():
     measure = sphere_quadrature(60)
     field = eval_legendre(2, measure.points[:, 2])
-    errors = [np.abs(functional_laplacian(measure, t) @ field - 6 * field).max() for t in (0.04, 0.02, 0.01)]
-    np.testing.assert_allclose(np.log2(errors[:-1]) - np.log2(errors[1:]), 1, atol=0.1)  # first order in t
+    errors = [
+        np.abs(functional_laplacian(measure, t) @ field - 6 * field).max()
+        for t in (0.04, 0.02, 0.01)
+    ]
+    np.testing.assert_allclose(
+        np.log2(errors[:-1]) - np.log2(errors[1:]), 1, atol=0.1
+    )  # first order in t
 
 
 @pytest.mark.long
@@ -148,7 +169,9 @@ def test_without_a_matrix_it_is_the_same():
     measure, stored = mesh_quadrature(mesh), mesh_laplacian(mesh)
     fields = np.random.default_rng(0).normal(size=(mesh.n_vertices, 3))
     product = functional_laplacian(measure, stored.kernel.t, cutoff=4.0) @ fields
-    np.testing.assert_allclose(measure.weights[:, None] * product, stored.stiffness @ fields, atol=1e-11)
+    np.testing.assert_allclose(
+        measure.weights[:, None] * product, stored.stiffness @ fields, atol=1e-11
+    )
     one = functional_laplacian(measure, stored.kernel.t, cutoff=4.0) @ fields[:, 0]
     np.testing.assert_array_equal(one, product[:, 0])
 
@@ -164,11 +187,17 @@ def test_weights_that_are_volumes_make_the_mesh_laplacian():
 @pytest.mark.parametrize(
     ("options", "match"),
     [
-        ({"t": 1.0, "h": 1.0}, r"One of t, h and edge_factor sets the scale; given are \{'t': 1.0, 'h': 1.0\}"),
+        (
+            {"t": 1.0, "h": 1.0},
+            r"One of t, h and edge_factor sets the scale; given are \{'t': 1.0, 'h': 1.0\}",
+        ),
         ({"t": 0.0}, "t must be positive and finite; entry 0 is 0.0"),
         ({"h": -1.0}, "h must be positive"),
         ({"edge_factor": np.nan}, "edge_factor must be positive and finite; entry 0 is nan"),
-        ({"edge_factor": 0.9}, r"A kernel must reach the neighbours, h ≥ e; h = 2√t is 0.9 of the mean edge length"),
+        (
+            {"edge_factor": 0.9},
+            r"A kernel must reach the neighbours, h ≥ e; h = 2√t is 0.9 of the mean edge length",
+        ),
         ({"cutoff": 0.0}, "cutoff must be positive"),
     ],
 )
@@ -204,47 +233,66 @@ def test_a_narrow_kernel_is_warned_of():
 
 
 def test_a_time_that_leaves_nothing_is_warned_of():
-    with pytest.warns(UserWarning, match="t = 2 leaves about 1 eigenvalues .* k takes n > 5 k t/e² points"):
+    with pytest.warns(
+        UserWarning, match="t = 2 leaves about 1 eigenvalues .* k takes n > 5 k t/e² points"
+    ):
         mesh_laplacian(icosphere(2), t=2.0)
 
 
 def test_weights_of_one_over_n_are_corrected_in_the_random_walk_form_only():
-    with pytest.raises(InvalidParameterError, match="Weights of 1/n must be corrected in the random-walk form"):
+    with pytest.raises(
+        InvalidParameterError, match="Weights of 1/n must be corrected in the random-walk form"
+    ):
         gaussian_laplacian(np.random.default_rng(0).random((50, 2)), 0.1, 2, correct="log")
 
 
 def test_a_point_out_of_reach_is_named():
     points = np.vstack([np.random.default_rng(0).random((60, 2)), [[9.0, 9.0]]])
-    with pytest.raises(InvalidShapeError, match=r"there is no other \(1 such\)\. Choose a larger t") as caught:
+    with pytest.raises(
+        InvalidShapeError, match=r"there is no other \(1 such\)\. Choose a larger t"
+    ) as caught:
         gaussian_laplacian(points, 0.2, 2)
     assert "of point 60 at [9.0, 9.0]" in str(caught.value)
 
 
 def test_a_component_that_falls_apart_is_refused():
     spheres = disjoint_union(
-        icosphere(2), TriangleMesh(icosphere(2).vertices + np.array([3.0, 0, 0]), icosphere(2).faces)
+        icosphere(2),
+        TriangleMesh(icosphere(2).vertices + np.array([3.0, 0, 0]), icosphere(2).faces),
     )
     mesh_laplacian(spheres)  # two components are two parts
-    strip = np.vstack([spheres.faces, [[0, spheres.n_vertices // 2, 1]]])  # one long triangle joins them
-    with pytest.raises(InvalidShapeError, match=r"at t = \S+ component 0 falls into 2 parts \(2 in all\)"):
+    strip = np.vstack(
+        [spheres.faces, [[0, spheres.n_vertices // 2, 1]]]
+    )  # one long triangle joins them
+    with pytest.raises(
+        InvalidShapeError, match=r"at t = \S+ component 0 falls into 2 parts \(2 in all\)"
+    ):
         mesh_laplacian(TriangleMesh(spheres.vertices, strip), edge_factor=1.6, cutoff=1.5)
 
 
 def test_a_matrix_beyond_memory_is_refused_before_it_is_built(monkeypatch):
     monkeypatch.setattr(kernel, "machine_memory", lambda: 1e6)
-    with pytest.raises(InvalidShapeError, match=r"half of the memory, 0.0 GiB; for \S+ entries, \d+ a row"):
+    with pytest.raises(
+        InvalidShapeError, match=r"half of the memory, 0.0 GiB; for \S+ entries, \d+ a row"
+    ):
         mesh_laplacian(icosphere(3))
 
 
 def test_too_small_and_equal_samples_are_refused():
-    with pytest.raises(InvalidShapeError, match="A sample of dimension 2 must have over 6 points; it has 6"):
+    with pytest.raises(
+        InvalidShapeError, match="A sample of dimension 2 must have over 6 points; it has 6"
+    ):
         quadrature_laplacian(uniform_quadrature(np.eye(6), 2), 1.0)
-    with pytest.raises(InvalidShapeError, match=r"The points of a sample must differ; all 9 are \[1.0, 1.0\]"):
+    with pytest.raises(
+        InvalidShapeError, match=r"The points of a sample must differ; all 9 are \[1.0, 1.0\]"
+    ):
         quadrature_laplacian(Quadrature(np.ones((9, 2)), np.ones(9), 2), 1.0)
 
 
 def test_distance_is_one_of_two():
-    with pytest.raises(InvalidParameterError, match="distance must be 'euclidean' or 'geodesic'; it is 'taxi'"):
+    with pytest.raises(
+        InvalidParameterError, match="distance must be 'euclidean' or 'geodesic'; it is 'taxi'"
+    ):
         _plain(mesh_laplacian)(icosphere(1), distance="taxi")
 
 
@@ -255,19 +303,25 @@ def _plain(function):
 @pytest.mark.long
 @pytest.mark.parametrize("size", [1e-30, 1.0, 1e30])
 def test_graph_laplacians_know_the_volume_that_their_eigenvalues_are_over(size):
-    points = size * es.fibonacci_sphere(1500).vertices
-    laplacian = es.gaussian_laplacian(points, 0.02 * size**2, 2)
+    points = size * es.shapes.fibonacci_sphere(1500).vertices
+    laplacian = es.operators.gaussian_laplacian(points, 0.02 * size**2, 2)
     assert laplacian.kernel.volume == pytest.approx(4 * np.pi * size**2, rel=0.02)
-    es.solve_spectrum(laplacian, 20)  # whose eigenvalues are far from the last: no warning at any size
+    es.solve_spectrum(
+        laplacian, 20
+    )  # whose eigenvalues are far from the last: no warning at any size
     with pytest.warns(UserWarning, match=r"too near to 1/\(t × volume\)"):
         es.solve_spectrum(laplacian, 200)
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-40, 1e40])
-@pytest.mark.parametrize(("flat", "place"), [(1, "on a line"), (2, "in a plane"), (3, "in a flat of 3 dimensions")])
+@pytest.mark.parametrize(
+    ("flat", "place"), [(1, "on a line"), (2, "in a plane"), (3, "in a flat of 3 dimensions")]
+)
 def test_points_must_span_the_dimension_that_they_sample(scale, flat, place):
     rng = np.random.default_rng(7)
-    points = scale * (rng.random((60, flat)) @ rng.standard_normal((flat, 5)) + rng.standard_normal(5))
+    points = scale * (
+        rng.random((60, flat)) @ rng.standard_normal((flat, 5)) + rng.standard_normal(5)
+    )
     fact = rf"The points of a sample must span {flat + 1} dimensions; all 60 lie {place} through point 0"
     with pytest.raises(InvalidShapeError, match=fact):
         quadrature_laplacian(uniform_quadrature(points, flat + 1), scale**2)
@@ -279,7 +333,7 @@ def test_what_converges_depends_on_how_t_falls():
     # As the docstring of mesh_laplacian says: L z of the unit sphere should be 2z.
     worst = {"e²": [], "e/10": []}
     for n in (1000, 4000, 16000):
-        mesh = es.random_sphere(n, rng=np.random.default_rng(0))
+        mesh = es.shapes.random_sphere(n, rng=np.random.default_rng(0))
         edge, z = mean_side_length(mesh), mesh.vertices[:, 2]
         for name, t in (("e²", edge**2), ("e/10", edge / 10)):
             laplacian = mesh_laplacian(mesh, t=t)

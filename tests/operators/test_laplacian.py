@@ -20,22 +20,30 @@ def test_whole_numbers_become_floats():
 
 @pytest.mark.parametrize("shape", [(2, 3), (0, 0)])
 def test_a_matrix_that_is_not_square_is_refused(shape):
-    with pytest.raises(InvalidParameterError, match=rf"stiffness must be a square sparse matrix; .* \({shape[0]}, "):
+    with pytest.raises(
+        InvalidParameterError, match=rf"stiffness must be a square sparse matrix; .* \({shape[0]}, "
+    ):
         Laplacian(sp.csr_array(shape), EYE)
 
 
 def test_sizes_that_differ_are_refused():
-    with pytest.raises(InvalidParameterError, match=r"one shape; the shapes are \(2, 2\) and \(3, 3\)"):
+    with pytest.raises(
+        InvalidParameterError, match=r"the same shape; the shapes are \(2, 2\) and \(3, 3\)"
+    ):
         Laplacian(matrix([1, -1], [-1, 1]), sp.csr_array(sp.eye_array(3)))
 
 
 def test_entries_that_are_not_finite_are_refused():
-    with pytest.raises(InvalidParameterError, match=r"stiffness must be finite; entry \(0, 1\) is nan \(2 such\)"):
+    with pytest.raises(
+        InvalidParameterError, match=r"stiffness must be finite; entry \(0, 1\) is nan \(2 such\)"
+    ):
         Laplacian(matrix([1, np.nan], [np.nan, 1]), EYE)
 
 
 def test_asymmetry_is_refused_with_both_entries():
-    with pytest.raises(InvalidParameterError, match=r"entry \(0, 1\) is -1\.0 and entry \(1, 0\) is -2\.0"):
+    with pytest.raises(
+        InvalidParameterError, match=r"entry \(0, 1\) is -1\.0 and entry \(1, 0\) is -2\.0"
+    ):
         Laplacian(matrix([1, -1], [-2, 1]), EYE)
 
 

@@ -7,7 +7,7 @@ from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.operators.graph import graph_laplacian
 from eigenshape.operators.neighbors import neighbor_graph
 from eigenshape.shapes.surfaces import grid
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 few = settings(deadline=None, max_examples=15)
 seeds = st.integers(0, 2**32 - 1)
@@ -18,13 +18,17 @@ def test_neighbors_on_a_line_by_hand():
     joined = neighbor_graph([[0.0], [1], [3], [7]], 1).toarray()
     np.testing.assert_array_equal(joined, [[0, 1, 0, 0], [1, 0, 1, 0], [0, 1, 0, 1], [0, 0, 1, 0]])
     weighted = neighbor_graph([[0.0], [1], [3], [7]], 1, t=2.0).toarray()
-    np.testing.assert_allclose(weighted[[0, 1, 2], [1, 2, 3]], np.exp([-1 / 8, -4 / 8, -16 / 8]), rtol=1e-15)
+    np.testing.assert_allclose(
+        weighted[[0, 1, 2], [1, 2, 3]], np.exp([-1 / 8, -4 / 8, -16 / 8]), rtol=1e-15
+    )
 
 
 def by_brute_force(points, k):
     squares = ((points[:, None] - points[None]) ** 2).sum(axis=2)
     np.fill_diagonal(squares, -1)
-    nearest = np.lexsort((np.broadcast_to(np.arange(len(points)), squares.shape), squares), axis=1)[:, 1 : k + 1]
+    nearest = np.lexsort((np.broadcast_to(np.arange(len(points)), squares.shape), squares), axis=1)[
+        :, 1 : k + 1
+    ]
     chosen = np.zeros(squares.shape)
     np.put_along_axis(chosen, nearest, 1, axis=1)
     return np.maximum(chosen, chosen.T)
@@ -34,7 +38,9 @@ def by_brute_force(points, k):
 @given(seeds)
 def test_neighbors_are_those_of_brute_force_ties_too(seed):
     rng = np.random.default_rng(seed)
-    points = rng.integers(0, 3, size=(40, 2)).astype(float)  # nine places for forty points: ties and equals abound
+    points = rng.integers(0, 3, size=(40, 2)).astype(
+        float
+    )  # nine places for forty points: ties and equals abound
     k = int(rng.integers(1, 39))
     np.testing.assert_array_equal(neighbor_graph(points, k).toarray(), by_brute_force(points, k))
 
@@ -61,7 +67,11 @@ def test_neighbor_weights_do_not_depend_on_the_unit(power):
         (0, None, r"n_neighbors must lie in 1\.\.2; it is 0"),
         (3, None, r"n_neighbors must lie in 1\.\.2; it is 3"),
         (1, -1.0, r"t must be positive and finite; entry 0 is -1\.0"),
-        (1, 1e-9, r"t must let every edge have weight; at t = 1e-09 edge \(0, 1\) of length 1 has .* \(2 such\)"),
+        (
+            1,
+            1e-9,
+            r"t must let every edge have weight; at t = 1e-09 edge \(0, 1\) of length 1 has .* \(2 such\)",
+        ),
         (1, 1e-320, r"t must let every edge have weight"),
     ],
 )
@@ -82,4 +92,6 @@ def test_points_on_a_circle_hear_the_circle():
     weights = np.exp(-((2 * np.sin(angles[1:5] / 2)) ** 2) / (4 * t))
     exact = np.array([weights @ (2 - 2 * np.cos(k * angles[1:5])) for k in (0, 1, 1, 2, 2, 3, 3)])
     graph = neighbor_graph(np.column_stack([np.cos(angles), np.sin(angles)]), 8, t=t)
-    np.testing.assert_allclose(solve_spectrum(graph_laplacian(graph, "weighted"), 7).eigenvalues, exact, atol=1e-12)
+    np.testing.assert_allclose(
+        solve_spectrum(graph_laplacian(graph, "weighted"), 7).eigenvalues, exact, atol=1e-12
+    )

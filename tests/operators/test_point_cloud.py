@@ -7,7 +7,7 @@ from eigenshape.geometry.cloud_measure import cloud_quadrature
 from eigenshape.operators.gaussian import gaussian_laplacian, point_cloud_laplacian
 from eigenshape.shapes.exact import sphere_eigenvalues
 from eigenshape.shapes.spheres import fibonacci_sphere, graded_sphere, three_sphere
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 
 @pytest.mark.parametrize("mesh", [fibonacci_sphere(1500), graded_sphere(1500)])
@@ -21,18 +21,26 @@ def test_points_hear_the_sphere_also_at_uneven_density(mesh, form):
 def test_the_graph_laplacian_does_not_bear_uneven_density():
     points = graded_sphere(1500).vertices
     t = point_cloud_laplacian(PointCloud(points)).kernel.t
-    found = solve_spectrum(gaussian_laplacian(points, t, 2, correct="log", form="random-walk"), 16).eigenvalues
-    assert np.abs(found[1:] / sphere_eigenvalues(16)[1:] - 1).max() > 0.1  # it hears the density as well
+    found = solve_spectrum(
+        gaussian_laplacian(points, t, 2, correct="log", form="random-walk"), 16
+    ).eigenvalues
+    assert (
+        np.abs(found[1:] / sphere_eigenvalues(16)[1:] - 1).max() > 0.1
+    )  # it hears the density as well
 
 
 def test_the_mass_is_the_measure_of_the_cloud():
     cloud = PointCloud(fibonacci_sphere(300).vertices)
-    np.testing.assert_array_equal(point_cloud_laplacian(cloud).mass.diagonal(), cloud_quadrature(cloud).weights)
+    np.testing.assert_array_equal(
+        point_cloud_laplacian(cloud).mass.diagonal(), cloud_quadrature(cloud).weights
+    )
 
 
 @pytest.mark.long
 def test_a_three_sphere_from_points_alone():
-    laplacian = point_cloud_laplacian(PointCloud(three_sphere(1500).points, 3), edge_factor=1.6, correct="log")
+    laplacian = point_cloud_laplacian(
+        PointCloud(three_sphere(1500).points, 3), edge_factor=1.6, correct="log"
+    )
     found = solve_spectrum(laplacian, 5).eigenvalues
     np.testing.assert_allclose(found, sphere_eigenvalues(5, 3), rtol=0.12, atol=1e-8)
 
@@ -54,7 +62,9 @@ def test_two_clouds_are_two_components_and_one_that_is_torn_is_refused():
     # A curve of two dense ends and a long sparse middle: its mean distance of neighbours says nothing of the middle.
     steps = np.concatenate([np.linspace(0, 1, 200), [4.0, 7.0], np.linspace(10, 11, 200)])
     curve = PointCloud(np.column_stack([steps, 0.01 * steps**2]), 1)
-    with pytest.raises(InvalidShapeError, match=r"there is no other \(2 such\)\. Choose a larger t"):
+    with pytest.raises(
+        InvalidShapeError, match=r"there is no other \(2 such\)\. Choose a larger t"
+    ):
         point_cloud_laplacian(curve)
 
 
@@ -62,5 +72,7 @@ def test_scales_are_as_for_meshes():
     cloud = PointCloud(fibonacci_sphere(200).vertices)
     with pytest.raises(InvalidParameterError, match="One of t, h and edge_factor sets the scale"):
         point_cloud_laplacian(cloud, t=1.0, h=1.0)
-    with pytest.raises(InvalidParameterError, match=r"A kernel must reach the neighbours, h ≥ e; h = 2√t is 0\.5"):
+    with pytest.raises(
+        InvalidParameterError, match=r"A kernel must reach the neighbours, h ≥ e; h = 2√t is 0\.5"
+    ):
         point_cloud_laplacian(cloud, edge_factor=0.5)

@@ -12,7 +12,10 @@ from eigenshape.io.shape_files import read_shape
 from eigenshape.operators.catalog import OPERATORS, build_laplacian
 
 FOLDERS = ("nasty", "tets", "points")
-pytestmark = [pytest.mark.data, pytest.mark.filterwarnings("ignore:A heat time", "ignore:A kernel of width")]
+pytestmark = [
+    pytest.mark.data,
+    pytest.mark.filterwarnings("ignore:A heat time", "ignore:A kernel of width"),
+]
 
 
 def keeps_the_laws(laplacian):
@@ -24,7 +27,9 @@ def keeps_the_laws(laplacian):
 
 
 def shapes(folder):
-    for path in sorted(path for name in FOLDERS for path in (folder / name).rglob("*") if path.is_file()):
+    for path in sorted(
+        path for name in FOLDERS for path in (folder / name).rglob("*") if path.is_file()
+    ):
         with suppress(EigenshapeError):  # which tests/io look at
             yield path, read_shape(path)
 
@@ -34,7 +39,7 @@ def shapes(folder):
 def test_every_file_gives_a_sound_operator_or_a_named_error(data, name):
     built, refused = [], []
     for path, shape in shapes(data):
-        if not isinstance(shape, OPERATORS[name].takes):
+        if not isinstance(shape, OPERATORS[name].shapes):
             continue
         try:
             laplacian = build_laplacian(shape, name)
@@ -49,14 +54,20 @@ def test_every_file_gives_a_sound_operator_or_a_named_error(data, name):
 
 
 def test_all_tetrahedra_curves_and_clouds_are_read(data):
-    kinds = {path.name: shape for path, shape in shapes(data) if path.parent.name in ("tets", "points")}
+    kinds = {
+        path.name: shape for path, shape in shapes(data) if path.parent.name in ("tets", "points")
+    }
     assert {name for name, shape in kinds.items() if isinstance(shape, PointCloud)} == {
         "bunny16k.pts",
         "chameleon4k.pts",
         "fragment_000.ply",
         "milk.pcd",
     }
-    counts = {name: (shape.n_points, shape.dim) for name, shape in kinds.items() if isinstance(shape, SimplicialMesh)}
+    counts = {
+        name: (shape.n_points, shape.dim)
+        for name, shape in kinds.items()
+        if isinstance(shape, SimplicialMesh)
+    }
     assert counts == {
         "bunny.mesh": (5433, 3),
         "octopus-low.mesh": (452, 3),

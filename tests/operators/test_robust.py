@@ -5,34 +5,55 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from eigenshape._errors import ConvergenceError, EigenshapeError, InvalidParameterError, InvalidShapeError
+from eigenshape._errors import (
+    ConvergenceError,
+    EigenshapeError,
+    InvalidParameterError,
+    InvalidShapeError,
+)
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import drop_duplicate_faces
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.robust import robust_laplacian
-from eigenshape.operators.tufted import Triangulation, edge_keys, flipped_to_delaunay, mollified, tufted_cover
+from eigenshape.operators.tufted import (
+    Triangulation,
+    edge_keys,
+    flipped_to_delaunay,
+    mollified,
+    tufted_cover,
+)
 from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 few = settings(deadline=None, max_examples=15)
 seeds = st.integers(0, 2**32 - 1)
 
 # Three faces at one edge; two tetrahedra that share a vertex; faces turned against each other.
-FAN = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]], [[0, 1, 2], [1, 0, 3], [0, 1, 4]])
+FAN = TriangleMesh(
+    [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]], [[0, 1, 2], [1, 0, 3], [0, 1, 4]]
+)
 CORNERS = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
 HOURGLASS = TriangleMesh(
-    [[0, 0, 0], *(np.array([[1, 0, 1], [0, 1, 1], [-1, -1, 1]])), *(np.array([[1, 0, -1], [0, 1, -1], [-1, -1, -1]]))],
+    [
+        [0, 0, 0],
+        *(np.array([[1, 0, 1], [0, 1, 1], [-1, -1, 1]])),
+        *(np.array([[1, 0, -1], [0, 1, -1], [-1, -1, -1]])),
+    ],
     [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2], [0, 5, 4], [0, 6, 5], [0, 4, 6], [4, 5, 6]],
 )
-TURNED = TriangleMesh(grid(3, 3).vertices, [face[::-1] if i % 2 else face for i, face in enumerate(grid(3, 3).faces)])
+TURNED = TriangleMesh(
+    grid(3, 3).vertices, [face[::-1] if i % 2 else face for i, face in enumerate(grid(3, 3).faces)]
+)
 
 
 def soup(seed: int) -> TriangleMesh:
     """Different faces over random points, some on each other, some without area."""
     rng = np.random.default_rng(seed)
-    points = rng.integers(0, 3, size=(9, 3)) + (0.3 * rng.standard_normal((9, 3)) if seed % 2 else 0.0)
+    points = rng.integers(0, 3, size=(9, 3)) + (
+        0.3 * rng.standard_normal((9, 3)) if seed % 2 else 0.0
+    )
     faces = np.array([rng.choice(9, 3, replace=False) for _ in range(25)])
     used, renumbered = np.unique(faces, return_inverse=True)
     return drop_duplicate_faces(TriangleMesh(points[used], renumbered.reshape(-1, 3))).mesh
@@ -84,7 +105,9 @@ def test_laws_on_noisy_surfaces(seed):
     require_laws(noisy(seed))
 
 
-@pytest.mark.parametrize("mesh", [icosphere(2), grid(6, 5), grid(4, 9, width=3.0), TURNED, disjoint_union(grid(2, 2))])
+@pytest.mark.parametrize(
+    "mesh", [icosphere(2), grid(6, 5), grid(4, 9, width=3.0), TURNED, disjoint_union(grid(2, 2))]
+)
 def test_on_a_delaunay_mesh_it_is_the_cotangent_laplacian(mesh):
     expected = cotangent_laplacian(mesh)
     require_same((expected.stiffness.toarray(), expected.mass.toarray()), dense(mesh), 1e-14)
@@ -100,7 +123,10 @@ def test_three_faces_at_an_edge_sum_over_all():
 def test_a_flip_by_hand():
     # A kite with the long diagonal: flat, so that the flip gives the mesh with the short one.
     points = [[-2, 0, 0], [0, -1, 0], [2, 0, 0], [0, 1, 0]]
-    long, short = TriangleMesh(points, [[0, 1, 2], [0, 2, 3]]), TriangleMesh(points, [[0, 1, 3], [1, 2, 3]])
+    long, short = (
+        TriangleMesh(points, [[0, 1, 2], [0, 2, 3]]),
+        TriangleMesh(points, [[0, 1, 3], [1, 2, 3]]),
+    )
     expected = cotangent_laplacian(short)
     require_same((expected.stiffness.toarray(), expected.mass.toarray()), dense(long), 1e-14)
     assert cotangent_laplacian(long).stiffness[0, 2] > 0.5  # what the flip takes away
@@ -121,7 +147,9 @@ def test_functions_obey_the_maximum_principle():
     fixed = np.zeros(mesh.n_vertices, dtype=bool)
     fixed[:3] = True
     values = np.array([0.0, 1.0, 0.5])
-    inner = np.linalg.solve(stiffness[np.ix_(~fixed, ~fixed)], -stiffness[np.ix_(~fixed, fixed)] @ values)
+    inner = np.linalg.solve(
+        stiffness[np.ix_(~fixed, ~fixed)], -stiffness[np.ix_(~fixed, fixed)] @ values
+    )
     assert inner.min() >= 0
     assert inner.max() <= 1
 
@@ -136,8 +164,12 @@ def test_orientation_rigid_motion_and_names_do_not_matter(seed):
     moved = mesh.vertices @ Rotation.random(rng=rng).as_matrix().T + rng.standard_normal(3)
     require_same(dense(mesh), dense(TriangleMesh(moved, mesh.faces)), 1e-9)
     old_of_new = rng.permutation(mesh.n_vertices)
-    renamed = TriangleMesh(mesh.vertices[old_of_new], np.argsort(old_of_new)[mesh.faces][rng.permutation(mesh.n_faces)])
-    require_same([part[np.ix_(old_of_new, old_of_new)] for part in dense(mesh)], dense(renamed), 1e-9)
+    renamed = TriangleMesh(
+        mesh.vertices[old_of_new], np.argsort(old_of_new)[mesh.faces][rng.permutation(mesh.n_faces)]
+    )
+    require_same(
+        [part[np.ix_(old_of_new, old_of_new)] for part in dense(mesh)], dense(renamed), 1e-9
+    )
 
 
 @few
@@ -168,7 +200,9 @@ def test_faces_on_each_other_lie_in_one_order_from_every_side():
     # Three sheets, each glued to the next along all three of its sides: six sheets of three pillows, none between.
     points, faces = np.array(CORNERS[:3], dtype=float), np.array([[0, 1, 2], [2, 0, 1], [1, 0, 2]])
     cover = tufted_cover(points, faces, np.ones(9))
-    pairs = {frozenset(pair) for pair in (np.column_stack([np.arange(18), cover.twins]) // 3).tolist()}
+    pairs = {
+        frozenset(pair) for pair in (np.column_stack([np.arange(18), cover.twins]) // 3).tolist()
+    }
     assert len(pairs) == 3
     assert all(len(pair) == 2 for pair in pairs)
 
@@ -189,14 +223,20 @@ def test_the_cover_is_a_closed_oriented_surface(seed):
 @given(seeds)
 def test_flips_keep_the_surface_and_end_delaunay(seed):
     mesh = noisy(seed)
-    lengths = np.linalg.norm(mesh.vertices[mesh.faces] - mesh.vertices[np.roll(mesh.faces, -1, axis=1)], axis=2).ravel()
+    lengths = np.linalg.norm(
+        mesh.vertices[mesh.faces] - mesh.vertices[np.roll(mesh.faces, -1, axis=1)], axis=2
+    ).ravel()
     before = tufted_cover(mesh.vertices, mesh.faces, lengths)
     after = flipped_to_delaunay(before)
     sides = np.arange(len(after.tails))
     np.testing.assert_array_equal(after.twins[after.twins], sides)
     np.testing.assert_array_equal(after.lengths[after.twins], after.lengths)
-    np.testing.assert_array_equal(after.tails[after.twins], after.tails[sides - sides % 3 + (sides + 1) % 3])
-    np.testing.assert_allclose(around(after, mesh.n_vertices), around(before, mesh.n_vertices), rtol=1e-11)
+    np.testing.assert_array_equal(
+        after.tails[after.twins], after.tails[sides - sides % 3 + (sides + 1) % 3]
+    )
+    np.testing.assert_allclose(
+        around(after, mesh.n_vertices), around(before, mesh.n_vertices), rtol=1e-11
+    )
     opposite = angles(after)[sides - sides % 3 + (sides + 2) % 3]
     assert (opposite + opposite[after.twins] < np.pi + 1e-9).all()
 
@@ -215,7 +255,9 @@ def test_mollification_by_hand():
     # Sides 3, 4, 7 have no slack; the mean edge is 14/3, so ε = .3 of it wants 1.4 more.
     found = mollified(np.array([3.0, 4.0, 7.0]), np.arange(3), 0.3)
     np.testing.assert_allclose(found, [4.4, 5.4, 8.4], rtol=1e-15)
-    np.testing.assert_array_equal(mollified(np.array([3.0, 4.0, 5.0]), np.arange(3), 0.3), [3, 4, 5])
+    np.testing.assert_array_equal(
+        mollified(np.array([3.0, 4.0, 5.0]), np.arange(3), 0.3), [3, 4, 5]
+    )
 
 
 def test_sides_of_one_edge_have_one_key():
@@ -231,31 +273,44 @@ def test_faces_without_area_are_lived_with_and_refused_without_mollification():
     require_laws(equal)
     with pytest.raises(InvalidShapeError, match=r"Faces must have area; face 1 is \[0, 1, 3\]"):
         robust_laplacian(mesh, mollify=0.0)
-    with pytest.raises(InvalidShapeError, match=r"Mollified faces must have area; face 1 .* larger mollify than 1e-18"):
+    with pytest.raises(
+        InvalidShapeError,
+        match=r"Mollified faces must have area; face 1 .* larger mollify than 1e-18",
+    ):
         robust_laplacian(mesh, mollify=1e-18)
 
 
 def test_without_mollification_good_faces_give_the_same():
     require_same(dense(torus(7, 5)), dense(torus(7, 5)))
     laplacian = robust_laplacian(torus(7, 5), mollify=0.0)
-    require_same(dense(torus(7, 5)), (laplacian.stiffness.toarray(), laplacian.mass.toarray()), 1e-14)
+    require_same(
+        dense(torus(7, 5)), (laplacian.stiffness.toarray(), laplacian.mass.toarray()), 1e-14
+    )
 
 
 def test_what_cannot_be_lived_with_is_refused():
     points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 0, 0]]
-    with pytest.raises(InvalidShapeError, match=r"Faces must have distinct corners; face 1 is \[0, 3, 3\]"):
+    with pytest.raises(
+        InvalidShapeError, match=r"Faces must have distinct corners; face 1 is \[0, 3, 3\]"
+    ):
         robust_laplacian(TriangleMesh(points, [[0, 1, 2], [0, 3, 3]]))
     with pytest.raises(InvalidShapeError, match=r"Every vertex must belong to a face; vertex 3"):
         robust_laplacian(TriangleMesh(points, [[0, 1, 2]]))
-    with pytest.raises(InvalidShapeError, match=r"Faces must differ, or they count twice; faces 0 and 1 both have"):
+    with pytest.raises(
+        InvalidShapeError, match=r"Faces must differ, or they count twice; faces 0 and 1 both have"
+    ):
         robust_laplacian(TriangleMesh(points[:3], [[0, 1, 2], [2, 1, 0]]))
-    with pytest.raises(InvalidShapeError, match=r"vertices of a mesh must differ; all 3 are \[5\.0, 5\.0, 5\.0\]"):
+    with pytest.raises(
+        InvalidShapeError, match=r"vertices of a mesh must differ; all 3 are \[5\.0, 5\.0, 5\.0\]"
+    ):
         robust_laplacian(TriangleMesh([[5, 5, 5]] * 3, [[0, 1, 2]]))
 
 
 @pytest.mark.parametrize("mollify", [-1e-9, np.nan, np.inf])
 def test_a_mollification_that_is_no_length_is_refused(mollify):
-    with pytest.raises(InvalidParameterError, match=r"mollify must be finite and not negative; it is"):
+    with pytest.raises(
+        InvalidParameterError, match=r"mollify must be finite and not negative; it is"
+    ):
         robust_laplacian(FAN, mollify=mollify)
 
 
@@ -268,8 +323,12 @@ def test_areas_that_floats_cannot_hold_are_refused(scale):
 def test_flips_without_end_are_an_error():
     points, faces = grid(2, 2).vertices, grid(2, 2).faces
     lengths = np.linalg.norm(points[faces] - points[np.roll(faces, -1, axis=1)], axis=2).ravel()
-    with pytest.raises(ConvergenceError, match=r"Flips to Delaunay must end; 48000 flips of 24 edges did not"):
-        flipped_to_delaunay(tufted_cover(points, faces, lengths), tolerance=-1.0)  # flips what is Delaunay, too
+    with pytest.raises(
+        ConvergenceError, match=r"Flips to Delaunay must end; 48000 flips of 24 edges did not"
+    ):
+        flipped_to_delaunay(
+            tufted_cover(points, faces, lengths), tolerance=-1.0
+        )  # flips what is Delaunay, too
 
 
 def test_the_spectrum_of_the_moebius_strip_is_near_that_of_the_flat_one():
@@ -306,7 +365,11 @@ def ribbon(points):
 @pytest.mark.parametrize(("scale", "shift"), [(1.0, 0.0), (1.0, 100.0), (1e-60, 0.0), (1e60, 0.0)])
 @pytest.mark.parametrize("build", [robust_laplacian, cotangent_laplacian])
 def test_points_on_a_line_have_no_operator(n, scale, shift, build):
-    line = np.linspace(0, scale, n)[:, None] * Rotation.random(rng=np.random.default_rng(n)).as_matrix()[0] + shift
+    line = (
+        np.linspace(0, scale, n)[:, None]
+        * Rotation.random(rng=np.random.default_rng(n)).as_matrix()[0]
+        + shift
+    )
     fact = r"The vertices of a mesh must span 2 dimensions; all \d+ lie on a line through point 0|Faces must have area"
     with pytest.raises(InvalidShapeError, match=fact):
         build(ribbon(line))

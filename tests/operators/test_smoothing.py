@@ -17,7 +17,9 @@ HALF = cut_by_planes(BALL, [[0, 0, 1, 0.1]]).mesh
 def noisy(mesh, share, seed=0):
     deviation = share * edge_lengths(mesh).mean()
     return TriangleMesh(
-        mesh.vertices + deviation * np.random.default_rng(seed).standard_normal((mesh.n_vertices, 3)), mesh.faces
+        mesh.vertices
+        + deviation * np.random.default_rng(seed).standard_normal((mesh.n_vertices, 3)),
+        mesh.faces,
     )
 
 
@@ -42,7 +44,9 @@ def test_noise_grows_with_noise_and_is_none_on_a_plane():
 def test_denoising_brings_a_noisy_sphere_nearer_to_one(mesh, share):
     rough = noisy(mesh, share)
     assert off_sphere(denoise(rough)) < 0.6 * off_sphere(rough)
-    assert abs(surface_area(denoise(rough)) - surface_area(mesh)) < 0.5 * abs(surface_area(rough) - surface_area(mesh))
+    assert abs(surface_area(denoise(rough)) - surface_area(mesh)) < 0.5 * abs(
+        surface_area(rough) - surface_area(mesh)
+    )
 
 
 def test_twicing_keeps_the_size_of_what_is_smooth():
@@ -58,7 +62,9 @@ def test_a_plane_stays_in_its_plane_and_a_straight_boundary_straight():
     flat = TriangleMesh(flat.vertices * [1, 1, 0], flat.faces)
     np.testing.assert_allclose(denoise(flat, reach=2.0).vertices[:, 2], 0, atol=1e-15)
     straight = denoise(grid(12, 12), reach=1.0)
-    middle = np.isclose(grid(12, 12).vertices[:, 0], 0) & (np.abs(grid(12, 12).vertices[:, 1] - 0.5) < 0.2)
+    middle = np.isclose(grid(12, 12).vertices[:, 0], 0) & (
+        np.abs(grid(12, 12).vertices[:, 1] - 0.5) < 0.2
+    )
     np.testing.assert_allclose(straight.vertices[middle, 0], 0, atol=2e-3)
 
 
@@ -103,11 +109,15 @@ def test_units_do_not_matter(scale):
     rough = noisy(HALF, 0.25)
     far = TriangleMesh(rough.vertices * scale, rough.faces)
     assert noise_level(far) == pytest.approx(noise_level(rough), rel=1e-12)
-    np.testing.assert_allclose(denoise(far).vertices / scale, denoise(rough).vertices, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        denoise(far).vertices / scale, denoise(rough).vertices, rtol=1e-9, atol=1e-12
+    )
 
 
 def test_bad_reach_and_faces_without_area_are_refused():
-    with pytest.raises(InvalidParameterError, match=r"reach must be positive and finite; entry 0 is 0.0"):
+    with pytest.raises(
+        InvalidParameterError, match=r"reach must be positive and finite; entry 0 is 0.0"
+    ):
         denoise(BALL, reach=0.0)
     flat = TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0.5]], [[0, 1, 2], [0, 1, 3]])
     with pytest.raises(InvalidShapeError, match=r"face 0"):
@@ -116,5 +126,7 @@ def test_bad_reach_and_faces_without_area_are_refused():
 
 def test_equations_that_cannot_be_solved_are_named(monkeypatch):
     monkeypatch.setattr("eigenshape.operators.smoothing.factorise", lambda *_: None)
-    with pytest.raises(InvalidShapeError, match="must have angles to be smoothed; some are too near to 0"):
+    with pytest.raises(
+        InvalidShapeError, match="must have angles to be smoothed; some are too near to 0"
+    ):
         denoise(make_creature("hand", n_vertices=600), reach=1.0)

@@ -37,7 +37,11 @@ def in_order(faces, rank):
     sides = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     lists = [np.arange(len(rank))[:, None], np.unique(sides, axis=0), faces]
     keys = [
-        np.pad(-np.sort(-rank[some], axis=1), ((0, 0), (0, 3 - some.shape[1])), constant_values=-len(rank))
+        np.pad(
+            -np.sort(-rank[some], axis=1),
+            ((0, 0), (0, 3 - some.shape[1])),
+            constant_values=-len(rank),
+        )
         for some in lists
     ]
     order = np.lexsort(np.concatenate(keys).T[::-1])
@@ -80,7 +84,9 @@ def waves(mesh, quantised):
 
 
 @pytest.mark.parametrize("quantised", [False, True])
-@pytest.mark.parametrize("mesh", [icosphere(3), torus(30, 18), grid(17, 13)], ids=["sphere", "torus", "flat"])
+@pytest.mark.parametrize(
+    "mesh", [icosphere(3), torus(30, 18), grid(17, 13)], ids=["sphere", "torus", "flat"]
+)
 def test_made_up_surfaces(mesh, quantised):
     values = waves(mesh, quantised)
     expected = pairs_by_gudhi(mesh, values)
@@ -117,7 +123,9 @@ def test_shapes_cut_open(data, path):
     mesh = read_mesh(data / path)
     for normal in np.eye(3):
         part = cut_by_planes(mesh, [*normal, np.quantile(mesh.vertices @ normal, 0.6)]).mesh
-        if is_manifold(part):  # sealing a loop by one vertex means the same only where each vertex has one fan
+        if is_manifold(
+            part
+        ):  # sealing a loop by one vertex means the same only where each vertex has one fan
             break
     else:
         pytest.fail("no cut of this shape is a manifold")

@@ -16,17 +16,21 @@ def some_faces(mesh, share):
 
 def random_simplices(corners, count):
     rng = np.random.default_rng(corners)
-    return es.SimplicialMesh(rng.random((12, 3)), [rng.choice(12, corners, replace=False) for _ in range(count)])
+    return es.SimplicialMesh(
+        rng.random((12, 3)), [rng.choice(12, corners, replace=False) for _ in range(count)]
+    )
 
 
 SHAPES = {
     "sphere": es.icosphere(1),
-    "torus": es.torus(7, 5),
-    "flat": es.grid(6, 5),
-    "pieces": es.disjoint_union(es.torus(6, 4), es.torus(5, 4), es.grid(3, 3)),
-    "holes": some_faces(es.torus(12, 9), 0.8),
-    "bow-ties": some_faces(es.grid(9, 8), 0.7),
-    "projective plane": es.projective_plane(1),
+    "torus": es.shapes.torus(7, 5),
+    "flat": es.shapes.grid(6, 5),
+    "pieces": es.shapes.disjoint_union(
+        es.shapes.torus(6, 4), es.shapes.torus(5, 4), es.shapes.grid(3, 3)
+    ),
+    "holes": some_faces(es.shapes.torus(12, 9), 0.8),
+    "bow-ties": some_faces(es.shapes.grid(9, 8), 0.7),
+    "projective plane": es.shapes.projective_plane(1),
     "curves": random_simplices(2, 20),
     "solids": random_simplices(4, 8),
     "soup": random_simplices(3, 25),
@@ -42,7 +46,9 @@ def by_gudhi(shape, values):
         simplices.assign_filtration([vertex], value)
     simplices.make_filtration_non_decreasing()
     simplices.extend_filtration()
-    ordinary, relative, upward, downward = simplices.extended_persistence(homology_coeff_field=2, min_persistence=-1)
+    ordinary, relative, upward, downward = simplices.extended_persistence(
+        homology_coeff_field=2, min_persistence=-1
+    )
     return {
         "minima": of_dimension(0, ordinary),
         "maxima": of_dimension(1, relative),
@@ -71,16 +77,24 @@ def test_every_kind_of_pair_is_that_of_extended_persistence(name, spread):
     shape = SHAPES[name]
     for seed in range(5):
         values = np.random.default_rng(seed).integers(0, spread, shape.n_points) / spread
-        expected, found = by_gudhi(shape, values), es.persistence_diagram(shape, values)
+        expected, found = by_gudhi(shape, values), es.features.persistence_diagram(shape, values)
         for kind in ("minima", "maxima", "components", "loops"):
             pairs = getattr(found, kind)
             if pairs is not None:
-                np.testing.assert_allclose(ours(pairs), expected[kind], atol=1e-9, err_msg=f"{kind}, seed {seed}")
+                np.testing.assert_allclose(
+                    ours(pairs), expected[kind], atol=1e-9, err_msg=f"{kind}, seed {seed}"
+                )
 
 
 def test_which_shapes_have_loops():
-    kinds = {name: es.persistence_diagram(shape, np.arange(shape.n_points) * 1.0) for name, shape in SHAPES.items()}
-    counts = {name: None if found.loops is None else len(found.loops.births) for name, found in kinds.items()}
+    kinds = {
+        name: es.features.persistence_diagram(shape, np.arange(shape.n_points) * 1.0)
+        for name, shape in SHAPES.items()
+    }
+    counts = {
+        name: None if found.loops is None else len(found.loops.births)
+        for name, found in kinds.items()
+    }
     assert counts["sphere"] == counts["flat"] == 0
     assert counts["torus"] == 2
     assert counts["pieces"] == 4
@@ -89,16 +103,21 @@ def test_which_shapes_have_loops():
     assert counts["soup"] is None
     assert counts["holes"] > 5
     curves = SHAPES["curves"]
-    n_edges, n_pieces = es.edge_graph(curves).nnz // 2, es.vertex_components(curves)[0]
+    n_edges, n_pieces = (
+        es.operators.edge_graph(curves).nnz // 2,
+        es.geometry.vertex_components(curves)[0],
+    )
     assert counts["curves"] == n_edges - 12 + n_pieces > 5
 
 
 @pytest.mark.data
-@pytest.mark.parametrize("path", ["classics/fertility.off", "classics/3holes.off", "retrieval/cup/psb22.ply"])
+@pytest.mark.parametrize(
+    "path", ["classics/fertility.off", "classics/3holes.off", "retrieval/cup/psb22.ply"]
+)
 def test_real_surfaces(data, path):
     mesh = es.read_mesh(data / path)
     values = mesh.vertices[:, 1]
-    expected, found = by_gudhi(mesh, values), es.persistence_diagram(mesh, values)
+    expected, found = by_gudhi(mesh, values), es.features.persistence_diagram(mesh, values)
     size = np.ptp(values)
     for kind in ("minima", "maxima", "components", "loops"):
         theirs, pairs = expected[kind], ours(getattr(found, kind))
@@ -115,4 +134,8 @@ def test_the_distance_of_two_diagrams_is_heras(seed):
         two = np.sort(one + rng.normal(0, 0.02, one.shape), axis=1)
     found = ordinary_distance(one, two)
     assert found == pytest.approx(hera(one, two, 0.0), abs=1e-15)
-    assert found <= min(gudhi.bottleneck_distance(one, two, 0.0), gudhi.bottleneck_distance(two, one, 0.0)) + 1e-15
+    assert (
+        found
+        <= min(gudhi.bottleneck_distance(one, two, 0.0), gudhi.bottleneck_distance(two, one, 0.0))
+        + 1e-15
+    )

@@ -9,7 +9,7 @@ from eigenshape.deformation.binding import bind
 from eigenshape.deformation.handles import Rotation
 from eigenshape.deformation.peers import as_rigid_as_possible
 from eigenshape.deformation.rig import rig_shape
-from eigenshape.deformation.rigidity import fitted_turns
+from eigenshape.deformation.rigidity import fit_turns
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.shapes.surfaces import icosphere
 
@@ -18,10 +18,12 @@ LONG = TriangleMesh(BALL.vertices * [1, 1, 3], BALL.faces)
 
 
 def energy(edges, rest, posed):
-    turns = fitted_turns(edges, rest, posed)
+    turns = fit_turns(edges, rest, posed)
     one = np.repeat(np.arange(len(rest)), np.diff(edges.starts))
     arms, after = rest[edges.others] - rest[one], posed[edges.others] - posed[one]
-    return edges.weights @ ((np.einsum("eij,ej->ei", turns[one], arms) - after) ** 2).sum(axis=1) / 2
+    return (
+        edges.weights @ ((np.einsum("eij,ej->ei", turns[one], arms) - after) ** 2).sum(axis=1) / 2
+    )
 
 
 @pytest.mark.parametrize("kind", ["SPOKES", "SPOKES_AND_RIMS"])

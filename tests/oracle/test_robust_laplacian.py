@@ -55,11 +55,16 @@ def differences(mesh: TriangleMesh, mollify: float = 1e-5) -> tuple[float, float
 @pytest.mark.data
 @pytest.mark.parametrize("name", NASTY)
 def test_nasty_files(data, name):
-    mesh = repair(read_mesh(data / "nasty" / name), ["drop_duplicate_faces"]).mesh  # ours refuses them
+    mesh = repair(
+        read_mesh(data / "nasty" / name), ["drop_duplicate_faces"]
+    ).mesh  # ours refuses them
     of_stiffness, of_mass = differences(mesh)
     if name.split("/")[1] in COCIRCULAR:
         assert of_stiffness < FLIPPED_FROM
-        totals = [robust_laplacian(mesh).mass.sum(), authors.mesh_laplacian(mesh.vertices, mesh.faces)[1].sum()]
+        totals = [
+            robust_laplacian(mesh).mass.sum(),
+            authors.mesh_laplacian(mesh.vertices, mesh.faces)[1].sum(),
+        ]
         assert totals[0] == pytest.approx(totals[1], rel=1e-12)
     else:
         assert of_stiffness < 1e-10
@@ -67,7 +72,9 @@ def test_nasty_files(data, name):
 
 
 @pytest.mark.data
-@pytest.mark.parametrize("name", [*CLASSICS, *(pytest.param(name, marks=pytest.mark.long) for name in LARGE)])
+@pytest.mark.parametrize(
+    "name", [*CLASSICS, *(pytest.param(name, marks=pytest.mark.long) for name in LARGE)]
+)
 def test_classics(data, name):
     of_stiffness, of_mass = differences(read_mesh(data / "classics" / name))
     assert of_stiffness < 1e-10
@@ -93,7 +100,9 @@ def test_noise(seed, mollify):
     # Faces are turned at random and some taken away: boundaries everywhere, no orientation.
     faces = np.where(rng.random((mesh.n_faces, 1)) < 0.5, mesh.faces, mesh.faces[:, ::-1])
     used, renumbered = np.unique(faces[rng.random(mesh.n_faces) < 0.8], return_inverse=True)
-    of_stiffness, of_mass = differences(TriangleMesh(points[used], renumbered.reshape(-1, 3)), mollify)
+    of_stiffness, of_mass = differences(
+        TriangleMesh(points[used], renumbered.reshape(-1, 3)), mollify
+    )
     assert of_stiffness < 1e-9
     assert of_mass < 1e-9
 

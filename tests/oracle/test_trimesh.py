@@ -46,16 +46,22 @@ def require_agreement(theirs):
     assert is_closed(ours) == theirs.is_watertight
     alone = trimesh.grouping.group_rows(theirs.edges_sorted, require_count=1)
     np.testing.assert_array_equal(
-        np.unique(boundary_edges(ours), axis=0), np.unique(theirs.edges[alone].reshape(-1, 2), axis=0)
+        np.unique(boundary_edges(ours), axis=0),
+        np.unique(theirs.edges[alone].reshape(-1, 2), axis=0),
     )
     if is_closed(ours):
         assert (inconsistent_edges(ours).size == 0) == theirs.is_winding_consistent
     assert (
         vertex_components(ours)[0]
-        == trimesh.graph.connected_component_labels(theirs.edges, node_count=len(theirs.vertices)).max() + 1
+        == trimesh.graph.connected_component_labels(
+            theirs.edges, node_count=len(theirs.vertices)
+        ).max()
+        + 1
     )
     np.testing.assert_allclose(surface_area(ours), theirs.area, rtol=1e-6)
-    np.testing.assert_allclose(edge_lengths(ours).sum(), theirs.edges_unique_length.sum(), rtol=1e-6)
+    np.testing.assert_allclose(
+        edge_lengths(ours).sum(), theirs.edges_unique_length.sum(), rtol=1e-6
+    )
     np.testing.assert_allclose(face_normals(ours), theirs.face_normals, atol=1e-6)
     if is_closed(ours):
         np.testing.assert_allclose(enclosed_volume(ours), theirs.volume, rtol=1e-6)

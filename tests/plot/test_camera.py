@@ -22,7 +22,9 @@ def leaning_tower(up):
     leg = BALL.vertices * [0.1, 0.1, 0.5] + [0.85, 0, 0.5]
     head = BALL.vertices * 0.6 + [0.35, 0, 1.5]
     nose = TriangleMesh(icosphere(4).vertices * 0.05 + [3, 0, 1.5], icosphere(4).faces)
-    tower = disjoint_union(nose, *(TriangleMesh(points, BALL.faces) for points in (plate, leg, head)))
+    tower = disjoint_union(
+        nose, *(TriangleMesh(points, BALL.faces) for points in (plate, leg, head))
+    )
     return TriangleMesh(np.roll(tower.vertices, {"z": 0, "x": 1, "y": 2}[up], axis=1), tower.faces)
 
 
@@ -38,7 +40,9 @@ def test_a_shape_that_stands_along_one_axis_is_shown_standing():
 
 def test_y_is_up_where_both_would_stand_or_neither():
     for mesh in (BALL, torus(), leaning_tower("x")):
-        assert np.array_equal(three_quarter_view(mesh).rotation, three_quarter_view(mesh, up="y").rotation)
+        assert np.array_equal(
+            three_quarter_view(mesh).rotation, three_quarter_view(mesh, up="y").rotation
+        )
 
 
 def test_the_guess_does_not_depend_on_the_unit():
@@ -81,7 +85,9 @@ def test_cameras_are_rotations_with_up_upward_and_shapes_fill_the_picture(up, se
     camera = three_quarter_view(mesh, up=up, size=100)
     right, down, towards = camera.rotation
     assert camera.rotation @ camera.rotation.T == pytest.approx(np.eye(3), abs=1e-12)
-    assert np.cross(right, towards) == pytest.approx(down, abs=1e-12)  # right, down, towards: a mirror would flip it
+    assert np.cross(right, towards) == pytest.approx(
+        down, abs=1e-12
+    )  # right, down, towards: a mirror would flip it
     assert right["xyz".index(up)] == pytest.approx(0, abs=1e-12)
     assert down["xyz".index(up)] < 0
     places = in_picture(mesh, camera)[:, :2]
@@ -91,13 +97,16 @@ def test_cameras_are_rotations_with_up_upward_and_shapes_fill_the_picture(up, se
 
 @pytest.mark.data
 def test_a_real_head_shows_its_face(data):
-    assert three_quarter_view(read_mesh(data / "classics" / "decimated-max.obj")).rotation[2, 2] < -0.5
+    assert (
+        three_quarter_view(read_mesh(data / "classics" / "decimated-max.obj")).rotation[2, 2] < -0.5
+    )
 
 
 @pytest.mark.long
 @pytest.mark.data
 @pytest.mark.parametrize(
-    ("name", "down"), [("horse.ply", [0, 0, -1]), ("bunny.off", [0, -1, 0]), ("camel.off", [0, -1, 0])]
+    ("name", "down"),
+    [("horse.ply", [0, 0, -1]), ("bunny.off", [0, -1, 0]), ("camel.off", [0, -1, 0])],
 )
 def test_every_picture_of_a_classic_shape_shows_it_upright(data, name, down, monkeypatch):
     """Whichever figure draws it, and without being told which axis is up."""
@@ -105,7 +114,9 @@ def test_every_picture_of_a_classic_shape_shows_it_upright(data, name, down, mon
     views = []
     for module in (fields, poses, sheet, stability):
         monkeypatch.setattr(
-            module, "draw", lambda shape, camera, **_: views.append(camera.rotation) or draw(BALL, camera)
+            module,
+            "draw",
+            lambda shape, camera, **_: views.append(camera.rotation) or draw(BALL, camera),
         )
     figure_segments(mesh, np.zeros(mesh.n_faces, dtype=int), np.array([0]))
     figure_field(mesh, mesh.vertices[:, 0], "x")
@@ -119,8 +130,12 @@ def test_every_picture_of_a_classic_shape_shows_it_upright(data, name, down, mon
 
 
 @pytest.mark.data
-@pytest.mark.parametrize(("name", "up"), [("tosca_cat0", "z"), ("tosca_dog0", "z"), ("sumner_horse-10", "y")])
+@pytest.mark.parametrize(
+    ("name", "up"), [("tosca_cat0", "z"), ("tosca_dog0", "z"), ("sumner_horse-10", "y")]
+)
 def test_real_animals_are_shown_on_their_feet(data, name, up):
     (path,) = (data / "retrieval").rglob(f"{name}.*")
     mesh = read_mesh(path)
-    assert np.array_equal(three_quarter_view(mesh).rotation, three_quarter_view(mesh, up=up).rotation)
+    assert np.array_equal(
+        three_quarter_view(mesh).rotation, three_quarter_view(mesh, up=up).rotation
+    )

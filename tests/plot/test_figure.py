@@ -16,10 +16,12 @@ LABELS = np.arange(BALL.n_faces) % 2
 def figures(title):
     spectra = {title: np.arange(1.0, 5), "other": np.arange(1.0, 5)}
     yield es.figure_field(BALL, BALL.vertices[:, 0], title)
-    yield es.figure_poses({title: BALL})
-    yield es.figure_spectra(spectra)
-    yield es.figure_contact_sheet(es.Panel(BALL, title, LABELS, np.array([0])), [], caption=title)
-    yield es.figure_merge_tree(es.merge_tree(BALL, BALL.vertices[:, 0]), label=title)
+    yield es.plot.figure_poses({title: BALL})
+    yield es.plot.figure_spectra(spectra)
+    yield es.plot.figure_contact_sheet(
+        es.plot.Panel(BALL, title, LABELS, np.array([0])), [], caption=title
+    )
+    yield es.plot.figure_merge_tree(es.merge_tree(BALL, BALL.vertices[:, 0]), label=title)
 
 
 @pytest.mark.long
@@ -28,7 +30,7 @@ def test_notebooks_show_the_picture():
     every = [
         *figures("plain"),
         es.figure_segments(BALL, LABELS, np.array([0])),
-        es.figure_spectrum(es.solve_spectrum(es.cotangent_laplacian(BALL), 5)),
+        es.plot.figure_spectrum(es.solve_spectrum(es.cotangent_laplacian(BALL), 5)),
     ]
     for figure in every:
         assert isinstance(figure, Figure)
@@ -48,7 +50,7 @@ def test_control_characters_break_no_picture(tmp_path, number):
 
 @pytest.mark.long
 def test_a_line_of_a_title_ends_where_it_did():
-    figure = es.figure_poses({"one\ntwo": BALL})
+    figure = es.plot.figure_poses({"one\ntwo": BALL})
     figure._repr_png_()
     assert figure.axes[0].get_title() == "one\ntwo"
 
@@ -56,5 +58,5 @@ def test_a_line_of_a_title_ends_where_it_did():
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["a$b$.ply", "$x_", r"$\frac{$", r"a\$b", "$$", "plain"])
 def test_a_name_is_shown_letter_by_letter(tmp_path, name):
-    es.save_figure(es.figure_poses({literal(name): BALL}), tmp_path / "a.svg")
+    es.save_figure(es.plot.figure_poses({literal(name): BALL}), tmp_path / "a.svg")
     assert f"<!-- {name} -->" in (tmp_path / "a.svg").read_text()

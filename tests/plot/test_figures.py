@@ -13,7 +13,7 @@ from eigenshape.plot.spectra import figure_spectrum
 from eigenshape.scans.partial import partial_scan
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 SPHERE = icosphere(3)
 RED, BLUE = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
@@ -64,8 +64,12 @@ def test_halves_have_their_colours_on_their_sides():
 
 def test_the_nodal_line_lies_where_the_function_is_zero():
     camera = three_quarter_view(SPHERE, size=300)
-    height = SPHERE.vertices @ camera.rotation[1]  # rises down the picture: zero along the middle row
-    drawing = draw(SPHERE, camera, vertex_colors=np.ones((SPHERE.n_vertices, 3)), zero_set_of=height)
+    height = (
+        SPHERE.vertices @ camera.rotation[1]
+    )  # rises down the picture: zero along the middle row
+    drawing = draw(
+        SPHERE, camera, vertex_colors=np.ones((SPHERE.n_vertices, 3)), zero_set_of=height
+    )
     dark = np.argwhere((drawing.image[..., 0] < (INK + AMBIENT) / 2) & (drawing.image[..., 3] == 1))
     assert len(dark) > 200
     assert np.abs(dark[:, 0] - 150).max() < 6
@@ -148,7 +152,9 @@ def test_files_are_whole_repeatable_and_of_a_known_kind(tmp_path):
     save_figure(figure, tmp_path / "two.png")
     assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()
     assert len(list(tmp_path.iterdir())) == 4
-    with pytest.raises(InvalidParameterError, match=r"A picture must end in .png, .svg, .pdf; .* ends in '.bmp'"):
+    with pytest.raises(
+        InvalidParameterError, match=r"A picture must end in .png, .svg, .pdf; .* ends in '.bmp'"
+    ):
         save_figure(figure, tmp_path / "one.bmp")
     with pytest.raises(InvalidParameterError, match="A picture needs a folder to lie in"):
         save_figure(figure, tmp_path / "nowhere" / "one.png")

@@ -7,9 +7,9 @@ from eigenshape.features.segmentation import merge_targets, segment
 from eigenshape.plot.persistence import KINDS, leaf_places
 from eigenshape.plot.render import palette
 
-MESH = es.torus(30, 16)
+MESH = es.shapes.torus(30, 16)
 NOISE = np.random.default_rng(0).standard_normal(MESH.n_vertices)
-PIECES = es.disjoint_union(es.torus(20, 12), es.icosphere(2))
+PIECES = es.shapes.disjoint_union(es.shapes.torus(20, 12), es.icosphere(2))
 
 
 def parts_by_targets(tree, persistence):
@@ -44,8 +44,8 @@ def test_no_stem_crosses_a_bar():
 
 
 def test_the_diagram_shows_every_pair():
-    found = es.persistence_diagram(MESH, NOISE)
-    (axes,) = es.figure_diagram(found, label="noise, in volts").axes
+    found = es.features.persistence_diagram(MESH, NOISE)
+    (axes,) = es.plot.figure_diagram(found, label="noise, in volts").axes
     assert "noise, in volts" in axes.get_xlabel()
     shown = [np.asarray(points.get_offsets()) for points in axes.collections]
     assert len(shown) == len(KINDS)
@@ -59,8 +59,8 @@ def test_the_diagram_shows_every_pair():
 
 
 def test_kinds_without_pairs_are_left_out():
-    flat = es.persistence_diagram(es.grid(3, 3), np.zeros(16))
-    (axes,) = es.figure_diagram(flat).axes
+    flat = es.features.persistence_diagram(es.shapes.grid(3, 3), np.zeros(16))
+    (axes,) = es.plot.figure_diagram(flat).axes
     assert len(axes.collections) == 1
     assert axes.get_xlim()[0] < axes.get_xlim()[1]
 
@@ -68,7 +68,7 @@ def test_kinds_without_pairs_are_left_out():
 def test_the_tree_shows_its_most_persistent_maxima_and_the_cut():
     tree = es.merge_tree(MESH, NOISE)
     cut = float(tree.persistence[5])
-    (axes,) = es.figure_merge_tree(tree, persistence=cut, n_maxima=20, label="noise").axes
+    (axes,) = es.plot.figure_merge_tree(tree, persistence=cut, n_maxima=20, label="noise").axes
     stems, bars = axes.collections
     assert len(stems.get_segments()) == 20
     assert len(bars.get_segments()) == 19
@@ -82,8 +82,8 @@ def test_a_single_maximum_and_several_that_never_merge(tmp_path):
     lonely = es.merge_tree(es.icosphere(1), es.icosphere(1).vertices[:, 2])
     apart = es.merge_tree(PIECES, PIECES.vertices[:, 2])
     for number, tree in enumerate((lonely, apart)):
-        figure = es.figure_merge_tree(tree, persistence=np.inf)
+        figure = es.plot.figure_merge_tree(tree, persistence=np.inf)
         es.save_figure(figure, tmp_path / f"{number}.png")
         assert "cut at inf" in figure.axes[0].get_title()
     with pytest.raises(InvalidParameterError, match="n_maxima must be at least 1; it is 0"):
-        es.figure_merge_tree(lonely, n_maxima=0)
+        es.plot.figure_merge_tree(lonely, n_maxima=0)

@@ -13,7 +13,9 @@ def twice(mesh):
 
 
 def pictures(figure, count):
-    return [np.asarray(axes.get_images()[0].get_array(), dtype=float) for axes in figure.axes[:count]]
+    return [
+        np.asarray(axes.get_images()[0].get_array(), dtype=float) for axes in figure.axes[:count]
+    ]
 
 
 def drawn_width(picture):
@@ -24,7 +26,7 @@ def drawn_width(picture):
 
 @pytest.mark.long
 def test_each_pose_has_its_title_and_one_bar_serves_all(tmp_path):
-    figure = es.figure_poses({"rest": BALL, "grown": twice(BALL)}, SHARES)
+    figure = es.plot.figure_poses({"rest": BALL, "grown": twice(BALL)}, SHARES)
     assert [axes.get_title() for axes in figure.axes[:2]] == ["rest", "grown"]
     assert figure.axes[-1].get_ylabel() == "share of the motion"
     es.save_figure(figure, tmp_path / "poses.png")
@@ -32,7 +34,7 @@ def test_each_pose_has_its_title_and_one_bar_serves_all(tmp_path):
 
 @pytest.mark.long
 def test_a_pose_twice_as_large_looks_twice_as_large():
-    one, two = pictures(es.figure_poses({"rest": BALL, "grown": twice(BALL)}, SHARES), 2)
+    one, two = pictures(es.plot.figure_poses({"rest": BALL, "grown": twice(BALL)}, SHARES), 2)
     assert one.shape == two.shape
     assert drawn_width(two) / drawn_width(one) == pytest.approx(2, rel=0.05)
 
@@ -40,7 +42,7 @@ def test_a_pose_twice_as_large_looks_twice_as_large():
 @pytest.mark.long
 def test_more_poses_than_columns_go_on_in_another_row():
     poses = {f"pose {number}": BALL for number in range(N_COLUMNS + 1)}
-    figure = es.figure_poses(poses, SHARES)
+    figure = es.plot.figure_poses(poses, SHARES)
     titles = [axes.get_title() for axes in figure.axes[: N_COLUMNS + 1]]
     assert titles == list(poses)
     first, last = pictures(figure, N_COLUMNS + 1)[::N_COLUMNS]
@@ -49,7 +51,10 @@ def test_more_poses_than_columns_go_on_in_another_row():
 
 @pytest.mark.long
 def test_what_moves_more_is_redder():
-    cold, warm = (pictures(es.figure_poses({"": BALL}, np.full(162, share)), 1)[0] for share in (0.0, 1.0))
+    cold, warm = (
+        pictures(es.plot.figure_poses({"": BALL}, np.full(162, share)), 1)[0]
+        for share in (0.0, 1.0)
+    )
     seen = np.abs(cold - warm).max(axis=2) > 1e-3
     assert seen.any()
     grey, red = (np.mean(picture[seen], axis=0) for picture in (cold, warm))

@@ -9,22 +9,32 @@ from eigenshape.shapes.exact import sphere_eigenvalues
 from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
 from eigenshape.spectral.comparison.spectra import compare_spectra
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 SPHERE = icosphere(2)
-LUMPED, CONSISTENT = (solve_spectrum(cotangent_laplacian(SPHERE, mass), 20) for mass in ("lumped", "consistent"))
+LUMPED, CONSISTENT = (
+    solve_spectrum(cotangent_laplacian(SPHERE, mass), 20) for mass in ("lumped", "consistent")
+)
 
 
 def test_several_spectra_and_how_far_they_are_from_the_first(tmp_path):
-    figure = figure_spectra({"exact": sphere_eigenvalues(25), "lumped": LUMPED, "consistent": CONSISTENT})
+    figure = figure_spectra(
+        {"exact": sphere_eigenvalues(25), "lumped": LUMPED, "consistent": CONSISTENT}
+    )
     above, below = figure.axes
-    assert [text.get_text() for text in above.get_legend().get_texts()] == ["exact", "lumped", "consistent"]
+    assert [text.get_text() for text in above.get_legend().get_texts()] == [
+        "exact",
+        "lumped",
+        "consistent",
+    ]
     assert above.get_ylabel() == "eigenvalue λ, 1/length²"
     assert below.get_xlabel() == "number i"
     assert below.get_ylabel() == "relative difference\nfrom exact"
     assert below.get_yscale() == "log"
     change = below.get_lines()[0].get_ydata()
-    np.testing.assert_allclose(change[1:], np.abs(LUMPED.eigenvalues[1:] / sphere_eigenvalues(20)[1:] - 1))
+    np.testing.assert_allclose(
+        change[1:], np.abs(LUMPED.eigenvalues[1:] / sphere_eigenvalues(20)[1:] - 1)
+    )
     assert np.isnan(change[0])  # of two zeros
     save_figure(figure, tmp_path / "spectra.png")
     save_figure(figure, tmp_path / "again.png")
@@ -45,7 +55,9 @@ def test_a_comparison_with_brackets():
 def test_brackets_of_one_and_differences_of_one_size():
     values = 1 + np.arange(20.0)
     spectra = {"one": values, "two": 1.1 * values, "sphere": LUMPED}
-    above, _ = figure_spectra(spectra, brackets={"sphere": bracket_eigenvalues(SPHERE, 20)}, unit="1/area").axes
+    above, _ = figure_spectra(
+        spectra, brackets={"sphere": bracket_eigenvalues(SPHERE, 20)}, unit="1/area"
+    ).axes
     assert "sphere: bracket" in [text.get_text() for text in above.get_legend().get_texts()]
     assert above.get_ylabel() == "eigenvalue λ, 1/area"
     figure = figure_spectra({"one": values, "two": 1.1 * values})
@@ -59,10 +71,17 @@ def test_equal_spectra_differ_by_nothing():
 
 
 def test_bad_input():
-    with pytest.raises(InvalidParameterError, match="Spectra side by side must be two or more; there are 1"):
+    with pytest.raises(
+        InvalidParameterError, match="Spectra side by side must be two or more; there are 1"
+    ):
         figure_spectra({"one": LUMPED})
-    with pytest.raises(InvalidParameterError, match="brackets must belong to spectra by their titles; 'three' is none"):
-        figure_spectra({"one": LUMPED, "two": LUMPED}, brackets={"three": bracket_eigenvalues(SPHERE, 20)})
+    with pytest.raises(
+        InvalidParameterError,
+        match="brackets must belong to spectra by their titles; 'three' is none",
+    ):
+        figure_spectra(
+            {"one": LUMPED, "two": LUMPED}, brackets={"three": bracket_eigenvalues(SPHERE, 20)}
+        )
     interval = solve_spectrum(cotangent_laplacian(SPHERE), above=1.0, below=3.0)
     with pytest.raises(InvalidParameterError, match="two must begin with the lowest eigenvalue"):
         figure_spectra({"one": LUMPED, "two": interval})

@@ -16,7 +16,9 @@ def right_share(kind, pose, labels_of):
     rest, posed = (make_creature(kind, each, n_vertices=2000) for each in (0, pose))
     labels = labels_of(rest)
     given = transfer_labels(rest, labels, posed)
-    areas = face_areas(posed)  # poses share their faces, so that labels of the rest pose are right on the other
+    areas = face_areas(
+        posed
+    )  # poses share their faces, so that labels of the rest pose are right on the other
     return areas[given.labels == labels].sum() / areas.sum(), given
 
 
@@ -91,5 +93,8 @@ def test_the_picture_gives_matched_parts_one_colour_and_says_how_sure():
 
 def test_one_label_a_face_is_asked_for():
     ball = icosphere(1)
-    with pytest.raises(InvalidParameterError, match=r"There must be one label a face, 80; there are 79"):
+    with pytest.raises(
+        InvalidParameterError,
+        match=r"labels must hold one integer for each of the 80 faces; they have shape \(79,\)",
+    ):
         transfer_labels(ball, np.zeros(79, dtype=np.int64), ball)

@@ -47,7 +47,9 @@ def test_vertices_lie_behind_their_pixels():
     middle, diagonal = np.array([0.5, 0.5, 0.0]), np.sqrt(2.0)
     places = (found.mesh.vertices - middle)[:, :2] / (PERFECT.distance * diagonal) * focal(PERFECT)
     turned = found.pixels + 0.5 - PERFECT.resolution / 2
-    np.testing.assert_allclose(np.linalg.norm(places, axis=1), np.linalg.norm(turned, axis=1), rtol=1e-9)
+    np.testing.assert_allclose(
+        np.linalg.norm(places, axis=1), np.linalg.norm(turned, axis=1), rtol=1e-9
+    )
 
 
 def test_noise_is_as_stated_face_on_and_more_on_slanted_surfaces():
@@ -55,7 +57,9 @@ def test_noise_is_as_stated_face_on_and_more_on_slanted_surfaces():
     flat = scanned(grid(8, 8), noisy).mesh
     central = np.linalg.norm(flat.vertices[:, :2] - 0.5, axis=1) < 0.2
     assert flat.vertices[central, 2].std() == pytest.approx(0.003 * np.sqrt(2), rel=0.03)
-    slanted = simulate_scan(grid(8, 8), np.random.default_rng(0), view=[0, 5.0, 1.0], camera=noisy).mesh
+    slanted = simulate_scan(
+        grid(8, 8), np.random.default_rng(0), view=[0, 5.0, 1.0], camera=noisy
+    ).mesh
     direction = np.array([0, 5.0, 1.0]) / np.sqrt(26)
     depth = slanted.vertices[:, 2] / direction[2]
     assert depth.std() > 1.15 * 0.003 * np.sqrt(2)
@@ -64,9 +68,13 @@ def test_noise_is_as_stated_face_on_and_more_on_slanted_surfaces():
 def test_noise_grows_with_the_square_of_the_depth():
     far = TriangleMesh(grid(8, 8).vertices + np.array([2.0, 0, -3.0]), grid(8, 8).faces)
     both, camera = disjoint_union(grid(8, 8), far), replace(PERFECT, noise=0.002, resolution=300)
-    seen = simulate_scan(both, np.random.default_rng(0), view=AHEAD, camera=camera, all_pieces=True).mesh
+    seen = simulate_scan(
+        both, np.random.default_rng(0), view=AHEAD, camera=camera, all_pieces=True
+    ).mesh
     heights = seen.vertices[:, 2]
-    middle = camera.distance * np.sqrt(9 + 9 + 1)  # depth of the middle of the box, half way between the two
+    middle = camera.distance * np.sqrt(
+        9 + 9 + 1
+    )  # depth of the middle of the box, half way between the two
     ratio = heights[heights < -1.5].std() / heights[heights > -1.5].std()
     assert ratio == pytest.approx(((middle + 1.5) / (middle - 1.5)) ** 2, rel=0.05)
 
@@ -95,7 +103,11 @@ def test_what_lies_behind_a_jump_is_not_joined_and_the_larger_piece_stays():
     np.testing.assert_allclose(found.mesh.vertices[:, 2], 0, atol=1e-12)
     assert (found.source_faces >= near.n_faces).all()
     both = simulate_scan(
-        disjoint_union(near, grid(4, 4)), np.random.default_rng(0), view=AHEAD, camera=PERFECT, all_pieces=True
+        disjoint_union(near, grid(4, 4)),
+        np.random.default_rng(0),
+        view=AHEAD,
+        camera=PERFECT,
+        all_pieces=True,
     )
     assert vertex_components(both.mesh)[0] == 2
     assert set(np.round(both.mesh.vertices[:, 2], 9)) == {0.0, 1.0}
@@ -110,7 +122,9 @@ def test_the_same_source_gives_the_same_scan_and_another_gives_another():
 
 def test_without_a_direction_the_source_draws_one():
     camera = replace(PERFECT, resolution=64)
-    views = [simulate_scan(BALL, np.random.default_rng(seed), camera=camera).mesh for seed in (0, 1)]
+    views = [
+        simulate_scan(BALL, np.random.default_rng(seed), camera=camera).mesh for seed in (0, 1)
+    ]
     means = [view.vertices.mean(axis=0) for view in views]
     assert np.linalg.norm(means[0] - means[1]) > 0.1
 
@@ -124,9 +138,14 @@ def test_scans_scale_with_the_shape(scale):
 
 def test_scans_stand_where_the_shape_stands():
     away = np.array([1000.0, -500.0, 20.0])
-    near, far = scanned(BALL, PERFECT), scanned(TriangleMesh(BALL.vertices + away, BALL.faces), PERFECT)
+    near, far = (
+        scanned(BALL, PERFECT),
+        scanned(TriangleMesh(BALL.vertices + away, BALL.faces), PERFECT),
+    )
     assert surface_area(far.mesh) == pytest.approx(surface_area(near.mesh), rel=1e-3)
-    np.testing.assert_allclose(far.mesh.vertices.mean(axis=0) - away, near.mesh.vertices.mean(axis=0), atol=1e-3)
+    np.testing.assert_allclose(
+        far.mesh.vertices.mean(axis=0) - away, near.mesh.vertices.mean(axis=0), atol=1e-3
+    )
 
 
 @pytest.mark.parametrize(
@@ -135,7 +154,10 @@ def test_scans_stand_where_the_shape_stands():
         ({"resolution": 8}, r"resolution must lie in 16..4096; it is 8"),
         ({"n_holes": -1}, r"n_holes must lie in 0..1000; it is -1"),
         ({"distance": 0.5}, r"distance must be more than half a diagonal, and finite; it is 0.5"),
-        ({"distance": np.inf}, r"distance must be more than half a diagonal, and finite; it is inf"),
+        (
+            {"distance": np.inf},
+            r"distance must be more than half a diagonal, and finite; it is inf",
+        ),
         ({"noise": -0.1}, r"noise must lie in 0..1 diagonals; it is -0.1"),
         ({"lost_from": 85.0}, r"lost_from must lie in 0..85 degrees, 85 excluded; it is 85.0"),
         ({"lost": 1.0}, r"lost must lie in 0..1, 1 excluded; it is 1.0"),
@@ -148,9 +170,15 @@ def test_cameras_out_of_range_are_refused(changes, message):
 
 def test_what_cannot_be_scanned_is_refused():
     point = TriangleMesh(np.ones((3, 3)), [[0, 1, 2]])
-    with pytest.raises(InvalidShapeError, match=r"must have a size to be scanned; all its vertices are equal"):
+    with pytest.raises(
+        InvalidShapeError, match=r"must have a size to be scanned; all its vertices are equal"
+    ):
         scanned(point, PERFECT)
-    with pytest.raises(InvalidShapeError, match=r"No three neighbouring pixels see one surface from there"):
+    with pytest.raises(
+        InvalidShapeError, match=r"No three neighbouring pixels see one surface from there"
+    ):
         scanned(grid(4, 4), PERFECT, view=[0, 1.0, 0])
-    with pytest.raises(InvalidParameterError, match=r"view must be three finite numbers, not all zero"):
+    with pytest.raises(
+        InvalidParameterError, match=r"view must be three finite numbers, not all zero"
+    ):
         scanned(BALL, PERFECT, view=[0, 0, 0])

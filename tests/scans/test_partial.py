@@ -19,7 +19,9 @@ BALL = icosphere(4)
 
 def require_part_of(part, whole):
     np.testing.assert_array_equal(part.mesh.vertices, whole.vertices[part.source_vertices])
-    np.testing.assert_array_equal(part.source_vertices[part.mesh.faces], whole.faces[part.source_faces])
+    np.testing.assert_array_equal(
+        part.source_vertices[part.mesh.faces], whole.faces[part.source_faces]
+    )
 
 
 @pytest.mark.parametrize("view", [[1, 0, 0], [0, 0, -1e-200], [1e200, -2e200, 5e199]])
@@ -61,26 +63,34 @@ def test_all_pieces_or_the_largest():
 
 
 def test_a_generator_draws_the_direction():
-    one, two, three = (partial_scan(BALL, np.random.default_rng(seed)).source_faces for seed in (1, 1, 2))
+    one, two, three = (
+        partial_scan(BALL, np.random.default_rng(seed)).source_faces for seed in (1, 1, 2)
+    )
     np.testing.assert_array_equal(one, two)
     assert not np.array_equal(one, three)
 
 
 @pytest.mark.parametrize("view", [[0.0, 0, 0], [np.nan, 0, 1], [np.inf, 0, 0], [1, 2], [[1, 2, 3]]])
 def test_a_direction_that_is_none_is_refused(view):
-    with pytest.raises(InvalidParameterError, match="view must be three finite numbers, not all zero; it is "):
+    with pytest.raises(
+        InvalidParameterError, match="view must be three finite numbers, not all zero; it is "
+    ):
         partial_scan(BALL, np.array(view, dtype=float))
 
 
 @pytest.mark.parametrize("resolution", [15, 8193])
 def test_a_resolution_out_of_range_is_refused(resolution):
-    with pytest.raises(InvalidParameterError, match=rf"resolution must lie in 16\.\.8192; it is {resolution}"):
+    with pytest.raises(
+        InvalidParameterError, match=rf"resolution must lie in 16\.\.8192; it is {resolution}"
+    ):
         partial_scan(BALL, [0, 0, 1], resolution=resolution)
 
 
 def test_a_shape_in_one_line_of_sight_is_refused():
     line = TriangleMesh([[0, 0, 0], [0, 0, 1], [0, 0, 2]], [[0, 1, 2]])
-    with pytest.raises(InvalidShapeError, match="a size to be scanned; all its vertices are in one line of sight"):
+    with pytest.raises(
+        InvalidShapeError, match="a size to be scanned; all its vertices are in one line of sight"
+    ):
         partial_scan(line, [0, 0, 1])
 
 
@@ -91,7 +101,9 @@ def test_no_whole_face_visible_is_refused():
     corners = np.stack([radii * np.cos(angles), radii * np.sin(angles), heights], axis=2)
     blades = TriangleMesh(corners.reshape(9, 3), np.arange(9).reshape(3, 3))
     for all_pieces in (False, True):
-        with pytest.raises(InvalidShapeError, match=r"A part must have a face\. No face is visible as a whole"):
+        with pytest.raises(
+            InvalidShapeError, match=r"A part must have a face\. No face is visible as a whole"
+        ):
             partial_scan(blades, [0, 0, 1], all_pieces=all_pieces)
     assert partial_scan(blades, [0, 0, -1], all_pieces=True).mesh.n_faces >= 1
 
@@ -137,8 +149,14 @@ def test_planes_cut_together():
     [
         (np.zeros((2, 3)), r"planes must have shape \(p, 4\); the shape is \(2, 3\)"),
         (np.zeros((1, 2, 4)), r"planes must have shape \(p, 4\); the shape is \(1, 2, 4\)"),
-        (np.array([[1.0, 0, 0, 0], [0, 0, 0, 1]]), r"a normal that is not zero; row 1 is \[0\.0, 0\.0, 0\.0, 1\.0\]"),
-        (np.array([[1.0, 0, np.nan, 0]]), r"planes must be finite .*; row 0 is \[1\.0, 0\.0, nan, 0\.0\]"),
+        (
+            np.array([[1.0, 0, 0, 0], [0, 0, 0, 1]]),
+            r"a normal that is not zero; row 1 is \[0\.0, 0\.0, 0\.0, 1\.0\]",
+        ),
+        (
+            np.array([[1.0, 0, np.nan, 0]]),
+            r"planes must be finite .*; row 0 is \[1\.0, 0\.0, nan, 0\.0\]",
+        ),
         (np.array([[1.0, 0, 0, np.inf]]), r"planes must be finite .*; row 0 is .* inf\]"),
     ],
 )
@@ -148,7 +166,9 @@ def test_planes_that_are_none_are_refused(planes, match):
 
 
 def test_planes_that_leave_nothing_are_refused():
-    with pytest.raises(InvalidShapeError, match=r"A part must have a face\. The planes leave no face"):
+    with pytest.raises(
+        InvalidShapeError, match=r"A part must have a face\. The planes leave no face"
+    ):
         cut_by_planes(BALL, [0, 0, 1, -2])
 
 
@@ -162,7 +182,9 @@ def test_random_planes_cut_off_their_share():
 
 @pytest.mark.parametrize("share", [0.0, 1.0, -0.5, float("nan")])
 def test_a_share_out_of_range_is_refused(share):
-    with pytest.raises(InvalidParameterError, match=rf"share must lie between 0 and 1; it is {share}"):
+    with pytest.raises(
+        InvalidParameterError, match=rf"share must lie between 0 and 1; it is {share}"
+    ):
         random_planes(BALL, np.random.default_rng(0), share=share)
 
 

@@ -26,7 +26,11 @@ def test_a_square_covers_exactly_its_pixels():
 def test_faces_share_the_diagonal_and_the_lower_one_wins_it():
     seen = rasterize(square(0, 0, 3, 3), QUAD, 3, 3)
     assert seen.face.tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
-    assert rasterize(square(0, 0, 3, 3), QUAD[::-1], 3, 3).face.tolist() == [[0, 1, 1], [0, 0, 1], [0, 0, 0]]
+    assert rasterize(square(0, 0, 3, 3), QUAD[::-1], 3, 3).face.tolist() == [
+        [0, 1, 1],
+        [0, 0, 1],
+        [0, 0, 0],
+    ]
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -36,7 +40,9 @@ def test_weights_give_the_middle_of_the_pixel(turned):
     seen = rasterize(points, faces, 8, 8)
     row, column = np.nonzero(seen.face == 0)
     assert len(row) > 10
-    there = np.einsum("ij,ijk->ik", seen.weights[row, column], points[faces[seen.face[row, column]]])
+    there = np.einsum(
+        "ij,ijk->ik", seen.weights[row, column], points[faces[seen.face[row, column]]]
+    )
     np.testing.assert_allclose(there[:, 0], column + 0.5, atol=1e-12)
     np.testing.assert_allclose(there[:, 1], row + 0.5, atol=1e-12)
     np.testing.assert_allclose(there[:, 2], seen.depth[row, column], atol=1e-12)

@@ -37,7 +37,9 @@ def windings(points, mesh):
     x, y, z = (np.linalg.norm(side, axis=2) for side in (a, b, c))
     dots = [np.einsum("pfi,pfi->pf", one, two) for one, two in ((a, b), (b, c), (c, a))]
     volume = np.einsum("pfi,pfi->pf", a, np.cross(b, c))
-    return np.arctan2(volume, x * y * z + dots[0] * z + dots[1] * x + dots[2] * y).sum(axis=1) / (2 * np.pi)
+    return np.arctan2(volume, x * y * z + dots[0] * z + dots[1] * x + dots[2] * y).sum(axis=1) / (
+        2 * np.pi
+    )
 
 
 def outward(mesh):
@@ -89,7 +91,10 @@ def test_poses_bend_and_hardly_stretch(kind):
 def test_poses_differ_to_the_eye(kind):
     rest = make_creature(kind, n_vertices=N)
     size = np.ptp(rest.vertices, axis=0).max()
-    moved = [np.linalg.norm(make_creature(kind, p, n_vertices=N).vertices - rest.vertices, axis=1) for p in POSES[1:]]
+    moved = [
+        np.linalg.norm(make_creature(kind, p, n_vertices=N).vertices - rest.vertices, axis=1)
+        for p in POSES[1:]
+    ]
     assert min(way.max() for way in moved) > 0.08 * size
     assert max(way.max() for way in moved) > 0.15 * size
 
@@ -153,7 +158,9 @@ def test_individuals_differ_in_proportions():
 
 
 def test_an_unknown_kind_is_refused_by_name():
-    with pytest.raises(InvalidParameterError, match=r"kind must be one of ant, biped, .*; it is 'unicorn'"):
+    with pytest.raises(
+        InvalidParameterError, match=r"kind must be one of ant, biped, .*; it is 'unicorn'"
+    ):
         make_creature("unicorn")
 
 

@@ -4,7 +4,12 @@ import pytest
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.measure import enclosed_volume, face_normals
 from eigenshape.geometry.simplices import require_volumes, simplex_volumes
-from eigenshape.geometry.topology import boundary_vertices, is_closed, is_manifold, unreferenced_vertices
+from eigenshape.geometry.topology import (
+    boundary_vertices,
+    is_closed,
+    is_manifold,
+    unreferenced_vertices,
+)
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes import exact
 from eigenshape.shapes.domains import ball, box, circle, disc, interval, irregular_grid
@@ -17,8 +22,7 @@ from eigenshape.shapes.spheres import (
     three_sphere,
 )
 from eigenshape.shapes.surfaces import icosphere
-from eigenshape.spectral.solver.dirichlet import solve_dirichlet
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 RNG = np.random.default_rng
 QUALITY = 0.45  # of the worst tetrahedron of a ball; it falls to 0.50 as n grows, 0.51 at n = 40
@@ -30,10 +34,25 @@ DOMAINS = {
     "box": (lambda: box(9, 14, 9, sides=(1, 2, 1)), 2.0, 0, exact.box_eigenvalues(10, (1, 2, 1))),
     "ball": (lambda: ball(12), 4 / 3 * np.pi, 0.01, exact.ball_eigenvalues(9)),
     "fibonacci": (lambda: fibonacci_sphere(1500), 4 * np.pi, 0.003, exact.sphere_eigenvalues(25)),
-    "random": (lambda: random_sphere(1500, rng=RNG(0)), 4 * np.pi, 0.006, exact.sphere_eigenvalues(25)),
+    "random": (
+        lambda: random_sphere(1500, rng=RNG(0)),
+        4 * np.pi,
+        0.006,
+        exact.sphere_eigenvalues(25),
+    ),
     "graded": (lambda: graded_sphere(1500), 4 * np.pi, 0.004, exact.sphere_eigenvalues(25)),
-    "three-sphere": (lambda: three_sphere(2500), 2 * np.pi**2, 0.03, exact.sphere_eigenvalues(14, 3)),
-    "projective plane": (lambda: projective_plane(3), 2 * np.pi, 0.012, exact.projective_plane_eigenvalues(15)),
+    "three-sphere": (
+        lambda: three_sphere(2500),
+        2 * np.pi**2,
+        0.03,
+        exact.sphere_eigenvalues(14, 3),
+    ),
+    "projective plane": (
+        lambda: projective_plane(3),
+        2 * np.pi,
+        0.012,
+        exact.projective_plane_eigenvalues(15),
+    ),
 }
 
 
@@ -43,7 +62,9 @@ def test_each_has_its_volume_and_its_spectrum(name):
     mesh = make()
     require_volumes(mesh)
     assert not unreferenced_vertices(mesh).size
-    assert -lost - 1e-12 <= simplex_volumes(mesh).sum() / volume - 1 <= 1e-12  # inscribed: never too much
+    assert (
+        -lost - 1e-12 <= simplex_volumes(mesh).sum() / volume - 1 <= 1e-12
+    )  # inscribed: never too much
     found = solve_spectrum(cotangent_laplacian(mesh, "averaged"), len(eigenvalues)).eigenvalues
     np.testing.assert_allclose(found, eigenvalues, rtol=0.035, atol=1e-8)
 
@@ -59,11 +80,13 @@ def test_each_has_its_volume_and_its_spectrum(name):
 )
 def test_held_at_their_boundary_they_are_drums(mesh, eigenvalues):
     laplacian = cotangent_laplacian(mesh, "averaged")
-    found = solve_dirichlet(laplacian, len(eigenvalues), boundary_vertices(mesh)).eigenvalues
+    found = solve_spectrum(laplacian, len(eigenvalues), fixed=boundary_vertices(mesh)).eigenvalues
     np.testing.assert_allclose(found, eigenvalues, rtol=0.07)
 
 
-@pytest.mark.parametrize("mesh", [fibonacci_sphere(60), graded_sphere(60), random_sphere(60, rng=RNG(3))])
+@pytest.mark.parametrize(
+    "mesh", [fibonacci_sphere(60), graded_sphere(60), random_sphere(60, rng=RNG(3))]
+)
 def test_spheres_are_closed_and_face_outward(mesh):
     assert is_closed(mesh)
     assert is_manifold(mesh)
@@ -74,7 +97,9 @@ def test_spheres_are_closed_and_face_outward(mesh):
 @pytest.mark.parametrize("mesh", [disc(1), disc(5), irregular_grid(6, 3, jitter=0.45, rng=RNG(1))])
 def test_flat_ones_are_manifolds_that_face_up(mesh):
     assert is_manifold(mesh)
-    np.testing.assert_allclose(face_normals(mesh), np.tile([0.0, 0, 1], (mesh.n_faces, 1)), atol=1e-12)
+    np.testing.assert_allclose(
+        face_normals(mesh), np.tile([0.0, 0, 1], (mesh.n_faces, 1)), atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("mesh", [box(2, 3, 1), ball(4)])
@@ -94,7 +119,9 @@ def test_no_tetrahedron_of_a_ball_is_flat_however_fine(n):
     first, second = np.triu_indices(4, 1)
     corners = mesh.points[mesh.simplices]
     sides = ((corners[:, first] - corners[:, second]) ** 2).sum(axis=(1, 2))
-    quality = 12 * (3 * simplex_volumes(mesh)) ** (2 / 3) / sides  # 1 where all sides are equal, 0 where flat
+    quality = (
+        12 * (3 * simplex_volumes(mesh)) ** (2 / 3) / sides
+    )  # 1 where all sides are equal, 0 where flat
     assert quality.min() > QUALITY
     on_boundary = np.isin(mesh.simplices, boundary_vertices(mesh)).sum(axis=1)
     assert on_boundary.max() == 3  # one side of it at most
@@ -133,15 +160,24 @@ def sides(mesh):
 
 
 def test_what_cannot_be_is_refused():
-    with pytest.raises(InvalidParameterError, match=r"jitter must be at least 0 and less than 0\.5; it is 0\.5"):
+    with pytest.raises(
+        InvalidParameterError, match=r"jitter must be at least 0 and less than 0\.5; it is 0\.5"
+    ):
         irregular_grid(3, 3, jitter=0.5, rng=RNG(0))
     with pytest.raises(InvalidParameterError, match="sides must be three lengths; they are 2"):
         box(2, 2, 2, sides=(1.0, 2.0))
     with pytest.raises(InvalidParameterError, match=r"ratio must lie in 1\.\.1e6; it is 0\.5"):
         graded_sphere(30, ratio=0.5)
-    with pytest.raises(InvalidParameterError, match="condition must be 'neumann' or 'dirichlet'; it is 'robin'"):
+    with pytest.raises(
+        InvalidParameterError, match="condition must be 'neumann' or 'dirichlet'; it is 'robin'"
+    ):
         exact.box_eigenvalues.__wrapped__(3, [1.0], "robin")
-    with pytest.raises(InvalidShapeError, match="Points of a sphere must have a hull with volume; these 4 have none"):
+    with pytest.raises(
+        InvalidShapeError,
+        match="Points of a sphere must have a hull with volume; these 4 have none",
+    ):
         sphere_hull([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
-    with pytest.raises(InvalidShapeError, match=r"must lie on their hull; point 4 is \[0\.0, 0\.0\] \(1 such\)"):
+    with pytest.raises(
+        InvalidShapeError, match=r"must lie on their hull; point 4 is \[0\.0, 0\.0\] \(1 such\)"
+    ):
         sphere_hull([[1.0, 0], [0, 1], [-1, 0], [0, -1], [0, 0]])

@@ -17,7 +17,9 @@ def gauss_grid(n):
     turns = np.pi / n * np.arange(2 * n)
     z, phi = (each.ravel() for each in np.meshgrid(heights, turns, indexing="ij"))
     ring = np.sqrt(1 - z**2)
-    return np.column_stack([ring * np.cos(phi), ring * np.sin(phi), z]), np.repeat(weights, 2 * n) * np.pi / n
+    return np.column_stack([ring * np.cos(phi), ring * np.sin(phi), z]), np.repeat(
+        weights, 2 * n
+    ) * np.pi / n
 
 
 def test_the_first_four_by_hand():
@@ -31,7 +33,13 @@ def test_a_quadratic_by_hand():
     x, y, z = random_sphere(50, rng=np.random.default_rng(2)).vertices.T
     found = sphere_harmonics(np.column_stack([x, y, z]), 9)[:, 4:]
     root = (15 / (4 * np.pi)) ** 0.5
-    expected = [root * x * y, root * y * z, (3 * z**2 - 1) * root / 12**0.5, root * x * z, root * (x**2 - y**2) / 2]
+    expected = [
+        root * x * y,
+        root * y * z,
+        (3 * z**2 - 1) * root / 12**0.5,
+        root * x * z,
+        root * (x**2 - y**2) / 2,
+    ]
     np.testing.assert_allclose(found, np.column_stack(expected), atol=1e-14)
 
 
@@ -39,7 +47,9 @@ def test_a_quadratic_by_hand():
 def test_they_are_orthonormal(degree):
     points, weights = gauss_grid(degree + 1)
     harmonics = sphere_harmonics(points, (degree + 1) ** 2)
-    np.testing.assert_allclose(harmonics.T @ (weights[:, None] * harmonics), np.eye((degree + 1) ** 2), atol=1e-12)
+    np.testing.assert_allclose(
+        harmonics.T @ (weights[:, None] * harmonics), np.eye((degree + 1) ** 2), atol=1e-12
+    )
 
 
 @settings(deadline=None, max_examples=30)
@@ -58,9 +68,9 @@ def test_addition_theorem(seed):
 
 
 def test_up_to_the_highest_degree_beside_a_pole_and_at_it():
-    values = sphere_harmonics([[0.0, 0.0, 1.0], [1e-3, 2e-3, 1.0], [0.3, 0.1, 1.0], [1.0, 0.5, 0.1]], 10**5)[
-        :, : 316**2
-    ]
+    values = sphere_harmonics(
+        [[0.0, 0.0, 1.0], [1e-3, 2e-3, 1.0], [0.3, 0.1, 1.0], [1.0, 0.5, 0.1]], 10**5
+    )[:, : 316**2]
     degrees = np.arange(316)
     sums = np.add.reduceat(values**2, degrees**2, axis=1)
     np.testing.assert_allclose(sums, np.tile((2 * degrees + 1) / (4 * np.pi), (4, 1)), rtol=1e-9)
@@ -74,7 +84,9 @@ def test_a_point_is_a_direction(scale):
 
 
 def test_bad_input():
-    with pytest.raises(InvalidShapeError, match="a direction from the origin; point 1 is the origin"):
+    with pytest.raises(
+        InvalidShapeError, match="a direction from the origin; point 1 is the origin"
+    ):
         sphere_harmonics(np.vstack([NORTH, 0 * NORTH]), 4)
     with pytest.raises(InvalidShapeError, match=r"points must have shape \(n, 3\)"):
         sphere_harmonics([[1.0, 0.0]], 4)

@@ -34,11 +34,15 @@ def test_a_torus_has_its_hole():
 
 
 def test_a_surface_in_two_parts_is_refused():
-    with pytest.raises(InvalidShapeError, match=r"smooth at the size of the grid; at spacing 0\.25 it is not"):
+    with pytest.raises(
+        InvalidShapeError, match=r"smooth at the size of the grid; at spacing 0\.25 it is not"
+    ):
         isosurface(two_balls, -np.ones(3), np.array([5.0, 1, 1]), 0.25)
 
 
 def test_the_spacing_gives_about_the_vertices_asked_for():
     for n_vertices in (300, 3000):
         spacing = spacing_for(ball, -np.ones(3), np.ones(3), n_vertices)
-        assert isosurface(ball, -np.ones(3), np.ones(3), spacing).n_vertices == pytest.approx(n_vertices, rel=0.1)
+        assert isosurface(ball, -np.ones(3), np.ones(3), spacing).n_vertices == pytest.approx(
+            n_vertices, rel=0.1
+        )

@@ -40,7 +40,9 @@ def test_squashed_limbs_are_thin_along_an_axis():
 
 
 def test_a_point_belongs_to_the_limb_and_the_place_that_are_nearest():
-    owner, place = nearest_limbs(np.array([[1.5, 0, 0.3], [1.0, 0.7, 0.2], [1.0, -1.6, 0]]), body_of(PLAN))
+    owner, place = nearest_limbs(
+        np.array([[1.5, 0, 0.3], [1.0, 0.7, 0.2], [1.0, -1.6, 0]]), body_of(PLAN)
+    )
     np.testing.assert_array_equal(owner, [0, 1, 4])
     np.testing.assert_allclose(place, [1.5, 0.5, 1.0], atol=1e-12)
 

@@ -12,7 +12,12 @@ def rod(points):
 
 def two_rods(points):
     """Rods side by side, 0.05 apart, that meet at one end."""
-    bridge = np.linalg.norm(points - np.clip(points[:, 1], 0, 0.45)[:, None] * [0, 1.0, 0] + [1.0, 0, 0], axis=1) - 0.2
+    bridge = (
+        np.linalg.norm(
+            points - np.clip(points[:, 1], 0, 0.45)[:, None] * [0, 1.0, 0] + [1.0, 0, 0], axis=1
+        )
+        - 0.2
+    )
     return np.minimum(np.minimum(rod(points), rod(points - [0, 0.45, 0])), bridge)
 
 
@@ -43,7 +48,9 @@ def test_nothing_leaks_to_a_limb_that_is_only_near_in_space():
 def test_a_full_share_turns_rigidly_and_none_stays():
     points = np.array([[2.0, 0, 0], [0, 0, 0], [2.0, 0, 0]])
     follows = np.array([[1.0], [1.0], [0.0]])
-    joint = Joints(np.array([[1.0, 0, 0]]), np.array([[0, 0, 1.0]]), np.array([[-1.0, 1.0]]), follows)
+    joint = Joints(
+        np.array([[1.0, 0, 0]]), np.array([[0, 0, 1.0]]), np.array([[-1.0, 1.0]]), follows
+    )
     np.testing.assert_allclose(
         turned(points, joint, np.array([np.pi / 2])), [[1, 1, 0], [1, -1, 0], [2, 0, 0]], atol=1e-15
     )

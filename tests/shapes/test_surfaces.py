@@ -67,9 +67,18 @@ def test_a_union_keeps_every_coordinate():
         (lambda: torus(9, 2), r"n_across must lie in 3\.\.1000000; it is 2"),
         (lambda: grid(0, 1), r"n_x must lie in 1\.\.1000000; it is 0"),
         (lambda: grid(1, 0), r"n_y must lie in 1\.\.1000000; it is 0"),
-        (lambda: grid(1, 1, height=0.0), r"width and height must be positive and finite; entry 1 is 0\.0"),
-        (lambda: torus(5, 5, outer=-1.0), r"outer and inner must be positive and finite; entry 0 is -1\.0"),
-        (lambda: torus(5, 5, inner=np.nan), r"outer and inner must be positive and finite; entry 1 is nan"),
+        (
+            lambda: grid(1, 1, height=0.0),
+            r"width and height must be positive and finite; entry 1 is 0\.0",
+        ),
+        (
+            lambda: torus(5, 5, outer=-1.0),
+            r"outer and inner must be positive and finite; entry 0 is -1\.0",
+        ),
+        (
+            lambda: torus(5, 5, inner=np.nan),
+            r"outer and inner must be positive and finite; entry 1 is nan",
+        ),
         (disjoint_union, "disjoint_union must be given a mesh; it was given none"),
     ],
 )

@@ -4,7 +4,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import edge_table, euler_characteristic, inconsistent_edges, is_closed, is_manifold
+from eigenshape.geometry.topology import (
+    edge_table,
+    euler_characteristic,
+    inconsistent_edges,
+    is_closed,
+    is_manifold,
+)
 from eigenshape.shapes.isosurface import isosurface
 from eigenshape.shapes.thinning import FEWEST, MOST, thinned
 

@@ -8,7 +8,9 @@ def unpacked(slots):
     return np.concatenate(list(slots), axis=1)
 
 
-@pytest.mark.parametrize(("n", "k", "groups"), [(1, 1, 1), (37, 13, 1), (2051, 24, 2), (1027, 5, 3)])
+@pytest.mark.parametrize(
+    ("n", "k", "groups"), [(1, 1, 1), (37, 13, 1), (2051, 24, 2), (1027, 5, 3)]
+)
 def test_slots_are_columns(n, k, groups):
     rng = np.random.default_rng(n)
     columns, block = rng.normal(size=(n, k)), rng.normal(size=(groups, n, 8))

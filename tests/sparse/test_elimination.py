@@ -16,8 +16,12 @@ from eigenshape.sparse.sort_loops import sort_part
 
 def random_symmetric(n, density, seed):
     rng = np.random.default_rng(seed)
-    half = sp.random_array((n, n), density=density, rng=rng, data_sampler=lambda size: rng.normal(size=size))
-    matrix = sp.csc_array(half + half.T + sp.diags_array(rng.normal(size=n) + 3 * np.sign(rng.normal(size=n))))
+    half = sp.random_array(
+        (n, n), density=density, rng=rng, data_sampler=lambda size: rng.normal(size=size)
+    )
+    matrix = sp.csc_array(
+        half + half.T + sp.diags_array(rng.normal(size=n) + 3 * np.sign(rng.normal(size=n)))
+    )
     matrix.sort_indices()
     return matrix
 
@@ -35,10 +39,17 @@ def test_any_pattern_is_factored_counted_and_solved(n, density, seed):
     factor, right, found = solved(matrix)
     assert sorted(factor.elimination.order) == list(range(n))
     dense = matrix.toarray()
-    growth = np.abs(factor.pivots).max() / np.abs(dense).max() + np.abs(dense).max() / np.abs(factor.pivots).min()
+    growth = (
+        np.abs(factor.pivots).max() / np.abs(dense).max()
+        + np.abs(dense).max() / np.abs(factor.pivots).min()
+    )
     if growth < 1e5:  # without pivoting, growth is bad luck
-        assert np.count_nonzero(factor.pivots < 0) == np.count_nonzero(np.linalg.eigvalsh(dense) < 0)
-        np.testing.assert_allclose(dense @ found, right, atol=1e-7 * np.abs(found).max() * np.abs(dense).max())
+        assert np.count_nonzero(factor.pivots < 0) == np.count_nonzero(
+            np.linalg.eigvalsh(dense) < 0
+        )
+        np.testing.assert_allclose(
+            dense @ found, right, atol=1e-7 * np.abs(found).max() * np.abs(dense).max()
+        )
 
 
 def fronts_by_definition(matrix, elimination):
@@ -63,7 +74,9 @@ def test_fronts_have_the_rows_of_their_definition_and_the_room_for_them(n, densi
     found = [e.rows[start:stop].tolist() for start, stop in itertools.pairwise(e.begins)]
     assert found == expected
     parents = [
-        next((s for s in range(len(expected)) if rows[width] < e.first[s + 1]), -1) if width < len(rows) else -1
+        next((s for s in range(len(expected)) if rows[width] < e.first[s + 1]), -1)
+        if width < len(rows)
+        else -1
         for rows, width in zip(expected, np.diff(e.first), strict=True)
     ]
     assert e.above.tolist() == parents
@@ -131,13 +144,17 @@ def test_an_arrow_is_eliminated_from_its_feathers():
 
 @pytest.mark.parametrize("bad", [0.0, np.nan, np.inf])
 def test_a_pivot_that_is_none(bad):
-    chain = sp.csc_array(sp.diags_array([-np.ones(9), np.full(10, 2.0), -np.ones(9)], offsets=[-1, 0, 1]))
+    chain = sp.csc_array(
+        sp.diags_array([-np.ones(9), np.full(10, 2.0), -np.ones(9)], offsets=[-1, 0, 1])
+    )
     assert factorise(analyse(chain), chain.data) is not None
     alone = sp.csc_array(sp.eye_array(4))
     assert factorise(analyse(alone), np.array([1.0, bad, 1.0, 1.0])) is None
 
 
 def test_nothing_depends_on_the_run():
-    matrix = sp.csc_array(cotangent_laplacian(fibonacci_sphere(2000)).stiffness + 0.1 * sp.eye_array(2000))
+    matrix = sp.csc_array(
+        cotangent_laplacian(fibonacci_sphere(2000)).stiffness + 0.1 * sp.eye_array(2000)
+    )
     one, two = (factorise(analyse(matrix), matrix.data) for _ in range(2))
     np.testing.assert_array_equal(one.panels, two.panels)

@@ -10,7 +10,7 @@ import pytest
 from eigenshape._errors import FileFormatError
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import icosphere
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 
@@ -48,7 +48,9 @@ def test_files_that_are_no_spectra(tmp_path, spectrum):
     path = tmp_path / "s.npz"
     for content in (b"", b"nothing", pickle.dumps([1, 2])):
         path.write_bytes(content)
-        with pytest.raises(FileFormatError, match=r"s\.npz must hold a spectrum that eigenshape saved; "):
+        with pytest.raises(
+            FileFormatError, match=r"s\.npz must hold a spectrum that eigenshape saved; "
+        ):
             Spectrum.load(path)
     spectrum.save(path)
     path.write_bytes(path.read_bytes()[:-200])
@@ -65,7 +67,9 @@ def test_parts_that_do_not_fit(tmp_path, spectrum):
     path = tmp_path / "s.npz"
     spectrum.save(path)
     rewritten(path, eigenvalues=spectrum.eigenvalues[:-1])
-    with pytest.raises(FileFormatError, match="must hold arrays that fit one another; their shapes are"):
+    with pytest.raises(
+        FileFormatError, match="must hold arrays that fit one another; their shapes are"
+    ):
         Spectrum.load(path)
     spectrum.save(path)
     rewritten(path, mass_indices=spectrum.mass.indices + 1000)
@@ -73,7 +77,9 @@ def test_parts_that_do_not_fit(tmp_path, spectrum):
         Spectrum.load(path)
     facts = {"eigenshape_spectrum": 99, "certificate": dataclasses.asdict(spectrum.certificate)}
     rewritten(path, head=np.array(json.dumps(facts)))
-    with pytest.raises(FileFormatError, match="must hold a spectrum in format 2; it is in format 99"):
+    with pytest.raises(
+        FileFormatError, match="must hold a spectrum in format 2; it is in format 99"
+    ):
         Spectrum.load(path)
 
 
@@ -100,11 +106,27 @@ def half_missing(values):
         ("eigenvalues", negative, "must hold eigenvalues of at least 0; number 0 is -"),
         ("eigenvalues", text, "must hold finite float64 numbers as eigenvalues"),
         ("eigenvalues", half_missing, "must hold finite float64 numbers as eigenvalues"),
-        ("eigenvalues", lambda values: values + 1j, "must hold finite float64 numbers as eigenvalues"),
-        ("eigenvectors", lambda values: np.full_like(values, np.inf), "must hold finite float64 numbers as eigenv"),
+        (
+            "eigenvalues",
+            lambda values: values + 1j,
+            "must hold finite float64 numbers as eigenvalues",
+        ),
+        (
+            "eigenvectors",
+            lambda values: np.full_like(values, np.inf),
+            "must hold finite float64 numbers as eigenv",
+        ),
         ("mass_data", half_missing, "must hold finite float64 numbers as mass"),
-        ("residuals", lambda values: values - 1, "must hold residuals of at least 0; number 0 is -"),
-        ("eigenvalues", lambda values: np.array(values[0]), "must hold arrays that fit one another"),
+        (
+            "residuals",
+            lambda values: values - 1,
+            "must hold residuals of at least 0; number 0 is -",
+        ),
+        (
+            "eigenvalues",
+            lambda values: np.array(values[0]),
+            "must hold arrays that fit one another",
+        ),
     ],
 )
 def test_what_no_spectrum_holds_is_refused(tmp_path, spectrum, part, harm, message):
@@ -119,13 +141,23 @@ def test_what_no_spectrum_holds_is_refused(tmp_path, spectrum, part, harm, messa
 
 @pytest.mark.parametrize(
     ("fact", "value"),
-    [("count", "ten"), ("shift", None), ("gap", [0.0]), ("clusters", ["1"]), ("n_found", 10.5), ("resolution", np.nan)],
+    [
+        ("count", "ten"),
+        ("shift", None),
+        ("gap", [0.0]),
+        ("clusters", ["1"]),
+        ("n_found", 10.5),
+        ("resolution", np.nan),
+    ],
 )
 def test_a_certificate_of_other_types_is_refused(tmp_path, spectrum, fact, value):
     path = tmp_path / "s.npz"
     spectrum.save(path)
     facts = dataclasses.asdict(spectrum.certificate) | {fact: value}
-    rewritten(path, head=np.array(json.dumps({"eigenshape_spectrum": 2, "key": None, "certificate": facts})))
+    rewritten(
+        path,
+        head=np.array(json.dumps({"eigenshape_spectrum": 2, "key": None, "certificate": facts})),
+    )
     with pytest.raises(FileFormatError, match=f"must hold a certificate whose {fact} is "):
         Spectrum.load(path)
 
@@ -134,7 +166,9 @@ def test_a_spectrum_is_loaded_by_its_key_alone(tmp_path, spectrum):
     path = tmp_path / "s.npz"
     spectrum.save(path, key="a cat")
     assert Spectrum.load(path, key="a cat").certificate == Spectrum.load(path).certificate
-    with pytest.raises(FileFormatError, match="must hold the spectrum of the key a dog; its key is a cat"):
+    with pytest.raises(
+        FileFormatError, match="must hold the spectrum of the key a dog; its key is a cat"
+    ):
         Spectrum.load(path, key="a dog")
 
 

@@ -19,7 +19,9 @@ WHOLE = Certificate(
 
 def test_a_whole_spectrum_is_explained_with_its_numbers():
     text = WHOLE.explain()
-    assert text.startswith("These are the 30 lowest eigenvalues of the operator: none is missing and none is extra.")
+    assert text.startswith(
+        "These are the 30 lowest eigenvalues of the operator: none is missing and none is extra."
+    )
     assert "σ = 2.5 (1/length²) has 30 negative pivots" in text
     assert "cluster" not in text
 
@@ -34,7 +36,9 @@ def test_a_cut_cluster_is_never_silent():
 def test_an_incomplete_spectrum_says_so_first():
     partial = replace(WHOLE, count=31)
     assert not partial.complete
-    assert partial.explain().startswith("This set of 30 eigenvalues is not proved: 31 lie below 2.5")
+    assert partial.explain().startswith(
+        "This set of 30 eigenvalues is not proved: 31 lie below 2.5"
+    )
 
 
 def test_all_eigenvalues_need_no_factor():

@@ -14,7 +14,9 @@ def bumped(height=0.2, level=2):
     for place, (a, b, c) in enumerate(old):
         top = mesh.n_vertices + place
         new += [[a, b, top], [b, c, top], [c, a, top]]
-    other = es.TriangleMesh(np.concatenate([mesh.vertices, middles]), np.concatenate([mesh.faces[~cap], new]))
+    other = es.TriangleMesh(
+        np.concatenate([mesh.vertices, middles]), np.concatenate([mesh.faces[~cap], new])
+    )
     labels = np.where(np.arange(other.n_faces) < (~cap).sum(), -1, 0)
     return mesh, other, np.where(cap, 0, -1), labels
 
@@ -32,7 +34,10 @@ def handled(level=3):
     k = len(rims[0])
     two = np.roll(rims[1][::-1], 1)
     starts = [np.roll(two, turn) for turn in range(k)]
-    apart = [np.linalg.norm(mesh.vertices[rims[0]] - mesh.vertices[start], axis=1).sum() for start in starts]
+    apart = [
+        np.linalg.norm(mesh.vertices[rims[0]] - mesh.vertices[start], axis=1).sum()
+        for start in starts
+    ]
     one, two = rims[0], starts[int(np.argmin(apart))]
     tube = [[one[i], one[(i + 1) % k], two[i]] for i in range(k)]
     tube += [[one[(i + 1) % k], two[(i + 1) % k], two[i]] for i in range(k)]

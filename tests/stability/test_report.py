@@ -5,17 +5,19 @@ import pytest
 
 import eigenshape as es
 
-PLAN = es.StabilityPlan(k=8, n_samples=300)
+PLAN = es.stability.StabilityPlan(k=8, n_samples=300)
 
 
 def moved(mesh, height):
     waves = np.sin(3 * mesh.vertices[:, :1]) * np.cos(2 * mesh.vertices[:, 1:2])
-    return es.TriangleMesh(mesh.vertices + height * waves * es.vertex_normals(mesh), mesh.faces)
+    return es.TriangleMesh(
+        mesh.vertices + height * waves * es.geometry.vertex_normals(mesh), mesh.faces
+    )
 
 
 @pytest.fixture(scope="module")
 def torus():
-    return es.torus(40, 20)
+    return es.shapes.torus(40, 20)
 
 
 @pytest.fixture(scope="module")
@@ -28,9 +30,9 @@ def test_a_shape_is_as_itself(torus):
     assert found.spectra.index_distance == 0.0
     assert found.closeness.delta == found.delta == found.distance == 0.0
     assert found.angles.angles.max() < 1e-6
-    assert found.times.low_by == "spacing"
+    assert found.times.low_reason == "spacing"
     assert not any(change.change > 2 * change.floor for change in found.changes)
-    assert not found.spectra.told.any()
+    assert not found.spectra.proved_changes.any()
 
 
 def test_the_map_from_vertex_to_vertex_is_measured(torus, bulged):
@@ -38,10 +40,14 @@ def test_the_map_from_vertex_to_vertex_is_measured(torus, bulged):
     steps = np.linalg.norm(other.vertices - torus.vertices, axis=1)
     assert bulged.delta == pytest.approx(steps.max())
     assert bulged.distance <= steps.max() * (1 + 1e-9)
-    assert bulged.closeness.delta == pytest.approx(es.map_closeness(torus, other.vertices).delta)
-    spectra = [es.solve_spectrum(es.cotangent_laplacian(mesh), 8).eigenvalues for mesh in (torus, other)]
+    assert bulged.closeness.delta == pytest.approx(
+        es.stability.map_closeness(torus, other.vertices).delta
+    )
+    spectra = [
+        es.solve_spectrum(es.cotangent_laplacian(mesh), 8).eigenvalues for mesh in (torus, other)
+    ]
     assert bulged.spectra.index_distance == pytest.approx(np.abs(spectra[0] - spectra[1]).max())
-    assert bulged.spectra.told[1:].all()
+    assert bulged.spectra.proved_changes[1:].all()
     assert bulged.angles.angles.max() > 0
     assert (bulged.angles.angles <= bulged.angles.bounds + 1e-9).all()
 
@@ -68,7 +74,7 @@ def test_a_report_can_be_read(bulged):
 
 @pytest.mark.long
 def test_other_meshes_are_matched_by_points_or_by_a_map(torus):
-    finer = es.subdivide(torus)
+    finer = es.shapes.subdivide(torus)
     found = es.compare_shapes(torus, finer, PLAN)
     assert found.closeness is None
     assert found.distance < 0.1  # edges are twice as long
@@ -81,7 +87,7 @@ def test_other_meshes_are_matched_by_points_or_by_a_map(torus):
 @pytest.mark.long
 def test_points_and_meshes_can_be_compared(torus):
     rng = np.random.default_rng(1)
-    cloud = es.PointCloud(es.sample_surface(torus, 1200, rng=rng).points)
+    cloud = es.PointCloud(es.geometry.sample_surface(torus, 1200, rng=rng).points)
     found = es.compare_shapes(torus, cloud, PLAN)
     assert found.closeness is None
     assert len(found.distances[1]) == 1200
@@ -96,16 +102,20 @@ def test_a_report_follows_the_unit(torus):
     one, two = es.compare_shapes(torus, other, PLAN), es.compare_shapes(*small, PLAN)
     assert two.delta == pytest.approx(1e-40 * one.delta)
     assert two.times.low == pytest.approx(1e-80 * one.times.low)
-    assert [c.change for c in two.changes] == pytest.approx([c.change for c in one.changes], rel=1e-6)
+    assert [c.change for c in two.changes] == pytest.approx(
+        [c.change for c in one.changes], rel=1e-6
+    )
     assert two.angles.angles == pytest.approx(one.angles.angles, rel=1e-5, abs=1e-6)
 
 
 def test_brackets_prove_changes_of_the_shapes(torus):
     far = es.compare_shapes(
-        torus, es.TriangleMesh(2 * torus.vertices, torus.faces), es.StabilityPlan(k=8, n_samples=300, brackets=True)
+        torus,
+        es.TriangleMesh(2 * torus.vertices, torus.faces),
+        es.stability.StabilityPlan(k=8, n_samples=300, brackets=True),
     )
     assert far.spectra.bracketed
-    assert far.spectra.told[1:].all()
+    assert far.spectra.proved_changes[1:].all()
 
 
 @pytest.mark.long
@@ -114,9 +124,11 @@ def test_a_change_that_is_too_large_leaves_no_heat_time(torus):
     found = es.compare_shapes(torus, away, PLAN)
     assert found.times.empty
     assert not any(change.trusted for change in found.changes)
-    assert found.times.low_by == "closeness"
+    assert found.times.low_reason == "closeness"
     assert "No heat time serves" in found.explain()
-    asked = es.compare_shapes(torus, away, es.StabilityPlan(k=8, n_samples=300, times=(0.1,)))
+    asked = es.compare_shapes(
+        torus, away, es.stability.StabilityPlan(k=8, n_samples=300, times=(0.1,))
+    )
     assert [change.t for change in asked.changes] == [0.1]
     assert not asked.changes[0].trusted
 
@@ -124,7 +136,7 @@ def test_a_change_that_is_too_large_leaves_no_heat_time(torus):
 def test_bad_input_is_named_before_anything_is_computed(torus):
     cloud = es.PointCloud(np.random.default_rng(0).random((150, 3)))
     with pytest.raises(es.InvalidParameterError, match=r"theirs are 2 in R\^3 and 3 in R\^3"):
-        es.compare_shapes(torus, es.box(2, 2, 2), PLAN)
+        es.compare_shapes(torus, es.shapes.box(2, 2, 2), PLAN)
     with pytest.raises(es.InvalidParameterError, match=r"takes 200 points; it is PointCloud\(150"):
         es.compare_shapes(torus, cloud, PLAN)
     with pytest.raises(es.InvalidParameterError, match="brackets and partners are for meshes"):
@@ -134,9 +146,9 @@ def test_bad_input_is_named_before_anything_is_computed(torus):
     with pytest.raises(es.InvalidParameterError, match="partners must"):
         es.compare_shapes(torus, torus, PLAN, partners=np.arange(1, 801))
     for wrong, told in (
-        (es.StabilityPlan(k=1), "k must"),
-        (es.StabilityPlan(n_samples=5), "n_samples must"),
-        (es.StabilityPlan(times=(-1.0,)), "times must be positive"),
+        (es.stability.StabilityPlan(k=1), "k must"),
+        (es.stability.StabilityPlan(n_samples=5), "n_samples must"),
+        (es.stability.StabilityPlan(times=(-1.0,)), "times must be positive"),
     ):
         with pytest.raises(es.InvalidParameterError, match=told):
             es.compare_shapes(torus, torus, wrong)

@@ -21,7 +21,7 @@ from eigenshape.cli.stability import stability
 
 app = typer.Typer(
     cls=Verbs,
-    rich_markup_mode="markdown",  # plain brackets stay: in rich markup, "eigenshape[gpu]" would lose the extra
+    rich_markup_mode="markdown",  # plain brackets stay: rich markup would read "eigenshape[bridges]" as a style
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -41,11 +41,27 @@ def _print_version(wanted: bool) -> bool:
 def options(
     *,
     version: Annotated[
-        bool, typer.Option("--version", help="Show the version and exit.", is_eager=True, callback=_print_version)
+        bool,
+        typer.Option(
+            "--version", help="Show the version and exit.", is_eager=True, callback=_print_version
+        ),
     ] = False,
 ) -> None:
     """Spectral shape analysis: spectra with proof, heat, features and parts, similar shapes, bending."""
 
 
-for verb in (info, repair, spectrum, operators, features, segment, label, deform, stability, index, query, demo):
+for verb in (
+    info,
+    repair,
+    spectrum,
+    operators,
+    features,
+    segment,
+    label,
+    deform,
+    stability,
+    index,
+    query,
+    demo,
+):
     app.command(no_args_is_help=verb not in (demo, operators))(verb)

@@ -45,7 +45,10 @@ RepairOption = Annotated[
     ),
 ]
 MeshArgument = Annotated[
-    Path, typer.Argument(help="Mesh file: OFF, OBJ, PLY, STL, GLB, glTF, or a surface in .mesh, .msh, .vtk, .vtu.")
+    Path,
+    typer.Argument(
+        help="Mesh file: OFF, OBJ, PLY, STL, GLB, glTF, or a surface in .mesh, .msh, .vtk, .vtu."
+    ),
 ]
 ShapeArgument = Annotated[
     Path,
@@ -55,18 +58,28 @@ ShapeArgument = Annotated[
     ),
 ]
 DropMissingOption = Annotated[
-    bool, typer.Option("--drop-missing", help="Leave out points of a point cloud whose coordinates are not finite.")
+    bool,
+    typer.Option(
+        "--drop-missing", help="Leave out points of a point cloud whose coordinates are not finite."
+    ),
 ]
 CellsOption = Annotated[
     CellKind | None,
-    typer.Option(help="Kind of cells to read from a file that holds several kinds, or does not say which."),
+    typer.Option(
+        help="Kind of cells to read from a file that holds several kinds, or does not say which."
+    ),
 ]
 DimOption = Annotated[
-    int, typer.Option(help="Dimension of what a point cloud samples: 1 a curve, 2 a surface, 3 a volume.")
+    int,
+    typer.Option(
+        help="Dimension of what a point cloud samples: 1 a curve, 2 a surface, 3 a volume."
+    ),
 ]
 
 
-UsageError: Any = typer.BadParameter.__base__  # of typer's own copy of click, or of click, by typer's version
+UsageError: Any = (
+    typer.BadParameter.__base__
+)  # of typer's own copy of click, or of click, by typer's version
 
 
 class Verbs(TyperGroup):
@@ -118,7 +131,9 @@ def load_mesh(path: Path, repairs: str) -> TriangleMesh:
     return done.mesh
 
 
-def load_shape(path: Path, repairs: str, dim: int, *, drop_missing: bool, cells: CellKind | None = None) -> Shape:
+def load_shape(
+    path: Path, repairs: str, dim: int, *, drop_missing: bool, cells: CellKind | None = None
+) -> Shape:
     """Read a shape of any kind, apply the requested repairs, and print on stderr what they did."""
     names = repair_names(repairs)
     done = repair(read_shape(path, dim=dim, drop_missing=drop_missing, cells=cells), names)
@@ -141,7 +156,9 @@ def repair_names(text: str) -> tuple[str, ...]:
     names = tuple(name.strip() for name in text.split(",") if name.strip())
     for name in names:
         if name not in KNOWN_REPAIRS:
-            raise InvalidParameterError(f"--repair takes {', '.join(KNOWN_REPAIRS)}; it was given {name!r}.")
+            raise InvalidParameterError(
+                f"--repair takes {', '.join(KNOWN_REPAIRS)}; it was given {name!r}."
+            )
     return names
 
 
@@ -172,7 +189,9 @@ def print_table(title: str, columns: list[str], rows: list[list[str]]) -> None:
         # long names give way in a narrow terminal, numbers do not
         widest = max([len(column), *(len(row[index]) for row in rows)])
         justify: Literal["left", "right"] = "left" if index == 0 else "right"
-        table.add_column(column, justify=justify, no_wrap=True, min_width=min(widest, LONGEST_NUMBER))
+        table.add_column(
+            column, justify=justify, no_wrap=True, min_width=min(widest, LONGEST_NUMBER)
+        )
     for row in rows:
         table.add_row(*map(shown, row))
     out.print(table)

@@ -48,7 +48,9 @@ def deform(
             ),
         ),
     ] = "",
-    move: Annotated[str, typer.Option(metavar="X,Y,Z", help="Move the region by this vector.")] = "",
+    move: Annotated[
+        str, typer.Option(metavar="X,Y,Z", help="Move the region by this vector.")
+    ] = "",
     fixed: Annotated[
         str,
         typer.Option(
@@ -75,19 +77,28 @@ def deform(
             ),
         ),
     ] = None,
-    edits: Annotated[Path | None, typer.Option(help="Apply the edits of this JSON file first.")] = None,
+    edits: Annotated[
+        Path | None, typer.Option(help="Apply the edits of this JSON file first.")
+    ] = None,
     carry: Annotated[
         Path | None,
         typer.Option(
             help="Mesh on which --edits were made, if it is another: their regions go to the nearest vertices."
         ),
     ] = None,
-    save_edits: Annotated[Path | None, typer.Option(help="Write all edits to this JSON file, for --edits.")] = None,
+    save_edits: Annotated[
+        Path | None, typer.Option(help="Write all edits to this JSON file, for --edits.")
+    ] = None,
     repair: RepairOption = "",
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", "--out", help="Write the bent mesh (PLY, OBJ, OFF, STL or GLB).")
+        Path | None,
+        typer.Option(
+            "-o", "--output", "--out", help="Write the bent mesh (PLY, OBJ, OFF, STL or GLB)."
+        ),
     ] = None,
-    picture: Annotated[Path | None, typer.Option(help="Draw the mesh before and after (PNG, SVG or PDF).")] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="Draw the mesh before and after (PNG, SVG or PDF).")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Bend, twist or stretch a mesh: a region is turned or moved, and the rest follows smoothly.
@@ -98,7 +109,9 @@ def deform(
     require_mesh_path(output)
     handles = [name for name in (rotate, move) if name]
     if bool(region) != (len(handles) == 1) or not (region or edits):
-        raise InvalidParameterError("Give --region with either --rotate or --move, or --edits, or all of them.")
+        raise InvalidParameterError(
+            "Give --region with either --rotate or --move, or --edits, or all of them."
+        )
     if carry and not edits:
         raise InvalidParameterError(
             f"--carry names the mesh that --edits were made on; it is {carry}, without --edits."
@@ -113,7 +126,9 @@ def deform(
         if region:
             chosen = told_region(region, session.mesh, progress)
             stays = told_region(fixed, session.mesh, progress) if fixed else None
-            handle: Handle = told_rotation(rotate, session.mesh, chosen) if rotate else told_translation(move)
+            handle: Handle = (
+                told_rotation(rotate, session.mesh, chosen) if rotate else told_translation(move)
+            )
             session.apply(Edit((Move(chosen, handle),), stays, n_modes, checked))
     _report(session.mesh, surface, session.edits, rig, as_json=as_json)
     if output:
@@ -123,7 +138,11 @@ def deform(
         said(save_edits)
     if picture:
         moved = np.linalg.norm(session.mesh.vertices - surface.vertices, axis=1)
-        shares = _last_shares(rig, session.edits) if len(session.edits) == 1 else moved / max(moved.max(), 1e-300)
+        shares = (
+            _last_shares(rig, session.edits)
+            if len(session.edits) == 1
+            else moved / max(moved.max(), 1e-300)
+        )
         save_picture(figure_poses({"before": surface, "after": session.mesh}, shares), picture)
 
 
@@ -136,11 +155,18 @@ def _read_edits(path: Path, mesh: TriangleMesh) -> list[Edit]:
 
 def _last_shares(rig: EigenRig, edits: tuple[Edit, ...]) -> np.ndarray:
     edit = edits[0]
-    return bind(rig, [m.region for m in edit.moves], fixed=edit.fixed, n_modes=edit.n_modes).shares.sum(axis=0)
+    return bind(
+        rig, [m.region for m in edit.moves], fixed=edit.fixed, n_modes=edit.n_modes
+    ).shares.sum(axis=0)
 
 
 def _report(
-    after: TriangleMesh, before: TriangleMesh, edits: tuple[Edit, ...], rig: EigenRig, *, as_json: bool
+    after: TriangleMesh,
+    before: TriangleMesh,
+    edits: tuple[Edit, ...],
+    rig: EigenRig,
+    *,
+    as_json: bool,
 ) -> None:
     found = measure_distortion(before, after)
     moved = np.linalg.norm(after.vertices - before.vertices, axis=1)

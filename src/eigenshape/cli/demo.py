@@ -1,6 +1,5 @@
 """eigenshape demo: the whole road on made-up creatures."""
 
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -9,7 +8,7 @@ import typer
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import out, progress_bar, save_picture, shown
-from eigenshape.cli.index import WorkersOption, describe_all, describe_file
+from eigenshape.cli.index import WorkersOption, describe_all
 from eigenshape.cli.presets import PATCHES, recipe_to_fill
 from eigenshape.cli.query import print_matches
 from eigenshape.cli.sheets import CAPTION, asked, contact_sheet
@@ -35,7 +34,9 @@ Read next:
 
 def demo(
     *,
-    folder: Annotated[Path, typer.Option("--out", help="Folder to write meshes, index and pictures to.")] = FOLDER,
+    folder: Annotated[
+        Path, typer.Option("--out", help="Folder to write meshes, index and pictures to.")
+    ] = FOLDER,
     kind: Annotated[str, typer.Option(help=f"Creature to scan: {', '.join(CREATURES)}.")] = "biped",
     workers: WorkersOption = 2,
 ) -> None:
@@ -45,14 +46,17 @@ def demo(
     items = _make(folder / "creatures")
     shelf = ShapeIndex.open_or_create(folder / "index")
     recipe = recipe_to_fill(shelf, PATCHES, items, (), Workers(workers))
-    describe = partial(describe_file, recipe=recipe, repairs=(), n_views=None)
-    report = describe_all(shelf, items, describe, recipe, Workers(workers))
+    report = describe_all(shelf, items, recipe, Workers(workers))
     out.print(f"indexed {len(shelf)} shapes ({len(report.skipped)} known already)")
 
     scan_path = folder / "scan.ply"
-    scan = partial_scan(make_creature(kind, UNSEEN, n_vertices=N_VERTICES), np.array([0.9, 0.25, 0.45])).mesh
+    scan = partial_scan(
+        make_creature(kind, UNSEEN, n_vertices=N_VERTICES), np.array([0.9, 0.25, 0.45])
+    ).mesh
     write_mesh(scan, scan_path)
-    out.print(f"scanned a {kind} from one side, in a pose that the index has not seen: {shown(scan_path)}")
+    out.print(
+        f"scanned a {kind} from one side, in a pose that the index has not seen: {shown(scan_path)}"
+    )
     shape = asked(scan, recipe)
     matches = shelf.query(shape.descriptor, n_matches=6)
     print_matches(matches)
@@ -75,6 +79,8 @@ def _make(folder: Path) -> list[Item]:
             progress(done / len(items), item.name)
             if not item.path.exists():
                 item.path.parent.mkdir(parents=True, exist_ok=True)
-                write_mesh(make_creature(item.label or "", done % POSES, n_vertices=N_VERTICES), item.path)
+                write_mesh(
+                    make_creature(item.label or "", done % POSES, n_vertices=N_VERTICES), item.path
+                )
     out.print(f"made {len(CREATURES)} kinds of creatures in {POSES} poses each: {shown(folder)}")
     return items

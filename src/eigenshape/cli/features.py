@@ -6,7 +6,6 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from eigenshape._progress import Progress
 from eigenshape.cli.console import (
     JsonOption,
     MeshArgument,
@@ -20,11 +19,9 @@ from eigenshape.cli.console import (
 from eigenshape.cli.parts import part_rows, print_rows, require_paths, save_colors
 from eigenshape.cli.presets import HeatPresetOption, heat_preset
 from eigenshape.features.segmentation import segment
-from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.plot.fields import figure_segments, value_colors
-from eigenshape.retrieval.heat.describe import DescribedShape, describe_mesh
-from eigenshape.retrieval.heat.describe_large import DescribedLargeShape, describe_large_mesh
-from eigenshape.retrieval.heat.descriptor import SCALE_FREE, Recipe
+from eigenshape.retrieval.heat.descriptor import SCALE_FREE
+from eigenshape.retrieval.heat.features import find_heat_features
 from eigenshape.spectral.signatures.approximate_heat import LARGE, USUAL_ACCURACY
 
 COLUMNS = {
@@ -40,7 +37,9 @@ COLUMNS = {
 def features(
     mesh: MeshArgument,
     *,
-    n_regions: Annotated[int, typer.Option("-n", "--n-regions", help="Largest number of regions.")] = 15,
+    n_regions: Annotated[
+        int, typer.Option("-n", "--n-regions", help="Largest number of regions.")
+    ] = 15,
     persistence: Annotated[
         float | None,
         typer.Option(
@@ -65,8 +64,12 @@ def features(
         ),
     ] = None,
     repair: RepairOption = "",
-    picture: Annotated[Path | None, typer.Option(help="Draw parts and feature points (PNG, SVG or PDF).")] = None,
-    ply: Annotated[Path | None, typer.Option(help="Write the mesh, coloured by its heat (PLY).")] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="Draw parts and feature points (PNG, SVG or PDF).")
+    ] = None,
+    ply: Annotated[
+        Path | None, typer.Option(help="Write the mesh, coloured by its heat (PLY).")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Find the feature points of a mesh and the parts around them, most persistent first.
@@ -77,35 +80,44 @@ def features(
     require_paths(picture, ply)
     surface = load_mesh(mesh, repair)
     with progress_bar("features") as progress:
-        shape = _described(surface, recipe, accuracy, progress)
-    error = shape.error if isinstance(shape, DescribedLargeShape) else None
-    if error is not None:
-        err.print(f"{surface.n_vertices:,} vertices: their heat is approximate, off by about {100 * error:.2g} %")
+        if accuracy is None and surface.n_vertices > LARGE:
+            accuracy = USUAL_ACCURACY
+        shape = find_heat_features(surface, recipe, accuracy=accuracy, progress=progress)
+    if shape.error is not None:
+        err.print(
+            f"{surface.n_vertices:,} vertices: their heat is approximate, off by about "
+            f"{100 * shape.error:.2g} %"
+        )
     n_fragments = int(np.isin(shape.tree.maxima, shape.fragments).sum())
     by_number = n_regions + n_fragments if persistence is None and not largest_gap else None
-    parts = segment(shape.tree, n_regions=by_number, persistence=persistence, largest_gap=largest_gap)
+    parts = segment(
+        shape.tree, n_regions=by_number, persistence=persistence, largest_gap=largest_gap
+    )
     if n_fragments:
-        err.print(f"{n_fragments} fragments with less than 1 % of the area each are one region each, without a feature")
-    rows = [row | {"heat": float(parts.features.values[i])} for i, row in enumerate(part_rows(shape.mesh, parts))]
+        err.print(
+            f"{n_fragments} fragments with less than 1 % of the area each are one region each, without a feature"
+        )
+    rows = [
+        row | {"heat": float(parts.features.values[i])}
+        for i, row in enumerate(part_rows(shape.mesh, parts))
+    ]
     loose = set(shape.fragments.tolist())
     if as_json:
-        found = {"path": str(mesh), "recipe": recipe.name, "features": rows, "heat_error": error}
+        found = {
+            "path": str(mesh),
+            "recipe": recipe.name,
+            "features": rows,
+            "heat_error": shape.error,
+        }
         print_json(found | {"face_labels": parts.labels})
     else:
-        features_alone = [row | {"feature": i} for i, row in enumerate(rows) if row["vertex"] not in loose]
+        features_alone = [
+            row | {"feature": i} for i, row in enumerate(rows) if row["vertex"] not in loose
+        ]
         print_rows("Feature points", COLUMNS, features_alone)
     if picture:
         save_picture(figure_segments(surface, parts.labels, parts.features.vertices), picture)
     if ply:
-        save_colors(surface, value_colors(np.log(np.maximum(shape.heat, np.finfo(np.float64).tiny))), ply)
-
-
-def _described(
-    surface: TriangleMesh, recipe: Recipe, accuracy: float | None, progress: Progress
-) -> DescribedShape | DescribedLargeShape:
-    """Take a certified spectrum where that is not asked too much, and approximate heat beyond."""
-    if accuracy is None and surface.n_vertices <= LARGE:
-        return describe_mesh(surface, recipe, progress=progress)
-    return describe_large_mesh(
-        surface, recipe, accuracy=USUAL_ACCURACY if accuracy is None else accuracy, progress=progress
-    )
+        save_colors(
+            surface, value_colors(np.log(np.maximum(shape.heat, np.finfo(np.float64).tiny))), ply
+        )

@@ -22,14 +22,16 @@ from eigenshape.cli.console import (
 )
 from eigenshape.cli.presets import PATCHES, PresetOption, recipe_to_fill, require_preset
 from eigenshape.io.parsing import MESH_FORMATS
-from eigenshape.retrieval.store.batch import BatchReport, Describe, build_index
+from eigenshape.retrieval.kinds import AnyRecipe
+from eigenshape.retrieval.store.batch import BatchReport, build_index
 from eigenshape.retrieval.store.index import ShapeIndex
-from eigenshape.retrieval.store.kinds import AnyRecipe, Descriptor, describe_to_keep
 from eigenshape.retrieval.store.workers import Item, Workers
 
 SOME_FAILED = 3
 
-DbOption = Annotated[Path, typer.Option("--db", help="Folder of the index; made if it is not there.")]
+DbOption = Annotated[
+    Path, typer.Option("--db", help="Folder of the index; made if it is not there.")
+]
 ViewsOption = Annotated[
     int | None,
     typer.Option(
@@ -41,18 +43,24 @@ ViewsOption = Annotated[
         ),
     ),
 ]
-WorkersOption = Annotated[int, typer.Option(min=1, help="Number of processes that describe shapes at the same time.")]
+WorkersOption = Annotated[
+    int, typer.Option(min=1, help="Number of processes that describe shapes at the same time.")
+]
 
 
 def index(
-    sources: Annotated[list[Path], typer.Argument(help="Mesh files, or folders to search for them.")],
+    sources: Annotated[
+        list[Path], typer.Argument(help="Mesh files, or folders to search for them.")
+    ],
     *,
     db: DbOption,
     preset_name: PresetOption = PATCHES,
     views: ViewsOption = None,
     repair: RepairOption = "",
     workers: WorkersOption = 2,
-    timeout: Annotated[float, typer.Option(min=1, help="Seconds after which a file is given up and named.")] = 300.0,
+    timeout: Annotated[
+        float, typer.Option(min=1, help="Seconds after which a file is given up and named.")
+    ] = 300.0,
     as_json: JsonOption = False,
 ) -> None:
     """Describe meshes and add them to an index; a file that fails is named, and the others are still added.
@@ -64,8 +72,7 @@ def index(
     items, repairs, processes = _items(sources), repair_names(repair), Workers(workers, timeout)
     shelf = ShapeIndex.open_or_create(db)
     recipe = recipe_to_fill(shelf, preset_name, items, repairs, processes)
-    describe = partial(describe_file, recipe=recipe, repairs=repairs, n_views=views)
-    report = describe_all(shelf, items, describe, recipe, processes)
+    report = describe_all(shelf, items, recipe, processes, repairs=repairs, n_views=views)
     if as_json:
         print_json({"db": str(db), "shapes": len(shelf), **vars(report)})
     else:
@@ -75,24 +82,36 @@ def index(
 
 
 def describe_all(
-    shelf: ShapeIndex, items: Sequence[Item], describe: Describe, recipe: AnyRecipe, workers: Workers
+    shelf: ShapeIndex,
+    items: Sequence[Item],
+    recipe: AnyRecipe,
+    workers: Workers,
+    *,
+    repairs: tuple[str, ...] = (),
+    n_views: int | None = None,
 ) -> BatchReport:
-    """Build an index with a progress bar, naming what cannot be taken as it comes."""
+    """Build an index with a progress bar, naming each file that fails as soon as it does."""
     with progress_bar("index") as progress:
-        return build_index(shelf, items, describe, recipes=(recipe,), workers=workers, told=told_by(progress))
-
-
-def describe_file(path: Path, *, recipe: AnyRecipe, repairs: tuple[str, ...], n_views: int | None) -> list[Descriptor]:
-    """Read a mesh, repair it as asked, and describe it, whole and as it is seen from some sides."""
-    mesh = read_repaired(path, repairs)
-    return describe_to_keep(mesh, recipe, n_views=n_views)
+        return build_index(
+            shelf,
+            items,
+            partial(read_repaired, names=repairs),
+            recipes=(recipe,),
+            n_views=n_views,
+            workers=workers,
+            callback=told_by(progress),
+        )
 
 
 def _items(sources: Sequence[Path]) -> list[Item]:
     items = [item for source in sources for item in _items_of(source)]
-    double = next((name for name, count in Counter(item.name for item in items).items() if count > 1), None)
+    double = next(
+        (name for name, count in Counter(item.name for item in items).items() if count > 1), None
+    )
     if double is not None:
-        raise InvalidParameterError(f"Names of shapes must differ; {double!r} comes twice. Give one common folder.")
+        raise InvalidParameterError(
+            f"Names of shapes must differ; {double!r} comes twice. Give one common folder."
+        )
     if not items:
         raise InvalidParameterError(
             f"There must be meshes ({', '.join(MESH_FORMATS)}) to index; {sources[0]} holds none."

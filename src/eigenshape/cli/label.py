@@ -51,15 +51,24 @@ def label(
     n_parts: Annotated[
         int | None,
         typer.Option(
-            "-n", "--n-parts", help="Largest number of parts to cut each mesh into; by default as many as are found."
+            "-n",
+            "--n-parts",
+            help="Largest number of parts to cut each mesh into; by default as many as are found.",
         ),
     ] = None,
     repair: RepairOption = "",
-    save: Annotated[Path | None, typer.Option(help="Write the labels, one a line for each face.")] = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Write the mesh with its labels, also as colors (PLY).")
+    save: Annotated[
+        Path | None, typer.Option(help="Write the labels, one a line for each face.")
     ] = None,
-    picture: Annotated[Path | None, typer.Option(help="Draw both meshes side by side (PNG, SVG or PDF).")] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="Write the mesh with its labels, also as colors (PLY)."
+        ),
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="Draw both meshes side by side (PNG, SVG or PDF).")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Copy the labels of one mesh to the matching parts of another: label a horse, and get a labelled camel.
@@ -73,7 +82,9 @@ def label(
         found = transfer_labels(source, given, target, n_parts=n_parts, progress=progress)
     rows = _rows(target, found)
     if as_json:
-        print_json({"path": str(mesh), "like": str(like), "parts": rows, "face_labels": found.labels})
+        print_json(
+            {"path": str(mesh), "like": str(like), "parts": rows, "face_labels": found.labels}
+        )
     else:
         print_rows("Labels", COLUMNS, rows)
     if save:

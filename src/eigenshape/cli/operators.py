@@ -3,21 +3,31 @@
 from eigenshape.cli.console import JsonOption, out, print_json
 from eigenshape.operators.catalog import OPERATORS
 
-NAMES = {"TriangleMesh": "triangles", "SimplicialMesh": "simplices", "PointCloud": "points", "sparray": "graphs"}
+NAMES = {
+    "TriangleMesh": "triangles",
+    "SimplicialMesh": "simplices",
+    "PointCloud": "points",
+    "sparray": "graphs",
+}
 
 
 def operators(*, as_json: JsonOption = False) -> None:
     """List the operators that `spectrum --operator` takes, with the shapes and options of each."""
     if as_json:
-        print_json({name: {**_facts(name), "is": entry.says} for name, entry in OPERATORS.items()})
+        print_json(
+            {name: {**_facts(name), "is": entry.description} for name, entry in OPERATORS.items()}
+        )
         return
     for name, entry in OPERATORS.items():
         facts = _facts(name)
         options = "".join(f" --{option.replace('_', '-')}" for option in facts["options"])
         takes = ", ".join(facts["takes"]) + (";" if options else "")
-        out.print(f"[bold]{name:<15}[/]{entry.says}\n{'':<15}of {takes}{options}")
+        out.print(f"[bold]{name:<15}[/]{entry.description}\n{'':<15}of {takes}{options}")
 
 
 def _facts(name: str) -> dict[str, list[str]]:
     entry = OPERATORS[name]
-    return {"takes": [NAMES[kind.__name__] for kind in entry.takes], "options": list(entry.options)}
+    return {
+        "takes": [NAMES[kind.__name__] for kind in entry.shapes],
+        "options": list(entry.options),
+    }

@@ -26,12 +26,18 @@ def require_mesh_path(path: Path | None) -> None:
     if path is None:
         return
     if path.suffix.lower() not in WRITTEN:
-        raise InvalidParameterError(f"A mesh goes to {', '.join(WRITTEN)}; {path} ends in {path.suffix!r}.")
+        raise InvalidParameterError(
+            f"A mesh goes to {', '.join(WRITTEN)}; {path} ends in {path.suffix!r}."
+        )
     if not path.absolute().parent.is_dir():
-        raise InvalidParameterError(f"A mesh needs a folder to lie in; {path.absolute().parent} is not there.")
+        raise InvalidParameterError(
+            f"A mesh needs a folder to lie in; {path.absolute().parent} is not there."
+        )
 
 
-def save_like(source: Path, mesh: TriangleMesh, path: Path, moved: Float[ndarray, "n 3"] | None = None) -> None:
+def save_like(
+    source: Path, mesh: TriangleMesh, path: Path, moved: Float[ndarray, "n 3"] | None = None
+) -> None:
     """Write a mesh and say so on stderr; from OBJ to OBJ with the polygons, textures and groups that are left.
 
     Parameters

@@ -22,7 +22,9 @@ SHOWN: dict[str, Callable[[Any], str]] = {
     "area_share": lambda share: f"{100 * share:.1f} %",
     "confidence": lambda share: f"{100 * share:.0f} %",
     "splits_from": lambda part: "none" if part is None else str(part),
-    "persistence": lambda persistence: "never merges" if np.isinf(persistence) else f"{persistence:.4g}",
+    "persistence": lambda persistence: (
+        "never merges" if np.isinf(persistence) else f"{persistence:.4g}"
+    ),
 }
 
 
@@ -31,10 +33,14 @@ def require_paths(picture: Path | None, colored: Path | None, labels: Path | Non
     if picture:
         require_picture_path(picture)
     if colored and colored.suffix.lower() != ".ply":
-        raise InvalidParameterError(f"Colours go to a .ply file; {colored} ends in {colored.suffix!r}.")
+        raise InvalidParameterError(
+            f"Colours go to a .ply file; {colored} ends in {colored.suffix!r}."
+        )
     require_mesh_path(colored)
     if labels and not labels.absolute().parent.is_dir():
-        raise InvalidParameterError(f"Labels need a folder to lie in; {labels.absolute().parent} is not there.")
+        raise InvalidParameterError(
+            f"Labels need a folder to lie in; {labels.absolute().parent} is not there."
+        )
 
 
 def save_colors(
@@ -64,4 +70,8 @@ def part_rows(mesh: TriangleMesh, parts: Segmentation) -> list[dict[str, Any]]:
 
 def print_rows(title: str, columns: dict[str, str], rows: list[dict[str, Any]]) -> None:
     """Print rows as a table: under each heading the entry that it names."""
-    print_table(title, list(columns), [[SHOWN.get(key, str)(row[key]) for key in columns.values()] for row in rows])
+    print_table(
+        title,
+        list(columns),
+        [[SHOWN.get(key, str)(row[key]) for key in columns.values()] for row in rows],
+    )

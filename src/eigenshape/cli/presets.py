@@ -2,30 +2,32 @@
 
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from eigenshape._errors import InvalidParameterError, StoreError
 from eigenshape.cli.console import err, progress_bar, read_repaired, told_by
-from eigenshape.retrieval.heat.descriptor import PRESETS, SCALE_FREE, Recipe
-from eigenshape.retrieval.patches.codebook import made_codebook
-from eigenshape.retrieval.patches.descriptor import PatchRecipe, seen_patches
-from eigenshape.retrieval.patches.patches import Patches
-from eigenshape.retrieval.store.batch import learn_words
+from eigenshape.retrieval.heat.descriptor import PRESETS, HeatRecipe
+from eigenshape.retrieval.kinds import AnyRecipe
+from eigenshape.retrieval.patches.codebook import default_codebook
+from eigenshape.retrieval.patches.descriptor import PatchRecipe
+from eigenshape.retrieval.store.batch import train_codebook_from_files
 from eigenshape.retrieval.store.index import ShapeIndex
-from eigenshape.retrieval.store.kinds import AnyRecipe
 from eigenshape.retrieval.store.workers import Item, Workers
 
 PATCHES = "patches"
-TEACHING_VIEWS = 2
 EVERY = (PATCHES, *PRESETS)
 
-HeatPresetOption = Annotated[str, typer.Option("--preset", help=f"How shapes are described: {' or '.join(PRESETS)}.")]
+HeatPresetOption = Annotated[
+    str, typer.Option("--preset", help=f"How shapes are described: {' or '.join(PRESETS)}.")
+]
 PresetOption = Annotated[
     str,
-    typer.Option("--preset", help=f"How shapes are described: {', '.join(EVERY)}; patches are best for partial scans."),
+    typer.Option(
+        "--preset",
+        help=f"How shapes are described: {', '.join(EVERY)}; patches are best for partial scans.",
+    ),
 ]
 HeldPresetOption = Annotated[
     str | None,
@@ -39,7 +41,7 @@ HeldPresetOption = Annotated[
 ]
 
 
-def heat_preset(name: str) -> Recipe:
+def heat_preset(name: str) -> HeatRecipe:
     """Look up a recipe of heat by the name that a user typed."""
     require_preset(name, tuple(PRESETS))
     return PRESETS[name]
@@ -54,37 +56,43 @@ def require_preset(name: str, names: Sequence[str] = EVERY) -> None:
 def recipe_to_fill(
     shelf: ShapeIndex, name: str, items: Sequence[Item], repairs: tuple[str, ...], workers: Workers
 ) -> AnyRecipe:
-    """Return the recipe of a preset for an index: for patches with its words, which it learns if it has none yet."""
+    """Return the recipe of a preset for an index; for patches, learn a codebook if it has none."""
     if name != PATCHES:
         return PRESETS[name]
-    held = _patch_recipe(shelf)
-    if held is None:
-        with progress_bar("words") as progress:
-            book = learn_words(items, partial(teach, repairs=repairs), workers=workers, told=told_by(progress))
+    recipe = _patch_recipe(shelf)
+    if recipe is None:
+        with progress_bar("codebook") as progress:
+            codebook = train_codebook_from_files(
+                items,
+                partial(read_repaired, names=repairs),
+                workers=workers,
+                callback=told_by(progress),
+            )
         err.print(
-            "words of patches: those that come with eigenshape, since there are few shapes to learn from"
-            if book == made_codebook()
-            else "words of patches: learnt from shapes of this index"
+            "codebook of patches: the one of eigenshape, since there are few shapes to learn from"
+            if codebook == default_codebook()
+            else "codebook of patches: learned from shapes of this index"
         )
-        held = PatchRecipe(book)
-        shelf.keep_recipe(held)
-        held = _patch_recipe(shelf) or held  # of several first writers, the words of the first serve all
-    return held
-
-
-def teach(path: Path, *, repairs: tuple[str, ...]) -> list[Patches]:
-    """Return the patches of a file's mesh and of two views of it."""
-    return seen_patches(read_repaired(path, repairs), n_views=TEACHING_VIEWS)
+        recipe = PatchRecipe(codebook)
+        shelf.keep_recipe(recipe)
+        # Of several processes that fill a new index, all take the codebook of the first.
+        recipe = _patch_recipe(shelf) or recipe
+    return recipe
 
 
 def recipe_to_ask(shelf: ShapeIndex, name: str | None) -> AnyRecipe:
-    """Return the recipe of a preset in which an index can answer; without name, its own."""
-    patches = _patch_recipe(shelf)
-    if name == PATCHES and patches is None:
-        raise StoreError(f"An index answers in the recipes it holds; {shelf.folder} holds no patches.")
-    if patches is not None and name in (None, PATCHES):
-        return patches
-    return PRESETS[name] if name else next(iter(shelf.recipes()), SCALE_FREE)
+    """Return the recipe of a preset by which an index can answer; without a name, its own."""
+    if name is None:
+        return shelf.default_recipe()
+    if name != PATCHES:
+        return PRESETS[name]
+    recipe = _patch_recipe(shelf)
+    if recipe is None:
+        raise StoreError(
+            f"An index must hold descriptors of the requested preset; {shelf.folder} holds no "
+            "patches."
+        )
+    return recipe
 
 
 def _patch_recipe(shelf: ShapeIndex) -> PatchRecipe | None:

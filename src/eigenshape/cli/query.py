@@ -27,9 +27,16 @@ from eigenshape.retrieval.store.index import Match, ShapeIndex
 
 def query(
     db: Annotated[Path, typer.Argument(help="Folder of the index.")],
-    scan: Annotated[Path, typer.Argument(help="Mesh file to search for: a whole shape or a part of one, in any pose.")],
+    scan: Annotated[
+        Path,
+        typer.Argument(
+            help="Mesh file to search for: a whole shape or a part of one, in any pose."
+        ),
+    ],
     *,
-    n_matches: Annotated[int, typer.Option("-n", "--n-matches", min=1, help="Number of matches to show.")] = 5,
+    n_matches: Annotated[
+        int, typer.Option("-n", "--n-matches", min=1, help="Number of matches to show.")
+    ] = 5,
     preset_name: HeldPresetOption = None,
     repair: RepairOption = "",
     sheet: Annotated[
@@ -56,10 +63,18 @@ def query(
     answered = perf_counter()
     if as_json:
         seconds = {"describe": described - began, "query": answered - described}
-        print_json({"scan": str(scan), "seconds": seconds, "matches": [_facts(shape, match) for match in matches]})
+        print_json(
+            {
+                "scan": str(scan),
+                "seconds": seconds,
+                "matches": [_facts(shape, match) for match in matches],
+            }
+        )
     else:
         print_matches(matches)
-        out.print(f"described in {described - began:.2f} s, answered in {1000 * (answered - described):.0f} ms")
+        out.print(
+            f"described in {described - began:.2f} s, answered in {1000 * (answered - described):.0f} ms"
+        )
     if sheet:
         names = literal(scan.name), literal(db.name)
         caption = f"{names[0]} and the {len(matches)} most similar shapes in {names[1]}: {CAPTION}"
@@ -69,7 +84,10 @@ def query(
 
 def _facts(shape: Asked, match: Match) -> dict[str, Any]:
     pairs = [
-        {"query_vertex": int(shape.descriptor.vertices[one]), "match_vertex": int(match.vertices[two])}
+        {
+            "query_vertex": int(shape.descriptor.vertices[one]),
+            "match_vertex": int(match.vertices[two]),
+        }
         for one, two in match.correspondences
     ]
     return {
@@ -83,5 +101,8 @@ def _facts(shape: Asked, match: Match) -> dict[str, Any]:
 
 def print_matches(matches: Sequence[Match]) -> None:
     """Print matches, best first, with the vertices that correspond best."""
-    rows = [[match.name, match.label or "", f"{match.score:.4g}", str(len(match.correspondences))] for match in matches]
+    rows = [
+        [match.name, match.label or "", f"{match.score:.4g}", str(len(match.correspondences))]
+        for match in matches
+    ]
     print_table("Most similar shapes", ["shape", "class", "score", "corresponding points"], rows)

@@ -9,7 +9,13 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape.deformation.handles import Rotation, Translation
-from eigenshape.deformation.region import Box, Brush, Region, region_boundary, region_mask
+from eigenshape.deformation.region import (
+    BoxRegion,
+    BrushRegion,
+    Region,
+    region_boundary,
+    region_mask,
+)
 from eigenshape.features.boundaries import smooth_boundaries
 from eigenshape.features.parts import PART_CONTRAST, facing_outward, find_parts
 from eigenshape.features.segmentation import segment
@@ -38,7 +44,7 @@ def told_region(text: str, mesh: TriangleMesh, progress: Progress) -> Region:
     if found := VERTEX.fullmatch(text):
         vertex = whole_number(int(found[1]), "A vertex of a region", 0, mesh.n_vertices - 1)
         radius = float(found[2]) * (surface_area(mesh) ** 0.5 / 100 if found[3] else 1.0)
-        return Brush(mesh.vertices[vertex], radius)
+        return BrushRegion(mesh.vertices[vertex], radius)
     if found := PART.fullmatch(text):
         return _part(mesh, int(found[1]), progress)
     conditions = [CONDITION.fullmatch(piece) for piece in text.split(",")]
@@ -49,14 +55,14 @@ def told_region(text: str, mesh: TriangleMesh, progress: Progress) -> Region:
     raise InvalidParameterError(f"A region is one of these: {REGIONS} It was given {text!r}.")
 
 
-def _box(conditions: list[re.Match[str]], mesh: TriangleMesh) -> Box:
+def _box(conditions: list[re.Match[str]], mesh: TriangleMesh) -> BoxRegion:
     ends = np.array([np.full(3, -np.inf), np.full(3, np.inf)])
     low, span = mesh.vertices.min(axis=0), np.ptp(mesh.vertices, axis=0)
     for found in conditions:
         axis, side = "xyz".index(found[1]), "><".index(found[2])
         value = float(found[3])
         ends[side, axis] = low[axis] + value / 100 * span[axis] if found[4] else value
-    return Box(*ends)
+    return BoxRegion(*ends)
 
 
 def _part(mesh: TriangleMesh, number: int, progress: Progress) -> Region:
@@ -70,7 +76,9 @@ def _listed(path: Path) -> Region:
     try:
         return np.array([int(line) for line in path.read_text().split()], dtype=np.int64)
     except ValueError as err:
-        raise InvalidParameterError(f"{path} must hold one index of a vertex a line; {err}.") from err
+        raise InvalidParameterError(
+            f"{path} must hold one index of a vertex a line; {err}."
+        ) from err
 
 
 def told_rotation(text: str, mesh: TriangleMesh, region: Region) -> Rotation:
@@ -88,7 +96,9 @@ def told_rotation(text: str, mesh: TriangleMesh, region: Region) -> Rotation:
             f"it was given {text!r}."
         )
     named = {"x": [1, 0, 0], "y": [0, 1, 0], "z": [0, 0, 1]}
-    axis = np.array(named[found[1]], dtype=float) if found[1] in named else _three(found[1], "An axis")
+    axis = (
+        np.array(named[found[1]], dtype=float) if found[1] in named else _three(found[1], "An axis")
+    )
     if found[3]:
         return Rotation(_three(found[3], "A pivot"), axis, np.deg2rad(float(found[2])))
     rim = region_boundary(mesh, region_mask(mesh, region))
@@ -111,5 +121,7 @@ def _three(text: str, name: str) -> np.ndarray:
     try:
         x, y, z = (float(piece) for piece in text.split(","))
     except ValueError as err:
-        raise InvalidParameterError(f"{name} is three numbers with commas between; it was given {text!r}.") from err
+        raise InvalidParameterError(
+            f"{name} is three numbers with commas between; it was given {text!r}."
+        ) from err
     return np.array([x, y, z])

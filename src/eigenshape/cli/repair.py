@@ -17,7 +17,8 @@ from eigenshape.cli.console import (
 )
 from eigenshape.cli.info import mesh_facts
 from eigenshape.cli.outputs import require_mesh_path, save_like
-from eigenshape.geometry import repair as repairs
+from eigenshape.geometry.repair import REPAIRS
+from eigenshape.geometry.repair import repair as repair_mesh
 from eigenshape.io.mesh_files import read_mesh
 
 USUAL = "auto"
@@ -30,14 +31,17 @@ ROWS = (
 def repair(
     mesh: MeshArgument,
     *,
-    output: Annotated[Path, typer.Option("-o", "--output", "--out", help="Mesh to write: OFF, OBJ, PLY, STL or GLB.")],
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", "--out", help="Mesh to write: OFF, OBJ, PLY, STL or GLB."),
+    ],
     names: Annotated[
         str,
         typer.Option(
             "--repair",
             metavar="NAMES",
             help=(
-                f"Repairs to apply in this order, separated by commas: {', '.join(repairs.REPAIRS)}. '' only converts."
+                f"Repairs to apply in this order, separated by commas: {', '.join(REPAIRS)}. '' only converts."
             ),
         ),
     ] = USUAL,
@@ -51,7 +55,7 @@ def repair(
     require_mesh_path(output)
     chosen = repair_names(names)
     before = read_mesh(mesh, cells=cells)
-    done = repairs.repair(before, chosen)
+    done = repair_mesh(before, chosen)
     for line in done.report:
         err.print(f"[yellow]repair:[/] {shown(line)}")
     facts = {"before": mesh_facts(before), "after": mesh_facts(done.mesh)}
@@ -59,7 +63,9 @@ def repair(
     if as_json:
         print_json({"path": str(mesh), "output": str(output), "report": list(done.report), **facts})
         return
-    rows = [[name.replace("_", " "), *(_shown(fact[name]) for fact in facts.values())] for name in ROWS]
+    rows = [
+        [name.replace("_", " "), *(_shown(fact[name]) for fact in facts.values())] for name in ROWS
+    ]
     print_table("Repaired", ["", *facts], rows)
 
 

@@ -24,8 +24,8 @@ from eigenshape.features.parts import PART_CONTRAST, facing_outward, find_parts
 from eigenshape.features.segmentation import Segmentation, Tree, merge_targets
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.plot.fields import figure_segments, part_colors
-from eigenshape.retrieval.heat.describe import describe_mesh
 from eigenshape.retrieval.heat.descriptor import PRESETS
+from eigenshape.retrieval.heat.features import find_heat_features
 
 PARTS = "parts"
 METHODS = (PARTS, *PRESETS)
@@ -51,7 +51,9 @@ def segment(
             )
         ),
     ] = PARTS,
-    n_regions: Annotated[int | None, typer.Option("-n", "--n-regions", help="Largest number of parts.")] = None,
+    n_regions: Annotated[
+        int | None, typer.Option("-n", "--n-regions", help="Largest number of parts.")
+    ] = None,
     persistence: Annotated[
         float | None,
         typer.Option(
@@ -62,7 +64,10 @@ def segment(
         ),
     ] = None,
     largest_gap: Annotated[
-        bool, typer.Option("--largest-gap", help="Keep the parts before the largest drop of persistence.")
+        bool,
+        typer.Option(
+            "--largest-gap", help="Keep the parts before the largest drop of persistence."
+        ),
     ] = False,
     smooth: Annotated[
         bool | None,
@@ -74,14 +79,18 @@ def segment(
     repair: RepairOption = "",
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Write the mesh with its parts as colors and labels (PLY)."),
+        typer.Option(
+            "-o", "--output", help="Write the mesh with its parts as colors and labels (PLY)."
+        ),
     ] = None,
     picture: Annotated[Path | None, typer.Option(help="Draw the parts (PNG, SVG or PDF).")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Cut a mesh into its parts: limbs, head, torso."""
     if method not in METHODS:
-        raise InvalidParameterError(f"--method takes {', '.join(METHODS)}; it was given {method!r}.")
+        raise InvalidParameterError(
+            f"--method takes {', '.join(METHODS)}; it was given {method!r}."
+        )
     require_paths(picture, output)
     surface = load_mesh(mesh, repair)
     with progress_bar("parts") as progress:
@@ -93,7 +102,9 @@ def segment(
         parts = smooth_boundaries(facing_outward(surface), parts)
     rows = _rows(surface, tree, parts)
     if as_json:
-        print_json({"path": str(mesh), "method": method, "parts": rows, "face_labels": parts.labels})
+        print_json(
+            {"path": str(mesh), "method": method, "parts": rows, "face_labels": parts.labels}
+        )
     else:
         print_rows("Parts", COLUMNS, rows)
     if output:
@@ -106,7 +117,7 @@ def _tree(surface: TriangleMesh, method: str, progress: Progress) -> tuple[Tree,
     """Return the tree of a method, and where it is cut unless told: fragments do not count among the regions."""
     if method == PARTS:
         return find_parts(surface, progress=progress).tree, {"persistence": PART_CONTRAST}
-    shape = describe_mesh(surface, PRESETS[method], progress=progress)
+    shape = find_heat_features(surface, PRESETS[method], progress=progress)
     n_fragments = int(np.isin(shape.tree.maxima, shape.fragments).sum())
     return shape.tree, {"n_regions": PRESETS[method].n_features + n_fragments}
 

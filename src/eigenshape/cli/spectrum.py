@@ -1,15 +1,14 @@
 """eigenshape spectrum: the lowest eigenvalues of a shape by any operator, with their proof."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 from jaxtyping import Int
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape._progress import Progress
 from eigenshape.cli.console import (
     CellsOption,
     DimOption,
@@ -41,14 +40,11 @@ from eigenshape.plot.fields import figure_eigenfunctions
 from eigenshape.plot.save import require_picture_path
 from eigenshape.plot.spectra import figure_spectrum
 from eigenshape.spectral.bounds.brackets import Brackets, bracket_eigenvalues
-from eigenshape.spectral.multilevel.approximate import approximate_spectrum
-from eigenshape.spectral.solver.dirichlet import solve_dirichlet
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 N_PICTURED = 8
 USUAL = 20  # pairs
-Device = Literal["cpu", "gpu"]
 ORDERS = {"p2": 2, "p3": 3}
 
 
@@ -63,10 +59,12 @@ def spectrum(
         ),
     ] = None,
     below: Annotated[
-        float | None, typer.Option(help="Instead of -k: all eigenvalues below this value, in 1/length².")
+        float | None,
+        typer.Option(help="Instead of -k: all eigenvalues below this value, in 1/length²."),
     ] = None,
     above: Annotated[
-        float | None, typer.Option(help="With --below: only eigenvalues from this value on, in 1/length².")
+        float | None,
+        typer.Option(help="With --below: only eigenvalues from this value on, in 1/length²."),
     ] = None,
     operator: Annotated[
         str | None,
@@ -88,32 +86,44 @@ def spectrum(
             )
         ),
     ] = None,
-    device: Annotated[
-        Device, typer.Option(help="Where --accuracy computes; gpu needs `pip install eigenshape[gpu]`.")
-    ] = "cpu",
     boundary: Annotated[
-        Condition, typer.Option(help="Boundary condition: neumann is free, dirichlet holds the boundary at 0.")
+        Condition,
+        typer.Option(
+            help="Boundary condition: neumann leaves the boundary free, dirichlet fixes it at 0."
+        ),
     ] = "neumann",
     brackets: Annotated[
         bool,
         typer.Option(
-            "--brackets", help="Also compute guaranteed lower and upper bounds of the eigenvalues of the mesh itself."
+            "--brackets",
+            help="Also compute guaranteed lower and upper bounds of the eigenvalues of the mesh itself.",
         ),
     ] = False,
-    mass: Annotated[Mass | None, typer.Option(help="Mass matrix of the cotangent operator.")] = None,
-    t: Annotated[float | None, typer.Option(help="Heat time of a kernel operator, in length².")] = None,
-    h: Annotated[float | None, typer.Option(help="Instead of --t: width of the kernel, 2√t, in length.")] = None,
+    mass: Annotated[
+        Mass | None, typer.Option(help="Mass matrix of the cotangent operator.")
+    ] = None,
+    t: Annotated[
+        float | None, typer.Option(help="Heat time of a kernel operator, in length².")
+    ] = None,
+    h: Annotated[
+        float | None, typer.Option(help="Instead of --t: width of the kernel, 2√t, in length.")
+    ] = None,
     edge_factor: Annotated[
         float | None, typer.Option(help="Instead of --t: width of the kernel in mean edge lengths.")
     ] = None,
-    correct: Annotated[Correction | None, typer.Option(help="Correct the bias of a kernel operator.")] = None,
+    correct: Annotated[
+        Correction | None, typer.Option(help="Correct the bias of a kernel operator.")
+    ] = None,
     form: Annotated[
-        Form | None, typer.Option(help="Mass matrix of a kernel operator; random-walk copes with noise.")
+        Form | None,
+        typer.Option(help="Mass matrix of a kernel operator; random-walk copes with noise."),
     ] = None,
     distance: Annotated[
         Distance | None, typer.Option(help="Distance that the kernel of the mesh operator uses.")
     ] = None,
-    cutoff: Annotated[float | None, typer.Option(help="Distance at which a kernel is cut off, in widths.")] = None,
+    cutoff: Annotated[
+        float | None, typer.Option(help="Distance at which a kernel is cut off, in widths.")
+    ] = None,
     mollify: Annotated[
         float | None,
         typer.Option(
@@ -124,13 +134,20 @@ def spectrum(
     drop_missing: DropMissingOption = False,
     cells: CellsOption = None,
     repair: RepairOption = "",
-    plot: Annotated[Path | None, typer.Option(help="Draw the eigenvalues (PNG, SVG or PDF).")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw the eigenvalues (PNG, SVG or PDF).")
+    ] = None,
     picture: Annotated[
-        Path | None, typer.Option(help="Draw the first eigenfunctions with their nodal lines (PNG, SVG or PDF).")
+        Path | None,
+        typer.Option(
+            help="Draw the first eigenfunctions with their nodal lines (PNG, SVG or PDF)."
+        ),
     ] = None,
     save: Annotated[
         Path | None,
-        typer.Option(help="Write eigenvalues, eigenvectors and the proof (.npz; Spectrum.load reads it)."),
+        typer.Option(
+            help="Write eigenvalues, eigenvectors and the proof (.npz; Spectrum.load reads it)."
+        ),
     ] = None,
     cache: Annotated[
         Path | None,
@@ -143,24 +160,57 @@ def spectrum(
     """Compute the lowest eigenvalues of a shape and prove that none is missing."""
     for path in filter(None, (plot, picture)):
         require_picture_path(path)
+    if accuracy is not None and below is not None:
+        raise InvalidParameterError(
+            "--accuracy needs -k, because the approximate method cannot count the eigenvalues below a value. Pass -k "
+            "instead of --below, or leave out --accuracy."
+        )
     scale = {"t": t, "h": h, "edge_factor": edge_factor, "cutoff": cutoff}
-    asked = {"mass": mass, "mollify": mollify, **scale, "correct": correct, "form": form, "distance": distance}
+    asked = {
+        "mass": mass,
+        "mollify": mollify,
+        **scale,
+        "correct": correct,
+        "form": form,
+        "distance": distance,
+    }
     options = {name: value for name, value in asked.items() if value is not None}
     found = load_shape(shape, repair, dim, drop_missing=drop_missing, cells=cells)
     _require_drawable(found, picture)
     bounded = _require_mesh(found) if brackets else None
     name = operator or default_operator(found)
-    held = _held(found, ORDERS.get(name, 1)) if boundary == "dirichlet" else None
+    fixed = _boundary_points(found, ORDERS.get(name, 1)) if boundary == "dirichlet" else None
     with progress_bar("spectrum") as progress:
         progress(0.0, "building the operator")
         laplacian = build_laplacian(found, name, **options)
-        n_pairs = _usual_pairs(laplacian, held) if k is None and below is None else k
-        wanted = _Wanted(n_pairs, above, below, held, accuracy, device, cache)
-        solved = _solved(laplacian, wanted, progress)
+        n_pairs = _usual_pairs(laplacian, fixed) if k is None and below is None else k
+        solved = solve_spectrum(
+            laplacian,
+            n_pairs,
+            fixed=fixed,
+            above=above,
+            below=below,
+            method="certified" if accuracy is None else "approximate",
+            accuracy=accuracy,
+            progress=progress,
+            cache=cache,
+        )
         count = solved.certificate.first + len(solved.eigenvalues)
-        bounds = bracket_eigenvalues(bounded, count, boundary=boundary, progress=progress) if bounded else None
+        bounds = (
+            bracket_eigenvalues(bounded, count, boundary=boundary, progress=progress)
+            if bounded
+            else None
+        )
     if as_json:
-        print_json({"path": str(shape), "operator": name, "boundary": boundary, **options, **_facts(solved, bounds)})
+        print_json(
+            {
+                "path": str(shape),
+                "operator": name,
+                "boundary": boundary,
+                **options,
+                **_facts(solved, bounds),
+            }
+        )
     else:
         _print(solved, bounds)
     if plot:
@@ -172,42 +222,14 @@ def spectrum(
         said(save)
 
 
-@dataclass(frozen=True)
-class _Wanted:
-    k: int | None
-    above: float | None
-    below: float | None
-    held: Int[np.ndarray, " c"] | None
-    accuracy: float | None
-    device: str
-    cache: Path | None
-
-
-def _usual_pairs(laplacian: Laplacian, held: Int[np.ndarray, " c"] | None) -> int:
-    """Return how many pairs to compute where nobody said, and tell on stderr where a shape has fewer than usual."""
-    most = laplacian.n_points - (0 if held is None else len(held))
+def _usual_pairs(laplacian: Laplacian, fixed: Int[np.ndarray, " c"] | None) -> int:
+    """Return the default number of pairs, with a note on stderr if the shape has fewer."""
+    most = laplacian.n_points - (0 if fixed is None else len(fixed))
     if most < USUAL:
-        err.print(f"[yellow]note:[/] {USUAL} pairs are usual; this shape has {most}, and all are computed")
-    return max(1, min(USUAL, most))
-
-
-def _solved(laplacian: Laplacian, wanted: _Wanted, progress: Progress) -> Spectrum:
-    if wanted.accuracy is not None:
-        if wanted.k is None or wanted.held is not None or wanted.cache:
-            raise InvalidParameterError(
-                "--accuracy goes with -k alone; --below, --boundary dirichlet and --cache are of the exact solver."
-            )
-        return approximate_spectrum(
-            laplacian, wanted.k, accuracy=wanted.accuracy, device=wanted.device, progress=progress
+        err.print(
+            f"[yellow]note:[/] {USUAL} pairs are usual; this shape has {most}, and all are computed"
         )
-    k, above, below = wanted.k, wanted.above, wanted.below
-    if wanted.held is not None:
-        if wanted.cache:
-            raise InvalidParameterError(
-                "--cache goes with the Neumann condition; spectra with points held are not kept."
-            )
-        return solve_dirichlet(laplacian, k, wanted.held, above=above, below=below, progress=progress)
-    return solve_spectrum(laplacian, k, above=above, below=below, progress=progress, cache=wanted.cache)
+    return max(1, min(USUAL, most))
 
 
 def _require_drawable(shape: Shape, picture: Path | None) -> None:
@@ -219,13 +241,17 @@ def _require_drawable(shape: Shape, picture: Path | None) -> None:
 
 def _require_mesh(shape: Shape) -> Mesh:
     if isinstance(shape, PointCloud):
-        raise InvalidParameterError("--brackets is for meshes; a cloud of points has no flat pieces to be bounded on.")
+        raise InvalidParameterError(
+            "--brackets is for meshes; a cloud of points has no flat pieces to be bounded on."
+        )
     return shape
 
 
-def _held(shape: Shape, order: int) -> Int[np.ndarray, " c"]:
+def _boundary_points(shape: Shape, order: int) -> Int[np.ndarray, " c"]:
     if isinstance(shape, PointCloud):
-        raise InvalidParameterError("--boundary dirichlet is for meshes; a cloud of points has no boundary to hold.")
+        raise InvalidParameterError(
+            "--boundary dirichlet is for meshes; a cloud of points has no boundary."
+        )
     nodes = fem_boundary_nodes(shape, order)
     if not nodes.size:
         raise InvalidParameterError(f"--boundary dirichlet needs a boundary; {shape!r} is closed.")
@@ -245,12 +271,16 @@ def _print(found: Spectrum, bounds: Brackets | None) -> None:
     columns, first = ["i", "λ", "error at most"], found.certificate.first
     rows = [
         [str(index), f"{value:.10g}", f"{residual:.1e}"]
-        for index, (value, residual) in enumerate(zip(found.eigenvalues, found.residuals, strict=True), first)
+        for index, (value, residual) in enumerate(
+            zip(found.eigenvalues, found.residuals, strict=True), first
+        )
     ]
     if bounds:
         columns += ["lower", "upper"]
         ends = zip(bounds.lower[first:], bounds.upper[first:], strict=True)
-        rows = [[*row, f"{low:.6g}", f"{high:.6g}"] for row, (low, high) in zip(rows, ends, strict=True)]
+        rows = [
+            [*row, f"{low:.6g}", f"{high:.6g}"] for row, (low, high) in zip(rows, ends, strict=True)
+        ]
     print_table("Eigenvalues, in 1/length²", columns, rows)
     out.print(found.certificate.explain())
     if bounds:

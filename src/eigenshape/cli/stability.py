@@ -33,7 +33,10 @@ from eigenshape.stability.report import USUAL_K, StabilityPlan, StabilityReport,
 
 USUAL = StabilityPlan()
 Scale = Literal["none", "area", "diameter"]
-SCALES: dict[str, Callable[[TriangleMesh], TriangleMesh]] = {"area": normalize_area, "diameter": normalize_diameter}
+SCALES: dict[str, Callable[[TriangleMesh], TriangleMesh]] = {
+    "area": normalize_area,
+    "diameter": normalize_diameter,
+}
 
 
 def stability(
@@ -41,11 +44,16 @@ def stability(
     two: ShapeArgument,
     *,
     k: Annotated[
-        int | None, typer.Option("-k", help=f"Number of eigenvalues to compare; {USUAL_K}, or as many as there are.")
+        int | None,
+        typer.Option(
+            "-k", help=f"Number of eigenvalues to compare; {USUAL_K}, or as many as there are."
+        ),
     ] = None,
     t: Annotated[
         list[float] | None,
-        typer.Option("-t", help="Heat time, in length²; may be repeated. By default four are chosen."),
+        typer.Option(
+            "-t", help="Heat time, in length²; may be repeated. By default four are chosen."
+        ),
     ] = None,
     n_samples: Annotated[
         int, typer.Option("-n", "--n-samples", help="Number of random points on each shape.")
@@ -63,12 +71,15 @@ def stability(
     ] = None,
     scale: Annotated[
         Scale,
-        typer.Option(help="Center both shapes and scale them to area 1 or to diameter 1 before they are compared."),
+        typer.Option(
+            help="Center both shapes and scale them to area 1 or to diameter 1 before they are compared."
+        ),
     ] = "none",
     brackets: Annotated[
         bool,
         typer.Option(
-            "--brackets", help="Compute guaranteed bounds of each eigenvalue, to prove that the shapes differ."
+            "--brackets",
+            help="Compute guaranteed bounds of each eigenvalue, to prove that the shapes differ.",
         ),
     ] = False,
     dim: DimOption = 2,
@@ -87,8 +98,13 @@ def stability(
     if picture:
         require_picture_path(picture)
     partners = read_map(map_file) if map_file else None
-    first, second = (_scaled(load_shape(path, repair, dim, drop_missing=drop_missing), scale) for path in (one, two))
-    plan = StabilityPlan(k=k, n_samples=n_samples, times=tuple(t or ()), seed=seed, brackets=brackets)
+    first, second = (
+        _scaled(load_shape(path, repair, dim, drop_missing=drop_missing), scale)
+        for path in (one, two)
+    )
+    plan = StabilityPlan(
+        k=k, n_samples=n_samples, times=tuple(t or ()), seed=seed, brackets=brackets
+    )
     with progress_bar("stability") as progress:
         report = compare_shapes(first, second, plan, partners=partners, progress=progress)
     if as_json:
@@ -96,7 +112,10 @@ def stability(
     else:
         _print(report)
     if picture:
-        save_picture(figure_stability(report, first, second, titles=(literal(one.stem), literal(two.stem))), picture)
+        save_picture(
+            figure_stability(report, first, second, titles=(literal(one.stem), literal(two.stem))),
+            picture,
+        )
 
 
 def _scaled(shape: Shape, scale: str) -> Shape:
@@ -112,7 +131,7 @@ def _facts(report: StabilityReport) -> dict[str, Any]:
     return {
         "spectra": {
             **asdict(compared),
-            "told": compared.told,
+            "proved": compared.proved_changes,
             "hausdorff": compared.hausdorff,
             "index_distance": compared.index_distance,
             "mean_relative": compared.mean_relative,
@@ -123,8 +142,14 @@ def _facts(report: StabilityReport) -> dict[str, Any]:
         "matched_floor": report.matched_floor,
         "delta": report.delta,
         "delta_of_the_map": report.closeness.delta if report.closeness else None,
-        "times": {**asdict(report.times), "empty": report.times.empty, "low_by": report.times.low_by},
-        "changes": [{**asdict(change), "seen": change.seen} for change in report.changes],
+        "times": {
+            **asdict(report.times),
+            "empty": report.times.empty,
+            "low_reason": report.times.low_reason,
+        },
+        "changes": [
+            {**asdict(change), "significant": change.significant} for change in report.changes
+        ],
         "eigenspaces": asdict(angles),
         "n_samples": report.n_samples,
         "explanation": report.explain(),
@@ -135,12 +160,20 @@ def _print(report: StabilityReport) -> None:
     compared = report.spectra
     pairs = np.where(compared.zero[:, None], 0.0, np.column_stack([compared.one, compared.two]))
     rows = [
-        [str(number), f"{one:.6g}", f"{two:.6g}", f"{change:.2%}", "yes" if told else "no"]
-        for number, ((one, two), change, told) in enumerate(zip(pairs, compared.relative, compared.told, strict=True))
+        [str(number), f"{one:.6g}", f"{two:.6g}", f"{change:.2%}", "yes" if proved else "no"]
+        for number, ((one, two), change, proved) in enumerate(
+            zip(pairs, compared.relative, compared.proved_changes, strict=True)
+        )
     ]
     print_table("Eigenvalues, in 1/length²", ["i", "first", "second", "change", "proved"], rows)
     heat = [
-        [f"{row.t:.3g}", f"{row.change:.3g}", f"{row.floor:.3g}", f"{row.weyl:.3g}", "yes" if row.trusted else "no"]
+        [
+            f"{row.t:.3g}",
+            f"{row.change:.3g}",
+            f"{row.floor:.3g}",
+            f"{row.weyl:.3g}",
+            "yes" if row.trusted else "no",
+        ]
         for row in report.changes
     ]
     title = f"Largest change of {len(rows)} eigenvalues of graph Laplacians, over the last, at heat time t (length²)"

@@ -1,4 +1,4 @@
-"""Bend a shape: a region of it follows a handle, and the rest follows smoothly."""
+"""Bend a shape: regions follow handles, and the rest follows smoothly."""
 
 from collections.abc import Sequence
 from typing import Literal, SupportsIndex, cast, get_args
@@ -6,11 +6,11 @@ from typing import Literal, SupportsIndex, cast, get_args
 from eigenshape._arguments import require_each, require_type
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.binding import Binding, bind
-from eigenshape.deformation.graded import graded, uncrossed
+from eigenshape.deformation.graded_bend import bend_graded, bend_uncrossed
 from eigenshape.deformation.handles import Handle
 from eigenshape.deformation.region import Region
 from eigenshape.deformation.rig import EigenRig
-from eigenshape.deformation.thesis import detail_skeleton, eigen_deformed
+from eigenshape.deformation.thesis import detailed_skeleton, eigen_deformation
 from eigenshape.geometry.mesh import TriangleMesh
 
 Mode = Literal["graded", "uncrossed", "thesis"]
@@ -25,18 +25,23 @@ def deform(
     mode: Mode = "graded",
     n_modes: SupportsIndex | None = None,
 ) -> TriangleMesh:
-    """Turn or move a region of a shape; the rest follows smoothly, and details survive (thesis chapter 6).
+    """Rotate or translate a region of a shape; the rest follows smoothly (thesis chapter 6).
 
-    For several edits of one region `bind` it once and `bend` it often; for several regions at once, the same.
+    To move one region many times, or several regions at once, call `bind` once and `bend` for each
+    motion.
 
     Parameters
     ----------
     rig : EigenRig
-    region, fixed, n_modes
-        As for `bind`.
+    region : (n,) bool, (k,) int, BoxRegion or BrushRegion
+        The vertices that the handle moves.
     handle : Rotation or Translation
+    fixed : region, optional
+        The vertices that must stay; see `bind`.
     mode : "graded", "uncrossed" or "thesis"
-        See `bend`.
+        The method; see `bend`.
+    n_modes : int, optional
+        Number of modes that spread the motion: fewer spread it further; see `bind`.
 
     Returns
     -------
@@ -47,6 +52,24 @@ def deform(
     ------
     InvalidParameterError
         As for `bind` and `bend`.
+
+    See Also
+    --------
+    rig_shape : Prepare a shape.
+    DeformationSession : Edit a shape step by step, with undo and redo.
+
+    Examples
+    --------
+    Turn the upper half of a sphere by 30 degrees about the vertical axis:
+
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> top = mesh.vertices[:, 2] > 0.2
+    >>> twist = es.Rotation(pivot=[0, 0, 0], axis=[0, 0, 1], angle=np.pi / 6)
+    >>> bent = es.deform(es.rig_shape(mesh), top, twist)
+    >>> bool(np.allclose(bent.vertices[:, 2], mesh.vertices[:, 2], atol=0.1))
+    True
     """
     require_type(rig, EigenRig, "rig")
     require_type(handle, Handle, "handle")
@@ -62,8 +85,10 @@ def bend(binding: Binding, handles: Sequence[Handle], *, mode: Mode = "graded") 
     handles : sequence of r Rotation or Translation
         One for each region.
     mode : "graded", "uncrossed" or "thesis"
-        By graded rotations and as rigidly as possible; the same, stiffer where faces would cross, which folds and
-        pinches less at the price of longer edges; or by the thesis' least-squares fit and its details.
+        "graded" rotates each vertex by its share of the motion and then makes edges as rigid as
+        possible. "uncrossed" does the same and stiffens the shape where faces would cross, which
+        avoids folds and changes edge lengths more. "thesis" is the least-squares fit of the thesis
+        with its details (chapter 6).
 
     Returns
     -------
@@ -73,33 +98,52 @@ def bend(binding: Binding, handles: Sequence[Handle], *, mode: Mode = "graded") 
     Raises
     ------
     InvalidParameterError
-        If there are more or fewer handles than regions, or the mode is another.
+        If the number of handles differs from the number of regions, or the mode is unknown.
 
     Warns
     -----
     UserWarning
-        If "uncrossed" leaves faces that cross, with their number.
+        If faces cross after "uncrossed", with the number of pairs.
+
+    See Also
+    --------
+    bind : Compute a binding.
+    deform : Bind and bend one region in one call.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> binding = es.deformation.bind(es.rig_shape(mesh), [mesh.vertices[:, 2] > 0.2])
+    >>> lifted = es.deformation.bend(binding, [es.Translation([0, 0, 0.5])])
+    >>> float(lifted.vertices[:, 2].max().round(3))
+    1.5
     """
     require_type(binding, Binding, "binding")
     require_each(handles, Handle, "handles")
     if len(handles) != len(binding.regions):
         raise InvalidParameterError(
-            f"Each region must have one handle; there are {len(binding.regions)} regions and {len(handles)} handles."
+            "Each region must have one handle; "
+            f"there are {len(binding.regions)} regions and {len(handles)} handles."
         )
     if require_mode(mode) == "thesis":
-        vertices = eigen_deformed(detail_skeleton(binding), handles)
+        vertices = eigen_deformation(detailed_skeleton(binding), handles)
+    elif mode == "uncrossed":
+        vertices = bend_uncrossed(binding, handles)
     else:
-        vertices = (uncrossed if mode == "uncrossed" else graded)(binding, handles)
+        vertices = bend_graded(binding, handles)
     return TriangleMesh(vertices, binding.rig.mesh.faces)
 
 
 def require_mode(mode: str) -> Mode:
-    """Return the mode, or refuse another.
+    """Return the mode; raise an error if it is unknown.
 
     Raises
     ------
     InvalidParameterError
     """
     if mode not in get_args(Mode):
-        raise InvalidParameterError(f"mode must be 'graded', 'uncrossed' or 'thesis'; it is {mode!r}.")
+        raise InvalidParameterError(
+            f"mode must be 'graded', 'uncrossed' or 'thesis'; it is {mode!r}."
+        )
     return cast(Mode, mode)

@@ -1,4 +1,4 @@
-"""How much a deformation stretches, squeezes and folds a shape."""
+"""Measure how much a deformation stretches, squeezes and folds a shape."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.deformation.rigidity import edge_weights, fitted_turns
+from eigenshape.deformation.rigidity import edge_weights, fit_turns
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, bounding_box, edge_lengths
 from eigenshape.geometry.mesh import TriangleMesh
@@ -16,18 +16,24 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 
 @dataclass(frozen=True, eq=False)
 class Distortion:
-    """What a deformation did to edges and faces.
+    """Changes of edges and faces in a deformation.
 
     Attributes
     ----------
     edge_error : float
-        Root mean square of the relative changes of edge lengths.
+        Root mean square of the relative changes of edge lengths, without unit.
     edge_error_of_box : float
-        Root mean square of the changes, over the diagonal of the box: the unit of table 6.2 of the thesis.
+        Root mean square of the changes of edge lengths, divided by the diagonal of the bounding
+        box, as in table 6.2 of the thesis.
     area_ratios : (f,) float
-        Area of each face, after over before.
+        Area of each face after the deformation, divided by its area before.
     flipped : (k,) int
-        Faces that look away from where the rotations of their corners, on the mean, would turn them.
+        Faces whose normal is turned by more than 90 degrees from its direction before, rotated by
+        the mean of the fitted rotations at the corners.
+
+    See Also
+    --------
+    measure_distortion : Compute the distortion.
     """
 
     edge_error: float
@@ -37,12 +43,12 @@ class Distortion:
 
 
 def measure_distortion(before: MeshLike, after: MeshLike) -> Distortion:
-    """Compare two poses of a mesh.
+    """Measure how much edges and faces change between two poses of a mesh.
 
     Parameters
     ----------
     before, after : MeshLike
-        With the same faces; those before may not be flat.
+        Two meshes with the same faces.
 
     Returns
     -------
@@ -53,7 +59,20 @@ def measure_distortion(before: MeshLike, after: MeshLike) -> Distortion:
     InvalidParameterError
         If the faces differ.
     InvalidShapeError
-        If a face has no area before.
+        If a face of `before` has no area.
+
+    Examples
+    --------
+    A sphere that is scaled by 1.1:
+
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> larger = es.TriangleMesh(1.1 * mesh.vertices, mesh.faces)
+    >>> distortion = es.deformation.measure_distortion(mesh, larger)
+    >>> round(distortion.edge_error, 6)
+    0.1
+    >>> distortion.area_ratios[:3].round(6)
+    array([1.21, 1.21, 1.21])
     """
     before = as_mesh(before, "before")
     after = as_mesh(after, "after")
@@ -65,7 +84,8 @@ def measure_distortion(before: MeshLike, after: MeshLike) -> Distortion:
     low, high = bounding_box(old)
     normals, turned = (area_vectors(mesh.vertices[mesh.faces]) for mesh in (old, new))
     edges = edge_weights(cotangent_laplacian(old).stiffness)
-    turns = fitted_turns(edges, old.vertices, new.vertices)[old.faces]
+    turns = fit_turns(edges, old.vertices, new.vertices)[old.faces]
+    # Scalar product of the new normal with the old one, turned by the rotation of each corner.
     away = np.einsum("fcij,fj,fi->f", turns, normals, turned) < 0
     return Distortion(
         float(np.sqrt(np.mean((change / lengths) ** 2))),
@@ -76,7 +96,7 @@ def measure_distortion(before: MeshLike, after: MeshLike) -> Distortion:
 
 
 def require_poses(before: TriangleMesh, after: TriangleMesh) -> None:
-    """Refuse two meshes that are not poses of one.
+    """Raise an error if two meshes do not have the same faces.
 
     Raises
     ------
@@ -84,4 +104,6 @@ def require_poses(before: TriangleMesh, after: TriangleMesh) -> None:
         If the faces differ.
     """
     if before.n_vertices != after.n_vertices or not np.array_equal(before.faces, after.faces):
-        raise InvalidParameterError(f"Poses of one mesh must have the same faces; these are {before} and {after}.")
+        raise InvalidParameterError(
+            f"Poses of one mesh must have the same faces; these are {before} and {after}."
+        )

@@ -1,6 +1,6 @@
-"""Edits as values: what was moved and how, fit to be kept as JSON and done again."""
+"""Edits as values that can be stored as JSON and applied again."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from typing import Any
@@ -8,22 +8,24 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from eigenshape._arguments import require_each, require_type
+from eigenshape._arguments import named_value, require_each, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import Mode, bend, require_mode
 from eigenshape.deformation.handles import Handle, Rotation, Translation
-from eigenshape.deformation.region import Box, Brush, Region, kept_region, region_mask
-from eigenshape.deformation.rig import EigenRig, posed
+from eigenshape.deformation.region import BoxRegion, BrushRegion, Region, copy_region, region_mask
+from eigenshape.deformation.rig import EigenRig, pose_rig
 from eigenshape.geometry.mesh import TriangleMesh
 
+# The entries "kind" and "version" of the JSON object. The version grows when older readers could
+# not read what is written.
 KIND, VERSION = "eigenshape edits", 2
 
 
 @dataclass(frozen=True)
 class MeshFingerprint:
-    """What tells a mesh from all others: its regions are indices of vertices, and mean nothing on another.
+    """Identifies the mesh of some edits, because indices of vertices mean nothing on another mesh.
 
     Attributes
     ----------
@@ -41,36 +43,65 @@ class MeshFingerprint:
 
 
 def mesh_fingerprint(mesh: TriangleMesh) -> MeshFingerprint:
-    """Return the fingerprint of a mesh, the same on every machine."""
-    numbers = mesh.vertices.astype("<f8") + 0.0  # -0 is 0
+    """Return the fingerprint of a mesh, which is the same on every machine."""
+    numbers = mesh.vertices.astype("<f8") + 0.0  # turns -0 into 0
     digest = sha256(numbers.tobytes() + mesh.faces.astype("<i8").tobytes()).hexdigest()
     return MeshFingerprint(mesh.n_vertices, mesh.n_faces, digest)
 
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """A region and the handle that moves it."""
+    """A region and the handle that moves it.
+
+    Parameters
+    ----------
+    region : (n,) bool, (k,) int, BoxRegion or BrushRegion
+        See `region_mask`.
+    handle : Rotation or Translation
+
+    Raises
+    ------
+    InvalidParameterError
+        If the region or the handle is of another type.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> top = es.deformation.BoxRegion([-9, -9, 0.2], [9, 9, 9])
+    >>> move = es.deformation.Move(top, es.Translation([0, 0, 1]))
+    """
 
     region: Region
     handle: Handle
 
     def __post_init__(self) -> None:
         require_type(self.handle, Handle, "handle")
-        object.__setattr__(self, "region", kept_region(self.region))
+        object.__setattr__(self, "region", copy_region(self.region))
 
 
 @dataclass(frozen=True, eq=False)
 class Edit:
-    """Regions that move at once, and what stays.
+    """One edit of a shape: regions that move together, and the region that stays.
 
-    Attributes
+    Parameters
     ----------
     moves : tuple of Move
     fixed : region, optional
+        The vertices that must stay; see `bind`.
     n_modes : int, optional
-        As for `bind`.
+        Number of modes; see `bind`.
     mode : "graded", "uncrossed" or "thesis"
-        As for `bend`.
+        The method; see `bend`.
+
+    Raises
+    ------
+    InvalidParameterError
+        If an entry of `moves` is not a `Move`, or `fixed` is not a region.
+
+    See Also
+    --------
+    apply_edit : Apply an edit to a rig.
+    replay : Apply several edits one after the other.
     """
 
     moves: tuple[Move, ...]
@@ -80,60 +111,92 @@ class Edit:
 
     def __post_init__(self) -> None:
         require_each(self.moves, Move, "moves")
-        object.__setattr__(self, "fixed", None if self.fixed is None else kept_region(self.fixed))
+        object.__setattr__(self, "fixed", None if self.fixed is None else copy_region(self.fixed))
 
 
 def apply_edit(rig: EigenRig, edit: Edit) -> EigenRig:
-    """Return the rig in the pose that an edit gives it; boxes and brushes are looked up in its present pose.
+    """Apply an edit to a rig.
+
+    Boxes and brushes select vertices in the present pose of the rig.
+
+    Parameters
+    ----------
+    rig : EigenRig
+    edit : Edit
+
+    Returns
+    -------
+    EigenRig
+        The rig in its new pose; `rig.mesh` is the deformed shape.
 
     Raises
     ------
     InvalidParameterError
         As for `bind` and `bend`.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> top = es.deformation.BoxRegion([-9, -9, 0.2], [9, 9, 9])
+    >>> edit = es.deformation.Edit((es.deformation.Move(top, es.Translation([0, 0, 1])),))
+    >>> lifted = es.deformation.apply_edit(es.rig_shape(es.icosphere(2)), edit)
+    >>> float(lifted.mesh.vertices[:, 2].max().round(3))
+    2.0
     """
     require_type(rig, EigenRig, "rig")
     require_type(edit, Edit, "edit")
-    binding = bind(rig, [move.region for move in edit.moves], fixed=edit.fixed, n_modes=edit.n_modes)
-    return posed(rig, bend(binding, [move.handle for move in edit.moves], mode=edit.mode).vertices)
+    regions = [move.region for move in edit.moves]
+    handles = [move.handle for move in edit.moves]
+    binding = bind(rig, regions, fixed=edit.fixed, n_modes=edit.n_modes)
+    return pose_rig(rig, bend(binding, handles, mode=edit.mode).vertices)
 
 
 def carry_edit(edit: Edit, source: TriangleMesh, target: TriangleMesh) -> Edit:
-    """Return an edit for another mesh of the same shape in the same place, vertices by their nearest.
+    """Return an edit for another mesh of the same shape in the same place.
 
-    Boxes and brushes stay as they are; of masks and indices, each vertex of the target asks its nearest in the source.
+    Boxes and brushes stay as they are. For masks and indices, each vertex of the target belongs to
+    a region if its nearest vertex of the source does.
     """
     nearest = cKDTree(source.vertices).query(target.vertices)[1]
 
-    def carried(region: Region) -> Region:
-        return region if isinstance(region, Box | Brush) else region_mask(source, region)[nearest]
+    def carry(region: Region) -> Region:
+        if isinstance(region, BoxRegion | BrushRegion):
+            return region
+        return region_mask(source, region)[nearest]
 
-    moves = tuple(Move(carried(move.region), move.handle) for move in edit.moves)
-    return Edit(moves, None if edit.fixed is None else carried(edit.fixed), edit.n_modes, edit.mode)
+    moves = tuple(Move(carry(move.region), move.handle) for move in edit.moves)
+    return Edit(moves, None if edit.fixed is None else carry(edit.fixed), edit.n_modes, edit.mode)
 
 
 def edits_to_json(edits: Sequence[Edit], mesh: TriangleMesh) -> dict[str, Any]:
-    """Return edits of a mesh as what JSON holds; regions of vertices by their indices.
+    """Return the edits of a mesh as a dictionary for JSON, with regions as indices of vertices.
 
     Raises
     ------
     InvalidParameterError
-        If a region is none of the mesh.
+        If a region does not fit the mesh.
     """
-    out = [_edit_out(edit, mesh) for edit in edits]
-    return {"kind": KIND, "version": VERSION, "mesh": asdict(mesh_fingerprint(mesh)), "edits": out}
-
-
-def _edit_out(edit: Edit, mesh: TriangleMesh) -> dict[str, Any]:
-    moves = [{"region": _region_out(move.region, mesh), "handle": _handle_out(move.handle)} for move in edit.moves]
-    fixed = None if edit.fixed is None else _region_out(edit.fixed, mesh)
-    return {"moves": moves, "fixed": fixed, "n_modes": edit.n_modes, "mode": edit.mode}
+    entries = []
+    for edit in edits:
+        moves = [
+            {"region": _region_out(move.region, mesh), "handle": _handle_out(move.handle)}
+            for move in edit.moves
+        ]
+        fixed = None if edit.fixed is None else _region_out(edit.fixed, mesh)
+        entries.append({"moves": moves, "fixed": fixed, "n_modes": edit.n_modes, "mode": edit.mode})
+    fingerprint = asdict(mesh_fingerprint(mesh))
+    return {"kind": KIND, "version": VERSION, "mesh": fingerprint, "edits": entries}
 
 
 def _region_out(region: Region, mesh: TriangleMesh) -> dict[str, Any]:
-    if isinstance(region, Box):
-        low, high = ([value if np.isfinite(value) else None for value in c.tolist()] for c in (region.low, region.high))
-        return {"kind": "box", "low": low, "high": high}  # JSON has no infinity
-    if isinstance(region, Brush):
+    if isinstance(region, BoxRegion):
+        # JSON has no infinity: null stands for an open side.
+        low, high = (
+            [value if np.isfinite(value) else None for value in corner.tolist()]
+            for corner in (region.low, region.high)
+        )
+        return {"kind": "box", "low": low, "high": high}
+    if isinstance(region, BrushRegion):
         return {"kind": "brush", "center": region.center.tolist(), "radius": region.radius}
     return {"kind": "vertices", "vertices": np.flatnonzero(region_mask(mesh, region)).tolist()}
 
@@ -146,77 +209,83 @@ def _handle_out(handle: Handle) -> dict[str, Any]:
 
 
 def edits_from_json(content: Any, mesh: TriangleMesh) -> list[Edit]:
-    """Return the edits of a mesh, as `edits_to_json` gave them.
+    """Return the edits of a mesh from what `edits_to_json` returned.
 
     Raises
     ------
     FileFormatError
-        If the content is no such thing; the message names the first edit at fault.
+        If the content is of another form; the message names the first edit that cannot be read.
     InvalidParameterError
-        If they were made on another mesh, with the size and digest of both.
+        If the edits belong to another mesh; the message names the size and digest of both.
     """
-    if not isinstance(content, Mapping) or content.get("kind") != KIND:
-        raise FileFormatError(f"Edits are kept as a JSON object of kind {KIND!r}; this is none.")
+    if not isinstance(content, Mapping):
+        raise FileFormatError(
+            f"Edits must be a JSON object of kind {KIND!r}; this is {named_value(content)}."
+        )
+    if content.get("kind") != KIND:
+        raise FileFormatError(
+            f"Edits must be a JSON object of kind {KIND!r}; the kind is {content.get('kind')!r}."
+        )
     if content.get("version") != VERSION:
-        raise FileFormatError(f"Edits of version {VERSION} are read; this is version {content.get('version')!r}.")
+        raise FileFormatError(
+            f"Edits must be of version {VERSION}; the version is {content.get('version')!r}."
+        )
     found: list[Edit] = []
     try:
-        made_on = _fingerprint_in(content["mesh"])
-        n_vertices = made_on.n_vertices
-        for entry in _listed(content["edits"], "edits"):
+        entry = content["mesh"]
+        n_vertices, n_faces = (_whole(entry[name], name, 0) for name in ("n_vertices", "n_faces"))
+        original = MeshFingerprint(n_vertices, n_faces, str(entry["digest"]))
+        for entry in _as_list(content["edits"], "edits"):
             found.append(_edit_in(entry, n_vertices))
     except (KeyError, TypeError, ValueError, OverflowError) as err:
-        raise FileFormatError(f"Edit {len(found)} cannot be read: {_reason(err)}") from err
+        reason = f"{err} is missing or unknown." if isinstance(err, KeyError) else str(err)
+        raise FileFormatError(f"Edit {len(found)} cannot be read: {reason}") from err
     present = mesh_fingerprint(mesh)
-    if made_on != present:
+    if original != present:
         raise InvalidParameterError(
-            f"Edits name vertices of the mesh that they were made on; that has {made_on}, and this mesh has {present}. "
-            "Read them with the mesh that they were made on, and give it to replay as source to carry them over."
+            "Edits name vertices of the mesh on which they were made; "
+            f"that has {original}, and this mesh has {present}. "
+            "Read them with the original mesh, and pass that to replay as source."
         )
     return found
-
-
-def _fingerprint_in(entry: Any) -> MeshFingerprint:
-    n_vertices, n_faces = (_whole(entry[name], name, 0) for name in ("n_vertices", "n_faces"))
-    return MeshFingerprint(n_vertices, n_faces, str(entry["digest"]))
-
-
-def _reason(err: Exception) -> str:
-    return f"{err} is missing, or not known." if isinstance(err, KeyError) else str(err)
 
 
 def _edit_in(entry: Any, n_vertices: int) -> Edit:
     moves = [
         (_region_in(move["region"], n_vertices), _handle_in(move["handle"]))
-        for move in _listed(entry["moves"], "moves")
+        for move in _as_list(entry["moves"], "moves")
     ]
     fixed = None if entry["fixed"] is None else _region_in(entry["fixed"], n_vertices)
     n_modes = None if entry["n_modes"] is None else _whole(entry["n_modes"], "n_modes", 1)
-    return Edit(tuple(Move(*pair) for pair in moves), fixed, n_modes, require_mode(str(entry["mode"])))
+    mode = require_mode(str(entry["mode"]))
+    return Edit(tuple(Move(*pair) for pair in moves), fixed, n_modes, mode)
 
 
 def _region_in(entry: Any, n_vertices: int) -> Region:
-    readers: dict[str, Callable[[], Region]] = {
-        "box": lambda: Box(_numbers(entry["low"], "low", -np.inf), _numbers(entry["high"], "high", np.inf)),
-        "brush": lambda: Brush(_numbers(entry["center"], "center"), _number(entry["radius"], "radius")),
-        "vertices": lambda: np.array(
-            [_whole(v, "A vertex", 0, n_vertices - 1) for v in _listed(entry["vertices"], "vertices")], dtype=np.int64
-        ),
-    }
-    return readers[entry["kind"]]()
+    kind = entry["kind"]
+    if kind == "box":
+        low = _numbers(entry["low"], "low", -np.inf)
+        return BoxRegion(low, _numbers(entry["high"], "high", np.inf))
+    if kind == "brush":
+        return BrushRegion(_numbers(entry["center"], "center"), _number(entry["radius"], "radius"))
+    if kind == "vertices":
+        vertices = _as_list(entry["vertices"], "vertices")
+        whole = [_whole(vertex, "A vertex", 0, n_vertices - 1) for vertex in vertices]
+        return np.array(whole, dtype=np.int64)
+    raise KeyError(kind)
 
 
 def _handle_in(entry: Any) -> Handle:
-    readers: dict[str, Callable[[], Handle]] = {
-        "rotation": lambda: Rotation(
-            _numbers(entry["pivot"], "pivot"), _numbers(entry["axis"], "axis"), _number(entry["angle"], "angle")
-        ),
-        "translation": lambda: Translation(_numbers(entry["vector"], "vector")),
-    }
-    return readers[entry["kind"]]()
+    kind = entry["kind"]
+    if kind == "rotation":
+        pivot, axis = _numbers(entry["pivot"], "pivot"), _numbers(entry["axis"], "axis")
+        return Rotation(pivot, axis, _number(entry["angle"], "angle"))
+    if kind == "translation":
+        return Translation(_numbers(entry["vector"], "vector"))
+    raise KeyError(kind)
 
 
-def _listed(value: Any, name: str) -> list[Any]:
+def _as_list(value: Any, name: str) -> list[Any]:
     if not isinstance(value, list):
         raise InvalidParameterError(f"{name} must be a list; it is {value!r}.")
     return value
@@ -234,6 +303,9 @@ def _number(value: Any, name: str) -> float:
     return float(value)
 
 
-def _numbers(value: Any, name: str, end: float | None = None) -> list[float]:
-    """Return numbers; where there is an end, it stands for null."""
-    return [end if end is not None and part is None else _number(part, name) for part in _listed(value, name)]
+def _numbers(value: Any, name: str, null: float | None = None) -> list[float]:
+    """Return a list of numbers; `null`, if given, is the meaning of a null in the list."""
+    return [
+        null if null is not None and part is None else _number(part, name)
+        for part in _as_list(value, name)
+    ]

@@ -1,32 +1,50 @@
-"""Handles: how a region is to be moved, and by how much of that."""
+"""Handles: the motions of regions."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from eigenshape._arrays import finite_values, frozen
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
+
+# Sine over cosine of two directions, below which they are parallel or opposite: far above the
+# rounding of a cross product, and far below any angle that a hand can drag.
+PARALLEL = 1e-12
 
 
 @dataclass(frozen=True, eq=False, init=False)
 class Rotation:
-    """Turn about an axis through a pivot, by any angle.
+    """A rotation about an axis through a pivot, by any angle.
 
     Parameters
     ----------
     pivot : (3,) float
-        A point of the axis, in length.
+        A point on the axis, in length.
     axis : (3,) float
-        Its direction, of any length but 0.
+        Direction of the axis. It is scaled to length 1 and must not be zero.
     angle : float
-        In radians, counter-clockwise seen from the axis' tip; beyond ±π it goes on turning.
+        In radians, counter-clockwise if the axis points towards the viewer. Angles beyond ±π are
+        full turns and more, which `deform` spreads over the shape.
 
     Raises
     ------
     InvalidParameterError
-        If a number is not finite, or the axis has no direction.
+        If a number is not finite, or the axis is zero.
+
+    See Also
+    --------
+    Translation : A motion along a vector.
+    deform : Move a region of a shape by a rotation or a translation.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> quarter = es.Rotation(pivot=[0, 0, 0], axis=[0, 0, 2], angle=np.pi / 2)
+    >>> quarter.axis
+    array([0., 0., 1.])
     """
 
     pivot: Float[np.ndarray, " 3"]
@@ -39,7 +57,8 @@ class Rotation:
         if largest == 0:
             raise InvalidParameterError("axis must have a direction; it is [0, 0, 0].")
         length = largest * np.linalg.norm(direction / largest)
-        if abs(length - 1) > 4 * np.finfo(float).eps:  # what is of length 1 is kept to the last digit
+        # An axis of length 1 keeps its last digits.
+        if abs(length - 1) > 4 * np.finfo(float).eps:
             direction = direction / largest
             direction = direction / np.linalg.norm(direction)
         object.__setattr__(self, "pivot", frozen(vector(pivot, "pivot")))
@@ -48,11 +67,16 @@ class Rotation:
 
     @property
     def turn(self) -> Float[np.ndarray, " 3"]:
-        """Axis times angle."""
+        """Rotation vector: axis times angle, in radians."""
         return self.axis * self.angle
 
-    def carry(self, points: Float[np.ndarray, "n 3"], share: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
-        """Return how far each point goes by its share of the angle (Rodrigues' formula)."""
+    def carry(
+        self, points: Float[np.ndarray, "n 3"], share: Float[np.ndarray, " n"]
+    ) -> Float[np.ndarray, "n 3"]:
+        """Return the displacement of each point under its share of the angle.
+
+        Rodrigues' formula, with 1 - cos x = 2 sin²(x/2) for small angles.
+        """
         from_pivot = points - self.pivot
         angle = share[:, None] * self.angle
         across = np.cross(self.axis, from_pivot)
@@ -61,7 +85,7 @@ class Rotation:
 
 @dataclass(frozen=True, eq=False, init=False)
 class Translation:
-    """Move by a vector.
+    """A translation by a vector.
 
     Parameters
     ----------
@@ -72,6 +96,17 @@ class Translation:
     ------
     InvalidParameterError
         If a number is not finite.
+
+    See Also
+    --------
+    Rotation : A motion about an axis.
+    deform : Move a region of a shape by a rotation or a translation.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.Translation([0, 0, 0.5]).vector
+    array([0. , 0. , 0.5])
     """
 
     vector: Float[np.ndarray, " 3"]
@@ -81,11 +116,13 @@ class Translation:
 
     @property
     def turn(self) -> Float[np.ndarray, " 3"]:
-        """Nothing turns."""
+        """Rotation vector: zero."""
         return np.zeros(3)
 
-    def carry(self, points: Float[np.ndarray, "n 3"], share: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
-        """Return the share of the vector by which each point goes."""
+    def carry(
+        self, points: Float[np.ndarray, "n 3"], share: Float[np.ndarray, " n"]
+    ) -> Float[np.ndarray, "n 3"]:
+        """Return the displacement of each point: its share of the vector."""
         return share[:, None] * self.vector
 
 
@@ -93,44 +130,61 @@ Handle = Rotation | Translation
 
 
 def affine_offset(handle: Handle) -> Float[np.ndarray, "3 4"]:
-    """Return D with D [x, 1] = how far the whole motion takes x."""
+    """Return D, for which D [x, 1] is the displacement of x under the whole motion."""
     shift = handle.carry(np.zeros((1, 3)), np.ones(1))[0]
     if isinstance(handle, Translation):
         return np.column_stack([np.zeros((3, 3)), shift])
-    about_origin = Rotation(np.zeros(3), handle.axis, handle.angle)  # a far pivot would cost digits
+    # The linear part, from a rotation about the origin: a distant pivot would cost digits.
+    about_origin = Rotation(np.zeros(3), handle.axis, handle.angle)
     return np.column_stack([about_origin.carry(np.eye(3), np.ones(3)).T, shift])
 
 
-def rotation_by_drag(pivot: ArrayLike, start: ArrayLike, end: ArrayLike) -> Rotation:
-    """Return the least rotation about a pivot that turns one point towards another (thesis 6.2.1).
+def rotation_from_drag(pivot: ArrayLike, start: ArrayLike, end: ArrayLike) -> Rotation:
+    """Return the smallest rotation that turns one point towards another (thesis 6.2.1).
 
     Parameters
     ----------
     pivot, start, end : (3,) float
         In length; the distances to the pivot may differ.
 
+    Returns
+    -------
+    Rotation
+
     Raises
     ------
     InvalidParameterError
-        If a point is the pivot, or the two lie on opposite sides of it, so that no axis is told.
+        If `start` or `end` is the pivot, or the two lie in opposite directions from it, so that
+        many axes are possible.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.deformation.rotation_from_drag([0, 0, 0], [1, 0, 0], [0, 2, 0]).axis
+    array([0., 0., 1.])
     """
     center = vector(pivot, "pivot")
     before, after = vector(start, "start") - center, vector(end, "end") - center
     for arm, name in ((before, "start"), (after, "end")):
         if not arm.any():
-            raise InvalidParameterError(f"{name} must be another point than the pivot; both are {center.tolist()}.")
+            raise InvalidParameterError(
+                f"{name} must be another point than the pivot; both are {center.tolist()}."
+            )
     before, after = (arm / np.abs(arm).max() for arm in (before, after))
     axis, along = np.cross(before, after), float(before @ after)
     across = float(np.linalg.norm(axis))
-    if across <= 1e-12 * abs(along):
+    if across <= PARALLEL * abs(along):
         if along < 0:
-            raise InvalidParameterError("start and end must not be opposite about the pivot: no axis is told then.")
+            raise InvalidParameterError(
+                "start and end must not be opposite about the pivot: every axis across would do. "
+                "Drag in two steps, or give a Rotation."
+            )
         return Rotation(center, [0, 0, 1], 0.0)
     return Rotation(center, axis, float(np.arctan2(across, along)))
 
 
 def vector(value: ArrayLike, name: str) -> Float[np.ndarray, " 3"]:
-    """Return three finite numbers.
+    """Return `value` as three finite numbers.
 
     Raises
     ------
@@ -138,5 +192,7 @@ def vector(value: ArrayLike, name: str) -> Float[np.ndarray, " 3"]:
     """
     numbers = finite_values(value, name)
     if numbers.shape != (3,):
-        raise InvalidParameterError(f"{name} must have three numbers; the shape is {numbers.shape}.")
+        raise InvalidParameterError(
+            f"{name} must have three numbers; the shape is {numbers.shape}."
+        )
     return numbers

@@ -1,4 +1,4 @@
-"""Regions of a shape: the vertices that a handle moves, told by a mask, by indices, a box or a brush."""
+"""Regions of a shape: vertices given by a mask, indices, a box or a brush."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
-from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import named_value
 from eigenshape._arrays import as_array, frozen, positive_values, real_numbers, whole_numbers
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.deformation.handles import vector
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.geodesic import geodesic_distance_to_set
@@ -20,41 +20,75 @@ from eigenshape.geometry.topology import edge_table
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Box:
-    """All vertices inside a box with sides along the axes.
+class BoxRegion:
+    """The vertices inside a box with sides parallel to the axes.
 
     Parameters
     ----------
     low, high : (3,) float
-        Opposite corners, in length; infinite ones leave a side open.
+        Opposite corners, in length. Infinite coordinates leave a side open.
+
+    Raises
+    ------
+    InvalidParameterError
+        If a corner is not three numbers, or `low` is above `high` along an axis.
+
+    See Also
+    --------
+    BrushRegion : The vertices near a point.
+    region_mask : Select the vertices of a region.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> left = es.deformation.BoxRegion([-np.inf, -np.inf, -np.inf], [0.3, np.inf, np.inf])
+    >>> es.deformation.region_mask(es.shapes.grid(4, 1), left).nonzero()[0]
+    array([0, 1, 2, 3])
     """
 
     low: Float[np.ndarray, " 3"]
     high: Float[np.ndarray, " 3"]
 
     def __init__(self, low: ArrayLike, high: ArrayLike) -> None:
-        corners = [real_numbers(corner, "A corner of a box").astype(np.float64) for corner in (low, high)]
+        corners = [
+            real_numbers(corner, "A corner of a box").astype(np.float64) for corner in (low, high)
+        ]
         for corner, name in zip(corners, ("low", "high"), strict=True):
             if corner.shape != (3,) or np.isnan(corner).any():
-                raise InvalidParameterError(f"{name} must be three numbers; it is {corner.tolist()}.")
+                raise InvalidParameterError(
+                    f"{name} must be three numbers; it is {corner.tolist()}."
+                )
         axis = np.flatnonzero(corners[0] > corners[1])
         if axis.size:
             below, above = (corner[axis[0]] for corner in corners)
-            raise InvalidParameterError(f"low must lie below high; along axis {axis[0]} they are {below} and {above}.")
+            raise InvalidParameterError(
+                f"low must lie below high; along axis {axis[0]} they are {below} and {above}."
+            )
         object.__setattr__(self, "low", frozen(corners[0]))
         object.__setattr__(self, "high", frozen(corners[1]))
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Brush:
-    """All vertices that lie within a length, along the surface, of the vertex next to a point.
+class BrushRegion:
+    """The vertices within a geodesic distance of the vertex nearest to a point.
 
     Parameters
     ----------
     center : (3,) float
         A point on the surface or near it, in length.
     radius : float
-        In length.
+        Largest geodesic distance, in length.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `center` is not three finite numbers, or `radius` is not positive.
+
+    See Also
+    --------
+    BoxRegion : The vertices inside a box.
+    region_mask : Select the vertices of a region.
     """
 
     center: Float[np.ndarray, " 3"]
@@ -65,12 +99,12 @@ class Brush:
         object.__setattr__(self, "radius", float(positive_values(radius, "radius")[0]))
 
 
-Region = Box | Brush | np.ndarray | Iterable[int]
+Region = BoxRegion | BrushRegion | np.ndarray | Iterable[int]
 
 
-def kept_region(region: Region) -> Region:
-    """Return a region that can be asked again and again, and that nobody else changes."""
-    if isinstance(region, Box | Brush):
+def copy_region(region: Region) -> Region:
+    """Return a region that can be used many times, and that the caller cannot change."""
+    if isinstance(region, BoxRegion | BrushRegion):
         return region
     return frozen(_entries(region))
 
@@ -82,44 +116,58 @@ def _entries(region: np.ndarray | Iterable[int]) -> np.ndarray:
             return as_array(region if isinstance(region, np.ndarray) else list(region), "A region")
     except InvalidParameterError:
         raise
-    except ValueError:  # rows that differ in length
+    except ValueError:  # the rows differ in length; the message below says what a region can be
         pass
     raise InvalidParameterError(
-        f"A region must be a Box, a Brush, a mask, or a list of vertices; it is {named_value(region)}. "
-        "Pass region_mask(mesh, region)."
+        "A region must be a BoxRegion, a BrushRegion, a mask, or a list of vertices; "
+        f"it is {named_value(region)}. Pass region_mask(mesh, region)."
     )
 
 
 def region_mask(mesh: MeshLike, region: Region) -> Bool[np.ndarray, " n"]:
-    """Tell which vertices of a shape a region holds.
+    """Select the vertices of a region.
 
     Parameters
     ----------
     mesh : MeshLike
-    region : (n,) bool, (k,) int, Box or Brush
-        A mask, indices of vertices, or a place in space.
+    region : (n,) bool, (k,) int, BoxRegion or BrushRegion
+        A mask, indices of vertices, a box, or a disc on the surface.
 
     Returns
     -------
     (n,) bool
+        Whether each vertex is in the region.
 
     Raises
     ------
     InvalidParameterError
-        If a mask is of another length, or an index is no vertex.
+        If a mask does not have length n, or an index is not in 0..n - 1.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.shapes.grid(4, 1)
+    >>> es.deformation.region_mask(mesh, [0, 3]).nonzero()[0]
+    array([0, 3])
+    >>> brush = es.deformation.BrushRegion(center=[0, 0, 0], radius=0.3)
+    >>> es.deformation.region_mask(mesh, brush).nonzero()[0]
+    array([0, 2])
     """
     mesh = as_mesh(mesh)
-    if isinstance(region, Box):
+    if isinstance(region, BoxRegion):
         inside = (mesh.vertices >= region.low) & (mesh.vertices <= region.high)
         return np.asarray(inside.all(axis=1))
-    if isinstance(region, Brush):
+    if isinstance(region, BrushRegion):
         nearest = int(cKDTree(mesh.vertices).query(region.center)[1])
-        return np.asarray(geodesic_distance_to_set(mesh, [nearest], reach=region.radius) <= region.radius)
+        return np.asarray(
+            geodesic_distance_to_set(mesh, [nearest], reach=region.radius) <= region.radius
+        )
     chosen = _entries(region)
     if chosen.dtype == bool:
         if chosen.shape != (mesh.n_vertices,):
             raise InvalidParameterError(
-                f"A mask must have one entry a vertex, shape ({mesh.n_vertices},); the shape is {chosen.shape}."
+                f"A mask must have one entry per vertex, shape ({mesh.n_vertices},); "
+                f"the shape is {chosen.shape}."
             )
         return chosen
     mask = np.zeros(mesh.n_vertices, dtype=bool)
@@ -128,26 +176,48 @@ def region_mask(mesh: MeshLike, region: Region) -> Bool[np.ndarray, " n"]:
 
 
 def region_boundary(mesh: MeshLike, mask: Bool[np.ndarray, " n"]) -> Int[np.ndarray, " b"]:
-    """Return the vertices of a region that have a neighbour outside it (thesis 6.3.1)."""
+    """List the vertices of a region that have a neighbor outside it (thesis 6.3.1).
+
+    Parameters
+    ----------
+    mesh : MeshLike
+    mask : (n,) bool
+        Whether each vertex is in the region; see `region_mask`.
+
+    Returns
+    -------
+    (b,) int
+        Indices of the boundary vertices, ascending.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.shapes.grid(4, 1)
+    >>> es.deformation.region_boundary(mesh, mesh.vertices[:, 0] < 0.3)
+    array([2, 3])
+    """
     mesh = as_mesh(mesh)
     edges = edge_table(mesh).edges
     across = edges[mask[edges[:, 0]] != mask[edges[:, 1]]]
     return np.unique(across[mask[across]])
 
 
-def require_boundary(mesh: TriangleMesh, mask: Bool[np.ndarray, " n"], number: int) -> Int[np.ndarray, " b"]:
-    """Return the boundary of a region, and refuse one that has none.
+def require_boundary(
+    mesh: TriangleMesh, mask: Bool[np.ndarray, " n"], number: int
+) -> Int[np.ndarray, " b"]:
+    """Return the boundary of a region; raise an error if it has none.
 
     Raises
     ------
     InvalidParameterError
-        If the region is empty, all there is, or made of whole components.
+        If the region is empty, or consists of whole components.
     """
     rim = region_boundary(mesh, mask)
     if len(rim):
         return rim
-    what = "holds no vertex" if not mask.any() else f"holds {mask.sum()} of {len(mask)} vertices, whole components"
+    whole = f"holds {mask.sum()} of {len(mask)} vertices, whole components"
+    what = whole if mask.any() else "holds no vertex"
     raise InvalidParameterError(
         f"A region must have a boundary on the shape, where it bends; region {number} {what}. "
-        "What is to move as a whole needs no deformation."
+        "To move a whole component, transform its vertices."
     )

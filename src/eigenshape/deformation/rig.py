@@ -1,4 +1,4 @@
-"""A rig: what a shape needs once so that it can be bent many times."""
+"""A rig: what is computed once for a shape, so that it can be deformed many times."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -6,7 +6,6 @@ from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 from scipy.linalg import cho_solve
 
 from eigenshape._arguments import require_type
@@ -14,35 +13,44 @@ from eigenshape._arrays import finite_rows, frozen, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.deformation.rigidity import EdgeWeights, edge_weights
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
+# Modes of a rig: as many as the finest skeleton of the thesis has (6.3.3). More take longer to
+# solve.
 N_MODES = 300
 
 
 @dataclass(frozen=True, eq=False)
 class EigenRig:
-    """A shape, its low modes, and what was factored for them.
+    """A shape, its lowest modes and the matrices that deformation needs.
 
     Attributes
     ----------
     mesh : TriangleMesh
-        The shape as it stands; edits bend it.
+        The shape in its present pose.
     eigenvectors : (n, k) float
-        Φ, of the shape as it was when it was rigged.
+        The modes Φ of the shape in its original pose.
     eigenvalues : (k,) float
-        In 1/length² of that shape.
+        Their eigenvalues, in 1/length².
     areas : (n,) float
-        Of the vertices, in length²: what each has of the mass in which the modes are orthonormal.
+        Row sums of the mass matrix for which the modes are orthonormal, in length².
     factor : (k, k) float
-        Lower triangular, with factor factorᵀ = ΦᵀΦ, the Gram matrix; its leading part is that of fewer modes
-        (thesis 6.3.4).
+        Cholesky factor of the Gram matrix: lower triangular, with factor factorᵀ = ΦᵀΦ. Its leading
+        block is the factor for fewer modes (thesis 6.3.4).
     edges : EdgeWeights
+        Weights of the edges in the rigidity energy.
+
+    See Also
+    --------
+    rig_shape : Compute a rig.
+    deform : Move a region of a rigged shape.
     """
 
     mesh: TriangleMesh
@@ -59,22 +67,24 @@ class EigenRig:
 
     @cached_property
     def components(self) -> Int[np.ndarray, " n"]:
-        """The number of each vertex' component."""
+        """Component of each vertex, (n,) int."""
         return frozen(vertex_components(self.mesh)[1])
 
 
-def rig_shape(mesh: MeshLike, spectrum: Spectrum | None = None, *, progress: Progress | None = None) -> EigenRig:
-    """Prepare a shape for many edits.
+def rig_shape(
+    mesh: MeshLike, spectrum: Spectrum | None = None, *, progress: Progress | None = None
+) -> EigenRig:
+    """Prepare a shape for deformation.
 
     Parameters
     ----------
     mesh : MeshLike
-        Its faces may not be flat, and each vertex has one.
     spectrum : Spectrum, optional
-        Of any operator of the shape (the thesis takes the mesh Laplacian); by default the 300 lowest modes of the
-        cotangent Laplacian, and one more for each component beyond the first.
+        Spectrum of any operator on the shape (the thesis uses the mesh Laplacian). By default, the
+        300 lowest modes of the cotangent Laplacian, and one more for each component beyond the
+        first.
     progress : callable, optional
-        As for `solve_spectrum`.
+        Called as ``progress(fraction_done, message)`` by the eigensolver.
 
     Returns
     -------
@@ -83,65 +93,103 @@ def rig_shape(mesh: MeshLike, spectrum: Spectrum | None = None, *, progress: Pro
     Raises
     ------
     InvalidShapeError
-        If a face has no area, or a vertex no face.
+        If a face has no area, or a vertex has no face.
     InvalidParameterError
-        If the spectrum is of another number of vertices.
+        If the spectrum has another number of vertices.
+
+    See Also
+    --------
+    deform : Move a region of a rigged shape.
+    DeformationSession : Edit a rigged shape step by step.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> es.rig_shape(mesh).n_modes
+    162
+
+    Fewer modes:
+
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(mesh), 20)
+    >>> es.rig_shape(mesh, spectrum).n_modes
+    20
     """
     mesh = as_mesh(mesh)
     require_type(spectrum, Spectrum | None, "spectrum")
     laplacian = cotangent_laplacian(mesh)
     if spectrum is None:
         n_components, _ = vertex_components(mesh)
-        spectrum = solve_spectrum(laplacian, min(N_MODES + n_components - 1, mesh.n_vertices), progress=progress)
+        wanted = min(N_MODES + n_components - 1, mesh.n_vertices)
+        spectrum = solve_spectrum(laplacian, wanted, progress=progress)
     modes = spectrum.eigenvectors
     if len(modes) != mesh.n_vertices:
-        raise InvalidParameterError(f"The spectrum is of {len(modes)} vertices, the shape has {mesh.n_vertices}.")
+        raise InvalidParameterError(
+            "spectrum must be of the shape; "
+            f"it has {len(modes)} points for {mesh.n_vertices} vertices."
+        )
     with one_blas_thread():
-        factor = np.asarray(
-            np.linalg.qr(modes, mode="r")
-        ).T  # of the Gram matrix too, without squaring how unequal areas are
+        # Φ = QR gives ΦᵀΦ = RᵀR, without the squared condition number of forming ΦᵀΦ.
+        factor = np.asarray(np.linalg.qr(modes, mode="r")).T
     edges = edge_weights(laplacian.stiffness)
-    return EigenRig(
-        mesh, modes, spectrum.eigenvalues, frozen(spectrum.mass @ np.ones(len(modes))), frozen(factor), edges
-    )
+    areas = frozen(spectrum.mass @ np.ones(len(modes)))
+    return EigenRig(mesh, modes, spectrum.eigenvalues, areas, frozen(factor), edges)
 
 
-def posed(rig: EigenRig, vertices: ArrayLike) -> EigenRig:
-    """Return the rig of the same shape in another pose; its modes stay, since bending hardly changes them.
+def pose_rig(rig: EigenRig, vertices: ArrayLike) -> EigenRig:
+    """Return the rig of the same shape in another pose.
+
+    The modes are kept, because bending hardly changes them.
 
     Raises
     ------
     InvalidShapeError
-        If a coordinate is not finite, or their number is another one.
+        If a coordinate is not finite, or the shape of the array is not (n, 3).
     """
     return replace(rig, mesh=TriangleMesh(finite_rows(vertices, "vertices", 3), rig.mesh.faces))
 
 
-def projected(rig: EigenRig, values: Float[np.ndarray, "n q"], n_modes: int) -> Float[np.ndarray, "m q"]:
+def project_on_modes(
+    rig: EigenRig, values: Float[np.ndarray, "n q"], n_modes: int
+) -> Float[np.ndarray, "m q"]:
     """Return the coefficients of the least-squares fit by the lowest modes (thesis eq. 6.1)."""
-    return cho_solve((rig.factor[:n_modes, :n_modes], True), rig.eigenvectors[:, :n_modes].T @ values)
+    return cho_solve(
+        (rig.factor[:n_modes, :n_modes], True), rig.eigenvectors[:, :n_modes].T @ values
+    )
 
 
 @one_blas_thread()
 def eigen_skeleton(rig: EigenRig, n_modes: SupportsIndex) -> Float[np.ndarray, "n 3"]:
-    """Return the vertices of a shape as its lowest modes know them (thesis 6.1.1).
+    """Compute the least-squares fit of a shape by its lowest modes (thesis 6.1.1).
 
     Parameters
     ----------
     rig : EigenRig
     n_modes : int
-        1 to k.
+        Number of modes, 1 to k.
 
     Returns
     -------
     (n, 3) float
-        With the faces of the shape, its eigen-skeleton.
+        The vertices of the eigen-skeleton; its faces are those of the shape.
 
     Raises
     ------
     InvalidParameterError
-        If the rig has fewer modes.
+        If `n_modes` is not in 1..k.
+
+    Examples
+    --------
+    The coordinates on a sphere are modes 1 to 3, so four modes reproduce it:
+
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(3)
+    >>> rig = es.rig_shape(mesh, es.solve_spectrum(es.cotangent_laplacian(mesh), 10))
+    >>> skeleton = es.deformation.eigen_skeleton(rig, 4)
+    >>> bool(np.abs(skeleton - mesh.vertices).max() < 1e-2)
+    True
     """
     require_type(rig, EigenRig, "rig")
     wanted = whole_number(n_modes, "n_modes", 1, rig.n_modes)
-    return rig.eigenvectors[:, :wanted] @ projected(rig, rig.mesh.vertices, wanted)
+    return rig.eigenvectors[:, :wanted] @ project_on_modes(rig, rig.mesh.vertices, wanted)

@@ -1,4 +1,4 @@
-"""As rigid as possible: edges turn with their vertices, by local fits and one global solve in turn."""
+"""As-rigid-as-possible deformation: local fits of rotations and global solves, alternating."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -15,22 +15,37 @@ from eigenshape.deformation.rigidity_loops import fit_rotations, turned_edges
 from eigenshape.sparse.elimination import SymmetricFactor, analyse, factorise
 
 Points = Float[np.ndarray, "n 3"]
-Step = tuple[Points, Points]  # how far a round moved, and where to
-WINDOW = 4  # rounds that the next one looks back on
-SETTLED = 1e-4  # share of the energy; a round that gains less is the last
-LEAST_WEIGHT = 1e-3  # of the mean: edges whose cotangents add up to nothing, or less, hold a little all the same
+Step = tuple[Points, Points]  # change of the free vertices in a round, and their new places
+# Earlier rounds that Anderson's step combines. Chosen on coarser versions of the scenes of
+# experiments/ch6_deformation.
+WINDOW = 4
+# A round that lowers the energy by less than this share is the last. A smaller value takes more
+# rounds.
+ENERGY_TOLERANCE = 1e-4
+# Least weight of an edge, as a share of the mean absolute weight. Edges whose cotangents sum to
+# zero or less keep a small stiffness.
+LEAST_WEIGHT = 1e-3
+# Relative cut-off of singular values in Anderson's step: changes of two rounds that are parallel up
+# to rounding count once.
+PARALLEL_CHANGES = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class EdgeWeights:
-    """What each edge counts in the energy Σ_ij w_ij |R_i (x_i - x_j) - (x'_i - x'_j)|² / 2 (Sorkine and Alexa 2007).
+    """Weights w of the edges in the rigidity energy (Sorkine and Alexa 2007).
+
+    The energy of a pose x' of the shape x is Σ_ij w_ij |R_i (x_i - x_j) - (x'_i - x'_j)|² / 2.
 
     Attributes
     ----------
     matrix : (n, n) sparse
-        Degrees minus weights.
-    starts, others, weights
-        The weights by rows: those of vertex i are weights[starts[i]:starts[i + 1]], to its neighbours.
+        Diagonal matrix of the row sums of w, minus w.
+    starts : (n + 1,) int
+        The edges of vertex i have the numbers starts[i] to starts[i + 1] - 1.
+    others : (e,) int
+        Other end of each edge.
+    weights : (e,) float
+        Weight of each edge.
     """
 
     matrix: sp.csr_array
@@ -41,19 +56,20 @@ class EdgeWeights:
 
 @dataclass(frozen=True, eq=False)
 class FreePart:
-    """The vertices that are not held, and their equations.
+    """The free vertices and their equations.
 
     Attributes
     ----------
     free : (u,) int
+        The free vertices.
     fitted : (a,) int
-        Those that are free or have a free neighbour: only their rotations matter.
+        The vertices that are free or have a free neighbor. Only their rotations matter.
     rows : (u, n) sparse
-        The matrix' rows of what is free.
+        The rows of the matrix of `EdgeWeights` for the free vertices.
     pull : (u,) float
-        h: the energy of a free vertex grows by h |x' - g|², g being where it starts.
+        h in the additional energy h |x' - g|² of a free vertex, g being its start.
     factor : SymmetricFactor or None
-        Of its square part and h; None where nothing is free.
+        Factor of the columns of `rows` for the free vertices plus h; None if no vertex is free.
     """
 
     free: Int[np.ndarray, " u"]
@@ -64,9 +80,9 @@ class FreePart:
 
 
 def edge_weights(stiffness: sp.csr_array) -> EdgeWeights:
-    """Return the weights of a cotangent stiffness matrix, none less than a thousandth of their mean.
+    """Return the weights of a cotangent stiffness matrix, none below a thousandth of their mean.
 
-    Negative ones would let the energy fall below 0 while a vertex turns over.
+    With negative weights, the energy could become negative while a vertex turns over.
     """
     links = (-stiffness).tocsr()
     links.setdiag(0)
@@ -74,48 +90,52 @@ def edge_weights(stiffness: sp.csr_array) -> EdgeWeights:
     links.sort_indices()
     links.data = np.maximum(links.data, LEAST_WEIGHT * np.abs(links.data).mean())
     matrix = (sp.diags_array(links.sum(axis=1)) - links).tocsr()
-    return EdgeWeights(matrix, links.indptr.astype(np.int64), links.indices.astype(np.int64), links.data)
+    return EdgeWeights(
+        matrix, links.indptr.astype(np.int64), links.indices.astype(np.int64), links.data
+    )
 
 
 def free_part(
-    edges: EdgeWeights, held: Bool[np.ndarray, " n"], pull: Float[np.ndarray, " n"] | None = None
+    edges: EdgeWeights, fixed: Bool[np.ndarray, " n"], pull: Float[np.ndarray, " n"] | None = None
 ) -> FreePart:
-    """Factor the equations of the vertices that are not held, and may be pulled to where they start.
+    """Factor the equations of the free vertices, with an optional pull to their start.
 
     Raises
     ------
     InvalidParameterError
-        If no vertex of some component is held.
+        If a component has no fixed vertex.
     InvalidShapeError
-        If angles are too near to 0 for the equations.
+        If the equations are not positive definite.
     """
-    require_held(edges, held)
-    free = np.flatnonzero(~held)
+    require_fixed_vertices(edges, fixed)
+    free = np.flatnonzero(~fixed)
     rows = edges.matrix[free]
     fitted = np.unique(np.concatenate([free, rows.indices])).astype(np.int64)
-    hold = np.zeros(len(free)) if pull is None else pull[free]
-    square = (rows[:, free] + sp.diags_array(hold)).tocsr()
-    return FreePart(free, fitted, rows, hold, factored(square) if len(free) else None)
+    strength = np.zeros(len(free)) if pull is None else pull[free]
+    square = (rows[:, free] + sp.diags_array(strength)).tocsr()
+    factor = factor_equations(square) if len(free) else None
+    return FreePart(free, fitted, rows, strength, factor)
 
 
-def require_held(edges: EdgeWeights, held: Bool[np.ndarray, " n"]) -> None:
-    """Refuse what holds no vertex of some component.
+def require_fixed_vertices(edges: EdgeWeights, fixed: Bool[np.ndarray, " n"]) -> None:
+    """Raise an error if a component has no fixed vertex.
 
     Raises
     ------
     InvalidParameterError
     """
     n_components, component = connected_components(edges.matrix, directed=False)
-    adrift = np.flatnonzero(np.bincount(component[held], minlength=n_components) == 0)
-    if adrift.size:
-        vertex = int(np.flatnonzero(component == adrift[0])[0])
+    loose = np.flatnonzero(np.bincount(component[fixed], minlength=n_components) == 0)
+    if loose.size:
+        vertex = int(np.flatnonzero(component == loose[0])[0])
         raise InvalidParameterError(
-            f"Each component must be held somewhere; that of vertex {vertex} is not ({adrift.size} such)."
+            "Each component must have a vertex that is fixed or in a region; "
+            f"the component of vertex {vertex} has none ({loose.size} such). Add one to fixed."
         )
 
 
-def factored(square: sp.csr_array) -> SymmetricFactor:
-    """Factor the equations of what is free.
+def factor_equations(square: sp.csr_array) -> SymmetricFactor:
+    """Factor the equations of the free vertices.
 
     Raises
     ------
@@ -127,88 +147,108 @@ def factored(square: sp.csr_array) -> SymmetricFactor:
     with one_blas_thread():
         factor = factorise(analyse(matrix), matrix.data)
     if factor is None or not (factor.pivots > 0).all():
-        raise InvalidShapeError("A shape must have angles to be bent; some are too near to 0 for the equations.")
+        raise InvalidShapeError(
+            "Every triangle must have angles well above zero to be bent; the equations of the "
+            f"{square.shape[0]} free vertices are not positive definite. "
+            'Try repair(mesh, ["collapse_needles"]).'
+        )
     return factor
 
 
 def relax(
-    edges: EdgeWeights, part: FreePart, rest: Points, start: Points, turns: Float[np.ndarray, "n 4"], n_rounds: int
+    edges: EdgeWeights,
+    part: FreePart,
+    rest: Points,
+    start: Points,
+    turns: Float[np.ndarray, "n 4"],
+    n_rounds: int,
 ) -> Points:
-    """Make edges as rigid as possible by moving what is free, in rounds of local fits and a global solve.
+    """Move the free vertices so that edges are as rigid as possible.
 
-    Rounds alone converge slowly where a long part bends, so each is followed by Anderson's step over the last ones
-    (Peng and others 2018), which is taken back where the energy rose.
+    Each round fits the rotations of vertices and solves for their places. Rounds alone converge
+    slowly on long parts, so each is followed by Anderson's step over the last rounds (Peng and
+    others 2018). A step that raises the energy is taken back.
 
     Parameters
     ----------
-    edges, part : EdgeWeights, FreePart
+    edges : EdgeWeights
+    part : FreePart
     rest : (n, 3) float
-        Edges as they were.
+        Vertices of the undeformed shape.
     start : (n, 3) float
-        Where vertices are held, and where the free ones begin.
+        Places of the fixed vertices, and starts of the free ones.
     turns : (n, 4) float
-        Unit quaternions near the rotations that are looked for.
+        Unit quaternions from which the fits of rotations start.
     n_rounds : int
-        At most.
+        Largest number of rounds.
 
     Returns
     -------
     (n, 3) float
+        The vertices of the deformed shape.
     """
     if part.factor is None:
         return start
-    links, turns = (edges.starts, edges.others, edges.weights), turns.copy()
-    moved = start - rest
-    pulled = part.pull[:, None] * moved[part.free]
-    moved[part.free] = 0
-    force, sums = pulled - part.rows @ moved, np.empty((len(part.free), 3))
-    found, free = start.copy(), part.free
+    free, links = part.free, (edges.starts, edges.others, edges.weights)
+    turns, found, sums = turns.copy(), start.copy(), np.empty((len(free), 3))
+    # The constant part of the right-hand side: the pull, and the displacements of fixed vertices.
+    displacement = start - rest
+    pull = part.pull[:, None] * displacement[free]
+    displacement[free] = 0
+    force = pull - part.rows @ displacement
     least, tried, solved = np.inf, start[free], start[free]
     steps = deque[Step](maxlen=WINDOW + 1)
     scratch = part.factor.scratch()
 
-    def settled(points: Float[np.ndarray, "u 3"]) -> float:
+    def fit_at(points: Float[np.ndarray, "u 3"]) -> float:
+        """Fit the rotations to some places of the free vertices, and return the energy."""
         found[free] = points
-        away = part.pull @ np.square(points - start[free]).sum(axis=1)
-        return float(fit_rotations(part.fitted, *links, rest, found, turns) + away)
+        pull_energy = part.pull @ np.square(points - start[free]).sum(axis=1)
+        return float(fit_rotations(part.fitted, *links, rest, found, turns) + pull_energy)
 
     with one_blas_thread():
         for _ in range(n_rounds):
-            energy = settled(tried)
+            energy = fit_at(tried)
             if energy > least:
+                # Anderson's step raised the energy: go back to the plain solution.
                 steps.clear()
                 tried = solved
-                energy = settled(tried)
-            if least - energy <= SETTLED * energy and len(steps) > 1:
+                energy = fit_at(tried)
+            if least - energy <= ENERGY_TOLERANCE * energy and len(steps) > 1:
                 break
             least = energy
             turned_edges(free, *links, rest, turns, sums)
-            # Solved for displacements, so that nothing at all moves where nothing is turned or pulled.
+            # Solved for displacements, so that vertices without rotation or pull do not move.
             solved = rest[free] + part.factor.solve(sums + force, scratch)
             steps.append((solved - tried, solved))
-            tried = _mixed(steps)
+            tried = _anderson_step(steps)
     found[free] = solved
     return found
 
 
-def fitted_turns(edges: EdgeWeights, rest: Points, posed: Points) -> Float[np.ndarray, "n 3 3"]:
-    """Return the rotation of each vertex that fits its edges best, by singular values, from no start."""
+def fit_turns(edges: EdgeWeights, rest: Points, posed: Points) -> Float[np.ndarray, "n 3 3"]:
+    """Return the rotation of each vertex that fits its edges best, by singular values."""
     one, two = np.repeat(np.arange(len(rest)), np.diff(edges.starts)), edges.others
-    products = np.einsum("e,ei,ej->eij", edges.weights, posed[two] - posed[one], rest[two] - rest[one])
+    products = np.einsum(
+        "e,ei,ej->eij", edges.weights, posed[two] - posed[one], rest[two] - rest[one]
+    )
     return nearest_rotations(np.add.reduceat(products, edges.starts[:-1]))
 
 
 def nearest_rotations(matrices: Float[np.ndarray, "k 3 3"]) -> Float[np.ndarray, "k 3 3"]:
-    """Return the rotation next to each matrix."""
+    """Return the rotation nearest to each matrix in the Frobenius norm."""
     left, _, right = np.linalg.svd(matrices)
+    # A reflection becomes a rotation by a change of sign along the smallest singular value.
     left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
     return np.asarray(left @ right)
 
 
-def _mixed(steps: Sequence[Step]) -> Points:
-    """Return the combination of solutions whose combined change is least (Anderson 1965)."""
+def _anderson_step(steps: Sequence[Step]) -> Points:
+    """Return the combination of solutions whose combined change is smallest (Anderson 1965)."""
     changes = np.array([change.ravel() for change, _ in steps])
     differences = changes[-1] - changes[:-1]
-    shares, *_ = np.linalg.lstsq(differences @ differences.T, differences @ changes[-1], rcond=1e-12)
+    gram, right = differences @ differences.T, differences @ changes[-1]
+    shares, *_ = np.linalg.lstsq(gram, right, rcond=PARALLEL_CHANGES)
     last = steps[-1][1]
-    return last - sum((share * (last - old) for share, (_, old) in zip(shares, steps, strict=False)), np.zeros(3))
+    pairs = zip(shares, steps, strict=False)
+    return last - sum((share * (last - old) for share, (_, old) in pairs), np.zeros(3))

@@ -6,11 +6,17 @@ import numpy as np
 
 from eigenshape._compile import njit
 
+# Most steps of a fit. Newton's method takes a few; the rest is for starts far from the maximum.
 ROUNDS = 100
-SETTLED = 1e-4  # last turn, in radians; the one after it would be of its square
-LEAST = 1e-9  # share of the largest covariance that holds what no edge tells
-EPS = 1e-15
-HALFWAY = 3.0  # radians: the most that one step turns
+# A step that turns by less, in radians, is the last: Newton's next one would be of its square.
+SETTLED = 1e-4
+# Added to the Hessian, as a share of the largest covariance, so that a rotation which the edges do
+# not determine keeps its value.
+LEAST = 1e-9
+# Length of the gradient, relative to the largest covariance, that is rounding: the fit is done.
+GRADIENT_ROUNDING = 1e-15
+# Most that one step turns, in radians: the tangent of half the angle has a pole at π.
+HALFWAY = 3.0
 
 
 @njit
@@ -28,7 +34,11 @@ def fit_rotations(vertices, starts, others, weights, rest, posed, turns):
         lengths = 0.0
         for k in range(starts[i], starts[i + 1]):
             j, w = others[k], weights[k]
-            u, v, t = posed[j, 0] - posed[i, 0], posed[j, 1] - posed[i, 1], posed[j, 2] - posed[i, 2]
+            u, v, t = (
+                posed[j, 0] - posed[i, 0],
+                posed[j, 1] - posed[i, 1],
+                posed[j, 2] - posed[i, 2],
+            )
             lengths += w * (u * u + v * v + t * t)
             for a in range(3):
                 before = rest[j, a] - rest[i, a]
@@ -69,7 +79,7 @@ def _settle(covariance, turns, i):
         p22 = m20 * covariance[0, 2] + m21 * covariance[1, 2] + m22 * covariance[2, 2]
         u, v, t = p12 - p21, p20 - p02, p01 - p10
         size = np.sqrt(u * u + v * v + t * t)
-        if size <= EPS:
+        if size <= GRADIENT_ROUNDING:
             break
         a, b, c = p11 + p22 + LEAST, p00 + p22 + LEAST, p00 + p11 + LEAST
         d, e, f = -(p01 + p10) / 2, -(p02 + p20) / 2, -(p12 + p21) / 2
@@ -84,7 +94,9 @@ def _settle(covariance, turns, i):
             angle = np.sqrt(u * u + v * v + t * t)
             u, v, t = u / 2, v / 2, t / 2
         else:
-            along = (p00 * u * u + p11 * v * v + p22 * t * t - 2 * (d * u * v + e * u * t + f * v * t)) / size**2
+            along = (
+                p00 * u * u + p11 * v * v + p22 * t * t - 2 * (d * u * v + e * u * t + f * v * t)
+            ) / size**2
             angle = np.arctan2(size, p00 + p11 + p22 - along)  # the best about this axis
             half = np.tan(min(angle, HALFWAY) / 2) / size
             u, v, t = u * half, v * half, t * half

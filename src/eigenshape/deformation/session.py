@@ -1,4 +1,4 @@
-"""A session: edits of one shape one after the other, to be seen, kept, taken back and done again."""
+"""A session: edits of one shape one after the other, with undo and redo."""
 
 from collections.abc import Iterable, Sequence
 from typing import SupportsIndex
@@ -14,25 +14,47 @@ from eigenshape.deformation.deform import Mode, bend, require_mode
 from eigenshape.deformation.edits import Edit, Move, apply_edit, carry_edit
 from eigenshape.deformation.handles import Handle
 from eigenshape.deformation.region import Region, region_mask
-from eigenshape.deformation.rig import EigenRig, posed
-from eigenshape.deformation.skeleton import SkeletonGrip, grip_skeleton, moved_skeleton
+from eigenshape.deformation.rig import EigenRig, pose_rig
+from eigenshape.deformation.skeleton import SkeletonResponse, move_skeleton, skeleton_response
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 
 
 class DeformationSession:
-    """Edits of a rigged shape: `drag` shows, `commit` does, `undo` and `redo` go back and forth exactly.
+    """Edit a rigged shape step by step.
+
+    `drag` previews an edit, `commit` applies it, and `undo` and `redo` restore earlier and later
+    poses exactly. A session is the one mutable object of the library; use it from one thread.
 
     Parameters
     ----------
     rig : EigenRig
     mode : "graded", "uncrossed" or "thesis"
-        How commits bend; see `bend`.
+        The method of commits; see `bend`.
 
     Raises
     ------
     InvalidParameterError
-        If the mode is another.
+        If the mode is unknown.
+
+    See Also
+    --------
+    deform : Apply one edit.
+    replay : Apply stored edits.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> session = es.DeformationSession(es.rig_shape(mesh))
+    >>> top = mesh.vertices[:, 2] > 0.2
+    >>> preview = session.drag(top, es.Translation([0, 0, 1]))
+    >>> float(session.commit().vertices[:, 2].max().round(3))
+    2.0
+    >>> float(session.undo().vertices[:, 2].max().round(3))
+    1.0
+    >>> session.n_redoable
+    1
     """
 
     def __init__(self, rig: EigenRig, *, mode: Mode = "graded") -> None:
@@ -40,8 +62,9 @@ class DeformationSession:
         self._mode: Mode = require_mode(mode)
         self._poses = [rig]
         self._edits: list[Edit] = []
-        self._place = 0  # how many edits count; those after it can be redone
-        self._pending: tuple[Edit, Binding, SkeletonGrip] | None = None
+        # Number of edits in the present pose; later edits were undone and can be redone.
+        self._place = 0
+        self._pending: tuple[Edit, Binding, SkeletonResponse] | None = None
 
     @property
     def rig(self) -> EigenRig:
@@ -50,55 +73,87 @@ class DeformationSession:
 
     @property
     def mesh(self) -> TriangleMesh:
-        """The shape in its present pose; a drag does not count until it is committed."""
+        """The shape in its present pose, without a drag that was not committed."""
         return self.rig.mesh
 
     @property
     def edits(self) -> tuple[Edit, ...]:
-        """The edits that led here, oldest first."""
+        """The edits that led to the present pose, oldest first."""
         return tuple(self._edits[: self._place])
 
     @property
-    def undone(self) -> int:
-        """How many edits can be redone."""
+    def n_redoable(self) -> int:
+        """Number of edits that can be redone."""
         return len(self._edits) - self._place
 
     @property
-    def grip(self) -> SkeletonGrip:
-        """What a viewer needs for the drag under way: places, and four numbers a vertex and region.
+    def response(self) -> SkeletonResponse:
+        """Response of the eigen-skeleton to the handles of the present drag, for a viewer.
 
         Raises
         ------
         InvalidParameterError
-            If nothing is dragged.
+            If no region is being dragged.
         """
-        return self._dragged()[2]
+        return self._require_drag()[2]
 
     def drag(
-        self, region: Region, handle: Handle, *, fixed: Region | None = None, n_modes: SupportsIndex | None = None
+        self,
+        region: Region,
+        handle: Handle,
+        *,
+        fixed: Region | None = None,
+        n_modes: SupportsIndex | None = None,
     ) -> Float[np.ndarray, "n 3"]:
-        """Show where a region's handle would take the shape: the moved eigen-skeleton.
+        """Preview the motion of one region.
 
-        A region that is dragged again, with the same options, is not bound anew. See `drag_all`.
+        A second drag of the same region, with the same options, reuses its binding.
+
+        Parameters
+        ----------
+        region : (n,) bool, (k,) int, BoxRegion or BrushRegion
+            The vertices that the handle moves.
+        handle : Rotation or Translation
+        fixed : region, optional
+            The vertices that must stay; see `bind`.
+        n_modes : int, optional
+            Number of modes; see `bind`.
+
+        Returns
+        -------
+        (n, 3) float
+            Vertices of the moved eigen-skeleton.
+
+        Raises
+        ------
+        InvalidParameterError
+            As for `bind`.
         """
         require_type(handle, Handle, "handle")
         return self.drag_all([Move(region, handle)], fixed=fixed, n_modes=n_modes)
 
     def drag_all(
-        self, moves: Iterable[Move], *, fixed: Region | None = None, n_modes: SupportsIndex | None = None
+        self,
+        moves: Iterable[Move],
+        *,
+        fixed: Region | None = None,
+        n_modes: SupportsIndex | None = None,
     ) -> Float[np.ndarray, "n 3"]:
-        """Show where the handles of several regions would take the shape.
+        """Preview the motion of several regions.
 
         Parameters
         ----------
         moves : iterable of Move
-        fixed, n_modes
-            As for `bind`.
+        fixed : region, optional
+            The vertices that must stay; see `bind`.
+        n_modes : int, optional
+            Number of modes; see `bind`.
 
         Returns
         -------
         (n, 3) float
-            Vertices of the eigen-skeleton; `grip` has what a viewer needs to follow the handles by itself.
+            Vertices of the moved eigen-skeleton. With `response`, a viewer can follow the handles
+            without further calls.
 
         Raises
         ------
@@ -109,39 +164,60 @@ class DeformationSession:
         moves = tuple(moves) if isinstance(moves, Iterable) else moves
         require_each(moves, Move, "moves")
         edit = Edit(tuple(moves), fixed, number, self._mode)
-        if self._pending is None or not self._binds_alike(edit, self._pending[0]):
-            binding = bind(self.rig, [move.region for move in edit.moves], fixed=fixed, n_modes=number)
-            self._pending = edit, binding, grip_skeleton(binding)
+        if self._pending is None or not self._same_regions(edit, self._pending[0]):
+            regions = [move.region for move in edit.moves]
+            binding = bind(self.rig, regions, fixed=fixed, n_modes=number)
+            self._pending = edit, binding, skeleton_response(binding)
         self._pending = edit, *self._pending[1:]
-        return moved_skeleton(self.grip, [move.handle for move in edit.moves])
+        return move_skeleton(self.response, [move.handle for move in edit.moves])
 
-    def _binds_alike(self, one: Edit, two: Edit) -> bool:
-        if one.n_modes != two.n_modes or len(one.moves) != len(two.moves) or (one.fixed is None) != (two.fixed is None):
+    def _same_regions(self, one: Edit, two: Edit) -> bool:
+        """Say whether two edits have the same binding."""
+        if (
+            one.n_modes != two.n_modes
+            or len(one.moves) != len(two.moves)
+            or (one.fixed is None) != (two.fixed is None)
+        ):
             return False
         pairs = [(a.region, b.region) for a, b in zip(one.moves, two.moves, strict=True)]
         pairs += [(one.fixed, two.fixed)] if one.fixed is not None and two.fixed is not None else []
-        return all(a is b or np.array_equal(region_mask(self.mesh, a), region_mask(self.mesh, b)) for a, b in pairs)
+        return all(
+            a is b or np.array_equal(region_mask(self.mesh, a), region_mask(self.mesh, b))
+            for a, b in pairs
+        )
 
-    def _dragged(self) -> tuple[Edit, Binding, SkeletonGrip]:
+    def _require_drag(self) -> tuple[Edit, Binding, SkeletonResponse]:
         if self._pending is None:
-            raise InvalidParameterError("A region must be dragged first; nothing is.")
+            raise InvalidParameterError(
+                "A region must be dragged first; none is. Call session.drag(region, handle)."
+            )
         return self._pending
 
     def commit(self) -> TriangleMesh:
-        """Bend the shape as it was dragged last, and forget what was undone.
+        """Apply the present drag, and forget the edits that were undone.
+
+        Returns
+        -------
+        TriangleMesh
+            The deformed shape.
 
         Raises
         ------
         InvalidParameterError
-            If nothing is dragged.
+            If no region is being dragged.
         """
-        edit, binding, _ = self._dragged()
+        edit, binding, _ = self._require_drag()
         bent = bend(binding, [move.handle for move in edit.moves], mode=self._mode)
-        self._advance(edit, posed(self.rig, bent.vertices))
+        self._advance(edit, pose_rig(self.rig, bent.vertices))
         return self.mesh
 
     def apply(self, edit: Edit) -> TriangleMesh:
-        """Do an edit at once, in its own mode; a drag under way is dropped.
+        """Apply an edit in its own mode, and drop the present drag.
+
+        Returns
+        -------
+        TriangleMesh
+            The deformed shape.
 
         Raises
         ------
@@ -159,16 +235,16 @@ class DeformationSession:
         self._pending = None
 
     def cancel(self) -> None:
-        """Drop the drag under way, if there is one."""
+        """Drop the present drag, if there is one."""
         self._pending = None
 
     def undo(self) -> TriangleMesh:
-        """Go back before the last edit, to the same vertices to the last digit.
+        """Return to the pose before the last edit, with exactly the same vertices.
 
         Raises
         ------
         InvalidParameterError
-            If there is none.
+            If there is no edit.
         """
         if not self._place:
             raise InvalidParameterError("There must be an edit to undo; there is none.")
@@ -177,43 +253,60 @@ class DeformationSession:
         return self.mesh
 
     def redo(self) -> TriangleMesh:
-        """Go on to the edit that was undone last, to the same vertices to the last digit.
+        """Return to the pose after the edit that was undone last, with exactly the same vertices.
 
         Raises
         ------
         InvalidParameterError
-            If there is none.
+            If no edit was undone.
         """
-        if not self.undone:
-            raise InvalidParameterError("An edit must have been undone to be redone; none was.")
+        if not self.n_redoable:
+            raise InvalidParameterError("There must be an undone edit to redo; there is none.")
         self._place += 1
         self._pending = None
         return self.mesh
 
 
-def replay(rig: EigenRig, edits: Sequence[Edit], *, source: MeshLike | None = None) -> DeformationSession:
-    """Do edits again, on the same shape or on another mesh of it.
+def replay(
+    rig: EigenRig, edits: Sequence[Edit], *, source: MeshLike | None = None
+) -> DeformationSession:
+    """Apply stored edits, on the same shape or on another mesh of it.
 
     Parameters
     ----------
     rig : EigenRig
     edits : sequence of Edit
     source : MeshLike, optional
-        The mesh, unbent, whose vertices the regions of the edits name, where it is another than the rig's.
+        The undeformed mesh on which the edits were made, if it is not the mesh of the rig. Regions
+        are carried over by nearest vertices.
 
     Returns
     -------
     DeformationSession
+        A session with these edits, which can be undone.
 
     Raises
     ------
     InvalidParameterError
-        As for `bind`, of the first edit that cannot be done.
+        As for `bind`, for the first edit that cannot be applied.
+
+    Examples
+    --------
+    Edits of a coarse sphere, on a finer one:
+
+    >>> import eigenshape as es
+    >>> coarse, fine = es.icosphere(2), es.icosphere(3)
+    >>> move = es.deformation.Move(coarse.vertices[:, 2] > 0.2, es.Translation([0, 0, 1]))
+    >>> edits = [es.deformation.Edit((move,))]
+    >>> session = es.deformation.replay(es.rig_shape(fine), edits, source=coarse)
+    >>> float(session.mesh.vertices[:, 2].max().round(3))
+    2.0
     """
     require_type(rig, EigenRig, "rig")
     require_each(edits, Edit, "edits")
     session = DeformationSession(rig)
-    unbent = None if source is None else as_mesh(source, "source")
+    undeformed = None if source is None else as_mesh(source, "source")
     for edit in edits:
-        session.apply(edit if unbent is None else carry_edit(edit, unbent, rig.mesh))
+        carried = edit if undeformed is None else carry_edit(edit, undeformed, rig.mesh)
+        session.apply(carried)
     return session

@@ -1,4 +1,4 @@
-"""The eigen-skeleton that follows handles: steps 1 and 2 of the thesis (6.2.1, 6.2.2), linear in each motion."""
+"""Response of the eigen-skeleton to handles: steps 1 and 2 of the thesis (6.2.1, 6.2.2)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,19 +10,28 @@ from eigenshape._arguments import require_each, require_type
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.binding import Binding
 from eigenshape.deformation.handles import Handle, affine_offset
-from eigenshape.deformation.rig import eigen_skeleton, projected
+from eigenshape.deformation.rig import eigen_skeleton, project_on_modes
 
 
 @dataclass(frozen=True, eq=False)
-class SkeletonGrip:
-    """What a drag needs at each vertex: its place, and four numbers a region.
+class SkeletonResponse:
+    """The eigen-skeleton, and how it responds to the motions of handles.
+
+    The response is linear: each drag costs four numbers per vertex and region, so a viewer can
+    follow a handle without calling the library (for example in a vertex shader).
 
     Attributes
     ----------
     skeleton : (n, 3) float
-        K, the eigen-skeleton of as many modes as the binding asks for.
+        K, the eigen-skeleton of as many modes as the binding uses.
     weights : (r, n, 4) float
-        U with K* = K + Σ U_r D_rᵀ, where D = [R - 1 | t] is a motion x → R x + t less the identity.
+        U with K* = K + Σ_r U_r D_rᵀ, where D_r = [R - 1 | t] for the motion x → R x + t of region
+        r.
+
+    See Also
+    --------
+    skeleton_response : Compute the response.
+    move_skeleton : Apply motions.
     """
 
     skeleton: Float[np.ndarray, "n 3"]
@@ -30,23 +39,62 @@ class SkeletonGrip:
 
 
 @one_blas_thread()
-def grip_skeleton(binding: Binding) -> SkeletonGrip:
-    """Find the least-squares fit of moved regions by the low modes, for all motions at once (thesis eq. 6.1).
+def skeleton_response(binding: Binding) -> SkeletonResponse:
+    """Compute how the eigen-skeleton responds to all motions of the bound regions (thesis eq. 6.1).
 
-    A motion cuts a region of the skeleton out and moves it; the fit is Φ (ΦᵀΦ)⁻¹ Φ_Rᵀ [K_R, 1] times D, and so four
-    columns serve all motions.
+    A motion cuts a region out of the skeleton and moves it; the new skeleton is the least-squares
+    fit by the lowest modes. The fit is Φ (ΦᵀΦ)⁻¹ Φ_Rᵀ [K_R, 1] times D, so four columns per region
+    serve all motions.
+
+    Parameters
+    ----------
+    binding : Binding
+
+    Returns
+    -------
+    SkeletonResponse
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> binding = es.deformation.bind(es.rig_shape(mesh), [mesh.vertices[:, 2] > 0.2])
+    >>> response = es.deformation.skeleton_response(binding)
+    >>> response.weights.shape
+    (1, 162, 4)
+    >>> es.deformation.move_skeleton(response, [es.Translation([0, 0, 1])]).shape
+    (162, 3)
     """
     require_type(binding, Binding, "binding")
     rig, n_modes = binding.rig, int(binding.n_modes.max())
     skeleton = eigen_skeleton(rig, n_modes)
-    ends = np.column_stack([skeleton, np.ones(len(skeleton))])
-    cut = [projected(rig, ends * mask[:, None], n_modes) for mask in binding.regions]
-    return SkeletonGrip(skeleton, np.array([rig.eigenvectors[:, :n_modes] @ columns for columns in cut]))
+    homogeneous = np.column_stack([skeleton, np.ones(len(skeleton))])
+    weights = [
+        rig.eigenvectors[:, :n_modes] @ project_on_modes(rig, homogeneous * mask[:, None], n_modes)
+        for mask in binding.regions
+    ]
+    return SkeletonResponse(skeleton, np.array(weights))
 
 
-def moved_skeleton(grip: SkeletonGrip, handles: Sequence[Handle]) -> Float[np.ndarray, "n 3"]:
-    """Return K*, the skeleton where handles take it."""
-    require_type(grip, SkeletonGrip, "grip")
+def move_skeleton(
+    response: SkeletonResponse, handles: Sequence[Handle]
+) -> Float[np.ndarray, "n 3"]:
+    """Return the eigen-skeleton under the motions of handles.
+
+    Parameters
+    ----------
+    response : SkeletonResponse
+    handles : sequence of r Rotation or Translation
+        One for each region.
+
+    Returns
+    -------
+    (n, 3) float
+        K*, the vertices of the moved skeleton.
+    """
+    require_type(response, SkeletonResponse, "response")
     require_each(handles, Handle, "handles")
-    pairs = zip(grip.weights, handles, strict=True)
-    return grip.skeleton + sum((weights @ affine_offset(handle).T for weights, handle in pairs), np.zeros(3))
+    pairs = zip(response.weights, handles, strict=True)
+    return response.skeleton + sum(
+        (weights @ affine_offset(handle).T for weights, handle in pairs), np.zeros(3)
+    )

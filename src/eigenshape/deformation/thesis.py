@@ -1,4 +1,4 @@
-"""Eigen deformation as in the thesis: a skeleton moved by least squares, and details put back in two passes (6.3.3)."""
+"""Eigen deformation of the thesis: a skeleton moved by least squares, and its details (6.3)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,12 +10,19 @@ from jaxtyping import Float
 from eigenshape._arguments import require_each, require_type
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.binding import Binding
-from eigenshape.deformation.details import FramedDetails, blended, framed, turned_by_frames, turned_by_handles
+from eigenshape.deformation.details import (
+    FramedDetails,
+    blend_details,
+    frame_details,
+    turn_by_frames,
+    turn_by_handles,
+)
 from eigenshape.deformation.handles import Handle
-from eigenshape.deformation.rig import eigen_skeleton, projected
-from eigenshape.deformation.skeleton import SkeletonGrip, grip_skeleton, moved_skeleton
+from eigenshape.deformation.rig import eigen_skeleton, project_on_modes
+from eigenshape.deformation.skeleton import SkeletonResponse, move_skeleton, skeleton_response
 
-SECOND_PASS = 300  # modes
+# Modes of the finer skeleton, through which the details come back (thesis 6.3.3).
+SECOND_PASS = 300
 
 Points = Float[np.ndarray, "n 3"]
 Details = Literal["blended", "frames", "handle"]
@@ -23,70 +30,101 @@ Details = Literal["blended", "frames", "handle"]
 
 @dataclass(frozen=True, eq=False)
 class DetailedSkeleton:
-    """A skeleton that handles can move, and what it takes to put details back.
+    """An eigen-skeleton that handles can move, and the details of the shape on it.
 
     Attributes
     ----------
     binding : Binding
-    grip : SkeletonGrip
+    response : SkeletonResponse
     fine : (n, 3) float
-        The skeleton of 300 modes; the shape itself where the grip has as many.
+        The skeleton of 300 modes; the shape itself if the coarse skeleton has as many.
     first, second : FramedDetails
-        From the grip's skeleton to the fine one, and from that to the shape.
+        Details of the fine skeleton on the coarse one, and of the shape on the fine one.
+
+    See Also
+    --------
+    detailed_skeleton : Prepare a binding.
+    eigen_deformation : Move the handles.
     """
 
     binding: Binding
-    grip: SkeletonGrip
+    response: SkeletonResponse
     fine: Points
     first: FramedDetails
     second: FramedDetails
 
 
 @one_blas_thread()
-def detail_skeleton(binding: Binding, *, second_pass: bool = True) -> DetailedSkeleton:
-    """Prepare a binding for the thesis' algorithm: for many positions of its handles.
+def detailed_skeleton(binding: Binding, *, second_pass: bool = True) -> DetailedSkeleton:
+    """Prepare a binding for the algorithm of the thesis, for many positions of its handles.
 
     Parameters
     ----------
     binding : Binding
     second_pass : bool
-        Whether details come back by way of the skeleton of 300 modes (6.3.3); all at once otherwise.
+        Whether details are put back in two passes, through the skeleton of 300 modes (6.3.3), or
+        all at once.
+
+    Returns
+    -------
+    DetailedSkeleton
     """
     require_type(binding, Binding, "binding")
-    rig, grip = binding.rig, grip_skeleton(binding)
+    rig, response = binding.rig, skeleton_response(binding)
     shape, faces, most = rig.mesh.vertices, rig.mesh.faces, min(SECOND_PASS, rig.n_modes)
     fine = eigen_skeleton(rig, most) if second_pass and binding.n_modes.max() < most else shape
-    return DetailedSkeleton(binding, grip, fine, framed(faces, grip.skeleton, fine), framed(faces, fine, shape))
+    first = frame_details(faces, response.skeleton, fine)
+    second = frame_details(faces, fine, shape)
+    return DetailedSkeleton(binding, response, fine, first, second)
 
 
 @one_blas_thread()
-def eigen_deformed(skeleton: DetailedSkeleton, handles: Sequence[Handle], *, details: Details = "blended") -> Points:
-    """Return the vertices where the thesis' algorithm takes them.
+def eigen_deformation(
+    skeleton: DetailedSkeleton, handles: Sequence[Handle], *, details: Details = "blended"
+) -> Points:
+    """Deform a shape by the algorithm of the thesis (6.2, 6.3).
 
-    Details are added up to the skeleton of 300 modes, which is fitted once more, and the rest by local frames alone;
-    with as many modes from the beginning, all at once.
+    The skeleton moves by least squares. Details up to the skeleton of 300 modes are added and
+    fitted once more by these modes; the rest is added in local frames. If the coarse skeleton has
+    as many modes, all details are added at once.
 
     Parameters
     ----------
     skeleton : DetailedSkeleton
     handles : sequence of r Rotation or Translation
+        One for each region.
     details : "blended", "frames" or "handle"
-        How the first pass turns details: as in 6.3.1, or by either of its two ways alone (figure 6.7).
+        How the first pass turns details: blended as in 6.3.1, by local frames alone, or by handles
+        alone (figure 6.7).
 
     Returns
     -------
     (n, 3) float
+        The vertices.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> binding = es.deformation.bind(es.rig_shape(mesh), [mesh.vertices[:, 2] > 0.2])
+    >>> skeleton = es.deformation.detailed_skeleton(binding)
+    >>> es.deformation.eigen_deformation(skeleton, [es.Translation([0, 0, 0.5])]).shape
+    (162, 3)
     """
     require_type(skeleton, DetailedSkeleton, "skeleton")
     require_each(handles, Handle, "handles")
     rig, faces = skeleton.binding.rig, skeleton.binding.rig.mesh.faces
-    moved = moved_skeleton(skeleton.grip, handles)
-    by_frames = turned_by_frames(faces, skeleton.first, moved)
-    by_handles = turned_by_handles(skeleton.binding, handles, skeleton.first.details)
-    ways = {"frames": by_frames, "handle": by_handles, "blended": blended(skeleton.binding, by_frames, by_handles)}
+    moved = move_skeleton(skeleton.response, handles)
+    by_frames = turn_by_frames(faces, skeleton.first, moved)
+    by_handles = turn_by_handles(skeleton.binding, handles, skeleton.first.details)
+    ways = {
+        "frames": by_frames,
+        "handle": by_handles,
+        "blended": blend_details(skeleton.binding, by_frames, by_handles),
+    }
     found = moved + ways[details]
     if skeleton.fine is rig.mesh.vertices:
         return found
     most = min(SECOND_PASS, rig.n_modes)
-    fitted = rig.eigenvectors[:, :most] @ projected(rig, found, most)
-    return fitted + turned_by_frames(faces, skeleton.second, fitted)
+    fitted = rig.eigenvectors[:, :most] @ project_on_modes(rig, found, most)
+    return fitted + turn_by_frames(faces, skeleton.second, fitted)

@@ -1,4 +1,4 @@
-"""Deformation transfer: how one shape was bent, done to another in correspondence (thesis chapter 7)."""
+"""Deformation transfer: bend one shape as another one was bent (thesis chapter 7)."""
 
 from typing import SupportsIndex
 
@@ -11,7 +11,7 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.distortion import require_poses
-from eigenshape.deformation.rigidity import edge_weights, fitted_turns, free_part, nearest_rotations
+from eigenshape.deformation.rigidity import edge_weights, fit_turns, free_part, nearest_rotations
 from eigenshape.deformation.rigidity_loops import turned_edges
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
@@ -31,86 +31,119 @@ def transfer_deformation(
     *,
     n_modes: SupportsIndex | None = None,
 ) -> TriangleMesh:
-    """Bend a shape as another one was bent.
+    """Bend a shape in the way another shape was bent.
 
-    What travels is how each vertex turned: the rotations that fit its edges, as nine functions in the low modes of
-    the source, by the functional map to the modes of the target. The target's edges are turned by them, and vertices
-    follow in the least-squares sense (Sumner and Popović 2004 do so with the gradients of faces). Few modes carry the
-    pose, more carry how limbs curve. Where the shapes stand differently in space, rotations are turned along.
+    The rotation of each vertex of the source is fitted to its edges. The nine entries of the
+    rotations are functions in the lowest modes of the source, and the functional map carries them
+    to the target. The edges of the target are rotated, and the vertices follow by least squares
+    (Sumner and Popović 2004 do this with the gradients of faces). Few modes carry the pose; more
+    modes also carry how limbs curve. If the two shapes are oriented differently in space, the
+    rotations are turned accordingly.
 
     Parameters
     ----------
     before, after : MeshLike
         Two poses of the source, with the same faces.
     target : MeshLike
-        In the pose that answers to `before`.
+        The target, in a pose that corresponds to `before`.
     mapping : FunctionalMap
         From the modes of `before` to those of the target.
     n_modes : int, optional
-        Modes of the source that carry; by default all of the map.
+        Number of modes of the source to use; by default all modes of the map.
 
     Returns
     -------
     TriangleMesh
-        The target, bent, its middle moved as that of the source in proportion to size.
+        The bent target. Its center moves as that of the source, in proportion to size.
 
     Raises
     ------
     InvalidParameterError
-        If the poses have other faces, the map is of other shapes, or has fewer modes.
+        If the poses have different faces, the map belongs to other shapes, or `n_modes` is not in
+        1..k.
     InvalidShapeError
-        If a face of `before` or the target has no area.
+        If a face of `before` or of the target has no area.
+
+    See Also
+    --------
+    functional_map : Compute the map from pairs of corresponding points.
+
+    Examples
+    --------
+    Stretch a sphere as another one was stretched:
+
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> longer = es.TriangleMesh(mesh.vertices * [1, 1, 1.2], mesh.faces)
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(mesh), 16)
+    >>> pairs = [[i, i] for i in range(162)]
+    >>> mapping = es.functional_map(spectrum, spectrum, pairs, n_modes=16)
+    >>> bent = es.deformation.transfer_deformation(mesh, longer, mesh, mapping)
+    >>> bent.n_vertices
+    162
     """
     before = as_mesh(before, "before")
     after = as_mesh(after, "after")
     target = as_mesh(target, "target")
     require_type(mapping, FunctionalMap, "mapping")
     require_poses(before, after)
-    for mesh, spectrum, name in ((before, mapping.source, "source"), (target, mapping.target, "target")):
+    for mesh, spectrum, name in (
+        (before, mapping.source, "source"),
+        (target, mapping.target, "target"),
+    ):
         if mesh.n_vertices != len(spectrum.eigenvectors):
             raise InvalidParameterError(
-                f"The map's {name} has {len(spectrum.eigenvectors)} vertices, and the mesh has {mesh.n_vertices}."
+                f"The {name} of the map must be the given mesh; it has "
+                f"{len(spectrum.eigenvectors)} vertices, and the mesh has {mesh.n_vertices}."
             )
     wanted = mapping.matrix.shape[1] if n_modes is None else n_modes
     k = whole_number(wanted, "n_modes", 1, mapping.matrix.shape[1])
     few = FunctionalMap(mapping.matrix[:, :k], mapping.source, mapping.target)
-    turns = fitted_turns(edge_weights(cotangent_laplacian(before).stiffness), before.vertices, after.vertices)
+    weights = edge_weights(cotangent_laplacian(before).stiffness)
+    turns = fit_turns(weights, before.vertices, after.vertices)
+    # A mean of rotations is no rotation: take the nearest one.
     carried = nearest_rotations(transfer_function(few, turns.reshape(-1, 9)).reshape(-1, 3, 3))
-    stand = _turn_between(transfer_function(mapping, before.vertices), target.vertices, point_areas(mapping.target))
-    return TriangleMesh(
-        _turned_by(target, stand @ carried @ stand.T) + _step(before, after, target, stand), target.faces
-    )
+    source_on_target = transfer_function(mapping, before.vertices)
+    stand = _rotation_between(source_on_target, target.vertices, point_areas(mapping.target))
+    turned = _turn_edges(target, stand @ carried @ stand.T)
+    return TriangleMesh(turned + _move_center(before, after, target, stand), target.faces)
 
 
-def _turn_between(
-    source: Float[np.ndarray, "n 3"], target: Float[np.ndarray, "n 3"], areas: Float[np.ndarray, " n"]
+def _rotation_between(
+    source: Float[np.ndarray, "n 3"],
+    target: Float[np.ndarray, "n 3"],
+    areas: Float[np.ndarray, " n"],
 ) -> Float[np.ndarray, "3 3"]:
-    """Return the rotation that takes points to their partners best (Kabsch 1976)."""
-    one, two = (size_one(points - _middle(points, areas))[0] for points in (source, target))
+    """Return the rotation that takes points nearest to their partners (Kabsch 1976)."""
+    one, two = (size_one(points - _center(points, areas))[0] for points in (source, target))
     return nearest_rotations((two.T @ (areas[:, None] / areas.sum() * one))[None])[0]
 
 
-def _middle(points: Float[np.ndarray, "n 3"], areas: Float[np.ndarray, " n"]) -> Float[np.ndarray, " 3"]:
+def _center(
+    points: Float[np.ndarray, "n 3"], areas: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, " 3"]:
     return np.asarray((areas / areas.sum()) @ points)
 
 
-def _turned_by(target: TriangleMesh, turns: Turns) -> Float[np.ndarray, "n 3"]:
-    """Return the target with its edges turned, its middle where it was."""
+def _turn_edges(target: TriangleMesh, turns: Turns) -> Float[np.ndarray, "n 3"]:
+    """Return the vertices of the target with its edges turned, and its center unchanged."""
     edges, areas = edge_weights(cotangent_laplacian(target).stiffness), dual_volumes(target)
-    held = np.arange(target.n_vertices) == 0
-    part = free_part(edges, held)
+    # The equations know edges alone: vertex 0 is fixed, and the center is restored below.
+    fixed = np.arange(target.n_vertices) == 0
+    part = free_part(edges, fixed)
     sums = np.empty((len(part.free), 3))
     spins = np.roll(Rotation.from_matrix(turns).as_quat(), 1, axis=1)
     turned_edges(part.free, edges.starts, edges.others, edges.weights, target.vertices, spins, sums)
     found = target.vertices.copy()
     if part.factor is not None:
         found[part.free] += part.factor.solve(sums)
-    return found + _middle(target.vertices, areas) - _middle(found, areas)
+    return found + _center(target.vertices, areas) - _center(found, areas)
 
 
-def _step(
+def _move_center(
     before: TriangleMesh, after: TriangleMesh, target: TriangleMesh, stand: Float[np.ndarray, "3 3"]
 ) -> Float[np.ndarray, " 3"]:
+    """Return the motion of the source's center, scaled to the size of the target and turned."""
     ours, theirs = dual_volumes(before), dual_volumes(target)
     size = np.sqrt(theirs.sum() / ours.sum())
-    return size * stand @ (_middle(after.vertices, ours) - _middle(before.vertices, ours))
+    return size * stand @ (_center(after.vertices, ours) - _center(before.vertices, ours))

@@ -1,4 +1,4 @@
-"""How far two persistence diagrams are apart."""
+"""Bottleneck distance of two persistence diagrams."""
 
 import numpy as np
 from jaxtyping import Float
@@ -9,20 +9,21 @@ from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs
 from eigenshape.features.least_matching import least_distance, least_perfect
 
 Points = Float[np.ndarray, "_ 2"]
-Reach = Float[np.ndarray, " _"]
 
 
 def bottleneck_distance(one: PersistenceDiagram, two: PersistenceDiagram) -> float:
-    """Measure how far the pairs of two diagrams must move to become equal: the least largest move.
+    """Compute the bottleneck distance of two persistence diagrams.
 
-    d_B = inf over matchings of the largest max(|birth - birth'|, |death - death'|), where a pair may also be matched
-    with the diagonal, half its persistence away (Cohen-Steiner, Edelsbrunner and Harer 2007). Maxima, minima,
-    components and loops are matched apart, the last two only with one another. It is at most max |f - g| for two
-    functions on one shape.
+    d_B = inf over matchings of the largest max(|birth - birth'|, |death - death'|), where a pair
+    may also be matched with the diagonal, at half its persistence (Cohen-Steiner, Edelsbrunner and
+    Harer 2007). Maxima, minima, components and loops are matched separately; components and loops
+    only with each other, not with the diagonal. For two functions f and g on one shape, d_B ≤ max
+    |f - g|.
 
-    Exact: whether a distance suffices is told by two maximum matchings among the pairs nearer than it (every pair that
-    is too far from the diagonal must be matched, first those of one diagram, then those of the other: Mendelsohn and
-    Dulmage 1958), and the least candidate that does is searched for. Memory grows with the number of such pairs.
+    The result is exact. A distance is sufficient if two maximum matchings exist among the pairs
+    within it: one of the points of the first diagram that are too far from the diagonal, and one of
+    those of the second (Mendelsohn and Dulmage 1958). The smallest sufficient candidate is found by
+    bisection. Memory grows with the number of pairs within the distance.
 
     Parameters
     ----------
@@ -31,19 +32,33 @@ def bottleneck_distance(one: PersistenceDiagram, two: PersistenceDiagram) -> flo
     Returns
     -------
     float
-        In the function's unit; infinite where the numbers of components or of loops differ.
+        In the function's unit; infinite if the numbers of components or of loops differ.
 
     Raises
     ------
     InvalidParameterError
-        If the loops of one diagram alone are known.
+        If only one of the diagrams has loops.
+
+    See Also
+    --------
+    persistence_diagram : Compute a diagram.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.shapes.grid(4, 1)
+    >>> heights = [0, 0, 2, 2, 1, 1, 3, 3, 0, 0]
+    >>> lower = [0, 0, 2, 2, 1, 1, 2.5, 2.5, 0, 0]
+    >>> diagram = es.features.persistence_diagram(mesh, heights)
+    >>> es.features.bottleneck_distance(diagram, es.features.persistence_diagram(mesh, lower))
+    0.5
     """
     require_type(one, PersistenceDiagram, "one")
     require_type(two, PersistenceDiagram, "two")
     if (one.loops is None) != (two.loops is None):
         raise InvalidParameterError(
-            "Diagrams must both have loops, or neither, to be compared; one is of a solid or of points. Compare such "
-            "diagrams by replace(diagram, loops=None)."
+            "Diagrams must both have loops, or neither, to be compared; one is of a solid or of "
+            "points. Compare such diagrams by replace(diagram, loops=None)."
         )
     distances = [ordinary_distance(_points(one.maxima), _points(two.maxima))]
     distances.append(ordinary_distance(_points(one.minima), _points(two.minima)))
@@ -58,14 +73,11 @@ def _points(pairs: PersistencePairs) -> Points:
 
 
 def ordinary_distance(one: Points, two: Points) -> float:
-    """Return the bottleneck distance of pairs (birth, death) that may vanish into the diagonal."""
-    return least_distance(one, two, _to_diagonal(one), _to_diagonal(two))
+    """Return the bottleneck distance of pairs that may be matched with the diagonal."""
+    reach_one, reach_two = (np.abs(points[:, 0] - points[:, 1]) / 2 for points in (one, two))
+    return least_distance(one, two, reach_one, reach_two)
 
 
 def essential_distance(one: Points, two: Points) -> float:
-    """Return the bottleneck distance of pairs that must all be matched; infinite where their numbers differ."""
+    """Return the bottleneck distance of pairs that must all be matched, or infinity."""
     return least_perfect(one, two, np.inf)[0] if len(one) == len(two) else float(np.inf)
-
-
-def _to_diagonal(points: Points) -> Reach:
-    return np.abs(points[:, 0] - points[:, 1]) / 2

@@ -1,4 +1,4 @@
-"""Boundaries between parts, moved to where a cut is shortest and follows creases."""
+"""Smooth the boundaries between parts: move each to a shortest cut that follows creases."""
 
 from dataclasses import dataclass
 
@@ -9,40 +9,53 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components, dijk
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, positive_values
-from eigenshape.features.segmentation import Segmentation, touching_parts
+from eigenshape.features.segmentation import Segmentation, adjacent_parts
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, face_pairs
 from eigenshape.operators.anisotropic import curvature_tensors
 
-CONCAVITY = 10.0  # α of `curvature_tensors`
-WIDTH = 0.4  # of the square root of the smaller part's area
-CORE = 0.9  # of a part's depth: no band reaches deeper
-CAPACITY = 2.0**30  # of all edges together: what the flow counts with has 31 bits
+# α of `curvature_tensors`, without unit: the strength of creases. The best of 1, 5, 10, 20, 40 and
+# 100 on the tuning half of experiments/ch5_parts.
+CONCAVITY = 10.0
+# Half width of the band, as a share of the square root of the smaller part's area. The best of 0.1
+# to 1.2 on the tuning half of experiments/ch5_parts.
+WIDTH = 0.4
+# The band covers at most this share of a part's depth, so that faces remain that surely belong to
+# the part.
+MOST_OF_DEPTH = 0.9
+# Sum of all edge capacities. `maximum_flow` counts in 32-bit integers: a larger sum could overflow,
+# a smaller one would round the costs more coarsely.
+CAPACITY = 2.0**30
 
 
-def smooth_boundaries(mesh: MeshLike, segmentation: Segmentation, *, width: float = WIDTH) -> Segmentation:
-    """Move the boundary between each two parts to the least cut in a band around it.
+def smooth_boundaries(
+    mesh: MeshLike, segmentation: Segmentation, *, width: float = WIDTH
+) -> Segmentation:
+    """Move the boundary between adjacent parts to a shortest cut nearby.
 
-    A cut costs the length of its edges times the conductivity across them, which is low in concave creases
-    (`curvature_tensors`), so that the least is short and follows creases (as Katz and Tal 2003, 4.4, whose costs are of
-    dihedral angles alone). It is a maximum flow between what of the two parts lies beyond the band. Pairs of parts are
-    taken in their order. A part keeps its feature point and does not fall apart: where it would, the boundary stays.
+    Each pair of adjacent parts is cut anew inside a band around their boundary, by a maximum flow
+    between the faces on either side of the band. A cut costs the length of its edges times the
+    conductivity across them. Conductivity is low in concave creases (`curvature_tensors`), so the
+    cheapest cut is short and follows creases. Katz and Tal (2003, section 4.4) do the same with
+    costs from dihedral angles. Pairs of parts are treated in ascending order. Each part keeps the
+    faces at its feature point. A boundary that would break a part into pieces is not moved.
 
     Parameters
     ----------
     mesh : MeshLike
-        Its faces seen from outside counter-clockwise, so that creases are known from ridges.
+        With faces counter-clockwise as seen from outside, so that concave creases differ from
+        ridges.
     segmentation : Segmentation
     width : float
-        How far the band reaches to both sides, along face centres, as a share of the square root of the smaller part's
-        area. It never reaches deeper than nine tenths of a part.
+        Reach of the band to both sides, measured between face centers, as a share of the square
+        root of the smaller part's area. The band covers at most nine tenths of a part's depth.
 
     Returns
     -------
     Segmentation
-        The same feature points, with other labels.
+        With the same feature points and new labels.
 
     Raises
     ------
@@ -50,101 +63,109 @@ def smooth_boundaries(mesh: MeshLike, segmentation: Segmentation, *, width: floa
         If the width is not positive.
     InvalidShapeError
         If a face has no area.
+
+    See Also
+    --------
+    find_parts : Find parts and smooth their boundaries.
+    segment : Cut a tree into parts.
     """
     mesh = as_mesh(mesh)
     require_type(segmentation, Segmentation, "segmentation")
     (share,) = positive_values(width, "width")
-    network, labels = _network(mesh), segmentation.labels.copy()
-    held = _faces_at(mesh, segmentation)
-    for one, two in touching_parts(mesh, labels).tolist():
-        _move(network, labels, (one, two), held, share)
+    network, labels = _build_network(mesh), segmentation.labels.copy()
+    tips = segmentation.features.vertices[segmentation.labels]
+    fixed = (mesh.faces == tips[:, None]).any(axis=1)
+    for one, two in adjacent_parts(mesh, labels).tolist():
+        _move_boundary(network, labels, (one, two), fixed, share)
     return Segmentation(frozen(labels), segmentation.features)
 
 
 @dataclass(frozen=True, eq=False)
 class _Network:
-    """Faces joined over edges: pairs (p, 2), the way between their centres, what a cut there costs; areas (f,)."""
+    """Graph of faces joined over edges, for a mesh scaled to unit size.
+
+    pairs: the two faces of each inner edge; lengths: distance of their centers; costs: cost of a
+    cut along the edge; areas: of the faces.
+    """
 
     pairs: Int[np.ndarray, "p 2"]
-    ways: Float[np.ndarray, " p"]
+    lengths: Float[np.ndarray, " p"]
     costs: Float[np.ndarray, " p"]
     areas: Float[np.ndarray, " f"]
 
 
-def _network(mesh: TriangleMesh) -> _Network:
+def _build_network(mesh: TriangleMesh) -> _Network:
     points, _ = unit_scaled(mesh)
     unit = TriangleMesh(points, mesh.faces)
     table = edge_table(unit)
     pairs, edges = face_pairs(table)
-    centres = points[mesh.faces].mean(axis=1)
-    across = centres[pairs[:, 1]] - centres[pairs[:, 0]]
-    ways = np.linalg.norm(across, axis=1)
+    centers = points[mesh.faces].mean(axis=1)
+    across = centers[pairs[:, 1]] - centers[pairs[:, 0]]
+    lengths = np.linalg.norm(across, axis=1)
+    # Conductivity in the direction across the edge: the mean of the two faces' tensors.
     tensors = curvature_tensors(unit, CONCAVITY, concave=True)[pairs].mean(axis=1)
     squares = np.einsum("pi,pij,pj->p", across, tensors, across)
-    conductivity = np.divide(squares, ways**2, out=np.ones_like(ways), where=ways > 0)
-    lengths = np.linalg.norm(np.diff(points[table.edges[edges]], axis=1)[:, 0], axis=1)
-    return _Network(pairs, ways, lengths * conductivity, face_areas(unit))
+    conductivity = np.divide(squares, lengths**2, out=np.ones_like(lengths), where=lengths > 0)
+    edge_lengths = np.linalg.norm(np.diff(points[table.edges[edges]], axis=1)[:, 0], axis=1)
+    return _Network(pairs, lengths, edge_lengths * conductivity, face_areas(unit))
 
 
-def _faces_at(mesh: TriangleMesh, segmentation: Segmentation) -> Bool[np.ndarray, " f"]:
-    """Mark the faces at the feature point of their own part."""
-    tips = segmentation.features.vertices[segmentation.labels]
-    return (mesh.faces == tips[:, None]).any(axis=1)
-
-
-def _move(
-    network: _Network, labels: Int[np.ndarray, " f"], parts: tuple[int, int], held: Bool[np.ndarray, " f"], share: float
+def _move_boundary(
+    network: _Network,
+    labels: Int[np.ndarray, " f"],
+    parts: tuple[int, int],
+    fixed: Bool[np.ndarray, " f"],
+    share: float,
 ) -> None:
-    """Cut two parts anew, in place."""
+    """Move the boundary between two parts; `labels` changes in place."""
+    # Restrict the network to the faces of the two parts.
     faces = np.flatnonzero(np.isin(labels, parts))
     local = np.full(len(labels), -1)
     local[faces] = np.arange(len(faces))
     inside = (local[network.pairs] >= 0).all(axis=1)
     pairs, side = local[network.pairs[inside]], labels[faces] == parts[0]
     crossing = side[pairs[:, 0]] != side[pairs[:, 1]]
-    if not crossing.any():  # an earlier cut has parted them
+    if not crossing.any():  # an earlier cut has separated them
         return
-    band = _band(network.areas[faces], _graph(pairs, network.ways[inside], len(faces)), side, pairs[crossing], share)
-    band &= ~held[faces]
+
+    # The band: faces near the boundary, measured along the graph.
+    areas = network.areas[faces]
+    graph = _symmetric_graph(pairs, network.lengths[inside], len(faces))
+    depth = dijkstra(graph, indices=np.unique(pairs[crossing]), min_only=True)
+    reach = share * min(areas[side].sum(), areas[~side].sum()) ** 0.5
+    deepest = np.where(side, depth[side].max(), depth[~side].max())
+    band = depth < np.minimum(reach, MOST_OF_DEPTH * deepest)
+    band &= ~fixed[faces]
     if band[side].all() or band[~side].all():
         return
-    cut = _least_cut(pairs, network.costs[inside], side, band)
-    if _pieces(pairs, cut) <= _pieces(pairs, side):
+    cut = _minimum_cut(pairs, network.costs[inside], side, band)
+    if _count_pieces(pairs, cut) <= _count_pieces(pairs, side):
         labels[faces] = np.where(cut, *parts)
 
 
-def _graph(pairs: Int[np.ndarray, "p 2"], weights: np.ndarray, n: int) -> sp.csr_array:
+def _symmetric_graph(pairs: Int[np.ndarray, "p 2"], weights: np.ndarray, n: int) -> sp.csr_array:
     both = np.concatenate([pairs, pairs[:, ::-1]]).T
     return sp.coo_array((np.concatenate([weights, weights]), both), shape=(n, n)).tocsr()
 
 
-def _band(
-    areas: Float[np.ndarray, " k"],
-    graph: sp.csr_array,
-    side: Bool[np.ndarray, " k"],
-    crossing: Int[np.ndarray, "c 2"],
-    share: float,
-) -> Bool[np.ndarray, " k"]:
-    depth = dijkstra(graph, indices=np.unique(crossing), min_only=True)
-    reach = share * min(areas[side].sum(), areas[~side].sum()) ** 0.5
-    deepest = np.where(side, depth[side].max(), depth[~side].max())
-    return depth < np.minimum(reach, CORE * deepest)
-
-
-def _least_cut(
+def _minimum_cut(
     pairs: Int[np.ndarray, "p 2"],
     costs: Float[np.ndarray, " p"],
     side: Bool[np.ndarray, " k"],
     band: Bool[np.ndarray, " k"],
 ) -> Bool[np.ndarray, " k"]:
-    """Say which faces lie on the first side of the least cut through the band."""
+    """Say which faces lie on the first side of the cheapest cut through the band."""
+    # Node 0 is the first side beyond the band, node 1 the second; each face of the band has a node
+    # of its own.
     node = np.where(side, 0, 1)
     node[band] = 2 + np.arange(np.count_nonzero(band))
+    n_nodes = 2 + int(np.count_nonzero(band))
     ends = node[pairs]
     kept = ends[:, 0] != ends[:, 1]
     capacities = np.int64(1) + np.floor(CAPACITY * costs[kept] / costs[kept].sum()).astype(np.int64)
     capacities[(ends[kept] < 2).all(axis=1)] = 0
-    graph = sp.csr_matrix(_graph(ends[kept], capacities, 2 + int(np.count_nonzero(band))).astype(np.int32))
+    graph = sp.csr_matrix(_symmetric_graph(ends[kept], capacities, n_nodes).astype(np.int32))
+    # Maximum flow, minimum cut: the first side is what the source reaches in the residual graph.
     residual = graph - maximum_flow(graph, 0, 1).flow
     residual.data = (residual.data > 0).astype(np.int8)
     residual.eliminate_zeros()
@@ -153,7 +174,8 @@ def _least_cut(
     return reached[node]
 
 
-def _pieces(pairs: Int[np.ndarray, "p 2"], side: Bool[np.ndarray, " k"]) -> int:
-    """Count the pieces into which both sides fall."""
+def _count_pieces(pairs: Int[np.ndarray, "p 2"], side: Bool[np.ndarray, " k"]) -> int:
+    """Count the connected pieces of both sides together."""
     whole = side[pairs[:, 0]] == side[pairs[:, 1]]
-    return int(connected_components(_graph(pairs[whole], np.ones(whole.sum()), len(side)), directed=False)[0])
+    graph = _symmetric_graph(pairs[whole], np.ones(whole.sum()), len(side))
+    return int(connected_components(graph, directed=False)[0])

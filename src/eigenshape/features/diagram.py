@@ -3,30 +3,33 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arrays import frozen, vertex_values
+from eigenshape._typing import ArrayLike
 from eigenshape.features.loops import extended_loops
 from eigenshape.features.union_loops import join_points
-from eigenshape.geometry.cloud import PointCloud, Shape
+from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.operators.graph import edge_graph
 from eigenshape.operators.neighbors import neighbor_graph
 
+# Nearest neighbors to which each point of a cloud is joined. More join what is separate, fewer
+# break what is whole.
 N_NEIGHBORS = 10
 
 
 @dataclass(frozen=True, eq=False)
 class PersistencePairs:
-    """Pairs of vertices at which something begins and ends, most persistent first, ties by the vertex of birth.
+    """Pairs of vertices at which a class of homology begins and ends.
+
+    Pairs are sorted by falling persistence, then by the vertex of birth.
 
     Attributes
     ----------
     birth_vertices, death_vertices : (p,) int
     births, deaths : (p,) float
-        The function there.
+        The function at these vertices.
     """
 
     birth_vertices: Int[np.ndarray, " p"]
@@ -42,22 +45,29 @@ class PersistencePairs:
 
 @dataclass(frozen=True, eq=False)
 class PersistenceDiagram:
-    """How a function on a shape rises and falls, in dimension 0, with the essential loops where they are known.
+    """Persistence of a function on a shape, in dimension 0, and its essential loops.
 
     Attributes
     ----------
     maxima : PersistencePairs
-        Where values fall from infinity, a component of {f ≥ a} is born at a maximum and dies at the saddle where it
-        meets one with a higher maximum.
+        Components of {f ≥ a} for falling a: each is born at a maximum, and dies at the saddle where
+        it meets a component with a higher maximum.
     minima : PersistencePairs
-        The same of {f ≤ a}, where values rise: from a minimum to the saddle where it meets one with a lower minimum.
+        Components of {f ≤ a} for rising a: each is born at a minimum, and dies at the saddle where
+        it meets a component with a lower minimum.
     components : PersistencePairs
-        One for each component of the shape, from its lowest to its highest vertex: they never end, and are paired by
-        extended persistence.
+        One pair for each component of the shape, from its lowest to its highest vertex (extended
+        persistence).
     loops : PersistencePairs or None
-        One for each independent loop that nothing fills (modulo 2; twice the genus on a closed orientable surface):
-        born where {f ≤ a} first has it, paired with where {f ≥ a} last has it. None for solids, for surfaces with an
-        edge of more than two faces, and for point clouds.
+        One pair for each independent loop (H₁ modulo 2; twice the genus on a closed orientable
+        surface): from the value at which {f ≤ a} first contains it to that at which {f ≥ a} last
+        contains it. None for solids, for surfaces with an edge of more than two faces, and for
+        point clouds.
+
+    See Also
+    --------
+    persistence_diagram : Compute a diagram.
+    bottleneck_distance : Compare two diagrams.
     """
 
     maxima: PersistencePairs
@@ -66,66 +76,87 @@ class PersistenceDiagram:
     loops: PersistencePairs | None
 
 
-def persistence_diagram(shape: ShapeLike, values: ArrayLike, *, n_neighbors: int = N_NEIGHBORS) -> PersistenceDiagram:
-    """Pair the maxima and minima of a function with the saddles where they merge.
+def persistence_diagram(
+    shape: ShapeLike, values: ArrayLike, *, n_neighbors: int = N_NEIGHBORS
+) -> PersistenceDiagram:
+    """Compute the persistence diagram of a function on a shape.
 
-    The function is that of the vertices, linear on simplices; what is connected, edges tell alone (Edelsbrunner and
-    Harer 2010, VII). The order is total: vertices by (value, index). Maxima and minima that persist for no time are
-    left out, so what is left does not depend on the indices. Essential classes are paired by extended persistence
-    (Cohen-Steiner, Edelsbrunner and Harer 2009).
+    The function is linear on each simplex, so edges alone decide which vertices are connected
+    (Edelsbrunner and Harer 2010, chapter VII). Vertices are ordered by (value, index). Pairs of
+    persistence 0 are left out, so the diagram does not depend on the indices of vertices. Essential
+    classes are paired by extended persistence (Cohen-Steiner, Edelsbrunner and Harer 2009).
 
-    `merge_tree` differs from `maxima` by its saddles: it joins faces over edges, with the value of an edge that of its
-    higher vertex, as the thesis does; here the regions meet in vertices.
+    The saddles differ from those of `merge_tree`, which joins faces across edges, as the thesis
+    does, with the value of an edge at its higher vertex. Here, regions meet at vertices.
 
     Parameters
     ----------
     shape : ShapeLike
-        Of any dimension; the points of a cloud are joined to their nearest neighbours.
+        Of any dimension; each point of a cloud is joined to its nearest neighbors.
     values : (n,) float
         The function at the vertices.
     n_neighbors : int
-        Of each point of a cloud, as in `neighbor_graph`.
+        Number of neighbors of each point of a cloud, 1 to n - 1; see `neighbor_graph`.
 
     Returns
     -------
     PersistenceDiagram
-        In the function's unit; nothing depends on coordinates, but the neighbours of a cloud.
+        In the function's unit. Coordinates matter only for the neighbors of a cloud.
 
     Raises
     ------
     InvalidParameterError
-        If there is not one finite value a vertex, or `n_neighbors` is not in 1..n - 1.
+        If `values` does not hold one finite number per vertex, or `n_neighbors` is not in 1..n - 1.
     InvalidShapeError
         If a simplex has a corner twice.
+
+    See Also
+    --------
+    bottleneck_distance : Compare two diagrams.
+    merge_tree : Merge the regions of maxima on a surface.
+
+    Examples
+    --------
+    -------- The height on a torus that stands upright has one component and two loops, each between
+    0.6 and -0.6 or back:
+
+    >>> import eigenshape as es
+    >>> mesh = es.shapes.torus(24, 12)
+    >>> diagram = es.features.persistence_diagram(mesh, mesh.vertices[:, 0])
+    >>> diagram.components.persistence.round(3)
+    array([2.8])
+    >>> diagram.loops.persistence.round(3)
+    array([1.2, 1.2])
     """
     shape = as_shape(shape)
     height = vertex_values(values, "values", shape.n_points)
-    graph = _graph(shape, n_neighbors)
     order = np.argsort(height, kind="stable")
+    if isinstance(shape, PointCloud):
+        graph, loops = neighbor_graph(shape.points, n_neighbors), None
+    else:
+        graph, loops = edge_graph(shape), extended_loops(shape, order)
     top, falling = join_points(graph.indptr, graph.indices, order[::-1])
     bottom, rising = join_points(graph.indptr, graph.indices, order)
     tops = np.unique(top)
-    loops = None if isinstance(shape, PointCloud) else extended_loops(shape, order)
     return PersistenceDiagram(
-        maxima=_lasting(falling, height),
-        minima=_lasting(rising, height),
-        components=_pairs(np.column_stack([bottom[tops], tops]), height),
-        loops=None if loops is None else _pairs(loops, height),
+        maxima=_ordinary_pairs(falling, height),
+        minima=_ordinary_pairs(rising, height),
+        components=_sort_pairs(np.column_stack([bottom[tops], tops]), height),
+        loops=None if loops is None else _sort_pairs(loops, height),
     )
 
 
-def _graph(shape: Shape, n_neighbors: int) -> sp.csr_array:
-    if isinstance(shape, PointCloud):
-        return neighbor_graph(shape.points, n_neighbors)
-    return edge_graph(shape)
+def _ordinary_pairs(
+    vertices: Int[np.ndarray, "p 2"], height: Float[np.ndarray, " n"]
+) -> PersistencePairs:
+    """Leave out the pairs of persistence 0, and sort the rest."""
+    births, deaths = height[vertices].T
+    return _sort_pairs(vertices[births != deaths], height)
 
 
-def _lasting(ended: Int[np.ndarray, "p 2"], height: Float[np.ndarray, " n"]) -> PersistencePairs:
-    begins, ends = height[ended].T
-    return _pairs(ended[begins != ends], height)
-
-
-def _pairs(vertices: Int[np.ndarray, "p 2"], height: Float[np.ndarray, " n"]) -> PersistencePairs:
+def _sort_pairs(
+    vertices: Int[np.ndarray, "p 2"], height: Float[np.ndarray, " n"]
+) -> PersistencePairs:
     births, deaths = height[vertices].T
     order = np.lexsort((vertices[:, 1], vertices[:, 0], -np.abs(births - deaths)))
     sorted_columns = (*vertices[order].T, births[order], deaths[order])

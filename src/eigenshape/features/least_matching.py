@@ -1,4 +1,4 @@
-"""The least distance within which the points of two sets can be matched."""
+"""The smallest distance within which the points of two sets can be matched."""
 
 from bisect import bisect_left
 from typing import NamedTuple
@@ -16,50 +16,65 @@ Points = Float[np.ndarray, "_ d"]
 Reach = Float[np.ndarray, " _"]
 Partners = Int[np.ndarray, " n"]
 
-FINE = 1e-4  # of the distance: an interval so short holds few candidates
-SLACK = 1e-9  # of a distance: more than the rounding of two ways to compute it
+# Bisection of the interval that holds the distance stops at this share of it: so short an interval
+# holds few candidates.
+FINE = 1e-4
+# Relative margin for the rounding of a distance that is computed in two ways; 1e7 times the
+# rounding itself.
+SLACK = 1e-9
+# Factor by which the search distance grows. A larger one lists more pairs in the last round, a
+# smaller one takes more rounds.
 GROWTH = 1.5
-PEAK = 150  # bytes a pair while pairs are listed
-COARSE = 1e-3  # of the largest distance of points in the same place of their lists: where the search begins
+# Peak bytes of memory per pair while pairs are listed.
+BYTES_OF_PAIR = 150
+# Least distance at which the search begins, as a share of the largest distance of points at equal
+# places of their lists.
+COARSE = 1e-3
 
 
 class Pairs(NamedTuple):
-    """Pairs of points of two sets, and how far they are apart."""
+    """Pairs of points of two sets, and their distances."""
 
     i: Int[np.ndarray, " k"]
     j: Int[np.ndarray, " k"]
-    apart: Float[np.ndarray, " k"]
+    distances: Float[np.ndarray, " k"]
 
 
 def least_perfect(one: Points, two: Points, norm: float) -> tuple[float, Int[np.ndarray, " _"]]:
-    """Return the least distance within which each point of one set has one of the other for itself, and which.
+    """Return the smallest distance that allows a perfect matching, and the matching.
 
-    The sets have equal numbers of points. From just below the distance at which each has a neighbour the search grows
-    until it suffices; among the distances of the pairs found then the least that does is searched for. A matching that
-    was not enough is where the next begins.
+    It is given by the partner of each point of the first set. The sets have equal numbers of
+    points. The search distance starts just below the distance at which each point has a neighbor,
+    and grows until a perfect matching exists; bisection among the distances of the listed pairs
+    then finds the smallest sufficient one. Each matching starts from the last insufficient one.
     """
     partners = match_within(one, two, 0.0, norm)
     if (partners >= 0).all():
         return 0.0, partners
-    low, top = _enclosed(one, two, norm), float(_lengths(one - two, norm).max())
+    low, top = _lower_bound(one, two, norm), float(_lengths(one - two, norm).max())
     distance = max(GROWTH * low, COARSE * top)
     while True:
         near = near_pairs(one, two, min(distance, top), norm)
-        found = _matched(near, partners, len(two))
+        found = _match_pairs(near, partners, len(two))
         if (found >= 0).all():
-            return _least_of(near, np.unique(near.apart[near.apart > low]), found, partners)
+            candidates = np.unique(near.distances[near.distances > low])
+            return _bisect_perfect(near, candidates, found, partners)
         low, distance, partners = distance, GROWTH * distance, found
 
 
-def _least_of(
+def _bisect_perfect(
     near: Pairs, distances: Reach, found: Partners, partners: Partners
 ) -> tuple[float, Int[np.ndarray, " n"]]:
-    """Search ascending distances for the least that suffices; the last does, with the matching that was found."""
+    """Return the smallest of some distances that allows a perfect matching, and the matching.
+
+    Distances ascend. The last distance does, with the matching `found`; `partners` is the largest
+    known insufficient matching.
+    """
     low, high = 0, len(distances) - 1
     while low < high:
         middle = (low + high) // 2
-        inside = near.apart <= distances[middle]
-        tried = _matched(Pairs(*(part[inside] for part in near)), partners, len(partners))
+        inside = near.distances <= distances[middle]
+        tried = _match_pairs(Pairs(*(part[inside] for part in near)), partners, len(partners))
         if (tried >= 0).all():
             high, found = middle, tried
         else:
@@ -68,14 +83,17 @@ def _least_of(
 
 
 def least_distance(one: Points, two: Points, reach_one: Reach, reach_two: Reach) -> float:
-    """Return the least distance that suffices, by the largest coordinate, where points may vanish within their reach.
+    """Return the smallest sufficient distance in the maximum norm.
 
-    It is 0, one of the reaches, or the distance of two points. The interval that holds it is halved until few of
-    these lie in it, and these are searched.
+    A point whose reach is at most the distance needs no partner. The result is 0, one of the
+    reaches, or the distance of two points. Bisection shortens the interval that contains it until
+    few of these candidates lie inside; bisection among the candidates follows.
     """
 
     def suffices(distance: float) -> bool:
-        return _covers(one[reach_one > distance], two, distance) and _covers(two[reach_two > distance], one, distance)
+        return _covers(one[reach_one > distance], two, distance) and _covers(
+            two[reach_two > distance], one, distance
+        )
 
     if suffices(0.0):
         return 0.0
@@ -85,66 +103,81 @@ def least_distance(one: Points, two: Points, reach_one: Reach, reach_two: Reach)
         middle = low + (high - low) / 2
         low, high = (low, middle) if suffices(middle) else (middle, high)
     sides = [(one[reach_one > low], two), (two[reach_two > low], one)]
-    left = np.unique(np.concatenate([reaches, *(near_pairs(*side, high, np.inf).apart for side in sides), [high]]))
-    left = left[(left > low) & (left <= high)]
-    return float(left[bisect_left(range(len(left) - 1), True, key=lambda place: suffices(float(left[place])))])
+    distances = [near_pairs(*side, high, np.inf).distances for side in sides]
+    candidates = np.unique(np.concatenate([reaches, *distances, [high]]))
+    candidates = candidates[(candidates > low) & (candidates <= high)]
+    # The last candidate is `high`, which is sufficient.
+    place = bisect_left(
+        range(len(candidates) - 1), True, key=lambda place: suffices(float(candidates[place]))
+    )
+    return float(candidates[place])
 
 
 def _covers(some: Points, others: Points, distance: float) -> bool:
-    """Say whether each of some points can have another for itself within the distance."""
+    """Say whether each of some points can have a partner of its own within the distance."""
     if not len(some) or len(some) > len(others):
         return not len(some)
     return bool((match_within(some, others, distance, np.inf) >= 0).all())
 
 
-def match_within(some: Points, others: Points, distance: float, norm: float) -> Int[np.ndarray, " _"]:
-    """Match as many of some points as can be with another each within the distance; -1 where there is none."""
-    return _matched(near_pairs(some, others, distance, norm), np.full(len(some), -1), len(others))
+def match_within(
+    some: Points, others: Points, distance: float, norm: float
+) -> Int[np.ndarray, " _"]:
+    """Return a partner within the distance for as many points as possible; -1 for none."""
+    near = near_pairs(some, others, distance, norm)
+    return _match_pairs(near, np.full(len(some), -1), len(others))
 
 
-def _matched(near: Pairs, first: Partners, n_others: int) -> Int[np.ndarray, " n"]:
-    graph = sp.csr_array((np.ones(len(near.i), dtype=np.int8), (near.i, near.j)), shape=(len(first), n_others))
+def _match_pairs(near: Pairs, first: Partners, n_others: int) -> Int[np.ndarray, " n"]:
+    graph = sp.csr_array(
+        (np.ones(len(near.i), dtype=np.int8), (near.i, near.j)), shape=(len(first), n_others)
+    )
     return match_rows(graph.indptr, graph.indices, n_others, first)[0]
 
 
 def near_pairs(some: Points, others: Points, distance: float, norm: float) -> Pairs:
-    """List the pairs of points at most the distance apart.
+    """List the pairs of points whose distance is at most the given one.
 
     Raises
     ------
     InvalidShapeError
-        If they would not fit into half of the memory.
+        If the pairs do not fit into half of the memory.
     """
     if not len(some) or not len(others):
         return Pairs(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0))
-    # The tree compares powers of distances: it is asked for a little more, and what is near decided here alone.
+    # The tree compares powers of distances, with a rounding of its own: it returns a few more, and
+    # the comparison below decides.
     reach = distance * (1 + SLACK)
     trees = cKDTree(some), cKDTree(others)
-    _require_room(*trees, reach, norm)
+    _require_memory(*trees, reach, norm)
     found = trees[0].sparse_distance_matrix(trees[1], reach, p=norm, output_type="ndarray")
     i, j = found["i"].astype(np.int64), found["j"].astype(np.int64)
-    apart = _lengths(some[i] - others[j], norm)
-    near = apart <= distance
-    return Pairs(i[near], j[near], apart[near])
+    distances = _lengths(some[i] - others[j], norm)
+    near = distances <= distance
+    return Pairs(i[near], j[near], distances[near])
 
 
-def _require_room(one: cKDTree, two: cKDTree, reach: float, norm: float) -> None:
-    room, most = machine_memory() / 2, one.n * two.n
-    if most * PEAK <= room:
+def _require_memory(one: cKDTree, two: cKDTree, reach: float, norm: float) -> None:
+    available = machine_memory() / 2
+    if one.n * two.n * BYTES_OF_PAIR <= available:  # all pairs fit: no need to count
         return
     n_pairs = int(one.count_neighbors(two, reach, p=norm))
-    if n_pairs * PEAK > room:
+    needed = n_pairs * BYTES_OF_PAIR
+    if needed > available:
         raise InvalidShapeError(
-            f"Pairs of near points must fit into half of the memory, {room / 2**30:.1f} GiB; {n_pairs:.2g} pairs "
-            f"within {reach:.3g} take {n_pairs * PEAK / 2**30:.1f} GiB. "
+            "Pairs of near points must fit into half of the memory, "
+            f"{available / 2**30:.1f} GiB; {n_pairs:.2g} pairs within {reach:.3g} take "
+            f"{needed / 2**30:.1f} GiB. "
             "Bring the sets nearer to each other, or take fewer points."
         )
 
 
-def _enclosed(one: Points, two: Points, norm: float) -> float:
-    """Return a distance just below that at which each point has a neighbour."""
-    lonely = max(cKDTree(those).query(these, p=norm)[0].max() for these, those in ((one, two), (two, one)))
-    return float(lonely) * (1 - SLACK)
+def _lower_bound(one: Points, two: Points, norm: float) -> float:
+    """Return a distance just below that at which each point has a neighbor in the other set."""
+    to_nearest = max(
+        cKDTree(those).query(these, p=norm)[0].max() for these, those in ((one, two), (two, one))
+    )
+    return float(to_nearest) * (1 - SLACK)
 
 
 def _lengths(vectors: Float[np.ndarray, "k d"], norm: float) -> Float[np.ndarray, " k"]:

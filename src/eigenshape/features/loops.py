@@ -1,4 +1,4 @@
-"""Loops of curves and surfaces that nothing fills, and where a function's level sets first and last have them."""
+"""Essential loops of curves and surfaces, paired by extended persistence."""
 
 from collections import defaultdict
 from dataclasses import dataclass
@@ -16,13 +16,15 @@ from eigenshape.geometry.topology import edge_table
 
 
 def extended_loops(mesh: Mesh, order: Int[np.ndarray, " n"]) -> Int[np.ndarray, "loops 2"] | None:
-    """Pair by extended persistence the classes of H₁ modulo 2: the vertex where each begins, and that where it ends.
+    """Pair the loops (classes of H₁ modulo 2) of a curve or a surface by extended persistence.
 
-    Where values rise, an edge that neither joins two components (a tree) nor is filled by a face (a tree of faces)
-    begins a loop for good (Eppstein 2003 calls it tree-cotree decomposition). It is dual to a cut: faces crossed on
-    the way around. Loops z_i of rising and w_k of falling values span H₁ in two orders; cuts c_j with |z_i ∩ c_j| =
-    δ_ij give the coordinates |w_k ∩ c_j| of the second in the first. Reducing those rows, in the order in which the w_k
-    begin, to different last coordinates pairs the two orders.
+    As values rise, an edge that neither joins two components (it is not in a spanning tree) nor is
+    dual to an edge of a spanning tree of faces begins a loop that lasts (tree-cotree decomposition,
+    Eppstein 2003). The edge is dual to a cut: the edges that a path of faces crosses. The loops z_i
+    of rising and w_k of falling values span H₁ in two orders. Cuts c_j with |z_i ∩ c_j| = δ_ij give
+    the coordinates |w_k ∩ c_j| of the second basis in the first. The rows of these coordinates, in
+    the order in which the w_k begin, are reduced to different last coordinates; these are the
+    pairs.
 
     Parameters
     ----------
@@ -33,16 +35,21 @@ def extended_loops(mesh: Mesh, order: Int[np.ndarray, " n"]) -> Int[np.ndarray, 
     Returns
     -------
     (loops, 2) int, or None
-        None where the mesh is neither a curve nor a surface, or an edge has more than two faces.
+        For each loop, the vertex where it begins as values rise, and the vertex where it begins as
+        values fall. None if the mesh is neither a curve nor a surface, or if an edge has more than
+        two faces.
     """
-    complex_ = _complex(mesh)
+    complex_ = _build_complex(mesh)
     if complex_ is None:
         return None
-    rising, falling = _generators(complex_, order), _generators(complex_, order[::-1])
+    rising = _find_generators(complex_, order)
+    falling = _find_generators(complex_, order[::-1])
     if not len(rising.edges):
         return np.empty((0, 2), dtype=np.int64)
     crossing = _cuts_at_edges(complex_, rising)
-    tree = _rooted(complex_.edges, falling.tree, len(order))
+    tree = _root_forest(complex_.edges, falling.tree, len(order))
+    # A row is an integer: bit j says whether the loop crosses cut j. `last` holds reduced rows by
+    # their highest bit.
     last: dict[int, int] = {}
     pairs = []
     for edge in falling.edges.tolist():
@@ -55,54 +62,54 @@ def extended_loops(mesh: Mesh, order: Int[np.ndarray, " n"]) -> Int[np.ndarray, 
         pairs.append((rising.edges[row.bit_length() - 1], edge))
     place = np.argsort(order)
     ends = complex_.edges[np.array(pairs)]
-    return np.column_stack([order[place[ends[:, 0]].max(axis=1)], order[place[ends[:, 1]].min(axis=1)]])
+    return np.column_stack(
+        [order[place[ends[:, 0]].max(axis=1)], order[place[ends[:, 1]].min(axis=1)]]
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class _Complex:
-    """Edges by their vertices, and the two faces of each; where there is none, the outside, number `n_faces`."""
+    """The two vertices and the two faces of each edge; `n_faces` stands for a missing face."""
 
     edges: Int[np.ndarray, "e 2"]
     sides: Int[np.ndarray, "e 2"]
     n_faces: int
 
 
-def _complex(mesh: Mesh) -> _Complex | None:
+def _build_complex(mesh: Mesh) -> _Complex | None:
+    """Return the complex of a curve or surface, or None (see `extended_loops`)."""
     if mesh.dim == 1:
         edges = np.unique(np.sort(mesh.simplices, axis=1), axis=0)
         return _Complex(edges, np.zeros_like(edges), 0)
     if mesh.dim != 2:
         return None
-    edges, edge_of, counts = _edges(mesh)
+    if isinstance(mesh, TriangleMesh):
+        table = edge_table(mesh)
+        edges, face_edges, counts = table.edges, table.face_edges, table.n_faces
+    else:
+        facets = facet_table(mesh)
+        edges, face_edges, counts = facets.facets, facets.simplex_facets, facets.n_simplices
     if counts.max() > 2:
         return None
-    sides = np.full((len(edges), 2), len(edge_of))
-    order = np.argsort(edge_of.ravel(), kind="stable")
+    sides = np.full((len(edges), 2), len(face_edges))
+    order = np.argsort(face_edges.ravel(), kind="stable")
     starts = np.cumsum(counts) - counts
     sides[:, 0] = order[starts] // 3
     sides[counts == 2, 1] = order[starts[counts == 2] + 1] // 3
-    return _Complex(edges, sides, len(edge_of))
-
-
-def _edges(mesh: Mesh) -> tuple[Int[np.ndarray, "e 2"], Int[np.ndarray, "f 3"], Int[np.ndarray, " e"]]:
-    if isinstance(mesh, TriangleMesh):
-        edges = edge_table(mesh)
-        return edges.edges, edges.face_edges, edges.n_faces
-    facets = facet_table(mesh)
-    return facets.facets, facets.simplex_facets, facets.n_simplices
+    return _Complex(edges, sides, len(face_edges))
 
 
 @dataclass(frozen=True, eq=False)
 class _Generators:
-    """Which edges join vertices, which join faces, and the others in the order in which they enter."""
+    """Edges of the two spanning trees, and the other edges in the order of entry."""
 
     tree: Bool[np.ndarray, " e"]
     cotree: Bool[np.ndarray, " e"]
     edges: Int[np.ndarray, " loops"]
 
 
-def _generators(complex_: _Complex, order: Int[np.ndarray, " n"]) -> _Generators:
-    """Let edges enter with their later vertex in order."""
+def _find_generators(complex_: _Complex, order: Int[np.ndarray, " n"]) -> _Generators:
+    """Let the edges enter in the order of their later vertices; each other edge begins a loop."""
     place = np.argsort(order)[complex_.edges]
     entering = np.lexsort((place.min(axis=1), place.max(axis=1)))
     tree = spanning_forest(complex_.edges, entering, len(order))
@@ -111,8 +118,12 @@ def _generators(complex_: _Complex, order: Int[np.ndarray, " n"]) -> _Generators
 
 
 def _cuts_at_edges(complex_: _Complex, rising: _Generators) -> dict[int, int]:
-    """Return for each edge the cuts that cross it, cut j as bit j: edge j and the way between its faces."""
-    tree = _rooted(complex_.sides, rising.cotree, complex_.n_faces + 1)
+    """Return, for each edge, the cuts that contain it, cut j as bit j.
+
+    Cut j consists of the edge that begins loop j and of the edges crossed on the path of faces
+    between its two sides.
+    """
+    tree = _root_forest(complex_.sides, rising.cotree, complex_.n_faces + 1)
     crossing: dict[int, int] = defaultdict(int)
     for number, edge in enumerate(rising.edges.tolist()):
         for step in (edge, *_path(tree, *complex_.sides[edge].tolist())):
@@ -121,31 +132,38 @@ def _cuts_at_edges(complex_: _Complex, rising: _Generators) -> dict[int, int]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Rooted:
-    """Trees under one root: the place of each node, later than that of its parent, the parent, and the edge to it."""
+class _RootedForest:
+    """Trees below one common root.
+
+    place: breadth-first number of each node, larger than that of its parent; parent: its parent;
+    edge: the edge to it.
+    """
 
     place: Int[np.ndarray, " n"]
     parent: Int[np.ndarray, " n"]
     edge: Int[np.ndarray, " n"]
 
 
-def _rooted(ends: Int[np.ndarray, "e 2"], kept: Bool[np.ndarray, " e"], n: int) -> _Rooted:
+def _root_forest(
+    ends: Int[np.ndarray, "e 2"], kept: Bool[np.ndarray, " e"], n: int
+) -> _RootedForest:
     edges = np.flatnonzero(kept)
     one, two = ends[edges].T
     graph = sp.coo_array((np.ones(len(edges), dtype=np.int8), (one, two)), shape=(n + 1, n + 1))
     _, labels = connected_components(graph, directed=False)
-    _, firsts = np.unique(labels[:n], return_index=True)  # one of each tree, to hang from a root of all
+    # The first node of each tree becomes a child of node n, the common root.
+    _, firsts = np.unique(labels[:n], return_index=True)
     rows, columns = np.append(one, firsts), np.append(two, np.full(len(firsts), n))
     graph = sp.coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(n + 1, n + 1))
     order, parent = breadth_first_order(graph.tocsr(), n, directed=False)
     place, to_parent = np.argsort(order), np.full(n + 1, -1)
     up = parent[one] == two
     to_parent[np.where(up, one, two)] = edges
-    return _Rooted(place, parent, to_parent)
+    return _RootedForest(place, parent, to_parent)
 
 
-def _path(tree: _Rooted, one: int, two: int) -> list[int]:
-    """Return the edges on the way between two nodes of one tree."""
+def _path(tree: _RootedForest, one: int, two: int) -> list[int]:
+    """Return the edges on the path between two nodes of one tree."""
     steps = []
     while one != two:
         if tree.place[one] < tree.place[two]:

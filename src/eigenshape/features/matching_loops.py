@@ -28,7 +28,9 @@ def match_rows(starts, columns, n_columns, first):
     while n_matched < n and _layer(starts, columns, row_of, column_of, depth, queue):
         following[:] = starts[:-1]
         for row in range(n):
-            if column_of[row] < 0 and _augment(row, columns, starts, row_of, column_of, depth, following, path):
+            if column_of[row] < 0 and _augment(
+                row, columns, starts, row_of, column_of, depth, following, path
+            ):
                 n_matched += 1
     return column_of, depth
 

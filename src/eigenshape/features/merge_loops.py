@@ -63,7 +63,9 @@ def join_faces(corners, starts, lower, owner, climbs_to, highest, ended):
             last = first
             while last + 1 < end and lower[last + 1] == low:
                 last += 1
-            for side in range(last - 1, first - 1, -1):  # the higher face first, whose own way up it may be
+            for side in range(
+                last - 1, first - 1, -1
+            ):  # the higher face first, whose own way up it may be
                 face = owner[side]
                 if corners[face, 0] == high and corners[face, 1] == low and owner[side + 1] != face:
                     climbs_to[face] = climbs_to[owner[side + 1]]
@@ -107,7 +109,8 @@ def _sort_sides(corners, lower, owner, first, end):
             low, face = lower[place], owner[place]
             into = place
             while into >= first + gap and (
-                lower[into - gap] < low or (lower[into - gap] == low and _is_lower(corners, face, owner[into - gap]))
+                lower[into - gap] < low
+                or (lower[into - gap] == low and _is_lower(corners, face, owner[into - gap]))
             ):
                 lower[into], owner[into] = lower[into - gap], owner[into - gap]
                 into -= gap

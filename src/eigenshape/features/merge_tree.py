@@ -1,60 +1,29 @@
-"""Region merging by persistence: how the maxima of a function on a surface merge into each other (thesis 5.2.2)."""
-
-from dataclasses import dataclass
+"""Merge tree of a function on a surface: how the regions of its maxima merge (thesis 5.2.2)."""
 
 import numpy as np
-import scipy.sparse as sp
-from jaxtyping import Bool, Float, Int
-from numpy.typing import ArrayLike
-from scipy.sparse.csgraph import connected_components
+from jaxtyping import Float, Int
 
 from eigenshape._arrays import frozen, vertex_values
+from eigenshape._typing import ArrayLike
 from eigenshape.features.merge_loops import file_sides, find_corners, join_faces
+from eigenshape.features.region_tree import MergeTree, merge_regions, number_regions
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 
 
-@dataclass(frozen=True, eq=False)
-class MergeTree:
-    """The maxima of a function, each with the saddle over which its region merges into a neighbour.
-
-    Maxima stand in the order of falling persistence, ties by falling height; only those that persist at all are here.
-
-    Attributes
-    ----------
-    maxima : (m,) int
-        Vertex of each maximum.
-    values : (m,) float
-        Function there.
-    saddles : (m, 2) int
-        The edge over which the maximum merges, its higher vertex first; (-1, -1) where it never does.
-    persistence : (m,) float
-        Value at the maximum minus value at the saddle's higher vertex; infinite once in each component.
-    parent : (m,) int
-        The maximum whose basin lies across the saddle; -1 where it never merges.
-    basins : (f,) int
-        For each face, the maximum that it climbs to.
-    """
-
-    maxima: Int[np.ndarray, " m"]
-    values: Float[np.ndarray, " m"]
-    saddles: Int[np.ndarray, "m 2"]
-    persistence: Float[np.ndarray, " m"]
-    parent: Int[np.ndarray, " m"]
-    basins: Int[np.ndarray, " f"]
-
-
 def merge_tree(mesh: MeshLike, values: ArrayLike) -> MergeTree:
-    """Merge the faces of a mesh into the basins of the function's maxima, and pair each maximum with its saddle.
+    """Compute the merge tree of a function on a surface.
 
-    The order is total (simulation of simplicity): vertices by (value, index), edges by (higher, lower vertex),
-    triangles by (highest, middle, lowest vertex). Boundary edges are ignored, which equals sealing each boundary loop
-    by a vertex lower than all. Faces at an edge with more than two faces are all neighbours there, so that what hangs
-    together stays one region; the homology modulo 2 of the thesis says this of two faces only, and else differs.
+    Each face belongs to the basin of one maximum. Edges are visited from the highest to the lowest,
+    and each edge joins the basins of its faces; of two basins, the one with the lower maximum ends
+    (Kruskal's algorithm on the dual graph; thesis 5.2.2). The tree is computed once and can be cut
+    at any number of regions or at any persistence.
 
-    The merge is that of the dual graph: an edge joins the basins of its faces, highest edge first, and the basin
-    with the lower maximum ends there. A face whose highest edge leads to a higher face ends at once. A million
-    vertices take about a second on one core, most of it to wait for memory.
+    Ties are broken by simulation of simplicity: vertices are ordered by (value, index), edges by
+    (higher, lower vertex), triangles by (highest, middle, lowest vertex). Boundary edges are
+    ignored, which is the same as closing each boundary loop with a vertex below all others. All
+    faces at an edge with more than two faces count as neighbors, so connected faces stay one
+    region; homology modulo 2, which the thesis uses, differs at such edges.
 
     Parameters
     ----------
@@ -69,84 +38,100 @@ def merge_tree(mesh: MeshLike, values: ArrayLike) -> MergeTree:
     Raises
     ------
     InvalidParameterError
-        If there is not one finite value a vertex.
+        If `values` does not hold one finite number per vertex.
+
+    See Also
+    --------
+    segment : Cut the tree into regions.
+    persistence_diagram : Pairs of maxima and minima with saddles, on shapes of any dimension.
+
+    Examples
+    --------
+    -------- A strip of eight triangles, and a function with two ridges of heights 2 and 3 and a
+    valley of height 1 between:
+
+    >>> import eigenshape as es
+    >>> mesh = es.shapes.grid(4, 1)
+    >>> tree = es.merge_tree(mesh, [0, 0, 2, 2, 1, 1, 3, 3, 0, 0])
+    >>> tree.values
+    array([3., 2.])
+    >>> tree.persistence
+    array([inf,  1.])
+    >>> tree.parent
+    array([-1,  0])
     """
     mesh = as_mesh(mesh)
     height = vertex_values(values, "values", mesh.n_vertices)
-    return _gather(height, _joined(mesh, height))
+    climbs_to, ended, corners, vertex = _join_basins(mesh, height)
+
+    # Basins, sorted by their highest faces from the lowest to the highest.
+    roots = np.flatnonzero(climbs_to == np.arange(mesh.n_faces))
+    highest, middle, lowest = corners[roots].T
+    order = np.lexsort((lowest, middle, highest))
+    roots, tops = roots[order], vertex[highest[order]]
+    n_basins = len(roots)
+    place = np.empty(mesh.n_faces, dtype=np.int64)
+    place[roots] = np.arange(n_basins)
+
+    # For each basin that ends: its saddle edge, and the basin on the other side.
+    saddles, neighbor = np.full((n_basins, 2), -1), np.arange(n_basins)
+    ends = place[ended[:, 0]]
+    saddles[ends] = vertex[ended[:, 1:3]]
+    neighbor[ends] = place[climbs_to[ended[:, 3]]]
+    values_at_tops = height[tops]
+    persistence = np.full(n_basins, np.inf)
+    persistence[ends] = values_at_tops[ends] - height[saddles[ends, 0]]
+
+    # Basins of persistence 0 join their neighbors, so that flat regions make no maxima.
+    region = merge_regions(neighbor, persistence <= 0)
+    kept = np.flatnonzero(persistence > 0)
+    kept = kept[np.lexsort((-kept, -persistence[kept]))]
+    parent = np.where(saddles[:, 0] < 0, -1, region[neighbor])
+    place[roots] = region
+    parent, basins = number_regions(kept, parent, place[climbs_to])
+    return MergeTree(
+        maxima=frozen(tops[kept]),
+        values=frozen(values_at_tops[kept]),
+        persistence=frozen(persistence[kept]),
+        parent=frozen(parent),
+        basins=frozen(basins),
+        saddles=frozen(saddles[kept]),
+    )
 
 
-@dataclass(frozen=True, eq=False)
-class _Joined:
-    """What the walk over falling edges found; vertices and faces by their old numbers.
+def _join_basins(
+    mesh: TriangleMesh, height: Float[np.ndarray, " n"]
+) -> tuple[
+    Int[np.ndarray, " f"], Int[np.ndarray, "e 4"], Int[np.ndarray, "f 3"], Int[np.ndarray, " n"]
+]:
+    """Join faces over falling edges.
 
-    climbs_to: (f,) the highest face of each face's basin; roots: (r,) those faces, lowest first; tops: (r,) their
-    highest vertices; ended: (e, 4) of each basin that ends its face, the higher and the lower vertex of the edge, and
-    the face of the basin across.
+    Returns
+    -------
+    climbs_to : (f,) int
+        For each face, the highest face of its basin.
+    ended : (e, 4) int
+        For each basin that ends: its highest face, the ranks of the higher and the lower vertex of
+        the edge over which it merges, and the face on the other side.
+    corners : (f, 3) int
+        Ranks of the corners of each face, highest first.
+    vertex : (n,) int
+        The vertex of each rank.
     """
-
-    climbs_to: Int[np.ndarray, " f"]
-    roots: Int[np.ndarray, " r"]
-    tops: Int[np.ndarray, " r"]
-    ended: Int[np.ndarray, "e 4"]
-
-
-def _joined(mesh: TriangleMesh, height: Float[np.ndarray, " n"]) -> _Joined:
     n, n_faces = mesh.n_vertices, mesh.n_faces
-    kind = np.int32 if max(n, n_faces) < 2**31 else np.int64  # half the memory to wait for, where it fits
+    # Half the memory traffic, where 32 bits are enough.
+    kind = np.int32 if max(n, n_faces) < 2**31 else np.int64
     vertex = np.argsort(height, kind="stable")
     rank = np.empty(n, dtype=kind)
     rank[vertex] = np.arange(n)
     corners = np.empty((n_faces, 3), dtype=kind)
     find_corners(mesh.faces, rank, corners)
-    # Each face has two sides whose higher vertex is its highest, and one whose higher vertex is its middle one.
-    n_sides = 2 * np.bincount(corners[:, 0], minlength=n) + np.bincount(corners[:, 1], minlength=n)
+    # The higher vertex is the highest of the face for two of its sides, the middle one for the third.
+    n_sides = 2 * np.bincount(corners[:, 0], minlength=n)
+    n_sides += np.bincount(corners[:, 1], minlength=n)
     starts = np.concatenate([[0], np.cumsum(n_sides)])
     lower, owner = np.empty(3 * n_faces, dtype=kind), np.empty(3 * n_faces, dtype=kind)
     file_sides(corners, starts[:-1].copy(), lower, owner)
     climbs_to, ended = np.arange(n_faces, dtype=kind), np.empty((n_faces, 4), dtype=kind)
     n_ended = join_faces(corners, starts, lower, owner, climbs_to, climbs_to.copy(), ended)
-    ended = ended[:n_ended].astype(np.int64)
-    roots = np.flatnonzero(climbs_to == np.arange(mesh.n_faces))
-    highest, middle, lowest = corners[roots].T
-    order = np.lexsort((lowest, middle, highest))
-    ended[:, 1:3] = vertex[ended[:, 1:3]]
-    return _Joined(climbs_to, roots[order], vertex[highest[order]], ended)
-
-
-def _gather(height: Float[np.ndarray, " n"], joined: _Joined) -> MergeTree:
-    """Fold what persists for no time at all into its neighbours, and sort the rest."""
-    roots, count = joined.roots, len(joined.roots)
-    place = np.empty(len(joined.climbs_to), dtype=np.int64)
-    place[roots] = np.arange(count)
-    edges, neighbour = np.full((count, 2), -1), np.arange(count)
-    ends = place[joined.ended[:, 0]]
-    edges[ends], neighbour[ends] = joined.ended[:, 1:3], place[joined.climbs_to[joined.ended[:, 3]]]
-    values = height[joined.tops]
-    persistence = np.full(count, np.inf)
-    persistence[ends] = values[ends] - height[edges[ends, 0]]
-    region = merged_regions(neighbour, persistence <= 0)
-    kept = np.flatnonzero(persistence > 0)
-    kept = kept[np.lexsort((-kept, -persistence[kept]))]
-    number = np.empty(count, dtype=np.int64)
-    number[kept] = np.arange(len(kept))
-    place[roots] = number[region]
-    return MergeTree(
-        maxima=frozen(joined.tops[kept]),
-        values=frozen(values[kept]),
-        saddles=frozen(edges[kept]),
-        persistence=frozen(persistence[kept]),
-        parent=frozen(np.where(edges[kept, 0] < 0, -1, number[region[neighbour[kept]]])),
-        basins=frozen(place[joined.climbs_to]),
-    )
-
-
-def merged_regions(neighbour: Int[np.ndarray, " m"], ends: Bool[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
-    """Merge each basin that ends into its neighbour's region: for each basin, the one of its region that stays."""
-    m = len(neighbour)
-    links = (np.flatnonzero(ends), neighbour[ends])
-    graph = sp.coo_array((np.ones(len(links[0]), dtype=np.int8), links), shape=(m, m))
-    _, region = connected_components(graph, directed=False)
-    stays = np.empty(m, dtype=np.int64)
-    stays[region[~ends]] = np.flatnonzero(~ends)
-    return stays[region]
+    return climbs_to, ended[:n_ended].astype(np.int64), corners, vertex

@@ -1,4 +1,4 @@
-"""The road from a mesh to its parts: limbs, head, torso."""
+"""Find the parts of a mesh: limbs, head, torso."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from eigenshape._arrays import frozen, whole_number
 from eigenshape._progress import Progress
 from eigenshape.features.boundaries import CONCAVITY, smooth_boundaries
 from eigenshape.features.part_merging import SEED_TIME, part_tree
-from eigenshape.features.part_tree import PartTree
+from eigenshape.features.region_tree import PartTree
 from eigenshape.features.segmentation import Segmentation, segment
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.fragments import fragment_vertices
@@ -19,28 +19,39 @@ from eigenshape.geometry.requirements import require_describable
 from eigenshape.geometry.topology import is_closed, vertex_components
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
 from eigenshape.spectral.signatures.heat import heat_kernel_signature
-from eigenshape.spectral.solver.dirichlet import solve_free
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
-N_MODES = 25  # beside one for each component
-PART_CONTRAST = 0.3  # parts between which more is left of a difference are two
+# Eigenpairs, beside one for each component. Of 15, 25 and 40, 25 was chosen on the tuning half of
+# experiments/ch5_parts, where 15 were as good.
+N_MODES = 25
+# Least persistence of a part: the share of a temperature difference to its parent that is left
+# after diffusion. A larger value finds fewer parts. The best of 0.1 to 0.4 on the tuning half of
+# experiments/ch5_parts.
+PART_CONTRAST = 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class FoundParts:
-    """The parts of a shape with all that was found on the way to them.
+class PartDecomposition:
+    """The parts of a surface and the intermediate results of `find_parts`.
 
     Attributes
     ----------
     mesh : TriangleMesh
-        As it was given, or turned to face outward.
+        The given mesh; if it is closed, with its faces oriented outward.
     spectrum : Spectrum
-        Of a Laplacian that conducts badly across concave creases; with zeros on fragments, whose pairs are left out.
+        Spectrum of a Laplacian that conducts badly across concave creases. Fragments have no
+        eigenpairs of their own; the eigenvectors are 0 there.
     heat : (n,) float
-        What seeds are the maxima of, in 1/length².
+        Heat kernel signature whose maxima are the seeds of parts, in 1/length².
     tree : PartTree
-        Which part splits from which; it can be cut elsewhere without computing anything again.
+        Tree in which the parts merge. `segment` can cut it elsewhere without further computation.
     parts : Segmentation
+        The part of each face.
+
+    See Also
+    --------
+    find_parts : Compute a decomposition.
     """
 
     mesh: TriangleMesh
@@ -50,37 +61,67 @@ class FoundParts:
     parts: Segmentation
 
 
-def find_parts(mesh: MeshLike, *, n_modes: int = N_MODES, progress: Progress | None = None) -> FoundParts:
-    """Find the parts of a surface: rooms between which heat flows badly, cut along concave creases.
+def find_parts(
+    mesh: MeshLike, *, n_modes: int = N_MODES, progress: Progress | None = None
+) -> PartDecomposition:
+    """Find the parts of a surface, such as limbs, head and torso.
 
-    Heat flows slowly across concave creases (`curvature_tensors`, α = 10); regions around the maxima of early heat are
-    merged in the order in which heat evens them out (`part_tree`); those are parts of which more than 0.3 of a
-    difference is left, and their boundaries are moved to the least cut (`smooth_boundaries`). All times are shares of
-    the area, so no unit counts.
+    A part is a region with little heat flow across its boundary. Heat flows slowly across concave
+    creases (`curvature_tensors`, α = 10). The basins of the maxima of early heat are merged in the
+    order in which diffusion equalizes them (`part_tree`), the tree is cut where more than 0.3 of a
+    temperature difference is left, and each boundary is moved to the shortest cut nearby
+    (`smooth_boundaries`). All times are shares of the surface area, so the result does not depend
+    on the unit of length.
 
-    Each component is a part at least. A fragment of less than a hundredth of the area (`fragment_vertices`) is exactly
-    one: it comes to one temperature long before the time at which parts are told apart.
+    Each component has at least one part. A fragment with less than a hundredth of the area
+    (`fragment_vertices`) is always exactly one part.
 
     Parameters
     ----------
     mesh : MeshLike
-        A closed surface is turned outward; of an open one the faces are seen from outside counter-clockwise.
+        A closed surface is oriented outward first. The faces of an open surface must be
+        counter-clockwise as seen from outside.
     n_modes : int
-        Eigenpairs, at least 2, to which one is added for each component that is no fragment.
+        Number of eigenpairs, at least 2; one is added for each component that is not a fragment.
     progress : callable, optional
-        Told of the eigensolver's progress.
+        Called as ``progress(fraction_done, message)`` by the eigensolver.
 
     Returns
     -------
-    FoundParts
+    PartDecomposition
 
     Raises
     ------
     InvalidParameterError
-        If there are fewer than 2 modes.
+        If `n_modes` is less than 2.
     InvalidShapeError
-        If the mesh has a face without area or twice, or a vertex without face; if neighboring faces are turned against
-        each other; or if it is a soup, whose faces lie edge on edge without sharing vertices.
+        If the mesh has a face without area, a duplicate face or a vertex without a face; if
+        neighboring faces are oriented against each other; or if faces lie edge to edge without
+        sharing vertices.
+
+    See Also
+    --------
+    segment : Cut the resulting tree elsewhere.
+    transfer_labels : Copy labels from the parts of one shape to those of another.
+
+    Examples
+    --------
+    A dumbbell is two parts:
+
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(3)
+    >>> x, y, z = ball.vertices.T
+    >>> thickness = 0.1 + z**2
+    >>> dumbbell = es.TriangleMesh(np.column_stack([thickness * x, thickness * y, z]), ball.faces)
+    >>> found = es.find_parts(dumbbell)
+    >>> len(found.parts.features.vertices)
+    2
+
+    The tree can be cut again, for example to keep the whole shape together:
+
+    >>> len(es.segment(found.tree, n_regions=1).features.vertices)
+    1
     """
     mesh = as_mesh(mesh)
     outward = facing_outward(mesh)
@@ -88,13 +129,40 @@ def find_parts(mesh: MeshLike, *, n_modes: int = N_MODES, progress: Progress | N
     tree = part_tree(outward, spectrum)
     heat = heat_kernel_signature(spectrum, [SEED_TIME * float(spectrum.mass.sum())])[:, 0]
     parts = smooth_boundaries(outward, segment(tree, persistence=PART_CONTRAST))
-    return FoundParts(outward, spectrum, frozen(heat), tree, parts)
+    return PartDecomposition(outward, spectrum, frozen(heat), tree, parts)
 
 
-def part_spectrum(mesh: MeshLike, *, n_modes: int = N_MODES, progress: Progress | None = None) -> Spectrum:
-    """Solve for the lowest modes of a Laplacian that conducts badly across concave creases, fragments left out.
+def part_spectrum(
+    mesh: MeshLike, *, n_modes: int = N_MODES, progress: Progress | None = None
+) -> Spectrum:
+    """Compute the lowest eigenpairs of a Laplacian that conducts badly across concave creases.
 
-    Parameters and errors are those of `find_parts`, the faces of the mesh being turned outward.
+    Fragments (`fragment_vertices`) are left out of the problem, and the eigenvectors are 0 there.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        With faces counter-clockwise as seen from outside, so that concave creases differ from
+        ridges.
+    n_modes : int
+        Number of eigenpairs, at least 2; one is added for each component that is not a fragment.
+    progress : callable, optional
+        Called as ``progress(fraction_done, message)`` by the eigensolver.
+
+    Returns
+    -------
+    Spectrum
+
+    Raises
+    ------
+    InvalidParameterError
+        If `n_modes` is less than 2.
+    InvalidShapeError
+        As for `find_parts`.
+
+    See Also
+    --------
+    part_tree : Merge parts by this spectrum.
     """
     mesh = as_mesh(mesh)
     require_describable(mesh)
@@ -103,11 +171,12 @@ def part_spectrum(mesh: MeshLike, *, n_modes: int = N_MODES, progress: Progress 
     n_components = len(np.unique(np.delete(labels, fragments)))
     wanted = whole_number(n_modes, "n_modes", 2) + n_components
     laplacian = anisotropic_laplacian(mesh, curvature_tensors(mesh, CONCAVITY, concave=True))
-    return solve_free(laplacian, min(wanted, mesh.n_vertices - len(fragments)), fragments, progress)
+    n_pairs = min(wanted, mesh.n_vertices - len(fragments))
+    return solve_spectrum(laplacian, n_pairs, fixed=fragments, progress=progress)
 
 
 def facing_outward(mesh: TriangleMesh) -> TriangleMesh:
-    """Return a closed mesh with its faces seen from outside counter-clockwise; an open one as it is."""
+    """Return a closed mesh with its faces oriented outward, and an open mesh unchanged."""
     if not is_closed(mesh) or enclosed_volume(mesh) >= 0:
         return mesh
     return TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])

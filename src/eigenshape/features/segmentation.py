@@ -3,13 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape.features.merge_tree import MergeTree, merged_regions
-from eigenshape.features.part_tree import PartTree
+from eigenshape.features.region_tree import MergeTree, PartTree, merge_regions
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.topology import edge_table, face_pairs
 
@@ -18,15 +17,20 @@ Tree = MergeTree | PartTree
 
 @dataclass(frozen=True, eq=False)
 class FeaturePoints:
-    """The maxima that a cut left, most persistent first, ties by height.
+    """The maxima that remain after a cut, sorted by falling persistence, then by falling height.
 
     Attributes
     ----------
     vertices : (m,) int
+        Vertex of each maximum.
     values : (m,) float
-        Function at each.
+        Function at each maximum.
     persistence : (m,) float
-        In the function's unit; infinite for the highest of each component.
+        In the function's unit; infinite for the highest maximum of each component.
+
+    See Also
+    --------
+    segment : Compute feature points and their regions.
     """
 
     vertices: Int[np.ndarray, " m"]
@@ -36,13 +40,17 @@ class FeaturePoints:
 
 @dataclass(frozen=True, eq=False)
 class Segmentation:
-    """A part of the surface around each feature point.
+    """A partition of a surface into regions, one around each feature point.
 
     Attributes
     ----------
     labels : (f,) int
-        For each face, the feature point in whose part it lies.
+        For each face, the index of its feature point.
     features : FeaturePoints
+
+    See Also
+    --------
+    segment : Compute a segmentation.
     """
 
     labels: Int[np.ndarray, " f"]
@@ -50,23 +58,29 @@ class Segmentation:
 
 
 def segment(
-    tree: Tree, *, n_regions: int | None = None, persistence: float | None = None, largest_gap: bool = False
+    tree: Tree,
+    *,
+    n_regions: int | None = None,
+    persistence: float | None = None,
+    largest_gap: bool = False,
 ) -> Segmentation:
-    """Merge regions in the order of their persistence until so many are left, or all left persist so long.
+    """Cut a merge tree into regions.
+
+    Regions are merged in the order of rising persistence until the given rule stops. Give exactly
+    one rule.
 
     Parameters
     ----------
     tree : MergeTree or PartTree
-    n_regions : int
-        Regions to leave, at least 1: fewer are left where the function has fewer maxima, more where the surface has
-        more components, each of which keeps one.
-    persistence : float
-        Regions that persist at least this long are left (thesis proposition 5.2.2); at least 0, in the function's
-        unit, of a `PartTree` a share without unit, infinite to leave one a component.
-    largest_gap : bool
-        Cut where persistence, sorted and ending in 0, falls most from one region to the next, as is done by eye in a
-        persistence diagram (Chazal, Guibas, Oudot and Skraba 2013); of equal gaps at the more persistent. Regions
-        that persist for ever are left and do not count.
+    n_regions : int, optional
+        Number of regions to keep, at least 1. Fewer are kept if the function has fewer maxima; more
+        if the surface has more components, each of which keeps one.
+    persistence : float, optional
+        Keep the regions with at least this persistence (thesis proposition 5.2.2). At least 0, in
+        the function's unit; without unit for a `PartTree`. Infinity keeps one region per component.
+    largest_gap : bool, optional
+        Cut at the largest gap of the sorted finite persistences, followed by 0 (Chazal, Guibas,
+        Oudot and Skraba 2013); of equal gaps, at the one of higher persistence.
 
     Returns
     -------
@@ -75,7 +89,29 @@ def segment(
     Raises
     ------
     InvalidParameterError
-        If not exactly one of the three is given, or it is below its least value.
+        If not exactly one rule is given, `n_regions` is less than 1, or `persistence` is less than
+        0.
+
+    See Also
+    --------
+    merge_tree : Compute the tree of a function.
+    find_parts : Find limbs, head and torso.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.shapes.grid(4, 1)
+    >>> tree = es.merge_tree(mesh, [0, 0, 2, 2, 1, 1, 3, 3, 0, 0])
+    >>> parts = es.segment(tree, n_regions=2)
+    >>> parts.labels
+    array([1, 1, 0, 0, 1, 1, 0, 0])
+    >>> parts.features.values
+    array([3., 2.])
+
+    The lower maximum has persistence 1, so a threshold above 1 leaves one region:
+
+    >>> es.segment(tree, persistence=1.5).labels
+    array([0, 0, 0, 0, 0, 0, 0, 0])
     """
     require_type(tree, Tree, "tree")
     rules = {"n_regions": n_regions, "persistence": persistence, "largest_gap": largest_gap or None}
@@ -86,40 +122,55 @@ def segment(
             f"{' and '.join(given) or 'none'}."
         )
     if n_regions is not None:
-        return _cut(tree, _beyond_number(tree, n_regions))
-    return _cut(tree, _below(tree, _above_largest_gap(tree) if persistence is None else persistence))
+        count = whole_number(n_regions, "n_regions", 1)
+        # The last region of a component has no parent, so it stays whatever the number.
+        ends = (np.arange(len(tree.maxima)) >= count) & (tree.parent >= 0)
+    else:
+        least = _above_largest_gap(tree) if persistence is None else persistence
+        if not least >= 0:
+            raise InvalidParameterError(f"persistence must be at least 0; it is {least}.")
+        ends = tree.persistence < least
 
-
-def _cut(tree: Tree, ends: Bool[np.ndarray, " m"]) -> Segmentation:
-    left = np.flatnonzero(~ends)
-    regions = merged_regions(np.maximum(tree.parent, 0), ends)[tree.basins]
+    kept = np.flatnonzero(~ends)
+    regions = merge_regions(np.maximum(tree.parent, 0), ends)[tree.basins]
     features = FeaturePoints(
-        vertices=frozen(tree.maxima[left]), values=frozen(tree.values[left]), persistence=frozen(tree.persistence[left])
+        vertices=frozen(tree.maxima[kept]),
+        values=frozen(tree.values[kept]),
+        persistence=frozen(tree.persistence[kept]),
     )
-    return Segmentation(frozen(np.searchsorted(left, regions)), features)
-
-
-def _beyond_number(tree: Tree, n_regions: int) -> Bool[np.ndarray, " m"]:
-    count = whole_number(n_regions, "n_regions", 1)
-    return (np.arange(len(tree.maxima)) >= count) & (tree.parent >= 0)
-
-
-def _below(tree: Tree, persistence: float) -> Bool[np.ndarray, " m"]:
-    if not persistence >= 0:
-        raise InvalidParameterError(f"persistence must be at least 0; it is {persistence}.")
-    return tree.persistence < persistence
+    return Segmentation(frozen(np.searchsorted(kept, regions)), features)
 
 
 def _above_largest_gap(tree: Tree) -> float:
-    """Return the persistence above the largest gap, infinite where nothing ends."""
+    """Return the persistence just above the largest gap, or infinity if all are infinite."""
     finite = tree.persistence[tree.parent >= 0]
     if not len(finite):
         return float(np.inf)
     return float(finite[np.argmax(finite - np.append(finite[1:], 0.0))])
 
 
-def touching_parts(mesh: MeshLike, labels: Int[np.ndarray, " f"]) -> Int[np.ndarray, "p 2"]:
-    """List the pairs of different labels that meet at an edge, the lower first, ascending."""
+def adjacent_parts(mesh: MeshLike, labels: Int[np.ndarray, " f"]) -> Int[np.ndarray, "p 2"]:
+    """List the pairs of parts that share an edge.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+    labels : (f,) int
+        The part of each face.
+
+    Returns
+    -------
+    (p, 2) int
+        Pairs of labels without duplicates, the lower label first, in ascending order.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> es.features.adjacent_parts(es.shapes.grid(4, 1), np.array([0, 0, 1, 2, 0, 0, 1, 2]))
+    array([[0, 1],
+           [1, 2]])
+    """
     mesh = as_mesh(mesh)
     faces, _ = face_pairs(edge_table(mesh))
     pairs = np.sort(labels[faces], axis=1)
@@ -127,14 +178,31 @@ def touching_parts(mesh: MeshLike, labels: Int[np.ndarray, " f"]) -> Int[np.ndar
 
 
 def merge_targets(tree: Tree) -> Int[np.ndarray, " m"]:
-    """Return for each maximum that in whose region it ends up when it merges, or splits from; -1 where it never does.
+    """Return, for each maximum, the maximum whose region absorbs it, or -1 if none does.
 
-    The neighbour across the saddle may have merged before; then it is whoever took that one over, and so on. Maxima
-    that stand earlier persist longer, so the first earlier one on the way is it.
+    `tree.parent` is the maximum across the saddle. If the region of that maximum was absorbed
+    earlier, the target is the maximum that absorbed it, and so on.
+
+    Parameters
+    ----------
+    tree : MergeTree or PartTree
+
+    Returns
+    -------
+    (m,) int
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.shapes.grid(4, 1)
+    >>> tree = es.merge_tree(mesh, [0, 0, 2, 2, 1, 1, 3, 3, 0, 0])
+    >>> es.features.merge_targets(tree)
+    array([-1,  0])
     """
     require_type(tree, Tree, "tree")
     target = tree.parent.copy()
     for number in range(len(target)):
+        # Maxima are sorted by falling persistence: a later one has been absorbed before this one.
         while target[number] > number:
             target[number] = tree.parent[target[number]]
     return target

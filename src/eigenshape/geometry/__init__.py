@@ -1,1 +1,5 @@
 """What a shape is: meshes, their topology, repairs, samples of them, and made-up ones."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

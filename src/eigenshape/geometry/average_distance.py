@@ -18,7 +18,9 @@ N_BASES = 150
 
 
 @one_blas_thread()
-def average_geodesic_distance(mesh: MeshLike, *, n_bases: SupportsIndex = N_BASES) -> Float[np.ndarray, " n"]:
+def average_geodesic_distance(
+    mesh: MeshLike, *, n_bases: SupportsIndex = N_BASES
+) -> Float[np.ndarray, " n"]:
     """Measure for each vertex the mean geodesic distance to all points of the surface.
 
     a(x) = ∫ g(x, y) dy / area ≈ Σ_b g(x, b) A_b / area over bases b (Hilaga, Shinagawa, Kohmura and Kunii 2001, who

@@ -49,9 +49,13 @@ def cloud_quadrature(cloud: PointCloud, *, n_neighbors: SupportsIndex | None = N
     require_type(cloud, PointCloud, "cloud")
     dim = cloud.dim
     if cloud.n_points <= dim + 1:
-        raise InvalidShapeError(f"A cloud of dimension {dim} needs over {dim + 1} points; it has {cloud.n_points}.")
+        raise InvalidShapeError(
+            f"A cloud of dimension {dim} needs over {dim + 1} points; it has {cloud.n_points}."
+        )
     usual = min(NEIGHBORS.get(dim, 20 * dim**2), cloud.n_points - 1)
-    near = whole_number(usual if n_neighbors is None else n_neighbors, "n_neighbors", dim + 1, cloud.n_points - 1)
+    near = whole_number(
+        usual if n_neighbors is None else n_neighbors, "n_neighbors", dim + 1, cloud.n_points - 1
+    )
     points, scale = size_one(cloud.points)
     distances, neighbors = cKDTree(points).query(points, near + 1)
     _require_different(cloud, distances, neighbors)
@@ -90,7 +94,9 @@ def _flattened(
     _, spreads, axes = np.linalg.svd(centred, full_matrices=False)
     shadows = around @ axes[:, :dim].transpose(0, 2, 1)
     lengths = np.linalg.norm(shadows, axis=2)
-    shadows[lengths == 0, 0] = lengths[lengths == 0] = 1  # right above the point: any direction serves
+    shadows[lengths == 0, 0] = lengths[lengths == 0] = (
+        1  # right above the point: any direction serves
+    )
     shadows[spreads[:, dim - 1] <= FLATTEST * spreads[:, 0]] = 0
     return shadows * (distances[:, 1:] / lengths)[..., None]
 
@@ -101,7 +107,9 @@ def _cell_volumes(neighbors: Float[np.ndarray, "r k m"]) -> Float[np.ndarray, " 
         places = neighbors[:, :, 0]
         ahead = np.min(np.where(places > 0, places, np.inf), axis=1)
         behind = np.min(np.where(places < 0, -places, np.inf), axis=1)
-        return (np.where(np.isfinite(ahead), ahead, 0) + np.where(np.isfinite(behind), behind, 0)) / 2
+        return (
+            np.where(np.isfinite(ahead), ahead, 0) + np.where(np.isfinite(behind), behind, 0)
+        ) / 2
     if dim == 2:
         places = np.concatenate([neighbors, np.zeros_like(neighbors[:, :1])], axis=1)
         by_x = np.lexsort((places[:, :, 1], places[:, :, 0]))
@@ -115,7 +123,9 @@ def _cell_volume(neighbors: Float[np.ndarray, "k m"]) -> float:
     bisectors = np.column_stack([neighbors, -(distances**2) / 2])
     middle = neighbors.mean(axis=0)
     away = np.linalg.norm(middle)
-    inside = middle * min(1, distances.min() / 4 / away) if away else middle  # the origin may lie on the hull
+    inside = (
+        middle * min(1, distances.min() / 4 / away) if away else middle
+    )  # the origin may lie on the hull
     try:
         hull = ConvexHull(np.vstack([neighbors, np.zeros_like(middle)]))
         cell = HalfspaceIntersection(np.vstack([bisectors, hull.equations]), inside)

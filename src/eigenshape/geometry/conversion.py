@@ -5,11 +5,12 @@ from collections.abc import Sequence
 from typing import Any, Literal, Protocol, SupportsIndex, TypeAlias, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike
+from typing_extensions import TypeAliasType
 
 from eigenshape._arguments import attribute_of, named_value
 from eigenshape._arrays import as_array
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
@@ -48,8 +49,8 @@ class HasPolygons(Protocol):
 
 
 Pair: TypeAlias = tuple[ArrayLike, ArrayLike]
-MeshLike: TypeAlias = TriangleMesh | SimplicialMesh | HasFaces | HasPolygons | Pair
-ShapeLike: TypeAlias = MeshLike | PointCloud
+MeshLike = TypeAliasType("MeshLike", TriangleMesh | SimplicialMesh | HasFaces | HasPolygons | Pair)
+ShapeLike = TypeAliasType("ShapeLike", MeshLike | PointCloud)
 
 BRIDGES = {
     "trimesh": "Pass scene.to_mesh() of a scene, from_trimesh(cloud, dim=2) of points.",
@@ -123,7 +124,7 @@ def as_shape(value: object, name: str = "shape") -> Shape:
     Examples
     --------
     >>> import eigenshape as es
-    >>> es.as_shape(([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]]))
+    >>> es.geometry.as_shape(([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]]))
     SimplicialMesh(3 points in R^2, 1 simplices of dimension 2)
     """
     if isinstance(value, TriangleMesh | SimplicialMesh | PointCloud):
@@ -149,7 +150,11 @@ def _converted(value: object) -> Shape | None:
 
 def _refused(value: object, shape: Shape | None, needed: str, reader: str) -> InvalidParameterError:
     """Return the error that names a value, the shape it was taken for, and what to pass instead."""
-    given = named_value(value) if shape is None or shape is value else f"{named_value(value)} that is a {shape!r}"
+    given = (
+        named_value(value)
+        if shape is None or shape is value
+        else f"{named_value(value)} that is a {shape!r}"
+    )
     remedy = _remedy(value, reader) if shape is None else _use_of(shape)
     return InvalidParameterError(f"{needed}; it is {given}. {remedy}")
 
@@ -177,7 +182,11 @@ def _remedy(value: object, reader: str) -> str:
 
 
 def from_arrays(
-    points: ArrayLike, simplices: ArrayLike | None = None, *, dim: SupportsIndex = 2, cells: Cells | None = None
+    points: ArrayLike,
+    simplices: ArrayLike | None = None,
+    *,
+    dim: SupportsIndex = 2,
+    cells: Cells | None = None,
 ) -> Shape:
     """Return the shape that arrays describe: a TriangleMesh where they can be one.
 

@@ -106,7 +106,9 @@ def crossing_pairs(points, boxes):
             for one in (2 * a + 1, 2 * a + 2):
                 box = _box(nodes, one)
                 for other in (2 * b + 1, 2 * b + 2):
-                    if one == other or (not (a == b and one > other) and _meet(box, _box(nodes, other))):
+                    if one == other or (
+                        not (a == b and one > other) and _meet(box, _box(nodes, other))
+                    ):
                         waiting[height, 0], waiting[height, 1] = one, other
                         height += 1
             continue
@@ -158,7 +160,8 @@ def _cross(points, axes, i, j):
     if low_b == high_b:
         u, v = (axes[i] + 1) % 3, (axes[i] + 2) % 3
         return low_b == 0 and not (
-            _is_apart(points, u, v, a, b, b + 1, b + 2) or _is_apart(points, u, v, b, a, a + 1, a + 2)
+            _is_apart(points, u, v, a, b, b + 1, b + 2)
+            or _is_apart(points, u, v, b, a, a + 1, a + 2)
         )
     low_a, high_a, alone_a = _sides(points, b, a)
     if low_a == high_a or (low_a * high_a == 0 and low_b * high_b == 0):
@@ -223,7 +226,10 @@ def _is_apart(points, u, v, a, p, q, r):
 def _enters(points, axis, a, b):
     """Tell whether face a, a segment or a point, has a point inside face b, whose shadow along `axis` has area."""
     p, q = _ends(points, a)
-    from_p, from_q = side_of_plane(points, b, b + 1, b + 2, p), side_of_plane(points, b, b + 1, b + 2, q)
+    from_p, from_q = (
+        side_of_plane(points, b, b + 1, b + 2, p),
+        side_of_plane(points, b, b + 1, b + 2, q),
+    )
     if from_p * from_q > 0:
         return False
     if from_p != 0 or from_q != 0:

@@ -28,7 +28,11 @@ def angle_defects(mesh: TriangleMesh) -> Float[np.ndarray, " n"]:
     table = edge_table(mesh)
     n, at_edges = mesh.n_vertices, np.repeat(2.0 - table.n_faces, 2)
     turned = np.bincount(mesh.faces.ravel(), weights=face_angles(mesh).ravel(), minlength=n)
-    return 2 * np.pi - turned - np.pi / 2 * np.bincount(table.edges.ravel(), weights=at_edges, minlength=n)
+    return (
+        2 * np.pi
+        - turned
+        - np.pi / 2 * np.bincount(table.edges.ravel(), weights=at_edges, minlength=n)
+    )
 
 
 def gaussian_curvature(mesh: MeshLike) -> Float[np.ndarray, " n"]:

@@ -5,10 +5,10 @@ from itertools import combinations
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from eigenshape._arrays import finite_rows, frozen
 from eigenshape._errors import InvalidShapeError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.simplices import size_one
 
 Points = Float[np.ndarray, "n d"]
@@ -16,7 +16,7 @@ Support = list[int]
 
 
 @dataclass(frozen=True, eq=False)
-class Ball:
+class EnclosingBall:
     """A Euclidean ball in R^d.
 
     Attributes
@@ -31,7 +31,7 @@ class Ball:
     radius: float
 
 
-def enclosing_ball(points: ArrayLike) -> Ball:
+def enclosing_ball(points: ArrayLike) -> EnclosingBall:
     """Find the smallest ball that holds all points.
 
     It is the smallest ball of some d + 1 of them at most. Starting with one, the farthest point outside the ball joins
@@ -45,7 +45,7 @@ def enclosing_ball(points: ArrayLike) -> Ball:
 
     Returns
     -------
-    Ball
+    EnclosingBall
 
     Raises
     ------
@@ -60,7 +60,7 @@ def enclosing_ball(points: ArrayLike) -> Ball:
     unit, inner = size_one(unit - middle)
     center = _center(unit)
     radius = np.sqrt(((unit - center) ** 2).sum(axis=1).max())
-    return Ball(frozen(scale * (middle + inner * center)), float(scale * inner * radius))
+    return EnclosingBall(frozen(scale * (middle + inner * center)), float(scale * inner * radius))
 
 
 def _center(points: Points) -> Float[np.ndarray, " d"]:
@@ -69,7 +69,10 @@ def _center(points: Points) -> Float[np.ndarray, " d"]:
         far = int(((points - center) ** 2).sum(axis=1).argmax())
         if far in support:
             return center
-        grown = max((_held(points, some) for some in _with(far, support, points.shape[1])), key=lambda held: held[0])
+        grown = max(
+            (_held(points, some) for some in _with(far, support, points.shape[1])),
+            key=lambda held: held[0],
+        )
         if grown[0] <= value:  # what is left is rounding
             return center
         value, center, support = grown
@@ -77,7 +80,11 @@ def _center(points: Points) -> Float[np.ndarray, " d"]:
 
 def _with(far: int, support: Support, dim: int) -> list[Support]:
     """List the sets of at most d + 1 points that may hold a ball, and have the new one."""
-    return [[*some, far] for size in range(min(dim, len(support)) + 1) for some in combinations(support, size)]
+    return [
+        [*some, far]
+        for size in range(min(dim, len(support)) + 1)
+        for some in combinations(support, size)
+    ]
 
 
 def _held(points: Points, support: Support) -> tuple[float, Float[np.ndarray, " d"], Support]:

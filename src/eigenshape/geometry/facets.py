@@ -42,7 +42,9 @@ def facet_table(mesh: MeshLike) -> FacetTable:
     """List the facets of the mesh once each, with the simplices' way to them."""
     mesh = as_simplicial(mesh)
     named = mesh.simplices[np.arange(len(mesh.simplices))[:, None, None], _corners_of_facets(mesh)]
-    facets, inverse, counts = np.unique(named.reshape(-1, mesh.dim), axis=0, return_inverse=True, return_counts=True)
+    facets, inverse, counts = np.unique(
+        named.reshape(-1, mesh.dim), axis=0, return_inverse=True, return_counts=True
+    )
     return FacetTable(facets, inverse.reshape(mesh.simplices.shape), counts)
 
 
@@ -58,7 +60,9 @@ def boundary_surface(mesh: MeshLike) -> TriangleMesh:
     """
     solid = as_simplicial(mesh)
     if (solid.dim, solid.points.shape[1]) != (3, 3):
-        raise InvalidShapeError(f"Only tetrahedra in R^3 have a surface around them; the mesh is a {solid!r}.")
+        raise InvalidShapeError(
+            f"Only tetrahedra in R^3 have a surface around them; the mesh is a {solid!r}."
+        )
     table = facet_table(solid)
     owner, apex = np.nonzero(table.n_simplices[table.simplex_facets] == 1)
     triangles = table.facets[table.simplex_facets[owner, apex]]
@@ -116,7 +120,9 @@ def without_pinches(mesh: Mesh) -> SimplicialMesh:
     return SimplicialMesh(mesh.points[points[order]], places[fans].reshape(n, n_corners))
 
 
-def _components(n: int, one: Int[np.ndarray, " k"], two: Int[np.ndarray, " k"]) -> tuple[int, Int[np.ndarray, " n"]]:
+def _components(
+    n: int, one: Int[np.ndarray, " k"], two: Int[np.ndarray, " k"]
+) -> tuple[int, Int[np.ndarray, " n"]]:
     graph = sp.coo_array((np.ones(len(one), dtype=np.int8), (one, two)), shape=(n, n))
     count, labels = connected_components(graph, directed=False)
     return int(count), labels.astype(np.int64)

@@ -28,7 +28,9 @@ def flip_flat_faces(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
         mesh, n_flips = TriangleMesh(mesh.vertices, changed), n_flips + len(flat)
 
 
-def _flips(mesh: TriangleMesh) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"], Int[np.ndarray, "2 k 3"]]:
+def _flips(
+    mesh: TriangleMesh,
+) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"], Int[np.ndarray, "2 k 3"]]:
     """Return flat faces, the neighbors that are split at their vertices, and the faces that replace both.
 
     No two of these flips share a face or make the same edge, so that all can be done at once.

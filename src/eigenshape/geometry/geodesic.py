@@ -8,10 +8,10 @@ from itertools import islice
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arrays import positive_values, whole_numbers
 from eigenshape._errors import InvalidShapeError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.geodesic_loops import balls
 from eigenshape.geometry.simplices import in_length, scaled_corners
@@ -55,7 +55,10 @@ def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         sources = [np.arange(first, min(first + SOURCES, mesh.n_points)) for first in firsts]
         waves = pool.map(
-            lambda some: balls(starts, *others, sides, radius / scale, some, np.arange(len(some) + 1)), sources
+            lambda some: balls(
+                starts, *others, sides, radius / scale, some, np.arange(len(some) + 1)
+            ),
+            sources,
         )
         counts, columns, values = (np.concatenate(parts) for parts in zip(*waves, strict=True))
     rows = np.concatenate([[0], np.cumsum(counts)])
@@ -94,7 +97,9 @@ def geodesic_distances(mesh: MeshLike, sources: ArrayLike) -> Float[np.ndarray, 
     return np.array([wave(source) for source in wanted]).reshape(-1, mesh.n_points)
 
 
-def geodesic_distance_to_set(mesh: MeshLike, sources: ArrayLike, *, reach: float = np.inf) -> Float[np.ndarray, " n"]:
+def geodesic_distance_to_set(
+    mesh: MeshLike, sources: ArrayLike, *, reach: float = np.inf
+) -> Float[np.ndarray, " n"]:
     """Measure along the surface from each vertex to the nearest of some; one wave leaves all of them at once.
 
     As `geodesic_distances`; an edge between two of them is a source all along.
@@ -134,7 +139,9 @@ def waves_on(mesh: Mesh) -> Callable[..., Float[np.ndarray, " n"]]:
     def wave(source: ArrayLike, reach: float = np.inf) -> Float[np.ndarray, " n"]:
         found = np.full(mesh.n_points, np.inf)
         sources = np.atleast_1d(np.asarray(source, dtype=np.int64))
-        _, reached, values = balls(starts, *others, sides, reach / scale, sources, np.array([0, len(sources)]))
+        _, reached, values = balls(
+            starts, *others, sides, reach / scale, sources, np.array([0, len(sources)])
+        )
         found[reached] = in_length(values, scale, 1)
         return found
 
@@ -169,7 +176,9 @@ def farthest_points(
     chosen, rows = np.empty(count, dtype=np.int64), np.empty((count, n))
     least, nearest = np.full(n, np.inf), np.zeros(n, dtype=np.int64)
     first = int(wave(0).argmax())
-    for number, (vertex, row) in enumerate(islice(farthest_first(wave, n, first, reach=reach), count)):
+    for number, (vertex, row) in enumerate(
+        islice(farthest_first(wave, n, first, reach=reach), count)
+    ):
         chosen[number], rows[number] = vertex, row
         nearer = row < least
         least[nearer], nearest[nearer] = row[nearer], number
@@ -193,12 +202,18 @@ def farthest_first(
 
 def _require_surface(mesh: Mesh) -> None:
     if mesh.dim != 2:
-        raise InvalidShapeError(f"Geodesic distances are measured on surfaces; this mesh has dimension {mesh.dim}.")
+        raise InvalidShapeError(
+            f"Geodesic distances are measured on surfaces; this mesh has dimension {mesh.dim}."
+        )
 
 
 def _fans(
     mesh: Mesh, corners: Float[np.ndarray, "f 3 d"]
-) -> tuple[Int[np.ndarray, " n1"], tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]], Float[np.ndarray, "k 3"]]:
+) -> tuple[
+    Int[np.ndarray, " n1"],
+    tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]],
+    Float[np.ndarray, "k 3"],
+]:
     """List at each vertex its triangles by their other two corners, with the lengths to these and between them."""
     turns = [np.roll(np.arange(3), -turn) for turn in range(3)]
     triples = np.concatenate([mesh.simplices[:, turn] for turn in turns])

@@ -64,7 +64,9 @@ def balls(starts, first_corner, second_corner, sides, radius, sources, begins):
     """
     n = len(starts) - 1
     distance = np.full(n, np.inf)
-    sender = np.empty(n, dtype=np.int64)  # the source that a vertex was reached from; FRONT where several sent the wave
+    sender = np.empty(
+        n, dtype=np.int64
+    )  # the source that a vertex was reached from; FRONT where several sent the wave
     settled = np.zeros(n, dtype=np.bool_)
     counts = np.zeros(len(begins) - 1, dtype=np.int64)
     columns, values = np.empty(1024, dtype=np.int64), np.empty(1024)
@@ -94,7 +96,10 @@ def balls(starts, first_corner, second_corner, sides, radius, sources, begins):
                 break
             settled[vertex] = True
             if total == len(columns):
-                columns, values = np.append(columns, np.empty_like(columns)), np.append(values, np.empty_like(values))
+                columns, values = (
+                    np.append(columns, np.empty_like(columns)),
+                    np.append(values, np.empty_like(values)),
+                )
             columns[total], values[total] = vertex, key
             total += 1
             for entry in range(starts[vertex], starts[vertex + 1]):
@@ -111,9 +116,13 @@ def balls(starts, first_corner, second_corner, sides, radius, sources, begins):
                     reached, origin = key + to_corner, sender[vertex]
                     if settled[other]:
                         if origin == sender[other] and origin != FRONT:
-                            flat = through_edge(key, distance[other], to_other, to_corner, sides[entry, 2])
+                            flat = through_edge(
+                                key, distance[other], to_other, to_corner, sides[entry, 2]
+                            )
                         else:
-                            flat = across_edge(key, distance[other], to_other, to_corner, sides[entry, 2])
+                            flat = across_edge(
+                                key, distance[other], to_other, to_corner, sides[entry, 2]
+                            )
                             origin = FRONT if flat < reached else origin
                         reached = min(reached, flat)
                     if reached < distance[corner]:

@@ -66,7 +66,10 @@ def _taken(
     """Mark the pairs of the loop that are edges already, of the mesh or of faces added before."""
     taken = np.array(graph[loop][:, loop].toarray(), dtype=bool)
     if added:
-        faces, places = np.concatenate(added), {vertex: place for place, vertex in enumerate(loop.tolist())}
+        faces, places = (
+            np.concatenate(added),
+            {vertex: place for place, vertex in enumerate(loop.tolist())},
+        )
         drawn = np.concatenate([faces[:, :2], faces[:, 1:], faces[:, ::2]])
         for one, other in drawn[np.isin(drawn, loop).all(axis=1)].tolist():
             taken[places[one], places[other]] = taken[places[other], places[one]] = True

@@ -79,7 +79,9 @@ def mean_normals(mesh: TriangleMesh) -> Float[np.ndarray, "n 3"]:
     """Return `vertex_normals` of any mesh; where neighbors disagree their normals cancel, in part or all."""
     vectors = area_vectors(scaled_corners(mesh)[0])
     sums = [
-        np.bincount(mesh.faces.ravel(), weights=np.repeat(vectors[:, axis], 3), minlength=mesh.n_vertices)
+        np.bincount(
+            mesh.faces.ravel(), weights=np.repeat(vectors[:, axis], 3), minlength=mesh.n_vertices
+        )
         for axis in range(3)
     ]
     return _unit(np.column_stack(sums))

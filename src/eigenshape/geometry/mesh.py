@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arrays import finite_rows, frozen, index_rows
 from eigenshape._errors import InvalidShapeError
+from eigenshape._typing import ArrayLike
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -41,7 +41,9 @@ class TriangleMesh:
             raise InvalidShapeError("A mesh must have vertices; it has none.")
         corners = index_rows(faces, "faces", 3, len(points))
         if not len(corners):
-            raise InvalidShapeError(f"A mesh must have faces; it has {len(points)} vertices and no face.")
+            raise InvalidShapeError(
+                f"A mesh must have faces; it has {len(points)} vertices and no face."
+            )
         object.__setattr__(self, "vertices", frozen(points))
         object.__setattr__(self, "faces", frozen(corners))
 

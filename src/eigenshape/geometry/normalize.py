@@ -38,7 +38,9 @@ def normalize_area(mesh: MeshLike) -> TriangleMesh:
     """
     mesh = as_mesh(mesh)
     sound = np.delete(mesh.faces, degenerate_simplices(mesh), axis=0)
-    return _resized(mesh, lambda points: float(np.linalg.norm(area_vectors(points[sound]), axis=1).sum()) ** 0.5)
+    return _resized(
+        mesh, lambda points: float(np.linalg.norm(area_vectors(points[sound]), axis=1).sum()) ** 0.5
+    )
 
 
 def normalize_diameter(mesh: MeshLike) -> TriangleMesh:
@@ -66,7 +68,10 @@ def _resized(mesh: TriangleMesh, size_of: Callable[[Points], float]) -> Triangle
 def _diameter(points: Points) -> float:
     corners = _hull(points)
     # A sphere has all its points on its hull: their distances come a thousand rows at a time.
-    return max(float(cdist(rows, corners).max()) for rows in np.split(corners, range(1000, len(corners), 1000)))
+    return max(
+        float(cdist(rows, corners).max())
+        for rows in np.split(corners, range(1000, len(corners), 1000))
+    )
 
 
 def _hull(points: Points) -> Float[np.ndarray, "h 3"]:

@@ -12,7 +12,9 @@ from eigenshape.geometry.requirements import require_oriented
 from eigenshape.geometry.simplices import scaled_corners, size_one
 from eigenshape.geometry.topology import edge_table, face_turns, submesh, with_turned_faces
 
-FLAT = 1e-10  # volume over area^1.5 up to which rounding decides which side is out; a ball has 0.094
+FLAT = (
+    1e-10  # volume over area^1.5 up to which rounding decides which side is out; a ball has 0.094
+)
 
 
 @one_blas_thread()
@@ -97,7 +99,9 @@ def _faces_in(
     inward = volumes < -FLAT
     if not inward.any() or len(pieces) == 1:
         return inward
-    low, high = (np.array([extreme(faces, axis=(0, 1)) for faces in pieces]) for extreme in (np.min, np.max))
+    low, high = (
+        np.array([extreme(faces, axis=(0, 1)) for faces in pieces]) for extreme in (np.min, np.max)
+    )
     largest_first = np.argsort(-(high - low).prod(axis=1), kind="stable")
     found = inward.copy()
     for number, faces in enumerate(pieces):

@@ -36,7 +36,9 @@ def _two_product(a, b):
     wide_a, wide_b = SPLITTER * a, SPLITTER * b
     high_a, high_b = wide_a - (wide_a - a), wide_b - (wide_b - b)
     low_a, low_b = a - high_a, b - high_b
-    return product, low_a * low_b - (((product - high_a * high_b) - low_a * high_b) - high_a * low_b)
+    return product, low_a * low_b - (
+        ((product - high_a * high_b) - low_a * high_b) - high_a * low_b
+    )
 
 
 @njit
@@ -90,12 +92,28 @@ def _exact_side_of_line(points, u, v, a, b, c):
 @no_type_check
 def side_of_plane(points, a, b, c, d):
     """Return the sign of det[a - d, b - d, c - d]: 1 where a, b, c turn left when seen from the side away from d."""
-    ax, ay, az = points[a, 0] - points[d, 0], points[a, 1] - points[d, 1], points[a, 2] - points[d, 2]
-    bx, by, bz = points[b, 0] - points[d, 0], points[b, 1] - points[d, 1], points[b, 2] - points[d, 2]
-    cx, cy, cz = points[c, 0] - points[d, 0], points[c, 1] - points[d, 1], points[c, 2] - points[d, 2]
+    ax, ay, az = (
+        points[a, 0] - points[d, 0],
+        points[a, 1] - points[d, 1],
+        points[a, 2] - points[d, 2],
+    )
+    bx, by, bz = (
+        points[b, 0] - points[d, 0],
+        points[b, 1] - points[d, 1],
+        points[b, 2] - points[d, 2],
+    )
+    cx, cy, cz = (
+        points[c, 0] - points[d, 0],
+        points[c, 1] - points[d, 1],
+        points[c, 2] - points[d, 2],
+    )
     bxcy, cxby, cxay, axcy, axby, bxay = bx * cy, cx * by, cx * ay, ax * cy, ax * by, bx * ay
     volume = az * (bxcy - cxby) + bz * (cxay - axcy) + cz * (axby - bxay)
-    size = (abs(bxcy) + abs(cxby)) * abs(az) + (abs(cxay) + abs(axcy)) * abs(bz) + (abs(axby) + abs(bxay)) * abs(cz)
+    size = (
+        (abs(bxcy) + abs(cxby)) * abs(az)
+        + (abs(cxay) + abs(axcy)) * abs(bz)
+        + (abs(axby) + abs(bxay)) * abs(cz)
+    )
     rounding = PLANE_BOUND * size
     if abs(volume) > rounding or rounding == 0.0:
         return _sign(volume)
@@ -131,4 +149,8 @@ def _exact_side_of_plane(points, a, b, c, d):
 @njit
 @no_type_check
 def same_place(points, a, b):
-    return points[a, 0] == points[b, 0] and points[a, 1] == points[b, 1] and points[a, 2] == points[b, 2]
+    return (
+        points[a, 0] == points[b, 0]
+        and points[a, 1] == points[b, 1]
+        and points[a, 2] == points[b, 2]
+    )

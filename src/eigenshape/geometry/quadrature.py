@@ -5,10 +5,10 @@ from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from eigenshape._arrays import finite_rows, frozen, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import dual_volumes
@@ -98,7 +98,11 @@ def torus_quadrature(
     around = whole_number(n_around, "n_around", 3, 10**5)
     across = whole_number(n_across, "n_across", 3, 10**5)
     positive_values([outer, inner], "outer and inner")
-    angles = np.meshgrid(2 * np.pi * np.arange(around) / around, 2 * np.pi * np.arange(across) / across, indexing="ij")
+    angles = np.meshgrid(
+        2 * np.pi * np.arange(around) / around,
+        2 * np.pi * np.arange(across) / across,
+        indexing="ij",
+    )
     u, v = (angle.ravel() for angle in angles)
     rim = outer + inner * np.cos(v)
     points = np.column_stack([rim * np.cos(u), rim * np.sin(u), inner * np.sin(v)])

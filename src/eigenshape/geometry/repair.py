@@ -98,7 +98,9 @@ def weld(mesh: MeshLike, *, tolerance: float = 0.0) -> Repaired[Any]:
     """
     mesh = as_simplicial(mesh)
     if not 0 <= tolerance <= 0.1:
-        raise InvalidParameterError(f"tolerance must lie in 0..0.1 of the bounding box' diagonal; it is {tolerance}.")
+        raise InvalidParameterError(
+            f"tolerance must lie in 0..0.1 of the bounding box' diagonal; it is {tolerance}."
+        )
     if tolerance == 0:
         group = _places(mesh.points)
     else:
@@ -183,12 +185,20 @@ def collapse_needles(mesh: MeshLike) -> Repaired[Any]:
     in_simplex, side = np.nonzero(short)
     if short.any(axis=1).all():
         in_simplex, side = in_simplex[:0], side[:0]
-    ends = np.column_stack([mesh.simplices[in_simplex, one[side]], mesh.simplices[in_simplex, two[side]]])
-    joined = _joined(mesh, _linked(ends, mesh.n_points), "collapse_needles joined {} vertices to others beside them")
+    ends = np.column_stack(
+        [mesh.simplices[in_simplex, one[side]], mesh.simplices[in_simplex, two[side]]]
+    )
+    joined = _joined(
+        mesh,
+        _linked(ends, mesh.n_points),
+        "collapse_needles joined {} vertices to others beside them",
+    )
     ordered = np.sort(joined.mesh.simplices, axis=1)
     whole = (ordered[:, 1:] != ordered[:, :-1]).all(axis=1)
     kept = _kept(joined.mesh, whole | ~short.any(axis=1), "")
-    report = f"{joined.report[0]}, and removed {int((~whole & short.any(axis=1)).sum())} {_plural(mesh)}"
+    report = (
+        f"{joined.report[0]}, and removed {int((~whole & short.any(axis=1)).sum())} {_plural(mesh)}"
+    )
     return Repaired(kept.mesh, (report,), joined.source_vertices)
 
 
@@ -217,7 +227,9 @@ def drop_unreferenced(mesh: MeshLike) -> Repaired[Any]:
     source, renumbered = np.unique(mesh.simplices, return_inverse=True)
     kept = type(mesh)(mesh.points[source], renumbered.reshape(mesh.simplices.shape))
     noun = "face" if mesh.dim == 2 else "simplex"
-    return Repaired(kept, (f"drop_unreferenced removed {n_loose} vertices without a {noun}",), source)
+    return Repaired(
+        kept, (f"drop_unreferenced removed {n_loose} vertices without a {noun}",), source
+    )
 
 
 def orient(mesh: MeshLike) -> Repaired[TriangleMesh]:
@@ -281,7 +293,9 @@ def seal_holes(mesh: MeshLike, *, most_edges: int = 1000) -> Repaired[TriangleMe
     """
     mesh = as_mesh(mesh)
     if most_edges < 3:
-        raise InvalidParameterError(f"most_edges must be at least 3, the sides of a triangle; it is {most_edges}.")
+        raise InvalidParameterError(
+            f"most_edges must be at least 3, the sides of a triangle; it is {most_edges}."
+        )
     found = fillings(mesh, most_edges)
     sealed = TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, *found.faces]))
     n_faces = sealed.n_faces - mesh.n_faces
@@ -459,7 +473,9 @@ def _unchanged(mesh: MeshT) -> Repaired[MeshT]:
 
 
 def _followed(done: Repaired[MeshT], step: Repaired[MeshT]) -> Repaired[MeshT]:
-    return Repaired(step.mesh, done.report + step.report, done.source_vertices[step.source_vertices])
+    return Repaired(
+        step.mesh, done.report + step.report, done.source_vertices[step.source_vertices]
+    )
 
 
 def _same(one: MeshT, two: MeshT) -> bool:
@@ -483,4 +499,7 @@ def has_small_holes(mesh: TriangleMesh) -> bool:
     return bool(max(lengths, default=0.0) ** 2 / (4 * np.pi) <= HOLE * area)
 
 
-HELPS: dict[str, Callable[[Any], bool]] = {"largest_component": has_specks, "seal_holes": has_small_holes}
+HELPS: dict[str, Callable[[Any], bool]] = {
+    "largest_component": has_specks,
+    "seal_holes": has_small_holes,
+}

@@ -22,7 +22,9 @@ def squared_distances(
     return least
 
 
-def _to_inside(points: Float[np.ndarray, "p d"], corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndarray, "p s"]:
+def _to_inside(
+    points: Float[np.ndarray, "p d"], corners: Float[np.ndarray, "s corners d"]
+) -> Float[np.ndarray, "p s"]:
     """Return squared distances to the flats of simplices; infinite where the foot is outside."""
     sides = corners[:, 1:] - corners[:, :1]
     ways = points[:, None] - corners[None, :, 0]

@@ -48,7 +48,9 @@ def _size(coordinates: Float[np.ndarray, "..."]) -> float:
     return float(2.0 ** (np.frexp(largest)[1] - 1)) if largest > 0 else 1.0
 
 
-def in_length(values: Float[np.ndarray, "..."], scale: float, power: int) -> Float[np.ndarray, "..."]:
+def in_length(
+    values: Float[np.ndarray, "..."], scale: float, power: int
+) -> Float[np.ndarray, "..."]:
     """Return values times scale to a whole power; `scale` is a power of two.
 
     Raises
@@ -58,7 +60,9 @@ def in_length(values: Float[np.ndarray, "..."], scale: float, power: int) -> Flo
     """
     exponent = power * (int(np.frexp(scale)[1]) - 1)
     if abs(exponent) > LARGEST_EXPONENT:
-        noun = {-2: "eigenvalues", 1: "lengths", 2: "areas", 3: "volumes"}.get(power, f"{power}-volumes")
+        noun = {-2: "eigenvalues", 1: "lengths", 2: "areas", 3: "volumes"}.get(
+            power, f"{power}-volumes"
+        )
         most = 301 // abs(power)
         raise InvalidShapeError(
             f"To measure {noun} the largest coordinate must lie within 1e-{most}..1e{most}; it is about {scale:.0e}. "
@@ -115,7 +119,9 @@ def dual_volumes(mesh: MeshLike) -> Float[np.ndarray, " n"]:
 def at_points(mesh: Mesh, values: Float[np.ndarray, " s"]) -> Float[np.ndarray, " n"]:
     """Sum at each point a number of each of its simplices."""
     corners = mesh.simplices.shape[1]
-    return np.bincount(mesh.simplices.ravel(), weights=np.repeat(values, corners), minlength=mesh.n_points)
+    return np.bincount(
+        mesh.simplices.ravel(), weights=np.repeat(values, corners), minlength=mesh.n_points
+    )
 
 
 def mean_side_length(mesh: MeshLike) -> float:
@@ -154,7 +160,9 @@ def require_span(points: Float[np.ndarray, "n d"], dim: int, noun: str) -> None:
             direction = offsets[farthest] / lengths[farthest]
             offsets = offsets - np.outer(offsets @ direction, direction)
         elif not found:
-            raise InvalidShapeError(f"{noun} must differ; all {len(points)} are {points[0].tolist()}.")
+            raise InvalidShapeError(
+                f"{noun} must differ; all {len(points)} are {points[0].tolist()}."
+            )
         else:
             flat = FLATS.get(found, f"in a flat of {found} dimensions")
             raise InvalidShapeError(

@@ -5,10 +5,10 @@ from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arrays import finite_rows, frozen, index_rows
 from eigenshape._errors import InvalidShapeError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.mesh import TriangleMesh
 
 
@@ -42,7 +42,9 @@ class SimplicialMesh:
             raise InvalidShapeError("A mesh must have points; it has none.")
         corners = index_rows(simplices, "simplices", None, len(coordinates))
         if not corners.size:
-            raise InvalidShapeError(f"A mesh must have simplices; it has {len(coordinates)} points and no simplex.")
+            raise InvalidShapeError(
+                f"A mesh must have simplices; it has {len(coordinates)} points and no simplex."
+            )
         dim, ambient = corners.shape[1] - 1, coordinates.shape[1]
         if not 1 <= dim <= ambient:
             raise InvalidShapeError(

@@ -40,8 +40,12 @@ def pieces(dim: int) -> Int[np.ndarray, "pieces corners 2"]:
     In the simplex 2 ≥ x_1 ≥ ... ≥ x_m ≥ 0 these are Kuhn's simplices of the whole numbers: walks of unit steps.
     """
     starts = np.tril(np.ones((dim + 1, dim), dtype=np.int64), -1)
-    steps = np.array([np.eye(dim, dtype=np.int64)[list(order)] for order in permutations(range(dim))])
-    walks = np.concatenate([np.zeros((len(steps), 1, dim), dtype=np.int64), steps.cumsum(axis=1)], axis=1)
+    steps = np.array(
+        [np.eye(dim, dtype=np.int64)[list(order)] for order in permutations(range(dim))]
+    )
+    walks = np.concatenate(
+        [np.zeros((len(steps), 1, dim), dtype=np.int64), steps.cumsum(axis=1)], axis=1
+    )
     places = (starts[:, None, None] + walks).reshape(-1, dim + 1, dim)
     inside = (np.diff(places, axis=2) <= 0).all(axis=(1, 2))
     return frozen(np.stack([(places[inside] >= least).sum(axis=2) for least in (1, 2)], axis=-1))

@@ -12,7 +12,9 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
 
-MIXER = np.uint64(0x9E3779B97F4A7C15)  # 2^64 over the golden ratio, odd: the multiplier of Fibonacci hashing
+MIXER = np.uint64(
+    0x9E3779B97F4A7C15
+)  # 2^64 over the golden ratio, odd: the multiplier of Fibonacci hashing
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +97,9 @@ def require_simplices_everywhere(mesh: Mesh) -> None:
 
 def boundary_facets(mesh: Mesh) -> Int[np.ndarray, "b m"]:
     """Return the sides of simplices that one simplex alone has, by their corners, ascending."""
-    facets = np.concatenate([np.delete(mesh.simplices, corner, axis=1) for corner in range(mesh.dim + 1)])
+    facets = np.concatenate(
+        [np.delete(mesh.simplices, corner, axis=1) for corner in range(mesh.dim + 1)]
+    )
     facets, repeats = sorted_rows(np.sort(facets, axis=1))[1:]
     alone = ~repeats & ~np.append(repeats[1:], False)
     return facets[alone]
@@ -116,7 +120,9 @@ def repeated_simplices(mesh: Mesh) -> Int[np.ndarray, "k 2"]:
     """Return each simplex that has the corners of an earlier one, in any order, after that earlier one."""
     rows = np.sort(mesh.simplices, axis=1)
     # Different rows rarely share this number, taken modulo 2^64: to sort numbers takes a fifth of the time.
-    keys = np.sort(rows.astype(np.uint64) @ MIXER ** np.arange(1, rows.shape[1] + 1, dtype=np.uint64))
+    keys = np.sort(
+        rows.astype(np.uint64) @ MIXER ** np.arange(1, rows.shape[1] + 1, dtype=np.uint64)
+    )
     if (keys[1:] != keys[:-1]).all():
         return np.empty((0, 2), dtype=np.int64)
     order, _, repeats = sorted_rows(rows)
@@ -231,7 +237,9 @@ def inconsistent_edges(mesh: TriangleMesh) -> Int[np.ndarray, "k 2"]:
     """Return the edges that two faces pass in the same direction: one of the two is turned over."""
     sides = half_edges(mesh)
     directed = np.sort(sides[:, 0] * mesh.n_vertices + sides[:, 1])
-    if (directed[1:] != directed[:-1]).all():  # the usual case, told at a third of the cost of a table
+    if (
+        directed[1:] != directed[:-1]
+    ).all():  # the usual case, told at a third of the cost of a table
         return np.empty((0, 2), dtype=np.int64)
     forward = (sides[:, 0] < sides[:, 1]).astype(np.int64)
     table = edge_table(mesh)
@@ -318,7 +326,9 @@ def is_manifold(mesh: MeshLike) -> bool:
     return not len(non_manifold_edges(mesh)) and not len(non_manifold_vertices(mesh))
 
 
-def submesh(mesh: TriangleMesh, keep_faces: Bool[np.ndarray, " f"]) -> tuple[TriangleMesh, Int[np.ndarray, " k"]]:
+def submesh(
+    mesh: TriangleMesh, keep_faces: Bool[np.ndarray, " f"]
+) -> tuple[TriangleMesh, Int[np.ndarray, " k"]]:
     """Keep some faces and the vertices they use: the smaller mesh, and the old index of each of its vertices."""
     faces = mesh.faces[keep_faces]
     vertices, renumbered = np.unique(faces, return_inverse=True)

@@ -36,7 +36,9 @@ def from_trimesh(mesh: Any, *, dim: SupportsIndex = 2) -> TriangleMesh | PointCl
     if isinstance(mesh, trimesh.PointCloud):
         return PointCloud(np.asarray(mesh.vertices), dim)
     if not isinstance(mesh, trimesh.Trimesh):
-        raise InvalidShapeError(f"A Trimesh or PointCloud of trimesh is taken; this is a {type(mesh).__name__}.")
+        raise InvalidShapeError(
+            f"A Trimesh or PointCloud of trimesh is taken; this is a {type(mesh).__name__}."
+        )
     return TriangleMesh(np.asarray(mesh.vertices), np.asarray(mesh.faces))
 
 
@@ -55,7 +57,9 @@ def to_trimesh(shape: ShapeLike) -> Any:
     if isinstance(shape, PointCloud) and shape.points.shape[1] == 3:
         return trimesh.PointCloud(shape.points.copy())
     if not isinstance(shape, TriangleMesh):
-        raise InvalidShapeError(f"Only triangle meshes and clouds in R^3 fit into trimesh; this is {shape!r}.")
+        raise InvalidShapeError(
+            f"Only triangle meshes and clouds in R^3 fit into trimesh; this is {shape!r}."
+        )
     return trimesh.Trimesh(shape.vertices.copy(), shape.faces.copy(), process=False)
 
 
@@ -73,7 +77,9 @@ def from_pyvista(dataset: Any, *, dim: SupportsIndex = 2) -> Shape:
     """
     pyvista = _extra("pyvista")
     if not isinstance(dataset, pyvista.PolyData | pyvista.UnstructuredGrid):
-        raise InvalidShapeError(f"A PolyData or UnstructuredGrid is taken; this is a {type(dataset).__name__}.")
+        raise InvalidShapeError(
+            f"A PolyData or UnstructuredGrid is taken; this is a {type(dataset).__name__}."
+        )
     grid = dataset.cast_to_unstructured_grid()
     points = np.asarray(grid.points, dtype=np.float64)
     kinds = np.asarray(grid.celltypes)
@@ -84,7 +90,9 @@ def from_pyvista(dataset: Any, *, dim: SupportsIndex = 2) -> Shape:
         at = starts[:-1][kinds == VTK_CELLS[dim_of_cells]]
         if at.size:
             cells = corners[at[:, None] + np.arange(dim_of_cells + 1)]
-            return TriangleMesh(points, cells) if dim_of_cells == 2 else SimplicialMesh(points, cells)
+            return (
+                TriangleMesh(points, cells) if dim_of_cells == 2 else SimplicialMesh(points, cells)
+            )
     segments = _segments(kinds, np.diff(starts), corners)
     return SimplicialMesh(points, segments) if segments.size else PointCloud(points, dim)
 
@@ -121,7 +129,9 @@ def to_pyvista(shape: ShapeLike) -> Any:
     pyvista = _extra("pyvista")
     ambient = shape.points.shape[1]
     if ambient > 3:
-        raise InvalidShapeError(f"Only shapes in R^3 fit into PyVista; this one lies in R^{ambient}.")
+        raise InvalidShapeError(
+            f"Only shapes in R^3 fit into PyVista; this one lies in R^{ambient}."
+        )
     points = np.pad(shape.points, ((0, 0), (0, 3 - ambient)))
     if isinstance(shape, PointCloud):
         return pyvista.PolyData(points)

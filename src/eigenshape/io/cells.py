@@ -25,7 +25,9 @@ def require_kind(cells: str | None) -> CellKind | None:
         If it is another.
     """
     if cells is not None and cells not in get_args(CellKind):
-        raise InvalidParameterError(f"cells must be {', '.join(get_args(CellKind))} or None; it is {cells!r}.")
+        raise InvalidParameterError(
+            f"cells must be {', '.join(get_args(CellKind))} or None; it is {cells!r}."
+        )
     return cast(CellKind | None, cells)
 
 
@@ -47,7 +49,9 @@ def chosen_cells(blocks: Blocks, cells: CellKind | None) -> Int[np.ndarray, "s c
     if cells is not None:
         if not len(found[cells]):
             held = ", ".join(name for name, block in blocks.items() if len(block)) or "points alone"
-            raise FileFormatError(f"A file that is read with cells={cells!r} must hold {cells}; it holds {held}.")
+            raise FileFormatError(
+                f"A file that is read with cells={cells!r} must hold {cells}; it holds {held}."
+            )
         return found[cells]
     by_dimension = [tetrahedra, surface, blocks.get(SEGMENTS, surface)]
     return next((block for block in by_dimension if len(block)), surface)
@@ -68,7 +72,9 @@ def four_cornered(
         return "quads"
     distinct = np.unique(np.sort(cells, axis=1), axis=0, return_index=True)[1]
     cells = cells[np.sort(distinct)]
-    triples = np.sort(np.stack([np.delete(cells, corner, axis=1) for corner in range(4)], axis=1), axis=2)
+    triples = np.sort(
+        np.stack([np.delete(cells, corner, axis=1) for corner in range(4)], axis=1), axis=2
+    )
     sides = np.sort(np.stack([cells[:, side] for side in SIDES], axis=1), axis=2)
     shares_triple = (_multiplicities(triples) > 1).any(axis=1).mean()
     of_sides = _multiplicities(sides)

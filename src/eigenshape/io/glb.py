@@ -31,7 +31,9 @@ def parse_text(data: bytes, folder: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _scene(tree: dict[str, Any], buffers: list[bytes]) -> tuple[np.ndarray, np.ndarray]:
-    vertices, faces = placed_triangles(Gltf(tree, buffers, most=max(sum(map(len, buffers)), COPIES)))
+    vertices, faces = placed_triangles(
+        Gltf(tree, buffers, most=max(sum(map(len, buffers)), COPIES))
+    )
     if not len(faces):
         raise FileFormatError("A glTF file must hold triangles; it holds none.")
     return vertices, faces
@@ -49,7 +51,9 @@ def _chunks(data: bytes) -> dict[bytes, bytes]:
     while start < length:
         end = start + 8 + int.from_bytes(data[start : start + 4], "little")
         if start + 8 > length or end > length:
-            raise FileFormatError(f"A chunk of a GLB file must end within it; one ends at {end} of {length} bytes.")
+            raise FileFormatError(
+                f"A chunk of a GLB file must end within it; one ends at {end} of {length} bytes."
+            )
         chunks.setdefault(data[start + 4 : start + 8], data[start + 8 : end])
         start = end
     return chunks
@@ -59,9 +63,13 @@ def _tree(text: bytes) -> dict[str, Any]:
     try:
         tree: Any = json.loads(text)
     except (ValueError, RecursionError) as err:
-        raise FileFormatError(f"The first chunk of a GLB file, and a .gltf file, must be JSON; {err}.") from err
+        raise FileFormatError(
+            f"The first chunk of a GLB file, and a .gltf file, must be JSON; {err}."
+        ) from err
     if not isinstance(tree, dict):
-        raise FileFormatError(f"The JSON of a glTF file must be an object; it is a {type(tree).__name__}.")
+        raise FileFormatError(
+            f"The JSON of a glTF file must be an object; it is a {type(tree).__name__}."
+        )
     return tree
 
 
@@ -83,17 +91,30 @@ def format_mesh(mesh: TriangleMesh) -> bytes:
         "nodes": [{"mesh": 0}],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
         "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": mesh.n_vertices, "type": "VEC3", **box},
+            {
+                "bufferView": 0,
+                "componentType": 5126,
+                "count": mesh.n_vertices,
+                "type": "VEC3",
+                **box,
+            },
             {"bufferView": 1, "componentType": 5125, "count": 3 * mesh.n_faces, "type": "SCALAR"},
         ],
         "bufferViews": [
             {"buffer": 0, "byteOffset": 0, "byteLength": len(positions), "target": 34962},
-            {"buffer": 0, "byteOffset": len(positions), "byteLength": len(corners), "target": 34963},
+            {
+                "buffer": 0,
+                "byteOffset": len(positions),
+                "byteLength": len(corners),
+                "target": 34963,
+            },
         ],
         "buffers": [{"byteLength": len(positions) + len(corners)}],
     }
     text = json.dumps(tree, separators=(",", ":")).encode()
-    body = _chunk(JSON_CHUNK, text + b" " * (-len(text) % 4)) + _chunk(BINARY_CHUNK, positions + corners)
+    body = _chunk(JSON_CHUNK, text + b" " * (-len(text) % 4)) + _chunk(
+        BINARY_CHUNK, positions + corners
+    )
     return b"glTF" + (2).to_bytes(4, "little") + (12 + len(body)).to_bytes(4, "little") + body
 
 

@@ -20,7 +20,13 @@ TRIANGLES, STRIP, FAN = 4, 5, 6
 LARGEST = sys.float_info.max
 NO_FACES = np.empty((0, 3), dtype=np.int64)
 # Extensions that change what a surface looks like, not where it is, or that ask nothing of the reader.
-HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_mesh_quantization")
+HARMLESS = (
+    "KHR_materials_",
+    "KHR_texture_",
+    "EXT_texture_",
+    "KHR_lights_",
+    "KHR_mesh_quantization",
+)
 Piece = tuple[np.ndarray, np.ndarray]  # vertices and faces
 
 
@@ -54,7 +60,9 @@ def decoded_buffers(tree: dict[str, Any], binary: bytes, folder: Path | None = N
     FileFormatError
         If a buffer lies outside of the file, or of the folder; it is never opened.
     """
-    return [_decoded(index, entry, binary, folder) for index, entry in enumerate(_list(tree, "buffers"))]
+    return [
+        _decoded(index, entry, binary, folder) for index, entry in enumerate(_list(tree, "buffers"))
+    ]
 
 
 def _decoded(index: int, entry: Any, binary: bytes, folder: Path | None) -> bytes:
@@ -66,7 +74,9 @@ def _decoded(index: int, entry: Any, binary: bytes, folder: Path | None) -> byte
         try:
             return base64.b64decode(content, validate=True)
         except ValueError as err:
-            raise FileFormatError(f"A data URI must be in base64; buffers[{index}] is not.") from err
+            raise FileFormatError(
+                f"A data URI must be in base64; buffers[{index}] is not."
+            ) from err
     if folder is None:
         raise FileFormatError(
             f"A GLB file must hold all its data; buffers[{index}] points outside, to {str(uri)[:80]!r}."
@@ -74,7 +84,9 @@ def _decoded(index: int, entry: Any, binary: bytes, folder: Path | None) -> byte
     size = _whole(entry, "byteLength")
     data = read_regular(_beside(index, str(uri), folder), "numbers")
     if len(data) < size:
-        raise FileFormatError(f"buffers[{index}] must have {size} bytes; the file {str(uri)[:80]!r} has {len(data)}.")
+        raise FileFormatError(
+            f"buffers[{index}] must have {size} bytes; the file {str(uri)[:80]!r} has {len(data)}."
+        )
     return data[:size]
 
 
@@ -110,7 +122,9 @@ def placed_triangles(gltf: Gltf) -> Piece:
 
 def _require_few(total: int, gltf: Gltf) -> None:
     if total > gltf.most:
-        raise FileFormatError(f"A glTF file must stay within {gltf.most} vertices and faces; its copies make more.")
+        raise FileFormatError(
+            f"A glTF file must stay within {gltf.most} vertices and faces; its copies make more."
+        )
 
 
 def _merged(pieces: Sequence[Piece]) -> Piece:
@@ -123,7 +137,9 @@ def _merged(pieces: Sequence[Piece]) -> Piece:
 def _refuse_extensions(gltf: Gltf) -> None:
     for name in _list(gltf.tree, "extensionsRequired"):
         if not str(name).startswith(HARMLESS):
-            raise FileFormatError(f"A glTF file must be plain glTF 2.0; it requires the extension {str(name)[:60]!r}.")
+            raise FileFormatError(
+                f"A glTF file must be plain glTF 2.0; it requires the extension {str(name)[:60]!r}."
+            )
 
 
 def _placed_meshes(gltf: Gltf) -> Iterator[tuple[Any, np.ndarray]]:
@@ -133,7 +149,9 @@ def _placed_meshes(gltf: Gltf) -> Iterator[tuple[Any, np.ndarray]]:
         index, above = waiting.pop()
         node = gltf.entry("nodes", index)
         if index in seen:
-            raise FileFormatError(f"The nodes of a glTF file must form trees; node {index} is met twice.")
+            raise FileFormatError(
+                f"The nodes of a glTF file must form trees; node {index} is met twice."
+            )
         seen.add(index)
         matrix = above @ _local_matrix(node)
         if "mesh" in node:
@@ -145,7 +163,9 @@ def _roots(gltf: Gltf) -> list[Any]:
     if "scenes" in gltf.tree:
         return _list(gltf.entry("scenes", gltf.tree.get("scene", 0)), "nodes")
     everyone = range(len(_list(gltf.tree, "nodes")))
-    children = [child for index in everyone for child in _list(gltf.entry("nodes", index), "children")]
+    children = [
+        child for index in everyone for child in _list(gltf.entry("nodes", index), "children")
+    ]
     below = {child for child in children if isinstance(child, int)}
     return [index for index in everyone if index not in below]
 
@@ -155,7 +175,9 @@ def _local_matrix(node: dict[str, Any]) -> np.ndarray:
         return _numbers(node, "matrix", [0.0] * 16).reshape(4, 4).T  # stored by columns
     turn = _numbers(node, "rotation", [0.0, 0.0, 0.0, 1.0])
     if not turn.any():
-        raise FileFormatError("A rotation must be a quaternion other than zero; a node has [0, 0, 0, 0].")
+        raise FileFormatError(
+            "A rotation must be a quaternion other than zero; a node has [0, 0, 0, 0]."
+        )
     matrix = np.eye(4)
     matrix[:3, :3] = Rotation.from_quat(turn / np.abs(turn).max()).as_matrix() * _numbers(
         node, "scale", [1.0, 1.0, 1.0]
@@ -196,7 +218,9 @@ def _faces(gltf: Gltf, part: dict[str, Any], n_vertices: int) -> np.ndarray:
     if "indices" not in part:
         return _split(np.arange(n_vertices), mode)
     corners = _accessor(gltf, part["indices"], 1)[:, 0]
-    bad = np.flatnonzero(~((corners >= 0) & (corners < n_vertices) & (corners == np.floor(corners))))
+    bad = np.flatnonzero(
+        ~((corners >= 0) & (corners < n_vertices) & (corners == np.floor(corners)))
+    )
     if bad.size:
         raise FileFormatError(
             f"Indices of a primitive must be whole and within 0..{n_vertices - 1}; index {bad[0]} is "
@@ -208,10 +232,14 @@ def _faces(gltf: Gltf, part: dict[str, Any], n_vertices: int) -> np.ndarray:
 def _split(corners: np.ndarray, mode: int) -> np.ndarray:
     if mode == TRIANGLES:
         if len(corners) % 3:
-            raise FileFormatError(f"Triangles must have three corners each; a primitive has {len(corners)} in all.")
+            raise FileFormatError(
+                f"Triangles must have three corners each; a primitive has {len(corners)} in all."
+            )
         return corners.reshape(-1, 3)
     if mode == FAN:
-        return np.column_stack([corners[1:-1], corners[2:], np.broadcast_to(corners[:1], max(len(corners) - 2, 0))])
+        return np.column_stack(
+            [corners[1:-1], corners[2:], np.broadcast_to(corners[:1], max(len(corners) - 2, 0))]
+        )
     odd = np.arange(max(len(corners) - 2, 0)) % 2
     place = np.arange(len(odd))
     return np.column_stack([corners[place], corners[place + 1 + odd], corners[place + 2 - odd]])
@@ -221,13 +249,17 @@ def _accessor(gltf: Gltf, index: Any, width: int) -> np.ndarray:
     accessor = gltf.entry("accessors", index)
     kind = np.dtype(KINDS.get(_whole(accessor, "componentType"), "V0"))
     if not kind.itemsize or WIDTHS.get(str(accessor.get("type"))) != width or "sparse" in accessor:
-        raise FileFormatError(f"accessors[{index}] must be a plain list of {width} numbers each; it is not.")
+        raise FileFormatError(
+            f"accessors[{index}] must be a plain list of {width} numbers each; it is not."
+        )
     data, step = _view(gltf, accessor.get("bufferView"))
     row = kind.itemsize * width
     count, start = _whole(accessor, "count"), _whole(accessor, "byteOffset", 0)
     step = step if step and count > 1 else row  # no step is taken between fewer than two rows
     if step < row or start + (count - 1) * step + row > len(data):
-        raise FileFormatError(f"accessors[{index}] must lie in its buffer; {count} rows do not fit {len(data)} bytes.")
+        raise FileFormatError(
+            f"accessors[{index}] must lie in its buffer; {count} rows do not fit {len(data)} bytes."
+        )
     rows = np.ndarray((count, width), kind, data, start, (step, kind.itemsize)).astype(np.float64)
     if accessor.get("normalized") is True and kind.kind in "iu":
         return np.maximum(rows / np.iinfo(kind).max, -1.0)
@@ -238,7 +270,9 @@ def _view(gltf: Gltf, index: Any) -> tuple[memoryview, int]:
     view = gltf.entry("bufferViews", index)
     place = _whole(view, "buffer")
     data = memoryview(gltf.buffers[place] if place < len(gltf.buffers) else b"")
-    return data[_whole(view, "byteOffset", 0) :][: _whole(view, "byteLength")], _whole(view, "byteStride", 0)
+    return data[_whole(view, "byteOffset", 0) :][: _whole(view, "byteLength")], _whole(
+        view, "byteStride", 0
+    )
 
 
 def _list(entry: Any, key: str) -> list[Any]:
@@ -251,7 +285,9 @@ def _list(entry: Any, key: str) -> list[Any]:
 def _whole(entry: Any, key: str, default: int | None = None) -> int:
     value = entry.get(key, default) if isinstance(entry, dict) else None
     if type(value) is not int or value < 0:
-        raise FileFormatError(f"{key} in a glTF file must be a whole number from 0; it is {str(value)[:60]!r}.")
+        raise FileFormatError(
+            f"{key} in a glTF file must be a whole number from 0; it is {str(value)[:60]!r}."
+        )
     return value
 
 
@@ -259,5 +295,7 @@ def _numbers(entry: dict[str, Any], key: str, default: list[float]) -> np.ndarra
     value = entry.get(key, default)
     known = isinstance(value, list) and len(value) == len(default)
     if not known or not all(type(part) in (int, float) and abs(part) <= LARGEST for part in value):
-        raise FileFormatError(f"{key} of a node must be {len(default)} finite numbers; it is {str(value)[:60]!r}.")
+        raise FileFormatError(
+            f"{key} of a node must be {len(default)} finite numbers; it is {str(value)[:60]!r}."
+        )
     return np.array(value, dtype=np.float64)

@@ -12,7 +12,9 @@ from eigenshape.io.text import shown
 
 SECTIONS = (b"MeshFormat", b"Nodes", b"Elements")
 VERSIONS = {b"2": 2, b"2.1": 2, b"2.2": 2, b"4": 4, b"4.1": 4}
-LARGEST_TAG = 10**7  # meshio makes a table of that length; a file with more nodes than that may have larger tags
+LARGEST_TAG = (
+    10**7
+)  # meshio makes a table of that length; a file with more nodes than that may have larger tags
 LEAST_BYTES = 8  # of a node in a file
 RULE = "Nodes and elements of a gmsh file must be as it declares them"
 
@@ -30,7 +32,12 @@ def mesh_sections(data: bytes) -> tuple[bytes, int]:
     """
     found = {name: _section(data, name) for name in SECTIONS}
     words = found[b"MeshFormat"].split(b"\n")[0].split()
-    if len(words) != 3 or words[0] not in VERSIONS or words[1] not in (b"0", b"1") or words[2] not in (b"4", b"8"):
+    if (
+        len(words) != 3
+        or words[0] not in VERSIONS
+        or words[1] not in (b"0", b"1")
+        or words[2] not in (b"4", b"8")
+    ):
         raise FileFormatError(
             f"A gmsh file must be of version 2.2 or 4.1; its format is {shown((0, b' '.join(words)))}. Save it anew."
         )
@@ -48,7 +55,9 @@ def mesh_sections(data: bytes) -> tuple[bytes, int]:
 def _section(data: bytes, name: bytes) -> bytes:
     starts = [match.end() for match in re.finditer(rb"\$%b[ \t]*\r?\n" % name, data)]
     if len(starts) != 1:
-        raise FileFormatError(f"A gmsh file must have one section {name.decode()}; it has {len(starts)}.")
+        raise FileFormatError(
+            f"A gmsh file must have one section {name.decode()}; it has {len(starts)}."
+        )
     end = data.find(b"$End" + name, starts[0])
     if end < 0:
         raise FileFormatError(f"A gmsh file must be whole; it has no $End{name.decode()}.")
@@ -75,7 +84,11 @@ def _plain_tags(body: bytes, is_text: bool) -> np.ndarray:
 
 def _text_block_tags(words: Sequence[bytes]) -> np.ndarray:
     """Read the tags of version 4: four counts, then blocks of a head of four, the tags, and the coordinates."""
-    n_blocks, total, place = int(words[0]) if words else 0, int(words[1]) if len(words) > 1 else -1, 4
+    n_blocks, total, place = (
+        int(words[0]) if words else 0,
+        int(words[1]) if len(words) > 1 else -1,
+        4,
+    )
     tags: list[int] = []
     for _ in range(min(n_blocks, len(words))):
         count = int(b"".join(words[place + 3 : place + 4]))

@@ -65,7 +65,9 @@ def _from_lines(lines: list[Line], words: tuple[str, str]) -> Int[np.ndarray, " 
         return table[:, 0]
     several = next((line for line in lines if len(line[1].split()) > 1), None)
     if several:
-        raise FileFormatError(f"A line must hold {words[1]}; line {several[0]} is {shown(several)}.")
+        raise FileFormatError(
+            f"A line must hold {words[1]}; line {several[0]} is {shown(several)}."
+        )
     return np.array([whole(line[1], line, words[0]) for line in lines], dtype=np.int64)
 
 
@@ -73,11 +75,17 @@ def _from_json(data: bytes) -> Int[np.ndarray, " f"]:
     try:
         found: Any = json.loads(data)
     except (ValueError, RecursionError) as err:
-        raise FileFormatError(f"A .json file of labels must hold JSON; it does not: {err}.") from err
+        raise FileFormatError(
+            f"A .json file of labels must hold JSON; it does not: {err}."
+        ) from err
     labels = found.get(KEY) if isinstance(found, dict) else None
     if not isinstance(labels, list):
-        raise FileFormatError(f'A .json file of labels must have a list "{KEY}", as `eigenshape segment --json` has.')
+        raise FileFormatError(
+            f'A .json file of labels must have a list "{KEY}", as `eigenshape segment --json` has.'
+        )
     for place, label in enumerate(labels):
         if type(label) is not int or not -INT64 <= label < INT64:
-            raise FileFormatError(f"Labels must be whole numbers of 64 bits; that of face {place} is {label!r}.")
+            raise FileFormatError(
+                f"Labels must be whole numbers of 64 bits; that of face {place} is {label!r}."
+            )
     return np.array(labels, dtype=np.int64)

@@ -15,12 +15,19 @@ from eigenshape.io import glb, obj, off, ply, stl
 from eigenshape.io.cells import CellKind, require_kind
 from eigenshape.io.parsing import MESH_FORMATS, naming, parse_mesh, suffix_of
 
-TEXT = {".off": off.format_mesh, ".obj": obj.format_mesh, ".ply": ply.format_text, ".stl": stl.format_text}
+TEXT = {
+    ".off": off.format_mesh,
+    ".obj": obj.format_mesh,
+    ".ply": ply.format_text,
+    ".stl": stl.format_text,
+}
 BINARY = {".ply": ply.format_binary, ".stl": stl.format_binary, ".glb": glb.format_mesh}
 WRITTEN = tuple({**TEXT, **BINARY})
 
 
-def read_mesh(path: str | Path, *, file_format: str | None = None, cells: CellKind | None = None) -> TriangleMesh:
+def read_mesh(
+    path: str | Path, *, file_format: str | None = None, cells: CellKind | None = None
+) -> TriangleMesh:
     """Read a triangle mesh from a file of any format that can hold one.
 
     Vertices keep their order and are neither joined nor split, but in STL, which cannot say that corners are shared:
@@ -70,7 +77,11 @@ def _require_surface(points: np.ndarray, simplices: np.ndarray) -> None:
     n_corners, dim = simplices.shape[1], points.shape[1]
     if (n_corners, dim) != (3, 3):
         what = {2: "segments", 3: "triangles", 4: "tetrahedra"}[n_corners]
-        remedy = ' cells="triangles" reads the triangles beside them, if there are any.' if n_corners == 4 else ""
+        remedy = (
+            ' cells="triangles" reads the triangles beside them, if there are any.'
+            if n_corners == 4
+            else ""
+        )
         raise FileFormatError(
             f"A mesh file must hold triangles in R^3; it holds {len(simplices)} {what} in R^{dim}, which read_shape "
             f"reads.{remedy}"
@@ -128,7 +139,9 @@ def write_mesh(
 def _writer(suffix: str, binary: bool) -> Callable[..., bytes]:
     writers: dict[str, Callable[..., bytes]] = {**(BINARY if binary else TEXT)}
     if suffix not in writers:
-        raise InvalidParameterError(f"binary={binary} is for {', '.join(writers)}; the suffix is {suffix}.")
+        raise InvalidParameterError(
+            f"binary={binary} is for {', '.join(writers)}; the suffix is {suffix}."
+        )
     return writers[suffix]
 
 

@@ -8,7 +8,16 @@ import numpy as np
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.text import Line, coordinates, fans, lines_of, rows_text, shown, whole, whole_table
+from eigenshape.io.text import (
+    Line,
+    coordinates,
+    fans,
+    lines_of,
+    rows_text,
+    shown,
+    whole,
+    whole_table,
+)
 
 # A backslash joins lines only in numbers: a comment may end in one, as may a folder's name.
 CONTINUED = re.compile(rb"^[ \t]*[vfl](?:[^\n\\#]|\\\r?\n|\\(?!\r?\n))*", re.MULTILINE)
@@ -33,7 +42,9 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
             polylines.append((number, AFTER_POSITION.sub(b"", text[1:])))
             n_so_far[keyword].append(len(positions))
     vertices = coordinates(positions)
-    return vertices, _triangles(polygons, n_so_far[b"f"]) if polygons else _segments(polylines, n_so_far[b"l"])
+    return vertices, _triangles(polygons, n_so_far[b"f"]) if polygons else _segments(
+        polylines, n_so_far[b"l"]
+    )
 
 
 def joined_lines(data: bytes) -> bytes:
@@ -56,7 +67,9 @@ def _triangles(polygons: Sequence[Line], n_so_far: Sequence[int]) -> np.ndarray:
 def _corners(line: Line, n_so_far: int) -> list[int]:
     words = line[1].split()
     if len(words) < 3:
-        raise FileFormatError(f"A face must have three corners or more; line {line[0]} is {shown(line)}.")
+        raise FileFormatError(
+            f"A face must have three corners or more; line {line[0]} is {shown(line)}."
+        )
     return [corner_index(word, line, n_so_far) for word in words]
 
 
@@ -65,7 +78,9 @@ def _segments(polylines: Sequence[Line], n_so_far: Sequence[int]) -> np.ndarray:
     for line, count in zip(polylines, n_so_far, strict=True):
         places = [corner_index(word, line, count) for word in line[1].split()]
         if len(places) < 2:
-            raise FileFormatError(f"A polyline must have two points or more; line {line[0]} is {shown(line)}.")
+            raise FileFormatError(
+                f"A polyline must have two points or more; line {line[0]} is {shown(line)}."
+            )
         pairs += pairwise(places)
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 

@@ -82,7 +82,9 @@ def _corner(word: bytes, line: Line, n_vertices: int, n_textures: int) -> Corner
     return vertex, f"/{place if place > 0 else n_textures + 1 + place}"
 
 
-def format_sheet(sheet: ObjSheet, mesh: TriangleMesh, moved: Float[np.ndarray, "k 3"] | None = None) -> bytes:
+def format_sheet(
+    sheet: ObjSheet, mesh: TriangleMesh, moved: Float[np.ndarray, "k 3"] | None = None
+) -> bytes:
     """Write a repaired or deformed mesh with what is left of the file's polygons, textures and groups.
 
     A polygon stays one where all its triangles are still there; else those that are there are written as triangles. A
@@ -110,26 +112,37 @@ def format_sheet(sheet: ObjSheet, mesh: TriangleMesh, moved: Float[np.ndarray, "
 
     triangles, added = _matched(sheet, mesh.faces, old_places, new_places)
     for row in sheet.rows:
-        lines += [row] if isinstance(row, str) else _polygon_rows(sheet.polygons[row], triangles[row])
+        lines += (
+            [row] if isinstance(row, str) else _polygon_rows(sheet.polygons[row], triangles[row])
+        )
     return ("\n".join([*lines, *rows_text("f ", added + 1)]) + "\n").encode("latin-1")
 
 
-def _places(old: np.ndarray, new: np.ndarray) -> tuple[int, Int[np.ndarray, " n"], Int[np.ndarray, " k"]]:
+def _places(
+    old: np.ndarray, new: np.ndarray
+) -> tuple[int, Int[np.ndarray, " n"], Int[np.ndarray, " k"]]:
     """Return how many places there are at which vertices lie, and that of each old and each new vertex."""
     # Adding 0.0 makes -0.0 equal to 0.0.
     distinct, numbers = np.unique(np.concatenate([old, new]) + 0.0, axis=0, return_inverse=True)
     return len(distinct), numbers.ravel()[: len(old)], numbers.ravel()[len(old) :]
 
 
-Triangles = list[tuple[Sequence[int], bool] | None]  # of a polygon: new corners and whether it is turned, or none
+Triangles = list[
+    tuple[Sequence[int], bool] | None
+]  # of a polygon: new corners and whether it is turned, or none
 
 
 def _matched(
-    sheet: ObjSheet, faces: Int[np.ndarray, "f 3"], old_places: Int[np.ndarray, " n"], new_places: Int[np.ndarray, " k"]
+    sheet: ObjSheet,
+    faces: Int[np.ndarray, "f 3"],
+    old_places: Int[np.ndarray, " n"],
+    new_places: Int[np.ndarray, " k"],
 ) -> tuple[list[Triangles], Int[np.ndarray, "a 3"]]:
     """Find each triangle of each polygon among the faces of the mesh, by place; and faces that no polygon has."""
     by_places: defaultdict[tuple[int, ...], deque[list[int]]] = defaultdict(deque)
-    for face, places in zip(faces.tolist(), np.sort(new_places[faces], axis=1).tolist(), strict=True):
+    for face, places in zip(
+        faces.tolist(), np.sort(new_places[faces], axis=1).tolist(), strict=True
+    ):
         by_places[tuple(places)].append(face)
     found: list[Triangles] = []
     for polygon in sheet.polygons:
@@ -144,9 +157,13 @@ def _matched(
     return found, np.array(added, dtype=np.int64).reshape(-1, 3)
 
 
-def _fitted(face: list[int], wanted: list[int], places: Int[np.ndarray, " k"]) -> tuple[Sequence[int], bool]:
+def _fitted(
+    face: list[int], wanted: list[int], places: Int[np.ndarray, " k"]
+) -> tuple[Sequence[int], bool]:
     """Bring the corners of a face into the order of the places that are wanted."""
-    orders = (order for order in ORDERS if places[[face[place] for place in order]].tolist() == wanted)
+    orders = (
+        order for order in ORDERS if places[[face[place] for place in order]].tolist() == wanted
+    )
     order = next(orders)  # the sorted places agree, so one does
     return [face[place] for place in order], order in TURNED
 
@@ -177,7 +194,11 @@ def _whole(triangles: Triangles) -> tuple[list[int], bool] | None:
         return None
     vertices, is_turned = [*triangles[0][0][:2]], triangles[0][1]
     for triangle in triangles:
-        if triangle is None or triangle[1] != is_turned or [*triangle[0][:2]] != [vertices[0], vertices[-1]]:
+        if (
+            triangle is None
+            or triangle[1] != is_turned
+            or [*triangle[0][:2]] != [vertices[0], vertices[-1]]
+        ):
             return None
         vertices.append(triangle[0][2])
     return vertices, is_turned

@@ -7,7 +7,17 @@ import numpy as np
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.text import Line, coordinates, fans, lines_of, number, rows_text, shown, whole, whole_table
+from eigenshape.io.text import (
+    Line,
+    coordinates,
+    fans,
+    lines_of,
+    number,
+    rows_text,
+    shown,
+    whole,
+    whole_table,
+)
 
 KEYWORD = re.compile(rb"(?:ST)?C?N?OFF(?P<glued>\d*)", re.IGNORECASE)  # some write OFF8 6 12
 PLAIN = re.compile(rb"OFF", re.IGNORECASE)  # three numbers a vertex
@@ -34,7 +44,9 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     return coordinates(rows[:n_vertices]), _triangles(rows[n_vertices:])
 
 
-def _parse_stream(rows: Sequence[Line], n_vertices: int, n_faces: int) -> tuple[np.ndarray, np.ndarray] | None:
+def _parse_stream(
+    rows: Sequence[Line], n_vertices: int, n_faces: int
+) -> tuple[np.ndarray, np.ndarray] | None:
     """Read numbers wherever lines break; None where vertices and faces without colors do not fill the file."""
     words = [(at, word) for at, text in rows for word in text.split()]
     if 3 * n_vertices + 4 * n_faces > len(words):
@@ -116,7 +128,9 @@ def _head(lines: list[Line]) -> tuple[Line, list[Line]]:
 def _counts(line: Line) -> tuple[int, int]:
     words = line[1].split()
     if len(words) < 2:
-        raise FileFormatError(f"An OFF file must declare vertices and faces; line {line[0]} is {shown(line)}.")
+        raise FileFormatError(
+            f"An OFF file must declare vertices and faces; line {line[0]} is {shown(line)}."
+        )
     n_vertices, n_faces = (whole(word, line, "A count") for word in words[:2])
     if min(n_vertices, n_faces) < 0:
         raise FileFormatError(f"A count must not be negative; line {line[0]} is {shown(line)}.")
@@ -135,7 +149,11 @@ def _require_equal_rows(rows: Sequence[Line]) -> None:
 
 def _triangles(rows: Sequence[Line]) -> np.ndarray:
     table = whole_table(rows)
-    if table is not None and (table[:, 0] == table[0, 0]).all() and 3 <= table[0, 0] < table.shape[1]:
+    if (
+        table is not None
+        and (table[:, 0] == table[0, 0]).all()
+        and 3 <= table[0, 0] < table.shape[1]
+    ):
         return fans(table[:, 1 : 1 + table[0, 0]])
     return fans([_corners(row) for row in rows])
 
@@ -152,5 +170,9 @@ def _corners(row: Line) -> list[int]:
 
 def format_mesh(mesh: TriangleMesh) -> bytes:
     """Write a mesh so that it reads back exactly."""
-    lines = [f"OFF\n{mesh.n_vertices} {mesh.n_faces} 0", *rows_text("", mesh.vertices), *rows_text("3 ", mesh.faces)]
+    lines = [
+        f"OFF\n{mesh.n_vertices} {mesh.n_faces} 0",
+        *rows_text("", mesh.vertices),
+        *rows_text("3 ", mesh.faces),
+    ]
     return ("\n".join(lines) + "\n").encode()

@@ -12,7 +12,13 @@ from eigenshape.io import glb, obj, off, ply, stl, unstructured, vtk_legacy, vtu
 from eigenshape.io.cells import SEGMENTS, Blocks, CellKind, chosen_cells
 
 # Formats whose bytes alone give vertices, and triangles or segments.
-PARSERS = {".off": off.parse, ".obj": obj.parse, ".ply": ply.parse, ".stl": stl.parse, ".glb": glb.parse}
+PARSERS = {
+    ".off": off.parse,
+    ".obj": obj.parse,
+    ".ply": ply.parse,
+    ".stl": stl.parse,
+    ".glb": glb.parse,
+}
 NAMES = {2: SEGMENTS, 3: "triangles"}
 MESH_FORMATS = (*PARSERS, ".gltf", ".vtk", ".vtu", *unstructured.READERS)
 
@@ -25,9 +31,13 @@ def suffix_of(path: Path, file_format: str | None, known: tuple[str, ...]) -> st
     FileFormatError
         If it is not among those that are known.
     """
-    suffix = path.suffix.lower() if file_format is None else f".{file_format.lower().removeprefix('.')}"
+    suffix = (
+        path.suffix.lower() if file_format is None else f".{file_format.lower().removeprefix('.')}"
+    )
     if suffix not in known:
-        raise FileFormatError(f"{path} must be of a known format, {', '.join(known)}; it is {suffix!r}.")
+        raise FileFormatError(
+            f"{path} must be of a known format, {', '.join(known)}; it is {suffix!r}."
+        )
     return suffix
 
 
@@ -41,7 +51,9 @@ def naming(path: Path) -> Iterator[None]:
         name = "" if str(err).startswith(str(path)) else f"{path}: "
         raise type(err)(f"{name}{err}") from err
     except MemoryError as err:
-        raise FileFormatError(f"{path} must fit into memory; there is too little to read it.") from err
+        raise FileFormatError(
+            f"{path} must fit into memory; there is too little to read it."
+        ) from err
 
 
 def parse_mesh(
@@ -52,7 +64,9 @@ def parse_mesh(
     return points, chosen_cells(blocks, cells)
 
 
-def _blocks(path: Path, suffix: str, data: bytes, cells: CellKind | None) -> tuple[np.ndarray, Blocks]:
+def _blocks(
+    path: Path, suffix: str, data: bytes, cells: CellKind | None
+) -> tuple[np.ndarray, Blocks]:
     if suffix in PARSERS:
         points, simplices = PARSERS[suffix](data)
         return points, {NAMES[simplices.shape[1]]: simplices}

@@ -42,7 +42,9 @@ def parse(data: bytes) -> Float[np.ndarray, "n 3"]:
         return _records(header, body)
     if kind == b"binary_compressed":
         return _columns(header, _unpacked(header, body))
-    raise FileFormatError(f"DATA of a PCD file must be ascii, binary or binary_compressed; it is {shown((0, kind))}.")
+    raise FileFormatError(
+        f"DATA of a PCD file must be ascii, binary or binary_compressed; it is {shown((0, kind))}."
+    )
 
 
 def _split(data: bytes) -> tuple[list[Line], bytes, bytes]:
@@ -62,17 +64,27 @@ def _header(lines: list[Line]) -> Header:
     sizes = _numbers(rows[b"SIZE"], "A size")
     counts = _numbers(rows[b"COUNT"], "A count") if b"COUNT" in rows else (1,) * len(names)
     kinds = tuple(rows[b"TYPE"][1].split()[1:])
-    if not len(names) == len(sizes) == len(counts) == len(kinds) or min((*sizes, *counts), default=0) < 1:
-        raise FileFormatError("FIELDS, SIZE, TYPE and COUNT of a PCD file must be of one length; they are not.")
+    if (
+        not len(names) == len(sizes) == len(counts) == len(kinds)
+        or min((*sizes, *counts), default=0) < 1
+    ):
+        raise FileFormatError(
+            "FIELDS, SIZE, TYPE and COUNT of a PCD file must be of one length; they are not."
+        )
     missing = [axis.decode() for axis in AXES if axis not in names]
     if missing:
-        raise FileFormatError(f"A PCD file must have the fields x, y and z; {missing[0]} is missing.")
+        raise FileFormatError(
+            f"A PCD file must have the fields x, y and z; {missing[0]} is missing."
+        )
     types = tuple(
-        KINDS.get((kind, size)) if count == 1 else None for kind, size, count in zip(kinds, sizes, counts, strict=True)
+        KINDS.get((kind, size)) if count == 1 else None
+        for kind, size, count in zip(kinds, sizes, counts, strict=True)
     )
     for axis in AXES:
         if types[names.index(axis)] is None:
-            raise FileFormatError(f"Coordinates of a PCD file must be floats of 4 or 8 bytes; {axis.decode()} is not.")
+            raise FileFormatError(
+                f"Coordinates of a PCD file must be floats of 4 or 8 bytes; {axis.decode()} is not."
+            )
     (n_points,) = _numbers(rows[b"POINTS"], "A number of points")[:1] or (0,)
     if n_points < 1:
         raise FileFormatError(f"A PCD file must hold points; it declares {n_points}.")
@@ -95,13 +107,17 @@ def _parse_text(header: Header, body: bytes, first: int) -> Float[np.ndarray, "n
     table = number_table(lines)
     if table is not None and table.shape[1] == n_words:
         return table[:, places]
-    return coordinates([(number, b" ".join(_chosen(number, text, places, n_words))) for number, text in lines])
+    return coordinates(
+        [(number, b" ".join(_chosen(number, text, places, n_words))) for number, text in lines]
+    )
 
 
 def _chosen(number: int, text: bytes, places: list[int], n_words: int) -> list[bytes]:
     words = text.split()
     if len(words) != n_words:
-        raise FileFormatError(f"A point must have all fields and no more; line {number} is {shown((number, text))}.")
+        raise FileFormatError(
+            f"A point must have all fields and no more; line {number} is {shown((number, text))}."
+        )
     return [words[place] for place in places]
 
 
@@ -115,16 +131,22 @@ def _require_bytes(header: Header, body: bytes | np.ndarray) -> None:
 
 def _records(header: Header, body: bytes) -> Float[np.ndarray, "n 3"]:
     _require_bytes(header, body)
-    rows = np.frombuffer(body, np.uint8, header.n_points * header.record).reshape(header.n_points, header.record)
+    rows = np.frombuffer(body, np.uint8, header.n_points * header.record).reshape(
+        header.n_points, header.record
+    )
     starts = np.cumsum([0, *header.sizes])
     columns = [np.ascontiguousarray(rows[:, starts[i] : starts[i + 1]]) for i in _axes(header)]
-    return np.column_stack([_values(header, raw, i) for raw, i in zip(columns, _axes(header), strict=True)])
+    return np.column_stack(
+        [_values(header, raw, i) for raw, i in zip(columns, _axes(header), strict=True)]
+    )
 
 
 def _columns(header: Header, body: np.ndarray) -> Float[np.ndarray, "n 3"]:
     """Read what stands field by field instead of point by point."""
     starts = np.cumsum([0, *header.sizes]) * header.n_points
-    return np.column_stack([_values(header, body[starts[i] : starts[i + 1]], i) for i in _axes(header)])
+    return np.column_stack(
+        [_values(header, body[starts[i] : starts[i + 1]], i) for i in _axes(header)]
+    )
 
 
 def _axes(header: Header) -> list[int]:
@@ -137,9 +159,15 @@ def _values(header: Header, raw: np.ndarray, place: int) -> np.ndarray:
 
 def _unpacked(header: Header, body: bytes) -> np.ndarray:
     if len(body) < 8:
-        raise FileFormatError(f"Compressed points must begin with two sizes; the file ends after {len(body)} bytes.")
+        raise FileFormatError(
+            f"Compressed points must begin with two sizes; the file ends after {len(body)} bytes."
+        )
     packed, size = struct.unpack_from("<II", body)
-    if len(body) - 8 < packed or size > MOST_TIMES * packed or size < header.n_points * header.record:
+    if (
+        len(body) - 8 < packed
+        or size > MOST_TIMES * packed
+        or size < header.n_points * header.record
+    ):
         raise FileFormatError(
             f"Compressed points must have the size they declare; {packed} bytes that unpack to {size} are declared, "
             f"{len(body) - 8} are there, and {header.n_points} points take {header.n_points * header.record}."

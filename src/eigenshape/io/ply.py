@@ -33,7 +33,9 @@ Table = dict[str, Any]  # the values of each column, by name
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     """Read vertices and faces, if any; polygons become fans, strips triangles, the rest is passed over."""
     tables = _tables(data)
-    vertices = np.column_stack([np.asarray(tables["vertex"][axis], dtype=np.float64) for axis in AXES])
+    vertices = np.column_stack(
+        [np.asarray(tables["vertex"][axis], dtype=np.float64) for axis in AXES]
+    )
     polygons, strips = _lists(tables, "face"), _lists(tables, "tristrips")
     triangles = [_triangles(polygons)] if len(polygons) else []
     if len(strips):
@@ -67,14 +69,20 @@ def _pieces(strips: Sequence[Sequence[int]] | np.ndarray) -> list[np.ndarray]:
 
 
 def _require_mesh(elements: Sequence[Element]) -> None:
-    columns = {(element.name, column.name): column for element in elements for column in element.columns}
+    columns = {
+        (element.name, column.name): column for element in elements for column in element.columns
+    }
     axes = [columns.get(("vertex", axis)) for axis in AXES]
     if any(axis is None or axis.length_kind for axis in axes):
-        raise FileFormatError("A PLY file must declare an element vertex with the numbers x, y and z; it does not.")
+        raise FileFormatError(
+            "A PLY file must declare an element vertex with the numbers x, y and z; it does not."
+        )
     for element in elements:
         if element.name not in ("face", "tristrips") or not element.count:
             continue
-        corners = [columns[element.name, name] for name in CORNERS if (element.name, name) in columns]
+        corners = [
+            columns[element.name, name] for name in CORNERS if (element.name, name) in columns
+        ]
         if not (corners and corners[0].length_kind and corners[0].is_whole):
             raise FileFormatError(
                 f"The element {element.name} of a PLY file must declare a list of whole vertex_indices; it does not."
@@ -85,7 +93,9 @@ def _triangles(polygons: Sequence[Sequence[int]] | np.ndarray) -> np.ndarray:
     uniform = isinstance(polygons, np.ndarray)
     for index, corners in enumerate(polygons[:1] if uniform else polygons):
         if len(corners) < 3:
-            raise FileFormatError(f"A face must have three corners or more; face {index} is {list(map(int, corners))}.")
+            raise FileFormatError(
+                f"A face must have three corners or more; face {index} is {list(map(int, corners))}."
+            )
     return fans(polygons.astype(np.int64) if isinstance(polygons, np.ndarray) else polygons)
 
 
@@ -120,7 +130,9 @@ def _plain_table(rows: Sequence[Line], element: Element) -> Table | None:
         if column.length_kind and (length < 0 or (values[:, place] != length).any()):
             return None
         place += bool(column.length_kind)
-        table[column.name] = values[:, place : place + length] if column.length_kind else values[:, place]
+        table[column.name] = (
+            values[:, place : place + length] if column.length_kind else values[:, place]
+        )
         place += length
     return table if place == values.shape[1] else None
 
@@ -141,13 +153,17 @@ def _row_by_row(rows: Sequence[Line], element: Element) -> Table:
     return table
 
 
-def _text_values(words: Sequence[bytes], place: int, column: Column, row: Line) -> tuple[Sequence[Any], int]:
+def _text_values(
+    words: Sequence[bytes], place: int, column: Column, row: Line
+) -> tuple[Sequence[Any], int]:
     count = 1
     if column.length_kind and place < len(words):
         count = whole(words[place], row, "The length of a list")
         place += 1
     if not 0 <= count <= len(words) - place:
-        raise FileFormatError(f"A row must hold all its columns; line {row[0]} lacks {column.name}: {shown(row)}.")
+        raise FileFormatError(
+            f"A row must hold all its columns; line {row[0]} lacks {column.name}: {shown(row)}."
+        )
     return _understood(words[place : place + count], column, row), place + count
 
 
@@ -164,7 +180,9 @@ def _binary_tables(body: bytes, elements: Sequence[Element], order: str) -> dict
     for element in elements:
         tables[element.name], start = _binary_table(body, element, order, start)
     if body[start:].strip(b"\r\n\0 "):
-        raise FileFormatError(f"A PLY file must end with its last row; {len(body) - start} more bytes follow.")
+        raise FileFormatError(
+            f"A PLY file must end with its last row; {len(body) - start} more bytes follow."
+        )
     return tables
 
 
@@ -177,7 +195,13 @@ def _binary_table(body: bytes, element: Element, order: str, start: int) -> tupl
     for column in element.columns:
         if column.length_kind:
             fields.append((f"length of {column.name}", order + column.length_kind))
-        fields.append((column.name, order + column.kind, (len(first[column.name][0]),) if column.length_kind else ()))
+        fields.append(
+            (
+                column.name,
+                order + column.kind,
+                (len(first[column.name][0]),) if column.length_kind else (),
+            )
+        )
     record = np.dtype(fields)
     end = start + element.count * record.itemsize
     if end <= len(body):
@@ -218,22 +242,30 @@ def parse_labels(data: bytes) -> Int[np.ndarray, " f"]:
     tables = _tables(data)
     labels = tables.get("face", {}).get(LABEL)
     if labels is None:
-        raise FileFormatError(f"Faces of a PLY file of labels must have a property {LABEL}; they have none.")
+        raise FileFormatError(
+            f"Faces of a PLY file of labels must have a property {LABEL}; they have none."
+        )
     try:
         values = np.array([int(label) for label in labels], dtype=np.int64)
     except (TypeError, ValueError, OverflowError) as err:
-        raise FileFormatError(f"The property {LABEL} of faces must be a whole number; it is not: {err}.") from err
+        raise FileFormatError(
+            f"The property {LABEL} of faces must be a whole number; it is not: {err}."
+        ) from err
     n_triangles = [len(polygon) - 2 for polygon in _lists(tables, "face")]
     return np.repeat(values, n_triangles)
 
 
 def format_text(
-    mesh: TriangleMesh, colors: np.ndarray | None = None, face_labels: Int[np.ndarray, " f"] | None = None
+    mesh: TriangleMesh,
+    colors: np.ndarray | None = None,
+    face_labels: Int[np.ndarray, " f"] | None = None,
 ) -> bytes:
     """Write a mesh as text that reads back exactly; colors, (n, 3) uint8, stand with the vertices."""
     vertices = rows_text("", mesh.vertices)
     if colors is not None:
-        vertices = [f"{row} {tint}" for row, tint in zip(vertices, rows_text("", colors), strict=True)]
+        vertices = [
+            f"{row} {tint}" for row, tint in zip(vertices, rows_text("", colors), strict=True)
+        ]
     faces = rows_text("3 ", mesh.faces)
     if face_labels is not None:
         faces = [f"{row} {label}" for row, label in zip(faces, face_labels.tolist(), strict=True)]
@@ -242,10 +274,15 @@ def format_text(
 
 
 def format_binary(
-    mesh: TriangleMesh, colors: np.ndarray | None = None, face_labels: Int[np.ndarray, " f"] | None = None
+    mesh: TriangleMesh,
+    colors: np.ndarray | None = None,
+    face_labels: Int[np.ndarray, " f"] | None = None,
 ) -> bytes:
     """Write a mesh in binary that reads back exactly; colors, (n, 3) uint8, stand with the vertices."""
-    vertices = np.zeros(mesh.n_vertices, dtype=[("xyz", "<f8", 3)] + ([("rgb", "u1", 3)] if colors is not None else []))
+    vertices = np.zeros(
+        mesh.n_vertices,
+        dtype=[("xyz", "<f8", 3)] + ([("rgb", "u1", 3)] if colors is not None else []),
+    )
     vertices["xyz"] = mesh.vertices
     if colors is not None:
         vertices["rgb"] = colors
@@ -254,7 +291,11 @@ def format_binary(
     faces["n"], faces["corners"] = 3, mesh.faces
     if face_labels is not None:
         faces[LABEL] = face_labels
-    return _header_text(mesh, "binary_little_endian", colors, face_labels) + vertices.tobytes() + faces.tobytes()
+    return (
+        _header_text(mesh, "binary_little_endian", colors, face_labels)
+        + vertices.tobytes()
+        + faces.tobytes()
+    )
 
 
 def format_points(points: np.ndarray) -> bytes:
@@ -267,7 +308,10 @@ def format_points(points: np.ndarray) -> bytes:
 
 
 def _header_text(
-    mesh: TriangleMesh, order: str, colors: np.ndarray | None, face_labels: Int[np.ndarray, " f"] | None
+    mesh: TriangleMesh,
+    order: str,
+    colors: np.ndarray | None,
+    face_labels: Int[np.ndarray, " f"] | None,
 ) -> bytes:
     tints = [f"property uchar {name}" for name in ("red", "green", "blue") if colors is not None]
     lines = [

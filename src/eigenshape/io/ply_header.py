@@ -61,7 +61,9 @@ class Header:
 def parse_header(data: bytes) -> Header:
     """Read the header, refusing tables that are larger than the file before anybody makes room for them."""
     if not re.match(rb"ply\s", data):
-        raise FileFormatError(f"A PLY file must begin with ply; it begins with {shown((1, data[:10]))}.")
+        raise FileFormatError(
+            f"A PLY file must begin with ply; it begins with {shown((1, data[:10]))}."
+        )
     mark = END.search(data)
     if mark is None:
         raise FileFormatError("A PLY header must end with end_header; the file has no such line.")
@@ -96,7 +98,9 @@ def _declarations(lines: list[bytes]) -> tuple[str, tuple[Element, ...]]:
             raise FileFormatError(
                 f"A PLY header must declare format, elements and properties; line {number} is {shown((number, line))}."
             ) from err
-    return order, tuple(Element(name, count, tuple(columns[name].values())) for name, count in counts.items())
+    return order, tuple(
+        Element(name, count, tuple(columns[name].values())) for name, count in counts.items()
+    )
 
 
 def _put_new(table: dict[str, Any], name: str, value: Any) -> None:

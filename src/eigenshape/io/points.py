@@ -40,9 +40,13 @@ def _parse_binary(data: bytes) -> Float[np.ndarray, "n 3"]:
         elif words[0] == b"nofpoints" and len(words) == 2:
             declared = whole(words[1], line, "A number of points")
         else:
-            raise FileFormatError(f"A binary point set must declare properties; line {line[0]} is {shown(line)}.")
+            raise FileFormatError(
+                f"A binary point set must declare properties; line {line[0]} is {shown(line)}."
+            )
     if sizes.get(b"position") != 12 or min(sizes.values()) < 1:
-        raise FileFormatError(f"A binary point set must have a position of 12 bytes; it has {sizes}.")
+        raise FileFormatError(
+            f"A binary point set must have a position of 12 bytes; it has {sizes}."
+        )
     record = sum(sizes.values())
     if declared < 1 or len(body) < declared * record:
         raise FileFormatError(
@@ -50,7 +54,9 @@ def _parse_binary(data: bytes) -> Float[np.ndarray, "n 3"]:
             f"holds {len(body)} bytes."
         )
     before = sum(size for name, size in list(sizes.items())[: list(sizes).index(b"position")])
-    rows = np.frombuffer(body, np.uint8, declared * record).reshape(declared, record)[:, before : before + 12]
+    rows = np.frombuffer(body, np.uint8, declared * record).reshape(declared, record)[
+        :, before : before + 12
+    ]
     return np.ascontiguousarray(rows).view("<f4").astype(np.float64)
 
 

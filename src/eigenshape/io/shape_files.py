@@ -98,7 +98,11 @@ def _finite(coordinates: Float[np.ndarray, "n d"], drop_missing: bool) -> Float[
 
 
 def read_points(
-    path: str | Path, *, file_format: str | None = None, dim: SupportsIndex = 2, drop_missing: bool = False
+    path: str | Path,
+    *,
+    file_format: str | None = None,
+    dim: SupportsIndex = 2,
+    drop_missing: bool = False,
 ) -> PointCloud:
     """Read a cloud of points; faces and cells between them are passed over.
 
@@ -136,7 +140,11 @@ def write_points(cloud: PointCloud, path: str | Path) -> None:
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in WRITERS:
-        raise FileFormatError(f"{path} must end in {', '.join(WRITERS)} to hold points; it ends in {path.suffix!r}.")
+        raise FileFormatError(
+            f"{path} must end in {', '.join(WRITERS)} to hold points; it ends in {path.suffix!r}."
+        )
     if cloud.points.shape[1] != 3:
-        raise InvalidShapeError(f"Files of points hold three coordinates; these points have {cloud.points.shape[1]}.")
+        raise InvalidShapeError(
+            f"Files of points hold three coordinates; these points have {cloud.points.shape[1]}."
+        )
     replace_file(path, WRITERS[suffix](cloud.points))

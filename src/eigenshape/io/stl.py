@@ -33,14 +33,20 @@ def _declared(data: bytes) -> int:
 
 def _parse_binary(data: bytes) -> np.ndarray:
     if len(data) < HEADER:
-        raise FileFormatError(f"A binary STL file must have {HEADER} bytes of header; it has {len(data)} in all.")
+        raise FileFormatError(
+            f"A binary STL file must have {HEADER} bytes of header; it has {len(data)} in all."
+        )
     expected = HEADER + RECORD.itemsize * _declared(data)
     if len(data) != expected:
         raise FileFormatError(
             f"A binary STL file must hold the triangles it declares; {_declared(data)} take {expected} bytes and it "
             f"has {len(data)}."
         )
-    return np.frombuffer(data, dtype=RECORD, offset=HEADER)["corners"].reshape(-1, 3).astype(np.float64)
+    return (
+        np.frombuffer(data, dtype=RECORD, offset=HEADER)["corners"]
+        .reshape(-1, 3)
+        .astype(np.float64)
+    )
 
 
 def _parse_text(data: bytes) -> np.ndarray:
@@ -48,24 +54,36 @@ def _parse_text(data: bytes) -> np.ndarray:
     words = [text.split(None, 1)[0].lower() for _, text in lines]
     n_open, n_closed = words.count(b"solid"), words.count(b"endsolid")
     if n_open != n_closed:
-        raise FileFormatError(f"A text STL file must close what it opens; it has {n_open} solid, {n_closed} endsolid.")
-    rows = [pair for pair in zip(lines, words, strict=True) if pair[1] not in (b"solid", b"endsolid")]
+        raise FileFormatError(
+            f"A text STL file must close what it opens; it has {n_open} solid, {n_closed} endsolid."
+        )
+    rows = [
+        pair for pair in zip(lines, words, strict=True) if pair[1] not in (b"solid", b"endsolid")
+    ]
     for place, (line, word) in enumerate(rows):
         if word != FACET[place % len(FACET)]:
             raise FileFormatError(
                 f"A facet must be lines of {b' '.join(FACET).decode()}; line {line[0]} is {shown(line)}."
             )
     if len(rows) % len(FACET):
-        raise FileFormatError(f"A text STL file must end with a whole facet; its last line is {shown(rows[-1][0])}.")
-    return coordinates([(line[0], line[1][len(word) :]) for line, word in rows if word == b"vertex"])
+        raise FileFormatError(
+            f"A text STL file must end with a whole facet; its last line is {shown(rows[-1][0])}."
+        )
+    return coordinates(
+        [(line[0], line[1][len(word) :]) for line, word in rows if word == b"vertex"]
+    )
 
 
 def format_text(mesh: TriangleMesh) -> bytes:
     """Write text STL in full precision."""
     lines = ["solid mesh"]
-    for normal, corners in zip(_normals(mesh).tolist(), mesh.vertices[mesh.faces].tolist(), strict=True):
+    for normal, corners in zip(
+        _normals(mesh).tolist(), mesh.vertices[mesh.faces].tolist(), strict=True
+    ):
         rows = "\n".join(f"vertex {x!r} {y!r} {z!r}" for x, y, z in corners)
-        lines.append(f"facet normal {' '.join(map(repr, normal))}\nouter loop\n{rows}\nendloop\nendfacet")
+        lines.append(
+            f"facet normal {' '.join(map(repr, normal))}\nouter loop\n{rows}\nendloop\nendfacet"
+        )
     return ("\n".join([*lines, "endsolid mesh"]) + "\n").encode()
 
 

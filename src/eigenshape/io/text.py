@@ -78,7 +78,9 @@ def whole(word: bytes, line: Line, what: str) -> int:
             f"{what} must be a whole number; line {line[0]} has {shown((0, word))} in {shown(line)}."
         ) from err
     if not -INT64 <= value < INT64:
-        raise FileFormatError(f"{what} must fit into 64 bits; line {line[0]} has {shown((0, word))}.")
+        raise FileFormatError(
+            f"{what} must fit into 64 bits; line {line[0]} has {shown((0, word))}."
+        )
     return value
 
 
@@ -93,7 +95,9 @@ def fans(polygons: Sequence[Sequence[int]] | Int[np.ndarray, "p c"]) -> Int[np.n
         first = np.broadcast_to(polygons[:, :1], polygons[:, 1:-1].shape)
         return np.stack([first, polygons[:, 1:-1], polygons[:, 2:]], axis=2).reshape(-1, 3)
     triangles = [
-        (corners[0], corners[place], corners[place + 1]) for corners in polygons for place in range(1, len(corners) - 1)
+        (corners[0], corners[place], corners[place + 1])
+        for corners in polygons
+        for place in range(1, len(corners) - 1)
     ]
     return np.array(triangles, dtype=np.int64).reshape(-1, 3)
 

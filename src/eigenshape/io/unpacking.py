@@ -47,5 +47,7 @@ def unpacked_block(packed: bytes, size: int, compressor: str) -> bytes:
         raise FileFormatError(f"A compressed block must be whole; one is damaged: {err}.") from err
     if len(found) != size:
         more = "more" if len(found) > size else f"{len(found)}"
-        raise FileFormatError(f"A compressed block must unpack to the size it declares, {size}; it unpacks to {more}.")
+        raise FileFormatError(
+            f"A compressed block must unpack to the size it declares, {size}; it unpacks to {more}."
+        )
     return found

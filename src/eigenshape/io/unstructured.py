@@ -26,7 +26,9 @@ READERS: dict[str, Callable[[Path], Any]] = {
 }
 ENDS = (b"$EndNodes", b"$EndElements")  # without which a .msh was cut off
 KINDS = {"tetra": "tetrahedra", "triangle": "triangles", "quad": "quads", "line": SEGMENTS}
-_ONE_READER = Lock()  # meshio prints to the streams of the process, which only one thread at a time may redirect
+_ONE_READER = (
+    Lock()
+)  # meshio prints to the streams of the process, which only one thread at a time may redirect
 
 
 def read(path: Path, suffix: str, data: bytes) -> tuple[np.ndarray, dict[str, np.ndarray]]:
@@ -55,7 +57,9 @@ def read(path: Path, suffix: str, data: bytes) -> tuple[np.ndarray, dict[str, np
         )
     points = np.asarray(found.points)
     if points.ndim != 2:
-        raise FileFormatError(f"{path} must hold points in rows; meshio reads an array of shape {points.shape}.")
+        raise FileFormatError(
+            f"{path} must hold points in rows; meshio reads an array of shape {points.shape}."
+        )
     blocks = {}
     for kind, name in KINDS.items():
         of_kind = [block for found_kind, block in cells if found_kind == kind]
@@ -73,7 +77,9 @@ def _require_ends(path: Path, suffix: str, data: bytes) -> None:
 def _require_whole(path: Path, suffix: str, data: bytes, found: Any, declared: int | None) -> None:
     kinds = {str(block.type) for block in found.cells if len(block.data)}
     if suffix == ".mesh" and b"End" not in data and "tetra" not in kinds:
-        raise FileFormatError(f"{path} must be whole; it has no End, and no tetrahedra, after which nothing is missed.")
+        raise FileFormatError(
+            f"{path} must be whole; it has no End, and no tetrahedra, after which nothing is missed."
+        )
     if "End-of-file" in found.said:
         raise FileFormatError(f"{path} must be whole; meshio says {found.said!r}.")
     n_cells = sum(len(block.data) for block in found.cells)
@@ -98,7 +104,9 @@ def _guarded(reader: Callable[[Path], Any], copy: Path, path: Path) -> Any:
             return SimpleNamespace(points=found.points, cells=found.cells, said=printed.words())
         except (SystemExit, Exception) as err:
             what = printed.words() or f"{type(err).__name__}: {err}"
-            raise FileFormatError(f"{path} must be a readable {copy.suffix} file; meshio says {what[:200]!r}.") from err
+            raise FileFormatError(
+                f"{path} must be a readable {copy.suffix} file; meshio says {what[:200]!r}."
+            ) from err
 
 
 class _Printed(io.StringIO):

@@ -9,7 +9,12 @@ from eigenshape._errors import FileFormatError
 from eigenshape.io.cells import SEGMENTS
 
 VERTEX, POLY_VERTEX, LINE, POLYLINE, TRIANGLE, QUAD, TETRAHEDRON = 1, 2, 3, 4, 5, 9, 10
-KINDS = {LINE: (SEGMENTS, 2), TRIANGLE: ("triangles", 3), QUAD: ("quads", 4), TETRAHEDRON: ("tetrahedra", 4)}
+KINDS = {
+    LINE: (SEGMENTS, 2),
+    TRIANGLE: ("triangles", 3),
+    QUAD: ("quads", 4),
+    TETRAHEDRON: ("tetrahedra", 4),
+}
 NAMES = {
     6: "triangle strip", 7: "polygon", 8: "pixel", 11: "voxel", 12: "hexahedron", 13: "wedge", 14: "pyramid",
     21: "quadratic edge", 22: "quadratic triangle", 23: "quadratic quad", 24: "quadratic tetrahedron", 42: "polyhedron",
@@ -39,7 +44,9 @@ class CellLists:
         return np.column_stack([self.corners[:-1][follows], self.corners[1:][follows]])
 
 
-def cells_of_types(lists: CellLists, types: Int[np.ndarray, " c"]) -> dict[str, Int[np.ndarray, "_ _"]]:
+def cells_of_types(
+    lists: CellLists, types: Int[np.ndarray, " c"]
+) -> dict[str, Int[np.ndarray, "_ _"]]:
     """Sort cells into segments, triangles, quads and tetrahedra; cells that are points are passed over.
 
     Raises
@@ -59,10 +66,14 @@ def cells_of_types(lists: CellLists, types: Int[np.ndarray, " c"]) -> dict[str, 
         wrong = chosen[lists.lengths[chosen] != length]
         if wrong.size:
             count = lists.lengths[wrong[0]]
-            raise FileFormatError(f"A VTK cell of type {kind} must have {length} corners; cell {wrong[0]} has {count}.")
+            raise FileFormatError(
+                f"A VTK cell of type {kind} must have {length} corners; cell {wrong[0]} has {count}."
+            )
         if chosen.size:
             blocks[name] = lists.rows(chosen, length)
     polylines = np.flatnonzero(types == POLYLINE)
     if polylines.size:
-        blocks[SEGMENTS] = np.concatenate([blocks.get(SEGMENTS, np.empty((0, 2), int)), lists.pairs(polylines)])
+        blocks[SEGMENTS] = np.concatenate(
+            [blocks.get(SEGMENTS, np.empty((0, 2), int)), lists.pairs(polylines)]
+        )
     return blocks

@@ -45,15 +45,23 @@ class _Cursor:
     def numbers(self, count: int, kind: bytes) -> np.ndarray:
         """Return the next numbers; so many must be there."""
         if kind not in KINDS:
-            raise FileFormatError(f"Numbers of a VTK file must be {b', '.join(KINDS).decode()}; they are {kind!r}.")
+            raise FileFormatError(
+                f"Numbers of a VTK file must be {b', '.join(KINDS).decode()}; they are {kind!r}."
+            )
         if not 0 <= count <= len(self.data):
-            raise FileFormatError(f"A VTK file must hold what it declares; {count} numbers do not fit into it.")
-        return self._binary_numbers(count, KINDS[kind]) if self.binary else self._text_numbers(count)
+            raise FileFormatError(
+                f"A VTK file must hold what it declares; {count} numbers do not fit into it."
+            )
+        return (
+            self._binary_numbers(count, KINDS[kind]) if self.binary else self._text_numbers(count)
+        )
 
     def _binary_numbers(self, count: int, kind: str) -> np.ndarray:
         size = count * np.dtype(kind).itemsize
         if self.place + size > len(self.data):
-            raise FileFormatError(f"A VTK file must hold what it declares; it ends within {count} numbers.")
+            raise FileFormatError(
+                f"A VTK file must hold what it declares; it ends within {count} numbers."
+            )
         found = np.frombuffer(self.data, kind, count, self.place)
         self.place += size
         return found
@@ -64,11 +72,17 @@ class _Cursor:
             # Python would read 1_0 as ten.
             found = np.array([float(word.replace(b"_", b"?")) for word in words[:count]])
         except ValueError as err:
-            raise FileFormatError(f"A VTK file must hold {count} numbers at byte {self.place}; it does not.") from err
+            raise FileFormatError(
+                f"A VTK file must hold {count} numbers at byte {self.place}; it does not."
+            ) from err
         if len(found) < count:
-            raise FileFormatError(f"A VTK file must hold what it declares; it ends within {count} numbers.")
+            raise FileFormatError(
+                f"A VTK file must hold what it declares; it ends within {count} numbers."
+            )
         if count and len(words) == count and not self.data[-1:].isspace():
-            raise FileFormatError("A VTK file must be whole; its last number has no line break after it.")
+            raise FileFormatError(
+                "A VTK file must be whole; its last number has no line break after it."
+            )
         self.place = len(self.data) - len(words[count]) if len(words) > count else len(self.data)
         return found
 
@@ -78,7 +92,9 @@ class _Cursor:
         odd = (found != np.floor(found)) | (np.abs(found.astype(np.float64)) >= EXACT)
         bad = np.flatnonzero(odd)
         if bad.size:
-            raise FileFormatError(f"Cells of a VTK file must be whole numbers; number {bad[0]} is {found[bad[0]]}.")
+            raise FileFormatError(
+                f"Cells of a VTK file must be whole numbers; number {bad[0]} is {found[bad[0]]}."
+            )
         return found.astype(np.int64)
 
 
@@ -103,10 +119,14 @@ def parse(
     if dataset[-1].upper() == b"POLYDATA":
         return points, _polydata_cells(points, lists, cells)
     if types is None or b"CELLS" not in lists:
-        raise FileFormatError("An unstructured grid of a VTK file must have CELLS and CELL_TYPES; one is missing.")
+        raise FileFormatError(
+            "An unstructured grid of a VTK file must have CELLS and CELL_TYPES; one is missing."
+        )
     n_cells = len(lists[b"CELLS"].lengths)
     if len(types) != n_cells:
-        raise FileFormatError(f"Each cell of a VTK file must have a type; it has {n_cells} cells, {len(types)} types.")
+        raise FileFormatError(
+            f"Each cell of a VTK file must have a type; it has {n_cells} cells, {len(types)} types."
+        )
     return points, cells_of_types(lists[b"CELLS"], types)
 
 
@@ -146,7 +166,11 @@ def _polydata_cells(
     if b"LINES" in lists:
         blocks[SEGMENTS] = lists[b"LINES"].pairs(np.arange(len(lists[b"LINES"].lengths)))
     strips = lists.get(b"TRIANGLE_STRIPS")
-    triangles = strip_triangles(np.split(strips.corners, strips.starts[1:-1])) if strips else np.empty((0, 3), int)
+    triangles = (
+        strip_triangles(np.split(strips.corners, strips.starts[1:-1]))
+        if strips
+        else np.empty((0, 3), int)
+    )
     polygons = lists.get(b"POLYGONS")
     if polygons is not None and len(polygons.lengths):
         lengths = polygons.lengths
@@ -157,12 +181,16 @@ def _polydata_cells(
         if (lengths == lengths[0]).all():
             fanned = fans(polygons.rows(everyone, int(lengths[0])))
         else:
-            fanned = fans([row.tolist() for row in np.split(polygons.corners, polygons.starts[1:-1])])
+            fanned = fans(
+                [row.tolist() for row in np.split(polygons.corners, polygons.starts[1:-1])]
+            )
         triangles = np.concatenate([triangles, fanned])
     return blocks | {"triangles": triangles} if len(triangles) else blocks
 
 
-def _four_cornered_kind(points: np.ndarray, four: Int[np.ndarray, "c 4"], cells: CellKind | None) -> CellKind:
+def _four_cornered_kind(
+    points: np.ndarray, four: Int[np.ndarray, "c 4"], cells: CellKind | None
+) -> CellKind:
     """Return what polygons of four corners are: programs such as LaPy write tetrahedra as such."""
     if cells is not None:
         return "tetrahedra" if cells == "tetrahedra" else "quads"
@@ -180,7 +208,9 @@ def _count(word: bytes) -> int:
     try:
         return int(word)
     except ValueError as err:
-        raise FileFormatError(f"A VTK file must count its cells by whole numbers; it says {word[:30]!r}.") from err
+        raise FileFormatError(
+            f"A VTK file must count its cells by whole numbers; it says {word[:30]!r}."
+        ) from err
 
 
 def _cells(cursor: _Cursor, name: bytes, count: int, size: int) -> CellLists:
@@ -205,7 +235,9 @@ def _cells_by_offsets(cursor: _Cursor, words: Sequence[bytes], count: int, size:
     offsets = cursor.wholes(count, _kind(words))
     corners = cursor.wholes(size, _kind(cursor.line().split()))
     if not count or offsets[0] != 0 or offsets[-1] != size or (np.diff(offsets) < 0).any():
-        raise FileFormatError(f"Offsets of a VTK file must rise from 0 to {size}; they are {offsets[:9].tolist()}.")
+        raise FileFormatError(
+            f"Offsets of a VTK file must rise from 0 to {size}; they are {offsets[:9].tolist()}."
+        )
     return CellLists(offsets, corners)
 
 
@@ -217,16 +249,22 @@ def _cells_by_counts(flat: Int[np.ndarray, " k"], count: int) -> CellLists:
     size = len(flat)
     length = int(flat[0]) if size else 0
     if length > 0 and size == count * (1 + length) and (flat[:: 1 + length] == length).all():
-        return CellLists(np.arange(0, count * length + 1, length), flat.reshape(count, -1)[:, 1:].ravel())
+        return CellLists(
+            np.arange(0, count * length + 1, length), flat.reshape(count, -1)[:, 1:].ravel()
+        )
     places = []  # of the counts
     place = 0
     for index in range(count):
         if place >= size or not 0 <= flat[place] < size - place:
-            raise FileFormatError(f"Cells of a VTK file must fill {size} numbers; cell {index} of {count} does not.")
+            raise FileFormatError(
+                f"Cells of a VTK file must fill {size} numbers; cell {index} of {count} does not."
+            )
         places.append(place)
         place += 1 + int(flat[place])
     if place != size:
-        raise FileFormatError(f"Cells of a VTK file must fill {size} numbers; {count} cells fill {place}.")
+        raise FileFormatError(
+            f"Cells of a VTK file must fill {size} numbers; {count} cells fill {place}."
+        )
     at_counts = np.array(places, dtype=np.int64)
     starts = np.concatenate([[0], np.cumsum(flat[at_counts])])
     return CellLists(starts, np.delete(flat, at_counts))

@@ -38,14 +38,18 @@ class _Packing:
         name = array.get("Name", "an array")
         kind = NUMBERS.get(array.get("type", ""))
         if kind is None:
-            raise FileFormatError(f"Arrays of a VTU file must be of numbers; {name!r} is of {array.get('type')!r}.")
+            raise FileFormatError(
+                f"Arrays of a VTU file must be of numbers; {name!r} is of {array.get('type')!r}."
+            )
         if array.get("format", "ascii") == "ascii":
             found = _text_numbers(array.text or "", name)
         else:
             dtype = np.dtype(self.order + kind)
             data = self._data(array, None if count is None else count * dtype.itemsize, name)
             if len(data) % dtype.itemsize:
-                raise FileFormatError(f"Arrays of a VTU file must be of whole numbers; {name!r} has {len(data)} bytes.")
+                raise FileFormatError(
+                    f"Arrays of a VTU file must be of whole numbers; {name!r} has {len(data)} bytes."
+                )
             found = np.frombuffer(data, dtype)
         if count is not None and len(found) != count:
             raise FileFormatError(
@@ -57,7 +61,9 @@ class _Packing:
         if array.get("format") == "appended":
             offset = array.get("offset", "")
             if not re.fullmatch(r"\s*[0-9]{1,18}\s*", offset):
-                raise FileFormatError(f"An appended array must have an offset; that of {name!r} is {offset!r}.")
+                raise FileFormatError(
+                    f"An appended array must have an offset; that of {name!r} is {offset!r}."
+                )
             text, is_raw = self.appended[int(offset) :], self.is_raw
         else:
             text, is_raw = (array.text or "").strip().encode(), False
@@ -73,7 +79,9 @@ class _Packing:
             )
         (n_blocks,) = source.counts(self.size, 1)
         if n_blocks > len(text):
-            raise FileFormatError(f"A VTU file must hold what it declares; {name!r} is of {n_blocks} blocks.")
+            raise FileFormatError(
+                f"A VTU file must hold what it declares; {name!r} is of {n_blocks} blocks."
+            )
         _, usual, last, *packed = source.counts(self.size, 3 + n_blocks)
         sizes = [usual] * n_blocks
         if n_blocks and last:  # 0 stands for a last block as large as the others
@@ -115,7 +123,9 @@ class _Source:
             try:
                 found = base64.b64decode(text[: _coded(length)], validate=True)[:length]
             except binascii.Error as err:
-                raise FileFormatError(f"Arrays of a VTU file must be in base64; {self.name!r} is not: {err}.") from err
+                raise FileFormatError(
+                    f"Arrays of a VTU file must be in base64; {self.name!r} is not: {err}."
+                ) from err
         if len(found) < length:
             raise FileFormatError(
                 f"A VTU file must hold what it declares; {self.name!r} lacks {length - len(found)} of {length} bytes."
@@ -130,14 +140,18 @@ def _coded(length: int) -> int:
 
 def _require_size(found: int, expected: int | None, name: str) -> None:
     if expected is not None and found != expected:
-        raise FileFormatError(f"A VTU file must hold what it declares; {name!r} takes {expected} bytes, not {found}.")
+        raise FileFormatError(
+            f"A VTU file must hold what it declares; {name!r} takes {expected} bytes, not {found}."
+        )
 
 
 def _text_numbers(text: str, name: str) -> np.ndarray:
     try:
         return np.array([float(word.replace("_", "?")) for word in text.split()])
     except ValueError as err:
-        raise FileFormatError(f"Arrays of a VTU file must be of numbers; {name!r} is not: {err}.") from err
+        raise FileFormatError(
+            f"Arrays of a VTU file must be of numbers; {name!r} is not: {err}."
+        ) from err
 
 
 def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], dict[str, Int[np.ndarray, "_ _"]]]:
@@ -151,8 +165,12 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], dict[str, Int[np.ndarr
     root, packing = _opened(data)
     pieces = root.findall("./UnstructuredGrid/Piece")
     counts = [(piece.get("NumberOfPoints", ""), piece.get("NumberOfCells", "")) for piece in pieces]
-    if not counts or not all(re.fullmatch(r"\s*[0-9]{1,18}\s*", word) for pair in counts for word in pair):
-        raise FileFormatError(f"A VTU file must hold pieces that count points and cells; the counts are {counts[:9]}.")
+    if not counts or not all(
+        re.fullmatch(r"\s*[0-9]{1,18}\s*", word) for pair in counts for word in pair
+    ):
+        raise FileFormatError(
+            f"A VTU file must hold pieces that count points and cells; the counts are {counts[:9]}."
+        )
     filled = [piece for piece, (_, n_cells) in zip(pieces, counts, strict=True) if int(n_cells)]
     if len(filled) > 1:
         raise FileFormatError(
@@ -173,7 +191,9 @@ def _opened(data: bytes) -> tuple[ElementTree.Element, _Packing]:
         appended = data[raw.end() : max(end, raw.end())]
         tags = data[: raw.end()] + data[max(end, raw.end()) :]
     if b"<!DOCTYPE" in tags:
-        raise FileFormatError("A VTU file must be plain XML; it has a DOCTYPE, whose entities could be of any size.")
+        raise FileFormatError(
+            "A VTU file must be plain XML; it has a DOCTYPE, whose entities could be of any size."
+        )
     try:
         root = ElementTree.fromstring(tags)
     except (ElementTree.ParseError, ValueError, LookupError) as err:
@@ -188,27 +208,37 @@ def _opened(data: bytes) -> tuple[ElementTree.Element, _Packing]:
         appended = (section.text or "").strip().removeprefix("_").encode()
     header_type = root.get("header_type", "UInt32")
     if header_type not in HEADER_TYPES:
-        raise FileFormatError(f"header_type of a VTU file must be UInt32 or UInt64; it is {header_type[:30]!r}.")
+        raise FileFormatError(
+            f"header_type of a VTU file must be UInt32 or UInt64; it is {header_type[:30]!r}."
+        )
     order = root.get("byte_order", "LittleEndian")
     if order not in ORDERS:
-        raise FileFormatError(f"byte_order of a VTU file must be LittleEndian or BigEndian; it is {order[:30]!r}.")
+        raise FileFormatError(
+            f"byte_order of a VTU file must be LittleEndian or BigEndian; it is {order[:30]!r}."
+        )
     compressor = root.get("compressor") or None
     size = np.dtype(ORDERS[order] + HEADER_TYPES[header_type])
     return root, _Packing(size, ORDERS[order], compressor, appended, raw is not None, len(data))
 
 
-def _points(piece: ElementTree.Element, packing: _Packing, n_points: int) -> Float[np.ndarray, "n d"]:
+def _points(
+    piece: ElementTree.Element, packing: _Packing, n_points: int
+) -> Float[np.ndarray, "n d"]:
     array = piece.find("./Points/DataArray")
     if array is None:
         raise FileFormatError("A VTU file must have points; it has none.")
     width = (array.get("NumberOfComponents") or "3").strip()
     if width not in ("1", "2", "3"):
-        raise FileFormatError(f"Points of a VTU file must have 1 to 3 coordinates each; they have {width[:30]!r}.")
+        raise FileFormatError(
+            f"Points of a VTU file must have 1 to 3 coordinates each; they have {width[:30]!r}."
+        )
     numbers = packing.numbers(array, n_points * int(width))
     return numbers.reshape(n_points, int(width)).astype(np.float64)
 
 
-def _cells(piece: ElementTree.Element, packing: _Packing, n_cells: int) -> dict[str, Int[np.ndarray, "_ _"]]:
+def _cells(
+    piece: ElementTree.Element, packing: _Packing, n_cells: int
+) -> dict[str, Int[np.ndarray, "_ _"]]:
     arrays = {array.get("Name"): array for array in piece.findall("./Cells/DataArray")}
     if not n_cells:
         return {}
@@ -220,7 +250,9 @@ def _cells(piece: ElementTree.Element, packing: _Packing, n_cells: int) -> dict[
     ends = _wholes(packing.numbers(arrays["offsets"], n_cells), "offsets")
     starts = np.concatenate([[0], ends])
     if (np.diff(starts) < 0).any():
-        raise FileFormatError(f"Offsets of a VTU file must rise from 0; they begin with {ends[:9].tolist()}.")
+        raise FileFormatError(
+            f"Offsets of a VTU file must rise from 0; they begin with {ends[:9].tolist()}."
+        )
     corners = _wholes(packing.numbers(arrays["connectivity"], int(starts[-1])), "connectivity")
     return cells_of_types(CellLists(starts, corners), types)
 
@@ -229,5 +261,7 @@ def _wholes(numbers: np.ndarray, name: str) -> Int[np.ndarray, " k"]:
     whole = numbers.astype(np.int64)
     bad = np.flatnonzero(whole != numbers)
     if bad.size:
-        raise FileFormatError(f"{name} of a VTU file must be whole numbers; number {bad[0]} is {numbers[bad[0]]}.")
+        raise FileFormatError(
+            f"{name} of a VTU file must be whole numbers; number {bad[0]} is {numbers[bad[0]]}."
+        )
     return whole

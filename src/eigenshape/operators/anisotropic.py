@@ -16,7 +16,9 @@ from eigenshape.operators.laplacian import Laplacian
 ROUNDING = 1e-12  # of the largest entry of a tensor: what may be asymmetric, or lie below zero
 
 
-def anisotropic_laplacian(mesh: MeshLike, tensors: Float[np.ndarray, "s d d"], mass: Mass = "lumped") -> Laplacian:
+def anisotropic_laplacian(
+    mesh: MeshLike, tensors: Float[np.ndarray, "s d d"], mass: Mass = "lumped"
+) -> Laplacian:
     """Build the Laplacian -div(D grad) of linear elements, with one conductivity tensor a simplex.
 
     W has the energy Σ V ∇fᵀD∇f. With the identity everywhere it is the cotangent Laplacian.
@@ -51,7 +53,9 @@ def anisotropic_laplacian(mesh: MeshLike, tensors: Float[np.ndarray, "s d d"], m
 def _require_tensors(mesh: Mesh, tensors: np.ndarray) -> None:
     wanted = (len(mesh.simplices), *(mesh.points.shape[1],) * 2)
     if tensors.shape != wanted:
-        raise InvalidParameterError(f"tensors must have shape {wanted}; the shape is {tensors.shape}.")
+        raise InvalidParameterError(
+            f"tensors must have shape {wanted}; the shape is {tensors.shape}."
+        )
     noun = "face" if mesh.dim == 2 else "simplex"
     bad = np.flatnonzero(~np.isfinite(tensors).all(axis=(1, 2)))
     if bad.size:
@@ -73,7 +77,9 @@ def _require_tensors(mesh: Mesh, tensors: np.ndarray) -> None:
         )
 
 
-def curvature_tensors(mesh: MeshLike, alpha: float, *, concave: bool = False) -> Float[np.ndarray, "f 3 3"]:
+def curvature_tensors(
+    mesh: MeshLike, alpha: float, *, concave: bool = False
+) -> Float[np.ndarray, "f 3 3"]:
     """Return tensors that slow diffusion down across bends (Andreux, Rodolà, Aubry, Cremers 2014).
 
     Along each principal direction of a face the conductivity is 1 / (1 + α |κ| √area), with κ the principal curvature

@@ -11,14 +11,16 @@ import numpy as np
 from jaxtyping import Int
 
 from eigenshape._arguments import require_type
+from eigenshape._arrays import as_array
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian
 
 Condition = Literal["neumann", "dirichlet"]
 
 
 def dirichlet_laplacian(
-    laplacian: Laplacian, fixed: Int[np.ndarray, " c"]
+    laplacian: Laplacian, fixed: ArrayLike
 ) -> tuple[Laplacian, Int[np.ndarray, " free"]]:
     """Cut an operator down to the functions that are zero at the fixed points.
 
@@ -42,12 +44,18 @@ def dirichlet_laplacian(
         If a fixed point is out of range, or none is free.
     """
     require_type(laplacian, Laplacian, "laplacian")
-    bad = np.flatnonzero((fixed < 0) | (fixed >= laplacian.n_points))
+    points = np.atleast_1d(as_array(fixed, "fixed"))
+    if points.size and points.dtype.kind not in "iu":
+        raise InvalidParameterError(
+            f"fixed must be a list of point numbers; the type of its entries is {points.dtype}. "
+            f"Pass np.flatnonzero(mask) for a mask."
+        )
+    bad = np.flatnonzero((points < 0) | (points >= laplacian.n_points))
     if bad.size:
         raise InvalidParameterError(
-            f"fixed must hold points 0..{laplacian.n_points - 1}; entry {bad[0]} is {fixed[bad[0]]}."
+            f"fixed must hold points 0..{laplacian.n_points - 1}; entry {bad[0]} is {points[bad[0]]}."
         )
-    free = np.setdiff1d(np.arange(laplacian.n_points), fixed)
+    free = np.setdiff1d(np.arange(laplacian.n_points), points)
     if not free.size:
         raise InvalidParameterError(f"Some point must be free; all {laplacian.n_points} are fixed.")
     cut = {name: getattr(laplacian, name)[free][:, free] for name in ("stiffness", "mass")}

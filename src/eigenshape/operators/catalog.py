@@ -26,51 +26,75 @@ KERNEL = ("t", "h", "edge_factor", "correct", "form", "cutoff")
 
 @dataclass(frozen=True)
 class Operator:
-    """An operator that can be asked for by name.
+    """An operator that can be built by name.
 
     Attributes
     ----------
     build : callable
-        From a shape and options to a Laplacian.
-    takes : tuple of types
-        Shapes that it is for.
+        Maps a shape and options to a `Laplacian`.
+    shapes : tuple of types
+        Types of shapes on which the operator is defined.
     options : tuple of str
-        Names of the options that it knows.
-    says : str
-        What it is, in a line.
+        Names of its options.
+    description : str
+        One line that says what the operator is.
     """
 
     build: Callable[..., Laplacian]
-    takes: tuple[type, ...]
+    shapes: tuple[type, ...]
     options: tuple[str, ...]
-    says: str
+    description: str
 
 
 OPERATORS = {
     "cotangent": Operator(cotangent_laplacian, MESHES, ("mass",), "linear finite elements"),
-    "p2": Operator(partial(fem_laplacian, order=2), MESHES, (), "quadratic finite elements, nodes on edges too"),
-    "p3": Operator(partial(fem_laplacian, order=3), MESHES, (), "cubic finite elements, nodes inside triangles too"),
-    "robust": Operator(robust_laplacian, (TriangleMesh,), ("mollify",), "linear elements on intrinsic triangles"),
-    "mesh": Operator(mesh_laplacian, MESHES, (*KERNEL, "distance"), "Gaussian kernel, weighed by volumes"),
-    "point-cloud": Operator(point_cloud_laplacian, (PointCloud,), KERNEL, "Gaussian kernel, weighed in tangent planes"),
-    "combinatorial": Operator(partial(graph_laplacian, kind="combinatorial"), GRAPHS, (), "edges of weight 1"),
-    "weighted": Operator(
-        partial(graph_laplacian, kind="weighted"), GRAPHS, (), "edges weigh what they do, or 1/length"
+    "p2": Operator(
+        partial(fem_laplacian, order=2), MESHES, (), "quadratic finite elements, nodes on edges too"
     ),
-    "normalized": Operator(partial(graph_laplacian, kind="normalized"), GRAPHS, (), "eigenvalues in 0..2"),
+    "p3": Operator(
+        partial(fem_laplacian, order=3),
+        MESHES,
+        (),
+        "cubic finite elements, nodes inside triangles too",
+    ),
+    "robust": Operator(
+        robust_laplacian, (TriangleMesh,), ("mollify",), "linear elements on intrinsic triangles"
+    ),
+    "mesh": Operator(
+        mesh_laplacian, MESHES, (*KERNEL, "distance"), "Gaussian kernel, weighed by volumes"
+    ),
+    "point-cloud": Operator(
+        point_cloud_laplacian, (PointCloud,), KERNEL, "Gaussian kernel, weighed in tangent planes"
+    ),
+    "combinatorial": Operator(
+        partial(graph_laplacian, kind="combinatorial"), GRAPHS, (), "edges of weight 1"
+    ),
+    "weighted": Operator(
+        partial(graph_laplacian, kind="weighted"),
+        GRAPHS,
+        (),
+        "edges weigh what they do, or 1/length",
+    ),
+    "normalized": Operator(
+        partial(graph_laplacian, kind="normalized"), GRAPHS, (), "eigenvalues in 0..2"
+    ),
 }
 
 
-def build_laplacian(shape: ShapeLike | sp.sparray, operator: str | None = None, **options: Any) -> Laplacian:
-    """Build the operator of a name on a shape.
+def build_laplacian(
+    shape: ShapeLike | sp.sparray, operator: str | None = None, **options: Any
+) -> Laplacian:
+    """Build a Laplace operator by its name.
 
     Parameters
     ----------
-    shape : ShapeLike or (n, n) sparse adjacency matrix
+    shape : ShapeLike or (n, n) sparse
+        A mesh, a point cloud, or the adjacency matrix of a graph.
     operator : str, optional
-        A name in `OPERATORS`; by default "cotangent" on meshes, "point-cloud" on points and "weighted" on graphs.
+        A name in `es.operators.OPERATORS`. The default is "cotangent" for meshes, "point-cloud" for
+        points and "weighted" for graphs.
     **options
-        Handed to the operator.
+        Options of the operator, such as `mass` or `t`.
 
     Returns
     -------
@@ -79,36 +103,54 @@ def build_laplacian(shape: ShapeLike | sp.sparray, operator: str | None = None, 
     Raises
     ------
     InvalidParameterError
-        If there is no such operator, it is not for such a shape, or does not know an option.
+        If there is no operator of this name, it is not defined on such a shape, or it does not have
+        one of the options.
     InvalidShapeError
-        As the operator says.
+        If the operator cannot be built on this shape.
+
+    See Also
+    --------
+    cotangent_laplacian, robust_laplacian, mesh_laplacian, point_cloud_laplacian : The operators.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(2)
+    >>> es.build_laplacian(ball).n_points
+    162
+    >>> es.build_laplacian(ball, "p2").n_points  # nodes on the edges too
+    642
+    >>> es.build_laplacian(ball, "cotangent", mass="averaged").mass.nnz
+    1122
     """
     if not isinstance(shape, sp.sparray):
         shape = as_shape(shape)
     name = operator or default_operator(shape)
     if name not in OPERATORS:
-        raise InvalidParameterError(f"operator must be one of {', '.join(OPERATORS)}; it is {name!r}.")
-    entry = OPERATORS[name]
-    if not isinstance(shape, entry.takes):
         raise InvalidParameterError(
-            f"The {name} operator takes {' or '.join(kind.__name__ for kind in entry.takes)}; the shape is a "
+            f"operator must be one of {', '.join(OPERATORS)}; it is {name!r}."
+        )
+    entry = OPERATORS[name]
+    if not isinstance(shape, entry.shapes):
+        raise InvalidParameterError(
+            f"The {name} operator takes {' or '.join(kind.__name__ for kind in entry.shapes)}; the shape is a "
             f"{type(shape).__name__}. {_instead(shape)}"
         )
     unknown = [option for option in options if option not in entry.options]
     if unknown:
         raise InvalidParameterError(
-            f"The {name} operator takes {', '.join(entry.options) or 'no option'}; it was given {unknown[0]}."
+            f"The {name} operator takes {', '.join(entry.options) or 'no options'}; the option {unknown[0]} was given."
         )
     return entry.build(shape, **options)
 
 
 def default_operator(shape: Shape | sp.sparray) -> str:
-    """Name the operator that serves a kind of shape best in general."""
+    """Return the name of the default operator for a shape."""
     if isinstance(shape, PointCloud):
         return "point-cloud"
     return "cotangent" if isinstance(shape, MESHES) else "weighted"
 
 
 def _instead(shape: object) -> str:
-    names = [name for name, entry in OPERATORS.items() if isinstance(shape, entry.takes)]
+    names = [name for name, entry in OPERATORS.items() if isinstance(shape, entry.shapes)]
     return f"It is for {', '.join(names)}." if names else "No operator is for that."

@@ -54,10 +54,14 @@ def cell_grid(points: Float[np.ndarray, "n d"], reach: float) -> CellGrid:
     keys = keys[order]
     firsts = np.flatnonzero(np.diff(keys, prepend=-1))
     cells = np.append(firsts, len(keys))
-    return CellGrid(np.ascontiguousarray(points[order]), order, cells, _runs(keys, keys[firsts], sizes), reach)
+    return CellGrid(
+        np.ascontiguousarray(points[order]), order, cells, _runs(keys, keys[firsts], sizes), reach
+    )
 
 
-def _cell_keys(points: np.ndarray, reach: float) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, "3"]]:
+def _cell_keys(
+    points: np.ndarray, reach: float
+) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, "3"]]:
     """Give each point the number of its cell; neighbours along the last axis follow each other."""
     spread = np.ptp(points, axis=0)
     axes = np.sort(np.argsort(-spread, kind="stable")[:AXES])
@@ -73,10 +77,15 @@ def _cell_keys(points: np.ndarray, reach: float) -> tuple[Int[np.ndarray, " n"],
 def _runs(keys: np.ndarray, cell_keys: np.ndarray, sizes: np.ndarray) -> Int[np.ndarray, "c 9 2"]:
     steps = np.array([(a * sizes[1] + b) * sizes[2] for a in (-1, 0, 1) for b in (-1, 0, 1)])
     middle = cell_keys[:, None] + steps
-    return np.stack([np.searchsorted(keys, middle - 1, "left"), np.searchsorted(keys, middle + 1, "right")], axis=-1)
+    return np.stack(
+        [np.searchsorted(keys, middle - 1, "left"), np.searchsorted(keys, middle + 1, "right")],
+        axis=-1,
+    )
 
 
-def count_partners(grid: CellGrid, chosen: Int[np.ndarray, " k"] | None = None) -> Int[np.ndarray, " n"]:
+def count_partners(
+    grid: CellGrid, chosen: Int[np.ndarray, " k"] | None = None
+) -> Int[np.ndarray, " n"]:
     """Count for each point, in the order before sorting, itself and those within reach; 0 for points not chosen."""
     counts = np.zeros(len(grid.order), dtype=np.int64)
     wanted = np.ones(len(grid.order), dtype=np.bool_)
@@ -84,7 +93,17 @@ def count_partners(grid: CellGrid, chosen: Int[np.ndarray, " k"] | None = None) 
         wanted[:] = False
         wanted[chosen] = True
     _each_cell(
-        grid, partial(pair_loops.count, grid.points, grid.order, grid.cells, grid.runs, grid.reach**2, wanted, counts)
+        grid,
+        partial(
+            pair_loops.count,
+            grid.points,
+            grid.order,
+            grid.cells,
+            grid.runs,
+            grid.reach**2,
+            wanted,
+            counts,
+        ),
     )
     return counts
 
@@ -105,7 +124,9 @@ def gaussian_rows(
     def fill(first: int, last: int) -> None:
         scratch = np.empty(most, dtype=np.int64), np.empty((most, grid.points.shape[1]))
         known = grid.points, grid.order, grid.cells, grid.runs, grid.reach**2, place
-        pair_loops.fill(*known, weights, 1 / (4 * t), starts, columns, values, *scratch, first, last)
+        pair_loops.fill(
+            *known, weights, 1 / (4 * t), starts, columns, values, *scratch, first, last
+        )
 
     _each_cell(grid, fill)
     return columns, values
@@ -118,7 +139,13 @@ def gaussian_differences(
     sorted_values = np.ascontiguousarray(values[grid.order])
     sums = np.empty_like(sorted_values)
     walk = partial(
-        pair_loops.difference, grid.points, grid.cells, grid.runs, grid.reach**2, weights[grid.order], 1 / (4 * t)
+        pair_loops.difference,
+        grid.points,
+        grid.cells,
+        grid.runs,
+        grid.reach**2,
+        weights[grid.order],
+        1 / (4 * t),
     )
     _each_cell(grid, partial(walk, sorted_values, sums))
     result = np.empty_like(sums)

@@ -14,7 +14,11 @@ from eigenshape.operators.directions import corner_products, vertex_directions
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.tufted import edge_keys
 
-MASS_SHARES = {"lumped": 0.0, "consistent": 1 / 12, "averaged": 1 / 24}  # of a face's area, for two of its corners
+MASS_SHARES = {
+    "lumped": 0.0,
+    "consistent": 1 / 12,
+    "averaged": 1 / 24,
+}  # of a face's area, for two of its corners
 COCIRCULAR = 1e-14  # a sum of cotangents that rounding may leave below zero
 
 
@@ -62,9 +66,13 @@ def connection_laplacian(mesh: MeshLike, mass: Mass = "lumped") -> Laplacian:
     flat_turns = flattened(turns)
     weights = _weights(mesh)
     flat = np.repeat(_faces_to_flatten(mesh, weights), 3)
-    stiffness = _carried(mesh, scalar.stiffness.diagonal(), -weights * np.where(flat, flat_turns, turns))
+    stiffness = _carried(
+        mesh, scalar.stiffness.diagonal(), -weights * np.where(flat, flat_turns, turns)
+    )
     shares = np.repeat(MASS_SHARES[mass] * face_areas(mesh), 3)
-    return Laplacian(_real(stiffness), _real(_carried(mesh, scalar.mass.diagonal(), shares * flat_turns)))
+    return Laplacian(
+        _real(stiffness), _real(_carried(mesh, scalar.mass.diagonal(), shares * flat_turns))
+    )
 
 
 def tangent_frames(mesh: MeshLike) -> Float[np.ndarray, "n 2 3"]:
@@ -109,7 +117,9 @@ def flattened(turns: Complex[np.ndarray, " h"]) -> Complex[np.ndarray, " h"]:
     return turns * np.repeat(np.exp(-1j * np.angle(around) / 3), 3)
 
 
-def _faces_to_flatten(mesh: TriangleMesh, weights: Float[np.ndarray, " h"]) -> Bool[np.ndarray, " f"]:
+def _faces_to_flatten(
+    mesh: TriangleMesh, weights: Float[np.ndarray, " h"]
+) -> Bool[np.ndarray, " f"]:
     """Choose faces so that the weights of all others sum to 0 or more at every edge.
 
     What is left is a sum of squares edge by edge, and a flat face is one by itself.
@@ -125,7 +135,9 @@ def _faces_to_flatten(mesh: TriangleMesh, weights: Float[np.ndarray, " h"]) -> B
         flat |= more
 
 
-def _carried(mesh: TriangleMesh, diagonal: Float[np.ndarray, " n"], entries: Complex[np.ndarray, " h"]) -> sp.csr_array:
+def _carried(
+    mesh: TriangleMesh, diagonal: Float[np.ndarray, " n"], entries: Complex[np.ndarray, " h"]
+) -> sp.csr_array:
     """Put the entry of each side where it acts on its tail and counts at its head, and the conjugate the other way."""
     tails, heads = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     half = sp.coo_array((entries, (heads, tails)), shape=(mesh.n_vertices,) * 2).tocsr()

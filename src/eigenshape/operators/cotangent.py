@@ -16,19 +16,21 @@ Mass = Literal["lumped", "consistent", "averaged"]
 
 
 def cotangent_laplacian(mesh: MeshLike, mass: Mass = "lumped") -> Laplacian:
-    """Build the linear finite-element Laplacian of a mesh of any dimension and codimension.
+    """Build the cotangent Laplacian: linear finite elements on a mesh of any dimension.
 
-    w_ij = (cot α_ij + cot β_ij) / 2 on triangles, with the angles opposite to the edge (thesis 1.1.2; Pinkall and
-    Polthier 1993); in general w_ij = -Σ V ∇λ_i·∇λ_j over the simplices at the edge. On a boundary the missing terms
-    vanish, which is the Neumann condition. An edge with more than two faces sums over all of them.
+    On triangles w_ij = (cot α_ij + cot β_ij) / 2, with the angles opposite to the edge (thesis
+    1.1.2; Pinkall and Polthier 1993). In general w_ij = -Σ V ∇λ_i·∇λ_j over the simplices at the
+    edge. On a boundary the missing terms vanish, which is the Neumann condition. An edge may have
+    more than two faces; the sum then includes all of them.
 
     Parameters
     ----------
     mesh : MeshLike
-    mass : "lumped", "consistent" or "averaged"
-        B: 1/(m+1) of the incident volumes on the diagonal; the full matrix ∫ φ_i φ_j, with the eigenvalues of
-        conforming elements, which bound those of the surface from above; or the mean of the two, whose leading
-        errors cancel.
+        Triangles, tetrahedra, segments, or m-simplices in R^d.
+    mass : {"lumped", "consistent", "averaged"}
+        "lumped": B is diagonal, 1/(m+1) of the volume of the incident simplices. "consistent": the
+        full matrix ∫ φ_i φ_j; its eigenvalues are upper bounds for those of the surface.
+        "averaged": the mean of the two, whose leading errors cancel.
 
     Returns
     -------
@@ -38,10 +40,26 @@ def cotangent_laplacian(mesh: MeshLike, mass: Mass = "lumped") -> Laplacian:
     Raises
     ------
     InvalidShapeError
-        If a simplex has no volume or the corners of another, a point no simplex, or floats cannot hold
-        lengths to these powers.
+        If a simplex has no volume or the same corners as another, a point belongs to no simplex, or
+        coordinates are so large or small that floats cannot hold these powers of lengths.
     InvalidParameterError
-        If `mass` is none of the three.
+        If `mass` is not one of the three.
+
+    See Also
+    --------
+    robust_laplacian : For slivers and non-manifold meshes.
+    fem_laplacian : Elements of order 2 and 3.
+    solve_spectrum : Compute eigenvalues and eigenvectors.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> square = es.shapes.grid(1, 1)
+    >>> laplacian = es.cotangent_laplacian(square)
+    >>> laplacian.stiffness.toarray().round(12).tolist()[0]
+    [1.0, -0.5, -0.5, 0.0]
+    >>> laplacian.mass.diagonal().sum().round(12).item()  # the area
+    1.0
     """
     mesh = as_simplicial(mesh)
     require_mass(mass)
@@ -67,4 +85,6 @@ def require_mass(mass: str) -> None:
     InvalidParameterError
     """
     if mass not in ("lumped", "consistent", "averaged"):
-        raise InvalidParameterError(f"mass must be 'lumped', 'consistent' or 'averaged'; it is {mass!r}.")
+        raise InvalidParameterError(
+            f"mass must be 'lumped', 'consistent' or 'averaged'; it is {mass!r}."
+        )

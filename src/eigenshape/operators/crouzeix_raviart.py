@@ -13,7 +13,12 @@ from jaxtyping import Float
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import FacetTable, facet_table
 from eigenshape.geometry.requirements import require_sound
-from eigenshape.geometry.simplices import in_length, scaled_corners, simplex_volumes, triangular_sides
+from eigenshape.geometry.simplices import (
+    in_length,
+    scaled_corners,
+    simplex_volumes,
+    triangular_sides,
+)
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators import elements
 from eigenshape.operators.laplacian import Laplacian
@@ -50,7 +55,9 @@ def crouzeix_raviart_laplacian(mesh: MeshLike) -> Laplacian:
     mesh = as_simplicial(mesh)
     require_sound(mesh)
     table = facet_table(mesh)
-    weights = elements.stiffness(table.simplex_facets, mesh.dim**2 * elements.gradient_products(mesh), 1)
+    weights = elements.stiffness(
+        table.simplex_facets, mesh.dim**2 * elements.gradient_products(mesh), 1
+    )
     return Laplacian(weights, facet_mass(table, simplex_volumes(mesh)))
 
 
@@ -85,7 +92,9 @@ def interpolation_constants(mesh: Mesh) -> Float[np.ndarray, " s"]:
     elif m == 2:
         bounds = TRIANGLE * longest
     else:
-        bounds = np.sqrt((longest / pi) ** 2 + (lengths**2).sum(axis=1) / (m**2 * (m + 1) ** 2 * (m + 2)))
+        bounds = np.sqrt(
+            (longest / pi) ** 2 + (lengths**2).sum(axis=1) / (m**2 * (m + 1) ** 2 * (m + 2))
+        )
     if m == 3:
         bounds = np.minimum(bounds, REGULAR_TETRAHEDRON * _stretch(corners))
     return in_length(bounds, scale, 1)

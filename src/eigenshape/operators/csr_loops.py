@@ -21,7 +21,9 @@ def worst_asymmetry(starts, columns, values):
         for entry in range(starts[i], starts[i + 1]):
             j = columns[entry]
             if j <= i:
-                if j < i and entry >= following[i] and abs(values[entry]) > worst:  # nothing above mirrors it
+                if (
+                    j < i and entry >= following[i] and abs(values[entry]) > worst
+                ):  # nothing above mirrors it
                     worst, row, column = abs(values[entry]), i, j
                 continue
             place = following[j]

@@ -89,7 +89,10 @@ def _first_sides(mesh: TriangleMesh, twins: Int[np.ndarray, " h"]) -> tuple[np.n
 
 
 def _turned(
-    mesh: TriangleMesh, first: Int[np.ndarray, " n"], twins: Int[np.ndarray, " h"], angles: Float[np.ndarray, " h"]
+    mesh: TriangleMesh,
+    first: Int[np.ndarray, " n"],
+    twins: Int[np.ndarray, " h"],
+    angles: Float[np.ndarray, " h"],
 ) -> tuple[Float[np.ndarray, " h"], Float[np.ndarray, " h"], Float[np.ndarray, " n"]]:
     """Walk around all vertices at once, from side to side of a corner, and sum up the angles."""
     at_tail, at_head = np.empty(len(angles)), np.empty(len(angles))

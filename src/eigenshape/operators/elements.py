@@ -14,7 +14,13 @@ from jaxtyping import Float, Int
 
 from eigenshape._arrays import frozen
 from eigenshape._threads import one_blas_thread
-from eigenshape.geometry.simplices import in_length, scaled_corners, simplex_volumes, triangular_sides, volumes_of
+from eigenshape.geometry.simplices import (
+    in_length,
+    scaled_corners,
+    simplex_volumes,
+    triangular_sides,
+    volumes_of,
+)
 from eigenshape.geometry.simplicial import Mesh
 
 
@@ -30,7 +36,9 @@ def gradient_products(
     basis, triangles = triangular_sides(corners)
     inner = np.linalg.inv(triangles)
     gradients = np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
-    conducted = gradients if tensors is None else gradients @ (basis.transpose(0, 2, 1) @ tensors @ basis)
+    conducted = (
+        gradients if tensors is None else gradients @ (basis.transpose(0, 2, 1) @ tensors @ basis)
+    )
     products = (conducted @ gradients.transpose(0, 2, 1)) * volumes_of(triangles)[:, None, None]
     return in_length(products, scale, mesh.dim - 2)
 
@@ -52,14 +60,20 @@ def mass(mesh: Mesh, nodes: Int[np.ndarray, "s nodes"], order: int) -> sp.csr_ar
 
 
 def weighed_mass(
-    measure: Float[np.ndarray, " s"], nodes: Int[np.ndarray, "s nodes"], reference: Float[np.ndarray, "nodes nodes"]
+    measure: Float[np.ndarray, " s"],
+    nodes: Int[np.ndarray, "s nodes"],
+    reference: Float[np.ndarray, "nodes nodes"],
 ) -> sp.csr_array:
     """Assemble a measure of each simplex times one matrix for all."""
     diagonal = np.bincount(nodes.ravel(), weights=np.outer(measure, np.diag(reference)).ravel())
-    return (sp.diags_array(diagonal) + _assembled(nodes, measure[:, None, None] * reference)).tocsr()
+    return (
+        sp.diags_array(diagonal) + _assembled(nodes, measure[:, None, None] * reference)
+    ).tocsr()
 
 
-def _assembled(nodes: Int[np.ndarray, "s nodes"], local: Float[np.ndarray, "s nodes nodes"]) -> sp.csr_array:
+def _assembled(
+    nodes: Int[np.ndarray, "s nodes"], local: Float[np.ndarray, "s nodes nodes"]
+) -> sp.csr_array:
     """Sum up what lies off the diagonal, each pair once and then mirrored."""
     i, j = np.triu_indices(nodes.shape[1], 1)
     ends = (nodes[:, i].ravel(), nodes[:, j].ravel())
@@ -74,7 +88,9 @@ def local_nodes(dim: int, order: int) -> Int[np.ndarray, "nodes order"]:
     return frozen(np.array(list(combinations_with_replacement(range(dim + 1), order))))
 
 
-def number_nodes(simplices: Int[np.ndarray, "s corners"], order: int) -> tuple[np.ndarray, Int[np.ndarray, "s nodes"]]:
+def number_nodes(
+    simplices: Int[np.ndarray, "s corners"], order: int
+) -> tuple[np.ndarray, Int[np.ndarray, "s nodes"]]:
     """Return the nodes of a mesh by their corners, (n_nodes, order), and those of each simplex by number.
 
     The points of the mesh come first, in their own order; then the nodes between two of them, between three, and so on.
@@ -85,7 +101,9 @@ def number_nodes(simplices: Int[np.ndarray, "s corners"], order: int) -> tuple[n
     return named.reshape(-1, order)[firsts], numbers.reshape(n_corners.shape)
 
 
-def _keys(n_corners: Int[np.ndarray, "s nodes"], named: Int[np.ndarray, "s nodes order"]) -> np.ndarray:
+def _keys(
+    n_corners: Int[np.ndarray, "s nodes"], named: Int[np.ndarray, "s nodes order"]
+) -> np.ndarray:
     """Return a key for each node, in whose order nodes are numbered: one whole number where it fits."""
     base, order = int(named.max()) + 1, named.shape[2]
     if (order + 1) * base**order < 2**63:
@@ -116,7 +134,9 @@ def reference_stiffness(dim: int, order: int) -> Float[np.ndarray, "corners corn
 
 
 @lru_cache
-def _basis(dim: int, order: int) -> tuple[Int[np.ndarray, "nodes corners"], Float[np.ndarray, "nodes nodes"]]:
+def _basis(
+    dim: int, order: int
+) -> tuple[Int[np.ndarray, "nodes corners"], Float[np.ndarray, "nodes nodes"]]:
     """Return monomials λ^α with |α| = order, and each basis function's coefficients as a column."""
     names = local_nodes(dim, order)
     exponents = (names[:, :, None] == np.arange(dim + 1)).sum(axis=1)
@@ -128,5 +148,7 @@ def _integrals(exponents: Int[np.ndarray, "i j corners"]) -> Float[np.ndarray, "
     """Return ∫ λ^α over a simplex of volume 1: m! α! / (m + |α|)!."""
     factorials = np.array([float(factorial(value)) for value in range(int(exponents.max()) + 1)])
     dim = exponents.shape[2] - 1
-    below = np.vectorize(lambda degree: float(factorial(dim + degree)), otypes=[float])(exponents.sum(axis=2))
+    below = np.vectorize(lambda degree: float(factorial(dim + degree)), otypes=[float])(
+        exponents.sum(axis=2)
+    )
     return factorial(dim) * factorials[exponents].prod(axis=2) / below

@@ -47,7 +47,9 @@ def fem_laplacian(mesh: MeshLike, order: SupportsIndex = 2) -> Laplacian:
     require_sound(mesh)
     _, nodes = elements.number_nodes(mesh.simplices, degree)
     products = elements.gradient_products(mesh)
-    return Laplacian(elements.stiffness(nodes, products, degree), elements.mass(mesh, nodes, degree))
+    return Laplacian(
+        elements.stiffness(nodes, products, degree), elements.mass(mesh, nodes, degree)
+    )
 
 
 def fem_nodes(mesh: MeshLike, order: SupportsIndex = 2) -> Float[np.ndarray, "nodes d"]:

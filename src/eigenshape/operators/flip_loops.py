@@ -91,7 +91,9 @@ def _flip(tails, twins, lengths, side):
     # Triangles (u, v, w) and (v, u, x) become (x, w, u) and (w, x, v): each outer side moves one place on.
     twin = twins[side]
     crossing = _crossing(lengths, side, twin)
-    new = np.array([next_side(side), next_side(next_side(side)), next_side(twin), next_side(next_side(twin))])
+    new = np.array(
+        [next_side(side), next_side(next_side(side)), next_side(twin), next_side(next_side(twin))]
+    )
     old = np.array([new[1], new[2], new[3], new[0]])
     from_old, of_old, old_lengths = tails[old], twins[old], lengths[old]
     for k in range(4):

@@ -4,13 +4,13 @@ from dataclasses import replace
 from typing import Literal, SupportsIndex, TypedDict, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import LinearOperator
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.cloud_measure import cloud_quadrature
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -55,69 +55,94 @@ def mesh_laplacian(  # noqa: PLR0913 - one keyword for each choice that the meth
     distance: Distance = "euclidean",
     cutoff: float = 4.0,
 ) -> Laplacian:
-    """Build the mesh Laplacian of Belkin, Sun and Wang on a mesh of any dimension and codimension.
+    """Build the mesh Laplacian of Belkin, Sun and Wang, with a Gaussian kernel.
 
-    L f(x_i) = 1/(t (4πt)^{m/2}) Σ_j A_j exp(-|x_i - x_j|²/4t) (f_i - f_j)        (thesis 2.1; Belkin, Sun, Wang 2008)
+    L f(x_i) = 1/(t (4πt)^{m/2}) Σ_j A_j exp(-|x_i - x_j|²/4t) (f_i - f_j)
 
-    with A_j the volume around point j, as the symmetric pencil W_ij = -A_i A_j G_ij / t, B = diag(A). It bears noise;
-    its kernel is Euclidean, and leaks between limbs that come near each other. On flat space it is (1 - e^{-tΔ})/t,
-    which puts its eigenvalues below those of Δ.
+    (thesis 2.1; Belkin, Sun, Wang 2008), with A_j the volume around point j, as the symmetric pencil
+    W_ij = -A_i A_j G_ij / t, B = diag(A). The operator is robust to noise. Its kernel uses Euclidean
+    distance, so heat leaks between limbs that are close to each other. On flat space the operator is
+    (1 - e^{-tΔ})/t, whose eigenvalues are below those of Δ.
 
-    What converges depends on how t falls as the mesh gets finer. Let ε be the fineness of an approximation of a
-    smooth manifold by a mesh with its vertices on the manifold. L f converges to Δf at every point for
-    t = ε^{1/(2.5 + α)}, α > 0 (Belkin, Sun, Wang 2008; thesis 2.1.1), and each eigenvalue if t and ε / t^{m/2 + 3} go
-    to 0 (thesis 3.1.3). Both need t to fall far more slowly than e², whatever the triangles are.
+    Whether the operator converges depends on how t decreases as the mesh gets finer. Let ε be the
+    fineness of a mesh with its vertices on a smooth manifold. L f converges to Δf at every point for
+    t = ε^{1/(2.5 + α)}, α > 0 (Belkin, Sun, Wang 2008; thesis 2.1.1), and each eigenvalue converges
+    if t and ε / t^{m/2 + 3} go to 0 (thesis 3.1.3). In both cases t decreases far more slowly than e².
 
-    With the default, t = e², no such theorem holds, and L f does not converge: the kernel always sees equally many
-    points, and the error of their weights A_j is divided by t. On 1,000 to 64,000 random points of the unit sphere the
-    largest error of L z, which should be 2z, grows from 1.3 to 14; with t = 0.1 e, in units of the radius, it falls
-    from 1.9 to 0.3. Eigenvalues fare better, because the errors of weights average out: on 1,000 to 16,000 even points
-    of the sphere the median error of 300 falls from 0.6 to 0.07, and with `correct="log"` from 0.012 to 0.0007. That
-    is measured, not proved (docs/operators.md; experiments/ch3_sphere).
+    With the default, t = e², no such theorem holds, and L f does not converge: the kernel always
+    sees the same number of points, and the error of their weights A_j is divided by t. On 1,000 to
+    64,000 random points of the unit sphere the largest error of L z, which should be 2z, grows from
+    1.3 to 14; with t = 0.1 e, in units of the radius, it decreases from 1.9 to 0.3. Eigenvalues are
+    more accurate, because the errors of weights average out: on 1,000 to 16,000 even points of the
+    sphere the median error of 300 eigenvalues decreases from 0.6 to 0.07, and with `correct="log"`
+    from 0.012 to 0.0007. That is measured, not proved (docs/operators.md; experiments/ch3_sphere).
 
     Parameters
     ----------
     shape : MeshLike
     t, h, edge_factor : float, optional
-        The scale, by one of three names: heat time t in length²; width h = 2√t in length; or h over the mean length e
-        of the sides of all simplices. By default h = 2e, which is t = e².
-    correct : None or "log"
-        "log": solvers report λ = -log(1 - t μ)/t for an eigenvalue μ of the pencil, without that bias.
-    form : "literal" or "random-walk"
-        The mass of point i: A_i, or what the kernel sees of the surface there, A_i Σ_j G_ij A_j. With `correct` the
-        second form is what noise on the vertices disturbs least.
-    distance : "euclidean" or "geodesic"
-        Distance in the kernel. Geodesic (on surfaces) never leaks, and is shortened by no curvature.
+        The scale, by one of three names: heat time t in length²; width h = 2√t in length; or h over
+        the mean length e of the sides of all simplices. The default is h = 2e, which is t = e².
+    correct : {None, "log"}
+        "log": solvers report λ = -log(1 - t μ)/t for an eigenvalue μ of the pencil, which removes
+        the bias.
+    form : {"literal", "random-walk"}
+        The mass of point i: A_i, or the volume that the kernel sees there, A_i Σ_j G_ij A_j. With
+        `correct`, the second form is least sensitive to noise on the vertices.
+    distance : {"euclidean", "geodesic"}
+        Distance in the kernel. Geodesic distance (on surfaces) does not leak between limbs.
     cutoff : float
-        In widths h: what lies beyond is left out. 4 loses 2e-6 of an eigenvalue, 3 loses .12 %.
+        Distance, in widths h, beyond which the kernel is set to zero. The value 4 changes
+        eigenvalues by 2e-6 of themselves, 3 by 0.12 %.
 
     Returns
     -------
     Laplacian
-        W in length^(m-2), B in length^m, `kernel` with the scale by all its names.
+        W in length^(m-2), B in length^m, and `kernel` with the scale.
 
     Raises
     ------
     InvalidParameterError
         If more than one scale is given, one is not positive, or h < e.
     InvalidShapeError
-        If a simplex has no volume or the corners of another, a point no simplex, the kernel does not hold a
-        component together, or the matrix would not fit into half of the memory.
+        If a simplex has no volume or the same corners as another, a point belongs to no simplex,
+        the kernel graph of a component is not connected, or the matrix needs more than half of the
+        memory.
 
     Warns
     -----
     UserWarning
-        If h < 1.5 e, or t is so large that fewer than ten eigenvalues can be told.
+        If h < 1.5 e, or t is so large that fewer than ten eigenvalues can be distinguished.
+
+    See Also
+    --------
+    point_cloud_laplacian : The same kernel on points without triangles.
+    cotangent_laplacian : Linear elements; faster and sparser.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> laplacian = es.mesh_laplacian(es.icosphere(3), correct="log")
+    >>> es.solve_spectrum(laplacian, 4).eigenvalues.round(1).tolist()
+    [0.0, 2.0, 2.0, 2.0]
+    >>> round(laplacian.kernel.edge_factor, 6)
+    2.0
     """
     shape = as_simplicial(shape, "shape")
     if distance not in ("euclidean", "geodesic"):
-        raise InvalidParameterError(f"distance must be 'euclidean' or 'geodesic'; it is {distance!r}.")
+        raise InvalidParameterError(
+            f"distance must be 'euclidean' or 'geodesic'; it is {distance!r}."
+        )
     measure = mesh_quadrature(shape)
-    kernel = choose_kernel(KernelOptions(t, h, edge_factor, correct, form, cutoff), mean_side_length(shape))
+    kernel = choose_kernel(
+        KernelOptions(t, h, edge_factor, correct, form, cutoff), mean_side_length(shape)
+    )
     warn_of_narrow(kernel)
     warn_of_few(measure, kernel)
     laplacian = (
-        geodesic_laplacian(shape, measure, kernel) if distance == "geodesic" else kernel_laplacian(measure, kernel)
+        geodesic_laplacian(shape, measure, kernel)
+        if distance == "geodesic"
+        else kernel_laplacian(measure, kernel)
     )
     require_whole(laplacian, vertex_components(shape)[1], kernel)
     return laplacian
@@ -168,7 +193,9 @@ def gaussian_laplacian(
             "Weights of 1/n must be corrected in the random-walk form; form is 'literal', whose eigenvalues are over "
             "the unknown volume. Choose form='random-walk', or quadrature_laplacian with weights in length^m."
         )
-    laplacian = quadrature_laplacian(uniform_quadrature(points, dim), t, correct=correct, form=form, cutoff=cutoff)
+    laplacian = quadrature_laplacian(
+        uniform_quadrature(points, dim), t, correct=correct, form=form, cutoff=cutoff
+    )
     return laplacian if form == "random-walk" else _over_volume(laplacian, int(dim))
 
 
@@ -177,12 +204,19 @@ def _over_volume(laplacian: Laplacian, dim: int) -> Laplacian:
     kernel, n = laplacian.kernel, laplacian.n_points
     if kernel is None:
         return laplacian
-    degrees = kernel.t * laplacian.stiffness.diagonal() * n + (4 * np.pi * kernel.t) ** (-dim / 2) / n
+    degrees = (
+        kernel.t * laplacian.stiffness.diagonal() * n + (4 * np.pi * kernel.t) ** (-dim / 2) / n
+    )
     return replace(laplacian, kernel=replace(kernel, volume=float(1 / degrees.mean())))
 
 
 def quadrature_laplacian(
-    measure: Quadrature, t: float, *, correct: Correction | None = None, form: Form = "literal", cutoff: float = 4.0
+    measure: Quadrature,
+    t: float,
+    *,
+    correct: Correction | None = None,
+    form: Form = "literal",
+    cutoff: float = 4.0,
 ) -> Laplacian:
     """Build the Gaussian Laplacian of points with any weights: the functional approximation 𝓛_t as a pencil.
 
@@ -221,14 +255,14 @@ def point_cloud_laplacian(
 ) -> Laplacian:
     """Build the Laplacian of points that sample a manifold, evenly or not.
 
-    That of `mesh_laplacian` with the volume around each point taken from its Voronoi cell in the tangent plane
-    (`cloud_quadrature`; after Belkin, Sun, Wang 2009).
+    This is the operator of `mesh_laplacian`, with the volume around each point taken from its
+    Voronoi cell in the tangent plane (`es.geometry.cloud_quadrature`; after Belkin, Sun, Wang 2009).
 
     Parameters
     ----------
     cloud : PointCloud
     t, h, edge_factor : float, optional
-        As in `mesh_laplacian`; e is the mean distance of a point to its m(m+1) nearest.
+        As in `mesh_laplacian`; e is the mean distance of a point to its m(m+1) nearest neighbors.
     **options
         `correct`, `form` and `cutoff` as in `mesh_laplacian`.
 
@@ -242,13 +276,26 @@ def point_cloud_laplacian(
     InvalidParameterError
         If more than one scale is given, one is not positive, or h < e.
     InvalidShapeError
-        If two points are equal, the neighbours of a point do not span m dimensions, the kernel tears apart what
-        nearest neighbours join, or the matrix would not fit into half of the memory.
+        If two points are equal, the neighbors of a point do not span m dimensions, the kernel graph
+        has more components than the graph of nearest neighbors, or the matrix needs more than half
+        of the memory.
 
     Warns
     -----
     UserWarning
-        As `mesh_laplacian`.
+        If h < 1.5 e, or t is so large that fewer than ten eigenvalues can be distinguished.
+
+    See Also
+    --------
+    mesh_laplacian : The same kernel on meshes.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> cloud = es.PointCloud(es.shapes.fibonacci_sphere(1000).vertices, dim=2)
+    >>> laplacian = es.point_cloud_laplacian(cloud, correct="log")
+    >>> es.solve_spectrum(laplacian, 4).eigenvalues.round(1).tolist()
+    [0.0, 2.0, 2.0, 2.0]
     """
     require_type(cloud, PointCloud, "cloud")
     measure = cloud_quadrature(cloud)
@@ -302,5 +349,8 @@ def functional_laplacian(measure: Quadrature, t: float, *, cutoff: float = 6.0) 
         return factor * gaussian_differences(grid, weights, time, columns) / weights[:, None]
 
     return LinearOperator(
-        (len(weights),) * 2, matvec=lambda f: product(f).ravel(), matmat=product, dtype=np.dtype(np.float64)
+        (len(weights),) * 2,
+        matvec=lambda f: product(f).ravel(),
+        matmat=product,
+        dtype=np.dtype(np.float64),
     )

@@ -18,7 +18,9 @@ EdgeWeights = Literal["unit", "inverse_length"]
 ASYMMETRY = 1e-12  # of a pair of weights, relative to the larger: what rounding may leave
 
 
-def graph_laplacian(graph: sp.sparray | sp.spmatrix | MeshLike, kind: Kind = "combinatorial") -> Laplacian:
+def graph_laplacian(
+    graph: sp.sparray | sp.spmatrix | MeshLike, kind: Kind = "combinatorial"
+) -> Laplacian:
     """Build the Laplacian of a graph: W = D - A with D the row sums of A (thesis 1.1.2).
 
     Parameters
@@ -45,11 +47,15 @@ def graph_laplacian(graph: sp.sparray | sp.spmatrix | MeshLike, kind: Kind = "co
         If a simplex has a corner twice, or an edge of a mesh no length where `kind` is weighted.
     """
     if kind not in ("combinatorial", "weighted", "normalized"):
-        raise InvalidParameterError(f"kind must be 'combinatorial', 'weighted' or 'normalized'; it is {kind!r}.")
+        raise InvalidParameterError(
+            f"kind must be 'combinatorial', 'weighted' or 'normalized'; it is {kind!r}."
+        )
     if sp.issparse(graph) or isinstance(graph, np.ndarray):
         adjacency = _checked_adjacency(graph)
     else:
-        adjacency = edge_graph(as_simplicial(graph, "graph"), "inverse_length" if kind == "weighted" else "unit")
+        adjacency = edge_graph(
+            as_simplicial(graph, "graph"), "inverse_length" if kind == "weighted" else "unit"
+        )
     if kind == "combinatorial":
         adjacency.data[:] = 1.0
     degrees = sp.diags_array(adjacency.sum(axis=1)).tocsr()
@@ -60,13 +66,20 @@ def graph_laplacian(graph: sp.sparray | sp.spmatrix | MeshLike, kind: Kind = "co
 
 
 def _checked_adjacency(graph: sp.sparray | sp.spmatrix) -> sp.csr_array:
-    if not sp.issparse(graph) or graph.ndim != 2 or graph.shape[0] != graph.shape[1] or not graph.shape[0]:
+    if (
+        not sp.issparse(graph)
+        or graph.ndim != 2
+        or graph.shape[0] != graph.shape[1]
+        or not graph.shape[0]
+    ):
         raise InvalidParameterError(
             "A graph must be a mesh or a square sparse matrix; it is a "
             f"{type(graph).__name__} of shape {np.shape(graph)}."
         )
     if graph.dtype.kind not in "biuf":
-        raise InvalidParameterError(f"Weights of edges must be real numbers; the type is {graph.dtype}.")
+        raise InvalidParameterError(
+            f"Weights of edges must be real numbers; the type is {graph.dtype}."
+        )
     adjacency = sp.csr_array(graph, dtype=np.float64, copy=True)
     adjacency.sum_duplicates()
     _require_weights(adjacency)
@@ -138,7 +151,9 @@ def edge_graph(mesh: MeshLike, weights: EdgeWeights = "unit") -> sp.csr_array:
     """
     mesh = as_simplicial(mesh)
     if weights not in ("unit", "inverse_length"):
-        raise InvalidParameterError(f"weights must be 'unit' or 'inverse_length'; it is {weights!r}.")
+        raise InvalidParameterError(
+            f"weights must be 'unit' or 'inverse_length'; it is {weights!r}."
+        )
     require_distinct_corners(mesh)
     edges = _edges(mesh)
     values = np.ones(len(edges)) if weights == "unit" else 1 / _lengths(mesh, edges)
@@ -183,7 +198,9 @@ def _lengths(mesh: Mesh, edges: Int[np.ndarray, "e 2"]) -> Float[np.ndarray, " e
     return in_length(lengths, scale, 1)
 
 
-def adjacency_matrix(edges: Int[np.ndarray, "e 2"], values: Float[np.ndarray, " e"], n: int) -> sp.csr_array:
+def adjacency_matrix(
+    edges: Int[np.ndarray, "e 2"], values: Float[np.ndarray, " e"], n: int
+) -> sp.csr_array:
     """Return the symmetric matrix of weighted edges, each given once."""
     one, two = edges.T
     ends = (np.concatenate([one, two]), np.concatenate([two, one]))

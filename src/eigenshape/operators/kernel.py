@@ -66,19 +66,29 @@ def choose_kernel(options: KernelOptions, edge: float) -> GaussianKernel:
             f"A kernel must reach the neighbours, h ≥ e; h = 2√t is {factor:.3g} of the mean edge length "
             f"e = {edge:.4g}, t = {t:.4g}. Choose t ≥ {edge**2 / 4:.4g}; t = e² is the default."
         )
-    return GaussianKernel(t, factor, corrected=options.correct == "log", form=options.form, cutoff=options.cutoff)
+    return GaussianKernel(
+        t, factor, corrected=options.correct == "log", form=options.form, cutoff=options.cutoff
+    )
 
 
 def _require_options(options: KernelOptions) -> None:
-    given = {name: value for name in ("t", "h", "edge_factor") if (value := getattr(options, name)) is not None}
+    given = {
+        name: value
+        for name in ("t", "h", "edge_factor")
+        if (value := getattr(options, name)) is not None
+    }
     if len(given) > 1:
-        raise InvalidParameterError(f"One of t, h and edge_factor sets the scale; given are {given}.")
+        raise InvalidParameterError(
+            f"One of t, h and edge_factor sets the scale; given are {given}."
+        )
     for name, value in {**given, "cutoff": options.cutoff}.items():
         positive_values(value, name)
     if options.correct not in (None, "log"):
         raise InvalidParameterError(f"correct must be None or 'log'; it is {options.correct!r}.")
     if options.form not in ("literal", "random-walk"):
-        raise InvalidParameterError(f"form must be 'literal' or 'random-walk'; it is {options.form!r}.")
+        raise InvalidParameterError(
+            f"form must be 'literal' or 'random-walk'; it is {options.form!r}."
+        )
 
 
 def neighbor_distance(points: Float[np.ndarray, "n d"], dim: int) -> float:
@@ -91,11 +101,15 @@ def neighbor_distance(points: Float[np.ndarray, "n d"], dim: int) -> float:
     """
     near = dim * (dim + 1)
     if len(points) <= near:
-        raise InvalidShapeError(f"A sample of dimension {dim} must have over {near} points; it has {len(points)}.")
+        raise InvalidShapeError(
+            f"A sample of dimension {dim} must have over {near} points; it has {len(points)}."
+        )
     scaled, scale = size_one(points)
     distance = float(cKDTree(scaled).query(scaled, near + 1)[0][:, 1:].mean() * scale)
     if not distance > 0:
-        raise InvalidShapeError(f"The points of a sample must differ; all {len(points)} are {points[0].tolist()}.")
+        raise InvalidShapeError(
+            f"The points of a sample must differ; all {len(points)} are {points[0].tolist()}."
+        )
     return distance
 
 
@@ -131,11 +145,15 @@ def geodesic_laplacian(mesh: Mesh, measure: Quadrature, kernel: GaussianKernel) 
     points, scale = size_one(measure.points)
     weights, unit = size_one(measure.weights)
     radius = kernel.cutoff * kernel.width
-    _require_room(cell_grid(points, radius / scale))  # no ball along the surface holds more than one through space
+    _require_room(
+        cell_grid(points, radius / scale)
+    )  # no ball along the surface holds more than one through space
     matrix = geodesic_balls(mesh, radius)
     _require_partners(measure, np.diff(matrix.indptr), kernel)
     rows = np.repeat(np.arange(measure.n_points), np.diff(matrix.indptr))
-    matrix.data = weights[rows] * weights[matrix.indices] * np.exp(-((matrix.data / kernel.width) ** 2))
+    matrix.data = (
+        weights[rows] * weights[matrix.indices] * np.exp(-((matrix.data / kernel.width) ** 2))
+    )
     return _assembled(measure, kernel, (matrix + sp.diags_array(weights**2)).tocsr(), (unit, scale))
 
 
@@ -150,7 +168,9 @@ def _assembled(
     t = float(np.ldexp(kernel.t, -2 * of_length))
     matrix.data /= (4 * pi * t) ** (measure.dim / 2)
     exponent = 2 * of_weight - measure.dim * of_length
-    mass = _raised(matrix.sum(axis=1), exponent) if kernel.form == "random-walk" else measure.weights
+    mass = (
+        _raised(matrix.sum(axis=1), exponent) if kernel.form == "random-walk" else measure.weights
+    )
     matrix.setdiag(0)
     matrix.data /= -t
     matrix.setdiag(-matrix.sum(axis=1))

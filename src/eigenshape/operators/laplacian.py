@@ -8,30 +8,34 @@ import scipy.sparse as sp
 from eigenshape._errors import InvalidParameterError
 from eigenshape.operators.csr_loops import worst_asymmetry
 
-ASYMMETRY = 1e-12  # relative to the largest entry: what rounding may leave
+# Largest difference of W_ij and W_ji, relative to the largest entry, that is accepted as rounding.
+ASYMMETRY = 1e-12
 
 
 @dataclass(frozen=True)
 class GaussianKernel:
-    """The Gaussian kernel exp(-|x - y|²/4t) / (4πt)^{m/2} that an operator was built with.
+    """The Gaussian kernel exp(-|x - y|²/4t) / (4πt)^{m/2} from which an operator was built.
 
-    Such an operator stands for (1 - e^{-tΔ})/t, exactly so on flat space: its eigenvalue for λ is (1 - e^{-tλ})/t.
+    The operator approximates (1 - e^{-tΔ})/t, exactly on flat space: an eigenvalue λ of Δ becomes
+    (1 - e^{-tλ})/t.
 
     Attributes
     ----------
     t : float
         Heat time, in length².
     edge_factor : float
-        h / e: the width h = 2√t over the mean edge length e, on points the mean distance to near neighbours.
+        h / e, the width h = 2√t over the mean edge length e. On points, e is the mean distance to
+        near neighbors.
     corrected : bool
-        Whether solvers report λ = -log(1 - t μ)/t for an eigenvalue μ of the pencil, which takes that bias away.
-    form : "literal" or "random-walk"
-        Whether the mass of a point is its own measure, or what the kernel sees of the measure there.
+        Whether solvers report λ = -log(1 - t μ)/t for an eigenvalue μ of the pencil, which removes
+        that bias.
+    form : {"literal", "random-walk"}
+        Whether the mass of a point is its own volume, or the volume that the kernel sees there.
     cutoff : float
-        Distance, in widths h, beyond which the kernel is taken for zero.
+        Distance, in widths h, beyond which the kernel is set to zero.
     volume : float
-        What eigenvalues are over: 1 where weights are in length^m; where they are 1/n, the volume of the manifold in
-        length^m, as the kernel sees it.
+        Factor by which eigenvalues are divided: 1 if weights are in length^m; if weights are 1/n,
+        the volume of the manifold in length^m, as estimated by the kernel.
     """
 
     t: float
@@ -43,31 +47,52 @@ class GaussianKernel:
 
     @property
     def width(self) -> float:
-        """H = 2√t, in length."""
+        """Width h = 2√t of the kernel, in length."""
         return 2 * self.t**0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Laplacian:
-    """A discrete Laplace operator L = B⁻¹W, positive, as the pencil (W, B).
+    """A discrete Laplace operator L = B⁻¹W, given by its stiffness and mass matrices.
 
-    W φ = λ B φ with λ ≥ 0: the sign is that of -div grad (thesis 1.1, eq. 1.1: b_i = B_ii, w_ij = -W_ij).
+    The eigenvalue problem is W φ = λ B φ with λ ≥ 0: the sign is that of -div grad (thesis 1.1,
+    eq. 1.1: b_i = B_ii, w_ij = -W_ij).
 
     Parameters
     ----------
     stiffness : (n, n) sparse
-        W: symmetric, positive semidefinite, W·1 = 0.
+        W, symmetric and positive semidefinite, with W·1 = 0.
     mass : (n, n) sparse
-        B: symmetric, positive definite, in length^m; diagonal where it is lumped. Functions f and g have the
-        inner product fᵀBg (thesis eq. 1.2).
+        B, symmetric and positive definite, in length^m; diagonal if it is lumped. The inner product
+        of functions f and g is fᵀBg (thesis eq. 1.2).
     kernel : GaussianKernel, optional
-        What operators made from a Gaussian kernel keep of it.
+        The kernel, if the operator was built from one.
 
     Raises
     ------
     InvalidParameterError
-        If W and B are not sparse, square and of one size, an entry is not finite, the matrix not symmetric, or a
-        diagonal entry of B not positive. (Whether W is semidefinite and B definite, the eigensolver finds out.)
+        If W or B is not sparse, square, finite and symmetric, their sizes differ, or a diagonal
+        entry of B is not positive. The eigensolver checks that W is semidefinite and B definite.
+
+    See Also
+    --------
+    cotangent_laplacian, robust_laplacian, mesh_laplacian, point_cloud_laplacian : Build operators.
+    solve_spectrum : Compute eigenvalues and eigenvectors.
+    check_operator : Check the laws of an operator of your own.
+
+    Examples
+    --------
+    Two points joined by a weight of 3, with masses 1 and 2:
+
+    >>> import eigenshape as es
+    >>> from scipy.sparse import csr_array
+    >>> W = csr_array([[3.0, -3.0], [-3.0, 3.0]])
+    >>> B = csr_array([[1.0, 0.0], [0.0, 2.0]])
+    >>> laplacian = es.Laplacian(W, B)
+    >>> laplacian.n_points
+    2
+    >>> es.solve_spectrum(laplacian, 2).eigenvalues.round(6).tolist()
+    [0.0, 4.5]
     """
 
     stiffness: sp.csr_array
@@ -79,7 +104,8 @@ class Laplacian:
             object.__setattr__(self, name, _checked(name, getattr(self, name)))
         if self.stiffness.shape != self.mass.shape:
             raise InvalidParameterError(
-                f"stiffness and mass must have one shape; the shapes are {self.stiffness.shape} and {self.mass.shape}."
+                f"stiffness and mass must have the same shape; the shapes are {self.stiffness.shape} and "
+                f"{self.mass.shape}."
             )
         diagonal = self.mass.diagonal()
         bad = np.flatnonzero(diagonal <= 0)
@@ -90,7 +116,7 @@ class Laplacian:
 
     @property
     def n_points(self) -> int:
-        """Number of points n that the operator acts on."""
+        """Number of points n on which the operator acts."""
         return int(self.stiffness.shape[0])
 
 
@@ -106,7 +132,12 @@ def _checked(name: str, value: sp.sparray) -> sp.csr_array:
 
 
 def _require_square(name: str, matrix: sp.sparray) -> None:
-    if not sp.issparse(matrix) or matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.shape[0]:
+    if (
+        not sp.issparse(matrix)
+        or matrix.ndim != 2
+        or matrix.shape[0] != matrix.shape[1]
+        or not matrix.shape[0]
+    ):
         raise InvalidParameterError(
             f"{name} must be a square sparse matrix; it is a {type(matrix).__name__} of shape {np.shape(matrix)}."
         )

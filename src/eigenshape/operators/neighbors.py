@@ -5,18 +5,20 @@ from typing import SupportsIndex
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from eigenshape._arrays import finite_rows, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.graph import adjacency_matrix
 
 SPARE = 8  # neighbours asked for beyond those wanted, so that most ties are seen whole
 
 
-def neighbor_graph(points: ArrayLike, n_neighbors: SupportsIndex, *, t: float | None = None) -> sp.csr_array:
+def neighbor_graph(
+    points: ArrayLike, n_neighbors: SupportsIndex, *, t: float | None = None
+) -> sp.csr_array:
     """Join each point to its nearest ones: two are joined where either is among the nearest of the other.
 
     Weights are exp(-|x - y|²/4t) (Belkin and Niyogi 2003; thesis reference 5), or 1 where no t is given. Of points

@@ -58,7 +58,21 @@ def _find_candidates(points, order, place, runs, cell, numbers, near):
 @njit
 @no_type_check
 def fill(
-    points, order, cells, runs, farthest, place, weights, rate, starts, columns, values, numbers, near, first, last
+    points,
+    order,
+    cells,
+    runs,
+    farthest,
+    place,
+    weights,
+    rate,
+    starts,
+    columns,
+    values,
+    numbers,
+    near,
+    first,
+    last,
 ):
     """Fill columns and values of the rows of some cells; `numbers` and `near` have room for what one cell may reach."""
     for cell in range(first, last):

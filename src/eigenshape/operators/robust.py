@@ -8,47 +8,78 @@ from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_different_simplices
-from eigenshape.geometry.simplices import degenerate_simplices, in_length, require_span, require_volumes, size_one
+from eigenshape.geometry.simplices import (
+    degenerate_simplices,
+    in_length,
+    require_span,
+    require_volumes,
+    size_one,
+)
 from eigenshape.geometry.topology import require_simplices_everywhere
 from eigenshape.operators import flip_loops
 from eigenshape.operators.graph import require_distinct_corners
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.operators.tufted import Triangulation, edge_keys, flipped_to_delaunay, mollified, tufted_cover
+from eigenshape.operators.tufted import (
+    Triangulation,
+    edge_keys,
+    flipped_to_delaunay,
+    mollified,
+    tufted_cover,
+)
 
 
 def robust_laplacian(mesh: MeshLike, *, mollify: float = 1e-5) -> Laplacian:
-    """Build the Laplacian of Sharp and Crane, "A Laplacian for Nonmanifold Triangle Meshes" (2020).
+    """Build the Laplacian of a triangle mesh of any quality, manifold or not.
 
-    Edge lengths are mollified, each face gets a front and a back that are glued into the tufted cover, edges are
-    flipped until they are Delaunay, and the cotangent Laplacian of the cover is halved. So no weight is negative:
-    there is a maximum principle. On a mesh that is Delaunay, with no obtuse angle opposite to a boundary edge, this is
-    `cotangent_laplacian(mesh, "lumped")`. Entries of W join the ends of intrinsic edges, which need not be edges of
-    the mesh.
+    This is the operator of Sharp and Crane, "A Laplacian for Nonmanifold Triangle Meshes" (2020).
+    Edge lengths are mollified; each face gets a front and a back, which are glued into the tufted
+    cover; edges are flipped until they are Delaunay; and the cotangent Laplacian of the cover is
+    halved. No weight is negative, so there is a maximum principle. On a Delaunay mesh without
+    obtuse angles opposite to boundary edges the result is `cotangent_laplacian(mesh, "lumped")`.
+    Entries of W join the ends of intrinsic edges, which need not be edges of the mesh.
 
-    Edges may have any number of faces and faces may be turned any way (a Möbius strip, a soup); faces may lie on each
-    other, if not with the same three vertices, and have no area. A face without area has no angle around its edges:
-    where more than two meet, its place among them is that of its number. Of two diagonals that are both Delaunay, as in
-    a square, that of the mesh stays; B depends on which it is, W does not.
+    An edge may have any number of faces, and faces may have any orientation (a Möbius strip, a
+    soup). Faces may overlap if they do not have the same three vertices, and may have no area. A
+    face without area has no angle around its edges: if more than two faces meet there, its place
+    among them is given by its index. If both diagonals of a quadrilateral are Delaunay, as in a
+    square, the diagonal of the mesh is kept; this choice affects B and not W.
 
     Parameters
     ----------
     mesh : MeshLike
     mollify : float
-        ε ≥ 0, a multiple of the mean edge length: all edges grow by the least length that leaves every triangle
-        a + b ≥ c + ε, by none where that holds. At 0, faces without area are refused.
+        ε ≥ 0, as a multiple of the mean edge length. All edges grow by the smallest length such
+        that a + b ≥ c + ε in every triangle. With 0, faces without area are refused.
 
     Returns
     -------
     Laplacian
-        W without unit, off the diagonal ≤ 0; B diagonal, in length².
+        W without unit, entries off the diagonal ≤ 0; B diagonal, in length².
 
     Raises
     ------
     InvalidShapeError
-        If a face has a corner twice or all corners of another, a vertex no face, all vertices lie on a line, no face
-        has area, or one has none and `mollify` gives it none that rounding spares; or if coordinates are beyond 1e±150.
+        If a face has a corner twice or the same corners as another, a vertex belongs to no face,
+        all vertices lie on a line, no face has area, `mollify` is too small to give area to one that
+        has none, or coordinates are beyond 1e±150.
     InvalidParameterError
         If `mollify` is negative or not finite.
+
+    See Also
+    --------
+    cotangent_laplacian : Linear elements on the triangles as they are.
+
+    Examples
+    --------
+    A sliver makes cotangent weights negative, and robust weights not:
+
+    >>> import eigenshape as es
+    >>> points = [[0, 0, 0], [1, 0, 0], [0.5, 0.1, 0], [0.5, -0.1, 0]]
+    >>> mesh = es.TriangleMesh(points, [[0, 1, 2], [1, 0, 3]])
+    >>> es.cotangent_laplacian(mesh).stiffness[0, 1].item() > 0  # -w_ij
+    True
+    >>> es.robust_laplacian(mesh).stiffness[0, 1].item() > 0
+    False
     """
     mesh = as_mesh(mesh)
     if not 0 <= mollify < np.inf:
@@ -57,7 +88,9 @@ def robust_laplacian(mesh: MeshLike, *, mollify: float = 1e-5) -> Laplacian:
     require_simplices_everywhere(mesh)
     require_different_simplices(mesh)
     require_span(mesh.vertices, 2, "The vertices of a mesh")
-    if not mollify or len(degenerate_simplices(mesh)) == mesh.n_faces:  # no face: all area would be that of mollifying
+    if (
+        not mollify or len(degenerate_simplices(mesh)) == mesh.n_faces
+    ):  # no face: all area would be that of mollifying
         require_volumes(mesh)
     cover, scale = _cover(mesh, mollify)
     delaunay = flipped_to_delaunay(cover)
@@ -67,7 +100,9 @@ def robust_laplacian(mesh: MeshLike, *, mollify: float = 1e-5) -> Laplacian:
 
 def _cover(mesh: TriangleMesh, mollify: float) -> tuple[Triangulation, float]:
     points, scale = size_one(mesh.vertices)
-    lengths = np.linalg.norm(points[mesh.faces] - points[np.roll(mesh.faces, -1, axis=1)], axis=2).ravel()
+    lengths = np.linalg.norm(
+        points[mesh.faces] - points[np.roll(mesh.faces, -1, axis=1)], axis=2
+    ).ravel()
     lengths = mollified(lengths, edge_keys(mesh.faces, mesh.n_vertices), mollify)
     flat = np.flatnonzero(flip_loops.areas(lengths) == 0)
     if flat.size:
@@ -89,7 +124,9 @@ def _stiffness(cover: Triangulation, n: int) -> sp.csr_array:
     half = sp.coo_array((weights, ends), shape=(n, n)).tocsr()
     whole = (half + half.T).tocsr()
     whole.eliminate_zeros()
-    return (sp.diags_array(whole.sum(axis=1)) - whole).tocsr()  # an edge from a vertex to itself cancels here
+    return (
+        sp.diags_array(whole.sum(axis=1)) - whole
+    ).tocsr()  # an edge from a vertex to itself cancels here
 
 
 def _areas(cover: Triangulation, n: int) -> Float[np.ndarray, " n"]:

@@ -77,7 +77,11 @@ def denoise(mesh: MeshLike, *, reach: float | None = None) -> TriangleMesh:
         If a face has no area or next to no angles, or a vertex no face.
     """
     mesh = as_mesh(mesh)
-    edges = float(positive_values(reach, "reach")[0]) if reach is not None else (noise_level(mesh) / ONE_EDGE) ** 2
+    edges = (
+        float(positive_values(reach, "reach")[0])
+        if reach is not None
+        else (noise_level(mesh) / ONE_EDGE) ** 2
+    )
     if edges == 0:
         return mesh
     points, scale = size_one(mesh.vertices)
@@ -105,6 +109,8 @@ def _flowed(
     with one_blas_thread():
         factor = factorise(analyse(matrix), matrix.data)
     if factor is None:
-        raise InvalidShapeError("A surface must have angles to be smoothed; some are too near to 0 for the equations.")
+        raise InvalidShapeError(
+            "A surface must have angles to be smoothed; some are too near to 0 for the equations."
+        )
     once = factor.solve(mass * points[free] - pencil[:, held] @ points[held])
     return once + factor.solve(mass * (points[free] - once))

@@ -34,7 +34,9 @@ class Triangulation:
     lengths: Float[np.ndarray, " h"]
 
 
-def mollified(lengths: Float[np.ndarray, " h"], edges: Int[np.ndarray, " h"], factor: float) -> Float[np.ndarray, " h"]:
+def mollified(
+    lengths: Float[np.ndarray, " h"], edges: Int[np.ndarray, " h"], factor: float
+) -> Float[np.ndarray, " h"]:
     """Lengthen all sides by one amount, the least that leaves every triangle inequality a margin.
 
     The margin is `factor` times the mean edge length (Sharp and Crane 2020); sides are left as they are
@@ -48,7 +50,9 @@ def mollified(lengths: Float[np.ndarray, " h"], edges: Int[np.ndarray, " h"], fa
 
 
 def tufted_cover(
-    points: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"], lengths: Float[np.ndarray, " h"]
+    points: Float[np.ndarray, "n 3"],
+    faces: Int[np.ndarray, "f 3"],
+    lengths: Float[np.ndarray, " h"],
 ) -> Triangulation:
     """Give each face a front and a back and glue these around each edge (Sharp and Crane 2020).
 
@@ -97,7 +101,10 @@ def _around_edges(
 
 
 def _angles(
-    points: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"], sides: Int[np.ndarray, " c"], edges: np.ndarray
+    points: Float[np.ndarray, "n 3"],
+    faces: Int[np.ndarray, "f 3"],
+    sides: Int[np.ndarray, " c"],
+    edges: np.ndarray,
 ) -> tuple[Float[np.ndarray, " c"], Int[np.ndarray, " c"]]:
     """Return the angle at which the face of each side stands around its edge, and what orders faces at one angle."""
     face, corner = np.divmod(sides, 3)
@@ -130,5 +137,7 @@ def flipped_to_delaunay(cover: Triangulation, tolerance: float = TOLERANCE) -> T
     tails, twins, lengths = cover.tails.copy(), cover.twins.copy(), cover.lengths.copy()
     most = MOST_FLIPS * len(tails)
     if flip_loops.flip_to_delaunay(tails, twins, lengths, tolerance, most) < 0:
-        raise ConvergenceError(f"Flips to Delaunay must end; {most} flips of {len(tails) // 2} edges did not.")
+        raise ConvergenceError(
+            f"Flips to Delaunay must end; {most} flips of {len(tails) // 2} edges did not."
+        )
     return Triangulation(tails, twins, lengths)

@@ -100,7 +100,9 @@ def _seen_bending(mesh: TriangleMesh, towards: Float[np.ndarray, "3"]) -> float:
     """Sum the bending of a surface, angle times length of each edge, weighted by how far the edge faces the viewer."""
     points = unit_scaled(mesh)[0]
     vectors = area_vectors(points[mesh.faces])
-    normals = vectors / np.maximum(np.linalg.norm(vectors, axis=1), np.finfo(np.float64).tiny)[:, None]
+    normals = (
+        vectors / np.maximum(np.linalg.norm(vectors, axis=1), np.finfo(np.float64).tiny)[:, None]
+    )
     if np.einsum("ij,ij->", vectors, points[mesh.faces].mean(axis=1)) < 0:
         normals = -normals  # the faces look inward
     table = edge_table(mesh)
@@ -115,7 +117,9 @@ def _seen_bending(mesh: TriangleMesh, towards: Float[np.ndarray, "3"]) -> float:
 def _facing(mesh: TriangleMesh) -> Float[np.ndarray, "3"] | None:
     """Return the mean normal of an open surface that mostly faces one way."""
     vectors = area_vectors(unit_scaled(mesh)[0][mesh.faces])
-    mean = vectors.sum(axis=0) / max(np.linalg.norm(vectors, axis=1).sum(), np.finfo(np.float64).tiny)
+    mean = vectors.sum(axis=0) / max(
+        np.linalg.norm(vectors, axis=1).sum(), np.finfo(np.float64).tiny
+    )
     return mean if np.linalg.norm(mean) > ONE_WAY else None
 
 

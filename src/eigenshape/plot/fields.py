@@ -38,7 +38,15 @@ def figure_eigenfunctions(
     for axes, index in zip(grid.flat, indices, strict=False):
         function = spectrum.eigenvectors[:, index]
         shown = function / np.abs(function).max()
-        show(axes, draw(mesh, camera, vertex_colors=colors(scale(shown))[:, :3], zero_set_of=_constant_as_one(shown)))
+        show(
+            axes,
+            draw(
+                mesh,
+                camera,
+                vertex_colors=colors(scale(shown))[:, :3],
+                zero_set_of=_constant_as_one(shown),
+            ),
+        )
         number = spectrum.certificate.first + index
         axes.set_title(f"φ$_{{{number}}}$,  λ = {spectrum.eigenvalues[index]:.4g}")
     for axes in grid.flat[len(indices) :]:
@@ -72,13 +80,19 @@ def figure_field(
     return figure
 
 
-def mapped(values: Float[np.ndarray, " n"], scale: Normalize, colors: Colormap) -> Float[np.ndarray, "n 3"]:
+def mapped(
+    values: Float[np.ndarray, " n"], scale: Normalize, colors: Colormap
+) -> Float[np.ndarray, "n 3"]:
     """Return the colour of each value."""
     return np.asarray(colors(scale(values)))[:, :3]
 
 
 def figure_segments(
-    mesh: MeshLike, labels: Int[np.ndarray, " f"], vertices: Int[np.ndarray, " m"], *, camera: Camera | None = None
+    mesh: MeshLike,
+    labels: Int[np.ndarray, " f"],
+    vertices: Int[np.ndarray, " m"],
+    *,
+    camera: Camera | None = None,
 ) -> Figure:
     """Draw the parts of a shape in colours, with their numbered feature points; hidden ones are hollow."""
     mesh = as_mesh(mesh)
@@ -88,7 +102,9 @@ def figure_segments(
     drawing = draw(mesh, camera or three_quarter_view(mesh), face_colors=palette(labels))
     show(axes, drawing)
     mark(axes, drawing, vertices, numbers=True)
-    axes.set_title(f"{len(vertices)} parts around their feature points (hollow: on the far side)", fontsize=10)
+    axes.set_title(
+        f"{len(vertices)} parts around their feature points (hollow: on the far side)", fontsize=10
+    )
     return figure
 
 
@@ -100,13 +116,21 @@ def part_colors(mesh: MeshLike, labels: Int[np.ndarray, " f"]) -> UInt8[np.ndarr
     mesh = as_mesh(mesh)
     corners, areas = mesh.faces.ravel(), np.repeat(face_areas(mesh), 3)
     shape = (mesh.n_vertices, int(labels.max(initial=-1)) + 2)
-    around = sp.coo_array((areas / (areas.max() or 1.0), (corners, np.repeat(labels, 3) + 1)), shape=shape).tocsr()
+    around = sp.coo_array(
+        (areas / (areas.max() or 1.0), (corners, np.repeat(labels, 3) + 1)), shape=shape
+    ).tocsr()
     return _bytes(palette(np.asarray(around.argmax(axis=1)).ravel() - 1))
 
 
-def value_colors(values: Float[np.ndarray, " n"], color_map: str = "viridis") -> UInt8[np.ndarray, "n 3"]:
+def value_colors(
+    values: Float[np.ndarray, " n"], color_map: str = "viridis"
+) -> UInt8[np.ndarray, "n 3"]:
     """Return red, green and blue of each vertex for `write_mesh`: a function from its lowest to its highest value."""
-    return _bytes(mapped(values, Normalize(float(values.min()), float(values.max())), mpl.colormaps[color_map]))
+    return _bytes(
+        mapped(
+            values, Normalize(float(values.min()), float(values.max())), mpl.colormaps[color_map]
+        )
+    )
 
 
 def _bytes(colors: Float[np.ndarray, "n 3"]) -> UInt8[np.ndarray, "n 3"]:
@@ -119,12 +143,24 @@ def show(axes: Axes, drawing: Drawing) -> None:
     axes.set_axis_off()
 
 
-def mark(axes: Axes, drawing: Drawing, vertices: Int[np.ndarray, " m"], *, numbers: bool = False) -> None:
+def mark(
+    axes: Axes, drawing: Drawing, vertices: Int[np.ndarray, " m"], *, numbers: bool = False
+) -> None:
     """Mark vertices by red dots, hollow where the shape hides them."""
     for number, vertex in enumerate(vertices.tolist()):
         x, y = drawing.places[vertex]
         seen = bool(drawing.visible[vertex])
         face = "#d62728" if seen else "none"
-        axes.scatter([x], [y], s=DOT, c=face, edgecolors="black" if seen else "#7f7f7f", linewidths=1.0, zorder=3)
+        axes.scatter(
+            [x],
+            [y],
+            s=DOT,
+            c=face,
+            edgecolors="black" if seen else "#7f7f7f",
+            linewidths=1.0,
+            zorder=3,
+        )
         if numbers and seen:
-            axes.annotate(str(number), (x, y), (5, 5), textcoords="offset points", fontsize=8, zorder=4)
+            axes.annotate(
+                str(number), (x, y), (5, 5), textcoords="offset points", fontsize=8, zorder=4
+            )

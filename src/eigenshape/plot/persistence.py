@@ -38,7 +38,9 @@ def figure_diagram(diagram: PersistenceDiagram, *, label: str = "function") -> F
         pairs: PersistencePairs | None = getattr(diagram, kind)
         if pairs is None or not len(pairs.births):
             continue
-        points = axes.scatter(pairs.births, pairs.deaths, s=34, marker=marker, c=color, alpha=0.85, zorder=3)
+        points = axes.scatter(
+            pairs.births, pairs.deaths, s=34, marker=marker, c=color, alpha=0.85, zorder=3
+        )
         points.set(edgecolor="white", linewidth=0.4, label=f"{text} ({len(pairs.births):,})")
     low, high = _limits(diagram)
     axes.plot([low, high], [low, high], color=QUIET, lw=1, zorder=1)
@@ -89,7 +91,13 @@ def figure_merge_tree(
     figure = Figure(figsize=(max(4.5, 2.2 + 0.24 * shown), 4.6), layout="constrained")
     axes = figure.subplots()
     place = leaf_places(into)
-    _draw_stems(axes, place, into, np.minimum(tree.persistence[:shown], top), _colors(tree, shown, persistence))
+    _draw_stems(
+        axes,
+        place,
+        into,
+        np.minimum(tree.persistence[:shown], top),
+        _colors(tree, shown, persistence),
+    )
     axes.set_xticks(place, [str(number) for number in range(shown)], fontsize=7)
     axes.set(ylim=(0, top), xlim=(-0.8, shown - 0.2))
     axes.set_xlabel("number of the maximum, 0 the most persistent" + _left_out(tree, shown))
@@ -97,7 +105,9 @@ def figure_merge_tree(
     if persistence is not None:
         left = int(np.count_nonzero(tree.persistence >= persistence))
         axes.axhline(min(persistence, top), color="black", lw=1, ls="--", zorder=4)
-        axes.set_title(f"cut at {persistence:.4g}: {left:,} region{'s' * (left != 1)} left", fontsize=10)
+        axes.set_title(
+            f"cut at {persistence:.4g}: {left:,} region{'s' * (left != 1)} left", fontsize=10
+        )
     axes.spines[["top", "right"]].set_visible(False)
     return figure
 
@@ -139,5 +149,13 @@ def _draw_stems(
     axes.vlines(place, 0, height, colors=[to_hex(color) for color in colors], lw=2.2, zorder=3)
     merging = into >= 0
     for number in np.flatnonzero(~merging):  # an arrow: upward for ever
-        axes.plot(place[number], height[number], "^", color=colors[number], markersize=8, clip_on=False, zorder=5)
+        axes.plot(
+            place[number],
+            height[number],
+            "^",
+            color=colors[number],
+            markersize=8,
+            clip_on=False,
+            zorder=5,
+        )
     axes.hlines(height[merging], place[into[merging]], place[merging], colors=QUIET, lw=1, zorder=2)

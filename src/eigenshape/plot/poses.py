@@ -21,7 +21,10 @@ MOVED = ("#c9c9c9", "#f3c27b", "#d9541e")  # colors of shares 0, 1/2 and 1
 
 
 def figure_poses(
-    poses: Mapping[str, MeshLike], shares: Float[np.ndarray, " n"] | None = None, *, camera: Camera | None = None
+    poses: Mapping[str, MeshLike],
+    shares: Float[np.ndarray, " n"] | None = None,
+    *,
+    camera: Camera | None = None,
 ) -> Figure:
     """Draw poses of one shape in a common frame, coloured by how much of a motion each vertex is to follow.
 
@@ -45,7 +48,9 @@ def figure_poses(
     grid = figure.subplots(rows, columns, squeeze=False)
     corners = _frame(list(meshes.values()), camera)
     told = np.zeros(rest.n_vertices) if shares is None else shares
-    colormap = LinearSegmentedColormap.from_list("moved", MOVED)  # of this call: it fills its table at first use
+    colormap = LinearSegmentedColormap.from_list(
+        "moved", MOVED
+    )  # of this call: it fills its table at first use
     colors = np.asarray(colormap(np.append(told, np.zeros(len(corners)))))[:, :3]
     for axes in grid.flat:
         axes.set_axis_off()
@@ -55,11 +60,16 @@ def figure_poses(
         axes.set_title(title, fontsize=10)
     if shares is not None:
         scale = ScalarMappable(Normalize(0, 1), colormap)
-        figure.colorbar(scale, ax=grid.ravel().tolist(), shrink=0.6, pad=0.01).set_label("share of the motion")
+        figure.colorbar(scale, ax=grid.ravel().tolist(), shrink=0.6, pad=0.01).set_label(
+            "share of the motion"
+        )
     return figure
 
 
 def _frame(meshes: list[TriangleMesh], camera: Camera) -> Float[np.ndarray, "8 3"]:
     """Return the corners of the box, along the camera's axes, that holds all poses: pictures fit what they show."""
     seen = np.vstack([mesh.vertices @ camera.rotation.T for mesh in meshes])
-    return np.array(list(product(*zip(seen.min(axis=0), seen.max(axis=0), strict=True)))) @ camera.rotation
+    return (
+        np.array(list(product(*zip(seen.min(axis=0), seen.max(axis=0), strict=True))))
+        @ camera.rotation
+    )

@@ -103,14 +103,18 @@ def _pick(values: Float[np.ndarray, "f c"], raster: Raster) -> Float[np.ndarray,
     return values[raster.face]
 
 
-def _blend(values: Float[np.ndarray, "n c"], mesh: TriangleMesh, raster: Raster) -> Float[np.ndarray, "h w c"]:
+def _blend(
+    values: Float[np.ndarray, "n c"], mesh: TriangleMesh, raster: Raster
+) -> Float[np.ndarray, "h w c"]:
     return np.einsum("hwk,hwkc->hwc", raster.weights, values[mesh.faces[raster.face]])
 
 
 def _brightness(mesh: TriangleMesh, camera: Camera, raster: Raster) -> Float[np.ndarray, "h w"]:
     normals = _blend(mean_normals(agreeing(mesh)) @ camera.rotation.T, mesh, raster)
     normals = normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-12)
-    normals = np.where(normals[..., 2:] < 0, -normals, normals)  # both sides of an open surface are lit
+    normals = np.where(
+        normals[..., 2:] < 0, -normals, normals
+    )  # both sides of an open surface are lit
     light = LIGHT / np.linalg.norm(LIGHT)
     return np.asarray(AMBIENT + (1.08 - AMBIENT) * np.clip(normals @ light, 0, 1))
 
@@ -134,7 +138,9 @@ def _neighbours(values: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
     return values.take(np.arange(n - 1), axis), values.take(np.arange(1, n), axis)
 
 
-def _edge_ink(mesh: TriangleMesh, points: Float[np.ndarray, "n 3"], raster: Raster) -> Bool[np.ndarray, "h w"]:
+def _edge_ink(
+    mesh: TriangleMesh, points: Float[np.ndarray, "n 3"], raster: Raster
+) -> Bool[np.ndarray, "h w"]:
     """Mark the pixels under boundary edges that nothing hides."""
     ink = np.zeros(raster.face.shape, dtype=bool)
     edges = boundary_edges(mesh)
@@ -149,7 +155,9 @@ def _edge_ink(mesh: TriangleMesh, points: Float[np.ndarray, "n 3"], raster: Rast
     return ink
 
 
-def _pixels(points: Float[np.ndarray, "k 3"], shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+def _pixels(
+    points: Float[np.ndarray, "k 3"], shape: tuple[int, ...]
+) -> tuple[np.ndarray, np.ndarray]:
     column, row = np.clip(points[:, :2].astype(np.int64), 0, [shape[1] - 1, shape[0] - 1]).T
     return column, row
 

@@ -22,9 +22,13 @@ def require_picture_path(path: str | Path) -> Path:
     """
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
-        raise InvalidParameterError(f"A picture must end in {', '.join(SUFFIXES)}; {path} ends in {path.suffix!r}.")
+        raise InvalidParameterError(
+            f"A picture must end in {', '.join(SUFFIXES)}; {path} ends in {path.suffix!r}."
+        )
     if not path.absolute().parent.is_dir():
-        raise InvalidParameterError(f"A picture needs a folder to lie in; {path.absolute().parent} is not there.")
+        raise InvalidParameterError(
+            f"A picture needs a folder to lie in; {path.absolute().parent} is not there."
+        )
     return path
 
 
@@ -42,6 +46,8 @@ def save_figure(figure: Figure, path: str | Path) -> None:
     path = require_picture_path(path)
     FigureCanvasAgg(figure)
     kind = path.suffix.lower()
-    metadata = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[kind]
+    metadata = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[
+        kind
+    ]
     with replacing(path) as file:
         figure.savefig(file, format=kind[1:], metadata=metadata, facecolor="white")

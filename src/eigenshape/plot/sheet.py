@@ -69,10 +69,20 @@ def figure_contact_sheet(query: Panel, matches: Sequence[Panel], *, caption: str
 def _fill(axes: Axes, panel: Panel) -> None:
     axes.set_title(panel.title, fontsize=10)
     if panel.mesh is None:
-        axes.text(0.5, 0.5, "no mesh to draw", ha="center", va="center", color=QUIET, transform=axes.transAxes)
+        axes.text(
+            0.5,
+            0.5,
+            "no mesh to draw",
+            ha="center",
+            va="center",
+            color=QUIET,
+            transform=axes.transAxes,
+        )
         axes.set_axis_off()
         return
-    drawing = draw(panel.mesh, three_quarter_view(panel.mesh, size=440), face_colors=palette(panel.colors))
+    drawing = draw(
+        panel.mesh, three_quarter_view(panel.mesh, size=440), face_colors=palette(panel.colors)
+    )
     show(axes, drawing)
     mark(axes, drawing, panel.vertices[drawing.visible[panel.vertices]])
 
@@ -84,15 +94,21 @@ def figure_label_transfer(source: MeshLike, target: MeshLike, transfer: LabelTra
     require_type(transfer, LabelTransfer, "transfer")
     figure = Figure(figsize=(4.4 * PANEL, 2.2 * PANEL + 0.4), layout="constrained")
     left, right = figure.subplots(1, 2)
-    _fill(left, Panel(source, "labelled", transfer.source.labels, transfer.source.features.vertices))
+    _fill(
+        left, Panel(source, "labelled", transfer.source.labels, transfer.source.features.vertices)
+    )
     colors = transfer.matches[transfer.target.labels]
     drawing = draw(target, three_quarter_view(target), face_colors=palette(colors))
     show(right, drawing)
     vertices = transfer.target.features.vertices
     mark(right, drawing, vertices)
     paper = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
-    for vertex, label, sure in zip(vertices, transfer.part_labels, transfer.confidence, strict=True):
+    for vertex, label, sure in zip(
+        vertices, transfer.part_labels, transfer.confidence, strict=True
+    ):
         text = f"label {label}, {100 * sure:.0f} %"
-        right.annotate(text, drawing.places[vertex], (7, 7), textcoords="offset points", fontsize=8, bbox=paper)
+        right.annotate(
+            text, drawing.places[vertex], (7, 7), textcoords="offset points", fontsize=8, bbox=paper
+        )
     right.set_title("labels given, with their confidence (hollow: on the far side)", fontsize=10)
     return figure

@@ -7,11 +7,11 @@ import numpy as np
 from jaxtyping import Bool, Float
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_values
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import palette
 from eigenshape.spectral.bounds.brackets import Brackets
@@ -28,7 +28,9 @@ DECADES = 1.5  # over which relative differences are drawn on a logarithmic axis
 FAINT = 1e-12  # smaller relative differences are rounding, and have no place on a logarithmic axis
 
 
-def figure_spectrum(spectrum: Spectrum, *, area: float | None = None, brackets: Brackets | None = None) -> Figure:
+def figure_spectrum(
+    spectrum: Spectrum, *, area: float | None = None, brackets: Brackets | None = None
+) -> Figure:
     """Plot eigenvalues by their number, with the lines between which none is missing.
 
     Parameters
@@ -47,10 +49,26 @@ def figure_spectrum(spectrum: Spectrum, *, area: float | None = None, brackets: 
     number = proof.first + np.arange(len(spectrum.eigenvalues))
     if brackets is not None:
         lower, upper = brackets.lower[number], brackets.upper[number]
-        axes.vlines(number, lower, upper, color="#f2b36b", lw=3, label="bracket of the shape's eigenvalue")
-    axes.plot(number, spectrum.eigenvalues, ".", color="#1f77b4", markersize=5, label="eigenvalues of the operator")
+        axes.vlines(
+            number, lower, upper, color="#f2b36b", lw=3, label="bracket of the shape's eigenvalue"
+        )
+    axes.plot(
+        number,
+        spectrum.eigenvalues,
+        ".",
+        color="#1f77b4",
+        markersize=5,
+        label="eigenvalues of the operator",
+    )
     if area is not None:
-        axes.plot(number, 4 * np.pi * number / area, "-", color="#999999", lw=1, label="Weyl's law, 4π i / area")
+        axes.plot(
+            number,
+            4 * np.pi * number / area,
+            "-",
+            color="#999999",
+            lw=1,
+            label="Weyl's law, 4π i / area",
+        )
     ends = [end for end in (proof.floor, proof.shift) if np.isfinite(end)]
     if proof.complete and ends:
         label = "none is missing below" if len(ends) == 1 else "none is missing between"
@@ -105,13 +123,17 @@ def figure_spectra(
     require_type(brackets, Mapping | None, "brackets")
     rows = _rows(spectra, titles, brackets or {})
     if len(rows) < 2:
-        raise InvalidParameterError(f"Spectra side by side must be two or more; there are {len(rows)}.")
+        raise InvalidParameterError(
+            f"Spectra side by side must be two or more; there are {len(rows)}."
+        )
     figure = Figure(figsize=(7.5, 6.4), layout="constrained")
     _draw_rows(figure.subplots(2, 1, sharex=True, height_ratios=(3, 2)), rows, unit)
     return figure
 
 
-def draw_comparison(panels: np.ndarray, compared: SpectrumComparison, titles: tuple[str, str]) -> None:
+def draw_comparison(
+    panels: np.ndarray, compared: SpectrumComparison, titles: tuple[str, str]
+) -> None:
     """Draw a comparison into two panels, one above the other, as `figure_spectra` does."""
     _draw_rows(panels, _rows(compared, titles, {}), "1/length²")
 
@@ -167,7 +189,14 @@ def _draw_spectrum(axes: Axes, row: _Row, color: Float[np.ndarray, "3"]) -> None
     number = np.arange(len(row.values))
     if row.intervals is not None:
         bars = f"{row.title}: bracket" if row.bracketed else "_"
-        axes.vlines(number, *row.intervals.T, color=color, lw=3 if row.bracketed else 1, alpha=0.35, label=bars)
+        axes.vlines(
+            number,
+            *row.intervals.T,
+            color=color,
+            lw=3 if row.bracketed else 1,
+            alpha=0.35,
+            label=bars,
+        )
     axes.plot(number, row.values, ".-", color=color, markersize=3.5, lw=0.8, label=row.title)
 
 
@@ -188,5 +217,7 @@ def _draw_differences(axes: Axes, rows: list[_Row], colors: Float[np.ndarray, "r
 
 def _differences(first: _Row, other: _Row) -> Float[np.ndarray, " k"]:
     k = min(len(first.values), len(other.values))
-    change = relative_change(first.values[:k], other.values[:k], zero=(first.zero[:k], other.zero[:k]))
+    change = relative_change(
+        first.values[:k], other.values[:k], zero=(first.zero[:k], other.zero[:k])
+    )
     return np.where(np.isfinite(change), change, np.nan)

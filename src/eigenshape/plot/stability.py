@@ -22,7 +22,11 @@ TRUSTED = "#e4f1e4"
 
 
 def figure_stability(
-    report: StabilityReport, one: ShapeLike, two: ShapeLike, *, titles: tuple[str, str] = ("one", "two")
+    report: StabilityReport,
+    one: ShapeLike,
+    two: ShapeLike,
+    *,
+    titles: tuple[str, str] = ("one", "two"),
 ) -> Figure:
     """Draw two shapes coloured by their distance, their spectra, what changes at each heat time, and eigenspaces.
 
@@ -38,7 +42,9 @@ def figure_stability(
     two = as_shape(two, "two")
     drawn = isinstance(one, TriangleMesh) and isinstance(two, TriangleMesh)
     figure = Figure(figsize=(11, 11.5 if drawn else 8), layout="constrained")
-    rows = figure.subfigures(2 if drawn else 1, 1, squeeze=False, height_ratios=[PANEL, 8] if drawn else None)[:, 0]
+    rows = figure.subfigures(
+        2 if drawn else 1, 1, squeeze=False, height_ratios=[PANEL, 8] if drawn else None
+    )[:, 0]
     if isinstance(one, TriangleMesh) and isinstance(two, TriangleMesh):
         _draw_shapes(rows[0], report, (one, two), titles)
     grid = rows[-1].subplots(2, 2)
@@ -51,7 +57,10 @@ def figure_stability(
 
 
 def _draw_shapes(
-    figure: SubFigure, report: StabilityReport, meshes: tuple[TriangleMesh, TriangleMesh], titles: tuple[str, str]
+    figure: SubFigure,
+    report: StabilityReport,
+    meshes: tuple[TriangleMesh, TriangleMesh],
+    titles: tuple[str, str],
 ) -> None:
     panels = figure.subplots(1, 2)
     scale, colors = Normalize(0.0, report.distance or 1.0), mpl.colormaps["viridis"]
@@ -66,20 +75,36 @@ def _draw_shapes(
 def _draw_times(axes: Axes, report: StabilityReport) -> None:
     times = np.array([change.t for change in report.changes])
     rows = {
-        "bound for points so far apart": ([change.bound for change in report.changes], "^:", "#999999"),
+        "bound for points so far apart": (
+            [change.bound for change in report.changes],
+            "^:",
+            "#999999",
+        ),
         "Weyl's bound": ([change.weyl for change in report.changes], "s--", "#9467bd"),
         "between the shapes": ([change.change for change in report.changes], "o-", "#d9541e"),
-        "between two samples of the first": ([change.floor for change in report.changes], "o-", "#7f7f7f"),
+        "between two samples of the first": (
+            [change.floor for change in report.changes],
+            "o-",
+            "#7f7f7f",
+        ),
     }
     for name, (values, style, color) in rows.items():
         axes.plot(times, values, style, color=color, ms=4, lw=1, label=name)
     axes.set_xscale("log")
     axes.set_yscale("log")
     if not report.times.empty:
-        axes.axvspan(report.times.low, report.times.high, color=TRUSTED, zorder=0, label="heat times to trust")
+        axes.axvspan(
+            report.times.low,
+            report.times.high,
+            color=TRUSTED,
+            zorder=0,
+            label="heat times to trust",
+        )
     axes.set_xlabel("heat time t, length²")
     axes.set_ylabel("largest change / last eigenvalue")
-    axes.set_title(f"graph Laplacians of {report.n_samples} points thrown on each", fontsize=10, loc="left")
+    axes.set_title(
+        f"graph Laplacians of {report.n_samples} points thrown on each", fontsize=10, loc="left"
+    )
     axes.legend(frameon=False, fontsize=8)
 
 
@@ -88,10 +113,24 @@ def _draw_angles(axes: Axes, report: StabilityReport) -> None:
     middle = (found.starts + found.stops - 1) / 2
     reach = np.maximum((found.stops - 1 - found.starts) / 2, 0.15)
     axes.errorbar(
-        middle, np.degrees(found.angles), xerr=reach, fmt="o", ms=4, lw=1.5, color="#1f77b4", label="measured"
+        middle,
+        np.degrees(found.angles),
+        xerr=reach,
+        fmt="o",
+        ms=4,
+        lw=1.5,
+        color="#1f77b4",
+        label="measured",
     )
     if found.bounds is not None:
-        axes.plot(middle, np.degrees(found.bounds), "v", ms=4, color="#999999", label="at most, by the gap (90°: none)")
+        axes.plot(
+            middle,
+            np.degrees(found.bounds),
+            "v",
+            ms=4,
+            color="#999999",
+            label="at most, by the gap (90°: none)",
+        )
     axes.set_ylim(0, 110)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("numbers of the eigenvalues of a group")

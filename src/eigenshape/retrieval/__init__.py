@@ -1,1 +1,5 @@
 """Descriptors, their scores, and the index that finds similar shapes."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -130,7 +130,9 @@ def simulate_scan(
     low, high = points.min(axis=0), points.max(axis=0)
     diagonal = float(np.linalg.norm(high - low))
     if not diagonal > 0:
-        raise InvalidShapeError("A shape must have a size to be scanned; all its vertices are equal.")
+        raise InvalidShapeError(
+            "A shape must have a size to be scanned; all its vertices are equal."
+        )
     turn, middle = rotation_towards(towards), low + (high - low) / 2
     ahead = np.array([0, 0, camera.distance])
     placed = TriangleMesh((points - middle) @ turn.T / diagonal - ahead, mesh.faces)
@@ -142,18 +144,24 @@ def simulate_scan(
     back = ((seen.vertices + ahead) * diagonal @ turn + middle) * scale
     columns = source % camera.resolution
     pixels = np.column_stack([columns, source // camera.resolution])
-    return DepthScan(TriangleMesh(back, seen.faces), frozen(picture.face.ravel()[source]), frozen(pixels))
+    return DepthScan(
+        TriangleMesh(back, seen.faces), frozen(picture.face.ravel()[source]), frozen(pixels)
+    )
 
 
 def _checked(camera: DepthCamera) -> DepthCamera:
     whole_number(camera.resolution, "resolution", 16, 4096)
     whole_number(camera.n_holes, "n_holes", 0, 1000)
     if not 0.5 < camera.distance < np.inf:
-        raise InvalidParameterError(f"distance must be more than half a diagonal, and finite; it is {camera.distance}.")
+        raise InvalidParameterError(
+            f"distance must be more than half a diagonal, and finite; it is {camera.distance}."
+        )
     if not 0 <= camera.noise <= 1:
         raise InvalidParameterError(f"noise must lie in 0..1 diagonals; it is {camera.noise}.")
     if not 0 <= camera.lost_from < np.rad2deg(ALL_LOST):
-        raise InvalidParameterError(f"lost_from must lie in 0..85 degrees, 85 excluded; it is {camera.lost_from}.")
+        raise InvalidParameterError(
+            f"lost_from must lie in 0..85 degrees, 85 excluded; it is {camera.lost_from}."
+        )
     if not 0 <= camera.lost < 1:
         raise InvalidParameterError(f"lost must lie in 0..1, 1 excluded; it is {camera.lost}.")
     return camera
@@ -168,7 +176,9 @@ def _taken(placed: TriangleMesh, camera: DepthCamera) -> _Picture:
     raster = rasterize(pixels, placed.faces, size, size)
     depth = np.where(raster.face >= 0, 1 / raster.depth, np.inf)
     rays = _rays(size, focal)
-    facing = np.abs(np.einsum("hwi,hwi->hw", face_normals(placed)[raster.face], rays)) / np.linalg.norm(rays, axis=2)
+    facing = np.abs(
+        np.einsum("hwi,hwi->hw", face_normals(placed)[raster.face], rays)
+    ) / np.linalg.norm(rays, axis=2)
     return _Picture(focal, depth, np.arccos(np.minimum(facing, 1)), raster.face)
 
 
@@ -178,7 +188,9 @@ def _rays(size: int, focal: float) -> Float[np.ndarray, "h w 3"]:
     return np.stack([*np.meshgrid(across, across), np.full((size, size), -1.0)], axis=2)
 
 
-def _kept(picture: _Picture, camera: DepthCamera, rng: np.random.Generator) -> Bool[np.ndarray, "h w"]:
+def _kept(
+    picture: _Picture, camera: DepthCamera, rng: np.random.Generator
+) -> Bool[np.ndarray, "h w"]:
     begins = np.deg2rad(camera.lost_from)
     odds = np.clip((picture.slant - begins) / (ALL_LOST - begins), camera.lost, 1)
     kept = (picture.face >= 0) & (rng.random(odds.shape) >= odds)
@@ -191,18 +203,29 @@ def _kept(picture: _Picture, camera: DepthCamera, rng: np.random.Generator) -> B
     return kept
 
 
-def _noisy(picture: _Picture, camera: DepthCamera, rng: np.random.Generator) -> Float[np.ndarray, "h w"]:
+def _noisy(
+    picture: _Picture, camera: DepthCamera, rng: np.random.Generator
+) -> Float[np.ndarray, "h w"]:
     slanted = SLANT_NOISE * (picture.slant / np.maximum(np.pi / 2 - picture.slant, 1e-9)) ** 2
     growth = (picture.depth / camera.distance) ** 2 + np.minimum(slanted, STEEPEST_NOISE)
     away = rng.standard_normal(picture.depth.shape)
-    return np.where(picture.face >= 0, picture.depth + camera.noise * np.where(picture.face >= 0, growth, 0) * away, 0)
+    return np.where(
+        picture.face >= 0,
+        picture.depth + camera.noise * np.where(picture.face >= 0, growth, 0) * away,
+        0,
+    )
 
 
-def _joined(picture: _Picture, depth: Float[np.ndarray, "h w"], kept: Bool[np.ndarray, "h w"]) -> TriangleMesh:
+def _joined(
+    picture: _Picture, depth: Float[np.ndarray, "h w"], kept: Bool[np.ndarray, "h w"]
+) -> TriangleMesh:
     """Make triangles of squares of neighbours, cut along the diagonal with the lesser jump."""
     size = len(depth)
     corner = np.arange(size * size).reshape(size, size)
-    a, b, c, d = (part.ravel() for part in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]))
+    a, b, c, d = (
+        part.ravel()
+        for part in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1])
+    )
     flat = np.where(kept, depth, np.inf).ravel()
     with np.errstate(invalid="ignore"):
         along = ~(np.abs(flat[a] - flat[c]) > np.abs(flat[b] - flat[d]))
@@ -213,6 +236,8 @@ def _joined(picture: _Picture, depth: Float[np.ndarray, "h w"], kept: Bool[np.nd
     depths = flat[faces]
     faces = faces[np.ptp(depths, axis=1) <= LARGEST_JUMP * depths.mean(axis=1) / picture.focal]
     if not len(faces):
-        raise InvalidShapeError("A scan must have a face. No three neighbouring pixels see one surface from there.")
+        raise InvalidShapeError(
+            "A scan must have a face. No three neighbouring pixels see one surface from there."
+        )
     points = (_rays(size, picture.focal) * np.where(kept, depth, 0)[:, :, None]).reshape(-1, 3)
     return TriangleMesh(points, faces)

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import mean_normals, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
@@ -41,7 +41,11 @@ class MeshPart:
 
 @one_blas_thread()
 def partial_scan(
-    mesh: MeshLike, view: ArrayLike | np.random.Generator, *, resolution: int = 512, all_pieces: bool = False
+    mesh: MeshLike,
+    view: ArrayLike | np.random.Generator,
+    *,
+    resolution: int = 512,
+    all_pieces: bool = False,
 ) -> MeshPart:
     """Keep what is visible from far away in one direction.
 
@@ -92,7 +96,9 @@ def viewpoint(number: int) -> Float[np.ndarray, "3"]:
 
 def views_of(mesh: TriangleMesh, n_views: int) -> list[MeshPart]:
     """Return what the first few viewpoints see of a closed shape; nothing of an open one, which is a part already."""
-    return [partial_scan(mesh, viewpoint(view)) for view in range(n_views if is_closed(mesh) else 0)]
+    return [
+        partial_scan(mesh, viewpoint(view)) for view in range(n_views if is_closed(mesh) else 0)
+    ]
 
 
 def unit_direction(view: ArrayLike | np.random.Generator) -> Float[np.ndarray, "3"]:
@@ -103,9 +109,15 @@ def unit_direction(view: ArrayLike | np.random.Generator) -> Float[np.ndarray, "
     InvalidParameterError
         If it is zero or not finite.
     """
-    vector = view.standard_normal(3) if isinstance(view, np.random.Generator) else real_numbers(view, "view")
+    vector = (
+        view.standard_normal(3)
+        if isinstance(view, np.random.Generator)
+        else real_numbers(view, "view")
+    )
     if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
-        raise InvalidParameterError(f"view must be three finite numbers, not all zero; it is {vector.tolist()}.")
+        raise InvalidParameterError(
+            f"view must be three finite numbers, not all zero; it is {vector.tolist()}."
+        )
     vector = vector / np.abs(vector).max()
     return vector / np.linalg.norm(vector)
 
@@ -118,17 +130,23 @@ def rotation_towards(view: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
     return np.stack([right, np.cross(view, right), view])
 
 
-def _visible_vertices(mesh: TriangleMesh, view: Float[np.ndarray, "3"], resolution: int) -> Bool[np.ndarray, " n"]:
+def _visible_vertices(
+    mesh: TriangleMesh, view: Float[np.ndarray, "3"], resolution: int
+) -> Bool[np.ndarray, " n"]:
     points = unit_scaled(mesh)[0] @ rotation_towards(view).T
     low = points.min(axis=0)
     span = float((points.max(axis=0) - low)[:2].max())
     if not span > 0:
-        raise InvalidShapeError("A shape must have a size to be scanned; all its vertices are in one line of sight.")
+        raise InvalidShapeError(
+            "A shape must have a size to be scanned; all its vertices are in one line of sight."
+        )
     pixels = (points - low) * ((resolution - 2) / span) + 1
     raster = rasterize(pixels, mesh.faces, resolution, resolution)
     column, row = pixels[:, :2].astype(np.int64).T
     towards = np.abs(mean_normals(agreeing(mesh)) @ view)  # which side is out does not matter
-    slope = np.minimum(np.sqrt(1 - np.minimum(towards, 1) ** 2) / np.maximum(towards, 1 / STEEPEST), STEEPEST)
+    slope = np.minimum(
+        np.sqrt(1 - np.minimum(towards, 1) ** 2) / np.maximum(towards, 1 / STEEPEST), STEEPEST
+    )
     return pixels[:, 2] >= raster.depth[row, column] - SLACK * (1 + slope)
 
 

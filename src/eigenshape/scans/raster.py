@@ -30,7 +30,9 @@ class Raster:
     depth: Float[np.ndarray, "h w"]
 
 
-def rasterize(points: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"], width: int, height: int) -> Raster:
+def rasterize(
+    points: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"], width: int, height: int
+) -> Raster:
     """Find the nearest face at the middle of each pixel.
 
     Parameters
@@ -61,10 +63,14 @@ def rasterize(points: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"], w
         nearest = np.flatnonzero((height_there == depth[pixel]) & (height_there > before))[::-1]
         face[pixel[nearest]] = index[nearest]
         weights[pixel[nearest]] = inside[nearest]
-    return Raster(face.reshape(height, width), weights.reshape(height, width, 3), depth.reshape(height, width))
+    return Raster(
+        face.reshape(height, width), weights.reshape(height, width, 3), depth.reshape(height, width)
+    )
 
 
-def _chunks(corners: Float[np.ndarray, "f 3 3"], width: int, height: int) -> Iterator[Int[np.ndarray, "k 5"]]:
+def _chunks(
+    corners: Float[np.ndarray, "f 3 3"], width: int, height: int
+) -> Iterator[Int[np.ndarray, "k 5"]]:
     """Yield rows of (face, left, top, columns, rows): the box of pixels whose middles a face may cover."""
     size = np.array([width, height])
     low = np.clip(np.ceil(corners[:, :, :2].min(axis=1) - 0.5), 0, size).astype(np.int64)
@@ -75,7 +81,10 @@ def _chunks(corners: Float[np.ndarray, "f 3 3"], width: int, height: int) -> Ite
     ends = np.cumsum(boxes[:, 3] * boxes[:, 4])
     if len(boxes):
         yield from np.split(
-            boxes, np.unique(np.searchsorted(ends, np.arange(CANDIDATES_AT_ONCE, ends[-1], CANDIDATES_AT_ONCE)))
+            boxes,
+            np.unique(
+                np.searchsorted(ends, np.arange(CANDIDATES_AT_ONCE, ends[-1], CANDIDATES_AT_ONCE))
+            ),
         )
 
 
@@ -85,7 +94,9 @@ def _bands(boxes: Int[np.ndarray, "k 5"]) -> Int[np.ndarray, "b 5"]:
     rows_at_once = np.clip(CANDIDATES_AT_ONCE // columns, 1, rows)
     counts = -(-rows // rows_at_once)
     box = np.repeat(np.arange(len(boxes)), counts)
-    above = (np.arange(len(box)) - np.repeat(np.cumsum(counts) - counts, counts)) * rows_at_once[box]
+    above = (np.arange(len(box)) - np.repeat(np.cumsum(counts) - counts, counts)) * rows_at_once[
+        box
+    ]
     bands = boxes[box]
     bands[:, 2] += above
     bands[:, 4] = np.minimum(rows_at_once[box], rows[box] - above)
@@ -101,7 +112,9 @@ def _covered(
     place = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     across = np.repeat(columns, counts)
     down, right = np.divmod(place, across)
-    first, by_column, by_row = (np.repeat(part, counts, axis=0) for part in _weight_planes(corners[face], left, top))
+    first, by_column, by_row = (
+        np.repeat(part, counts, axis=0) for part in _weight_planes(corners[face], left, top)
+    )
     weights = first + by_column * right[:, None] + by_row * down[:, None]
     weights = np.column_stack([1 - weights.sum(axis=1), weights])
     inside = np.flatnonzero((weights >= -EDGE_SLACK).all(axis=1))

@@ -1,1 +1,5 @@
 """Synthetic shapes: surfaces, domains, creatures in poses, and their exact spectra."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

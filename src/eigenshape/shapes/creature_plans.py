@@ -115,7 +115,9 @@ def _tentacle(name: str, turn: float) -> Limb:
         (0.1, 0.02, 0.11), (0.27, -0.07, 0.1), (0.47, -0.13, 0.085), (0.67, -0.15, 0.07), (0.87, -0.13, 0.058),
         (1.05, -0.06, 0.045),
     )  # fmt: skip
-    nodes = tuple((far * outward[0], far * outward[1], height, radius) for far, height, radius in profile)
+    nodes = tuple(
+        (far * outward[0], far * outward[1], height, radius) for far, height, radius in profile
+    )
     bends: list[Swing] = [(1, Z, -9, 9), (1, across, -14, 9)]
     for node, sideways, upwards in ((2, 14, 10), (3, 18, 14), (4, 22, 18)):
         bends += [(node, Z, -sideways, sideways), (node, across, -upwards, upwards)]

@@ -21,7 +21,9 @@ SOFTNESS = 2.2  # standard deviation of a bend along the skin, in thicknesses of
 TO_Y_UP = [1, 2, 0]  # plans face x and stand along z
 
 
-def make_creature(kind: str, pose: int = 0, *, n_vertices: int = 2500, individual: int = 0) -> TriangleMesh:
+def make_creature(
+    kind: str, pose: int = 0, *, n_vertices: int = 2500, individual: int = 0
+) -> TriangleMesh:
     """Make a creature: a closed, connected, outward-facing manifold surface, in a pose drawn from a seed.
 
     Poses are nearly isometric: the skin of the rest pose bends around joints, and most lengths change by a few per
@@ -53,7 +55,11 @@ def make_creature(kind: str, pose: int = 0, *, n_vertices: int = 2500, individua
     seed = whole_number(pose, "pose", 0, 2**32 - 1)
     about = whole_number(n_vertices, "n_vertices", 500, 100_000)
     rest, joints = _at_rest(kind, about, whole_number(individual, "individual", 0, 2**32 - 1))
-    points = turned(rest.vertices, joints, _angles(joints, [seed, CREATURES.index(kind)])) if seed else rest.vertices
+    points = (
+        turned(rest.vertices, joints, _angles(joints, [seed, CREATURES.index(kind)]))
+        if seed
+        else rest.vertices
+    )
     return TriangleMesh(points[:, TO_Y_UP], rest.faces)
 
 
@@ -81,7 +87,9 @@ def _joints(mesh: TriangleMesh, body: Body) -> Joints:
     for number in range(len(body.limbs) - 1, -1, -1):
         limb = body.limbs[number]
         along = np.where(owner == number, place, body.hangs_at(number)[owner])
-        for node, axis, low, high in sorted(limb.swings, key=lambda swing: -abs(swing[0] - limb.hub)):
+        for node, axis, low, high in sorted(
+            limb.swings, key=lambda swing: -abs(swing[0] - limb.hub)
+        ):
             rows.append([*limb.nodes[node, :3], *axis, low, high])
             beyond.append(along > node if node >= limb.hub else along < node)
             widths.append(SOFTNESS * limb.nodes[node, 3] * limb.squash.mean())

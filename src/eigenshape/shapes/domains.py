@@ -21,7 +21,9 @@ def interval(n: SupportsIndex = 50, length: float = 1.0) -> SimplicialMesh:
     count = whole_number(n, "n", 1, MOST)
     positive_values(length, "length")
     steps = np.arange(count)
-    return SimplicialMesh(np.linspace(0, length, count + 1)[:, None], np.column_stack([steps, steps + 1]))
+    return SimplicialMesh(
+        np.linspace(0, length, count + 1)[:, None], np.column_stack([steps, steps + 1])
+    )
 
 
 def circle(n: SupportsIndex = 50, radius: float = 1.0) -> SimplicialMesh:
@@ -64,7 +66,11 @@ def _band(j: int) -> np.ndarray:
 
 
 def irregular_grid(
-    n_x: SupportsIndex = 20, n_y: SupportsIndex = 20, *, jitter: float = 0.3, rng: np.random.Generator
+    n_x: SupportsIndex = 20,
+    n_y: SupportsIndex = 20,
+    *,
+    jitter: float = 0.3,
+    rng: np.random.Generator,
 ) -> TriangleMesh:
     """Triangulate the flat unit square with inner vertices moved at random by up to `jitter` steps of the grid.
 
@@ -81,20 +87,30 @@ def irregular_grid(
     corners = Delaunay(flat).simplices
     sides = flat[corners[:, 1:]] - flat[corners[:, :1]]
     doubled = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
-    sound = np.abs(doubled) > 1e-12 / (counts[0] * counts[1])  # points on one side of the square make flat ones
+    sound = np.abs(doubled) > 1e-12 / (
+        counts[0] * counts[1]
+    )  # points on one side of the square make flat ones
     corners[doubled < 0] = corners[doubled < 0][:, ::-1]
     return TriangleMesh(np.pad(flat, ((0, 0), (0, 1))), corners[sound])
 
 
 def box(
-    n_x: SupportsIndex = 6, n_y: SupportsIndex = 6, n_z: SupportsIndex = 6, *, sides: Sequence[float] = (1.0, 1.0, 1.0)
+    n_x: SupportsIndex = 6,
+    n_y: SupportsIndex = 6,
+    n_z: SupportsIndex = 6,
+    *,
+    sides: Sequence[float] = (1.0, 1.0, 1.0),
 ) -> SimplicialMesh:
     """Fill a box with tetrahedra, six to a cell; eigenvalues are `box_eigenvalues(k, sides)`."""
-    counts = tuple(whole_number(n, name, 1, 500) for n, name in ((n_x, "n_x"), (n_y, "n_y"), (n_z, "n_z")))
+    counts = tuple(
+        whole_number(n, name, 1, 500) for n, name in ((n_x, "n_x"), (n_y, "n_y"), (n_z, "n_z"))
+    )
     lengths = positive_values(list(sides), "sides")
     if len(lengths) != 3:
         raise InvalidParameterError(f"sides must be three lengths; they are {len(lengths)}.")
-    points = np.stack(np.meshgrid(*(np.arange(count + 1) for count in counts), indexing="ij"), axis=-1).reshape(-1, 3)
+    points = np.stack(
+        np.meshgrid(*(np.arange(count + 1) for count in counts), indexing="ij"), axis=-1
+    ).reshape(-1, 3)
     return SimplicialMesh(points / np.array(counts) * lengths, _kuhn(counts))
 
 
@@ -108,7 +124,10 @@ def _kuhn(counts: tuple[int, ...], turned: int = 0) -> np.ndarray:
     cells = np.moveaxis(np.indices(counts), 0, -1).reshape(-1, 3)
     steps = np.where(cells < turned, -strides, strides)
     starts = cells @ strides + np.maximum(-steps, 0).sum(axis=1)
-    walks = [np.cumsum(np.column_stack([starts, steps[:, order]]), axis=1) for order in permutations(range(3))]
+    walks = [
+        np.cumsum(np.column_stack([starts, steps[:, order]]), axis=1)
+        for order in permutations(range(3))
+    ]
     return np.concatenate(walks)
 
 

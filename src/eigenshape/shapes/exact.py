@@ -7,13 +7,13 @@ from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.special import comb, eval_legendre, jn_zeros, jnp_zeros, spherical_jn
 
 from eigenshape._arrays import positive_values, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.operators.boundary import Condition
 
 GAUSS = 600  # nodes: enough for degree 300 over the whole sphere
@@ -31,7 +31,9 @@ def sphere_eigenvalues(k: SupportsIndex, dim: SupportsIndex = 2) -> Float[np.nda
     values: list[float] = []
     degree = 0
     while len(values) < count:
-        copies = comb(m + degree, m, exact=True) - (comb(m + degree - 2, m, exact=True) if degree > 1 else 0)
+        copies = comb(m + degree, m, exact=True) - (
+            comb(m + degree - 2, m, exact=True) if degree > 1 else 0
+        )
         values += [float(degree * (degree + m - 1))] * copies
         degree += 1
     return np.array(values[:count])
@@ -95,21 +97,27 @@ def box_eigenvalues(
     return np.pi**2 * sums
 
 
-def _lowest_sums(one: Float[np.ndarray, " k"], two: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+def _lowest_sums(
+    one: Float[np.ndarray, " k"], two: Float[np.ndarray, " k"]
+) -> Float[np.ndarray, " k"]:
     """Return the k lowest sums of one number of each of two ascending lists of k.
 
     The sum of the i-th and the j-th has i·j sums that are no higher, itself among them: where that is over k, it need
     not be formed.
     """
     count = len(one)
-    return np.sort(np.concatenate([one[: count // j] + two[j - 1] for j in range(1, count + 1)]))[:count]
+    return np.sort(np.concatenate([one[: count // j] + two[j - 1] for j in range(1, count + 1)]))[
+        :count
+    ]
 
 
 def flat_torus_eigenvalues(k: SupportsIndex, periods: ArrayLike) -> Float[np.ndarray, " k"]:
     """Return 4π² |ξ|² over the frequencies ξ that are whole on both periods, the rows of a 2 x 2 matrix."""
     count, rows = whole_number(k, "k", 1, None), real_numbers(periods, "periods").astype(np.float64)
     if rows.shape != (2, 2) or not np.isfinite(rows).all():
-        raise InvalidParameterError(f"periods must be a finite 2 x 2 matrix; they are {rows.tolist()}.")
+        raise InvalidParameterError(
+            f"periods must be a finite 2 x 2 matrix; they are {rows.tolist()}."
+        )
     reach = np.ceil(np.sqrt(count) * np.linalg.cond(rows)) + 1
     if not reach <= HIGHEST:
         raise InvalidParameterError(
@@ -156,10 +164,14 @@ def _zeros(function: Callable[[float], float], start: int, count: int) -> Float[
     grid = np.arange(max(0.5, 0.5 * start), start + np.pi * (count ** (1 / 2) + 4) * 2, 0.1)
     signs = np.sign([function(x) for x in grid])
     changes = np.flatnonzero(signs[1:] * signs[:-1] < 0)
-    return np.array([brentq(function, grid[place], grid[place + 1], xtol=1e-14) for place in changes])
+    return np.array(
+        [brentq(function, grid[place], grid[place + 1], xtol=1e-14) for place in changes]
+    )
 
 
 def _require_condition(condition: str) -> str:
     if condition not in ("neumann", "dirichlet"):
-        raise InvalidParameterError(f"condition must be 'neumann' or 'dirichlet'; it is {condition!r}.")
+        raise InvalidParameterError(
+            f"condition must be 'neumann' or 'dirichlet'; it is {condition!r}."
+        )
     return condition

@@ -5,10 +5,10 @@ from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from eigenshape._arrays import finite_rows, frozen, whole_number
 from eigenshape._errors import InvalidShapeError
+from eigenshape._typing import ArrayLike
 
 MOST = 10**5  # degrees up to 316; beyond 1400 the functions over (1 - z²)^{m/2} are no floats
 
@@ -61,12 +61,18 @@ def _directions(points: ArrayLike) -> Float[np.ndarray, "n 3"]:
     sizes = np.abs(rows).max(axis=1, initial=0.0)
     origin = np.flatnonzero(sizes == 0)
     if origin.size:
-        raise InvalidShapeError(f"points must have a direction from the origin; point {origin[0]} is the origin.")
-    rows = np.ldexp(rows, -np.frexp(sizes)[1][:, None])  # squares of tiny or huge coordinates are no floats
+        raise InvalidShapeError(
+            f"points must have a direction from the origin; point {origin[0]} is the origin."
+        )
+    rows = np.ldexp(
+        rows, -np.frexp(sizes)[1][:, None]
+    )  # squares of tiny or huge coordinates are no floats
     return rows / np.linalg.norm(rows, axis=1, keepdims=True)
 
 
-def _over_degrees(heights: Float[np.ndarray, " n"], order: int, last: int, top: float) -> Float[np.ndarray, "n l"]:
+def _over_degrees(
+    heights: Float[np.ndarray, " n"], order: int, last: int, top: float
+) -> Float[np.ndarray, "n l"]:
     """Return N P_l^m(z) / (1 - z²)^{m/2} for l = m..last, where that of l = m is `top`."""
     values = np.empty((last - order + 1, len(heights)))
     values[0] = top

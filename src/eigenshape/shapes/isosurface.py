@@ -19,10 +19,14 @@ CHUNK = 1 << 16  # points at a time
 CLOSE_ENOUGH = 0.04  # of the number of vertices asked for
 # Places of the grid against the surface, in cells, none a symmetric one: sheets that meet in a cell at one place of it
 # are apart at another.
-PLACES = np.array([[0.5, 0.5, 0.5]]) + np.arange(12)[:, None] * np.array([[0.7548777, 0.5698403, 0.3247180]])
+PLACES = np.array([[0.5, 0.5, 0.5]]) + np.arange(12)[:, None] * np.array(
+    [[0.7548777, 0.5698403, 0.3247180]]
+)
 
 
-def isosurface(field: Field, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"], spacing: float) -> TriangleMesh:
+def isosurface(
+    field: Field, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"], spacing: float
+) -> TriangleMesh:
     """Mesh the zero set of about a signed distance, negative inside, by surface nets that are drawn onto it and evened.
 
     Each sheet in a cell has a vertex of its own (Gibson 1998 gives the nets, Nielson 2004 the sheets). Two neighbouring
@@ -40,10 +44,14 @@ def isosurface(field: Field, low: Float[np.ndarray, "3"], high: Float[np.ndarray
             mesh = _evened(field, points, quads, spacing)
             if _is_sound(mesh):
                 return mesh
-    raise InvalidShapeError(f"A surface must be smooth at the size of the grid; at spacing {spacing:.3g} it is not.")
+    raise InvalidShapeError(
+        f"A surface must be smooth at the size of the grid; at spacing {spacing:.3g} it is not."
+    )
 
 
-def spacing_for(field: Field, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"], n_vertices: int) -> float:
+def spacing_for(
+    field: Field, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"], n_vertices: int
+) -> float:
     """Find the spacing at which surface nets have about so many vertices: they go with 1 / spacing^2."""
     spacing = float((high - low).max()) / 30
     for _ in range(4):
@@ -88,7 +96,9 @@ def _lattice_values(
 
 
 def _in_chunks(field: Field, points: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, " p"]:
-    return np.concatenate([field(points[start : start + CHUNK]) for start in range(0, len(points), CHUNK)])
+    return np.concatenate(
+        [field(points[start : start + CHUNK]) for start in range(0, len(points), CHUNK)]
+    )
 
 
 def _edge(axis: int, corner: tuple[int, ...]) -> int:
@@ -134,22 +144,31 @@ def _sheet_points(
 
     Returns the point of each edge of each cell, -1 where the surface does not cross it, and the points.
     """
-    ends = [(_corner(tuple(start.tolist())), _corner(tuple((start + UNIT[axis]).tolist()))) for axis, start in EDGES]
+    ends = [
+        (_corner(tuple(start.tolist())), _corner(tuple((start + UNIT[axis]).tolist())))
+        for axis, start in EDGES
+    ]
     here, there = corners[:, [one for one, _ in ends]], corners[:, [two for _, two in ends]]
     crosses = (here < 0) != (there < 0)
     share = np.where(crosses, here / np.where(crosses, here - there, 1.0), 0.0)
     directions = np.eye(3)[[axis for axis, _ in EDGES]]
-    places = np.array([start for _, start in EDGES]) + share[..., None] * directions + cells[:, None, :]
+    places = (
+        np.array([start for _, start in EDGES]) + share[..., None] * directions + cells[:, None, :]
+    )
     sheets = 12 * np.arange(len(cells))[:, None] + _sheets(corners < 0, crosses)
     _, number = np.unique(sheets[crosses], return_inverse=True)
     counts = np.bincount(number)
-    points = np.column_stack([np.bincount(number, places[crosses][:, axis]) / counts for axis in range(3)])
+    points = np.column_stack(
+        [np.bincount(number, places[crosses][:, axis]) / counts for axis in range(3)]
+    )
     of_edge = np.full(crosses.shape, -1, dtype=np.int64)
     of_edge[crosses] = number
     return of_edge, points
 
 
-def _sheets(inside: Bool[np.ndarray, "c 8"], crosses: Bool[np.ndarray, "c 12"]) -> Int[np.ndarray, "c 12"]:
+def _sheets(
+    inside: Bool[np.ndarray, "c 8"], crosses: Bool[np.ndarray, "c 12"]
+) -> Int[np.ndarray, "c 12"]:
     """Label the crossings of each cell by the sheet that they lie on (Nielson 2004).
 
     The sheet runs over each face of the cell from crossing to crossing; where all four edges of a face are crossed it
@@ -183,15 +202,22 @@ def _quads(
     one, two = UNIT[[(axis + 1) % 3, (axis + 2) % 3]]
     back = (one + two, two, 0 * one, one)
     quads = np.column_stack(
-        [number[cell_number[tuple((edges - step).T)], _edge(axis, tuple(step.tolist()))] for step in back]
+        [
+            number[cell_number[tuple((edges - step).T)], _edge(axis, tuple(step.tolist()))]
+            for step in back
+        ]
     )
     return np.where(leaves[:, None], quads, quads[:, ::-1])
 
 
-def _split(points: Float[np.ndarray, "p 3"], quads: Int[np.ndarray, "q 4"]) -> Int[np.ndarray, "f 3"]:
+def _split(
+    points: Float[np.ndarray, "p 3"], quads: Int[np.ndarray, "q 4"]
+) -> Int[np.ndarray, "f 3"]:
     """Cut each quad along the diagonal with the lesser angles opposite to it (Delaunay)."""
     a, b, c, d = points[quads].transpose(1, 0, 2)
-    turn = np.where((_cotangent(b, a, c) + _cotangent(d, a, c) < 0)[:, None], np.roll(quads, -1, axis=1), quads)
+    turn = np.where(
+        (_cotangent(b, a, c) + _cotangent(d, a, c) < 0)[:, None], np.roll(quads, -1, axis=1), quads
+    )
     return np.concatenate([turn[:, [0, 1, 2]], turn[:, [0, 2, 3]]])
 
 
@@ -232,7 +258,9 @@ def _drawn(
     """Move points onto the zero set by one Newton step, not longer than half a cell; return also the normals."""
     width = 1e-3 * spacing
     values = field(points)
-    slopes = np.column_stack([(field(points + move) - values) / width for move in width * np.eye(3)])
+    slopes = np.column_stack(
+        [(field(points + move) - values) / width for move in width * np.eye(3)]
+    )
     slope = np.linalg.norm(slopes, axis=1, keepdims=True)
     step = np.clip(values[:, None] / slope, -0.5 * spacing, 0.5 * spacing)
     return points - step * slopes / slope, slopes / slope

@@ -61,7 +61,9 @@ class Body:
 def body_of(plan: Sequence[Limb], individual: int = 0) -> Body:
     """Place the limbs of a plan; the seed of an individual, unless it is 0, varies their lengths and widths."""
     growth = _growth(plan, individual)
-    drawn = {_sided(limb.name, side): _mirrored(limb, side) for limb in plan for side in _sides(limb)}
+    drawn = {
+        _sided(limb.name, side): _mirrored(limb, side) for limb in plan for side in _sides(limb)
+    }
     numbers = {name: number for number, name in enumerate(drawn)}
     placed: list[PlacedLimb] = []
     for name, limb in drawn.items():
@@ -80,7 +82,10 @@ def _growth(plan: Sequence[Limb], individual: int) -> dict[str, Float[np.ndarray
     """Draw how much longer and wider limbs are: those whose names begin with the same word alike."""
     rng = np.random.default_rng(individual)
     groups = dict.fromkeys(_group(limb.name) for limb in plan)
-    return {group: np.exp(VARIATION * rng.uniform(-1, 1, 2)) if individual else np.ones(2) for group in groups}
+    return {
+        group: np.exp(VARIATION * rng.uniform(-1, 1, 2)) if individual else np.ones(2)
+        for group in groups
+    }
 
 
 def _group(name: str) -> str:
@@ -98,7 +103,9 @@ def _sided(name: str, side: int) -> str:
 def _mirrored(limb: Limb, side: int) -> Limb:
     """Return one of a pair: in a mirror a turn about y stays the same, and one about x or z changes its sense."""
     nodes = tuple((x, side * y, z, radius) for x, y, z, radius in limb.nodes)
-    swings = tuple((node, (side * x, y, side * z), low, high) for node, (x, y, z), low, high in limb.swings)
+    swings = tuple(
+        (node, (side * x, y, side * z), low, high) for node, (x, y, z), low, high in limb.swings
+    )
     return limb._replace(parent=_sided(limb.parent, side), nodes=nodes, swings=swings)
 
 
@@ -108,12 +115,16 @@ def _grown(
     return np.column_stack([start + longer * (nodes[:, :3] - nodes[0, :3]), wider * nodes[:, 3]])
 
 
-def _placed(limb: Limb, nodes: Float[np.ndarray, "k 4"], parent: int, parent_node: int) -> PlacedLimb:
+def _placed(
+    limb: Limb, nodes: Float[np.ndarray, "k 4"], parent: int, parent_node: int
+) -> PlacedLimb:
     """Draw a smooth curve through the nodes (Catmull and Rom 1974), in straight pieces."""
     curve = CubicHermiteSpline(np.arange(len(nodes)), nodes, np.gradient(nodes, axis=0))
     pieces = curve(np.linspace(0, len(nodes) - 1, FINE * (len(nodes) - 1) + 1))
     squash = np.array(limb.squash, dtype=np.float64)
-    return PlacedLimb(nodes, pieces, squash, float(limb.power), parent, parent_node, limb.hub, limb.swings)
+    return PlacedLimb(
+        nodes, pieces, squash, float(limb.power), parent, parent_node, limb.hub, limb.swings
+    )
 
 
 def distance_to_body(points: Float[np.ndarray, "p 3"], body: Body) -> Float[np.ndarray, " p"]:
@@ -165,14 +176,20 @@ def _nearest_piece(
     reach = _products(points, along) - (begins * along).sum(axis=1)
     share = np.clip(reach / length2, 0, 1)
     # |p - b - s a|² with the squares taken apart: no array has both all points and all pieces and three coordinates.
-    apart2 = np.square(points).sum(axis=1)[:, None] - 2 * _products(points, begins) + np.square(begins).sum(axis=1)
+    apart2 = (
+        np.square(points).sum(axis=1)[:, None]
+        - 2 * _products(points, begins)
+        + np.square(begins).sum(axis=1)
+    )
     apart2 += share * (share * length2 - 2 * reach)
     apart = np.sqrt(np.maximum(apart2, 0)) - radii[:-1] - share * np.diff(radii)
     piece = apart.argmin(axis=1)
     return piece, share[np.arange(len(points)), piece]
 
 
-def _products(one: Float[np.ndarray, "p 3"], two: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "p s"]:
+def _products(
+    one: Float[np.ndarray, "p 3"], two: Float[np.ndarray, "s 3"]
+) -> Float[np.ndarray, "p s"]:
     # Not by a matrix product: nothing promises that its last digits are free of the number of threads.
     return np.einsum("pi,si->ps", one, two)
 

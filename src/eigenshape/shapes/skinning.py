@@ -48,10 +48,14 @@ def diffused(
     links = links + links.T
     step = widths.min() ** 2 / STEPS
     # Over six neighbours at one length, differences add up to 3/2 length² times the Laplacian; variance is twice time.
-    pencil = sp.eye_array(mesh.n_vertices) + step / (3 * length2) * (sp.diags_array(links.sum(axis=1)) - links)
+    pencil = sp.eye_array(mesh.n_vertices) + step / (3 * length2) * (
+        sp.diags_array(links.sum(axis=1)) - links
+    )
     spread, n_steps = values.copy(), np.rint(widths**2 / step)
     with one_blas_thread():
-        solve = splu(pencil.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve
+        solve = splu(
+            pencil.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
+        ).solve
         for done in range(int(n_steps.max())):
             going = n_steps > done
             spread[:, going] = solve(spread[:, going])
@@ -62,7 +66,9 @@ def turned(
     points: Float[np.ndarray, "n 3"], joints: Joints, angles: Float[np.ndarray, " j"]
 ) -> Float[np.ndarray, "n 3"]:
     """Turn each point about each joint by its share of the joint's angle (Rodrigues)."""
-    for pivot, axis, angle, share in zip(joints.pivots, joints.axes, angles, joints.follows.T, strict=True):
+    for pivot, axis, angle, share in zip(
+        joints.pivots, joints.axes, angles, joints.follows.T, strict=True
+    ):
         arm = points - pivot
         cosine, sine = np.cos(angle * share)[:, None], np.sin(angle * share)[:, None]
         points = (

@@ -4,12 +4,12 @@ from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull, QhullError
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_rows, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.shapes.surfaces import icosphere
@@ -69,7 +69,11 @@ def three_sphere(n: SupportsIndex = 1000) -> SimplicialMesh:
     share = (places + 0.5) / count  # sin² of the torus' angle is uniform
     one, two = 2 * np.pi * places * 0.7548776662466927, 2 * np.pi * places * 0.5698402909980532
     near, far = np.sqrt(share), np.sqrt(1 - share)
-    return sphere_hull(np.column_stack([near * np.cos(one), near * np.sin(one), far * np.cos(two), far * np.sin(two)]))
+    return sphere_hull(
+        np.column_stack(
+            [near * np.cos(one), near * np.sin(one), far * np.cos(two), far * np.sin(two)]
+        )
+    )
 
 
 def sphere_hull(points: ArrayLike) -> SimplicialMesh:
@@ -109,9 +113,15 @@ def projective_plane(level: SupportsIndex = 3) -> SimplicialMesh:
     sphere = icosphere(whole_number(level, "level", 1, 9))
     x, y, z = sphere.vertices.T
     # Of each pair of antipodes the one that comes first stands for both.
-    _, first, names = np.unique(_signless(sphere.vertices), axis=0, return_index=True, return_inverse=True)
-    image = np.column_stack([y * z, x * z, x * y, (x**2 - y**2) / 2, (x**2 + y**2 - 2 * z**2) / 12**0.5])
-    return SimplicialMesh(image[first], np.unique(np.sort(names.ravel()[sphere.faces], axis=1), axis=0))
+    _, first, names = np.unique(
+        _signless(sphere.vertices), axis=0, return_index=True, return_inverse=True
+    )
+    image = np.column_stack(
+        [y * z, x * z, x * y, (x**2 - y**2) / 2, (x**2 + y**2 - 2 * z**2) / 12**0.5]
+    )
+    return SimplicialMesh(
+        image[first], np.unique(np.sort(names.ravel()[sphere.faces], axis=1), axis=0)
+    )
 
 
 def _signless(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:

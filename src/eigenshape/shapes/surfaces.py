@@ -23,14 +23,18 @@ def icosphere(level: int = 3) -> TriangleMesh:
     mesh = _icosahedron()
     for _ in range(level):
         mesh = subdivide(mesh)
-        mesh = TriangleMesh(mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True), mesh.faces)
+        mesh = TriangleMesh(
+            mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True), mesh.faces
+        )
     return mesh
 
 
 def _icosahedron() -> TriangleMesh:
     golden = (1 + 5**0.5) / 2
     signs = np.array([(a, b * golden) for a in (-1, 1) for b in (-1, 1)])
-    points = np.concatenate([np.roll(np.insert(signs, 0, 0.0, axis=1), turn, axis=1) for turn in range(3)])
+    points = np.concatenate(
+        [np.roll(np.insert(signs, 0, 0.0, axis=1), turn, axis=1) for turn in range(3)]
+    )
     points = points / np.linalg.norm(points[0])
     return TriangleMesh(points, _faces_around_origin(points))
 
@@ -47,7 +51,9 @@ def _faces_around_origin(points: np.ndarray) -> Int[np.ndarray, "f 3"]:
         for c in range(b + 1, n)
         if near[a, b] and near[b, c] and near[a, c]
     ]
-    outward = [(a, b, c) if np.linalg.det(points[[a, b, c]]) > 0 else (a, c, b) for a, b, c in triples]
+    outward = [
+        (a, b, c) if np.linalg.det(points[[a, b, c]]) > 0 else (a, c, b) for a, b, c in triples
+    ]
     return np.array(outward, dtype=np.int64)
 
 
@@ -78,7 +84,9 @@ def _quartered(mesh: TriangleMesh) -> TriangleMesh:
     return TriangleMesh(np.concatenate([mesh.vertices, middles]), faces)
 
 
-def torus(n_around: int = 48, n_across: int = 24, *, outer: float = 1.0, inner: float = 0.4) -> TriangleMesh:
+def torus(
+    n_around: int = 48, n_across: int = 24, *, outer: float = 1.0, inner: float = 0.4
+) -> TriangleMesh:
     """Sweep a circle of radius `inner` around the z axis at distance `outer`, on a regular grid."""
     whole_number(n_around, "n_around", 3, 10**6)
     whole_number(n_across, "n_across", 3, 10**6)
@@ -86,7 +94,9 @@ def torus(n_around: int = 48, n_across: int = 24, *, outer: float = 1.0, inner: 
     u = 2 * np.pi * np.arange(n_around)[:, None] / n_around
     v = 2 * np.pi * np.arange(n_across)[None, :] / n_across
     rim = outer + inner * np.cos(v)
-    points = np.stack([rim * np.cos(u), rim * np.sin(u), np.broadcast_to(inner * np.sin(v), (n_around, n_across))])
+    points = np.stack(
+        [rim * np.cos(u), rim * np.sin(u), np.broadcast_to(inner * np.sin(v), (n_around, n_across))]
+    )
     return TriangleMesh(points.reshape(3, -1).T, _wrapped_grid(n_around, n_across))
 
 
@@ -94,7 +104,9 @@ def _wrapped_grid(rows: int, columns: int) -> Int[np.ndarray, "f 3"]:
     i, j = (index.ravel() for index in np.indices((rows, columns)))
     here, right = i * columns + j, i * columns + (j + 1) % columns
     below, across = (i + 1) % rows * columns + j, (i + 1) % rows * columns + (j + 1) % columns
-    return np.concatenate([np.column_stack([here, below, across]), np.column_stack([here, across, right])])
+    return np.concatenate(
+        [np.column_stack([here, below, across]), np.column_stack([here, across, right])]
+    )
 
 
 def grid(n_x: int = 20, n_y: int = 20, *, width: float = 1.0, height: float = 1.0) -> TriangleMesh:
@@ -102,12 +114,16 @@ def grid(n_x: int = 20, n_y: int = 20, *, width: float = 1.0, height: float = 1.
     whole_number(n_x, "n_x", 1, 10**6)
     whole_number(n_y, "n_y", 1, 10**6)
     positive_values([width, height], "width and height")
-    x, y = np.meshgrid(np.linspace(0, width, n_x + 1), np.linspace(0, height, n_y + 1), indexing="ij")
+    x, y = np.meshgrid(
+        np.linspace(0, width, n_x + 1), np.linspace(0, height, n_y + 1), indexing="ij"
+    )
     points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
     i, j = (index.ravel() for index in np.indices((n_x, n_y)))
     here = i * (n_y + 1) + j
     right, below, across = here + 1, here + n_y + 1, here + n_y + 2
-    faces = np.concatenate([np.column_stack([here, below, across]), np.column_stack([here, across, right])])
+    faces = np.concatenate(
+        [np.column_stack([here, below, across]), np.column_stack([here, across, right])]
+    )
     return TriangleMesh(points, faces)
 
 

@@ -31,7 +31,9 @@ def products(space: Slots, columns: Block) -> Float[np.ndarray, "m b"]:
 
 def subtract(space: Slots, weights: Float[np.ndarray, "m b"], columns: Block) -> None:
     """Take space weights from the columns, in place."""
-    parts = np.ascontiguousarray(weights.reshape(len(weights), len(columns), LANES).transpose(1, 0, 2))
+    parts = np.ascontiguousarray(
+        weights.reshape(len(weights), len(columns), LANES).transpose(1, 0, 2)
+    )
     subtract_combination(space, parts, columns)
 
 

@@ -45,9 +45,21 @@ def subtract_combination(space, parts, columns):
                 given, to = (group * slots + slot) * LANES, group * n
                 for row in range(start, four, 4):
                     place = (slot * n + row) * LANES
-                    subtract_four_sums(space, place, 1, LANES, parts, given, LANES, columns, to + row)
+                    subtract_four_sums(
+                        space, place, 1, LANES, parts, given, LANES, columns, to + row
+                    )
                 for row in range(four, stop):
-                    subtract_sum(space, (slot * n + row) * LANES, 1, 0, parts, given, LANES, columns, to + row)
+                    subtract_sum(
+                        space,
+                        (slot * n + row) * LANES,
+                        1,
+                        0,
+                        parts,
+                        given,
+                        LANES,
+                        columns,
+                        to + row,
+                    )
 
 
 @njit

@@ -16,12 +16,22 @@ MODULE = "scipy.linalg.cython_blas"
 
 def addresses() -> tuple[int, int]:
     """Return where dgemm and dtrsm are in this process; compiled code that is kept on disk takes them as numbers."""
-    return get_cython_function_address(MODULE, "dgemm"), get_cython_function_address(MODULE, "dtrsm")
+    return get_cython_function_address(MODULE, "dgemm"), get_cython_function_address(
+        MODULE, "dtrsm"
+    )
 
 
 @intrinsic
 def subtract_product(
-    context: Any, address: Any, size: Any, left: Any, left_at: Any, right: Any, right_at: Any, taken: Any, taken_at: Any
+    context: Any,
+    address: Any,
+    size: Any,
+    left: Any,
+    left_at: Any,
+    right: Any,
+    right_at: Any,
+    taken: Any,
+    taken_at: Any,
 ) -> Any:
     """Take A Bᵀ from C: parts of matrices in C order that begin at flat places, size = (rows, columns, terms)."""
     whole, place = types.int64, types.int64
@@ -42,7 +52,9 @@ def subtract_product(
 
 
 @intrinsic
-def solve_triangle(context: Any, address: Any, size: Any, triangle: Any, triangle_at: Any, right: Any, at: Any) -> Any:
+def solve_triangle(
+    context: Any, address: Any, size: Any, triangle: Any, triangle_at: Any, right: Any, at: Any
+) -> Any:
     """Replace X by X L⁻ᵀ, L unit lower triangular, parts of matrices in C order; size = (rows of X, columns)."""
     whole, place = types.int64, types.int64
     signature = types.void(whole, size, triangle, place, right, place)
@@ -74,7 +86,9 @@ def _letter(builder: Any, letter: str) -> Any:
 def _part(context: Any, builder: Any, signature: Any, arguments: Any, i: int) -> tuple[Any, Any]:
     """Return the first number of a part, and the numbers from one row to the next."""
     array = context.make_array(signature.args[i])(context, builder, arguments[i])
-    return builder.gep(array.data, [arguments[i + 1]]), _kept(builder, builder.extract_value(array.shape, 1))
+    return builder.gep(array.data, [arguments[i + 1]]), _kept(
+        builder, builder.extract_value(array.shape, 1)
+    )
 
 
 def _call(builder: Any, address: Any, given: list[Any]) -> None:

@@ -51,7 +51,9 @@ def eliminate_blocked(front, width, pivots, times, blas):
         if end < width:
             _update(front, times, max(end - span, 0), end, min(end + span, width), blas[0])
     if width < height:
-        zero = np.int64(0)  # a literal 0 would be another type, for which `_update` is compiled again
+        zero = np.int64(
+            0
+        )  # a literal 0 would be another type, for which `_update` is compiled again
         _update(front, times, zero, width, height, blas[0])
     return True
 
@@ -76,7 +78,9 @@ def _eliminate_narrow(front, start, end, pivots, times, trsm):
         for j in range(start, end):
             times[i, j] = front[i, j]
     rest, wide = height - end, times.shape[1]
-    solve_triangle(trsm, (rest, end - start), front, start * height + start, times, end * wide + start)
+    solve_triangle(
+        trsm, (rest, end - start), front, start * height + start, times, end * wide + start
+    )
     for i in range(end, height):
         for j in range(start, end):
             front[i, j] = times[i, j] / pivots[j]

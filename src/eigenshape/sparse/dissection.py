@@ -33,7 +33,9 @@ def dissect(indptr: Indices, indices: Indices) -> Indices:
     """
     n = len(indptr) - 1
     nodes, place = np.arange(n), np.arange(n)  # nodes[place[v]] = v
-    owner = np.zeros(n, dtype=np.int64)  # the name of the segment that a point lies in; -1 when its place is final
+    owner = np.zeros(
+        n, dtype=np.int64
+    )  # the name of the segment that a point lies in; -1 when its place is final
     one, two, queue, key = (np.empty(n, dtype=np.int64) for _ in range(4))
     side = np.empty(n, dtype=np.int8)
     bits = np.empty(LEAF * -(-n // WORD), dtype=np.uint64)
@@ -65,12 +67,16 @@ def dissect(indptr: Indices, indices: Indices) -> Indices:
         level, above, full = cheapest_cut(indptr, indices, segment, owner, name, key, low, *scratch)
         n_first, n_cut = take_sides(indptr, indices, segment, owner, name, key, level, above, side)
         parted = n_first > 0 and n_first + n_cut < size
-        if n_cut in (0, size) or (full and not parted):  # a clique or nearly, or nothing left to cut
+        if n_cut in (0, size) or (
+            full and not parted
+        ):  # a clique or nearly, or nothing left to cut
             owner[segment] = -1
             continue
         nodes[start:stop] = segment[np.argsort(side[segment], kind="stable")]
         place[segment] = np.arange(start, stop)
         middle, cut = start + n_first, stop - n_cut
         owner[nodes[cut:stop]] = -1
-        waiting += [(first, last, False) for first, last in ((start, middle), (middle, cut)) if first < last]
+        waiting += [
+            (first, last, False) for first, last in ((start, middle), (middle, cut)) if first < last
+        ]
     return nodes

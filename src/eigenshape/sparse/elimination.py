@@ -68,7 +68,9 @@ class SymmetricFactor:
     panels: Float[np.ndarray, " e"]
     pivots: Float[np.ndarray, " n"]
 
-    def solve(self, right: Float[np.ndarray, "n b"], scratch: Scratch | None = None) -> Float[np.ndarray, "n b"]:
+    def solve(
+        self, right: Float[np.ndarray, "n b"], scratch: Scratch | None = None
+    ) -> Float[np.ndarray, "n b"]:
         """Solve A x = right, in memory of the caller or in fresh memory."""
         width, scratch = right.shape[1], scratch or self.scratch()
         solution, lanes = np.empty((len(right), width)), np.zeros((len(right), LANES))
@@ -85,9 +87,15 @@ class SymmetricFactor:
         Whoever solves often keeps it, and shares it with no other thread: a factor is a value and holds none.
         """
         e = self.elimination
-        return np.empty((len(e.order), LANES)), np.empty((e.room[1], LANES)), np.empty(fronts.NEAR * fronts.WIDE)
+        return (
+            np.empty((len(e.order), LANES)),
+            np.empty((e.room[1], LANES)),
+            np.empty(fronts.NEAR * fronts.WIDE),
+        )
 
-    def solve_lanes(self, right: Float[np.ndarray, "n 8"], out: Float[np.ndarray, "n 8"], scratch: Scratch) -> None:
+    def solve_lanes(
+        self, right: Float[np.ndarray, "n 8"], out: Float[np.ndarray, "n 8"], scratch: Scratch
+    ) -> None:
         """Solve A x = right for eight right-hand sides, arrays in C order, at once; `out` may be `right` itself."""
         e = self.elimination
         tree = e.order, e.first, e.begins, e.rows, e.places
@@ -111,7 +119,9 @@ class SymmetricFactor:
         lengths = np.full(n_fronts, LONG)
         fronts.sum_lengths(e.first, e.begins, e.above, np.zeros(n_fronts, dtype=np.int64), lengths)
         bounds = np.empty_like(sizes)
-        bounds[e.order] = EPS * (np.minimum(terms, np.repeat(lengths, np.diff(e.first))) + 4) * sizes
+        bounds[e.order] = (
+            EPS * (np.minimum(terms, np.repeat(lengths, np.diff(e.first))) + 4) * sizes
+        )
         return bounds
 
 
@@ -132,11 +142,15 @@ def analyse(pattern: sp.csc_array) -> Elimination:
     begins = np.concatenate([[0], np.cumsum(heights)])
     rows, above = np.empty(begins[-1], dtype=np.int64), _unknown(size)
     scratch = np.empty(n, dtype=np.int64), _unknown(size), _unknown(size), _unknown(n)
-    symbolic.find_front_rows(indptr, indices, order, place, parent, first, begins, rows, above, *scratch)
+    symbolic.find_front_rows(
+        indptr, indices, order, place, parent, first, begins, rows, above, *scratch
+    )
     lower_ptr, lower_rows, source = _lower(indptr, indices, place)
     places = _panel_places(np.diff(first), heights)
     room = fronts.stack_size(first, begins, above, np.zeros(size, dtype=np.int64))
-    return Elimination(order, first, begins, rows, above, places, room, lower_ptr, lower_rows, source)
+    return Elimination(
+        order, first, begins, rows, above, places, room, lower_ptr, lower_rows, source
+    )
 
 
 def _unknown(n: int) -> Indices:
@@ -195,7 +209,9 @@ def factorise(
 ) -> SymmetricFactor | None:
     """Factor the matrix with these entries, in the room of a spent factor; None where a pivot is zero or not finite."""
     e = elimination
-    panels = np.empty(e.n_entries) if spent is None else spent.panels  # fresh pages cost half as much as a factor
+    panels = (
+        np.empty(e.n_entries) if spent is None else spent.panels
+    )  # fresh pages cost half as much as a factor
     pivots = np.empty(len(e.order))
     lower = e.lower_ptr, e.lower_rows, data[e.source]
     tree = e.first, e.begins, e.rows, e.above, e.places

@@ -58,7 +58,19 @@ def sum_lengths(first, begins, above, children, lengths):
 @njit
 @no_type_check
 def factor_fronts(
-    lower_ptr, lower_rows, values, first, begins, rows, above, places, panels, pivots, room, children, blas
+    lower_ptr,
+    lower_rows,
+    values,
+    first,
+    begins,
+    rows,
+    above,
+    places,
+    panels,
+    pivots,
+    room,
+    children,
+    blas,
 ):
     """Fill panels and pivots with L and D of a matrix whose lower triangle is given by columns; tell if it could be.
 
@@ -145,7 +157,9 @@ def solve_fronts(order, first, begins, rows, places, panels, pivots, right, solu
         for block in range((width - 1) // WIDE * WIDE, -1, -WIDE):
             columns = min(WIDE, width - block)
             at -= (height - block) * columns
-            _backward(panels, at, columns, rows[start + block : start + height], lanes, gathered, near)
+            _backward(
+                panels, at, columns, rows[start + block : start + height], lanes, gathered, near
+            )
     for i in range(n):
         for lane in range(LANES):
             solution[order[i], lane] = lanes[i, lane]
@@ -163,7 +177,9 @@ def _forward(panels, at, columns, rows, lanes, gathered):
             gathered[i, lane] = 0.0
     four = rest // 4 * 4
     for i in range(0, four, 4):
-        subtract_four_sums(panels, at + (columns + i) * columns, 1, columns, lanes, mine, columns, gathered, i)
+        subtract_four_sums(
+            panels, at + (columns + i) * columns, 1, columns, lanes, mine, columns, gathered, i
+        )
     for i in range(four, rest):
         subtract_sum(panels, at + (columns + i) * columns, 1, 0, lanes, mine, columns, gathered, i)
     for i in range(rest):
@@ -192,7 +208,15 @@ def _backward(panels, at, columns, rows, lanes, gathered, near):
             subtract_sum(near, j, columns, 0, gathered, low, count, lanes, mine + j)
     for j in range(columns - 2, -1, -1):
         subtract_sum(
-            panels, at + (j + 1) * columns + j, columns, 0, lanes, mine + j + 1, columns - 1 - j, lanes, mine + j
+            panels,
+            at + (j + 1) * columns + j,
+            columns,
+            0,
+            lanes,
+            mine + j + 1,
+            columns - 1 - j,
+            lanes,
+            mine + j,
         )
 
 
@@ -218,7 +242,12 @@ def column_sizes(first, begins, places, panels, sizes):
 def row_sizes(first, begins, rows, places, panels, weights, sizes, terms):
     """Add |L| weights to `sizes`, and how many entries of L each row has to `terms`."""
     for s in range(len(first) - 1):
-        at, start, height, width = places[s], begins[s], begins[s + 1] - begins[s], first[s + 1] - first[s]
+        at, start, height, width = (
+            places[s],
+            begins[s],
+            begins[s + 1] - begins[s],
+            first[s + 1] - first[s],
+        )
         for block in range(0, width, WIDE):
             columns = min(WIDE, width - block)
             mine = first[s] + block

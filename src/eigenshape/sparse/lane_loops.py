@@ -43,7 +43,10 @@ def _summation(n_targets: int, *, added: bool) -> Any:
             shares, given, taken = arrays
             _, at, stride, apart, _, start, count, _, to = arguments
             eight = ir.Constant(at.type, LANES)
-            sums = [cgutils.alloca_once_value(builder, ir.Constant(VECTOR, None)) for _ in range(n_targets)]
+            sums = [
+                cgutils.alloca_once_value(builder, ir.Constant(VECTOR, None))
+                for _ in range(n_targets)
+            ]
             with cgutils.for_range(builder, count) as loop:
                 row = _load(builder, given, builder.mul(builder.add(start, loop.index), eight))
                 place = builder.add(at, builder.mul(loop.index, stride))
@@ -55,7 +58,9 @@ def _summation(n_targets: int, *, added: bool) -> Any:
                 offset = builder.mul(builder.add(to, ir.Constant(to.type, q)), eight)
                 pointer = _pointer(builder, taken, offset)
                 change = builder.fadd if added else builder.fsub
-                builder.store(change(builder.load(pointer, align=8), builder.load(total)), pointer, align=8)
+                builder.store(
+                    change(builder.load(pointer, align=8), builder.load(total)), pointer, align=8
+                )
             return context.get_dummy_value()
 
         return signature, generate

@@ -135,7 +135,19 @@ def find_supernodes(parent, counts, first, heights, widths, zeros, keep):
 @njit
 @no_type_check
 def find_front_rows(
-    indptr, indices, order, place, parent, first, begins, rows, above, home, first_child, sibling, mark
+    indptr,
+    indices,
+    order,
+    place,
+    parent,
+    first,
+    begins,
+    rows,
+    above,
+    home,
+    first_child,
+    sibling,
+    mark,
 ):
     """Fill for each supernode the rows of its front, ascending, from rows[begins[s]] on, and its parent supernode.
 

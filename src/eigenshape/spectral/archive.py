@@ -21,11 +21,17 @@ ROUNDING = 1e-6  # of the largest eigenvalue: how far below 0 rounding may put o
 
 
 def write_archive(
-    path: str | Path, arrays: dict[str, np.ndarray], mass: sp.csr_array, certificate: Certificate, key: str | None
+    path: str | Path,
+    arrays: dict[str, np.ndarray],
+    mass: sp.csr_array,
+    certificate: Certificate,
+    key: str | None,
 ) -> None:
     """Write what a spectrum holds, and the key of what it was computed from."""
     parts: dict[str, Any] = {f"mass_{name}": getattr(mass, name) for name in MASS}
-    head = json.dumps({"eigenshape_spectrum": FORMAT, "key": key, "certificate": asdict(certificate)})
+    head = json.dumps(
+        {"eigenshape_spectrum": FORMAT, "key": key, "certificate": asdict(certificate)}
+    )
     with replacing(Path(path)) as file:
         np.savez(file, **{**parts, **arrays, "head": np.array(head)})
 
@@ -53,7 +59,9 @@ def read_archive(path: str | Path, key: str | None) -> dict[str, Any]:
     except FileFormatError:
         raise
     except (KeyError, TypeError, ValueError, EOFError, MemoryError, zipfile.BadZipFile) as error:
-        raise FileFormatError(f"{path} must hold a spectrum that eigenshape saved; {error}.") from error
+        raise FileFormatError(
+            f"{path} must hold a spectrum that eigenshape saved; {error}."
+        ) from error
     _require_sound(path, {**arrays, "mass": mass.data}, certificate)
     return {**arrays, "mass": mass, "certificate": certificate}
 
@@ -74,12 +82,16 @@ def _certificate(path: str | Path, head: dict[str, Any], key: str | None) -> Cer
             f"{path} must hold a spectrum in format {FORMAT}; it is in format {head['eigenshape_spectrum']}."
         )
     if key is not None and head["key"] != key:
-        raise FileFormatError(f"{path} must hold the spectrum of the key {key}; its key is {head['key']}.")
+        raise FileFormatError(
+            f"{path} must hold the spectrum of the key {key}; its key is {head['key']}."
+        )
     facts = head["certificate"]
     facts = {**facts, "gap": tuple(facts["gap"]), "clusters": tuple(facts["clusters"])}
     for name, kind in typing.get_type_hints(Certificate).items():
         if not _is_of(facts[name], kind):
-            raise FileFormatError(f"{path} must hold a certificate whose {name} is {kind}; it is {facts[name]!r}.")
+            raise FileFormatError(
+                f"{path} must hold a certificate whose {name} is {kind}; it is {facts[name]!r}."
+            )
     return Certificate(**facts)
 
 
@@ -95,13 +107,20 @@ def _is_of(value: object, kind: Any) -> bool:
     return isinstance(value, kinds) or (float in kinds and isinstance(value, int))
 
 
-def _require_sound(path: str | Path, arrays: dict[str, np.ndarray], certificate: Certificate) -> None:
+def _require_sound(
+    path: str | Path, arrays: dict[str, np.ndarray], certificate: Certificate
+) -> None:
     for name, array in arrays.items():
         if array.dtype != np.float64 or not np.isfinite(array).all():
-            raise FileFormatError(f"{path} must hold finite float64 numbers as {name}; there are others.")
+            raise FileFormatError(
+                f"{path} must hold finite float64 numbers as {name}; there are others."
+            )
     n, k = len(arrays["eigenvectors"]), arrays["eigenvalues"].size
     shapes = {name: arrays[name].shape for name in ARRAYS}
-    if shapes != {"eigenvalues": (k,), "eigenvectors": (n, k), "residuals": (k,)} or certificate.n_pairs != k:
+    if (
+        shapes != {"eigenvalues": (k,), "eigenvectors": (n, k), "residuals": (k,)}
+        or certificate.n_pairs != k
+    ):
         raise FileFormatError(
             f"{path} must hold arrays that fit one another; their shapes are {shapes}, and {certificate.n_pairs} pairs "
             f"are certified."
@@ -114,7 +133,11 @@ def _require_sound(path: str | Path, arrays: dict[str, np.ndarray], certificate:
             f"{path} must hold ascending eigenvalues; number {at} is {values[at]} after {values[at - 1]}."
         )
     if k and values[0] < -max(certificate.resolution, ROUNDING * values[-1]):
-        raise FileFormatError(f"{path} must hold eigenvalues of at least 0; number 0 is {values[0]}.")
+        raise FileFormatError(
+            f"{path} must hold eigenvalues of at least 0; number 0 is {values[0]}."
+        )
     if (arrays["residuals"] < 0).any():
         at = int(np.argmax(arrays["residuals"] < 0))
-        raise FileFormatError(f"{path} must hold residuals of at least 0; number {at} is {arrays['residuals'][at]}.")
+        raise FileFormatError(
+            f"{path} must hold residuals of at least 0; number {at} is {arrays['residuals'][at]}."
+        )

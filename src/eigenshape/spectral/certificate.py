@@ -1,4 +1,4 @@
-"""The proof that nothing is missing from a spectrum, or the word that there is none."""
+"""The proof that no eigenvalue of a spectrum is missing."""
 
 from dataclasses import dataclass
 
@@ -7,46 +7,59 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Certificate:
-    """Why these are the lowest eigenvalues, or all in an interval, with none missing and none extra.
+    """The proof that a spectrum contains all eigenvalues, with none missing and none extra.
 
-    Sylvester's law of inertia: the factor of W - σB has as many negative pivots as there are eigenvalues below σ.
-    With as many B-orthonormal eigenvectors found, whose error intervals end below σ, none is missing and none is
-    extra. Where the last of the k eigenvalues has equals (to `resolution`) beyond the k, σ stands below all of
-    these equals, and those found at the level of the last eigenvalue are the rest of the k. In an interval far up a
-    second factor counts below its lower end, and the difference of the counts is what must be found.
+    By Sylvester's law of inertia, the number of negative pivots of a factor of W - σB is the number
+    of eigenvalues below σ. If as many B-orthonormal eigenvectors were found, and their error
+    intervals end below σ, none is missing and none is extra. If the k-th eigenvalue is multiple (to
+    `resolution`) and more copies follow, σ is below all copies, and the pairs found at the level of
+    the k-th eigenvalue are the rest of the k. For an interval far up in the spectrum a second factor
+    counts below its lower end, and the difference of the counts must have been found.
 
     Attributes
     ----------
     n_pairs : int
-        Eigenpairs k that are certified.
+        Number of certified eigenpairs k.
     first : int
-        Number of the first of them among all, 0 for the lowest: so many eigenvalues lie below it.
+        Index of the first of them among all eigenvalues, 0 for the lowest: the number of eigenvalues
+        below it.
     floor : float
-        Where the count of an interval begins, in 1/length²; -inf where it begins below all eigenvalues.
+        Lower end of the count, in 1/length²; -inf if all eigenvalues below σ are counted.
     shift : float
-        σ, in 1/length²; infinite where all n eigenvalues were computed, or nothing was counted.
+        σ, in 1/length²; infinite if all n eigenvalues were computed, or nothing was counted.
     count : int or None
-        Eigenvalues below σ, and above `floor`, by inertia; None where they were not counted (`approximate_spectrum`).
+        Number of eigenvalues between `floor` and σ, by inertia; None if they were not counted
+        (approximate method).
     n_found : int
-        Eigenpairs found there; equal to `count`, or the spectrum is refused.
+        Number of eigenpairs found there. It equals `count`, or the spectrum is refused.
     gap : (float, float)
-        An interval around σ, in 1/length², that is free of eigenvalues up to its upper end by the count and above
-        its lower end by the error intervals of what was found.
+        An interval around σ, in 1/length², without eigenvalues: its upper part by the count, its
+        lower part by the error intervals of the eigenvalues.
     resolution : float
-        Eigenvalues closer than this, in 1/length², are taken for one: the rounding of the factor and of the
-        eigenvectors, or 1e-6 of the largest eigenvalue where that is more.
+        Eigenvalues closer than this, in 1/length², count as equal: the rounding of the factor and of
+        the eigenvectors, and at least 1e-6 of the largest eigenvalue.
     orthonormality : float
         Largest entry of |ΦᵀBΦ - I|.
     max_residual : float
         Largest of `Spectrum.residuals`, relative to the largest eigenvalue found.
     n_split : int
-        Eigenvalues equal to the k-th (to `resolution`) that were not asked for. Where it is not 0, the k-th
-        eigenvector is one choice among many inside an eigenspace that was cut.
+        Number of eigenvalues equal to the k-th (to `resolution`) that are not among the k. If it is
+        not 0, the k-th eigenvector is one of many choices inside a truncated eigenspace.
     clusters : tuple of int
-        Sizes of the clusters that the eigenvalues fall into, ascending: within one, neighbours are equal to 1e-6 of
-        the largest eigenvalue, or to the rounding of the vectors where that is more.
+        Sizes of the clusters of eigenvalues, in ascending order of eigenvalues. Within a cluster
+        neighbors are equal to 1e-6 of the largest eigenvalue, or to the rounding of the vectors.
     estimate : float or None
-        Of approximations: how far the last round of refinement lowered an eigenvalue, relative to the largest.
+        Approximate method: estimated error of the eigenvalues, relative to the largest.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(es.icosphere(3)), 6)
+    >>> proof = spectrum.certificate
+    >>> proof.complete, proof.n_pairs, proof.n_split
+    (True, 6, 3)
+
+    The last two of the six eigenvalues belong to a cluster of five, of which three were left out.
     """
 
     n_pairs: int
@@ -65,22 +78,22 @@ class Certificate:
 
     @property
     def complete(self) -> bool:
-        """Whether what was found is what there is."""
+        """Whether all eigenvalues that were counted were found."""
         return self.count == self.n_found
 
     @property
     def n_missing(self) -> int:
-        """Eigenvalues counted below σ that were not found there; 0 where nothing was counted."""
+        """Number of eigenvalues counted and not found; 0 if nothing was counted."""
         return 0 if self.count is None else self.count - self.n_found
 
     def explain(self) -> str:
-        """Say in plain words what is proved and how."""
+        """Return a text that says what is proved, and how."""
         if self.count is None:
             return (
                 f"These are approximations, {self.n_pairs} of them: by what the last round of refinement changed, each "
                 f"is off an eigenvalue by about {self.estimate or 0.0:.1e} of the largest, and for certain by at most "
                 f"{self.max_residual:.1e}. The eigenvectors are orthonormal to {self.orthonormality:.1e}. Whether one "
-                f"is missing was not counted; solve_spectrum proves that none is."
+                f"is missing was not counted; the certified method of solve_spectrum proves that none is."
             )
         if not self.complete:
             return (
@@ -94,7 +107,9 @@ class Certificate:
         if self.first:
             return f"These are the eigenvalues from number {self.first} to {self.first + self.n_pairs - 1}"
         return (
-            "This is the lowest eigenvalue" if self.n_pairs == 1 else f"These are the {self.n_pairs} lowest eigenvalues"
+            "This is the lowest eigenvalue"
+            if self.n_pairs == 1
+            else f"These are the {self.n_pairs} lowest eigenvalues"
         )
 
     def _how(self) -> str:

@@ -15,20 +15,40 @@ from eigenshape.spectral.certificate import Certificate
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """The k lowest eigenpairs of a Laplacian, or those of an interval, with their proof.
+    """Eigenvalues and eigenvectors of a Laplacian, with the certificate that none is missing.
+
+    These are the k lowest eigenpairs, or all eigenpairs in an interval.
 
     Attributes
     ----------
     eigenvalues : (k,) float
         λ ≥ 0 in ascending order, in 1/length².
     eigenvectors : (n, k) float
-        Φ with ΦᵀBΦ = I. The entry of largest size in a column is positive (the first one, where several come within
-        1e-6 of it), so the same input gives the same columns.
+        Φ with ΦᵀBΦ = I. In each column the entry of largest absolute value is positive (the first
+        one, if several agree to 1e-6), so the same input gives the same columns.
     mass : (n, n) sparse
         B of the operator.
     residuals : (k,) float
-        |λ - true eigenvalue| is at most this, in 1/length²: the norm of W φ - λ B φ in B⁻¹, or a bound of it.
+        Bounds of the errors of the eigenvalues, in 1/length²: the norm of W φ - λ B φ in B⁻¹, or an
+        upper bound of it.
     certificate : Certificate
+        What is proved of the eigenvalues. `certificate.explain()` says it in words.
+
+    See Also
+    --------
+    solve_spectrum : Compute a spectrum.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(es.icosphere(2)), 9)
+    >>> spectrum.eigenvectors.shape
+    (162, 9)
+    >>> gram = spectrum.eigenvectors.T @ spectrum.mass @ spectrum.eigenvectors
+    >>> bool(abs(gram - [[i == j for j in range(9)] for i in range(9)]).max() < 1e-10)
+    True
+    >>> print(spectrum.certificate.explain()[:56])
+    These are the 9 lowest eigenvalues of the operator: none
     """
 
     eigenvalues: Float[np.ndarray, " k"]
@@ -38,54 +58,63 @@ class Spectrum:
     certificate: Certificate
 
     def save(self, path: str | Path, *, key: str | None = None) -> None:
-        """Write the spectrum to a .npz file, whole or not at all; `load` reads it again to the last digit.
+        """Write the spectrum to a .npz file; `load` reads it back bit for bit.
+
+        The file is written completely or not at all.
 
         Parameters
         ----------
         path : str or Path
         key : str, optional
-            What tells this spectrum from others, such as a hash of the mesh; `load` can require it.
+            A label, such as a hash of the mesh, that `load` can require.
 
         Raises
         ------
         OSError
-            If the system cannot write there.
+            If the file cannot be written.
         """
-        arrays = {"eigenvalues": self.eigenvalues, "eigenvectors": self.eigenvectors, "residuals": self.residuals}
+        arrays = {
+            "eigenvalues": self.eigenvalues,
+            "eigenvectors": self.eigenvectors,
+            "residuals": self.residuals,
+        }
         write_archive(path, arrays, self.mass, self.certificate, key)
 
     @classmethod
     def load(cls, path: str | Path, *, key: str | None = None) -> "Spectrum":
-        """Read a spectrum that `save` wrote; no code in a file is ever run.
+        """Read a spectrum from a file that `save` wrote. No code in the file is ever run.
 
         Parameters
         ----------
         path : str or Path
         key : str, optional
-            The one that it must have been saved with; by default any.
+            The key with which the spectrum must have been saved. By default any key is accepted.
 
         Raises
         ------
         OSError
-            If the system cannot read it.
+            If the file cannot be read.
         FileFormatError
-            If it is no such file, is cut off, its parts do not fit one another, it holds what no spectrum holds
-            (numbers that are not finite, eigenvalues that descend or are negative), or its key is another.
+            If the file is not a spectrum, is truncated, its parts do not fit together, its numbers
+            are not finite, its eigenvalues are negative or not ascending, or its key differs.
         """
         parts = read_archive(path, key)
-        arrays = {name: frozen(parts[name]) for name in ("eigenvalues", "eigenvectors", "residuals")}
+        arrays = {
+            name: frozen(parts[name]) for name in ("eigenvalues", "eigenvectors", "residuals")
+        }
         return cls(**arrays, mass=parts["mass"], certificate=parts["certificate"])
 
 
 def require_lowest(spectrum: Spectrum, name: str) -> None:
-    """Refuse the spectrum of an interval.
+    """Raise an error if a spectrum does not begin with the lowest eigenvalue.
 
     Raises
     ------
     InvalidParameterError
-        If it does not begin with number 0.
+        If the spectrum is that of an interval.
     """
     if spectrum.certificate.first:
         raise InvalidParameterError(
-            f"{name} must begin with the lowest eigenvalue; it begins with number {spectrum.certificate.first}."
+            f"{name} must begin with the lowest eigenvalue; it begins with number "
+            f"{spectrum.certificate.first}. Use solve_spectrum without above."
         )

@@ -179,7 +179,9 @@ def preimages(
     counterpart = np.full(n, OUTSIDE)
     counterpart[perturbation.outside_two] = perturbation.outside_one
     outside = labels == OUTSIDE
-    before = place_points(perturbation.one, counterpart[points.simplices[outside]], points.weights[outside])
+    before = place_points(
+        perturbation.one, counterpart[points.simplices[outside]], points.weights[outside]
+    )
     return labels, before.points
 
 
@@ -201,7 +203,9 @@ def regions_met(perturbation: Perturbation, nodes: Points, reach: float) -> Bool
         unsure = np.flatnonzero(~found[:, region] & np.isfinite(away))
         for node, point in zip(unsure, nodes[unsure] / scale, strict=True):
             near = some[(np.linalg.norm(some - point, axis=2) <= farthest).any(axis=1)]
-            found[node, region] = squared_distances(point[None], near).min(initial=np.inf) <= within**2
+            found[node, region] = (
+                squared_distances(point[None], near).min(initial=np.inf) <= within**2
+            )
     return found
 
 

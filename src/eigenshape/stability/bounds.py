@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import ArrayLike
 from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_numbers
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.operators.kernel import EDGE_FACTOR, LAST
 from eigenshape.operators.laplacian import Laplacian
 
@@ -79,7 +79,11 @@ def _permutation(partners: ArrayLike | None, n: int) -> np.ndarray:
     order = whole_numbers(partners, "partners", 0, n - 1)
     times = np.bincount(order, minlength=n)
     if len(order) != n or times.max() > 1:
-        fact = f"there are {len(order)} of {n}" if len(order) != n else f"point {times.argmax()} has {times.max()}"
+        fact = (
+            f"there are {len(order)} of {n}"
+            if len(order) != n
+            else f"point {times.argmax()} has {times.max()}"
+        )
         raise InvalidParameterError(f"partners must name each point once; {fact}.")
     return order
 
@@ -104,10 +108,18 @@ def _norm(matrix: sp.csr_array) -> float:
     start = np.random.default_rng(0).standard_normal(n)
     try:
         values = eigsh(
-            matrix / size, 1, which="LM", v0=start, tol=TOLERANCE, maxiter=MOST_STEPS, return_eigenvectors=False
+            matrix / size,
+            1,
+            which="LM",
+            v0=start,
+            tol=TOLERANCE,
+            maxiter=MOST_STEPS,
+            return_eigenvectors=False,
         )
     except ArpackNoConvergence as err:
-        raise ConvergenceError(f"The norm of a difference of operators was not found in {MOST_STEPS} steps.") from err
+        raise ConvergenceError(
+            f"The norm of a difference of operators was not found in {MOST_STEPS} steps."
+        ) from err
     return size * float(np.abs(values[0]))
 
 
@@ -128,7 +140,7 @@ class TimeRange:
     reach: float
 
     @property
-    def low_by(self) -> str:
+    def low_reason(self) -> str:
         """What asks for the least: "closeness", t ≥ δ² (Theorem 4.1.1), or "spacing"."""
         return "closeness" if self.low > self.reach else "spacing"
 
@@ -142,7 +154,7 @@ class TimeRange:
         smaller = {
             "closeness": "smaller ones hear the change and not the shape, as t is under δ²",
             "spacing": "smaller ones do not reach from point to point",
-        }[self.low_by]
+        }[self.low_reason]
         low = f"{self.low:.3g} ({smaller})"
         high = f"{self.high:.3g} (larger ones press the last eigenvalues into what a kernel cannot tell apart)"
         if self.empty:
@@ -150,7 +162,9 @@ class TimeRange:
         return f"Trust heat times from {low} to {high}."
 
 
-def trusted_times(*, delta: float, spacing: float, eigenvalue: float, corrected: bool = False) -> TimeRange:
+def admissible_times(
+    *, delta: float, spacing: float, eigenvalue: float, corrected: bool = False
+) -> TimeRange:
     """Say at which heat times the eigenvalues of a kernel up to a given one can be trusted.
 
     At least δ² (Theorem 4.1.1 asks for more than any δ^(2-ε)), and at least what makes the width h = 2√t twice the

@@ -78,7 +78,9 @@ def cheeger_estimate(
     require_type(spectrum, Spectrum, "spectrum")
     values = _first_values(mesh, spectrum)
     count = min(whole_number(n_modes, "n_modes", 1), len(values) - 1)
-    cuts = [(*_best_cut(mesh, spectrum.eigenvectors[:, mode]), mode) for mode in range(1, count + 1)]
+    cuts = [
+        (*_best_cut(mesh, spectrum.eigenvectors[:, mode]), mode) for mode in range(1, count + 1)
+    ]
     upper, level, mode = min(cuts)
     a = np.sqrt(max(-least_curvature, 0.0)) if least_curvature is not None else np.inf
     lower = (np.sqrt(a**2 + 10 * values[1]) - a) / 10 if np.isfinite(a) else 0.0
@@ -132,7 +134,10 @@ def _slopes(
 
 
 def _ratio(
-    corners: Float[np.ndarray, "f 3"], areas: Float[np.ndarray, " f"], slopes: Float[np.ndarray, " f"], level: float
+    corners: Float[np.ndarray, "f 3"],
+    areas: Float[np.ndarray, " f"],
+    slopes: Float[np.ndarray, " f"],
+    level: float,
 ) -> float:
     """Return length over smaller area of the line at a level; corners hold ascending values."""
     low, middle, high = corners.T
@@ -148,4 +153,6 @@ def _ratio(
         length += float((2 * areas[chosen] * slopes[chosen] * share / reach).sum())
     part = float(below.sum())
     smaller = min(part, float(areas.sum()) - part)
-    return length / smaller if smaller > 0 else np.inf  # a level at a vertex of few faces may part nothing
+    return (
+        length / smaller if smaller > 0 else np.inf
+    )  # a level at a vertex of few faces may part nothing

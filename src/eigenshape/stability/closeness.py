@@ -5,17 +5,17 @@ from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_rows, frozen
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.enclosing_ball import enclosing_ball
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import require_volumes, size_one, volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.stability.perturbation import Perturbation, perturbation, vertex_pairs
+from eigenshape.stability.perturbation import Perturbation, measure_perturbation, vertex_pairs
 
 Limit = Literal["nothing", "displacement", "Jacobian", "ball", "volume"]
 
@@ -72,9 +72,8 @@ class Closeness:
             "ball": "the size of the regions decides",
             "volume": "how much the volume of a region changes decides",
         }[self.limited_by]
-        return (
-            f"{outside}{inside if len(self.radii) else ''} The shapes are δ-close from δ = {self.delta:.3g}: {decides}."
-        )
+        regions = inside if len(self.radii) else ""
+        return f"{outside}{regions} The shapes are δ-close from δ = {self.delta:.3g}: {decides}."
 
 
 def measure_closeness(perturbation: Perturbation) -> Closeness:
@@ -101,7 +100,8 @@ def measure_closeness(perturbation: Perturbation) -> Closeness:
     here, there, scale = _scaled(perturbation)
     pairs = vertex_pairs(perturbation)
     volumes_one, volumes_two = (
-        volumes(points[mesh.simplices]) for points, mesh in ((here, perturbation.one), (there, perturbation.two))
+        volumes(points[mesh.simplices])
+        for points, mesh in ((here, perturbation.one), (there, perturbation.two))
     )
     regions = range(perturbation.n_regions)
     return _closeness(
@@ -141,10 +141,12 @@ def map_closeness(mesh: MeshLike, images: ArrayLike) -> Closeness:
             f"A map must have one image a vertex; there are {len(places)} images of {mesh.n_points} vertices."
         )
     kind = TriangleMesh if isinstance(mesh, TriangleMesh) else SimplicialMesh
-    return measure_closeness(perturbation(mesh, kind(places, mesh.simplices)))
+    return measure_closeness(measure_perturbation(mesh, kind(places, mesh.simplices)))
 
 
-def _scaled(perturbation: Perturbation) -> tuple[Float[np.ndarray, "n d"], Float[np.ndarray, "k d"], float]:
+def _scaled(
+    perturbation: Perturbation,
+) -> tuple[Float[np.ndarray, "n d"], Float[np.ndarray, "k d"], float]:
     """Return the points of both shapes divided by one power of two, and that power."""
     n = perturbation.one.n_points
     points, scale = size_one(np.concatenate([perturbation.one.points, perturbation.two.points]))
@@ -152,11 +154,16 @@ def _scaled(perturbation: Perturbation) -> tuple[Float[np.ndarray, "n d"], Float
 
 
 def _radius(
-    perturbation: Perturbation, here: Float[np.ndarray, "n d"], there: Float[np.ndarray, "k d"], region: int
+    perturbation: Perturbation,
+    here: Float[np.ndarray, "n d"],
+    there: Float[np.ndarray, "k d"],
+    region: int,
 ) -> float:
     corners_one = perturbation.one.simplices[perturbation.regions_one == region]
     corners_two = perturbation.two.simplices[perturbation.regions_two == region]
-    return enclosing_ball(np.concatenate([here[np.unique(corners_one)], there[np.unique(corners_two)]])).radius
+    return enclosing_ball(
+        np.concatenate([here[np.unique(corners_one)], there[np.unique(corners_two)]])
+    ).radius
 
 
 def _parts(
@@ -195,7 +202,9 @@ def _closeness(
     )
 
 
-def _sums(values: Float[np.ndarray, " s"], labels: Int[np.ndarray, " s"]) -> Float[np.ndarray, " r"]:
+def _sums(
+    values: Float[np.ndarray, " s"], labels: Int[np.ndarray, " s"]
+) -> Float[np.ndarray, " r"]:
     """Sum the values of each region."""
     return np.bincount(labels + 1, weights=values, minlength=labels.max() + 2)[1:]
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_rows, frozen, positive_values
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.features.least_matching import least_perfect, near_pairs
 from eigenshape.features.matching_loops import match_rows
 from eigenshape.geometry.simplices import size_one
@@ -138,7 +138,9 @@ def _witnessed(
         rows.append(np.repeat(met, len(inside)))
         columns.append(np.tile(inside, len(met)))
     ends = np.concatenate(rows), np.concatenate(columns)
-    graph = sp.csr_array((np.ones(len(ends[0]), dtype=np.int8), ends), shape=(len(nodes), len(labels)))
+    graph = sp.csr_array(
+        (np.ones(len(ends[0]), dtype=np.int8), ends), shape=(len(nodes), len(labels))
+    )
     graph.sort_indices()
     return graph
 

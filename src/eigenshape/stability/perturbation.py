@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import as_array, frozen
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.simplicial import Mesh
@@ -56,8 +56,12 @@ class Perturbation:
         return np.flatnonzero(self.regions_two == OUTSIDE)
 
 
-def perturbation(
-    one: MeshLike, two: MeshLike, *, regions_one: ArrayLike | None = None, regions_two: ArrayLike | None = None
+def measure_perturbation(
+    one: MeshLike,
+    two: MeshLike,
+    *,
+    regions_one: ArrayLike | None = None,
+    regions_two: ArrayLike | None = None,
 ) -> Perturbation:
     """Say how one shape became another: by a map, and by anything at all in some regions.
 
@@ -90,7 +94,10 @@ def perturbation(
         raise InvalidParameterError(
             f"Two shapes must have the same dimensions to correspond; these have (m, d) = {dims[0]} and {dims[1]}."
         )
-    labels_one, labels_two = _labels(regions_one, one, "regions_one"), _labels(regions_two, two, "regions_two")
+    labels_one, labels_two = (
+        _labels(regions_one, one, "regions_one"),
+        _labels(regions_two, two, "regions_two"),
+    )
     _require_same_regions(labels_one, labels_two)
     found = Perturbation(one, two, frozen(labels_one), frozen(labels_two))
     _require_rims(found, vertex_pairs(found))

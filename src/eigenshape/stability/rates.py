@@ -6,11 +6,11 @@ from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 
 THEOREMS = ("3.1.1", "3.1.3", "3.1.4", "3.1.5", "4.1.1", "4.3.1", "lipschitz", "dense")
 MOST_DIM = 100
@@ -73,11 +73,13 @@ def theorem_rate(theorem: str, dim: SupportsIndex) -> Rate:
         "dense": Rate(1.0, -3 / 2, 4 * exp(lgamma((m + 1) / 2) - lgamma(m / 2))),
     }
     if theorem not in rates:
-        raise InvalidParameterError(f"theorem must be one of {', '.join(THEOREMS)}; it is {theorem!r}.")
+        raise InvalidParameterError(
+            f"theorem must be one of {', '.join(THEOREMS)}; it is {theorem!r}."
+        )
     return rates[theorem]
 
 
-def cover_by_rate(rate: Rate, delta: ArrayLike, t: ArrayLike, measured: ArrayLike) -> Rate:
+def bounding_rate(rate: Rate, delta: ArrayLike, t: ArrayLike, measured: ArrayLike) -> Rate:
     """Give a law the least constant with which it covers all that was measured.
 
     Parameters
@@ -127,10 +129,14 @@ def fit_rate(delta: ArrayLike, t: ArrayLike, measured: ArrayLike) -> Rate:
     return Rate(float(exponents[0]), float(exponents[1]), constant)
 
 
-def _measurements(delta: ArrayLike, t: ArrayLike, measured: ArrayLike) -> tuple[Float[np.ndarray, " q"], ...]:
+def _measurements(
+    delta: ArrayLike, t: ArrayLike, measured: ArrayLike
+) -> tuple[Float[np.ndarray, " q"], ...]:
     named = {"delta": delta, "t": t, "measured": measured}
     rows = [np.atleast_1d(positive_values(value, name)) for name, value in named.items()]
     counts = [len(row) for row in rows]
     if len(set(counts)) > 1:
-        raise InvalidParameterError(f"delta, t and measured must be equally many; they are {counts}.")
+        raise InvalidParameterError(
+            f"delta, t and measured must be equally many; they are {counts}."
+        )
     return tuple(rows)

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.simplicial import Mesh
@@ -18,8 +18,8 @@ from eigenshape.operators.kernel import neighbor_distance
 from eigenshape.spectral.bounds.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.comparison.angles import EigenspaceAngles, eigenspace_angles
 from eigenshape.spectral.comparison.spectra import SpectrumComparison, compare_spectra
-from eigenshape.spectral.solver.solve import solve_spectrum
-from eigenshape.stability.bounds import TimeRange, trusted_times
+from eigenshape.spectral.solve import solve_spectrum
+from eigenshape.stability.bounds import TimeRange, admissible_times
 from eigenshape.stability.closeness import Closeness, map_closeness
 from eigenshape.stability.sampled import (
     ChangeAtTime,
@@ -98,12 +98,20 @@ class StabilityReport:
 
     def explain(self) -> str:
         """Say in plain words what was found, a paragraph each."""
-        where = "from vertex to vertex" if self.closeness else f"between {self.n_samples} matched points of each"
+        where = (
+            "from vertex to vertex"
+            if self.closeness
+            else f"between {self.n_samples} matched points of each"
+        )
         lines = [self.spectra.explain(), self._lie()]
         if self.closeness:
             lines.append(self.closeness.explain())
-        lines += [self.times.explain(), self._heard(), f"Eigenspaces, {where}: {self.angles.explain()}"]
-        if not self.closeness and self.times.low_by == "closeness":
+        lines += [
+            self.times.explain(),
+            self._heard(),
+            f"Eigenspaces, {where}: {self.angles.explain()}",
+        ]
+        if not self.closeness and self.times.low_reason == "closeness":
             lines.append(
                 "Points were matched as the shapes lie. Of one shape in two poses that tells little: bring a map "
                 "between their vertices, or look at the eigenvalues alone."
@@ -118,7 +126,7 @@ class StabilityReport:
         )
 
     def _heard(self) -> str:
-        seen = [change for change in self.changes if change.seen]
+        seen = [change for change in self.changes if change.significant]
         if not seen:
             return "At no heat time do graph Laplacians of such samples tell the shapes apart: sampling does as much."
         worst = max(seen, key=lambda change: change.change / change.floor)
@@ -186,10 +194,18 @@ def compare_shapes(
     distance = float(max(each.max() for each in distances))
     closeness = map_closeness(meshes[0], two.points[told]) if meshes and told is not None else None
     delta = float(closeness.displacement.max()) if closeness else distance
-    spacing = max(neighbor_distance(points, one.dim) for points in (samples.one, samples.two, samples.again))
-    times = trusted_times(delta=delta, spacing=spacing, eigenvalue=float(spectra[0].eigenvalues[-1]))
+    spacing = max(
+        neighbor_distance(points, one.dim) for points in (samples.one, samples.two, samples.again)
+    )
+    times = admissible_times(
+        delta=delta, spacing=spacing, eigenvalue=float(spectra[0].eigenvalues[-1])
+    )
     changes, angles = changes_over_times(
-        samples, k, chosen.times or spaced_times(times), times, lambda share, what: tell(0.5 + share / 2, what)
+        samples,
+        k,
+        chosen.times or spaced_times(times),
+        times,
+        lambda share, what: tell(0.5 + share / 2, what),
     )
     if told is not None:
         angles = eigenspace_angles(*spectra, points=told, laplacian=laplacians[0])
@@ -214,7 +230,9 @@ def _checked(plan: StabilityPlan, one: Shape, two: Shape) -> tuple[int, int]:
     kinds = [(shape.dim, shape.points.shape[1]) for shape in (one, two)]
     if kinds[0] != kinds[1]:
         said = " and ".join(f"{dim} in R^{d}" for dim, d in kinds)
-        raise InvalidParameterError(f"Shapes to compare must have one dimension, in one space; theirs are {said}.")
+        raise InvalidParameterError(
+            f"Shapes to compare must have one dimension, in one space; theirs are {said}."
+        )
     if plan.times:
         positive_values(np.array(plan.times), "times")
     clouds = [shape for shape in (one, two) if isinstance(shape, PointCloud)]
@@ -230,11 +248,15 @@ def _checked(plan: StabilityPlan, one: Shape, two: Shape) -> tuple[int, int]:
     return n_samples, whole_number(k, "k", 2, most)
 
 
-def _meshes(one: Shape, two: Shape, plan: StabilityPlan, partners: ArrayLike | None) -> tuple[Mesh, Mesh] | None:
+def _meshes(
+    one: Shape, two: Shape, plan: StabilityPlan, partners: ArrayLike | None
+) -> tuple[Mesh, Mesh] | None:
     if not isinstance(one, PointCloud) and not isinstance(two, PointCloud):
         return one, two
     if plan.brackets or partners is not None:
-        raise InvalidParameterError(f"brackets and partners are for meshes; the shapes are {one!r} and {two!r}.")
+        raise InvalidParameterError(
+            f"brackets and partners are for meshes; the shapes are {one!r} and {two!r}."
+        )
     return None
 
 
@@ -246,7 +268,9 @@ def _partners(one: Mesh, two: Mesh, partners: ArrayLike | None) -> Int[np.ndarra
         return np.arange(n) if same else None
     found = whole_numbers(partners, "partners", 0, two.n_points - 1)
     if len(found) != n:
-        raise InvalidParameterError(f"partners must be one a point of the first mesh; there are {len(found)} for {n}.")
+        raise InvalidParameterError(
+            f"partners must be one a point of the first mesh; there are {len(found)} for {n}."
+        )
     return found
 
 

@@ -22,7 +22,7 @@ from eigenshape.operators.kernel import (
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.neighbors import neighbor_graph
 from eigenshape.spectral.comparison.angles import EigenspaceAngles, eigenspace_angles
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 from eigenshape.stability.bounds import TimeRange, weyl_bound
 from eigenshape.stability.correspondence import BottleneckMatching, bottleneck_matching
@@ -30,7 +30,9 @@ from eigenshape.stability.rates import theorem_rate
 
 N_TIMES = 4
 DENSER = 20  # times as many points to measure distances to, as are matched
-ABOVE_SAMPLING = 2.0  # a change that is so much more than that of two samples of one shape is the shapes'
+ABOVE_SAMPLING = (
+    2.0  # a change that is so much more than that of two samples of one shape is the shapes'
+)
 
 Points = Float[np.ndarray, "n d"]
 
@@ -65,7 +67,7 @@ class ChangeAtTime:
     trusted: bool
 
     @property
-    def seen(self) -> bool:
+    def significant(self) -> bool:
         """Whether the change stands out from what sampling does."""
         return self.change > ABOVE_SAMPLING * self.floor
 
@@ -132,14 +134,19 @@ def changes_over_times(
 ) -> tuple[tuple[ChangeAtTime, ...], EigenspaceAngles]:
     """Return what changes at each heat time, and how far eigenspaces turn at the one in the middle."""
     changes = []
-    pieces = [(points, _pieces(points, samples.dim)) for points in (samples.one, samples.two, samples.again)]
+    pieces = [
+        (points, _pieces(points, samples.dim))
+        for points in (samples.one, samples.two, samples.again)
+    ]
     for place, t in enumerate(asked):
         progress(place / len(asked), f"heat time {t:.3g}")
         laplacians = [_whole(points, t, samples.dim, labels) for points, labels in pieces]
         spectra = [solve_spectrum(laplacian, k) for laplacian in laplacians]
         changes.append(_change(samples, laplacians, spectra, t, trusted))
         if place == len(asked) // 2:
-            angles = eigenspace_angles(*spectra[:2], points=samples.matched.partners, laplacian=laplacians[0])
+            angles = eigenspace_angles(
+                *spectra[:2], points=samples.matched.partners, laplacian=laplacians[0]
+            )
     return tuple(changes), angles
 
 
@@ -163,7 +170,11 @@ def _pieces(points: Points, dim: int) -> Int[np.ndarray, " n"]:
 
 
 def _change(
-    samples: Samples, laplacians: list[Laplacian], spectra: list[Spectrum], t: float, trusted: TimeRange
+    samples: Samples,
+    laplacians: list[Laplacian],
+    spectra: list[Spectrum],
+    t: float,
+    trusted: TimeRange,
 ) -> ChangeAtTime:
     values = [spectrum.eigenvalues for spectrum in spectra]
     last = float(values[0][-1])

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 import eigenshape as es
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape.retrieval.baselines import light_field as lf
+from eigenshape.retrieval.baselines import light_fields as lf
 from eigenshape.retrieval.baselines.light_field_loops import outline, power_sums, silhouette
 from eigenshape.scans.raster import EDGE_SLACK, THINNEST, rasterize
 
@@ -31,8 +31,17 @@ def test_moments_are_those_of_the_definition():
     r, angle = np.sqrt(rng.random(50)), 2 * np.pi * rng.random(50)
     found = lf.zernike_magnitudes(power_sums(r * np.cos(angle), r * np.sin(angle), lf.ORDER))
     # R_1^1 = r, R_2^0 = 2r² - 1, R_2^2 = r², R_3^1 = 3r³ - 2r, R_3^3 = r³, R_4^0 = 6r⁴ - 6r² + 1
-    radial = [(r, 1), (2 * r**2 - 1, 0), (r**2, 2), (3 * r**3 - 2 * r, 1), (r**3, 3), (6 * r**4 - 6 * r**2 + 1, 0)]
-    np.testing.assert_allclose(found[:6], [abs(np.mean(R * np.exp(1j * m * angle))) for R, m in radial], rtol=1e-12)
+    radial = [
+        (r, 1),
+        (2 * r**2 - 1, 0),
+        (r**2, 2),
+        (3 * r**3 - 2 * r, 1),
+        (r**3, 3),
+        (6 * r**4 - 6 * r**2 + 1, 0),
+    ]
+    np.testing.assert_allclose(
+        found[:6], [abs(np.mean(R * np.exp(1j * m * angle))) for R, m in radial], rtol=1e-12
+    )
     assert len(found) == 35
 
 
@@ -54,7 +63,9 @@ def test_the_outline_goes_once_around():
     path = outline(image, 2, 3)
     assert len(path) == 14 + 1
     assert np.array_equal(path[0], path[-1])
-    border = {(row, column) for row, column in np.argwhere(image) if row in (2, 5) or column in (3, 7)}
+    border = {
+        (row, column) for row, column in np.argwhere(image) if row in (2, 5) or column in (3, 7)
+    }
     assert {tuple(place) for place in path} == border
 
 
@@ -104,9 +115,13 @@ def test_a_turn_of_the_dodecahedron_is_no_difference():
     turn = Rotation.from_rotvec(2 * np.pi / 3 * lf._axes()[4]).as_matrix()
     turned = es.TriangleMesh(HAND.vertices @ turn.T, HAND.faces)
     one, two, other = (lf.light_field(mesh, n_fields=1) for mesh in (HAND, turned, ANT))
-    assert es.light_field_distance(one, one) == 0
-    assert es.light_field_distance(one, two) < 0.05 * es.light_field_distance(one, other)
-    assert es.light_field_distance(one, other) == pytest.approx(es.light_field_distance(other, one), rel=1e-12)
+    assert es.retrieval.baselines.light_field_distance(one, one) == 0
+    assert es.retrieval.baselines.light_field_distance(
+        one, two
+    ) < 0.05 * es.retrieval.baselines.light_field_distance(one, other)
+    assert es.retrieval.baselines.light_field_distance(one, other) == pytest.approx(
+        es.retrieval.baselines.light_field_distance(other, one), rel=1e-12
+    )
 
 
 @few
@@ -114,8 +129,13 @@ def test_a_turn_of_the_dodecahedron_is_no_difference():
 def test_any_turn_is_less_than_another_shape(seed):
     turn = Rotation.random(random_state=seed).as_matrix()
     turned = es.TriangleMesh(HAND.vertices @ turn.T, HAND.faces)
-    one, two, other = (es.light_field(mesh, n_fields=4, size=96) for mesh in (HAND, turned, ANT))
-    assert es.light_field_distance(one, two) < 0.5 * es.light_field_distance(one, other)
+    one, two, other = (
+        es.retrieval.baselines.light_field(mesh, n_fields=4, size=96)
+        for mesh in (HAND, turned, ANT)
+    )
+    assert es.retrieval.baselines.light_field_distance(
+        one, two
+    ) < 0.5 * es.retrieval.baselines.light_field_distance(one, other)
 
 
 @few
@@ -123,22 +143,30 @@ def test_any_turn_is_less_than_another_shape(seed):
 def test_size_and_place_drop_out(power, seed):
     place = np.random.default_rng(seed).standard_normal(3)
     moved = es.TriangleMesh(10.0**power * (HAND.vertices + place), HAND.faces)
-    one, two = (es.light_field(mesh, n_fields=1, size=96) for mesh in (HAND, moved))
+    one, two = (
+        es.retrieval.baselines.light_field(mesh, n_fields=1, size=96) for mesh in (HAND, moved)
+    )
     # A pixel at the very edge may fall to the other side by rounding.
     np.testing.assert_allclose(two, one, atol=0.01)
 
 
 def test_a_flat_shape_may_show_nothing():
-    found = es.light_field(es.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), n_fields=1, size=32)
+    found = es.retrieval.baselines.light_field(
+        es.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), n_fields=1, size=32
+    )
     assert np.isfinite(found).all()
 
 
 def test_bad_input_is_named():
-    with pytest.raises(InvalidShapeError, match="A shape must have area to be seen; all 1 faces have none"):
-        es.light_field(es.TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]))
+    with pytest.raises(
+        InvalidShapeError, match="A shape must have area to be seen; all 1 faces have none"
+    ):
+        es.retrieval.baselines.light_field(
+            es.TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
+        )
     with pytest.raises(InvalidParameterError, match=r"n_fields must lie in 1\.\.100; it is 0"):
-        es.light_field(HAND, n_fields=0)
+        es.retrieval.baselines.light_field(HAND, n_fields=0)
     with pytest.raises(InvalidParameterError, match=r"size must lie in 16\.\.4096; it is 8"):
-        es.light_field(HAND, size=8)
+        es.retrieval.baselines.light_field(HAND, size=8)
     with pytest.raises(InvalidParameterError, match="A light field must have shape"):
-        es.light_field_distance(np.zeros((1, 10, 45)), np.zeros((1, 10, 44)))
+        es.retrieval.baselines.light_field_distance(np.zeros((1, 10, 45)), np.zeros((1, 10, 44)))

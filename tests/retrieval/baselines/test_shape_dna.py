@@ -14,22 +14,26 @@ few = settings(deadline=None, max_examples=10)
 
 def bumpy(seed):
     rng = np.random.default_rng(seed)
-    mesh = es.torus(14, 9) if seed % 2 else es.icosphere(2)
-    return es.TriangleMesh(mesh.vertices + 0.03 * rng.standard_normal(mesh.vertices.shape), mesh.faces)
+    mesh = es.shapes.torus(14, 9) if seed % 2 else es.icosphere(2)
+    return es.TriangleMesh(
+        mesh.vertices + 0.03 * rng.standard_normal(mesh.vertices.shape), mesh.faces
+    )
 
 
 def test_on_a_sphere_it_is_known():
-    exact = 4 * np.pi * es.sphere_eigenvalues(21)[1:] / np.arange(1, 21)
-    np.testing.assert_allclose(es.shape_dna(es.icosphere(4)), exact, rtol=0.02)
+    exact = 4 * np.pi * es.shapes.sphere_eigenvalues(21)[1:] / np.arange(1, 21)
+    np.testing.assert_allclose(es.retrieval.baselines.shape_dna(es.icosphere(4)), exact, rtol=0.02)
 
 
 def test_lapy_divides_by_one_more():
-    mesh = es.torus(20, 12)
+    mesh = es.shapes.torus(20, 12)
     fem = lapy.TriaMesh(mesh.vertices, mesh.faces)
     values = shapedna.compute_shapedna(fem, k=21, lump=True)["Eigenvalues"]
     theirs = shapedna.reweight_ev(shapedna.normalize_ev(fem, values))[1:]
     rank = np.arange(1, 21)
-    np.testing.assert_allclose(theirs, es.shape_dna(mesh) * rank / (rank + 1), rtol=1e-6)
+    np.testing.assert_allclose(
+        theirs, es.retrieval.baselines.shape_dna(mesh) * rank / (rank + 1), rtol=1e-6
+    )
 
 
 @few
@@ -40,24 +44,37 @@ def test_size_place_and_numbering_drop_out(seed, power):
     moved = np.empty_like(mesh.vertices)
     moved[order] = 10.0**power * (mesh.vertices @ turn.as_matrix().T + rng.standard_normal(3))
     there = es.TriangleMesh(moved, order[mesh.faces])
-    np.testing.assert_allclose(es.shape_dna(there), es.shape_dna(mesh), rtol=1e-8)
+    np.testing.assert_allclose(
+        es.retrieval.baselines.shape_dna(there), es.retrieval.baselines.shape_dna(mesh), rtol=1e-8
+    )
 
 
 def test_the_distance_is_euclidean():
-    assert es.shape_dna_distance(np.array([1.0, 5.0]), np.array([4.0, 1.0])) == 5.0
+    assert (
+        es.retrieval.baselines.shape_dna_distance(np.array([1.0, 5.0]), np.array([4.0, 1.0])) == 5.0
+    )
 
 
 def test_poses_are_nearer_than_other_shapes():
-    one, two = (es.shape_dna(es.make_creature("biped", seed)) for seed in (0, 1))
-    assert es.shape_dna_distance(one, two) < es.shape_dna_distance(one, es.shape_dna(es.icosphere(3)))
+    one, two = (
+        es.retrieval.baselines.shape_dna(es.make_creature("biped", seed)) for seed in (0, 1)
+    )
+    assert es.retrieval.baselines.shape_dna_distance(
+        one, two
+    ) < es.retrieval.baselines.shape_dna_distance(
+        one, es.retrieval.baselines.shape_dna(es.icosphere(3))
+    )
 
 
 def test_bad_input_is_named():
     mesh = es.icosphere(0)
     with pytest.raises(InvalidParameterError, match=r"n_values must lie in 1\.\.11; it is 12"):
-        es.shape_dna(mesh, n_values=12)
+        es.retrieval.baselines.shape_dna(mesh, n_values=12)
     flat = es.TriangleMesh(np.zeros((4, 3)), [[0, 1, 2], [1, 2, 3]])
     with pytest.raises(InvalidShapeError):
-        es.shape_dna(flat, n_values=1)
-    with pytest.raises(InvalidParameterError, match="Only equal numbers of eigenvalues compare; the first shape has 2"):
-        es.shape_dna_distance(np.ones(2), np.ones(3))
+        es.retrieval.baselines.shape_dna(flat, n_values=1)
+    with pytest.raises(
+        InvalidParameterError,
+        match="Only equal numbers of eigenvalues compare; the first shape has 2",
+    ):
+        es.retrieval.baselines.shape_dna_distance(np.ones(2), np.ones(3))

@@ -8,13 +8,19 @@ from hypothesis import strategies as st
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.retrieval.heat import score
-from eigenshape.retrieval.heat.descriptor import PRESETS, SCALE_FREE, THESIS, Recipe, ShapeDescriptor
+from eigenshape.retrieval.heat.descriptor import (
+    PRESETS,
+    SCALE_FREE,
+    THESIS,
+    HeatDescriptor,
+    HeatRecipe,
+)
 from eigenshape.retrieval.heat.score import match_features, matching_score, matching_scores
 
 
 def of(vectors, recipe=RECIPE):
     vectors = np.asarray(vectors, dtype=float)
-    return ShapeDescriptor(vectors, np.arange(len(vectors)), recipe)
+    return HeatDescriptor(vectors, np.arange(len(vectors)), recipe)
 
 
 def literal(first, second):
@@ -22,7 +28,9 @@ def literal(first, second):
     total = 0.0
     for ones, twos in ((first, second), (second, first)):
         for one in ones.vectors:
-            total += min(sum(abs(a - b) for a, b in zip(one, two, strict=True)) for two in twos.vectors)
+            total += min(
+                sum(abs(a - b) for a, b in zip(one, two, strict=True)) for two in twos.vectors
+            )
     return total
 
 
@@ -48,7 +56,9 @@ def test_many_at_once_equal_one_by_one_whatever_the_chunk(monkeypatch):
     one_by_one = [matching_score(query, other) for other in others]
     for budget in (1, 40, 10**6):
         monkeypatch.setattr(score, "NUMBERS_AT_ONCE", budget)
-        assert matching_scores(query.vectors, rows, starts, RECIPE)[0] == pytest.approx(one_by_one, rel=1e-14)
+        assert matching_scores(query.vectors, rows, starts, RECIPE)[0] == pytest.approx(
+            one_by_one, rel=1e-14
+        )
 
 
 def test_shifts_undo_a_change_of_area():
@@ -57,12 +67,16 @@ def test_shifts_undo_a_change_of_area():
     rng = np.random.default_rng(3)
     longer = np.cumsum(rng.random((4, 18)), axis=1)
     whole = of(longer[:, 3:], recipe)
-    part = of(longer[:, :15] - 3 * step, recipe)  # time s of the part is time s - 3 of the whole, its heat lower
+    part = of(
+        longer[:, :15] - 3 * step, recipe
+    )  # time s of the part is time s - 3 of the whole, its heat lower
     _, shifts = matching_scores(part.vectors, whole.vectors, np.array([0]), recipe)
     assert shifts[0] == 3
     assert matching_score(part, whole) == pytest.approx(score.SHIFT_PRICE * 3 * 15 * 4)
     assert matching_score(part, whole) == pytest.approx(matching_score(whole, part))
-    assert {tuple(pair) for pair in match_features(part, whole).tolist()} == {(i, i) for i in range(4)}
+    assert {tuple(pair) for pair in match_features(part, whole).tolist()} == {
+        (i, i) for i in range(4)
+    }
 
 
 def test_correspondences_are_mutual_and_closest_first():
@@ -71,16 +85,24 @@ def test_correspondences_are_mutual_and_closest_first():
 
 
 def test_recipes_must_agree():
-    with pytest.raises(InvalidParameterError, match="Only descriptors of one recipe compare"):
+    with pytest.raises(InvalidParameterError, match="Only descriptors by the same recipe compare"):
         matching_score(descriptor(1), descriptor(1, replace(RECIPE, name="other")))
-    with pytest.raises(InvalidParameterError, match="Shifts need logarithmic vectors at scales in geometric sequence"):
-        Recipe(scales=(1.0, 2.0, 3.0))
+    with pytest.raises(
+        InvalidParameterError,
+        match="Shifts need logarithmic vectors at scales in geometric sequence",
+    ):
+        HeatRecipe(scales=(1.0, 2.0, 3.0))
     with pytest.raises(InvalidParameterError, match="Shifts need logarithmic vectors"):
-        Recipe(logarithmic=False)
+        HeatRecipe(logarithmic=False)
 
 
 def test_presets_say_what_the_thesis_says():
     assert set(PRESETS) == {"scale-free", "thesis"}
     assert THESIS.scales == (5, 20, 40, 60, 100, 150, 200, 300, 400, 500, 600, 700, 800, 900, 1000)
-    assert (THESIS.time_unit, THESIS.feature_scale, THESIS.n_features, THESIS.unit) == (2e-4, 5, 15, "box")
+    assert (THESIS.time_unit, THESIS.feature_scale, THESIS.n_features, THESIS.unit) == (
+        2e-4,
+        5,
+        15,
+        "box",
+    )
     assert len(SCALE_FREE.scales) == SCALE_FREE.n_features == 15

@@ -7,8 +7,10 @@ import pytest
 
 import eigenshape as es
 from eigenshape.retrieval.patches import matching as patch_matching
+from eigenshape.retrieval.patches.matching import patch_points
 from eigenshape.retrieval.patches.matching_loops import leading, nearest_of_each_other
 from eigenshape.retrieval.patches.packing import pack_points, unpack_points
+from eigenshape.retrieval.patches.patches import surface_patches
 
 HAND = es.make_creature("hand", 1, n_vertices=1500)
 
@@ -25,28 +27,32 @@ BOX = es.TriangleMesh(
     ].reshape(-1, 3),
 )
 SYMMETRIC = {
-    "torus": lambda: es.torus(60, 40),
+    "torus": lambda: es.shapes.torus(60, 40),
     "sphere": lambda: es.icosphere(3),
     "icosahedron": lambda: es.icosphere(0),
     "box": lambda: BOX,
-    "two spheres": lambda: es.disjoint_union(BALL, moved(BALL, 3)),
-    "twelve boxes": lambda: es.disjoint_union(*(moved(BOX, 2 * number) for number in range(12))),
+    "two spheres": lambda: es.shapes.disjoint_union(BALL, moved(BALL, 3)),
+    "twelve boxes": lambda: es.shapes.disjoint_union(
+        *(moved(BOX, 2 * number) for number in range(12))
+    ),
 }
 KINDS = ("quadruped", "hand", "octopus", "biped")
 
 
 @pytest.fixture(scope="module")
 def book():
-    return es.train_codebook([es.describe_patches(es.make_creature(kind, 3, n_vertices=1200)) for kind in KINDS])
+    return es.retrieval.train_codebook(
+        [surface_patches(es.make_creature(kind, 3, n_vertices=1200)) for kind in KINDS]
+    )
 
 
 @pytest.fixture(scope="module")
 def hand(book):
-    return es.patch_points(es.describe_patches(HAND), book)
+    return patch_points(surface_patches(HAND), book)
 
 
 def test_a_shape_matches_itself_point_by_point(hand):
-    match = es.match_patches(hand, hand)
+    match = es.retrieval.match_patches(hand, hand)
     assert match.step == 0
     assert len(match.points) > 100
     assert np.array_equal(match.points[:, 0], match.points[:, 1])
@@ -57,7 +63,7 @@ def test_a_shape_matches_itself_point_by_point(hand):
 def test_rigid_motion_and_size_change_no_match(hand, book):
     turn = np.diag([-1.0, -1.0, 1.0])  # keeps the box, whose sides are the unit
     moved = es.TriangleMesh(1e-50 * (HAND.vertices @ turn + [3, 0, 1]), HAND.faces)
-    match = es.match_patches(hand, es.patch_points(es.describe_patches(moved), book))
+    match = es.retrieval.match_patches(hand, patch_points(surface_patches(moved), book))
     assert len(match.points) > 100
     assert np.array_equal(match.vertices[:, 0], match.vertices[:, 1])
     assert match.agreement > 0.95
@@ -72,18 +78,18 @@ def test_points_in_another_order_match_the_same(hand):
         vertices=hand.vertices[order],
         distances=hand.distances[np.ix_(order, order)],
     )
-    match = es.match_patches(hand, mixed)
+    match = es.retrieval.match_patches(hand, mixed)
     assert np.array_equal(match.points[:, 0], order[match.points[:, 1]])
-    assert match.agreement == pytest.approx(es.match_patches(hand, hand).agreement)
+    assert match.agreement == pytest.approx(es.retrieval.match_patches(hand, hand).agreement)
 
 
 def test_other_vertex_numbers_change_little(hand, book):
     order = np.random.default_rng(1).permutation(HAND.n_vertices)
     places = np.argsort(order)
     shuffled = es.TriangleMesh(HAND.vertices[order], places[HAND.faces])
-    match = es.match_patches(hand, es.patch_points(es.describe_patches(shuffled), book))
+    match = es.retrieval.match_patches(hand, patch_points(surface_patches(shuffled), book))
     gaps = HAND.vertices[match.vertices[:, 0]] - shuffled.vertices[match.vertices[:, 1]]
-    near = np.linalg.norm(gaps, axis=1) < 0.1 * np.sqrt(es.surface_area(HAND))
+    near = np.linalg.norm(gaps, axis=1) < 0.1 * np.sqrt(es.geometry.surface_area(HAND))
     assert len(near) > 60
     assert near.mean() > 0.9
 
@@ -91,16 +97,23 @@ def test_other_vertex_numbers_change_little(hand, book):
 @pytest.mark.long
 def test_a_part_agrees_with_its_whole_more_than_with_another_kind(hand, book):
     part = es.partial_scan(HAND, [0.0, 0, 1])
-    scan = es.patch_points(es.describe_patches(part.mesh), book)
-    other = es.patch_points(es.describe_patches(es.make_creature("biped", 1, n_vertices=1500)), book)
-    assert es.match_patches(scan, hand).agreement > 1.5 * es.match_patches(scan, other).agreement
+    scan = patch_points(surface_patches(part.mesh), book)
+    other = patch_points(surface_patches(es.make_creature("biped", 1, n_vertices=1500)), book)
+    assert (
+        es.retrieval.match_patches(scan, hand).agreement
+        > 1.5 * es.retrieval.match_patches(scan, other).agreement
+    )
 
 
 def test_larger_lengths_are_a_step(hand, monkeypatch):
-    radii = np.roll(hand.numbers, 1, axis=1)  # what one shape shows at a radius, the other shows at the next
-    larger = replace(hand, numbers=radii, distances=np.float32(patch_matching.SIZE_STEP) * hand.distances)
+    radii = np.roll(
+        hand.numbers, 1, axis=1
+    )  # what one shape shows at a radius, the other shows at the next
+    larger = replace(
+        hand, numbers=radii, distances=np.float32(patch_matching.SIZE_STEP) * hand.distances
+    )
     monkeypatch.setattr(patch_matching, "SLACK", 0.1)
-    match = es.match_patches(hand, larger)
+    match = es.retrieval.match_patches(hand, larger)
     assert match.step == 1
     assert np.array_equal(match.points[:, 0], match.points[:, 1])
     assert match.agreement > 0.95
@@ -128,9 +141,9 @@ def test_equally_near_points_are_paired_in_order():
 @pytest.mark.long
 @pytest.mark.parametrize("name", SYMMETRIC)
 def test_a_symmetric_shape_finds_itself_near_0(name, book):
-    shape = es.describe_shape(SYMMETRIC[name](), es.PatchRecipe(book))
-    assert es.patch_scores(shape, [shape])[0] == pytest.approx(0, abs=0.01)
-    match = es.match_patches(shape.points[0], shape.points[0])
+    shape = es.describe(SYMMETRIC[name](), es.retrieval.PatchRecipe(book))
+    assert es.retrieval.patch_scores(shape, [shape])[0] == pytest.approx(0, abs=0.01)
+    match = es.retrieval.match_patches(shape.points[0], shape.points[0])
     assert np.array_equal(match.points[:, 0], match.points[:, 1])
     assert len(match.points) == len(shape.vertices)
 
@@ -140,14 +153,16 @@ def test_a_point_without_weight_spoils_no_match(hand):
     weights = hand.weights.copy()
     weights[0] = 0
     points = replace(hand, weights=weights)
-    match = es.match_patches(points, points)
+    match = es.retrieval.match_patches(points, points)
     assert np.array_equal(match.points[:, 0], match.points[:, 1])
-    assert len(match.points) == len(es.match_patches(hand, hand).points)
+    assert len(match.points) == len(es.retrieval.match_patches(hand, hand).points)
     assert match.agreement == pytest.approx(1)
 
 
 def test_points_are_packed_without_loss(hand, book):
-    part = es.patch_points(es.describe_patches(es.partial_scan(HAND, [0.0, 0, 1]).mesh, n_samples=40), book)
+    part = patch_points(
+        surface_patches(es.partial_scan(HAND, [0.0, 0, 1]).mesh, n_samples=40), book
+    )
     data = pack_points([hand, part])
     assert len(data) < 60_000
     for before, after in zip([hand, part], unpack_points(data), strict=True):
@@ -157,12 +172,14 @@ def test_points_are_packed_without_loss(hand, book):
 
 def test_what_does_not_agree_is_no_match(hand):
     apart = replace(hand, distances=np.full_like(hand.distances, np.inf))
-    match = es.match_patches(hand, apart)
+    match = es.retrieval.match_patches(hand, apart)
     assert match.agreement == 0
     assert match.points.shape == match.vertices.shape == (0, 2)
 
 
 def test_other_codebooks_are_refused(hand):
     short = replace(hand, numbers=hand.numbers[:, :, :3])
-    with pytest.raises(es.InvalidParameterError, match=r"Only points of one codebook match; .* the second \(9, 3\)"):
-        es.match_patches(hand, short)
+    with pytest.raises(
+        es.InvalidParameterError, match=r"Only points by one codebook match; .* the second \(9, 3\)"
+    ):
+        es.retrieval.match_patches(hand, short)

@@ -13,7 +13,7 @@ from eigenshape.operators.fem import fem_laplacian
 from eigenshape.shapes import exact
 from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 
 def test_parts_that_touch_in_a_point_are_apart():
@@ -21,7 +21,9 @@ def test_parts_that_touch_in_a_point_are_apart():
     points = np.concatenate([front.vertices, back.vertices - [1, 1, 0]])
     names = np.arange(2 * front.n_vertices)
     names[2 * front.n_vertices - 1] = 0  # the corner (1, 1) of one is (0, 0) of the other
-    mesh = TriangleMesh(points[:-1], names[np.concatenate([front.faces, back.faces + front.n_vertices])])
+    mesh = TriangleMesh(
+        points[:-1], names[np.concatenate([front.faces, back.faces + front.n_vertices])]
+    )
     found = bracket_eigenvalues(mesh, 20)
     assert found.n_zero == 2
     assert_around(found, np.repeat(exact.box_eigenvalues(10), 2))
@@ -56,16 +58,22 @@ def test_a_closed_part_stays_free_where_another_is_held():
 def test_a_real_solid(data):
     mesh = read_shape(data / "tets" / "octopus-low.mesh")
     found = bracket_eigenvalues(mesh, 12)
-    assert_around(found, np.maximum(solve_spectrum(fem_laplacian(mesh, 3), 12).eigenvalues, 0) * (np.arange(12) > 0))
+    assert_around(
+        found,
+        np.maximum(solve_spectrum(fem_laplacian(mesh, 3), 12).eigenvalues, 0) * (np.arange(12) > 0),
+    )
 
 
 @pytest.mark.long
 @pytest.mark.data
 @pytest.mark.parametrize(
-    "name", ["trimesh/teapot.stl", "geometrycentral/triple_vierbein.obj", "geometrycentral/fan3.obj"]
+    "name",
+    ["trimesh/teapot.stl", "geometrycentral/triple_vierbein.obj", "geometrycentral/fan3.obj"],
 )
 def test_real_surfaces_that_are_no_manifolds(data, name):
-    mesh = repair(read_mesh(data / "nasty" / name), ("weld", "drop_degenerate", "drop_unreferenced")).mesh
+    mesh = repair(
+        read_mesh(data / "nasty" / name), ("weld", "drop_degenerate", "drop_unreferenced")
+    ).mesh
     k = min(30, mesh.n_vertices)
     found = bracket_eigenvalues(mesh, k)
     fine = without_pinches(finer(mesh, 1))

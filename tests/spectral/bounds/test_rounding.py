@@ -12,7 +12,7 @@ from eigenshape.shapes.domains import ball, interval
 from eigenshape.shapes.surfaces import grid, icosphere
 from eigenshape.sparse.elimination import EPS
 from eigenshape.spectral.bounds.rounding import enclose, relative_rounding
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 EQUILATERAL = TriangleMesh([[0, 0, 0], [1, 0, 0], [0.5, 0.75**0.5, 0]], [[0, 1, 2]])
 
@@ -20,7 +20,9 @@ EQUILATERAL = TriangleMesh([[0, 0, 0], [1, 0, 0], [0.5, 0.75**0.5, 0]], [[0, 1, 
 def exact_sides(corners):
     """Return e_a·e_b of the sides opposite to the corners, without rounding."""
     rows = [[Fraction(float(value)) for value in point] for point in corners]
-    sides = [[y - x for x, y in zip(rows[(a + 1) % 3], rows[(a + 2) % 3], strict=True)] for a in range(3)]
+    sides = [
+        [y - x for x, y in zip(rows[(a + 1) % 3], rows[(a + 2) % 3], strict=True)] for a in range(3)
+    ]
     return [[sum(x * y for x, y in zip(one, two, strict=True)) for two in sides] for one in sides]
 
 
@@ -34,7 +36,9 @@ def test_what_rounding_does_to_one_triangle_is_within_the_bound(height):
     rng = np.random.default_rng(int(-np.log10(height)))
     for _ in range(40):
         points = rng.standard_normal((3, 3))
-        points[2] = points[0] + rng.uniform() * (points[1] - points[0]) + height * rng.standard_normal(3)
+        points[2] = (
+            points[0] + rng.uniform() * (points[1] - points[0]) + height * rng.standard_normal(3)
+        )
         points += rng.standard_normal(3)  # far from the origin, for one more rounding
         mesh = TriangleMesh(points, [[0, 1, 2]])
         products = exact_sides(points)
@@ -43,7 +47,10 @@ def test_what_rounding_does_to_one_triangle_is_within_the_bound(height):
         weights = cotangent_laplacian(mesh).stiffness.toarray()
         area = Fraction(float(doubled)) ** Fraction(1, 2) / 2
         off = [
-            [Fraction(float(weights[a, b])) * 4 * Fraction(float(area)) - products[a][b] for b in range(3)]
+            [
+                Fraction(float(weights[a, b])) * 4 * Fraction(float(area)) - products[a][b]
+                for b in range(3)
+            ]
             for a in range(3)
         ]
         error = np.array([[float(entry) for entry in row] for row in off])

@@ -16,7 +16,7 @@ from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.comparison.angles import eigenspace_angles
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 SPHERE = icosphere(2)
 OPERATOR = cotangent_laplacian(SPHERE)
@@ -78,7 +78,9 @@ def test_no_angle_is_above_its_bound(mass, seed, size):
     found = eigenspace_angles(one, two, laplacian=operator)
     assert (found.angles <= found.bounds + 1e-12).all()
     rest = [other for other in range(20) if not found.starts[0] <= other < found.stops[0]]
-    assert found.gaps[0] == np.abs(one.eigenvalues[rest] - one.eigenvalues[found.stops[0] - 1]).min()
+    assert (
+        found.gaps[0] == np.abs(one.eigenvalues[rest] - one.eigenvalues[found.stops[0] - 1]).min()
+    )
 
 
 def test_angles_are_those_of_scipy():
@@ -131,7 +133,9 @@ def test_a_corrected_kernel_is_bounded_by_its_pencil():
 @pytest.mark.parametrize("scale", [1e-100, 1e100])
 def test_results_scale_with_the_shape(scale):
     mesh = moved(SPHERE, 3, 0.02)
-    here = eigenspace_angles(SPECTRUM, solve_spectrum(cotangent_laplacian(mesh), 20), laplacian=OPERATOR)
+    here = eigenspace_angles(
+        SPECTRUM, solve_spectrum(cotangent_laplacian(mesh), 20), laplacian=OPERATOR
+    )
     far = cotangent_laplacian(TriangleMesh(scale * SPHERE.vertices, SPHERE.faces))
     other = solve_spectrum(cotangent_laplacian(TriangleMesh(scale * mesh.vertices, mesh.faces)), 20)
     there = eigenspace_angles(solve_spectrum(far, 20), other, laplacian=far)
@@ -155,18 +159,30 @@ def test_bad_input():
     with pytest.raises(InvalidParameterError, match="two must begin with the lowest eigenvalue"):
         eigenspace_angles(SPECTRUM, interval)
     fine = solve_spectrum(cotangent_laplacian(icosphere(3)), 10)
-    with pytest.raises(InvalidParameterError, match="different numbers of points, 162 and 642, need to be told"):
+    with pytest.raises(
+        InvalidParameterError, match="different numbers of points, 162 and 642, need to be told"
+    ):
         eigenspace_angles(SPECTRUM, fine)
-    with pytest.raises(InvalidParameterError, match=r"a point of two must lie in 0..641; it is 642"):
+    with pytest.raises(
+        InvalidParameterError, match=r"a point of two must lie in 0..641; it is 642"
+    ):
         eigenspace_angles(SPECTRUM, fine, points=np.arange(162) + 481)
-    with pytest.raises(InvalidParameterError, match="points must name one for each of 162 points; there are 3"):
+    with pytest.raises(
+        InvalidParameterError, match="points must name one for each of 162 points; there are 3"
+    ):
         eigenspace_angles(SPECTRUM, fine, points=[0, 1, 2])
-    with pytest.raises(InvalidParameterError, match="Eigenvectors 1 to 3 of two must be independent at the points"):
+    with pytest.raises(
+        InvalidParameterError, match="Eigenvectors 1 to 3 of two must be independent at the points"
+    ):
         eigenspace_angles(SPECTRUM, fine, points=np.zeros(162, dtype=int))
-    with pytest.raises(InvalidParameterError, match="laplacian must be the operator that one is of; they have 642"):
+    with pytest.raises(
+        InvalidParameterError, match="laplacian must be the operator that one is of; they have 642"
+    ):
         eigenspace_angles(SPECTRUM, SPECTRUM, laplacian=cotangent_laplacian(icosphere(3)))
     with pytest.raises(ConvergenceError, match="Eigenvectors must be B-orthonormal"):
         eigenspace_angles(SPECTRUM, SPECTRUM, laplacian=cotangent_laplacian(moved(SPHERE, 0, 0.1)))
     rough = replace(SPECTRUM, certificate=replace(SPECTRUM.certificate, count=None))
-    with pytest.raises(InvalidParameterError, match="need a spectrum without gaps; one was not counted"):
+    with pytest.raises(
+        InvalidParameterError, match="need a spectrum without gaps; one was not counted"
+    ):
         eigenspace_angles(rough, SPECTRUM, laplacian=OPERATOR)

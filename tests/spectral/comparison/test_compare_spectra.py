@@ -11,7 +11,7 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import disjoint_union, icosphere, subdivide, torus
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
 from eigenshape.spectral.comparison.spectra import compare_spectra, spectral_hausdorff_distance
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 
 SPHERE = icosphere(2)
 SPECTRUM = solve_spectrum(cotangent_laplacian(SPHERE), 20)
@@ -31,9 +31,16 @@ def scaled(scale):
 
 
 def test_by_hand():
-    found = compare_spectra(of([0, 1, 4, 10], [0, 0.1, 0.1, 0]), of([0, 1.15, 3, 10, 12], [0, 0.1, 0.1, 0, 0]))
+    found = compare_spectra(
+        of([0, 1, 4, 10], [0, 0.1, 0.1, 0]), of([0, 1.15, 3, 10, 12], [0, 0.1, 0.1, 0, 0])
+    )
     np.testing.assert_allclose(found.relative, [0, 0.15, 0.25, 0])
-    assert found.told.tolist() == [False, False, True, False]  # .15 is within the two bars of .1
+    assert found.proved_changes.tolist() == [
+        False,
+        False,
+        True,
+        False,
+    ]  # .15 is within the two bars of .1
     assert found.index_distance == 1
     assert found.hausdorff == pytest.approx(1)
     assert found.median_relative == pytest.approx(0.15)
@@ -49,7 +56,9 @@ def test_zeros_to_rounding_are_equal_and_a_lost_one_is_heard():
     np.testing.assert_array_equal(compare_spectra(whole, apart).relative, [0, np.inf, 0])
     np.testing.assert_array_equal(compare_spectra(apart, whole).relative, [0, np.inf, 0])
     assert compare_spectra(whole, apart).mean_relative == np.inf
-    assert compare_spectra(of([1e-17], [1e-16]), of([0.0])).median_relative == 0  # one eigenvalue, within its residual
+    assert (
+        compare_spectra(of([1e-17], [1e-16]), of([0.0])).median_relative == 0
+    )  # one eigenvalue, within its residual
 
 
 def test_two_spheres_have_one_zero_more():
@@ -57,7 +66,7 @@ def test_two_spheres_have_one_zero_more():
     found = compare_spectra(SPECTRUM, two)
     assert found.relative[0] == 0
     assert found.relative[1] == np.inf
-    assert found.told[1]
+    assert found.proved_changes[1]
 
 
 @pytest.mark.parametrize("scale", [1e-100, 1e100])
@@ -67,7 +76,7 @@ def test_results_scale_with_the_shape(scale):
     other, here = (solve_spectrum(cotangent_laplacian(each), 20) for each in (far, mesh))
     there, near = compare_spectra(scaled(scale), other), compare_spectra(SPECTRUM, here)
     np.testing.assert_allclose(there.relative, near.relative, rtol=1e-8)
-    np.testing.assert_array_equal(there.told, near.told)
+    np.testing.assert_array_equal(there.proved_changes, near.proved_changes)
     assert there.hausdorff == pytest.approx(near.hausdorff / scale / scale, rel=1e-9)
     assert there.index_distance == pytest.approx(near.index_distance / scale / scale, rel=1e-9)
 
@@ -77,19 +86,24 @@ def test_brackets_prove_changes_of_shapes_alone():
     cut = subdivide(SPHERE)
     fine = solve_spectrum(cotangent_laplacian(cut), 20)
     brackets = bracket_eigenvalues(SPHERE, 20), bracket_eigenvalues(cut, 20)
-    by_residuals, by_brackets = compare_spectra(SPECTRUM, fine), compare_spectra(SPECTRUM, fine, brackets=brackets)
-    assert by_residuals.told[1:].all()
-    assert not by_brackets.told.any()
+    by_residuals, by_brackets = (
+        compare_spectra(SPECTRUM, fine),
+        compare_spectra(SPECTRUM, fine, brackets=brackets),
+    )
+    assert by_residuals.proved_changes[1:].all()
+    assert not by_brackets.proved_changes.any()
     assert "brackets of the shapes' eigenvalues" in by_brackets.explain()
     twice = TriangleMesh(2 * SPHERE.vertices, SPHERE.faces)
     pair = brackets[0], bracket_eigenvalues(twice, 20)
-    assert compare_spectra(SPECTRUM, scaled(2.0), brackets=pair).told[1:].all()
+    assert compare_spectra(SPECTRUM, scaled(2.0), brackets=pair).proved_changes[1:].all()
 
 
 def test_hausdorff_by_hand():
     assert spectral_hausdorff_distance([0, 1, 4], [0, 2, 4]) == 1
     assert spectral_hausdorff_distance([0, 1, 4], [4, 1, 0, 0, 1]) == 0  # sets: copies do not count
-    assert spectral_hausdorff_distance([0, 5], [0, 1, 2]) == 2  # 5 may have a neighbour beyond 2; 2 has none
+    assert (
+        spectral_hausdorff_distance([0, 5], [0, 1, 2]) == 2
+    )  # 5 may have a neighbour beyond 2; 2 has none
     assert spectral_hausdorff_distance([0.0], [3.0]) == 3
 
 
@@ -101,7 +115,9 @@ def test_hausdorff_is_symmetric_and_below_the_index_distance(one, two):
     distance = spectral_hausdorff_distance(one, two)
     assert distance == spectral_hausdorff_distance(two, one)
     k = min(len(one), len(two))
-    assert spectral_hausdorff_distance(one[:k], two[:k]) <= np.abs(np.subtract(one[:k], two[:k])).max()
+    assert (
+        spectral_hausdorff_distance(one[:k], two[:k]) <= np.abs(np.subtract(one[:k], two[:k])).max()
+    )
 
 
 @given(sets, sets, st.integers(1, 12))
@@ -119,7 +135,8 @@ def test_what_is_told_of_cut_spectra_is_true_of_whole_ones(one, two, k):
 def test_bad_input():
     interval = solve_spectrum(cotangent_laplacian(SPHERE), above=1.0, below=3.0)
     with pytest.raises(
-        InvalidParameterError, match="one must begin with the lowest eigenvalue; it begins with number 1"
+        InvalidParameterError,
+        match="one must begin with the lowest eigenvalue; it begins with number 1",
     ):
         compare_spectra(interval, SPECTRUM)
     with pytest.raises(InvalidParameterError, match="two must begin with the lowest eigenvalue"):

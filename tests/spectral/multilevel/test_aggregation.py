@@ -44,12 +44,16 @@ def test_aggregates_are_connected_and_of_the_size_asked_for():
     assert 10 < sizes.mean() < 20
     within = laplacian.stiffness.tocoo()
     same = labels[within.row] == labels[within.col]
-    inside = sp.csr_array((np.ones(same.sum()), (within.row[same], within.col[same])), shape=laplacian.stiffness.shape)
+    inside = sp.csr_array(
+        (np.ones(same.sum()), (within.row[same], within.col[same])), shape=laplacian.stiffness.shape
+    )
     assert component_labels(inside.indptr, inside.indices).max() + 1 <= 1.2 * count
 
 
 @pytest.mark.parametrize("smooth", [True, False])
-@pytest.mark.parametrize("laplacian", [cotangent_laplacian(icosphere(4)), graph(cycle(500)), wild()])
+@pytest.mark.parametrize(
+    "laplacian", [cotangent_laplacian(icosphere(4)), graph(cycle(500)), wild()]
+)
 def test_constants_stay_constant_and_symmetry_stays(laplacian, smooth):
     levels = build_levels(laplacian.stiffness, laplacian.mass, 30, smooth=smooth)
     assert len(levels) > 1
@@ -66,7 +70,10 @@ def test_constants_stay_constant_and_symmetry_stays(laplacian, smooth):
 def test_coarse_eigenvalues_are_near_and_above():
     laplacian = cotangent_laplacian(icosphere(4))
     coarse = build_levels(laplacian.stiffness, laplacian.mass, 200)[-1]
-    exact, found = dense_eigenvalues(laplacian)[:16], dense_eigenvalues(Laplacian(coarse.stiffness, coarse.mass))[:16]
+    exact, found = (
+        dense_eigenvalues(laplacian)[:16],
+        dense_eigenvalues(Laplacian(coarse.stiffness, coarse.mass))[:16],
+    )
     assert (found > exact - 1e-9).all()  # Rayleigh and Ritz
     np.testing.assert_allclose(found[1:], exact[1:], rtol=0.02)
 
@@ -74,5 +81,7 @@ def test_coarse_eigenvalues_are_near_and_above():
 def test_the_top_is_a_bound():
     for laplacian in (cotangent_laplacian(icosphere(3)), graph(cycle(100)), wild(10)):
         level = build_levels(laplacian.stiffness, laplacian.mass, 10**9)[0]
-        scaled = Laplacian(laplacian.stiffness, sp.csr_array(sp.diags_array(laplacian.stiffness.diagonal())))
+        scaled = Laplacian(
+            laplacian.stiffness, sp.csr_array(sp.diags_array(laplacian.stiffness.diagonal()))
+        )
         assert dense_eigenvalues(scaled)[-1] <= level.top * (1 + 1e-12)

@@ -11,9 +11,9 @@ from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes.surfaces import disjoint_union, icosphere
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver.diagnosis import require_solvable
 from eigenshape.spectral.solver.pencil import normalise
-from eigenshape.spectral.solver.solve import solve_spectrum
 
 TRIANGLE, PAIR = np.ones((3, 3)) - np.eye(3), np.ones((2, 2)) - np.eye(2)
 
@@ -41,7 +41,9 @@ def shifted(laplacian, amount):
 
 def with_edge(laplacian, weight):
     """Put an edge of this weight between points 0 and 1."""
-    corner = sp.coo_array((weight * np.array([1.0, 1, -1, -1]), ([0, 1, 0, 1], [0, 1, 1, 0])), laplacian.mass.shape)
+    corner = sp.coo_array(
+        (weight * np.array([1.0, 1, -1, -1]), ([0, 1, 0, 1], [0, 1, 1, 0])), laplacian.mass.shape
+    )
     return Laplacian(sp.csr_array(laplacian.stiffness + corner), laplacian.mass)
 
 
@@ -59,14 +61,17 @@ def test_k_that_is_not_whole(k):
 
 @pytest.mark.parametrize("below", [np.nan, 0.0, -1.0, np.inf, -np.inf])
 def test_below_that_is_no_bound(below):
-    with pytest.raises(InvalidParameterError, match=rf"below must be positive and finite; entry 0 is {below}"):
+    with pytest.raises(
+        InvalidParameterError, match=rf"below must be positive and finite; entry 0 is {below}"
+    ):
         solve_spectrum(grid(5), below=below)
 
 
 def test_below_the_lowest_eigenvalue():
     inside = dirichlet_laplacian(grid(30), np.array([0]))[0]
     with pytest.raises(
-        InvalidParameterError, match=r"below must exceed the lowest eigenvalue, 0\.00\d+; it is 1e-12\."
+        InvalidParameterError,
+        match=r"below must exceed the lowest eigenvalue, 0\.00\d+; it is 1e-12\.",
     ):
         solve_spectrum(inside, below=1e-12)
 
@@ -89,7 +94,8 @@ def test_an_entry_of_the_mass(entry, rule):
 def test_a_mass_that_is_indefinite_off_its_diagonal(n):
     mass = sp.csr_array(unit(n) + sp.coo_array(([2.0, 2.0], ([5, 7], [7, 5])), shape=(n, n)))
     with pytest.raises(
-        InvalidParameterError, match=r"mass must be positive definite; .* not positive, -3 at point [57]"
+        InvalidParameterError,
+        match=r"mass must be positive definite; .* not positive, -3 at point [57]",
     ):
         solve_spectrum(Laplacian(graph(path(n)).stiffness, mass), 3)
 
@@ -97,17 +103,23 @@ def test_a_mass_that_is_indefinite_off_its_diagonal(n):
 @pytest.mark.parametrize("n", [2, 1000])
 def test_a_mass_that_is_singular(n):
     mass = sp.csr_array(sp.kron(sp.eye_array(n // 2), np.ones((2, 2))))
-    with pytest.raises(InvalidParameterError, match=r"mass must be positive definite; .* at point \d+"):
+    with pytest.raises(
+        InvalidParameterError, match=r"mass must be positive definite; .* at point \d+"
+    ):
         solve_spectrum(Laplacian(graph(path(n)).stiffness, mass), 1)
 
 
 def test_a_stiffness_that_is_not_symmetric_or_not_finite():
     skew = sp.csr_array(np.array([[1.0, -1, 0], [-1, 2, -1], [0, -1.5, 1]]))
-    with pytest.raises(InvalidParameterError, match=r"entry \(1, 2\) is -1\.0 and entry \(2, 1\) is -1\.5"):
+    with pytest.raises(
+        InvalidParameterError, match=r"entry \(1, 2\) is -1\.0 and entry \(2, 1\) is -1\.5"
+    ):
         Laplacian(skew, unit(3))
     for entry in (np.nan, np.inf):
         bad = sp.csr_array(np.array([[1.0, entry], [entry, 1]]))
-        with pytest.raises(InvalidParameterError, match=rf"stiffness must be finite; entry \(0, 1\) is {entry}"):
+        with pytest.raises(
+            InvalidParameterError, match=rf"stiffness must be finite; entry \(0, 1\) is {entry}"
+        ):
             Laplacian(bad, unit(2))
 
 
@@ -119,12 +131,18 @@ def test_a_stiffness_that_is_not_symmetric_or_not_finite():
         (shifted(grid(80), 0.5), -0.5, -0.5),
         (shifted(grid(80), 1e-6), -1e-6, -1e-6),
         (Laplacian(-grid(80).stiffness, unit(6400)), -8.0, -7.9),
-        (Laplacian(sp.csr_array(grid(80).stiffness - diagonal(7, *np.zeros(6399))), unit(6400)), -5.5, -5.0),
+        (
+            Laplacian(sp.csr_array(grid(80).stiffness - diagonal(7, *np.zeros(6399))), unit(6400)),
+            -5.5,
+            -5.0,
+        ),
     ],
     ids=["by hand", "small", "large", "by little", "negative", "one point"],
 )
 def test_a_stiffness_with_negative_eigenvalues(laplacian, low, high):
-    with pytest.raises(InvalidParameterError, match=r"stiffness must be positive semidefinite; eigenvalue 0 ") as error:
+    with pytest.raises(
+        InvalidParameterError, match=r"stiffness must be positive semidefinite; eigenvalue 0 "
+    ) as error:
         solve_spectrum(laplacian, 2)
     words = str(error.value).replace(",", " ").replace(";", " ").split()
     if "between" in words:  # where nothing converged, an interval
@@ -136,7 +154,12 @@ def test_a_stiffness_with_negative_eigenvalues(laplacian, low, high):
 
 
 def test_an_operator_that_is_sound_is_not_blamed():
-    for laplacian in (grid(20), cotangent_laplacian(icosphere(3)), copies(PAIR, 4), Laplacian(0 * unit(5), unit(5))):
+    for laplacian in (
+        grid(20),
+        cotangent_laplacian(icosphere(3)),
+        copies(PAIR, 4),
+        Laplacian(0 * unit(5), unit(5)),
+    ):
         require_solvable(normalise(laplacian), ConvergenceError("no"))
 
 
@@ -157,7 +180,9 @@ def test_one_point_and_two():
     np.testing.assert_allclose(solve_spectrum(one, 1).eigenvalues, [1.5], rtol=1e-15)
     np.testing.assert_allclose(solve_spectrum(one, 1).eigenvectors, [[2**-0.5]], rtol=1e-15)
     assert len(solve_spectrum(one, below=2.0).eigenvalues) == 1
-    with pytest.raises(InvalidParameterError, match=r"below must exceed the lowest eigenvalue, 1\.5; it is 1\."):
+    with pytest.raises(
+        InvalidParameterError, match=r"below must exceed the lowest eigenvalue, 1\.5; it is 1\."
+    ):
         solve_spectrum(one, below=1.0)
     two = graph(path(2))
     np.testing.assert_allclose(solve_spectrum(two, 2).eigenvalues, [0, 2], atol=1e-15)
@@ -183,12 +208,16 @@ def test_entries_too_far_apart_for_floats(n):
         ):
             solve_spectrum(with_edge(grid(n), weight), 5)
     tiny = Laplacian(1e-300 * grid(n).stiffness, unit(n * n))
-    with pytest.raises(InvalidParameterError, match=r"entry [01] is 1e\+300 and entry \d+ is 2e-300"):
+    with pytest.raises(
+        InvalidParameterError, match=r"entry [01] is 1e\+300 and entry \d+ is 2e-300"
+    ):
         solve_spectrum(with_edge(tiny, 1e300), 5)
     for mass in (1e300, 1e-300):
         masses = np.ones(n * n)
         masses[3] = mass
-        with pytest.raises(InvalidParameterError, match=r"diagonal of mass must .* 1e\+140; entry \d+ is 1"):
+        with pytest.raises(
+            InvalidParameterError, match=r"diagonal of mass must .* 1e\+140; entry \d+ is 1"
+        ):
             solve_spectrum(graph(sp.kronsum(path(n), path(n)), masses), 5)
 
 
@@ -197,8 +226,12 @@ def test_entries_too_far_apart_for_floats(n):
 def test_one_huge_entry_gives_the_right_answer_or_says_where_it_is(weight, side):
     # Two points so tightly joined are one of mass 2: eigenvalues differ by about 1/weight of themselves.
     laplacian = with_edge(grid(side), weight)
-    join = sp.csr_array((np.ones(side**2), (np.arange(side**2), np.maximum(np.arange(side**2) - 1, 0))))
-    joined = Laplacian(sp.csr_array(join.T @ grid(side).stiffness @ join), sp.csr_array(join.T @ join))
+    join = sp.csr_array(
+        (np.ones(side**2), (np.arange(side**2), np.maximum(np.arange(side**2) - 1, 0)))
+    )
+    joined = Laplacian(
+        sp.csr_array(join.T @ grid(side).stiffness @ join), sp.csr_array(join.T @ join)
+    )
     expected = solve_spectrum(joined, 5)
     try:
         found = solve_spectrum(laplacian, 5)
@@ -219,7 +252,9 @@ def test_a_tiny_entry_is_as_good_as_none():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("block", "size", "gap"), [([[0.0]], 1, 0), (PAIR, 2, 2), (TRIANGLE, 3, 3)])
+@pytest.mark.parametrize(
+    ("block", "size", "gap"), [([[0.0]], 1, 0), (PAIR, 2, 2), (TRIANGLE, 3, 3)]
+)
 @pytest.mark.parametrize("k", [1, 50, 500])
 def test_ten_thousand_components(block, size, gap, k):
     laplacian = copies(block, 10_000)
@@ -277,7 +312,13 @@ def test_three_hundred_spheres_by_degree():
 
 
 def test_parts_of_many_sizes_and_full_masses():
-    meshes = [icosphere(0), icosphere(1), icosphere(0), icosphere(1), TriangleMesh(np.eye(3), np.array([[0, 1, 2]]))]
+    meshes = [
+        icosphere(0),
+        icosphere(1),
+        icosphere(0),
+        icosphere(1),
+        TriangleMesh(np.eye(3), np.array([[0, 1, 2]])),
+    ]
     for mass in ("lumped", "consistent"):
         laplacian = cotangent_laplacian(disjoint_union(*meshes * 3), mass)
         expected = dense_eigenvalues(laplacian)
@@ -290,13 +331,19 @@ def test_parts_of_many_sizes_and_full_masses():
 
 def two_sizes(ratio, level=3):
     small = icosphere(level)
-    return cotangent_laplacian(disjoint_union(small, TriangleMesh(ratio * small.vertices, small.faces)))
+    return cotangent_laplacian(
+        disjoint_union(small, TriangleMesh(ratio * small.vertices, small.faces))
+    )
 
 
 @pytest.mark.parametrize("ratio", [1e8, 1e-8])
 def test_shapes_of_very_different_sizes(ratio):
-    with pytest.raises(InvalidParameterError, match=r"W_ii/B_ii must not span .* at point \d+ and .* at point \d+"):
-        solve_spectrum(two_sizes(ratio), 20)  # rounding at the small sphere is more than all of these
+    with pytest.raises(
+        InvalidParameterError, match=r"W_ii/B_ii must not span .* at point \d+ and .* at point \d+"
+    ):
+        solve_spectrum(
+            two_sizes(ratio), 20
+        )  # rounding at the small sphere is more than all of these
 
 
 @pytest.mark.long

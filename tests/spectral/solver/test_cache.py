@@ -13,10 +13,9 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes.surfaces import icosphere
-from eigenshape.spectral import archive
+from eigenshape.spectral import archive, solve
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import cache
-from eigenshape.spectral.solver import solve as solver
-from eigenshape.spectral.solver.solve import solve_spectrum
 
 
 @pytest.fixture
@@ -32,7 +31,7 @@ def nothing_computed(monkeypatch):
         message = "computed"
         raise AssertionError(message)
 
-    return lambda: monkeypatch.setattr(solver, "normalise", refuse)
+    return lambda: monkeypatch.setattr(solve, "normalise", refuse)
 
 
 def require_same(one, two):
@@ -72,21 +71,42 @@ def test_another_entry_is_another_key(laplacian):
     keys = {cache.content_key(laplacian, ("lowest", 5))}
     places = np.random.default_rng(0).choice(laplacian.stiffness.nnz, 20, replace=False)
     for place in places.tolist():
-        keys.add(cache.content_key(Laplacian(changed(laplacian.stiffness, place), laplacian.mass), ("lowest", 5)))
-        keys.add(cache.content_key(Laplacian(laplacian.stiffness, changed(laplacian.mass, place)), ("lowest", 5)))
+        keys.add(
+            cache.content_key(
+                Laplacian(changed(laplacian.stiffness, place), laplacian.mass), ("lowest", 5)
+            )
+        )
+        keys.add(
+            cache.content_key(
+                Laplacian(laplacian.stiffness, changed(laplacian.mass, place)), ("lowest", 5)
+            )
+        )
     mirrored = {
-        frozenset(ends) for ends in zip(*(part[places] for part in laplacian.stiffness.tocoo().coords), strict=True)
+        frozenset(ends)
+        for ends in zip(*(part[places] for part in laplacian.stiffness.tocoo().coords), strict=True)
     }
     assert len(keys) == 1 + 2 * len(mirrored)
 
 
 def test_another_question_is_another_key(laplacian, monkeypatch):
     kernel = mesh_laplacian(icosphere(2))
-    asked = [("lowest", 5), ("lowest", 6), ("below", 5.0), ("below", np.nextafter(5.0, 6)), ("between", 5.0, 6.0)]
+    asked = [
+        ("lowest", 5),
+        ("lowest", 6),
+        ("below", 5.0),
+        ("below", np.nextafter(5.0, 6)),
+        ("between", 5.0, 6.0),
+    ]
     keys = [cache.content_key(laplacian, request) for request in asked]
-    for other in (kernel, replace(kernel, kernel=None), replace(kernel, kernel=replace(kernel.kernel, corrected=True))):
+    for other in (
+        kernel,
+        replace(kernel, kernel=None),
+        replace(kernel, kernel=replace(kernel.kernel, corrected=True)),
+    ):
         keys.append(cache.content_key(other, asked[0]))
-    keys.append(cache.content_key(Laplacian(laplacian.mass, laplacian.stiffness + laplacian.mass), asked[0]))
+    keys.append(
+        cache.content_key(Laplacian(laplacian.mass, laplacian.stiffness + laplacian.mass), asked[0])
+    )
     monkeypatch.setattr(cache, "FORMAT", 99)
     keys.append(cache.content_key(laplacian, asked[0]))
     monkeypatch.setattr(cache, "version", lambda _: "99.0")
@@ -101,9 +121,12 @@ def test_a_damaged_file_is_computed_again_and_replaced(tmp_path, laplacian, noth
     whole = path.read_bytes()
     bit = bytearray(whole)
     bit[len(whole) // 2] ^= 1
-    path.write_bytes({"cut": whole[:-100], "empty": b"", "one bit": bytes(bit), "not ours": b"hello" * 99}[harm])
+    path.write_bytes(
+        {"cut": whole[:-100], "empty": b"", "one bit": bytes(bit), "not ours": b"hello" * 99}[harm]
+    )
     with pytest.warns(
-        UserWarning, match=r"A spectrum in the cache cannot be used and is computed again: .*\.npz must hold"
+        UserWarning,
+        match=r"A spectrum in the cache cannot be used and is computed again: .*\.npz must hold",
     ):
         require_same(solve_spectrum(laplacian, 20, cache=tmp_path), plain)
     assert list(tmp_path.iterdir()) == [path]
@@ -116,7 +139,9 @@ def test_a_folder_that_cannot_be_written_to_is_refused_before_anything_is_comput
 ):
     nothing_computed()
     (tmp_path / "file").write_text("")
-    with pytest.raises(InvalidParameterError, match=r"cache must be a folder that can be written to; .*file: "):
+    with pytest.raises(
+        InvalidParameterError, match=r"cache must be a folder that can be written to; .*file: "
+    ):
         solve_spectrum(laplacian, 5, cache=tmp_path / "file")
 
     def forbid(**_):
@@ -127,13 +152,17 @@ def test_a_folder_that_cannot_be_written_to_is_refused_before_anything_is_comput
         solve_spectrum(laplacian, 5, cache=tmp_path)
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere"
+)
 def test_a_read_only_folder_is_refused_and_still_read(tmp_path, laplacian, nothing_computed):
     plain = solve_spectrum(laplacian, 5, cache=tmp_path)
     tmp_path.chmod(0o500)
     nothing_computed()
     require_same(solve_spectrum(laplacian, 5, cache=tmp_path), plain)
-    with pytest.raises(InvalidParameterError, match="cache must be a folder that can be written to"):
+    with pytest.raises(
+        InvalidParameterError, match="cache must be a folder that can be written to"
+    ):
         solve_spectrum(laplacian, 6, cache=tmp_path)
 
 
@@ -151,7 +180,10 @@ def test_two_processes_may_write_at_once(tmp_path, laplacian):
         "[es.solve_spectrum(laplacian, k, cache=sys.argv[1]) for k in range(1, 9)]"
     )
     environment = os.environ | {"PYTHONPATH": str(Path(eigenshape.__file__).parents[1])}
-    both = [subprocess.Popen([sys.executable, "-W", "error", "-c", code, tmp_path], env=environment) for _ in range(2)]
+    both = [
+        subprocess.Popen([sys.executable, "-W", "error", "-c", code, tmp_path], env=environment)
+        for _ in range(2)
+    ]
     assert [process.wait() for process in both] == [0, 0]
     assert len(list(tmp_path.iterdir())) == 8
     require_same(solve_spectrum(laplacian, 8, cache=tmp_path), solve_spectrum(laplacian, 8))
@@ -177,7 +209,10 @@ def test_an_entry_that_is_no_file_neither_hangs_nor_loses_the_spectrum(tmp_path,
     with pytest.warns(UserWarning, match="cache") as said:
         require_same(solve_spectrum(laplacian, 20, cache=tmp_path), plain)
     first, second = (str(warning.message) for warning in said)
-    assert f"cannot be used and is computed again: {path} must be a regular file; it is {entry}" in first
+    assert (
+        f"cannot be used and is computed again: {path} must be a regular file; it is {entry}"
+        in first
+    )
     assert "was computed and could not be kept in the cache" in second
 
 
@@ -188,6 +223,8 @@ def test_a_full_disk_does_not_lose_the_spectrum(tmp_path, laplacian, monkeypatch
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(archive.np, "savez", fill)
-    with pytest.warns(UserWarning, match="could not be kept in the cache: .*No space left on device"):
+    with pytest.warns(
+        UserWarning, match="could not be kept in the cache: .*No space left on device"
+    ):
         require_same(solve_spectrum(laplacian, 20, cache=tmp_path), plain)
     assert not list(tmp_path.iterdir())

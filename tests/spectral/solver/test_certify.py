@@ -5,10 +5,10 @@ from pencils import graph, path, tetrahedra, wild
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import icosphere, torus
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import certify as certify_module
 from eigenshape.spectral.solver import inertia as count
 from eigenshape.spectral.solver.certify import certify
-from eigenshape.spectral.solver.solve import solve_spectrum
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,12 @@ def test_path_of_three_by_hand():
     laplacian = graph(path(3))  # eigenvalues 0, 1, 3
     vectors = np.array([[1, 1, 1], [1, 0, -1]]).T / np.sqrt([3, 2])
     certificate = certify(laplacian, np.array([0.0, 1.0]), vectors)
-    assert (certificate.count, certificate.n_found, certificate.n_pairs, certificate.n_split) == (2, 2, 2, 0)
+    assert (certificate.count, certificate.n_found, certificate.n_pairs, certificate.n_split) == (
+        2,
+        2,
+        2,
+        0,
+    )
     assert 1 < certificate.shift < 3
     assert certificate.gap[0] <= certificate.shift <= certificate.gap[1] < 3
     assert "3" not in certificate.explain().split(".")[0]
@@ -43,14 +48,18 @@ def test_the_solver_and_the_doctor_agree(bumpy):
 def test_a_dropped_pair_is_noticed(bumpy, dropped):
     laplacian, spectrum = bumpy
     kept = np.delete(np.arange(30), dropped)
-    with pytest.raises(ConvergenceError, match=r"not proved: \d+ lie below .* \d+ were found there"):
+    with pytest.raises(
+        ConvergenceError, match=r"not proved: \d+ lie below .* \d+ were found there"
+    ):
         certify(laplacian, spectrum.eigenvalues[kept], spectrum.eigenvectors[:, kept])
 
 
 def test_a_duplicated_pair_is_noticed(bumpy):
     laplacian, spectrum = bumpy
     twice = np.sort(np.append(np.arange(30), 7))
-    with pytest.raises(ConvergenceError, match=r"B-orthonormal to 1e-08; columns 7 and 8 are off by 1.00e"):
+    with pytest.raises(
+        ConvergenceError, match=r"B-orthonormal to 1e-08; columns 7 and 8 are off by 1.00e"
+    ):
         certify(laplacian, spectrum.eigenvalues[twice], spectrum.eigenvectors[:, twice])
 
 
@@ -89,21 +98,28 @@ def test_rounding_is_allowed_for():
 def test_no_usable_factor_is_an_error(bumpy, monkeypatch):
     laplacian, spectrum = bumpy
     monkeypatch.setattr(count, "factorise", lambda *args: None)
-    with pytest.raises(ConvergenceError, match=r"counted only where rounding takes less than their distance"):
+    with pytest.raises(
+        ConvergenceError, match=r"counted only where rounding takes less than their distance"
+    ):
         certify(laplacian, spectrum.eigenvalues, spectrum.eigenvectors)
 
 
 def test_a_spectrum_that_is_all_one_chain_is_an_error(bumpy, monkeypatch):
     laplacian, spectrum = bumpy
     monkeypatch.setattr(certify_module, "RESOLUTION", 0.2)
-    with pytest.raises(ConvergenceError, match=r"differ by more than rounding takes; the last 30 of 30 do not"):
+    with pytest.raises(
+        ConvergenceError, match=r"differ by more than rounding takes; the last 30 of 30 do not"
+    ):
         certify(laplacian, spectrum.eigenvalues, spectrum.eigenvectors)
 
 
 def test_arrays_that_do_not_fit_are_refused(bumpy):
     laplacian, spectrum = bumpy
     values, vectors = spectrum.eigenvalues, spectrum.eigenvectors
-    with pytest.raises(InvalidParameterError, match=r"shapes \(k,\) and \(280, k\); the shapes are \(30,\) and \(279,"):
+    with pytest.raises(
+        InvalidParameterError,
+        match=r"shapes \(k,\) and \(280, k\); the shapes are \(30,\) and \(279,",
+    ):
         certify(laplacian, values, vectors[1:])
     with pytest.raises(InvalidParameterError, match=r"must be finite"):
         certify(laplacian, values, np.where(vectors == vectors[3, 3], np.nan, vectors))

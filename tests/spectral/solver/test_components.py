@@ -9,11 +9,10 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
-from eigenshape.spectral.multilevel.approximate import approximate_spectrum
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import strategy as roads
 from eigenshape.spectral.solver.certify import certify
 from eigenshape.spectral.solver.pencil import normalise
-from eigenshape.spectral.solver.solve import solve_spectrum
 
 
 def moved(mesh: TriangleMesh, scale: float, along: float) -> TriangleMesh:
@@ -31,7 +30,9 @@ def test_a_sphere_with_forty_specks(mass, k):
     laplacian = cotangent_laplacian(with_specks(icosphere(3), 40), mass)
     spectrum = solve_spectrum(laplacian, k)
     sphere = solve_spectrum(cotangent_laplacian(icosphere(3), mass), 60).eigenvalues
-    expected = np.concatenate([np.zeros(40), sphere])[:k]  # the specks' next eigenvalue is 2/.03², above all of these
+    expected = np.concatenate([np.zeros(40), sphere])[
+        :k
+    ]  # the specks' next eigenvalue is 2/.03², above all of these
     assert sphere[-1] < 2 / 0.03**2
     np.testing.assert_allclose(spectrum.eigenvalues, expected, rtol=1e-11, atol=1e-12)
     assert spectrum.certificate.complete
@@ -44,7 +45,9 @@ def test_parts_of_many_sizes_by_hand():
     """Cycles of m points have the eigenvalues 2 - 2 cos(2πj/m)."""
     sizes = [3, 700, 3, 350, 20, 301, 20]
     laplacian = graph(sp.block_diag([cycle(size) for size in sizes]))
-    values = np.sort(np.concatenate([2 - 2 * np.cos(2 * np.pi * np.arange(size) / size) for size in sizes]))
+    values = np.sort(
+        np.concatenate([2 - 2 * np.cos(2 * np.pi * np.arange(size) / size) for size in sizes])
+    )
     for k in (1, 5, 7, 30, 200, 700):
         found = solve_spectrum(laplacian, k)
         np.testing.assert_allclose(found.eigenvalues, values[:k], rtol=1e-9, atol=1e-13)
@@ -64,19 +67,27 @@ def test_a_part_that_has_more_low_eigenvalues_than_expected_is_asked_again(monke
     square = sp.kronsum(path(25), path(25))
     laplacian = graph(sp.block_diag([square, path(400)]))
     found = solve_spectrum(laplacian, 60)
-    np.testing.assert_allclose(found.eigenvalues, dense_eigenvalues(laplacian)[:60], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        found.eigenvalues, dense_eigenvalues(laplacian)[:60], rtol=1e-9, atol=1e-12
+    )
     assert [n for n, _ in asked].count(400) == 2, "more pairs of the path were asked for"
 
 
 def test_equal_eigenvalues_stand_in_the_order_of_their_parts():
     """Four spheres, the large one in the middle; turned copies differ in the last digits."""
-    turned = TriangleMesh(icosphere(2).vertices[:, [1, 2, 0]] @ np.diag([1, 1, -1.0]), icosphere(2).faces[:, ::-1])
-    mesh = disjoint_union(moved(turned, 1, 0), icosphere(3), moved(icosphere(2), 1, 7.0), moved(turned, 1, 1 / 3))
+    turned = TriangleMesh(
+        icosphere(2).vertices[:, [1, 2, 0]] @ np.diag([1, 1, -1.0]), icosphere(2).faces[:, ::-1]
+    )
+    mesh = disjoint_union(
+        moved(turned, 1, 0), icosphere(3), moved(icosphere(2), 1, 7.0), moved(turned, 1, 1 / 3)
+    )
     spectrum = solve_spectrum(cotangent_laplacian(mesh), 14)
     labels = np.repeat([0, 1, 2, 3], [162, 642, 162, 162])
     owners = [np.unique(labels[column != 0]).tolist() for column in spectrum.eigenvectors.T]
     assert owners[:4] == [[0], [1], [2], [3]]
-    second = [owner for owner, value in zip(owners, spectrum.eigenvalues, strict=True) if 1 < value < 2.1]
+    second = [
+        owner for owner, value in zip(owners, spectrum.eigenvalues, strict=True) if 1 < value < 2.1
+    ]
     small = [owner for owner in second if owner != [1]]
     assert small == sorted(small)
     assert len(small) >= 6
@@ -118,9 +129,14 @@ def test_kernels_on_many_parts():
 def test_connected_parts_and_their_level():
     """Tiny parts have few of the low eigenvalues, and do not set the unit."""
     alone = normalise(cotangent_laplacian(grid(30, 30)))
-    specks = cotangent_laplacian(disjoint_union(grid(30, 30), *[moved(icosphere(0), 1e-4, 2.0 + i) for i in range(5)]))
+    specks = cotangent_laplacian(
+        disjoint_union(grid(30, 30), *[moved(icosphere(0), 1e-4, 2.0 + i) for i in range(5)])
+    )
     pencil = normalise(specks)
-    level, own = pencil.values_out(np.array([pencil.level]))[0], alone.values_out(np.array([alone.level]))[0]
+    level, own = (
+        pencil.values_out(np.array([pencil.level]))[0],
+        alone.values_out(np.array([alone.level]))[0],
+    )
     assert own < level < 1.1 * own
     assert np.bincount(pencil.labels).tolist() == [961, 12, 12, 12, 12, 12]
     assert not alone.labels.any()
@@ -132,6 +148,6 @@ def test_approximations_of_many_parts(k):
     """Specks become single points on the coarsest level, whose energy is rounding alone."""
     mesh = disjoint_union(icosphere(5), *[moved(icosphere(0), 0.02, 3.0 + i) for i in range(3000)])
     laplacian = cotangent_laplacian(mesh)
-    found = approximate_spectrum(laplacian, k, accuracy=1e-3)
+    found = solve_spectrum(laplacian, k, method="approximate")
     exact = solve_spectrum(laplacian, k).eigenvalues
     np.testing.assert_allclose(found.eigenvalues, exact, atol=max(1e-3 * exact[-1], 1e-9))

@@ -20,7 +20,9 @@ def scaled_back(pencil, value):
 
 def test_pivots_count_the_eigenvalues_below_the_shift():
     pencil = normalise(graph(path(3)))  # eigenvalues 0, 1, 3
-    counts = [factorise(pencil, scaled_back(pencil, shift)).count for shift in (-0.5, 0.5, 1.5, 2.9, 3.1)]
+    counts = [
+        factorise(pencil, scaled_back(pencil, shift)).count for shift in (-0.5, 0.5, 1.5, 2.9, 3.1)
+    ]
     assert counts == [0, 1, 2, 2, 3]
 
 
@@ -29,13 +31,18 @@ def test_counts_agree_with_a_dense_solve(mass):
     laplacian = cotangent_laplacian(icosphere(2), mass)
     pencil, reference = normalise(laplacian), dense_eigenvalues(laplacian)
     for shift in np.linspace(0.7, 0.99 * reference[-1], 23):
-        assert factorise(pencil, scaled_back(pencil, shift)).count == np.count_nonzero(reference < shift)
+        assert factorise(pencil, scaled_back(pencil, shift)).count == np.count_nonzero(
+            reference < shift
+        )
 
 
 def test_a_zero_pivot_is_no_factor():
     pencil = normalise(graph(path(2)))  # at σ = 1 the diagonal is zero and pivots would leave it
     assert factorise(pencil, scaled_back(pencil, 1.0)) is None
-    assert factorise(normalise(Laplacian(sp.csr_array((2, 2)), sp.csr_array(sp.eye_array(2)))), 0.0) is None
+    assert (
+        factorise(normalise(Laplacian(sp.csr_array((2, 2)), sp.csr_array(sp.eye_array(2)))), 0.0)
+        is None
+    )
 
 
 def unpacked(factor):
@@ -45,7 +52,9 @@ def unpacked(factor):
         for start in range(e.first[s], e.first[s + 1], WIDE):
             columns = np.arange(start, min(start + WIDE, e.first[s + 1]))
             tall = rows[start - e.first[s] :]
-            lower[np.ix_(tall, columns)] = factor.panels[at : at + len(tall) * len(columns)].reshape(len(tall), -1)
+            lower[np.ix_(tall, columns)] = factor.panels[
+                at : at + len(tall) * len(columns)
+            ].reshape(len(tall), -1)
             at += len(tall) * len(columns)
     return np.tril(lower)
 
@@ -68,7 +77,10 @@ def test_the_rounding_bound_covers_the_rounding(laplacian, share):
 def test_slack_is_taken_off_the_diagonal():
     pencil = normalise(graph(path(30)))
     slack = np.full(30, 0.11)
-    one, two = factorise(pencil, 0.37, slack), factorise(pencil, 0.48)  # B is 1, so slack is a shift
+    one, two = (
+        factorise(pencil, 0.37, slack),
+        factorise(pencil, 0.48),
+    )  # B is 1, so slack is a shift
     assert one.count == two.count > factorise(pencil, 0.37).count
     right = np.arange(30.0)[:, None]
     np.testing.assert_allclose(one.solve(right), two.solve(right))
@@ -83,7 +95,10 @@ def test_the_shift_stands_among_the_wanted(laplacian, k):
 
 def test_a_shift_without_a_factor_is_an_error(monkeypatch):
     monkeypatch.setattr(shift_module, "factorise", lambda *args: None)
-    with pytest.raises(ConvergenceError, match=r"must have its pivots on the diagonal, and little rounding; none has"):
+    with pytest.raises(
+        ConvergenceError,
+        match=r"must have its pivots on the diagonal, and little rounding; none has",
+    ):
         factorise_near(normalise(graph(path(9))), 0.3)
 
 

@@ -4,8 +4,8 @@ import pytest
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.shapes.surfaces import icosphere, torus
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver.certify import certify
-from eigenshape.spectral.solver.solve import solve_spectrum
 
 
 def sphere_eigenvalues(k):
@@ -22,10 +22,17 @@ def kernels():
 def test_a_corrected_spectrum_is_the_logarithm_of_the_pencils(kernels):
     plain, corrected = (solve_spectrum(laplacian, 25) for laplacian in kernels)
     t = kernels[0].kernel.t
-    np.testing.assert_allclose(corrected.eigenvalues, -np.log1p(-t * plain.eigenvalues) / t, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(
+        corrected.eigenvalues, -np.log1p(-t * plain.eigenvalues) / t, rtol=1e-12, atol=1e-12
+    )
     np.testing.assert_array_equal(corrected.eigenvectors, plain.eigenvectors)
-    assert np.median(np.abs(corrected.eigenvalues / np.maximum(sphere_eigenvalues(25), 1) - 1)[1:]) < 0.02
-    assert np.median(np.abs(plain.eigenvalues / np.maximum(sphere_eigenvalues(25), 1) - 1)[1:]) > 0.1
+    assert (
+        np.median(np.abs(corrected.eigenvalues / np.maximum(sphere_eigenvalues(25), 1) - 1)[1:])
+        < 0.02
+    )
+    assert (
+        np.median(np.abs(plain.eigenvalues / np.maximum(sphere_eigenvalues(25), 1) - 1)[1:]) > 0.1
+    )
     assert (corrected.residuals >= plain.residuals).all()
 
 
@@ -50,14 +57,21 @@ def test_a_doctored_corrected_spectrum_is_refused(kernels):
 
 
 def test_eigenvalues_at_the_end_of_the_kernel_are_refused_or_warned_of(kernels):
-    with pytest.warns(UserWarning, match=r"too near to 1/t = \S+ to tell .* k takes n > 5 k t/e² points of a"):
+    with pytest.warns(
+        UserWarning, match=r"too near to 1/t = \S+ to tell .* k takes n > 5 k t/e² points of a"
+    ):
         solve_spectrum(kernels[1], 150)
-    with pytest.warns(UserWarning, match=r"n > 21 k t/e² points .* 72 k t/e² to be within 10 %, as the first \d+ are"):
+    with pytest.warns(
+        UserWarning,
+        match=r"n > 21 k t/e² points .* 72 k t/e² to be within 10 %, as the first \d+ are",
+    ):
         solve_spectrum(kernels[0], 150)
 
 
 @pytest.mark.filterwarnings("ignore:A heat time:UserWarning")
 def test_eigenvalues_beyond_the_end_of_the_kernel_are_refused():
     coarse = mesh_laplacian(torus(24, 12), correct="log")
-    with pytest.raises(InvalidParameterError, match=r"to be corrected must lie below 1/t; eigenvalue \d+ of"):
+    with pytest.raises(
+        InvalidParameterError, match=r"to be corrected must lie below 1/t; eigenvalue \d+ of"
+    ):
         solve_spectrum(coarse, 288)

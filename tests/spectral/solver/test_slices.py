@@ -6,11 +6,11 @@ from eigenshape._errors import ConvergenceError
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.domains import irregular_grid
 from eigenshape.shapes.surfaces import icosphere, torus
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import slices
 from eigenshape.spectral.solver import strategy as roads
 from eigenshape.spectral.solver.pencil import normalise, rayleigh_residuals
 from eigenshape.spectral.solver.slices import walk
-from eigenshape.spectral.solver.solve import solve_spectrum
 
 
 @pytest.fixture
@@ -49,10 +49,14 @@ def test_a_walk_takes_several_slices_and_finds_all_of_a_simple_spectrum(monkeypa
     monkeypatch.setattr(slices, "SLICE", 14)
     pencil, told = normalise(cotangent_laplacian(irregular(24))), []
     vectors, factor = walk(pencil, 60, told.append)
-    reference = np.ldexp(dense_eigenvalues(cotangent_laplacian(irregular(24)))[:60], -pencil.value_exponent)
+    reference = np.ldexp(
+        dense_eigenvalues(cotangent_laplacian(irregular(24)))[:60], -pencil.value_exponent
+    )
     assert factor.count > 40  # the last shift stands in the last slice
     assert told == sorted(told)
-    np.testing.assert_allclose(np.sort(rayleigh_residuals(pencil, vectors)[0]), reference, atol=1e-9 * reference[-1])
+    np.testing.assert_allclose(
+        np.sort(rayleigh_residuals(pencil, vectors)[0]), reference, atol=1e-9 * reference[-1]
+    )
 
 
 def test_a_slice_needs_a_gap_to_end_in():
@@ -72,10 +76,15 @@ def test_slices_that_lean_on_each_other_are_not_taken(thin, monkeypatch):
 
     monkeypatch.setattr(roads, "walk", leaning)
     laplacian = cotangent_laplacian(irregular(24))
-    np.testing.assert_allclose(solve_spectrum(laplacian, 60).eigenvalues, dense_eigenvalues(laplacian)[:60], atol=1e-9)
+    np.testing.assert_allclose(
+        solve_spectrum(laplacian, 60).eigenvalues, dense_eigenvalues(laplacian)[:60], atol=1e-9
+    )
     monkeypatch.setattr(roads, "_at_once", leaning)
     monkeypatch.setattr(roads, "DENSE_LIMIT", 0)
-    with pytest.raises(ConvergenceError, match=r"Vectors of different runs must be B-orthogonal; two are off by 1\.0"):
+    with pytest.raises(
+        ConvergenceError,
+        match=r"Vectors of different runs must be B-orthogonal; two are off by 1\.0",
+    ):
         solve_spectrum(laplacian, 60)
 
 
@@ -84,6 +93,7 @@ def test_a_shift_that_does_not_move_on_is_an_error(monkeypatch):
     first = slices.shift_inside(normalise(cotangent_laplacian(irregular(24))), 5)
     monkeypatch.setattr(slices, "factorise_near", lambda pencil, shift: first)
     with pytest.raises(
-        ConvergenceError, match=r"The shift of a slice must lie beyond the one before; -\d+ eigenvalues"
+        ConvergenceError,
+        match=r"The shift of a slice must lie beyond the one before; -\d+ eigenvalues",
     ):
         walk(normalise(cotangent_laplacian(irregular(24))), 60, lambda done: None)

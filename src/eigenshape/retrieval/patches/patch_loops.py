@@ -6,11 +6,12 @@ import numpy as np
 
 from eigenshape._compile import njit
 
-RINGS = 4  # of equal width, about a disc's center
+RINGS = 4  # of equal width, from the center of a disc to its radius
 TURN_BINS = 8  # of the cosine to the disc's normal, on 0..1
 HEIGHT_BINS = 6  # of the height over the point, in radii, on -1..1
-RING_NUMBERS = TURN_BINS + HEIGHT_BINS + 2  # both histograms, the area and the straightness
-NUMBERS = RINGS * RING_NUMBERS  # of one disc
+# The two histograms, the logarithm of the area, and the ratio of distances
+RING_NUMBERS = TURN_BINS + HEIGHT_BINS + 2
+NUMBERS = RINGS * RING_NUMBERS
 INNER = 0.35  # of the radius: where the disc's normal is taken
 LEAST_AREA = 1e-3  # of a flat disc's, added before the logarithm
 
@@ -52,7 +53,11 @@ def describe_disc(distances, center, order, surface, radius, kept, straight, fou
         kept[ring] += areas[i]
         straight[ring] += areas[i] * (beeline / distances[i] if distances[i] > 0 else 1.0)
         _add(found[first : first + TURN_BINS], turn, areas[i])
-        _add(found[first + TURN_BINS : first + TURN_BINS + HEIGHT_BINS], (height / radius + 1) / 2, areas[i])
+        _add(
+            found[first + TURN_BINS : first + TURN_BINS + HEIGHT_BINS],
+            (height / radius + 1) / 2,
+            areas[i],
+        )
     covered = 0.0
     for ring in range(RINGS):
         first = ring * RING_NUMBERS
@@ -69,7 +74,7 @@ def describe_disc(distances, center, order, surface, radius, kept, straight, fou
 @njit
 @no_type_check
 def _add(bins, share, weight):
-    """Add a weight at 0..1 to the two bins whose centers it lies between."""
+    """Share a weight at 0..1 between the two bins whose centers it lies between."""
     place = min(max(share * len(bins) - 0.5, 0.0), len(bins) - 1.0)
     low = min(int(place), len(bins) - 2)
     bins[low] += weight * (low + 1 - place)

@@ -19,7 +19,13 @@ import numpy as np
 from filelock import FileLock, Timeout
 
 from eigenshape._errors import StoreError
-from eigenshape.retrieval.store.catalog import Catalog, DescriptorRow, create_tables, read_catalog, seal
+from eigenshape.retrieval.store.catalog import (
+    Catalog,
+    DescriptorRow,
+    create_tables,
+    read_catalog,
+    seal,
+)
 
 DATABASE = "index.sqlite"
 DRAFT = "draft.sqlite"
@@ -65,7 +71,9 @@ def _creating(folder: Path) -> Iterator[None]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as err:
-        raise StoreError(f"An index needs a folder; {folder} cannot be made: {err.strerror}.") from err
+        raise StoreError(
+            f"An index needs a folder; {folder} cannot be made: {err.strerror}."
+        ) from err
     _require_empty(folder, or_store=True)
     with _lock(folder):
         yield
@@ -73,10 +81,14 @@ def _creating(folder: Path) -> Iterator[None]:
 
 def _require_empty(folder: Path, *, or_store: bool = False) -> None:
     names = {entry.name for entry in folder.iterdir()} - {LOCK, HOLDER, COMMITTED}
-    if or_store and (folder / DATABASE).is_file():  # asked after the list, into which another may just have put it
+    if (
+        or_store and (folder / DATABASE).is_file()
+    ):  # asked after the list, into which another may just have put it
         return
     if not all(name.startswith(DRAFT) for name in names):
-        raise StoreError(f"{folder} must be empty to become an index; it is not. Open it, or choose another folder.")
+        raise StoreError(
+            f"{folder} must be empty to become an index; it is not. Open it, or choose another folder."
+        )
 
 
 def _make(folder: Path) -> None:
@@ -222,7 +234,9 @@ def _lock(folder: Path) -> Iterator[None]:
             f"An index has one writer; {who} has held {folder / LOCK} for more than {WAIT:g} s. Wait for it to end."
         ) from err
     except OSError as err:
-        raise StoreError(f"An index changes only where one may write; of {folder}: {err.strerror}.") from err
+        raise StoreError(
+            f"An index changes only where one may write; of {folder}: {err.strerror}."
+        ) from err
     try:
         holder.write_text(f"process {os.getpid()} on {socket.gethostname()}")
         yield
@@ -254,7 +268,9 @@ def append_rows(folder: Path, database: sqlite3.Connection, recipe: int, rows: n
     return int(offset)
 
 
-def read_rows(data: memoryview, kept: DescriptorRow, row: "np.dtype[Any]", path: Path) -> np.ndarray:
+def read_rows(
+    data: memoryview, kept: DescriptorRow, row: "np.dtype[Any]", path: Path
+) -> np.ndarray:
     """Return the rows of a descriptor, of a type.
 
     Raises
@@ -265,7 +281,11 @@ def read_rows(data: memoryview, kept: DescriptorRow, row: "np.dtype[Any]", path:
     begin, count = kept.offset, kept.n_rows * kept.n_columns
     end = begin + count * row.itemsize
     if end > len(data):
-        raise StoreError(f"{path} must hold {end} bytes; it holds {len(data)}. Index the shapes again.")
+        raise StoreError(
+            f"{path} must hold {end} bytes; it holds {len(data)}. Index the shapes again."
+        )
     if crc32(data[begin:end]) != kept.checksum:
-        raise StoreError(f"{path} must hold what was written; bytes {begin} to {end} differ. Index the shapes again.")
+        raise StoreError(
+            f"{path} must hold what was written; bytes {begin} to {end} differ. Index the shapes again."
+        )
     return np.frombuffer(data, row, count, begin).reshape(kept.n_rows, kept.n_columns)

@@ -1,4 +1,4 @@
-"""Two bounds for each eigenvalue of a shape itself, not of a matrix."""
+"""Lower and upper bounds for the eigenvalues of a mesh itself, rather than of a matrix."""
 
 from dataclasses import dataclass
 from typing import SupportsIndex
@@ -21,31 +21,47 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import interpolation_constants, longest_edges
 from eigenshape.spectral.bounds.nonconforming import lower_bounds, partly
 from eigenshape.spectral.bounds.rounding import enclose, relative_rounding
-from eigenshape.spectral.solver.dirichlet import solve_free
+from eigenshape.spectral.solve import solve_spectrum
 
-LINEAR_FLOOR = 0.5  # consistent mass of linear elements over its diagonal, in any dimension
+# Largest c with B ≥ c diag(B) for the consistent mass of linear elements, in any dimension.
+LINEAR_FLOOR = 0.5
 NOTHING = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
 class Brackets:
-    """An interval around each of the k lowest eigenvalues of the Laplace operator of a shape made of flat simplices.
+    """Guaranteed lower and upper bounds for the k lowest eigenvalues of a mesh.
+
+    The eigenvalues are those of the Laplace operator of the shape made of flat simplices.
 
     Attributes
     ----------
     lower, upper : (k,) float
         lower ≤ λ ≤ upper, each ascending, in 1/length²; both exactly 0 for the first `n_zero`.
-    boundary : "neumann" or "dirichlet"
-        What holds on the boundary.
+    boundary : {"neumann", "dirichlet"}
+        The boundary condition.
     n_zero : int
-        Eigenvalues that are 0 by topology: one a part that facets hold together; with the Dirichlet condition, only
-        where it has no boundary.
+        Number of eigenvalues that are 0 by topology: one for each part that is connected by facets;
+        with the Dirichlet condition, one for each part without boundary.
     longest_edge : float
         In length.
     constant : float
-        C, the largest of `interpolation_constants`, in length: no lower end exceeds 1/C².
+        C, the largest interpolation constant of a simplex, in length. No lower bound exceeds 1/C².
     rounding : float
-        Share of the last upper end by which rounding and residuals widen it.
+        Share of the last upper bound by which rounding and residuals widen it.
+
+    See Also
+    --------
+    bracket_eigenvalues : Compute the bounds.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> found = es.bracket_eigenvalues(es.icosphere(2), 5)
+    >>> len(found.lower), found.n_zero
+    (5, 1)
+    >>> print(found.explain()[:61])
+    Each of the 5 lowest eigenvalues of this shape, its simplices
     """
 
     lower: Float[np.ndarray, " k"]
@@ -57,7 +73,7 @@ class Brackets:
     rounding: float
 
     def explain(self) -> str:
-        """Say in plain words what is bounded, and by what."""
+        """Return a text that says what is bounded, and how tightly."""
         how = (
             f"Each of the {len(self.upper)} lowest eigenvalues of this shape, its simplices taken as flat "
             f"({self.boundary.capitalize()} condition), lies in its bracket. Linear elements bound it from above, "
@@ -72,7 +88,10 @@ class Brackets:
         if self.n_zero == len(self.upper):
             return zero.strip()
         if self.lower[-1] == 0:
-            return f"{zero}Rounding in slivers leaves no lower end above 0; only longer edges across them would help."
+            return (
+                f"{zero}Rounding in slivers leaves no lower bound above 0. Repair or remesh nearly "
+                f"degenerate simplices."
+            )
         widths = 1 - self.lower[self.n_zero :] / self.upper[self.n_zero :]
         return (
             f"{zero}The brackets are {np.median(widths):.2g} of their upper ends wide in the median, "
@@ -82,49 +101,70 @@ class Brackets:
 
 @one_blas_thread()
 def bracket_eigenvalues(
-    mesh: MeshLike, k: SupportsIndex, *, boundary: Condition = "neumann", progress: Progress | None = None
+    mesh: MeshLike,
+    k: SupportsIndex,
+    *,
+    boundary: Condition = "neumann",
+    progress: Progress | None = None,
 ) -> Brackets:
-    """Bound each of the k lowest eigenvalues of a mesh from both sides, as the shape of flat simplices that it is.
+    """Compute guaranteed lower and upper bounds for the k lowest eigenvalues of a mesh.
 
-    From above by linear elements with consistent mass (Rayleigh and Ritz). From below by Crouzeix-Raviart elements. Let
-    Πu have the facet means of u, and w = u - Πu. Green's formula on each simplex gives |u|₁² = |Πu|₁² + |w|₁², and
-    `interpolation_constants` ‖w‖_T ≤ C_T |w|_{1,T}; neither asks more of how simplices are glued than common facet
-    means, so the angles around a vertex may sum to anything, a facet may have any number of simplices, and the ambient
-    space does not matter. Where μ C_T² < 1 on all simplices, (a + b)² ≤ a²/(1-θ) + b²/θ with θ = μ C_T² gives
-    ‖u‖² ≤ Σ ‖Πu‖_T² / (1 - μ C_T²) + |w|₁²/μ. So with eigenvalues λ*_k of the elements whose mass is weighed by
-    1/(1 - μ C_T²), min-max over the span of the first k eigenfunctions gives λ_k ≥ λ*_k if λ*_k ≤ μ, and otherwise, the
-    weights of a larger μ bounded by these, λ_k ≥ λ*_k / (1 + C² (λ*_k - μ)), C the largest C_T. With μ = 0 this is Liu
-    (2015), after Carstensen and Gedicke (2014). Larger μ are tried where C_T is uneven, and keep one long edge from
-    spoiling all, as the stabilised elements of Carstensen and Puttkammer (2024) do. On curves it all holds with linear
-    elements for both.
+    The mesh is taken as the shape made of its flat simplices. Upper bounds come from linear elements
+    with consistent mass (Rayleigh-Ritz), lower bounds from Crouzeix-Raviart elements, as follows.
 
-    Residuals and the rounding of matrix entries widen the bounds (`spectral.enclosure`). Not counted are the last few
-    roundings in forming the ends, and errors in the coordinates.
+    Let Πu have the facet means of u, and w = u - Πu. Green's formula on each simplex gives
+    |u|₁² = |Πu|₁² + |w|₁², and `interpolation_constants` gives ‖w‖_T ≤ C_T |w|_{1,T}. Both need only
+    that neighboring simplices have the same facet means: the angles around a vertex may have any
+    sum, a facet may have any number of simplices, and the ambient space does not matter. If
+    μ C_T² < 1 on all simplices, (a + b)² ≤ a²/(1-θ) + b²/θ with θ = μ C_T² gives
+    ‖u‖² ≤ Σ ‖Πu‖_T² / (1 - μ C_T²) + |w|₁²/μ. Let λ*_k be the eigenvalues of the elements with mass
+    weighted by 1/(1 - μ C_T²). Min-max over the span of the first k eigenfunctions gives
+    λ_k ≥ λ*_k if λ*_k ≤ μ, and otherwise λ_k ≥ λ*_k / (1 + C² (λ*_k - μ)), C the largest C_T. With
+    μ = 0 this is Liu (2015), after Carstensen and Gedicke (2014). Larger μ are tried if C_T varies,
+    so that a single long edge does not weaken all bounds, as in the stabilized elements of
+    Carstensen and Puttkammer (2024). On curves both bounds use linear elements.
+
+    The bounds include residuals and the rounding of matrix entries (`spectral.bounds.rounding`).
+    They do not include the last few roundings in their own computation, or errors in the coordinates.
 
     Parameters
     ----------
     mesh : MeshLike
-        Of any dimension; two triangles that touch in a point alone are apart.
+        Of any dimension. Triangles that share only a point are not connected.
     k : int
-        Number of eigenvalues, 1 to the number of points that are not held.
-    boundary : "neumann" or "dirichlet"
+        Number of eigenvalues, 1 to the number of free points.
+    boundary : {"neumann", "dirichlet"}
     progress : callable, optional
         Called as progress(fraction_done, message).
 
     Returns
     -------
     Brackets
-        In 1/length². Their width falls with the square of the edges.
+        In 1/length². Their width is proportional to the square of the edge length.
 
     Raises
     ------
     InvalidShapeError
-        If a simplex has no volume or the corners of another, a point no simplex, or floats cannot hold 1/length².
+        If a simplex has no volume or the same corners as another, a point belongs to no simplex, or
+        floats cannot hold 1/length².
     InvalidParameterError
-        If `boundary` is neither of the two, or "dirichlet" on a mesh without boundary or without points inside; or k
-        is not in range.
+        If `boundary` is unknown, or "dirichlet" on a mesh without boundary or without inner points;
+        or k is out of range.
     ConvergenceError
         If the proof of completeness fails.
+
+    See Also
+    --------
+    solve_spectrum : Certified eigenvalues of the matrices.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> square = es.shapes.grid(8, 8)
+    >>> found = es.bracket_eigenvalues(square, 4)
+    >>> exact = es.shapes.box_eigenvalues(4, (1, 1), "neumann")
+    >>> bool((found.lower <= exact).all() and (exact <= found.upper).all())
+    True
     """
     mesh = as_simplicial(mesh)
     _require_condition(boundary)
@@ -159,10 +199,12 @@ def _upper_bounds(
     n_free = conforming.n_points - len(held)
     if boundary == "dirichlet" and not (len(held) and n_free):
         fact = f"{mesh!r} has {len(held)} points on its boundary and {n_free} inside"
-        raise InvalidParameterError(f"boundary='dirichlet' needs a boundary and points inside; {fact}.")
+        raise InvalidParameterError(
+            f"boundary='dirichlet' needs a boundary and points inside; {fact}."
+        )
     count = whole_number(k, "k", 1, n_free)
     laplacian = cotangent_laplacian(conforming, "consistent")
-    found = solve_free(laplacian, count, held, partly(progress, 0.0, 0.3))
+    found = solve_spectrum(laplacian, count, fixed=held, progress=partly(progress, 0.0, 0.3))
     ends = enclose(found, laplacian, LINEAR_FLOOR, relative_rounding(mesh))[1]
     return ends, float(1 - found.eigenvalues[-1] / ends[-1]) if ends[-1] else 0.0
 
@@ -175,4 +217,6 @@ def _n_zero(table: FacetTable, held: Int[np.ndarray, " h"]) -> int:
 
 def _require_condition(boundary: str) -> None:
     if boundary not in ("neumann", "dirichlet"):
-        raise InvalidParameterError(f"boundary must be 'neumann' or 'dirichlet'; it is {boundary!r}.")
+        raise InvalidParameterError(
+            f"boundary must be 'neumann' or 'dirichlet'; it is {boundary!r}."
+        )

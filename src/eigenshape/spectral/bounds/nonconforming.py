@@ -18,7 +18,7 @@ from eigenshape.operators.crouzeix_raviart import (
 )
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.bounds.rounding import enclose, relative_rounding
-from eigenshape.spectral.solver.dirichlet import solve_free
+from eigenshape.spectral.solve import solve_spectrum
 
 EVEN = 1.5  # largest over mean C² up to which one constant serves all simplices
 STEP = 2.0  # from one weight to the next
@@ -75,7 +75,7 @@ def _solver(
 
     def solve(measure: Float[np.ndarray, " s"], k: int, progress: Progress | None) -> Values:
         laplacian = Laplacian(stiffness, facet_mass(table, measure))
-        found = solve_free(laplacian, k, held, progress)
+        found = solve_spectrum(laplacian, k, fixed=held, progress=progress)
         return enclose(found, laplacian, mass_floor(mesh.dim), rounding)[0]
 
     return solve

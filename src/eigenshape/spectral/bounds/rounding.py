@@ -35,7 +35,9 @@ def enclose(
     rows = abs(laplacian.stiffness).sum(axis=1) / laplacian.mass.diagonal()
     longest_row = int(np.diff(laplacian.stiffness.indptr).max())
     stray += (longest_row + 4) * EPS * float(rows.max()) / floor
-    lower = np.maximum(values - stray, 0.0) * max(1 - relative, 0.0)  # slivers may leave no digit: then 0 is all
+    lower = np.maximum(values - stray, 0.0) * max(
+        1 - relative, 0.0
+    )  # slivers may leave no digit: then 0 is all
     return lower, (values + stray) * (1 + relative)
 
 
@@ -57,7 +59,9 @@ def relative_rounding(mesh: Mesh) -> float:
 
 def _flatness(corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndarray, " s"]:
     inner = np.linalg.inv(triangular_sides(corners)[1])
-    gradients = np.linalg.norm(np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1), axis=2)
+    gradients = np.linalg.norm(
+        np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1), axis=2
+    )
     first, second = np.triu_indices(corners.shape[1], 1)
     squares = ((corners[:, first] - corners[:, second]) ** 2).sum(axis=2)
     return (squares * gradients[:, first] * gradients[:, second]).sum(axis=1)

@@ -4,14 +4,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import frozen, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.spectral.comparison.eigenspaces import SEPARATED, orthonormal, outside, separated_groups
+from eigenshape.spectral.comparison.eigenspaces import (
+    SEPARATED,
+    orthonormal,
+    outside,
+    separated_groups,
+)
 from eigenshape.spectral.solver.certify import quality
 from eigenshape.spectral.solver.kernel_values import to_pencil
 from eigenshape.spectral.solver.pairs import Pairs, spread
@@ -23,18 +28,22 @@ Vectors = Float[np.ndarray, "n p"]
 
 @dataclass(frozen=True, eq=False)
 class EigenspaceAngles:
-    """How far the eigenspaces of one shape turn when it becomes another.
+    """How far the eigenspaces of a shape rotate when it is deformed into another.
 
     Attributes
     ----------
     starts, stops : (g,) int
-        Group j has the numbers starts[j] to stops[j] - 1.
+        Group j consists of the eigenvalues number starts[j] to stops[j] - 1.
     angles : (g,) float
         Largest principal angle between the two spaces of a group, in radians, 0 to π/2.
     gaps : (g,) float
         Distance of the group from the nearest other eigenvalue of the first shape, in 1/length².
     bounds : (g,) float or None
-        No angle is larger than its bound, in radians; π/2 says nothing. None without an operator.
+        Upper bound of each angle, in radians; π/2 if there is no bound. None without an operator.
+
+    See Also
+    --------
+    es.spectral.eigenspace_angles : Compute the angles.
     """
 
     starts: Int[np.ndarray, " g"]
@@ -44,20 +53,20 @@ class EigenspaceAngles:
     bounds: Float[np.ndarray, " g"] | None
 
     def explain(self) -> str:
-        """Say in plain words how far the spaces turn, and for how many that is bounded."""
+        """Return a text that says how far the spaces rotate, and how many angles are bounded."""
         if not len(self.angles):
-            return "No group of eigenvalues is known whole."
+            return "No group of eigenvalues is known completely."
         worst = int(self.angles.argmax())
         numbers = f"numbers {self.starts[worst]} to {self.stops[worst] - 1}"
         degrees = np.degrees([np.median(self.angles), self.angles[worst]])
-        says = (
+        summary = (
             f"The eigenspaces of {len(self.angles)} groups turn by {degrees[0]:.3g}° in the median and by at most "
             f"{degrees[1]:.3g}° ({numbers})."
         )
         if self.bounds is None:
-            return says
+            return summary
         n_bounded = np.count_nonzero(self.bounds < np.pi / 2)
-        return f"{says} For {n_bounded} of them the gap proves a bound below a right angle."
+        return f"{summary} For {n_bounded} of them the gap proves a bound below a right angle."
 
 
 @one_blas_thread()
@@ -69,27 +78,30 @@ def eigenspace_angles(
     laplacian: Laplacian | None = None,
     ratio: float = SEPARATED,
 ) -> EigenspaceAngles:
-    """Measure how far eigenspaces turn between two shapes, and bound it where gaps allow (thesis 3.5).
+    """Measure how far eigenspaces rotate between two shapes, and bound the angles (thesis 3.5).
 
-    Groups are the `separated_groups` of `one` that are known whole. The eigenvectors of `two` with the same numbers are
-    pulled back to the points of `one` (thesis, lemma 3.2.1) and made orthonormal in its mass.
+    Groups are the `separated_groups` of `one` that are known completely. The eigenvectors of `two`
+    with the same numbers are pulled back to the points of `one` (thesis, lemma 3.2.1) and
+    orthonormalized in its mass.
 
-    With the operator (W, B) of `one` the angle has a bound. Let V be that basis, H = VᵀWV, R = WV - BVH, and δ the
-    distance of the interval that the eigenvalues of H span from all eigenvalues of `one` outside the group. Then
-    sin θ ≤ ‖R‖/δ, the largest singular value in B⁻¹ (Davis and Kahan 1970, the sin θ theorem; Parlett 1998, section
-    11.7), as X = U⊥ᵀBV, U⊥ the eigenvectors of the rest, solves Λ⊥X - XH = U⊥ᵀR. The eigenvectors of `one` have the
-    same bound by their own residuals, which is added, and eigenvalues are off by at most √2 times the norm of all
-    residuals, which the gap loses. What the bound needs of `two` is V alone: it is a posteriori, and says nothing where
-    numbers are exchanged.
+    With the operator (W, B) of `one` the angle has a bound. Let V be that basis, H = VᵀWV,
+    R = WV - BVH, and δ the distance between the interval spanned by the eigenvalues of H and all
+    eigenvalues of `one` outside the group. Then sin θ ≤ ‖R‖/δ, with the largest singular value in
+    B⁻¹ (Davis and Kahan 1970, the sin θ theorem; Parlett 1998, section 11.7), since X = U⊥ᵀBV, U⊥ the
+    other eigenvectors, solves Λ⊥X - XH = U⊥ᵀR. The eigenvectors of `one` have the same kind of bound
+    by their own residuals, which is added. Eigenvalues have errors of at most √2 times the norm of
+    all residuals, by which the gap is reduced. The bound depends on `two` only through V: it is a
+    posteriori, and gives no information if eigenvalues change places.
 
     Parameters
     ----------
     one, two : Spectrum
         From the lowest eigenvalue on.
     points : (n_one,) int, optional
-        The point of `two` that belongs to each point of `one`; by default that of the same number.
+        The point of `two` that corresponds to each point of `one`. The default is the point of the
+        same number.
     laplacian : Laplacian, optional
-        The operator that `one` is of.
+        The operator of `one`.
     ratio : float
         As in `separated_groups`.
 
@@ -100,10 +112,22 @@ def eigenspace_angles(
     Raises
     ------
     InvalidParameterError
-        If a spectrum does not begin with the lowest eigenvalue, the points do not fit, eigenvectors are dependent where
-        they are pulled back to, or `laplacian` is given and `one` has no proof of completeness or other points.
+        If a spectrum does not begin with the lowest eigenvalue, the points do not fit, the
+        pulled-back eigenvectors are dependent, or `laplacian` is given and `one` is not certified or
+        has other points.
     ConvergenceError
-        If `laplacian` is not the operator that `one` is of.
+        If `laplacian` is not the operator of `one`.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.shapes.torus(24, 12)
+    >>> bumpy = es.TriangleMesh(mesh.vertices * [1.0, 1.0, 1.01], mesh.faces)
+    >>> laplacian = es.cotangent_laplacian(mesh)
+    >>> one, two = (es.solve_spectrum(es.cotangent_laplacian(m), 10) for m in (mesh, bumpy))
+    >>> found = es.spectral.eigenspace_angles(one, two, laplacian=laplacian)
+    >>> bool((found.angles <= found.bounds).all())
+    True
     """
     require_type(one, Spectrum, "one")
     require_type(two, Spectrum, "two")
@@ -124,7 +148,10 @@ def eigenspace_angles(
         angles[place] = _largest_angle(one, group, pulled)
         bounds[place] = np.pi / 2 if exact is None else _bound(*exact, group, pulled)
     steps = np.concatenate([[np.inf], np.diff(one.eigenvalues)])
-    starts, stops = (np.array([getattr(group, end) for group in groups], dtype=np.int64) for end in ("start", "stop"))
+    starts, stops = (
+        np.array([getattr(group, end) for group in groups], dtype=np.int64)
+        for end in ("start", "stop")
+    )
     return EigenspaceAngles(
         starts=frozen(starts),
         stops=frozen(stops),
@@ -138,12 +165,16 @@ def _partners(one: Spectrum, two: Spectrum, points: ArrayLike | None) -> Int[np.
     n_one, n_two = len(one.eigenvectors), len(two.eigenvectors)
     if points is None and n_one != n_two:
         raise InvalidParameterError(
-            f"Spectra on different numbers of points, {n_one} and {n_two}, need to be told which point of two belongs "
-            f"to each point of one. Pass points."
+            f"Spectra on different numbers of points need corresponding points; one has {n_one} points and two has "
+            f"{n_two}. Pass points, the point of two that corresponds to each point of one."
         )
-    partners = whole_numbers(np.arange(n_one) if points is None else points, "a point of two", 0, n_two - 1)
+    partners = whole_numbers(
+        np.arange(n_one) if points is None else points, "a point of two", 0, n_two - 1
+    )
     if len(partners) != n_one:
-        raise InvalidParameterError(f"points must name one for each of {n_one} points; there are {len(partners)}.")
+        raise InvalidParameterError(
+            f"points must hold one point of two for each of {n_one} points of one; there are {len(partners)}."
+        )
     return partners
 
 
@@ -164,7 +195,10 @@ def _unit_pairs(one: Spectrum, laplacian: Laplacian) -> tuple[Pencil, Pairs]:
             f"{len(one.eigenvectors)} points."
         )
     if one.certificate.count is None:
-        raise InvalidParameterError("Bounds of angles need a spectrum without gaps; one was not counted.")
+        raise InvalidParameterError(
+            "Bounds of angles need a certified spectrum; the eigenvalues of one were not counted. Solve with "
+            "method='certified'."
+        )
     pencil = normalise(laplacian)
     values = np.ldexp(to_pencil(laplacian.kernel, one.eigenvalues), -pencil.value_exponent)
     vectors = np.ldexp(one.eigenvectors, -pencil.vector_exponent)
@@ -183,7 +217,9 @@ def _bound(pencil: Pencil, pairs: Pairs, group: slice, pulled: Vectors) -> float
     size = np.sqrt(max(np.linalg.eigvalsh(squares)[-1], 0.0) / pencil.mass_floor)
     own = float(np.linalg.norm(pairs.residuals[group]))
     turned = _sine_bound(float(size), _distance(pairs, group, np.linalg.eigvalsh(inner)))
-    return min(turned + _sine_bound(own, _distance(pairs, group, pairs.values[group])), float(np.pi / 2))
+    return min(
+        turned + _sine_bound(own, _distance(pairs, group, pairs.values[group])), float(np.pi / 2)
+    )
 
 
 def _distance(pairs: Pairs, group: slice, inside: Float[np.ndarray, " p"]) -> float:

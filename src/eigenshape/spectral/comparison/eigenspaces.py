@@ -1,4 +1,4 @@
-"""Spaces of eigenvectors: which belong together, and how far they are from those that they stand for."""
+"""Eigenspaces: which eigenvectors belong together, and how accurate they are."""
 
 from itertools import pairwise
 
@@ -6,39 +6,45 @@ import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.spectral.spectrum import Spectrum, require_lowest
 
-EQUAL = 1e-9  # of the larger: exact eigenvalues that differ less are one
+# Exact eigenvalues that differ by less than this share of the larger one are copies of one eigenvalue:
+# formulas evaluate them to about 1e-15.
+EQUAL = 1e-9
+# Least ratio of the gap around a group to its spread. With 4 the bound sin θ ≤ ‖R‖/δ can hold for
+# perturbations as large as the spread; larger ratios give fewer and smaller groups.
 SEPARATED = 4.0
-DEPENDENT = 1e-12  # least eigenvalue of the Gram matrix of unit columns: below, they span less than they should
+# Least eigenvalue of the Gram matrix of unit columns that count as independent. Cholesky loses about
+# 1e-16 / DEPENDENT of orthonormality at once, so two steps still reach rounding.
+DEPENDENT = 1e-12
 
 
 @one_blas_thread()
 def eigenspace_errors(
     spectrum: Spectrum, eigenvalues: ArrayLike, functions: Float[np.ndarray, "n j"]
 ) -> Float[np.ndarray, " k"]:
-    """Measure how far each discrete eigenvector is from the exact eigenspace of its number (thesis 3.4, Figure 3.2b).
+    """Measure the distance of each eigenvector from the exact eigenspace (thesis 3.4, Figure 3.2b).
 
-    ‖φ_i - P φ_i‖, P the projection on the span of all exact eigenfunctions with the eigenvalue of number i, as their
-    values at the points. The thesis takes the plain inner product; this is that of the mass B, in which eigenvectors
-    are orthonormal and which stands for the integral.
+    The distance is ‖φ_i - P φ_i‖, with P the projection on the span of all exact eigenfunctions of
+    eigenvalue number i, sampled at the points. The thesis uses the plain inner product; this function
+    uses that of the mass B, in which eigenvectors are orthonormal and which approximates the integral.
 
     Parameters
     ----------
     spectrum : Spectrum
         From the lowest eigenvalue on.
     eigenvalues : (j + 1 or more,) float
-        Exact eigenvalues, ascending, each as often as its multiplicity says. One more than there are functions shows
-        that the last group of these is whole.
+        Exact eigenvalues, ascending, repeated by multiplicity. There must be more eigenvalues than
+        functions, to show that the last group of functions is complete.
     functions : (n, j) float
-        Exact eigenfunctions at the points, a column for each of the first j eigenvalues; within a multiplicity any
-        basis serves.
+        Exact eigenfunctions at the points, one column for each of the first j eigenvalues. For a
+        multiple eigenvalue any basis of the eigenspace is suitable.
 
     Returns
     -------
@@ -48,8 +54,19 @@ def eigenspace_errors(
     Raises
     ------
     InvalidParameterError
-        If the spectrum does not begin with the lowest eigenvalue, eigenvalues are not ascending, functions are not
-        one finite row a point, their last group is cut, or those of a group are dependent at these points.
+        If the spectrum does not begin with the lowest eigenvalue, eigenvalues are not ascending,
+        `functions` does not have one finite row for each point, their last group is incomplete, or
+        the functions of a group are linearly dependent at these points.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(3)
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(ball), 9)
+    >>> exact = es.shapes.sphere_eigenvalues(10)
+    >>> functions = es.shapes.sphere_harmonics(ball.vertices, 9)
+    >>> bool(es.spectral.eigenspace_errors(spectrum, exact, functions).max() < 0.01)
+    True
     """
     require_type(spectrum, Spectrum, "spectrum")
     require_lowest(spectrum, "spectrum")
@@ -60,8 +77,12 @@ def eigenspace_errors(
     for group in _equal_runs(values[: functions.shape[1]]):
         found = spectrum.eigenvectors[:, group.start : min(group.stop, count)]
         if found.shape[1]:
-            basis = orthonormal(functions[:, group], spectrum.mass, f"functions {group.start} to {group.stop - 1}")
-            errors[group.start : group.stop] = norms(outside(found, basis, spectrum.mass), spectrum.mass)
+            basis = orthonormal(
+                functions[:, group], spectrum.mass, f"functions {group.start} to {group.stop - 1}"
+            )
+            errors[group.start : group.stop] = norms(
+                outside(found, basis, spectrum.mass), spectrum.mass
+            )
     return np.minimum(errors, 1.0)
 
 
@@ -70,10 +91,14 @@ def _require_functions(
 ) -> None:
     n, shape = len(spectrum.eigenvectors), functions.shape
     if shape[0] != n or not shape[1]:
-        raise InvalidParameterError(f"functions must have one row for each of {n} points; the shape is {shape}.")
+        raise InvalidParameterError(
+            f"functions must have one row for each of {n} points; the shape is {shape}."
+        )
     bad = np.flatnonzero(~np.isfinite(functions).all(axis=1))
     if bad.size:
-        raise InvalidParameterError(f"functions must be finite; row {bad[0]} is not ({bad.size} such).")
+        raise InvalidParameterError(
+            f"functions must be finite; row {bad[0]} is not ({bad.size} such)."
+        )
     falling = np.flatnonzero(np.diff(values) < 0)
     if falling.size:
         i = int(falling[0])
@@ -83,13 +108,13 @@ def _require_functions(
     j = shape[1]
     if len(values) <= j:
         raise InvalidParameterError(
-            f"eigenvalues must go on beyond the functions, to show that their last group is whole; there are "
+            f"There must be more eigenvalues than functions, to show that the last group is complete; there are "
             f"{len(values)} eigenvalues and {j} functions. Pass one more eigenvalue."
         )
     start = _equal_runs(values[: j + 1])[-1].start
     if start < j:
         raise InvalidParameterError(
-            f"The last group of functions must be whole; eigenvalue {j} is {values[j]:.6g} as that of function "
+            f"The last group of functions must be complete; eigenvalue {j} is {values[j]:.6g} as that of function "
             f"{j - 1} is. Pass functions for the whole group, or the first {start}."
         )
 
@@ -104,29 +129,38 @@ def _slices(ends: list[int]) -> list[slice]:
 
 
 def separated_groups(eigenvalues: ArrayLike, *, ratio: float = SEPARATED) -> list[slice]:
-    """Cut a spectrum where gaps are wide: groups of eigenvalues that only together have a stable space (thesis 3.5).
+    """Divide eigenvalues into groups that are separated by wide gaps (thesis 3.5).
 
-    A group is a run of eigenvalues whose distance from the rest is at least `ratio` times its own spread, last less
-    first; of such runs the largest are taken, all eigenvalues together not counted. Each alone is such a run, and two
-    that overlap lie one in the other: a gap at an end of each would be part of the spread of the other. So every
-    eigenvalue is in one group. Nothing changes with the unit.
+    Only the space of a whole group is stable under perturbations. A group is a run of eigenvalues
+    whose distance from the rest is at least `ratio` times its own spread, last minus first. The
+    largest such runs are returned, the run of all eigenvalues excluded. Each single eigenvalue is
+    such a run, and of two runs that overlap one contains the other: otherwise a gap at an end of each
+    would be part of the spread of the other. So every eigenvalue is in exactly one group. The result
+    does not depend on units.
 
     Parameters
     ----------
     eigenvalues : (k,) float
         Ascending.
     ratio : float
-        Above 1: the larger, the smaller the groups.
+        Above 1. A larger ratio gives smaller groups.
 
     Returns
     -------
     list of slice
-        In order. What follows the last eigenvalue is not known, and is taken for far: the last group may be cut.
+        In ascending order. The eigenvalue after the last is unknown and assumed to be far away, so
+        the last group may be incomplete.
 
     Raises
     ------
     InvalidParameterError
         If eigenvalues are not finite or not ascending, or the ratio is not above 1.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.spectral.separated_groups([0.0, 2.0, 2.01, 2.02, 6.0])
+    [slice(0, 1, None), slice(1, 4, None), slice(4, 5, None)]
     """
     values = finite_values(eigenvalues, "eigenvalues")
     if not ratio > 1:
@@ -149,7 +183,9 @@ def separated_groups(eigenvalues: ArrayLike, *, ratio: float = SEPARATED) -> lis
     return _slices(ends)
 
 
-def orthonormal(columns: Float[np.ndarray, "n p"], mass: sp.sparray, name: str) -> Float[np.ndarray, "n p"]:
+def orthonormal(
+    columns: Float[np.ndarray, "n p"], mass: sp.sparray, name: str
+) -> Float[np.ndarray, "n p"]:
     """Return a basis of the span of these columns that is orthonormal in B.
 
     Twice by Cholesky, of columns made of one length first: as orthonormal as rounding lets it be for all that pass

@@ -1,14 +1,14 @@
-"""Spectra of two shapes side by side: what changes, by how much, and which changes are proved."""
+"""Comparison of the spectra of two shapes: what changes, by how much, and which changes are proved."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import finite_values, frozen
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.spectral.bounds.brackets import Brackets
 from eigenshape.spectral.signatures.heat import NULL
 from eigenshape.spectral.spectrum import Spectrum, require_lowest
@@ -16,21 +16,25 @@ from eigenshape.spectral.spectrum import Spectrum, require_lowest
 
 @dataclass(frozen=True, eq=False)
 class SpectrumComparison:
-    """The k lowest eigenvalues of two shapes, number by number.
+    """The k lowest eigenvalues of two shapes, compared by number.
 
     Attributes
     ----------
     one, two : (k,) float
         Eigenvalues, ascending, in 1/length².
     intervals_one, intervals_two : (k, 2) float
-        Where the eigenvalues that they stand for lie: of the operator, within the residual; of the shape itself, in
-        its bracket.
+        Intervals that contain the exact eigenvalues: those of the operator, by the residuals, or those
+        of the shape, by brackets.
     relative : (k,) float
-        |two - one| / one; 0 where both are 0 to rounding, infinite where one of them is.
+        |two - one| / one; 0 if both are 0 to rounding, infinite if one of them is.
     zero : (k,) bool
         Whether both are 0 to rounding.
     bracketed : bool
         Whether the intervals are brackets.
+
+    See Also
+    --------
+    es.spectral.compare_spectra : Compare two spectra.
     """
 
     one: Float[np.ndarray, " k"]
@@ -42,8 +46,8 @@ class SpectrumComparison:
     bracketed: bool
 
     @property
-    def told(self) -> Bool[np.ndarray, " k"]:
-        """Which changes are proved: the two intervals have no point in common."""
+    def proved_changes(self) -> Bool[np.ndarray, " k"]:
+        """Mask (k,) of the changes that are proved: the two intervals do not overlap."""
         (low_one, high_one), (low_two, high_two) = self.intervals_one.T, self.intervals_two.T
         return np.asarray((high_one < low_two) | (high_two < low_one))
 
@@ -71,28 +75,29 @@ class SpectrumComparison:
         return np.zeros(1) if self.zero.all() else self.relative[~self.zero]
 
     def explain(self) -> str:
-        """Say in plain words how far the spectra are apart, and what of it is proved."""
-        k, n_told, worst = len(self.one), int(self.told.sum()), int(np.abs(self.one - self.two).argmax())
+        """Return a text that says how far apart the spectra are, and which changes are proved."""
+        k, n_proved = len(self.one), int(self.proved_changes.sum())
+        worst = int(np.abs(self.one - self.two).argmax())
         bars = "brackets of the shapes'" if self.bracketed else "error bars of the operators'"
         return (
             f"Of the {k} lowest eigenvalues, number {worst} changes most, from {self.one[worst]:.6g} to "
             f"{self.two[worst]:.6g} (1/length²). They change by {self.median_relative:.3g} of themselves in the median "
             f"and {self.mean_relative:.3g} in the mean, and the sets are {self.hausdorff:.3g} apart (Hausdorff). "
-            f"{n_told} of the {k} changes are proved: the {bars} eigenvalues do not overlap."
+            f"{n_proved} of the {k} changes are proved: the {bars} eigenvalues do not overlap."
         )
 
 
 def compare_spectra(
     one: Spectrum, two: Spectrum, *, brackets: tuple[Brackets, Brackets] | None = None
 ) -> SpectrumComparison:
-    """Set the eigenvalues of two shapes side by side, as many as both have (thesis 3.1, 3.4).
+    """Compare the lowest eigenvalues of two shapes, as many as both have (thesis 3.1, 3.4).
 
     Parameters
     ----------
     one, two : Spectrum
-        From the lowest eigenvalue on. Where size shall not matter, of shapes with one area.
+        From the lowest eigenvalue on. To ignore size, scale both shapes to the same area.
     brackets : (Brackets, Brackets), optional
-        Of the two shapes. A change is then proved of the shapes, and not of the operators alone.
+        Brackets of the two shapes. Changes are then proved for the shapes, not only for the operators.
 
     Returns
     -------
@@ -101,7 +106,21 @@ def compare_spectra(
     Raises
     ------
     InvalidParameterError
-        If a spectrum does not begin with the lowest eigenvalue, or there are fewer brackets than eigenvalues.
+        If a spectrum does not begin with the lowest eigenvalue, or there are fewer brackets than
+        eigenvalues.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> one, two = (
+    ...     es.solve_spectrum(es.cotangent_laplacian(mesh), 4)
+    ...     for mesh in (es.icosphere(2), es.TriangleMesh(2 * es.icosphere(2).vertices, es.icosphere(2).faces))
+    ... )
+    >>> found = es.spectral.compare_spectra(one, two)
+    >>> found.relative.round(6).tolist()  # a quarter, as 1/length²
+    [0.0, 0.75, 0.75, 0.75]
+    >>> found.proved_changes.tolist()
+    [False, True, True, True]
     """
     require_type(one, Spectrum, "one")
     require_type(two, Spectrum, "two")
@@ -113,7 +132,10 @@ def compare_spectra(
     zeros = bars[0][:, 0] <= 0, bars[1][:, 0] <= 0
     if brackets is not None:
         require_each(brackets, Brackets, "brackets")
-        bars = [within_brackets(each, k, name) for each, name in zip(brackets, ("one", "two"), strict=True)]
+        bars = [
+            within_brackets(each, k, name)
+            for each, name in zip(brackets, ("one", "two"), strict=True)
+        ]
     return SpectrumComparison(
         one=frozen(values[0]),
         two=frozen(values[1]),
@@ -142,7 +164,7 @@ def within_brackets(brackets: Brackets, k: int, name: str) -> Float[np.ndarray, 
     """
     if len(brackets.upper) < k:
         raise InvalidParameterError(
-            f"brackets must hold each eigenvalue that is compared; there are {k} of these, and "
+            f"There must be a bracket for each eigenvalue that is compared; there are {k} eigenvalues, and "
             f"{len(brackets.upper)} brackets of {name}."
         )
     return np.column_stack([brackets.lower[:k], brackets.upper[:k]])
@@ -166,11 +188,12 @@ def relative_change(
 
 
 def spectral_hausdorff_distance(one: ArrayLike, two: ArrayLike) -> float:
-    """Measure how far an eigenvalue of one set may be from the nearest of the other (thesis, theorem 3.1.4).
+    """Compute the Hausdorff distance of two sets of eigenvalues (thesis, theorem 3.1.4).
 
-    max(max_λ dist(λ, Ω), max_ω dist(ω, Λ)) over what the known ends of two spectra tell. An eigenvalue above the last
-    known one of the other set is left out, because its nearest neighbour may be unknown. For one at or below it none
-    is: what is not known of the other set lies at or above its last known eigenvalue, and so no nearer than that one.
+    max(max_λ dist(λ, Ω), max_ω dist(ω, Λ)), restricted to what two truncated spectra determine. An
+    eigenvalue above the last known one of the other set is left out, because its nearest neighbor may
+    be unknown. For all others the distance is exact: unknown eigenvalues of the other set are at or
+    above its last known one, and so no nearer than that.
 
     Parameters
     ----------
@@ -181,19 +204,26 @@ def spectral_hausdorff_distance(one: ArrayLike, two: ArrayLike) -> float:
     Returns
     -------
     float
-        In 1/length²; at most the largest |λ_i - ω_i| where both have as many.
+        In 1/length²; at most the largest |λ_i - ω_i| if both have the same number.
 
     Raises
     ------
     InvalidParameterError
-        If a value is not finite, or there is none.
+        If a value is not finite, or a set is empty.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.spectral.spectral_hausdorff_distance([0.0, 2.0, 6.0], [0.0, 2.5, 6.0])
+    0.5
     """
     first, second = np.sort(finite_values(one, "one")), np.sort(finite_values(two, "two"))
     return max(_farthest(first, second), _farthest(second, first))
 
 
 def _farthest(values: Float[np.ndarray, " k"], others: Float[np.ndarray, " j"]) -> float:
-    told = values[values <= others[-1]]
-    above = np.searchsorted(others, told)
+    known = values[values <= others[-1]]
+    above = np.searchsorted(others, known)
     below = np.maximum(above - 1, 0)
-    return float(np.minimum(np.abs(others[above] - told), np.abs(told - others[below])).max(initial=0.0))
+    distances = np.minimum(np.abs(others[above] - known), np.abs(known - others[below]))
+    return float(distances.max(initial=0.0))

@@ -7,8 +7,8 @@ from jaxtyping import Float, Int
 from eigenshape._errors import ConvergenceError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.sparse.elimination import EPS
-from eigenshape.spectral.laws.report import Law, NotJudged, Outcome, judged
-from eigenshape.spectral.solver.solve import solve_spectrum
+from eigenshape.spectral.laws.report import Law, Outcome, SkippedLaw, judged
+from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
 N_EIGENVALUES = 20
@@ -25,8 +25,8 @@ def same_entries(name: str, found: Laplacian, expected: Laplacian, allowed: floa
     """Compare entry by entry."""
     if found.n_points != expected.n_points:
         return judged(name, np.inf, allowed, _other_rows(found.n_points, expected.n_points))
-    measured, says = distance(expected, found)
-    return judged(name, measured, allowed, f"{says}; rounding takes up to {allowed:.1e}.")
+    measured, explanation = distance(expected, found)
+    return judged(name, measured, allowed, f"{explanation}; rounding takes up to {allowed:.1e}.")
 
 
 def _other_rows(found: int, expected: int) -> str:
@@ -42,7 +42,9 @@ def distance(expected: Laplacian, found: Laplacian) -> tuple[float, str]:
 def _largest_change(name: str, expected: sp.csr_array, found: sp.csr_array) -> tuple[float, str]:
     change = (found - expected).tocoo()
     roots = sizes_of(expected)
-    relative = np.abs(change.data) / np.maximum(roots[change.row] * roots[change.col], np.finfo(float).tiny)
+    relative = np.abs(change.data) / np.maximum(
+        roots[change.row] * roots[change.col], np.finfo(float).tiny
+    )
     if not relative.any():
         return 0.0, f"no entry of {name} changes"
     worst = int(relative.argmax())
@@ -51,7 +53,9 @@ def _largest_change(name: str, expected: sp.csr_array, found: sp.csr_array) -> t
     return float(relative[worst]), f"{where}, {relative[worst]:.1e} of √({name}_ii {name}_jj)"
 
 
-def same_eigenvalues(name: str, found: Laplacian, spectrum: Spectrum, allowed: float, *, copies: int = 1) -> Outcome:
+def same_eigenvalues(
+    name: str, found: Laplacian, spectrum: Spectrum, allowed: float, *, copies: int = 1
+) -> Outcome:
     """Compare the lowest eigenvalues, whatever the order of the rows, with those of so many copies of an operator."""
     n_rows, k = copies * len(spectrum.eigenvectors), len(spectrum.eigenvalues)
     if found.n_points != n_rows:
@@ -59,20 +63,26 @@ def same_eigenvalues(name: str, found: Laplacian, spectrum: Spectrum, allowed: f
     try:
         lowest = lowest_eigenvalues(found, k)
     except ConvergenceError as err:
-        return NotJudged(name, str(err))
+        return SkippedLaw(name, str(err))
     expected = np.repeat(spectrum.eigenvalues, copies)[:k]
     change, worst = spectral_distance(expected, lowest.eigenvalues)
-    allowed += float(spectrum.residuals.max() + lowest.residuals.max()) / (float(expected[-1]) or 1.0)
+    allowed += float(spectrum.residuals.max() + lowest.residuals.max()) / (
+        float(expected[-1]) or 1.0
+    )
     if allowed > MOST_ROUNDING:
-        return NotJudged(name, f"rounding may change eigenvalues by {allowed:.0e} of the last: elements are thin")
-    says = (
+        return SkippedLaw(
+            name, f"rounding may change eigenvalues by {allowed:.0e} of the last: elements are thin"
+        )
+    explanation = (
         f"of the {len(expected)} lowest eigenvalues, {worst} changes most, from {expected[worst]:.6g} to "
         f"{lowest.eigenvalues[worst]:.6g}, {change:.1e} of the last; rounding takes up to {allowed:.1e}."
     )
-    return judged(name, change, allowed, says)
+    return judged(name, change, allowed, explanation)
 
 
-def spectral_distance(expected: Float[np.ndarray, " k"], found: Float[np.ndarray, " k"]) -> tuple[float, int]:
+def spectral_distance(
+    expected: Float[np.ndarray, " k"], found: Float[np.ndarray, " k"]
+) -> tuple[float, int]:
     """Return the largest change of an eigenvalue relative to the last, and its index."""
     change = np.abs(found - expected) / (float(expected[-1]) or 1.0)
     worst = int(change.argmax())
@@ -81,7 +91,9 @@ def spectral_distance(expected: Float[np.ndarray, " k"], found: Float[np.ndarray
 
 def lowest_eigenvalues(laplacian: Laplacian, k: int = N_EIGENVALUES) -> Spectrum:
     """Solve the pencil itself, whatever correction its kernel has."""
-    return solve_spectrum(Laplacian(laplacian.stiffness, laplacian.mass), min(k, laplacian.n_points))
+    return solve_spectrum(
+        Laplacian(laplacian.stiffness, laplacian.mass), min(k, laplacian.n_points)
+    )
 
 
 def permuted(laplacian: Laplacian, old_of_new: Int[np.ndarray, " n"]) -> Laplacian:

@@ -17,12 +17,12 @@ from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.laplacian import ASYMMETRY, Laplacian
 from eigenshape.spectral.laws.comparison import sizes_of
 from eigenshape.spectral.laws.report import (
-    USUAL,
+    DEFAULT_PROMISES,
     Law,
-    NotJudged,
     OperatorReport,
     Outcome,
     Promise,
+    SkippedLaw,
     gathered,
     judged,
     known_promises,
@@ -39,30 +39,37 @@ NEGATIVE = 1e-9  # of trace W / trace B
 # Shifts in trace W / trace B, from what rounding leaves of a zero upwards.
 LADDER = 10.0 ** np.arange(-12, 4)
 FIRST_LINE = 1e-14  # in the same unit: between zero and not zero
-LARGEST_ZERO = 1e-6  # up to where rounding, or constants that are not annihilated, may move that line
+LARGEST_ZERO = (
+    1e-6  # up to where rounding, or constants that are not annihilated, may move that line
+)
 NUDGES = (1.0, 1.07, 0.93, 1.15)
 
 
 @one_blas_thread()
 def check_laplacian(
-    laplacian: Laplacian, shape: ShapeLike | sp.sparray | None = None, *, promises: Iterable[Promise] = USUAL
+    laplacian: Laplacian,
+    shape: ShapeLike | sp.sparray | None = None,
+    *,
+    promises: Iterable[Promise] = DEFAULT_PROMISES,
 ) -> OperatorReport:
-    """Judge the laws that can be read off the two matrices.
+    """Check the laws that the two matrices of a Laplace operator must obey.
 
-    Symmetry of W and B, B positive definite and W positive semidefinite are always judged, the others where they are
-    promised. Signs of eigenvalues are counted by Sylvester's law of inertia (Parlett 1998, section 3.3), at any size:
-    a factor of W + δB without negative pivot shows that no eigenvalue lies below -δ.
+    Symmetry of W and B, B positive definite and W positive semidefinite are always checked, other
+    laws if they are promised. Signs of eigenvalues are counted by Sylvester's law of inertia
+    (Parlett 1998, section 3.3), at any size: a factor of W + δB without negative pivots shows that
+    no eigenvalue is below -δ.
 
     Parameters
     ----------
     laplacian : Laplacian
-    shape : ShapeLike or (n, n) sparse adjacency, optional
-        What the operator was made from; "volume" and "components" take a mesh.
+    shape : ShapeLike or (n, n) sparse, optional
+        The shape on which the operator was built; "volume" and "components" need a mesh.
     promises : iterable of str
-        "constants": zero row sums, and no more zeros among the eigenvalues than the graph of W has components.
-        "components": no entry of W or B joins two components of the shape, and W has one for each. "definite": no
-        eigenvalue is zero, in place of "constants" where a boundary condition holds points fixed. "volume": the
-        entries of B sum to the volume. "nonnegative_weights": w_ij = -W_ij ≥ 0. The others are for `check_operator`.
+        "constants": row sums are zero, and as many eigenvalues are zero as the graph of W has
+        components. "components": no entry of W or B joins two components of the shape, and W has as
+        many. "definite": no eigenvalue is zero, instead of "constants" if points are fixed.
+        "volume": the entries of B sum to the volume. "nonnegative_weights": w_ij = -W_ij ≥ 0. The
+        other promises are for `check_operator`.
 
     Returns
     -------
@@ -72,6 +79,14 @@ def check_laplacian(
     ------
     InvalidParameterError
         If a promise is unknown.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(1)
+    >>> report = es.spectral.check_laplacian(es.cotangent_laplacian(ball), ball)
+    >>> report.passed
+    True
     """
     require_type(laplacian, Laplacian, "laplacian")
     promised, subject = known_promises(promises), None if shape is None else as_subject(shape)
@@ -90,7 +105,9 @@ def check_laplacian(
         _semidefinite(pencil),
     ]
     for name, laws in optional.items():
-        found += laws() if name in promised else [NotJudged(name.replace("_", " "), "not promised")]
+        found += (
+            laws() if name in promised else [SkippedLaw(name.replace("_", " "), "not promised")]
+        )
     return gathered(found)
 
 
@@ -98,7 +115,12 @@ def _symmetry(name: str, matrix: sp.csr_array) -> Law:
     off = abs(matrix - matrix.T).tocoo()
     largest = float(np.abs(matrix.data).max(initial=0.0)) or 1.0
     worst = float(off.data.max(initial=0.0)) / largest
-    return judged(name, worst, ASYMMETRY, f"entries (i, j) and (j, i) differ by at most {worst:.1e} of the largest.")
+    return judged(
+        name,
+        worst,
+        ASYMMETRY,
+        f"entries (i, j) and (j, i) differ by at most {worst:.1e} of the largest.",
+    )
 
 
 def _mass(laplacian: Laplacian) -> tuple[Law, Pencil]:
@@ -108,9 +130,13 @@ def _mass(laplacian: Laplacian) -> tuple[Law, Pencil]:
         pencil = normalise(laplacian)
     except InvalidParameterError as err:
         diagonal = sp.diags_array(laplacian.mass.diagonal()).tocsr()
-        return Law(name, False, 1.0, 0.0, str(err)), normalise(Laplacian(laplacian.stiffness, diagonal))
+        return Law(name, False, 1.0, 0.0, str(err)), normalise(
+            Laplacian(laplacian.stiffness, diagonal)
+        )
     floor = pencil.mass_floor
-    return Law(name, True, 0.0, 0.0, f"B is positive definite: it is at least {floor:.3g} of its diagonal."), pencil
+    return Law(
+        name, True, 0.0, 0.0, f"B is positive definite: it is at least {floor:.3g} of its diagonal."
+    ), pencil
 
 
 def _factor(pencil: Pencil, share: float) -> Factor | None:
@@ -129,18 +155,25 @@ def _semidefinite(pencil: Pencil) -> Law:
     for share in LADDER:
         factor = _factor(pencil, -float(share))
         if factor and factor.count == 0:
-            return judged("positive semidefinite", float(share), NEGATIVE, _bounded_below(pencil, factor, float(share)))
-    says = f"eigenvalues lie below -{LADDER[-1]:.0e} trace W / trace B."
-    return judged("positive semidefinite", np.inf, NEGATIVE, says)
+            return judged(
+                "positive semidefinite",
+                float(share),
+                NEGATIVE,
+                _bounded_below(pencil, factor, float(share)),
+            )
+    explanation = f"eigenvalues lie below -{LADDER[-1]:.0e} trace W / trace B."
+    return judged("positive semidefinite", np.inf, NEGATIVE, explanation)
 
 
 def _bounded_below(pencil: Pencil, factor: Factor, share: float) -> str:
-    bound = -factor.shift + float((rounding(factor) / pencil.mass_diagonal).max()) / pencil.mass_floor
-    says = f"W + {share:.0e} (trace W / trace B) B has no negative pivot"
+    bound = (
+        -factor.shift + float((rounding(factor) / pencil.mass_diagonal).max()) / pencil.mass_floor
+    )
+    explanation = f"W + {share:.0e} (trace W / trace B) B has no negative pivot"
     if share > LADDER[0]:
-        says = f"{says}, and some with {share / 10:.0e}"
+        explanation = f"{explanation}, and some with {share / 10:.0e}"
     proved = float(pencil.values_out(np.array([bound]))[0])
-    return f"{says}: rounding included, no eigenvalue lies below {-proved:.1e}."
+    return f"{explanation}: rounding included, no eigenvalue lies below {-proved:.1e}."
 
 
 def _row_sums(laplacian: Laplacian) -> Law:
@@ -151,8 +184,11 @@ def _row_sums(laplacian: Laplacian) -> Law:
     np.maximum.at(largest, rows, roots[W.indices])
     relative = np.abs(sums) / np.maximum(roots * largest, np.finfo(float).tiny)
     worst = int(relative.argmax())
-    says = f"the largest sum of a row is that of row {worst}, {sums[worst]:.3g} where W_ii is {W[worst, worst]:.3g}."
-    return judged("row sums", relative[worst], ROW_SUM, says)
+    explanation = (
+        f"the largest sum of a row is that of row {worst}, {sums[worst]:.3g} where W_ii is "
+        f"{W[worst, worst]:.3g}."
+    )
+    return judged("row sums", relative[worst], ROW_SUM, explanation)
 
 
 def _kernel(laplacian: Laplacian, pencil: Pencil) -> Law:
@@ -164,12 +200,17 @@ def _kernel(laplacian: Laplacian, pencil: Pencil) -> Law:
     n_parts, labels = _graph_parts(laplacian.stiffness)
     energies = np.abs(np.bincount(labels, weights=pencil.stiffness.sum(axis=1)))
     masses = np.bincount(labels, weights=pencil.mass.sum(axis=1))
-    energy = float((energies / np.maximum(np.abs(masses), np.finfo(float).tiny)).max()) / pencil.level
+    energy = (
+        float((energies / np.maximum(np.abs(masses), np.finfo(float).tiny)).max()) / pencil.level
+    )
     line = min(max(FIRST_LINE, 4 * energy), LARGEST_ZERO)
     while (zeros := _zeros(pencil, line)) < n_parts and line < LARGEST_ZERO:
         line *= 10  # what rounding makes of a zero may lie farther out; a larger interval holds no fewer
-    says = f"within {line:.0e} trace W / trace B of zero lie {zeros} of the eigenvalues; components of W: {n_parts}."
-    return judged("kernel", abs(zeros - n_parts), 0, says)
+    explanation = (
+        f"within {line:.0e} trace W / trace B of zero lie {zeros} of the eigenvalues; "
+        f"components of W: {n_parts}."
+    )
+    return judged("kernel", abs(zeros - n_parts), 0, explanation)
 
 
 def _zeros(pencil: Pencil, line: float) -> int:
@@ -187,25 +228,31 @@ def _graph_parts(matrix: sp.csr_array) -> tuple[int, Int[np.ndarray, " n"]]:
 
 def _components(laplacian: Laplacian, shape: Subject | None) -> Outcome:
     if shape is None or isinstance(shape, PointCloud):
-        return NotJudged("components", "no mesh or graph says what belongs together")
-    n_parts, labels = _graph_parts(shape) if isinstance(shape, sp.csr_array) else vertex_components(shape)
+        return SkippedLaw("components", "no mesh or graph says what belongs together")
+    n_parts, labels = (
+        _graph_parts(shape) if isinstance(shape, sp.csr_array) else vertex_components(shape)
+    )
     if len(labels) != laplacian.n_points:
         return _number_of_parts(laplacian, n_parts)
-    worst, says = 0.0, "no entry of W or B joins two of them."
+    worst, explanation = 0.0, "no entry of W or B joins two of them."
     for name, matrix in (("W", laplacian.stiffness), ("B", laplacian.mass)):
         size, place = _largest_link(matrix, labels)
         if size > worst:
             worst = size
-            says = f"entry {place} of {name} joins two of them: it is {size:.1e} of √({name}_ii {name}_jj)."
-    return judged("components", worst, LINK, f"the shape has {n_parts}; {says}")
+            explanation = f"entry {place} of {name} joins two of them: it is {size:.1e} of √({name}_ii {name}_jj)."
+    return judged("components", worst, LINK, f"the shape has {n_parts}; {explanation}")
 
 
 def _number_of_parts(laplacian: Laplacian, n_parts: int) -> Law:
     found = _graph_parts(laplacian.stiffness)[0]
-    return judged("components", abs(found - n_parts), 0, f"the shape has {n_parts}, and W has {found}.")
+    return judged(
+        "components", abs(found - n_parts), 0, f"the shape has {n_parts}, and W has {found}."
+    )
 
 
-def _largest_link(matrix: sp.csr_array, labels: Int[np.ndarray, " n"]) -> tuple[float, tuple[int, int]]:
+def _largest_link(
+    matrix: sp.csr_array, labels: Int[np.ndarray, " n"]
+) -> tuple[float, tuple[int, int]]:
     entries, roots = matrix.tocoo(), sizes_of(matrix)
     scaled = np.abs(entries.data) / (roots[entries.row] * roots[entries.col])
     scaled[labels[entries.row] == labels[entries.col]] = 0.0
@@ -220,15 +267,17 @@ def _definite(pencil: Pencil) -> Law:
     count = _count(pencil, share)
     if count is None:
         return judged("definite", np.inf, 0, "no factor near zero has its pivots on the diagonal.")
-    return judged("definite", count, 0, f"below {share:.0e} trace W / trace B lie {count} of the eigenvalues.")
+    return judged(
+        "definite", count, 0, f"below {share:.0e} trace W / trace B lie {count} of the eigenvalues."
+    )
 
 
 def _volume(laplacian: Laplacian, shape: Subject | None) -> Outcome:
     if shape is None or isinstance(shape, PointCloud | sp.csr_array):
-        return NotJudged("volume", "only a mesh has one to compare with")
+        return SkippedLaw("volume", "only a mesh has one to compare with")
     volume, total = float(simplex_volumes(shape).sum()), float(laplacian.mass.sum())
-    says = f"the entries of B sum to {total:.12g}, and the shape has volume {volume:.12g}."
-    return judged("volume", abs(total / volume - 1), VOLUME, says)
+    explanation = f"the entries of B sum to {total:.12g}, and the shape has volume {volume:.12g}."
+    return judged("volume", abs(total / volume - 1), VOLUME, explanation)
 
 
 def _weights(laplacian: Laplacian) -> Law:
@@ -239,5 +288,5 @@ def _weights(laplacian: Laplacian) -> Law:
     if not relative.size:
         return judged("nonnegative weights", 0, WEIGHT, "there is no pair of points to weigh.")
     worst = int(relative.argmax())
-    says = f"the lowest weight, {weights[worst]:.3g}, is that of points {rows[worst]} and {columns[worst]}."
-    return judged("nonnegative weights", max(relative[worst], 0.0), WEIGHT, says)
+    explanation = f"the lowest weight, {weights[worst]:.3g}, is that of points {rows[worst]} and {columns[worst]}."
+    return judged("nonnegative weights", max(relative[worst], 0.0), WEIGHT, explanation)

@@ -25,12 +25,12 @@ from eigenshape.spectral.laws.comparison import (
 )
 from eigenshape.spectral.laws.laplacian_laws import check_laplacian
 from eigenshape.spectral.laws.report import (
-    USUAL,
+    DEFAULT_PROMISES,
     Law,
-    NotJudged,
     OperatorReport,
     Outcome,
     Promise,
+    SkippedLaw,
     gathered,
     judged,
     judgements,
@@ -86,36 +86,41 @@ def check_operator(
     build: Build,
     shape: ShapeLike | sp.sparray,
     *,
-    promises: Iterable[Promise] = USUAL,
+    promises: Iterable[Promise] = DEFAULT_PROMISES,
     by_points: bool | None = None,
     rng: np.random.Generator | None = None,
 ) -> OperatorReport:
-    """Judge the laws that a Laplace operator of a shape must obey, by the operator that is handed over.
+    """Check the laws that a Laplace operator must obey, by building it on transformed copies of a shape.
 
-    The matrices are judged as in `check_laplacian`; then the operator is built again of the same shape told otherwise,
-    and compared entry by entry, relative to √(W_ii W_jj) and √(B_ii B_jj). Where rows are not points (elements of
-    higher order, a boundary condition, vectors), the 20 lowest eigenvalues are compared.
+    The matrices are checked as in `es.spectral.check_laplacian`. Then the operator is built again on
+    transformed copies of the shape (moved, scaled, renumbered, ...) and compared entry by entry,
+    relative to √(W_ii W_jj) and √(B_ii B_jj). If rows are not points (elements of higher order, a
+    boundary condition, vectors), the 20 lowest eigenvalues are compared instead.
 
-    Rounding moves entries where simplices are thin: allowed is 32 times what changes most in three jiggles of the
-    coordinates by their rounding, and 1e-12 at least. Where that is more than 1e-4, laws that round anew, coordinates
-    or the order of corners, are not judged.
+    Rounding changes entries more if simplices are thin. The tolerance is 32 times the largest change
+    under three random perturbations of the coordinates by their rounding, and at least 1e-12. If it
+    is above 1e-4, laws that round coordinates anew are skipped.
 
     Parameters
     ----------
     build : callable
-        Shape to `Laplacian`. A scale parameter is to be chosen inside, as a multiple of a length of the shape.
-    shape : ShapeLike or (n, n) sparse adjacency
+        Maps a shape to a `Laplacian`. A scale parameter must be chosen inside, as a multiple of a
+        length of the shape.
+    shape : ShapeLike or (n, n) sparse
+        A mesh, a point cloud, or the adjacency matrix of a graph.
     promises : iterable of str
-        As in `check_laplacian`, and: "rigid_motion": turned and moved by its own size, the shape has the same operator.
-        "reflection": so has its mirror image. "orientation": so has the mesh with some simplices turned over.
-        "scaling": in a unit 1e±100 times as large W and B change by one factor each, and eigenvalues by 1/length² (by
-        any factor on a graph, whose weights are scaled). "union": a shape and its copy far away have the operator of
-        the shape twice, as blocks. That building twice gives the same bits, and that the order of points and simplices
-        does not matter, is always judged.
+        Laws to check, those of `es.spectral.check_laplacian` and these. "rigid_motion": a rotated and
+        translated shape has the same operator. "reflection": so has its mirror image. "orientation":
+        so has the mesh with some simplices reversed. "scaling": at 1e±100 times the size W and B
+        change by one factor each, and eigenvalues by 1/length² (on a graph, whose weights are
+        scaled, by any factor). "union": a shape with a distant copy has the operator twice, as
+        blocks. Two laws are always checked: building twice gives the same bits, and the order of
+        points and simplices does not matter.
     by_points : bool, optional
-        Whether row i of the operator is point i of the shape; by default where there are as many.
+        Whether row i of the operator is point i of the shape. The default is True if the operator
+        has as many rows as the shape has points.
     rng : Generator, optional
-        What is random about the changes; by default the same at each call.
+        Source of the random transformations. The default is the same at each call.
 
     Returns
     -------
@@ -124,7 +129,23 @@ def check_operator(
     Raises
     ------
     InvalidParameterError
-        If a promise is unknown, or what `build` returns is not a `Laplacian`.
+        If a promise is unknown, or `build` does not return a `Laplacian`.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(1)
+    >>> es.check_operator(es.cotangent_laplacian, ball).passed
+    True
+
+    An operator that depends on the position of the shape:
+
+    >>> def build(mesh):
+    ...     laplacian = es.cotangent_laplacian(mesh)
+    ...     return es.Laplacian(laplacian.stiffness * mesh.points[:, 0].max(), laplacian.mass)
+    >>> report = es.check_operator(build, es.icosphere(1))
+    >>> [law.name for law in report.laws if law.name == "rigid motion" and not law.holds]
+    ['rigid motion']
     """
     require_type(rng, np.random.Generator | None, "rng")
     promised = known_promises(promises)
@@ -132,7 +153,9 @@ def check_operator(
     subject = changes.as_subject(shape)
     laplacian = build(subject)
     if not isinstance(laplacian, Laplacian):
-        raise InvalidParameterError(f"build must return a Laplacian; it returned a {type(laplacian).__name__}.")
+        raise InvalidParameterError(
+            f"build must return a Laplacian; it returned a {type(laplacian).__name__}."
+        )
     report = check_laplacian(laplacian, subject, promises=promised)
     rows_are_points = laplacian.n_points == _n_points(subject) if by_points is None else by_points
     spectrum = None if rows_are_points else _spectrum(laplacian)
@@ -161,7 +184,9 @@ def _rebuilt(trial: Trial, promised: frozenset[Promise]) -> Iterator[Outcome]:
     }
     for promise, law in optional.items():
         name = promise.replace("_", " ")
-        yield _attempt(name, law, trial) if promise in promised else NotJudged(name, "not promised")
+        yield (
+            _attempt(name, law, trial) if promise in promised else SkippedLaw(name, "not promised")
+        )
 
 
 def _attempt(name: str, law: Callable[[Trial], Outcome], trial: Trial) -> Outcome:
@@ -169,10 +194,18 @@ def _attempt(name: str, law: Callable[[Trial], Outcome], trial: Trial) -> Outcom
     try:
         return law(trial)
     except (EigenshapeError, ValueError, ArithmeticError) as err:
-        return Law(name, False, np.inf, trial.allowed, f"told otherwise, the shape or its spectrum is refused: {err}")
+        return Law(
+            name,
+            False,
+            np.inf,
+            trial.allowed,
+            f"told otherwise, the shape or its spectrum is refused: {err}",
+        )
 
 
-def _rounding(build: Build, subject: Subject, expected: Laplacian | Spectrum, rng: np.random.Generator) -> float:
+def _rounding(
+    build: Build, subject: Subject, expected: Laplacian | Spectrum, rng: np.random.Generator
+) -> float:
     if isinstance(subject, sp.csr_array):
         return ROUNDING
     try:
@@ -192,37 +225,44 @@ def _jiggle(expected: Laplacian | Spectrum, other: Laplacian) -> float:
 def _repetition(trial: Trial) -> Outcome:
     again = trial.build(trial.subject)
     pairs = [(again.stiffness, trial.laplacian.stiffness), (again.mass, trial.laplacian.mass)]
-    n_changed = sum((one != two).nnz if one.shape == two.shape else max(one.nnz, two.nnz) for one, two in pairs)
+    n_changed = sum(
+        (one != two).nnz if one.shape == two.shape else max(one.nnz, two.nnz) for one, two in pairs
+    )
     return judged("repetition", n_changed, 0, f"built twice, {n_changed} entries differ.")
 
 
 def _point_order(trial: Trial) -> Outcome:
     old_of_new = trial.rng.permutation(_n_points(trial.subject))
     other = trial.build(changes.renumbered(trial.subject, old_of_new))
-    return _agree("point order", trial, other, permuted(trial.laplacian, old_of_new) if trial.by_points else None)
+    return _agree(
+        "point order",
+        trial,
+        other,
+        permuted(trial.laplacian, old_of_new) if trial.by_points else None,
+    )
 
 
 def _simplex_order(trial: Trial) -> Outcome:
     if isinstance(trial.subject, PointCloud | sp.csr_array):
-        return NotJudged("simplex order", "the shape has no simplices")
+        return SkippedLaw("simplex order", "the shape has no simplices")
     return _same("simplex order", trial, changes.reordered(trial.subject, trial.rng))
 
 
 def _orientation(trial: Trial) -> Outcome:
     if isinstance(trial.subject, PointCloud | sp.csr_array):
-        return NotJudged("orientation", "the shape has no simplices")
+        return SkippedLaw("orientation", "the shape has no simplices")
     return _same("orientation", trial, changes.turned_over(trial.subject, trial.rng))
 
 
 def _rigid_motion(trial: Trial) -> Outcome:
     if isinstance(trial.subject, sp.csr_array):
-        return NotJudged("rigid motion", "a graph lies nowhere")
+        return SkippedLaw("rigid motion", "a graph lies nowhere")
     return _same("rigid motion", trial, changes.moved(trial.subject, trial.rng))
 
 
 def _reflection(trial: Trial) -> Outcome:
     if isinstance(trial.subject, sp.csr_array):
-        return NotJudged("reflection", "a graph lies nowhere")
+        return SkippedLaw("reflection", "a graph lies nowhere")
     return _same("reflection", trial, changes.mirrored(trial.subject))
 
 
@@ -235,7 +275,10 @@ def _scaling(trial: Trial) -> Outcome:
 def _doublings(trial: Trial) -> int:
     """Measure how W and B grow with the shape, and say how far it may."""
     few = 20
-    traces = [_unit_traces(trial.build(changes.rescaled(trial.subject, 2.0**power)))[2:] for power in (0, few)]
+    traces = [
+        _unit_traces(trial.build(changes.rescaled(trial.subject, 2.0**power)))[2:]
+        for power in (0, few)
+    ]
     growth = max(np.abs(np.log2(traces[1]) - np.log2(traces[0]))) / few
     return next((power for power in DOUBLINGS if growth * power <= LARGEST_EXPONENT), few)
 
@@ -244,13 +287,15 @@ def _scaled(trial: Trial, power: int) -> Law:
     """Compare W and B after division by their traces, and the ratio of the traces with 1/length²."""
     other = trial.build(changes.rescaled(trial.subject, 2.0**power))
     here, there = _unit_traces(trial.laplacian), _unit_traces(other)
-    law = same_entries("scaling", Laplacian(there[0], there[1]), Laplacian(here[0], here[1]), trial.allowed)
+    law = same_entries(
+        "scaling", Laplacian(there[0], there[1]), Laplacian(here[0], here[1]), trial.allowed
+    )
     unit = f"in a unit 2^{power} (1e{power * np.log10(2):+.0f}) times as large,"
     if not law.holds or isinstance(trial.subject, sp.csr_array):
-        return judged("scaling", law.measured, law.allowed, f"{unit} {law.says}")
+        return judged("scaling", law.measured, law.allowed, f"{unit} {law.explanation}")
     ratio = (there[2] / here[2]) / (there[3] / here[3]) * 2.0**power * 2.0**power
-    says = f"{unit} W and B change by one factor each, and eigenvalues times length² by {abs(ratio - 1):.1e}."
-    return judged("scaling", max(law.measured, abs(ratio - 1)), law.allowed, says)
+    explanation = f"{unit} W and B change by one factor each, and eigenvalues times length² by {abs(ratio - 1):.1e}."
+    return judged("scaling", max(law.measured, abs(ratio - 1)), law.allowed, explanation)
 
 
 def _unit_traces(laplacian: Laplacian) -> tuple[sp.csr_array, sp.csr_array, float, float]:
@@ -263,25 +308,30 @@ def _union(trial: Trial) -> Outcome:
     other = trial.build(changes.doubled(trial.subject))
     rounding = trial.rounding
     if not isinstance(trial.subject, sp.csr_array):
-        rounding *= changes.APART  # the coordinates of a copy that far away are so many times coarser
+        rounding *= (
+            changes.APART
+        )  # the coordinates of a copy that far away are so many times coarser
     if rounding > MOST_ROUNDING:
         return _drowned("union", rounding)
     if trial.by_points:
-        twice = Laplacian(*(sp.csr_array(sp.block_diag([matrix, matrix])) for matrix in matrices(trial.laplacian)))
+        twice = Laplacian(
+            *(sp.csr_array(sp.block_diag([matrix, matrix])) for matrix in matrices(trial.laplacian))
+        )
         return same_entries("union", other, twice, rounding)
     if trial.spectrum is None:
         return _unsolved("union")
     return same_eigenvalues("union", other, trial.spectrum, rounding, copies=2)
 
 
-def _drowned(name: str, rounding: float) -> NotJudged:
-    return NotJudged(
-        name, f"rounding of coordinates may change W by {rounding:.0e}: simplices are thin, or the operator is unstable"
+def _drowned(name: str, rounding: float) -> SkippedLaw:
+    return SkippedLaw(
+        name,
+        f"rounding of coordinates may change W by {rounding:.0e}: simplices are thin, or the operator is unstable",
     )
 
 
-def _unsolved(name: str) -> NotJudged:
-    return NotJudged(name, "rows are no points, and the lowest eigenvalues cannot be proved")
+def _unsolved(name: str) -> SkippedLaw:
+    return SkippedLaw(name, "rows are no points, and the lowest eigenvalues cannot be proved")
 
 
 def _same(name: str, trial: Trial, subject: Subject) -> Outcome:

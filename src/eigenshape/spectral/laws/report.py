@@ -1,4 +1,4 @@
-"""The laws of a Laplace operator: which can be promised, what was measured, what holds."""
+"""Reports on the laws of a Laplace operator: which are promised, what was measured, which hold."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -20,35 +20,35 @@ Promise = Literal[
 ]
 
 # What every Laplace operator of a shape is expected to keep, whatever it was made from.
-USUAL: frozenset[Promise] = frozenset(
+DEFAULT_PROMISES: frozenset[Promise] = frozenset(
     ("constants", "components", "rigid_motion", "reflection", "orientation", "scaling", "union")
 )
 
 
 @dataclass(frozen=True)
 class Law:
-    """One law and what was measured of it.
+    """One law, and what was measured.
 
     Attributes
     ----------
     name : str
     holds : bool
     measured, allowed : float
-        The law holds where `measured` is at most `allowed`; neither has a unit.
-    says : str
-        One plain sentence with the numbers, and the entry at fault where there is one.
+        The law holds if `measured` is at most `allowed`; both are without unit.
+    explanation : str
+        One sentence with the numbers, and the worst entry if there is one.
     """
 
     name: str
     holds: bool
     measured: float
     allowed: float
-    says: str
+    explanation: str
 
 
 @dataclass(frozen=True)
-class NotJudged:
-    """A law that was not looked at, and why."""
+class SkippedLaw:
+    """A law that was not checked, and the reason."""
 
     name: str
     reason: str
@@ -56,37 +56,53 @@ class NotJudged:
 
 @dataclass(frozen=True)
 class OperatorReport:
-    """Every law that was judged, in the order of the proof, and every one that was not."""
+    """The result of checking an operator: the laws that were checked, and those that were skipped.
+
+    Attributes
+    ----------
+    laws : tuple of Law
+        In the order in which they were checked.
+    skipped : tuple of SkippedLaw
+    """
 
     laws: tuple[Law, ...]
-    not_judged: tuple[NotJudged, ...]
+    skipped: tuple[SkippedLaw, ...]
 
     @property
     def passed(self) -> bool:
-        """Whether every law that was judged holds."""
+        """Whether every law that was checked holds."""
         return all(law.holds for law in self.laws)
 
     def explain(self) -> str:
-        """Say law by law what holds, what does not and what was not judged."""
+        """Return a text with one line for each law: whether it holds, is broken, or was skipped."""
         broken = sum(not law.holds for law in self.laws)
-        head = f"All {len(self.laws)} laws hold." if self.passed else f"{broken} of {len(self.laws)} laws are broken."
-        judged = [f"{'holds ' if law.holds else 'BROKEN'}  {law.name}: {law.says}" for law in self.laws]
-        return "\n".join([head, *judged, *(f"not judged  {law.name}: {law.reason}" for law in self.not_judged)])
+        head = (
+            f"All {len(self.laws)} laws hold."
+            if self.passed
+            else f"{broken} of {len(self.laws)} laws are broken."
+        )
+        judged = [
+            f"{'holds ' if law.holds else 'BROKEN'}  {law.name}: {law.explanation}"
+            for law in self.laws
+        ]
+        return "\n".join(
+            [head, *judged, *(f"skipped {law.name}: {law.reason}" for law in self.skipped)]
+        )
 
 
-def judged(name: str, measured: float, allowed: float, says: str) -> Law:
+def judged(name: str, measured: float, allowed: float, explanation: str) -> Law:
     """Return the law, which holds where what was measured is allowed."""
-    return Law(name, bool(measured <= allowed), float(measured), float(allowed), says)
+    return Law(name, bool(measured <= allowed), float(measured), float(allowed), explanation)
 
 
-Outcome: TypeAlias = Law | NotJudged
+Outcome: TypeAlias = Law | SkippedLaw
 
 
-def gathered(found: Iterable[Law | NotJudged]) -> OperatorReport:
+def gathered(found: Iterable[Law | SkippedLaw]) -> OperatorReport:
     """Sort what was judged from what was not."""
     rows = list(found)
     laws = tuple(law for law in rows if isinstance(law, Law))
-    return OperatorReport(laws, tuple(law for law in rows if isinstance(law, NotJudged)))
+    return OperatorReport(laws, tuple(law for law in rows if isinstance(law, SkippedLaw)))
 
 
 def known_promises(promises: Iterable[Promise]) -> frozenset[Promise]:
@@ -94,11 +110,13 @@ def known_promises(promises: Iterable[Promise]) -> frozenset[Promise]:
     given = frozenset(promises)
     unknown = sorted(given - frozenset(get_args(Promise)), key=str)
     if unknown:
-        raise InvalidParameterError(f"promises must be among {', '.join(get_args(Promise))}; {unknown[0]!r} is not.")
+        raise InvalidParameterError(
+            f"promises must be among {', '.join(get_args(Promise))}; {unknown[0]!r} is not."
+        )
     return given
 
 
-def judgements(report: OperatorReport) -> Iterator[Law | NotJudged]:
+def judgements(report: OperatorReport) -> Iterator[Law | SkippedLaw]:
     """Return what was judged, then what was not."""
     yield from report.laws
-    yield from report.not_judged
+    yield from report.skipped

@@ -65,7 +65,9 @@ def mirrored(shape: Shape) -> Shape:
 def turned_over(mesh: Mesh, rng: np.random.Generator) -> Mesh:
     """Swap two corners in a random half of the simplices, the first among them."""
     chosen = np.append(True, rng.random(len(mesh.simplices) - 1) < 0.5)
-    return with_simplices(mesh, np.where(chosen[:, None], _turned_over(mesh.simplices), mesh.simplices))
+    return with_simplices(
+        mesh, np.where(chosen[:, None], _turned_over(mesh.simplices), mesh.simplices)
+    )
 
 
 def _turned_over(simplices: Int[np.ndarray, "s corners"]) -> Int[np.ndarray, "s corners"]:
@@ -87,13 +89,19 @@ def reordered(mesh: Mesh, rng: np.random.Generator) -> Mesh:
     if mesh.dim > 1:
         turns = rng.integers(0, 3, len(simplices))
         corners = (np.arange(3) + turns[:, None]) % 3
-        simplices = np.column_stack([np.take_along_axis(simplices, corners, axis=1), simplices[:, 3:]])
+        simplices = np.column_stack(
+            [np.take_along_axis(simplices, corners, axis=1), simplices[:, 3:]]
+        )
     return with_simplices(mesh, simplices)
 
 
 def rescaled(subject: Subject, factor: float) -> Subject:
     """Multiply coordinates, or the weights of a graph."""
-    return subject * factor if isinstance(subject, sp.csr_array) else with_points(subject, subject.points * factor)
+    return (
+        subject * factor
+        if isinstance(subject, sp.csr_array)
+        else with_points(subject, subject.points * factor)
+    )
 
 
 def doubled(subject: Subject) -> Subject:
@@ -105,4 +113,6 @@ def doubled(subject: Subject) -> Subject:
     points = np.concatenate([subject.points, subject.points + step])
     if isinstance(subject, PointCloud):
         return PointCloud(points, subject.dim)
-    return type(subject)(points, np.concatenate([subject.simplices, subject.simplices + subject.n_points]))
+    return type(subject)(
+        points, np.concatenate([subject.simplices, subject.simplices + subject.n_points])
+    )

@@ -7,7 +7,6 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from eigenshape.spectral.multilevel.device import Array, Device, put, put_matrix
 from eigenshape.spectral.multilevel.multilevel_loops import grow_aggregates, smooth_columns
 
 LARGEST = 64  # points to an aggregate
@@ -50,16 +49,16 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A level on a device: A and M as they are, P as vectors are kept, and A, P and Pᵀ in single for corrections."""
+    """A level as the solver uses it: A, M, P in the precision of the vectors; A, P and Pᵀ in single for corrections."""
 
-    stiffness: Array
-    mass: Array | None
-    weights: Array
-    rough: Array
-    rough_scales: tuple[Array, Array]
-    prolong: Array
-    rough_prolong: Array
-    rough_restrict: Array
+    stiffness: sp.csr_array
+    mass: sp.csr_array | None
+    weights: np.ndarray
+    rough: sp.csr_array
+    rough_scales: tuple[np.ndarray, np.ndarray]
+    prolong: sp.csr_array
+    rough_prolong: sp.csr_array
+    rough_restrict: sp.csr_array
     top: float
     spread: float
 
@@ -69,7 +68,9 @@ class Loaded:
         return int(self.weights.shape[0])
 
 
-def build_levels(stiffness: sp.csr_array, mass: sp.csr_array, n_coarsest: int, *, smooth: bool = True) -> list[Level]:
+def build_levels(
+    stiffness: sp.csr_array, mass: sp.csr_array, n_coarsest: int, *, smooth: bool = True
+) -> list[Level]:
     """Coarsen a pencil to about so many points; the last level has no way down.
 
     Without smoothing the columns of P are indicators of aggregates: rough, but never nearly dependent.
@@ -96,22 +97,33 @@ def _least_spread(stiffness: sp.csr_array) -> float:
     return max(least, min(most, most * MESH_ROW * stiffness.shape[0] / stiffness.nnz))
 
 
-def load(device: Device, level: Level, dtype: type, *, lumped: bool) -> Loaded:
-    """Put a level with a way down on a device; `lumped` says that M is diagonal, `dtype` how vectors are kept."""
-    rough = put_matrix(device, level.down, np.float32)
+def load(level: Level, dtype: type, *, lumped: bool) -> Loaded:
+    """Return a level that has a way down with its matrices in the precisions that the solver uses.
+
+    `lumped` says that M is diagonal, and `dtype` is the precision of the vectors.
+    """
+    rough_prolong = _in_precision(level.down, np.float32)
     diagonal = level.mass.diagonal()[:, None]
-    scales = diagonal, 1 / _positive(level.stiffness.diagonal())[:, None]
+    inverse = 1 / _positive(level.stiffness.diagonal())[:, None]
     return Loaded(
-        stiffness=put_matrix(device, level.stiffness, np.float64),
-        mass=None if lumped else put_matrix(device, level.mass, np.float64),
-        weights=put(device, diagonal),
-        rough=put_matrix(device, level.stiffness, np.float32),
-        rough_scales=(put(device, scales[0].astype(np.float32)), put(device, scales[1].astype(np.float32))),
-        prolong=rough if dtype is np.float32 else put_matrix(device, level.down, dtype),
-        rough_prolong=rough,
-        rough_restrict=put_matrix(device, level.up, np.float32),
+        stiffness=_in_precision(level.stiffness, np.float64),
+        mass=None if lumped else _in_precision(level.mass, np.float64),
+        weights=diagonal,
+        rough=_in_precision(level.stiffness, np.float32),
+        rough_scales=(diagonal.astype(np.float32), inverse.astype(np.float32)),
+        prolong=rough_prolong if dtype is np.float32 else _in_precision(level.down, dtype),
+        rough_prolong=rough_prolong,
+        rough_restrict=_in_precision(level.up, np.float32),
         top=level.top,
         spread=level.spread,
+    )
+
+
+def _in_precision(matrix: sp.sparray, dtype: type) -> sp.csr_array:
+    """Return a matrix sorted by rows, with values of this precision and indices of 32 bits."""
+    rows = _by_rows(matrix)
+    return sp.csr_array(
+        (rows.data.astype(dtype, copy=False), rows.indices, rows.indptr), shape=rows.shape
     )
 
 
@@ -134,7 +146,10 @@ def _smoothed(stiffness: sp.csr_array, top: float, columns: sp.csr_array) -> sp.
     row = stiffness.nnz / stiffness.shape[0]
     degree = max(round(DEGREE * np.sqrt(size * MESH_ROW / row)), 1)
     low = top / max(size / PASSED, LEAST_RATIO)
-    matrix, inverse = (stiffness.indptr, stiffness.indices, stiffness.data), 1 / _positive(stiffness.diagonal())
+    matrix, inverse = (
+        (stiffness.indptr, stiffness.indices, stiffness.data),
+        1 / _positive(stiffness.diagonal()),
+    )
     rows = columns.indptr, columns.indices, columns.data
     for node in np.cos(np.pi * (2 * np.arange(degree) + 1) / (2 * degree)):
         step = 2 / (top + low + (top - low) * node)

@@ -7,7 +7,6 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._errors import ConvergenceError
-from eigenshape.spectral.multilevel.device import Array, fetch, multiply, put
 from eigenshape.spectral.multilevel.residuals import (
     chosen,
     images,
@@ -16,12 +15,15 @@ from eigenshape.spectral.multilevel.residuals import (
     residual_block,
     row_chunks,
 )
-from eigenshape.spectral.multilevel.vcycle import Tower, correct, smooth
+from eigenshape.spectral.multilevel.vcycle import Tower, correct, multiply, smooth
 
 WIDTH = 32  # columns that are corrected at once
 STEPS = (8, 30)  # of smoothing, fewest and most
 FIRST_STEPS = 2.0  # of smoothing alone, times the root of what is to be smoothed
-DEPENDENT = {4: 1e-6, 8: 1e-13}  # of the largest eigenvalue of a Gram matrix of unit columns, by their bytes
+DEPENDENT = {
+    4: 1e-6,
+    8: 1e-13,
+}  # of the largest eigenvalue of a Gram matrix of unit columns, by their bytes
 NOTHING = 1e-6
 FIRST_SHARE = 0.3  # of the work, told while the columns are smoothed the first time
 PROBES = 8  # random columns of a last look
@@ -29,7 +31,9 @@ PROBE_STEPS = 4
 MOST_LEFT = 10.0  # times what a round has lowered
 EARLY = 0.5  # of the bound, or:
 EXACT = 0.01  # of the accuracy, under which a residual is left as it is
-TOO_FAR = "The weights of the operator spread too far for its diagonal: take solve_spectrum."
+TOO_FAR = (
+    "The weights of the operator spread too far for its diagonal: solve with method='certified'."
+)
 UNSEEN = 3.0  # times what is estimated, where only smoothing has been at work
 
 
@@ -37,8 +41,8 @@ UNSEEN = 3.0  # times what is estimated, where only smoothing has been at work
 class Space:
     """Columns S of approximate eigenvectors, and room for as many that are added to them."""
 
-    columns: Array
-    added: Array
+    columns: np.ndarray
+    added: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -67,8 +71,8 @@ class Standing:
 
 
 def refine(
-    tower: Tower, below: tuple[Array, np.ndarray], goal: Goal, report: Callable[[float], None]
-) -> tuple[Array, np.ndarray, float]:
+    tower: Tower, below: tuple[np.ndarray, np.ndarray], goal: Goal, report: Callable[[float], None]
+) -> tuple[np.ndarray, np.ndarray, float]:
     """Return M-orthonormal Ritz vectors, their values and an estimate of these' error, refined until the goal.
 
     The vectors come from the next coarser level, which has no more to say about them, so they are smoothed first, and
@@ -88,7 +92,9 @@ def refine(
     for done in range(goal.rounds + 1):
         residuals = norms_of_residuals(tower, space.columns, values)
         lowered = float(np.abs(before - values)[: goal.k].max())
-        standing = _standing(goal, values, residuals, standing.worst, lowered if done else UNSEEN * lowered)
+        standing = _standing(
+            goal, values, residuals, standing.worst, lowered if done else UNSEEN * lowered
+        )
         bound, worst = min(goal.bound, np.sqrt(goal.accuracy)), standing.worst
         reached = standing.left <= goal.accuracy and worst <= goal.bound
         if reached and not looked:
@@ -108,17 +114,19 @@ def refine(
     raise ConvergenceError(
         f"The error must be estimated at no more than {goal.accuracy:.1e} of the last eigenvalue, and no residual be "
         f"above {goal.bound:.1e}; after {goal.rounds} rounds these are {standing.left:.1e} and {standing.worst:.1e}. "
-        f"Ask for less accuracy, or take solve_spectrum."
+        f"Request less accuracy, or solve with method='certified'."
     )
 
 
-def settled(tower: Tower, columns: Array, values: np.ndarray) -> tuple[Array, np.ndarray]:
+def settled(tower: Tower, columns: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return Ritz vectors and values of the columns in double precision."""
     columns = columns.astype(np.float64)
     return columns, _ritz(tower, Space(columns, columns[:, :0]), values, slice(0, len(values)))
 
 
-def _standing(goal: Goal, values: np.ndarray, residuals: np.ndarray, before: float, lowered: float) -> Standing:
+def _standing(
+    goal: Goal, values: np.ndarray, residuals: np.ndarray, before: float, lowered: float
+) -> Standing:
     """Judge a round by what it did to the values and to the largest residual.
 
     Errors go with the squares of residuals. If they fell only as much as those did, by a factor q, then of what the
@@ -131,31 +139,40 @@ def _standing(goal: Goal, values: np.ndarray, residuals: np.ndarray, before: flo
     return Standing(scale, worst, lowered / scale * min(factor / max(1 - factor, 0.01), MOST_LEFT))
 
 
-def _prolonged(tower: Tower, vectors: Array) -> Space:
+def _prolonged(tower: Tower, vectors: np.ndarray) -> Space:
     # M and A of the level below are PᵀMP and PᵀAP: P keeps orthonormality and Ritz values.
     level, shape = tower.levels[0], (tower.levels[0].n, vectors.shape[1])
-    columns, added = (tower.device.arrays.empty(shape, dtype=level.prolong.dtype) for _ in range(2))
-    return Space(multiply(tower.device, level.prolong, vectors.astype(columns.dtype), columns), added)
+    columns, added = (np.empty(shape, dtype=level.prolong.dtype) for _ in range(2))
+    return Space(multiply(level.prolong, vectors.astype(columns.dtype), columns), added)
 
 
 def _smooth_all(
     tower: Tower, space: Space, values: np.ndarray, report: Callable[[float], None]
 ) -> Float[np.ndarray, " m"]:
     """Smooth the columns, and return the norms of the residuals that they had."""
-    steps, norms = int(np.ceil(FIRST_STEPS * np.sqrt(tower.levels[0].spread))), np.empty(len(values))
+    steps, norms = (
+        int(np.ceil(FIRST_STEPS * np.sqrt(tower.levels[0].spread))),
+        np.empty(len(values)),
+    )
     for start in range(0, len(values), WIDTH):
         report(FIRST_SHARE * start / len(values))
         some = np.arange(start, min(start + WIDTH, len(values)))
-        block, norms[some] = residual_block(tower, chosen(tower, space.columns, some), values[some], np.ones(len(some)))
+        block, norms[some] = residual_block(
+            tower, chosen(tower, space.columns, some), values[some], np.ones(len(some))
+        )
         corrections = smooth(tower, block, values[some].astype(np.float32), steps)
-        _require_finite(tower, corrections, some)
+        _require_finite(corrections, some)
         for rows in row_chunks(tower):
             space.columns[rows, start : start + len(some)] -= corrections[rows]
     return norms
 
 
 def _add_corrections(
-    tower: Tower, space: Space, state: tuple[np.ndarray, np.ndarray], late: np.ndarray, excess: float
+    tower: Tower,
+    space: Space,
+    state: tuple[np.ndarray, np.ndarray],
+    late: np.ndarray,
+    excess: float,
 ) -> None:
     """Add the corrections of late columns, which have these values and residuals.
 
@@ -164,21 +181,27 @@ def _add_corrections(
     ConvergenceError
         If they overflow.
     """
-    steps = int(np.clip(np.ceil(0.5 * np.sqrt(tower.levels[0].spread) * np.log(8 * excess)), *STEPS))
+    steps = int(
+        np.clip(np.ceil(0.5 * np.sqrt(tower.levels[0].spread) * np.log(8 * excess)), *STEPS)
+    )
     values, residuals = state
     for start in range(0, len(late), WIDTH):
         some = late[start : start + WIDTH]
-        block, _ = residual_block(tower, chosen(tower, space.columns, some), values[some], 1 / residuals[some])
+        block, _ = residual_block(
+            tower, chosen(tower, space.columns, some), values[some], 1 / residuals[some]
+        )
         corrections = correct(tower, block, values[some].astype(np.float32), steps)
-        _require_finite(tower, corrections, some)
+        _require_finite(corrections, some)
         for rows in row_chunks(tower):
             space.added[rows, start : start + len(some)] = corrections[rows]
 
 
-def _require_finite(tower: Tower, corrections: Array, some: np.ndarray) -> None:
+def _require_finite(corrections: np.ndarray, some: np.ndarray) -> None:
     # Far below zero, where single rows are next to nothing beside θM, smoothing makes columns grow.
-    if not tower.device.arrays.isfinite(corrections.sum()):
-        raise ConvergenceError(f"Corrections must be finite; those of eigenvector {some[0]} overflow. {TOO_FAR}")
+    if not np.isfinite(corrections.sum()):
+        raise ConvergenceError(
+            f"Corrections must be finite; those of eigenvector {some[0]} overflow. {TOO_FAR}"
+        )
 
 
 def _look_again(
@@ -190,11 +213,11 @@ def _look_again(
     of the first k values by half the bound or more, they are taken in, and the new values returned; else everything
     stays as it is.
     """
-    level, device, m = tower.levels[0], tower.device, len(values)
+    level, m = tower.levels[0], len(values)
     shifts = np.zeros(PROBES, dtype=np.float32)
-    block = put(device, np.random.default_rng(seed).standard_normal((level.n, PROBES), dtype=np.float32))
+    block = np.random.default_rng(seed).standard_normal((level.n, PROBES), dtype=np.float32)
     for _ in range(PROBE_STEPS):
-        block *= level.rough_scales[0] / device.arrays.abs(block).max(axis=0)
+        block *= level.rough_scales[0] / np.abs(block).max(axis=0)
         block = correct(tower, block, shifts, STEPS[0])
         keep_outside(tower, space.columns, block)
     space = Space(space.columns, block)
@@ -215,7 +238,7 @@ def _ritz(tower: Tower, space: Space, values: np.ndarray, fresh: slice) -> np.nd
     return values
 
 
-def _combine(tower: Tower, space: Space, weights: Array) -> None:
+def _combine(tower: Tower, space: Space, weights: np.ndarray) -> None:
     m, weights = space.columns.shape[1], weights.astype(space.columns.dtype)
     late = len(weights) - m
     for rows in row_chunks(tower):
@@ -225,27 +248,31 @@ def _combine(tower: Tower, space: Space, weights: Array) -> None:
         space.columns[rows] = part
 
 
-def _combination(tower: Tower, space: Space, values: np.ndarray, fresh: slice) -> tuple[np.ndarray, Array]:
+def _combination(
+    tower: Tower, space: Space, values: np.ndarray, fresh: slice
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest Ritz values of the columns up to the last fresh ones, and their vectors' coefficients."""
-    arrays, known = tower.device.arrays, fresh.start
+    known = fresh.start
     gram, projected = _grams(tower, space, fresh)
-    gram[:known, :known] = arrays.eye(known)
-    projected[:known, :known] = arrays.diag(put(tower.device, values[:known]))
-    scales = 1 / arrays.sqrt(arrays.diagonal(gram))
-    sizes, axes = arrays.linalg.eigh(gram * scales * scales[:, None])
+    gram[:known, :known] = np.eye(known)
+    projected[:known, :known] = np.diag(values[:known])
+    scales = 1 / np.sqrt(np.diagonal(gram))
+    sizes, axes = np.linalg.eigh(gram * scales * scales[:, None])
     kept = sizes > DEPENDENT[space.columns.dtype.itemsize] * sizes[-1]
-    if np.count_nonzero(fetch(tower.device, kept)) < len(values):
-        raise ConvergenceError(f"Smoothed eigenvectors must be independent; fewer than {len(values)} are. {TOO_FAR}")
-    axes = (scales[:, None] * axes[:, kept]) / arrays.sqrt(sizes[kept])
-    found, weights = arrays.linalg.eigh(axes.T @ projected @ axes)
+    if np.count_nonzero(kept) < len(values):
+        raise ConvergenceError(
+            f"Smoothed eigenvectors must be independent; fewer than {len(values)} are. {TOO_FAR}"
+        )
+    axes = (scales[:, None] * axes[:, kept]) / np.sqrt(sizes[kept])
+    found, weights = np.linalg.eigh(axes.T @ projected @ axes)
     m = len(values)
-    return np.array(fetch(tower.device, found[:m])), axes @ weights[:, :m]
+    return np.array(found[:m]), axes @ weights[:, :m]
 
 
-def _grams(tower: Tower, space: Space, fresh: slice) -> tuple[Array, Array]:
+def _grams(tower: Tower, space: Space, fresh: slice) -> tuple[np.ndarray, np.ndarray]:
     """Return SᵀMS and SᵀAS, without the block of the columns before the fresh ones."""
-    arrays, size, m = tower.device.arrays, fresh.stop, space.columns.shape[1]
-    gram, projected = arrays.zeros((size, size)), arrays.zeros((size, size))
+    size, m = fresh.stop, space.columns.shape[1]
+    gram, projected = np.zeros((size, size)), np.zeros((size, size))
     of = space.columns if fresh.start == 0 else space.added[:, : size - m]
     for rows, image, weighed in images(tower, of):
         for block, start in ((space.columns, 0), (space.added, m)):

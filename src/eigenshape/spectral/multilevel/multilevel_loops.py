@@ -1,4 +1,4 @@
-"""Compiled loops of `hierarchy` and `device`: aggregates of points, their smoothed indicators, and products."""
+"""Compiled loops of `aggregation` and `vcycle`: aggregates of points, their smoothed indicators, and products."""
 
 from typing import no_type_check
 
@@ -76,7 +76,10 @@ def smooth_columns(matrix, factors, sparse, n_columns):
     (starts, columns, values), (old_starts, old_columns, old_values) = matrix, sparse
     n = len(starts) - 1
     new_starts = np.zeros(n + 1, dtype=np.int32)
-    new_columns, new_values = np.empty(2 * len(old_values), dtype=np.int32), np.empty(2 * len(old_values))
+    new_columns, new_values = (
+        np.empty(2 * len(old_values), dtype=np.int32),
+        np.empty(2 * len(old_values)),
+    )
     places, height = np.full(n_columns, -1, dtype=np.int64), 0
     for i in range(n):
         first = height
@@ -118,7 +121,7 @@ def _doubled(array, more):
 
 @njit
 @no_type_check
-def multiply(starts, columns, values, block, product):
+def multiply_rows(starts, columns, values, block, product):
     """Write a sparse matrix times a block of columns; `starts` may be that of some rows only."""
     for i in range(len(starts) - 1):
         _row_product(starts, columns, values, block, i, product)

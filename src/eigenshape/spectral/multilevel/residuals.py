@@ -1,83 +1,86 @@
-"""Tall blocks of columns on a device, some rows at a time: their images and residuals."""
+"""Tall blocks of columns, some rows at a time: their images and residuals."""
 
 from collections.abc import Iterator
 
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape.spectral.multilevel.device import Array, fetch, multiply, put
-from eigenshape.spectral.multilevel.vcycle import Tower
+from eigenshape.spectral.multilevel.vcycle import Tower, multiply
+
+ROWS = (
+    4096  # of tall blocks at once: two products of 32 columns then take 2 MiB, which a cache holds
+)
 
 
 def row_chunks(tower: Tower) -> list[slice]:
-    """Return the rows of the first level, as many at a time as the device likes."""
-    n, rows = tower.levels[0].n, tower.device.rows
-    return [slice(start, min(start + rows, n)) for start in range(0, n, rows)]
+    """Return the rows of the first level, as many at a time as a cache holds."""
+    n = tower.levels[0].n
+    return [slice(start, min(start + ROWS, n)) for start in range(0, n, ROWS)]
 
 
-def images(tower: Tower, columns: Array) -> Iterator[tuple[slice, Array, Array]]:
+def images(tower: Tower, columns: np.ndarray) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
     """Give A and M times columns some rows at a time, in double precision."""
-    level, device = tower.levels[0], tower.device
-    width, arrays = columns.shape[1], device.arrays
-    room = [arrays.empty((min(device.rows, level.n), width)) for _ in range(2)]
+    level = tower.levels[0]
+    room = [np.empty((min(ROWS, level.n), columns.shape[1])) for _ in range(2)]
     for rows in row_chunks(tower):
         image, weighed = (part[: rows.stop - rows.start] for part in room)
-        multiply(device, level.stiffness, columns, image, rows)
+        multiply(level.stiffness, columns, image, rows)
         if level.mass is None:
-            arrays.multiply(columns[rows], level.weights[rows], out=weighed)
+            np.multiply(columns[rows], level.weights[rows], out=weighed)
         else:
-            multiply(device, level.mass, columns, weighed, rows)
+            multiply(level.mass, columns, weighed, rows)
         yield rows, image, weighed
 
 
-def _residual_rows(tower: Tower, columns: Array, values: np.ndarray) -> Iterator[tuple[slice, Array]]:
+def _residual_rows(
+    tower: Tower, columns: np.ndarray, values: np.ndarray
+) -> Iterator[tuple[slice, np.ndarray]]:
     """Give A S - M S θ some rows at a time."""
-    known = put(tower.device, values)
     for rows, image, weighed in images(tower, columns):
-        tower.device.arrays.multiply(weighed, known, out=weighed)
-        yield rows, tower.device.arrays.subtract(image, weighed, out=image)
+        np.multiply(weighed, values, out=weighed)
+        yield rows, np.subtract(image, weighed, out=image)
 
 
-def norms_of_residuals(tower: Tower, columns: Array, values: np.ndarray) -> Float[np.ndarray, " m"]:
+def norms_of_residuals(
+    tower: Tower, columns: np.ndarray, values: np.ndarray
+) -> Float[np.ndarray, " m"]:
     """Return the norms of the columns' residuals, in the inverse of M or of its diagonal."""
-    squares = tower.device.arrays.zeros(len(values))
+    squares = np.zeros(len(values))
     for rows, rest in _residual_rows(tower, columns, values):
         squares += _squares(tower, rows, rest)
-    return np.sqrt(fetch(tower.device, squares))
+    return np.sqrt(squares)
 
 
-def _squares(tower: Tower, rows: slice, rest: Array) -> Array:
+def _squares(tower: Tower, rows: slice, rest: np.ndarray) -> np.ndarray:
     rest *= rest
     rest /= tower.levels[0].weights[rows]
     return rest.sum(axis=0)
 
 
-def chosen(tower: Tower, columns: Array, some: np.ndarray) -> Array:
+def chosen(tower: Tower, columns: np.ndarray, some: np.ndarray) -> np.ndarray:
     """Return some of the columns, beside each other."""
-    arrays = tower.device.arrays
-    picked, places = arrays.empty((len(columns), len(some)), dtype=columns.dtype), put(tower.device, some)
+    picked = np.empty((len(columns), len(some)), dtype=columns.dtype)
     for rows in row_chunks(tower):
-        picked[rows] = arrays.take(columns[rows], places, axis=1)
+        picked[rows] = np.take(columns[rows], some, axis=1)
     return picked
 
 
 def residual_block(
-    tower: Tower, columns: Array, values: np.ndarray, scales: np.ndarray
-) -> tuple[Array, Float[np.ndarray, " b"]]:
+    tower: Tower, columns: np.ndarray, values: np.ndarray, scales: np.ndarray
+) -> tuple[np.ndarray, Float[np.ndarray, " b"]]:
     """Return scaled residuals in single precision, and their norms."""
-    arrays, device = tower.device.arrays, tower.device
-    factors, squares = put(device, scales), arrays.zeros(len(values))
-    block = arrays.empty(columns.shape, dtype=np.float32)
+    squares = np.zeros(len(values))
+    block = np.empty(columns.shape, dtype=np.float32)
     for rows, rest in _residual_rows(tower, columns, values):
-        block[rows] = rest * factors
+        block[rows] = rest * scales
         squares += _squares(tower, rows, rest)
-    return block, np.sqrt(fetch(device, squares))
+    return block, np.sqrt(squares)
 
 
-def keep_outside(tower: Tower, columns: Array, block: Array) -> None:
+def keep_outside(tower: Tower, columns: np.ndarray, block: np.ndarray) -> None:
     """Take from a block in place what lies in the span of columns that are orthonormal in M, or in its diagonal."""
-    arrays, weights = tower.device.arrays, tower.levels[0].weights
-    inside = arrays.zeros((columns.shape[1], block.shape[1]))
+    weights = tower.levels[0].weights
+    inside = np.zeros((columns.shape[1], block.shape[1]))
     for rows in row_chunks(tower):
         inside += columns[rows].T @ (weights[rows] * block[rows]).astype(columns.dtype)
     for rows in row_chunks(tower):

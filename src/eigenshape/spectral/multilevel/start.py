@@ -15,7 +15,6 @@ from eigenshape._progress import Progress, silent
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.multilevel.aggregation import Level, build_levels, load
 from eigenshape.spectral.multilevel.davidson import WIDTH, Goal, refine
-from eigenshape.spectral.multilevel.device import Array, Device, put
 from eigenshape.spectral.multilevel.vcycle import Coarsest, Tower
 from eigenshape.spectral.solver.pencil import Pencil, as_pencil
 from eigenshape.spectral.solver.shift import factorise_near
@@ -51,11 +50,11 @@ class Start:
 
     order: Int[np.ndarray, " n"]
     tower: Tower
-    below: tuple[Array, np.ndarray]
+    below: tuple[np.ndarray, np.ndarray]
 
 
 def climb(
-    pencil: Pencil, k: int, device: Device, report: Progress, *, dtype: type = np.float32, kept: int = 0
+    pencil: Pencil, k: int, report: Progress, *, dtype: type = np.float32, kept: int = 0
 ) -> Start | None:
     """Make the levels of a pencil with diagonal mass, solve the coarsest, and refine its vectors up to the second.
 
@@ -75,17 +74,21 @@ def climb(
     require_memory(f"{k} pairs of {pencil.n} points", parts, "Ask for fewer pairs")
     report(0.01, "making coarser levels")
     order = reverse_cuthill_mckee(sp.csr_matrix(pencil.stiffness), symmetric_mode=True)
-    coarsened = _coarsened(_reordered(pencil.stiffness, order), _reordered(pencil.mass, order), k, m)
+    coarsened = _coarsened(
+        _reordered(pencil.stiffness, order), _reordered(pencil.mass, order), k, m
+    )
     if coarsened is None:
         return None
     levels, coarsest, values = coarsened
-    loaded = [load(device, level, dtype, lumped=place == 0) for place, level in enumerate(levels[:-1])]
+    loaded = [load(level, dtype, lumped=place == 0) for place, level in enumerate(levels[:-1])]
     goal = Goal(k, np.inf, INNER_ACCURACY, pencil.level / pencil.n, INNER_ROUNDS, strict=False)
-    vectors = put(device, coarsest.vectors)
+    vectors = coarsest.vectors
     for place in range(len(loaded) - 1, 0, -1):
-        tower = Tower(device, tuple(loaded[place:]), coarsest)
-        vectors, values, _ = refine(tower, (vectors, values), goal, _in_level(report, place, len(loaded)))
-    return Start(order, Tower(device, tuple(loaded), coarsest), (vectors, values))
+        tower = Tower(tuple(loaded[place:]), coarsest)
+        vectors, values, _ = refine(
+            tower, (vectors, values), goal, _in_level(report, place, len(loaded))
+        )
+    return Start(order, Tower(tuple(loaded), coarsest), (vectors, values))
 
 
 def require_lumped(laplacian: Laplacian) -> None:
@@ -93,9 +96,11 @@ def require_lumped(laplacian: Laplacian) -> None:
     rows = laplacian.mass.tocoo()
     beside = np.flatnonzero((rows.row != rows.col) & (rows.data != 0))
     if beside.size:
+        first = beside[0]
         raise InvalidParameterError(
-            f"mass must be diagonal here; entry ({rows.row[beside[0]]}, {rows.col[beside[0]]}) is "
-            f"{rows.data[beside[0]]:.6g}. Lump the mass, or take solve_spectrum."
+            f"mass must be diagonal for approximate eigenpairs; entry ({rows.row[first]}, "
+            f"{rows.col[first]}) is {rows.data[first]:.6g}. "
+            f"Build the operator with a lumped mass, or solve with method='certified'."
         )
 
 
@@ -139,4 +144,6 @@ def _solved_coarsest(level: Level, k: int, m: int) -> tuple[Coarsest, Float[np.n
 
 def _in_level(report: Progress, place: int, n_levels: int) -> Callable[[float], None]:
     share = 0.15 / n_levels
-    return lambda done: report(0.35 + share * (done - place), f"refining on level {n_levels - place} of {n_levels}")
+    return lambda done: report(
+        0.35 + share * (done - place), f"refining on level {n_levels - place} of {n_levels}"
+    )

@@ -1,44 +1,49 @@
-"""Heat kernel signatures: how much heat stays where it was put."""
+"""Heat kernel signatures: how much heat remains at each point."""
 
 from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.spectral.spectrum import Spectrum, require_lowest
 
-EVEN = 1e-9  # steps between logarithms of times that differ less are equal
-NULL = 1e-9  # of the largest eigenvalue: what is below counts as 0
-N_TIMES = 100
+# Relative difference between steps of log t up to which times count as a geometric sequence; the
+# rounding of numpy.geomspace stays far below it.
+EVEN = 1e-9
+# Eigenvalues below this multiple of the largest one count as 0. Solvers are off by about 1e-12 of it.
+NULL = 1e-9
+N_TIMES = 100  # times by default, as in Sun, Ovsjanikov and Guibas 2009
 
 
 def positive_eigenvalues(spectrum: Spectrum) -> Float[np.ndarray, " k"]:
-    """Return the eigenvalues above 0, of which each component of a shape has one without.
+    """Return the eigenvalues above 0; each component of the shape has one eigenvalue 0.
 
     Raises
     ------
     InvalidParameterError
-        If there is none.
+        If no eigenvalue is above 0.
     """
     values = spectrum.eigenvalues
     positive = values[values > np.maximum(NULL * values[-1], 4 * spectrum.residuals)]
     if not positive.size:
         raise InvalidParameterError(
-            f"A spectrum must have an eigenvalue above 0; its {len(values)} are one for each component. Solve for more."
+            f"The spectrum must have an eigenvalue above 0; its {len(values)} are all 0, one for each "
+            f"component of the shape. Increase k."
         )
     return positive
 
 
 def default_times(spectrum: Spectrum, n_times: SupportsIndex = N_TIMES) -> Float[np.ndarray, " q"]:
-    """Return times in geometric sequence, between which the heat of a spectrum changes.
+    """Return diffusion times in geometric sequence that suit a spectrum.
 
-    4 ln 10 / λ_k to 4 ln 10 / λ_1, λ_1 the first eigenvalue above 0 (Sun, Ovsjanikov, Guibas 2009, 5): at the first of
-    them the last exponential is 1e-4, and at the last the first one is. They scale with the shape.
+    The times range from 4 ln 10 / λ_k to 4 ln 10 / λ_1, with λ_1 the first eigenvalue above 0 (Sun,
+    Ovsjanikov, Guibas 2009, section 5): exp(-tλ_k) is 1e-4 at the first time, and exp(-tλ_1) is 1e-4
+    at the last. They scale with the shape.
 
     Parameters
     ----------
@@ -49,12 +54,19 @@ def default_times(spectrum: Spectrum, n_times: SupportsIndex = N_TIMES) -> Float
     Returns
     -------
     (q,) float
-        In length^2, ascending.
+        In length², ascending.
 
     Raises
     ------
     InvalidParameterError
-        If there are fewer than 2 times, or no eigenvalue above 0.
+        If `n_times` is less than 2, or no eigenvalue is above 0.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(es.icosphere(2)), 9)
+    >>> es.spectral.default_times(spectrum, 3).round().tolist()
+    [2.0, 3.0, 5.0]
     """
     require_type(spectrum, Spectrum, "spectrum")
     values = positive_eigenvalues(spectrum)
@@ -63,16 +75,17 @@ def default_times(spectrum: Spectrum, n_times: SupportsIndex = N_TIMES) -> Float
 
 @one_blas_thread()
 def heat_kernel_signature(spectrum: Spectrum, times: ArrayLike) -> Float[np.ndarray, "n q"]:
-    """Measure the heat left at each point after each time.
+    """Compute the heat kernel signature: the heat that remains at each point after each time.
 
-    h_t(x, x) = sum_i exp(-t lambda_i) phi_i(x)^2                (thesis eq. 5.1; Sun, Ovsjanikov, Guibas 2009)
+    h_t(x, x) = Σ_i exp(-t λ_i) φ_i(x)²          (thesis eq. 5.1; Sun, Ovsjanikov, Guibas 2009)
 
     Parameters
     ----------
     spectrum : Spectrum
-        k eigenpairs; stopping at k leaves out at most exp(-t lambda_k) / b_x at point x.
+        k eigenpairs. The pairs beyond k contribute at most exp(-t λ_k) / b_x at point x, with b_x
+        the mass of the point.
     times : (q,) float
-        Diffusion times, in length^2, all > 0.
+        Diffusion times, in length², all > 0.
 
     Returns
     -------
@@ -82,7 +95,25 @@ def heat_kernel_signature(spectrum: Spectrum, times: ArrayLike) -> Float[np.ndar
     Raises
     ------
     InvalidParameterError
-        If a time is not positive and finite, or the spectrum is of an interval.
+        If a time is not positive and finite, or the spectrum does not begin with the lowest
+        eigenvalue.
+
+    See Also
+    --------
+    wave_kernel_signature : Signature of one frequency band at a time.
+    merge_tree, segment : Segment a shape by its heat.
+
+    Examples
+    --------
+    On a sphere all points are alike, and after a long time the heat is spread over the area 4π:
+
+    >>> import eigenshape as es
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(es.icosphere(3)), 50)
+    >>> heat = es.heat_kernel_signature(spectrum, [0.1, 10.0])
+    >>> heat.shape
+    (642, 2)
+    >>> (heat[:3, 1] * 12.566).round(2).tolist()
+    [1.0, 1.0, 1.0]
     """
     require_type(spectrum, Spectrum, "spectrum")
     require_lowest(spectrum, "spectrum")
@@ -91,19 +122,21 @@ def heat_kernel_signature(spectrum: Spectrum, times: ArrayLike) -> Float[np.ndar
 
 
 @one_blas_thread()
-def reflection_free_signature(neumann: Spectrum, dirichlet: Spectrum, times: ArrayLike) -> Float[np.ndarray, "n q"]:
-    """Measure the heat left at each point as if the surface went on beyond its boundary.
+def reflection_free_signature(
+    neumann: Spectrum, dirichlet: Spectrum, times: ArrayLike
+) -> Float[np.ndarray, "n q"]:
+    """Compute the heat kernel signature of a surface without the effect of its boundary.
 
-    A boundary throws heat back with the Neumann condition and swallows it with the Dirichlet condition: near a straight
-    one the kernels are those of the whole plane plus and minus the same mirror image (the method of images), so their
-    mean is free of it.
+    The Neumann condition reflects heat at a boundary, and the Dirichlet condition absorbs it. Near a
+    straight boundary the two kernels are that of the whole plane plus and minus the same mirror
+    image (the method of images), so their mean contains no mirror image.
 
     Parameters
     ----------
     neumann, dirichlet : Spectrum
-        Of one surface, from `solve_spectrum` and `solve_dirichlet` with its boundary fixed.
+        Of one surface, from `solve_spectrum`, without and with its boundary fixed.
     times : (q,) float
-        Diffusion times, in length^2, all > 0.
+        Diffusion times, in length², all > 0.
 
     Returns
     -------
@@ -113,36 +146,49 @@ def reflection_free_signature(neumann: Spectrum, dirichlet: Spectrum, times: Arr
     Raises
     ------
     InvalidParameterError
-        If a time is not positive and finite, or the spectra are of different sizes.
+        If a time is not positive and finite, or the spectra have different numbers of points.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.shapes.grid(20, 20)
+    >>> laplacian, rim = es.cotangent_laplacian(mesh), es.geometry.boundary_vertices(mesh)
+    >>> free = es.solve_spectrum(laplacian, 60)
+    >>> fixed = es.solve_spectrum(laplacian, 60, fixed=rim)
+    >>> es.spectral.reflection_free_signature(free, fixed, [0.02]).shape
+    (441, 1)
     """
     require_type(neumann, Spectrum, "neumann")
     require_type(dirichlet, Spectrum, "dirichlet")
     sizes = len(neumann.eigenvectors), len(dirichlet.eigenvectors)
     if sizes[0] != sizes[1]:
-        raise InvalidParameterError(f"Both spectra must be of one surface; they have {sizes[0]} and {sizes[1]} points.")
+        raise InvalidParameterError(
+            f"Both spectra must be of the same surface; they have {sizes[0]} and {sizes[1]} points."
+        )
     return (heat_kernel_signature(neumann, times) + heat_kernel_signature(dirichlet, times)) / 2
 
 
 @one_blas_thread()
-def scale_invariant_heat_kernel_signature(
+def scale_invariant_signature(
     spectrum: Spectrum, times: ArrayLike | None = None, *, n_frequencies: SupportsIndex = 6
 ) -> Float[np.ndarray, "n frequencies"]:
-    """Measure how heat falls in time, blind to the size of the shape.
+    """Compute a heat kernel signature that does not depend on the size of the shape.
 
-    |F[d/dτ log h(x, α^τ)](ω)|                                    (Bronstein and Kokkinos 2010; thesis reference 36)
+    |F[d/dτ log h(x, α^τ)](ω)|             (Bronstein and Kokkinos 2010; thesis reference 36)
 
-    On a surface β times as large h'(x, t) = h(x, t/β²) / β²: in log h the factor is a constant, which the derivative
-    removes, and the time a shift in τ, which the modulus of the Fourier transform F removes, as far as nothing happens
-    at the ends of the times.
+    On a surface β times as large h'(x, t) = h(x, t/β²) / β². In log h the factor is a constant,
+    which the derivative removes. The change of time is a shift in τ, which the modulus of the
+    Fourier transform F removes, up to effects at the first and last time.
 
     Parameters
     ----------
     spectrum : Spectrum
     times : (q,) float, optional
-        In geometric sequence, in length^2; `default_times` otherwise, with which the invariance is exact. Times
-        of one's own make parts comparable with wholes.
+        In geometric sequence, in length². The default is `default_times(spectrum)`, with which the
+        invariance is exact. Fixed times make parts comparable with whole shapes.
     n_frequencies : int
-        Lowest frequencies ω = 0, 1, ... to keep, at most q/2; the first says how far the logarithm falls in all.
+        Number of lowest frequencies ω = 0, 1, ... to return, at most q/2. The first one is the total
+        decrease of log h.
 
     Returns
     -------
@@ -152,7 +198,21 @@ def scale_invariant_heat_kernel_signature(
     Raises
     ------
     InvalidParameterError
-        If the times are not positive or no geometric sequence of at least 3, or frequencies are more than q/2.
+        If the times are not a geometric sequence of at least 3 positive numbers, or `n_frequencies`
+        is more than q/2.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> from numpy import allclose
+    >>> small = es.shapes.torus(24, 12)
+    >>> large = es.TriangleMesh(7 * small.vertices, small.faces)
+    >>> one, two = (
+    ...     es.spectral.scale_invariant_signature(es.solve_spectrum(es.cotangent_laplacian(m), 30))
+    ...     for m in (small, large)
+    ... )
+    >>> allclose(one, two)
+    True
     """
     require_type(spectrum, Spectrum, "spectrum")
     moments = default_times(spectrum) if times is None else positive_values(times, "times")

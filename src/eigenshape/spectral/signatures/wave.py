@@ -1,29 +1,32 @@
-"""Wave kernel signatures: how often a particle of some energy is seen at a point."""
+"""Wave kernel signatures: the probability to find a particle of some energy at a point."""
 
 from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_values, positive_values, whole_number
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.spectral.signatures.heat import positive_eigenvalues
 from eigenshape.spectral.spectrum import Spectrum
 
+# All three from Aubry, Schlickewei and Cremers 2011, section 4.
 N_ENERGIES = 100
-SPREAD = 7.0  # standard deviations in steps between energies
-MARGIN = 2.0  # standard deviations between the ends of the spectrum and the first and last energy
+SPREAD = 7.0  # standard deviation of the bands, in steps between energies
+MARGIN = (
+    2.0  # distance of the first and last energy from the ends of the spectrum, in the same unit σ
+)
 
 
 def default_energies(
     spectrum: Spectrum, n_energies: SupportsIndex = N_ENERGIES
 ) -> tuple[Float[np.ndarray, " q"], float]:
-    """Return evenly spaced energies and the standard deviation that a spectrum suggests.
+    """Return evenly spaced energies and a band width that suit a spectrum.
 
-    From log λ_1 + 2σ to log λ_k - 2σ with σ = 7 steps, λ_1 the first eigenvalue above 0 (Aubry, Schlickewei and Cremers
-    2011, 4).
+    The energies range from log λ_1 + 2σ to log λ_k - 2σ, with σ = 7 steps and λ_1 the first
+    eigenvalue above 0 (Aubry, Schlickewei and Cremers 2011, section 4).
 
     Parameters
     ----------
@@ -35,14 +38,22 @@ def default_energies(
     Returns
     -------
     energies : (q,) float
-        Logarithms of eigenvalues in 1/length^2: a shape β times as large has them 2 log β lower.
+        Logarithms of eigenvalues in 1/length². On a shape β times as large they are lower by 2 log β.
     sigma : float
-        Without unit.
+        Standard deviation of the bands, without unit.
 
     Raises
     ------
     InvalidParameterError
-        If there are fewer than 2 energies, or no two different eigenvalues above 0.
+        If `n_energies` is less than 2, or no two different eigenvalues are above 0.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(es.icosphere(2)), 30)
+    >>> energies, sigma = es.spectral.default_energies(spectrum, 4)
+    >>> len(energies)
+    4
     """
     require_type(spectrum, Spectrum, "spectrum")
     count = whole_number(n_energies, "n_energies", 2)
@@ -56,36 +67,58 @@ def default_energies(
 def wave_kernel_signature(
     spectrum: Spectrum, energies: ArrayLike | None = None, *, sigma: float | None = None
 ) -> Float[np.ndarray, "n q"]:
-    """Measure the mean probability over time to meet a quantum particle of an energy at each point.
+    """Compute the wave kernel signature: the probability to find a particle of an energy at a point.
 
-    w_e(x) = sum_i phi_i(x)^2 g(e - log lambda_i) / sum_i g(e - log lambda_i), g(d) = exp(-d^2 / 2 sigma^2), over the
-    eigenvalues above 0 (Aubry, Schlickewei and Cremers 2011). Where heat is a low-pass filter, this is one of bands:
-    w_e tells details of size exp(-e/2) alone. The sum over x of b_x w_e(x) is 1.
+    w_e(x) = Σ_i φ_i(x)² g(e - log λ_i) / Σ_i g(e - log λ_i),  g(d) = exp(-d² / 2σ²),
+
+    over the eigenvalues above 0 (Aubry, Schlickewei and Cremers 2011): the mean probability over
+    time to find a quantum particle with energy distribution g at x. Heat is a low-pass filter; this
+    signature is a band-pass filter, which separates details of size exp(-e/2) from all others. The
+    sum over x of b_x w_e(x), with b_x the mass of point x, is 1.
 
     Parameters
     ----------
     spectrum : Spectrum
     energies : (q,) float, optional
-        Logarithms of eigenvalues in 1/length^2; those of `default_energies` otherwise.
+        Logarithms of eigenvalues in 1/length². The default is that of `default_energies`.
     sigma : float, optional
-        Standard deviation of the bands, > 0; that of `default_energies` otherwise.
+        Standard deviation of the bands, > 0. The default is that of `default_energies`.
 
     Returns
     -------
     (n, q) float
-        In 1/length^dim. With default energies the product with the shape's measure does not depend on its size.
+        In 1/length^dim. With default energies the product with the area does not depend on scale.
 
     Raises
     ------
     InvalidParameterError
-        If an energy is not finite, sigma not positive, or the spectrum has no two different eigenvalues above 0.
+        If an energy is not finite, sigma is not positive, or no two different eigenvalues are above
+        0.
+
+    See Also
+    --------
+    heat_kernel_signature : Signature over diffusion times.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(es.icosphere(3)), 50)
+    >>> waves = es.wave_kernel_signature(spectrum)
+    >>> waves.shape
+    (642, 100)
+    >>> total = spectrum.mass.diagonal() @ waves
+    >>> total.min().round(9).item(), total.max().round(9).item()
+    (1.0, 1.0)
     """
     require_type(spectrum, Spectrum, "spectrum")
     values = positive_eigenvalues(spectrum)
     if energies is None or sigma is None:
         suggested, spread = default_energies(spectrum)
-        energies, sigma = suggested if energies is None else energies, spread if sigma is None else sigma
-    levels, width = finite_values(energies, "energies"), positive_values(sigma, "sigma")[0]
+        energies = suggested if energies is None else energies
+        sigma = spread if sigma is None else sigma
+    levels = finite_values(energies, "energies")
+    width = positive_values(sigma, "sigma")[0]
     exponents = -((np.log(values)[:, None] - levels) ** 2) / (2 * width**2)
-    bands = np.exp(exponents - exponents.max(axis=0))  # far from all eigenvalues the nearest counts, not 0 / 0
+    # Far from all eigenvalues every exponential is 0; relative to the largest, the nearest one is 1.
+    bands = np.exp(exponents - exponents.max(axis=0))
     return np.asarray(spectrum.eigenvectors[:, -len(values) :] ** 2 @ (bands / bands.sum(axis=0)))

@@ -25,13 +25,15 @@ FARTHER = 10.0
 
 
 def certify(
-    laplacian: Laplacian, eigenvalues: Float[np.ndarray, " k"], eigenvectors: Float[np.ndarray, "n k"]
+    laplacian: Laplacian,
+    eigenvalues: Float[np.ndarray, " k"],
+    eigenvectors: Float[np.ndarray, "n k"],
 ) -> Certificate:
-    """Prove that these are the k lowest eigenpairs, or refuse them.
+    """Prove that given eigenpairs are the k lowest ones of an operator, or raise an error.
 
-    Sylvester's law of inertia (Parlett 1998, section 3.3): W - σB = L D Lᵀ has as many negative entries in D as
-    there are eigenvalues below σ. σ stands just above the k-th eigenvalue, farther than the rounding of the factor
-    can move the count.
+    By Sylvester's law of inertia (Parlett 1998, section 3.3), D in W - σB = L D Lᵀ has as many negative
+    entries as there are eigenvalues below σ. σ is placed just above the k-th eigenvalue, farther away
+    than the rounding of the factor can change the count.
 
     Parameters
     ----------
@@ -48,16 +50,36 @@ def certify(
     Raises
     ------
     InvalidParameterError
-        If the arrays do not fit the operator, are not finite or not ascending.
+        If the arrays do not fit the operator, or are not finite or not ascending.
     ConvergenceError
-        If the columns are not B-orthonormal eigenvectors, or more or fewer eigenvalues lie there.
+        If the columns are not B-orthonormal eigenvectors, or the number of eigenvalues differs.
+
+    See Also
+    --------
+    solve_spectrum : Compute eigenpairs with their certificate.
+
+    Examples
+    --------
+    Certify the result of another solver:
+
+    >>> import eigenshape as es
+    >>> from scipy.linalg import eigh
+    >>> laplacian = es.cotangent_laplacian(es.icosphere(1))
+    >>> values, vectors = eigh(laplacian.stiffness.toarray(), laplacian.mass.toarray())
+    >>> es.spectral.certify(laplacian, values[:4], vectors[:, :4]).complete
+    True
     """
     require_type(laplacian, Laplacian, "laplacian")
-    values, vectors = _checked(laplacian, as_array(eigenvalues, "eigenvalues"), as_array(eigenvectors, "eigenvectors"))
+    values, vectors = _checked(
+        laplacian, as_array(eigenvalues, "eigenvalues"), as_array(eigenvectors, "eigenvectors")
+    )
     values = to_pencil(laplacian.kernel, values)
     with one_blas_thread():
         pencil = normalise(laplacian)
-        values, vectors = np.ldexp(values, -pencil.value_exponent), np.ldexp(vectors, -pencil.vector_exponent)
+        values, vectors = (
+            np.ldexp(values, -pencil.value_exponent),
+            np.ldexp(vectors, -pencil.vector_exponent),
+        )
         certificate = prove(pencil, Pairs(values, vectors, residual_norms(pencil, values, vectors)))
     last = float(np.ldexp(values[-1], pencil.value_exponent))
     certificate = reported(laplacian.kernel, in_user_units(pencil, certificate), last)
@@ -115,12 +137,16 @@ def in_user_units(pencil: Pencil, certificate: Certificate) -> Certificate:
     return replace(certificate, shift=shift, floor=floor, gap=(low, high), resolution=resolution)
 
 
-def part(pencil: Pencil, pairs: Pairs, certificate: Certificate, start: int, stop: int) -> tuple[Pairs, Certificate]:
+def part(
+    pencil: Pencil, pairs: Pairs, certificate: Certificate, start: int, stop: int
+) -> tuple[Pairs, Certificate]:
     """Return the pairs from one number to another; what proves them all proves these."""
     resolution = RESOLUTION * _scale(pencil, pairs)
     rest = pairs.values[stop:] - pairs.values[stop - 1]
     equal = int(np.count_nonzero(rest <= resolution))
-    fewer = Pairs(pairs.values[start:stop], pairs.vectors[:, start:stop], pairs.residuals[start:stop])
+    fewer = Pairs(
+        pairs.values[start:stop], pairs.vectors[:, start:stop], pairs.residuals[start:stop]
+    )
     return fewer, replace(
         certificate,
         first=certificate.first + start,
@@ -145,7 +171,11 @@ def _below_cluster(pencil: Pencil, pairs: Pairs, above: Certificate, beside: Fac
             f"Neighbouring eigenvalues must differ by more than rounding takes; the last {len(pairs.values) - first} "
             f"of {len(pairs.values)} do not. Repair nearly degenerate elements."
         )
-    return replace(_counted(above, pairs, factor), resolution=resolution, n_split=beside.count - len(pairs.values))
+    return replace(
+        _counted(above, pairs, factor),
+        resolution=resolution,
+        n_split=beside.count - len(pairs.values),
+    )
 
 
 def _counted(certificate: Certificate, pairs: Pairs, factor: Factor) -> Certificate:

@@ -12,7 +12,9 @@ from eigenshape.spectral.solver.pencil import Pencil, part_pencil, residual_norm
 
 AT_ONCE = 2**22  # numbers in the blocks that are solved together
 FOUR = 4  # residuals: what is nearer to 0 is 0, as in `positive_eigenvalues`
-EQUAL = 1e-12  # relative: eigenvalues of congruent parts differ so much where coordinates are rounded
+EQUAL = (
+    1e-12  # relative: eigenvalues of congruent parts differ so much where coordinates are rounded
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +44,8 @@ class Parts:
     def ordered(self) -> tuple[sp.csc_array, sp.csc_array]:
         """W and B with their points in order: each part is a block on the diagonal."""
         stiffness, mass = (
-            sp.csc_array(matrix[self.order][:, self.order]) for matrix in (self.pencil.stiffness, self.pencil.mass)
+            sp.csc_array(matrix[self.order][:, self.order])
+            for matrix in (self.pencil.stiffness, self.pencil.mass)
         )
         return stiffness, mass
 
@@ -86,7 +89,9 @@ def solve_small(parts: Parts, largest: int, k: int) -> list[Pairs]:
             ceiling = known.max() if len(known) == k else np.inf
             n_kept = np.count_nonzero(values - widths(values, residuals) <= ceiling, axis=1)
             for i, n in enumerate(n_kept.tolist()):
-                found.append(Pairs(values[i, :n].copy(), vectors[i, :, :n].copy(), residuals[i, :n].copy()))
+                found.append(
+                    Pairs(values[i, :n].copy(), vectors[i, :, :n].copy(), residuals[i, :n].copy())
+                )
     return found
 
 
@@ -118,7 +123,9 @@ def _blocks(matrix: sp.csc_array, size: int) -> Float[np.ndarray, "c s s"]:
     return blocks
 
 
-def widths(values: Float[np.ndarray, "*k"], residuals: Float[np.ndarray, "*k"]) -> Float[np.ndarray, "*k"]:
+def widths(
+    values: Float[np.ndarray, "*k"], residuals: Float[np.ndarray, "*k"]
+) -> Float[np.ndarray, "*k"]:
     """Return how far from each value another may lie that is equal to it but for rounding."""
     return FOUR * residuals + EQUAL * np.abs(values)
 
@@ -146,5 +153,7 @@ def merge_pairs(parts: Parts, found: list[Pairs], k: int) -> Pairs:
     vectors = np.zeros((parts.pencil.n, k))
     for number in np.unique(part[lowest]).tolist():
         places = np.flatnonzero(part[lowest] == number)
-        vectors[np.ix_(parts.points(number), places)] = found[number].vectors[:, column[lowest[places]]]
+        vectors[np.ix_(parts.points(number), places)] = found[number].vectors[
+            :, column[lowest[places]]
+        ]
     return Pairs(merged, vectors, residual_norms(parts.pencil, merged, vectors))

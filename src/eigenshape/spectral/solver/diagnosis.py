@@ -66,6 +66,8 @@ def _counted_below(pencil: Pencil, shift: float) -> Factor | None:
     """
     constant = np.full((pencil.n, 1), pencil.mass_diagonal.sum() ** -0.5)
     with suppress(ConvergenceError):
-        found = count_beside(pencil, Pairs(np.zeros(1), constant, np.zeros(1)), 0, shift, most=False)
+        found = count_beside(
+            pencil, Pairs(np.zeros(1), constant, np.zeros(1)), 0, shift, most=False
+        )
         return found if found.count else None
     return None

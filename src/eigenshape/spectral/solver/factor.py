@@ -37,7 +37,10 @@ class Factor:
 
 
 def factorise(
-    pencil: Pencil, shift: float, slack: Float[np.ndarray, " n"] | None = None, spent: Factor | None = None
+    pencil: Pencil,
+    shift: float,
+    slack: Float[np.ndarray, " n"] | None = None,
+    spent: Factor | None = None,
 ) -> Factor | None:
     """Factor W - σB - S, S = diag(slack), pivots on the diagonal; None where one is zero or not finite.
 

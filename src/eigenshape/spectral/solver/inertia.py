@@ -15,7 +15,13 @@ TRIALS = 12
 
 
 def count_beside(
-    pencil: Pencil, pairs: Pairs, index: int, step: float, beside: Factor | None = None, *, most: bool = True
+    pencil: Pencil,
+    pairs: Pairs,
+    index: int,
+    step: float,
+    beside: Factor | None = None,
+    *,
+    most: bool = True,
 ) -> Factor:
     """Count at `step` from a value, or farther off where rounding would move a value found across σ.
 
@@ -28,7 +34,11 @@ def count_beside(
     ConvergenceError
         If rounding takes more than the distance to the next value found, however far off.
     """
-    value, shape, side = float(pairs.values[index]), pairs.vectors[:, index] ** 2, 1.0 if most else -1.0
+    value, shape, side = (
+        float(pairs.values[index]),
+        pairs.vectors[:, index] ** 2,
+        1.0 if most else -1.0,
+    )
     found_error = spread(pairs)
 
     def taken(slack: Float[np.ndarray, " n"]) -> float:

@@ -14,7 +14,14 @@ from eigenshape.spectral.solver.lanczos import Wanted, block_lanczos
 from eigenshape.spectral.solver.pairs import Pairs, lowest, polished, spread
 from eigenshape.spectral.solver.pencil import Pencil
 from eigenshape.spectral.solver.shift import factorise_near
-from eigenshape.spectral.solver.slices import CLEAR_GAP, OVERLAP, Report, factor_beyond, next_slice, walk_on
+from eigenshape.spectral.solver.slices import (
+    CLEAR_GAP,
+    OVERLAP,
+    Report,
+    factor_beyond,
+    next_slice,
+    walk_on,
+)
 
 RUNS = 20
 FARTHER = 4  # times as many pairs past the ends, where there was no gap among them
@@ -59,12 +66,18 @@ def solve_interval(pencil: Pencil, interval: Interval, report: Report) -> tuple[
         if found:
             return found
         if first == 0 and last == pencil.n:
-            raise ConvergenceError("An interval must end between eigenvalues that can be told apart; there are none.")
+            raise ConvergenceError(
+                "An interval must end between eigenvalues that can be told apart; there are none."
+            )
         extra *= FARTHER
 
 
 def _completed(
-    pencil: Pencil, factor: Factor, vectors: Float[np.ndarray, "n j"], interval: Interval, report: Report
+    pencil: Pencil,
+    factor: Factor,
+    vectors: Float[np.ndarray, "n j"],
+    interval: Interval,
+    report: Report,
 ) -> tuple[Pairs, Certificate] | None:
     """Search for what the counts find missing; None where no gap is clear on one of the sides."""
     for _ in range(RUNS):
@@ -79,7 +92,9 @@ def _completed(
             return inner, certificate
         if missing < 0:
             break
-        wanted = Wanted(below=missing, above=missing, floor=certificate.floor, ceiling=certificate.shift)
+        wanted = Wanted(
+            below=missing, above=missing, floor=certificate.floor, ceiling=certificate.shift
+        )
         _, more = block_lanczos(pencil, factor, wanted, locked=pairs.vectors, report=report)
         if not more.shape[1]:
             break
@@ -90,10 +105,15 @@ def _completed(
     )
 
 
-def _clear_gaps(values: Float[np.ndarray, " k"], interval: Interval) -> tuple[tuple[int, float], ...] | None:
+def _clear_gaps(
+    values: Float[np.ndarray, " k"], interval: Interval
+) -> tuple[tuple[int, float], ...] | None:
     """Return where to count on either side: a pair, and the step from it into the widest gap outside the interval."""
     starts, ends = values[:-1], values[1:]
-    before, after = np.minimum(ends, interval.low) - starts, ends - np.maximum(starts, interval.high)
+    before, after = (
+        np.minimum(ends, interval.low) - starts,
+        ends - np.maximum(starts, interval.high),
+    )
     if len(values) < 2:
         return None
     lower, upper = int(before.argmax()), int(after.argmax())

@@ -14,17 +14,27 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.operators.laplacian import GaussianKernel
 from eigenshape.spectral.certificate import Certificate
 
-LAST_CORRECTED = 0.945  # t μ at t λ = 2.9: of a surface with n = 5 k t/e² points the k-th eigenvalue
+LAST_CORRECTED = (
+    0.945  # t μ at t λ = 2.9: of a surface with n = 5 k t/e² points the k-th eigenvalue
+)
 ESSENTIAL = 0.5  # t μ from which the literal form's eigenvalues say nothing of λ; n = 21 k t/e²
 BIASED = 0.181  # t μ at t λ = .2, ten per cent low; n = 72 k t/e²
 
 
-def to_pencil(kernel: GaussianKernel | None, values: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+def to_pencil(
+    kernel: GaussianKernel | None, values: Float[np.ndarray, " k"]
+) -> Float[np.ndarray, " k"]:
     """Return the eigenvalues μ of the pencil for reported ones."""
-    return -np.expm1(-kernel.t * values) / kernel.t if kernel is not None and kernel.corrected else values
+    return (
+        -np.expm1(-kernel.t * values) / kernel.t
+        if kernel is not None and kernel.corrected
+        else values
+    )
 
 
-def require_readable(kernel: GaussianKernel | None, values: Float[np.ndarray, " k"], *, stacklevel: int = 3) -> None:
+def require_readable(
+    kernel: GaussianKernel | None, values: Float[np.ndarray, " k"], *, stacklevel: int = 3
+) -> None:
     """Refuse corrected eigenvalues at 1/t or beyond, and warn of those that are hard to tell or far too low.
 
     Raises
@@ -62,13 +72,21 @@ def _named(kernel: GaussianKernel) -> str:
     return "1/t" if kernel.volume == 1 else "1/(t × volume)"
 
 
-def from_pencil(kernel: GaussianKernel | None, values: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+def from_pencil(
+    kernel: GaussianKernel | None, values: Float[np.ndarray, " k"]
+) -> Float[np.ndarray, " k"]:
     """Return what is reported for eigenvalues μ of the pencil: λ where the kernel is corrected, μ itself elsewhere."""
-    return -np.log1p(-kernel.t * values) / kernel.t if kernel is not None and kernel.corrected else values
+    return (
+        -np.log1p(-kernel.t * values) / kernel.t
+        if kernel is not None and kernel.corrected
+        else values
+    )
 
 
 def widened(
-    kernel: GaussianKernel | None, values: Float[np.ndarray, " k"], residuals: Float[np.ndarray, " k"]
+    kernel: GaussianKernel | None,
+    values: Float[np.ndarray, " k"],
+    residuals: Float[np.ndarray, " k"],
 ) -> Float[np.ndarray, " k"]:
     """Return the error intervals of reported eigenvalues from those of the pencil's."""
     if kernel is None or not kernel.corrected:

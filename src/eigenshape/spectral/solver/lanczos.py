@@ -15,11 +15,15 @@ from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.pencil import Pencil
 
 TOLERANCE = 5e-12  # of a residual, relative to the shift
-FLOOR = 32 * float(np.finfo(np.float64).eps)  # of a residual, relative to the largest θ: rounding goes no lower
+FLOOR = 32 * float(
+    np.finfo(np.float64).eps
+)  # of a residual, relative to the largest θ: rounding goes no lower
 SHRUNK = 1e-2  # a column that projection shortened this much is projected once more
 REPEATS = 5
 NEGLIGIBLE = 1e-13  # a column this short against what it was is rounding: the space is invariant
-ALIKE = 1e-4  # a pivot of a Gram matrix this small, in lengths: too many digits are lost in its square
+ALIKE = (
+    1e-4  # a pivot of a Gram matrix this small, in lengths: too many digits are lost in its square
+)
 UNLIKE = 0.1  # and this large: none are
 
 
@@ -49,7 +53,11 @@ class Operator:
 
     def weigh(self, block: Float[np.ndarray, "g n b"]) -> Float[np.ndarray, "g n b"]:
         """Return what the plain product with columns is the inner product with."""
-        return block if self.roots is not None else np.stack([self.pencil.weigh(slot) for slot in block])
+        return (
+            block
+            if self.roots is not None
+            else np.stack([self.pencil.weigh(slot) for slot in block])
+        )
 
     def enter(self, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
         """Return u for φ."""
@@ -124,10 +132,14 @@ def block_lanczos(
     inner = operator(pencil, factor)
     rng, first, block = np.random.default_rng(0), -(-locked.shape[1] // LANES), groups * LANES
     capacity = _capacity(pencil, wanted, locked.shape[1], block)
-    space = np.empty((first + capacity // LANES + groups, pencil.n, LANES))  # pages are touched only as it grows
+    space = np.empty(
+        (first + capacity // LANES + groups, pencil.n, LANES)
+    )  # pages are touched only as it grows
     space[:first] = packed(inner.enter(locked))
     projected = np.zeros((capacity, capacity))
-    _orthonormalise(inner, space[: first + groups], rng.standard_normal((groups, pencil.n, LANES)), rng)
+    _orthonormalise(
+        inner, space[: first + groups], rng.standard_normal((groups, pencil.n, LANES)), rng
+    )
     missing = wanted.below + wanted.above
     check = min(min(missing, capacity // 4) + 2 * block, capacity)
     for size in range(block, capacity + 1, block):
@@ -189,7 +201,11 @@ def _project(inner: Operator, space: Slots, columns: Block) -> Float[np.ndarray,
 
 
 def _gram_schmidt(
-    inner: Operator, columns: Block, fresh: Block, lengths: Float[np.ndarray, " b"], rng: np.random.Generator
+    inner: Operator,
+    columns: Block,
+    fresh: Block,
+    lengths: Float[np.ndarray, " b"],
+    rng: np.random.Generator,
 ) -> tuple[Float[np.ndarray, "b b"], bool]:
     """Orthonormalise a block into `fresh`; return the triangle, and whether a column became short against what it was.
 
@@ -229,7 +245,11 @@ def _cholesky(gram: Float[np.ndarray, "b b"]) -> Float[np.ndarray, "b b"] | None
 
 
 def _one_by_one(
-    inner: Operator, block: Block, fresh: Block, lengths: Float[np.ndarray, " b"], rng: np.random.Generator
+    inner: Operator,
+    block: Block,
+    fresh: Block,
+    lengths: Float[np.ndarray, " b"],
+    rng: np.random.Generator,
 ) -> tuple[Float[np.ndarray, "b b"], bool]:
     """Orthonormalise a block; a negligible column is replaced by a random one that the triangle R leaves out."""
     columns, width = np.concatenate(list(block), axis=1), len(lengths)
@@ -279,7 +299,9 @@ def _choose(ritz: Ritz, wanted: Wanted) -> tuple[Int[np.ndarray, " j"], int]:
     On either side only those count that no unconverged one is nearer than: nothing seen lies between.
     """
     above, below = np.flatnonzero(ritz.thetas > 0)[::-1], np.flatnonzero(ritz.thetas < 0)
-    n_above, n_below = (int(np.argmin(np.append(ritz.converged[side], False))) for side in (above, below))
+    n_above, n_below = (
+        int(np.argmin(np.append(ritz.converged[side], False))) for side in (above, below)
+    )
     past_ceiling = n_above > 0 and ritz.values[above[n_above - 1]] > wanted.ceiling
     past_floor = n_below > 0 and ritz.values[below[n_below - 1]] < wanted.floor
     late_above = 0 if past_ceiling else max(wanted.above - n_above, 0)

@@ -63,5 +63,7 @@ def _orthonormal(pencil: Pencil, vectors: Float[np.ndarray, "n j"]) -> Float[np.
     if off < LOOSE:
         return vectors
     if off > SKEW:
-        raise ConvergenceError(f"Vectors of different runs must be B-orthogonal; two are off by {off:.1e}.")
+        raise ConvergenceError(
+            f"Vectors of different runs must be B-orthogonal; two are off by {off:.1e}."
+        )
     return vectors @ (1.5 * identity - 0.5 * gram)

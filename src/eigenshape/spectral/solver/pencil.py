@@ -128,7 +128,10 @@ def as_pencil(stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
 
 
 def _normalised(
-    stiffness: sp.sparray, mass: sp.sparray, exponents: tuple[int, int], kernel: GaussianKernel | None
+    stiffness: sp.sparray,
+    mass: sp.sparray,
+    exponents: tuple[int, int],
+    kernel: GaussianKernel | None,
 ) -> Pencil:
     """Scale a pencil whose eigenvalues and vectors are powers of two times those in the user's units."""
     up_w, up_b = _exponent(stiffness), _exponent(mass)
@@ -138,7 +141,10 @@ def _normalised(
 
 
 def _pencil(
-    stiffness: sp.csc_array, mass: sp.csc_array, exponents: tuple[int, int], kernel: GaussianKernel | None
+    stiffness: sp.csc_array,
+    mass: sp.csc_array,
+    exponents: tuple[int, int],
+    kernel: GaussianKernel | None,
 ) -> Pencil:
     diagonal = mass.diagonal()
     mass_floor = _mass_floor(mass, diagonal)
@@ -169,7 +175,9 @@ def _require_range(name: str, diagonal: Float[np.ndarray, " n"]) -> None:
         )
 
 
-def _level(stiffness: Float[np.ndarray, " n"], mass: Float[np.ndarray, " n"], labels: Int[np.ndarray, " n"]) -> float:
+def _level(
+    stiffness: Float[np.ndarray, " n"], mass: Float[np.ndarray, " n"], labels: Int[np.ndarray, " n"]
+) -> float:
     mean = float(stiffness.sum() / mass.sum())
     if labels.any() and mean > 0:
         mean = _harmonic_mean(stiffness, mass, labels)
@@ -239,7 +247,9 @@ def _mass_floor(mass: sp.csc_array, diagonal: Float[np.ndarray, " n"]) -> float:
         if lower and (lower.pivots > 0).all():
             return floor
     place = int(np.argmax(lower.pivots <= 0)) if lower else 0
-    where = f", {lower.pivots[place]:.3g} at point {shifted.elimination.order[place]}" if lower else ""
+    where = (
+        f", {lower.pivots[place]:.3g} at point {shifted.elimination.order[place]}" if lower else ""
+    )
     raise InvalidParameterError(
         f"mass must be positive definite; B - {floor:.1e} diag(B) has a pivot that is not positive{where}."
     )

@@ -8,7 +8,12 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.solver.certify import in_user_units
-from eigenshape.spectral.solver.kernel_values import from_pencil, reported, require_readable, widened
+from eigenshape.spectral.solver.kernel_values import (
+    from_pencil,
+    reported,
+    require_readable,
+    widened,
+)
 from eigenshape.spectral.solver.pairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil, finished
 from eigenshape.spectral.spectrum import Spectrum
@@ -16,7 +21,9 @@ from eigenshape.spectral.spectrum import Spectrum
 ROUNDING = 1e-9  # of the mean eigenvalue
 
 
-def spectrum_of(laplacian: Laplacian, pencil: Pencil, pairs: Pairs, certificate: Certificate) -> Spectrum:
+def spectrum_of(
+    laplacian: Laplacian, pencil: Pencil, pairs: Pairs, certificate: Certificate
+) -> Spectrum:
     """Return pairs of the pencil as what the user is told: in the user's units, corrected where the kernel is.
 
     Raises
@@ -24,14 +31,19 @@ def spectrum_of(laplacian: Laplacian, pencil: Pencil, pairs: Pairs, certificate:
     InvalidParameterError
         If an eigenvalue is below zero by more than its error, or stands for none of a corrected kernel's shape.
     """
-    values, residuals = pencil.values_out(_without_negatives(pencil, pairs)), pencil.values_out(pairs.residuals)
+    values, residuals = (
+        pencil.values_out(_without_negatives(pencil, pairs)),
+        pencil.values_out(pairs.residuals),
+    )
     require_readable(laplacian.kernel, values, stacklevel=4)
     return Spectrum(
         eigenvalues=frozen(from_pencil(laplacian.kernel, values)),
         eigenvectors=finished(pencil, pairs.vectors),
         mass=laplacian.mass,
         residuals=frozen(widened(laplacian.kernel, values, residuals)),
-        certificate=reported(laplacian.kernel, in_user_units(pencil, certificate), float(values[-1])),
+        certificate=reported(
+            laplacian.kernel, in_user_units(pencil, certificate), float(values[-1])
+        ),
     )
 
 

@@ -46,7 +46,9 @@ def expected_values(pencil: Pencil, numbers: Float[np.ndarray, " j"]) -> Float[n
     shares = UNIFORM_MESH * numbers / pencil.n
     if pencil.kernel is None:
         return pencil.level * shares
-    return -pencil.level * np.expm1(-shares * pencil.kernel.edge_factor**2)  # (1 - e^{-tλ})/t, where level is 1/t
+    return -pencil.level * np.expm1(
+        -shares * pencil.kernel.edge_factor**2
+    )  # (1 - e^{-tλ})/t, where level is 1/t
 
 
 def factor_below(pencil: Pencil, shift: float) -> Factor:
@@ -81,7 +83,11 @@ def _serves(pencil: Pencil, factor: Factor) -> bool:
     start = pencil.weigh(np.random.default_rng(0).standard_normal((pencil.n, 1)))
     once = factor.solve(start)
     rest = pencil.stiffness @ once - factor.shift * pencil.weigh(once) - start
-    terms = abs(pencil.stiffness) @ np.abs(once) + abs(factor.shift) * pencil.weigh(np.abs(once)) + np.abs(start)
+    terms = (
+        abs(pencil.stiffness) @ np.abs(once)
+        + abs(factor.shift) * pencil.weigh(np.abs(once))
+        + np.abs(start)
+    )
     # Two steps of inverse iteration: an eigenvalue very close to σ would outshine all others in any vector.
     twice = factor.solve(pencil.weigh(once))
     clear = CLEAR * abs(factor.shift) * np.linalg.norm(twice) < np.linalg.norm(once)

@@ -54,7 +54,9 @@ def walk_on(
         share = (known - begin) / (k - begin), target / (k - begin)
         wanted = Wanted(below=factor.count - known, above=above, floor=floor)
         none = np.empty((pencil.n, 0))
-        values, vectors = block_lanczos(pencil, factor, wanted, locked=none, report=_within(report, *share))
+        values, vectors = block_lanczos(
+            pencil, factor, wanted, locked=none, report=_within(report, *share)
+        )
         if last:
             return np.hstack([*parts, vectors]), factor
         kept, floor = _cut(values, factor.shift)
@@ -81,7 +83,9 @@ def _cut(values: Float[np.ndarray, " j"], shift: float) -> tuple[int, float]:
     gaps = np.diff(above[-(OVERLAP + 1) :])
     widest = int(gaps.argmax()) if gaps.size else 0
     if not gaps.size or gaps[widest] < CLEAR_GAP * above[-1]:
-        raise ConvergenceError("A slice must end in a clear gap; there is none among the last eigenvalues seen.")
+        raise ConvergenceError(
+            "A slice must end in a clear gap; there is none among the last eigenvalues seen."
+        )
     kept = len(above) - len(gaps) + widest
     return kept, float(above[kept - 1] + above[kept]) / 2
 

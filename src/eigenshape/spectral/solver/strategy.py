@@ -101,14 +101,20 @@ def _in_parts(parts: Parts, k: int, report: Progress) -> tuple[Pairs, Certificat
     progress = report
     while wanted:
         for number, count in wanted.items():
-            found[number] = _solve_part(parts, large[number], count, _share(progress, parts, number))
+            found[number] = _solve_part(
+                parts, large[number], count, _share(progress, parts, number)
+            )
         wanted = _missing_counts(parts, large, found, k)
         progress = silent  # it has come to the end once
     report(0.9, "counting eigenvalues")
-    return _complete(parts.pencil, merge_pairs(parts, [found[number] for number in range(len(found))], k))
+    return _complete(
+        parts.pencil, merge_pairs(parts, [found[number] for number in range(len(found))], k)
+    )
 
 
-def _expected_counts(parts: Parts, large: dict[int, Pencil], found: dict[int, Pairs], k: int) -> dict[int, int]:
+def _expected_counts(
+    parts: Parts, large: dict[int, Pencil], found: dict[int, Pairs], k: int
+) -> dict[int, int]:
     """Return how many of the k lowest pairs are expected of each large part, and some more."""
     expected = {}
     for number, pencil in large.items():
@@ -117,10 +123,15 @@ def _expected_counts(parts: Parts, large: dict[int, Pencil], found: dict[int, Pa
     known = np.concatenate([*expected.values(), *(pairs.values for pairs in found.values())])
     last = np.partition(known, k - 1)[k - 1]
     counts = {number: int(np.count_nonzero(values <= last)) for number, values in expected.items()}
-    return {number: min(int(MARGIN * count) + MORE, k, large[number].n) for number, count in counts.items()}
+    return {
+        number: min(int(MARGIN * count) + MORE, k, large[number].n)
+        for number, count in counts.items()
+    }
 
 
-def _missing_counts(parts: Parts, large: dict[int, Pencil], found: dict[int, Pairs], k: int) -> dict[int, int]:
+def _missing_counts(
+    parts: Parts, large: dict[int, Pencil], found: dict[int, Pairs], k: int
+) -> dict[int, int]:
     """Return how many pairs each part has below the k-th of all where those found of it end before."""
     known = np.concatenate([pairs.values for pairs in found.values()])
     residuals = np.concatenate([pairs.residuals for pairs in found.values()])
@@ -138,7 +149,9 @@ def _share(report: Progress, parts: Parts, number: int) -> Progress:
     """Return what reports the solving of one part as a share of all points."""
     begin, end = (parts.starts[number : number + 2] / parts.pencil.n).tolist()
     label = f"part {number + 1} of {len(parts.sizes)}"
-    return lambda done, message: report(0.05 + 0.85 * (begin + done * (end - begin)), f"{label}: {message}")
+    return lambda done, message: report(
+        0.05 + 0.85 * (begin + done * (end - begin)), f"{label}: {message}"
+    )
 
 
 def _solve_part(parts: Parts, pencil: Pencil, k: int, report: Progress) -> Pairs:
@@ -169,7 +182,9 @@ def _sparse(pencil: Pencil, k: int, report: Progress, *, start: Start) -> tuple[
         if missing == 0 or run == RUNS:
             break
         groups, more = min(1 + -(-missing // LANES), WIDEST), _in_run(report, run)
-        _, found = block_lanczos(pencil, factor, wanted, locked=pairs.vectors, groups=groups, report=more)
+        _, found = block_lanczos(
+            pencil, factor, wanted, locked=pairs.vectors, groups=groups, report=more
+        )
         if not found.shape[1]:
             break
         vectors = np.hstack([pairs.vectors, found])
@@ -189,22 +204,36 @@ def require_memory_for_pairs(pencil: Pencil, k: int, factors: int | None = None)
     """
     if factors is None:
         factors = 24 * pencil.shifted.elimination.n_entries  # two at once, and their making
-    bases = 8 * pencil.n * (3 * k + FEWEST_VECTORS + 2 * min(k, WHOLE))  # a space of twice the pairs, results, a copy
-    advice = "Ask for fewer pairs, or for approximate_spectrum, which needs no factor"
-    require_memory(f"{k} pairs of {pencil.n} points", {"bases": bases, "factors of their operator": factors}, advice)
+    bases = (
+        8 * pencil.n * (3 * k + FEWEST_VECTORS + 2 * min(k, WHOLE))
+    )  # a space of twice the pairs, results, a copy
+    advice = (
+        "Request fewer pairs, or pass method='approximate' to solve_spectrum, which needs no factor"
+    )
+    require_memory(
+        f"{k} pairs of {pencil.n} points",
+        {"bases": bases, "factors of their operator": factors},
+        advice,
+    )
 
 
-def _at_once(pencil: Pencil, k: int, report: Callable[[float], None]) -> tuple[Float[np.ndarray, "n j"], Factor]:
+def _at_once(
+    pencil: Pencil, k: int, report: Callable[[float], None]
+) -> tuple[Float[np.ndarray, "n j"], Factor]:
     factor = shift_inside(pencil, k)
     wanted = Wanted(below=factor.count, above=k - factor.count)
-    return block_lanczos(pencil, factor, wanted, locked=np.empty((pencil.n, 0)), report=report)[1], factor
+    return block_lanczos(pencil, factor, wanted, locked=np.empty((pencil.n, 0)), report=report)[
+        1
+    ], factor
 
 
 def _in_run(report: Progress, run: int) -> Callable[[float], None]:
     return lambda done: report(0.05 + 0.8 * done, f"run {run + 1} of block Lanczos")
 
 
-def _still_wanted(pencil: Pencil, factor: Factor, pairs: Pairs, k: int) -> tuple[Certificate | None, Wanted]:
+def _still_wanted(
+    pencil: Pencil, factor: Factor, pairs: Pairs, k: int
+) -> tuple[Certificate | None, Wanted]:
     """Return the proof as far as it goes, and what a further run has to find."""
     certificate = prove(pencil, pairs) if len(pairs.values) == k else None
     missing = certificate.n_missing if certificate else k - len(pairs.values)

@@ -1,0 +1,141 @@
+"""How the docs site is built: python -m sphinx -W docs docs/_build."""
+
+import inspect
+import re
+from pathlib import Path
+
+import eigenshape as es
+
+HERE = Path(__file__).parent
+
+project = "eigenshape"
+author = "The eigenshape founders"
+version = release = es.__version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.napoleon",
+]
+source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+exclude_patterns = ["_build", "README.md"]
+templates_path = ["_templates"]
+
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 4
+
+autosummary_generate = True
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"  # docstrings give types and shapes
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+napoleon_use_ivar = True
+default_role = "code"  # `name` in docstrings is code, as in numpydoc
+
+html_theme = "pydata_sphinx_theme"
+html_title = "eigenshape"
+html_static_path = ["_static"]
+html_css_files = ["eigenshape.css"]
+html_theme_options = {
+    "show_prev_next": False,
+    "navigation_with_keys": False,
+    "header_links_before_dropdown": 7,
+    "secondary_sidebar_items": ["page-toc"],
+}
+
+
+def write_api_pages() -> None:
+    """Write a page for each public room, with all its names, from the `__all__` of the room."""
+    folder = HERE / "api"
+    pages = []
+    rooms = [
+        (name, getattr(es, name)) for name in es.__all__ if inspect.ismodule(getattr(es, name))
+    ]
+    for name, room in [("eigenshape", es), *rooms, ("retrieval.baselines", es.retrieval.baselines)]:
+        title = "The short door" if room is es else f"eigenshape.{name}"
+        summary = (inspect.getdoc(room) or "").split("\n\n")
+        things = {each: getattr(room, each) for each in room.__all__ if not each.startswith("__")}
+        kinds = {
+            "Functions": [
+                each for each, thing in things.items() if inspect.isroutine(inspect.unwrap(thing))
+            ],
+            "Classes": [each for each, thing in things.items() if inspect.isclass(thing)],
+        }
+        kinds["Values"] = [
+            each
+            for each, thing in things.items()
+            if not inspect.ismodule(thing) and each not in kinds["Functions"] + kinds["Classes"]
+        ]
+        lines = [
+            title,
+            "=" * len(title),
+            "",
+            *summary,
+            "",
+            f".. currentmodule:: {room.__name__}",
+            "",
+        ]
+        for kind, names in kinds.items():
+            if names and kind == "Values":
+                lines += [kind, "-" * len(kind), "", *[f"- ``{each}``" for each in names], ""]
+            elif names:
+                lines += [kind, "-" * len(kind), "", ".. autosummary::"]
+                lines += [] if room is es else ["   :toctree: generated"]
+                lines += ["", *[f"   {each}" for each in names], ""]
+        write_if_changed(folder / f"{name}.rst", "\n".join(lines))
+        pages.append(name)
+    listed = "\n".join(pages)
+    write_if_changed(
+        folder / "index.md",
+        "# API\n\nNames of the short door are there as `es.name`; all others stand in their room, as "
+        f"`es.geometry.weld`.\n\n```{{toctree}}\n:maxdepth: 1\n\n{listed}\n```\n",
+    )
+
+
+def write_if_changed(path: Path, text: str) -> None:
+    """Write a page, unless it is there: an unchanged page is not built again."""
+    path.parent.mkdir(exist_ok=True)
+    if not path.exists() or path.read_text() != text:
+        path.write_text(text)
+
+
+def write_experiment_pages() -> None:
+    """Write a page for each experiment, which includes its README."""
+    include = "```{{include}} {}\n:relative-images:\n:relative-docs: ../\n```\n"
+    readmes = sorted(HERE.parent.glob("experiments/*/README.md"))
+    for readme in readmes:
+        source = f"../../experiments/{readme.parent.name}/README.md"
+        write_if_changed(HERE / "experiments" / f"{readme.parent.name}.md", include.format(source))
+    listed = "\n".join(readme.parent.name for readme in readmes)
+    index = include.format("../../experiments/README.md")
+    index += f"\n```{{toctree}}\n:maxdepth: 1\n:hidden:\n\n{listed}\n```\n"
+    write_if_changed(HERE / "experiments" / "index.md", index)
+
+
+def link_experiment_pages(_app: object, _name: str, text: list[str]) -> None:
+    """Lead links to the READMEs of experiments, which lie outside the docs, to their pages."""
+    text[0] = re.sub(r"\]\(\.\./experiments/(\w+)/README\.md", r"](experiments/\1.md", text[0])
+    text[0] = text[0].replace("](../experiments/README.md", "](experiments/index.md")
+
+
+def escape_bars(
+    _app: object, _what: str, _name: str, _thing: object, _options: object, lines: list[str]
+) -> None:
+    """Escape the bars of |x|, which would begin a substitution, outside of code."""
+    for number, line in enumerate(lines):
+        if not line.lstrip().startswith((">>>", "...")):
+            lines[number] = re.sub(
+                r"`[^`]*`|\|", lambda found: "\\|" if found[0] == "|" else found[0], line
+            )
+
+
+def setup(app: object) -> None:
+    """Connect what is done to sources and docstrings."""
+    app.connect("source-read", link_experiment_pages)  # type: ignore[attr-defined]
+    app.connect("autodoc-process-docstring", escape_bars)  # type: ignore[attr-defined]
+
+
+write_api_pages()
+write_experiment_pages()

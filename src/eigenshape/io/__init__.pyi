@@ -1,0 +1,12 @@
+from .bridges import from_pyvista as from_pyvista
+from .bridges import from_trimesh as from_trimesh
+from .bridges import to_arrays as to_arrays
+from .bridges import to_pyvista as to_pyvista
+from .bridges import to_trimesh as to_trimesh
+from .edits import read_edits as read_edits
+from .edits import write_edits as write_edits
+from .mesh_files import read_mesh as read_mesh
+from .mesh_files import write_mesh as write_mesh
+from .shape_files import read_points as read_points
+from .shape_files import read_shape as read_shape
+from .shape_files import write_points as write_points

@@ -1,0 +1,17 @@
+from .camera import Camera as Camera
+from .camera import three_quarter_view as three_quarter_view
+from .fields import figure_eigenfunctions as figure_eigenfunctions
+from .fields import figure_field as figure_field
+from .fields import figure_segments as figure_segments
+from .fields import part_colors as part_colors
+from .fields import value_colors as value_colors
+from .persistence import figure_diagram as figure_diagram
+from .persistence import figure_merge_tree as figure_merge_tree
+from .poses import figure_poses as figure_poses
+from .save import save_figure as save_figure
+from .sheet import Panel as Panel
+from .sheet import figure_contact_sheet as figure_contact_sheet
+from .sheet import figure_label_transfer as figure_label_transfer
+from .spectra import figure_spectra as figure_spectra
+from .spectra import figure_spectrum as figure_spectrum
+from .stability import figure_stability as figure_stability

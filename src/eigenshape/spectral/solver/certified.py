@@ -1,0 +1,93 @@
+"""The lowest eigenpairs of a pencil, or those of an interval, proved complete."""
+
+from contextlib import suppress
+
+import numpy as np
+from jaxtyping import Float
+
+from eigenshape._errors import ConvergenceError, InvalidParameterError
+from eigenshape._progress import Progress
+from eigenshape.spectral.certificate import Certificate
+from eigenshape.spectral.solver.certify import part
+from eigenshape.spectral.solver.diagnosis import require_solvable
+from eigenshape.spectral.solver.interval import count_interval, solve_interval
+from eigenshape.spectral.solver.pairs import Pairs
+from eigenshape.spectral.solver.pencil import Pencil
+from eigenshape.spectral.solver.shift import factor_below
+from eigenshape.spectral.solver.strategy import dense_serves, proved, require_memory_for_pairs
+
+MORE = 8  # pairs that are added where a guess was too low
+FEW = 50  # eigenvalues below an interval that are not worth a second count
+
+
+def certified_pairs(
+    pencil: Pencil, k: int, interval: Float[np.ndarray, " 2"], report: Progress
+) -> tuple[Pairs, Certificate]:
+    """Return the k lowest pairs, or where k is 0 those of an interval in the operator's units, and their proof.
+
+    Raises
+    ------
+    InvalidParameterError
+        If no eigenvalue lies in the interval, the memory is too small, or the operator cannot be solved.
+    ConvergenceError
+        If the proof cannot be completed.
+    """
+    try:
+        if k:
+            return proved(pencil, k, report)
+        low, high = np.ldexp(interval, -pencil.value_exponent).tolist()
+        return _proved_between(pencil, low, high, report)
+    except ConvergenceError as error:
+        require_solvable(pencil, error)
+        raise
+
+
+def _proved_between(
+    pencil: Pencil, low: float, high: float, report: Progress
+) -> tuple[Pairs, Certificate]:
+    report(0.01, "counting eigenvalues")
+    pairs, certificate = _far_up(pencil, low, high, report) or _lowest_below(pencil, high, report)
+    start, stop = np.searchsorted(pairs.values, [low, high]).tolist()
+    if start == stop:
+        raise InvalidParameterError(_nothing(pencil, pairs, certificate.first + start, low, high))
+    return part(pencil, pairs, certificate, start, stop)
+
+
+def _far_up(
+    pencil: Pencil, low: float, high: float, report: Progress
+) -> tuple[Pairs, Certificate] | None:
+    """Solve for an interval by itself where it is less work than all eigenvalues below its upper end."""
+    if low <= 0 or dense_serves(pencil, 1):
+        return None
+    interval = count_interval(pencil, low, high)
+    within = interval.below_high - interval.below_low
+    if interval.below_low < max(within, FEW) or dense_serves(pencil, interval.below_high):
+        return None
+    require_memory_for_pairs(pencil, within)
+    with suppress(ConvergenceError):
+        return solve_interval(
+            pencil, interval, lambda done: report(0.05 + 0.9 * done, "slices of the interval")
+        )
+    return None
+
+
+def _lowest_below(pencil: Pencil, limit: float, report: Progress) -> tuple[Pairs, Certificate]:
+    """Prove one pair more than lie below the limit: then none of them is missing."""
+    k = min(factor_below(pencil, limit).count + 1, pencil.n)
+    while True:
+        pairs, certificate = proved(pencil, k, report)
+        count = int(np.count_nonzero(pairs.values < limit))
+        if count < k or k == pencil.n:
+            return pairs, certificate
+        k = min(k + max(k // 10, MORE), pencil.n)
+
+
+def _nothing(pencil: Pencil, pairs: Pairs, number: int, low: float, high: float) -> str:
+    below, above = pencil.values_out(np.array([high, low])).tolist()
+    if number == 0:
+        lowest = pencil.values_out(pairs.values[:1])[0]
+        return f"below must exceed the lowest eigenvalue, {lowest:.6g}; it is {below:.6g}."
+    return (
+        f"above and below must have eigenvalues between them; {number} lie below {above:.6g} and none from there to "
+        f"{below:.6g}."
+    )
