@@ -48,27 +48,26 @@ CALLS = {
         ),
     },
     "describe": {
-        "eigenshape": (OURS, "es.describe_mesh(es.TriangleMesh(v, f))"),
+        "eigenshape": (OURS, "es.describe(es.TriangleMesh(v, f), es.retrieval.SCALE_FREE)"),
         "LaPy, ShapeDNA": (
             "import lapy.shapedna",
             "lapy.shapedna.compute_shapedna(lapy.TriaMesh(v, f), k=50)",
         ),
     },
-    "describe by patches": {
-        "eigenshape": (
-            OURS,
-            "es.describe_shape(es.TriangleMesh(v, f), es.PatchRecipe(es.made_codebook()))",
-        ),
-    },
+    "describe by patches": {"eigenshape": (OURS, "es.describe(es.TriangleMesh(v, f))")},
     "find_parts": {"eigenshape": (OURS, "es.find_parts(es.TriangleMesh(v, f))")},
     "mesh_laplacian": {
-        "eigenshape": (OURS, "es.solve_spectrum(es.mesh_laplacian(es.TriangleMesh(v, f)), 50)"),
+        "eigenshape": (
+            OURS,
+            "es.solve_spectrum(es.operators.mesh_laplacian(es.TriangleMesh(v, f)), 50)",
+        ),
     },
     "deform": {
         "eigenshape": (
             OURS,
-            "es.deform(es.rig_shape(es.TriangleMesh(v, f)), es.Brush(v[v[:, 1].argmax()], 0.5), "
-            "es.Rotation(v.mean(axis=0), (0, 0, 1), 0.4))",
+            "es.deform(es.rig_shape(es.TriangleMesh(v, f)), "
+            "es.deformation.BrushRegion(v[v[:, 1].argmax()], 0.5), "
+            "es.deformation.Rotation(v.mean(axis=0), (0, 0, 1), 0.4))",
         ),
     },
 }
