@@ -117,8 +117,18 @@ def gaussian_rows(
     """
     kind = np.int32 if max(len(weights), starts[-1]) < 2**31 else np.int64
     columns, values = np.empty(starts[-1], dtype=kind), np.empty(starts[-1])
-    fill = partial(pair_loops.fill, grid.points, grid.order, grid.cells, grid.runs, grid.reach**2)
-    _each_cell(grid, partial(fill, weights, 1 / (4 * t), starts, columns, values))
+    place = np.empty_like(grid.order)
+    place[grid.order] = np.arange(len(place))
+    most = int(np.diff(grid.runs, axis=2).sum(axis=(1, 2)).max())  # points that one cell may reach
+
+    def fill(first: int, last: int) -> None:
+        scratch = np.empty(most, dtype=np.int64), np.empty((most, grid.points.shape[1]))
+        known = grid.points, grid.order, grid.cells, grid.runs, grid.reach**2, place
+        pair_loops.fill(
+            *known, weights, 1 / (4 * t), starts, columns, values, *scratch, first, last
+        )
+
+    _each_cell(grid, fill)
     return columns, values
 
 

@@ -154,7 +154,10 @@ def _require_finite(name: str, matrix: sp.csr_array) -> None:
 
 
 def _require_symmetric(name: str, matrix: sp.csr_array) -> None:
-    worst, row, column = worst_asymmetry(matrix.indptr, matrix.indices, matrix.data)
+    # One type of indices where they fit, whatever SciPy chose: the loop is compiled once.
+    kind = np.int32 if max(matrix.shape[0], matrix.nnz) < 2**31 else np.int64
+    starts, columns = (each.astype(kind, copy=False) for each in (matrix.indptr, matrix.indices))
+    worst, row, column = worst_asymmetry(starts, columns, matrix.data)
     if worst > ASYMMETRY * max(matrix.data.max(initial=0.0), -matrix.data.min(initial=0.0)):
         raise InvalidParameterError(
             f"{name} must be symmetric; entry ({row}, {column}) is {matrix[row, column]} "

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from eigenshape._errors import InvalidParameterError
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 from eigenshape.sparse.elimination import Elimination, analyse, factorise
-from eigenshape.spectral.solver.residual_loops import quotient_sums, residual_sums
+from eigenshape.spectral.solver.residual_loops import add_sums
 
 COLUMNS_AT_ONCE = 64
 WIDEST = 1e140  # of two entries on a diagonal: squares of vectors must fit into floats
@@ -276,20 +276,24 @@ def _residuals(
     pencil: Pencil, vectors: Float[np.ndarray, "n k"], given: Float[np.ndarray, " k"] | None
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     values, norms = np.empty(vectors.shape[1]), np.empty(vectors.shape[1])
+    # One type of indices, whatever SciPy chose: the loop is compiled once.
     matrices = tuple(
-        (part.indptr, part.indices, part.data) for part in (pencil.stiffness, pencil.mass)
+        (part.indptr.astype(np.int64), part.indices.astype(np.int64), part.data)
+        for part in (pencil.stiffness, pencil.mass)
     )
     for columns in column_chunks(vectors.shape[1]):
         part = np.ascontiguousarray(vectors[:, columns])
+        k = part.shape[1]
+        scratch = np.empty((2, k)), np.zeros((3, k))
         if given is None:
-            products, sizes = sums = np.zeros((2, part.shape[1]))
-            quotient_sums(*matrices, part, sums)
-            values[columns] = products / sizes
+            sums = np.zeros((3, k))
+            add_sums(*matrices, part, values[columns], pencil.mass_diagonal, False, *scratch, sums)
+            values[columns] = sums[0] / sums[1]
         else:
             values[columns] = given[columns]
-        squares, sizes = sums = np.zeros((2, part.shape[1]))
-        residual_sums(*matrices, part, values[columns], pencil.mass_diagonal, sums)
-        norms[columns] = np.sqrt(squares / pencil.mass_floor / sizes)
+        sums = np.zeros((3, k))
+        add_sums(*matrices, part, values[columns], pencil.mass_diagonal, True, *scratch, sums)
+        norms[columns] = np.sqrt(sums[2] / pencil.mass_floor / sums[1])
     return values, norms
 
 
