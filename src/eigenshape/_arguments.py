@@ -82,7 +82,7 @@ def require_type(value: object, kind: type | UnionType, name: str) -> None:
     """
     if not isinstance(value, kind):
         raise InvalidParameterError(
-            f"{name} must be {named_kind(kind)}; the value is {named_value(value)}. {instead(value, kind)}"
+            f"{name} must be {describe_kind(kind)}; the value is {describe_value(value)}. {instead(value, kind)}"
         )
 
 
@@ -101,13 +101,13 @@ def require_each(values: object, kind: type | UnionType, name: str) -> None:
     ):
         remedy = f"Pass [{name}]." if isinstance(values, kind) else instead(values, kind)
         raise InvalidParameterError(
-            f"{name} must be a list, each entry {named_kind(kind)}; it is {named_value(values)}. {remedy}"
+            f"{name} must be a list, each entry {describe_kind(kind)}; it is {describe_value(values)}. {remedy}"
         )
     for index, value in enumerate(values):
         require_type(value, kind, f"{name}[{index}]")
 
 
-def named_kind(kind: type | UnionType) -> str:
+def describe_kind(kind: type | UnionType) -> str:
     """Return the name of a type with its article, or those of several joined by "or"."""
     names = [
         "None" if each is type(None) else f"{_article(each.__name__)} {each.__name__}"
@@ -116,7 +116,7 @@ def named_kind(kind: type | UnionType) -> str:
     return " or ".join(names)
 
 
-def named_value(value: object) -> str:
+def describe_value(value: object) -> str:
     """Return what a value is: None, text or a number as it stands, of anything else its type."""
     if value is None:
         return "None"
@@ -144,7 +144,7 @@ def instead(value: object, kind: type | UnionType) -> str:
 
 
 def attribute_of(value: object, kind: type | UnionType) -> str | None:
-    """Return the name of the first attribute of a value that is of some kind, as `mesh` is of a Repaired."""
+    """Return the name of the first attribute of a value that is of some kind, as `mesh` is of a RepairedMesh."""
     parts = fields(value) if is_dataclass(value) else ()
     return next(
         (part.name for part in parts if isinstance(getattr(value, part.name, None), kind)), None

@@ -6,7 +6,7 @@ from typing import Any, SupportsIndex, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from eigenshape._arguments import named_value
+from eigenshape._arguments import describe_value
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._memory import machine_memory
 from eigenshape._typing import ArrayLike
@@ -195,7 +195,7 @@ def real_numbers(value: ArrayLike, name: str) -> NDArray[Any]:
         ) from err
     if numbers.dtype.kind not in "biuf":
         is_array = isinstance(value, list | tuple | np.ndarray)
-        given = f"the type is {numbers.dtype}" if is_array else f"it is {named_value(value)}"
+        given = f"the type is {numbers.dtype}" if is_array else f"it is {describe_value(value)}"
         raise InvalidParameterError(f"{name} must be real numbers; {given}.")
     return numbers
 

@@ -7,8 +7,9 @@ from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.segmentation import segment
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import non_manifold_vertices, submesh
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 
 def wavy(mesh, step=0.0):

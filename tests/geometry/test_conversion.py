@@ -64,7 +64,7 @@ def test_a_shape_stays_what_it_is():
             circle(5),
             r"it is a SimplicialMesh\. cotangent_laplacian\(mesh\) and edge_graph\(mesh\) take",
         ),
-        (weld(MESH), r"it is a Repaired\. Pass its attribute mesh\."),
+        (weld(MESH), r"it is a RepairedMesh\. Pass its attribute mesh\."),
         (MESH.vertices, r"it is an ndarray\. Pass PointCloud\(points, dim=2\) if it is points"),
         (trimesh.Scene(to_trimesh(MESH)), r"it is a Scene\. Pass scene\.to_mesh\(\)"),
         (pyvista.Cube(), r"it is a PolyData\. Pass dataset\.extract_surface\(\)\.triangulate\(\)"),

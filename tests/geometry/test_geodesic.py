@@ -13,7 +13,8 @@ from eigenshape.geometry.geodesic import (
 )
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
+from eigenshape.geometry.union import disjoint_union
+from eigenshape.shapes.surfaces import grid, icosphere
 
 
 def test_on_a_flat_grid_the_way_is_straight():

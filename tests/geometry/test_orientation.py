@@ -8,6 +8,7 @@ from eigenshape.geometry.measure import enclosed_volume, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.repair import orient, repair
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.curvature import mean_curvature
 from eigenshape.retrieval.patches.patches import surface_patches
 from eigenshape.scans.partial import (
@@ -18,7 +19,7 @@ from eigenshape.scans.partial import (
     viewpoint,
 )
 from eigenshape.shapes.creatures import make_creature
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 
 def require_out(mesh):

@@ -24,6 +24,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.quadrature import mesh_quadrature
 from eigenshape.geometry.repair import REPAIRS, repair
 from eigenshape.geometry.requirements import require_joined
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.anisotropic import curvature_tensors
 from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
@@ -44,7 +45,7 @@ from eigenshape.retrieval.patches.patches import extract_patches, surface_patche
 from eigenshape.retrieval.store.index import describe_to_store
 from eigenshape.scans.partial import partial_scan, viewpoint
 from eigenshape.shapes.spheres import fibonacci_sphere
-from eigenshape.shapes.surfaces import disjoint_union, icosphere
+from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
 from eigenshape.spectral.solve import solve_spectrum
 

@@ -5,6 +5,7 @@ from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import boundary_loops, vertex_components
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.scans.partial import (
     cut_by_planes,
     partial_scan,
@@ -12,7 +13,7 @@ from eigenshape.scans.partial import (
     rotation_towards,
     viewpoint,
 )
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
+from eigenshape.shapes.surfaces import grid, icosphere
 
 BALL = icosphere(4)
 

@@ -3,8 +3,10 @@ import pytest
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.measure import enclosed_volume, face_normals, surface_area
+from eigenshape.geometry.subdivision import subdivide
 from eigenshape.geometry.topology import boundary_loops, inconsistent_edges, is_closed, is_manifold
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, subdivide, torus
+from eigenshape.geometry.union import disjoint_union
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 
 @pytest.mark.parametrize("level", [0, 1, 3])

@@ -7,7 +7,7 @@ from typing import Any, Literal, Protocol, SupportsIndex, TypeAlias, runtime_che
 import numpy as np
 from typing_extensions import TypeAliasType
 
-from eigenshape._arguments import attribute_of, named_value
+from eigenshape._arguments import attribute_of, describe_value
 from eigenshape._arrays import as_array
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
@@ -151,9 +151,9 @@ def _converted(value: object) -> Shape | None:
 def _refused(value: object, shape: Shape | None, needed: str, reader: str) -> InvalidParameterError:
     """Return the error that names a value, the shape it was taken for, and what to pass instead."""
     given = (
-        named_value(value)
+        describe_value(value)
         if shape is None or shape is value
-        else f"{named_value(value)} that is a {shape!r}"
+        else f"{describe_value(value)} that is a {shape!r}"
     )
     remedy = _remedy(value, reader) if shape is None else _use_of(shape)
     return InvalidParameterError(f"{needed}; it is {given}. {remedy}")

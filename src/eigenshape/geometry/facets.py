@@ -1,4 +1,6 @@
-"""The facets of a mesh, its simplices' sides of one dimension less, and what holds together through them."""
+"""The facets of a mesh: the sides of its simplices, of one dimension less, and the parts that they connect."""
+
+from __future__ import annotations
 
 from dataclasses import dataclass
 
@@ -13,19 +15,27 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 
+# The corners of a facet are packed into one integer while that stays below this bound: sorting
+# integers is several times as fast as sorting rows.
+PACKED_BELOW = 2**63
+
 
 @dataclass(frozen=True, eq=False)
 class FacetTable:
-    """The facets of a mesh once each: edges of triangles, triangles of tetrahedra, ends of segments.
+    """The facets of a mesh without duplicates, and where each simplex has them.
+
+    The facets of triangles are edges, those of tetrahedra are triangles, those of segments are
+    their end points.
 
     Attributes
     ----------
     facets : (q, m) int
-        Corners of each facet, ascending, and the facets in the order of their corners.
+        Corners of each facet, ascending; the facets are in lexicographic order.
     simplex_facets : (s, m+1) int
         Facet of each simplex opposite to its corner 0, 1, ..., m.
     n_simplices : (q,) int
-        Simplices at each facet: 1 on a boundary, 2 inside, more where the mesh is not a manifold.
+        Number of simplices at each facet: 1 on the boundary, 2 inside, more where the mesh is not
+        a manifold.
     """
 
     facets: Int[np.ndarray, "q m"]
@@ -34,18 +44,58 @@ class FacetTable:
 
     @property
     def boundary(self) -> Int[np.ndarray, " b"]:
-        """The facets that one simplex alone has, ascending."""
+        """Indices of the facets that belong to one simplex only, ascending."""
         return np.flatnonzero(self.n_simplices == 1)
 
 
 def facet_table(mesh: MeshLike) -> FacetTable:
-    """List the facets of the mesh once each, with the simplices' way to them."""
+    """List the facets of a mesh without duplicates, and the facets of each simplex.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Of any dimension.
+
+    Returns
+    -------
+    FacetTable
+
+    See Also
+    --------
+    edge_table : The same for triangle meshes, where facets are called edges.
+    boundary_surface : The facets on the boundary of tetrahedra, as a triangle mesh.
+
+    Examples
+    --------
+    Two tetrahedra with a triangle in common have seven facets.
+
+    >>> import eigenshape as es
+    >>> points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, -1]]
+    >>> mesh = es.SimplicialMesh(points, [[0, 1, 2, 3], [0, 1, 2, 4]])
+    >>> table = es.geometry.facet_table(mesh)
+    >>> len(table.facets), table.facets[table.n_simplices == 2].tolist()
+    (7, [[0, 1, 2]])
+    """
     mesh = as_simplicial(mesh)
-    named = mesh.simplices[np.arange(len(mesh.simplices))[:, None, None], _corners_of_facets(mesh)]
-    facets, inverse, counts = np.unique(
-        named.reshape(-1, mesh.dim), axis=0, return_inverse=True, return_counts=True
-    )
-    return FacetTable(facets, inverse.reshape(mesh.simplices.shape), counts)
+    corners = np.arange(mesh.dim + 1)
+    opposite = np.array([np.delete(corners, corner) for corner in corners])
+    # One row for each corner of a facet, one column for each facet: those opposite to corner 0 of
+    # all simplices first, then those opposite to corner 1, and so on.
+    ends = np.sort(mesh.simplices.T[opposite], axis=1).swapaxes(0, 1).reshape(mesh.dim, -1)
+    if mesh.n_points**mesh.dim < PACKED_BELOW:
+        shape = (mesh.n_points,) * mesh.dim
+        packed = np.ravel_multi_index(tuple(ends), shape)
+        keys, inverse, counts = np.unique(packed, return_inverse=True, return_counts=True)
+        facets = np.stack(np.unravel_index(keys, shape), axis=1)
+    else:
+        facets, inverse, counts = np.unique(ends.T, axis=0, return_inverse=True, return_counts=True)
+    return FacetTable(facets, inverse.reshape(mesh.dim + 1, -1).T, counts)
+
+
+def boundary_facets(mesh: Mesh) -> Int[np.ndarray, "b m"]:
+    """Return the corners of the facets that belong to one simplex only, in lexicographic order."""
+    table = facet_table(mesh)
+    return table.facets[table.boundary]
 
 
 def boundary_surface(mesh: MeshLike) -> TriangleMesh:

@@ -6,11 +6,17 @@ from scipy.spatial import ConvexHull, QhullError
 
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import area_vectors, mean_normals, unit_scaled
+from eigenshape.geometry.measure import area_vectors, enclosed_volume, mean_normals, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented
 from eigenshape.geometry.simplices import scaled_corners, size_one
-from eigenshape.geometry.topology import edge_table, face_turns, submesh, with_turned_faces
+from eigenshape.geometry.topology import (
+    edge_table,
+    face_turns,
+    is_closed,
+    submesh,
+    with_turned_faces,
+)
 
 FLAT = (
     1e-10  # volume over area^1.5 up to which rounding decides which side is out; a ball has 0.094
@@ -51,6 +57,22 @@ def orient_outward(mesh: MeshLike) -> TriangleMesh:
     sums = mean_normals(mesh)[hull.simplices].sum(axis=1)
     vote = areas @ np.einsum("fi,fi->f", sums, hull.equations[:, :3])
     return mesh if vote >= 0 else TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
+
+
+def orient_closed_outward(mesh: TriangleMesh) -> TriangleMesh:
+    """Turn all faces of a closed mesh over if its signed volume is negative.
+
+    An open mesh, whose signed volume says nothing, is returned as it is; `orient_outward` decides
+    for those.
+
+    Raises
+    ------
+    InvalidShapeError
+        If two neighboring faces of a closed mesh are turned against each other.
+    """
+    if not is_closed(mesh) or enclosed_volume(mesh) >= 0:
+        return mesh
+    return TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
 
 
 def faces_to_turn(

@@ -43,7 +43,7 @@ NEEDLE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Repaired(Generic[MeshT]):
+class RepairedMesh(Generic[MeshT]):
     """A mesh after one or more repairs, and what they did.
 
     Attributes
@@ -68,7 +68,7 @@ class RepairedCloud:
     ----------
     cloud : PointCloud
     report : tuple of str
-        One sentence, such as "drop_copies removed 2 points at the places of others".
+        One sentence, such as "drop_duplicate_points removed 2 points at the places of others".
     source_points : (n,) int
         For each point of `cloud`, the point of the original that it was.
     """
@@ -78,7 +78,7 @@ class RepairedCloud:
     source_points: Int[np.ndarray, " n"]
 
 
-def weld(mesh: MeshLike, *, tolerance: float = 0.0) -> Repaired[Any]:
+def weld(mesh: MeshLike, *, tolerance: float = 0.0) -> RepairedMesh[Any]:
     """Make one vertex of all that lie at the same place.
 
     Where closed pieces touch, this joins them too; `weld_seams` does not.
@@ -111,7 +111,7 @@ def weld(mesh: MeshLike, *, tolerance: float = 0.0) -> Repaired[Any]:
     return _joined(mesh, group, "weld joined {} vertices to others at the same place")
 
 
-def weld_seams(mesh: MeshLike) -> Repaired[Any]:
+def weld_seams(mesh: MeshLike) -> RepairedMesh[Any]:
     """Join sides on the boundary that lie on each other: the seams of a cut surface, or all sides of a soup.
 
     No edge gets worse: one with a single face becomes one with two or more. Where pieces touch without such a seam,
@@ -136,16 +136,16 @@ def _linked(pairs: Int[np.ndarray, "k 2"], n: int) -> Int[np.ndarray, " n"]:
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
-def _joined(mesh: MeshT, group: Int[np.ndarray, " n"], report: str) -> Repaired[MeshT]:
+def _joined(mesh: MeshT, group: Int[np.ndarray, " n"], report: str) -> RepairedMesh[MeshT]:
     """Make one vertex of each group, the first of it, in the order in which these appear."""
     _, first, renumbered = np.unique(group, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.argsort(order)
     joined = type(mesh)(mesh.points[first[order]], rank[renumbered[mesh.simplices]])
-    return Repaired(joined, (report.format(mesh.n_points - joined.n_points),), first[order])
+    return RepairedMesh(joined, (report.format(mesh.n_points - joined.n_points),), first[order])
 
 
-def drop_degenerate(mesh: MeshLike) -> Repaired[Any]:
+def drop_degenerate(mesh: MeshLike) -> RepairedMesh[Any]:
     """Remove faces without area, or simplices without volume; their vertices stay.
 
     Where a vertex of such a face lies on its longest side, the face beyond that side is split there, so that no slit is
@@ -169,7 +169,7 @@ def drop_degenerate(mesh: MeshLike) -> Repaired[Any]:
     return _kept(mesh, keep, report)
 
 
-def collapse_needles(mesh: MeshLike) -> Repaired[Any]:
+def collapse_needles(mesh: MeshLike) -> RepairedMesh[Any]:
     """Join the ends of sides under a millionth of the longest side of their face, or simplex.
 
     Such a face has area, but next to its angle the others round to nothing, and its eigenvalues hide those of the
@@ -199,10 +199,10 @@ def collapse_needles(mesh: MeshLike) -> Repaired[Any]:
     report = (
         f"{joined.report[0]}, and removed {int((~whole & short.any(axis=1)).sum())} {_plural(mesh)}"
     )
-    return Repaired(kept.mesh, (report,), joined.source_vertices)
+    return RepairedMesh(kept.mesh, (report,), joined.source_vertices)
 
 
-def drop_duplicate_faces(mesh: MeshLike) -> Repaired[Any]:
+def drop_duplicate_faces(mesh: MeshLike) -> RepairedMesh[Any]:
     """Keep the first of all faces, or simplices, with the same corners, whatever their order."""
     mesh = as_simplicial(mesh)
     keep = np.ones(len(mesh.simplices), dtype=bool)
@@ -211,28 +211,28 @@ def drop_duplicate_faces(mesh: MeshLike) -> Repaired[Any]:
     return _kept(mesh, keep, report)
 
 
-def _kept(mesh: MeshT, keep: Bool[np.ndarray, " s"], report: str) -> Repaired[MeshT]:
+def _kept(mesh: MeshT, keep: Bool[np.ndarray, " s"], report: str) -> RepairedMesh[MeshT]:
     kept = type(mesh)(mesh.points, mesh.simplices[keep])
-    return Repaired(kept, (report,), np.arange(mesh.n_points))
+    return RepairedMesh(kept, (report,), np.arange(mesh.n_points))
 
 
 def _plural(mesh: Mesh) -> str:
     return MEASURES[mesh.dim][0].lower() if mesh.dim in MEASURES else "simplices"
 
 
-def drop_unreferenced(mesh: MeshLike) -> Repaired[Any]:
+def drop_unreferenced(mesh: MeshLike) -> RepairedMesh[Any]:
     """Remove vertices that no face, or simplex, uses."""
     mesh = as_simplicial(mesh)
     n_loose = len(unreferenced_vertices(mesh))
     source, renumbered = np.unique(mesh.simplices, return_inverse=True)
     kept = type(mesh)(mesh.points[source], renumbered.reshape(mesh.simplices.shape))
     noun = "face" if mesh.dim == 2 else "simplex"
-    return Repaired(
+    return RepairedMesh(
         kept, (f"drop_unreferenced removed {n_loose} vertices without a {noun}",), source
     )
 
 
-def orient(mesh: MeshLike) -> Repaired[TriangleMesh]:
+def orient(mesh: MeshLike) -> RepairedMesh[TriangleMesh]:
     """Turn faces over so that neighbors agree, and pieces face out.
 
     Of each piece the fewer faces are turned. Then a closed piece is turned as a whole if its signed volume is negative;
@@ -247,21 +247,21 @@ def orient(mesh: MeshLike) -> Repaired[TriangleMesh]:
         named = np.flatnonzero(one_sided)[np.unique(piece[one_sided], return_index=True)[1]]
         report += f", left {_count(len(named), 'piece')} with one side only, of face {', '.join(map(str, named[:9]))}"
         report += " and others" if len(named) > 9 else ""
-    return Repaired(with_turned_faces(mesh, turned), (report,), np.arange(mesh.n_vertices))
+    return RepairedMesh(with_turned_faces(mesh, turned), (report,), np.arange(mesh.n_vertices))
 
 
 def _count(number: int, noun: str) -> str:
     return f"{number} {noun}{'s' * (number != 1)}"
 
 
-def largest_component(mesh: MeshLike) -> Repaired[TriangleMesh]:
+def largest_component(mesh: MeshLike) -> RepairedMesh[TriangleMesh]:
     """Keep the connected component with the most area; of equal ones, the one with the lowest vertex."""
     mesh = as_mesh(mesh)
     count, _ = vertex_components(mesh)
     keep = faces_of_largest(mesh)
     kept, source = submesh(mesh, keep)
     report = f"largest_component removed {count - 1} components with {int((~keep).sum())} faces"
-    return Repaired(kept, (report,), source)
+    return RepairedMesh(kept, (report,), source)
 
 
 def faces_of_largest(mesh: TriangleMesh) -> Bool[np.ndarray, " f"]:
@@ -272,7 +272,7 @@ def faces_of_largest(mesh: TriangleMesh) -> Bool[np.ndarray, " f"]:
     return np.asarray(of_face == np.argmax(np.bincount(of_face, weights=areas)))
 
 
-def seal_holes(mesh: MeshLike, *, most_edges: int = 1000) -> Repaired[TriangleMesh]:
+def fill_holes(mesh: MeshLike, *, most_edges: int = 1000) -> RepairedMesh[TriangleMesh]:
     """Close every hole by faces between the vertices around it; no vertex is added.
 
     Each boundary loop is triangulated with the least sum of areas (Barequet and Sharir, Filling gaps in the boundary of
@@ -299,22 +299,22 @@ def seal_holes(mesh: MeshLike, *, most_edges: int = 1000) -> Repaired[TriangleMe
     found = fillings(mesh, most_edges)
     sealed = TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, *found.faces]))
     n_faces = sealed.n_faces - mesh.n_faces
-    report = f"seal_holes closed {_count(len(found.faces), 'hole')} with {_count(n_faces, 'face')}"
+    report = f"fill_holes closed {_count(len(found.faces), 'hole')} with {_count(n_faces, 'face')}"
     report += f", left {found.n_long} of more than {most_edges} edges" if found.n_long else ""
     report += f", left {found.n_open} that good faces do not close" if found.n_open else ""
-    return Repaired(sealed, (report,), np.arange(mesh.n_vertices))
+    return RepairedMesh(sealed, (report,), np.arange(mesh.n_vertices))
 
 
-def drop_copies(cloud: PointCloud) -> RepairedCloud:
+def drop_duplicate_points(cloud: PointCloud) -> RepairedCloud:
     """Keep the first of all points at the same place."""
     require_type(cloud, PointCloud, "cloud")
     _, source = np.unique(_places(cloud.points), return_index=True)
     source = np.sort(source)
-    report = f"drop_copies removed {_count(cloud.n_points - len(source), 'point')} at the places of others"
+    report = f"drop_duplicate_points removed {_count(cloud.n_points - len(source), 'point')} at the places of others"
     return RepairedCloud(PointCloud(cloud.points[source], cloud.dim), (report,), source)
 
 
-def repair_as_needed(mesh: MeshT) -> Repaired[MeshT]:
+def repair_as_needed(mesh: MeshT) -> RepairedMesh[MeshT]:
     """Apply each of `AUTO` that changes something, until none does.
 
     Raises
@@ -336,7 +336,7 @@ AUTO = (
     "orient",
 )
 
-REPAIRS: dict[str, Callable[[Any], Repaired[Any]]] = {
+REPAIRS: dict[str, Callable[[Any], RepairedMesh[Any]]] = {
     "auto": repair_as_needed,
     "weld": weld,
     "weld_seams": weld_seams,
@@ -346,10 +346,10 @@ REPAIRS: dict[str, Callable[[Any], Repaired[Any]]] = {
     "drop_unreferenced": drop_unreferenced,
     "orient": orient,
     "largest_component": largest_component,
-    "seal_holes": seal_holes,
+    "fill_holes": fill_holes,
 }
-OF_SURFACES_ONLY = ("orient", "largest_component", "seal_holes")
-CLOUD_REPAIRS = {"auto": drop_copies, "drop_copies": drop_copies}
+OF_SURFACES_ONLY = ("orient", "largest_component", "fill_holes")
+CLOUD_REPAIRS = {"auto": drop_duplicate_points, "drop_duplicate_points": drop_duplicate_points}
 
 
 def names_of_repairs(shape: Shape) -> tuple[str, ...]:
@@ -363,15 +363,15 @@ def names_of_repairs(shape: Shape) -> tuple[str, ...]:
 @overload
 def repair(shape: PointCloud, names: Sequence[str]) -> RepairedCloud: ...
 @overload
-def repair(shape: MeshT, names: Sequence[str]) -> Repaired[MeshT]: ...
+def repair(shape: MeshT, names: Sequence[str]) -> RepairedMesh[MeshT]: ...
 @overload
-def repair(shape: MeshLike, names: Sequence[str]) -> Repaired[Any]: ...
-def repair(shape: ShapeLike, names: Sequence[str]) -> Repaired[Any] | RepairedCloud:
+def repair(shape: MeshLike, names: Sequence[str]) -> RepairedMesh[Any]: ...
+def repair(shape: ShapeLike, names: Sequence[str]) -> RepairedMesh[Any] | RepairedCloud:
     """Apply the named repairs one after the other.
 
     "auto" stands for whatever is needed of `drop_duplicate_faces`, `weld_seams`, `collapse_needles`, `drop_degenerate`,
-    `drop_unreferenced` and, on surfaces, `orient`; on a cloud it is `drop_copies`. It fills no hole and drops no
-    component.
+    `drop_unreferenced` and, on surfaces, `orient`; on a cloud it is `drop_duplicate_points`. It fills no hole and drops
+    no component.
 
     Parameters
     ----------
@@ -380,7 +380,7 @@ def repair(shape: ShapeLike, names: Sequence[str]) -> Repaired[Any] | RepairedCl
 
     Returns
     -------
-    Repaired or RepairedCloud
+    RepairedMesh or RepairedCloud
         With one sentence of report for each repair; "auto" reports what it changed.
 
     Raises
@@ -422,7 +422,7 @@ def suggest_repairs(shape: ShapeLike) -> tuple[str, ...]:
     """Name the repairs that would help a shape, in an order in which they can be handed to `repair`.
 
     Those that "auto" stands for; on surfaces also `largest_component`, where each other component is a speck of at most
-    1 % of the area and all specks have at most 20 %, and `seal_holes`, where each hole has at most 5 %: a disc with its
+    1 % of the area and all specks have at most 20 %, and `fill_holes`, where each hole has at most 5 %: a disc with its
     length. Once these repairs have been applied, none is left to suggest.
 
     Parameters
@@ -439,18 +439,22 @@ def suggest_repairs(shape: ShapeLike) -> tuple[str, ...]:
     >>> import eigenshape as es
     >>> ball = es.icosphere(2)
     >>> es.suggest_repairs(es.TriangleMesh(ball.vertices, ball.faces[1:, ::-1]))
-    ('seal_holes', 'orient')
+    ('fill_holes', 'orient')
     """
     shape = as_shape(shape)
     if isinstance(shape, PointCloud):
-        return ("drop_copies",) if drop_copies(shape).cloud.n_points < shape.n_points else ()
+        return (
+            ("drop_duplicate_points",)
+            if drop_duplicate_points(shape).cloud.n_points < shape.n_points
+            else ()
+        )
     try:
         return _until_sound(shape, (*AUTO, *HELPS))[1]
     except InvalidShapeError:  # no face has area
         return ()
 
 
-def _until_sound(mesh: MeshT, names: Sequence[str]) -> tuple[Repaired[MeshT], tuple[str, ...]]:
+def _until_sound(mesh: MeshT, names: Sequence[str]) -> tuple[RepairedMesh[MeshT], tuple[str, ...]]:
     """Apply in turn each of some repairs that helps, until none does; return the result and the names of these."""
     done = _unchanged(mesh)
     applied: list[str] = []
@@ -468,12 +472,12 @@ def _until_sound(mesh: MeshT, names: Sequence[str]) -> tuple[Repaired[MeshT], tu
     return done, tuple(applied)
 
 
-def _unchanged(mesh: MeshT) -> Repaired[MeshT]:
-    return Repaired(mesh, (), np.arange(mesh.n_points))
+def _unchanged(mesh: MeshT) -> RepairedMesh[MeshT]:
+    return RepairedMesh(mesh, (), np.arange(mesh.n_points))
 
 
-def _followed(done: Repaired[MeshT], step: Repaired[MeshT]) -> Repaired[MeshT]:
-    return Repaired(
+def _followed(done: RepairedMesh[MeshT], step: RepairedMesh[MeshT]) -> RepairedMesh[MeshT]:
+    return RepairedMesh(
         step.mesh, done.report + step.report, done.source_vertices[step.source_vertices]
     )
 
@@ -501,5 +505,5 @@ def has_small_holes(mesh: TriangleMesh) -> bool:
 
 HELPS: dict[str, Callable[[Any], bool]] = {
     "largest_component": has_specks,
-    "seal_holes": has_small_holes,
+    "fill_holes": has_small_holes,
 }

@@ -2,12 +2,43 @@
 
 from functools import lru_cache
 from itertools import permutations
+from typing import overload
 
 import numpy as np
 from jaxtyping import Int
 
 from eigenshape._arrays import frozen
-from eigenshape.geometry.simplicial import SimplicialMesh
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
+from eigenshape.geometry.topology import edge_table
+
+
+@overload
+def subdivide(mesh: TriangleMesh) -> TriangleMesh: ...
+@overload
+def subdivide(mesh: SimplicialMesh) -> SimplicialMesh: ...
+@overload
+def subdivide(mesh: MeshLike) -> Mesh: ...
+def subdivide(mesh: MeshLike) -> Mesh:
+    """Split each simplex at the middles of its edges: a triangle in four, which face as it does, in general in 2^m.
+
+    Nothing moves: it is the same shape with finer simplices.
+    """
+    mesh = as_simplicial(mesh)
+    if isinstance(mesh, TriangleMesh):
+        return _quartered(mesh)
+    return halve_simplices(mesh)
+
+
+def _quartered(mesh: TriangleMesh) -> TriangleMesh:
+    table = edge_table(mesh)
+    middles = mesh.vertices[table.edges].mean(axis=1)
+    a, b, c = mesh.faces.T
+    at_a, at_b, at_c = (table.face_edges + mesh.n_vertices).T
+    quarters = [(a, at_c, at_b), (b, at_a, at_c), (c, at_b, at_a), (at_a, at_b, at_c)]
+    faces = np.stack([np.column_stack(quarter) for quarter in quarters], axis=1).reshape(-1, 3)
+    return TriangleMesh(np.concatenate([mesh.vertices, middles]), faces)
 
 
 def halve_simplices(mesh: SimplicialMesh) -> SimplicialMesh:

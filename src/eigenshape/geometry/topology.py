@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
+from eigenshape.geometry.facets import boundary_facets, facet_table
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
 
@@ -38,13 +39,8 @@ class EdgeTable:
 
 def edge_table(mesh: MeshLike) -> EdgeTable:
     """List the edges of the mesh once each, with the faces' way to them."""
-    mesh = as_mesh(mesh)
-    sides = np.sort(half_edges(mesh), axis=1)
-    keys, inverse, counts = np.unique(
-        sides[:, 0] * mesh.n_vertices + sides[:, 1], return_inverse=True, return_counts=True
-    )
-    edges = np.column_stack(np.divmod(keys, mesh.n_vertices))
-    return EdgeTable(edges, inverse.reshape(3, -1).T, counts)
+    table = facet_table(as_mesh(mesh))
+    return EdgeTable(table.facets, table.simplex_facets, table.n_simplices)
 
 
 def face_pairs(table: EdgeTable) -> tuple[Int[np.ndarray, "p 2"], Int[np.ndarray, " p"]]:
@@ -93,16 +89,6 @@ def require_simplices_everywhere(mesh: Mesh) -> None:
             f"Every {point} must belong to a {simplex}; {point} {loose[0]} at {mesh.points[loose[0]].tolist()} has "
             f"none ({loose.size} such). {try_auto()}"
         )
-
-
-def boundary_facets(mesh: Mesh) -> Int[np.ndarray, "b m"]:
-    """Return the sides of simplices that one simplex alone has, by their corners, ascending."""
-    facets = np.concatenate(
-        [np.delete(mesh.simplices, corner, axis=1) for corner in range(mesh.dim + 1)]
-    )
-    facets, repeats = sorted_rows(np.sort(facets, axis=1))[1:]
-    alone = ~repeats & ~np.append(repeats[1:], False)
-    return facets[alone]
 
 
 def sorted_rows(

@@ -20,7 +20,7 @@ from eigenshape.scans.raster import rasterize
 
 SLANT_NOISE = 0.025  # of the noise face on, times (θ / (π/2 - θ))²
 STEEPEST_NOISE = 20.0  # times the noise face on, at most
-ALL_LOST = np.deg2rad(85.0)  # slant from which nothing comes back
+FULL_DROPOUT = np.deg2rad(85.0)  # slant from which nothing comes back
 LARGEST_JUMP = 4.0  # pixels of depth between corners of one triangle
 HOLE_SIZES = (0.01, 0.03)  # radii of holes, of the picture
 
@@ -37,9 +37,9 @@ class DepthCamera:
         From the middle of the box, in its diagonals, more than .5.
     noise : float
         Standard deviation of the depth of what is seen face on at that distance, in diagonals.
-    lost_from : float
+    dropout_angle : float
         Slant, in degrees below 85, from which pixels get lost; the share grows to all of them at 85.
-    lost : float
+    dropout : float
         Share of pixels that get lost wherever they are, in 0..1.
     n_holes : int
         Round holes, of .01 to .03 of the picture in radius: shiny spots, say.
@@ -48,8 +48,8 @@ class DepthCamera:
     resolution: int = 160
     distance: float = 1.5
     noise: float = 0.002
-    lost_from: float = 60.0
-    lost: float = 0.01
+    dropout_angle: float = 60.0
+    dropout: float = 0.01
     n_holes: int = 3
 
 
@@ -158,12 +158,14 @@ def _checked(camera: DepthCamera) -> DepthCamera:
         )
     if not 0 <= camera.noise <= 1:
         raise InvalidParameterError(f"noise must lie in 0..1 diagonals; it is {camera.noise}.")
-    if not 0 <= camera.lost_from < np.rad2deg(ALL_LOST):
+    if not 0 <= camera.dropout_angle < np.rad2deg(FULL_DROPOUT):
         raise InvalidParameterError(
-            f"lost_from must lie in 0..85 degrees, 85 excluded; it is {camera.lost_from}."
+            f"dropout_angle must lie in 0..85 degrees, 85 excluded; it is {camera.dropout_angle}."
         )
-    if not 0 <= camera.lost < 1:
-        raise InvalidParameterError(f"lost must lie in 0..1, 1 excluded; it is {camera.lost}.")
+    if not 0 <= camera.dropout < 1:
+        raise InvalidParameterError(
+            f"dropout must lie in 0..1, 1 excluded; it is {camera.dropout}."
+        )
     return camera
 
 
@@ -191,8 +193,8 @@ def _rays(size: int, focal: float) -> Float[np.ndarray, "h w 3"]:
 def _kept(
     picture: _Picture, camera: DepthCamera, rng: np.random.Generator
 ) -> Bool[np.ndarray, "h w"]:
-    begins = np.deg2rad(camera.lost_from)
-    odds = np.clip((picture.slant - begins) / (ALL_LOST - begins), camera.lost, 1)
+    begins = np.deg2rad(camera.dropout_angle)
+    odds = np.clip((picture.slant - begins) / (FULL_DROPOUT - begins), camera.dropout, 1)
     kept = (picture.face >= 0) & (rng.random(odds.shape) >= odds)
     seen = np.argwhere(picture.face >= 0)
     if len(seen):

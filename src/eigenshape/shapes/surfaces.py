@@ -1,17 +1,11 @@
 """Made-up surfaces whose spectra are known."""
 
-from typing import overload
-
 import numpy as np
 from jaxtyping import Int
 
 from eigenshape._arrays import positive_values, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
-from eigenshape.geometry.subdivision import halve_simplices
-from eigenshape.geometry.topology import edge_table
+from eigenshape.geometry.subdivision import subdivide
 
 
 def icosphere(level: int = 3) -> TriangleMesh:
@@ -57,33 +51,6 @@ def _faces_around_origin(points: np.ndarray) -> Int[np.ndarray, "f 3"]:
     return np.array(outward, dtype=np.int64)
 
 
-@overload
-def subdivide(mesh: TriangleMesh) -> TriangleMesh: ...
-@overload
-def subdivide(mesh: SimplicialMesh) -> SimplicialMesh: ...
-@overload
-def subdivide(mesh: MeshLike) -> Mesh: ...
-def subdivide(mesh: MeshLike) -> Mesh:
-    """Split each simplex at the middles of its edges: a triangle in four, which face as it does, in general in 2^m.
-
-    Nothing moves: it is the same shape with finer simplices.
-    """
-    mesh = as_simplicial(mesh)
-    if isinstance(mesh, TriangleMesh):
-        return _quartered(mesh)
-    return halve_simplices(mesh)
-
-
-def _quartered(mesh: TriangleMesh) -> TriangleMesh:
-    table = edge_table(mesh)
-    middles = mesh.vertices[table.edges].mean(axis=1)
-    a, b, c = mesh.faces.T
-    at_a, at_b, at_c = (table.face_edges + mesh.n_vertices).T
-    quarters = [(a, at_c, at_b), (b, at_a, at_c), (c, at_b, at_a), (at_a, at_b, at_c)]
-    faces = np.stack([np.column_stack(quarter) for quarter in quarters], axis=1).reshape(-1, 3)
-    return TriangleMesh(np.concatenate([mesh.vertices, middles]), faces)
-
-
 def torus(
     n_around: int = 48, n_across: int = 24, *, outer: float = 1.0, inner: float = 0.4
 ) -> TriangleMesh:
@@ -125,13 +92,3 @@ def grid(n_x: int = 20, n_y: int = 20, *, width: float = 1.0, height: float = 1.
         [np.column_stack([here, below, across]), np.column_stack([here, across, right])]
     )
     return TriangleMesh(points, faces)
-
-
-def disjoint_union(*meshes: MeshLike) -> TriangleMesh:
-    """Put meshes into one, as separate components with their coordinates unchanged."""
-    if not meshes:
-        raise InvalidParameterError("disjoint_union must be given a mesh; it was given none.")
-    parts = [as_mesh(mesh, f"meshes[{index}]") for index, mesh in enumerate(meshes)]
-    starts = np.cumsum([0, *(mesh.n_vertices for mesh in parts)])[:-1]
-    faces = [mesh.faces + start for mesh, start in zip(parts, starts, strict=True)]
-    return TriangleMesh(np.concatenate([mesh.vertices for mesh in parts]), np.concatenate(faces))
