@@ -1,4 +1,4 @@
-"""Simplices cut into smaller ones at the middles of their edges, in any dimension."""
+"""Subdivision of simplices at the midpoints of their edges, in any dimension."""
 
 from functools import lru_cache
 from itertools import permutations
@@ -21,17 +21,41 @@ def subdivide(mesh: SimplicialMesh) -> SimplicialMesh: ...
 @overload
 def subdivide(mesh: MeshLike) -> Mesh: ...
 def subdivide(mesh: MeshLike) -> Mesh:
-    """Split each simplex at the middles of its edges: a triangle in four, which face as it does, in general in 2^m.
+    """Split each simplex at the midpoints of its edges into 2^m simplices.
 
-    Nothing moves: it is the same shape with finer simplices.
+    A triangle becomes four triangles with the same orientation, a tetrahedron eight tetrahedra. No
+    point moves: the shape stays the same set of points.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Of any dimension m.
+
+    Returns
+    -------
+    TriangleMesh or SimplicialMesh
+        The old points come first, in their order, then the midpoints.
+
+    See Also
+    --------
+    icosphere : A subdivided icosahedron on the unit sphere.
+
+    Notes
+    -----
+    Simplices that are not triangles in R³ are split by the edgewise subdivision (Edelsbrunner and
+    Grayson 2000). Its pieces have at most m!/2 shapes however often it is repeated.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.geometry.subdivide(es.shapes.grid(1, 1))
+    TriangleMesh(9 vertices, 8 faces)
     """
     mesh = as_simplicial(mesh)
-    if isinstance(mesh, TriangleMesh):
-        return _quartered(mesh)
-    return halve_simplices(mesh)
+    return _split_triangles(mesh) if isinstance(mesh, TriangleMesh) else _split_simplices(mesh)
 
 
-def _quartered(mesh: TriangleMesh) -> TriangleMesh:
+def _split_triangles(mesh: TriangleMesh) -> TriangleMesh:
     table = edge_table(mesh)
     middles = mesh.vertices[table.edges].mean(axis=1)
     a, b, c = mesh.faces.T
@@ -41,14 +65,18 @@ def _quartered(mesh: TriangleMesh) -> TriangleMesh:
     return TriangleMesh(np.concatenate([mesh.vertices, middles]), faces)
 
 
-def halve_simplices(mesh: SimplicialMesh) -> SimplicialMesh:
-    """Split each simplex in 2^m at the middles of its edges, so that neighbours match.
+def _split_simplices(mesh: SimplicialMesh) -> SimplicialMesh:
+    """Split each simplex so that the pieces of neighbors match.
 
-    The edgewise subdivision (Edelsbrunner and Grayson 2000), whose pieces have at most m!/2 shapes however often it is
-    repeated. It takes the corners of each simplex in their order, if neighbours agree on it, and gives such an order to
-    the pieces; otherwise it begins with the order of the points.
+    The pieces depend on the order of the corners. If all simplices with an edge have its ends in
+    the same order, that order is used, and the pieces have such an order again; otherwise corners
+    are sorted by their points.
     """
-    corners = mesh.simplices if _agree(mesh.simplices) else np.sort(mesh.simplices, axis=1)
+    corners = mesh.simplices
+    edges = corners[:, np.column_stack(np.triu_indices(corners.shape[1], 1))].reshape(-1, 2)
+    n_directed, n_edges = (len(np.unique(ends, axis=0)) for ends in (edges, np.sort(edges, axis=1)))
+    if n_directed != n_edges:
+        corners = np.sort(corners, axis=1)
     ends = np.sort(corners[:, pieces(mesh.dim)], axis=-1)
     simplices = ends[..., 0].copy()
     between = ends[..., 0] < ends[..., 1]
@@ -58,17 +86,12 @@ def halve_simplices(mesh: SimplicialMesh) -> SimplicialMesh:
     return SimplicialMesh(points, simplices.reshape(-1, mesh.dim + 1))
 
 
-def _agree(simplices: Int[np.ndarray, "s corners"]) -> bool:
-    """Say whether each edge has the same end first in all of its simplices."""
-    edges = simplices[:, np.column_stack(np.triu_indices(simplices.shape[1], 1))].reshape(-1, 2)
-    return len(np.unique(edges, axis=0)) == len(np.unique(np.sort(edges, axis=1), axis=0))
-
-
 @lru_cache
 def pieces(dim: int) -> Int[np.ndarray, "pieces corners 2"]:
-    """Return the pieces of one simplex, each corner as the two corners of the whole that it lies midway between.
+    """Return the pieces of one simplex; each corner is the midpoint of two corners of the whole.
 
-    In the simplex 2 ≥ x_1 ≥ ... ≥ x_m ≥ 0 these are Kuhn's simplices of the whole numbers: walks of unit steps.
+    In the simplex 2 ≥ x_1 ≥ ... ≥ x_m ≥ 0 these are Kuhn's simplices of the integer grid: walks of
+    unit steps, one along each axis.
     """
     starts = np.tril(np.ones((dim + 1, dim), dtype=np.int64), -1)
     steps = np.array(

@@ -13,7 +13,7 @@ from eigenshape.geometry.measure import edge_lengths, mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import mean_side_length, size_one
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.topology import agreeing, boundary_vertices, edge_table
+from eigenshape.geometry.topology import boundary_vertices, consistently_oriented, edge_table
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.sparse.elimination import analyse, factorise
@@ -46,7 +46,7 @@ def noise_level(mesh: MeshLike) -> float:
     if not inside.any():
         return 0.0
     away = links[inside] @ points / degrees[inside, None] - points[inside]
-    normals = mean_normals(agreeing(unit))[inside]  # which side is out does not matter
+    normals = mean_normals(consistently_oriented(unit))[inside]  # which side is out does not matter
     heights = np.abs(np.einsum("ni,ni->n", away, normals))
     return float(np.median(heights) / edge_lengths(unit).mean())
 

@@ -14,7 +14,7 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import mean_normals, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import faces_of_largest
-from eigenshape.geometry.topology import agreeing, is_closed, submesh
+from eigenshape.geometry.topology import consistently_oriented, is_closed, submesh
 from eigenshape.scans.raster import rasterize
 
 SLACK = 1.5  # pixels that a vertex may lie off the place where the surface was seen
@@ -143,7 +143,9 @@ def _visible_vertices(
     pixels = (points - low) * ((resolution - 2) / span) + 1
     raster = rasterize(pixels, mesh.faces, resolution, resolution)
     column, row = pixels[:, :2].astype(np.int64).T
-    towards = np.abs(mean_normals(agreeing(mesh)) @ view)  # which side is out does not matter
+    towards = np.abs(
+        mean_normals(consistently_oriented(mesh)) @ view
+    )  # which side is out does not matter
     slope = np.minimum(
         np.sqrt(1 - np.minimum(towards, 1) ** 2) / np.maximum(towards, 1 / STEEPEST), STEEPEST
     )
