@@ -167,7 +167,7 @@ def weld_seams(mesh: MeshLike) -> RepairedMesh[Any]:
 
 
 def _place_numbers(points: Float[np.ndarray, "n d"]) -> Int[np.ndarray, " n"]:
-    """Number the different places of points; return the number of each point's place."""
+    """Return for each point the number of its place; equal points have the same place."""
     # np.unique compares bytes; adding 0.0 turns -0.0 into 0.0.
     _, place = np.unique(points + 0.0, axis=0, return_inverse=True)
     return place.ravel().astype(np.int64)
@@ -218,7 +218,7 @@ def drop_degenerate(mesh: MeshLike) -> RepairedMesh[Any]:
     >>> import eigenshape as es
     >>> points = [[0, 0, 0], [2, 0, 0], [0, 1, 0], [1, 0, 0]]
     >>> es.geometry.drop_degenerate((points, [[0, 1, 2], [0, 1, 3]])).report
-    ('drop_degenerate removed 1 faces without area',)
+    ('drop_degenerate removed 1 faces without area, and split 1 neighbor at their vertices',)
     """
     mesh = as_simplicial(mesh)
     n_flat = len(degenerate_simplices(mesh))

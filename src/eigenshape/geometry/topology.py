@@ -240,7 +240,7 @@ def boundary_edges(mesh: MeshLike) -> Int[np.ndarray, "b 2"]:
     --------
     >>> import eigenshape as es
     >>> es.geometry.boundary_edges(es.shapes.grid(1, 1)).tolist()
-    [[2, 3], [3, 1], [0, 2], [1, 0]]
+    [[2, 3], [3, 1], [1, 0], [0, 2]]
     """
     mesh = as_mesh(mesh)
     table = edge_table(mesh)

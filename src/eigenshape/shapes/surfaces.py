@@ -1,4 +1,4 @@
-"""Made-up surfaces whose spectra are known."""
+"""Synthetic surfaces whose spectra are known."""
 
 import numpy as np
 from jaxtyping import Int
@@ -9,9 +9,33 @@ from eigenshape.geometry.subdivision import subdivide
 
 
 def icosphere(level: int = 3) -> TriangleMesh:
-    """Subdivide an icosahedron `level` times onto the unit sphere: 10·4^level + 2 vertices.
+    """Make a triangle mesh of the unit sphere by subdividing an icosahedron.
 
-    The sphere's eigenvalues are l(l+1), each 2l+1 times.
+    Parameters
+    ----------
+    level : int
+        Number of subdivisions, 0 to 9. The mesh has 10·4^level + 2 vertices.
+
+    Returns
+    -------
+    TriangleMesh
+        Closed, facing outward, with vertices on the unit sphere.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `level` is out of range.
+
+    See Also
+    --------
+    sphere_eigenvalues : The exact eigenvalues of the sphere.
+    fibonacci_sphere : A sphere with any number of vertices.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.icosphere(3)
+    TriangleMesh(642 vertices, 1280 faces)
     """
     whole_number(level, "level", 0, 9)
     mesh = _icosahedron()
@@ -34,7 +58,7 @@ def _icosahedron() -> TriangleMesh:
 
 
 def _faces_around_origin(points: np.ndarray) -> Int[np.ndarray, "f 3"]:
-    """Return the triangles of three mutually nearest points, turned outward."""
+    """Return the triangles of points that are nearest neighbors of each other, facing outward."""
     distance = np.linalg.norm(points[:, None] - points[None], axis=2)
     near = (distance < 1.01 * distance[distance > 0].min()) & (distance > 0)
     n = len(points)
@@ -54,7 +78,35 @@ def _faces_around_origin(points: np.ndarray) -> Int[np.ndarray, "f 3"]:
 def torus(
     n_around: int = 48, n_across: int = 24, *, outer: float = 1.0, inner: float = 0.4
 ) -> TriangleMesh:
-    """Sweep a circle of radius `inner` around the z axis at distance `outer`, on a regular grid."""
+    """Make a triangle mesh of a torus around the z axis, on a regular grid of its two angles.
+
+    Parameters
+    ----------
+    n_around, n_across : int
+        Number of vertices around the axis and across the tube, at least 3 each.
+    outer, inner : float
+        Radius of the circle in the middle of the tube, and radius of the tube, in length.
+
+    Returns
+    -------
+    TriangleMesh
+        n_around · n_across vertices; closed and facing outward.
+
+    Raises
+    ------
+    InvalidParameterError
+        If a number is out of range or a radius is not positive.
+
+    See Also
+    --------
+    torus_quadrature : A quadrature of the same torus.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.shapes.torus(12, 6)
+    TriangleMesh(72 vertices, 144 faces)
+    """
     whole_number(n_around, "n_around", 3, 10**6)
     whole_number(n_across, "n_across", 3, 10**6)
     positive_values([outer, inner], "outer and inner")
@@ -77,7 +129,37 @@ def _wrapped_grid(rows: int, columns: int) -> Int[np.ndarray, "f 3"]:
 
 
 def grid(n_x: int = 20, n_y: int = 20, *, width: float = 1.0, height: float = 1.0) -> TriangleMesh:
-    """Triangulate a flat rectangle with n_x by n_y squares; its Neumann eigenvalues are π²(p²/w² + q²/h²)."""
+    """Make a triangle mesh of a flat rectangle, of n_x by n_y cells with two triangles each.
+
+    Parameters
+    ----------
+    n_x, n_y : int
+        Number of cells along x and y, at least 1 each.
+    width, height : float
+        Length of the sides along x and y.
+
+    Returns
+    -------
+    TriangleMesh
+        (n_x + 1)·(n_y + 1) vertices in the plane z = 0; vertex i·(n_y + 1) + j is the i-th along x
+        and the j-th along y.
+
+    Raises
+    ------
+    InvalidParameterError
+        If a number is out of range or a side is not positive.
+
+    See Also
+    --------
+    box_eigenvalues : The exact eigenvalues, with sides (width, height).
+    irregular_grid : A square with randomly moved vertices.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.shapes.grid(4, 2)
+    TriangleMesh(15 vertices, 16 faces)
+    """
     whole_number(n_x, "n_x", 1, 10**6)
     whole_number(n_y, "n_y", 1, 10**6)
     positive_values([width, height], "width and height")
