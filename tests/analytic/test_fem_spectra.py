@@ -9,8 +9,7 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
 from eigenshape.shapes import exact
 from eigenshape.shapes.domains import ball, box, disc, interval, irregular_grid
-from eigenshape.shapes.surfaces import (grid)
-from eigenshape.geometry.subdivision import subdivide
+from eigenshape.shapes.surfaces import grid
 from eigenshape.spectral.solve import solve_spectrum
 
 

@@ -11,8 +11,7 @@ from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.operators.graph import graph_laplacian
-from eigenshape.shapes.surfaces import (icosphere, torus)
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.solve import solve_spectrum
 
 

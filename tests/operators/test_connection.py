@@ -13,8 +13,7 @@ from eigenshape.io.mesh_files import read_mesh
 from eigenshape.operators.connection import connection_laplacian, flattened, tangent_frames
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.directions import vertex_directions
-from eigenshape.shapes.surfaces import (grid, icosphere, torus)
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 from eigenshape.spectral.solve import solve_spectrum
 
 few = settings(deadline=None, max_examples=15)

@@ -25,8 +25,7 @@ from eigenshape.operators.tufted import (
     mollified,
     tufted_cover,
 )
-from eigenshape.shapes.surfaces import (grid, icosphere, torus)
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 from eigenshape.spectral.solve import solve_spectrum
 
 few = settings(deadline=None, max_examples=15)

@@ -11,8 +11,7 @@ from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.shapes.surfaces import (icosphere)
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver.diagnosis import require_solvable
 from eigenshape.spectral.solver.pencil import normalise

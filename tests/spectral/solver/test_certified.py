@@ -9,8 +9,7 @@ from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.shapes.surfaces import (icosphere, torus)
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import strategy as roads
 from eigenshape.spectral.solver.certify import certify
