@@ -188,7 +188,7 @@ def test_three_faces_at_an_edge_are_all_neighbours():
 
 @pytest.mark.parametrize(
     ("values", "message"),
-    [([0.0, 1.0], "one number a vertex"), ([0.0, np.nan, 1.0, 2.0], "entry 1 is nan")],
+    [([0.0, 1.0], "one number per vertex"), ([0.0, np.nan, 1.0, 2.0], "entry 1 is nan")],
 )
 def test_bad_values_are_named(values, message):
     mesh = grid(1, 1)

@@ -117,7 +117,7 @@ def test_it_is_a_repair_by_name_and_refuses_nonsense():
     assert repair(capped(2, 0.9), ["fill_holes"]).report[0].startswith("fill_holes closed 2 holes")
     with pytest.raises(
         InvalidParameterError,
-        match="most_edges must be at least 3, the sides of a triangle; it is 2",
+        match="most_edges must be at least 3, the edges of a triangle; it is 2",
     ):
         fill_holes(icosphere(1), most_edges=2)
 

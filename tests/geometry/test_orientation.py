@@ -128,7 +128,7 @@ def test_faces_that_disagree_have_no_outside():
         surface_patches,
     ):
         with pytest.raises(
-            InvalidShapeError, match=r"Faces must be turned one way; .* Try repair\(mesh,"
+            InvalidShapeError, match=r"faces must be turned the same way; .* Try repair\(mesh,"
         ):
             needs(ball)
         needs(repair(ball, ["auto"]).mesh)

@@ -154,11 +154,11 @@ def test_what_hides_a_shape_has_one_remedy(name):
     "name", ["describe by patches", "surface_patches", "find_parts", "transfer_labels"]
 )
 def test_what_looks_from_outside_needs_an_orientation(name):
-    require_remedy(DESCRIBERS[name], flipped(BALL, rng()), "Faces must be turned one way; ")
+    require_remedy(DESCRIBERS[name], flipped(BALL, rng()), "faces must be turned the same way; ")
     require_remedy(
         lambda mesh: curvature_tensors(mesh, 1.0),
         flipped(BALL, rng()),
-        "Faces must be turned one way; ",
+        "faces must be turned the same way; ",
     )
 
 

@@ -286,7 +286,7 @@ def test_two_fans_at_a_vertex_are_refused():
 def test_faces_turned_against_each_other_are_refused():
     points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]
     with pytest.raises(
-        InvalidShapeError, match=r"turned one way; the two at edge \(1, 2\) are turned against"
+        InvalidShapeError, match=r"turned the same way; the two at edge \(1, 2\) are turned against"
     ):
         connection_laplacian(TriangleMesh(points, [[0, 1, 2], [1, 2, 3]]))
 

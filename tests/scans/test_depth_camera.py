@@ -154,17 +154,17 @@ def test_scans_stand_where_the_shape_stands():
     [
         ({"resolution": 8}, r"resolution must lie in 16..4096; it is 8"),
         ({"n_holes": -1}, r"n_holes must lie in 0..1000; it is -1"),
-        ({"distance": 0.5}, r"distance must be more than half a diagonal, and finite; it is 0.5"),
+        ({"distance": 0.5}, r"distance must be finite and more than 0.5 diagonals; it is 0.5"),
         (
             {"distance": np.inf},
-            r"distance must be more than half a diagonal, and finite; it is inf",
+            r"distance must be finite and more than 0.5 diagonals; it is inf",
         ),
         ({"noise": -0.1}, r"noise must lie in 0..1 diagonals; it is -0.1"),
         (
             {"dropout_angle": 85.0},
-            r"dropout_angle must lie in 0..85 degrees, 85 excluded; it is 85.0",
+            r"dropout_angle must be at least 0 and less than 85 degrees; it is 85.0",
         ),
-        ({"dropout": 1.0}, r"dropout must lie in 0..1, 1 excluded; it is 1.0"),
+        ({"dropout": 1.0}, r"dropout must be at least 0 and less than 1; it is 1.0"),
     ],
 )
 def test_cameras_out_of_range_are_refused(changes, message):
@@ -175,14 +175,15 @@ def test_cameras_out_of_range_are_refused(changes, message):
 def test_what_cannot_be_scanned_is_refused():
     point = TriangleMesh(np.ones((3, 3)), [[0, 1, 2]])
     with pytest.raises(
-        InvalidShapeError, match=r"must have a size to be scanned; all its vertices are equal"
+        InvalidShapeError,
+        match=r"must have a size above zero to be scanned; all its vertices are equal",
     ):
         scanned(point, PERFECT)
     with pytest.raises(
-        InvalidShapeError, match=r"No three neighbouring pixels see one surface from there"
+        InvalidShapeError, match=r"no three neighboring pixels see one surface from this view"
     ):
         scanned(grid(4, 4), PERFECT, view=[0, 1.0, 0])
     with pytest.raises(
-        InvalidParameterError, match=r"view must be three finite numbers, not all zero"
+        InvalidParameterError, match=r"view must be three finite numbers that are not all zero"
     ):
         scanned(BALL, PERFECT, view=[0, 0, 0])

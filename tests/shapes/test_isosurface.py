@@ -35,7 +35,7 @@ def test_a_torus_has_its_hole():
 
 def test_a_surface_in_two_parts_is_refused():
     with pytest.raises(
-        InvalidShapeError, match=r"smooth at the size of the grid; at spacing 0\.25 it is not"
+        InvalidShapeError, match=r"smooth at the spacing of the grid; at spacing 0\.25 it is not"
     ):
         isosurface(two_balls, -np.ones(3), np.array([5.0, 1, 1]), 0.25)
 

@@ -81,7 +81,7 @@ def test_a_union_keeps_every_coordinate():
             lambda: torus(5, 5, inner=np.nan),
             r"outer and inner must be positive and finite; entry 1 is nan",
         ),
-        (disjoint_union, "disjoint_union must be given a mesh; it was given none"),
+        (disjoint_union, "disjoint_union must be given at least one mesh; it was given none"),
     ],
 )
 def test_sizes_out_of_range_are_refused(make, match):
