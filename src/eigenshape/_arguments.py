@@ -119,7 +119,7 @@ def describe_kind(kind: type | UnionType) -> str:
 
 
 def describe_value(value: object) -> str:
-    """Return the type of a value with its article, and the value itself if it is text or a number."""
+    """Return the type of a value with its article, and a text or number itself."""
     if value is None:
         return "None"
     name = type(value).__name__

@@ -15,8 +15,8 @@ from eigenshape._typing import ArrayLike
 SINGULAR = {"vertices": "vertex", "faces": "face", "points": "point", "simplices": "simplex"}
 INDEXED = {"faces": "vertices", "simplices": "points"}
 
-# Share of the memory of the machine that one array may take while it is checked and copied. A larger
-# share would leave too little for the computation.
+# Share of the memory of the machine that one array may take while it is checked and copied. A
+# larger share would leave too little for the computation.
 SHARE_OF_ARRAYS = 0.5
 BYTES_OF_ENTRY = 17  # memory per entry meanwhile: two copies of 8 bytes and one bool
 

@@ -111,7 +111,7 @@ def test_rows_of_four_indices_must_be_said_to_be_tetrahedra_or_quads():
         match=r"cells must be given for rows of four indices; .*cells='tetrahedra'\) or",
     ):
         from_arrays(SQUARE, [[0, 1, 2, 3]])
-    with pytest.raises(InvalidParameterError, match="Rows of four indices are tetrahedra or quads"):
+    with pytest.raises(InvalidParameterError, match="cells must be given for rows of four"):
         as_mesh((SQUARE, [[0, 1, 2, 3]]))
     quads = from_arrays(SQUARE, [[0, 1, 2, 3]], cells="quads")
     assert isinstance(quads, TriangleMesh)

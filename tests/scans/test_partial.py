@@ -105,7 +105,7 @@ def test_no_whole_face_visible_is_refused():
     blades = TriangleMesh(corners.reshape(9, 3), np.arange(9).reshape(3, 3))
     for all_pieces in (False, True):
         with pytest.raises(
-            InvalidShapeError, match=r"A part must have a face\. No face is visible as a whole"
+            InvalidShapeError, match=r"A part must have a face\. No face is visible as a whole from"
         ):
             partial_scan(blades, [0, 0, 1], all_pieces=all_pieces)
     assert partial_scan(blades, [0, 0, -1], all_pieces=True).mesh.n_faces >= 1

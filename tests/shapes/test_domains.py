@@ -178,6 +178,7 @@ def test_what_cannot_be_is_refused():
     ):
         sphere_hull([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
     with pytest.raises(
-        InvalidShapeError, match=r"must lie on their hull; point 4 is \[0\.0, 0\.0\] \(1 such\)"
+        InvalidShapeError,
+        match=r"must lie on their hull; point 4 at \[0\.0, 0\.0\] does not \(1 such\)",
     ):
         sphere_hull([[1.0, 0], [0, 1], [-1, 0], [0, -1], [0, 0]])

@@ -111,7 +111,7 @@ def as_mesh(value: object, name: str = "mesh") -> TriangleMesh:
         return shape
     if isinstance(shape, SimplicialMesh) and (shape.dim, shape.points.shape[1]) == (2, 3):
         return TriangleMesh(shape.points, shape.simplices)
-    raise _refused(value, shape, f"{name} must be a triangle mesh", "read_mesh")
+    raise _conversion_error(value, shape, f"{name} must be a triangle mesh", "read_mesh")
 
 
 def as_simplicial(value: object, name: str = "mesh") -> Mesh:
@@ -127,7 +127,7 @@ def as_simplicial(value: object, name: str = "mesh") -> Mesh:
     shape = _converted(value)
     if isinstance(shape, TriangleMesh | SimplicialMesh):
         return shape
-    raise _refused(value, shape, f"{name} must be a mesh", "read_shape")
+    raise _conversion_error(value, shape, f"{name} must be a mesh", "read_shape")
 
 
 def as_shape(value: object, name: str = "shape") -> Shape:
@@ -164,7 +164,7 @@ def as_shape(value: object, name: str = "shape") -> Shape:
     shape = _converted(value)
     if shape is not None:
         return shape
-    raise _refused(value, None, f"{name} must be a mesh or a point cloud", "read_shape")
+    raise _conversion_error(value, None, f"{name} must be a mesh or a point cloud", "read_shape")
 
 
 def _converted(value: object) -> Shape | None:
@@ -180,7 +180,9 @@ def _converted(value: object) -> Shape | None:
     return None
 
 
-def _refused(value: object, shape: Shape | None, needed: str, reader: str) -> InvalidParameterError:
+def _conversion_error(
+    value: object, shape: Shape | None, needed: str, reader: str
+) -> InvalidParameterError:
     """Return the error that names a value, the shape it was taken for, and what to pass instead."""
     given = describe_value(value)
     if shape is not None and shape is not value:

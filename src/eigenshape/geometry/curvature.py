@@ -34,7 +34,7 @@ def angle_defects(mesh: TriangleMesh) -> Float[np.ndarray, " n"]:
 
 
 def gaussian_curvature(mesh: MeshLike) -> Float[np.ndarray, " n"]:
-    """Compute the Gaussian curvature at each vertex: the angle defect divided by the area around it.
+    """Compute the Gaussian curvature at each vertex: its angle defect divided by its area.
 
     K_i / A_i with A_i a third of the area of the faces at the vertex (Meyer, Desbrun, Schröder and
     Barr 2003, with that area).

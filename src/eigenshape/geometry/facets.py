@@ -1,4 +1,4 @@
-"""The facets of a mesh: the sides of its simplices, of one dimension less, and the parts that they connect."""
+"""The facets of a mesh, and the components that are connected through facets."""
 
 from dataclasses import dataclass
 

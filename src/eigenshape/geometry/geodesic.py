@@ -294,13 +294,12 @@ def _fans(
     """
     turns = [np.roll(np.arange(3), -turn) for turn in range(3)]
     triples = np.concatenate([mesh.simplices[:, turn] for turn in turns])
-    lengths = np.concatenate([_lengths(corners[:, turn]) for turn in turns])
+    lengths = []
+    for turn in turns:
+        a, b, c = corners[:, turn].transpose(1, 0, 2)
+        sides = [np.linalg.norm(side, axis=1) for side in (b - a, c - a, c - b)]
+        lengths.append(np.column_stack(sides))
     order = np.argsort(triples[:, 0], kind="stable")
     starts = np.searchsorted(triples[order, 0], np.arange(mesh.n_points + 1))
     one, two = (np.ascontiguousarray(triples[order, place]) for place in (1, 2))
-    return starts, (one, two), lengths[order]
-
-
-def _lengths(corners: Float[np.ndarray, "f 3 d"]) -> Float[np.ndarray, "f 3"]:
-    a, b, c = corners.transpose(1, 0, 2)
-    return np.column_stack([np.linalg.norm(side, axis=1) for side in (b - a, c - a, c - b)])
+    return starts, (one, two), np.concatenate(lengths)[order]

@@ -59,7 +59,8 @@ class TriangleMesh:
         corners = index_rows(faces, "faces", 3, len(points))
         if not len(corners):
             raise InvalidShapeError(
-                f"A mesh must have faces; it has {len(points)} vertices and no face."
+                f"A mesh must have faces; it has {len(points)} vertices and no face. "
+                "Use PointCloud for points without faces."
             )
         object.__setattr__(self, "vertices", frozen(points))
         object.__setattr__(self, "faces", frozen(corners))

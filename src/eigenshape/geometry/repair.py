@@ -38,9 +38,9 @@ MeshT = TypeVar("MeshT", bound=Mesh)
 LARGEST_SPECK = 0.01  # a component other than the largest
 ALL_SPECKS = 0.2  # all these components together
 LARGEST_HOLE = 0.05  # a hole; for comparison, the open side of half a ball has 0.5
-# A face is a needle if one of its sides is shorter than this share of another. Cotangents of 1e6 are
-# the largest that solvers handled beside ordinary ones in every mesh that was tried; with 1e9 they
-# lost the eigenvalue 0 in meshes of many parts.
+# A face is a needle if one of its sides is shorter than this share of another. Cotangents of 1e6
+# are the largest that solvers handled beside ordinary ones in every mesh that was tried; with 1e9
+# they lost the eigenvalue 0 in meshes of many parts.
 NEEDLE = 1e-6
 
 
@@ -137,8 +137,8 @@ def weld(mesh: MeshLike, *, tolerance: float = 0.0) -> RepairedMesh[Any]:
 def weld_seams(mesh: MeshLike) -> RepairedMesh[Any]:
     """Join boundary edges that lie on each other, such as the seams of a surface that was cut open.
 
-    This also connects a soup of separate triangles. Pieces that touch without such a seam, as closed
-    pieces do, stay apart. Only edges on the boundary change: they get two faces or more.
+    This also connects a soup of separate triangles. Pieces that touch without such a seam, as
+    closed pieces do, stay apart. Only edges on the boundary change: they get two faces or more.
 
     Parameters
     ----------
@@ -527,7 +527,8 @@ def drop_duplicate_points(cloud: PointCloud) -> RepairedCloud:
     require_type(cloud, PointCloud, "cloud")
     _, source = np.unique(_place_numbers(cloud.points), return_index=True)
     source = np.sort(source)
-    report = f"drop_duplicate_points removed {_count(cloud.n_points - len(source), 'point')} at the places of others"
+    removed = _count(cloud.n_points - len(source), "point")
+    report = f"drop_duplicate_points removed {removed} at the places of others"
     return RepairedCloud(PointCloud(cloud.points[source], cloud.dim), (report,), source)
 
 
@@ -624,9 +625,11 @@ def repair(shape: ShapeLike, names: Sequence[str]) -> RepairedMesh[Any] | Repair
     --------
     >>> import eigenshape as es
     >>> ball = es.icosphere(1)
-    >>> twice = es.TriangleMesh(ball.vertices, [*ball.faces[:, ::-1], ball.faces[3]])
-    >>> es.repair(twice, ["auto"]).report
-    ('drop_duplicate_faces removed 1 faces that repeat an earlier one', 'orient turned 80 faces over')
+    >>> inverted = es.TriangleMesh(ball.vertices, [*ball.faces[:, ::-1], ball.faces[3]])
+    >>> for sentence in es.repair(inverted, ["auto"]).report:
+    ...     print(sentence)
+    drop_duplicate_faces removed 1 faces that repeat an earlier one
+    orient turned 80 faces over
     """
     shape = as_shape(shape)
     known = names_of_repairs(shape)
@@ -706,7 +709,9 @@ def _until_sound(mesh: MeshT, names: Sequence[str]) -> tuple[RepairedMesh[MeshT]
             if name not in known or (name in CONDITIONS and not CONDITIONS[name](done.mesh)):
                 continue
             step = REPAIRS[name](done.mesh)
-            if not _same(done.mesh, step.mesh):
+            before, after = done.mesh, step.mesh
+            same_points = before.n_points == after.n_points
+            if not (same_points and np.array_equal(before.simplices, after.simplices)):
                 done = _combine(done, step)
                 applied.append(name)
     return done, tuple(applied)
@@ -720,10 +725,6 @@ def _combine(done: RepairedMesh[MeshT], step: RepairedMesh[MeshT]) -> RepairedMe
     return RepairedMesh(
         step.mesh, done.report + step.report, done.source_vertices[step.source_vertices]
     )
-
-
-def _same(one: MeshT, two: MeshT) -> bool:
-    return one.n_points == two.n_points and np.array_equal(one.simplices, two.simplices)
 
 
 def has_specks(mesh: TriangleMesh) -> bool:

@@ -107,7 +107,10 @@ def require_oriented(mesh: TriangleMesh) -> None:
     remedy = try_auto()
     if not orientable.all():
         one_sided = int(np.argmin(orientable))
-        remedy = f"No repair helps: the piece of face {one_sided} has one side only, like a Möbius strip."
+        remedy = (
+            f"No repair helps: the piece of face {one_sided} has one side only, "
+            "like a Möbius strip."
+        )
     raise InvalidShapeError(
         "Neighboring faces must be turned the same way; "
         f"the two at edge ({edges[0, 0]}, {edges[0, 1]}) are turned against each other "

@@ -206,7 +206,7 @@ def mean_side_length(mesh: MeshLike) -> float:
 
 
 def degenerate_simplices(mesh: Mesh) -> Int[np.ndarray, " k"]:
-    """Return the degenerate simplices: at most 1e-14 of the volume of a cube on the longest side."""
+    """Return the simplices with at most 1e-14 of the volume of a cube on their longest side."""
     corners, _ = scaled_corners(mesh)
     longest = np.zeros(len(corners))
     for first, second in combinations(range(corners.shape[1]), 2):

@@ -321,7 +321,7 @@ def non_manifold_vertices(mesh: TriangleMesh) -> Int[np.ndarray, " k"]:
 
 
 def _corner_fans(mesh: TriangleMesh) -> tuple[Int[np.ndarray, " c"], Int[np.ndarray, " k"]]:
-    """Group the corners of the faces into fans; return the fan of each corner, the vertex of each fan.
+    """Group the corners of faces into fans; return the fan of each corner, and each fan's vertex.
 
     A fan consists of faces at one vertex that are connected through edges at that vertex.
     """
@@ -347,7 +347,10 @@ def _corner_fans(mesh: TriangleMesh) -> tuple[Int[np.ndarray, " c"], Int[np.ndar
 
 
 def inconsistent_edges(mesh: TriangleMesh) -> Int[np.ndarray, "k 2"]:
-    """Return the edges that two faces traverse in the same direction: one of them is turned over."""
+    """Return the edges that two faces traverse in the same direction.
+
+    One of the two faces is turned over.
+    """
     sides = half_edges(mesh)
     directed = np.sort(sides[:, 0] * mesh.n_vertices + sides[:, 1])
     # The usual case; this check takes a third of the time of an edge table.
@@ -438,8 +441,8 @@ def euler_characteristic(mesh: MeshLike) -> int:
     Examples
     --------
     >>> import eigenshape as es
-    >>> es.geometry.euler_characteristic(es.icosphere(1)), es.geometry.euler_characteristic(es.shapes.torus())
-    (2, 0)
+    >>> [es.geometry.euler_characteristic(mesh) for mesh in (es.icosphere(1), es.shapes.torus())]
+    [2, 0]
     """
     mesh = as_mesh(mesh)
     n_used = mesh.n_vertices - len(unreferenced_vertices(mesh))

@@ -18,8 +18,8 @@ from eigenshape.geometry.topology import submesh
 from eigenshape.scans.partial import rotation_towards, unit_direction
 from eigenshape.scans.raster import rasterize
 
-# The noise grows with the slant θ by this number times (θ / (π/2 - θ))², relative to the noise at θ = 0
-# (Nguyen, Izadi and Lovell 2012, equation 3, at 1.5 m).
+# The noise grows with the slant θ by this number times (θ / (π/2 - θ))², relative to the noise at θ
+# = 0 (Nguyen, Izadi and Lovell 2012, equation 3, at 1.5 m).
 SLANT_NOISE = 0.025
 LARGEST_SLANT_NOISE = 20.0  # upper bound of that growth, which is infinite at θ = π/2
 FULL_DROPOUT = np.deg2rad(85.0)  # slant from which no depth is measured
@@ -201,7 +201,8 @@ def _require_in_range(camera: DepthCamera) -> DepthCamera:
         raise InvalidParameterError(f"noise must lie in 0..1 diagonals; it is {camera.noise}.")
     if not 0 <= camera.dropout_angle < np.rad2deg(FULL_DROPOUT):
         raise InvalidParameterError(
-            f"dropout_angle must be at least 0 and less than 85 degrees; it is {camera.dropout_angle}."
+            "dropout_angle must be at least 0 and less than 85 degrees; "
+            f"it is {camera.dropout_angle}."
         )
     if not 0 <= camera.dropout < 1:
         raise InvalidParameterError(

@@ -17,11 +17,11 @@ from eigenshape.geometry.repair import faces_of_largest
 from eigenshape.geometry.topology import consistently_oriented, is_closed, submesh
 from eigenshape.scans.raster import rasterize
 
-# A vertex may be this many pixels away from the middle of the pixel in which the surface was seen, so
-# it may lie deeper than that surface by SLACK times (1 + slope).
+# A vertex may be this many pixels away from the middle of the pixel in which the surface was seen,
+# so it may lie deeper than that surface by SLACK times (1 + slope).
 SLACK = 1.5
-# Slopes are limited to this value. A larger one would keep vertices seen from their edge that another
-# part of the surface hides.
+# Slopes are limited to this value. A larger one would keep vertices seen from their edge that
+# another part of the surface hides.
 STEEPEST = 10.0
 
 
@@ -106,7 +106,7 @@ def partial_scan(
     keep = visible[mesh.faces].all(axis=1)
     if keep.any() and not all_pieces:
         keep[keep] = faces_of_largest(TriangleMesh(mesh.vertices, mesh.faces[keep]))
-    return _part(mesh, keep, "No face is visible from this direction.")
+    return _part(mesh, keep, "No face is visible as a whole from this direction.")
 
 
 def viewpoint(number: int) -> Float[np.ndarray, "3"]:

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-# Pairs of a face and a pixel in its bounding box that are tested at a time; a pair takes about 100 bytes.
+# Pairs of a face and a pixel in its bounding box that are tested at a time; a pair takes about 100
+# bytes.
 CANDIDATES_AT_ONCE = 2_000_000
 # Twice the area, in square pixels, up to which a face is seen from its edge and covers no pixel.
 THINNEST = 1e-12
-# Pixels this far outside a face, in barycentric coordinates, count as inside, so that rounding leaves
-# no gap between two faces.
+# Pixels this far outside a face, in barycentric coordinates, count as inside, so that rounding
+# leaves no gap between two faces.
 EDGE_SLACK = 1e-9
 
 
@@ -63,8 +64,8 @@ def rasterize(
         height_there = np.einsum("ij,ij->i", inside, corners[index, :, 2])
         before = depth[pixel]
         np.maximum.at(depth, pixel, height_there)
-        # Of faces at equal height the one with the lowest index must win: faces of earlier chunks are
-        # not overwritten, and within a chunk faces are written in reverse order.
+        # Of faces at equal height the one with the lowest index must win: faces of earlier chunks
+        # are not overwritten, and within a chunk faces are written in reverse order.
         nearest = np.flatnonzero((height_there == depth[pixel]) & (height_there > before))[::-1]
         face[pixel[nearest]] = index[nearest]
         weights[pixel[nearest]] = inside[nearest]
@@ -125,7 +126,10 @@ def _covered(
 def _weight_planes(
     corners: Float[np.ndarray, "k 3 3"], left: Int[np.ndarray, " k"], top: Int[np.ndarray, " k"]
 ) -> tuple[Float[np.ndarray, "k 2"], Float[np.ndarray, "k 2"], Float[np.ndarray, "k 2"]]:
-    """Return the weights of corners 1 and 2 at the first pixel, and their change per column and row."""
+    """Return the weights of corners 1 and 2 at the first pixel, and their change per pixel.
+
+    The second result is the change per column, the third the change per row.
+    """
     origin, one, two = corners[:, :, :2].transpose(1, 0, 2)
     to_one, to_two = one - origin, two - origin
     here = np.column_stack([left + 0.5, top + 0.5]) - origin

@@ -22,7 +22,8 @@ SURPLUS = 1.06
 # Standard deviation of a bend along the skin, in radii of the limb. Smaller values fold the skin at
 # joints, larger ones bend whole limbs.
 SOFTNESS = 2.2
-# Order of the axes that turns plans, which face +x and stand along +z, to face +z and stand along +y.
+# Order of the axes that turns plans, which face +x and stand along +z, to face +z and stand along
+# +y.
 TO_Y_UP = [1, 2, 0]
 
 
@@ -31,8 +32,8 @@ def make_creature(
 ) -> TriangleMesh:
     """Make a synthetic creature in a random pose.
 
-    The mesh is a closed, connected manifold that faces outward. Poses are nearly isometric: the skin
-    of the rest pose bends around joints, and most lengths change by a few percent at most.
+    The mesh is a closed, connected manifold that faces outward. Poses are nearly isometric: the
+    skin of the rest pose bends around joints, and most lengths change by a few percent at most.
 
     Parameters
     ----------
@@ -73,7 +74,7 @@ def make_creature(
         raise InvalidParameterError(f"kind must be one of {', '.join(CREATURES)}; it is {kind!r}.")
     seed = whole_number(pose, "pose", 0, 2**32 - 1)
     about = whole_number(n_vertices, "n_vertices", 500, 100_000)
-    rest, joints = _at_rest(kind, about, whole_number(individual, "individual", 0, 2**32 - 1))
+    rest, joints = _rest_pose(kind, about, whole_number(individual, "individual", 0, 2**32 - 1))
     points = rest.vertices
     if seed:
         points = bend_at_joints(points, joints, _angles(joints, [seed, CREATURES.index(kind)]))
@@ -81,14 +82,14 @@ def make_creature(
 
 
 @lru_cache(maxsize=32)
-def _at_rest(kind: str, n_vertices: int, individual: int) -> tuple[TriangleMesh, Joints]:
+def _rest_pose(kind: str, n_vertices: int, individual: int) -> tuple[TriangleMesh, Joints]:
     body = place_limbs(PLANS[kind], individual)
     mesh = _skin(body, n_vertices)
     return mesh, _joints(mesh, body)
 
 
 def _skin(body: Body, n_vertices: int) -> TriangleMesh:
-    """Mesh the skin on a grid fine enough for the thinnest limb, then collapse the shortest edges."""
+    """Mesh the skin on a grid fine enough for the thinnest limb, then remove surplus vertices."""
 
     def field(points: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, " p"]:
         return distance_to_body(points, body)
@@ -105,7 +106,7 @@ def _joints(mesh: TriangleMesh, body: Body) -> Joints:
     rows, beyond, widths = [], [], []
     for number in range(len(body.limbs) - 1, -1, -1):
         limb = body.limbs[number]
-        along = np.where(owner == number, place, body.hangs_at(number)[owner])
+        along = np.where(owner == number, place, body.attachment_nodes(number)[owner])
         for node, axis, low, high in sorted(
             limb.swings, key=lambda swing: -abs(swing[0] - limb.hub)
         ):

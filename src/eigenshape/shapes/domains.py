@@ -124,15 +124,13 @@ def disc(n_rings: SupportsIndex = 10, radius: float = 1.0) -> TriangleMesh:
     """
     count = whole_number(n_rings, "n_rings", 1, 1000)
     positive_values(radius, "radius")
-    rings = [_ring(j, j / count * radius) for j in range(1, count + 1)]
-    flat = np.concatenate([np.zeros((1, 2)), *rings])
+    rings = [np.zeros((1, 2))]
+    for j in range(1, count + 1):
+        angles = 2 * np.pi * np.arange(6 * j) / (6 * j)
+        rings.append(j / count * radius * np.column_stack([np.cos(angles), np.sin(angles)]))
+    flat = np.concatenate(rings)
     faces = [_band(j) for j in range(1, count + 1)]
     return TriangleMesh(np.pad(flat, ((0, 0), (0, 1))), np.concatenate(faces))
-
-
-def _ring(j: int, radius: float) -> np.ndarray:
-    angles = 2 * np.pi * np.arange(6 * j) / (6 * j)
-    return radius * np.column_stack([np.cos(angles), np.sin(angles)])
 
 
 def _band(j: int) -> np.ndarray:

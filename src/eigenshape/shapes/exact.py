@@ -16,8 +16,8 @@ from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.boundary import Condition
 
-# Nodes of the Gauss rule of `sphere_functional_eigenvalues`: enough for harmonics of degree 300 over
-# the whole sphere.
+# Nodes of the Gauss rule of `sphere_functional_eigenvalues`: enough for harmonics of degree 300
+# over the whole sphere.
 N_GAUSS_NODES = 600
 # The integral of exp(-u) ends here: exp(-60) is 1e-26, far below rounding.
 NEGLIGIBLE_EXPONENT = 60.0

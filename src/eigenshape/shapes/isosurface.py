@@ -12,8 +12,8 @@ from eigenshape.geometry.topology import edge_table, is_closed, is_manifold, ver
 
 Field = Callable[[Float[np.ndarray, "p 3"]], Float[np.ndarray, " p"]]
 
-# The quads are split into triangles N_STAGES times anew, with N_ROUNDS of smoothing along the surface
-# before each. More of either makes triangles a little more even and takes longer.
+# The quads are split into triangles N_STAGES times anew, with N_ROUNDS of smoothing along the
+# surface before each. More of either makes triangles a little more even and takes longer.
 N_STAGES = 3
 N_ROUNDS = 5
 SMOOTHING_STEP = 0.6  # share of the way to the mean of its neighbors that a vertex moves in a round
@@ -23,8 +23,8 @@ BLOCK = 3
 STEEPEST = 1.3  # largest slope of a field that is approximately a distance
 POINTS_AT_ONCE = 1 << 16  # points at which a field is evaluated at a time, to bound memory
 CLOSE_ENOUGH = 0.04  # relative error of the number of vertices that `find_spacing` accepts
-# Offsets of the grid relative to the surface, in cells: a sequence without symmetric positions. Sheets
-# that meet in one cell of a grid are apart in another grid.
+# Offsets of the grid relative to the surface, in cells: a sequence without symmetric positions.
+# Sheets that meet in one cell of a grid are apart in another grid.
 OFFSETS = np.array([[0.5, 0.5, 0.5]]) + np.arange(12)[:, None] * np.array(
     [[0.7548777, 0.5698403, 0.3247180]]
 )

@@ -9,8 +9,9 @@ from scipy.interpolate import CubicHermiteSpline
 
 from eigenshape.shapes.creature_plans import Limb, Swing
 
-# Limbs are blended where the difference of their distances is below this length (a creature is about
-# two units long). A larger value makes joints thicker and fuses limbs that are near each other.
+# Limbs are blended where the difference of their distances is below this length (a creature is
+# about two units long). A larger value makes joints thicker and fuses limbs that are near each
+# other.
 BLEND = 0.1
 PIECES_PER_SEGMENT = 4  # straight pieces between two nodes of a limb; more are smoother and slower
 TINY_SIZE = 1e-12  # lower bound of a size that is divided by
@@ -53,7 +54,7 @@ class Body:
         """Smallest radius of a limb, along the axis in which it is thinnest."""
         return float(min(limb.nodes[:, 3].min() * limb.squash.min() for limb in self.limbs))
 
-    def hangs_at(self, ancestor: int) -> Float[np.ndarray, " l"]:
+    def attachment_nodes(self, ancestor: int) -> Float[np.ndarray, " l"]:
         """Return the node of limb `ancestor` at which each limb is attached, directly or not.
 
         NaN for limbs that are not attached to it.
@@ -85,7 +86,9 @@ def place_limbs(plan: Sequence[Limb], individual: int = 0) -> Body:
             # A limb attached to a wider one starts farther from its middle.
             arm = start - drawn[parent].nodes[int(node)][:3]
             start = placed[numbers[parent]].nodes[int(node), :3] + growth[_group(parent)][1] * arm
-        nodes = _grown(nodes, start, *growth[_group(name)])
+        longer, wider = growth[_group(name)]
+        lengthened = start + longer * (nodes[:, :3] - nodes[0, :3])
+        nodes = np.column_stack([lengthened, wider * nodes[:, 3]])
         placed.append(_place(limb, nodes, numbers.get(parent, -1), int(node or 0)))
     return Body(tuple(placed))
 
@@ -122,12 +125,6 @@ def _mirrored(limb: Limb, side: int) -> Limb:
         (node, (side * x, y, side * z), low, high) for node, (x, y, z), low, high in limb.swings
     )
     return limb._replace(parent=_sided(limb.parent, side), nodes=nodes, swings=swings)
-
-
-def _grown(
-    nodes: Float[np.ndarray, "k 4"], start: Float[np.ndarray, "3"], longer: float, wider: float
-) -> Float[np.ndarray, "k 4"]:
-    return np.column_stack([start + longer * (nodes[:, :3] - nodes[0, :3]), wider * nodes[:, 3]])
 
 
 def _place(
@@ -209,7 +206,8 @@ def _nearest_piece(
 def _products(
     one: Float[np.ndarray, "p 3"], two: Float[np.ndarray, "s 3"]
 ) -> Float[np.ndarray, "p s"]:
-    # A matrix product by BLAS may change its last digits with the number of threads; einsum does not.
+    # A matrix product by BLAS may change its last digits with the number of threads; einsum does
+    # not.
     return np.einsum("pi,si->ps", one, two)
 
 

@@ -11,8 +11,8 @@ from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
 
-# Implicit diffusion steps of the narrowest bend; wider bends take more steps of the same length. Three
-# steps are close to a Gaussian profile.
+# Implicit diffusion steps of the narrowest bend; wider bends take more steps of the same length.
+# Three steps are close to a Gaussian profile.
 STEPS = 3
 
 
@@ -50,8 +50,8 @@ def diffuse(
     links = sp.coo_array((np.ones(len(edges)), (one, two)), shape=(mesh.n_vertices,) * 2)
     links = links + links.T
     step = widths.min() ** 2 / STEPS
-    # With six neighbors at equal distance the sum of differences is 3/2 length² times the Laplacian,
-    # and the variance of diffused heat is twice the time.
+    # With six neighbors at equal distance the sum of differences is 3/2 length² times the
+    # Laplacian, and the variance of diffused heat is twice the time.
     pencil = sp.eye_array(mesh.n_vertices) + step / (3 * length2) * (
         sp.diags_array(links.sum(axis=1)) - links
     )

@@ -48,7 +48,7 @@ def fibonacci_sphere(n: SupportsIndex = 1000) -> TriangleMesh:
     TriangleMesh(100 vertices, 196 faces)
     """
     count = whole_number(n, "n", 6, MOST_POINTS)
-    return _outward(_spiral(1 - 2 * (np.arange(count) + 0.5) / count))
+    return _outward_hull(_spiral(1 - 2 * (np.arange(count) + 0.5) / count))
 
 
 def random_sphere(n: SupportsIndex = 1000, *, rng: np.random.Generator) -> TriangleMesh:
@@ -84,7 +84,8 @@ def random_sphere(n: SupportsIndex = 1000, *, rng: np.random.Generator) -> Trian
     """
     require_type(rng, np.random.Generator, "rng")
     count = whole_number(n, "n", 20, MOST_POINTS)
-    return _outward(_unit(rng.standard_normal((count, 3))))
+    directions = rng.standard_normal((count, 3))
+    return _outward_hull(directions / np.linalg.norm(directions, axis=1, keepdims=True))
 
 
 def graded_sphere(n: SupportsIndex = 1000, *, ratio: float = 4.0) -> TriangleMesh:
@@ -123,14 +124,14 @@ def graded_sphere(n: SupportsIndex = 1000, *, ratio: float = 4.0) -> TriangleMes
     count = whole_number(n, "n", 6, MOST_POINTS)
     if not 1 <= ratio < 1e6:
         raise InvalidParameterError(f"ratio must lie in 1..1e6; it is {ratio}.")
-    # The density (1 + s z) / 2 has the distribution function ((1 + z) - s (1 - z²) / 2) / 2. Heights
-    # are found by inverting this quadratic.
+    # The density (1 + s z) / 2 has the distribution function ((1 + z) - s (1 - z²) / 2) / 2.
+    # Heights are found by inverting this quadratic.
     slope = (ratio - 1) / (ratio + 1)
     share = (np.arange(count) + 0.5) / count
     if slope == 0:
-        return _outward(_spiral(2 * share - 1))
+        return _outward_hull(_spiral(2 * share - 1))
     root = np.sqrt(1 - slope * (2 - slope - 4 * share))
-    return _outward(_spiral(np.clip((root - 1) / slope, -1, 1)))
+    return _outward_hull(_spiral(np.clip((root - 1) / slope, -1, 1)))
 
 
 def _spiral(heights: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
@@ -139,7 +140,7 @@ def _spiral(heights: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
     return np.column_stack([rings * np.cos(angles), rings * np.sin(angles), heights])
 
 
-def _outward(points: Float[np.ndarray, "n 3"]) -> TriangleMesh:
+def _outward_hull(points: Float[np.ndarray, "n 3"]) -> TriangleMesh:
     faces = sphere_hull(points).simplices.copy()
     # The mean of the points is inside their hull; for few points the origin may be outside.
     inside = points.mean(axis=0)
@@ -237,10 +238,6 @@ def sphere_hull(points: ArrayLike) -> SimplicialMesh:
             f"{rows[inside[0]].tolist()} does not ({inside.size} such). Remove duplicate points."
         )
     return SimplicialMesh(rows, hull.simplices)
-
-
-def _unit(vectors: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "n d"]:
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
 def projective_plane(level: SupportsIndex = 3) -> SimplicialMesh:
