@@ -37,8 +37,8 @@ def self_intersections(mesh: MeshLike) -> Int[np.ndarray, "p 2"]:
     Notes
     -----
     - Two faces at one edge cross if one is folded flat onto the other. Two faces at one vertex
-      cross if the side opposite to the vertex goes through the other face, or if both lie folded in one
-      plane.
+      cross if the side opposite to the vertex goes through the other face, or if both lie folded
+      in one plane.
     - Only positions count, not the indices of vertices, so a mesh has the same pairs before and
       after `weld`. Two sheets that go through each other exactly along edges of both have no
       crossing pair; after `weld` such edges are not manifold.
