@@ -18,8 +18,9 @@ from eigenshape.deformation.rigidity import (
 from eigenshape.deformation.rigidity_loops import fit_rotations, turned_edges
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
+from eigenshape.shapes.surfaces import grid, icosphere
 
 RNG = np.random.default_rng(0)
 

@@ -8,11 +8,12 @@ from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.measure import surface_area, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import boundary_vertices
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.operators.connection import connection_laplacian, flattened, tangent_frames
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.directions import vertex_directions
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 from eigenshape.spectral.solve import solve_spectrum
 
 few = settings(deadline=None, max_examples=15)
@@ -285,7 +286,7 @@ def test_two_fans_at_a_vertex_are_refused():
 def test_faces_turned_against_each_other_are_refused():
     points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]
     with pytest.raises(
-        InvalidShapeError, match=r"turned one way; the two at edge \(1, 2\) are turned against"
+        InvalidShapeError, match=r"turned the same way; the two at edge \(1, 2\) are turned against"
     ):
         connection_laplacian(TriangleMesh(points, [[0, 1, 2], [1, 2, 3]]))
 

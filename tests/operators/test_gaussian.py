@@ -17,6 +17,7 @@ from eigenshape.geometry.quadrature import (
 )
 from eigenshape.geometry.simplices import dual_volumes, mean_side_length
 from eigenshape.geometry.simplicial import SimplicialMesh
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators import kernel
 from eigenshape.operators.gaussian import (
     functional_laplacian,
@@ -24,7 +25,7 @@ from eigenshape.operators.gaussian import (
     mesh_laplacian,
     quadrature_laplacian,
 )
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
+from eigenshape.shapes.surfaces import grid, icosphere
 
 
 def by_the_book(points, weights, t, dim):

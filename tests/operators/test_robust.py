@@ -14,6 +14,7 @@ from eigenshape._errors import (
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import drop_duplicate_faces
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.robust import robust_laplacian
@@ -24,7 +25,7 @@ from eigenshape.operators.tufted import (
     mollified,
     tufted_cover,
 )
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 from eigenshape.spectral.solve import solve_spectrum
 
 few = settings(deadline=None, max_examples=15)

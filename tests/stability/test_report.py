@@ -74,7 +74,7 @@ def test_a_report_can_be_read(bulged):
 
 @pytest.mark.long
 def test_other_meshes_are_matched_by_points_or_by_a_map(torus):
-    finer = es.shapes.subdivide(torus)
+    finer = es.geometry.subdivide(torus)
     found = es.compare_shapes(torus, finer, PLAN)
     assert found.closeness is None
     assert found.distance < 0.1  # edges are twice as long

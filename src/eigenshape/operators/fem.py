@@ -7,9 +7,10 @@ from jaxtyping import Float, Int
 
 from eigenshape._arrays import whole_number
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
+from eigenshape.geometry.facets import boundary_facets
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.geometry.topology import boundary_facets, require_simplices_everywhere
+from eigenshape.geometry.topology import require_simplices_everywhere
 from eigenshape.operators import elements
 from eigenshape.operators.laplacian import Laplacian
 

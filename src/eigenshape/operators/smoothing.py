@@ -8,11 +8,12 @@ from eigenshape._arrays import positive_values
 from eigenshape._errors import InvalidShapeError
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.facets import boundary_facets
 from eigenshape.geometry.measure import edge_lengths, mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import mean_side_length, size_one
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.topology import agreeing, boundary_facets, boundary_vertices, edge_table
+from eigenshape.geometry.topology import boundary_vertices, consistently_oriented, edge_table
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.sparse.elimination import analyse, factorise
@@ -45,7 +46,7 @@ def noise_level(mesh: MeshLike) -> float:
     if not inside.any():
         return 0.0
     away = links[inside] @ points / degrees[inside, None] - points[inside]
-    normals = mean_normals(agreeing(unit))[inside]  # which side is out does not matter
+    normals = mean_normals(consistently_oriented(unit))[inside]  # which side is out does not matter
     heights = np.abs(np.einsum("ni,ni->n", away, normals))
     return float(np.median(heights) / edge_lengths(unit).mean())
 

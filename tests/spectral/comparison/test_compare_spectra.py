@@ -7,8 +7,10 @@ from hypothesis import strategies as st
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.subdivision import subdivide
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.shapes.surfaces import disjoint_union, icosphere, subdivide, torus
+from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
 from eigenshape.spectral.comparison.spectra import compare_spectra, spectral_hausdorff_distance
 from eigenshape.spectral.solve import solve_spectrum

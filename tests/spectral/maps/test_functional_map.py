@@ -221,7 +221,7 @@ def test_point_maps_of_another_form_are_refused(hand):
 
 
 def test_shapes_in_pieces_are_refused(hand):
-    two = solve(es.shapes.disjoint_union(HAND, HAND), 30)
+    two = solve(es.geometry.disjoint_union(HAND, HAND), 30)
     with pytest.raises(
         es.InvalidParameterError,
         match=r"Shapes to be mapped must be connected; the target has the eigenvalues",
