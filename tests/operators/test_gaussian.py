@@ -241,7 +241,7 @@ def test_a_time_that_leaves_nothing_is_warned_of():
 
 def test_weights_of_one_over_n_are_corrected_in_the_random_walk_form_only():
     with pytest.raises(
-        InvalidParameterError, match="Weights of 1/n must be corrected in the random-walk form"
+        InvalidParameterError, match="A correction of weights 1/n needs the random-walk form"
     ):
         gaussian_laplacian(np.random.default_rng(0).random((50, 2)), 0.1, 2, correct="log")
 
