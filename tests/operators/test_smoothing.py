@@ -127,6 +127,6 @@ def test_bad_reach_and_faces_without_area_are_refused():
 def test_equations_that_cannot_be_solved_are_named(monkeypatch):
     monkeypatch.setattr("eigenshape.operators.smoothing.factorise", lambda *_: None)
     with pytest.raises(
-        InvalidShapeError, match="must have angles well above 0 for .*; some have angles so close"
+        InvalidShapeError, match=r"must have angles well above 0 for .*; some have angles so close"
     ):
         denoise(make_creature("hand", n_vertices=600), reach=1.0)
