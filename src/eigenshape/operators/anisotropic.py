@@ -14,7 +14,7 @@ from eigenshape.operators.cotangent import Mass, linear_mass, require_mass
 from eigenshape.operators.laplacian import Laplacian
 
 # Asymmetry and negative eigenvalues up to this share of the largest entry count as rounding.
-ROUNDING = 1e-12
+TENSOR_ROUNDING = 1e-12
 
 
 def anisotropic_laplacian(
@@ -72,7 +72,7 @@ def _require_tensors(mesh: Mesh, tensors: np.ndarray) -> None:
         raise InvalidParameterError(
             f"tensors must be finite; that of {noun} {bad[0]} is {tensors[bad[0]].tolist()} ({bad.size} such)."
         )
-    allowed = ROUNDING * np.abs(tensors).max(axis=(1, 2))
+    allowed = TENSOR_ROUNDING * np.abs(tensors).max(axis=(1, 2))
     bad = np.flatnonzero(np.abs(tensors - tensors.transpose(0, 2, 1)).max(axis=(1, 2)) > allowed)
     if bad.size:
         raise InvalidParameterError(

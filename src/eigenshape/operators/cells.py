@@ -18,6 +18,7 @@ from jaxtyping import Float, Int
 from eigenshape.operators import pair_loops
 
 AXES = 3  # axes that are cut into cells, those along which the points spread most
+# Cells along an axis at most: 2^60 cells have numbers that fit 64 bits.
 CELLS_PER_AXIS = 2**20
 CHUNK = 64  # cells a task
 

@@ -27,13 +27,20 @@ from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 Correction = Literal["log"]
 Form = Literal["literal", "random-walk"]
 
-EDGE_FACTOR = 2.0  # h / e
-NARROWEST = 1.0  # half of it loses half of every eigenvalue even on the most regular points
-NARROW = 1.5  # irregular points lose 5 % there
+# Width of a kernel by default, h / e; t = e².
+EDGE_FACTOR = 2.0
+# Narrowest kernel, h / e: at half of it eigenvalues are half as large even on the most regular points.
+NARROWEST = 1.0
+# h / e below which eigenvalues of irregular points are 5 % too low or worse.
+NARROW = 1.5
+# Eigenvalues that can be distinguished at least, without a warning.
 FEWEST_PAIRS = 10
-LAST = 2.9  # t λ up to which the correction can still tell one eigenvalue from the next
+# t λ up to which the correction distinguishes one eigenvalue from the next.
+LAST = 2.9
+# Rows from which the number of entries of the matrix is estimated.
 SAMPLED_ROWS = 512
-PEAK = 30  # bytes an entry while the matrix is built and checked
+# Bytes per entry while the matrix is built and checked.
+PEAK = 30
 
 
 @dataclass(frozen=True)

@@ -26,9 +26,9 @@ from eigenshape.spectral.spectrum import Spectrum
 
 Method = Literal["certified", "approximate"]
 
-# Relative error of approximate eigenvalues. The default is what pictures and signatures need; below 1e-10 rounding
-# decides, and at such accuracies the certified solver is the quicker one anyway.
+# Relative error of approximate eigenvalues by default.
 DEFAULT_ACCURACY = 1e-3
+# Smallest `accuracy` and `max_residual` that can be requested; below it rounding dominates.
 LEAST_ACCURACY = 1e-10
 
 

@@ -18,7 +18,7 @@ from eigenshape.spectral.solver.pencil import normalise
 @pytest.fixture
 def always_lanczos(monkeypatch):
     """Take the road of large operators, also for small ones."""
-    monkeypatch.setattr(roads, "SMALL", 0)
+    monkeypatch.setattr(roads, "DENSE_POINTS", 0)
     monkeypatch.setattr(roads, "DENSE_SHARE", 2.5)
 
 
@@ -224,7 +224,7 @@ def test_lanczos_that_never_finds_a_pair_is_refused(monkeypatch, always_lanczos)
         return values[1:], vectors[:, 1:]
 
     monkeypatch.setattr(roads, "block_lanczos", lossy)
-    monkeypatch.setattr(roads, "RUNS", 1)
+    monkeypatch.setattr(roads, "MOST_RUNS", 1)
     with pytest.raises(ConvergenceError, match=r"19 of 20 were found in 1 runs and 1 are missing"):
         solve_spectrum(cotangent_laplacian(icosphere(3)), 20)
 

@@ -16,8 +16,8 @@ from eigenshape.spectral.solver.slices import walk
 @pytest.fixture
 def thin(monkeypatch):
     monkeypatch.setattr(slices, "SLICE", 14)
-    monkeypatch.setattr(roads, "WHOLE", 20)
-    monkeypatch.setattr(roads, "SMALL", 0)
+    monkeypatch.setattr(roads, "ONE_SHIFT_PAIRS", 20)
+    monkeypatch.setattr(roads, "DENSE_POINTS", 0)
 
 
 def irregular(n):

@@ -11,8 +11,10 @@ from eigenshape.spectral.laws.report import Law, Outcome, SkippedLaw, judged
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
+# Lowest eigenvalues that are compared if rows are not points.
 N_EIGENVALUES = 20
-MOST_ROUNDING = 1e-4  # above, a comparison would prove nothing
+# Tolerance above which a comparison would prove nothing.
+MOST_ROUNDING = 1e-4
 
 
 def sizes_of(matrix: sp.csr_array) -> Float[np.ndarray, " n"]:

@@ -33,16 +33,19 @@ from eigenshape.spectral.solver.pencil import Pencil, normalise
 
 ROW_SUM = 1e-11  # of the largest √(W_ii W_jj) in the row
 WEIGHT = 1e-11  # of √(W_ii W_jj): weights that are 0 in exact arithmetic come out on either side
+# Entry between two components, relative to √(W_ii W_jj), that counts as rounding.
 LINK = 1e-14
+# Relative difference of the sum of B and the volume that counts as rounding.
 VOLUME = 1e-11
 NEGATIVE = 1e-9  # of trace W / trace B
 # Shifts in trace W / trace B, from what rounding leaves of a zero upwards.
 LADDER = 10.0 ** np.arange(-12, 4)
 FIRST_LINE = 1e-14  # in the same unit: between zero and not zero
-LARGEST_ZERO = (
-    1e-6  # up to where rounding, or constants that are not annihilated, may move that line
-)
-NUDGES = (1.0, 1.07, 0.93, 1.15)
+# Largest line between zero and positive eigenvalues, in the same unit: rounding, or constants with
+# energy, may move it up to here.
+LARGEST_ZERO = 1e-6
+# Multiples of a shift that are tried if a pivot is exactly zero.
+COUNT_NUDGES = (1.0, 1.07, 0.93, 1.15)
 
 
 @one_blas_thread()
@@ -141,7 +144,7 @@ def _mass(laplacian: Laplacian) -> tuple[Law, Pencil]:
 
 def _factor(pencil: Pencil, share: float) -> Factor | None:
     """Factor at a share of trace W / trace B, or within a few per cent of it where a pivot is exactly zero."""
-    tries = (factorise(pencil, nudge * share * pencil.level) for nudge in NUDGES)
+    tries = (factorise(pencil, nudge * share * pencil.level) for nudge in COUNT_NUDGES)
     return next((factor for factor in tries if factor), None)
 
 

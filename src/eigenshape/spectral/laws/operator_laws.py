@@ -43,8 +43,11 @@ Build: TypeAlias = Callable[[Any], Laplacian]
 
 # Powers of two near 1e±100, 1e±50 and 1e±20, which round no coordinate; the first for which W and B stay floats serves.
 DOUBLINGS = (332, 166, 66)
+# Powers of two that W and B may grow by: floats end at 2^1023.
 LARGEST_EXPONENT = 900
-ROUNDING = 1e-12  # of √(W_ii W_jj), whatever the shape
+# Tolerance at least, of √(W_ii W_jj).
+LEAST_ROUNDING = 1e-12
+# Perturbations of the coordinates by which rounding is measured.
 JIGGLES = 3
 HEADROOM = 32  # over what jiggles by rounding change: an entry takes ten roundings or more, that may all go one way
 
@@ -207,12 +210,12 @@ def _rounding(
     build: Build, subject: Subject, expected: Laplacian | Spectrum, rng: np.random.Generator
 ) -> float:
     if isinstance(subject, sp.csr_array):
-        return ROUNDING
+        return LEAST_ROUNDING
     try:
         others = [build(changes.jiggled(subject, rng)) for _ in range(JIGGLES)]
-        return max(ROUNDING, HEADROOM * max(_jiggle(expected, other) for other in others))
+        return max(LEAST_ROUNDING, HEADROOM * max(_jiggle(expected, other) for other in others))
     except (EigenshapeError, ValueError, ArithmeticError):
-        return ROUNDING  # the laws that change coordinates will find the refusal
+        return LEAST_ROUNDING  # the laws that change coordinates will find the refusal
 
 
 def _jiggle(expected: Laplacian | Spectrum, other: Laplacian) -> float:

@@ -22,12 +22,12 @@ from eigenshape.spectral.maps.functional_map import (
 )
 from eigenshape.spectral.spectrum import Spectrum
 
-STEP = 5  # modes added in each round; 1 takes five times as many rounds
+MODE_STEP = 5  # modes added in each round; 1 takes five times as many rounds
 # Samples of the target per mode: on nine pairs of animals 10 give the error of all vertices (0.016
 # √area), 5 slightly more (0.017).
 SAMPLES_A_MODE = 10
 SPREAD_MODES = 20  # modes in which the samples are spread: low ones, which see the shape as a whole
-AT_ONCE = 2**22  # distances computed at a time: 32 MiB of float64
+DISTANCES_AT_ONCE = 2**22  # distances computed at a time: 32 MiB of float64
 
 
 @one_blas_thread()
@@ -67,7 +67,7 @@ def point_map(mapping: FunctionalMap) -> Int[np.ndarray, " n2"]:
 def _nearest(
     points: Float[np.ndarray, "n k"], queries: Float[np.ndarray, "q k"]
 ) -> Int[np.ndarray, " q"]:
-    halves, rows = (points**2).sum(axis=1) / 2, max(AT_ONCE // len(points), 1)
+    halves, rows = (points**2).sum(axis=1) / 2, max(DISTANCES_AT_ONCE // len(points), 1)
     found = [
         (halves - queries[i : i + rows] @ points.T).argmin(axis=1)
         for i in range(0, len(queries), rows)
@@ -139,7 +139,7 @@ def refine_map(
     start: FunctionalMap,
     n_modes: SupportsIndex,
     *,
-    step: SupportsIndex = STEP,
+    step: SupportsIndex = MODE_STEP,
     n_samples: SupportsIndex | None = None,
     progress: Progress | None = None,
 ) -> FunctionalMap:

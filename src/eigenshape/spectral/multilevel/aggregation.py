@@ -15,8 +15,11 @@ DEGREE = 1.0  # steps of smoothing per edge that an aggregate is across
 MESH_ROW = 7.0  # entries in a row of a triangle mesh, whose steps reach one edge far
 PASSED = 4.0  # points of an aggregate to the wavelength from which functions are kept
 LEAST_RATIO = 2.5  # of the top to the least of these zeros' interval
-LANCZOS = 12
-ROUNDING = 1e-12  # of the energy that functions of a component would have without their neighbours
+# Steps of Lanczos that bound the largest eigenvalue of diag(A)⁻¹ A.
+LANCZOS_STEPS = 12
+ENERGY_ROUNDING = (
+    1e-12  # of the energy that functions of a component would have without their neighbours
+)
 SMOOTHED = 0.6  # of an aggregate's points: how far below the top of the spectrum smoothing reaches
 LEAST_SPREADS = (6.0, 20.0)  # of operators whose rows are full, and of those of a triangle mesh
 
@@ -172,7 +175,7 @@ def _clear_rounding(stiffness: sp.csr_array, energies: Float[np.ndarray, " m"]) 
     """
     alone = np.flatnonzero(np.diff(stiffness.indptr) == 1)
     places = stiffness.indptr[alone]
-    rounding = np.abs(stiffness.data[places]) <= ROUNDING * energies[alone]
+    rounding = np.abs(stiffness.data[places]) <= ENERGY_ROUNDING * energies[alone]
     stiffness.data[places[rounding]] = 0.0
 
 
@@ -201,7 +204,7 @@ def _lanczos_top(matrix: sp.csr_array, roots: Float[np.ndarray, " n"]) -> float:
     column = np.random.default_rng(0).standard_normal(len(roots))
     column /= np.linalg.norm(column)
     before, rest, diagonal, beside = np.zeros_like(column), 0.0, [], []
-    for _ in range(LANCZOS):
+    for _ in range(LANCZOS_STEPS):
         image = roots * (matrix @ (roots * column)) - rest * before
         diagonal.append(float(column @ image))
         image -= diagonal[-1] * column

@@ -18,15 +18,17 @@ from eigenshape.spectral.multilevel.residuals import (
 from eigenshape.spectral.multilevel.vcycle import Tower, correct, multiply, smooth
 
 WIDTH = 32  # columns that are corrected at once
-STEPS = (8, 30)  # of smoothing, fewest and most
+SMOOTHING_STEPS = (8, 30)  # of smoothing, fewest and most
 FIRST_STEPS = 2.0  # of smoothing alone, times the root of what is to be smoothed
-DEPENDENT = {
+DEPENDENT_COLUMNS = {
     4: 1e-6,
     8: 1e-13,
 }  # of the largest eigenvalue of a Gram matrix of unit columns, by their bytes
-NOTHING = 1e-6
+# A k-th eigenvalue below this share of `Goal.least` counts as 0.
+ZERO_SHARE = 1e-6
 FIRST_SHARE = 0.3  # of the work, told while the columns are smoothed the first time
 PROBES = 8  # random columns of a last look
+# Steps of inverse iteration on these random columns.
 PROBE_STEPS = 4
 MOST_LEFT = 10.0  # times what a round has lowered
 EARLY = 0.5  # of the bound, or:
@@ -133,7 +135,7 @@ def _standing(
     round lowered q / (1 - q) is left; no more than ten times is taken to be left, lest rounding in residuals decides.
     """
     last = float(values[goal.k - 1])
-    scale = last if last > NOTHING * goal.least else goal.least
+    scale = last if last > ZERO_SHARE * goal.least else goal.least
     worst = float(residuals[: goal.k].max()) / scale
     factor = worst / before if np.isfinite(before) and before > 0 else 1.0
     return Standing(scale, worst, lowered / scale * min(factor / max(1 - factor, 0.01), MOST_LEFT))
@@ -182,7 +184,9 @@ def _add_corrections(
         If they overflow.
     """
     steps = int(
-        np.clip(np.ceil(0.5 * np.sqrt(tower.levels[0].spread) * np.log(8 * excess)), *STEPS)
+        np.clip(
+            np.ceil(0.5 * np.sqrt(tower.levels[0].spread) * np.log(8 * excess)), *SMOOTHING_STEPS
+        )
     )
     values, residuals = state
     for start in range(0, len(late), WIDTH):
@@ -218,7 +222,7 @@ def _look_again(
     block = np.random.default_rng(seed).standard_normal((level.n, PROBES), dtype=np.float32)
     for _ in range(PROBE_STEPS):
         block *= level.rough_scales[0] / np.abs(block).max(axis=0)
-        block = correct(tower, block, shifts, STEPS[0])
+        block = correct(tower, block, shifts, SMOOTHING_STEPS[0])
         keep_outside(tower, space.columns, block)
     space = Space(space.columns, block)
     lower, weights = _combination(tower, space, values, slice(m, m + PROBES))
@@ -258,7 +262,7 @@ def _combination(
     projected[:known, :known] = np.diag(values[:known])
     scales = 1 / np.sqrt(np.diagonal(gram))
     sizes, axes = np.linalg.eigh(gram * scales * scales[:, None])
-    kept = sizes > DEPENDENT[space.columns.dtype.itemsize] * sizes[-1]
+    kept = sizes > DEPENDENT_COLUMNS[space.columns.dtype.itemsize] * sizes[-1]
     if np.count_nonzero(kept) < len(values):
         raise ConvergenceError(
             f"Smoothed eigenvectors must be independent; fewer than {len(values)} are. {TOO_FAR}"

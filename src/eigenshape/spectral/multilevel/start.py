@@ -20,17 +20,29 @@ from eigenshape.spectral.solver.pencil import Pencil, as_pencil
 from eigenshape.spectral.solver.shift import factorise_near
 from eigenshape.spectral.solver.strategy import proved
 
-SMALL = 600  # points up to which the exact solve is the quicker one
-GUARDS = 8  # more pairs than asked for, at least, and in all a multiple of it
+# Points up to which the exact solve is faster.
+EXACT_POINTS = 600
+# Pairs refined beyond the k requested: at least these, a multiple of them in all,
+GUARDS = 8
+# and at least this multiple of k, so that copies of a multiple eigenvalue are found.
 GUARD_SHARE = 1.125
-COARSEST = 3000  # points of the coarsest level, at least; and times k:
+# Points of the coarsest level: at least these,
+COARSEST = 3000
+# and this many times k. More make the exact solve slow, fewer the refinement.
 COARSEST_PER_PAIR = 30
-COARSENED = 8  # times, at least
-SHIFTS = (0.2, 0.5, 0.75, 0.93)  # of the k-th eigenvalue
+# Factor at least between the points of the operator and those of the coarsest level.
+COARSENED = 8
+# Shifts of the factors of the coarsest level, as shares of the k-th eigenvalue.
+SHIFTS = (0.2, 0.5, 0.75, 0.93)
+# Rounds of refinement before an error is raised.
 ROUNDS = 100
-SINGLE = 1e-4  # accuracy from which vectors are kept in single precision while they are refined
+# Accuracy from which vectors are refined in single precision.
+SINGLE = 1e-4
+# Largest `accuracy` that can be requested.
 LEAST_ACCURATE = 0.1
-INNER_ACCURACY = 0.03  # on levels between, within so many rounds
+# Residual at which refinement on levels in between stops,
+INNER_ACCURACY = 0.03
+# or the rounds after which it does.
 INNER_ROUNDS = 3
 
 
@@ -67,7 +79,7 @@ def climb(
         If the memory is too small.
     """
     m = -(-max(k + GUARDS, int(GUARD_SHARE * k)) // GUARDS) * GUARDS
-    if pencil.n <= max(SMALL, COARSENED * m):
+    if pencil.n <= max(EXACT_POINTS, COARSENED * m):
         return None
     bases = pencil.n * (2 * np.dtype(dtype).itemsize * m + 20 * WIDTH)
     parts = {"bases": bases + kept, "levels of their operator": 100 * pencil.stiffness.nnz}

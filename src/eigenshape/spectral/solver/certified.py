@@ -16,8 +16,10 @@ from eigenshape.spectral.solver.pencil import Pencil
 from eigenshape.spectral.solver.shift import factor_below
 from eigenshape.spectral.solver.strategy import dense_serves, proved, require_memory_for_pairs
 
-MORE = 8  # pairs that are added where a guess was too low
-FEW = 50  # eigenvalues below an interval that are not worth a second count
+# Pairs added if a trial factor counted too few eigenvalues below the limit.
+RETRY_PAIRS = 8
+# Eigenvalues below an interval up to which they are computed too: cheaper than a second count.
+FEW_BELOW = 50
 
 
 def certified_pairs(
@@ -61,7 +63,7 @@ def _far_up(
         return None
     interval = count_interval(pencil, low, high)
     within = interval.below_high - interval.below_low
-    if interval.below_low < max(within, FEW) or dense_serves(pencil, interval.below_high):
+    if interval.below_low < max(within, FEW_BELOW) or dense_serves(pencil, interval.below_high):
         return None
     require_memory_for_pairs(pencil, within)
     with suppress(ConvergenceError):
@@ -79,7 +81,7 @@ def _lowest_below(pencil: Pencil, limit: float, report: Progress) -> tuple[Pairs
         count = int(np.count_nonzero(pairs.values < limit))
         if count < k or k == pencil.n:
             return pairs, certificate
-        k = min(k + max(k // 10, MORE), pencil.n)
+        k = min(k + max(k // 10, RETRY_PAIRS), pencil.n)
 
 
 def _nothing(pencil: Pencil, pairs: Pairs, number: int, low: float, high: float) -> str:

@@ -17,11 +17,18 @@ from eigenshape.spectral.solver.kernel_values import reported, to_pencil
 from eigenshape.spectral.solver.pairs import Pairs, spread
 from eigenshape.spectral.solver.pencil import Pencil, column_chunks, normalise, residual_norms
 
-RESOLUTION = 1e-6  # relative to the largest eigenvalue: what is closer counts as one cluster
-WIDEST_CLUSTER = 1e-3  # relative too: a chain of close eigenvalues longer than this proves nothing
+# Eigenvalues closer than this, relative to the largest one, form a cluster.
+RESOLUTION = 1e-6
+# Extent, relative to the largest eigenvalue, beyond which a chain of close eigenvalues is no cluster
+# and proves nothing.
+WIDEST_CLUSTER = 1e-3
+# Largest entry of |ΦᵀBΦ - I| with which eigenvectors count as orthonormal. Solvers
+# correct what is above 1e-12; a large tolerance would let one eigenvector count twice.
 ORTHONORMAL = 1e-8
+# Largest residual, relative to the largest eigenvalue, of an eigenpair that counts as found.
 LARGEST_RESIDUAL = 1e-5
-FARTHER = 10.0
+# Second attempt to count below a cluster: this many times farther below it.
+CLUSTER_STEP = 10.0
 
 
 def certify(
@@ -163,7 +170,7 @@ def _below_cluster(pencil: Pencil, pairs: Pairs, above: Certificate, beside: Fac
     factor = count_beside(pencil, pairs, first, -above.resolution, beside)
     if factor.count > first:
         # Slack may have taken copies of the cluster below σ that are not among the pairs: once more, from farther off.
-        farther = FARTHER * (factor.shift - float(pairs.values[first]))
+        farther = CLUSTER_STEP * (factor.shift - float(pairs.values[first]))
         factor = count_beside(pencil, pairs, first, farther, factor)
     resolution = float(pairs.values[-1]) - factor.shift
     if resolution > WIDEST_CLUSTER * _scale(pencil, pairs):

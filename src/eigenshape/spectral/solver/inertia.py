@@ -10,8 +10,10 @@ from eigenshape.spectral.solver.factor import Factor, factorise, rounding
 from eigenshape.spectral.solver.pairs import Pairs, spread
 from eigenshape.spectral.solver.pencil import Pencil
 
+# Factor by which σ moves away from the eigenvalue if rounding could move it across.
 WIDENING = 3.7
-TRIALS = 12
+# Factors for one count before giving up.
+COUNT_TRIALS = 12
 
 
 def count_beside(
@@ -49,7 +51,7 @@ def count_beside(
 
     factor, none, sigma = beside, np.zeros(pencil.n), value + step
     slack = none if beside is None or too_much(taken(beside.slack), sigma) else beside.slack
-    for _ in range(TRIALS):
+    for _ in range(COUNT_TRIALS):
         factor = factorise(pencil, sigma, side * slack, factor)
         loss = rounding(factor) if factor else np.full(pencil.n, np.inf)
         # What is above the slack moves σ: W - σB - S + E ≤ W - (σ - ρ)B where no row has more than ρ c D of it.

@@ -23,8 +23,10 @@ from eigenshape.spectral.solver.slices import (
     walk_on,
 )
 
-RUNS = 20
-FARTHER = 4  # times as many pairs past the ends, where there was no gap among them
+# Runs of block Lanczos for missing pairs of an interval before giving up.
+INTERVAL_RUNS = 20
+# Factor by which the search past the ends grows if there was no clear gap.
+WIDER_OVERLAP = 4
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ def solve_interval(pencil: Pencil, interval: Interval, report: Report) -> tuple[
             raise ConvergenceError(
                 "An interval must end between eigenvalues that can be told apart; there are none."
             )
-        extra *= FARTHER
+        extra *= WIDER_OVERLAP
 
 
 def _completed(
@@ -80,7 +82,7 @@ def _completed(
     report: Report,
 ) -> tuple[Pairs, Certificate] | None:
     """Search for what the counts find missing; None where no gap is clear on one of the sides."""
-    for _ in range(RUNS):
+    for _ in range(INTERVAL_RUNS):
         pairs = polished(pencil, factor, lowest(pencil, vectors, vectors.shape[1]))
         report(0.9)
         gaps = _clear_gaps(pairs.values, interval)

@@ -14,11 +14,13 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.operators.laplacian import GaussianKernel
 from eigenshape.spectral.certificate import Certificate
 
-LAST_CORRECTED = (
-    0.945  # t μ at t λ = 2.9: of a surface with n = 5 k t/e² points the k-th eigenvalue
-)
-ESSENTIAL = 0.5  # t μ from which the literal form's eigenvalues say nothing of λ; n = 21 k t/e²
-BIASED = 0.181  # t μ at t λ = .2, ten per cent low; n = 72 k t/e²
+# t μ at t λ = 2.9, beyond which corrected eigenvalues cannot be distinguished: on a surface that is the
+# k-th eigenvalue of n = 5 k t/e² points.
+LAST_CORRECTED = 0.945
+# t μ from which eigenvalues of the literal form do not depend on λ: n = 21 k t/e².
+ESSENTIAL = 0.5
+# t μ at t λ = 0.2, where the bias is ten per cent: n = 72 k t/e².
+BIASED = 0.181
 
 
 def to_pencil(

@@ -14,17 +14,20 @@ from eigenshape.sparse.lane_loops import LANES
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.pencil import Pencil
 
-TOLERANCE = 5e-12  # of a residual, relative to the shift
-FLOOR = 32 * float(
-    np.finfo(np.float64).eps
-)  # of a residual, relative to the largest θ: rounding goes no lower
-SHRUNK = 1e-2  # a column that projection shortened this much is projected once more
+# Residual of a converged pair, relative to the shift.
+TOLERANCE = 5e-12
+# Residual that rounding leaves, relative to the largest θ.
+FLOOR = 32 * float(np.finfo(np.float64).eps)
+# A column that projection shortens below this share of its length is projected once more.
+SHRUNK = 1e-2
+# Projections of a block at most.
 REPEATS = 5
-NEGLIGIBLE = 1e-13  # a column this short against what it was is rounding: the space is invariant
-ALIKE = (
-    1e-4  # a pivot of a Gram matrix this small, in lengths: too many digits are lost in its square
-)
-UNLIKE = 0.1  # and this large: none are
+# A column that projection shortens to this share is rounding: the space is invariant.
+NEGLIGIBLE = 1e-13
+# Pivots of a Gram matrix, relative to lengths: below this one Cholesky has lost too many digits,
+DEPENDENT_PIVOT = 1e-4
+# and above this one none.
+INDEPENDENT_PIVOT = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,7 +218,7 @@ def _gram_schmidt(
     upper = _by_cholesky(inner, columns, fresh)
     if upper is None:
         return _one_by_one(inner, columns, fresh, lengths, rng)
-    if np.diag(upper).min() <= UNLIKE * np.linalg.norm(upper, axis=0).max():
+    if np.diag(upper).min() <= INDEPENDENT_PIVOT * np.linalg.norm(upper, axis=0).max():
         columns[:] = fresh
         second = _by_cholesky(inner, columns, fresh)
         if second is None:
@@ -241,7 +244,7 @@ def _cholesky(gram: Float[np.ndarray, "b b"]) -> Float[np.ndarray, "b b"] | None
         triangle = sl.cholesky(gram / np.outer(sizes, sizes))
     except np.linalg.LinAlgError:
         return None
-    return triangle * sizes if np.diag(triangle).min() > ALIKE else None
+    return triangle * sizes if np.diag(triangle).min() > DEPENDENT_PIVOT else None
 
 
 def _one_by_one(

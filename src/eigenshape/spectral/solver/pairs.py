@@ -9,8 +9,12 @@ from eigenshape._errors import ConvergenceError
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.pencil import Pencil, rayleigh_residuals
 
+# Largest entry of |ΦᵀBΦ - I| that needs no correction.
 LOOSE = 1e-12
+# Largest entry that one Newton step corrects to rounding, since its error is the square; beyond it the
+# vectors of different runs are wrong.
 SKEW = 1e-5
+# Residual, relative to the largest eigenvalue, above which a pair takes one more solve.
 POLISHED = 2e-9
 
 

@@ -13,9 +13,13 @@ from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 from eigenshape.sparse.elimination import Elimination, analyse, factorise
 from eigenshape.spectral.solver.residual_loops import quotient_sums, residual_sums
 
+# Columns of a Gram matrix that are computed together: enough for fast products, little memory.
 COLUMNS_AT_ONCE = 64
-WIDEST = 1e140  # of two entries on a diagonal: squares of vectors must fit into floats
-ALIKE = 1e11
+# Largest ratio of two diagonal entries: squares of vectors must be floats.
+WIDEST_RANGE = 1e140
+# If trace W / trace B exceeds the median of W_ii/B_ii by this factor, the median is the pencil's level:
+# a few points must not set the unit of all tolerances.
+LARGEST_LEVEL_RATIO = 1e11
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,9 +172,9 @@ def _require_range(name: str, diagonal: Float[np.ndarray, " n"]) -> None:
     if np.isnan(sizes).all():
         return
     low, high = int(np.nanargmin(sizes)), int(np.nanargmax(sizes))
-    if sizes[high] / WIDEST > sizes[low]:
+    if sizes[high] / WIDEST_RANGE > sizes[low]:
         raise InvalidParameterError(
-            f"Entries on the diagonal of {name} must lie within a factor of {WIDEST:.0e}; entry {high} is "
+            f"Entries on the diagonal of {name} must lie within a factor of {WIDEST_RANGE:.0e}; entry {high} is "
             f"{diagonal[high]:.3g} and entry {low} is {diagonal[low]:.3g}."
         )
 
@@ -185,7 +189,7 @@ def _level(
     if mean <= 0 or not ratios.size:
         return 1.0
     median = float(np.median(ratios))
-    return mean if mean < median * ALIKE else median
+    return mean if mean < median * LARGEST_LEVEL_RATIO else median
 
 
 def _harmonic_mean(

@@ -18,7 +18,8 @@ from eigenshape.spectral.solver.pairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil, finished
 from eigenshape.spectral.spectrum import Spectrum
 
-ROUNDING = 1e-9  # of the mean eigenvalue
+# Negative eigenvalues down to minus this share of the mean eigenvalue may be rounding.
+NEGATIVE_ROUNDING = 1e-9
 
 
 def spectrum_of(
@@ -49,7 +50,9 @@ def spectrum_of(
 
 def _without_negatives(pencil: Pencil, pairs: Pairs) -> Float[np.ndarray, " k"]:
     # A Rayleigh quotient below zero shows an eigenvalue below zero, however large its residual, but for rounding.
-    rounding = np.minimum(4 * pairs.residuals, ROUNDING * pencil.level) + 1e-14 * pencil.level
+    rounding = (
+        np.minimum(4 * pairs.residuals, NEGATIVE_ROUNDING * pencil.level) + 1e-14 * pencil.level
+    )
     bad = np.flatnonzero(pairs.values < -rounding)
     if bad.size:
         value, bound = pencil.values_out(np.array([pairs.values[bad[0]], rounding[bad[0]]]))

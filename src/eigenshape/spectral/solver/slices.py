@@ -13,11 +13,16 @@ from eigenshape.spectral.solver.shift import factorise_near, shift_inside
 
 Report = Callable[[float], None]
 
-SLICE = 250  # eigenvalues to a slice: more make the space dear, fewer the factors
-OVERLAP = 12  # eigenvalues past the end of a slice, among which it is cut
-CLEAR_GAP = 1e-5  # of the last eigenvalue: over a gap this wide two slices come out orthogonal
-TRIALS = 5
-FAIR = (0.2, 0.9)  # share of a slice that may lie below its shift
+# Eigenvalues in a slice: with more the orthogonalization is slow, with fewer there are more factors.
+SLICE = 250
+# Eigenvalues found past the end of a slice, in whose widest gap it ends.
+OVERLAP = 12
+# Gap, relative to the last eigenvalue, across which two slices are orthogonal to rounding.
+CLEAR_GAP = 1e-5
+# Trial factors for the shift of a slice; any shift beyond the last one is correct, some are slow.
+SLICE_TRIALS = 5
+# Shares of a slice that may lie below its shift.
+FAIR = (0.2, 0.9)
 
 
 def walk(pencil: Pencil, k: int, report: Report) -> tuple[Float[np.ndarray, "n j"], Factor]:
@@ -99,7 +104,7 @@ def factor_beyond(pencil: Pencil, floor: float, spacing: float, known: int, targ
         If none is found beyond `floor`.
     """
     step = spacing * target / 2
-    for _ in range(TRIALS):
+    for _ in range(SLICE_TRIALS):
         factor = factorise_near(pencil, floor + step)
         between = factor.count - known
         if FAIR[0] * target <= between <= FAIR[1] * target:
