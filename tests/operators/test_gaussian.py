@@ -196,7 +196,7 @@ def test_weights_that_are_volumes_make_the_mesh_laplacian():
         ({"edge_factor": np.nan}, "edge_factor must be positive and finite; entry 0 is nan"),
         (
             {"edge_factor": 0.9},
-            r"A kernel must reach the neighbours, h ≥ e; h = 2√t is 0.9 of the mean edge length",
+            r"A kernel must reach the neighbors, h ≥ e; h = 2√t is 0.9 of the mean edge length",
         ),
         ({"cutoff": 0.0}, "cutoff must be positive"),
     ],

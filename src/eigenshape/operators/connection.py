@@ -79,15 +79,16 @@ def connection_laplacian(mesh: MeshLike, mass: Mass = "lumped") -> Laplacian:
     scalar = cotangent_laplacian(mesh, mass)
     sides = vertex_directions(mesh)
     turns = np.exp(1j * (sides.at_head + np.pi - sides.at_tail))
-    flat_turns = flattened(turns)
+    flat_turns = flatten_turns(turns)
     weights = _weights(mesh)
     flat = np.repeat(_faces_to_flatten(mesh, weights), 3)
-    stiffness = _carried(
+    stiffness = _transport_matrix(
         mesh, scalar.stiffness.diagonal(), -weights * np.where(flat, flat_turns, turns)
     )
     shares = np.repeat(MASS_SHARES[mass] * face_areas(mesh), 3)
     return Laplacian(
-        _real(stiffness), _real(_carried(mesh, scalar.mass.diagonal(), shares * flat_turns))
+        _real(stiffness),
+        _real(_transport_matrix(mesh, scalar.mass.diagonal(), shares * flat_turns)),
     )
 
 
@@ -144,7 +145,7 @@ def _weights(mesh: TriangleMesh) -> Float[np.ndarray, " h"]:
     return np.roll((cosines / sines).reshape(-1, 3), 1, axis=1).ravel() / 2
 
 
-def flattened(turns: Complex[np.ndarray, " h"]) -> Complex[np.ndarray, " h"]:
+def flatten_turns(turns: Complex[np.ndarray, " h"]) -> Complex[np.ndarray, " h"]:
     """Turn the three of each face by a third of its curvature each, so that they lead back to the same vector."""
     around = turns.reshape(-1, 3).prod(axis=1)
     return turns * np.repeat(np.exp(-1j * np.angle(around) / 3), 3)
@@ -168,7 +169,7 @@ def _faces_to_flatten(
         flat |= more
 
 
-def _carried(
+def _transport_matrix(
     mesh: TriangleMesh, diagonal: Float[np.ndarray, " n"], entries: Complex[np.ndarray, " h"]
 ) -> sp.csr_array:
     """Put the entry of each side where it acts on its tail and counts at its head, and the conjugate the other way."""

@@ -73,7 +73,7 @@ def facet_mass(table: FacetTable, measure: Float[np.ndarray, " s"]) -> sp.csr_ar
     """Assemble ∫ ψ_a ψ_b for a measure of each simplex."""
     m = table.facets.shape[1]
     reference = (m * m * np.eye(m + 1) + 2 - m) / ((m + 1) * (m + 2))
-    return elements.weighed_mass(measure, table.simplex_facets, reference)
+    return elements.weighted_mass(measure, table.simplex_facets, reference)
 
 
 def mass_floor(dim: int) -> float:

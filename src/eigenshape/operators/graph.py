@@ -65,7 +65,7 @@ def graph_laplacian(
             f"kind must be 'combinatorial', 'weighted' or 'normalized'; it is {kind!r}."
         )
     if sp.issparse(graph) or isinstance(graph, np.ndarray):
-        adjacency = _checked_adjacency(graph)
+        adjacency = _as_adjacency(graph)
     else:
         adjacency = edge_graph(
             as_simplicial(graph, "graph"), "inverse_length" if kind == "weighted" else "unit"
@@ -79,7 +79,7 @@ def graph_laplacian(
     return Laplacian((degrees - adjacency).tocsr(), sp.eye_array(adjacency.shape[0], format="csr"))
 
 
-def _checked_adjacency(graph: sp.sparray | sp.spmatrix) -> sp.csr_array:
+def _as_adjacency(graph: sp.sparray | sp.spmatrix) -> sp.csr_array:
     if (
         not sp.issparse(graph)
         or graph.ndim != 2

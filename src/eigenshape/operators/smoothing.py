@@ -116,14 +116,14 @@ def denoise(mesh: MeshLike, *, reach: float | None = None) -> TriangleMesh:
     found = points.copy()
     if len(rim):
         curves = SimplicialMesh(points[rim], np.searchsorted(rim, boundary_facets(mesh)))
-        found[rim] = _flowed(cotangent_laplacian(curves), time, points[rim], np.arange(len(rim)))
+        found[rim] = _flow(cotangent_laplacian(curves), time, points[rim], np.arange(len(rim)))
     inside = np.setdiff1d(np.arange(mesh.n_vertices), rim)
     if len(inside):
-        found[inside] = _flowed(laplacian, time, found, inside)
+        found[inside] = _flow(laplacian, time, found, inside)
     return TriangleMesh(found * scale, mesh.faces)
 
 
-def _flowed(
+def _flow(
     laplacian: Laplacian, time: float, points: Float[np.ndarray, "n d"], free: Int[np.ndarray, " k"]
 ) -> Float[np.ndarray, "k d"]:
     """Return where a step and its twicing take the free points, while the others stay."""

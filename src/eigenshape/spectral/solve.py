@@ -20,7 +20,7 @@ from eigenshape.spectral.multilevel.start import require_accuracy, require_lumpe
 from eigenshape.spectral.solver.cache import content_key, keep, load_kept, require_writable
 from eigenshape.spectral.solver.certified import certified_pairs
 from eigenshape.spectral.solver.kernel_values import to_pencil
-from eigenshape.spectral.solver.pencil import normalise
+from eigenshape.spectral.solver.pencil import normalize
 from eigenshape.spectral.solver.result import spectrum_of
 from eigenshape.spectral.spectrum import Spectrum
 
@@ -175,7 +175,7 @@ def solve_spectrum(  # noqa: PLR0913 - one keyword for each choice: which pairs,
     report = progress or silent
     with one_blas_thread():
         report(0.0, "scaling the operator")
-        pencil = normalise(operator)
+        pencil = normalize(operator)
         if method == "certified":
             pairs, certificate = certified_pairs(pencil, wanted, interval, report)
         else:

@@ -12,7 +12,7 @@ from eigenshape.shapes.surfaces import disjoint_union, icosphere, torus
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import strategy as roads
 from eigenshape.spectral.solver.certify import certify
-from eigenshape.spectral.solver.pencil import normalise
+from eigenshape.spectral.solver.pencil import normalize
 
 
 @pytest.fixture
@@ -122,12 +122,12 @@ def test_all_eigenvalues():
 def test_a_shift_on_an_eigenvalue_moves_away(monkeypatch):
     laplacian = cotangent_laplacian(icosphere(3))
     expected = solve_spectrum(laplacian, 40)
-    pencil = normalise(laplacian)
+    pencil = normalize(laplacian)
     on_it = float(np.ldexp(expected.eigenvalues[25], -pencil.value_exponent))
-    from eigenshape.spectral.solver.shift import factorise_near
+    from eigenshape.spectral.solver.shift import factorize_near
 
     monkeypatch.setattr(
-        roads, "shift_inside", lambda pencil, k: factorise_near(pencil, on_it * (1 + 1e-12))
+        roads, "shift_inside", lambda pencil, k: factorize_near(pencil, on_it * (1 + 1e-12))
     )
     found = solve_spectrum(laplacian, 40)
     np.testing.assert_allclose(found.eigenvalues, expected.eigenvalues, rtol=1e-12, atol=1e-12)

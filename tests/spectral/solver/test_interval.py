@@ -13,7 +13,7 @@ from eigenshape.spectral.signatures.heat import heat_kernel_signature
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import certified, interval, slices
 from eigenshape.spectral.solver import strategy as roads
-from eigenshape.spectral.solver.pencil import normalise
+from eigenshape.spectral.solver.pencil import normalize
 from eigenshape.spectral.spectrum import Spectrum
 
 
@@ -182,7 +182,7 @@ def test_where_counts_and_finds_never_agree_nothing_is_returned(monkeypatch):
     laplacian = cotangent_laplacian(
         TriangleMesh(np.tile(small.vertices, (20, 1)), np.concatenate(faces))
     )
-    pencil = normalise(laplacian)
+    pencil = normalize(laplacian)
     values = dense_eigenvalues(laplacian) * np.ldexp(1.0, -pencil.value_exponent)
     low, high = middle(values, 90, 130)
     counted = interval.count_interval(pencil, low, high)

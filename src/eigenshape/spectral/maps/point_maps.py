@@ -203,12 +203,12 @@ def refine_map(
         nearest = _nearest(
             modes[:, : matrix.shape[1]] @ matrix.T, samples.modes[:, : matrix.shape[0]]
         )
-        matrix = _fitted(samples, modes[nearest, :k1], k2)
+        matrix = _fit(samples, modes[nearest, :k1], k2)
     report(1.0, f"{k} modes")
     return FunctionalMap(matrix, *ends)
 
 
-def _fitted(
+def _fit(
     samples: _Samples, pulled: Float[np.ndarray, "s k1"], k2: int
 ) -> Float[np.ndarray, "k2 k1"]:
     weighed = samples.weighed[:, :k2].T
@@ -219,12 +219,14 @@ def _samples(spectrum: Spectrum, count: int, k: int) -> _Samples:
     modes, areas = unit_modes(spectrum, k), point_areas(spectrum)
     if count == len(modes):
         return _Samples(modes, spectrum.mass @ modes / areas.sum())
-    chosen, cells = _spread(spectrum, count)
+    chosen, cells = _spread_samples(spectrum, count)
     shares = np.bincount(cells, weights=areas / areas.sum(), minlength=count)
     return _Samples(modes[chosen], shares[:, None] * modes[chosen])
 
 
-def _spread(spectrum: Spectrum, count: int) -> tuple[Int[np.ndarray, " s"], Int[np.ndarray, " n"]]:
+def _spread_samples(
+    spectrum: Spectrum, count: int
+) -> tuple[Int[np.ndarray, " s"], Int[np.ndarray, " n"]]:
     """Choose vertices one by one, each farthest from those before in φ/√λ; tell which is nearest to each vertex."""
     k = min(SPREAD_MODES, len(spectrum.eigenvalues))
     places = unit_modes(spectrum, k)[:, 1:] / np.sqrt(

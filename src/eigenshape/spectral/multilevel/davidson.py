@@ -8,10 +8,10 @@ from jaxtyping import Float
 
 from eigenshape._errors import ConvergenceError
 from eigenshape.spectral.multilevel.residuals import (
-    chosen,
     images,
     keep_outside,
     norms_of_residuals,
+    pick_columns,
     residual_block,
     row_chunks,
 )
@@ -87,7 +87,7 @@ def refine(
         If a strict goal is not reached in its rounds, or columns overflow or become dependent.
     """
     values, m = below[1], len(below[1])
-    space = _prolonged(tower, below[0])
+    space = _prolong(tower, below[0])
     standing = _standing(goal, values, _smooth_all(tower, space, values, report), np.inf, np.inf)
     before, values = values, _ritz(tower, space, values, slice(0, m))
     first, looked = standing.worst, not goal.strict
@@ -120,7 +120,9 @@ def refine(
     )
 
 
-def settled(tower: Tower, columns: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def finish_vectors(
+    tower: Tower, columns: np.ndarray, values: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return Ritz vectors and values of the columns in double precision."""
     columns = columns.astype(np.float64)
     return columns, _ritz(tower, Space(columns, columns[:, :0]), values, slice(0, len(values)))
@@ -141,7 +143,7 @@ def _standing(
     return Standing(scale, worst, lowered / scale * min(factor / max(1 - factor, 0.01), MOST_LEFT))
 
 
-def _prolonged(tower: Tower, vectors: np.ndarray) -> Space:
+def _prolong(tower: Tower, vectors: np.ndarray) -> Space:
     # M and A of the level below are PᵀMP and PᵀAP: P keeps orthonormality and Ritz values.
     level, shape = tower.levels[0], (tower.levels[0].n, vectors.shape[1])
     columns, added = (np.empty(shape, dtype=level.prolong.dtype) for _ in range(2))
@@ -160,7 +162,7 @@ def _smooth_all(
         report(FIRST_SHARE * start / len(values))
         some = np.arange(start, min(start + WIDTH, len(values)))
         block, norms[some] = residual_block(
-            tower, chosen(tower, space.columns, some), values[some], np.ones(len(some))
+            tower, pick_columns(tower, space.columns, some), values[some], np.ones(len(some))
         )
         corrections = smooth(tower, block, values[some].astype(np.float32), steps)
         _require_finite(corrections, some)
@@ -192,7 +194,7 @@ def _add_corrections(
     for start in range(0, len(late), WIDTH):
         some = late[start : start + WIDTH]
         block, _ = residual_block(
-            tower, chosen(tower, space.columns, some), values[some], 1 / residuals[some]
+            tower, pick_columns(tower, space.columns, some), values[some], 1 / residuals[some]
         )
         corrections = correct(tower, block, values[some].astype(np.float32), steps)
         _require_finite(corrections, some)

@@ -17,8 +17,8 @@ from eigenshape.spectral.multilevel.aggregation import Level, build_levels, load
 from eigenshape.spectral.multilevel.davidson import WIDTH, Goal, refine
 from eigenshape.spectral.multilevel.vcycle import Coarsest, Tower
 from eigenshape.spectral.solver.pencil import Pencil, as_pencil
-from eigenshape.spectral.solver.shift import factorise_near
-from eigenshape.spectral.solver.strategy import proved
+from eigenshape.spectral.solver.shift import factorize_near
+from eigenshape.spectral.solver.strategy import solve_lowest
 
 # Points up to which the exact solve is faster.
 EXACT_POINTS = 600
@@ -86,9 +86,7 @@ def climb(
     require_memory(f"{k} pairs of {pencil.n} points", parts, "Ask for fewer pairs")
     report(0.01, "making coarser levels")
     order = reverse_cuthill_mckee(sp.csr_matrix(pencil.stiffness), symmetric_mode=True)
-    coarsened = _coarsened(
-        _reordered(pencil.stiffness, order), _reordered(pencil.mass, order), k, m
-    )
+    coarsened = _coarsen(_reorder(pencil.stiffness, order), _reorder(pencil.mass, order), k, m)
     if coarsened is None:
         return None
     levels, coarsest, values = coarsened
@@ -128,11 +126,11 @@ def on_finest(report: Progress, start: Start) -> Callable[[float], None]:
     return lambda done: report(0.35 + 0.6 * done, f"refining on level {n_levels} of {n_levels}")
 
 
-def _reordered(matrix: sp.sparray, order: Int[np.ndarray, " n"]) -> sp.csr_array:
+def _reorder(matrix: sp.sparray, order: Int[np.ndarray, " n"]) -> sp.csr_array:
     return sp.csr_array(sp.csr_array(matrix)[order][:, order])
 
 
-def _coarsened(
+def _coarsen(
     stiffness: sp.csr_array, mass: sp.csr_array, k: int, m: int
 ) -> tuple[list[Level], Coarsest, Float[np.ndarray, " m"]] | None:
     """Return the levels with the solved coarsest one, and its values; None where nothing can be joined."""
@@ -141,16 +139,16 @@ def _coarsened(
     if len(levels) == 1:
         return None
     with suppress(ConvergenceError, InvalidParameterError):
-        return levels, *_solved_coarsest(levels[-1], k, m)
+        return levels, *_solve_coarsest(levels[-1], k, m)
     levels = build_levels(stiffness, mass, n_coarsest, smooth=False)  # weights over many decades
-    return levels, *_solved_coarsest(levels[-1], k, m)
+    return levels, *_solve_coarsest(levels[-1], k, m)
 
 
-def _solved_coarsest(level: Level, k: int, m: int) -> tuple[Coarsest, Float[np.ndarray, " m"]]:
+def _solve_coarsest(level: Level, k: int, m: int) -> tuple[Coarsest, Float[np.ndarray, " m"]]:
     pencil = as_pencil(level.stiffness, level.mass)
-    pairs, _ = proved(pencil, m, silent)
+    pairs, _ = solve_lowest(pencil, m, silent)
     last = max(float(pairs.values[k - 1]), pencil.level / pencil.n)  # where all that is wanted is 0
-    factors = tuple(factorise_near(pencil, share * last) for share in SHIFTS)
+    factors = tuple(factorize_near(pencil, share * last) for share in SHIFTS)
     return Coarsest(pencil, pairs.vectors, factors), pairs.values
 
 

@@ -14,9 +14,9 @@ from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.multilevel.davidson import Goal, refine
 from eigenshape.spectral.multilevel.residuals import (
-    chosen,
     images,
     keep_outside,
+    pick_columns,
     residual_block,
     row_chunks,
 )
@@ -33,7 +33,7 @@ from eigenshape.spectral.multilevel.vcycle import Tower, correct
 from eigenshape.spectral.signatures.heat import heat_kernel_signature
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver.kernel_values import from_pencil, require_readable
-from eigenshape.spectral.solver.pencil import Pencil, normalise
+from eigenshape.spectral.solver.pencil import Pencil, normalize
 
 LARGE = 100_000  # points beyond which the command line computes approximate signatures
 USUAL_ACCURACY = 1e-2  # of eigenvalues; the heat then has a relative error of about 1e-3
@@ -134,15 +134,15 @@ def approximate_heat_signature(
     require_lumped(laplacian)
     report = progress or silent
     with one_blas_thread():
-        pencil = normalise(laplacian)
+        pencil = normalize(laplacian)
         start = climb(pencil, wanted, report)
         if start is None:
-            return _proved(laplacian, wanted, clock, report)
+            return _certified_signature(laplacian, wanted, clock, report)
         goal = Goal(wanted, float(accuracy), np.inf, pencil.level / pencil.n, ROUNDS, strict=True)
-        return _refined(pencil, start, goal, clock, report)
+        return _approximate_signature(pencil, start, goal, clock, report)
 
 
-def _proved(
+def _certified_signature(
     laplacian: Laplacian, k: int, times: Float[np.ndarray, " q"], report: Progress
 ) -> ApproximateSignature:
     found = solve_spectrum(laplacian, k, progress=report)
@@ -152,7 +152,7 @@ def _proved(
     )
 
 
-def _refined(
+def _approximate_signature(
     pencil: Pencil, start: Start, goal: Goal, times: Float[np.ndarray, " q"], report: Progress
 ) -> ApproximateSignature:
     columns, ritz, _ = refine(start.tower, start.below, goal, on_finest(report, start))
@@ -207,7 +207,11 @@ def _changes(
 
     Only what lies outside the span of all columns counts: within it Ritz vectors are what they can be.
     """
-    vectors, values, mass = chosen(tower, columns, sample), ritz[sample], tower.levels[0].weights
+    vectors, values, mass = (
+        pick_columns(tower, columns, sample),
+        ritz[sample],
+        tower.levels[0].weights,
+    )
     residual, _ = residual_block(tower, vectors, values, np.ones(len(sample)))
     step = correct(tower, residual, values.astype(np.float32), CORRECTION_STEPS)
     keep_outside(tower, columns, step)

@@ -219,7 +219,7 @@ def scale_invariant_signature(
     steps = np.diff(np.log(moments))
     if len(moments) < 3 or np.ptp(steps) > EQUAL_STEPS * np.abs(steps).max():
         raise InvalidParameterError(
-            f"times must be a geometric sequence of at least 3; there are {len(moments)}, with ratios of neighbours "
+            f"times must be a geometric sequence of at least 3; there are {len(moments)}, with ratios of neighbors "
             f"from {np.exp(steps.min(initial=0.0)):.6g} to {np.exp(steps.max(initial=0.0)):.6g}. Use numpy.geomspace."
         )
     kept = whole_number(n_frequencies, "n_frequencies", 1, len(moments) // 2)

@@ -8,13 +8,13 @@ from jaxtyping import Float
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape.spectral.certificate import Certificate
-from eigenshape.spectral.solver.certify import part
+from eigenshape.spectral.solver.certify import take_pairs
 from eigenshape.spectral.solver.diagnosis import require_solvable
 from eigenshape.spectral.solver.interval import count_interval, solve_interval
 from eigenshape.spectral.solver.pairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil
 from eigenshape.spectral.solver.shift import factor_below
-from eigenshape.spectral.solver.strategy import dense_serves, proved, require_memory_for_pairs
+from eigenshape.spectral.solver.strategy import dense_serves, require_memory_for_pairs, solve_lowest
 
 # Pairs added if a trial factor counted too few eigenvalues below the limit.
 RETRY_PAIRS = 8
@@ -36,15 +36,15 @@ def certified_pairs(
     """
     try:
         if k:
-            return proved(pencil, k, report)
+            return solve_lowest(pencil, k, report)
         low, high = np.ldexp(interval, -pencil.value_exponent).tolist()
-        return _proved_between(pencil, low, high, report)
+        return _solve_between(pencil, low, high, report)
     except ConvergenceError as error:
         require_solvable(pencil, error)
         raise
 
 
-def _proved_between(
+def _solve_between(
     pencil: Pencil, low: float, high: float, report: Progress
 ) -> tuple[Pairs, Certificate]:
     report(0.01, "counting eigenvalues")
@@ -52,7 +52,7 @@ def _proved_between(
     start, stop = np.searchsorted(pairs.values, [low, high]).tolist()
     if start == stop:
         raise InvalidParameterError(_nothing(pencil, pairs, certificate.first + start, low, high))
-    return part(pencil, pairs, certificate, start, stop)
+    return take_pairs(pencil, pairs, certificate, start, stop)
 
 
 def _far_up(
@@ -77,7 +77,7 @@ def _lowest_below(pencil: Pencil, limit: float, report: Progress) -> tuple[Pairs
     """Prove one pair more than lie below the limit: then none of them is missing."""
     k = min(factor_below(pencil, limit).count + 1, pencil.n)
     while True:
-        pairs, certificate = proved(pencil, k, report)
+        pairs, certificate = solve_lowest(pencil, k, report)
         count = int(np.count_nonzero(pairs.values < limit))
         if count < k or k == pencil.n:
             return pairs, certificate

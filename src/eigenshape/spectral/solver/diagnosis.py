@@ -48,11 +48,11 @@ def _require_near_scales(pencil: Pencil, error: ConvergenceError) -> None:
 
 
 def _require_semidefinite(pencil: Pencil, error: ConvergenceError) -> None:
-    first = last = _counted_below(pencil, -BELOW_ZERO * pencil.level)
+    first = last = _count_below(pencil, -BELOW_ZERO * pencil.level)
     if first is None or last is None:
         return
     for _ in range(MOST_STEPS_DOWN):
-        farther = _counted_below(pencil, STEP_DOWN * last.shift)
+        farther = _count_below(pencil, STEP_DOWN * last.shift)
         if farther is None:
             break
         last = farther
@@ -65,7 +65,7 @@ def _require_semidefinite(pencil: Pencil, error: ConvergenceError) -> None:
     ) from error
 
 
-def _counted_below(pencil: Pencil, shift: float) -> Factor | None:
+def _count_below(pencil: Pencil, shift: float) -> Factor | None:
     """Count eigenvalues below a negative value, or one farther off, whatever the rounding; None where none surely is.
 
     No eigenpair is known. 0 and the constant should be one, and `count_beside` keeps rounding away from it.

@@ -64,13 +64,13 @@ def require_readable(
             f"{np.count_nonzero(shares <= BIASED)} are; or pass correct='log'"
         )
         warnings.warn(
-            f"Eigenvalues from number {late} on lie too near to {_named(kernel)} = {top:.4g} to tell those of the "
+            f"Eigenvalues from number {late} on lie too near to {_limit_name(kernel)} = {top:.4g} to tell those of the "
             f"shape: {advice}. Choose a smaller t, or more points.",
             stacklevel=stacklevel,
         )
 
 
-def _named(kernel: GaussianKernel) -> str:
+def _limit_name(kernel: GaussianKernel) -> str:
     return "1/t" if kernel.volume == 1 else "1/(t × volume)"
 
 
@@ -85,7 +85,7 @@ def from_pencil(
     )
 
 
-def widened(
+def reported_residuals(
     kernel: GaussianKernel | None,
     values: Float[np.ndarray, " k"],
     residuals: Float[np.ndarray, " k"],
@@ -98,7 +98,9 @@ def widened(
     return above - from_pencil(kernel, values)
 
 
-def reported(kernel: GaussianKernel | None, certificate: Certificate, last: float) -> Certificate:
+def reported_certificate(
+    kernel: GaussianKernel | None, certificate: Certificate, last: float
+) -> Certificate:
     """Return a certificate whose shift, gap and resolution are in the values that are reported.
 
     `last` is the largest eigenvalue of the pencil that was found. A shift at 1/t or beyond is moved down in its gap,

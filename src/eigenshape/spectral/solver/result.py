@@ -10,12 +10,12 @@ from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.solver.certify import in_user_units
 from eigenshape.spectral.solver.kernel_values import (
     from_pencil,
-    reported,
+    reported_certificate,
+    reported_residuals,
     require_readable,
-    widened,
 )
 from eigenshape.spectral.solver.pairs import Pairs
-from eigenshape.spectral.solver.pencil import Pencil, finished
+from eigenshape.spectral.solver.pencil import Pencil, to_user_vectors
 from eigenshape.spectral.spectrum import Spectrum
 
 # Negative eigenvalues down to minus this share of the mean eigenvalue may be rounding.
@@ -39,10 +39,10 @@ def spectrum_of(
     require_readable(laplacian.kernel, values, stacklevel=4)
     return Spectrum(
         eigenvalues=frozen(from_pencil(laplacian.kernel, values)),
-        eigenvectors=finished(pencil, pairs.vectors),
+        eigenvectors=to_user_vectors(pencil, pairs.vectors),
         mass=laplacian.mass,
-        residuals=frozen(widened(laplacian.kernel, values, residuals)),
-        certificate=reported(
+        residuals=frozen(reported_residuals(laplacian.kernel, values, residuals)),
+        certificate=reported_certificate(
             laplacian.kernel, in_user_units(pencil, certificate), float(values[-1])
         ),
     )

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._errors import ConvergenceError
-from eigenshape.spectral.solver.factor import Factor, factorise
+from eigenshape.spectral.solver.factor import Factor, factorize
 from eigenshape.spectral.solver.pencil import Pencil
 
 # Of the k wanted eigenvalues this share lies below the shift. On a surface counts grow like eigenvalues (Weyl), and
@@ -43,7 +43,7 @@ def shift_inside(pencil: Pencil, k: int) -> Factor:
         if high and high.shift < (1.02 * low.shift if low else LOWEST * guess):
             break
         factor = factor_below(pencil, _next_shift(factor, low, high, SHARE_BELOW * k))
-    return low or factorise_near(pencil, -guess)
+    return low or factorize_near(pencil, -guess)
 
 
 def expected_values(pencil: Pencil, numbers: Float[np.ndarray, " j"]) -> Float[np.ndarray, " j"]:
@@ -60,13 +60,13 @@ def factor_below(pencil: Pencil, shift: float) -> Factor:
     """Factor near `shift`, or at a share of it: solids and uneven masses may put a guess far up among eigenvalues."""
     for share in LOWER_SHARES:
         try:
-            return factorise_near(pencil, share * shift)
+            return factorize_near(pencil, share * shift)
         except ConvergenceError:
             continue
-    return factorise_near(pencil, shift)
+    return factorize_near(pencil, shift)
 
 
-def factorise_near(pencil: Pencil, shift: float) -> Factor:
+def factorize_near(pencil: Pencil, shift: float) -> Factor:
     """Factor at `shift`, or within a few per cent of it where pivots there are poor or an eigenvalue is too near.
 
     Raises
@@ -75,7 +75,7 @@ def factorise_near(pencil: Pencil, shift: float) -> Factor:
         If that is so at all of them.
     """
     for nudge in SHIFT_NUDGES:
-        factor = factorise(pencil, nudge * shift)
+        factor = factorize(pencil, nudge * shift)
         if factor and _serves(pencil, factor):
             return factor
     raise ConvergenceError(

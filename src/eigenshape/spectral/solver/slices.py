@@ -9,7 +9,7 @@ from eigenshape._errors import ConvergenceError
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.lanczos import Wanted, block_lanczos
 from eigenshape.spectral.solver.pencil import Pencil
-from eigenshape.spectral.solver.shift import factorise_near, shift_inside
+from eigenshape.spectral.solver.shift import factorize_near, shift_inside
 
 Report = Callable[[float], None]
 
@@ -64,7 +64,7 @@ def walk_on(
         )
         if last:
             return np.hstack([*parts, vectors]), factor
-        kept, floor = _cut(values, factor.shift)
+        kept, floor = _find_cut(values, factor.shift)
         parts.append(vectors[:, values < floor])
         known = factor.count + kept
         upper_half = np.sort(values[values < floor])[parts[-1].shape[1] // 2 :]
@@ -82,7 +82,7 @@ def _within(report: Report, start: float, share: float) -> Report:
     return lambda done: report(start + share * done)
 
 
-def _cut(values: Float[np.ndarray, " j"], shift: float) -> tuple[int, float]:
+def _find_cut(values: Float[np.ndarray, " j"], shift: float) -> tuple[int, float]:
     """Return how many eigenvalues above the shift the slice keeps, and the middle of the gap it ends in."""
     above = np.sort(values[values > shift])
     gaps = np.diff(above[-(OVERLAP + 1) :])
@@ -105,7 +105,7 @@ def factor_beyond(pencil: Pencil, floor: float, spacing: float, known: int, targ
     """
     step = spacing * target / 2
     for _ in range(SLICE_TRIALS):
-        factor = factorise_near(pencil, floor + step)
+        factor = factorize_near(pencil, floor + step)
         between = factor.count - known
         if FAIR[0] * target <= between <= FAIR[1] * target:
             break

@@ -23,7 +23,7 @@ from eigenshape.spectral.solver.components import (
 )
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.lanczos import Wanted, block_lanczos
-from eigenshape.spectral.solver.pairs import Pairs, lowest, polished
+from eigenshape.spectral.solver.pairs import Pairs, lowest_pairs, polish
 from eigenshape.spectral.solver.pencil import Pencil
 from eigenshape.spectral.solver.shift import expected_values, factor_below, shift_inside
 from eigenshape.spectral.solver.slices import walk
@@ -52,7 +52,7 @@ PART_MARGIN = 1.1
 EXTRA_PAIRS = 2
 
 
-def proved(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+def solve_lowest(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
     """Return the k lowest pairs of a pencil and their proof, by the quickest road that reaches it.
 
     Raises
@@ -63,16 +63,16 @@ def proved(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate
         If none does.
     """
     if pencil.labels.any():
-        return _in_parts(connected_parts(pencil), k, report)
-    return _connected(pencil, k, report)
+        return _solve_parts(connected_parts(pencil), k, report)
+    return _solve_connected(pencil, k, report)
 
 
-def _connected(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+def _solve_connected(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
     if dense_serves(pencil, k):
-        return _dense(pencil, k, report)
-    roads: list[Road] = [partial(_sparse, start=walk)] if k > ONE_SHIFT_PAIRS else []
-    roads += [partial(_sparse, start=_at_once)]
-    roads += [_dense] if pencil.n <= DENSE_LIMIT else []  # nothing there can fail to converge
+        return _solve_dense(pencil, k, report)
+    roads: list[Road] = [partial(_solve_sparse, start=walk)] if k > ONE_SHIFT_PAIRS else []
+    roads += [partial(_solve_sparse, start=_at_once)]
+    roads += [_solve_dense] if pencil.n <= DENSE_LIMIT else []  # nothing there can fail to converge
     for road in roads[:-1]:
         with suppress(ConvergenceError):
             return road(pencil, k, report)
@@ -84,19 +84,19 @@ def dense_serves(pencil: Pencil, k: int) -> bool:
     return pencil.n <= DENSE_POINTS or (DENSE_SHARE * k > pencil.n and pencil.n <= DENSE_LIMIT)
 
 
-def _dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+def _solve_dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
     require_memory_for_pairs(pencil, k, 32 * pencil.n**2)
     report(0.1, f"solving {pencil.n} points densely")
     roots = np.sqrt(pencil.mass_diagonal)
     stiffness = pencil.stiffness.toarray() / np.outer(roots, roots)
     mass = None if pencil.mass_floor == 1.0 else pencil.mass.toarray() / np.outer(roots, roots)
     _, vectors = sl.eigh(stiffness, mass)
-    pairs = lowest(pencil, vectors[:, :k] / roots[:, None], k)
+    pairs = lowest_pairs(pencil, vectors[:, :k] / roots[:, None], k)
     report(0.8, "counting eigenvalues")
     return _complete(pencil, pairs)
 
 
-def _in_parts(parts: Parts, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+def _solve_parts(parts: Parts, k: int, report: Progress) -> tuple[Pairs, Certificate]:
     """Solve each part by itself, and prove what is merged of them as a whole.
 
     A Krylov space of all of them would see few copies of an eigenvalue at a time, and 0 has as many as there are parts.
@@ -165,7 +165,7 @@ def _share(report: Progress, parts: Parts, number: int) -> Progress:
 
 
 def _solve_part(parts: Parts, pencil: Pencil, k: int, report: Progress) -> Pairs:
-    pairs, _ = _connected(pencil, k, report)
+    pairs, _ = _solve_connected(pencil, k, report)
     up = pencil.vector_exponent - parts.pencil.vector_exponent
     values, residuals = np.ldexp([pairs.values, pairs.residuals], parts.exponent(pencil))
     return Pairs(values, np.ldexp(pairs.vectors, up), residuals)
@@ -178,14 +178,16 @@ def _complete(pencil: Pencil, pairs: Pairs) -> tuple[Pairs, Certificate]:
     return pairs, certificate
 
 
-def _sparse(pencil: Pencil, k: int, report: Progress, *, start: Start) -> tuple[Pairs, Certificate]:
+def _solve_sparse(
+    pencil: Pencil, k: int, report: Progress, *, start: Start
+) -> tuple[Pairs, Certificate]:
     require_memory_for_pairs(pencil, k)
     report(0.02, "looking for a shift")
     vectors, factor = start(pencil, k, _in_run(report, 0))
     for run in range(1, MOST_RUNS + 1):
-        pairs = polished(pencil, factor, lowest(pencil, vectors, k))
+        pairs = polish(pencil, factor, lowest_pairs(pencil, vectors, k))
         report(0.9, "counting eigenvalues")
-        certificate, wanted = _still_wanted(pencil, factor, pairs, k)
+        certificate, wanted = _remaining(pencil, factor, pairs, k)
         missing = wanted.below + wanted.above
         if certificate is not None and certificate.complete:
             return pairs, certificate
@@ -241,7 +243,7 @@ def _in_run(report: Progress, run: int) -> Callable[[float], None]:
     return lambda done: report(0.05 + 0.8 * done, f"run {run + 1} of block Lanczos")
 
 
-def _still_wanted(
+def _remaining(
     pencil: Pencil, factor: Factor, pairs: Pairs, k: int
 ) -> tuple[Certificate | None, Wanted]:
     """Return the proof as far as it goes, and what a further run has to find."""
