@@ -29,7 +29,7 @@ def shape(seed: int) -> TriangleMesh:
 def lanczos_for_all():
     """Take the road of large operators, which is the one with something to lose."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(roads, "SMALL", 0)
+        patch.setattr(roads, "DENSE_POINTS", 0)
         yield
 
 

@@ -197,7 +197,7 @@ def test_weights_that_are_volumes_make_the_mesh_laplacian():
         ({"edge_factor": np.nan}, "edge_factor must be positive and finite; entry 0 is nan"),
         (
             {"edge_factor": 0.9},
-            r"A kernel must reach the neighbours, h ≥ e; h = 2√t is 0.9 of the mean edge length",
+            r"A kernel must reach the neighbors, h ≥ e; h = 2√t is 0.9 of the mean edge length",
         ),
         ({"cutoff": 0.0}, "cutoff must be positive"),
     ],
@@ -242,7 +242,7 @@ def test_a_time_that_leaves_nothing_is_warned_of():
 
 def test_weights_of_one_over_n_are_corrected_in_the_random_walk_form_only():
     with pytest.raises(
-        InvalidParameterError, match="Weights of 1/n must be corrected in the random-walk form"
+        InvalidParameterError, match="A correction of weights 1/n needs the random-walk form"
     ):
         gaussian_laplacian(np.random.default_rng(0).random((50, 2)), 0.1, 2, correct="log")
 

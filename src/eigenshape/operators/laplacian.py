@@ -101,7 +101,7 @@ class Laplacian:
 
     def __post_init__(self) -> None:
         for name in ("stiffness", "mass"):
-            object.__setattr__(self, name, _checked(name, getattr(self, name)))
+            object.__setattr__(self, name, _as_symmetric(name, getattr(self, name)))
         if self.stiffness.shape != self.mass.shape:
             raise InvalidParameterError(
                 f"stiffness and mass must have the same shape; the shapes are {self.stiffness.shape} and "
@@ -120,7 +120,7 @@ class Laplacian:
         return int(self.stiffness.shape[0])
 
 
-def _checked(name: str, value: sp.sparray) -> sp.csr_array:
+def _as_symmetric(name: str, value: sp.sparray) -> sp.csr_array:
     _require_square(name, value)
     matrix = sp.csr_array(value, dtype=np.float64)
     if not matrix.has_canonical_format:

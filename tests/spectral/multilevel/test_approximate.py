@@ -28,7 +28,7 @@ solve_roughly = partial(solve_spectrum, method="approximate")
 @pytest.fixture
 def always_coarsen(monkeypatch):
     """Take the road of large operators, also for small ones."""
-    monkeypatch.setattr(climbing, "SMALL", 0)
+    monkeypatch.setattr(climbing, "EXACT_POINTS", 0)
     monkeypatch.setattr(climbing, "COARSENED", 3)
 
 

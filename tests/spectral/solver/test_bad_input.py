@@ -14,7 +14,7 @@ from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver.diagnosis import require_solvable
-from eigenshape.spectral.solver.pencil import normalise
+from eigenshape.spectral.solver.pencil import normalize
 
 TRIANGLE, PAIR = np.ones((3, 3)) - np.eye(3), np.ones((2, 2)) - np.eye(2)
 
@@ -161,7 +161,7 @@ def test_an_operator_that_is_sound_is_not_blamed():
         copies(PAIR, 4),
         Laplacian(0 * unit(5), unit(5)),
     ):
-        require_solvable(normalise(laplacian), ConvergenceError("no"))
+        require_solvable(normalize(laplacian), ConvergenceError("no"))
 
 
 @pytest.mark.long
