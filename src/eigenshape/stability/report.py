@@ -136,8 +136,8 @@ class StabilityReport:
         ]
         if not self.closeness and self.times.low_reason == "closeness":
             lines.append(
-                "Points were matched by their places in space, which says little about one shape in "
-                "two poses. Pass partners, the map between the vertices, or compare eigenvalues "
+                "Points were matched by their places in space, which says little about one shape "
+                "in two poses. Pass partners, the map between the vertices, or compare eigenvalues "
                 "only."
             )
         return "\n\n".join(lines)
