@@ -84,7 +84,7 @@ class StabilityReport:
         Closeness of the map from vertex to vertex; None if the vertices do not correspond.
     distance : float
         Hausdorff distance of the shapes in space, in length.
-    matched, matched_floor : float
+    matching_distance, sampling_distance : float
         Largest distance of partners in the bottleneck matching of samples of both shapes, and of
         two samples of the first shape, in length.
     delta : float
@@ -110,8 +110,8 @@ class StabilityReport:
     spectra: SpectrumComparison
     closeness: Closeness | None
     distance: float
-    matched: float
-    matched_floor: float
+    matching_distance: float
+    sampling_distance: float
     delta: float
     times: TimeRange
     changes: tuple[ChangeAtTime, ...]
@@ -146,8 +146,8 @@ class StabilityReport:
         return (
             f"In space, each point of one shape is within {self.distance:.3g} of the other. The "
             f"best one-to-one correspondence of {self.n_samples} random points of each moves them "
-            f"by up to {self.matched:.3g}; for two such samples of the first shape it is "
-            f"{self.matched_floor:.3g}."
+            f"by up to {self.matching_distance:.3g}; for two such samples of the first shape it is "
+            f"{self.sampling_distance:.3g}."
         )
 
     def _explain_changes(self) -> str:
@@ -266,8 +266,8 @@ def compare_shapes(
         spectra=compare_spectra(*spectra, brackets=brackets),
         closeness=closeness,
         distance=distance,
-        matched=samples.matched.distance,
-        matched_floor=samples.floor.distance,
+        matching_distance=samples.matching.distance,
+        sampling_distance=samples.resampling.distance,
         delta=delta,
         times=times,
         changes=changes,

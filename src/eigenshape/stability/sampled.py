@@ -57,7 +57,7 @@ class ChangeAtTime:
         ‖L_P - L_Q‖₂ of the matched points: no eigenvalue can change by more.
     bound : float
         Bound by theory for points at this distance (`theorem_rate("lipschitz")`).
-    trusted : bool
+    admissible : bool
         Whether the time is in the admissible range.
 
     See Also
@@ -70,7 +70,7 @@ class ChangeAtTime:
     floor: float
     weyl: float
     bound: float
-    trusted: bool
+    admissible: bool
 
     @property
     def significant(self) -> bool:
@@ -86,7 +86,7 @@ class Samples:
     ----------
     one, two, again : (n, d) float
         Points of the first shape, of the second, and further points of the first, in length.
-    matched, floor : BottleneckMatching
+    matching, resampling : BottleneckMatching
         Between `one` and `two`, and between `one` and `again`.
     dim : int
         m.
@@ -95,8 +95,8 @@ class Samples:
     one: Points
     two: Points
     again: Points
-    matched: BottleneckMatching
-    floor: BottleneckMatching
+    matching: BottleneckMatching
+    resampling: BottleneckMatching
     dim: int
 
 
@@ -104,8 +104,8 @@ def matched_samples(one: Shape, two: Shape, n: int, rng: np.random.Generator) ->
     """Draw 2n points of the first shape and n of the second, and match them one to one."""
     both, other = _draw_points(one, 2 * n, rng), _draw_points(two, n, rng)
     first, again = both[:n], both[n:]
-    matched, floor = bottleneck_matching(first, other), bottleneck_matching(first, again)
-    return Samples(first, other, again, matched, floor, one.dim)
+    matching, resampling = bottleneck_matching(first, other), bottleneck_matching(first, again)
+    return Samples(first, other, again, matching, resampling, one.dim)
 
 
 def _draw_points(shape: Shape, n: int, rng: np.random.Generator) -> Points:
@@ -140,7 +140,7 @@ def default_sample_times(times: TimeRange) -> tuple[float, ...]:
 
 
 def changes_over_times(
-    samples: Samples, k: int, times: tuple[float, ...], trusted: TimeRange, progress: Progress
+    samples: Samples, k: int, times: tuple[float, ...], admissible: TimeRange, progress: Progress
 ) -> tuple[tuple[ChangeAtTime, ...], EigenspaceAngles]:
     """Return the changes at each heat time, and the angles of eigenspaces at the middle one."""
     changes = []
@@ -150,10 +150,10 @@ def changes_over_times(
         progress(place / len(times), f"heat time {t:.3g}")
         laplacians = [_graph_laplacian(points, t, samples.dim, labels) for points, labels in pieces]
         spectra = [solve_spectrum(laplacian, k) for laplacian in laplacians]
-        changes.append(_measure_change(samples, laplacians, spectra, t, trusted))
+        changes.append(_measure_change(samples, laplacians, spectra, t, admissible))
         if place == len(times) // 2:
             angles = eigenspace_angles(
-                *spectra[:2], points=samples.matched.partners, laplacian=laplacians[0]
+                *spectra[:2], points=samples.matching.partners, laplacian=laplacians[0]
             )
     return tuple(changes), angles
 
@@ -164,7 +164,7 @@ def _graph_laplacian(
     """Build the Gaussian graph Laplacian of some points, which must connect points of one label.
 
     The kernel is removed from the result, so that the solver does not warn about heat times out of
-    range: `ChangeAtTime.trusted` reports them. (A filter of warnings would act on other threads
+    range: `ChangeAtTime.admissible` reports them. (A filter of warnings would act on other threads
     too.)
     """
     measure = uniform_quadrature(points, dim)
@@ -185,16 +185,16 @@ def _measure_change(
     laplacians: list[Laplacian],
     spectra: list[Spectrum],
     t: float,
-    trusted: TimeRange,
+    admissible: TimeRange,
 ) -> ChangeAtTime:
     values = [spectrum.eigenvalues for spectrum in spectra]
     last = float(values[0][-1])
-    moved = samples.matched
+    moved = samples.matching
     return ChangeAtTime(
         t=t,
         change=float(np.abs(values[1] - values[0]).max()) / last,
         floor=float(np.abs(values[2] - values[0]).max()) / last,
         weyl=weyl_bound(laplacians[0], laplacians[1], moved.partners).norm / last,
         bound=float(theorem_rate("lipschitz", samples.dim).at(moved.distance, t)) / last,
-        trusted=trusted.low <= t <= trusted.high,
+        admissible=admissible.low <= t <= admissible.high,
     )
