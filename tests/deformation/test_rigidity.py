@@ -219,7 +219,7 @@ def test_many_rounds_end_where_plain_alternation_does(monkeypatch):
         posed[free] = solve @ ((own + theirs)[free] / 2 - matrix[np.ix_(free, held)] @ posed[held])
     quick = bend_graded(binding, [handle])
     assert total(binding, quick) == pytest.approx(total(binding, posed), rel=3e-4)
-    monkeypatch.setattr(rigidity, "SETTLED", 0.0)
+    monkeypatch.setattr(rigidity, "ENERGY_TOLERANCE", 0.0)
     patient = bend_graded(binding, [handle], n_rounds=2000)
     assert np.abs(patient - posed).max() < 1e-9
 

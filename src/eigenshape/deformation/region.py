@@ -7,6 +7,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
+from typing_extensions import TypeAliasType
 
 from eigenshape._arguments import describe_value
 from eigenshape._arrays import as_array, frozen, positive_values, real_numbers, whole_numbers
@@ -99,7 +100,7 @@ class BrushRegion:
         object.__setattr__(self, "radius", float(positive_values(radius, "radius")[0]))
 
 
-Region = BoxRegion | BrushRegion | np.ndarray | Iterable[int]
+Region = TypeAliasType("Region", BoxRegion | BrushRegion | np.ndarray | Iterable[int])
 
 
 def copy_region(region: Region) -> Region:
