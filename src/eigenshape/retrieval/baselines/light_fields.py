@@ -45,7 +45,7 @@ def light_field(
     area (35), and of the first 10 Fourier coefficients of the distance of its outline from its
     center, over the mean distance and doubled. Both are taken about the center of the silhouette,
     in units of its radius, so that they do not change if it is turned or mirrored. Several
-    dodecahedra, turned against each other, make the descriptor less dependent on how the shape lies.
+    dodecahedra, turned against each other, make the descriptor depend less on how the shape lies.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def _fourier(
     """Return Fourier magnitudes of the distance from the center along the outline."""
     pieces, _ = label(image, np.ones((3, 3)))
     names, away = pieces[image] - 1, np.square(np.argwhere(image) - center).sum(axis=1)
-    # Take the largest piece; of equal ones the outer one, so that the choice turns with the picture.
+    # Take the largest piece; of equal ones the outer one, so the choice turns with the picture.
     largest = pieces == 1 + np.lexsort((np.bincount(names, away), np.bincount(names)))[-1]
     start = int(largest.argmax())
     path = outline(largest, start // image.shape[1], start % image.shape[1]).astype(np.float64)
