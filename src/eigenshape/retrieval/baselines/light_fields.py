@@ -167,7 +167,10 @@ def _describe_silhouette(image: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, "4
 
 
 def zernike_magnitudes(sums: Complex[np.ndarray, "m j"]) -> Float[np.ndarray, "35"]:
-    """Return |Σ R_n^m(r) e^{imθ}| over the number of points, from sums of z^m |z|^2j; each in 0..1."""
+    """Return |Σ R_n^m(r) e^{imθ}| over the number of points, each in 0..1.
+
+    The argument holds the sums of z^m |z|^2j over the points.
+    """
     moments = [
         sum(c * sums[m, j] for j, c in enumerate(_radial(n, m)))
         for n in range(1, ORDER + 1)

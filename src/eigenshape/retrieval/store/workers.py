@@ -22,8 +22,8 @@ from eigenshape._errors import EigenshapeError
 T = TypeVar("T")
 NO_WORKERS = (
     "Worker processes import the script that starts them, and must reach its end; all of them "
-    "ended before they took a file. Put what the script does, from its first call of eigenshape on, "
-    'under `if __name__ == "__main__":`.'
+    "ended before they took a file. Put what the script does, from its first call of eigenshape "
+    'on, under `if __name__ == "__main__":`.'
 )
 
 
