@@ -23,7 +23,7 @@ T = TypeVar("T")
 NO_WORKERS = (
     "Worker processes import the script that starts them, and must reach its end; all of them "
     "ended before they took a file. Put what the script does, from its first call of eigenshape "
-    'on, under `if __name__ == "__main__":`.'
+    'on, under `if __name__ == "__main__":`, and define the function that reads files above it.'
 )
 
 
