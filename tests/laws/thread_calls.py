@@ -280,6 +280,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "crouzeix_raviart_laplacian": lambda v: es.operators.crouzeix_raviart_laplacian(v.ball),
     "curvature_tensors": lambda v: es.operators.curvature_tensors(v.animal, 2.0),
     "cut_by_planes": lambda v: es.scans.cut_by_planes(v.animal, [[0, 1, 0, 0.3]]),
+    "default_codebook": lambda v: es.retrieval.default_codebook(),
     "default_energies": lambda v: es.spectral.default_energies(v.spectrum),
     "default_times": lambda v: es.spectral.default_times(v.spectrum),
     "deform": lambda v: es.deform(v.rig, v.region, v.move, fixed=v.fixed),
@@ -388,14 +389,15 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "largest_component": lambda v: es.geometry.largest_component(v.animal),
     "light_field": lambda v: es.retrieval.baselines.light_field(v.ball, n_fields=1, size=32),
     "light_field_distance": lambda v: es.retrieval.baselines.light_field_distance(*v.light),
-    "default_codebook": lambda v: es.retrieval.default_codebook(),
     "make_creature": lambda v: es.make_creature("quadruped", 3, n_vertices=700),
     "map_closeness": lambda v: es.stability.map_closeness(v.ball, 1.01 * v.ball.vertices),
     "map_from_points": lambda v: es.spectral.map_from_points(
         v.many_spectrum, v.many_spectrum, np.arange(v.many.n_vertices), n_modes=6
     ),
     "match_features": lambda v: es.retrieval.match_features(*v.by_heat),
-    "match_patches": lambda v: es.retrieval.match_patches(*v.points),
+    "match_patches": lambda v: es.retrieval.match_patches(
+        *(descriptor.points[0] for descriptor in v.by_patches)
+    ),
     "matching_reach": lambda v: es.stability.matching_reach(2.0),
     "matching_score": lambda v: es.retrieval.matching_score(*v.by_heat),
     "maximum_matching": lambda v: es.stability.maximum_matching(
