@@ -7,18 +7,9 @@ import numpy as np
 import typer
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import (
-    JsonOption,
-    MeshArgument,
-    RepairOption,
-    load_mesh,
-    print_json,
-    print_table,
-    progress_bar,
-    said,
-    save_picture,
-)
-from eigenshape.cli.outputs import require_mesh_path, save_like
+from eigenshape.cli.console import print_json, print_table, print_written, progress_bar
+from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, load_mesh
+from eigenshape.cli.outputs import require_mesh_path, save_like, save_picture
 from eigenshape.cli.parts import require_paths
 from eigenshape.cli.regions import REGIONS, told_region, told_rotation, told_translation
 from eigenshape.deformation.binding import bind
@@ -135,7 +126,7 @@ def deform(
         save_like(mesh, surface, output, session.mesh.vertices)
     if save_edits:
         write_edits(session.edits, surface, save_edits)
-        said(save_edits)
+        print_written(save_edits)
     if picture:
         moved = np.linalg.norm(session.mesh.vertices - surface.vertices, axis=1)
         shares = (

@@ -8,8 +8,9 @@ import numpy as np
 import typer
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import out, progress_bar, save_picture, shown
+from eigenshape.cli.console import out, progress_bar, shown
 from eigenshape.cli.index import WorkersOption, describe_all, describe_file
+from eigenshape.cli.outputs import save_picture
 from eigenshape.cli.presets import PATCHES, recipe_to_fill
 from eigenshape.cli.query import print_matches
 from eigenshape.cli.sheets import CAPTION, asked, contact_sheet

@@ -7,16 +7,9 @@ import numpy as np
 import typer
 
 from eigenshape._progress import Progress
-from eigenshape.cli.console import (
-    JsonOption,
-    MeshArgument,
-    RepairOption,
-    err,
-    load_mesh,
-    print_json,
-    progress_bar,
-    save_picture,
-)
+from eigenshape.cli.console import err, print_json, progress_bar
+from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, load_mesh
+from eigenshape.cli.outputs import save_picture
 from eigenshape.cli.parts import part_rows, print_rows, require_paths, save_colors
 from eigenshape.cli.presets import HeatPresetOption, heat_preset
 from eigenshape.features.segmentation import segment

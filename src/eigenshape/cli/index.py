@@ -9,17 +9,8 @@ from typing import Annotated
 import typer
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import (
-    JsonOption,
-    RepairOption,
-    out,
-    print_json,
-    progress_bar,
-    read_repaired,
-    repair_names,
-    shown,
-    told_by,
-)
+from eigenshape.cli.console import batch_reporter, out, print_json, progress_bar, shown
+from eigenshape.cli.inputs import JsonOption, RepairOption, read_repaired, repair_names
 from eigenshape.cli.presets import PATCHES, PresetOption, recipe_to_fill, require_preset
 from eigenshape.io.parsing import MESH_FORMATS
 from eigenshape.retrieval.store.batch import BatchReport, Describe, build_index
@@ -92,7 +83,12 @@ def describe_all(
     """Build an index with a progress bar, naming what cannot be taken as it comes."""
     with progress_bar("index") as progress:
         return build_index(
-            shelf, items, describe, recipes=(recipe,), workers=workers, told=told_by(progress)
+            shelf,
+            items,
+            describe,
+            recipes=(recipe,),
+            workers=workers,
+            told=batch_reporter(progress),
         )
 
 

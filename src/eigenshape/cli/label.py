@@ -6,16 +6,9 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from eigenshape.cli.console import (
-    JsonOption,
-    MeshArgument,
-    RepairOption,
-    load_mesh,
-    print_json,
-    progress_bar,
-    said,
-    save_picture,
-)
+from eigenshape.cli.console import print_json, print_written, progress_bar
+from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, load_mesh
+from eigenshape.cli.outputs import save_picture
 from eigenshape.cli.parts import part_rows, print_rows, require_paths, save_colors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.labels import read_labels, write_labels
@@ -89,7 +82,7 @@ def label(
         print_rows("Labels", COLUMNS, rows)
     if save:
         write_labels(found.labels, save)
-        said(save)
+        print_written(save)
     if output:
         colors = part_colors(target, np.searchsorted(np.unique(given), found.labels))
         save_colors(target, colors, output, found.labels)

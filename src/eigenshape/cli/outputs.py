@@ -3,14 +3,16 @@
 from pathlib import Path
 
 from jaxtyping import Float
+from matplotlib.figure import Figure
 from numpy import ndarray
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape._files import read_regular, replace_file
-from eigenshape.cli.console import said
+from eigenshape.cli.console import print_written
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.mesh_files import WRITTEN, write_mesh
 from eigenshape.io.obj_sheet import format_sheet, read_sheet
+from eigenshape.plot.save import save_figure
 
 OBJ = ".obj"
 
@@ -54,4 +56,10 @@ def save_like(
         replace_file(path, format_sheet(read_sheet(read_regular(source)), mesh, moved))
     else:
         write_mesh(mesh if moved is None else TriangleMesh(moved, mesh.faces), path)
-    said(path)
+    print_written(path)
+
+
+def save_picture(figure: Figure, path: Path) -> None:
+    """Write a figure, and print so on stderr."""
+    save_figure(figure, path)
+    print_written(path)

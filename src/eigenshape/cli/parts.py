@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Int, UInt8
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import print_table, said
+from eigenshape.cli.console import print_table, print_written
 from eigenshape.cli.outputs import require_mesh_path
 from eigenshape.features.segmentation import Segmentation
 from eigenshape.geometry.measure import face_areas
@@ -51,7 +51,7 @@ def save_colors(
 ) -> None:
     """Write a mesh with its colors, and its labels if there are any, and say so on stderr."""
     write_mesh(mesh, path, colors=colors, face_labels=face_labels)
-    said(path)
+    print_written(path)
 
 
 def part_rows(mesh: TriangleMesh, parts: Segmentation) -> list[dict[str, Any]]:

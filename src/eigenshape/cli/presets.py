@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from eigenshape._errors import InvalidParameterError, StoreError
-from eigenshape.cli.console import err, progress_bar, read_repaired, told_by
+from eigenshape.cli.console import batch_reporter, err, progress_bar
+from eigenshape.cli.inputs import read_repaired
 from eigenshape.retrieval.heat.descriptor import PRESETS, SCALE_FREE, Recipe
 from eigenshape.retrieval.patches.codebook import made_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe, seen_patches
@@ -66,7 +67,10 @@ def recipe_to_fill(
     if held is None:
         with progress_bar("words") as progress:
             book = learn_words(
-                items, partial(teach, repairs=repairs), workers=workers, told=told_by(progress)
+                items,
+                partial(teach, repairs=repairs),
+                workers=workers,
+                told=batch_reporter(progress),
             )
         err.print(
             "words of patches: those that come with eigenshape, since there are few shapes to learn from"

@@ -7,17 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
-from eigenshape.cli.console import (
-    JsonOption,
-    RepairOption,
-    load_mesh,
-    out,
-    print_json,
-    print_table,
-    progress_bar,
-    repair_names,
-    save_picture,
-)
+from eigenshape.cli.console import out, print_json, print_table, progress_bar
+from eigenshape.cli.inputs import JsonOption, RepairOption, load_mesh, repair_names
+from eigenshape.cli.outputs import save_picture
 from eigenshape.cli.presets import HeldPresetOption, recipe_to_ask, require_preset
 from eigenshape.cli.sheets import CAPTION, Asked, asked, contact_sheet
 from eigenshape.plot.figure import literal

@@ -8,15 +8,9 @@ import typer
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
-from eigenshape.cli.console import (
-    JsonOption,
-    MeshArgument,
-    RepairOption,
-    load_mesh,
-    print_json,
-    progress_bar,
-    save_picture,
-)
+from eigenshape.cli.console import print_json, progress_bar
+from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, load_mesh
+from eigenshape.cli.outputs import save_picture
 from eigenshape.cli.parts import part_rows, print_rows, require_paths, save_colors
 from eigenshape.features import segmentation
 from eigenshape.features.boundaries import smooth_boundaries

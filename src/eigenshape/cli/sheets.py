@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 
 from eigenshape._errors import EigenshapeError, StoreError
 from eigenshape._progress import Progress
-from eigenshape.cli.console import err, progress_bar, read_repaired, shown
+from eigenshape.cli.console import err, progress_bar, shown
+from eigenshape.cli.inputs import read_repaired
 from eigenshape.geometry.geodesic import geodesic_distances
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh

@@ -9,22 +9,17 @@ import typer
 from jaxtyping import Int
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import (
+from eigenshape.cli.console import err, out, print_json, print_table, print_written, progress_bar
+from eigenshape.cli.inputs import (
     CellsOption,
     DimOption,
     DropMissingOption,
     JsonOption,
     RepairOption,
     ShapeArgument,
-    err,
     load_shape,
-    out,
-    print_json,
-    print_table,
-    progress_bar,
-    said,
-    save_picture,
 )
+from eigenshape.cli.outputs import save_picture
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
@@ -219,7 +214,7 @@ def spectrum(
         _picture(found, solved, picture)
     if save:
         solved.save(save)
-        said(save)
+        print_written(save)
 
 
 def _usual_pairs(laplacian: Laplacian, fixed: Int[np.ndarray, " c"] | None) -> int:

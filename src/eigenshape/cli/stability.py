@@ -9,19 +9,16 @@ import numpy as np
 import typer
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import (
+from eigenshape.cli.console import out, print_json, print_table, progress_bar
+from eigenshape.cli.inputs import (
     DimOption,
     DropMissingOption,
     JsonOption,
     RepairOption,
     ShapeArgument,
     load_shape,
-    out,
-    print_json,
-    print_table,
-    progress_bar,
-    save_picture,
 )
+from eigenshape.cli.outputs import save_picture
 from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_area, normalize_diameter
