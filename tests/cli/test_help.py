@@ -101,3 +101,44 @@ def test_the_command_is_a_module_too(module):
         [sys.executable, "-m", module, "info", "-h"], capture_output=True, text=True, check=True
     )
     assert "Usage: eigenshape info" in usage.stdout
+
+
+ALL = [(verb, parameter) for verb in VERBS for parameter in load_verb(verb).params]
+
+
+def spellings(of):
+    return {tuple(parameter.opts) for _, parameter in ALL if of(parameter)}
+
+
+def test_the_main_output_of_every_verb_is_called_output():
+    written = [verb for verb, parameter in ALL if parameter.name == "output"]
+    assert written == ["repair", "spectrum", "features", "segment", "label", "deform", "demo"]
+    assert spellings(lambda parameter: parameter.name == "output") == {("-o", "--output")}
+    assert spellings(lambda parameter: "-o" in parameter.opts) == {("-o", "--output")}
+
+
+def test_a_picture_is_called_picture():
+    drawn = {
+        parameter.name for _, parameter in ALL if "PNG, SVG or PDF" in " ".join([parameter.help])
+    }
+    assert drawn == {"picture", "eigenfunctions"}
+    assert spellings(lambda parameter: parameter.name == "picture") == {("--picture",)}
+
+
+def test_an_index_is_the_first_argument():
+    for verb in ("index", "query"):
+        first = load_verb(verb).params[0]
+        assert (first.name, first.param_type_name) == ("index", "argument")
+
+
+def test_an_option_of_one_name_is_spelled_alike_in_every_verb():
+    for name in {parameter.name for _, parameter in ALL}:
+        options = [found for _, found in ALL if found.name == name]
+        if name not in {"shape", "mesh"}:  # which are arguments
+            assert len({tuple(option.opts) for option in options}) == 1, name
+
+
+def test_no_option_has_two_long_names():
+    for verb, parameter in ALL:
+        long = [text for text in parameter.opts if text.startswith("--")]
+        assert len(long) <= 1, (verb, parameter.opts)

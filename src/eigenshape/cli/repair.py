@@ -25,7 +25,7 @@ def repair(
     *,
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", "--out", help="Mesh to write: OFF, OBJ, PLY, STL or GLB."),
+        typer.Option("-o", "--output", help="Mesh to write: OFF, OBJ, PLY, STL or GLB."),
     ],
     names: Annotated[
         str,
@@ -33,7 +33,8 @@ def repair(
             "--repair",
             metavar="NAMES",
             help=(
-                f"Repairs to apply in this order, separated by commas: {', '.join(REPAIRS)}. '' only converts."
+                f"Repairs to apply in this order, separated by commas: {', '.join(REPAIRS)}. "
+                "'' only converts the file."
             ),
         ),
     ] = USUAL,

@@ -1,4 +1,4 @@
-"""The ways of describing that the command line knows by name."""
+"""The methods of describing shapes that the command line knows by name."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -23,20 +23,20 @@ PATCHES = "patches"
 TEACHING_VIEWS = 2
 EVERY = (PATCHES, *PRESETS)
 
-HeatPresetOption = Annotated[
-    str, typer.Option("--preset", help=f"How shapes are described: {' or '.join(PRESETS)}.")
+HeatMethodOption = Annotated[
+    str, typer.Option("--method", help=f"How shapes are described: {' or '.join(PRESETS)}.")
 ]
-PresetOption = Annotated[
+MethodOption = Annotated[
     str,
     typer.Option(
-        "--preset",
-        help=f"How shapes are described: {', '.join(EVERY)}; patches are best for partial scans.",
+        "--method",
+        help=f"How shapes are described: {', '.join(EVERY)}. patches is best for partial scans.",
     ),
 ]
-HeldPresetOption = Annotated[
+StoredMethodOption = Annotated[
     str | None,
     typer.Option(
-        "--preset",
+        "--method",
         help=(
             f"Which descriptions to compare: {', '.join(EVERY)}. By default the index's "
             "own, or patches if it has several."
@@ -45,27 +45,27 @@ HeldPresetOption = Annotated[
 ]
 
 
-def heat_preset(name: str) -> Recipe:
-    """Look up a recipe of heat by the name that a user typed."""
-    require_preset(name, tuple(PRESETS))
+def heat_recipe(name: str) -> Recipe:
+    """Return the recipe of a heat method."""
+    require_method(name, tuple(PRESETS))
     return PRESETS[name]
 
 
-def require_preset(name: str, names: Sequence[str] = EVERY) -> None:
-    """Refuse a name that is none of some."""
+def require_method(name: str, names: Sequence[str] = EVERY) -> None:
+    """Raise an error if the name is not one of the allowed names."""
     if name not in names:
-        raise InvalidParameterError(f"--preset takes {' or '.join(names)}; it was given {name!r}.")
+        raise InvalidParameterError(f"--method takes {', '.join(names)}; it is {name!r}.")
 
 
 def recipe_to_fill(
     shelf: ShapeIndex, name: str, items: Sequence[Item], repairs: tuple[str, ...], workers: Workers
 ) -> AnyRecipe:
-    """Return the recipe of a preset for an index: for patches with its words, which it learns if it has none yet."""
+    """Return the recipe of a method for an index. For patches it has a codebook, learned if the index has none."""
     if name != PATCHES:
         return PRESETS[name]
     held = _patch_recipe(shelf)
     if held is None:
-        with progress_bar("words") as progress:
+        with progress_bar("codebook") as progress:
             book = learn_words(
                 items,
                 partial(teach, repairs=repairs),
@@ -73,15 +73,15 @@ def recipe_to_fill(
                 told=batch_reporter(progress),
             )
         err.print(
-            "words of patches: those that come with eigenshape, since there are few shapes to learn from"
+            "codebook: the one that comes with eigenshape, because there are too few shapes to learn from"
             if book == made_codebook()
-            else "words of patches: learnt from shapes of this index"
+            else "codebook: learned from the shapes of this index"
         )
         held = PatchRecipe(book)
         shelf.keep_recipe(held)
         held = (
             _patch_recipe(shelf) or held
-        )  # of several first writers, the words of the first serve all
+        )  # if several processes start an index, all use the first one's codebook
     return held
 
 
@@ -91,11 +91,12 @@ def teach(path: Path, *, repairs: tuple[str, ...]) -> list[Patches]:
 
 
 def recipe_to_ask(shelf: ShapeIndex, name: str | None) -> AnyRecipe:
-    """Return the recipe of a preset in which an index can answer; without name, its own."""
+    """Return the recipe of a method that an index can answer; without a name, the index's own."""
     patches = _patch_recipe(shelf)
     if name == PATCHES and patches is None:
         raise StoreError(
-            f"An index answers in the recipes it holds; {shelf.folder} holds no patches."
+            f"An index answers by the methods that it was made with; {shelf.folder} has no patches. "
+            "Run `eigenshape index` with --method patches first."
         )
     if patches is not None and name in (None, PATCHES):
         return patches
