@@ -65,7 +65,7 @@ def demo(
     print_matches(matches)
 
     sheet = output / "sheet.png"
-    caption = f"A partial scan of a {kind} in a new pose, and the most similar shapes: {CAPTION}"
+    caption = f"A partial scan of a {kind} in a new pose, and the most similar shapes ({CAPTION})"
     save_picture(contact_sheet(shape, "partial scan", matches, caption=caption), sheet)
     out.print(NEXT.format(scan=shown(scan_path)))
 

@@ -68,7 +68,7 @@ def query(
         )
     if picture:
         names = literal(scan.name), literal(index.name)
-        caption = f"{names[0]} and the {len(matches)} most similar shapes in {names[1]}: {CAPTION}"
+        caption = f"{names[0]} and the {len(matches)} most similar shapes in {names[1]} ({CAPTION})"
         title, repairs = literal(scan.stem), repair_names(repair)
         save_picture(
             contact_sheet(shape, title, matches, repairs=repairs, caption=caption), picture

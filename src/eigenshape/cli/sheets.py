@@ -1,4 +1,4 @@
-"""A query beside its matches, with what corresponds in one colour."""
+"""A query beside its matches, with corresponding parts in one color."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ from eigenshape.retrieval.heat.descriptor import Recipe
 from eigenshape.retrieval.store.index import Match
 from eigenshape.retrieval.store.kinds import AnyRecipe, Descriptor, describe_shape
 
-CAPTION = "parts that correspond share a colour"
+CAPTION = "corresponding parts have one color; a lower score is more similar"
 N_CELLS = 12  # of the query by patches
 REACH = 3.0  # times what a patch has of the surface, in length: farther from a matched patch nothing is known
 
@@ -94,7 +94,7 @@ def contact_sheet(
 
 
 def _panel(query: Asked, match: Match, repairs: tuple[str, ...]) -> Panel:
-    title = f"{literal(match.name)}\nscore {match.score:.4g}"
+    title = f"{literal(match.name)}\nscore {match.score:#.4g}"
     try:
         mesh = _read_match(match, repairs)
     except (EigenshapeError, OSError) as error:
