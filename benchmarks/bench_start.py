@@ -10,7 +10,7 @@ installed are left out.
 """
 
 import importlib.util
-import os
+import resource
 import statistics
 import subprocess
 import sys
@@ -51,7 +51,7 @@ def is_installed(name: str) -> bool:
 
 def cells(row: Row) -> list[str]:
     """Return a row as text."""
-    return [row["start"], f"{row['cpu']:.2f}", ratio_text(row["ratio"])]
+    return [row["start"], f"{row['cpu']:.3f}", ratio_text(row["ratio"])]
 
 
 def main() -> None:
