@@ -71,13 +71,13 @@ def times() -> np.ndarray:
 
 def ours(mesh: es.TriangleMesh, accuracy: float = 1e-2) -> tuple[np.ndarray, np.ndarray, float]:
     """Return the heat at the first time, the features, and the stated error; the accuracy is the usual one."""
-    found = es.retrieval.describe_large_mesh(mesh, es.retrieval.THESIS, accuracy=accuracy)
+    found = es.retrieval.find_heat_features(mesh, es.retrieval.THESIS, accuracy=accuracy)
     return found.heat, found.descriptor.vertices, found.error
 
 
 def exact(mesh: es.TriangleMesh) -> tuple[np.ndarray, np.ndarray, float]:
     """Take the certified spectrum."""
-    found = es.retrieval.describe_mesh(mesh, es.retrieval.THESIS)
+    found = es.retrieval.find_heat_features(mesh, es.retrieval.THESIS)
     return found.heat, found.descriptor.vertices, 0.0
 
 

@@ -44,15 +44,13 @@ COLUMNS = ("vertices", "method", "CPU s", "wall s", "MiB", "the thesis, then")
 
 def patches(mesh: es.TriangleMesh) -> Any:
     """Describe by patches, with views where the shape is closed."""
-    return es.retrieval.describe_shape(mesh, es.retrieval.PatchRecipe(es.retrieval.made_codebook()))
+    return es.describe(mesh, es.retrieval.PatchRecipe())
 
 
-def thesis(mesh: es.TriangleMesh) -> es.retrieval.ShapeDescriptor:
+def thesis(mesh: es.TriangleMesh) -> es.retrieval.HeatDescriptor:
     """Describe by the thesis' recipe, exactly where it does."""
-    describe = (
-        es.retrieval.describe_mesh if mesh.n_vertices <= EXACT else es.retrieval.describe_large_mesh
-    )
-    return describe(mesh, es.retrieval.THESIS).descriptor
+    accuracy = None if mesh.n_vertices <= EXACT else 0.01
+    return es.retrieval.find_heat_features(mesh, es.retrieval.THESIS, accuracy=accuracy).descriptor
 
 
 METHODS: dict[str, Callable[[es.TriangleMesh], Any]] = {
@@ -108,17 +106,16 @@ def asked(method: str, n_shapes: int) -> Row:
         return measured(
             lambda: [distance(query, known[number % len(known)]) for number in range(n_shapes)]
         )
-    recipe = (
-        es.retrieval.THESIS
-        if method == "thesis"
-        else es.retrieval.PatchRecipe(es.retrieval.made_codebook())
-    )
-    views = [es.retrieval.describe_to_keep(mesh, recipe) for mesh in poses]
+    recipe = es.retrieval.THESIS if method == "thesis" else es.retrieval.PatchRecipe()
     with tempfile.TemporaryDirectory() as folder:
         index = es.ShapeIndex.create(Path(folder) / "index")
-        for number in range(n_shapes):
-            index.add(f"shape {number}", views[number % len(views)])
-        query = es.retrieval.describe_shape(scan, recipe)
+        for number in range(n_shapes):  # some poses, and copies of them
+            name, copied = f"shape {number}", f"shape {number % len(poses)}"
+            if number < len(poses):
+                index.add(name, poses[number], recipe=recipe)
+            else:
+                index.add_descriptors(name, index.descriptors(copied, recipe))
+        query = es.describe(scan, recipe)
         index.query(query)
         return measured(lambda: index.query(query))
 

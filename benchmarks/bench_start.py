@@ -10,7 +10,6 @@ installed are left out.
 """
 
 import importlib.util
-import resource
 import statistics
 import subprocess
 import sys

@@ -1,6 +1,6 @@
 """Find the kind of a noisy scan from one side, in a pose that the index has not seen, and which points correspond.
 
-Made-up creatures stand in for a folder of scans; `read_mesh("scan.ply")` takes their place with real files.
+Synthetic creatures stand in for a folder of scans; with files, read each by `es.read_mesh("scan.ply")`.
 """
 
 import tempfile
@@ -13,23 +13,16 @@ import eigenshape as es
 
 def main(folder: Path) -> list[es.retrieval.Match]:
     """Index two poses of three creatures by patches, and ask for what one side of a third pose shows, with noise."""
-    recipe = es.retrieval.PatchRecipe(
-        es.retrieval.made_codebook()
-    )  # es.retrieval.train_codebook learns words from shapes of yours
     index = es.ShapeIndex.create(folder / "creatures")
     for kind in ("biped", "octopus", "fish"):
         for pose in range(2):
-            index.add(
-                f"{kind}-{pose}",
-                es.retrieval.describe_to_keep(es.make_creature(kind, pose), recipe),
-                label=kind,
-            )
+            index.add(f"{kind}-{pose}", es.make_creature(kind, pose), label=kind)
 
     rng = np.random.default_rng(1)
     seen = es.partial_scan(es.make_creature("octopus", 7), rng).mesh
     noise = 0.2 * es.geometry.edge_lengths(seen).mean() * rng.standard_normal(seen.vertices.shape)
     scan = es.TriangleMesh(seen.vertices + noise, seen.faces)
-    return index.query(es.retrieval.describe_shape(scan, recipe), n_matches=3)
+    return index.query(scan, n_matches=3)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""The main road in ten lines: index a few shapes, then find the kin of a partial scan in another pose.
+"""From meshes to matches: index a few shapes, then find those most like a partial scan in another pose.
 
-Made-up creatures stand in for a folder of scans; `read_mesh("scan.ply")` takes their place with real files.
+Synthetic creatures stand in for a folder of scans; with files, read each by `es.read_mesh("scan.ply")`.
 """
 
 import tempfile
@@ -12,21 +12,22 @@ import eigenshape as es
 
 
 def main(folder: Path) -> list[es.retrieval.Match]:
-    """Index three poses of three creatures and query with what one viewpoint sees of a fourth pose."""
+    """Index three poses of three creatures, and query with what one viewpoint sees of a fourth pose."""
     index = es.ShapeIndex.create(folder / "creatures")
     for kind in ("biped", "octopus", "fish"):
         for pose in range(3):
             mesh = es.make_creature(kind, pose)
-            spectrum = es.solve_spectrum(es.cotangent_laplacian(mesh), k=300)
-            heat = es.heat_kernel_signature(spectrum, [0.004 * es.geometry.surface_area(mesh)])
-            parts = es.segment(es.merge_tree(mesh, heat[:, 0]), n_regions=15)
-            views = es.retrieval.describe_views(
-                mesh
-            )  # what single viewpoints see, so that a scan meets its like
-            index.add(f"{kind}-{pose}", [es.describe(spectrum, parts.features), *views], label=kind)
+            index.add(f"{kind}-{pose}", mesh, recipe=es.retrieval.SCALE_FREE, label=kind)
 
     scan = es.partial_scan(es.make_creature("octopus", 7), np.random.default_rng(1)).mesh
-    return index.query(es.retrieval.describe_mesh(scan).descriptor, n_matches=3)
+
+    # The same steps by hand: spectrum, heat, and one part around each of its persistent maxima
+    spectrum = es.solve_spectrum(es.cotangent_laplacian(scan), k=150)
+    heat = es.heat_kernel_signature(spectrum, [0.004 * es.geometry.surface_area(scan)])
+    parts = es.segment(es.merge_tree(scan, heat[:, 0]), n_regions=15)
+    print(f"{scan.n_vertices} vertices, {len(parts.features.vertices)} parts")
+
+    return index.query(scan, n_matches=3)
 
 
 if __name__ == "__main__":

@@ -1,16 +1,17 @@
-"""What worker processes of the tests run; importable by name."""
+"""What worker processes of the tests read; importable by name."""
 
 import os
 import time
-from dataclasses import replace
 
 import numpy as np
 from filelock import FileLock
 
 from eigenshape._errors import InvalidShapeError
-from eigenshape.retrieval.heat.descriptor import Recipe, ShapeDescriptor
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.retrieval.heat.descriptor import HeatDescriptor, HeatRecipe
+from eigenshape.shapes.surfaces import icosphere
 
-RECIPE = Recipe(name="test", scales=(1.0, 2.0, 4.0), n_features=2, n_shifts=0)
+RECIPE = HeatRecipe(name="test", scales=(1.0, 2.0, 4.0), n_features=2, n_shifts=0)
 
 
 class PicklesBadlyError(Exception):
@@ -20,15 +21,22 @@ class PicklesBadlyError(Exception):
 
 def descriptor(seed, recipe=RECIPE, m=2):
     rng = np.random.default_rng(seed)
-    return ShapeDescriptor(rng.random((m, len(recipe.scales))), np.arange(m), recipe)
+    return HeatDescriptor(rng.random((m, len(recipe.scales))), np.arange(m), recipe)
 
 
-def by_content(path):
-    """Do what the file says: be described, raise, die, hang, return nonsense."""
+def mesh_of(number):
+    """Return a small closed mesh of its own form for each number."""
+    radii = 1 + 0.5 * np.random.default_rng(number).random(42)
+    ball = icosphere(1)
+    return TriangleMesh(radii[:, None] * ball.vertices, ball.faces)
+
+
+def read_by_content(path):
+    """Do what the file says: be a mesh, raise, die, hang, return nonsense."""
     word = path.read_text()
     if word in WORDS:
         return WORDS[word](path)
-    return [descriptor(int(word))]
+    return mesh_of(int(word))
 
 
 def refuse(path):
@@ -48,12 +56,12 @@ def hang(path):
 
 def change(path):
     path.write_text("9")
-    return [descriptor(1)]
+    return mesh_of(1)
 
 
 def vanish(path):
     path.unlink()
-    return [descriptor(1)]
+    return mesh_of(1)
 
 
 WORDS = {
@@ -64,7 +72,5 @@ WORDS = {
     "vanish": vanish,
     "die": lambda path: os._exit(77),
     "nothing": lambda path: None,
-    "text": lambda path: ["text"],
-    "nan": lambda path: [ShapeDescriptor(np.full((2, 3), np.nan), np.arange(2), RECIPE)],
-    "another recipe": lambda path: [descriptor(1, replace(RECIPE, name="other"))],
+    "loose": lambda path: TriangleMesh([*mesh_of(1).vertices, [9, 9, 9]], mesh_of(1).faces),
 }

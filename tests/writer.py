@@ -13,7 +13,7 @@ def add_shapes(folder, done):
     start = len(index)
     done.send(start - 1)
     for number in itertools.count(start):
-        index.add(f"shape-{number:05}", [descriptor(number)], digest=str(number))
+        index.add_descriptors(f"shape-{number:05}", [descriptor(number)], digest=str(number))
         done.send(number)
 
 
@@ -22,7 +22,7 @@ def replace_a_shape(folder, done):
     start = int(index.records()[0].digest)
     done.send(start)
     for number in itertools.count(start + 1):
-        index.add("one", [descriptor(number)], digest=str(number), replace=True)
+        index.add_descriptors("one", [descriptor(number)], digest=str(number), replace=True)
         done.send(number)
 
 
@@ -37,7 +37,7 @@ def open_and_add(folder, done):
     done.send("ready")
     name = done.recv()
     try:
-        ShapeIndex.open_or_create(folder).add(name, [descriptor(1)])
+        ShapeIndex.open_or_create(folder).add_descriptors(name, [descriptor(1)])
     except StoreError as err:
         done.send(str(err))
     else:

@@ -131,8 +131,10 @@ def segmentations(mesh: es.TriangleMesh) -> dict[str, Callable[[], Labels]]:
         "default, boundaries not smoothed": lambda: (
             es.segment(found.tree, persistence=es.features.PART_CONTRAST).labels
         ),
-        "heat, scale-free preset": lambda: es.retrieval.describe_mesh(mesh).parts.labels,
-        "thesis preset": lambda: es.retrieval.describe_mesh(mesh, es.retrieval.THESIS).parts.labels,
+        "heat, scale-free preset": lambda: es.retrieval.find_heat_features(mesh).parts.labels,
+        "thesis preset": lambda: (
+            es.retrieval.find_heat_features(mesh, es.retrieval.THESIS).parts.labels
+        ),
     }
     for name, coordinates in (
         ("k-means", spectral_coordinates),

@@ -30,9 +30,9 @@ N_POSES, N_VERTICES = 4, 3000
 PICTURES = {"humans": ("human/tosca_michael", 3), "animals": ("cat/tosca_cat", 3)}
 
 
-def by_heat(recipe: es.retrieval.Recipe) -> object:
+def by_heat(recipe: es.retrieval.HeatRecipe) -> object:
     """Return the features of a recipe as they are described."""
-    return lambda mesh: es.retrieval.describe_mesh(mesh, recipe).parts
+    return lambda mesh: es.retrieval.find_heat_features(mesh, recipe).parts
 
 
 def by_values(function: object) -> object:

@@ -65,7 +65,7 @@ def curvature(mesh: es.TriangleMesh, spectrum: es.Spectrum) -> np.ndarray:
 
 
 def matching_scores(
-    query: es.retrieval.ShapeDescriptor, described: Sequence[es.retrieval.ShapeDescriptor]
+    query: es.retrieval.HeatDescriptor, described: Sequence[es.retrieval.HeatDescriptor]
 ) -> np.ndarray:
     """Return the thesis' score of a query with each of many."""
     return np.array([es.retrieval.matching_score(query, other) for other in described])
@@ -79,18 +79,18 @@ class ThesisRecipe:
     function: str = "early_heat"
     spectrum: str = "cotangent_spectrum"
 
-    def describe(self, mesh: es.TriangleMesh) -> es.retrieval.ShapeDescriptor:
+    def describe(self, mesh: es.TriangleMesh) -> es.retrieval.HeatDescriptor:
         """Return the heat vectors."""
         spectrum = globals()[self.spectrum](mesh)
         tree = es.merge_tree(mesh, globals()[self.function](mesh, spectrum))
-        return es.describe(
+        return es.retrieval.heat_descriptor(
             spectrum,
             es.segment(tree, n_regions=es.retrieval.THESIS.n_features).features,
             es.retrieval.THESIS,
         )
 
     def distances(
-        self, query: es.retrieval.ShapeDescriptor, described: Sequence[es.retrieval.ShapeDescriptor]
+        self, query: es.retrieval.HeatDescriptor, described: Sequence[es.retrieval.HeatDescriptor]
     ) -> np.ndarray:
         """Return matching scores."""
         return matching_scores(query, described)
@@ -102,12 +102,12 @@ class ScaleFree:
 
     name: str = "scale-free"
 
-    def describe(self, mesh: es.TriangleMesh) -> es.retrieval.ShapeDescriptor:
+    def describe(self, mesh: es.TriangleMesh) -> es.retrieval.HeatDescriptor:
         """Return the heat vectors, without units."""
-        return es.retrieval.describe_mesh(mesh, es.retrieval.SCALE_FREE).descriptor
+        return es.retrieval.find_heat_features(mesh, es.retrieval.SCALE_FREE).descriptor
 
     def distances(
-        self, query: es.retrieval.ShapeDescriptor, described: Sequence[es.retrieval.ShapeDescriptor]
+        self, query: es.retrieval.HeatDescriptor, described: Sequence[es.retrieval.HeatDescriptor]
     ) -> np.ndarray:
         """Return matching scores."""
         return matching_scores(query, described)
@@ -139,33 +139,31 @@ TEACHING_VIEWS = 2
 
 @dataclass(frozen=True)
 class Patches:
-    """Patches as an index keeps and asks them, in words that the other half or made creatures have taught."""
+    """Patches as an index stores and compares them, with a codebook of the other half or of synthetic creatures."""
 
     name: str
-    teachers: Literal["other half", "made creatures"] = "other half"
+    teachers: Literal["other half", "synthetic creatures"] = "other half"
     verified: bool = True
     recipe: es.retrieval.PatchRecipe | None = None
 
     def train(self, meshes: Iterable[es.TriangleMesh]) -> "Patches":
-        """Learn words, or take those that come with the library."""
-        if self.teachers == "made creatures":
-            return replace(self, recipe=es.retrieval.PatchRecipe(es.retrieval.made_codebook()))
+        """Learn a codebook, or take the one that comes with the library."""
+        if self.teachers == "synthetic creatures":
+            return replace(self, recipe=es.retrieval.PatchRecipe())
         lessons = [
             patches
             for mesh in meshes
-            for patches in es.retrieval.seen_patches(mesh, n_views=TEACHING_VIEWS)
+            for patches in es.retrieval.extract_patches(mesh, n_views=TEACHING_VIEWS)
         ]
         return replace(self, recipe=es.retrieval.PatchRecipe(es.retrieval.train_codebook(lessons)))
 
     def describe(self, mesh: es.TriangleMesh) -> Any:
         """Return the descriptor, with six views of what is closed."""
-        return es.retrieval.describe_shape(mesh, self.recipe)
+        return es.describe(mesh, self.recipe)
 
     def distances(self, query: Any, described: Sequence[Any]) -> np.ndarray:
-        """Return scores, or distances by words alone."""
-        if self.verified:
-            return es.retrieval.patch_scores(query, described)
-        return es.retrieval.word_distances(query.codes, [each.codes for each in described])
+        """Return scores, or distances by codes alone."""
+        return es.retrieval.patch_scores(query, described, verify=self.verified)
 
 
 METHODS: dict[str, Method] = {
@@ -173,7 +171,7 @@ METHODS: dict[str, Method] = {
     for method in (
         Patches("patches"),
         Patches("patches, not verified", verified=False),
-        Patches("patches, made words", "made creatures"),
+        Patches("patches, default codebook", "synthetic creatures"),
         ThesisRecipe("thesis, cotangent"),
         ThesisRecipe("thesis, mesh Laplacian", spectrum="kernel_spectrum"),
         ScaleFree(),

@@ -45,7 +45,8 @@ class Asking:
         """Return the descriptor."""
         if self.cure == CURES[1]:
             return self.method.describe(mesh)
-        return es.retrieval.in_words([es.retrieval.describe_patches(mesh)], self.method.recipe)
+        patches = es.retrieval.extract_patches(mesh, n_views=0, clean=False)
+        return es.retrieval.patch_descriptor(patches, self.method.recipe)
 
     def distances(self, query: Any, described: Sequence[Any]) -> np.ndarray:
         """Return the method's scores."""
@@ -124,9 +125,9 @@ def main() -> None:
     seeds, numbers = (chosen.draws[:1], QUICK_QUERIES) if chosen.quick else (chosen.draws, (18, 32))
     draws = [draw(some, seed, *numbers) for seed in seeds]
     store = Store(chosen.cache)
-    # made words are there already, while those of the other half take a minute to learn
-    words = METHODS["patches, made words" if chosen.quick else "patches"]
-    method = ready(words, [shape for shape in everything if shape not in some], store)
+    # The default codebook is there already; that of the other half takes a minute to learn.
+    patches = METHODS["patches, default codebook" if chosen.quick else "patches"]
+    method = ready(patches, [shape for shape in everything if shape not in some], store)
     cures = [Asking(method, cure) for cure in CURES]
     changes = list(dict.fromkeys([CLEAN, *chosen.changes]))
     database = [version for each in draws for version in each.mixed]

@@ -24,7 +24,7 @@ from tables import PROTOCOLS, printed
 
 SEEDS = (0, 1, 2)
 QUICK_CLASSES, QUICK_QUERIES = ("glasses", "octopus", "teddy"), (2, 4)
-QUICK_METHODS = ("patches, made words", "thesis, cotangent", "ShapeDNA")
+QUICK_METHODS = ("patches, default codebook", "thesis, cotangent", "ShapeDNA")
 
 
 def ready(method: Method, some: Sequence[Shape], store: Store) -> Method:

@@ -15,3 +15,13 @@ def test_the_quick_case_has_an_exact_row_and_one_for_each_accuracy(run_quick):
         assert row["true"] <= row["estimated"] <= row["accuracy"]
         assert row["true"] <= row["bound"]
         assert row["cpu"] > 0
+
+
+def test_the_peer_comes_below_the_accuracy_before_it_is_timed(run_quick):
+    (exact, ours, peer), _, page = run_quick("bench_approximate.py", "--peers")
+    assert page.count("| LOBPCG to 0.001 |") == 1
+    assert exact["complete"]
+    assert ours["true"] <= ours["accuracy"] == peer["accuracy"]
+    assert peer["true"] <= peer["accuracy"]
+    assert 1 <= peer["iterations"] < 20
+    assert peer["cpu"] > 0

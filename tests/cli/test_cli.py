@@ -14,7 +14,7 @@ from eigenshape.cli import app
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.retrieval.heat.describe import describe_mesh
+from eigenshape.retrieval.heat.features import find_heat_features
 from eigenshape.retrieval.store.index import ShapeIndex
 from eigenshape.scans.partial import partial_scan
 from eigenshape.shapes.creatures import make_creature
@@ -282,7 +282,7 @@ def test_a_match_without_its_file_leaves_its_place_empty(zoo, tmp_path):
         tmp_path / "changed.ply",
     )
     index = ShapeIndex.create(tmp_path / "index")
-    descriptor = describe_mesh(read_mesh(path)).descriptor
+    descriptor = find_heat_features(read_mesh(path)).descriptor
     write_mesh(icosphere(0), changed)
     for name, source in {
         "loose": None,

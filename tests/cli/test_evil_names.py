@@ -98,7 +98,9 @@ def test_an_index(zoo, tmp_path):
     assert f"query: {SPELLED}0" in text
     assert f"<!-- {SPELLED}1 -->" in text
     foreign = es.ShapeIndex.create(tmp_path / "foreign")
-    descriptor = es.retrieval.describe_mesh(es.make_creature("fish", 0, n_vertices=500)).descriptor
+    descriptor = es.retrieval.find_heat_features(
+        es.make_creature("fish", 0, n_vertices=500)
+    ).descriptor
     foreign.add(EVIL, [descriptor], label=EVIL, source=EVIL)
     done = run("query", foreign.folder, zoo / f"{EVIL}0.ply", "--picture", sheet)
     assert done.stdout.count(SPELLED) == 2

@@ -236,7 +236,7 @@ def test_the_number_of_workers_changes_no_descriptor(tmp_path):
 def test_patches_find_parts_better_than_the_thesis_recipe(quick_form):
     rates = quick_form("ch5_retrieval/run.py")["mixed"]
     assert (
-        rates["patches, made words"]["all"]["top3"][0]
+        rates["patches, default codebook"]["all"]["top3"][0]
         >= rates["thesis, cotangent"]["all"]["top3"][0]
     )
 

@@ -79,12 +79,10 @@ def test_losses_are_of_the_same_queries():
 
 @pytest.mark.long
 def test_queries_are_described_as_they_are_or_as_the_method_takes_them():
-    method = methods.Patches(
-        "patches", recipe=es.retrieval.PatchRecipe(es.retrieval.made_codebook())
-    )
+    method = methods.Patches("patches", recipe=es.retrieval.PatchRecipe())
     flipped = es.TriangleMesh(BALL.vertices, BALL.faces[:, ::-1])
     asking = [robustness.Asking(method, cure).describe(flipped) for cure in robustness.CURES]
-    outward = es.retrieval.describe_shape(BALL, method.recipe)
+    outward = es.describe(BALL, method.recipe)
     assert np.array_equal(asking[1].codes, outward.codes)
     assert not np.array_equal(asking[0].codes[0], outward.codes[0])
 

@@ -7,7 +7,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 README = " ".join((ROOT / "README.md").read_text().split())
-METHODS = ("patches", "patches, made words", "scale-free", "thesis, cotangent", "LFD", "EVD")
+METHODS = ("patches", "patches, default codebook", "scale-free", "thesis, cotangent", "LFD", "EVD")
 QUERIES = {
     "complete": "a complete shape, often in another pose",
     "incomplete": "what one side shows, or planes leave",

@@ -9,7 +9,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.repair import orient, repair
 from eigenshape.operators.curvature import mean_curvature
-from eigenshape.retrieval.patches.patches import describe_patches
+from eigenshape.retrieval.patches.patches import surface_patches
 from eigenshape.scans.partial import (
     cut_by_planes,
     partial_scan,
@@ -124,7 +124,7 @@ def test_faces_that_disagree_have_no_outside():
         enclosed_volume,
         vertex_normals,
         mean_curvature,
-        describe_patches,
+        surface_patches,
     ):
         with pytest.raises(
             InvalidShapeError, match=r"Faces must be turned one way; .* Try repair\(mesh,"

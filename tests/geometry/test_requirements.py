@@ -1,5 +1,7 @@
 """What a mesh must be, and that each remedy a message names helps."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from broken_meshes import (
@@ -33,14 +35,13 @@ from eigenshape.operators.robust import robust_laplacian
 from eigenshape.operators.smoothing import noise_level
 from eigenshape.retrieval.baselines.affinity import affinity_eigenvalues
 from eigenshape.retrieval.baselines.shape_dna import shape_dna
-from eigenshape.retrieval.heat.describe import describe_mesh
-from eigenshape.retrieval.heat.describe_large import describe_large_mesh
+from eigenshape.retrieval.description import describe
 from eigenshape.retrieval.heat.descriptor import SCALE_FREE
+from eigenshape.retrieval.heat.features import find_heat_features
 from eigenshape.retrieval.label_transfer import transfer_labels
-from eigenshape.retrieval.patches.codebook import made_codebook
-from eigenshape.retrieval.patches.descriptor import PatchRecipe, seen_patches
-from eigenshape.retrieval.patches.patches import describe_patches
-from eigenshape.retrieval.store.kinds import describe_shape, describe_to_keep
+from eigenshape.retrieval.patches.descriptor import PatchRecipe
+from eigenshape.retrieval.patches.patches import extract_patches, surface_patches
+from eigenshape.retrieval.store.index import describe_to_store
 from eigenshape.scans.partial import partial_scan, viewpoint
 from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.shapes.surfaces import disjoint_union, icosphere
@@ -60,16 +61,14 @@ OPERATORS = {
     "gaussian_curvature": gaussian_curvature,
 }
 DESCRIBERS = {
-    "describe_mesh": describe_mesh,
-    "describe_large_mesh": describe_large_mesh,
-    "describe_shape by heat": lambda mesh: describe_shape(mesh, SCALE_FREE),
-    "describe_shape by patches": lambda mesh: describe_shape(mesh, PatchRecipe(made_codebook())),
-    "describe_to_keep by heat": lambda mesh: describe_to_keep(mesh, SCALE_FREE, n_views=1),
-    "describe_to_keep by patches": lambda mesh: describe_to_keep(
-        mesh, PatchRecipe(made_codebook()), n_views=1
-    ),
-    "describe_patches": describe_patches,
-    "seen_patches": lambda mesh: seen_patches(mesh, n_views=1),
+    "find_heat_features": find_heat_features,
+    "find_heat_features, approximately": partial(find_heat_features, accuracy=0.01),
+    "describe by heat": lambda mesh: describe(mesh, SCALE_FREE),
+    "describe by patches": describe,
+    "describe_to_store by heat": lambda mesh: describe_to_store(mesh, SCALE_FREE, 1),
+    "describe_to_store by patches": lambda mesh: describe_to_store(mesh, PatchRecipe(), 1),
+    "surface_patches": surface_patches,
+    "extract_patches": lambda mesh: extract_patches(mesh, n_views=1),
     "find_parts": find_parts,
     "transfer_labels": lambda mesh: transfer_labels(
         BALL, np.zeros(BALL.n_faces, dtype=np.int64), mesh
@@ -151,7 +150,7 @@ def test_what_hides_a_shape_has_one_remedy(name):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    "name", ["describe_shape by patches", "describe_patches", "find_parts", "transfer_labels"]
+    "name", ["describe by patches", "surface_patches", "find_parts", "transfer_labels"]
 )
 def test_what_looks_from_outside_needs_an_orientation(name):
     require_remedy(DESCRIBERS[name], flipped(BALL, rng()), "Faces must be turned one way; ")

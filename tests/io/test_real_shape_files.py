@@ -68,7 +68,7 @@ def test_tetrahedra_and_curves(data):
         assert isinstance(shape, SimplicialMesh)
         assert (shape.n_points, shape.n_simplices, shape.dim) == counts, name
     with pytest.raises(
-        FileFormatError, match=r"ellipsoid\.mesh must hold simplices .* it holds hexahedron"
+        FileFormatError, match=r"ellipsoid\.mesh: A file must hold simplices .* it holds hexahedron"
     ):
         read_shape(data / "tets" / "ellipsoid.mesh")
 

@@ -189,11 +189,15 @@ def test_files_that_lack_cells_or_their_end_are_named(tmp_path):
         read_shape(path)
     path = written(tmp_path / "a.msh", CUBE.points, [("tetra", CUBE.simplices)])
     path.write_bytes(path.read_bytes().replace(b"$EndElements", b"$EndElement"))
-    with pytest.raises(FileFormatError, match=r"a\.msh must be whole; it has no \$EndElements"):
+    with pytest.raises(
+        FileFormatError, match=r"a\.msh: A gmsh file must be whole; it has no \$EndElements"
+    ):
         read_shape(path)
     path = written(tmp_path / "a.mesh", DISC.vertices, [("triangle", DISC.faces)])
     path.write_bytes(path.read_bytes().replace(b"End", b""))
-    with pytest.raises(FileFormatError, match=r"a\.mesh must be whole; it has no End"):
+    with pytest.raises(
+        FileFormatError, match=r"a\.mesh: A Medit file must be whole; it has no End"
+    ):
         read_shape(path)
     path = written(tmp_path / "b.vtk", CUBE.points, [("tetra", CUBE.simplices)], binary=False)
     path.write_bytes(path.read_bytes().rstrip())
@@ -206,7 +210,7 @@ def test_files_that_lack_cells_or_their_end_are_named(tmp_path):
 
 @pytest.mark.parametrize("suffix", [".mesh", ".meshb", ".msh", ".vtk", ".vtu"])
 @pytest.mark.parametrize("content", [b"nonsense", b"\x00\xff\xfe" * 50, b"5\n1 2 3\n", b"\n"])
-def test_what_meshio_cannot_read_is_named_and_nothing_is_printed(tmp_path, capfd, suffix, content):
+def test_what_is_no_mesh_is_named_and_nothing_is_printed(tmp_path, capfd, suffix, content):
     path = tmp_path / f"a{suffix}"
     path.write_bytes(content)
     with pytest.raises(EigenshapeError, match=rf"a{suffix}"):

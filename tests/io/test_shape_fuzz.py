@@ -21,8 +21,11 @@ def files(tmp_path_factory):
     contents["lapy.vtk"] = (folder / "lapy.vtk").read_bytes()
     for name, kind, options in (
         ("a.mesh", "medit", {}),
+        ("a.meshb", "medit", {}),
         ("a.msh", "gmsh", {}),
-        ("b.msh", "gmsh22", {"binary": False}),
+        ("b.msh", "gmsh", {"binary": False}),
+        ("c.msh", "gmsh22", {}),
+        ("d.msh", "gmsh22", {"binary": False}),
         ("a.vtk", "vtk", {}),
         ("b.vtk", "vtk", {"binary": False}),
         ("a.vtu", "vtu", {}),

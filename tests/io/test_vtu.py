@@ -65,7 +65,10 @@ def binaries(tmp_path_factory):
         (("Points>", "Pointy>"), "A VTU file must have points; it has none"),
         (('type="Float64"', 'type="String"'), "must be of numbers; 'an array' is of 'String'"),
         (("1 0 0", "1 0 zero"), "must be of numbers; 'an array' is not: could not convert"),
-        (("1 0 0", "1 0 1_0"), "must be of numbers; 'an array' is not: could not convert"),
+        (
+            ("1 0 0", "1 0 1_0"),
+            "must be of numbers; 'an array' is not: numbers have no underscores",
+        ),
         ((">4<", ">-4<"), r"must rise from 0; they begin with \[-4\]"),
         ((">4<", ">5<"), "'connectivity' must have 5 numbers and has 4"),
         (

@@ -63,29 +63,29 @@ def binding() -> es.deformation.Binding:
 
 
 @cache
-def described() -> es.retrieval.DescribedShape:
-    return es.retrieval.describe_mesh(body())
+def described() -> es.retrieval.HeatFeatures:
+    return es.retrieval.find_heat_features(body())
 
 
 @cache
 def recipe() -> es.retrieval.PatchRecipe:
-    return es.retrieval.PatchRecipe(es.retrieval.made_codebook())
+    return es.retrieval.PatchRecipe()
 
 
 @cache
 def patches() -> es.retrieval.Patches:
-    return es.retrieval.describe_patches(body())
+    return es.retrieval.extract_patches(body(), n_views=0)[0]
 
 
 @cache
 def patched() -> es.retrieval.PatchDescriptor:
-    return es.retrieval.in_words([patches()], recipe())
+    return es.retrieval.patch_descriptor([patches()], recipe())
 
 
 @cache
 def shelf() -> es.ShapeIndex:
     index = es.ShapeIndex.create(FOLDER / "index")
-    index.add("body", [described().descriptor])
+    index.add_descriptors("body", [described().descriptor])
     return index
 
 
@@ -126,15 +126,13 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.features.MergeTree: lambda: es.merge_tree(body(), height()),
     es.features.Segmentation: lambda: described().parts,
     es.features.FeaturePoints: lambda: described().parts.features,
-    es.retrieval.ShapeDescriptor: lambda: described().descriptor,
-    es.retrieval.Recipe: lambda: es.retrieval.SCALE_FREE,
+    es.retrieval.HeatDescriptor: lambda: described().descriptor,
+    es.retrieval.HeatRecipe: lambda: es.retrieval.SCALE_FREE,
     es.retrieval.PatchRecipe: recipe,
-    es.retrieval.PatchCodebook: es.retrieval.made_codebook,
+    es.retrieval.PatchCodebook: es.retrieval.default_codebook,
     es.retrieval.PatchDescriptor: patched,
     es.retrieval.Patches: patches,
-    es.retrieval.PatchPoints: lambda: es.retrieval.patch_points(
-        patches(), es.retrieval.made_codebook()
-    ),
+    es.retrieval.PatchPoints: lambda: patched().points[0],
     es.features.PersistenceDiagram: lambda: es.features.persistence_diagram(body(), height()),
     es.deformation.EigenRig: rig,
     es.deformation.Binding: binding,
@@ -172,7 +170,6 @@ NAMED: dict[str, Callable[[], Any]] = {
     "bind.regions": lambda: [HEAD],
     "boundary_surface.mesh": lambda: es.shapes.box(2, 2, 2),
     "build": lambda: es.cotangent_laplacian,
-    "build_index.describe": lambda: len,
     "caption": lambda: "",
     "certify.eigenvalues": lambda: spectrum().eigenvalues,
     "certify.eigenvectors": lambda: spectrum().eigenvectors,
@@ -207,17 +204,19 @@ NAMED: dict[str, Callable[[], Any]] = {
     "point_map.mapping": mapping,
     "poses": lambda: {"rest": body()},
     "radius": lambda: 0.4,
+    "read": lambda: es.read_mesh,
     "read_edits.path": written_edits,
     "region": lambda: HEAD,
     "rho": lambda: 3.0,
     "save_figure.path": lambda: FOLDER / "written.png",
+    "ShapeIndex.add.n_views": lambda: 0,
     "ShapeIndex.add.replace": lambda: True,
+    "ShapeIndex.add_descriptors.replace": lambda: True,
     "segment.n_regions": lambda: 3,
     "solve_spectrum.k": lambda: 5,
     "sources": lambda: [0, 5],
     "spectra": lambda: {"one": spectrum(), "two": spectrum()},
     "t": lambda: 0.05,
-    "teach": lambda: len,
     "tensors": lambda: es.operators.curvature_tensors(body(), 1.0),
     "times": lambda: [0.1, 0.2],
     "transfer_function.values": height,

@@ -80,24 +80,18 @@ class Shared:
         self.map = es.functional_map(self.spectrum, self.spectrum2, pairs, n_modes=8)
 
     def _make_descriptors(self) -> None:
-        self.codebook = es.retrieval.made_codebook()
+        self.codebook = es.retrieval.default_codebook()
         self.patches = (
-            es.retrieval.describe_patches(self.ball, n_samples=40),
-            es.retrieval.describe_patches(self.torus, n_samples=40),
+            es.retrieval.extract_patches(self.ball, n_samples=40, n_views=0)[0],
+            es.retrieval.extract_patches(self.torus, n_samples=40, n_views=0)[0],
         )
-        self.animal_patches = es.retrieval.describe_patches(self.animal)
-        self.points = tuple(
-            es.retrieval.patch_points(patches, self.codebook) for patches in self.patches
-        )
-        self.codes = np.stack(
-            [es.retrieval.encode_patches(patches, self.codebook) for patches in self.patches]
-        )
+        self.animal_patches = es.retrieval.extract_patches(self.animal, n_views=0)
         self.recipe = es.retrieval.PatchRecipe(self.codebook)
-        self.in_words = tuple(
-            es.retrieval.in_words([patches], self.recipe) for patches in self.patches
+        self.by_patches = tuple(
+            es.retrieval.patch_descriptor([patches], self.recipe) for patches in self.patches
         )
-        self.described = tuple(
-            es.describe(spectrum, es.segment(self.tree, n_regions=6).features)
+        self.by_heat = tuple(
+            es.retrieval.heat_descriptor(spectrum, es.segment(self.tree, n_regions=6).features)
             for spectrum in (self.spectrum, self.spectrum2)
         )
         self.light = tuple(
@@ -106,10 +100,10 @@ class Shared:
         )
         self.index = es.ShapeIndex.create(self.folder / "index")
         for number, (by_heat, by_patches) in enumerate(
-            zip(self.described, self.in_words, strict=True)
+            zip(self.by_heat, self.by_patches, strict=True)
         ):
-            self.index.add(f"shape {number}", [by_heat])
-            self.index.add(f"in words {number}", [by_patches])
+            self.index.add_descriptors(f"shape {number}", [by_heat])
+            self.index.add_descriptors(f"by patches {number}", [by_patches])
 
     def _make_perturbation(self) -> None:
         moved = es.TriangleMesh(self.ball.vertices * [1.0, 1.02, 1.0], self.ball.faces)
@@ -172,9 +166,10 @@ def session_of(v: Shared) -> tuple[object, ...]:
 def index_of(v: Shared) -> tuple[object, ...]:
     """Write an index of this call alone: one writer at a time is what an index allows."""
     index = es.ShapeIndex.create(v.folder / secrets.token_hex(8))
-    index.add("one", [v.described[0]])
+    index.add_descriptors("one", [v.by_heat[0]])
     index.keep_recipe(v.recipe)
-    index.add("two", [v.described[1]])
+    index.add_descriptors("two", [v.by_heat[1]])
+    index.add("three", v.ball, n_views=0)
     index.remove("one")
     return index.records(), index.recipes()
 
@@ -182,14 +177,14 @@ def index_of(v: Shared) -> tuple[object, ...]:
 def answers(v: Shared) -> tuple[object, ...]:
     """Query the index that all threads read."""
     index = es.ShapeIndex.open(v.index.folder)
-    by_heat, by_patches = v.described[0], v.in_words[0]
+    by_heat, by_patches = v.by_heat[0], v.by_patches[0]
     found = [index.query(asked, n_matches=2) for asked in (by_heat, by_patches)]
     return (
         found,
         index.records(),
         index.recipes(),
         len(index),
-        index.descriptor("shape 0", by_heat.recipe),
+        index.descriptors("shape 0", by_heat.recipe),
     )
 
 
@@ -289,14 +284,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "default_times": lambda v: es.spectral.default_times(v.spectrum),
     "deform": lambda v: es.deform(v.rig, v.region, v.move, fixed=v.fixed),
     "denoise": lambda v: es.operators.denoise(v.animal, reach=0.02),
-    "describe": lambda v: es.describe(v.spectrum, v.parts.features),
-    "describe_large_mesh": lambda v: es.retrieval.describe_large_mesh(v.animal),
-    "describe_mesh": lambda v: es.retrieval.describe_mesh(v.animal),
-    "describe_patch_views": lambda v: es.retrieval.describe_patch_views(v.ball, n_views=1),
-    "describe_patches": lambda v: es.retrieval.describe_patches(v.torus, n_samples=40),
-    "describe_shape": lambda v: es.retrieval.describe_shape(v.animal, es.retrieval.SCALE_FREE),
-    "describe_to_keep": lambda v: es.retrieval.describe_to_keep(v.animal, es.retrieval.THESIS),
-    "describe_views": lambda v: es.retrieval.describe_views(v.animal, n_views=1),
+    "describe": lambda v: [es.describe(v.animal), es.describe(v.animal, es.retrieval.SCALE_FREE)],
     "detailed_skeleton": lambda v: es.deformation.detailed_skeleton(v.binding).fine,
     "dirichlet_laplacian": lambda v: es.operators.dirichlet_laplacian(
         v.laplacian, np.array([0, 5])
@@ -323,8 +311,8 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ),
     "enclosed_volume": lambda v: es.geometry.enclosed_volume(v.many),
     "enclosing_ball": lambda v: es.geometry.enclosing_ball(v.animal.vertices),
-    "encode_patches": lambda v: es.retrieval.encode_patches(v.patches[0], v.codebook),
     "euler_characteristic": lambda v: es.geometry.euler_characteristic(v.animal),
+    "extract_patches": lambda v: es.retrieval.extract_patches(v.torus, n_views=1),
     "face_areas": lambda v: es.geometry.face_areas(v.many),
     "face_normals": lambda v: es.geometry.face_normals(v.many),
     "facet_table": lambda v: es.geometry.facet_table(v.solid),
@@ -362,6 +350,10 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ),
     "figure_spectrum": lambda v: drawn(es.plot.figure_spectrum(v.spectrum)),
     "figure_stability": lambda v: drawn(es.plot.figure_stability(v.report, v.cloud, v.cloud)),
+    "find_heat_features": lambda v: [
+        es.retrieval.find_heat_features(v.animal),
+        es.retrieval.find_heat_features(v.animal, accuracy=0.01),
+    ],
     "find_parts": lambda v: es.find_parts(v.animal).parts,
     "fit_rate": lambda v: es.stability.fit_rate(
         [0.1, 0.2, 0.4], [0.01, 0.02, 0.03], [1.0, 2.0, 5.0]
@@ -385,10 +377,10 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "graded_sphere": lambda v: es.shapes.graded_sphere(200),
     "graph_laplacian": lambda v: es.operators.graph_laplacian(v.animal, "normalized"),
     "grid": lambda v: es.shapes.grid(3, 4),
+    "heat_descriptor": lambda v: es.retrieval.heat_descriptor(v.spectrum, v.parts.features),
     "skeleton_response": lambda v: es.deformation.skeleton_response(v.binding),
     "heat_kernel_signature": lambda v: es.heat_kernel_signature(v.many_spectrum, [0.3]),
     "icosphere": lambda v: es.icosphere(2),
-    "in_words": lambda v: es.retrieval.in_words([v.patches[0]], v.recipe),
     "interval": lambda v: es.shapes.interval(9),
     "irregular_grid": lambda v: es.shapes.irregular_grid(4, 5, rng=rng()),
     "is_closed": lambda v: es.geometry.is_closed(v.animal),
@@ -396,16 +388,16 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "largest_component": lambda v: es.geometry.largest_component(v.animal),
     "light_field": lambda v: es.retrieval.baselines.light_field(v.ball, n_fields=1, size=32),
     "light_field_distance": lambda v: es.retrieval.baselines.light_field_distance(*v.light),
-    "made_codebook": lambda v: es.retrieval.made_codebook(),
+    "default_codebook": lambda v: es.retrieval.default_codebook(),
     "make_creature": lambda v: es.make_creature("quadruped", 3, n_vertices=700),
     "map_closeness": lambda v: es.stability.map_closeness(v.ball, 1.01 * v.ball.vertices),
     "map_from_points": lambda v: es.spectral.map_from_points(
         v.many_spectrum, v.many_spectrum, np.arange(v.many.n_vertices), n_modes=6
     ),
-    "match_features": lambda v: es.retrieval.match_features(*v.described),
+    "match_features": lambda v: es.retrieval.match_features(*v.by_heat),
     "match_patches": lambda v: es.retrieval.match_patches(*v.points),
     "matching_reach": lambda v: es.stability.matching_reach(2.0),
-    "matching_score": lambda v: es.retrieval.matching_score(*v.described),
+    "matching_score": lambda v: es.retrieval.matching_score(*v.by_heat),
     "maximum_matching": lambda v: es.stability.maximum_matching(
         sp.csr_array(np.eye(5)[[4, 2, 0, 1, 3]])
     ),
@@ -431,9 +423,8 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "part_spectrum": lambda v: es.features.part_spectrum(v.animal),
     "part_tree": lambda v: es.features.part_tree(v.animal, v.spectrum),
     "partial_scan": lambda v: es.partial_scan(v.many, [0, 0, 1], resolution=100),
-    "patch_distances": lambda v: es.retrieval.patch_distances(v.codes[0], v.codes),
-    "patch_points": lambda v: es.retrieval.patch_points(v.patches[0], v.codebook),
-    "patch_scores": lambda v: es.retrieval.patch_scores(v.in_words[0], v.in_words),
+    "patch_descriptor": lambda v: es.retrieval.patch_descriptor([v.patches[0]], v.recipe),
+    "patch_scores": lambda v: es.retrieval.patch_scores(v.by_patches[0], v.by_patches),
     "persistence_diagram": lambda v: es.features.persistence_diagram(v.solid, v.solid.points[:, 0]),
     "measure_perturbation": lambda v: es.stability.measure_perturbation(v.ball, v.ball),
     "point_cloud_laplacian": lambda v: es.point_cloud_laplacian(v.cloud),
@@ -473,7 +464,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ],  # random names in SVG
     "scale_invariant_signature": lambda v: es.spectral.scale_invariant_signature(v.many_spectrum),
     "seal_holes": lambda v: es.geometry.seal_holes(v.grid),
-    "seen_patches": lambda v: es.retrieval.seen_patches(v.torus, n_views=1),
     "segment": lambda v: es.segment(v.tree, n_regions=4),
     "self_intersections": lambda v: es.geometry.self_intersections(v.animal),
     "separated_groups": lambda v: es.spectral.separated_groups(v.spectrum.eigenvalues),
@@ -517,7 +507,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "torus": lambda v: es.shapes.torus(9, 7),
     "torus_quadrature": lambda v: es.geometry.torus_quadrature(9, 7),
     "adjacent_parts": lambda v: es.features.adjacent_parts(v.animal, v.labels),
-    "train_codebook": lambda v: es.retrieval.train_codebook([v.animal_patches]),
+    "train_codebook": lambda v: es.retrieval.train_codebook(v.animal_patches),
     "transfer_deformation": lambda v: es.deformation.transfer_deformation(
         v.animal, v.pose, v.pose, v.map
     ),
@@ -531,9 +521,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "vertex_components": lambda v: es.geometry.vertex_components(v.animal),
     "vertex_normals": lambda v: es.geometry.vertex_normals(v.many),
     "vertex_pairs": lambda v: es.stability.vertex_pairs(v.change),
-    "view_distances": lambda v: es.retrieval.view_distances(
-        v.codes[0], v.codes, v.codes[1:], np.array([1])
-    ),
     "wave_kernel_signature": lambda v: es.wave_kernel_signature(
         v.many_spectrum, es.spectral.default_energies(v.many_spectrum, 4)[0]
     ),
@@ -542,9 +529,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "weyl_bound": lambda v: es.stability.weyl_bound(v.laplacian, v.other),
     "witness_region": lambda v: es.stability.witness_region(
         v.change, v.on_two, v.nodes.points, 0.5, rho=3.0
-    ),
-    "word_distances": lambda v: es.retrieval.word_distances(
-        v.in_words[0].codes, [words.codes for words in v.in_words]
     ),
     "write_codebook": lambda v: es.retrieval.write_codebook(v.codebook),
     "write_edits": lambda v: written(
@@ -558,5 +542,5 @@ CALLS: dict[str, Callable[[Shared], object]] = {
 
 LEFT_OUT = {
     "build_index": "It starts processes, which take seconds to import; it writes to an index, which admits one writer.",
-    "learn_words": "It starts processes, which take seconds to import.",
+    "train_codebook_from_files": "It starts processes, which take seconds to import.",
 }

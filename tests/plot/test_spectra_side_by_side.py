@@ -77,7 +77,7 @@ def test_bad_input():
         figure_spectra({"one": LUMPED})
     with pytest.raises(
         InvalidParameterError,
-        match="The titles of brackets must be titles of spectra, .*; one is 'three'",
+        match=r"The titles of brackets must be titles of spectra, .*; one is 'three'",
     ):
         figure_spectra(
             {"one": LUMPED, "two": LUMPED}, brackets={"three": bracket_eigenvalues(SPHERE, 20)}

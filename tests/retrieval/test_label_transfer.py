@@ -94,6 +94,7 @@ def test_the_picture_gives_matched_parts_one_colour_and_says_how_sure():
 def test_one_label_a_face_is_asked_for():
     ball = icosphere(1)
     with pytest.raises(
-        InvalidParameterError, match=r"There must be one label a face, 80; there are 79"
+        InvalidParameterError,
+        match=r"labels must hold one integer for each of the 80 faces; they have shape \(79,\)",
     ):
         transfer_labels(ball, np.zeros(79, dtype=np.int64), ball)

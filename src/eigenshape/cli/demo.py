@@ -1,6 +1,5 @@
 """eigenshape demo: the whole road on made-up creatures."""
 
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -9,7 +8,7 @@ import typer
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import out, progress_bar, shown
-from eigenshape.cli.index import WorkersOption, describe_all, describe_file
+from eigenshape.cli.index import WorkersOption, describe_all
 from eigenshape.cli.methods import PATCHES, recipe_to_fill
 from eigenshape.cli.outputs import save_picture
 from eigenshape.cli.query import print_matches
@@ -48,8 +47,7 @@ def demo(
     items = _make(output / "creatures")
     shelf = ShapeIndex.open_or_create(output / "index")
     recipe = recipe_to_fill(shelf, PATCHES, items, (), Workers(workers))
-    describe = partial(describe_file, recipe=recipe, repairs=(), n_views=None)
-    report = describe_all(shelf, items, describe, recipe, Workers(workers))
+    report = describe_all(shelf, items, recipe, Workers(workers))
     out.print(f"indexed {len(shelf)} shapes ({len(report.skipped)} known already)")
 
     scan_path = output / "scan.ply"

@@ -6,18 +6,15 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from eigenshape._progress import Progress
 from eigenshape.cli.console import err, print_json, progress_bar
 from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, load_mesh
 from eigenshape.cli.methods import HeatMethodOption, heat_recipe
 from eigenshape.cli.outputs import require_picture, save_picture
 from eigenshape.cli.parts import part_rows, print_rows, require_colored_path, save_colors
 from eigenshape.features.segmentation import segment
-from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.plot.fields import figure_segments, value_colors
-from eigenshape.retrieval.heat.describe import DescribedShape, describe_mesh
-from eigenshape.retrieval.heat.describe_large import DescribedLargeShape, describe_large_mesh
-from eigenshape.retrieval.heat.descriptor import SCALE_FREE, Recipe
+from eigenshape.retrieval.heat.descriptor import SCALE_FREE
+from eigenshape.retrieval.heat.features import find_heat_features
 from eigenshape.spectral.signatures.approximate_heat import LARGE, USUAL_ACCURACY
 
 COLUMNS = {
@@ -76,11 +73,13 @@ def features(
     require_colored_path(output)
     surface = load_mesh(mesh, repair)
     with progress_bar("features") as progress:
-        shape = _described(surface, recipe, accuracy, progress)
-    error = shape.error if isinstance(shape, DescribedLargeShape) else None
-    if error is not None:
+        if accuracy is None and surface.n_vertices > LARGE:
+            accuracy = USUAL_ACCURACY
+        shape = find_heat_features(surface, recipe, accuracy=accuracy, progress=progress)
+    if shape.error is not None:
         err.print(
-            f"{surface.n_vertices:,} vertices: their heat is approximate, off by about {100 * error:.2g} %"
+            f"{surface.n_vertices:,} vertices: their heat is approximate, off by about "
+            f"{100 * shape.error:.2g} %"
         )
     n_fragments = int(np.isin(shape.tree.maxima, shape.fragments).sum())
     by_number = n_parts + n_fragments if persistence is None and not largest_gap else None
@@ -97,7 +96,12 @@ def features(
     ]
     loose = set(shape.fragments.tolist())
     if as_json:
-        found = {"path": str(mesh), "recipe": recipe.name, "features": rows, "heat_error": error}
+        found = {
+            "path": str(mesh),
+            "recipe": recipe.name,
+            "features": rows,
+            "heat_error": shape.error,
+        }
         print_json(found | {"face_labels": parts.labels})
     else:
         features_alone = [
@@ -110,17 +114,3 @@ def features(
         save_colors(
             surface, value_colors(np.log(np.maximum(shape.heat, np.finfo(np.float64).tiny))), output
         )
-
-
-def _described(
-    surface: TriangleMesh, recipe: Recipe, accuracy: float | None, progress: Progress
-) -> DescribedShape | DescribedLargeShape:
-    """Take a certified spectrum where that is not asked too much, and approximate heat beyond."""
-    if accuracy is None and surface.n_vertices <= LARGE:
-        return describe_mesh(surface, recipe, progress=progress)
-    return describe_large_mesh(
-        surface,
-        recipe,
-        accuracy=USUAL_ACCURACY if accuracy is None else accuracy,
-        progress=progress,
-    )

@@ -13,9 +13,9 @@ from eigenshape.cli.console import batch_reporter, out, print_json, progress_bar
 from eigenshape.cli.inputs import JsonOption, RepairOption, read_repaired, repair_names
 from eigenshape.cli.methods import PATCHES, MethodOption, recipe_to_fill, require_method
 from eigenshape.io.parsing import MESH_FORMATS
-from eigenshape.retrieval.store.batch import BatchReport, Describe, build_index
+from eigenshape.retrieval.kinds import AnyRecipe
+from eigenshape.retrieval.store.batch import BatchReport, build_index
 from eigenshape.retrieval.store.index import ShapeIndex
-from eigenshape.retrieval.store.kinds import AnyRecipe, Descriptor, describe_to_keep
 from eigenshape.retrieval.store.workers import Item, Workers
 
 SOME_FAILED = 3
@@ -63,8 +63,7 @@ def index(
     items, repairs, processes = _items(sources), repair_names(repair), Workers(workers, timeout)
     shelf = ShapeIndex.open_or_create(index)
     recipe = recipe_to_fill(shelf, method, items, repairs, processes)
-    describe = partial(describe_file, recipe=recipe, repairs=repairs, n_views=views)
-    report = describe_all(shelf, items, describe, recipe, processes)
+    report = describe_all(shelf, items, recipe, processes, repairs=repairs, n_views=views)
     if as_json:
         print_json({"index": str(index), "shapes": len(shelf), **vars(report)})
     else:
@@ -76,28 +75,23 @@ def index(
 def describe_all(
     shelf: ShapeIndex,
     items: Sequence[Item],
-    describe: Describe,
     recipe: AnyRecipe,
     workers: Workers,
+    *,
+    repairs: tuple[str, ...] = (),
+    n_views: int | None = None,
 ) -> BatchReport:
-    """Build an index with a progress bar, naming what cannot be taken as it comes."""
+    """Build an index with a progress bar, naming each file that fails as soon as it does."""
     with progress_bar("index") as progress:
         return build_index(
             shelf,
             items,
-            describe,
+            partial(read_repaired, names=repairs),
             recipes=(recipe,),
+            n_views=n_views,
             workers=workers,
-            told=batch_reporter(progress),
+            callback=batch_reporter(progress),
         )
-
-
-def describe_file(
-    path: Path, *, recipe: AnyRecipe, repairs: tuple[str, ...], n_views: int | None
-) -> list[Descriptor]:
-    """Read a mesh, repair it as asked, and describe it, whole and as it is seen from some sides."""
-    mesh = read_repaired(path, repairs)
-    return describe_to_keep(mesh, recipe, n_views=n_views)
 
 
 def _items(sources: Sequence[Path]) -> list[Item]:

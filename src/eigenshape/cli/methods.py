@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -10,17 +9,15 @@ import typer
 from eigenshape._errors import InvalidParameterError, StoreError
 from eigenshape.cli.console import batch_reporter, err, progress_bar
 from eigenshape.cli.inputs import read_repaired
-from eigenshape.retrieval.heat.descriptor import PRESETS, SCALE_FREE, Recipe
-from eigenshape.retrieval.patches.codebook import made_codebook
-from eigenshape.retrieval.patches.descriptor import PatchRecipe, seen_patches
-from eigenshape.retrieval.patches.patches import Patches
-from eigenshape.retrieval.store.batch import learn_words
+from eigenshape.retrieval.heat.descriptor import PRESETS, HeatRecipe
+from eigenshape.retrieval.kinds import AnyRecipe
+from eigenshape.retrieval.patches.codebook import default_codebook
+from eigenshape.retrieval.patches.descriptor import PatchRecipe
+from eigenshape.retrieval.store.batch import train_codebook_from_files
 from eigenshape.retrieval.store.index import ShapeIndex
-from eigenshape.retrieval.store.kinds import AnyRecipe
 from eigenshape.retrieval.store.workers import Item, Workers
 
 PATCHES = "patches"
-TEACHING_VIEWS = 2
 EVERY = (PATCHES, *PRESETS)
 
 HeatMethodOption = Annotated[
@@ -45,7 +42,7 @@ StoredMethodOption = Annotated[
 ]
 
 
-def heat_recipe(name: str) -> Recipe:
+def heat_recipe(name: str) -> HeatRecipe:
     """Return the recipe of a heat method."""
     require_method(name, tuple(PRESETS))
     return PRESETS[name]
@@ -60,47 +57,43 @@ def require_method(name: str, names: Sequence[str] = EVERY) -> None:
 def recipe_to_fill(
     shelf: ShapeIndex, name: str, items: Sequence[Item], repairs: tuple[str, ...], workers: Workers
 ) -> AnyRecipe:
-    """Return the recipe of a method for an index. For patches it has a codebook, learned if the index has none."""
+    """Return the recipe of a method for an index; for patches, learn a codebook if it has none."""
     if name != PATCHES:
         return PRESETS[name]
-    held = _patch_recipe(shelf)
-    if held is None:
+    recipe = _patch_recipe(shelf)
+    if recipe is None:
         with progress_bar("codebook") as progress:
-            book = learn_words(
+            codebook = train_codebook_from_files(
                 items,
-                partial(teach, repairs=repairs),
+                partial(read_repaired, names=repairs),
                 workers=workers,
-                told=batch_reporter(progress),
+                callback=batch_reporter(progress),
             )
         err.print(
             "codebook: the one that comes with eigenshape, because there are too few shapes to learn from"
-            if book == made_codebook()
+            if codebook == default_codebook()
             else "codebook: learned from the shapes of this index"
         )
-        held = PatchRecipe(book)
-        shelf.keep_recipe(held)
-        held = (
-            _patch_recipe(shelf) or held
-        )  # if several processes start an index, all use the first one's codebook
-    return held
-
-
-def teach(path: Path, *, repairs: tuple[str, ...]) -> list[Patches]:
-    """Return the patches of a file's mesh and of two views of it."""
-    return seen_patches(read_repaired(path, repairs), n_views=TEACHING_VIEWS)
+        recipe = PatchRecipe(codebook)
+        shelf.keep_recipe(recipe)
+        # Of several processes that fill a new index, all take the codebook of the first.
+        recipe = _patch_recipe(shelf) or recipe
+    return recipe
 
 
 def recipe_to_ask(shelf: ShapeIndex, name: str | None) -> AnyRecipe:
-    """Return the recipe of a method that an index can answer; without a name, the index's own."""
-    patches = _patch_recipe(shelf)
-    if name == PATCHES and patches is None:
+    """Return the recipe of a method by which an index can answer; without a name, its own."""
+    if name is None:
+        return shelf.default_recipe()
+    if name != PATCHES:
+        return PRESETS[name]
+    recipe = _patch_recipe(shelf)
+    if recipe is None:
         raise StoreError(
-            f"An index answers by the methods that it was made with; {shelf.folder} has no patches. "
-            "Run `eigenshape index` with --method patches first."
+            f"An index answers by the methods that it was made with; {shelf.folder} has no "
+            "patches. Run `eigenshape index` with --method patches first."
         )
-    if patches is not None and name in (None, PATCHES):
-        return patches
-    return PRESETS[name] if name else next(iter(shelf.recipes()), SCALE_FREE)
+    return recipe
 
 
 def _patch_recipe(shelf: ShapeIndex) -> PatchRecipe | None:

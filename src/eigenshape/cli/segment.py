@@ -18,8 +18,8 @@ from eigenshape.features.parts import PART_CONTRAST, facing_outward, find_parts
 from eigenshape.features.segmentation import Segmentation, Tree, merge_targets
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.plot.fields import figure_segments, part_colors
-from eigenshape.retrieval.heat.describe import describe_mesh
 from eigenshape.retrieval.heat.descriptor import PRESETS
+from eigenshape.retrieval.heat.features import find_heat_features
 
 PARTS = "parts"
 METHODS = (PARTS, *PRESETS)
@@ -113,7 +113,7 @@ def _tree(surface: TriangleMesh, method: str, progress: Progress) -> tuple[Tree,
     """Return the tree of a method, and its default cut. Fragments are not counted as parts."""
     if method == PARTS:
         return find_parts(surface, progress=progress).tree, {"persistence": PART_CONTRAST}
-    shape = describe_mesh(surface, PRESETS[method], progress=progress)
+    shape = find_heat_features(surface, PRESETS[method], progress=progress)
     n_fragments = int(np.isin(shape.tree.maxima, shape.fragments).sum())
     return shape.tree, {"n_regions": PRESETS[method].n_features + n_fragments}
 

@@ -17,10 +17,11 @@ from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.plot.figure import literal
 from eigenshape.plot.sheet import Panel, figure_contact_sheet
-from eigenshape.retrieval.heat.describe import describe_mesh, described_view
-from eigenshape.retrieval.heat.descriptor import Recipe
+from eigenshape.retrieval.description import describe
+from eigenshape.retrieval.heat.descriptor import HeatRecipe
+from eigenshape.retrieval.heat.features import find_heat_features, find_view_features
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
 from eigenshape.retrieval.store.index import Match
-from eigenshape.retrieval.store.kinds import AnyRecipe, Descriptor, describe_shape
 
 CAPTION = "corresponding parts have one color; a lower score is more similar"
 N_CELLS = 12  # of the query by patches
@@ -34,7 +35,7 @@ class Asked:
     Attributes
     ----------
     mesh : TriangleMesh
-    descriptor : ShapeDescriptor or PatchDescriptor
+    descriptor : HeatDescriptor or PatchDescriptor
     labels : (f,) int
         Colour of each face.
     colors : (m,) int
@@ -52,11 +53,11 @@ class Asked:
 
 def asked(mesh: TriangleMesh, recipe: AnyRecipe, progress: Progress | None = None) -> Asked:
     """Describe a query, and cut it into parts: around its features, or around the first of its patches."""
-    if isinstance(recipe, Recipe):
-        shape = describe_mesh(mesh, recipe, progress=progress)
+    if isinstance(recipe, HeatRecipe):
+        shape = find_heat_features(mesh, recipe, progress=progress)
         every = np.arange(len(shape.descriptor.vertices))
         return Asked(shape.mesh, shape.descriptor, shape.parts.labels, every, every)
-    descriptor = describe_shape(mesh, recipe)
+    descriptor = describe(mesh, recipe)
     distances = geodesic_distances(mesh, descriptor.vertices[:N_CELLS])
     cells = distances.argmin(axis=0)
     return Asked(
@@ -103,7 +104,7 @@ def _panel(query: Asked, match: Match, repairs: tuple[str, ...]) -> Panel:
         return Panel(None, title, nothing, nothing)
     ours, theirs = match.correspondences.T
     recipe = query.descriptor.recipe
-    if isinstance(recipe, Recipe):
+    if isinstance(recipe, HeatRecipe):
         colors = np.full(
             len(match.vertices) + 1, -1
         )  # the last one is for what no view of the match shows
@@ -131,14 +132,14 @@ def _read_match(match: Match, repairs: tuple[str, ...]) -> TriangleMesh:
     return mesh
 
 
-def _parts(mesh: TriangleMesh, recipe: Recipe, match: Match) -> Int[np.ndarray, " f"]:
+def _parts(mesh: TriangleMesh, recipe: HeatRecipe, match: Match) -> Int[np.ndarray, " f"]:
     """Find the parts of a match again, -1 on fragments and where the view that matched does not see its surface."""
     if match.view == 0:
-        labels = describe_mesh(mesh, recipe).parts.labels
+        labels = find_heat_features(mesh, recipe).parts.labels
         return np.where(
             labels < len(match.vertices), labels, -1
         )  # fragments, which come last, have no feature
-    part, seen = described_view(mesh, recipe, match.view - 1)
+    part, seen = find_view_features(mesh, recipe, match.view - 1)
     labels = np.full(mesh.n_faces, -1)
     labels[part.source_faces] = seen.parts.labels
     return labels

@@ -1,6 +1,6 @@
 """Which cells of a file are read: those of the highest dimension, or those that the caller names."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Literal, cast, get_args
 
 import numpy as np
@@ -29,6 +29,21 @@ def require_kind(cells: str | None) -> CellKind | None:
             f"cells must be {', '.join(get_args(CellKind))} or None; it is {cells!r}."
         )
     return cast(CellKind | None, cells)
+
+
+def require_splittable(others: Sequence[str]) -> None:
+    """Refuse cells that are neither simplices nor quads, by their names.
+
+    Raises
+    ------
+    FileFormatError
+        If there are any.
+    """
+    if others:
+        raise FileFormatError(
+            "A file must hold simplices (tetra, triangle or line) or quads, with straight sides; "
+            f"it holds {', '.join(others)}. Split them first."
+        )
 
 
 def chosen_cells(blocks: Blocks, cells: CellKind | None) -> Int[np.ndarray, "s corners"]:

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError, InvalidShapeError
-from eigenshape.io import glb, obj, off, ply, stl, unstructured, vtk_legacy, vtu
+from eigenshape.io import glb, gmsh, medit, obj, off, ply, stl, vtk_legacy, vtu
 from eigenshape.io.cells import SEGMENTS, Blocks, CellKind, chosen_cells
 
 # Formats whose bytes alone give vertices, and triangles or segments.
@@ -20,7 +20,14 @@ PARSERS = {
     ".glb": glb.parse,
 }
 NAMES = {2: SEGMENTS, 3: "triangles"}
-MESH_FORMATS = (*PARSERS, ".gltf", ".vtk", ".vtu", *unstructured.READERS)
+# Formats whose bytes alone give points, and cells by kind.
+GRIDS = {
+    ".mesh": medit.parse_text,
+    ".meshb": medit.parse_binary,
+    ".msh": gmsh.parse,
+    ".vtu": vtu.parse,
+}
+MESH_FORMATS = (*PARSERS, ".gltf", ".vtk", *GRIDS)
 
 
 def suffix_of(path: Path, file_format: str | None, known: tuple[str, ...]) -> str:
@@ -73,8 +80,4 @@ def _blocks(
     if suffix == ".gltf":
         points, simplices = glb.parse_text(data, path.parent)
         return points, {"triangles": simplices}
-    if suffix == ".vtk":
-        return vtk_legacy.parse(data, cells)
-    if suffix == ".vtu":
-        return vtu.parse(data)
-    return unstructured.read(path, suffix, data)
+    return vtk_legacy.parse(data, cells) if suffix == ".vtk" else GRIDS[suffix](data)

@@ -4,7 +4,7 @@ import codecs
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, Shaped
 
 from eigenshape._errors import FileFormatError
 
@@ -82,6 +82,30 @@ def whole(word: bytes, line: Line, what: str) -> int:
             f"{what} must fit into 64 bits; line {line[0]} has {shown((0, word))}."
         )
     return value
+
+
+def numbers_of(words: Sequence[bytes]) -> Float[np.ndarray, " k"]:
+    """Read words as numbers.
+
+    Raises
+    ------
+    ValueError
+        If one is no number.
+    """
+    if b"_" in b" ".join(words):  # Python would read 1_0 as ten
+        raise ValueError("numbers have no underscores")
+    return np.fromiter(map(float, words), np.float64, len(words))
+
+
+def wholes(numbers: Shaped[np.ndarray, " k"], what: str) -> Int[np.ndarray, " k"]:
+    """Return numbers as whole numbers, refusing others."""
+    odd = (numbers != np.floor(numbers)) | ~(np.abs(numbers.astype(np.float64)) < EXACT)
+    bad = np.flatnonzero(odd)
+    if bad.size:
+        raise FileFormatError(
+            f"{what} must be whole numbers; number {bad[0]} is {numbers[bad[0]]}."
+        )
+    return numbers.astype(np.int64)
 
 
 def shown(line: Line) -> str:

@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.io.cells import SEGMENTS, CellKind, four_cornered
-from eigenshape.io.text import EXACT, fans, shown, strip_triangles
+from eigenshape.io.text import fans, numbers_of, shown, strip_triangles, wholes
 from eigenshape.io.vtk_cells import CellLists, cells_of_types
 
 KINDS = {
@@ -69,8 +69,7 @@ class _Cursor:
     def _text_numbers(self, count: int) -> np.ndarray:
         words = self.data[self.place :].split(None, count)
         try:
-            # Python would read 1_0 as ten.
-            found = np.array([float(word.replace(b"_", b"?")) for word in words[:count]])
+            found = numbers_of(words[:count])
         except ValueError as err:
             raise FileFormatError(
                 f"A VTK file must hold {count} numbers at byte {self.place}; it does not."
@@ -88,14 +87,7 @@ class _Cursor:
 
     def wholes(self, count: int, kind: bytes) -> Int[np.ndarray, " k"]:
         """Return the next numbers, all of them whole."""
-        found = self.numbers(count, kind)
-        odd = (found != np.floor(found)) | (np.abs(found.astype(np.float64)) >= EXACT)
-        bad = np.flatnonzero(odd)
-        if bad.size:
-            raise FileFormatError(
-                f"Cells of a VTK file must be whole numbers; number {bad[0]} is {found[bad[0]]}."
-            )
-        return found.astype(np.int64)
+        return wholes(self.numbers(count, kind), "Cells of a VTK file")
 
 
 def parse(

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
+from eigenshape.io.text import numbers_of, wholes
 from eigenshape.io.unpacking import COMPRESSORS, require_reasonable, unpacked_block
 from eigenshape.io.vtk_cells import CellLists, cells_of_types
 
@@ -147,7 +148,7 @@ def _require_size(found: int, expected: int | None, name: str) -> None:
 
 def _text_numbers(text: str, name: str) -> np.ndarray:
     try:
-        return np.array([float(word.replace("_", "?")) for word in text.split()])
+        return numbers_of(text.encode().split())
     except ValueError as err:
         raise FileFormatError(
             f"Arrays of a VTU file must be of numbers; {name!r} is not: {err}."
@@ -246,22 +247,14 @@ def _cells(
         raise FileFormatError(
             f"Cells of a VTU file must have connectivity, offsets and types; it has {', '.join(map(str, arrays))}."
         )
-    types = _wholes(packing.numbers(arrays["types"], n_cells), "types")
-    ends = _wholes(packing.numbers(arrays["offsets"], n_cells), "offsets")
+    types = wholes(packing.numbers(arrays["types"], n_cells), "types of a VTU file")
+    ends = wholes(packing.numbers(arrays["offsets"], n_cells), "offsets of a VTU file")
     starts = np.concatenate([[0], ends])
     if (np.diff(starts) < 0).any():
         raise FileFormatError(
             f"Offsets of a VTU file must rise from 0; they begin with {ends[:9].tolist()}."
         )
-    corners = _wholes(packing.numbers(arrays["connectivity"], int(starts[-1])), "connectivity")
+    corners = wholes(
+        packing.numbers(arrays["connectivity"], int(starts[-1])), "connectivity of a VTU file"
+    )
     return cells_of_types(CellLists(starts, corners), types)
-
-
-def _wholes(numbers: np.ndarray, name: str) -> Int[np.ndarray, " k"]:
-    whole = numbers.astype(np.int64)
-    bad = np.flatnonzero(whole != numbers)
-    if bad.size:
-        raise FileFormatError(
-            f"{name} of a VTU file must be whole numbers; number {bad[0]} is {numbers[bad[0]]}."
-        )
-    return whole

@@ -23,8 +23,8 @@ def test_the_descriptor_is_nearly_that_of_a_spectrum(recipe, cut):
     mesh = es.make_creature("quadruped", 2, n_vertices=5500)
     mesh = es.scans.cut_by_planes(mesh, [[0, 0, 1, 0.3]]).mesh if cut else mesh
     exact, found = (
-        es.retrieval.describe_mesh(mesh, recipe),
-        es.retrieval.describe_large_mesh(mesh, recipe),
+        es.retrieval.find_heat_features(mesh, recipe),
+        es.retrieval.find_heat_features(mesh, recipe, accuracy=0.01),
     )
     mass = es.geometry.dual_volumes(exact.mesh)
     off = np.sqrt(mass @ (found.heat - exact.heat) ** 2 / (mass @ exact.heat**2))
@@ -37,15 +37,15 @@ def test_the_descriptor_is_nearly_that_of_a_spectrum(recipe, cut):
         found.descriptor, exact.descriptor
     ) < 0.15 * es.retrieval.matching_score(
         found.descriptor,
-        es.retrieval.describe_mesh(es.make_creature("octopus", 0), recipe).descriptor,
+        es.retrieval.find_heat_features(es.make_creature("octopus", 0), recipe).descriptor,
     )
 
 
 def test_small_meshes_are_described_as_ever():
     mesh = es.shapes.torus(30, 18)
     exact, found = (
-        es.retrieval.describe_mesh(mesh, SMALL_RECIPE),
-        es.retrieval.describe_large_mesh(mesh, SMALL_RECIPE),
+        es.retrieval.find_heat_features(mesh, SMALL_RECIPE),
+        es.retrieval.find_heat_features(mesh, SMALL_RECIPE, accuracy=0.01),
     )
     assert found.descriptor.vectors == pytest.approx(exact.descriptor.vectors, rel=1e-6)
     assert np.array_equal(found.descriptor.vertices, exact.descriptor.vertices)

@@ -11,14 +11,14 @@ from eigenshape._errors import InvalidParameterError
 def test_features_are_the_maxima_of_the_function_and_vectors_those_of_heat(function):
     mesh = es.make_creature("quadruped", 1, n_vertices=800)
     values = function(mesh)
-    found = es.retrieval.describe_mesh(mesh, es.retrieval.SCALE_FREE, values=values)
+    found = es.retrieval.find_heat_features(mesh, es.retrieval.SCALE_FREE, values=values)
     features = es.segment(es.merge_tree(mesh, values), n_regions=15).features
-    expected = es.describe(found.spectrum, features)
+    expected = es.retrieval.heat_descriptor(found.spectrum, features)
     assert np.array_equal(found.descriptor.vertices, expected.vertices)
     assert np.array_equal(found.descriptor.vectors, expected.vectors)
     assert np.array_equal(found.heat, values)
     assert not np.array_equal(
-        found.descriptor.vertices, es.retrieval.describe_mesh(mesh).descriptor.vertices
+        found.descriptor.vertices, es.retrieval.find_heat_features(mesh).descriptor.vertices
     )
 
 
@@ -27,4 +27,4 @@ def test_values_are_checked():
     with pytest.raises(
         InvalidParameterError, match=r"values must hold one number a vertex, shape \(42,\)"
     ):
-        es.retrieval.describe_mesh(mesh, values=np.ones(3))
+        es.retrieval.find_heat_features(mesh, values=np.ones(3))

@@ -12,15 +12,15 @@ from eigenshape.retrieval.heat.descriptor import (
     PRESETS,
     SCALE_FREE,
     THESIS,
-    Recipe,
-    ShapeDescriptor,
+    HeatDescriptor,
+    HeatRecipe,
 )
 from eigenshape.retrieval.heat.score import match_features, matching_score, matching_scores
 
 
 def of(vectors, recipe=RECIPE):
     vectors = np.asarray(vectors, dtype=float)
-    return ShapeDescriptor(vectors, np.arange(len(vectors)), recipe)
+    return HeatDescriptor(vectors, np.arange(len(vectors)), recipe)
 
 
 def literal(first, second):
@@ -85,15 +85,15 @@ def test_correspondences_are_mutual_and_closest_first():
 
 
 def test_recipes_must_agree():
-    with pytest.raises(InvalidParameterError, match="Only descriptors of one recipe compare"):
+    with pytest.raises(InvalidParameterError, match="Only descriptors by the same recipe compare"):
         matching_score(descriptor(1), descriptor(1, replace(RECIPE, name="other")))
     with pytest.raises(
         InvalidParameterError,
         match="Shifts need logarithmic vectors at scales in geometric sequence",
     ):
-        Recipe(scales=(1.0, 2.0, 3.0))
+        HeatRecipe(scales=(1.0, 2.0, 3.0))
     with pytest.raises(InvalidParameterError, match="Shifts need logarithmic vectors"):
-        Recipe(logarithmic=False)
+        HeatRecipe(logarithmic=False)
 
 
 def test_presets_say_what_the_thesis_says():

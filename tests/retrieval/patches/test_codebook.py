@@ -8,7 +8,7 @@ import eigenshape as es
 from eigenshape.retrieval.patches import codebook as codes
 from eigenshape.retrieval.patches.codebook import encode_patches, train_codebook
 from eigenshape.retrieval.patches.distance import SIZE_PRICE, patch_distances, view_distances
-from eigenshape.retrieval.patches.patches import Patches, describe_patches
+from eigenshape.retrieval.patches.patches import Patches, extract_patches, surface_patches
 from eigenshape.scans.partial import viewpoint
 
 KINDS = ("quadruped", "hand", "octopus", "biped")
@@ -17,7 +17,7 @@ KINDS = ("quadruped", "hand", "octopus", "biped")
 @pytest.fixture(scope="module")
 def creatures():
     return {
-        (kind, seed): describe_patches(es.make_creature(kind, seed, n_vertices=1200))
+        (kind, seed): surface_patches(es.make_creature(kind, seed, n_vertices=1200))
         for kind in KINDS
         for seed in (1, 2)
     }
@@ -70,12 +70,17 @@ def test_vectors_are_gradients_of_the_likelihood(creatures, book):
 def test_the_mixture_is_as_likely_as_another_librarys():
     rng = np.random.default_rng(0)
     points = np.concatenate([rng.normal(place, 0.5 + 0.1 * place, (200, 4)) for place in range(8)])
-    shares, centers, variances = codes._mixture(points, 0)
+    shares, centers, variances = codes._fit_mixture(points, 0)
     ours = np.log(
         np.exp(codes._log_joint(points, shares, centers, variances)).sum(axis=1)
     ).mean() - 2 * np.log(2 * np.pi)
     theirs = GaussianMixture(
-        codes.N_WORDS, covariance_type="diag", reg_covar=0, tol=1e-5, max_iter=2000, random_state=0
+        codes.N_ENTRIES,
+        covariance_type="diag",
+        reg_covar=0,
+        tol=1e-5,
+        max_iter=2000,
+        random_state=0,
     ).fit(points)
     assert shares.sum() == pytest.approx(1)
     assert ours > theirs.score(points) - 0.05
@@ -109,15 +114,15 @@ def test_a_view_counts_by_half():
 
 def test_a_scan_is_nearest_to_the_view_from_its_side(creatures, book):
     mesh = es.make_creature("hand", 1, n_vertices=1200)
-    views = es.retrieval.describe_patch_views(mesh, n_views=3)
+    _, *views = extract_patches(mesh, n_views=3, clean=False)
     codes = np.array([encode_patches(view, book) for view in views])
     for place in range(3):
         scan = es.partial_scan(mesh, viewpoint(place)).mesh
-        found = patch_distances(encode_patches(describe_patches(scan), book), codes)
+        found = patch_distances(encode_patches(surface_patches(scan), book), codes)
         assert found.argmin() == place
         assert found[place] == pytest.approx(0, abs=1e-5)
         assert set(views[place].vertices) <= set(range(mesh.n_vertices))
-    assert es.retrieval.describe_patch_views(scan) == []
+    assert len(extract_patches(scan, n_views=3)) == 1
 
 
 def test_the_same_again(creatures):

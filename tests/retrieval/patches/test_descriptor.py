@@ -1,4 +1,4 @@
-"""Patches in an index: words, codes and answers."""
+"""Patches in an index: codebooks, codes and answers."""
 
 from functools import partial
 
@@ -6,15 +6,18 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape.retrieval.patches.descriptor import rounded
+from eigenshape.retrieval.patches.codebook import encode_patches
+from eigenshape.retrieval.patches.descriptor import rounded_codes
+from eigenshape.retrieval.patches.patches import surface_patches
 from eigenshape.retrieval.store import batch
+from eigenshape.retrieval.store.index import describe_to_store
 
 KINDS = ("quadruped", "hand", "octopus", "biped")
 
 
 @pytest.fixture(scope="module")
 def recipe():
-    return es.retrieval.PatchRecipe(es.retrieval.made_codebook())
+    return es.retrieval.PatchRecipe()
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +29,7 @@ def meshes():
 def index(recipe, meshes, tmp_path_factory):
     index = es.ShapeIndex.create(tmp_path_factory.mktemp("patches") / "index")
     for kind, mesh in meshes.items():
-        index.add(kind, es.retrieval.describe_to_keep(mesh, recipe, n_views=2), label=kind)
+        index.add(kind, mesh, recipe=recipe, n_views=2, label=kind)
     return index
 
 
@@ -36,31 +39,25 @@ def test_a_scan_of_another_pose_finds_its_kind(index, recipe, kind):
     pose = es.make_creature(kind, 2, n_vertices=1500)
     scan = es.partial_scan(pose, np.array([0.3, 0.5, 0.8])).mesh
     for shape in (pose, scan):
-        assert index.query(es.retrieval.describe_shape(shape, recipe))[0].name == kind
+        assert index.query(es.describe(shape, recipe))[0].name == kind
 
 
 @pytest.mark.long
 def test_a_shape_finds_itself_nearly_at_zero(index, recipe, meshes):
-    best, other = index.query(es.retrieval.describe_shape(meshes["hand"], recipe), n_matches=2)
+    best, other = index.query(es.describe(meshes["hand"], recipe), n_matches=2)
     assert (best.name, best.view) == ("hand", 0)
     assert best.score < 0.05
     assert other.score > 0.7
     points = best.correspondences
     assert len(points) > 100
     assert np.array_equal(points[:, 0], points[:, 1])
-    assert np.array_equal(
-        best.vertices, es.retrieval.describe_shape(meshes["hand"], recipe).vertices
-    )
+    assert np.array_equal(best.vertices, es.describe(meshes["hand"], recipe).vertices)
 
 
 @pytest.mark.long
 def test_an_index_scores_as_the_function_does(index, recipe, meshes):
-    kept = [
-        es.retrieval.describe_to_keep(meshes[kind], recipe, n_views=2)[0] for kind in sorted(KINDS)
-    ]
-    query = es.retrieval.describe_shape(
-        es.partial_scan(meshes["biped"], np.array([1.0, 0.2, 0.1])).mesh, recipe
-    )
+    kept = [describe_to_store(meshes[kind], recipe, 2)[0] for kind in sorted(KINDS)]
+    query = es.describe(es.partial_scan(meshes["biped"], np.array([1.0, 0.2, 0.1])).mesh, recipe)
     found = {match.name: match.score for match in index.query(query)}
     assert [found[kind] for kind in sorted(KINDS)] == pytest.approx(
         es.retrieval.patch_scores(query, kept), abs=1e-6
@@ -68,23 +65,21 @@ def test_an_index_scores_as_the_function_does(index, recipe, meshes):
 
 
 def test_rounding_hardly_turns_a_code(recipe, meshes):
-    codes = es.retrieval.encode_patches(
-        es.retrieval.describe_patches(meshes["octopus"]), recipe.codebook
-    )
-    whole = rounded(codes).astype(float)
+    codes = encode_patches(surface_patches(meshes["octopus"]), recipe.codebook)
+    whole = rounded_codes(codes).astype(float)
     assert (whole * codes).sum(axis=2) == pytest.approx(np.linalg.norm(whole, axis=2), rel=2e-3)
 
 
-def test_words_survive_the_file_and_the_index(index, recipe):
+def test_a_codebook_survives_the_file_and_the_index(index, recipe):
     again = es.retrieval.read_codebook(es.retrieval.write_codebook(recipe.codebook))
     assert (again, again.digest) == (recipe.codebook, recipe.codebook.digest)
     assert es.retrieval.write_codebook(again) == es.retrieval.write_codebook(recipe.codebook)
     assert index.recipes() == [recipe]
     assert index.records()[0].recipes == (recipe,)
-    assert index.descriptor("hand", recipe).recipe == recipe
+    assert index.descriptors("hand", recipe)[0].recipe == recipe
 
 
-def other_words(book):
+def with_other_codebook(book):
     return es.retrieval.PatchRecipe(
         es.retrieval.PatchCodebook(
             **{**vars(book), "means": np.asarray(book.means + 1, dtype=np.float32)}
@@ -93,16 +88,20 @@ def other_words(book):
 
 
 @pytest.mark.long
-def test_other_words_are_another_recipe(index, recipe, meshes):
-    query = es.retrieval.describe_shape(
+def test_another_codebook_is_another_recipe(index, recipe, meshes):
+    query = es.describe(
         meshes["hand"],
-        other_words(es.retrieval.read_codebook(es.retrieval.write_codebook(recipe.codebook))),
+        with_other_codebook(
+            es.retrieval.read_codebook(es.retrieval.write_codebook(recipe.codebook))
+        ),
     )
-    message = rf"holds patches {recipe.codebook.digest[:8]} and was asked in PatchRecipe\(codebook=PatchCodebook\("
+    message = (
+        rf"holds patches {recipe.codebook.digest[:8]}, and PatchRecipe\(codebook=PatchCodebook\("
+    )
     with pytest.raises(es.StoreError, match=message):
         index.query(query)
-    with pytest.raises(es.StoreError, match=r"holds patches .* and was asked in Recipe"):
-        index.query(es.retrieval.describe_shape(meshes["hand"], es.retrieval.SCALE_FREE))
+    with pytest.raises(es.StoreError, match=r"holds patches .*, and HeatRecipe.* was requested"):
+        index.query(es.describe(meshes["hand"], es.retrieval.SCALE_FREE))
 
 
 @pytest.mark.long
@@ -111,25 +110,17 @@ def test_an_index_keeps_heat_and_patches_side_by_side(tmp_path, recipe, meshes):
     index.keep_recipe(recipe)
     assert (index.recipes(), len(index)) == ([recipe], 0)
     for kind in KINDS[:2]:
-        shapes = [
-            es.retrieval.describe_shape(meshes[kind], one)
-            for one in (recipe, es.retrieval.SCALE_FREE)
-        ]
-        index.add(kind, shapes)
+        shapes = [es.describe(meshes[kind], one) for one in (recipe, es.retrieval.SCALE_FREE)]
+        index.add_descriptors(kind, shapes)
     assert index.recipes() == [recipe, es.retrieval.SCALE_FREE]
     for one in index.recipes():
-        assert index.query(es.retrieval.describe_shape(meshes["hand"], one))[0].name == "hand"
+        assert index.query(es.describe(meshes["hand"], one))[0].name == "hand"
 
 
-def taught(path, *, known):
+def read_known(path, *, meshes):
     if path.stem == "bad":
         raise es.InvalidShapeError("A face must have area; face 3 has none.")
-    return [known[path.stem]]
-
-
-@pytest.fixture(scope="module")
-def lessons(meshes):
-    return {kind: es.retrieval.describe_patches(mesh) for kind, mesh in meshes.items()}
+    return meshes[path.stem]
 
 
 def files(folder, names):
@@ -137,37 +128,35 @@ def files(folder, names):
 
 
 @pytest.mark.long
-def test_words_are_learnt_from_files_in_any_order(tmp_path, lessons, monkeypatch):
-    monkeypatch.setattr(batch, "FEWEST_TEACHERS", 3)
-    items, heard = files(tmp_path, [*KINDS, "bad"]), []
-    learn = partial(es.retrieval.learn_words, teach=partial(taught, known=lessons))
-    book = learn(items, told=lambda *news: heard.append(news))
-    assert book == learn(items[::-1], workers=es.retrieval.Workers(1))
-    assert book != es.retrieval.made_codebook()
-    assert [news[:2] for news in heard] == [(done, 5) for done in range(1, 6)]
+def test_a_codebook_is_learned_from_files_in_any_order(tmp_path, meshes, monkeypatch):
+    monkeypatch.setattr(batch, "FEWEST_TO_TRAIN", 3)
+    items, calls = files(tmp_path, [*KINDS, "bad"]), []
+    train = partial(es.retrieval.train_codebook_from_files, read=partial(read_known, meshes=meshes))
+    book = train(items, callback=lambda *call: calls.append(call))
+    assert book == train(items[::-1], workers=es.retrieval.Workers(1))
+    assert book != es.retrieval.default_codebook()
+    assert [call[:2] for call in calls] == [(done, 5) for done in range(1, 6)]
 
 
 @pytest.mark.long
-def test_few_shapes_take_words_that_are_there(tmp_path, lessons, monkeypatch):
-    teach = partial(taught, known=lessons)
-    assert es.retrieval.learn_words(files(tmp_path, KINDS), teach) == es.retrieval.made_codebook()
-    monkeypatch.setattr(batch, "FEWEST_TEACHERS", 3)
-    assert (
-        es.retrieval.learn_words(files(tmp_path, ["hand", "bad", "biped"]), teach)
-        == es.retrieval.made_codebook()
-    )
+def test_few_shapes_take_the_default_codebook(tmp_path, meshes, monkeypatch):
+    train = partial(es.retrieval.train_codebook_from_files, read=partial(read_known, meshes=meshes))
+    assert train(files(tmp_path, KINDS)) == es.retrieval.default_codebook()
+    monkeypatch.setattr(batch, "FEWEST_TO_TRAIN", 3)
+    some = files(tmp_path, ["hand", "bad", "biped"])
+    assert train(some) == es.retrieval.default_codebook()
 
 
 def test_odd_queries_are_answered_or_named(index, recipe):
     square = es.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]], [[0, 1, 2], [0, 2, 3]])
-    assert len(index.query(es.retrieval.describe_shape(square, recipe))) == len(KINDS)
+    assert len(index.query(es.describe(square, recipe))) == len(KINDS)
     hand = es.make_creature("hand", 2, n_vertices=1200)
     twice = np.concatenate([hand.vertices, hand.vertices + np.array([5, 0, 0])])
     pair = es.TriangleMesh(twice, np.concatenate([hand.faces, hand.faces + hand.n_vertices]))
-    assert len(index.query(es.retrieval.describe_shape(pair, recipe))) == len(KINDS)
+    assert len(index.query(es.describe(pair, recipe))) == len(KINDS)
     sliver = es.TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0.0]], [[0, 1, 2]])
     with pytest.raises(es.InvalidShapeError, match="area"):
-        es.retrieval.describe_shape(sliver, recipe)
+        es.describe(sliver, recipe)
     loose = es.TriangleMesh([*square.vertices, [9, 9, 9]], square.faces)
     with pytest.raises(es.InvalidShapeError, match="vertex 4"):
-        es.retrieval.describe_shape(loose, recipe)
+        es.describe(loose, recipe)

@@ -7,8 +7,10 @@ import pytest
 
 import eigenshape as es
 from eigenshape.retrieval.patches import matching as patch_matching
+from eigenshape.retrieval.patches.matching import patch_points
 from eigenshape.retrieval.patches.matching_loops import leading, nearest_of_each_other
 from eigenshape.retrieval.patches.packing import pack_points, unpack_points
+from eigenshape.retrieval.patches.patches import surface_patches
 
 HAND = es.make_creature("hand", 1, n_vertices=1500)
 
@@ -40,16 +42,13 @@ KINDS = ("quadruped", "hand", "octopus", "biped")
 @pytest.fixture(scope="module")
 def book():
     return es.retrieval.train_codebook(
-        [
-            es.retrieval.describe_patches(es.make_creature(kind, 3, n_vertices=1200))
-            for kind in KINDS
-        ]
+        [surface_patches(es.make_creature(kind, 3, n_vertices=1200)) for kind in KINDS]
     )
 
 
 @pytest.fixture(scope="module")
 def hand(book):
-    return es.retrieval.patch_points(es.retrieval.describe_patches(HAND), book)
+    return patch_points(surface_patches(HAND), book)
 
 
 def test_a_shape_matches_itself_point_by_point(hand):
@@ -64,9 +63,7 @@ def test_a_shape_matches_itself_point_by_point(hand):
 def test_rigid_motion_and_size_change_no_match(hand, book):
     turn = np.diag([-1.0, -1.0, 1.0])  # keeps the box, whose sides are the unit
     moved = es.TriangleMesh(1e-50 * (HAND.vertices @ turn + [3, 0, 1]), HAND.faces)
-    match = es.retrieval.match_patches(
-        hand, es.retrieval.patch_points(es.retrieval.describe_patches(moved), book)
-    )
+    match = es.retrieval.match_patches(hand, patch_points(surface_patches(moved), book))
     assert len(match.points) > 100
     assert np.array_equal(match.vertices[:, 0], match.vertices[:, 1])
     assert match.agreement > 0.95
@@ -90,9 +87,7 @@ def test_other_vertex_numbers_change_little(hand, book):
     order = np.random.default_rng(1).permutation(HAND.n_vertices)
     places = np.argsort(order)
     shuffled = es.TriangleMesh(HAND.vertices[order], places[HAND.faces])
-    match = es.retrieval.match_patches(
-        hand, es.retrieval.patch_points(es.retrieval.describe_patches(shuffled), book)
-    )
+    match = es.retrieval.match_patches(hand, patch_points(surface_patches(shuffled), book))
     gaps = HAND.vertices[match.vertices[:, 0]] - shuffled.vertices[match.vertices[:, 1]]
     near = np.linalg.norm(gaps, axis=1) < 0.1 * np.sqrt(es.geometry.surface_area(HAND))
     assert len(near) > 60
@@ -102,10 +97,8 @@ def test_other_vertex_numbers_change_little(hand, book):
 @pytest.mark.long
 def test_a_part_agrees_with_its_whole_more_than_with_another_kind(hand, book):
     part = es.partial_scan(HAND, [0.0, 0, 1])
-    scan = es.retrieval.patch_points(es.retrieval.describe_patches(part.mesh), book)
-    other = es.retrieval.patch_points(
-        es.retrieval.describe_patches(es.make_creature("biped", 1, n_vertices=1500)), book
-    )
+    scan = patch_points(surface_patches(part.mesh), book)
+    other = patch_points(surface_patches(es.make_creature("biped", 1, n_vertices=1500)), book)
     assert (
         es.retrieval.match_patches(scan, hand).agreement
         > 1.5 * es.retrieval.match_patches(scan, other).agreement
@@ -148,7 +141,7 @@ def test_equally_near_points_are_paired_in_order():
 @pytest.mark.long
 @pytest.mark.parametrize("name", SYMMETRIC)
 def test_a_symmetric_shape_finds_itself_near_0(name, book):
-    shape = es.retrieval.describe_shape(SYMMETRIC[name](), es.retrieval.PatchRecipe(book))
+    shape = es.describe(SYMMETRIC[name](), es.retrieval.PatchRecipe(book))
     assert es.retrieval.patch_scores(shape, [shape])[0] == pytest.approx(0, abs=0.01)
     match = es.retrieval.match_patches(shape.points[0], shape.points[0])
     assert np.array_equal(match.points[:, 0], match.points[:, 1])
@@ -167,8 +160,8 @@ def test_a_point_without_weight_spoils_no_match(hand):
 
 
 def test_points_are_packed_without_loss(hand, book):
-    part = es.retrieval.patch_points(
-        es.retrieval.describe_patches(es.partial_scan(HAND, [0.0, 0, 1]).mesh, n_samples=40), book
+    part = patch_points(
+        surface_patches(es.partial_scan(HAND, [0.0, 0, 1]).mesh, n_samples=40), book
     )
     data = pack_points([hand, part])
     assert len(data) < 60_000
@@ -187,6 +180,6 @@ def test_what_does_not_agree_is_no_match(hand):
 def test_other_codebooks_are_refused(hand):
     short = replace(hand, numbers=hand.numbers[:, :, :3])
     with pytest.raises(
-        es.InvalidParameterError, match=r"Only points of one codebook match; .* the second \(9, 3\)"
+        es.InvalidParameterError, match=r"Only points by one codebook match; .* the second \(9, 3\)"
     ):
         es.retrieval.match_patches(hand, short)

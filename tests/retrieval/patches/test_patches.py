@@ -5,7 +5,7 @@ import pytest
 
 import eigenshape as es
 from eigenshape.retrieval.patches.patch_loops import HEIGHT_BINS, NUMBERS, RING_NUMBERS, TURN_BINS
-from eigenshape.retrieval.patches.patches import RADII, describe_patches
+from eigenshape.retrieval.patches.patches import RADII, extract_patches, surface_patches
 
 
 def rings(patches):
@@ -27,7 +27,7 @@ def sheet(n=41):
 
 def test_a_flat_disc():
     mesh = sheet()
-    found = describe_patches(mesh)
+    found = surface_patches(mesh)
     turns, heights, areas, straight = rings(found)
     assert turns[..., -1] == pytest.approx(1)
     assert turns[..., :-1] == pytest.approx(0)
@@ -46,7 +46,7 @@ def test_a_flat_disc():
 
 
 def test_discs_of_a_ball():
-    found = describe_patches(es.icosphere(5))
+    found = surface_patches(es.icosphere(5))
     turns, heights, areas, straight = rings(found)
     ring, radius = 3, 5
     middle = RADII[radius] * np.linspace(0.75, 1, 9)  # on a ball of radius .5: angles of twice that
@@ -71,7 +71,7 @@ def test_what_faces_away_does_not_count():
         np.concatenate([front.vertices, back.vertices - [0, 0, 0.01]]),
         np.concatenate([front.faces, back.faces[:, ::-1] + front.n_vertices]),
     )
-    one, two = describe_patches(front, n_samples=20), describe_patches(thin, n_samples=40)
+    one, two = surface_patches(front, n_samples=20), surface_patches(thin, n_samples=40)
     assert two.numbers.mean(axis=0) == pytest.approx(one.numbers.mean(axis=0), abs=0.2)
 
 
@@ -80,7 +80,7 @@ def test_size_and_rigid_motion_change_nothing(scale):
     mesh = es.make_creature("quadruped", 1, n_vertices=1500)
     half_turn = np.diag([-1.0, -1.0, 1.0])  # keeps the box, whose sides are the unit
     moved = es.TriangleMesh(scale * (mesh.vertices @ half_turn + [3, 0, 1]), mesh.faces)
-    one, two = describe_patches(mesh), describe_patches(moved)
+    one, two = surface_patches(mesh), surface_patches(moved)
     assert np.array_equal(one.vertices, two.vertices)
     assert two.numbers == pytest.approx(one.numbers, abs=2e-3)
     assert two.weights == pytest.approx(one.weights, abs=1e-6)
@@ -88,7 +88,7 @@ def test_size_and_rigid_motion_change_nothing(scale):
 
 def test_weights_are_shares_of_the_surface():
     mesh = es.make_creature("hand", n_vertices=1500)
-    found = describe_patches(mesh, n_samples=60)
+    found = surface_patches(mesh, n_samples=60)
     assert found.numbers.shape == (60, len(RADII), NUMBERS)
     assert found.weights.sum(axis=0) == pytest.approx(1)
     assert np.isfinite(found.numbers).all()
@@ -96,20 +96,20 @@ def test_weights_are_shares_of_the_surface():
 
 
 def test_few_vertices_have_few_patches():
-    assert len(describe_patches(es.icosphere(0)).vertices) == 12
-    assert np.isfinite(describe_patches(es.icosphere(0)).numbers).all()
+    assert len(surface_patches(es.icosphere(0)).vertices) == 12
+    assert np.isfinite(surface_patches(es.icosphere(0)).numbers).all()
 
 
 def test_each_piece_is_sampled():
     one, two = es.icosphere(2), es.icosphere(2)
     pair = es.shapes.disjoint_union(one, es.TriangleMesh(two.vertices + 3, two.faces))
-    found = describe_patches(pair, n_samples=30)
+    found = surface_patches(pair, n_samples=30)
     assert (found.vertices < one.n_vertices).sum() == pytest.approx(15, abs=2)
 
 
 def test_two_triangles_are_enough():
     mesh = es.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
-    found = describe_patches(mesh)
+    found = surface_patches(mesh)
     assert len(found.vertices) == 4
     assert np.isfinite(found.numbers).all()
     assert (found.weights > 0).all()
@@ -118,13 +118,15 @@ def test_two_triangles_are_enough():
 def test_bad_input_is_named():
     ball = es.icosphere(1)
     with pytest.raises(es.InvalidParameterError, match="n_samples must be at least 1; it is 0"):
-        describe_patches(ball, n_samples=0)
+        extract_patches(ball, n_samples=0)
+    with pytest.raises(es.InvalidParameterError, match="n_views must be at least 0; it is -1"):
+        extract_patches(ball, n_views=-1)
     loose = es.TriangleMesh(np.concatenate([ball.vertices, [[2, 0, 0]]]), ball.faces)
     with pytest.raises(es.InvalidShapeError, match="42"):
-        describe_patches(loose)
+        surface_patches(loose)
     line = es.TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
     with pytest.raises(
         es.InvalidShapeError,
         match="must have an area to be described by patches; all its faces have none",
     ):
-        describe_patches(line)
+        surface_patches(line)

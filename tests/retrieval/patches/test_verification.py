@@ -6,12 +6,13 @@ import pytest
 import eigenshape as es
 from eigenshape.retrieval.patches.distance import patch_distances, view_distances
 from eigenshape.retrieval.patches.matching import patch_agreement
+from eigenshape.retrieval.patches.patches import surface_patches
 from eigenshape.retrieval.patches.verification import (
-    WORTH,
+    AGREEMENT_WEIGHT,
+    code_distances,
     patch_scores,
     shape_agreement,
     verified_scores,
-    word_distances,
 )
 
 KINDS = ("quadruped", "hand", "octopus", "biped")
@@ -20,10 +21,7 @@ KINDS = ("quadruped", "hand", "octopus", "biped")
 @pytest.fixture(scope="module")
 def book():
     return es.retrieval.train_codebook(
-        [
-            es.retrieval.describe_patches(es.make_creature(kind, 3, n_vertices=1200))
-            for kind in KINDS
-        ]
+        [surface_patches(es.make_creature(kind, 3, n_vertices=1200)) for kind in KINDS]
     )
 
 
@@ -43,8 +41,8 @@ def floats(codes):
 
 
 def known(mesh, book):
-    return es.retrieval.in_words(
-        es.retrieval.seen_patches(mesh, n_views=3), es.retrieval.PatchRecipe(book)
+    return es.retrieval.patch_descriptor(
+        es.retrieval.extract_patches(mesh, n_views=3), es.retrieval.PatchRecipe(book)
     )
 
 
@@ -52,9 +50,13 @@ def known(mesh, book):
 def test_only_the_nearest_come_nearer(wholes, scan):
     far = np.array([0.9, 0.3, 0.5, 0.8])
     found = verified_scores(scan, wholes.__getitem__, far, n_verified=2)
-    assert found[[0, 3]].tolist() == ((far[[0, 3]] + WORTH) / (1 + WORTH)).tolist()
+    assert (
+        found[[0, 3]].tolist()
+        == ((far[[0, 3]] + AGREEMENT_WEIGHT) / (1 + AGREEMENT_WEIGHT)).tolist()
+    )
     expected = [
-        (far[place] + WORTH * (1 - shape_agreement(scan, wholes[place]))) / (1 + WORTH)
+        (far[place] + AGREEMENT_WEIGHT * (1 - shape_agreement(scan, wholes[place])))
+        / (1 + AGREEMENT_WEIGHT)
         for place in (1, 2)
     ]
     assert found[[1, 2]] == pytest.approx(expected)
@@ -85,14 +87,14 @@ def test_views_of_the_query_serve_against_parts(wholes, scan):
     assert nearest < own[0]
     assert found[0] == pytest.approx((own[0] + nearest) / 2)
     assert found[1] == view_distances(whole[0], shapes, other[1:], of)[1]
-    assert word_distances(wholes[1].codes, [scan.codes, wholes[0].codes]) == pytest.approx(
+    assert code_distances(wholes[1].codes, [scan.codes, wholes[0].codes]) == pytest.approx(
         found, abs=1e-6
     )
 
 
 def test_many_shapes_are_scored_some_at_a_time(wholes, scan, monkeypatch):
     at_once = patch_scores(scan, wholes)
-    monkeypatch.setattr("eigenshape.retrieval.patches.verification.AT_ONCE", 3)
+    monkeypatch.setattr("eigenshape.retrieval.patches.verification.SHAPES_AT_ONCE", 3)
     assert patch_scores(scan, wholes) == pytest.approx(at_once, abs=1e-6)
     assert at_once.argmin() == 1
 
@@ -100,9 +102,9 @@ def test_many_shapes_are_scored_some_at_a_time(wholes, scan, monkeypatch):
 def test_a_descriptor_takes_patches(book, scan):
     with pytest.raises(
         es.InvalidParameterError,
-        match="takes patches of a shape, then of its views; there are none",
+        match="needs the patches of a shape; the list is empty",
     ):
-        es.retrieval.in_words([], es.retrieval.PatchRecipe(book))
+        es.retrieval.patch_descriptor([], es.retrieval.PatchRecipe(book))
     assert len(scan.points) == len(scan.codes) == 1
     assert not scan.codes.flags.writeable
 
@@ -117,4 +119,4 @@ def test_noise_and_inward_faces_hardly_matter(wholes):
     )
     spoilt = es.TriangleMesh(mesh.vertices + noise, mesh.faces[:, ::-1])
     recipe = wholes[0].recipe
-    assert patch_scores(es.retrieval.describe_shape(spoilt, recipe), wholes).argmin() == 1
+    assert patch_scores(es.describe(spoilt, recipe), wholes).argmin() == 1

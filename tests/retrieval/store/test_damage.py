@@ -9,10 +9,11 @@ import pytest
 from describers import descriptor
 
 import eigenshape as es
+from eigenshape.retrieval.store.index import describe_to_store
 
 HAND = es.make_creature("hand", 1, n_vertices=500)
 KINDS = ("hand", "octopus")
-PATCHES = es.retrieval.PatchRecipe(es.retrieval.made_codebook())
+PATCHES = es.retrieval.PatchRecipe()
 
 
 @pytest.fixture(scope="module")
@@ -21,14 +22,14 @@ def sound(tmp_path_factory):
     index = es.ShapeIndex.create(tmp_path_factory.mktemp("sound") / "index")
     for seed in range(60):
         name, label = f"shape {seed} " + 20 * "n", f"class {seed % 3}"
-        index.add(
+        index.add_descriptors(
             name, [descriptor(seed)], label=label, source=f"/meshes/{seed}.ply", digest=64 * "d"
         )
     for kind in KINDS:
         mesh = es.make_creature(kind, 1, n_vertices=500)
-        index.add(kind, es.retrieval.describe_to_keep(mesh, PATCHES, n_views=0), label=kind)
-    index.add("hand", [descriptor(99)], digest="new", replace=True)
-    index.add("hand", es.retrieval.describe_to_keep(HAND, PATCHES, n_views=0), digest="new")
+        index.add(kind, mesh, recipe=PATCHES, n_views=0, label=kind)
+    index.add_descriptors("hand", [descriptor(99)], digest="new", replace=True)
+    index.add_descriptors("hand", describe_to_store(HAND, PATCHES, 0), digest="new")
     with closing(sqlite3.connect(index.folder / "index.sqlite")) as reader:
         reader.execute("BEGIN")
         reader.execute("SELECT * FROM shape").fetchone()
@@ -38,7 +39,7 @@ def sound(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def hand():
-    return es.retrieval.describe_shape(HAND, PATCHES)
+    return es.describe(HAND, PATCHES)
 
 
 def answers(folder, hand):
@@ -48,7 +49,7 @@ def answers(folder, hand):
         len(index),
         index.recipes(),
         index.records(),
-        index.descriptor("octopus", PATCHES).codes.tolist(),
+        index.descriptors("octopus", PATCHES)[0].codes.tolist(),
     ]
     matches = index.query(descriptor(3), n_matches=100) + index.query(hand)
     found = [(vars(match) | {"vertices": match.vertices.tolist()}) for match in matches]

@@ -20,7 +20,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eigenshape._errors import InvalidParameterError, StoreError
-from eigenshape.retrieval.heat.descriptor import Recipe, ShapeDescriptor
+from eigenshape.retrieval.heat.descriptor import HeatDescriptor, HeatRecipe
 from eigenshape.retrieval.heat.score import matching_score
 from eigenshape.retrieval.store import files as store
 from eigenshape.retrieval.store.index import ShapeIndex
@@ -34,12 +34,12 @@ def index(tmp_path):
 
 
 def rounded(shape):
-    return ShapeDescriptor(shape.vectors.astype("<f4").astype(float), shape.vertices, shape.recipe)
+    return HeatDescriptor(shape.vectors.astype("<f4").astype(float), shape.vertices, shape.recipe)
 
 
 def test_a_shape_finds_itself_first_with_score_zero(index):
     for seed in range(12):
-        index.add(
+        index.add_descriptors(
             f"s{seed:02}", [descriptor(seed)], label=f"class {seed % 3}", source=f"/{seed}.ply"
         )
     for seed in range(12):
@@ -53,7 +53,7 @@ def test_a_shape_finds_itself_first_with_score_zero(index):
 def test_scores_equal_brute_force(index):
     shapes = {f"s{seed}": descriptor(seed, m=1 + seed % 3) for seed in range(20)}
     for name, shape in shapes.items():
-        index.add(name, [shape])
+        index.add_descriptors(name, [shape])
     query = descriptor(99, m=3)
     found = {match.name: match.score for match in index.query(query, n_matches=50)}
     assert found == pytest.approx(
@@ -62,34 +62,35 @@ def test_scores_equal_brute_force(index):
 
 
 def test_a_shape_in_the_index_can_ask_for_its_like(index):
-    index.add("one", [descriptor(1), descriptor(2)])
-    again = index.descriptor("one", RECIPE)
-    assert np.array_equal(again.vectors, rounded(descriptor(1)).vectors)
-    assert np.array_equal(again.vertices, descriptor(1).vertices)
+    index.add_descriptors("one", [descriptor(1), descriptor(2)])
+    first, second = index.descriptors("one", RECIPE)
+    assert np.array_equal(first.vectors, rounded(descriptor(1)).vectors)
+    assert np.array_equal(first.vertices, descriptor(1).vertices)
+    assert np.array_equal(second.vectors, rounded(descriptor(2)).vectors)
     with pytest.raises(
         StoreError,
-        match="A shape must be described by the recipe asked for; 'two' is not described",
+        match="A shape must be described by the requested recipe; 'two' is not described",
     ):
-        index.descriptor("two", RECIPE)
+        index.descriptors("two", RECIPE)
 
 
 def test_equal_scores_are_sorted_by_name(index):
     for name in ("b", "c", "a"):
-        index.add(name, [descriptor(1)])
+        index.add_descriptors(name, [descriptor(1)])
     assert [match.name for match in index.query(descriptor(2))] == ["a", "b", "c"]
 
 
 def test_a_record_holds_several_recipes_some_of_them_long(index):
-    index.add("one", [descriptor(1), descriptor(1, OTHER, m=500)], digest="d")
-    index.add("two", [descriptor(2)])
+    index.add_descriptors("one", [descriptor(1), descriptor(1, OTHER, m=500)], digest="d")
+    index.add_descriptors("two", [descriptor(2)])
     assert [record.recipes for record in index.records()] == [(RECIPE, OTHER), (RECIPE,)]
     assert [match.name for match in index.query(descriptor(1, OTHER))] == ["one"]
     assert index.query(descriptor(1, OTHER, m=500))[0].score == 0
 
 
 def test_the_best_view_of_a_shape_counts(index):
-    index.add("one", [descriptor(1), descriptor(2), descriptor(3)])
-    index.add("two", [descriptor(4), descriptor(5)])
+    index.add_descriptors("one", [descriptor(1), descriptor(2), descriptor(3)])
+    index.add_descriptors("two", [descriptor(4), descriptor(5)])
     for name, view, seed in (("one", 0, 1), ("one", 2, 3), ("two", 1, 5)):
         best, other = index.query(descriptor(seed))
         assert (best.name, best.view, best.score) == (name, view, 0)
@@ -97,34 +98,34 @@ def test_the_best_view_of_a_shape_counts(index):
 
 
 def test_the_same_digest_gains_recipes_and_keeps_the_rest(index):
-    index.add("one", [descriptor(1)], digest="d")
-    index.add("one", [descriptor(1), descriptor(3, OTHER)], digest="d")
+    index.add_descriptors("one", [descriptor(1)], digest="d")
+    index.add_descriptors("one", [descriptor(1), descriptor(3, OTHER)], digest="d")
     assert index.records()[0].recipes == (RECIPE, OTHER)
     with pytest.raises(
         StoreError, match="A name stands for one shape; 'one' is in the index with digest d, not e"
     ):
-        index.add("one", [descriptor(2)], digest="e")
+        index.add_descriptors("one", [descriptor(2)], digest="e")
 
 
 def test_another_digest_gives_way_where_asked(index):
-    index.add("one", [descriptor(1), descriptor(1, OTHER)], label="old")
-    index.add("one", [descriptor(2)], digest="d", replace=True)
-    index.add("one", [descriptor(3)], digest="e", label="new", replace=True)
+    index.add_descriptors("one", [descriptor(1), descriptor(1, OTHER)], label="old")
+    index.add_descriptors("one", [descriptor(2)], digest="d", replace=True)
+    index.add_descriptors("one", [descriptor(3)], digest="e", label="new", replace=True)
     assert [(record.label, record.digest, record.recipes) for record in index.records()] == [
         ("new", "e", (RECIPE,))
     ]
     assert index.query(descriptor(3))[0].score == 0
-    index.add("one", [descriptor(4)], digest="e", replace=True)
+    index.add_descriptors("one", [descriptor(4)], digest="e", replace=True)
     assert index.query(descriptor(3))[0].score == 0
 
 
 def test_remove(index):
     for seed in range(3):
-        index.add(f"s{seed}", [descriptor(seed)])
+        index.add_descriptors(f"s{seed}", [descriptor(seed)])
     index.remove("s1")
     assert [record.name for record in index.records()] == ["s0", "s2"]
     assert {match.name for match in index.query(descriptor(1))} == {"s0", "s2"}
-    index.add("s1", [descriptor(7)])
+    index.add_descriptors("s1", [descriptor(7)])
     assert index.query(descriptor(7))[0].name == "s1"
     with pytest.raises(
         StoreError, match="A shape must be in the index to be removed; 'nobody' is not"
@@ -138,7 +139,7 @@ def test_index_behaves_like_a_dict(tmp_path_factory, steps):
     index, model = ShapeIndex.create(tmp_path_factory.mktemp("model") / "index"), {}
     for number, (name, adds) in enumerate(steps):
         if adds and name not in model:
-            index.add(name, [descriptor(number)])
+            index.add_descriptors(name, [descriptor(number)])
             model[name] = number
         elif not adds and name in model:
             index.remove(name)
@@ -161,56 +162,56 @@ def test_what_cannot_be_stored(index):
         InvalidParameterError,
         match=r"finite single-precision numbers; of 'x' entry \[1, 2\] is nan",
     ):
-        index.add("x", [ShapeDescriptor(bad, np.arange(2), RECIPE)])
+        index.add_descriptors("x", [HeatDescriptor(bad, np.arange(2), RECIPE)])
     with pytest.raises(InvalidParameterError, match=r"of 'x' entry \[0, 0\] is 1e\+300"):
-        index.add("x", [ShapeDescriptor(np.full((2, 3), 1e300), np.arange(2), RECIPE)])
+        index.add_descriptors("x", [HeatDescriptor(np.full((2, 3), 1e300), np.arange(2), RECIPE)])
     with pytest.raises(
-        InvalidParameterError, match="A shape needs a descriptor to be found by; 'x' has none"
+        InvalidParameterError, match="A shape must have a descriptor to be found; 'x' has none"
     ):
-        index.add("x", [])
+        index.add_descriptors("x", [])
     with pytest.raises(
         InvalidParameterError,
         match="must name one vertex a feature; of 'x' 2 features have vertices",
     ):
-        index.add("x", [with_vertices(descriptor(1), np.arange(2)[:, None])])
-    with pytest.raises(
-        InvalidParameterError, match=r"beside numbers must be Unicode text; 'b\\udcff' is not"
-    ):
-        index.add("x", [descriptor(1)], source="b\udcff")
+        index.add_descriptors("x", [with_vertices(descriptor(1), np.arange(2)[:, None])])
+    with pytest.raises(InvalidParameterError, match=r"must be Unicode text; 'b\\udcff' is not"):
+        index.add_descriptors("x", [descriptor(1)], source="b\udcff")
     with pytest.raises(
         InvalidParameterError,
-        match="must have equally many numbers; of 'test' they have 3, and here 5",
+        match="must have as many numbers; those of recipe 'test' have 3, and these have 5",
     ):
-        index.add("x", [descriptor(1), ShapeDescriptor(np.ones((2, 5)), np.arange(2), RECIPE)])
+        index.add_descriptors(
+            "x", [descriptor(1), HeatDescriptor(np.ones((2, 5)), np.arange(2), RECIPE)]
+        )
     assert len(index) == 0
 
 
 def test_rows_of_another_length_do_not_spoil_an_index(index):
-    longer = ShapeDescriptor(np.ones((2, 5)), np.arange(2), RECIPE)
-    index.add("one", [descriptor(1)])
-    with pytest.raises(InvalidParameterError, match="of 'test' they have 3, and here 5"):
-        index.add("two", [longer])
-    with pytest.raises(InvalidParameterError, match="of 'test' they have 3, and here 5"):
+    longer = HeatDescriptor(np.ones((2, 5)), np.arange(2), RECIPE)
+    index.add_descriptors("one", [descriptor(1)])
+    with pytest.raises(InvalidParameterError, match="of recipe 'test' have 3, and these have 5"):
+        index.add_descriptors("two", [longer])
+    with pytest.raises(InvalidParameterError, match="of recipe 'test' have 3, and these have 5"):
         index.query(longer)
     assert [match.name for match in index.query(descriptor(1))] == ["one"]
 
 
 def test_what_cannot_be_asked(index):
-    index.add("one", [descriptor(1)])
+    index.add_descriptors("one", [descriptor(1)])
     with pytest.raises(InvalidParameterError, match=r"of 'the query' entry \[0, 0\] is nan"):
-        index.query(ShapeDescriptor(np.full((2, 3), np.nan), np.arange(2), RECIPE))
+        index.query(HeatDescriptor(np.full((2, 3), np.nan), np.arange(2), RECIPE))
     with pytest.raises(InvalidParameterError, match="of 'the query' it has none"):
-        index.query(ShapeDescriptor(np.empty((0, 3)), np.arange(0), RECIPE))
+        index.query(HeatDescriptor(np.empty((0, 3)), np.arange(0), RECIPE))
 
 
 def test_recipes_are_equal_as_values_are(index):
-    index.add("one", [descriptor(1, replace(RECIPE, time_unit=1))])
-    index.add("two", [descriptor(2, replace(RECIPE, time_unit=1.0))])
+    index.add_descriptors("one", [descriptor(1, replace(RECIPE, time_unit=1))])
+    index.add_descriptors("two", [descriptor(2, replace(RECIPE, time_unit=1.0))])
     assert len(index.query(descriptor(1, replace(RECIPE, time_unit=1.0)))) == 2
 
 
 def test_recipes_of_other_versions(index):
-    index.add("one", [descriptor(1, replace(RECIPE, n_modes=Recipe().n_modes))])
+    index.add_descriptors("one", [descriptor(1, replace(RECIPE, n_modes=HeatRecipe().n_modes))])
     fields = edit_recipe(index, lambda fields: fields.pop("n_modes"))
     assert "n_modes" not in fields
     assert index.query(descriptor(1))[0].score == 0
@@ -218,7 +219,7 @@ def test_recipes_of_other_versions(index):
     for ask in (
         index.records,
         lambda: index.query(descriptor(1)),
-        lambda: index.add("two", [descriptor(2)]),
+        lambda: index.add_descriptors("two", [descriptor(2)]),
     ):
         with pytest.raises(
             StoreError, match=r"must be known to this version of eigenshape; .* argument 'colour'"
@@ -235,18 +236,18 @@ def edit_recipe(index, edit):
 
 
 def test_a_query_in_a_recipe_that_is_not_there(index):
-    with pytest.raises(StoreError, match="holds no shape and was asked in"):
+    with pytest.raises(StoreError, match="holds no shape, and HeatRecipe"):
         index.query(descriptor(1))
-    index.add("one", [descriptor(1)])
+    index.add_descriptors("one", [descriptor(1)])
     with pytest.raises(
         StoreError,
-        match=r"An index answers in the recipes it holds; .* holds test and was asked in",
+        match=r"must hold descriptors of the requested recipe; .* holds test, and HeatRecipe",
     ):
-        index.query(descriptor(1, Recipe()))
+        index.query(descriptor(1, HeatRecipe()))
     index.remove("one")
-    with pytest.raises(StoreError, match="holds no shape and was asked in"):
+    with pytest.raises(StoreError, match="holds no shape, and HeatRecipe"):
         index.query(descriptor(1))
-    index.add("one", [descriptor(1)])
+    index.add_descriptors("one", [descriptor(1)])
     with pytest.raises(InvalidParameterError, match=r"n_matches must lie in 1\.\."):
         index.query(descriptor(1), n_matches=0)
 
@@ -273,7 +274,7 @@ def test_folders_that_are_no_index(tmp_path, index):
     database = sqlite3.connect(index.folder / store.DATABASE)
     database.execute("PRAGMA user_version = 9")
     database.close()
-    with pytest.raises(StoreError, match="must be an index of format 3; it is of format 9"):
+    with pytest.raises(StoreError, match="must be an index of format 4; it is of format 9"):
         ShapeIndex.open(index.folder)
 
 
@@ -281,7 +282,7 @@ def test_a_folder_that_is_gone_does_not_come_back(index):
     shutil.rmtree(index.folder)
     for act in (
         lambda: len(index),
-        lambda: index.add("one", [descriptor(1)]),
+        lambda: index.add_descriptors("one", [descriptor(1)]),
         lambda: index.remove("one"),
     ):
         with pytest.raises(StoreError, match=r"must be an index; it has no index.sqlite"):
@@ -336,7 +337,7 @@ def test_a_folder_of_other_things_becomes_no_index(tmp_path):
 
 
 def test_damaged_rows_are_named(index):
-    index.add("one", [descriptor(1)])
+    index.add_descriptors("one", [descriptor(1)])
     path = index.folder / "rows-1.bin"
     whole = path.read_bytes()
     path.write_bytes(whole[:-4])
@@ -350,11 +351,11 @@ def test_damaged_rows_are_named(index):
 
 
 def test_a_copy_without_its_log_is_named(index, tmp_path):
-    index.add("one", [descriptor(1)])
+    index.add_descriptors("one", [descriptor(1)])
     with closing(sqlite3.connect(index.folder / store.DATABASE)) as reader:
         reader.execute("BEGIN")
         reader.execute("SELECT * FROM shape").fetchone()
-        index.add("two", [descriptor(2)])
+        index.add_descriptors("two", [descriptor(2)])
         whole = shutil.copytree(index.folder, tmp_path / "whole")
         part = shutil.copytree(
             index.folder, tmp_path / "part", ignore=shutil.ignore_patterns("*-wal")
@@ -362,7 +363,7 @@ def test_a_copy_without_its_log_is_named(index, tmp_path):
     assert len(ShapeIndex.open(whole)) == 2
     for act in (
         lambda: ShapeIndex.open(part),
-        lambda: ShapeIndex(part).add("three", [descriptor(3)]),
+        lambda: ShapeIndex(part).add_descriptors("three", [descriptor(3)]),
     ):
         with pytest.raises(
             StoreError, match="must hold all 2 changes that were committed; it holds 1"
@@ -379,13 +380,13 @@ def test_a_second_writer_is_told(index, monkeypatch):
         FileLock(index.folder / store.LOCK),
         pytest.raises(StoreError, match="An index has one writer; another process"),
     ):
-        index.add("one", [descriptor(1)])
+        index.add_descriptors("one", [descriptor(1)])
     with (
         store.writing(index.folder),
         pytest.raises(StoreError, match=r"one writer; process \d+ on .* has held"),
     ):
-        index.add("one", [descriptor(1)])
-    index.add("one", [descriptor(1)])
+        index.add_descriptors("one", [descriptor(1)])
+    index.add_descriptors("one", [descriptor(1)])
     assert len(index) == 1
 
 
@@ -394,11 +395,11 @@ def test_a_database_that_cannot_be_written(index):
     database.execute("DROP TABLE shape")
     database.close()
     with pytest.raises(StoreError, match="must be a writable index; no such table"):
-        index.add("one", [descriptor(1)])
+        index.add_descriptors("one", [descriptor(1)])
 
 
 def test_a_failed_add_leaves_the_state_before(index, monkeypatch):
-    index.add("one", [descriptor(1)])
+    index.add_descriptors("one", [descriptor(1)])
 
     def torn(folder, database, recipe, rows):
         with store.rows_path(folder, recipe).open("ab") as file:
@@ -407,15 +408,15 @@ def test_a_failed_add_leaves_the_state_before(index, monkeypatch):
 
     monkeypatch.setattr(store, "append_rows", torn)
     with pytest.raises(OSError, match="disk full"):
-        index.add("two", [descriptor(2)])
+        index.add_descriptors("two", [descriptor(2)])
     monkeypatch.undo()
     assert [record.name for record in index.records()] == ["one"]
-    index.add("two", [descriptor(2)])
+    index.add_descriptors("two", [descriptor(2)])
     assert index.query(descriptor(2))[0].score == 0
 
 
 def test_readers_work_while_one_writes(index):
-    index.add("s-1", [descriptor(1000)])
+    index.add_descriptors("s-1", [descriptor(1000)])
     failures, stop = [], threading.Event()
 
     def read():
@@ -428,7 +429,7 @@ def test_readers_work_while_one_writes(index):
     for reader in readers:
         reader.start()
     for seed in range(30):
-        index.add(f"s{seed}", [descriptor(seed)])
+        index.add_descriptors(f"s{seed}", [descriptor(seed)])
     stop.set()
     for reader in readers:
         reader.join()
@@ -447,10 +448,10 @@ def open_folder():
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="rights are a Unix thing")
 @pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may write everywhere")
 def test_reading_needs_no_right_to_write(index, open_folder):
-    index.add("one", [descriptor(1)])
+    index.add_descriptors("one", [descriptor(1)])
     reader = sqlite3.connect(index.folder / store.DATABASE)
     reader.execute("SELECT count(*) FROM shape").fetchone()
-    index.add("two", [descriptor(2)])  # stays in the log as long as somebody reads
+    index.add_descriptors("two", [descriptor(2)])  # stays in the log as long as somebody reads
     shutil.copytree(index.folder, open_folder / "with log", ignore=shutil.ignore_patterns("*-shm"))
     reader.close()
     shutil.copytree(index.folder, open_folder / "whole")
@@ -527,7 +528,7 @@ def test_a_killed_writer_leaves_the_state_before_or_after(index):
 @kills
 def test_a_killed_replacement_leaves_the_old_shape_or_the_new(index):
     rng = np.random.default_rng(1)
-    index.add("one", [descriptor(0)], digest="0")
+    index.add_descriptors("one", [descriptor(0)], digest="0")
     for _ in range(20):
         done = killed_at_random(writer.replace_a_shape, index.folder, rng)
         (record,) = index.records()
@@ -549,7 +550,7 @@ def test_a_killed_creator_leaves_an_index_or_a_place_for_one(tmp_path):
     for folder in folders:
         whole = (folder / store.DATABASE).exists()
         index = ShapeIndex.open(folder) if whole else ShapeIndex.create(folder)
-        index.add("one", [descriptor(1)])
+        index.add_descriptors("one", [descriptor(1)])
         assert len(index) == 1
 
 

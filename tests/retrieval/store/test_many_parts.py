@@ -5,8 +5,9 @@ import pytest
 
 import eigenshape as es
 from eigenshape.geometry.fragments import fragment_vertices
+from eigenshape.retrieval.patches.patches import surface_patches
 
-RECIPE = es.retrieval.Recipe(n_modes=40)
+RECIPE = es.retrieval.HeatRecipe(n_modes=40)
 
 
 def moved(mesh, scale, to):
@@ -45,8 +46,8 @@ def test_fragments_by_hand():
 
 def test_specks_leave_the_features_of_a_body_as_they_are():
     alone, found = (
-        es.retrieval.describe_mesh(BODY, RECIPE),
-        es.retrieval.describe_mesh(SPECKED, RECIPE),
+        es.retrieval.find_heat_features(BODY, RECIPE),
+        es.retrieval.find_heat_features(SPECKED, RECIPE),
     )
     assert found.descriptor.vertices.tolist() == alone.descriptor.vertices.tolist()
     np.testing.assert_allclose(found.descriptor.vectors, alone.descriptor.vectors, rtol=1e-9)
@@ -61,7 +62,7 @@ def test_specks_leave_the_features_of_a_body_as_they_are():
 
 def test_specks_have_come_to_one_temperature():
     """1 over the area of each, as all of the heat that stays there says."""
-    found = es.retrieval.describe_mesh(SPECKED, RECIPE)
+    found = es.retrieval.find_heat_features(SPECKED, RECIPE)
     area = es.geometry.surface_area(moved(es.icosphere(0), 0.004, [0, 0, 0]))
     np.testing.assert_allclose(found.heat[800:], 1 / area, rtol=1e-6)
     laplacian = es.cotangent_laplacian(SPECKED)
@@ -71,15 +72,15 @@ def test_specks_have_come_to_one_temperature():
 
 
 def test_forty_equal_parts_have_a_feature_each():
-    found = es.retrieval.describe_mesh(SOUP, RECIPE)
+    found = es.retrieval.find_heat_features(SOUP, RECIPE)
     parts = np.sort(found.descriptor.vertices) // 42
     assert parts.tolist() == list(range(40))
     assert len(found.spectrum.eigenvalues) == RECIPE.n_modes + 39
-    large = es.retrieval.describe_large_mesh(SOUP, RECIPE)
+    large = es.retrieval.find_heat_features(SOUP, RECIPE, accuracy=0.01)
     assert es.retrieval.matching_score(
         large.descriptor, found.descriptor
     ) < 0.05 * es.retrieval.matching_score(
-        large.descriptor, es.retrieval.describe_mesh(BODY, RECIPE).descriptor
+        large.descriptor, es.retrieval.find_heat_features(BODY, RECIPE).descriptor
     )
 
 
@@ -89,23 +90,23 @@ def test_an_open_body_with_specks():
     speck = es.TriangleMesh(0.01 * np.eye(3), [[0, 1, 2]])
     mesh = es.shapes.disjoint_union(half, *[moved(speck, 1, [2 + i, 0, 0]) for i in range(20)])
     alone, found = (
-        es.retrieval.describe_mesh(half, RECIPE).descriptor,
-        es.retrieval.describe_mesh(mesh, RECIPE).descriptor,
+        es.retrieval.find_heat_features(half, RECIPE).descriptor,
+        es.retrieval.find_heat_features(mesh, RECIPE).descriptor,
     )
     assert found.vertices.tolist() == alone.vertices.tolist()
     np.testing.assert_allclose(found.vectors, alone.vectors, rtol=1e-9)
-    large = es.retrieval.describe_large_mesh(mesh, RECIPE)
+    large = es.retrieval.find_heat_features(mesh, RECIPE, accuracy=0.01)
     assert es.retrieval.matching_score(large.descriptor, alone) < 1
 
 
 def test_patches_are_spread_over_what_has_the_area_of_one():
-    alone, found = es.retrieval.describe_patches(BODY), es.retrieval.describe_patches(SPECKED)
+    alone, found = surface_patches(BODY), surface_patches(SPECKED)
     for name in ("numbers", "weights", "vertices", "distances"):
         np.testing.assert_array_equal(getattr(found, name), getattr(alone, name))
-    many = es.retrieval.describe_patches(SOUP)
+    many = surface_patches(SOUP)
     assert set((many.vertices // 42).tolist()) == set(range(40))
     assert np.isinf(many.distances).any(), "there is no way from one part to another"
-    dusty = es.retrieval.describe_patches(DUST)
+    dusty = surface_patches(DUST)
     assert len(np.unique(dusty.vertices // 12)) == 150
     assert dusty.weights.sum(axis=0) == pytest.approx(np.ones(9))
 
@@ -125,7 +126,7 @@ def test_each_component_is_a_part_at_least(mesh):
 @pytest.mark.long
 @pytest.mark.parametrize(
     "recipe",
-    [RECIPE, es.retrieval.PatchRecipe(es.retrieval.made_codebook())],
+    [RECIPE, es.retrieval.PatchRecipe()],
     ids=["heat", "patches"],
 )
 def test_an_index_of_shapes_of_many_parts(tmp_path, recipe):
@@ -136,6 +137,6 @@ def test_an_index_of_shapes_of_many_parts(tmp_path, recipe):
     }
     index = es.ShapeIndex.create(tmp_path / "index")
     for name, mesh in shapes.items():
-        index.add(name, es.retrieval.describe_to_keep(mesh, recipe, n_views=1))
+        index.add(name, mesh, recipe=recipe, n_views=1)
     for name, mesh in (("specked", BODY), ("specked", SPECKED), ("soup", SOUP)):
-        assert index.query(es.retrieval.describe_shape(mesh, recipe), n_matches=1)[0].name == name
+        assert index.query(es.describe(mesh, recipe), n_matches=1)[0].name == name

@@ -1,4 +1,4 @@
-"""Peers of the literature: ShapeDNA, affinity spectra, light fields."""
+"""Descriptors of the literature, for comparison: ShapeDNA, affinity spectra, light fields."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Compiled loops of `light_field`: silhouettes, their moments and outlines, and the best of all pairings of views."""
+"""Compiled loops of `light_field`: silhouettes, moments, outlines, and the best pairing of views."""
 
 from typing import no_type_check
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from eigenshape._compile import njit
 
-# The eight neighbours of a pixel, row and column, clockwise from the left
+# The eight neighbors of a pixel, row and column, clockwise from the left
 ROW = np.array([0, -1, -1, -1, 0, 1, 1, 1])
 COLUMN = np.array([-1, -1, 0, 1, 1, 1, 0, -1])
 
@@ -14,7 +14,7 @@ COLUMN = np.array([-1, -1, 0, 1, 1, 1, 0, -1])
 @njit
 @no_type_check
 def silhouette(points, faces, size, slack, thinnest):
-    """Return which pixel middles of a square picture lie in a face; points are pixels to the right and down."""
+    """Return which pixel centers of a square picture lie in a face; points are in pixels."""
     image = np.zeros((size, size), dtype=np.bool_)
     for face in range(len(faces)):
         a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
@@ -59,9 +59,10 @@ def power_sums(x, y, order):
 @njit
 @no_type_check
 def outline(image, row, column):
-    """Walk clockwise around the pixels that hang together with the uppermost, and there leftmost, of them.
+    """Return the rows and columns of the pixels passed by Moore's boundary tracing, clockwise.
 
-    Moore's tracing, until the first step would be taken again; rows and columns of the pixels passed.
+    The walk starts at the uppermost, and there leftmost, pixel, and ends when its first step would
+    be repeated.
     """
     height, width = image.shape
     path = np.empty((4 * height * width, 2), dtype=np.int64)
@@ -82,7 +83,7 @@ def outline(image, row, column):
         if first < 0:
             first = step
         here_row, here_column = here_row + ROW[step], here_column + COLUMN[step]
-        # Looked at last before the step was the neighbour on its left; from the new pixel it lies behind.
+        # The last pixel looked at before the step is behind the new one: look on from there.
         came = (step + 5) % 8 if step % 2 else (step + 6) % 8
         path[length] = here_row, here_column
         length += 1

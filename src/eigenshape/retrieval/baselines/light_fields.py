@@ -1,4 +1,4 @@
-"""LFD: a shape known by its silhouettes from all sides (Chen, Tian, Shen and Ouhyoung 2003)."""
+"""LFD: silhouettes from all sides (Chen, Tian, Shen and Ouhyoung 2003)."""
 
 from functools import lru_cache
 from math import factorial
@@ -24,33 +24,33 @@ from eigenshape.retrieval.baselines.light_field_loops import (
 from eigenshape.scans.partial import rotation_towards
 from eigenshape.scans.raster import EDGE_SLACK, THINNEST
 
-N_FIELDS, N_VIEWS = 10, 10
-ORDER = 10  # of the Zernike moments: 35 numbers beside the area
-N_FOURIER = 10
+N_FIELDS = 10  # dodecahedra, as in the paper
+N_VIEWS = 10  # silhouettes of each: 20 vertices, of which opposite ones see mirror images
+ORDER = 10  # of the Zernike moments, as in the paper: 35 numbers beside the area
+N_FOURIER = 10  # Fourier coefficients of an outline, as in the paper
 N_NUMBERS = 35 + N_FOURIER
-FOURIER_WEIGHT = (
-    2.0  # the scale to which the authors' program quantises them, beside 1 for the moments
-)
-OUTLINE_POINTS = 256
+FOURIER_WEIGHT = 2.0  # the scale, beside 1 for moments, to which the authors' program quantizes
+OUTLINE_POINTS = 256  # at which an outline is sampled, evenly along its length
 MARGIN = 1.0  # pixels left free around the sphere that holds the shape
-CANDIDATES = 2000
+CANDIDATES = 2000  # random rotations from which those of the dodecahedra are chosen
 
 
 @one_blas_thread()
 def light_field(
     mesh: MeshLike, *, n_fields: SupportsIndex = N_FIELDS, size: SupportsIndex = 256
 ) -> Float[np.ndarray, "fields 10 45"]:
-    """Describe a shape by silhouettes from the vertices of dodecahedra around it, opposite ones being mirror images.
+    """Describe a shape by its silhouettes from the vertices of dodecahedra around it.
 
-    Each silhouette is described by the magnitudes of its Zernike moments up to order 10, over the area (35 numbers),
-    and of the first 10 Fourier coefficients of the distance between its outline and its centre, over the mean distance
-    (doubled). Both are taken about the silhouette's own centre, in units of its own radius, so that they do not depend
-    on how it is turned or mirrored. Several dodecahedra, turned against each other, make up for how the shape lies.
+    Each silhouette has 45 numbers: the magnitudes of its Zernike moments up to order 10, over its
+    area (35), and of the first 10 Fourier coefficients of the distance of its outline from its
+    center, over the mean distance and doubled. Both are taken about the center of the silhouette,
+    in units of its radius, so that they do not change if it is turned or mirrored. Several
+    dodecahedra, turned against each other, make the descriptor less dependent on how the shape lies.
 
     Parameters
     ----------
     mesh : MeshLike
-        In any number of pieces, of which a silhouette's outline follows the largest.
+        With any number of components; the outline of a silhouette follows its largest piece.
     n_fields : int
         Dodecahedra, 1 to 100; 10 in the paper.
     size : int
@@ -59,7 +59,7 @@ def light_field(
     Returns
     -------
     (n_fields, 10, 45) float
-        Without unit; zeros where nothing is seen, as of a flat shape from its edge.
+        Without unit; zeros for an empty silhouette, as of a flat shape seen edge on.
 
     Raises
     ------
@@ -68,10 +68,20 @@ def light_field(
     InvalidParameterError
         If a number is out of its range.
 
+    See Also
+    --------
+    light_field_distance
+
     References
     ----------
-    D.-Y. Chen, X.-P. Tian, Y.-T. Shen, M. Ouhyoung: On visual similarity based 3D model retrieval. Computer Graphics
-    Forum 22, 2003. The numbers are not quantised here.
+    D.-Y. Chen, X.-P. Tian, Y.-T. Shen, M. Ouhyoung: On visual similarity based 3D model retrieval.
+    Computer Graphics Forum 22, 2003. The numbers are not quantized here.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.retrieval.baselines.light_field(es.icosphere(1), n_fields=1, size=32).shape
+    (1, 10, 45)
     """
     mesh = as_mesh(mesh)
     fields = whole_number(n_fields, "n_fields", 1, 100)
@@ -81,7 +91,7 @@ def light_field(
     for field, turn in enumerate(_turns(fields)):
         for view, axis in enumerate(_axes() @ turn.T):
             flat = (points @ rotation_towards(axis).T[:, :2]) * (pixels / 2 - MARGIN) + pixels / 2
-            found[field, view] = _described(
+            found[field, view] = _describe_silhouette(
                 silhouette(flat, mesh.faces, pixels, EDGE_SLACK, THINNEST)
             )
     return found
@@ -90,28 +100,49 @@ def light_field(
 def light_field_distance(
     first: Float[np.ndarray, "f v q"], second: Float[np.ndarray, "g w r"]
 ) -> float:
-    """Sum the L1 distances of ten pairs of silhouettes, at the relative turn that makes the sum least.
+    """Return the distance of two descriptors of `light_field`.
 
-    Tried are, for each dodecahedron around one shape and each around the other, the 60 rotations that take a
-    dodecahedron to itself.
+    It is the sum of the L1 distances of ten pairs of silhouettes, at the relative rotation with the
+    least sum. For each dodecahedron around one shape and each around the other, the 60 rotations
+    are tried that map a dodecahedron to itself.
+
+    Parameters
+    ----------
+    first, second : (n_fields, 10, 45) float
+
+    Returns
+    -------
+    float
 
     Raises
     ------
     InvalidParameterError
-        If the numbers do not come from `light_field`.
+        If an array has another shape.
+
+    See Also
+    --------
+    light_field
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.retrieval.baselines.light_field(es.icosphere(1), n_fields=1, size=32)
+    >>> es.retrieval.baselines.light_field_distance(ball, ball)
+    0.0
     """
     for descriptor in (first, second):
         if descriptor.shape[1:] != (N_VIEWS, N_NUMBERS):
             raise InvalidParameterError(
-                f"A light field must have shape (fields, {N_VIEWS}, {N_NUMBERS}); the shape is {descriptor.shape}."
+                f"A light field must have shape (fields, {N_VIEWS}, {N_NUMBERS}); the shape is "
+                f"{descriptor.shape}. Pass the result of light_field(mesh)."
             )
     return float(least_difference(first, second, _pairings()))
 
 
 def _in_unit_ball(mesh: TriangleMesh) -> Float[np.ndarray, "n 3"]:
-    """Return the vertices about the centre of the surface, in units of the distance of the farthest corner of a face.
+    """Return the vertices about the center of the surface, scaled to a ball of radius 1.
 
-    Unlike a box, these do not depend on how the shape lies.
+    Unlike a bounding box, the ball does not depend on how the shape lies.
     """
     points, _ = unit_scaled(mesh)
     corners = points[mesh.faces]
@@ -120,18 +151,19 @@ def _in_unit_ball(mesh: TriangleMesh) -> Float[np.ndarray, "n 3"]:
         raise InvalidShapeError(
             f"A shape must have area to be seen; all {mesh.n_faces} faces have none."
         )
-    centre = areas @ corners.mean(axis=1) / areas.sum()
-    return (points - centre) / np.linalg.norm(corners - centre, axis=2).max()
+    center = areas @ corners.mean(axis=1) / areas.sum()
+    return (points - center) / np.linalg.norm(corners - center, axis=2).max()
 
 
-def _described(image: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, "45"]:
+def _describe_silhouette(image: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, "45"]:
+    """Return the Zernike magnitudes and the Fourier coefficients of a silhouette."""
     rows, columns = np.nonzero(image)
     if not len(rows):
         return np.zeros(N_NUMBERS)
-    centre = np.array([rows.mean(), columns.mean()])
-    radius = np.sqrt(((rows - centre[0]) ** 2 + (columns - centre[1]) ** 2).max()) or 1.0
-    sums = power_sums((columns - centre[1]) / radius, (rows - centre[0]) / radius, ORDER)
-    return np.concatenate([zernike_magnitudes(sums), FOURIER_WEIGHT * _fourier(image, centre)])
+    center = np.array([rows.mean(), columns.mean()])
+    radius = np.sqrt(((rows - center[0]) ** 2 + (columns - center[1]) ** 2).max()) or 1.0
+    sums = power_sums((columns - center[1]) / radius, (rows - center[0]) / radius, ORDER)
+    return np.concatenate([zernike_magnitudes(sums), FOURIER_WEIGHT * _fourier(image, center)])
 
 
 def zernike_magnitudes(sums: Complex[np.ndarray, "m j"]) -> Float[np.ndarray, "35"]:
@@ -157,19 +189,19 @@ def _radial(n: int, m: int) -> tuple[int, ...]:
 
 
 def _fourier(
-    image: Bool[np.ndarray, "h w"], centre: Float[np.ndarray, "2"]
+    image: Bool[np.ndarray, "h w"], center: Float[np.ndarray, "2"]
 ) -> Float[np.ndarray, "10"]:
-    """Describe the outline of the largest piece by how its distance from the centre varies along it."""
+    """Return Fourier magnitudes of the distance from the center along the outline."""
     pieces, _ = label(image, np.ones((3, 3)))
-    names, away = pieces[image] - 1, np.square(np.argwhere(image) - centre).sum(axis=1)
-    # Of pieces of one size the outer one, so that the choice turns with the picture.
+    names, away = pieces[image] - 1, np.square(np.argwhere(image) - center).sum(axis=1)
+    # Take the largest piece; of equal ones the outer one, so that the choice turns with the picture.
     largest = pieces == 1 + np.lexsort((np.bincount(names, away), np.bincount(names)))[-1]
     start = int(largest.argmax())
     path = outline(largest, start // image.shape[1], start % image.shape[1]).astype(np.float64)
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
     places = np.arange(OUTLINE_POINTS) * along[-1] / OUTLINE_POINTS
-    distances = np.interp(places, along, np.linalg.norm(path - centre, axis=1))
+    distances = np.interp(places, along, np.linalg.norm(path - center, axis=1))
     waves = np.abs(np.fft.rfft(distances))
     return waves[1 : N_FOURIER + 1] / waves[0] if waves[0] > 0 else np.zeros(N_FOURIER)
 
@@ -187,9 +219,10 @@ def _axes() -> Float[np.ndarray, "10 3"]:
 
 @lru_cache
 def _pairings() -> Int[np.ndarray, "60 10"]:
-    """Return for each rotation of the dodecahedron where it takes each axis: one for each directed edge."""
+    """Return where each of the 60 rotations of a dodecahedron takes each axis."""
     vertices = np.concatenate([_axes(), -_axes()])
     cosines = vertices @ vertices.T
+    # There is one rotation for each directed edge: it takes the first edge there.
     edges = np.argwhere(np.isclose(cosines, np.sqrt(5) / 3))
     frames = np.array([_frame(vertices[one], vertices[two]) for one, two in edges])
     images = np.einsum("eij,kj,ak->eai", frames, frames[0].T, _axes())
@@ -204,9 +237,10 @@ def _frame(one: Float[np.ndarray, "3"], two: Float[np.ndarray, "3"]) -> Float[np
 
 @lru_cache
 def _turns(count: int) -> Float[np.ndarray, "count 3 3"]:
-    """Return rotations of which each brings the axes as far as possible from all before; the first is none at all.
+    """Return rotations, each of which takes the axes as far as possible from all before.
 
-    They are chosen from a fixed list of random ones, so that more of them keep the first.
+    The first is the identity. The others are chosen from a fixed list of random ones, so that a
+    larger count keeps the rotations of a smaller one.
     """
     candidates = Rotation.from_quat(
         np.random.default_rng(0).standard_normal((CANDIDATES, 4))

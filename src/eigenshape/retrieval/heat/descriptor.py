@@ -1,4 +1,4 @@
-"""What a shape is known by: a few feature points, each with the heat that it keeps at several times."""
+"""The heat descriptor of a shape: a few feature points, each with its heat at several times."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -9,39 +9,59 @@ from jaxtyping import Float, Int
 from eigenshape._arrays import frozen
 from eigenshape._errors import InvalidParameterError
 
-EVEN = 1e-9  # steps between logarithms of scales that differ less are equal
+# Scales are a geometric sequence if the steps of their logarithms differ by less than this.
+EQUAL_STEPS = 1e-9
 
 
 @dataclass(frozen=True)
-class Recipe:
-    """How a descriptor is made; two descriptors compare only if their recipes are equal.
+class HeatRecipe:
+    """Describe a shape by feature points and the heat that they keep at several times.
 
-    A time is a scale times `time_unit`, in units of the shape's own area or of its squared box, never of length.
-    The defaults are those of the scale-free preset.
+    Two descriptors compare only if their recipes are equal. Times are scale × `time_unit`, in units
+    of the area of the shape or of its squared box, so none depends on its size. The defaults are
+    the preset ``SCALE_FREE``; the other preset is ``THESIS``.
 
     Parameters
     ----------
     name : str
-        Of the preset.
+        For messages and tables.
     unit : "area" or "box"
-        What a time of 1 means: the area of the surface, or the square of the longest side of its box.
+        What a time of 1 means: the area of the surface, or the square of the longest side of its
+        bounding box.
     time_unit : float
-        The thesis' τ.
+        τ in the thesis.
     feature_scale : float
-        Features are the persistent maxima of the heat at feature_scale × time_unit.
-    scales : tuple of float
-        The thesis' α, one a column of the descriptor.
+        Features are the persistent maxima of heat at time feature_scale × time_unit.
+    scales : tuple of q floats
+        α in the thesis; one for each number of a feature.
     logarithmic : bool
-        Whether vectors hold the logarithm of the heat, so that a ratio counts the same at every scale.
+        Whether the numbers are logarithms of heat, so that a ratio counts the same at every scale.
     n_features : int
-        Feature points at most (the thesis' κ).
+        Feature points at most; κ in the thesis.
     n_modes : int
-        Eigenpairs of the spectrum at most.
+        Eigenpairs at most.
     reflections : bool
-        Whether a boundary may throw heat back. Without, heat is the mean of the Neumann and the Dirichlet kernel.
+        Whether heat is reflected at a boundary. If False, heat is the mean of those with a free and
+        with a fixed boundary, in which reflections cancel.
     n_shifts : int
-        Steps along the scales by which two shapes may differ in size: a part has less area than the whole. The scales
-        must then be a geometric sequence and the vectors logarithmic.
+        Steps along the scales by which two shapes may differ in size, since a part has less area
+        than the whole. Shifts require logarithms, and scales in geometric sequence.
+
+    Raises
+    ------
+    InvalidParameterError
+        If there are shifts without logarithms or without a geometric sequence of scales.
+
+    See Also
+    --------
+    PatchRecipe, describe, find_heat_features
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> recipe = es.retrieval.HeatRecipe("few", n_features=5)
+    >>> es.describe(es.make_creature("fish", n_vertices=500), recipe).vectors.shape
+    (5, 15)
     """
 
     name: str = "scale-free"
@@ -56,15 +76,18 @@ class Recipe:
     n_shifts: int = 5
 
     def __post_init__(self) -> None:
-        if self.n_shifts and not (self.logarithmic and np.ptp(np.diff(np.log(self.scales))) < EVEN):
+        if self.n_shifts and not (
+            self.logarithmic and np.ptp(np.diff(np.log(self.scales))) < EQUAL_STEPS
+        ):
             raise InvalidParameterError(
-                f"Shifts need logarithmic vectors at scales in geometric sequence; recipe {self.name!r} has "
-                f"logarithmic {self.logarithmic} and scales {self.scales}."
+                "Shifts need logarithmic vectors at scales in geometric sequence; recipe "
+                f"{self.name!r} has logarithmic={self.logarithmic} and scales {self.scales}. "
+                "Pass n_shifts=0."
             )
 
 
-SCALE_FREE = Recipe()
-THESIS = Recipe(
+SCALE_FREE = HeatRecipe()
+THESIS = HeatRecipe(
     name="thesis",
     unit="box",
     time_unit=2e-4,
@@ -79,21 +102,25 @@ PRESETS = {recipe.name: recipe for recipe in (SCALE_FREE, THESIS)}
 
 
 @dataclass(frozen=True, eq=False)
-class ShapeDescriptor:
-    """m feature points of a shape and the q numbers that describe each.
+class HeatDescriptor:
+    """A shape described by m feature points with q numbers each.
 
     Parameters
     ----------
     vectors : (m, q) float
-        One row a feature point, without unit. Copied, then read-only.
+        One row for each feature point, without unit. Copied, then read-only.
     vertices : (m,) int
-        The vertex at which each feature lies. Copied, then read-only.
-    recipe : Recipe
+        The vertex of each feature point. Copied, then read-only.
+    recipe : HeatRecipe
+
+    See Also
+    --------
+    matching_score, match_features
     """
 
     vectors: Float[np.ndarray, "m q"]
     vertices: Int[np.ndarray, " m"]
-    recipe: Recipe
+    recipe: HeatRecipe
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vectors", frozen(self.vectors))

@@ -1,4 +1,4 @@
-"""How far apart two descriptors are, and which of their features belong together (thesis 5.3)."""
+"""Scores of heat descriptors, and the features of two that correspond (thesis 5.3)."""
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -6,30 +6,56 @@ from scipy.spatial.distance import cdist
 
 from eigenshape._arguments import require_type
 from eigenshape._errors import InvalidParameterError
-from eigenshape.retrieval.heat.descriptor import Recipe, ShapeDescriptor
+from eigenshape.retrieval.heat.descriptor import HeatDescriptor, HeatRecipe
 
-NUMBERS_AT_ONCE = 4_000_000
-SHIFT_PRICE = (
-    0.03  # of one step, for each number compared: cutting changes the area, but seldom for nothing
-)
+NUMBERS_AT_ONCE = 4_000_000  # distances held at a time: 32 MB
+# Added to a score for each step of relative size and each number compared. A part has less area
+# than the whole, but without a price any shape would choose the size that suits it.
+SHIFT_PRICE = 0.03
 
 
-def matching_score(first: ShapeDescriptor, second: ShapeDescriptor) -> float:
-    """Sum over the features of both shapes the L1 distance to the nearest feature of the other.
+def matching_score(first: HeatDescriptor, second: HeatDescriptor) -> float:
+    """Sum the distances from each feature to the nearest feature of the other shape.
 
-    sum_{f in F1} min_{g in F2} |f - g|_1 + sum_{g in F2} min_{f in F1} |f - g|_1              (thesis 5.3)
+    sum_{f in F1} min_{g in F2} |f - g|_1 + sum_{g in F2} min_{f in F1} |f - g|_1     (thesis 5.3)
 
-    A recipe with shifts takes the least such sum over relative sizes of the two shapes, each step of size at a small
-    price. Symmetric, 0 for equal descriptors, and no metric: the triangle inequality need not hold.
+    If the recipe has shifts, the score is the least such sum over relative sizes of the two shapes,
+    with a small price for each step of size.
+
+    Parameters
+    ----------
+    first, second : HeatDescriptor
+        By the same recipe.
+
+    Returns
+    -------
+    float
+        0 for equal descriptors. Symmetric, but not a metric: the triangle inequality may fail.
 
     Raises
     ------
     InvalidParameterError
-        If the two were made by different recipes.
+        If the recipes differ.
+
+    See Also
+    --------
+    match_features, patch_scores, ShapeIndex.query
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> fish, again, bird = (
+    ...     es.describe(es.make_creature(kind, pose, n_vertices=500), es.retrieval.SCALE_FREE)
+    ...     for kind, pose in (("fish", 0), ("fish", 1), ("bird", 0))
+    ... )
+    >>> es.retrieval.matching_score(fish, fish)
+    0.0
+    >>> es.retrieval.matching_score(fish, again) < es.retrieval.matching_score(fish, bird)
+    True
     """
-    require_type(first, ShapeDescriptor, "first")
-    require_type(second, ShapeDescriptor, "second")
-    _require_one_recipe(first, second)
+    require_type(first, HeatDescriptor, "first")
+    require_type(second, HeatDescriptor, "second")
+    _require_same_recipe(first, second)
     scores, _ = matching_scores(first.vectors, second.vectors, np.array([0]), first.recipe)
     return float(scores[0])
 
@@ -38,35 +64,39 @@ def matching_scores(
     query: Float[np.ndarray, "m q"],
     rows: Float[np.ndarray, "r q"],
     starts: Int[np.ndarray, " s"],
-    recipe: Recipe,
+    recipe: HeatRecipe,
 ) -> tuple[Float[np.ndarray, " s"], Int[np.ndarray, " s"]]:
-    """Score one descriptor against many, whose rows stand below each other from `starts` on.
+    """Score one descriptor against many, whose rows are stacked and begin at `starts`.
 
     Returns
     -------
     scores : (s,) float
     shifts : (s,) int
-        Steps of scale by which the query is smaller than each shape, where the score is least.
+        Steps of scale by which the query is smaller than each shape, at the least score.
     """
     best = np.full(len(starts), np.inf)
     shifts = np.zeros(len(starts), dtype=np.int64)
     n_rows = np.diff(np.append(starts, len(rows)))
     for shift in sorted(range(-recipe.n_shifts, recipe.n_shifts + 1), key=abs):
         ours, theirs = shifted(query, rows, shift, recipe)
-        kept = query.shape[1] / ours.shape[1]  # so that sums over fewer columns compare
+        stretch = query.shape[1] / ours.shape[1]  # so that sums over fewer columns compare
         price = SHIFT_PRICE * abs(shift) * query.shape[1] * (len(query) + n_rows) / 2
-        scores = kept * _sums_of_nearest(ours, theirs, starts) + price
+        scores = stretch * _sums_of_nearest(ours, theirs, starts) + price
         shifts[scores < best] = shift
         best = np.minimum(best, scores)
     return best, shifts
 
 
 def shifted(
-    first: Float[np.ndarray, "m q"], second: Float[np.ndarray, "r q"], shift: int, recipe: Recipe
+    first: Float[np.ndarray, "m q"],
+    second: Float[np.ndarray, "r q"],
+    shift: int,
+    recipe: HeatRecipe,
 ) -> tuple[Float[np.ndarray, "m c"], Float[np.ndarray, "r c"]]:
-    """Return the columns that compare when the first shape has scale ratio^-shift of the area of the second.
+    """Return the columns that compare if the first shape has ratio^-shift of the area of the second.
 
-    Its time s is then the second's time s - shift, and its heat times area is ratio^-shift as high.
+    Scale s of the first is then scale s - shift of the second, and its heat times area is
+    ratio^-shift times that of the second.
     """
     if not shift:
         return first, second
@@ -85,7 +115,7 @@ def _sums_of_nearest(
     first = 0
     while first < len(starts):
         last = max(int(np.searchsorted(ends, starts[first] + budget, side="right")), first + 1)
-        distances = _distances(query, rows[starts[first] : ends[last - 1]])
+        distances = cdist(query, rows[starts[first] : ends[last - 1]], "cityblock")
         begin = starts[first:last] - starts[first]
         to_rows = np.minimum.reduceat(distances, begin, axis=1).sum(axis=0)
         sums[first:last] = to_rows + np.add.reduceat(distances.min(axis=0), begin)
@@ -93,38 +123,53 @@ def _sums_of_nearest(
     return sums
 
 
-def _distances(
-    first: Float[np.ndarray, "m c"], second: Float[np.ndarray, "r c"]
-) -> Float[np.ndarray, "m r"]:
-    return cdist(first, second, "cityblock")
+def match_features(first: HeatDescriptor, second: HeatDescriptor) -> Int[np.ndarray, "p 2"]:
+    """Pair the features of two shapes that are each other's nearest.
 
+    If the recipe has shifts, descriptors are compared at the relative size of the best score.
 
-def match_features(first: ShapeDescriptor, second: ShapeDescriptor) -> Int[np.ndarray, "p 2"]:
-    """Pair the features that are each other's nearest, closest pairs first, at the relative size of the best score.
+    Parameters
+    ----------
+    first, second : HeatDescriptor
+        By the same recipe.
 
     Returns
     -------
     (p, 2) int
-        Feature of the first shape, feature of the second.
+        Number of a feature of the first shape, and of one of the second; closest pairs first.
 
     Raises
     ------
     InvalidParameterError
-        If the two were made by different recipes.
+        If the recipes differ.
+
+    See Also
+    --------
+    matching_score, match_patches
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> fish = es.describe(es.make_creature("fish", n_vertices=500), es.retrieval.SCALE_FREE)
+    >>> pairs = es.retrieval.match_features(fish, fish)
+    >>> bool((pairs[:, 0] == pairs[:, 1]).all())
+    True
     """
-    require_type(first, ShapeDescriptor, "first")
-    require_type(second, ShapeDescriptor, "second")
-    _require_one_recipe(first, second)
+    require_type(first, HeatDescriptor, "first")
+    require_type(second, HeatDescriptor, "second")
+    _require_same_recipe(first, second)
     _, shifts = matching_scores(first.vectors, second.vectors, np.array([0]), first.recipe)
-    distances = _distances(*shifted(first.vectors, second.vectors, int(shifts[0]), first.recipe))
+    ours, theirs = shifted(first.vectors, second.vectors, int(shifts[0]), first.recipe)
+    distances = cdist(ours, theirs, "cityblock")
     forth, back = distances.argmin(axis=1), distances.argmin(axis=0)
     one = np.flatnonzero(back[forth] == np.arange(len(forth)))
     pairs = np.column_stack([one, forth[one]])
     return pairs[np.argsort(distances[one, forth[one]], kind="stable")]
 
 
-def _require_one_recipe(first: ShapeDescriptor, second: ShapeDescriptor) -> None:
+def _require_same_recipe(first: HeatDescriptor, second: HeatDescriptor) -> None:
     if first.recipe != second.recipe:
         raise InvalidParameterError(
-            f"Only descriptors of one recipe compare; the first is of {first.recipe}, the second of {second.recipe}."
+            f"Only descriptors by the same recipe compare; the first is by {first.recipe}, the "
+            f"second by {second.recipe}. Describe both by one recipe."
         )

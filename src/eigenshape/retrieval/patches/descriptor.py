@@ -1,7 +1,7 @@
-"""What a shape is known by through its patches: codes in the words of a codebook, and points that can be matched."""
+"""The patch descriptor of a shape: codes in a codebook, and points that can be matched."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float32, Int, Int8
@@ -10,51 +10,59 @@ from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import frozen
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
-from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.orientation import orient_outward
-from eigenshape.geometry.requirements import require_describable
-from eigenshape.operators.smoothing import denoise
-from eigenshape.retrieval.patches.codebook import PatchCodebook, encode_patches
+from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook, encode_patches
 from eigenshape.retrieval.patches.matching import PatchPoints, patch_points
-from eigenshape.retrieval.patches.patches import (
-    N_VIEWS,
-    Patches,
-    describe_patch_views,
-    describe_patches,
-)
+from eigenshape.retrieval.patches.patches import Patches
 
-FULL = 127  # the largest entry of a code
+LARGEST_CODE = 127  # the largest entry of a rounded code, as an int8 holds it
 
 
 @dataclass(frozen=True)
 class PatchRecipe:
-    """Patches in the words of a codebook; two descriptors compare only if their words are the same.
+    """Describe a shape by patches, encoded in a codebook.
+
+    Two descriptors compare only if their codebooks are equal.
 
     Parameters
     ----------
-    codebook : PatchCodebook
+    codebook : PatchCodebook, optional
+        By default the one that comes with the library (`default_codebook`).
+
+    See Also
+    --------
+    HeatRecipe, train_codebook
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.retrieval.PatchRecipe() == es.retrieval.PatchRecipe(es.retrieval.default_codebook())
+    True
     """
 
-    codebook: PatchCodebook
+    codebook: PatchCodebook = field(default_factory=default_codebook)
 
     @property
     def name(self) -> str:
-        """Return what errors and tables call it."""
+        """Return a short name for messages and tables."""
         return f"patches {self.codebook.digest[:8]}"
 
 
 @dataclass(frozen=True, eq=False)
 class PatchDescriptor:
-    """A shape in words, and what is seen of it from some sides if it is closed.
+    """A shape described by patches, and w partial views of it if it is closed.
 
     Attributes
     ----------
     codes : (1 + w, b, s, v) int8
-        Fisher vectors of `encode_patches`, of the shape and of w views, each rounded so that its largest entry is 127.
+        Fisher vectors (`encode_patches`) of the shape and of its views, at b base radii and s sizes.
+        Each is rounded so that its largest entry is 127.
     points : tuple of 1 + w PatchPoints
-        The same in points, at vertices of the whole.
+        Points of the shape and of its views, at vertices of the whole.
     recipe : PatchRecipe
+
+    See Also
+    --------
+    patch_scores, match_patches
     """
 
     codes: Int8[np.ndarray, "w b s v"]
@@ -67,61 +75,51 @@ class PatchDescriptor:
         return self.points[0].vertices
 
 
-def seen_patches(mesh: MeshLike, *, n_views: int = N_VIEWS) -> list[Patches]:
-    """Describe the patches of a surface, and of what single viewpoints see of it if it is closed.
+def patch_descriptor(patches: Sequence[Patches], recipe: PatchRecipe) -> PatchDescriptor:
+    """Encode the patches of a shape, and of its views, as one descriptor.
 
-    They are those of a copy that `orient_outward` has turned and `denoise` has smoothed as far as its noise asks for,
-    so that neither sets a scan apart from clean shapes.
+    Use this for patches that you extracted yourself; `describe` does both in one call.
 
     Parameters
     ----------
-    mesh : MeshLike
-    n_views : int
-        Viewpoints, spread evenly around the shape.
+    patches : sequence of Patches
+        Of `extract_patches`: the whole shape first, then its views.
+    recipe : PatchRecipe
 
     Returns
     -------
-    list of Patches
-        The whole first.
-
-    Raises
-    ------
-    InvalidShapeError
-        If a face has no area, or as `describe_patches`.
-    """
-    mesh = as_mesh(mesh)
-    require_describable(mesh)
-    clean = denoise(orient_outward(mesh))
-    return [describe_patches(clean), *describe_patch_views(clean, n_views=n_views)]
-
-
-def describe_by_patches(
-    mesh: TriangleMesh, recipe: PatchRecipe, *, n_views: int = N_VIEWS
-) -> PatchDescriptor:
-    """Describe a surface by its patches; see `seen_patches`."""
-    return in_words(seen_patches(mesh, n_views=n_views), recipe)
-
-
-def in_words(patches: Sequence[Patches], recipe: PatchRecipe) -> PatchDescriptor:
-    """Return the descriptor of a shape from its patches, and those of its views.
+    PatchDescriptor
 
     Raises
     ------
     InvalidParameterError
-        If there are none.
+        If `patches` is empty.
+
+    See Also
+    --------
+    extract_patches, describe
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> patches = es.retrieval.extract_patches(es.icosphere(2), n_samples=20, n_views=1)
+    >>> es.retrieval.patch_descriptor(patches, es.retrieval.PatchRecipe()).codes.shape
+    (2, 3, 3, 1280)
     """
     require_type(recipe, PatchRecipe, "recipe")
     require_each(patches, Patches, "patches")
     if not patches:
         raise InvalidParameterError(
-            "A descriptor takes patches of a shape, then of its views; there are none."
+            "A patch descriptor needs the patches of a shape; the list is empty. "
+            "Pass extract_patches(mesh)."
         )
     with one_blas_thread():
-        codes = np.stack([rounded(encode_patches(each, recipe.codebook)) for each in patches])
+        codes = np.stack([rounded_codes(encode_patches(each, recipe.codebook)) for each in patches])
         points = tuple(patch_points(each, recipe.codebook) for each in patches)
     return PatchDescriptor(frozen(codes), points, recipe)
 
 
-def rounded(codes: Float32[np.ndarray, "*k v"]) -> Int8[np.ndarray, "*k v"]:
-    """Return codes as small integers, which find the same answers in a quarter of the room."""
-    return np.rint(FULL * codes / np.abs(codes).max(axis=-1, keepdims=True)).astype(np.int8)
+def rounded_codes(codes: Float32[np.ndarray, "*k v"]) -> Int8[np.ndarray, "*k v"]:
+    """Return codes as small integers: the same matches in a quarter of the memory."""
+    largest = np.abs(codes).max(axis=-1, keepdims=True)
+    return np.rint(LARGEST_CODE * codes / largest).astype(np.int8)

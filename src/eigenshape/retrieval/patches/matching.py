@@ -1,4 +1,4 @@
-"""Which points of one shape are which of another: patches that look alike, and keep their distances to each other."""
+"""Match points of two shapes whose patches are alike and that keep their distances."""
 
 from dataclasses import dataclass
 
@@ -13,31 +13,40 @@ from eigenshape.retrieval.patches.codebook import BASES, N_SIZES, PatchCodebook,
 from eigenshape.retrieval.patches.matching_loops import leading, nearest_of_each_other
 from eigenshape.retrieval.patches.patches import RADII, Patches
 
-NUMBER_STEP, LARGEST = 1 / 16, 127  # so that a number is a byte
-N_MATCHED = 10  # axes of most variance
-SLACK = 0.2  # of a distance, by which it may change and still speak for a match a little
-LEAST_LENGTH = 0.05  # sides of the box; errors of shorter distances count as of this
-SURE = 0.7  # of the support of the best match, that a match needs to be kept,
-ANCHORING = 0.5  # and to be one of those by which all points are matched once more
-N_ANCHORS = 20
-ANCHORED = 3.0  # typical distances of numbers, that keeping no distance counts as
+# Whitened numbers are rounded to sixteenths and clipped at 127 of them, so that one is a byte.
+NUMBER_STEP, LARGEST_STEP = 1 / 16, 127
+N_MATCHED = 10  # axes of most variance by which points are matched; stored bytes grow with it
+SLACK = 0.2  # share of a distance by which two matches may disagree and still support each other
+LEAST_LENGTH = 0.05  # sides of the box; errors of shorter distances are shares of this
+# Support, as a share of that of the best match, that a match needs to be returned, and to be an
+# anchor by which all points are matched once more.
+LEAST_SUPPORT = 0.7
+LEAST_ANCHOR_SUPPORT = 0.5
+N_ANCHORS = 20  # at most; time and memory of the second round grow with it
+# What keeping no distance to the anchors counts as, in median squared distances of numbers
+STRAIN_WEIGHT = 3.0
+# Relative sizes that are tried, in steps of 1.25, no change first
 STEPS = sorted(range(1 - N_SIZES, N_SIZES), key=abs)
-SIZE_STEP = float(RADII[1] / RADII[0])
+SIZE_STEP = float(RADII[1] / RADII[0])  # 1.25
 
 
 @dataclass(frozen=True, eq=False)
 class PatchPoints:
-    """The points of a shape as they are matched.
+    """Points of a shape with what matching needs; part of a `PatchDescriptor`.
 
     Attributes
     ----------
     numbers : (m, r, d) float32
-        Of m points at r radii, whitened by a codebook, in whole sixteenths below 8.
+        Of m points at r radii: whitened by a codebook, in whole sixteenths below 8.
     weights : (m,) float32
-        The most that each weighs at any radius, in half precision.
+        Largest weight of each point over all radii, in half precision.
     distances : (m, m) float32
         Along the surface, in sides of the box, in half precision.
     vertices : (m,) int
+
+    See Also
+    --------
+    match_patches, PatchDescriptor
     """
 
     numbers: Float32[np.ndarray, "m r d"]
@@ -48,19 +57,25 @@ class PatchPoints:
 
 @dataclass(frozen=True, eq=False)
 class PatchMatch:
-    """What belongs together on two shapes.
+    """Points of two shapes that correspond.
 
     Attributes
     ----------
     points : (p, 2) int
-        Number of a point of the first shape and of one of the second, the surest first; each point at most once.
+        Number of a point of the first shape, and of one of the second, surest pairs first. Each
+        point occurs at most once.
     vertices : (p, 2) int
         Their vertices.
     agreement : float
-        0 where nothing agrees; 1 where all points of the first match and keep all distances, piece by piece. Not
-        symmetric: the area of the first counts, of which the second may be the whole.
+        0 if nothing agrees; 1 if all points of the first match and keep all distances, component by
+        component. Not symmetric: it is a share of the area of the first, which may be a part of the
+        second.
     step : int
-        Lengths of the first are 1.25^-step of those of the second, each in sides of its box.
+        Lengths on the first are 1.25^-step of those on the second, each in sides of its box.
+
+    See Also
+    --------
+    match_patches
     """
 
     points: Int[np.ndarray, "p 2"]
@@ -70,17 +85,7 @@ class PatchMatch:
 
 
 def patch_points(shape: Patches, codebook: PatchCodebook) -> PatchPoints:
-    """Keep of patches what matching needs: ten whitened numbers a radius, by the base radius that this belongs to.
-
-    Parameters
-    ----------
-    shape : Patches
-    codebook : PatchCodebook
-
-    Returns
-    -------
-    PatchPoints
-    """
+    """Return what matching needs of patches: ten whitened numbers at each radius."""
     require_type(shape, Patches, "shape")
     require_type(codebook, PatchCodebook, "codebook")
     rows = [
@@ -88,13 +93,12 @@ def patch_points(shape: Patches, codebook: PatchCodebook) -> PatchPoints:
         for place, base in enumerate(BASES)
         for size in range(N_SIZES)
     ]
-    whitened_rows = np.stack(rows, axis=1)[:, :, :N_MATCHED] / NUMBER_STEP
-    numbers = NUMBER_STEP * np.clip(np.rint(whitened_rows), -LARGEST, LARGEST).astype(np.float32)
-    weights, distances = (
-        part.astype(np.float16) for part in (shape.weights.max(axis=1), shape.distances)
-    )
+    steps = np.stack(rows, axis=1)[:, :, :N_MATCHED] / NUMBER_STEP
+    clipped = np.clip(np.rint(steps), -LARGEST_STEP, LARGEST_STEP)
+    weights = shape.weights.max(axis=1).astype(np.float16)  # as `pack_points` stores them
+    distances = shape.distances.astype(np.float16)
     return PatchPoints(
-        frozen(numbers),
+        frozen(NUMBER_STEP * clipped.astype(np.float32)),
         frozen(weights.astype(np.float32)),
         frozen(distances.astype(np.float32)),
         shape.vertices,
@@ -103,19 +107,22 @@ def patch_points(shape: Patches, codebook: PatchCodebook) -> PatchPoints:
 
 @one_blas_thread()
 def match_patches(first: PatchPoints, second: PatchPoints) -> PatchMatch:
-    """Match points whose patches are each other's nearest, and keep the matches that agree with the most of others.
+    """Match points of two shapes whose patches are alike and that keep their distances.
 
-    Two matches agree as far as the distance along the surface between their points is the same on both shapes. The
-    leading eigenvector of this agreement tells which matches belong to the largest consistent set, and its eigenvalue
-    how large that is (Leordeanu and Hebert 2005). Each piece of the first is matched with one piece of the second. Of
-    relative sizes, 1.25 a step and two either way, the one whose agreement is largest counts. Then all points are
-    matched once more, by their patches and by their distances to the surest twenty. Left and right cannot be told by
-    distances: all of a match may be mirrored.
+    Points are matched whose patches are each other's nearest. Two matches agree as far as the
+    distance along the surface between their points is the same on both shapes. The leading
+    eigenvector of this agreement finds the largest consistent set of matches, and its eigenvalue
+    says how large that is (Leordeanu and Hebert 2005). Each component of the first shape is matched
+    with one of the second. Five relative sizes are tried, 1.25 apart; the one with the largest
+    agreement counts. Then all points are matched once more, by their patches and by their distances
+    to the surest twenty matches.
+
+    Distances do not distinguish left from right: a whole match may be mirrored.
 
     Parameters
     ----------
     first, second : PatchPoints
-        Of one codebook.
+        By the same codebook: ``descriptor.points[0]`` of a `PatchDescriptor`.
 
     Returns
     -------
@@ -124,21 +131,33 @@ def match_patches(first: PatchPoints, second: PatchPoints) -> PatchMatch:
     Raises
     ------
     InvalidParameterError
-        If the two have different numbers a point.
+        If points of the two have different shapes of numbers, as by different codebooks.
+
+    See Also
+    --------
+    match_features, patch_scores, ShapeIndex.query
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> points = es.describe(es.make_creature("fish", n_vertices=500)).points[0]
+    >>> match = es.retrieval.match_patches(points, points)
+    >>> bool((match.points[:, 0] == match.points[:, 1]).all())
+    True
     """
     require_type(first, PatchPoints, "first")
     require_type(second, PatchPoints, "second")
-    found = _best_start(first, second)
-    apart = _apart(first, second, found.step)
-    strained = apart + ANCHORED * np.median(apart) * _strain(first, second, found)
-    points = _supported(_consistent(first, second, strained, found.step), SURE)
+    start = _best_start(first, second)
+    costs = _squared_distances(first, second, start.step)
+    costs = costs + STRAIN_WEIGHT * np.median(costs) * _strain(first, second, start)
+    points = _supported(_consistent(first, second, costs, start.step), LEAST_SUPPORT)
     vertices = np.column_stack([first.vertices[points[:, 0]], second.vertices[points[:, 1]]])
-    return PatchMatch(frozen(points), frozen(vertices), found.agreement, found.step)
+    return PatchMatch(frozen(points), frozen(vertices), start.agreement, start.step)
 
 
 @one_blas_thread()
 def patch_agreement(first: PatchPoints, second: PatchPoints) -> float:
-    """Return the agreement of `match_patches`, without its second round."""
+    """Return the agreement of `match_patches`, which its second round leaves as it is."""
     return _best_start(first, second).agreement
 
 
@@ -153,22 +172,30 @@ class _Matches:
 
 
 def _best_start(first: PatchPoints, second: PatchPoints) -> _Matches:
-    _require_alike(first, second)
-    starts = (_consistent(first, second, _apart(first, second, step), step) for step in STEPS)
+    """Match by patches alone, at the relative size at which most agrees."""
+    if first.numbers.shape[1:] != second.numbers.shape[1:]:
+        raise InvalidParameterError(
+            f"Only points by one codebook match; those of the first have {first.numbers.shape[1:]} "
+            f"numbers each, those of the second {second.numbers.shape[1:]}."
+        )
+    starts = [
+        _consistent(first, second, _squared_distances(first, second, step), step) for step in STEPS
+    ]
     return max(starts, key=lambda matches: matches.agreement)
 
 
 def _consistent(
-    first: PatchPoints, second: PatchPoints, apart: Float32[np.ndarray, "m n"], step: int
+    first: PatchPoints, second: PatchPoints, costs: Float32[np.ndarray, "m n"], step: int
 ) -> _Matches:
-    """Match nearest points, and rate the matches piece by piece, since no distance leads to another piece.
+    """Match the points that are each other's nearest, and rate the matches by their agreement.
 
-    Each piece of the first is matched with one piece of the second, those that agree most first.
-    What agrees in a piece is a share of what its matches with itself would, times its area.
+    Components are rated one by one, since there is no distance from one to another. Each component
+    of the first shape is matched with one of the second, those that agree most first. The agreement
+    of a component is a share of that of its matches with itself, times its area.
     """
-    rows, columns = nearest_of_each_other(apart)
+    rows, columns = nearest_of_each_other(costs)
     shares = first.weights.astype(np.float64) / first.weights.sum(dtype=np.float64)
-    ours, theirs = _pieces(first), _pieces(second)
+    ours, theirs = _components(first), _components(second)
     pairs = []
     for one, two in sorted(set(zip(ours[rows].tolist(), theirs[columns].tolist(), strict=True))):
         places = np.flatnonzero((ours[rows] == one) & (theirs[columns] == two))
@@ -176,10 +203,10 @@ def _consistent(
         between = first.distances[np.ix_(own, own)], second.distances[np.ix_(other, other)]
         value, support = leading(*between, shares[own], SIZE_STEP**step, SLACK, LEAST_LENGTH)
         if value > 0:
-            piece = shares[ours == one]
+            areas = shares[ours == one]
             # No match agrees with itself, so that even a perfect eigenvalue is below the area.
-            perfect = piece.sum() - (piece**2).sum() / piece.sum()
-            agreement = piece.sum() * min(value / perfect, 1.0)
+            perfect = areas.sum() - (areas**2).sum() / areas.sum()
+            agreement = areas.sum() * min(value / perfect, 1.0)
             pairs.append((agreement, one, two, places, support * np.sqrt(value)))
     total, supports = 0.0, np.zeros(len(rows))
     matched: tuple[set[int], set[int]] = set(), set()
@@ -193,8 +220,8 @@ def _consistent(
     return _Matches(np.column_stack([rows, columns])[order], supports[order], total, step)
 
 
-def _pieces(points: PatchPoints) -> Int[np.ndarray, " m"]:
-    """Return for each point the first point of its piece."""
+def _components(points: PatchPoints) -> Int[np.ndarray, " m"]:
+    """Return, for each point, the first point of its component."""
     if np.isfinite(points.distances[0]).all():  # by far the most shapes
         return np.zeros(len(points.vertices), dtype=np.int64)
     return np.isfinite(points.distances).argmax(axis=1)
@@ -204,12 +231,14 @@ def _supported(matches: _Matches, share: float) -> Int[np.ndarray, "p 2"]:
     return matches.points[matches.support > share * matches.support.max(initial=0.0)]
 
 
-def _strain(first: PatchPoints, second: PatchPoints, found: _Matches) -> Float32[np.ndarray, "m n"]:
-    """Return how badly each pair of points keeps its distances to the surest matches, 0 to 1."""
-    anchors = _supported(found, ANCHORING)[:N_ANCHORS]
+def _strain(
+    first: PatchPoints, second: PatchPoints, matches: _Matches
+) -> Float32[np.ndarray, "m n"]:
+    """Return the mean squared error of the distances of each pair to the surest matches, 0 to 1."""
+    anchors = _supported(matches, LEAST_ANCHOR_SUPPORT)[:N_ANCHORS]
     if not len(anchors):
         return np.zeros((len(first.numbers), len(second.numbers)), dtype=np.float32)
-    ours = np.float32(SIZE_STEP**found.step) * first.distances[:, None, anchors[:, 0]]
+    ours = np.float32(SIZE_STEP**matches.step) * first.distances[:, None, anchors[:, 0]]
     theirs = second.distances[None, :, anchors[:, 1]]
     longest = np.maximum(np.maximum(ours, theirs), np.float32(LEAST_LENGTH))
     known = np.isfinite(longest)
@@ -218,17 +247,11 @@ def _strain(first: PatchPoints, second: PatchPoints, found: _Matches) -> Float32
     return np.asarray(np.minimum(errors**2, 1).mean(axis=2))
 
 
-def _apart(first: PatchPoints, second: PatchPoints, step: int) -> Float32[np.ndarray, "m n"]:
-    """Return squared distances between the numbers at base radii of one and those some steps on of the other."""
+def _squared_distances(
+    first: PatchPoints, second: PatchPoints, step: int
+) -> Float32[np.ndarray, "m n"]:
+    """Compare numbers at base radii of one shape with those some steps larger of the other."""
     ours = first.numbers[:, max(-step, 0) :: N_SIZES].reshape(len(first.numbers), -1)
     theirs = second.numbers[:, max(step, 0) :: N_SIZES].reshape(len(second.numbers), -1)
     products = ours @ theirs.T
     return (ours**2).sum(axis=1)[:, None] - 2 * products + (theirs**2).sum(axis=1)
-
-
-def _require_alike(first: PatchPoints, second: PatchPoints) -> None:
-    if first.numbers.shape[1:] != second.numbers.shape[1:]:
-        raise InvalidParameterError(
-            f"Only points of one codebook match; the first have {first.numbers.shape[1:]} numbers each, the second "
-            f"{second.numbers.shape[1:]}."
-        )

@@ -1,4 +1,4 @@
-"""Compiled loops of `patch_matching`: which pairs of matched points keep their distance, and what agrees with most."""
+"""Compiled loops of `matching`: mutual nearest neighbors, and the largest consistent set of matches."""
 
 from typing import no_type_check
 
@@ -6,13 +6,13 @@ import numpy as np
 
 from eigenshape._compile import njit
 
-ROUNDS = 20
+ROUNDS = 20  # of the power method
 
 
 @njit
 @no_type_check
 def nearest_of_each_other(apart):
-    """Return the rows and columns of entries that are least in both their row and their column, each once.
+    """Return the rows and columns of entries that are least in both, each row and column once.
 
     Where several are equally near, as on a sphere, they are paired in their order. So a shape is
     matched with itself point by point, whatever its symmetry.
@@ -39,7 +39,7 @@ def nearest_of_each_other(apart):
 @njit
 @no_type_check
 def leading(ours, theirs, shares, ratio, slack, least):
-    """Return the largest eigenvalue of how well each two matches agree in their distance, and each one's support.
+    """Return the largest eigenvalue of the agreement of matches, and the support of each match.
 
     `ours` and `theirs` are distances between matched points, `ratio` what the first are multiplied by. Two matches
     agree by A = 1 - (error / slack)^2, where the error is a share of the longer distance. Of √s A √s with the shares s,

@@ -1,4 +1,4 @@
-"""Points of patches as bytes, and back without loss."""
+"""Turn the points of patches into bytes, and back without loss."""
 
 from collections.abc import Sequence
 
@@ -7,11 +7,12 @@ import numpy as np
 from eigenshape._arrays import frozen
 from eigenshape.retrieval.patches.matching import NUMBER_STEP, PatchPoints
 
+# How numbers of points, vertices, and weights and distances are stored
 LENGTH, VERTEX, HALF = np.dtype("<u4"), np.dtype("<i8"), np.dtype("<f2")
 
 
 def pack_points(points: Sequence[PatchPoints]) -> bytes:
-    """Return some sets of points one after the other: about 39 KB for 150 points with 90 numbers each."""
+    """Return sets of points one after the other: 39 KB for 150 points with 90 numbers each."""
     return b"".join(part for each in points for part in _parts(each))
 
 
@@ -27,7 +28,7 @@ def _parts(points: PatchPoints) -> tuple[bytes, ...]:
 
 
 def unpack_points(data: bytes) -> tuple[PatchPoints, ...]:
-    """Return what `pack_points` packed."""
+    """Return the points that `pack_points` turned into bytes."""
     found, place = [], 0
 
     def take(kind: "np.dtype[np.generic]", count: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Compiled loops of `patches`: what lies in the discs around a point, ring by ring."""
+"""Compiled loops of `patches`: describe the discs around points, ring by ring."""
 
 from typing import no_type_check
 
@@ -6,9 +6,10 @@ import numpy as np
 
 from eigenshape._compile import njit
 
-RINGS = 4
+RINGS = 4  # of equal width, from the center of a disc to its radius
 TURN_BINS = 8  # of the cosine to the disc's normal, on 0..1
 HEIGHT_BINS = 6  # of the height over the point, in radii, on -1..1
+# The two histograms, the logarithm of the area, and the ratio of distances
 RING_NUMBERS = TURN_BINS + HEIGHT_BINS + 2
 NUMBERS = RINGS * RING_NUMBERS
 INNER = 0.35  # of the radius: where the disc's normal is taken
@@ -18,7 +19,7 @@ LEAST_AREA = 1e-3  # of a flat disc's, added before the logarithm
 @njit
 @no_type_check
 def describe_discs(rows, chosen, surface, radii, found):
-    """Write NUMBERS for each chosen point and radius; `surface` are points, normals and areas of all vertices."""
+    """Describe the discs around each chosen point; `surface` holds points, normals and areas."""
     for sample in range(len(chosen)):
         reach = np.flatnonzero(rows[sample] <= radii[-1])
         order = reach[np.argsort(rows[sample][reach], kind="mergesort")]
@@ -84,7 +85,7 @@ def _describe_disc(distances, center, order, surface, radius, found):
 @njit
 @no_type_check
 def _add(bins, share, weight):
-    """Add a weight at 0..1 to the two bins whose centres it lies between."""
+    """Share a weight at 0..1 between the two bins whose centers it lies between."""
     place = min(max(share * len(bins) - 0.5, 0.0), len(bins) - 1.0)
     low = min(int(place), len(bins) - 2)
     bins[low] += weight * (low + 1 - place)

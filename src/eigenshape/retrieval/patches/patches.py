@@ -1,10 +1,10 @@
-"""What the surface is like around points spread all over it: descriptors of geodesic discs of several sizes."""
+"""Local descriptors of a surface: geodesic discs of several radii around sampled points."""
 
 from dataclasses import dataclass, replace
 from typing import SupportsIndex
 
 import numpy as np
-from jaxtyping import Float, Float32, Int
+from jaxtyping import Float32, Int
 from scipy.sparse.csgraph import shortest_path
 
 from eigenshape._arrays import frozen, whole_number
@@ -15,34 +15,40 @@ from eigenshape.geometry.geodesic import farthest_points
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_box
+from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.requirements import require_describable, require_oriented
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import boundary_vertices, submesh
+from eigenshape.operators.smoothing import denoise
 from eigenshape.retrieval.patches.patch_loops import NUMBERS, describe_discs
 from eigenshape.scans.partial import views_of
 
-N_SAMPLES = 150
+N_SAMPLES = 150  # points of a surface; time and stored bytes grow with their square
+# Viewpoints from which a closed shape is described beside the whole. Each costs one more
+# description and 51 KB in the index.
 N_VIEWS = 6
-RADII = 0.05 * 1.25 ** np.arange(1, 10)  # in sides of the box
-AT_BOUNDARY = 0.5  # of the radius, nearer than which to a boundary a disc weighs less
+RADII = 0.05 * 1.25 ** np.arange(1, 10)  # of the discs, in sides of the box
+# A disc nearer to a boundary than this share of its radius weighs less, since part of it is cut
+# off, but never less than LEAST_WEIGHT of a whole one.
+AT_BOUNDARY = 0.5
 LEAST_WEIGHT = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """Geodesic discs around points of a shape in a unit box.
+    """Geodesic discs around m points of a shape in a unit box, each described at r radii.
 
     Attributes
     ----------
     numbers : (m, r, 64) float32
-        Of m points at r radii; see `describe_patches`.
+        Descriptor of each disc; see `extract_patches`.
     weights : (m, r) float32
         Share of the surface that a point stands for, less near a boundary.
     vertices : (m,) int
         The vertex of each point.
     distances : (m, m) float32
-        Along the surface between points, in sides of the box; far ones by way of other points, and so a few per cent
-        long; infinite between pieces.
+        Geodesic distances between points, in sides of the box. Long ones are sums of short ones,
+        and so a few per cent too long; infinite between components.
     """
 
     numbers: Float32[np.ndarray, "m r c"]
@@ -51,85 +57,108 @@ class Patches:
     distances: Float32[np.ndarray, "m m"]
 
 
-def describe_patches(mesh: MeshLike, *, n_samples: SupportsIndex = N_SAMPLES) -> Patches:
-    """Describe the discs around farthest points, at nine radii from .0625 to .37 of the box.
+def extract_patches(
+    mesh: MeshLike,
+    *,
+    n_samples: SupportsIndex = N_SAMPLES,
+    n_views: SupportsIndex = N_VIEWS,
+    clean: bool = True,
+) -> list[Patches]:
+    """Describe geodesic discs around points of a surface, and of what single viewpoints see of it.
 
-    A disc's normal n is the mean normal within .35 of its radius R. Only what faces the same way counts, N_q · n > 0:
-    so a scan from one side compares with the whole. In each of four rings of equal width: histograms of N_q · n
-    (8 bins) and of the height (x_q - x_p) · n / R (6 bins), by area, square roots of shares; the logarithm of the area
-    up to there over that of a flat disc; and the mean of the straight over the geodesic distance.
+    Points are farthest-point samples; radii R are nine from 0.0625 to 0.37 sides of the box. The
+    normal n of a disc is the mean normal within 0.35 R. Only vertices q that face the same way
+    count, N_q · n > 0, so that a scan from one side compares with the whole. In each of four rings
+    of equal width a disc has 16 numbers: histograms of N_q · n (8 bins) and of the height
+    (x_q - x_p) · n / R (6 bins), as square roots of shares of area; the logarithm of the area up to
+    that ring over that of a flat disc; and the mean ratio of straight to geodesic distance.
 
-    Components whose area is less than a point's share are left out (`fragment_vertices`), of the box too.
+    Components whose area is less than that of a point are left out (`fragment_vertices`).
 
     Parameters
     ----------
     mesh : MeshLike
-        Oriented outward. In any size: it is put into a unit box.
+        Of any size: it is scaled to a unit box.
     n_samples : int
         Points at most; never more than vertices.
+    n_views : int
+        Viewpoints, spread evenly around the shape, if it is closed. An open shape has none.
+    clean : bool
+        Whether to describe a copy that is turned outward (`orient_outward`) and smoothed as far as
+        its noise requires (`denoise`), so that a scan compares with clean shapes. If False, faces
+        must be oriented outward.
 
     Returns
     -------
-    Patches
+    list of Patches
+        The whole first, then the views. All points lie at vertices of the whole.
 
     Raises
     ------
     InvalidParameterError
-        If n_samples is not positive.
+        If n_samples is not positive, or n_views is negative.
     InvalidShapeError
-        If a vertex has no face, a face is there twice, neighboring faces are turned against each other, the mesh is
-        a soup, whose faces lie edge on edge without sharing vertices, or the surface has no area.
+        If a face has no area or occurs twice, a vertex has no face, the mesh is a soup (faces lie
+        edge on edge without sharing vertices), or neighboring faces disagree and `clean` is False.
+
+    See Also
+    --------
+    train_codebook, patch_descriptor
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> whole, view = es.retrieval.extract_patches(es.icosphere(2), n_samples=20, n_views=1)
+    >>> whole.numbers.shape
+    (20, 9, 64)
     """
     mesh = as_mesh(mesh)
     count = whole_number(n_samples, "n_samples", 1)
+    n_viewpoints = whole_number(n_views, "n_views", 0)
+    require_describable(mesh)
+    if clean:
+        mesh = denoise(orient_outward(mesh))
+    found = [surface_patches(mesh, n_samples=count)]
+    for part in views_of(mesh, n_viewpoints):
+        patches = surface_patches(part.mesh, n_samples=count)
+        found.append(replace(patches, vertices=frozen(part.source_vertices[patches.vertices])))
+    return found
+
+
+def surface_patches(mesh: TriangleMesh, *, n_samples: int = N_SAMPLES) -> Patches:
+    """Describe the discs of a mesh as it is; see `extract_patches`."""
     require_describable(mesh)
     require_oriented(mesh)
-    fragments = fragment_vertices(mesh, count)
-    if not len(fragments):
-        return _describe_patches(mesh, count)
-    body, source = submesh(mesh, ~np.isin(mesh.faces[:, 0], fragments))
-    found = _describe_patches(body, count)
-    return replace(found, vertices=frozen(source[found.vertices]))
+    fragments = fragment_vertices(mesh, n_samples)
+    source = np.arange(mesh.n_vertices)
+    if len(fragments):
+        mesh, source = submesh(mesh, ~np.isin(mesh.faces[:, 0], fragments))
 
-
-def _describe_patches(mesh: TriangleMesh, n_samples: int) -> Patches:
-    """Describe the discs of a mesh without fragments: each component gets a point, since there are fewer of them."""
-    count = min(n_samples, mesh.n_vertices)
+    # Without fragments there are fewer components than points, so each gets one.
     mesh = normalize_box(mesh)
     areas = dual_volumes(mesh)
     if not areas.sum() > 0:
         raise InvalidShapeError(
             "A surface must have an area to be described by patches; all its faces have none."
         )
-    chosen, rows, nearest = farthest_points(mesh, count, reach=RADII[-1])
+    n_points = min(n_samples, mesh.n_vertices)
+    chosen, rows, nearest = farthest_points(mesh, n_points, reach=RADII[-1])
     numbers = np.empty((len(chosen), len(RADII), NUMBERS), dtype=np.float32)
     describe_discs(rows, chosen, (mesh.vertices, mean_normals(mesh), areas), RADII, numbers)
+
+    # Weigh each disc by the share of the surface that is nearest to its point.
     cells = np.bincount(nearest, weights=areas / areas.sum(), minlength=len(chosen))
     rim = boundary_vertices(mesh)
     away = rows[:, rim].min(axis=1) if len(rim) else np.full(len(chosen), np.inf)
     weights = cells[:, None] * np.clip(away[:, None] / (AT_BOUNDARY * RADII), LEAST_WEIGHT, 1.0)
-    between = _by_way(rows[:, chosen]).astype(np.float32)
+
+    # The waves that measure distances end at the largest radius: fill in longer ones as shortest
+    # paths from point to point.
+    near = rows[:, chosen]
+    distances = np.asarray(shortest_path(np.minimum(near, near.T), directed=False))
     return Patches(
-        frozen(numbers), frozen(weights.astype(np.float32)), frozen(chosen), frozen(between)
+        frozen(numbers),
+        frozen(weights.astype(np.float32)),
+        frozen(source[chosen]),
+        frozen(distances.astype(np.float32)),
     )
-
-
-def _by_way(near: Float[np.ndarray, "m m"]) -> Float[np.ndarray, "m m"]:
-    """Fill in distances that waves did not reach, along others."""
-    return np.asarray(shortest_path(np.minimum(near, near.T), directed=False))
-
-
-def describe_patch_views(mesh: MeshLike, *, n_views: int = N_VIEWS) -> list[Patches]:
-    """Describe what single viewpoints see of a closed shape, as partial scans of it will be.
-
-    Returns
-    -------
-    list of Patches
-        With points at vertices of the whole; empty for an open shape, which is a part already.
-    """
-    mesh = as_mesh(mesh)
-    seen = [(part, describe_patches(part.mesh)) for part in views_of(mesh, n_views)]
-    return [
-        replace(patches, vertices=frozen(part.source_vertices[patches.vertices]))
-        for part, patches in seen
-    ]

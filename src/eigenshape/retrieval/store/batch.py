@@ -1,4 +1,4 @@
-"""Describe many shapes in worker processes that may die, and keep what they find."""
+"""Describe many files in worker processes, and add what they find to an index."""
 
 from collections.abc import Callable, Sequence
 from contextlib import closing
@@ -6,33 +6,40 @@ from dataclasses import dataclass
 from functools import partial
 from hashlib import file_digest, sha256
 from pathlib import Path
-from typing import get_args
+from typing import SupportsIndex
 
 from eigenshape._arguments import require_each, require_type
+from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape.retrieval.heat.descriptor import SCALE_FREE
-from eigenshape.retrieval.patches.codebook import PatchCodebook, made_codebook, train_codebook
-from eigenshape.retrieval.patches.patches import Patches
-from eigenshape.retrieval.store.index import Record, ShapeIndex
-from eigenshape.retrieval.store.kinds import AnyRecipe, Descriptor
-from eigenshape.retrieval.store.workers import Item, Workers, in_workers
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
+from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook, train_codebook
+from eigenshape.retrieval.patches.patches import Patches, extract_patches
+from eigenshape.retrieval.store.index import Record, ShapeIndex, describe_to_store
+from eigenshape.retrieval.store.workers import Item, Workers, run_in_workers
 
-Describe = Callable[[Path], Sequence[Descriptor]]
-Teach = Callable[[Path], Sequence[Patches]]
-Told = Callable[[int, int, str, str | None], None]
-FEWEST_TEACHERS, MOST_TEACHERS = 40, 100  # shapes
+Read = Callable[[Path], MeshLike]
+Callback = Callable[[int, int, str, str | None], None]
+# Shapes that a codebook is learned from. A hundred closed ones have 45,000 patches for its 32
+# Gaussians, and take some minutes; fewer than 40 leave it to the codebook of the library.
+FEWEST_TO_TRAIN, MOST_TO_TRAIN = 40, 100
+N_TRAINING_VIEWS = 2  # partial views of each closed shape that a codebook is learned from
 
 
 @dataclass(frozen=True)
 class BatchReport:
-    """What a batch did.
+    """What `build_index` did.
 
     Attributes
     ----------
     added, skipped : tuple of str
-        Names that were described now, and that the index had.
+        Names of the shapes that were added, and that the index had already.
     failed : tuple of (str, str)
-        Name and reason of each shape that could not be taken.
+        Name and reason of each shape that could not be added.
+
+    See Also
+    --------
+    build_index
     """
 
     added: tuple[str, ...]
@@ -41,74 +48,100 @@ class BatchReport:
 
 
 @dataclass(frozen=True)
-class _Described:
+class _DescribedFile:
     digest: str
     descriptors: tuple[Descriptor, ...]
 
 
-def build_index(
+def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
     index: ShapeIndex,
     items: Sequence[Item],
-    describe: Describe,
+    read: Read,
     *,
-    recipes: Sequence[AnyRecipe] = (SCALE_FREE,),
+    recipes: Sequence[AnyRecipe] | None = None,
+    n_views: SupportsIndex | None = None,
     workers: Workers = Workers(),
-    told: Told | None = None,
+    callback: Callback | None = None,
 ) -> BatchReport:
-    """Describe files side by side and add each to an index as soon as it is done.
+    """Describe files in several processes, and add each to an index as soon as it is described.
 
-    A file that raises, hangs or kills its process is reported, and the others go on. This process alone writes: after
-    Ctrl-C or a kill the same call does only what is left. A file that the index has with the same content and recipes
-    is skipped, one whose content has changed is replaced in one step.
+    A file that raises an error, hangs or kills its process is reported, and the others go on. Only
+    this process writes: after Ctrl-C or a crash, the same call continues where it stopped. A file
+    that the index has with the same content and recipes is skipped. A file whose content has
+    changed replaces the old shape in one step.
 
     Parameters
     ----------
     index : ShapeIndex
     items : sequence of Item
-    describe : callable
-        From a path to descriptors of each of `recipes`; importable by name, since it runs in fresh processes.
-    recipes : sequence of Recipe or PatchRecipe
-        What `describe` follows.
+        Files, with the names and labels of their shapes.
+    read : callable
+        Return the mesh of a path: ``es.read_mesh``, or a function of yours that a new process can
+        import by name.
+    recipes : sequence of HeatRecipe or PatchRecipe, optional
+        By default that of `ShapeIndex.default_recipe`.
+    n_views : int, optional
+        As of `ShapeIndex.add`.
     workers : Workers
-    told : callable, optional
-        Called as told(n_done, n_items, name, error or None) after each file.
+    callback : callable, optional
+        Called as callback(n_done, n_items, name, error or None) after each file.
 
     Returns
     -------
     BatchReport
-        In the order of `items`, whichever was done first.
+        In the order of `items`.
 
     Raises
     ------
     InvalidParameterError
-        If two items have one name.
+        If two items have the same name, or `n_views` is negative.
     StoreError
         If the index cannot be written.
     EigenshapeError
-        If no worker can start: a script must call this under ``if __name__ == "__main__":``, since workers import it.
+        If no worker can start. A script must call this under ``if __name__ == "__main__":``, since
+        workers import the script.
+
+    See Also
+    --------
+    ShapeIndex.add, train_codebook_from_files
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> import eigenshape as es
+    >>> index = es.ShapeIndex.create(mkdtemp())
+    >>> es.retrieval.build_index(index, [], es.read_mesh)  # with items: under the main guard
+    BatchReport(added=(), skipped=(), failed=())
     """
     require_type(index, ShapeIndex, "index")
     require_type(workers, Workers, "workers")
     require_each(items, Item, "items")
+    if recipes is None:
+        recipes = (index.default_recipe(),)
     require_each(recipes, AnyRecipe, "recipes")
-    _require_names(items)
-    tell = told or _silent
+    if n_views is not None:
+        n_views = whole_number(n_views, "n_views", 0)
+    _require_different_names(items)
+    callback = callback or _ignore
+
     known = {record.name: record for record in index.records()}
     todo = [item for item in items if not _is_known(item, known.get(item.name), recipes)]
-    added, failed = set(), {}
+    added: set[str] = set()
+    failed: dict[str, str] = {}
     n_done = len(items) - len(todo)
     if n_done:
-        tell(n_done, len(items), "already in the index", None)
-    work = partial(_described, describe, tuple(recipes))
-    with closing(in_workers(work, todo, workers)) as outcomes:  # closed at once, also after Ctrl-C
+        callback(n_done, len(items), "already in the index", None)
+    work = partial(_describe_file, read, tuple(recipes), n_views)
+    # Closing stops the workers at once, also after Ctrl-C.
+    with closing(run_in_workers(work, todo, workers)) as outcomes:
         for item, outcome in outcomes:
             n_done += 1
-            reason = outcome.reason if outcome.found is None else _keep(index, item, outcome.found)
-            if reason is None:
+            error = outcome.error if outcome.value is None else _add(index, item, outcome.value)
+            if error is None:
                 added.add(item.name)
             else:
-                failed[item.name] = reason
-            tell(n_done, len(items), item.name, reason)
+                failed[item.name] = error
+            callback(n_done, len(items), item.name, error)
     names = [item.name for item in items]
     return BatchReport(
         added=tuple(name for name in names if name in added),
@@ -117,92 +150,63 @@ def build_index(
     )
 
 
-def learn_words(
-    items: Sequence[Item], teach: Teach, *, workers: Workers = Workers(), told: Told | None = None
+def train_codebook_from_files(
+    items: Sequence[Item],
+    read: Read,
+    *,
+    workers: Workers = Workers(),
+    callback: Callback | None = None,
 ) -> PatchCodebook:
-    """Learn the words of patches from files side by side; a small collection takes words that come with the library.
+    """Learn a codebook of patches from files, in several processes.
 
-    At most 100 files teach, those whose names have the lowest hashes; the same whatever their order. Those that cannot
-    be taken are passed over: `build_index` will name them.
+    At most 100 files are used, those whose names have the lowest hashes, whatever the order of
+    `items`. Files that cannot be read or described are passed over: `build_index` reports them.
 
     Parameters
     ----------
     items : sequence of Item
-    teach : callable
-        From a path to the patches of a shape and of some views of it; importable by name.
+    read : callable
+        As of `build_index`.
     workers : Workers
-    told : callable, optional
-        As in `build_index`.
+    callback : callable, optional
+        As of `build_index`; errors are not passed.
 
     Returns
     -------
     PatchCodebook
-        Of `made_codebook` where there are fewer than 40 files, or fewer that can be taken.
+        `default_codebook` if there are fewer than 40 files, or fewer that can be described.
 
     Raises
     ------
     EigenshapeError
-        As `build_index`, if no worker can start.
+        If no worker can start, as for `build_index`.
+
+    See Also
+    --------
+    train_codebook, default_codebook, build_index
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> codebook = es.retrieval.train_codebook_from_files([], es.read_mesh)
+    >>> codebook == es.retrieval.default_codebook()
+    True
     """
     require_type(workers, Workers, "workers")
     require_each(items, Item, "items")
-    if len(items) < FEWEST_TEACHERS:
-        return made_codebook()
-    tell = told or _silent
-    teachers = sorted(items, key=lambda item: sha256(item.name.encode()).digest())[:MOST_TEACHERS]
-    lessons: dict[str, Sequence[Patches]] = {}
-    with closing(in_workers(teach, teachers, workers)) as outcomes:
+    if len(items) < FEWEST_TO_TRAIN:
+        return default_codebook()
+    callback = callback or _ignore
+    chosen = sorted(items, key=lambda item: sha256(item.name.encode()).digest())[:MOST_TO_TRAIN]
+    shapes: dict[str, list[Patches]] = {}
+    with closing(run_in_workers(partial(_extract_file, read), chosen, workers)) as outcomes:
         for number, (item, outcome) in enumerate(outcomes):
-            if outcome.found is not None:
-                lessons[item.name] = outcome.found
-            tell(number + 1, len(teachers), item.name, None)
-    if len(lessons) < FEWEST_TEACHERS:
-        return made_codebook()
-    return train_codebook([patches for item in teachers for patches in lessons.get(item.name, ())])
-
-
-def _require_names(items: Sequence[Item]) -> None:
-    paths: dict[str, Path] = {}
-    for item in items:
-        if item.name in paths:
-            raise InvalidParameterError(
-                f"Items must have different names; {item.name!r} is both {paths[item.name]} and {item.path}."
-            )
-        paths[item.name] = item.path
-
-
-def _described(describe: Describe, recipes: tuple[AnyRecipe, ...], path: Path) -> _Described:
-    """Describe a file, in a worker."""
-    digest = content_digest(
-        path
-    )  # before it is read: a file that changes meanwhile is done again next time
-    descriptors = tuple(describe(path))
-    _require_described(descriptors, recipes)
-    return _Described(digest, descriptors)
-
-
-def _require_described(descriptors: tuple[Descriptor, ...], recipes: tuple[AnyRecipe, ...]) -> None:
-    for found in descriptors:
-        if not isinstance(found, get_args(Descriptor)):
-            raise InvalidParameterError(
-                f"A describer must return descriptors; it returned {type(found).__name__}."
-            )
-    there = {found.recipe for found in descriptors}
-    for recipe in recipes:
-        if recipe not in there:
-            raise InvalidParameterError(
-                f"A describer must follow every recipe; {recipe.name!r} has no descriptor."
-            )
-
-
-def _keep(index: ShapeIndex, item: Item, found: _Described) -> str | None:
-    """Add a shape; the reason, where the index does not take it."""
-    known = {"label": item.label, "source": str(item.path.absolute()), "digest": found.digest}
-    try:
-        index.add(item.name, found.descriptors, **known, replace=True)
-    except InvalidParameterError as err:
-        return str(err)
-    return None
+            if outcome.value is not None:
+                shapes[item.name] = outcome.value
+            callback(number + 1, len(chosen), item.name, None)
+    if len(shapes) < FEWEST_TO_TRAIN:
+        return default_codebook()
+    return train_codebook([patches for item in chosen for patches in shapes.get(item.name, ())])
 
 
 def content_digest(path: Path) -> str:
@@ -211,14 +215,53 @@ def content_digest(path: Path) -> str:
         return file_digest(file, "sha256").hexdigest()
 
 
+def _require_different_names(items: Sequence[Item]) -> None:
+    paths: dict[str, Path] = {}
+    for item in items:
+        if item.name in paths:
+            raise InvalidParameterError(
+                f"Items must have different names; {item.name!r} is the name of both "
+                f"{paths[item.name]} and {item.path}."
+            )
+        paths[item.name] = item.path
+
+
+def _describe_file(
+    read: Read, recipes: tuple[AnyRecipe, ...], n_views: int | None, path: Path
+) -> _DescribedFile:
+    """Describe a file, in a worker."""
+    # Before it is read: a file that changes meanwhile is described again next time.
+    digest = content_digest(path)
+    mesh = as_mesh(read(path))
+    descriptors = [
+        descriptor for recipe in recipes for descriptor in describe_to_store(mesh, recipe, n_views)
+    ]
+    return _DescribedFile(digest, tuple(descriptors))
+
+
+def _extract_file(read: Read, path: Path) -> list[Patches]:
+    """Extract the patches of a file, in a worker."""
+    return extract_patches(read(path), n_views=N_TRAINING_VIEWS)
+
+
+def _add(index: ShapeIndex, item: Item, file: _DescribedFile) -> str | None:
+    """Add a shape; return the reason if the index refuses it."""
+    facts = {"label": item.label, "source": str(item.path.absolute()), "digest": file.digest}
+    try:
+        index.add_descriptors(item.name, file.descriptors, **facts, replace=True)
+    except InvalidParameterError as err:
+        return str(err)
+    return None
+
+
 def _is_known(item: Item, record: Record | None, recipes: Sequence[AnyRecipe]) -> bool:
     if record is None or not set(recipes) <= set(record.recipes):
         return False
     try:
         return content_digest(item.path) == record.digest
-    except OSError:  # a worker will say so
+    except OSError:  # the worker that opens the file reports it
         return False
 
 
-def _silent(n_done: int, n_items: int, name: str, error: str | None) -> None:
-    """Tell nobody."""
+def _ignore(n_done: int, n_items: int, name: str, error: str | None) -> None:
+    """Do nothing after a file."""

@@ -9,17 +9,17 @@ from typing import Any, NamedTuple
 from zlib import crc32
 
 from eigenshape._errors import StoreError
-from eigenshape.retrieval.store.kinds import AnyRecipe, read, written
+from eigenshape.retrieval.kinds import AnyRecipe, recipe_from_text, recipe_to_text
 
-APPLICATION = 0x65696773  # "eigs"
-FORMAT = 3
+APPLICATION = 0x65696773  # "eigs", by which SQLite files tell whose they are
+FORMAT = 4  # of the tables and of the files beside the database; raised by every change
 # A blob is the last column of its table, so that the others are read without it. Its checksum is
 # part of the row, and the digest in `seal` is of all rows of all tables without their blobs, and of
 # the number of changes that have been committed.
 SCHEMA = """
 CREATE TABLE recipe (
     id INTEGER PRIMARY KEY, fields TEXT NOT NULL UNIQUE, size INTEGER NOT NULL,
-    blob_checksum INTEGER NOT NULL, words BLOB NOT NULL
+    blob_checksum INTEGER NOT NULL, codebook BLOB NOT NULL
 );
 CREATE TABLE shape (
     id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, label TEXT, source TEXT, digest TEXT
@@ -39,7 +39,7 @@ CREATE TABLE seal (n_changes INTEGER NOT NULL, digest TEXT NOT NULL);
 
 
 class RecipeRow(NamedTuple):
-    """A recipe, but for its words; `size` is the number of committed bytes of rows."""
+    """A recipe, without its codebook; `size` is the number of committed bytes of rows."""
 
     id: int
     fields: str
@@ -58,7 +58,7 @@ class ShapeRow(NamedTuple):
 
 
 class DescriptorRow(NamedTuple):
-    """A descriptor, but for its details; `checksum` is of its rows in the file of its recipe."""
+    """A descriptor, without its details; `checksum` is of its rows in the file of its recipe."""
 
     id: int
     shape: int
@@ -87,9 +87,9 @@ class Catalog:
         return [(row.id, self._recipe(row)) for row in self.recipe_rows]
 
     def _recipe(self, row: RecipeRow) -> AnyRecipe:
-        words = self._blob("SELECT words FROM recipe WHERE id = ?", row)
+        codebook = self._blob("SELECT codebook FROM recipe WHERE id = ?", row)
         try:
-            return read(row.fields, words or None)
+            return recipe_from_text(row.fields, codebook or None)
         except (TypeError, ValueError) as err:
             raise StoreError(
                 f"Recipes of an index must be known to this version of eigenshape; {row.fields} is "
@@ -195,11 +195,11 @@ def _digest(n_changes: Any, rows: tuple[list[Any], ...]) -> str:
 
 
 def keep_recipe(catalog: Catalog, recipe: AnyRecipe) -> int:
-    """Return the number of a recipe, a new one where it is new."""
+    """Return the number of a recipe; store the recipe under a new number if it is new."""
     number = catalog.recipe_id(recipe)
     if number is not None:
         return number
-    fields, words = written(recipe)
-    values = (fields, 0, crc32(words or b""), words or b"")
-    query = "INSERT INTO recipe (fields, size, blob_checksum, words) VALUES (?, ?, ?, ?)"
+    fields, codebook = recipe_to_text(recipe)
+    values = (fields, 0, crc32(codebook or b""), codebook or b"")
+    query = "INSERT INTO recipe (fields, size, blob_checksum, codebook) VALUES (?, ?, ?, ?)"
     return int(catalog.database.execute(query, values).lastrowid or 0)

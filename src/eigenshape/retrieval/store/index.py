@@ -1,4 +1,4 @@
-"""A collection of described shapes in a folder, and the question which of them are most alike."""
+"""A collection of described shapes in a folder, searched for those that are most alike."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,28 +13,35 @@ from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError, StoreError
 from eigenshape._threads import one_blas_thread
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
+from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.store import files as store
 from eigenshape.retrieval.store.catalog import Catalog, ShapeRow, keep_recipe
-from eigenshape.retrieval.store.kinds import AnyRecipe, Descriptor, kind_of
-from eigenshape.retrieval.store.reading import Held, held_by
+from eigenshape.retrieval.store.reading import StoredDescriptors, read_descriptors
 
 
 @dataclass(frozen=True)
 class Record:
-    """What an index knows of a shape beside its descriptors.
+    """What an index holds of a shape beside its descriptors.
 
     Attributes
     ----------
     name : str
         Unique in the index.
     label : str or None
-        Class, where it is known.
+        Class of the shape.
     source : str or None
-        Where the shape came from, a path say.
+        Where the shape came from: a path, for example.
     digest : str or None
-        Hash of the content, by which a batch knows that it has the shape already.
-    recipes : tuple of Recipe or PatchRecipe
-        By which it is described.
+        Hash of the content, by which `build_index` recognizes a file that it has described.
+    recipes : tuple of HeatRecipe or PatchRecipe
+        By which the shape is described.
+
+    See Also
+    --------
+    ShapeIndex.records
     """
 
     name: str
@@ -46,20 +53,27 @@ class Record:
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """A shape that answers a query.
+    """A shape that `ShapeIndex.query` found.
 
     Attributes
     ----------
     name, label, source : str
         As in its `Record`.
     score : float
-        Of `matching_score` or `patch_scores`: 0, or nearly, for the same descriptor; smaller is more alike.
+        Of `matching_score` or `patch_scores`: 0, or nearly, for the same descriptor; smaller is
+        more alike.
     correspondences : (p, 2) int
-        Feature or patch of the query, the same of this shape, surest pairs first.
+        Features or patches that correspond: the number of one of the query, and of one of this
+        shape. Surest pairs first.
     vertices : (m,) int
-        The vertex at which each feature or patch of this shape lies.
+        The vertex of each feature or patch of this shape.
     view : int
-        Which of the shape's descriptors is meant, in the order in which they were added: 0 is the first.
+        Which of the descriptors of the shape matched, in the order in which they were added: 0 is
+        the first, that of the whole shape.
+
+    See Also
+    --------
+    ShapeIndex.query
     """
 
     name: str
@@ -73,17 +87,50 @@ class Match:
 
 @dataclass(frozen=True)
 class ShapeIndex:
-    """A handle on a folder of descriptors: one writer at a time, any number of readers.
+    """A folder of described shapes, in which similar ones are found.
 
-    Every call reads or writes the folder, and nothing is kept open between calls. A writer that is killed leaves the
-    state before or the state after. Made by `ShapeIndex.create` or `ShapeIndex.open`.
+    Call `ShapeIndex.create`, `ShapeIndex.open` or `ShapeIndex.open_or_create`. Any number of
+    processes may read an index at the same time, while one writes. Every call reads or writes the
+    folder, and nothing stays open between calls. A process that is killed while it writes leaves
+    the state before or after the call. All that is read is checked, and damage is reported.
+
+    Attributes
+    ----------
+    folder : Path
+
+    See Also
+    --------
+    build_index : Describe many files in worker processes.
+    describe : Describe a mesh without an index.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> import eigenshape as es
+    >>> index = es.ShapeIndex.create(mkdtemp())
+    >>> for kind in ("fish", "bird"):
+    ...     index.add(kind, es.make_creature(kind, n_vertices=500), label="animal", n_views=1)
+    >>> match, other = index.query(es.make_creature("fish", 1, n_vertices=500))
+    >>> match.name, other.name
+    ('fish', 'bird')
+    >>> match.score < other.score
+    True
     """
 
     folder: Path
 
     @classmethod
     def create(cls, folder: str | Path) -> "ShapeIndex":
-        """Make an empty index in a folder that is empty or not there yet.
+        """Make an empty index.
+
+        Parameters
+        ----------
+        folder : str or Path
+            An empty folder, or one that does not exist.
+
+        Returns
+        -------
+        ShapeIndex
 
         Raises
         ------
@@ -95,19 +142,37 @@ class ShapeIndex:
 
     @classmethod
     def open(cls, folder: str | Path) -> "ShapeIndex":
-        """Open an index that is there.
+        """Open an existing index.
+
+        Parameters
+        ----------
+        folder : str or Path
+
+        Returns
+        -------
+        ShapeIndex
 
         Raises
         ------
         StoreError
-            If the folder is no index, or one of another format, or its database is damaged.
+            If the folder is no index, its format is another one, or its database is damaged.
         """
         with store.reading(Path(folder)):
             return cls(Path(folder))
 
     @classmethod
     def open_or_create(cls, folder: str | Path) -> "ShapeIndex":
-        """Open the index in a folder, or make an empty one; of several processes at once, one makes it.
+        """Open the index in a folder, or make an empty one if there is none.
+
+        Several processes may call this at once: one of them makes the index.
+
+        Parameters
+        ----------
+        folder : str or Path
+
+        Returns
+        -------
+        ShapeIndex
 
         Raises
         ------
@@ -130,24 +195,51 @@ class ShapeIndex:
             return len(catalog.shapes)
 
     def records(self) -> list[Record]:
-        """List all shapes by name."""
+        """List all shapes, sorted by name.
+
+        Returns
+        -------
+        list of Record
+        """
         with store.reading(self.folder) as catalog:
             recipes = dict(catalog.recipes())
-        numbers: dict[int, set[int]] = {shape.id: set() for shape in catalog.shapes}
-        for kept in catalog.descriptors:
-            numbers[kept.shape].add(kept.recipe)
+        used: dict[int, set[int]] = {shape.id: set() for shape in catalog.shapes}
+        for row in catalog.descriptors:
+            used[row.shape].add(row.recipe)
         return [
-            Record(*shape[1:], tuple(recipes[number] for number in sorted(numbers[shape.id])))
+            Record(*shape[1:], tuple(recipes[number] for number in sorted(used[shape.id])))
             for shape in sorted(catalog.shapes, key=lambda shape: shape.name)
         ]
 
     def recipes(self) -> list[AnyRecipe]:
-        """List the recipes by which shapes are described or are to be, in the order in which they came."""
+        """List the recipes of the index, in the order in which they were added.
+
+        Returns
+        -------
+        list of HeatRecipe or PatchRecipe
+        """
         with store.reading(self.folder) as catalog:
             return [recipe for _, recipe in catalog.recipes()]
 
+    def default_recipe(self) -> AnyRecipe:
+        """Return the recipe by which `add` and `query` describe a mesh.
+
+        Returns
+        -------
+        HeatRecipe or PatchRecipe
+            The first `PatchRecipe` of the index, else its first recipe. For an empty index,
+            patches with the codebook that comes with the library.
+        """
+        recipes = self.recipes()
+        patches = [recipe for recipe in recipes if isinstance(recipe, PatchRecipe)]
+        return next(iter([*patches, *recipes])) if recipes else PatchRecipe()
+
     def keep_recipe(self, recipe: AnyRecipe) -> None:
-        """Keep a recipe before any shape is described by it, one whose words were long to learn, say.
+        """Add a recipe before any shape is described by it, so that its codebook is not lost.
+
+        Parameters
+        ----------
+        recipe : HeatRecipe or PatchRecipe
 
         Raises
         ------
@@ -158,7 +250,56 @@ class ShapeIndex:
         with store.writing(self.folder) as catalog:
             keep_recipe(catalog, recipe)
 
-    def add(
+    def add(  # noqa: PLR0913 - one keyword for each fact of a shape, and how it is described
+        self,
+        name: str,
+        mesh: MeshLike,
+        *,
+        label: str | None = None,
+        source: str | None = None,
+        recipe: AnyRecipe | None = None,
+        n_views: SupportsIndex | None = None,
+        replace: bool = False,
+    ) -> None:
+        """Describe a mesh and add it to the index.
+
+        A closed mesh is also described as single viewpoints see it, so that partial scans find it.
+
+        Parameters
+        ----------
+        name : str
+            By which the shape is found; unique in the index.
+        mesh : MeshLike
+            A closed or open surface, of any size.
+        label, source : str, optional
+            Class of the shape, and where it came from.
+        recipe : HeatRecipe or PatchRecipe, optional
+            By default that of `default_recipe`.
+        n_views : int, optional
+            Viewpoints: by default 6 for patches and 4 for heat.
+        replace : bool
+            Whether a shape of the same name is replaced.
+
+        Raises
+        ------
+        InvalidShapeError
+            As `describe`.
+        StoreError
+            If the name is in the index and `replace` is False, or another process is writing.
+
+        See Also
+        --------
+        ShapeIndex.add_descriptors, build_index
+        """
+        mesh = as_mesh(mesh)
+        require_type(recipe, AnyRecipe | None, "recipe")
+        _require_text(name, label, source)
+        if recipe is None:
+            recipe = self.default_recipe()
+        descriptors = describe_to_store(mesh, recipe, n_views)
+        self.add_descriptors(name, descriptors, label=label, source=source, replace=replace)
+
+    def add_descriptors(
         self,
         name: str,
         descriptors: Sequence[Descriptor],
@@ -168,27 +309,43 @@ class ShapeIndex:
         digest: str | None = None,
         replace: bool = False,
     ) -> None:
-        """Add a shape with one or more descriptors.
+        """Add a shape that is described already.
 
-        Descriptors of one recipe are views of the shape, the whole first, say, and then what is seen of it from some
-        sides: the view with the lowest score counts, for patches beside the first by half. A name that is there
-        with the same digest gains the recipes that it lacks, and keeps what it has of the others. With `replace`, a
-        shape that is there with another digest gives way in the same step.
+        Descriptors of one recipe are views of the shape: the whole first, then what is seen of it
+        from some sides. The view with the lowest score counts.
+
+        Parameters
+        ----------
+        name : str
+            By which the shape is found; unique in the index.
+        descriptors : sequence of HeatDescriptor or PatchDescriptor
+        label, source : str, optional
+            Class of the shape, and where it came from.
+        digest : str, optional
+            Hash of its content. If the name is in the index with the same digest, the shape gains
+            the recipes that it lacks, and keeps its descriptors by the others.
+        replace : bool
+            Whether a shape of the same name with another digest is replaced, in one step.
 
         Raises
         ------
         InvalidParameterError
-            If there is no descriptor, a number is not finite, or rows are not as long as others of the recipe.
+            If there is no descriptor, a number is not finite, or the rows of a descriptor are
+            longer or shorter than those of others by the same recipe.
         StoreError
-            If the name is there with another digest and is not to be replaced, or another process is writing.
+            If the name is in the index with another digest and `replace` is False, or another
+            process is writing.
+
+        See Also
+        --------
+        ShapeIndex.add, ShapeIndex.descriptors
         """
         require_each(descriptors, Descriptor, "descriptors")
         _require_text(name, label, source, digest)
-        rows = _packed(name, descriptors)
+        rows = _rows_of_each(name, descriptors)
         with store.writing(self.folder) as before:
-            catalog, shape = _with_shape(
-                before, ShapeRow(0, name, label, source, digest), replace=replace
-            )
+            row = ShapeRow(0, name, label, source, digest)
+            catalog, shape = _with_shape(before, row, replace=replace)
             for recipe in dict.fromkeys(descriptor.recipe for descriptor in descriptors):
                 views = [
                     pair for pair in zip(descriptors, rows, strict=True) if pair[0].recipe == recipe
@@ -202,31 +359,30 @@ class ShapeIndex:
         recipe: int,
         views: Sequence[tuple[Descriptor, np.ndarray]],
     ) -> None:
-        others = [kept for kept in catalog.descriptors if kept.recipe == recipe]
+        """Write the views of a shape by one recipe, unless it has some already."""
+        others = [row for row in catalog.descriptors if row.recipe == recipe]
         n_columns = others[0].n_columns if others else views[0][1].shape[1]
         for descriptor, rows in views:
             _require_columns(descriptor, rows, n_columns)
-        if any(kept.shape == shape for kept in others):
+        if any(row.shape == shape for row in others):
             return
         for view, (descriptor, rows) in enumerate(views):
             details = kind_of(descriptor.recipe).details(descriptor)
             offset = store.append_rows(self.folder, catalog.database, recipe, rows)
-            entry = (
-                shape,
-                recipe,
-                view,
-                offset,
-                *rows.shape,
-                crc32(rows.tobytes()),
-                crc32(details),
-                details,
-            )
+            checksums = crc32(rows.tobytes()), crc32(details)
             catalog.database.execute(
-                "INSERT INTO descriptor VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?)", entry
+                "INSERT INTO descriptor VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                (shape, recipe, view, offset, *rows.shape, *checksums, details),
             )
 
     def remove(self, name: str) -> None:
-        """Remove a shape. The bytes of its rows stay in the file, so that a reader of the old state still finds them.
+        """Remove a shape.
+
+        Its numbers stay in the file, so that processes that read the old state still find them.
+
+        Parameters
+        ----------
+        name : str
 
         Raises
         ------
@@ -239,57 +395,106 @@ class ShapeIndex:
                 raise StoreError(f"A shape must be in the index to be removed; {name!r} is not.")
             catalog.without(shape)
 
-    def query(self, descriptor: Descriptor, *, n_matches: SupportsIndex = 5) -> list[Match]:
-        """Find the shapes whose descriptors of the same recipe have the lowest score, each shape once.
+    def query(self, shape: MeshLike | Descriptor, *, n_matches: SupportsIndex = 5) -> list[Match]:
+        """Find the shapes that are most similar to a mesh, whole or partial, in any pose.
 
-        Numbers are kept in single precision, and those of the query are rounded alike, so that a shape in the index
-        finds itself with score 0. Equal scores are sorted by name.
+        Parameters
+        ----------
+        shape : MeshLike, HeatDescriptor or PatchDescriptor
+            A mesh is described by `default_recipe`. A descriptor, of `describe`, is compared with
+            the descriptors by its recipe.
+        n_matches : int
+            Shapes to return at most.
+
+        Returns
+        -------
+        list of Match
+            Lowest score first, each shape once; equal scores are sorted by name. The index keeps
+            numbers in single precision, and those of the query are rounded alike.
 
         Raises
         ------
+        InvalidShapeError
+            If a mesh is given, as `describe`.
         InvalidParameterError
-            If `n_matches` is not positive, or the descriptor could not stand in the index.
+            If `n_matches` is not positive, or a number of the descriptor is not finite.
         StoreError
-            If no shape has a descriptor of that recipe, or a file is damaged.
-        """
-        require_type(descriptor, Descriptor, "descriptor")
-        wanted = whole_number(n_matches, "n_matches", 1, 2**31)
-        kind, (ours,) = kind_of(descriptor.recipe), _packed("the query", [descriptor])
-        asked = kind.restored(ours, kind.details(descriptor), descriptor.recipe)
-        with store.reading(self.folder) as catalog, one_blas_thread():
-            held = held_by(self.folder, catalog, descriptor.recipe)
-            _require_columns(descriptor, ours, held.entries[0].kept.n_columns)
-            scores = kind.verified(asked, held.restored, kind.scored(asked, held.rows))
-            order = np.argsort(scores, kind="stable")
-            firsts = np.unique(
-                [held.entries[place].shape.name for place in order], return_index=True
-            )[1]
-            best = order[np.sort(firsts)[:wanted]].tolist()
-            return [_match(asked, held, place, float(scores[place])) for place in best]
+            If no shape is described by the recipe, or a file is damaged.
 
-    def descriptor(self, name: str, recipe: AnyRecipe) -> Descriptor:
-        """Return the first descriptor of a shape by a recipe, as it is kept, to ask for more of its like.
+        See Also
+        --------
+        describe, matching_score, patch_scores
+        """
+        wanted = whole_number(n_matches, "n_matches", 1, 2**31)
+        if isinstance(shape, Descriptor):
+            descriptor = shape
+        else:
+            mesh, recipe = as_mesh(shape, "shape"), self.default_recipe()
+            descriptor = kind_of(recipe).describe_query(mesh, recipe)
+        kind = kind_of(descriptor.recipe)
+        (rows,) = _rows_of_each("the query", [descriptor])
+        query = kind.restore(rows, kind.details(descriptor), descriptor.recipe)
+        with store.reading(self.folder) as catalog, one_blas_thread():
+            stored = read_descriptors(self.folder, catalog, descriptor.recipe)
+            _require_columns(descriptor, rows, stored.entries[0].row.n_columns)
+            scores = kind.verify(query, stored.descriptor, kind.scores(query, stored.rows))
+
+            # Of the views of each shape, keep the one with the lowest score. Entries are sorted by
+            # name, and so are equal scores.
+            order = np.argsort(scores, kind="stable")
+            names = [stored.entries[place].shape.name for place in order]
+            firsts = np.unique(names, return_index=True)[1]
+            best = order[np.sort(firsts)[:wanted]].tolist()
+            return [_match(query, stored, place, float(scores[place])) for place in best]
+
+    def descriptors(self, name: str, recipe: AnyRecipe) -> list[Descriptor]:
+        """Return the descriptors of a shape by a recipe, as they are stored.
+
+        Parameters
+        ----------
+        name : str
+        recipe : HeatRecipe or PatchRecipe
+
+        Returns
+        -------
+        list of HeatDescriptor or PatchDescriptor
+            That of the whole shape first. Pass it to `query` to find more shapes like it.
 
         Raises
         ------
         StoreError
-            If the shape is not there or has no descriptor of that recipe, or a file is damaged.
+            If the shape has no descriptor by that recipe, or a file is damaged.
         """
         require_type(recipe, AnyRecipe, "recipe")
         with store.reading(self.folder) as catalog:
-            held = held_by(self.folder, catalog, recipe)
-            for place, entry in enumerate(held.entries):
-                if entry.shape.name == name:
-                    return held.restored(place)
-        raise StoreError(
-            f"A shape must be described by the recipe asked for; {name!r} is not described by {recipe}."
-        )
+            stored = read_descriptors(self.folder, catalog, recipe)
+            found = [
+                stored.descriptor(place)
+                for place, entry in enumerate(stored.entries)
+                if entry.shape.name == name
+            ]
+        if not found:
+            raise StoreError(
+                f"A shape must be described by the requested recipe; {name!r} is not described by "
+                f"{recipe}."
+            )
+        return found
 
 
-def _match(asked: Descriptor, held: Held, place: int, score: float) -> Match:
-    (shape, kept), other = held.entries[place], held.restored(place)
-    pairs = kind_of(held.recipe).paired(asked, other)
-    return Match(shape.name, shape.label, shape.source, score, pairs, other.vertices, kept.view)
+def describe_to_store(
+    mesh: TriangleMesh, recipe: AnyRecipe, n_views: SupportsIndex | None = None
+) -> list[Descriptor]:
+    """Describe a mesh as an index keeps it: the whole, and what viewpoints see if it is closed."""
+    kind = kind_of(recipe)
+    count = kind.n_views if n_views is None else whole_number(n_views, "n_views", 0)
+    descriptors: list[Descriptor] = kind.describe_to_store(mesh, recipe, count)
+    return descriptors
+
+
+def _match(query: Descriptor, stored: StoredDescriptors, place: int, score: float) -> Match:
+    (shape, row), found = stored.entries[place], stored.descriptor(place)
+    pairs = kind_of(stored.recipe).correspondences(query, found)
+    return Match(shape.name, shape.label, shape.source, score, pairs, found.vertices, row.view)
 
 
 def _require_text(name: str, *others: str | None) -> None:
@@ -298,15 +503,16 @@ def _require_text(name: str, *others: str | None) -> None:
             not isinstance(text, str) or text != text.encode(errors="replace").decode()
         ):
             raise InvalidParameterError(
-                f"What an index keeps beside numbers must be Unicode text; {text!r} is not."
+                "Names, labels, sources and digests in an index must be Unicode text; "
+                f"{text!r} is not."
             )
 
 
-def _packed(name: str, descriptors: Sequence[Descriptor]) -> list[np.ndarray]:
-    """Return the rows of descriptors as they are kept, refusing what cannot be."""
+def _rows_of_each(name: str, descriptors: Sequence[Descriptor]) -> list[np.ndarray]:
+    """Return the rows of descriptors as they are stored; refuse numbers that cannot be."""
     if not descriptors:
         raise InvalidParameterError(
-            f"A shape needs a descriptor to be found by; {name!r} has none."
+            f"A shape must have a descriptor to be found; {name!r} has none."
         )
     return [kind_of(descriptor.recipe).rows(descriptor, name) for descriptor in descriptors]
 
@@ -314,20 +520,20 @@ def _packed(name: str, descriptors: Sequence[Descriptor]) -> list[np.ndarray]:
 def _require_columns(descriptor: Descriptor, rows: np.ndarray, n_columns: int) -> None:
     if rows.shape[1] != n_columns:
         raise InvalidParameterError(
-            f"Features of one recipe must have equally many numbers; of {descriptor.recipe.name!r} they have "
-            f"{n_columns}, and here {rows.shape[1]}."
+            f"All features of one recipe must have as many numbers; those of recipe "
+            f"{descriptor.recipe.name!r} have {n_columns}, and these have {rows.shape[1]}."
         )
 
 
 def _with_shape(catalog: Catalog, new: ShapeRow, *, replace: bool) -> tuple[Catalog, int]:
-    """Return a catalog with room for a shape's descriptors, and the number of the shape."""
+    """Return a catalog that holds a shape, and the number of the shape."""
     old = catalog.shape(new.name)
     if old is not None and old.digest is not None and old.digest == new.digest:
         return catalog, old.id
     if old is not None and not replace:
         raise StoreError(
-            f"A name stands for one shape; {new.name!r} is in the index with digest {old.digest}, not {new.digest}. "
-            "Remove it first, or add it with replace=True."
+            f"A name stands for one shape; {new.name!r} is in the index with digest {old.digest}, "
+            f"not {new.digest}. Remove it first, or add it with replace=True."
         )
     if old is not None:
         catalog = catalog.without(old)

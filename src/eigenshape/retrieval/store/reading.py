@@ -1,4 +1,4 @@
-"""All that a store holds of one recipe."""
+"""Read all descriptors that a store holds of one recipe."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,34 +7,45 @@ from typing import NamedTuple
 import numpy as np
 
 from eigenshape._errors import StoreError
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
 from eigenshape.retrieval.store import files as store
 from eigenshape.retrieval.store.catalog import Catalog, DescriptorRow, ShapeRow
-from eigenshape.retrieval.store.kinds import AnyRecipe, Descriptor, kind_of
 
 
 class Entry(NamedTuple):
-    """A descriptor, but for its details, and its shape."""
+    """A row of the catalog of descriptors, and the shape that it describes."""
 
     shape: ShapeRow
-    kept: DescriptorRow
+    row: DescriptorRow
 
 
 @dataclass(frozen=True)
-class Held:
-    """All descriptors of a recipe, by name and view."""
+class StoredDescriptors:
+    """All descriptors of a recipe, sorted by name and view.
+
+    Attributes
+    ----------
+    recipe : HeatRecipe or PatchRecipe
+    catalog : Catalog
+        From which details are read, one descriptor at a time.
+    entries : list of Entry
+    rows : list of (m, q) arrays
+        The rows of each entry.
+    """
 
     recipe: AnyRecipe
     catalog: Catalog
     entries: list[Entry]
     rows: list[np.ndarray]
 
-    def restored(self, place: int) -> Descriptor:
-        """Return a descriptor with its details."""
-        details = self.catalog.details(self.entries[place].kept)
-        return kind_of(self.recipe).restored(self.rows[place], details, self.recipe)
+    def descriptor(self, place: int) -> Descriptor:
+        """Return a descriptor, with its details, by its place among the entries."""
+        details = self.catalog.details(self.entries[place].row)
+        restored: Descriptor = kind_of(self.recipe).restore(self.rows[place], details, self.recipe)
+        return restored
 
 
-def held_by(folder: Path, catalog: Catalog, recipe: AnyRecipe) -> Held:
+def read_descriptors(folder: Path, catalog: Catalog, recipe: AnyRecipe) -> StoredDescriptors:
     """Read all rows of a recipe.
 
     Raises
@@ -44,23 +55,17 @@ def held_by(folder: Path, catalog: Catalog, recipe: AnyRecipe) -> Held:
     """
     number = catalog.recipe_id(recipe)
     shapes = {shape.id: shape for shape in catalog.shapes}
-    entries = [
-        Entry(shapes[kept.shape], kept) for kept in catalog.descriptors if kept.recipe == number
-    ]
+    entries = [Entry(shapes[row.shape], row) for row in catalog.descriptors if row.recipe == number]
     if number is None or not entries:
-        used = {kept.recipe for kept in catalog.descriptors}
-        there = sorted(str(other.name) for number, other in catalog.recipes() if number in used)
+        used = {row.recipe for row in catalog.descriptors}
+        names = sorted(str(other.name) for number, other in catalog.recipes() if number in used)
         raise StoreError(
-            f"An index answers in the recipes it holds; {folder} holds {', '.join(there) or 'no shape'} and "
-            f"was asked in {recipe}."
+            f"An index must hold descriptors of the requested recipe; {folder} holds "
+            f"{', '.join(names) or 'no shape'}, and {recipe} was requested."
         )
-    entries.sort(key=lambda entry: (entry.shape.name, entry.kept.view))
+    entries.sort(key=lambda entry: (entry.shape.name, entry.row.view))
     path = store.rows_path(folder, number)
     data = memoryview(path.read_bytes() if path.exists() else b"")
-    row = kind_of(recipe).row
-    return Held(
-        recipe,
-        catalog,
-        entries,
-        [store.read_rows(data, entry.kept, row, path) for entry in entries],
-    )
+    row_type = kind_of(recipe).row_type
+    rows = [store.read_rows(data, entry.row, row_type, path) for entry in entries]
+    return StoredDescriptors(recipe, catalog, entries, rows)

@@ -1,4 +1,4 @@
-"""Worker processes that may die: what each file gave, or why it gave nothing."""
+"""Run a function on files in worker processes, which may die."""
 
 import multiprocessing
 import os
@@ -21,14 +21,33 @@ from eigenshape._errors import EigenshapeError
 
 T = TypeVar("T")
 NO_WORKERS = (
-    "Worker processes import the script that starts them, and must come to its end; all of them ended before they took "
-    'a file. Put what the script does, from its first call of eigenshape on, under `if __name__ == "__main__":`.'
+    "Worker processes import the script that starts them, and must reach its end; all of them ended "
+    "before they took a file. Put what the script does, from its first call of eigenshape on, "
+    'under `if __name__ == "__main__":`.'
 )
 
 
 @dataclass(frozen=True)
 class Workers:
-    """How many processes describe side by side, and after how many seconds a file is given up."""
+    """How many processes describe files at the same time, and for how long each may take.
+
+    Parameters
+    ----------
+    count : int
+        Processes.
+    timeout : float
+        Seconds after which a file is given up.
+
+    See Also
+    --------
+    build_index, train_codebook_from_files
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.retrieval.Workers(count=4)
+    Workers(count=4, timeout=300.0)
+    """
 
     count: int = 2
     timeout: float = 300.0
@@ -40,7 +59,26 @@ class Workers:
 
 @dataclass(frozen=True)
 class Item:
-    """A file to describe, the name it goes by, and its class where that is known."""
+    """A file to describe, with the name and the class of its shape.
+
+    Parameters
+    ----------
+    name : str
+        Unique in the index.
+    path : Path
+    label : str, optional
+
+    See Also
+    --------
+    build_index, train_codebook_from_files
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import eigenshape as es
+    >>> es.retrieval.Item("felix", Path("cats/felix.ply"), label="cat").name
+    'felix'
+    """
 
     name: str
     path: Path
@@ -49,23 +87,24 @@ class Item:
 
 @dataclass(frozen=True)
 class Outcome(Generic[T]):
-    """What a file gave, or the reason why it gave nothing."""
+    """The result of a function on one file, or the reason why there is none."""
 
-    found: T | None = None
-    reason: str | None = None
+    value: T | None = None
+    error: str | None = None
 
 
-def in_workers(
+def run_in_workers(
     work: Callable[[Path], T], items: Sequence[Item], workers: Workers
 ) -> Generator[tuple[Item, Outcome[T]], None, None]:
-    """Yield each item with what `work`, importable by name, made of its path, as they come.
+    """Yield each item with the outcome of `work` on its path, in the order in which they finish.
 
-    Close the generator to stop all workers at once.
+    A new process must be able to import `work` by name. Close the generator to stop all workers at
+    once.
 
     Raises
     ------
     EigenshapeError
-        If no worker can start, as in a script that has no main guard.
+        If no worker can start, as in a script without a main guard.
     """
     _require_main_guard()
     context = multiprocessing.get_context("spawn")
@@ -92,12 +131,13 @@ def in_workers(
 
 @contextmanager
 def _sigint_deferred() -> Iterator[None]:
-    """Start processes and threads with Ctrl-C blocked, and raise what came meanwhile at the end of the block.
+    """Start processes and threads with Ctrl-C blocked; if it was pressed, raise it at the end.
 
-    Processes and threads inherit the mask of blocked signals, so that Ctrl-C never reaches a worker: the parent stops
-    its workers. A worker whose parent stops halfway through starting it would print a traceback.
+    Processes and threads inherit the mask of blocked signals, so Ctrl-C never reaches a worker:
+    the parent stops its workers. A worker whose parent stops while starting it would print a
+    traceback.
     """
-    resource_tracker.ensure_running()  # Python's helper of processes, whose start would unblock Ctrl-C
+    resource_tracker.ensure_running()  # its start, by multiprocessing, would unblock Ctrl-C
     with _mask_of_sigint(), _handler_of_sigint():
         yield
 
@@ -116,7 +156,7 @@ def _mask_of_sigint() -> Iterator[None]:
 
 @contextmanager
 def _handler_of_sigint() -> Iterator[None]:
-    """Keep Ctrl-C until the end of the block: a thread of BLAS may take it though this thread blocks it."""
+    """Hold Ctrl-C until the end of the block: a BLAS thread may receive it though this one does not."""
     before = signal.getsignal(signal.SIGINT)
     if not callable(before) or threading.current_thread() is not threading.main_thread():
         yield
@@ -132,13 +172,12 @@ def _handler_of_sigint() -> Iterator[None]:
 
 
 def _require_main_guard() -> None:
-    """End a worker that is still importing the script that started it, and would start workers in turn.
+    """End a worker that is still importing its script, and would start workers in turn.
 
-    Quietly: the process that waits for it says why.
+    It ends without a message: the process that waits for it reports the reason.
     """
-    if getattr(
-        multiprocessing.current_process(), "_inheriting", False
-    ):  # as multiprocessing itself tells
+    # multiprocessing itself tells by this attribute.
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise SystemExit(1)
 
 
@@ -157,16 +196,16 @@ def _die_with_parent() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
-        os._exit(1)  # killed, it can stop nobody, and nobody waits for the answer
+        os._exit(1)  # a killed parent cannot stop its workers, and waits for no answer
 
 
 def _work(work: Callable[[Path], T], path: Path) -> Outcome[T]:
-    """Work in a worker; only what surely survives the way back is returned."""
+    """Call `work` in a worker, and turn any error into text, which can always be pickled."""
     try:
         return Outcome(work(path))
-    except Exception as err:  # noqa: BLE001  an error that cannot be pickled would take the whole pool with it
+    except Exception as err:  # noqa: BLE001  one that cannot be pickled would break the whole pool
         known = isinstance(err, EigenshapeError | OSError)
-        return Outcome(reason=str(err) if known else f"{type(err).__name__}: {err}")
+        return Outcome(error=str(err) if known else f"{type(err).__name__}: {err}")
 
 
 def _outcome(future: "Future[Outcome[T]]", workers: Workers) -> Outcome[T]:
@@ -174,7 +213,7 @@ def _outcome(future: "Future[Outcome[T]]", workers: Workers) -> Outcome[T]:
     if error is None:
         return future.result()
     if isinstance(error, TimeoutError):
-        return Outcome(reason=f"it took more than {workers.timeout:g} s")
+        return Outcome(error=f"it took more than {workers.timeout:g} s")
     if isinstance(error, ProcessExpired):
-        return Outcome(reason=f"it ended its process with exit code {error.exitcode}")
-    return Outcome(reason=f"{type(error).__name__}: {error}")
+        return Outcome(error=f"it ended its process with exit code {error.exitcode}")
+    return Outcome(error=f"{type(error).__name__}: {error}")

@@ -49,7 +49,10 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A level as the solver uses it: A, M, P in the precision of the vectors; A, P and Pᵀ in single for corrections."""
+    """A level as the solver uses it: A and M in double precision, P in that of the vectors.
+
+    Corrections take A, P and Pᵀ in single precision.
+    """
 
     stiffness: sp.csr_array
     mass: sp.csr_array | None

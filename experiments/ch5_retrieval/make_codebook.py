@@ -1,4 +1,4 @@
-"""Learn the words of patches that come with the library, from made-up creatures alone, and write them into it."""
+"""Learn the codebook of patches that comes with the library, from synthetic creatures alone, and write it there."""
 
 import argparse
 import sys
@@ -20,7 +20,7 @@ PLACE = (
     / "eigenshape"
     / "retrieval"
     / "patches"
-    / "made_words.npz"
+    / "default_codebook.npz"
 )
 INDIVIDUALS, SIZES, VIEWS = 6, (2000, 5000), 3
 
@@ -29,10 +29,7 @@ def lesson(what: tuple[str, int]) -> list[es.retrieval.Patches]:
     """Return the patches of one creature, in a pose of its own, and of views of it."""
     kind, number = what
     mesh = es.make_creature(kind, number, individual=number, n_vertices=SIZES[number % len(SIZES)])
-    return [
-        es.retrieval.describe_patches(mesh),
-        *es.retrieval.describe_patch_views(mesh, n_views=VIEWS),
-    ]
+    return es.retrieval.extract_patches(mesh, n_views=VIEWS, clean=False)
 
 
 def main() -> None:

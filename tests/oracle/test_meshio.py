@@ -1,0 +1,85 @@
+"""Medit and gmsh files are read as meshio reads them, to the bit."""
+
+import meshio
+import numpy as np
+import pytest
+
+from eigenshape._errors import FileFormatError
+from eigenshape.io.parsing import GRIDS
+
+KINDS = {"tetra": "tetrahedra", "triangle": "triangles", "quad": "quads", "line": "segments"}
+DIMENSIONS = {"vertex": 0, "line": 1, "triangle": 2, "quad": 2, "tetra": 3, "hexahedron": 3}
+FORMATS = {
+    "medit text": (".mesh", "medit", {}),
+    "medit binary": (".meshb", "medit", {}),
+    "gmsh 4.1 text": (".msh", "gmsh", {"binary": False}),
+    "gmsh 4.1 binary": (".msh", "gmsh", {}),
+    "gmsh 2.2 text": (".msh", "gmsh22", {"binary": False}),
+    "gmsh 2.2 binary": (".msh", "gmsh22", {}),
+}
+
+
+def cells_of(kind, count, rng):
+    """Return cells between 12 points, no corner twice."""
+    n_corners = {"tetra": 4, "triangle": 3, "quad": 4, "line": 2, "vertex": 1, "hexahedron": 8}[
+        kind
+    ]
+    return kind, np.array([rng.permutation(12)[:n_corners] for _ in range(count)])
+
+
+def written(path, name, options, points, cells):
+    """Write a file by meshio, which needs the entities of nodes and cells for gmsh 4.1."""
+    tags = {}
+    if name == "gmsh":
+        entities = np.array(
+            [[DIMENSIONS[kind], number] for number, (kind, _) in enumerate(cells, 1)]
+        )
+        numbers = [np.full(len(block), number) for number, (_, block) in enumerate(cells, 1)]
+        tags = {
+            "point_data": {"gmsh:dim_tags": entities[np.arange(len(points)) % len(cells)]},
+            "cell_data": {"gmsh:geometrical": numbers, "gmsh:physical": numbers},
+        }
+    meshio.write_points_cells(path, points, cells, file_format=name, **tags, **options)
+    return path
+
+
+@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize(
+    "kinds",
+    [
+        ["tetra"],
+        ["triangle", "quad"],
+        ["line"],
+        ["triangle", "tetra", "triangle", "vertex", "quad", "line"],
+    ],
+)
+def test_points_and_cells_are_those_of_meshio(tmp_path, form, dtype, kinds):
+    rng = np.random.default_rng(len(kinds))
+    suffix, name, options = FORMATS[form]
+    points, cells = (
+        rng.normal(size=(12, 3)).astype(dtype),
+        [cells_of(kind, 5, rng) for kind in kinds],
+    )
+    path = written(tmp_path / f"a{suffix}", name, options, points, cells)
+    theirs = meshio.read(path)
+    found, blocks = GRIDS[suffix](path.read_bytes())
+    np.testing.assert_array_equal(found, theirs.points)
+    assert set(blocks) == {KINDS[kind] for kind in kinds if kind in KINDS}
+    for kind, block in KINDS.items():
+        if block in blocks:
+            expected = [part.data for part in theirs.cells if part.type == kind]
+            np.testing.assert_array_equal(blocks[block], np.concatenate(expected))
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_solids_of_more_corners_are_refused(tmp_path, form):
+    rng = np.random.default_rng(0)
+    suffix, name, options = FORMATS[form]
+    cells = [cells_of("tetra", 3, rng), cells_of("hexahedron", 2, rng)]
+    path = written(tmp_path / f"a{suffix}", name, options, rng.normal(size=(12, 3)), cells)
+    with pytest.raises(
+        FileFormatError,
+        match=r"must hold simplices .* or quads, .* it holds hexahedron\. Split them",
+    ):
+        GRIDS[suffix](path.read_bytes())
