@@ -63,8 +63,8 @@ def zoo(tmp_path_factory):
 @pytest.fixture(scope="module")
 def database(zoo, tmp_path_factory):
     db = tmp_path_factory.mktemp("db") / "index"
-    done = run("index", zoo, "--db", db, "--views", 1, code=3)
-    assert "4 described, 0 known already, 1 not taken; the index holds 4 shapes" in done.stdout
+    done = run("index", db, zoo, "--views", 1, code=3)
+    assert "4 described, 0 known already, 1 failed; the index holds 4 shapes" in done.stdout
     assert "broken: " in done.output
     assert "vertex 2 is [2.0, 0.0, nan]" in done.output
     return db
@@ -126,7 +126,18 @@ def test_info_says_which_repairs_would_help_and_they_do(tmp_path):
 def test_spectrum(sphere, tmp_path):
     expected = solve_spectrum(cotangent_laplacian(read_mesh(sphere), "averaged"), 9)
     plot, picture, saved = tmp_path / "plot.png", tmp_path / "functions.png", tmp_path / "s.npz"
-    options = ("-k", 9, "--mass", "averaged", "--plot", plot, "--picture", picture, "--save", saved)
+    options = (
+        "-k",
+        9,
+        "--mass",
+        "averaged",
+        "--picture",
+        plot,
+        "--eigenfunctions",
+        picture,
+        "-o",
+        saved,
+    )
     found = run_json("spectrum", sphere, *options)
     assert found["eigenvalues"] == pytest.approx(expected.eigenvalues.tolist(), abs=1e-12)
     assert found["certificate"]["count"] == 9
@@ -152,7 +163,7 @@ def test_features(zoo, tmp_path):
     assert picture.read_bytes()[:8] == PNG
     few = run_json("features", path, "--persistence", found["features"][2]["persistence"])
     assert len(few["features"]) == 3
-    assert "never merges" in run("features", path, "--preset", "thesis").stdout
+    assert "never merges" in run("features", path, "--method", "thesis").stdout
     lengths = [row["persistence"] for row in run_json("features", path, "-n", 999)["features"][1:]]
     widest = int(np.argmax(np.subtract(lengths, [*lengths[1:], 0])))
     assert len(run_json("features", path, "--largest-gap")["features"]) == widest + 2
@@ -164,7 +175,7 @@ def test_features(zoo, tmp_path):
 
 @pytest.mark.long
 def test_index_goes_on_where_it_stopped(zoo, database):
-    again = run_json("index", zoo, "--db", database, "--views", 1, code=3)
+    again = run_json("index", database, zoo, "--views", 1, code=3)
     assert len(again["skipped"]) == again["shapes"] == 4
     assert again["added"] == []
     assert [name for name, _ in again["failed"]] == ["broken"]
@@ -182,14 +193,13 @@ def test_a_stopped_index_goes_on_without_doing_a_shape_twice(tmp_path, how):
         "-c",
         STOPPABLE,
         "index",
-        folder,
-        "--db",
         db,
+        folder,
         "--workers",
         "1",
     ]
     running = subprocess.Popen(
-        [*command, "--views", "0", "--preset", "scale-free"], stderr=subprocess.PIPE, text=True
+        [*command, "--views", "0", "--method", "scale-free"], stderr=subprocess.PIPE, text=True
     )
     while running.poll() is None and not (db / "rows-1.bin").exists():
         time.sleep(0.01)
@@ -198,9 +208,7 @@ def test_a_stopped_index_goes_on_without_doing_a_shape_twice(tmp_path, how):
     if how == "SIGINT":
         assert (running.returncode, told) == (130, "stopped; what was finished is kept\n")
     before = {record.name for record in ShapeIndex.open(db).records()}
-    report = run_json(
-        "index", folder, "--db", db, "--workers", 1, "--views", 0, "--preset", "scale-free"
-    )
+    report = run_json("index", db, folder, "--workers", 1, "--views", 0, "--method", "scale-free")
     assert set(report["skipped"]) == before
     assert len(before) < 6
     assert set(report["added"]) | before == {f"fish{number}" for number in range(6)}
@@ -211,7 +219,7 @@ def test_query_finds_the_kind_and_draws_it(zoo, database, tmp_path):
     scan = tmp_path / "scan.ply"
     write_mesh(partial_scan(make_creature("snake", 5, n_vertices=800), [0.2, 1.0, 0.1]).mesh, scan)
     sheet = tmp_path / "sheet.png"
-    found = run_json("query", database, scan, "-n", 2, "--sheet", sheet)
+    found = run_json("query", database, scan, "-n", 2, "--picture", sheet)
     assert [match["class"] for match in found["matches"]] == ["snake", "snake"]
     assert found["matches"][0]["correspondences"]
     assert set(found["seconds"]) == {"describe", "query"}
@@ -227,14 +235,14 @@ def test_query_finds_the_kind_and_draws_it(zoo, database, tmp_path):
         (("info", "mesh.abc"), "mesh.abc must be of a"),
         (("spectrum", "{sphere}", "-k", "0"), "k must lie in 1..162; it is 0"),
         (("spectrum", "{sphere}", "-k", "163"), "k must lie in 1..162; it is 163"),
-        (("spectrum", "{sphere}", "--plot", "plot.bmp"), "A picture must end in"),
+        (("spectrum", "{sphere}", "--picture", "plot.bmp"), "A picture must end in"),
         (
-            ("features", "{sphere}", "--preset", "best"),
-            "--preset takes scale-free or thesis; it was given 'best'",
+            ("features", "{sphere}", "--method", "best"),
+            "--method takes scale-free, thesis; it is 'best'",
         ),
         (("info", "{sphere}", "--repair", "everything"), "--repair takes auto, weld"),
         (("query", "nowhere", "{sphere}"), "must be an index"),
-        (("index", "{folder}", "--db", "{folder}/db"), "There must be meshes"),
+        (("index", "{folder}/db", "{folder}"), "There must be meshes"),
         (("demo", "--kind", "unicorn"), "--kind takes ant"),
     ],
 )
@@ -249,7 +257,7 @@ def test_errors_are_one_line_and_exit_code_1(sphere, tmp_path, arguments, messag
 
 def test_names_that_come_twice_are_refused(zoo, tmp_path):
     path = zoo / "fish" / "fish0.ply"
-    done = run("index", path, path, "--db", tmp_path / "db", code=1)
+    done = run("index", tmp_path / "db", path, path, code=1)
     assert "Names of shapes must differ; 'fish0' comes twice" in done.stderr
 
 
@@ -258,10 +266,10 @@ def test_a_sheet_is_drawn_from_another_folder_than_the_index_was_made_in(
     zoo, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(zoo)
-    run("index", "fish", "--db", tmp_path / "index", "--views", 0, "--preset", "scale-free")
+    run("index", tmp_path / "index", "fish", "--views", 0, "--method", "scale-free")
     scan = zoo / "fish" / "fish0.ply"
     monkeypatch.chdir(tmp_path)
-    done = run("query", "index", scan, "--sheet", "sheet.png")
+    done = run("query", "index", scan, "--picture", "sheet.png")
     assert done.stderr == "wrote sheet.png\n"
     assert (tmp_path / "sheet.png").read_bytes()[:8] == PNG
 
@@ -283,7 +291,7 @@ def test_a_match_without_its_file_leaves_its_place_empty(zoo, tmp_path):
         "there": str(path),
     }.items():
         index.add(name, [descriptor], source=source)
-    done = run("query", index.folder, path, "--sheet", tmp_path / "sheet.png")
+    done = run("query", index.folder, path, "--picture", tmp_path / "sheet.png")
     for said in (
         "not drawn: loose: A match is drawn from its mesh file; it was added to the index without one",
         "not drawn: moved: [Errno 2] No such file or directory",

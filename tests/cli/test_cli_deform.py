@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from eigenshape.cli import app
-from eigenshape.cli.regions import told_region, told_rotation, told_translation
+from eigenshape.cli.regions import parse_region, parse_rotation, parse_translation
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import bend
 from eigenshape.deformation.region import BoxRegion, BrushRegion, region_boundary, region_mask
@@ -43,7 +43,7 @@ def test_a_head_nods(giraffe, tmp_path):
         "deform",
         giraffe,
         *words,
-        "--out",
+        "-o",
         bent,
         "--picture",
         picture,
@@ -53,8 +53,8 @@ def test_a_head_nods(giraffe, tmp_path):
     )
     found = json.loads(done.stdout)
     mesh = read_mesh(giraffe)
-    region = told_region("y>70%", mesh, QUIET)
-    expected = bend(bind(rig_shape(mesh), [region]), [told_rotation("x by 40", mesh, region)])
+    region = parse_region("y>70%", mesh, QUIET)
+    expected = bend(bind(rig_shape(mesh), [region]), [parse_rotation("x by 40", mesh, region)])
     np.testing.assert_array_equal(read_mesh(bent).vertices, expected.vertices)
     assert found["edits"] == 1
     assert 0 < found["vertices_moved"] < mesh.n_vertices
@@ -85,9 +85,9 @@ def test_edits_of_another_mesh_are_refused_or_carried(giraffe, tmp_path):
         "edits.json: Edits name vertices of the mesh that they were made on; that has 900 vertices"
         in refused
     )
-    assert "Here --carry PATH names it." in refused
+    assert "On the command line, --edits-mesh names it." in refused
     assert not bent.exists()
-    run("deform", finer, "--edits", edits, "--carry", giraffe, "-o", bent)
+    run("deform", finer, "--edits", edits, "--edits-mesh", giraffe, "-o", bent)
     moved = np.linalg.norm(read_mesh(bent).vertices - read_mesh(finer).vertices, axis=1)
     # The middle of the head moves as one; its rim follows the neck.
     assert np.median(moved[head]) == pytest.approx(0.05, rel=1e-6)
@@ -96,10 +96,13 @@ def test_edits_of_another_mesh_are_refused_or_carried(giraffe, tmp_path):
     assert np.median(moved) < 1e-3
     alone = " ".join(
         run(
-            "deform", finer, *("--carry", giraffe, "--region", "y>70%", "--move", "0,0.1,0"), code=1
+            "deform",
+            finer,
+            *("--edits-mesh", giraffe, "--region", "y>70%", "--move", "0,0.1,0"),
+            code=1,
         ).stderr.split()
     )
-    assert "--carry names the mesh that --edits were made on" in alone
+    assert "--edits-mesh is used together with --edits" in alone
 
 
 @pytest.mark.parametrize("suffix", [".obj", ".glb", ".stl", ".off", ".ply"])
@@ -123,20 +126,20 @@ def test_people_see_a_table(giraffe):
 def test_words_for_regions(giraffe, tmp_path):
     mesh = read_mesh(giraffe)
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    box = told_region("y > 25%, x<0.5", mesh, QUIET)
+    box = parse_region("y > 25%, x<0.5", mesh, QUIET)
     assert isinstance(box, BoxRegion)
     np.testing.assert_allclose(box.low, [-np.inf, low[1] + 0.25 * (high - low)[1], -np.inf])
     np.testing.assert_allclose(box.high, [0.5, np.inf, np.inf])
-    brush = told_region("vertex 7 within 10%", mesh, QUIET)
+    brush = parse_region("vertex 7 within 10%", mesh, QUIET)
     assert isinstance(brush, BrushRegion)
     assert brush.radius == pytest.approx(0.1 * surface_area(mesh) ** 0.5)
-    assert told_region("vertex 7 within 0.25", mesh, QUIET).radius == 0.25
+    assert parse_region("vertex 7 within 0.25", mesh, QUIET).radius == 0.25
     listed = tmp_path / "some.txt"
     listed.write_text("3\n1\n4\n")
-    assert told_region(str(listed), mesh, QUIET).tolist() == [3, 1, 4]
+    assert parse_region(str(listed), mesh, QUIET).tolist() == [3, 1, 4]
     n_parts = len(find_parts(mesh).parts.features.vertices)
     masks = [
-        region_mask(mesh, told_region(f"part {number}", mesh, QUIET)) for number in range(n_parts)
+        region_mask(mesh, parse_region(f"part {number}", mesh, QUIET)) for number in range(n_parts)
     ]
     assert np.all(np.any(masks, axis=0))
     assert all(0 < mask.sum() < mesh.n_vertices for mask in masks)
@@ -144,14 +147,14 @@ def test_words_for_regions(giraffe, tmp_path):
 
 def test_words_for_handles(giraffe):
     mesh = read_mesh(giraffe)
-    region = told_region("y>70%", mesh, QUIET)
-    turn = told_rotation("0,3,4 by -90", mesh, region)
+    region = parse_region("y>70%", mesh, QUIET)
+    turn = parse_rotation("0,3,4 by -90", mesh, region)
     np.testing.assert_allclose(turn.axis, [0, 0.6, 0.8])
     assert turn.angle == pytest.approx(-np.pi / 2)
     rim = region_boundary(mesh, region_mask(mesh, region))
     np.testing.assert_allclose(turn.pivot, mesh.vertices[rim].mean(axis=0))
-    np.testing.assert_allclose(told_rotation("z by 720 @ 1,2,3", mesh, region).pivot, [1, 2, 3])
-    np.testing.assert_allclose(told_translation("0, -1e-1 ,2").vector, [0, -0.1, 2])
+    np.testing.assert_allclose(parse_rotation("z by 720 @ 1,2,3", mesh, region).pivot, [1, 2, 3])
+    np.testing.assert_allclose(parse_translation("0, -1e-1 ,2").vector, [0, -0.1, 2])
 
 
 @pytest.mark.parametrize(
@@ -160,14 +163,14 @@ def test_words_for_handles(giraffe):
         (["--region", "head", "--move", "0,1,0"], "A region is one of these"),
         (
             ["--region", "head", "--move", "0,1,0", "-o", "a.txt"],
-            "A mesh goes to .off, .obj, .ply, .stl, .glb; a.txt ends in '.txt'",
+            "A mesh must be written to a file that ends in .off, .obj, .ply, .stl, .glb; a.txt ends in '.txt'",
         ),
         (
             ["--region", "head", "--move", "0,1,0", "-o", "nowhere/a.obj"],
-            "A mesh needs a folder to lie in",
+            "A mesh must be written to a folder that exists",
         ),
         (["--region", "y>500", "--move", "0,1,0"], "must have a boundary on the shape"),
-        (["--region", "y>70%", "--move", "0,1"], "A move is three numbers with commas between"),
+        (["--region", "y>70%", "--move", "0,1"], "A move is three numbers separated by commas"),
         (["--region", "y>70%", "--rotate", "x 90"], "A rotation is 'x by 90'"),
         (["--region", "y>70%", "--rotate", "a,b,c by 3"], "An axis is three numbers"),
         (["--region", "y>70%", "--rotate", "x by 3 @ 1,2"], "A pivot is three numbers"),
@@ -198,4 +201,4 @@ def test_a_list_that_is_none_is_named(giraffe, tmp_path):
     listed = tmp_path / "some.txt"
     listed.write_text("3\nx\n")
     done = run("deform", giraffe, "--region", listed, "--move", "0,1,0", code=1)
-    assert "must hold one index of a vertex a line" in " ".join(done.stderr.split())
+    assert "has one vertex index a line" in " ".join(done.stderr.split())

@@ -47,7 +47,8 @@ def command(poses, *more):
 @pytest.mark.long
 def test_label_gives_what_transfer_labels_gives(poses, tmp_path):
     saved, colored, picture = tmp_path / "posed.seg", tmp_path / "posed.ply", tmp_path / "both.png"
-    done = run(*command(poses, "--json", "--save", saved, "-o", colored, "--picture", picture))
+    run(*command(poses, "-o", saved))
+    done = run(*command(poses, "--json", "-o", colored, "--picture", picture))
     found = json.loads(done.stdout)
     rest, posed = read_mesh(poses / "rest.ply"), read_mesh(poses / "posed.ply")
     expected = transfer_labels(rest, read_labels(poses / "rest.seg"), posed)
@@ -60,7 +61,7 @@ def test_label_gives_what_transfer_labels_gives(poses, tmp_path):
     assert sum(row["area_share"] for row in found["parts"]) == pytest.approx(1)
     assert np.array_equal(read_mesh(colored).vertices, posed.vertices)
     assert picture.read_bytes()[:4] == b"\x89PNG"
-    assert [path.name for path in (saved, colored, picture)] == [
+    assert [path.name for path in (colored, picture)] == [
         line.rpartition("/")[2] for line in done.stderr.splitlines() if line.startswith("wrote ")
     ]
 
@@ -86,8 +87,14 @@ def test_label_prints_a_table_and_takes_what_segment_prints(poses, tmp_path):
         (("--labels", "{short}"), "There must be one label a face, 2396; there are 2"),
         (("--labels", "{bad}"), "A label must be a whole number; line 2 has 'head'"),
         (("--labels", "{bad}", "--picture", "a.bmp"), "A picture must end in"),
-        (("--labels", "{bad}", "-o", "a.obj"), "Colours go to a .ply file; a.obj ends in '.obj'"),
-        (("--labels", "{bad}", "--save", "{bad}/no/a.seg"), "Labels need a folder to lie in"),
+        (
+            ("--labels", "{bad}", "-o", "a.obj"),
+            "written to a file that ends in .ply, .seg, .txt; a.obj ends in '.obj'",
+        ),
+        (
+            ("--labels", "{bad}", "-o", "{bad}/no/a.seg"),
+            "A mesh with labels must be written to a folder that exists",
+        ),
         (("--labels", "{none}"), "No such file"),
         (("--labels", "{seg}", "-n", 0), "n_regions must be at least 1; it is 0"),
     ],

@@ -51,7 +51,7 @@ def test_a_broken_file_is_named_with_what_is_wrong_in_it(tmp_path, verb):
     ("arguments", "message"),
     [
         (
-            ("spectrum", "{missing}", "--plot", "{folder}/a.bmp"),
+            ("spectrum", "{missing}", "--picture", "{folder}/a.bmp"),
             "A picture must end in .png, .svg, .pdf",
         ),
         (
@@ -59,26 +59,26 @@ def test_a_broken_file_is_named_with_what_is_wrong_in_it(tmp_path, verb):
             "A picture must end in .png, .svg, .pdf",
         ),
         (
-            ("spectrum", "{missing}", "--plot", "{missing}/a.png"),
-            "A picture needs a folder to lie in",
+            ("spectrum", "{missing}", "--picture", "{missing}/a.png"),
+            "A picture must be written to a folder that exists",
         ),
         (
             ("features", "{missing}", "--picture", "{folder}/a.bmp"),
             "A picture must end in .png, .svg, .pdf",
         ),
         (
-            ("features", "{missing}", "--preset", "best"),
-            "--preset takes scale-free or thesis; it was given 'best'",
+            ("features", "{missing}", "--method", "best"),
+            "--method takes scale-free, thesis; it is 'best'",
         ),
         (
-            ("query", "{missing}", "{missing}", "--sheet", "{folder}/a.bmp"),
+            ("query", "{missing}", "{missing}", "--picture", "{folder}/a.bmp"),
             "A picture must end in .png, .svg, .pdf",
         ),
         (
-            ("index", "{missing}", "--db", "{folder}/db", "--preset", "best"),
-            "--preset takes patches or scale-free or th",
+            ("index", "{folder}/db", "{missing}", "--method", "best"),
+            "--method takes patches, scale-free, th",
         ),
-        (("index", "{missing}", "--db", "{folder}/db", "--repair", "all"), "it was given 'all'"),
+        (("index", "{folder}/db", "{missing}", "--repair", "all"), "it was given 'all'"),
     ],
 )
 def test_a_bad_option_is_refused_before_any_file_is_looked_at(tmp_path, arguments, message):
@@ -98,7 +98,7 @@ def test_a_bad_option_is_refused_before_any_file_is_looked_at(tmp_path, argument
 )
 def test_pictures_of_every_kind_are_more_than_a_frame(fish, tmp_path, suffix, magic):
     plot = tmp_path / f"plot.{suffix}"
-    done = run("spectrum", fish, "-k", 5, "--plot", plot, "--json", code=0)
+    done = run("spectrum", fish, "-k", 5, "--picture", plot, "--json", code=0)
     assert plot.read_bytes().startswith(magic)
     assert plot.stat().st_size > 5000
     assert "wrote " in done.stderr
@@ -111,9 +111,9 @@ def test_index_names_the_broken_file_takes_the_rest_and_knows_it_again(fish, tmp
     folder.mkdir()
     write_mesh(icosphere(2), folder / "ball.ply")
     (folder / "broken.off").write_text(BROKEN)
-    command = ("index", folder, fish, "--db", tmp_path / "db", "--workers", 1, "--views", 0)
+    command = ("index", tmp_path / "db", folder, fish, "--workers", 1, "--views", 0)
     first = run(*command, code=3)
-    assert "2 described, 0 known already, 1 not taken; the index holds 2 shapes" in first.stdout
+    assert "2 described, 0 known already, 1 failed; the index holds 2 shapes" in first.stdout
     assert "broken.off: faces must index vertices 0..2" in first.stdout
     again = json.loads(run(*command, "--json", code=3).stdout)
     assert (again["shapes"], again["added"], sorted(again["skipped"])) == (2, [], ["ball", "fish"])

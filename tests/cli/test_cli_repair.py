@@ -85,9 +85,12 @@ def test_without_repairs_it_converts(tmp_path):
         (("--repair", "polish", "-o", "{folder}/b.ply"), "--repair takes "),
         (
             ("--repair", "weld", "-o", "{folder}/b.vtk"),
-            "A mesh goes to .off, .obj, .ply, .stl, .glb; ",
+            "A mesh must be written to a file that ends in .off, .obj, .ply, .stl, .glb; ",
         ),
-        (("--repair", "weld", "-o", "{folder}/no/b.ply"), "A mesh needs a folder to lie in; "),
+        (
+            ("--repair", "weld", "-o", "{folder}/no/b.ply"),
+            "A mesh must be written to a folder that exists; ",
+        ),
     ],
 )
 def test_what_is_wrong_is_named_and_nothing_written(tmp_path, options, message):
@@ -187,7 +190,8 @@ def test_labels_are_a_property_of_faces_that_label_reads(tmp_path):
         "--labels",
         tmp_path / "parts.ply",
     )
-    run(*arguments, "-o", tmp_path / "again.ply", "--save", tmp_path / "again.seg")
+    for name in ("again.ply", "again.seg"):
+        run(*arguments, "-o", tmp_path / name)
     again = read_labels(tmp_path / "again.ply")
     assert again.tolist() == read_labels(tmp_path / "again.seg").tolist()
     assert np.mean(again == labels) > 0.95

@@ -81,7 +81,7 @@ def test_segment_smooths_parts_and_leaves_regions_of_heat_as_they_are(biped):
     assert rough != run_json("segment", biped)["face_labels"]
     thesis = run_json("segment", biped, "--method", "thesis")
     assert len(thesis["parts"]) == 15
-    features = run_json("features", biped, "--preset", "thesis")
+    features = run_json("features", biped, "--method", "thesis")
     assert thesis["face_labels"] == features["face_labels"]
     assert (
         thesis["face_labels"]
@@ -100,15 +100,21 @@ def test_segment_prints_a_table(biped):
     [
         (
             ("segment", "{missing}", "--method", "best"),
-            "--method takes parts, scale-free, thesis; it was given 'best'",
+            "--method takes parts, scale-free, thesis; it is 'best'",
         ),
         (
             ("segment", "{missing}", "-o", "a.obj"),
-            "Colours go to a .ply file; a.obj ends in '.obj'",
+            "A mesh with labels must be written to a file that ends in .ply, .seg, .txt; a.obj ends",
         ),
-        (("segment", "{missing}", "-o", "{missing}/a.ply"), "A mesh needs a folder to lie in"),
+        (
+            ("segment", "{missing}", "-o", "{missing}/a.ply"),
+            "A mesh with labels must be written to a folder",
+        ),
         (("segment", "{missing}", "--picture", "a.bmp"), "A picture must end in"),
-        (("features", "{missing}", "--ply", "a.obj"), "Colours go to a .ply file"),
+        (
+            ("features", "{missing}", "-o", "a.obj"),
+            "A mesh with colors must be written to a file that ends in .ply; ",
+        ),
         (
             ("segment", "{mesh}", "-n", 3, "--largest-gap"),
             "exactly one of n_regions, persistence and largest_gap",
@@ -124,9 +130,9 @@ def test_segment_refuses_before_it_works(biped, tmp_path, arguments, message):
     assert done.stdout == ""
 
 
-def test_features_write_their_heat_as_colours(biped, tmp_path):
+def test_features_write_their_heat_as_colors(biped, tmp_path):
     path = tmp_path / "heat.ply"
-    run("features", biped, "--ply", path)
+    run("features", biped, "-o", path)
     colors = colors_in(path)
     assert len(np.unique(colors, axis=0)) > 50
     hottest = run_json("features", biped)["features"][0]["vertex"]

@@ -83,7 +83,7 @@ def test_a_map_and_a_scale_can_be_given(folder):
         *FEW,
         "--scale",
         "area",
-        "-t",
+        "--t",
         "0.01",
         "--json",
     )

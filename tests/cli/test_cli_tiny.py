@@ -61,7 +61,7 @@ def test_other_verbs_take_a_tiny_shape(tiny, tmp_path):
 def test_tiny_shapes_are_indexed_and_found(preset, tmp_path):
     for name, mesh in TINY.items():
         write_mesh(mesh, tmp_path / f"{name}.obj")
-    run("index", tmp_path, "--db", tmp_path / "db", "--preset", preset)
+    run("index", tmp_path / "db", tmp_path, "--method", preset)
     for name in TINY:
         matches = run_json("query", tmp_path / "db", tmp_path / f"{name}.obj")["matches"]
         assert {match["name"] for match in matches} == {*TINY}

@@ -9,7 +9,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 import eigenshape as es
-from eigenshape.cli import app, console
+from eigenshape.cli import app, console, inputs
 
 EVIL = "a\x1b[31m\x07\n\u202e$x_[bold]\x9b$"
 SPELLED = r"a\x1b[31m\x07\n\u202e$x_[bold]\x9b$"
@@ -54,11 +54,11 @@ def test_a_mesh(zoo, tmp_path):
     labels, colored = tmp_path / f"{EVIL}.seg", tmp_path / f"{EVIL}.ply"
     labels.write_text("1\n" * es.read_mesh(mesh).n_faces)
     assert SPELLED in run("info", mesh).stdout
-    assert SPELLED in run("spectrum", mesh, "-k", 4, "--plot", picture).stderr
+    assert SPELLED in run("spectrum", mesh, "-k", 4, "--picture", picture).stderr
     parse(picture)
-    run("features", mesh, "--picture", picture, "--ply", colored)
+    run("features", mesh, "--picture", picture, "-o", colored)
     run("segment", mesh, "-o", colored)
-    run("label", mesh, "--like", mesh, "--labels", labels, "--save", tmp_path / f"{EVIL}2.seg")
+    run("label", mesh, "--like", mesh, "--labels", labels, "-o", tmp_path / f"{EVIL}2.seg")
     run(
         "deform",
         mesh,
@@ -89,10 +89,10 @@ def changed(edits):
 @pytest.mark.long
 def test_an_index(zoo, tmp_path):
     db, sheet = tmp_path / EVIL, tmp_path / "sheet.svg"
-    done = run("index", zoo, "--db", db, "--views", 0, "--preset", "scale-free", code=3)
+    done = run("index", db, zoo, "--views", 0, "--method", "scale-free", code=3)
     assert f"{SPELLED}: " in done.stdout
     assert f"{SPELLED}: " in done.stderr
-    done = run("query", db, zoo / f"{EVIL}0.ply", "--sheet", sheet)
+    done = run("query", db, zoo / f"{EVIL}0.ply", "--picture", sheet)
     assert f"{SPELLED}0" in done.stdout
     text = parse(sheet)
     assert f"query: {SPELLED}0" in text
@@ -102,7 +102,7 @@ def test_an_index(zoo, tmp_path):
         es.make_creature("fish", 0, n_vertices=500)
     ).descriptor
     foreign.add(EVIL, [descriptor], label=EVIL, source=EVIL)
-    done = run("query", foreign.folder, zoo / f"{EVIL}0.ply", "--sheet", sheet)
+    done = run("query", foreign.folder, zoo / f"{EVIL}0.ply", "--picture", sheet)
     assert done.stdout.count(SPELLED) == 2
     assert f"not drawn: {SPELLED}" in done.stderr
     parse(sheet)
@@ -125,9 +125,10 @@ def test_progress_bars(monkeypatch):
         (["info", f"{EVIL}.ply"], 1),
         (["info", "{zoo}"], 1),
         (["features", "{zoo}/{evil}.off"], 1),
+        (["spectrum", "{zoo}/{evil}0.ply", "--operator", EVIL], 1),
         (["spectrum", "{zoo}/{evil}0.ply", "-o", EVIL], 1),
         (["spectrum", "{zoo}/{evil}0.ply", "-k", EVIL], 2),
-        (["spectrum", "{zoo}/{evil}0.ply", "--plot", EVIL], 1),
+        (["spectrum", "{zoo}/{evil}0.ply", "--picture", EVIL], 1),
         (["segment", "{zoo}/{evil}0.ply", "-o", EVIL], 1),
         (["deform", "{zoo}/{evil}0.ply", "--region", EVIL, "--move", "0,1,0"], 1),
         (["deform", "{zoo}/{evil}0.ply", "--region", "y>0", "--rotate", EVIL], 1),
@@ -144,7 +145,7 @@ def test_progress_bars(monkeypatch):
             1,
         ),
         (["query", EVIL, EVIL], 1),
-        (["index", "{zoo}", "--db", "{zoo}", "--repair", EVIL], 1),
+        (["index", "{zoo}", "{zoo}", "--repair", EVIL], 1),
         (["demo", "--kind", EVIL], 1),
         ([f"--{EVIL}"], 2),
         ([EVIL], 2),
@@ -166,7 +167,7 @@ def test_warnings(zoo, monkeypatch):
         warnings.warn(f"{path} is odd", UserWarning, stacklevel=1)
         return es.icosphere(0)
 
-    monkeypatch.setattr(console, "read_mesh", warn)
+    monkeypatch.setattr(inputs, "read_mesh", warn)
     assert f"{SPELLED}0.ply is odd" in run("features", zoo / f"{EVIL}0.ply", "-n", 2).stderr
 
 

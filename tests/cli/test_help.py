@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 from importlib.metadata import version
+from pathlib import Path
 
 import pytest
 import typer
@@ -11,9 +12,11 @@ from typer.testing import CliRunner
 
 import eigenshape
 from eigenshape.cli import app
+from eigenshape.cli.verbs import VERBS, load_verb
 
 COMMAND = typer.main.get_command(app)
-VERBS = sorted(COMMAND.commands)
+# eigenshape itself and the command line are light; these take a second together
+HEAVY = {"numpy", "numba", "scipy", "matplotlib", "sqlite3", "jaxtyping"}
 WIDE = {"COLUMNS": "2000"}  # no text is broken over lines
 
 
@@ -31,21 +34,48 @@ def printed(*arguments):
 @pytest.mark.parametrize("verb", ["", *VERBS])
 def test_help_is_printed_to_the_letter(verb):
     """Nothing in it is taken for markup, such as the brackets of `eigenshape[bridges]`."""
-    command = COMMAND.commands[verb] if verb else COMMAND
+    command = load_verb(verb) if verb else COMMAND
     text = printed(verb) if verb else printed()
     written = [command.help, *(parameter.help for parameter in command.params)]
     if not verb:
-        written += [
-            COMMAND.epilog,
-            *(other.help.split("\n\n")[0] for other in COMMAND.commands.values()),
-        ]
+        written += [COMMAND.epilog, *VERBS, *VERBS.values()]
     for sentence in filter(None, written):
         assert words(sentence) in text
 
 
 @pytest.mark.parametrize("verb", VERBS)
+def test_the_list_of_verbs_has_the_first_line_of_each_docstring(verb):
+    assert words(load_verb(verb).help.split("\n\n")[0]) == words(VERBS[verb])
+
+
+def test_every_module_with_a_verb_is_in_the_list():
+    folder = Path(eigenshape.cli.__file__).parent
+    names = {path.stem for path in folder.glob("*.py") if f"\ndef {path.stem}(" in path.read_text()}
+    assert names == VERBS.keys()
+
+
+@pytest.mark.parametrize("arguments", [["--help"], [], ["--version"], ["quary"]])
+def test_the_list_of_verbs_loads_nothing_heavy(arguments):
+    code = (
+        "import sys, eigenshape_command\n"
+        "try: eigenshape_command.main()\n"
+        f"finally: print(sorted({HEAVY} & sys.modules.keys()), file=sys.stderr)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False
+    )
+    assert done.stderr.endswith("[]\n")
+
+
+def test_a_misspelt_verb_gets_a_suggestion():
+    done = CliRunner().invoke(app, ["quary"])
+    assert done.exit_code == 2
+    assert "Did you mean 'query'?" in done.stderr
+
+
+@pytest.mark.parametrize("verb", VERBS)
 def test_every_option_is_explained_in_a_sentence(verb):
-    for parameter in COMMAND.commands[verb].params:
+    for parameter in load_verb(verb).params:
         if parameter.name != "help":
             assert parameter.help, parameter.name
             assert parameter.help[-1] == ".", parameter.name
@@ -71,3 +101,44 @@ def test_the_command_is_a_module_too(module):
         [sys.executable, "-m", module, "info", "-h"], capture_output=True, text=True, check=True
     )
     assert "Usage: eigenshape info" in usage.stdout
+
+
+ALL = [(verb, parameter) for verb in VERBS for parameter in load_verb(verb).params]
+
+
+def spellings(of):
+    return {tuple(parameter.opts) for _, parameter in ALL if of(parameter)}
+
+
+def test_the_main_output_of_every_verb_is_called_output():
+    written = [verb for verb, parameter in ALL if parameter.name == "output"]
+    assert written == ["repair", "spectrum", "features", "segment", "label", "deform", "demo"]
+    assert spellings(lambda parameter: parameter.name == "output") == {("-o", "--output")}
+    assert spellings(lambda parameter: "-o" in parameter.opts) == {("-o", "--output")}
+
+
+def test_a_picture_is_called_picture():
+    drawn = {
+        parameter.name for _, parameter in ALL if "PNG, SVG or PDF" in " ".join([parameter.help])
+    }
+    assert drawn == {"picture", "eigenfunctions"}
+    assert spellings(lambda parameter: parameter.name == "picture") == {("--picture",)}
+
+
+def test_an_index_is_the_first_argument():
+    for verb in ("index", "query"):
+        first = load_verb(verb).params[0]
+        assert (first.name, first.param_type_name) == ("index", "argument")
+
+
+def test_an_option_of_one_name_is_spelled_alike_in_every_verb():
+    for name in {parameter.name for _, parameter in ALL}:
+        options = [found for _, found in ALL if found.name == name]
+        if name not in {"shape", "mesh"}:  # which are arguments
+            assert len({tuple(option.opts) for option in options}) == 1, name
+
+
+def test_no_option_has_two_long_names():
+    for verb, parameter in ALL:
+        long = [text for text in parameter.opts if text.startswith("--")]
+        assert len(long) <= 1, (verb, parameter.opts)

@@ -106,9 +106,7 @@ def test_while_loops_are_compiled(ball, tmp_path, n_files):
 def test_while_workers_start_and_work(herd, tmp_path, sign):
     """The first sign comes before the workers' own imports, the second with the first shape."""
     db = tmp_path / "db"
-    running = start(
-        "index", herd, "--db", db, "--workers", 2, "--views", 0, "--preset", "scale-free"
-    )
+    running = start("index", db, herd, "--workers", 2, "--views", 0, "--method", "scale-free")
     wait_until((db / sign).exists, running)
     assert press_ctrl_c(running) == (130, "stopped; what was finished is kept\n")
     assert len(ShapeIndex.open(db)) < 4

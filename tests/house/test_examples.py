@@ -1,3 +1,4 @@
+import re
 import runpy
 from pathlib import Path
 
@@ -70,3 +71,14 @@ def test_noise_moves_points_little_and_a_pose_eigenvalues_little(tmp_path):
     assert not noisy.times.empty
     assert posed.times.empty
     assert (tmp_path / "posed.png").stat().st_size > 10_000
+
+
+@pytest.mark.long
+def test_the_pictures_of_the_front_page_can_be_drawn(tmp_path):
+    drawn = runpy.run_path(str(ROOT / "examples" / "front_page.py"))["main"](
+        tmp_path, n_vertices=800
+    )
+    readme = (ROOT / "README.md").read_text()
+    shown = re.findall(r"\(docs/pictures/(\S+?)\)", readme)
+    assert shown == [path.name for path in drawn]
+    assert all(path.stat().st_size > 10_000 for path in drawn)

@@ -156,5 +156,7 @@ def test_files_are_whole_repeatable_and_of_a_known_kind(tmp_path):
         InvalidParameterError, match=r"A picture must end in .png, .svg, .pdf; .* ends in '.bmp'"
     ):
         save_figure(figure, tmp_path / "one.bmp")
-    with pytest.raises(InvalidParameterError, match="A picture needs a folder to lie in"):
+    with pytest.raises(
+        InvalidParameterError, match="A picture must be written to a folder that exists"
+    ):
         save_figure(figure, tmp_path / "nowhere" / "one.png")

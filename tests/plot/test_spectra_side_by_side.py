@@ -72,12 +72,12 @@ def test_equal_spectra_differ_by_nothing():
 
 def test_bad_input():
     with pytest.raises(
-        InvalidParameterError, match="Spectra side by side must be two or more; there are 1"
+        InvalidParameterError, match="spectra must hold two or more spectra; it holds 1"
     ):
         figure_spectra({"one": LUMPED})
     with pytest.raises(
         InvalidParameterError,
-        match="brackets must belong to spectra by their titles; 'three' is none",
+        match=r"The titles of brackets must be titles of spectra, .*; one is 'three'",
     ):
         figure_spectra(
             {"one": LUMPED, "two": LUMPED}, brackets={"three": bracket_eigenvalues(SPHERE, 20)}

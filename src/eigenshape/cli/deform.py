@@ -7,20 +7,16 @@ import numpy as np
 import typer
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import (
-    JsonOption,
-    MeshArgument,
-    RepairOption,
-    load_mesh,
-    print_json,
-    print_table,
-    progress_bar,
-    said,
+from eigenshape.cli.console import print_json, print_table, print_written, progress_bar
+from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, load_mesh
+from eigenshape.cli.outputs import (
+    require_mesh_path,
+    require_output,
+    require_picture,
+    save_like,
     save_picture,
 )
-from eigenshape.cli.outputs import require_mesh_path, save_like
-from eigenshape.cli.parts import require_paths
-from eigenshape.cli.regions import REGIONS, told_region, told_rotation, told_translation
+from eigenshape.cli.regions import REGIONS, parse_region, parse_rotation, parse_translation
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import require_mode
 from eigenshape.deformation.distortion import measure_distortion
@@ -41,7 +37,7 @@ def deform(
     rotate: Annotated[
         str,
         typer.Option(
-            metavar="WORDS",
+            metavar="ROTATION",
             help=(
                 "Turn the region about an axis, in degrees: 'x by 90', '0,1,1 by 30', or 'z by "
                 "45 @ 0,0.1,0' about a point."
@@ -54,7 +50,8 @@ def deform(
     fixed: Annotated[
         str,
         typer.Option(
-            help="Which part must not move, in the words of --region; by default all that is not in the region."
+            help="Which part must not move, written as for --region. By default everything outside the "
+            "region."
         ),
     ] = "",
     mode: Annotated[
@@ -72,18 +69,19 @@ def deform(
             "-n",
             "--n-modes",
             help=(
-                "Number of eigenfunctions: few bend over a wide zone, many bend sharply. By "
-                "default 8, 50 or 300, by the mode."
+                "Number of eigenfunctions: few bend over a wide zone, many bend sharply. The "
+                "default depends on --mode: 8, 50 or 300."
             ),
         ),
     ] = None,
     edits: Annotated[
         Path | None, typer.Option(help="Apply the edits of this JSON file first.")
     ] = None,
-    carry: Annotated[
+    edits_mesh: Annotated[
         Path | None,
         typer.Option(
-            help="Mesh on which --edits were made, if it is another: their regions go to the nearest vertices."
+            help="Mesh on which --edits were made, if it is another one. Their regions then "
+            "move to the nearest vertices."
         ),
     ] = None,
     save_edits: Annotated[
@@ -92,9 +90,7 @@ def deform(
     repair: RepairOption = "",
     output: Annotated[
         Path | None,
-        typer.Option(
-            "-o", "--output", "--out", help="Write the bent mesh (PLY, OBJ, OFF, STL or GLB)."
-        ),
+        typer.Option("-o", "--output", help="Write the bent mesh (PLY, OBJ, OFF, STL or GLB)."),
     ] = None,
     picture: Annotated[
         Path | None, typer.Option(help="Draw the mesh before and after (PNG, SVG or PDF).")
@@ -105,29 +101,30 @@ def deform(
 
     For instance: eigenshape deform scan.ply --region 'y>60%' --rotate 'x by 30' -o bent.ply --picture bent.png
     """
-    require_paths(picture, None)
+    require_picture(picture)
     require_mesh_path(output)
+    require_output(save_edits, (".json",), "A list of edits")
     handles = [name for name in (rotate, move) if name]
     if bool(region) != (len(handles) == 1) or not (region or edits):
         raise InvalidParameterError(
             "Give --region with either --rotate or --move, or --edits, or all of them."
         )
-    if carry and not edits:
+    if edits_mesh and not edits:
         raise InvalidParameterError(
-            f"--carry names the mesh that --edits were made on; it is {carry}, without --edits."
+            f"--edits-mesh is used together with --edits; it is {edits_mesh}, and --edits is missing."
         )
     checked = require_mode(mode)
     surface = load_mesh(mesh, repair)
     with progress_bar("modes") as progress:
         rig = rig_shape(surface, progress=progress)
-        source = load_mesh(carry, repair) if carry else None
+        source = load_mesh(edits_mesh, repair) if edits_mesh else None
         done = _read_edits(edits, source or surface) if edits else []
         session = replay(rig, done, source=source)
         if region:
-            chosen = told_region(region, session.mesh, progress)
-            stays = told_region(fixed, session.mesh, progress) if fixed else None
+            chosen = parse_region(region, session.mesh, progress)
+            stays = parse_region(fixed, session.mesh, progress) if fixed else None
             handle: Handle = (
-                told_rotation(rotate, session.mesh, chosen) if rotate else told_translation(move)
+                parse_rotation(rotate, session.mesh, chosen) if rotate else parse_translation(move)
             )
             session.apply(Edit((Move(chosen, handle),), stays, n_modes, checked))
     _report(session.mesh, surface, session.edits, rig, as_json=as_json)
@@ -135,7 +132,7 @@ def deform(
         save_like(mesh, surface, output, session.mesh.vertices)
     if save_edits:
         write_edits(session.edits, surface, save_edits)
-        said(save_edits)
+        print_written(save_edits)
     if picture:
         moved = np.linalg.norm(session.mesh.vertices - surface.vertices, axis=1)
         shares = (
@@ -150,7 +147,9 @@ def _read_edits(path: Path, mesh: TriangleMesh) -> list[Edit]:
     try:
         return read_edits(path, mesh)
     except InvalidParameterError as error:
-        raise InvalidParameterError(f"{path}: {error} Here --carry PATH names it.") from error
+        raise InvalidParameterError(
+            f"{path}: {error} On the command line, --edits-mesh names it."
+        ) from error
 
 
 def _last_shares(rig: EigenRig, edits: tuple[Edit, ...]) -> np.ndarray:

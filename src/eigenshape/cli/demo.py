@@ -7,9 +7,10 @@ import numpy as np
 import typer
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import out, progress_bar, save_picture, shown
+from eigenshape.cli.console import out, progress_bar, shown
 from eigenshape.cli.index import WorkersOption, describe_all
-from eigenshape.cli.presets import PATCHES, recipe_to_fill
+from eigenshape.cli.methods import PATCHES, recipe_to_fill
+from eigenshape.cli.outputs import save_picture
 from eigenshape.cli.query import print_matches
 from eigenshape.cli.sheets import CAPTION, asked, contact_sheet
 from eigenshape.io.mesh_files import write_mesh
@@ -25,31 +26,31 @@ N_VERTICES = 2000
 NEXT = """
 Read next:
   eigenshape features {scan} --picture parts.png      what persists on that scan, and the parts around it
-  eigenshape spectrum {scan} -k 20 --plot spectrum.png  its eigenvalues, and the proof that none is missing
-  eigenshape index FOLDER --db my-index               the same for a folder of your own meshes
-  eigenshape query my-index SCAN --sheet sheet.png    and a scan of yours
+  eigenshape spectrum {scan} -k 20 --picture spectrum.png  its eigenvalues, and the proof that none is missing
+  eigenshape index my-index FOLDER                    the same for a folder of your own meshes
+  eigenshape query my-index SCAN --picture sheet.png  and a scan of yours
   README.md, docs/glossary.md                         the same road in ten lines of Python, and the words
 """
 
 
 def demo(
     *,
-    folder: Annotated[
-        Path, typer.Option("--out", help="Folder to write meshes, index and pictures to.")
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Folder for meshes, index and picture.")
     ] = FOLDER,
     kind: Annotated[str, typer.Option(help=f"Creature to scan: {', '.join(CREATURES)}.")] = "biped",
     workers: WorkersOption = 2,
 ) -> None:
     """Try everything: make creatures, index them, scan one from one side in a new pose, and find its kind."""
     if kind not in CREATURES:
-        raise InvalidParameterError(f"--kind takes {', '.join(CREATURES)}; it was given {kind!r}.")
-    items = _make(folder / "creatures")
-    shelf = ShapeIndex.open_or_create(folder / "index")
+        raise InvalidParameterError(f"--kind takes {', '.join(CREATURES)}; it is {kind!r}.")
+    items = _make(output / "creatures")
+    shelf = ShapeIndex.open_or_create(output / "index")
     recipe = recipe_to_fill(shelf, PATCHES, items, (), Workers(workers))
     report = describe_all(shelf, items, recipe, Workers(workers))
     out.print(f"indexed {len(shelf)} shapes ({len(report.skipped)} known already)")
 
-    scan_path = folder / "scan.ply"
+    scan_path = output / "scan.ply"
     scan = partial_scan(
         make_creature(kind, UNSEEN, n_vertices=N_VERTICES), np.array([0.9, 0.25, 0.45])
     ).mesh
@@ -61,8 +62,8 @@ def demo(
     matches = shelf.query(shape.descriptor, n_matches=6)
     print_matches(matches)
 
-    sheet = folder / "sheet.png"
-    caption = f"A partial scan of a {kind} in a new pose, and the most similar shapes: {CAPTION}"
+    sheet = output / "sheet.png"
+    caption = f"A partial scan of a {kind} in a new pose, and the most similar shapes ({CAPTION})"
     save_picture(contact_sheet(shape, "partial scan", matches, caption=caption), sheet)
     out.print(NEXT.format(scan=shown(scan_path)))
 

@@ -6,18 +6,11 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from eigenshape.cli.console import (
-    JsonOption,
-    MeshArgument,
-    RepairOption,
-    err,
-    load_mesh,
-    print_json,
-    progress_bar,
-    save_picture,
-)
-from eigenshape.cli.parts import part_rows, print_rows, require_paths, save_colors
-from eigenshape.cli.presets import HeatPresetOption, heat_preset
+from eigenshape.cli.console import err, print_json, progress_bar
+from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, load_mesh
+from eigenshape.cli.methods import HeatMethodOption, heat_recipe
+from eigenshape.cli.outputs import require_picture, save_picture
+from eigenshape.cli.parts import part_rows, print_rows, require_colored_path, save_colors
 from eigenshape.features.segmentation import segment
 from eigenshape.plot.fields import figure_segments, value_colors
 from eigenshape.retrieval.heat.descriptor import SCALE_FREE
@@ -37,9 +30,7 @@ COLUMNS = {
 def features(
     mesh: MeshArgument,
     *,
-    n_regions: Annotated[
-        int, typer.Option("-n", "--n-regions", help="Largest number of regions.")
-    ] = 15,
+    n_parts: Annotated[int, typer.Option("-n", "--n-parts", help="Largest number of parts.")] = 15,
     persistence: Annotated[
         float | None,
         typer.Option(
@@ -53,7 +44,7 @@ def features(
             help="Keep the features before the largest drop of persistence, instead of a number of them.",
         ),
     ] = False,
-    preset_name: HeatPresetOption = SCALE_FREE.name,
+    method: HeatMethodOption = SCALE_FREE.name,
     accuracy: Annotated[
         float | None,
         typer.Option(
@@ -64,11 +55,12 @@ def features(
         ),
     ] = None,
     repair: RepairOption = "",
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Write the mesh, colored by its heat (PLY)."),
+    ] = None,
     picture: Annotated[
         Path | None, typer.Option(help="Draw parts and feature points (PNG, SVG or PDF).")
-    ] = None,
-    ply: Annotated[
-        Path | None, typer.Option(help="Write the mesh, coloured by its heat (PLY).")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -76,8 +68,9 @@ def features(
 
     Beyond 100,000 vertices, or with --accuracy, heat is approximate, and its error is printed.
     """
-    recipe = heat_preset(preset_name)
-    require_paths(picture, ply)
+    recipe = heat_recipe(method)
+    require_picture(picture)
+    require_colored_path(output)
     surface = load_mesh(mesh, repair)
     with progress_bar("features") as progress:
         if accuracy is None and surface.n_vertices > LARGE:
@@ -89,7 +82,7 @@ def features(
             f"{100 * shape.error:.2g} %"
         )
     n_fragments = int(np.isin(shape.tree.maxima, shape.fragments).sum())
-    by_number = n_regions + n_fragments if persistence is None and not largest_gap else None
+    by_number = n_parts + n_fragments if persistence is None and not largest_gap else None
     parts = segment(
         shape.tree, n_regions=by_number, persistence=persistence, largest_gap=largest_gap
     )
@@ -117,7 +110,7 @@ def features(
         print_rows("Feature points", COLUMNS, features_alone)
     if picture:
         save_picture(figure_segments(surface, parts.labels, parts.features.vertices), picture)
-    if ply:
+    if output:
         save_colors(
-            surface, value_colors(np.log(np.maximum(shape.heat, np.finfo(np.float64).tiny))), ply
+            surface, value_colors(np.log(np.maximum(shape.heat, np.finfo(np.float64).tiny))), output
         )

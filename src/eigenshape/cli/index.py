@@ -9,18 +9,9 @@ from typing import Annotated
 import typer
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import (
-    JsonOption,
-    RepairOption,
-    out,
-    print_json,
-    progress_bar,
-    read_repaired,
-    repair_names,
-    shown,
-    told_by,
-)
-from eigenshape.cli.presets import PATCHES, PresetOption, recipe_to_fill, require_preset
+from eigenshape.cli.console import batch_reporter, out, print_json, progress_bar, shown
+from eigenshape.cli.inputs import JsonOption, RepairOption, read_repaired, repair_names
+from eigenshape.cli.methods import PATCHES, MethodOption, recipe_to_fill, require_method
 from eigenshape.io.parsing import MESH_FORMATS
 from eigenshape.retrieval.kinds import AnyRecipe
 from eigenshape.retrieval.store.batch import BatchReport, build_index
@@ -29,8 +20,8 @@ from eigenshape.retrieval.store.workers import Item, Workers
 
 SOME_FAILED = 3
 
-DbOption = Annotated[
-    Path, typer.Option("--db", help="Folder of the index; made if it is not there.")
+NewIndexArgument = Annotated[
+    Path, typer.Argument(help="Folder of the index. It is created if it does not exist.")
 ]
 ViewsOption = Annotated[
     int | None,
@@ -38,8 +29,8 @@ ViewsOption = Annotated[
         min=0,
         max=50,
         help=(
-            "From how many sides closed shapes are also described, so that partial scans "
-            "find them. By default 6 with patches, 4 with the other presets."
+            "Number of sides from which closed shapes are also described, so that partial scans "
+            "find them. By default 6 with patches, 4 with the other methods."
         ),
     ),
 ]
@@ -49,17 +40,17 @@ WorkersOption = Annotated[
 
 
 def index(
+    index: NewIndexArgument,
     sources: Annotated[
         list[Path], typer.Argument(help="Mesh files, or folders to search for them.")
     ],
     *,
-    db: DbOption,
-    preset_name: PresetOption = PATCHES,
+    method: MethodOption = PATCHES,
     views: ViewsOption = None,
     repair: RepairOption = "",
     workers: WorkersOption = 2,
     timeout: Annotated[
-        float, typer.Option(min=1, help="Seconds after which a file is given up and named.")
+        float, typer.Option(min=1, help="Seconds after which a file is named as failed.")
     ] = 300.0,
     as_json: JsonOption = False,
 ) -> None:
@@ -68,13 +59,13 @@ def index(
     A shape is named by its path below the given folder; its class is the folder that holds it. After Ctrl-C or a
     crash, the same command continues where it stopped.
     """
-    require_preset(preset_name)
+    require_method(method)
     items, repairs, processes = _items(sources), repair_names(repair), Workers(workers, timeout)
-    shelf = ShapeIndex.open_or_create(db)
-    recipe = recipe_to_fill(shelf, preset_name, items, repairs, processes)
+    shelf = ShapeIndex.open_or_create(index)
+    recipe = recipe_to_fill(shelf, method, items, repairs, processes)
     report = describe_all(shelf, items, recipe, processes, repairs=repairs, n_views=views)
     if as_json:
-        print_json({"db": str(db), "shapes": len(shelf), **vars(report)})
+        print_json({"index": str(index), "shapes": len(shelf), **vars(report)})
     else:
         _print(shelf, report)
     if report.failed:
@@ -99,7 +90,7 @@ def describe_all(
             recipes=(recipe,),
             n_views=n_views,
             workers=workers,
-            callback=told_by(progress),
+            callback=batch_reporter(progress),
         )
 
 
@@ -110,7 +101,7 @@ def _items(sources: Sequence[Path]) -> list[Item]:
     )
     if double is not None:
         raise InvalidParameterError(
-            f"Names of shapes must differ; {double!r} comes twice. Give one common folder."
+            f"Names of shapes must differ; {double!r} comes twice. Give one folder that holds both."
         )
     if not items:
         raise InvalidParameterError(
@@ -131,7 +122,7 @@ def _items_of(source: Path) -> Iterator[Item]:
 
 def _print(shelf: ShapeIndex, report: BatchReport) -> None:
     out.print(
-        f"{len(report.added)} described, {len(report.skipped)} known already, {len(report.failed)} not taken; "
+        f"{len(report.added)} described, {len(report.skipped)} known already, {len(report.failed)} failed; "
         f"the index holds {len(shelf)} shapes."
     )
     for name, reason in report.failed:

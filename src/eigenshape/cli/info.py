@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 
 from eigenshape._errors import InvalidShapeError
-from eigenshape.cli.console import (
+from eigenshape.cli.console import out, print_json, shown
+from eigenshape.cli.inputs import (
     CellsOption,
     DimOption,
     DropMissingOption,
@@ -13,9 +14,6 @@ from eigenshape.cli.console import (
     RepairOption,
     ShapeArgument,
     load_shape,
-    out,
-    print_json,
-    shown,
 )
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.measure import bounding_box, edge_lengths, enclosed_volume, surface_area

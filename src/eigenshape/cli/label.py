@@ -6,19 +6,12 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from eigenshape.cli.console import (
-    JsonOption,
-    MeshArgument,
-    RepairOption,
-    load_mesh,
-    print_json,
-    progress_bar,
-    said,
-    save_picture,
-)
-from eigenshape.cli.parts import part_rows, print_rows, require_paths, save_colors
+from eigenshape.cli.console import print_json, progress_bar
+from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, load_mesh
+from eigenshape.cli.outputs import require_picture, save_picture
+from eigenshape.cli.parts import part_rows, print_rows, require_label_path, save_labels
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.labels import read_labels, write_labels
+from eigenshape.io.labels import read_labels
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.plot.fields import part_colors
 from eigenshape.plot.sheet import figure_label_transfer
@@ -37,7 +30,7 @@ COLUMNS = {
 def label(
     mesh: MeshArgument,
     *,
-    like: Annotated[Path, typer.Option("--like", help="Mesh whose faces are labelled.")],
+    like: Annotated[Path, typer.Option("--like", help="Mesh whose faces have labels.")],
     labels: Annotated[
         Path,
         typer.Option(
@@ -57,13 +50,13 @@ def label(
         ),
     ] = None,
     repair: RepairOption = "",
-    save: Annotated[
-        Path | None, typer.Option(help="Write the labels, one a line for each face.")
-    ] = None,
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", help="Write the mesh with its labels, also as colors (PLY)."
+            "-o",
+            "--output",
+            help="Write the mesh with its labels, also as colors (PLY), or the label of each face, "
+            "one a line (SEG or TXT).",
         ),
     ] = None,
     picture: Annotated[
@@ -75,7 +68,8 @@ def label(
 
     Left and right cannot be told apart. Repairs are applied to the mesh that gets the labels.
     """
-    require_paths(picture, output, save)
+    require_picture(picture)
+    require_label_path(output)
     given = read_labels(labels)
     source, target = read_mesh(like), load_mesh(mesh, repair)
     with progress_bar("label") as progress:
@@ -87,12 +81,9 @@ def label(
         )
     else:
         print_rows("Labels", COLUMNS, rows)
-    if save:
-        write_labels(found.labels, save)
-        said(save)
     if output:
         colors = part_colors(target, np.searchsorted(np.unique(given), found.labels))
-        save_colors(target, colors, output, found.labels)
+        save_labels(target, found.labels, colors, output)
     if picture:
         save_picture(figure_label_transfer(source, target, found), picture)
 

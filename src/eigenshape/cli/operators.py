@@ -1,6 +1,7 @@
 """eigenshape operators: what there is to choose from."""
 
-from eigenshape.cli.console import JsonOption, out, print_json
+from eigenshape.cli.console import out, print_json
+from eigenshape.cli.inputs import JsonOption
 from eigenshape.operators.catalog import OPERATORS
 
 NAMES = {

@@ -1,4 +1,4 @@
-"""What the verbs that cut a mesh share: the files asked for, and rows and a table of the parts."""
+"""What the verbs that cut a mesh share: the files that they write, and rows and a table of the parts."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int, UInt8
 
-from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import print_table, said
-from eigenshape.cli.outputs import require_mesh_path
+from eigenshape.cli.console import print_table, print_written
+from eigenshape.cli.outputs import require_output
 from eigenshape.features.segmentation import Segmentation
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.labels import write_labels
 from eigenshape.io.mesh_files import write_mesh
-from eigenshape.plot.save import require_picture_path
 
+LABEL_LISTS = (".seg", ".txt")  # files with one label a line
 SHOWN: dict[str, Callable[[Any], str]] = {
     "position": lambda place: "  ".join(f"{coordinate:.4g}" for coordinate in place),
     "heat": lambda heat: f"{heat:.4g}",
@@ -28,30 +28,34 @@ SHOWN: dict[str, Callable[[Any], str]] = {
 }
 
 
-def require_paths(picture: Path | None, colored: Path | None, labels: Path | None = None) -> None:
-    """Refuse a path that no picture, mesh in colours or labels can be written to, before any work is done."""
-    if picture:
-        require_picture_path(picture)
-    if colored and colored.suffix.lower() != ".ply":
-        raise InvalidParameterError(
-            f"Colours go to a .ply file; {colored} ends in {colored.suffix!r}."
-        )
-    require_mesh_path(colored)
-    if labels and not labels.absolute().parent.is_dir():
-        raise InvalidParameterError(
-            f"Labels need a folder to lie in; {labels.absolute().parent} is not there."
-        )
+def require_colored_path(path: Path | None) -> None:
+    """Raise an error if no mesh with colors can be written to a path, before any work is done."""
+    require_output(path, (".ply",), "A mesh with colors")
 
 
-def save_colors(
+def require_label_path(path: Path | None) -> None:
+    """Raise an error if no labels can be written to a path, before any work is done."""
+    require_output(path, (".ply", *LABEL_LISTS), "A mesh with labels")
+
+
+def save_colors(mesh: TriangleMesh, colors: UInt8[np.ndarray, "n 3"], path: Path) -> None:
+    """Write a mesh with its colors, and print so on stderr."""
+    write_mesh(mesh, path, colors=colors)
+    print_written(path)
+
+
+def save_labels(
     mesh: TriangleMesh,
+    labels: Int[np.ndarray, " f"],
     colors: UInt8[np.ndarray, "n 3"],
     path: Path,
-    face_labels: Int[np.ndarray, " f"] | None = None,
 ) -> None:
-    """Write a mesh with its colors, and its labels if there are any, and say so on stderr."""
-    write_mesh(mesh, path, colors=colors, face_labels=face_labels)
-    said(path)
+    """Write labels of faces, with the mesh and its colors (.ply) or alone, and print so on stderr."""
+    if path.suffix.lower() in LABEL_LISTS:
+        write_labels(labels, path)
+    else:
+        write_mesh(mesh, path, colors=colors, face_labels=labels)
+    print_written(path)
 
 
 def part_rows(mesh: TriangleMesh, parts: Segmentation) -> list[dict[str, Any]]:

@@ -7,26 +7,17 @@ from typing import Annotated, Any
 
 import typer
 
-from eigenshape.cli.console import (
-    JsonOption,
-    RepairOption,
-    load_mesh,
-    out,
-    print_json,
-    print_table,
-    progress_bar,
-    repair_names,
-    save_picture,
-)
-from eigenshape.cli.presets import HeldPresetOption, recipe_to_ask, require_preset
+from eigenshape.cli.console import out, print_json, print_table, progress_bar
+from eigenshape.cli.inputs import JsonOption, RepairOption, load_mesh, repair_names
+from eigenshape.cli.methods import StoredMethodOption, recipe_to_ask, require_method
+from eigenshape.cli.outputs import require_picture, save_picture
 from eigenshape.cli.sheets import CAPTION, Asked, asked, contact_sheet
 from eigenshape.plot.figure import literal
-from eigenshape.plot.save import require_picture_path
 from eigenshape.retrieval.store.index import Match, ShapeIndex
 
 
 def query(
-    db: Annotated[Path, typer.Argument(help="Folder of the index.")],
+    index: Annotated[Path, typer.Argument(help="Folder of the index.")],
     scan: Annotated[
         Path,
         typer.Argument(
@@ -37,23 +28,23 @@ def query(
     n_matches: Annotated[
         int, typer.Option("-n", "--n-matches", min=1, help="Number of matches to show.")
     ] = 5,
-    preset_name: HeldPresetOption = None,
+    method: StoredMethodOption = None,
     repair: RepairOption = "",
-    sheet: Annotated[
+    picture: Annotated[
         Path | None,
         typer.Option(
-            help="Draw the scan beside its matches, with corresponding parts in one colour (PNG, SVG or PDF)."
+            help="Draw the scan beside its matches, corresponding parts in one color (PNG, SVG or "
+            "PDF)."
         ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Find the shapes of an index that are most like a scan, and which features correspond."""
-    if sheet:
-        require_picture_path(sheet)
-    if preset_name is not None:
-        require_preset(preset_name)
-    shelf = ShapeIndex.open(db)
-    recipe = recipe_to_ask(shelf, preset_name)
+    require_picture(picture)
+    if method is not None:
+        require_method(method)
+    shelf = ShapeIndex.open(index)
+    recipe = recipe_to_ask(shelf, method)
     surface = load_mesh(scan, repair)
     began = perf_counter()
     with progress_bar("describe") as progress:
@@ -75,11 +66,13 @@ def query(
         out.print(
             f"described in {described - began:.2f} s, answered in {1000 * (answered - described):.0f} ms"
         )
-    if sheet:
-        names = literal(scan.name), literal(db.name)
-        caption = f"{names[0]} and the {len(matches)} most similar shapes in {names[1]}: {CAPTION}"
+    if picture:
+        names = literal(scan.name), literal(index.name)
+        caption = f"{names[0]} and the {len(matches)} most similar shapes in {names[1]} ({CAPTION})"
         title, repairs = literal(scan.stem), repair_names(repair)
-        save_picture(contact_sheet(shape, title, matches, repairs=repairs, caption=caption), sheet)
+        save_picture(
+            contact_sheet(shape, title, matches, repairs=repairs, caption=caption), picture
+        )
 
 
 def _facts(shape: Asked, match: Match) -> dict[str, Any]:

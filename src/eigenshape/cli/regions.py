@@ -1,4 +1,4 @@
-"""Regions and handles as words on the command line."""
+"""Regions, rotations and translations as they are written on the command line."""
 
 import re
 from pathlib import Path
@@ -34,13 +34,13 @@ PART = re.compile(r"\s*part\s+(\d+)\s*")
 TURN = re.compile(r"\s*([^@]+?)\s+by\s+(-?[\d.]+)(?:\s*@\s*(.+))?\s*")
 
 
-def told_region(text: str, mesh: TriangleMesh, progress: Progress) -> Region:
-    """Return the region that some words name.
+def parse_region(text: str, mesh: TriangleMesh, progress: Progress) -> Region:
+    """Return the region that a text describes.
 
     Raises
     ------
     InvalidParameterError
-        If they name none.
+        If the text describes no region.
     """
     if found := VERTEX.fullmatch(text):
         vertex = whole_number(int(found[1]), "A vertex of a region", 0, mesh.n_vertices - 1)
@@ -53,7 +53,7 @@ def told_region(text: str, mesh: TriangleMesh, progress: Progress) -> Region:
         return _box([found for found in conditions if found], mesh)
     if Path(text).is_file():
         return _listed(Path(text))
-    raise InvalidParameterError(f"A region is one of these: {REGIONS} It was given {text!r}.")
+    raise InvalidParameterError(f"A region is one of these: {REGIONS} It is {text!r}.")
 
 
 def _box(conditions: list[re.Match[str]], mesh: TriangleMesh) -> BoxRegion:
@@ -78,23 +78,23 @@ def _listed(path: Path) -> Region:
         return np.array([int(line) for line in path.read_text().split()], dtype=np.int64)
     except ValueError as err:
         raise InvalidParameterError(
-            f"{path} must hold one index of a vertex a line; {err}."
+            f"A file with a region has one vertex index a line; {path} does not: {err}."
         ) from err
 
 
-def told_rotation(text: str, mesh: TriangleMesh, region: Region) -> Rotation:
-    """Return the rotation that some words name; about the middle of the region's boundary unless they say otherwise.
+def parse_rotation(text: str, mesh: TriangleMesh, region: Region) -> Rotation:
+    """Return the rotation that a text describes, by default about the middle of the region's boundary.
 
     Raises
     ------
     InvalidParameterError
-        If they name none.
+        If the text describes no rotation.
     """
     found = TURN.fullmatch(text)
     if found is None:
         raise InvalidParameterError(
             f"A rotation is 'x by 90', '0,1,1 by -30', or 'z by 45 @ 0,0.1,0' (degrees, and a point of the axis); "
-            f"it was given {text!r}."
+            f"it is {text!r}."
         )
     named = {"x": [1, 0, 0], "y": [0, 1, 0], "z": [0, 0, 1]}
     axis = (
@@ -107,13 +107,13 @@ def told_rotation(text: str, mesh: TriangleMesh, region: Region) -> Rotation:
     return Rotation(middle, axis, np.deg2rad(float(found[2])))
 
 
-def told_translation(text: str) -> Translation:
-    """Return the translation that three numbers name.
+def parse_translation(text: str) -> Translation:
+    """Return the translation by three numbers.
 
     Raises
     ------
     InvalidParameterError
-        If they name none.
+        If the text is not three numbers.
     """
     return Translation(_three(text, "A move"))
 
@@ -123,6 +123,6 @@ def _three(text: str, name: str) -> np.ndarray:
         x, y, z = (float(piece) for piece in text.split(","))
     except ValueError as err:
         raise InvalidParameterError(
-            f"{name} is three numbers with commas between; it was given {text!r}."
+            f"{name} is three numbers separated by commas; it is {text!r}."
         ) from err
     return np.array([x, y, z])

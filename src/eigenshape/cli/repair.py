@@ -5,17 +5,9 @@ from typing import Annotated
 
 import typer
 
-from eigenshape.cli.console import (
-    CellsOption,
-    JsonOption,
-    MeshArgument,
-    err,
-    print_json,
-    print_table,
-    repair_names,
-    shown,
-)
+from eigenshape.cli.console import err, print_json, print_table, shown
 from eigenshape.cli.info import mesh_facts
+from eigenshape.cli.inputs import CellsOption, JsonOption, MeshArgument, repair_names
 from eigenshape.cli.outputs import require_mesh_path, save_like
 from eigenshape.geometry.repair import REPAIRS
 from eigenshape.geometry.repair import repair as repair_mesh
@@ -33,7 +25,7 @@ def repair(
     *,
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", "--out", help="Mesh to write: OFF, OBJ, PLY, STL or GLB."),
+        typer.Option("-o", "--output", help="Mesh to write: OFF, OBJ, PLY, STL or GLB."),
     ],
     names: Annotated[
         str,
@@ -41,7 +33,8 @@ def repair(
             "--repair",
             metavar="NAMES",
             help=(
-                f"Repairs to apply in this order, separated by commas: {', '.join(REPAIRS)}. '' only converts."
+                f"Repairs to apply in this order, separated by commas: {', '.join(REPAIRS)}. "
+                "'' only converts the file."
             ),
         ),
     ] = USUAL,

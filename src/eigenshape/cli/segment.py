@@ -8,16 +8,10 @@ import typer
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
-from eigenshape.cli.console import (
-    JsonOption,
-    MeshArgument,
-    RepairOption,
-    load_mesh,
-    print_json,
-    progress_bar,
-    save_picture,
-)
-from eigenshape.cli.parts import part_rows, print_rows, require_paths, save_colors
+from eigenshape.cli.console import print_json, progress_bar
+from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, load_mesh
+from eigenshape.cli.outputs import require_picture, save_picture
+from eigenshape.cli.parts import part_rows, print_rows, require_label_path, save_labels
 from eigenshape.features import segmentation
 from eigenshape.features.boundaries import smooth_boundaries
 from eigenshape.features.parts import PART_CONTRAST, find_parts
@@ -52,8 +46,8 @@ def segment(
             )
         ),
     ] = PARTS,
-    n_regions: Annotated[
-        int | None, typer.Option("-n", "--n-regions", help="Largest number of parts.")
+    n_parts: Annotated[
+        int | None, typer.Option("-n", "--n-parts", help="Largest number of parts.")
     ] = None,
     persistence: Annotated[
         float | None,
@@ -81,7 +75,10 @@ def segment(
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", help="Write the mesh with its parts as colors and labels (PLY)."
+            "-o",
+            "--output",
+            help="Write the mesh with its parts as colors and labels (PLY), or the number of the "
+            "part of each face, one a line (SEG or TXT).",
         ),
     ] = None,
     picture: Annotated[Path | None, typer.Option(help="Draw the parts (PNG, SVG or PDF).")] = None,
@@ -89,16 +86,15 @@ def segment(
 ) -> None:
     """Cut a mesh into its parts: limbs, head, torso."""
     if method not in METHODS:
-        raise InvalidParameterError(
-            f"--method takes {', '.join(METHODS)}; it was given {method!r}."
-        )
-    require_paths(picture, output)
+        raise InvalidParameterError(f"--method takes {', '.join(METHODS)}; it is {method!r}.")
+    require_picture(picture)
+    require_label_path(output)
     surface = load_mesh(mesh, repair)
     with progress_bar("parts") as progress:
         tree, usual = _tree(surface, method, progress)
-    rule = {"n_regions": n_regions, "persistence": persistence, "largest_gap": largest_gap}
-    told = n_regions is not None or persistence is not None or largest_gap
-    parts = segmentation.segment(tree, **(rule if told else usual))
+    rule = {"n_regions": n_parts, "persistence": persistence, "largest_gap": largest_gap}
+    chosen = n_parts is not None or persistence is not None or largest_gap
+    parts = segmentation.segment(tree, **(rule if chosen else usual))
     if smooth if smooth is not None else method == PARTS:
         parts = smooth_boundaries(orient_closed_outward(surface), parts)
     rows = _rows(surface, tree, parts)
@@ -109,13 +105,13 @@ def segment(
     else:
         print_rows("Parts", COLUMNS, rows)
     if output:
-        save_colors(surface, part_colors(surface, parts.labels), output, parts.labels)
+        save_labels(surface, parts.labels, part_colors(surface, parts.labels), output)
     if picture:
         save_picture(figure_segments(surface, parts.labels, parts.features.vertices), picture)
 
 
 def _tree(surface: TriangleMesh, method: str, progress: Progress) -> tuple[Tree, dict[str, Any]]:
-    """Return the tree of a method, and where it is cut unless told: fragments do not count among the regions."""
+    """Return the tree of a method, and its default cut. Fragments are not counted as parts."""
     if method == PARTS:
         return find_parts(surface, progress=progress).tree, {"persistence": PART_CONTRAST}
     shape = find_heat_features(surface, PRESETS[method], progress=progress)

@@ -1,4 +1,4 @@
-"""A query beside its matches, with what corresponds in one colour."""
+"""A query beside its matches, with corresponding parts in one color."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 
 from eigenshape._errors import EigenshapeError, StoreError
 from eigenshape._progress import Progress
-from eigenshape.cli.console import err, progress_bar, read_repaired, shown
+from eigenshape.cli.console import err, progress_bar, shown
+from eigenshape.cli.inputs import read_repaired
 from eigenshape.geometry.geodesic import geodesic_distances
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
@@ -22,7 +23,7 @@ from eigenshape.retrieval.heat.features import find_heat_features, find_view_fea
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
 from eigenshape.retrieval.store.index import Match
 
-CAPTION = "parts that correspond share a colour"
+CAPTION = "corresponding parts have one color; a lower score is more similar"
 N_CELLS = 12  # of the query by patches
 REACH = 3.0  # times what a patch has of the surface, in length: farther from a matched patch nothing is known
 
@@ -94,7 +95,7 @@ def contact_sheet(
 
 
 def _panel(query: Asked, match: Match, repairs: tuple[str, ...]) -> Panel:
-    title = f"{literal(match.name)}\nscore {match.score:.4g}"
+    title = f"{literal(match.name)}\nscore {match.score:#.4g}"
     try:
         mesh = _read_match(match, repairs)
     except (EigenshapeError, OSError) as error:

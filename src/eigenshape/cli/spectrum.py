@@ -9,22 +9,17 @@ import typer
 from jaxtyping import Int
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import (
+from eigenshape.cli.console import err, out, print_json, print_table, print_written, progress_bar
+from eigenshape.cli.inputs import (
     CellsOption,
     DimOption,
     DropMissingOption,
     JsonOption,
     RepairOption,
     ShapeArgument,
-    err,
     load_shape,
-    out,
-    print_json,
-    print_table,
-    progress_bar,
-    said,
-    save_picture,
 )
+from eigenshape.cli.outputs import require_output, require_picture, save_picture
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
@@ -37,7 +32,6 @@ from eigenshape.operators.gaussian import Distance
 from eigenshape.operators.kernel import Correction, Form
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.plot.fields import figure_eigenfunctions
-from eigenshape.plot.save import require_picture_path
 from eigenshape.plot.spectra import figure_spectrum
 from eigenshape.spectral.bounds.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.solve import solve_spectrum
@@ -70,7 +64,6 @@ def spectrum(
         str | None,
         typer.Option(
             "--operator",
-            "-o",
             help=(
                 f"{', '.join(OPERATORS)} (see `eigenshape operators`). By default cotangent for "
                 "meshes, point-cloud for points."
@@ -134,19 +127,22 @@ def spectrum(
     drop_missing: DropMissingOption = False,
     cells: CellsOption = None,
     repair: RepairOption = "",
-    plot: Annotated[
-        Path | None, typer.Option(help="Draw the eigenvalues (PNG, SVG or PDF).")
-    ] = None,
-    picture: Annotated[
+    output: Annotated[
         Path | None,
         typer.Option(
-            help="Draw the first eigenfunctions with their nodal lines (PNG, SVG or PDF)."
+            "-o",
+            "--output",
+            help="Write eigenvalues, eigenvectors and the proof (NPZ; Spectrum.load reads it).",
         ),
     ] = None,
-    save: Annotated[
+    picture: Annotated[
+        Path | None, typer.Option(help="Draw the eigenvalues (PNG, SVG or PDF).")
+    ] = None,
+    eigenfunctions: Annotated[
         Path | None,
         typer.Option(
-            help="Write eigenvalues, eigenvectors and the proof (.npz; Spectrum.load reads it)."
+            help="Draw the first eigenfunctions of a triangle mesh with their nodal lines (PNG, "
+            "SVG or PDF)."
         ),
     ] = None,
     cache: Annotated[
@@ -158,8 +154,9 @@ def spectrum(
     as_json: JsonOption = False,
 ) -> None:
     """Compute the lowest eigenvalues of a shape and prove that none is missing."""
-    for path in filter(None, (plot, picture)):
-        require_picture_path(path)
+    require_picture(picture)
+    require_picture(eigenfunctions)
+    require_output(output, (".npz",), "A spectrum")
     if accuracy is not None and below is not None:
         raise InvalidParameterError(
             "--accuracy needs -k, because the approximate method cannot count the eigenvalues below a value. Pass -k "
@@ -176,7 +173,7 @@ def spectrum(
     }
     options = {name: value for name, value in asked.items() if value is not None}
     found = load_shape(shape, repair, dim, drop_missing=drop_missing, cells=cells)
-    _require_drawable(found, picture)
+    _require_drawable(found, eigenfunctions)
     bounded = _require_mesh(found) if brackets else None
     name = operator or default_operator(found)
     fixed = _boundary_points(found, ORDERS.get(name, 1)) if boundary == "dirichlet" else None
@@ -213,13 +210,13 @@ def spectrum(
         )
     else:
         _print(solved, bounds)
-    if plot:
-        _plot(found, solved, bounds, plot)
-    if picture and isinstance(found, TriangleMesh):
-        _picture(found, solved, picture)
-    if save:
-        solved.save(save)
-        said(save)
+    if picture:
+        _draw_eigenvalues(found, solved, bounds, picture)
+    if eigenfunctions and isinstance(found, TriangleMesh):
+        _draw_eigenfunctions(found, solved, eigenfunctions)
+    if output:
+        solved.save(output)
+        print_written(output)
 
 
 def _usual_pairs(laplacian: Laplacian, fixed: Int[np.ndarray, " c"] | None) -> int:
@@ -232,10 +229,11 @@ def _usual_pairs(laplacian: Laplacian, fixed: Int[np.ndarray, " c"] | None) -> i
     return max(1, min(USUAL, most))
 
 
-def _require_drawable(shape: Shape, picture: Path | None) -> None:
-    if picture and not isinstance(shape, TriangleMesh):
+def _require_drawable(shape: Shape, eigenfunctions: Path | None) -> None:
+    if eigenfunctions and not isinstance(shape, TriangleMesh):
         raise InvalidParameterError(
-            f"--picture draws triangle meshes; the shape is {shape!r}. --plot draws any spectrum."
+            f"--eigenfunctions draws triangle meshes; the shape is {shape!r}. --picture draws the "
+            "eigenvalues of any shape."
         )
 
 
@@ -287,12 +285,12 @@ def _print(found: Spectrum, bounds: Brackets | None) -> None:
         out.print(bounds.explain())
 
 
-def _plot(shape: Shape, found: Spectrum, bounds: Brackets | None, path: Path) -> None:
+def _draw_eigenvalues(shape: Shape, found: Spectrum, bounds: Brackets | None, path: Path) -> None:
     area = surface_area(shape) if isinstance(shape, TriangleMesh) else None
     save_picture(figure_spectrum(found, area=area, brackets=bounds), path)
 
 
-def _picture(mesh: TriangleMesh, found: Spectrum, path: Path) -> None:
+def _draw_eigenfunctions(mesh: TriangleMesh, found: Spectrum, path: Path) -> None:
     first, k = found.certificate.first, len(found.eigenvalues)
     start = min(1, k - 1) if first == 0 else 0  # the lowest is constant
     save_picture(figure_eigenfunctions(mesh, found, range(start, min(k, start + N_PICTURED))), path)

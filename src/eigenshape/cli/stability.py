@@ -9,25 +9,21 @@ import numpy as np
 import typer
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import (
+from eigenshape.cli.console import out, print_json, print_table, progress_bar
+from eigenshape.cli.inputs import (
     DimOption,
     DropMissingOption,
     JsonOption,
     RepairOption,
     ShapeArgument,
     load_shape,
-    out,
-    print_json,
-    print_table,
-    progress_bar,
-    save_picture,
 )
+from eigenshape.cli.outputs import require_picture, save_picture
 from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_area, normalize_diameter
 from eigenshape.io.labels import read_map
 from eigenshape.plot.figure import literal
-from eigenshape.plot.save import require_picture_path
 from eigenshape.plot.stability import figure_stability
 from eigenshape.stability.report import USUAL_K, StabilityPlan, StabilityReport, compare_shapes
 
@@ -52,7 +48,8 @@ def stability(
     t: Annotated[
         list[float] | None,
         typer.Option(
-            "-t", help="Heat time, in length²; may be repeated. By default four are chosen."
+            "--t",
+            help="Heat time, in length²; may be given several times. By default four are chosen.",
         ),
     ] = None,
     n_samples: Annotated[
@@ -95,8 +92,7 @@ def stability(
 
     For instance: eigenshape stability clean.ply noisy.ply --picture report.png
     """
-    if picture:
-        require_picture_path(picture)
+    require_picture(picture)
     partners = read_map(map_file) if map_file else None
     first, second = (
         _scaled(load_shape(path, repair, dim, drop_missing=drop_missing), scale)

@@ -1,4 +1,4 @@
-"""From where a shape is looked at, and where its points then lie in the picture."""
+"""The direction of the view, and where the points of a shape lie in the picture."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -14,22 +14,39 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, face_pairs
 
 Up = Literal["auto", "x", "y", "z"]
-ONE_WAY = 0.3  # length of the mean normal, which a closed surface has 0 of, from which on a surface is a scan
-MARGIN = 0.04  # of the picture, left free on each side
-SOLE = 0.02  # of the longest side of the box: what is at most so far above the lowest point carries the shape
-WIDER = 4.0  # times the base along y: less upsets many shapes for which y is up
-LESS = 0.8  # of the bending seen from behind: with less, a shape is shown from behind
+# Length of the mean normal above which a surface counts as a scan. A closed surface has 0, a flat piece 1.
+ONE_WAY = 0.3
+MARGIN = 0.04  # share of the picture that is left free on each side
+# Points at most this share of the longest side of the box above the lowest point carry the shape.
+SOLE = 0.02
+# z is up only if the base along z is this many times larger: a smaller factor turns over many
+# shapes for which y is up.
+WIDER = 4.0
+# A shape is shown from behind if its front has less than this share of the curvature seen there.
+LESS = 0.8
 
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A parallel projection: rows are right, down and towards the viewer.
+    """A parallel projection onto a square picture.
 
     Attributes
     ----------
     rotation : (3, 3) float
+        Orthonormal rows, which point right, down and towards the viewer.
     size : int
-        Pixels of the square picture.
+        Width and height of the picture in pixels.
+
+    See Also
+    --------
+    three_quarter_view : Guess a camera from a shape.
+
+    Examples
+    --------
+    >>> import numpy as np, eigenshape as es
+    >>> from_z = es.plot.Camera(np.array([[1.0, 0, 0], [0, -1, 0], [0, 0, 1]]), size=300)
+    >>> mesh = es.icosphere(1)
+    >>> figure = es.figure_field(mesh, mesh.vertices[:, 2], camera=from_z)
     """
 
     rotation: Float[np.ndarray, "3 3"]
@@ -38,15 +55,32 @@ class Camera:
 
 @one_blas_thread()
 def three_quarter_view(mesh: MeshLike, *, up: Up = "auto", size: int = 600) -> Camera:
-    """Look at a shape from its front, its left and a little from above; at a scan from where it was seen.
+    """Return a camera that shows a shape upright, from its front left and a little from above.
 
-    The front is +z where y is up, as in most collections and in glTF; +x where z is up; +y where x
-    is up. If the other side bends clearly more, it is the front: a face bends more than the back of
-    a head. A surface that is open and mostly faces one way is a scan, and is looked at from there.
+    The front is +z if y is up, as in most collections and in glTF; +x if z is up; +y if x is up. If the opposite side
+    is clearly more curved, that side is the front, because a face is more curved than the back of a head. An open
+    surface that mostly faces one way is taken for a scan, and is shown from there.
 
-    "auto" takes y for up; but z if the shape would fall over along y and would stand along z, on a
-    base more than four times as large. It is a guess: of 243 real shapes whose upright pose is
-    known, it shows 183 upright, and y alone shows 143.
+    Parameters
+    ----------
+    mesh : MeshLike
+    up : {"auto", "x", "y", "z"}
+        The upward axis. "auto" takes y, or z if the shape would fall over along y and would stand along z on a base
+        more than four times as large. It is a guess: of 243 real shapes whose upright pose is known, it shows 183
+        upright, and y alone shows 143.
+    size : int
+        Width and height of the picture in pixels.
+
+    Returns
+    -------
+    Camera
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> camera = es.plot.three_quarter_view(es.icosphere(1), up="z", size=300)
+    >>> camera.size, bool(camera.rotation[1, 2] < 0)  # the second row points down
+    (300, True)
     """
     mesh = as_mesh(mesh)
     axis = "xyz".index(_upright_axis(mesh) if up == "auto" else up)

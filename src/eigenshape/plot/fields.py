@@ -18,14 +18,46 @@ from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import Drawing, draw, palette
 from eigenshape.spectral.spectrum import Spectrum
 
-PANEL = 3.2  # inches
-DOT = 46.0
+PANEL = 3.2  # inches; width of one drawing
+DOT = 46.0  # square points; area of the mark of a vertex
 
 
 def figure_eigenfunctions(
     mesh: MeshLike, spectrum: Spectrum, indices: Sequence[int], *, camera: Camera | None = None
 ) -> Figure:
-    """Draw eigenfunctions side by side, each with its nodal lines dark, in units of its largest value."""
+    """Draw eigenfunctions side by side, with their nodal lines.
+
+    Each is divided by its largest absolute value. Dark lines mark where it is zero.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        With n vertices.
+    spectrum : Spectrum
+        Of an operator on the n vertices.
+    indices : sequence of int
+        Which columns of `spectrum.eigenvectors` to draw, four in a row.
+    camera : Camera, optional
+        By default `three_quarter_view(mesh)`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    See Also
+    --------
+    figure_field : Draw one function, with a color bar.
+    figure_spectrum : Plot the eigenvalues.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(mesh), k=4)
+    >>> figure = es.plot.figure_eigenfunctions(mesh, spectrum, [1, 2, 3])
+    >>> len(figure.axes)  # three drawings and a color bar
+    4
+    """
     mesh = as_mesh(mesh)
     require_type(spectrum, Spectrum, "spectrum")
     require_type(camera, Camera | None, "camera")
@@ -63,12 +95,43 @@ def _constant_as_one(function: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n
 def figure_field(
     mesh: MeshLike,
     values: Float[np.ndarray, " n"],
-    label: str,
+    label: str = "",
     *,
     camera: Camera | None = None,
     color_map: str = "viridis",
 ) -> Figure:
-    """Draw one function on a shape with a labelled colour bar, heat for instance."""
+    """Draw one function on a mesh, with a color bar.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        With n vertices.
+    values : (n,) float
+        The function, one value for each vertex.
+    label : str
+        Text beside the color bar, such as the name of the function and its unit.
+    camera : Camera, optional
+        By default `three_quarter_view(mesh)`.
+    color_map : str
+        Name of a color map of matplotlib.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    See Also
+    --------
+    figure_segments : Draw the parts of a mesh.
+    save_figure : Write a figure to a file.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> figure = es.figure_field(mesh, mesh.vertices[:, 2], "height, length")
+    >>> figure.axes[-1].get_ylabel()
+    'height, length'
+    """
     mesh = as_mesh(mesh)
     require_type(camera, Camera | None, "camera")
     figure = Figure(figsize=(2 * PANEL + 1.2, 2 * PANEL), layout="constrained")
@@ -83,7 +146,7 @@ def figure_field(
 def mapped(
     values: Float[np.ndarray, " n"], scale: Normalize, colors: Colormap
 ) -> Float[np.ndarray, "n 3"]:
-    """Return the colour of each value."""
+    """Return the color of each value."""
     return np.asarray(colors(scale(values)))[:, :3]
 
 
@@ -94,7 +157,40 @@ def figure_segments(
     *,
     camera: Camera | None = None,
 ) -> Figure:
-    """Draw the parts of a shape in colours, with their numbered feature points; hidden ones are hollow."""
+    """Draw the parts of a mesh in colors, with their numbered feature points.
+
+    Feature points on the far side of the mesh are hollow and have no number.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        With f faces.
+    labels : (f,) int
+        Number of the part of each face. Faces below 0 are gray.
+    vertices : (m,) int
+        Feature point of each part.
+    camera : Camera, optional
+        By default `three_quarter_view(mesh)`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    See Also
+    --------
+    part_colors : Colors of the same parts for a mesh file.
+    find_parts, segment : Compute parts.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> upper = mesh.vertices[mesh.faces].mean(axis=1)[:, 1] > 0
+    >>> poles = mesh.vertices[:, 1].argsort()[[0, -1]]
+    >>> figure = es.figure_segments(mesh, upper.astype(int), poles)
+    >>> figure.axes[0].get_title()
+    '2 parts around their feature points (hollow: on the far side)'
+    """
     mesh = as_mesh(mesh)
     require_type(camera, Camera | None, "camera")
     figure = Figure(figsize=(2 * PANEL, 2 * PANEL + 0.4), layout="constrained")
@@ -109,9 +205,34 @@ def figure_segments(
 
 
 def part_colors(mesh: MeshLike, labels: Int[np.ndarray, " f"]) -> UInt8[np.ndarray, "n 3"]:
-    """Return red, green and blue of each vertex for `write_mesh`: those of the part with most area around it.
+    """Return a color for each vertex, by the part that has most of the area around it.
 
-    Parts have the colours that `figure_segments` gives them; what has no label, below 0, is grey.
+    Parts have the same colors as in `figure_segments`. Faces without a part, below 0, are gray.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        With n vertices and f faces.
+    labels : (f,) int
+        Number of the part of each face.
+
+    Returns
+    -------
+    (n, 3) uint8
+        Red, green and blue, for `write_mesh`.
+
+    See Also
+    --------
+    value_colors : Color vertices by a function.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(1)
+    >>> upper = mesh.vertices[mesh.faces].mean(axis=1)[:, 1] > 0
+    >>> colors = es.plot.part_colors(mesh, upper.astype(int))
+    >>> colors.shape, len(set(map(tuple, colors.tolist())))
+    ((42, 3), 2)
     """
     mesh = as_mesh(mesh)
     corners, areas = mesh.faces.ravel(), np.repeat(face_areas(mesh), 3)
@@ -125,7 +246,30 @@ def part_colors(mesh: MeshLike, labels: Int[np.ndarray, " f"]) -> UInt8[np.ndarr
 def value_colors(
     values: Float[np.ndarray, " n"], color_map: str = "viridis"
 ) -> UInt8[np.ndarray, "n 3"]:
-    """Return red, green and blue of each vertex for `write_mesh`: a function from its lowest to its highest value."""
+    """Return a color for each vertex, by the value of a function.
+
+    Parameters
+    ----------
+    values : (n,) float
+        One for each vertex. The lowest and the highest value have the ends of the color map.
+    color_map : str
+        Name of a color map of matplotlib.
+
+    Returns
+    -------
+    (n, 3) uint8
+        Red, green and blue, for `write_mesh`.
+
+    See Also
+    --------
+    part_colors : Color vertices by parts.
+
+    Examples
+    --------
+    >>> import numpy as np, eigenshape as es
+    >>> es.plot.value_colors(np.array([0.0, 1.0, 2.0]), "gray").tolist()
+    [[0, 0, 0], [128, 128, 128], [255, 255, 255]]
+    """
     return _bytes(
         mapped(
             values, Normalize(float(values.min()), float(values.max())), mpl.colormaps[color_map]

@@ -12,24 +12,43 @@ from eigenshape.features.segmentation import Tree, merge_targets
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import palette
 
-KINDS = {  # colour, marker and text of each kind of pair
+KINDS = {  # color, marker and text of each kind of pair
     "maxima": ("#d62728", "^", "maxima, to the saddle that ends them"),
     "minima": ("#1f77b4", "v", "minima, to the saddle that ends them"),
     "components": ("#2ca02c", "s", "components, lowest to highest point"),
     "loops": ("#9467bd", "o", "loops that nothing fills"),
 }
-HEADROOM = 1.12  # height of what never merges, in units of the highest merge
+HEADROOM = 1.12  # height of stems that never merge, in units of the highest merge
 QUIET = "#b0b0b0"
 
 
 def figure_diagram(diagram: PersistenceDiagram, *, label: str = "function") -> Figure:
-    """Plot birth and death of all pairs: the farther from the diagonal, the longer they persist.
+    """Plot births and deaths of all pairs of a persistence diagram.
+
+    The farther a point lies from the diagonal, the longer its feature persists.
 
     Parameters
     ----------
     diagram : PersistenceDiagram
     label : str
-        What the function is, with its unit.
+        Name and unit of the function.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    See Also
+    --------
+    figure_merge_tree : Draw which maximum merges into which.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> diagram = es.features.persistence_diagram(mesh, mesh.vertices[:, 1])
+    >>> figure = es.plot.figure_diagram(diagram, label="height")
+    >>> figure.axes[0].get_xlabel()
+    'birth: height'
     """
     require_type(diagram, PersistenceDiagram, "diagram")
     figure = Figure(figsize=(6.6, 6.0), layout="constrained")
@@ -62,25 +81,38 @@ def _limits(diagram: PersistenceDiagram) -> tuple[float, float]:
 def figure_merge_tree(
     tree: Tree, *, persistence: float | None = None, n_maxima: int = 40, label: str = "function"
 ) -> Figure:
-    """Draw which maximum's region merges into which, and after what persistence; a cut is a level line.
+    """Draw which region merges into which, and at which persistence.
 
-    Regions merge from the bottom to the top, as in `segment`: those whose stems cross the line are left, in the colours
-    that `figure_segments` gives them.
+    Regions merge from the bottom to the top, as in `segment`. A cut is a horizontal line: the regions whose stems cross
+    it remain, in the colors that `figure_segments` gives them.
 
     Parameters
     ----------
     tree : MergeTree or PartTree
     persistence : float, optional
-        Where to cut, in the function's unit.
+        Height of the cut, in the unit of the function.
     n_maxima : int
-        Most persistent maxima to draw, at least 1.
+        Number of maxima to draw, the most persistent ones; at least 1.
     label : str
-        What the function is, with its unit.
+        Name and unit of the function.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
 
     Raises
     ------
     InvalidParameterError
         If `n_maxima` is below 1.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> tree = es.merge_tree(mesh, abs(mesh.vertices[:, 1]))
+    >>> figure = es.plot.figure_merge_tree(tree, persistence=0.5)
+    >>> figure.axes[0].get_title()
+    'cut at 0.5: 2 regions left'
     """
     require_type(tree, Tree, "tree")
     shown = min(whole_number(n_maxima, "n_maxima", 1), len(tree.maxima))
@@ -134,7 +166,7 @@ def leaf_places(into: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
 
 
 def _colors(tree: Tree, shown: int, persistence: float | None) -> Float[np.ndarray, "m 3"]:
-    """Return the colour of each region that a cut leaves, grey for the others."""
+    """Return the color of each region that a cut leaves, and gray for the others."""
     left = tree.persistence[:shown] >= (persistence or 0.0)
     return palette(np.where(left, np.cumsum(left) - 1, -1))
 

@@ -26,15 +26,29 @@ def figure_poses(
     *,
     camera: Camera | None = None,
 ) -> Figure:
-    """Draw poses of one shape in a common frame, coloured by how much of a motion each vertex is to follow.
+    """Draw poses of one shape side by side, in the same view and at the same scale.
 
     Parameters
     ----------
     poses : mapping of titles to MeshLike
-        With the same faces; the first one chooses the view.
+        With the same n vertices and faces.
     shares : (n,) float, optional
-        0 to 1; of `Binding.shares`.
+        How much of a motion each vertex follows, from 0 to 1, such as `Binding.shares`. It sets the colors.
     camera : Camera, optional
+        By default `three_quarter_view` of the first pose.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(1)
+    >>> egg = es.TriangleMesh(ball.vertices * [1, 1.5, 1], ball.faces)
+    >>> figure = es.plot.figure_poses({"ball": ball, "egg": egg})
+    >>> [axes.get_title() for axes in figure.axes]
+    ['ball', 'egg']
     """
     require_type(camera, Camera | None, "camera")
     require_type(poses, Mapping, "poses")
@@ -47,11 +61,10 @@ def figure_poses(
     figure = Figure(figsize=(size * columns + 0.8, (size + 0.3) * rows), layout="constrained")
     grid = figure.subplots(rows, columns, squeeze=False)
     corners = _frame(list(meshes.values()), camera)
-    told = np.zeros(rest.n_vertices) if shares is None else shares
-    colormap = LinearSegmentedColormap.from_list(
-        "moved", MOVED
-    )  # of this call: it fills its table at first use
-    colors = np.asarray(colormap(np.append(told, np.zeros(len(corners)))))[:, :3]
+    values = np.zeros(rest.n_vertices) if shares is None else shares
+    # a new map for each call, because a map fills its table at first use and threads may share it
+    colormap = LinearSegmentedColormap.from_list("moved", MOVED)
+    colors = np.asarray(colormap(np.append(values, np.zeros(len(corners)))))[:, :3]
     for axes in grid.flat:
         axes.set_axis_off()
     for axes, (title, mesh) in zip(grid.flat, meshes.items(), strict=False):
@@ -67,7 +80,7 @@ def figure_poses(
 
 
 def _frame(meshes: list[TriangleMesh], camera: Camera) -> Float[np.ndarray, "8 3"]:
-    """Return the corners of the box, along the camera's axes, that holds all poses: pictures fit what they show."""
+    """Return the corners of the box that holds all poses, along the axes of the camera."""
     seen = np.vstack([mesh.vertices @ camera.rotation.T for mesh in meshes])
     return (
         np.array(list(product(*zip(seen.min(axis=0), seen.max(axis=0), strict=True))))

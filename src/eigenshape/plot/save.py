@@ -13,12 +13,12 @@ SUFFIXES = (".png", ".svg", ".pdf")
 
 
 def require_picture_path(path: str | Path) -> Path:
-    """Refuse a path that no picture can be written to, before any work is done.
+    """Raise an error if no picture can be written to a path, before any work is done.
 
     Raises
     ------
     InvalidParameterError
-        If the suffix is none of `SUFFIXES` or the folder is not there.
+        If the path does not end in .png, .svg or .pdf, or its folder does not exist.
     """
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
@@ -27,20 +27,38 @@ def require_picture_path(path: str | Path) -> Path:
         )
     if not path.absolute().parent.is_dir():
         raise InvalidParameterError(
-            f"A picture needs a folder to lie in; {path.absolute().parent} is not there."
+            f"A picture must be written to a folder that exists; {path.absolute().parent} does not."
         )
     return path
 
 
 def save_figure(figure: Figure, path: str | Path) -> None:
-    """Write a figure as PNG, SVG or PDF, whole or not at all.
+    """Write a figure to a PNG, SVG or PDF file.
 
-    Figures made alike give the same bytes as PNG and as PDF; in SVG, Matplotlib gives parts random names.
+    The file appears complete or not at all. The same figure gives the same bytes as PNG and as PDF; in SVG,
+    Matplotlib gives elements random names.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    path : str or Path
+        Must end in .png, .svg or .pdf.
 
     Raises
     ------
     InvalidParameterError
-        If the suffix is unknown or the folder is not there.
+        If the path does not end in .png, .svg or .pdf, or its folder does not exist.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> import tempfile, pathlib
+    >>> mesh = es.icosphere(1)
+    >>> figure = es.figure_field(mesh, mesh.vertices[:, 2])
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "height.png")
+    >>> es.save_figure(figure, path)
+    >>> path.read_bytes()[1:4]
+    b'PNG'
     """
     require_type(figure, Figure, "figure")
     path = require_picture_path(path)

@@ -16,7 +16,7 @@ from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import draw, palette
 from eigenshape.retrieval.label_transfer import LabelTransfer
 
-N_COLUMNS = 3
+N_COLUMNS = 3  # matches in a row
 QUIET = "#808080"
 
 
@@ -27,13 +27,17 @@ class Panel:
     Attributes
     ----------
     mesh : TriangleMesh or None
-        None where there is nothing to draw: the panel says so.
+        The shape with f faces. If None, the panel has the text "no mesh to draw".
     title : str
         One or two lines.
     colors : (f,) int
-        Number of each face's colour: equal numbers have equal colours on all panels, negative ones are grey.
+        Number of the color of each face. Equal numbers have the same color on all panels; negative ones are gray.
     vertices : (m,) int
         Vertices to mark by dots.
+
+    See Also
+    --------
+    figure_contact_sheet : Draw panels.
     """
 
     mesh: TriangleMesh | None
@@ -47,7 +51,31 @@ class Panel:
 
 
 def figure_contact_sheet(query: Panel, matches: Sequence[Panel], *, caption: str = "") -> Figure:
-    """Draw a query, large, beside its matches in reading order (thesis fig. 5.1)."""
+    """Draw a query beside its matches, as figure 5.1 of the thesis.
+
+    Parameters
+    ----------
+    query : Panel
+        Drawn larger than the matches.
+    matches : sequence of Panel
+        In reading order, three in a row.
+    caption : str
+        Title of the whole figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Examples
+    --------
+    >>> import numpy as np, eigenshape as es
+    >>> mesh = es.icosphere(1)
+    >>> colors, marked = np.zeros(mesh.n_faces, dtype=int), np.array([0])
+    >>> panel = es.plot.Panel(mesh, "ball", colors, marked)
+    >>> figure = es.plot.figure_contact_sheet(panel, [panel, panel], caption="balls")
+    >>> figure.get_suptitle()
+    'balls'
+    """
     require_type(query, Panel, "query")
     require_each(matches, Panel, "matches")
     n_rows = max(-(-len(matches) // N_COLUMNS), 1)
@@ -88,7 +116,25 @@ def _fill(axes: Axes, panel: Panel) -> None:
 
 
 def figure_label_transfer(source: MeshLike, target: MeshLike, transfer: LabelTransfer) -> Figure:
-    """Draw two shapes side by side: matched parts in one colour, and how sure each label is, at its feature."""
+    """Draw two shapes side by side, matched parts in one color, with the labels and their confidence.
+
+    Parameters
+    ----------
+    source : MeshLike
+        The mesh that had labels.
+    target : MeshLike
+        The mesh that got them.
+    transfer : LabelTransfer
+        Of `transfer_labels(source, labels, target)`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    See Also
+    --------
+    transfer_labels : Copy labels to the matching parts of another shape.
+    """
     source = as_mesh(source, "source")
     target = as_mesh(target, "target")
     require_type(transfer, LabelTransfer, "transfer")
@@ -110,5 +156,5 @@ def figure_label_transfer(source: MeshLike, target: MeshLike, transfer: LabelTra
         right.annotate(
             text, drawing.places[vertex], (7, 7), textcoords="offset points", fontsize=8, bbox=paper
         )
-    right.set_title("labels given, with their confidence (hollow: on the far side)", fontsize=10)
+    right.set_title("labels copied, with their confidence (hollow: on the far side)", fontsize=10)
     return figure

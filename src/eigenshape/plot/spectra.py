@@ -24,22 +24,41 @@ from eigenshape.spectral.comparison.spectra import (
 )
 from eigenshape.spectral.spectrum import Spectrum, require_lowest
 
-DECADES = 1.5  # over which relative differences are drawn on a logarithmic axis
-FAINT = 1e-12  # smaller relative differences are rounding, and have no place on a logarithmic axis
+# Relative differences that span more powers of ten than this are drawn on a logarithmic axis.
+DECADES = 1.5
+# Smaller relative differences are rounding errors, and are left out of a logarithmic axis.
+FAINT = 1e-12
 
 
 def figure_spectrum(
     spectrum: Spectrum, *, area: float | None = None, brackets: Brackets | None = None
 ) -> Figure:
-    """Plot eigenvalues by their number, with the lines between which none is missing.
+    """Plot eigenvalues by their number, with the range in which none is missing.
 
     Parameters
     ----------
     spectrum : Spectrum
     area : float, optional
-        Of a surface: draws Weyl's law λ_i ≈ 4π i / area beside them.
+        Area of the surface, in length². If given, Weyl's law λ_i ≈ 4π i / area is drawn too.
     brackets : Brackets, optional
-        Of the same shape: draws the interval in which each eigenvalue of the shape itself lies.
+        Of the same shape. If given, the interval that holds each eigenvalue of the shape itself is drawn too.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    See Also
+    --------
+    figure_spectra : Plot several spectra.
+    figure_eigenfunctions : Draw eigenfunctions on the shape.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(es.icosphere(2)), k=9)
+    >>> figure = es.plot.figure_spectrum(spectrum)
+    >>> figure.axes[0].get_ylabel()
+    'eigenvalue λ, 1/length²'
     """
     require_type(spectrum, Spectrum, "spectrum")
     require_type(brackets, Brackets | None, "brackets")
@@ -99,33 +118,46 @@ def figure_spectra(
     brackets: Mapping[str, Brackets] | None = None,
     unit: str = "1/length²",
 ) -> Figure:
-    """Plot several spectra side by side by number, and beneath them how far each is from the first.
+    """Plot several spectra by number, and their relative differences from the first one.
 
-    Bars are residual bounds, or brackets; most are too short to be seen.
+    Bars show the bounds of each eigenvalue, by residuals or brackets. Most are too short to be seen.
 
     Parameters
     ----------
     spectra : SpectrumComparison, or {title: Spectrum or (k,) float}
-        Two or more, from the lowest eigenvalue on; numbers alone have no bars.
+        Two or more, each from the lowest eigenvalue on. Numbers without a Spectrum have no bars.
     titles : (str, str)
-        Of the two of a comparison.
+        Titles of the two spectra of a SpectrumComparison.
     brackets : {title: Brackets}, optional
-        Of the shapes with these titles, in place of residual bounds.
+        Bounds of the spectra with these titles, instead of residuals.
     unit : str
-        Of the eigenvalues.
+        Unit of the eigenvalues.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
 
     Raises
     ------
     InvalidParameterError
-        If there are fewer than two, one does not begin with the lowest eigenvalue, or brackets belong to none.
+        If there are fewer than two spectra, one does not begin with the lowest eigenvalue, or the title of brackets
+        is not the title of a spectrum.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> coarse = es.solve_spectrum(es.cotangent_laplacian(mesh), k=9)
+    >>> exact = [0, 2, 2, 2, 6, 6, 6, 6, 6]
+    >>> figure = es.plot.figure_spectra({"unit sphere": exact, "162 vertices": coarse})
+    >>> len(figure.axes)
+    2
     """
     require_type(spectra, SpectrumComparison | Mapping, "spectra")
     require_type(brackets, Mapping | None, "brackets")
     rows = _rows(spectra, titles, brackets or {})
     if len(rows) < 2:
-        raise InvalidParameterError(
-            f"Spectra side by side must be two or more; there are {len(rows)}."
-        )
+        raise InvalidParameterError(f"spectra must hold two or more spectra; it holds {len(rows)}.")
     figure = Figure(figsize=(7.5, 6.4), layout="constrained")
     _draw_rows(figure.subplots(2, 1, sharex=True, height_ratios=(3, 2)), rows, unit)
     return figure
@@ -166,7 +198,7 @@ def _rows(
     unknown = [title for title in brackets if title not in spectra]
     if unknown:
         raise InvalidParameterError(
-            f"brackets must belong to spectra by their titles; {unknown[0]!r} is none of {list(spectra)}."
+            f"The titles of brackets must be titles of spectra, {list(spectra)}; one is {unknown[0]!r}."
         )
     return [_row(title, spectrum, brackets.get(title)) for title, spectrum in spectra.items()]
 

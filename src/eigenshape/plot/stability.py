@@ -28,14 +28,27 @@ def figure_stability(
     *,
     titles: tuple[str, str] = ("one", "two"),
 ) -> Figure:
-    """Draw two shapes coloured by their distance, their spectra, what changes at each heat time, and eigenspaces.
+    """Draw a report on two shapes.
+
+    It shows the shapes colored by the distance from each other, their spectra, the change at each heat time, and the
+    angles between their eigenspaces.
 
     Parameters
     ----------
     report : StabilityReport
+        Of `compare_shapes(one, two)`.
     one, two : ShapeLike
-        The shapes compared; only triangle meshes are drawn.
+        The shapes that were compared. They are drawn if both are triangle meshes.
     titles : (str, str)
+        Titles of the two shapes.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    See Also
+    --------
+    compare_shapes : Compute the report.
     """
     require_type(report, StabilityReport, "report")
     one = as_shape(one, "one")
@@ -75,7 +88,7 @@ def _draw_shapes(
 def _draw_times(axes: Axes, report: StabilityReport) -> None:
     times = np.array([change.t for change in report.changes])
     rows = {
-        "bound for points so far apart": (
+        "bound for points at this distance": (
             [change.bound for change in report.changes],
             "^:",
             "#999999",
@@ -103,7 +116,7 @@ def _draw_times(axes: Axes, report: StabilityReport) -> None:
     axes.set_xlabel("heat time t, length²")
     axes.set_ylabel("largest change / last eigenvalue")
     axes.set_title(
-        f"graph Laplacians of {report.n_samples} points thrown on each", fontsize=10, loc="left"
+        f"graph Laplacians of {report.n_samples} random points on each", fontsize=10, loc="left"
     )
     axes.legend(frameon=False, fontsize=8)
 

@@ -1,4 +1,4 @@
-"""The ways of describing that the command line knows by name."""
+"""The methods of describing shapes that the command line knows by name."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -7,7 +7,8 @@ from typing import Annotated
 import typer
 
 from eigenshape._errors import InvalidParameterError, StoreError
-from eigenshape.cli.console import err, progress_bar, read_repaired, told_by
+from eigenshape.cli.console import batch_reporter, err, progress_bar
+from eigenshape.cli.inputs import read_repaired
 from eigenshape.retrieval.heat.descriptor import PRESETS, HeatRecipe
 from eigenshape.retrieval.kinds import AnyRecipe
 from eigenshape.retrieval.patches.codebook import default_codebook
@@ -19,20 +20,20 @@ from eigenshape.retrieval.store.workers import Item, Workers
 PATCHES = "patches"
 EVERY = (PATCHES, *PRESETS)
 
-HeatPresetOption = Annotated[
-    str, typer.Option("--preset", help=f"How shapes are described: {' or '.join(PRESETS)}.")
+HeatMethodOption = Annotated[
+    str, typer.Option("--method", help=f"How shapes are described: {' or '.join(PRESETS)}.")
 ]
-PresetOption = Annotated[
+MethodOption = Annotated[
     str,
     typer.Option(
-        "--preset",
-        help=f"How shapes are described: {', '.join(EVERY)}; patches are best for partial scans.",
+        "--method",
+        help=f"How shapes are described: {', '.join(EVERY)}. patches is best for partial scans.",
     ),
 ]
-HeldPresetOption = Annotated[
+StoredMethodOption = Annotated[
     str | None,
     typer.Option(
-        "--preset",
+        "--method",
         help=(
             f"Which descriptions to compare: {', '.join(EVERY)}. By default the index's "
             "own, or patches if it has several."
@@ -41,22 +42,22 @@ HeldPresetOption = Annotated[
 ]
 
 
-def heat_preset(name: str) -> HeatRecipe:
-    """Look up a recipe of heat by the name that a user typed."""
-    require_preset(name, tuple(PRESETS))
+def heat_recipe(name: str) -> HeatRecipe:
+    """Return the recipe of a heat method."""
+    require_method(name, tuple(PRESETS))
     return PRESETS[name]
 
 
-def require_preset(name: str, names: Sequence[str] = EVERY) -> None:
-    """Refuse a name that is none of some."""
+def require_method(name: str, names: Sequence[str] = EVERY) -> None:
+    """Raise an error if the name is not one of the allowed names."""
     if name not in names:
-        raise InvalidParameterError(f"--preset takes {' or '.join(names)}; it was given {name!r}.")
+        raise InvalidParameterError(f"--method takes {', '.join(names)}; it is {name!r}.")
 
 
 def recipe_to_fill(
     shelf: ShapeIndex, name: str, items: Sequence[Item], repairs: tuple[str, ...], workers: Workers
 ) -> AnyRecipe:
-    """Return the recipe of a preset for an index; for patches, learn a codebook if it has none."""
+    """Return the recipe of a method for an index; for patches, learn a codebook if it has none."""
     if name != PATCHES:
         return PRESETS[name]
     recipe = _patch_recipe(shelf)
@@ -66,12 +67,12 @@ def recipe_to_fill(
                 items,
                 partial(read_repaired, names=repairs),
                 workers=workers,
-                callback=told_by(progress),
+                callback=batch_reporter(progress),
             )
         err.print(
-            "codebook of patches: the one of eigenshape, since there are few shapes to learn from"
+            "codebook: the one that comes with eigenshape, because there are too few shapes to learn from"
             if codebook == default_codebook()
-            else "codebook of patches: learned from shapes of this index"
+            else "codebook: learned from the shapes of this index"
         )
         recipe = PatchRecipe(codebook)
         shelf.keep_recipe(recipe)
@@ -81,7 +82,7 @@ def recipe_to_fill(
 
 
 def recipe_to_ask(shelf: ShapeIndex, name: str | None) -> AnyRecipe:
-    """Return the recipe of a preset by which an index can answer; without a name, its own."""
+    """Return the recipe of a method by which an index can answer; without a name, its own."""
     if name is None:
         return shelf.default_recipe()
     if name != PATCHES:
@@ -89,8 +90,8 @@ def recipe_to_ask(shelf: ShapeIndex, name: str | None) -> AnyRecipe:
     recipe = _patch_recipe(shelf)
     if recipe is None:
         raise StoreError(
-            f"An index must hold descriptors of the requested preset; {shelf.folder} holds no "
-            "patches."
+            f"An index answers by the methods that it was made with; {shelf.folder} has no "
+            "patches. Run `eigenshape index` with --method patches first."
         )
     return recipe
 

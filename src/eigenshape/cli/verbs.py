@@ -1,0 +1,116 @@
+"""The verbs of the command line: a list that costs nothing, and modules loaded when a verb is called."""
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from eigenshape._errors import EigenshapeError
+from eigenshape._text import printable
+from eigenshape.cli.console import err, shown
+from eigenshape.cli.interrupt import interruptible
+
+# The first line of each verb's docstring stands here again, because `eigenshape --help` lists the
+# verbs without importing their modules, which takes more than a second. A test compares the two.
+VERBS = {
+    "info": "Show the size, topology and faults of a shape, and which repairs would help.",
+    "repair": "Repair a mesh and write it, and report what was done. From OBJ to OBJ, polygons, "
+    "textures and groups stay.",
+    "spectrum": "Compute the lowest eigenvalues of a shape and prove that none is missing.",
+    "operators": "List the operators that `spectrum --operator` takes, with the shapes and options "
+    "of each.",
+    "features": "Find the feature points of a mesh and the parts around them, most persistent "
+    "first.",
+    "segment": "Cut a mesh into its parts: limbs, head, torso.",
+    "label": "Copy the labels of one mesh to the matching parts of another: label a horse, and get "
+    "a labelled camel.",
+    "deform": "Bend, twist or stretch a mesh: a region is turned or moved, and the rest follows "
+    "smoothly.",
+    "stability": "Compare two shapes: how close they lie, what changes in their spectra, and which "
+    "heat times to trust.",
+    "index": "Describe meshes and add them to an index; a file that fails is named, and the others "
+    "are still added.",
+    "query": "Find the shapes of an index that are most like a scan, and which features "
+    "correspond.",
+    "demo": "Try everything: make creatures, index them, scan one from one side in a new pose, and "
+    "find its kind.",
+}
+NEED_NO_ARGUMENT = ("operators", "demo")
+MARKUP: Any = "markdown"  # leaves plain brackets alone, which rich markup would take for its own
+
+# typer brings its own copy of click since version 0.20 and used the package before; this is the
+# class of usage errors of whichever is in use
+UsageError: Any = typer.BadParameter.__base__
+
+
+class Verb(TyperCommand):
+    """A verb: errors of the library and of the system become one line and exit code 1, Ctrl-C 130."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the options and arguments of the verb."""
+        with _printable_usage():
+            return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the verb."""
+        try:
+            with interruptible(), _printable_usage(), warnings.catch_warnings():
+                warnings.simplefilter("always", UserWarning)
+                warnings.showwarning = _print_warning
+                return super().invoke(ctx)
+        except (EigenshapeError, OSError) as error:
+            err.print(f"[bold red]error:[/] {shown(error)}")
+            raise typer.Exit(1) from error
+        except KeyboardInterrupt as error:
+            err.print("stopped; what was finished is kept")
+            raise typer.Exit(130) from error
+
+
+class Verbs(TyperGroup):
+    """The list of verbs. It holds the name and first line of each, and imports a verb when it is called."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.commands = {name: TyperCommand(name, help=line) for name, line in VERBS.items()}
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the options before the verb."""
+        with _printable_usage():
+            return super().parse_args(ctx, args)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> tuple[Any, Any, list[str]]:
+        """Return the verb that was called, from its module."""
+        with _printable_usage():
+            name, found, rest = super().resolve_command(ctx, args)
+        # found is None only where a shell completes a half-typed verb
+        return name, load_verb(str(name)) if found else None, rest
+
+
+def load_verb(name: str) -> Any:
+    """Import a verb's module and return its command."""
+    module = import_module(f"eigenshape.cli.{name}")
+    alone = typer.Typer(
+        rich_markup_mode=MARKUP, add_completion=False, pretty_exceptions_enable=False
+    )
+    alone.command(name, cls=Verb, no_args_is_help=name not in NEED_NO_ARGUMENT)(
+        getattr(module, name)
+    )
+    return typer.main.get_command(alone)
+
+
+@contextmanager
+def _printable_usage() -> Iterator[None]:
+    """Spell out control characters in words that the command does not know."""
+    try:
+        yield
+    except UsageError as error:
+        error.message = printable(error.message)
+        raise
+
+
+def _print_warning(message: Warning | str, *_: object, **__: object) -> None:
+    err.print(f"[yellow]warning:[/] {shown(message)}")
