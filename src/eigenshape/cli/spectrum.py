@@ -37,7 +37,7 @@ from eigenshape.spectral.bounds.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
-N_PICTURED = 8
+N_PICTURED = 8  # eigenfunctions in a picture: two rows of four
 USUAL = 20  # pairs
 ORDERS = {"p2": 2, "p3": 3}
 
