@@ -227,9 +227,9 @@ def test_tetrahedra_are_repaired_too():
     done = repair(ugly, ["auto"])
     assert (done.mesh.n_points, done.mesh.n_simplices) == (5, 2)
     assert done.report == (
-        "drop_duplicate_faces removed 1 tetrahedra with the corners of an earlier one",
+        "drop_duplicate_faces removed 1 tetrahedron with the corners of an earlier one",
         "weld_seams joined 3 vertices along seams",
-        "drop_degenerate removed 1 tetrahedra without volume",
+        "drop_degenerate removed 1 tetrahedron without volume",
         "drop_unreferenced removed 1 vertex without a simplex",
     )
     np.testing.assert_array_equal(done.mesh.points, ugly.points[done.source_vertices])
