@@ -58,7 +58,7 @@ def _solve_between(
 def _far_up(
     pencil: Pencil, low: float, high: float, report: Progress
 ) -> tuple[Pairs, Certificate] | None:
-    """Solve for an interval by itself where it is less work than all eigenvalues below its upper end."""
+    """Solve for the interval alone if that is less work than all eigenvalues below its upper end."""
     if low <= 0 or dense_serves(pencil, 1):
         return None
     interval = count_interval(pencil, low, high)
@@ -74,7 +74,7 @@ def _far_up(
 
 
 def _lowest_below(pencil: Pencil, limit: float, report: Progress) -> tuple[Pairs, Certificate]:
-    """Prove one pair more than lie below the limit: then none of them is missing."""
+    """Certify one pair more than there are below the limit; then none of those is missing."""
     k = min(factor_below(pencil, limit).count + 1, pencil.n)
     while True:
         pairs, certificate = solve_lowest(pencil, k, report)
