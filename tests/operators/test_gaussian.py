@@ -254,7 +254,7 @@ def test_a_point_out_of_reach_is_named():
         InvalidShapeError, match=r"has none within \S+ \(1 such\)\. Choose a larger t"
     ) as caught:
         gaussian_laplacian(points, 0.2, 2)
-    assert "of point 60 at [9.0, 9.0]" in str(caught.value)
+    assert "point 60 at [9.0, 9.0]" in str(caught.value)
 
 
 def test_a_component_that_falls_apart_is_refused():

@@ -147,7 +147,7 @@ def test_from_zero_on_an_interval_is_all_below(low):
         ({"above": -1.0, "below": 3.0}, r"above must be positive and finite"),
         (
             {"above": 2.5, "below": 5.0},
-            r"above and below must have eigenvalues between them; 4 lie below 2.5 and none",
+            r"There must be eigenvalues between above and below; 4 lie below 2.5 and none",
         ),
     ],
 )
