@@ -64,7 +64,7 @@ def zoo(tmp_path_factory):
 def database(zoo, tmp_path_factory):
     db = tmp_path_factory.mktemp("db") / "index"
     done = run("index", db, zoo, "--views", 1, code=3)
-    assert "4 described, 0 known already, 1 failed; the index holds 4 shapes" in done.stdout
+    assert "4 described, 0 indexed already, 1 failed; the index holds 4 shapes" in done.stdout
     assert "broken: " in done.output
     assert "vertex 2 is [2.0, 0.0, nan]" in done.output
     return db

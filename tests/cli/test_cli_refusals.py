@@ -113,7 +113,7 @@ def test_index_names_the_broken_file_takes_the_rest_and_knows_it_again(fish, tmp
     (folder / "broken.off").write_text(BROKEN)
     command = ("index", tmp_path / "db", folder, fish, "--workers", 1, "--views", 0)
     first = run(*command, code=3)
-    assert "2 described, 0 known already, 1 failed; the index holds 2 shapes" in first.stdout
+    assert "2 described, 0 indexed already, 1 failed; the index holds 2 shapes" in first.stdout
     assert "broken.off: faces must index vertices 0..2" in first.stdout
     again = json.loads(run(*command, "--json", code=3).stdout)
     assert (again["shapes"], again["added"], sorted(again["skipped"])) == (2, [], ["ball", "fish"])

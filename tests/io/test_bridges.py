@@ -68,11 +68,12 @@ def test_curves_and_flat_shapes_in_pyvista():
 
 def test_what_does_not_fit_is_refused():
     with pytest.raises(
-        InvalidShapeError, match=r"Only triangle meshes and clouds in R\^3 fit into trimesh"
+        InvalidShapeError, match=r"trimesh holds triangle meshes and point clouds in R\^3"
     ):
         to_trimesh(box(1, 1, 1))
     with pytest.raises(
-        InvalidShapeError, match=r"Only shapes in R\^3 fit into PyVista; this one lies in R\^5"
+        InvalidShapeError,
+        match=r"PyVista holds shapes in up to three dimensions; this one lies in R\^5",
     ):
         to_pyvista(projective_plane(1))
     with pytest.raises(

@@ -1,4 +1,4 @@
-"""eigenshape demo: the whole road on made-up creatures."""
+"""eigenshape demo: index synthetic creatures, scan one, and search for it."""
 
 from pathlib import Path
 from typing import Annotated
@@ -25,11 +25,11 @@ UNSEEN = 11
 N_VERTICES = 2000
 NEXT = """
 Read next:
-  eigenshape features {scan} --picture parts.png      what persists on that scan, and the parts around it
+  eigenshape features {scan} --picture parts.png      feature points of that scan, and the parts around them
   eigenshape spectrum {scan} -k 20 --picture spectrum.png  its eigenvalues, and the proof that none is missing
   eigenshape index my-index FOLDER                    the same for a folder of your own meshes
   eigenshape query my-index SCAN --picture sheet.png  and a scan of yours
-  README.md, docs/glossary.md                         the same road in ten lines of Python, and the words
+  README.md, docs/glossary.md                         the same steps in Python, and the terms
 """
 
 
@@ -48,7 +48,7 @@ def demo(
     shelf = ShapeIndex.open_or_create(output / "index")
     recipe = recipe_to_fill(shelf, PATCHES, items, (), Workers(workers))
     report = describe_all(shelf, items, recipe, Workers(workers))
-    out.print(f"indexed {len(shelf)} shapes ({len(report.skipped)} known already)")
+    out.print(f"indexed {len(shelf)} shapes ({len(report.skipped)} indexed already)")
 
     scan_path = output / "scan.ply"
     scan = partial_scan(

@@ -1,4 +1,4 @@
-"""eigenshape index: describe folders of meshes and keep what they are known by."""
+"""eigenshape index: describe folders of meshes and store the descriptions."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -122,7 +122,7 @@ def _items_of(source: Path) -> Iterator[Item]:
 
 def _print(shelf: ShapeIndex, report: BatchReport) -> None:
     out.print(
-        f"{len(report.added)} described, {len(report.skipped)} known already, {len(report.failed)} failed; "
+        f"{len(report.added)} described, {len(report.skipped)} indexed already, {len(report.failed)} failed; "
         f"the index holds {len(shelf)} shapes."
     )
     for name, reason in report.failed:

@@ -1,4 +1,4 @@
-"""eigenshape query: which shapes of an index are most like a scan, and which features correspond."""
+"""eigenshape query: which shapes of an index are most similar to a scan, and which features correspond."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -93,7 +93,7 @@ def _facts(shape: Asked, match: Match) -> dict[str, Any]:
 
 
 def print_matches(matches: Sequence[Match]) -> None:
-    """Print matches, best first, with the vertices that correspond best."""
+    """Print matches, best first, with the number of corresponding points."""
     rows = [
         [match.name, match.label or "", f"{match.score:.4g}", str(len(match.correspondences))]
         for match in matches
