@@ -55,7 +55,7 @@ def refined(path: str, times: int) -> es.Laplacian:
     """Return the cotangent Laplacian of a real mesh, subdivided some times."""
     mesh = es.read_mesh(DATA / path)
     for _ in range(times):
-        mesh = es.shapes.subdivide(mesh)
+        mesh = es.geometry.subdivide(mesh)
     return es.cotangent_laplacian(mesh)
 
 

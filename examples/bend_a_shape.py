@@ -42,7 +42,7 @@ def main(folder: Path) -> dict[str, es.TriangleMesh]:
 
     es.io.write_edits(session.edits, giraffe, folder / "edits.json")
     edits = es.io.read_edits(folder / "edits.json", giraffe)
-    again = es.deformation.replay(es.rig_shape(es.shapes.subdivide(giraffe)), edits).mesh
+    again = es.deformation.replay(es.rig_shape(es.geometry.subdivide(giraffe)), edits).mesh
     es.save_figure(
         es.plot.figure_poses({"as made": giraffe, "bent": lifted}, session_shares(giraffe, lifted)),
         folder / "giraffe.png",

@@ -120,7 +120,7 @@ def attach(
     mesh: es.TriangleMesh, other: es.TriangleMesh, vertex: int, end: int, radius: float
 ) -> Surgery:
     """Join another surface to one by a bridge between their vertices: N grew out of a disc of M, which is X_0."""
-    joined = bridge(es.shapes.disjoint_union(mesh, other), vertex, mesh.n_vertices + end, radius)
+    joined = bridge(es.geometry.disjoint_union(mesh, other), vertex, mesh.n_vertices + end, radius)
     regions_one = joined.regions_one[: mesh.n_faces]
     kept = int((regions_one < 0).sum())
     regions_two = np.where(np.arange(joined.two.n_faces) < kept, -1, 0)

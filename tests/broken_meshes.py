@@ -4,7 +4,8 @@ import numpy as np
 
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.shapes.surfaces import disjoint_union, icosphere
+from eigenshape.geometry.union import disjoint_union
+from eigenshape.shapes.surfaces import icosphere
 
 
 def soup(mesh):

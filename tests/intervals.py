@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from eigenshape.shapes.surfaces import subdivide
+from eigenshape.geometry.subdivision import subdivide
 
 
 def finer(mesh, times):

@@ -5,8 +5,8 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.shapes.surfaces import disjoint_union
 
 TETRAHEDRON = TriangleMesh(
     np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]),

@@ -97,7 +97,7 @@ def real() -> dict[str, Case]:
 def finer(mesh: Mesh, times: int) -> Mesh:
     """Split simplices at the middles of their edges, where they lie."""
     for _ in range(times):
-        mesh = es.shapes.subdivide(mesh)
+        mesh = es.geometry.subdivide(mesh)
     return mesh
 
 

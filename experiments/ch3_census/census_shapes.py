@@ -39,7 +39,7 @@ def octasphere(level: int) -> es.TriangleMesh:
     faces = [(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)]
     mesh = es.TriangleMesh(corners, np.array(faces))
     for _ in range(level):
-        mesh = es.shapes.subdivide(mesh)
+        mesh = es.geometry.subdivide(mesh)
         mesh = es.TriangleMesh(
             mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True), mesh.faces
         )
@@ -55,7 +55,7 @@ def cube_surface(level: int) -> es.TriangleMesh:
     )
     mesh = es.TriangleMesh(solid.points, sides[first[counts == 1]])
     for _ in range(level):
-        mesh = es.shapes.subdivide(mesh)
+        mesh = es.geometry.subdivide(mesh)
     return mesh
 
 
@@ -71,7 +71,7 @@ def flat_torus(n_u: int, n_v: int) -> es.SimplicialMesh:
 
 def copies(mesh: es.TriangleMesh, count: int) -> es.TriangleMesh:
     """Return equal components, all in one place."""
-    return es.shapes.disjoint_union(*[mesh] * count)
+    return es.geometry.disjoint_union(*[mesh] * count)
 
 
 def cycle(n: int) -> sp.csr_array:

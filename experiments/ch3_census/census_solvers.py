@@ -15,7 +15,7 @@ from census_shapes import Case
 import eigenshape as es
 
 # Parts below a hundred points, which equal components have, leave no room for a search.
-DENSE_SWITCHES = {"SMALL": 100, "DENSE_LIMIT": 0}
+DENSE_SWITCHES = {"DENSE_POINTS": 100, "DENSE_LIMIT": 0}
 TAKES_RNG = "rng" in inspect.signature(spl.eigsh).parameters
 
 

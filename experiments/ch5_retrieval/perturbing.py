@@ -18,7 +18,7 @@ def changed_whole(mesh: es.TriangleMesh, change: str) -> es.TriangleMesh:
     """Return a whole shape, before it is cut, with half the faces or with edges half as long, if that is the change."""
     if change == HALF:
         return halved(mesh)
-    return es.shapes.subdivide(mesh) if change == DOUBLE else mesh
+    return es.geometry.subdivide(mesh) if change == DOUBLE else mesh
 
 
 def changed_part(mesh: es.TriangleMesh, change: str, rng: np.random.Generator) -> es.TriangleMesh:

@@ -43,14 +43,14 @@ def skeletons(folder: Path) -> None:
     """Draw the dragon's skeleton, cut and fitted (figures 6.5, 6.6), and ways to put details back (6.7, 6.9)."""
     scene = SCENES["dragon"]()
     binding, handles = bound(scene)
-    grip, faces = es.deformation.skeleton_response(binding), scene.mesh.faces
-    cut = grip.skeleton.copy()
+    response, faces = es.deformation.skeleton_response(binding), scene.mesh.faces
+    cut = response.skeleton.copy()
     whole = binding.regions[0].astype(float)
     cut += handles[0].carry(cut, whole)
-    moved = es.deformation.move_skeleton(grip, handles)
+    moved = es.deformation.move_skeleton(response, handles)
     poses = {
         "shape": scene.mesh.vertices,
-        "skeleton, 8 modes": grip.skeleton,
+        "skeleton, 8 modes": response.skeleton,
         "region turned": cut,
         "fitted": moved,
     }

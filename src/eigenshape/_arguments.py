@@ -1,4 +1,4 @@
-"""What an argument must be, and what to pass instead of what was given."""
+"""Type checks of arguments, with errors that say what to pass instead."""
 
 import os
 from collections.abc import Iterable
@@ -8,7 +8,7 @@ from typing import get_args
 
 from eigenshape._errors import InvalidParameterError
 
-# The call that makes each value, from a mesh where one can.
+# The call that makes a value of each type, from a mesh if possible.
 MAKERS = {
     "Binding": "es.deformation.bind(rig, [region])",
     "Brackets": "es.bracket_eigenvalues(mesh, k)",
@@ -54,14 +54,14 @@ MAKERS = {
     "TriangleMesh": "es.TriangleMesh(vertices, faces)",
     "Workers": "es.retrieval.Workers()",
 }
-# What reads a value of each kind from a file.
+# The call that reads a value of each type from a file.
 READERS = {
     "PatchCodebook": "es.retrieval.read_codebook(Path({path}).read_bytes())",
     "PointCloud": "es.read_points({path}, dim=2)",
     "ShapeIndex": "es.ShapeIndex.open({path})",
     "Spectrum": "es.Spectrum.load({path})",
 }
-# What makes a value of one kind from one of another, where that is not the usual call.
+# The call that makes a value of one type from a value of another, if it is not the one in MAKERS.
 CONVERSIONS = {
     ("PointCloud", "Laplacian"): "es.point_cloud_laplacian(cloud)",
     ("PointCloud", "Quadrature"): "es.geometry.cloud_quadrature(cloud)",
@@ -73,42 +73,44 @@ CONVERSIONS = {
 
 
 def require_type(value: object, kind: type | UnionType, name: str) -> None:
-    """Refuse an argument of another kind, by its type and with what to pass instead.
+    """Raise an error if an argument is not an instance of `kind`.
 
     Raises
     ------
     InvalidParameterError
-        If the value is no instance of `kind`.
+        The message names the type of the value and says what to pass instead.
     """
     if not isinstance(value, kind):
         raise InvalidParameterError(
-            f"{name} must be {named_kind(kind)}; the value is {named_value(value)}. {instead(value, kind)}"
+            f"{name} must be {describe_kind(kind)}; the value is {describe_value(value)}. "
+            f"{suggest_argument(value, kind)}"
         )
 
 
 def require_each(values: object, kind: type | UnionType, name: str) -> None:
-    """Refuse an argument that is no list of values of one kind.
+    """Raise an error if an argument is not a list of instances of `kind`.
 
     Raises
     ------
     InvalidParameterError
-        If it is none, or a value in it is no instance of `kind`.
+        If it is not a list, or an entry is not an instance of `kind`.
     """
     if (
         isinstance(values, kind)
         or not isinstance(values, Iterable)
         or isinstance(values, str | bytes)
     ):
-        remedy = f"Pass [{name}]." if isinstance(values, kind) else instead(values, kind)
+        remedy = f"Pass [{name}]." if isinstance(values, kind) else suggest_argument(values, kind)
         raise InvalidParameterError(
-            f"{name} must be a list, each entry {named_kind(kind)}; it is {named_value(values)}. {remedy}"
+            f"{name} must be a list, each entry {describe_kind(kind)}; "
+            f"it is {describe_value(values)}. {remedy}"
         )
     for index, value in enumerate(values):
         require_type(value, kind, f"{name}[{index}]")
 
 
-def named_kind(kind: type | UnionType) -> str:
-    """Return the name of a type with its article, or those of several joined by "or"."""
+def describe_kind(kind: type | UnionType) -> str:
+    """Return the name of a type with its article; several types are joined by "or"."""
     names = [
         "None" if each is type(None) else f"{_article(each.__name__)} {each.__name__}"
         for each in _kinds(kind)
@@ -116,8 +118,8 @@ def named_kind(kind: type | UnionType) -> str:
     return " or ".join(names)
 
 
-def named_value(value: object) -> str:
-    """Return what a value is: None, text or a number as it stands, of anything else its type."""
+def describe_value(value: object) -> str:
+    """Return the type of a value with its article, and a text or number itself."""
     if value is None:
         return "None"
     name = type(value).__name__
@@ -126,8 +128,11 @@ def named_value(value: object) -> str:
     return f"{_article(name)} {name}{shown}"
 
 
-def instead(value: object, kind: type | UnionType) -> str:
-    """Say what to pass instead of a value: a part of it, what a file holds, or what a call makes of it."""
+def suggest_argument(value: object, kind: type | UnionType) -> str:
+    """Say what to pass instead of a value.
+
+    This is one of its attributes, the call that reads a file, or the call that makes such a value.
+    """
     part = attribute_of(value, kind)
     if part:
         return f"Pass its attribute {part}."
@@ -144,7 +149,10 @@ def instead(value: object, kind: type | UnionType) -> str:
 
 
 def attribute_of(value: object, kind: type | UnionType) -> str | None:
-    """Return the name of the first attribute of a value that is of some kind, as `mesh` is of a Repaired."""
+    """Return the name of the first attribute that is an instance of `kind`, if there is one.
+
+    For example, `mesh` is such an attribute of a RepairedMesh.
+    """
     parts = fields(value) if is_dataclass(value) else ()
     return next(
         (part.name for part in parts if isinstance(getattr(value, part.name, None), kind)), None
@@ -152,6 +160,7 @@ def attribute_of(value: object, kind: type | UnionType) -> str | None:
 
 
 def _kinds(kind: type | UnionType) -> tuple[type, ...]:
+    """Return the members of a union, or the type itself."""
     return get_args(kind) or (kind,)
 
 

@@ -1,4 +1,4 @@
-"""Small checks that name what they check, and read-only copies of arrays."""
+"""Checks of arrays and numbers, with errors that name the argument, and read-only copies."""
 
 import operator
 from typing import Any, SupportsIndex, TypeVar
@@ -6,22 +6,25 @@ from typing import Any, SupportsIndex, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from eigenshape._arguments import named_value
+from eigenshape._arguments import describe_value
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._memory import machine_memory
 from eigenshape._typing import ArrayLike
 
+# Names of rows in messages, and what rows of indices refer to.
 SINGULAR = {"vertices": "vertex", "faces": "face", "points": "point", "simplices": "simplex"}
 INDEXED = {"faces": "vertices", "simplices": "points"}
 
-SHARE_OF_ARRAYS = 0.5  # of the memory: what one array may take while it is checked and copied
-BYTES_OF_ENTRY = 17  # meanwhile: two copies of 8 bytes, and one bool
+# Share of the memory of the machine that one array may take while it is checked and copied. A
+# larger share would leave too little for the computation.
+SHARE_OF_ARRAYS = 0.5
+BYTES_OF_ENTRY = 17  # memory per entry meanwhile: two copies of 8 bytes and one bool
 
 ArrayT = TypeVar("ArrayT", bound=NDArray[Any])
 
 
 def frozen(array: ArrayT) -> ArrayT:
-    """Return a contiguous read-only copy that nobody else can write to."""
+    """Return a contiguous copy that is read-only."""
     copy = np.array(array, order="C")
     copy.flags.writeable = False
     return copy  # type: ignore[return-value]
@@ -32,13 +35,13 @@ def as_array(
     name: str,
     error: type[InvalidShapeError | InvalidParameterError] = InvalidParameterError,
 ) -> NDArray[Any]:
-    """Return `value` as an array; every array that a caller hands over comes through here.
+    """Return `value` as an array. All arrays that callers pass go through here.
 
     Raises
     ------
     InvalidShapeError or InvalidParameterError
-        If an entry is masked, or checking and copying would take more than half of the memory: a broadcast array says
-        that it has numbers which stand nowhere yet.
+        If an entry is masked, or if checking and copying would take more than half of the memory.
+        A broadcast array can be far larger than the memory that it occupies itself.
     ValueError
         If rows differ in length.
     """
@@ -50,32 +53,34 @@ def as_array(
     if np.any(masked):
         place = tuple(int(index) for index in np.argwhere(masked)[0])
         raise error(
-            f"{name} must not be masked; entry {place[0] if len(place) == 1 else place} is ({masked.sum()} such). "
-            "Fill what is masked with numbers, or leave it out."
+            f"{name} must not be masked; entry {place[0] if len(place) == 1 else place} is "
+            f"({masked.sum()} such). Fill masked entries with numbers, or remove them."
         )
     size, most = array.size * BYTES_OF_ENTRY, SHARE_OF_ARRAYS * machine_memory()
     if size > most:
         raise error(
-            f"{name} must fit into half of the memory, {most / 2**30:.1f} GiB; to check and to copy an array of shape "
-            f"{array.shape} takes {size / 2**30:.1f} GiB."
+            f"{name} must fit into half of the memory, {most / 2**30:.1f} GiB; "
+            f"checking and copying an array of shape {array.shape} takes {size / 2**30:.1f} GiB."
         )
     return np.asarray(array)
 
 
 def finite_rows(value: ArrayLike, name: str, columns: int | None = None) -> NDArray[np.float64]:
-    """Return `value` as an (n, columns) float64 array, refusing anything not finite by index and value.
+    """Return `value` as an (n, columns) float64 array; raise an error if an entry is not finite.
 
-    Any number of columns serves where none is given.
+    Without `columns` any number of columns is accepted.
     """
     rows = _table(value, name, columns)
     if rows.dtype.kind not in "iuf":
         raise InvalidShapeError(f"{name} must be real numbers; the type is {rows.dtype}.")
-    with np.errstate(over="ignore"):  # what long doubles hold and floats do not is refused below
+    # Long doubles that overflow become infinite, which raises the error below.
+    with np.errstate(over="ignore"):
         rows = rows.astype(np.float64)
     bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if bad.size:
         raise InvalidShapeError(
-            f"{name} must be finite; {SINGULAR[name]} {bad[0]} is {rows[bad[0]].tolist()} ({bad.size} such)."
+            f"{name} must be finite; {SINGULAR[name]} {bad[0]} is {rows[bad[0]].tolist()} "
+            f"({bad.size} such)."
         )
     return rows
 
@@ -83,8 +88,9 @@ def finite_rows(value: ArrayLike, name: str, columns: int | None = None) -> NDAr
 def index_rows(
     value: ArrayLike, name: str, columns: int | None, n_vertices: int
 ) -> NDArray[np.int64]:
-    """Return `value` as (f, columns) int64 indices below `n_vertices`, refusing the first bad row."""
+    """Return `value` as (f, columns) int64 indices from 0 to `n_vertices` - 1."""
     rows = _table(value, name, columns)
+    # Integers beyond 64 bits come as objects; they are out of range, and the message shows them.
     huge = rows.dtype.kind == "O" and all(
         isinstance(entry, int | np.integer) for entry in rows.flat
     )
@@ -121,8 +127,8 @@ def _table(value: ArrayLike, name: str, columns: int | None) -> NDArray[Any]:
         )
     if len(rows) > 1 and rows.strides[0] == 0:
         raise InvalidShapeError(
-            f"{name} must have a place in memory for each row; all {len(rows)} are one row, {rows[0].tolist()}, that "
-            "is broadcast. Copy the array if that is what you mean."
+            f"{name} must not be one broadcast row; all {len(rows)} rows are {rows[0].tolist()} "
+            "at one place in memory. Copy the array if this is intended."
         )
     return rows
 
@@ -133,7 +139,7 @@ def _first(name: str, rows: NDArray[Any], bad: NDArray[np.bool_]) -> str:
 
 
 def positive_values(value: ArrayLike, name: str) -> NDArray[np.float64]:
-    """Return `value` as a one-dimensional float64 array, refusing anything not positive and finite."""
+    """Return `value` as a one-dimensional float64 array of positive and finite numbers."""
     values = _list_of_numbers(value, name)
     bad = np.flatnonzero(~(np.isfinite(values) & (values > 0)))
     if bad.size:
@@ -144,18 +150,19 @@ def positive_values(value: ArrayLike, name: str) -> NDArray[np.float64]:
 
 
 def finite_values(value: ArrayLike, name: str) -> NDArray[np.float64]:
-    """Return `value` as a one-dimensional float64 array, refusing anything not finite."""
+    """Return `value` as a one-dimensional float64 array of finite numbers."""
     values = _list_of_numbers(value, name)
     _require_finite(values, name)
     return values
 
 
 def vertex_values(value: ArrayLike, name: str, n_vertices: int) -> NDArray[np.float64]:
-    """Return `value` as one finite float64 number a vertex."""
+    """Return `value` as a float64 array with one finite number per vertex."""
     values = real_numbers(value, name)
     if values.shape != (n_vertices,):
         raise InvalidParameterError(
-            f"{name} must hold one number a vertex, shape ({n_vertices},); the shape is {values.shape}."
+            f"{name} must hold one number per vertex, shape ({n_vertices},); "
+            f"the shape is {values.shape}."
         )
     values = values.astype(np.float64)
     _require_finite(values, name)
@@ -178,12 +185,12 @@ def _list_of_numbers(value: ArrayLike, name: str) -> NDArray[np.float64]:
 
 
 def real_numbers(value: ArrayLike, name: str) -> NDArray[Any]:
-    """Return `value` as an array of real numbers, of any shape and of its own type.
+    """Return `value` as an array of real numbers of any shape, without changing its type.
 
     Raises
     ------
     InvalidParameterError
-        If it holds anything else, or rows differ in length.
+        If it contains anything else, or rows differ in length.
     """
     try:
         numbers = as_array(value, name)
@@ -195,13 +202,13 @@ def real_numbers(value: ArrayLike, name: str) -> NDArray[Any]:
         ) from err
     if numbers.dtype.kind not in "biuf":
         is_array = isinstance(value, list | tuple | np.ndarray)
-        given = f"the type is {numbers.dtype}" if is_array else f"it is {named_value(value)}"
+        given = f"the type is {numbers.dtype}" if is_array else f"it is {describe_value(value)}"
         raise InvalidParameterError(f"{name} must be real numbers; {given}.")
     return numbers
 
 
 def whole_number(value: SupportsIndex, name: str, low: int, high: int | None = None) -> int:
-    """Return `value` as an int within low..high, both included; no `high` means no upper bound."""
+    """Return `value` as an int from `low` to `high`; without `high` there is no upper bound."""
     try:
         number = operator.index(value)
     except TypeError as err:
@@ -214,7 +221,10 @@ def whole_number(value: SupportsIndex, name: str, low: int, high: int | None = N
 
 
 def whole_numbers(value: ArrayLike, name: str, low: int, high: int) -> NDArray[np.int64]:
-    """Return a list of ints within low..high, both included; `name` is that of one of them."""
+    """Return `value` as an int64 array with entries from `low` to `high`.
+
+    `name` is the name of one entry.
+    """
     numbers = np.atleast_1d(as_array(value, name)).ravel()
     typed = numbers.dtype.kind in "iu"
     for suspect in numbers[(numbers < low) | (numbers > high)] if typed else numbers:

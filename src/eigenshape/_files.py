@@ -1,4 +1,4 @@
-"""Files read with care and replaced whole."""
+"""Reading regular files only, and replacing files atomically."""
 
 import secrets
 import shutil
@@ -12,14 +12,16 @@ from eigenshape._errors import FileFormatError
 
 
 def read_regular(path: Path, what: str = "a mesh") -> bytes:
-    """Read a whole file, refusing what is not one: a folder, a pipe or a device could hang or never end.
+    """Read a whole regular file.
+
+    Reading a pipe or a device could block or never end, so other files raise an error.
 
     Raises
     ------
     FileNotFoundError, PermissionError
-        As the system says.
+        As raised by the system.
     FileFormatError
-        If the path is no regular file, or is empty.
+        If the path is not a regular file, or the file is empty.
     """
     require_regular(path)
     data = path.read_bytes()
@@ -29,14 +31,14 @@ def read_regular(path: Path, what: str = "a mesh") -> bytes:
 
 
 def require_regular(path: Path) -> None:
-    """Refuse a path that is there and is no regular file.
+    """Raise an error if a path is not a regular file.
 
     Raises
     ------
     FileNotFoundError, PermissionError
-        As the system says.
+        As raised by the system.
     FileFormatError
-        With what it is instead.
+        The message says what the path is instead.
     """
     mode = path.stat().st_mode
     if not stat.S_ISREG(mode):
@@ -52,14 +54,16 @@ def require_regular(path: Path) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """Open a file beside its place and move it there in the end, so that nobody ever sees half of it.
+    """Open a temporary file that replaces `path` when the block ends without an error.
+
+    So no reader ever sees half of the file.
 
     Raises
     ------
     OSError
         If the system cannot write there.
     FileFormatError
-        If something that is no regular file stands there.
+        If `path` exists and is not a regular file.
     """
     replaced = path.exists()
     if replaced:
@@ -76,6 +80,6 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 
 
 def replace_file(path: Path, data: bytes) -> None:
-    """Write these bytes to a file, as `replacing` does."""
+    """Write bytes to a file atomically, as `replacing` does."""
     with replacing(path) as file:
         file.write(data)

@@ -1,11 +1,11 @@
-"""Text from outside: names of files, labels, what a foreign index says."""
+"""Text from outside, such as names of files and labels, made safe to print."""
 
 
 def printable(text: str) -> str:
-    r"""Return text with what is not printable spelled out, as ``\x1b`` for the escape character.
+    r"""Return text with characters that are not printable as escapes, such as ``\x1b``.
 
-    Control characters steer terminals and break SVG, and those that turn the direction of writing
-    disguise names. Letters of any script stay as they are.
+    Control characters change the state of terminals and are not allowed in SVG, and those that
+    reverse the direction of writing disguise names. Letters of any script do not change.
 
     Examples
     --------

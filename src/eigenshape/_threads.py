@@ -1,4 +1,4 @@
-"""One BLAS thread inside a computation, whatever other threads of Python do."""
+"""One BLAS thread inside a computation, also if several Python threads compute."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,11 +12,11 @@ from threadpoolctl import ThreadpoolController
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """Let BLAS use one thread inside the block or, as a decorator, inside the function.
+    """Limit BLAS to one thread inside the block or, as a decorator, inside the function.
 
-    Several BLAS threads cut sums where they like, so last digits would depend on how many there
-    are; with busy cores they made an eigensolve take 10 to 40 times longer, and OpenBLAS has hung
-    where four threads of Python called it with three threads of its own.
+    - With several threads the last digits of sums would depend on the number of threads.
+    - On busy cores several threads made an eigensolve take 10 to 40 times longer.
+    - OpenBLAS has hung when four Python threads called it with three threads of its own.
     """
     own = _LIMIT.begin()
     try:
@@ -26,12 +26,12 @@ def one_blas_thread() -> Iterator[None]:
 
 
 class _Limit:
-    """One thread in each BLAS library as long as any computation is under way.
+    """Keeps each BLAS library at one thread while any computation is running.
 
     Most libraries have one number of threads for the whole process. If each computation saved and
-    restored it by itself, the first of two to end would give the other its threads back, and the
-    second would leave one thread behind for good. So the first to begin saves the number, and the
-    last to end restores it. With OpenMP each thread of Python has a number of its own.
+    restored it, the first of two to end would give the other several threads, and the second would
+    leave the process with one thread. So the first to begin saves the number, and the last to end
+    restores it. With OpenMP each Python thread has its own number.
     """
 
     def __init__(self) -> None:
@@ -40,7 +40,7 @@ class _Limit:
         self._before: list[tuple[Any, int]] = []
 
     def begin(self) -> list[tuple[Any, int]]:
-        """Return the libraries whose number is this thread's own, and their numbers as they were."""
+        """Begin a computation; return the libraries with a number per thread, and these numbers."""
         with self._lock:
             numbers = [(library, library.get_num_threads()) for library in _blas_libraries()]
             own = [pair for pair in numbers if _is_per_thread(pair[0])]
@@ -52,6 +52,7 @@ class _Limit:
         return own
 
     def end(self, own: list[tuple[Any, int]]) -> None:
+        """End a computation, given what `begin` returned."""
         with self._lock:
             self._n_inside -= 1
             _set_threads(own)
@@ -64,7 +65,10 @@ _LIMIT = _Limit()
 
 @cache
 def _blas_libraries() -> list[Any]:
-    """Find the libraries of NumPy and SciPy; that takes 7 ms, setting their threads 0.06 ms."""
+    """Find the BLAS libraries of NumPy and SciPy.
+
+    This takes 7 ms, and setting their threads 0.06 ms, so the result is cached.
+    """
     return ThreadpoolController().select(user_api="blas").lib_controllers
 
 
@@ -74,8 +78,8 @@ def _is_per_thread(library: Any) -> bool:
 
 def _set_threads(numbers: list[tuple[Any, int]]) -> None:
     for library, number in numbers:
-        # From threadpoolctl 3.8 on, the first thread to set OpenBLAS's number owns it, and what
-        # other threads set is ignored without a word.
+        # From threadpoolctl 3.8 on, the first thread that sets the number of OpenBLAS owns it, and
+        # values set by other threads are silently ignored unless the ownership is released.
         release = getattr(library, "clear_controlling_thread", lambda **_: None)
         release(force=True)
         library.set_num_threads(number)

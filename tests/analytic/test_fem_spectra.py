@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
+from eigenshape.geometry.subdivision import subdivide
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
 from eigenshape.shapes import exact
 from eigenshape.shapes.domains import ball, box, disc, interval, irregular_grid
-from eigenshape.shapes.surfaces import grid, subdivide
+from eigenshape.shapes.surfaces import grid
 from eigenshape.spectral.solve import solve_spectrum
 
 

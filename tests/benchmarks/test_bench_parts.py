@@ -47,9 +47,9 @@ def test_the_operations_of_a_factor_are_counted_by_columns():
         import bench_parts
     finally:
         sys.path.remove(str(BENCHMARKS))
-    from eigenshape.spectral.solver.pencil import normalise
+    from eigenshape.spectral.solver.pencil import normalize
 
-    pencil = normalise(es.cotangent_laplacian(es.icosphere(0)))
+    pencil = normalize(es.cotangent_laplacian(es.icosphere(0)))
     moved, operations = bench_parts._factor(pencil.shifted.elimination, None)
     entries = np.zeros((12, 12))
     e = pencil.shifted.elimination

@@ -103,7 +103,7 @@ def test_info_proposes_all_that_helps(tmp_path):
         "inward": (TriangleMesh(ball.vertices, ball.faces[:, ::-1]), ["orient"]),
         "holes": (
             TriangleMesh(ball.vertices, np.delete(ball.faces, np.arange(0, 1140, 30), axis=0)),
-            ["seal_holes"],
+            ["fill_holes"],
         ),
         "specks": (with_specks(ball, rng, 200), ["largest_component"]),
         "soup": (soup(ball), ["weld_seams"]),
@@ -129,9 +129,11 @@ def test_copies_of_points_and_tetrahedra(tmp_path):
         in run("spectrum", tmp_path / "copies.xyz", code=1).stderr
     )
     done = run("spectrum", tmp_path / "copies.xyz", "-k", 4, "--json", "--repair", "auto")
-    assert "repair: drop_copies removed 5 points at the places of others" in done.stderr
-    assert info(tmp_path / "copies.xyz")["repairs_to_try"] == ["drop_copies"]
-    assert info(tmp_path / "copies.xyz", "--repair", "drop_copies")["repairs_to_try"] == []
+    assert "repair: drop_duplicate_points removed 5 points at the places of others" in done.stderr
+    assert info(tmp_path / "copies.xyz")["repairs_to_try"] == ["drop_duplicate_points"]
+    assert (
+        info(tmp_path / "copies.xyz", "--repair", "drop_duplicate_points")["repairs_to_try"] == []
+    )
     mesh = with_duplicates(tetrahedra(), np.random.default_rng(0), 1)
     rows = "\n".join(" ".join(map(str, row)) + " 0" for row in mesh.points.tolist())
     cells = "\n".join(" ".join(map(str, row)) + " 0" for row in (mesh.simplices + 1).tolist())

@@ -25,7 +25,7 @@ def folder(tmp_path_factory):
     mesh = es.shapes.torus(30, 15)
     es.write_mesh(mesh, place / "one.ply")
     es.write_mesh(es.TriangleMesh(mesh.vertices * [1, 1, 1.3], mesh.faces), place / "two.ply")
-    es.write_mesh(es.shapes.subdivide(mesh), place / "finer.ply")
+    es.write_mesh(es.geometry.subdivide(mesh), place / "finer.ply")
     (place / "map.txt").write_text("".join(f"{vertex}\n" for vertex in range(mesh.n_vertices)))
     return place
 

@@ -10,7 +10,7 @@ from eigenshape.deformation.region import BoxRegion, BrushRegion
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.deformation.session import DeformationSession, replay
 from eigenshape.deformation.skeleton import move_skeleton
-from eigenshape.shapes.surfaces import subdivide
+from eigenshape.geometry.subdivision import subdivide
 
 HEAD = np.flatnonzero(lump().vertices[:, 0] > 0.6)
 TAIL = lump().vertices[:, 0] < -0.7

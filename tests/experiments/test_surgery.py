@@ -16,7 +16,7 @@ from topological import coupled_points
 @pytest.fixture(scope="module")
 def spheres():
     ball = es.icosphere(3)
-    return es.shapes.disjoint_union(
+    return es.geometry.disjoint_union(
         ball, es.TriangleMesh(ball.vertices + np.array([2.3, 0, 0]), ball.faces)
     )
 

@@ -42,7 +42,7 @@ def test_the_loops_of_a_standing_torus_are_born_and_die_at_its_saddles():
 
 
 def test_a_constant_function_has_its_components_alone():
-    mesh = es.shapes.disjoint_union(es.icosphere(0), es.shapes.grid(2, 2))
+    mesh = es.geometry.disjoint_union(es.icosphere(0), es.shapes.grid(2, 2))
     found = es.features.persistence_diagram(mesh, np.full(mesh.n_vertices, 3.0))
     assert not len(found.maxima.births)
     assert not len(found.minima.births)
@@ -107,7 +107,7 @@ def test_the_distance_by_hand():
     assert es.features.bottleneck_distance(one, one) == 0.0
     lifted = es.features.persistence_diagram(*path([3, 12, 7, 9, 4]))
     assert es.features.bottleneck_distance(one, lifted) == 3.0  # the component must move
-    pieces = es.shapes.disjoint_union(es.shapes.grid(1, 1), es.shapes.grid(1, 1))
+    pieces = es.geometry.disjoint_union(es.shapes.grid(1, 1), es.shapes.grid(1, 1))
     apart = es.features.persistence_diagram(pieces, np.zeros(8))
     assert es.features.bottleneck_distance(one, apart) == np.inf
 

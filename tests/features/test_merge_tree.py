@@ -7,8 +7,9 @@ from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.segmentation import segment
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import non_manifold_vertices, submesh
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 
 def wavy(mesh, step=0.0):
@@ -187,7 +188,7 @@ def test_three_faces_at_an_edge_are_all_neighbours():
 
 @pytest.mark.parametrize(
     ("values", "message"),
-    [([0.0, 1.0], "one number a vertex"), ([0.0, np.nan, 1.0, 2.0], "entry 1 is nan")],
+    [([0.0, 1.0], "one number per vertex"), ([0.0, np.nan, 1.0, 2.0], "entry 1 is nan")],
 )
 def test_bad_values_are_named(values, message):
     mesh = grid(1, 1)

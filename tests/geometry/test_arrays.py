@@ -50,7 +50,7 @@ def test_vertex_values_are_one_finite_number_a_vertex():
     assert vertex_values([1, 2], "field", 2).dtype == np.float64
     with pytest.raises(
         InvalidParameterError,
-        match=r"field must hold one number a vertex, shape \(3,\); the shape is",
+        match=r"field must hold one number per vertex, shape \(3,\); the shape is",
     ):
         vertex_values([1, 2], "field", 3)
     with pytest.raises(InvalidParameterError, match="field must be finite; entry 1 is nan"):
@@ -165,14 +165,14 @@ except EigenshapeError as error:
 
 def test_an_array_is_measured_against_the_memory(monkeypatch):
     monkeypatch.setattr(_arrays, "machine_memory", lambda: 2.0**10)
-    fact = r"points must fit into half of the memory, 0\.0 GiB; to check and to copy an array of shape \(20, 2\) takes"
+    fact = r"points must fit into half of the memory, 0\.0 GiB; checking and copying an array of shape \(20, 2\) takes"
     with pytest.raises(InvalidShapeError, match=fact):
         PointCloud(np.arange(40.0).reshape(20, 2))
 
 
 def test_one_row_that_is_broadcast_is_no_shape():
     row = np.broadcast_to([0.0, 1.0, 2.0], (5, 3))
-    fact = r"a place in memory for each row; all 5 are one row, \[0\.0, 1\.0, 2\.0\], that is broadcast"
+    fact = r"not be one broadcast row; all 5 rows are \[0\.0, 1\.0, 2\.0\] at one place in memory"
     with pytest.raises(InvalidShapeError, match=fact):
         PointCloud(row)
     assert PointCloud(np.array(row)).n_points == 5

@@ -53,7 +53,7 @@ def test_it_scales_exactly():
 
 
 def test_distances_from_sources():
-    mesh = es.shapes.disjoint_union(es.shapes.grid(6, 6), es.icosphere(1))
+    mesh = es.geometry.disjoint_union(es.shapes.grid(6, 6), es.icosphere(1))
     found = es.geometry.geodesic_distances(mesh, [0, 48])
     flat = mesh.vertices[:49]
     np.testing.assert_allclose(found[0, :49], np.linalg.norm(flat - flat[0], axis=1), rtol=1e-12)
@@ -62,12 +62,15 @@ def test_distances_from_sources():
 
 
 def test_bad_input_is_named():
-    pieces = es.shapes.disjoint_union(es.shapes.grid(1, 1), es.icosphere(0))
-    with pytest.raises(InvalidShapeError, match="need one piece; the mesh has 2 components"):
+    pieces = es.geometry.disjoint_union(es.shapes.grid(1, 1), es.icosphere(0))
+    with pytest.raises(
+        InvalidShapeError,
+        match="must be connected to have average distances; this one has 2 components",
+    ):
         es.geometry.average_geodesic_distance(pieces)
     with pytest.raises(InvalidParameterError, match="n_bases must be at least 1; it is 0"):
         es.geometry.average_geodesic_distance(es.shapes.grid(1, 1), n_bases=0)
     with pytest.raises(InvalidParameterError, match=r"A source must lie in 0\.\.3; it is 4"):
         es.geometry.geodesic_distances(es.shapes.grid(1, 1), [4])
-    with pytest.raises(InvalidShapeError, match="this mesh has dimension 1"):
+    with pytest.raises(InvalidShapeError, match="this one has dimension 1"):
         es.geometry.geodesic_distances(es.shapes.interval(3), [0])

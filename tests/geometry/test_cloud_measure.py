@@ -83,7 +83,8 @@ def test_equal_points_are_named():
 
 def test_too_few_points_and_neighbours_are_refused():
     with pytest.raises(
-        InvalidShapeError, match="A cloud of dimension 2 needs over 3 points; it has 3"
+        InvalidShapeError,
+        match="A cloud of dimension 2 must have at least 4 points; this one has 3",
     ):
         cloud_quadrature(PointCloud(np.eye(3)))
     with pytest.raises(InvalidParameterError, match=r"n_neighbors must lie in 3\.\.49; it is 2"):

@@ -56,7 +56,7 @@ def test_a_shape_stays_what_it_is():
         (Path("cat.ply"), r"it is a PosixPath \('cat\.ply'\)\. Pass read_mesh\('cat\.ply'\)\."),
         (
             PointCloud(MESH.vertices),
-            r"it is a PointCloud\. A cloud has no faces; point_cloud_laplacian\(cloud\)",
+            r"it is a PointCloud\. A point cloud has no faces; point_cloud_laplacian\(cloud\)",
         ),
         (box(1, 1, 1), r"it is a SimplicialMesh\. Pass boundary_surface\(mesh\)"),
         (FLAT, r"it is a SimplicialMesh\. Pass TriangleMesh\(numpy\.pad"),
@@ -64,8 +64,8 @@ def test_a_shape_stays_what_it_is():
             circle(5),
             r"it is a SimplicialMesh\. cotangent_laplacian\(mesh\) and edge_graph\(mesh\) take",
         ),
-        (weld(MESH), r"it is a Repaired\. Pass its attribute mesh\."),
-        (MESH.vertices, r"it is an ndarray\. Pass PointCloud\(points, dim=2\) if it is points"),
+        (weld(MESH), r"it is a RepairedMesh\. Pass its attribute mesh\."),
+        (MESH.vertices, r"it is an ndarray\. Pass PointCloud\(points, dim=2\) if these are points"),
         (trimesh.Scene(to_trimesh(MESH)), r"it is a Scene\. Pass scene\.to_mesh\(\)"),
         (pyvista.Cube(), r"it is a PolyData\. Pass dataset\.extract_surface\(\)\.triangulate\(\)"),
         (pyvista.PolyData(MESH.vertices), r"it is a PolyData\. .* or from_pyvista\(dataset\)"),
@@ -82,7 +82,7 @@ def test_everything_else_is_refused_by_its_type_with_what_to_pass(value, fact):
 def test_shapes_of_other_kinds_are_refused():
     with pytest.raises(
         InvalidParameterError,
-        match=r"mesh must be a mesh; it is a PointCloud\. A cloud has no faces",
+        match=r"mesh must be a mesh; it is a PointCloud\. A point cloud has no faces",
     ):
         as_simplicial(PointCloud(MESH.vertices))
     with pytest.raises(
@@ -92,7 +92,7 @@ def test_shapes_of_other_kinds_are_refused():
         as_simplicial("a.msh")
     with pytest.raises(
         InvalidParameterError,
-        match=r"shape must be a mesh or a cloud of points; it is None\. Pass a",
+        match=r"shape must be a mesh or a point cloud; it is None\. Pass a",
     ):
         as_shape(None)
 
@@ -108,10 +108,10 @@ def test_what_the_messages_tell_to_pass_is_a_mesh():
 def test_rows_of_four_indices_must_be_said_to_be_tetrahedra_or_quads():
     with pytest.raises(
         InvalidParameterError,
-        match=r"Rows of four .* it must be said which; .*cells='tetrahedra'\) or",
+        match=r"cells must be given for rows of four indices; .*cells='tetrahedra'\) or",
     ):
         from_arrays(SQUARE, [[0, 1, 2, 3]])
-    with pytest.raises(InvalidParameterError, match="Rows of four indices are tetrahedra or quads"):
+    with pytest.raises(InvalidParameterError, match="cells must be given for rows of four"):
         as_mesh((SQUARE, [[0, 1, 2, 3]]))
     quads = from_arrays(SQUARE, [[0, 1, 2, 3]], cells="quads")
     assert isinstance(quads, TriangleMesh)
@@ -125,7 +125,7 @@ def test_rows_of_four_indices_must_be_said_to_be_tetrahedra_or_quads():
 def test_cells_are_said_of_rows_of_four_alone():
     with pytest.raises(
         InvalidParameterError,
-        match=r"cells is for rows of four indices; cells is 'quads' and rows of",
+        match=r"cells must be given only for rows of four indices; cells is 'quads' and rows of",
     ):
         from_arrays(MESH.vertices, MESH.faces, cells="quads")
     with pytest.raises(
@@ -153,6 +153,6 @@ def test_the_surface_around_tetrahedra_looks_outward(scale):
 def test_only_tetrahedra_have_a_surface_around_them():
     with pytest.raises(
         InvalidShapeError,
-        match=r"Only tetrahedra in R\^3 have a surface around them; the mesh is a",
+        match=r"boundary_surface must be given tetrahedra in R\^3; the mesh is a",
     ):
         boundary_surface(MESH)

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from eigenshape.geometry.crossings import self_intersections
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.shapes.creatures import make_creature
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=float)
 TETRAHEDRON_FACES = np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])

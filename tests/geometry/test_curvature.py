@@ -24,7 +24,7 @@ def test_a_cube_bends_at_its_corners_alone():
     faces = [triangle for a, b, c, d in quads for triangle in ((a, b, c), (a, c, d))]
     cube = es.TriangleMesh(corners, faces)
     np.testing.assert_allclose(angle_defects(cube), np.pi / 2)
-    np.testing.assert_allclose(angle_defects(es.shapes.subdivide(cube))[8:], 0, atol=1e-14)
+    np.testing.assert_allclose(angle_defects(es.geometry.subdivide(cube))[8:], 0, atol=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -33,7 +33,7 @@ def test_a_cube_bends_at_its_corners_alone():
         (es.icosphere(2), 2),
         (es.shapes.torus(20, 11), 0),
         (es.shapes.grid(5, 3), 1),
-        (es.shapes.disjoint_union(es.icosphere(1), es.shapes.grid(2, 2)), 3),
+        (es.geometry.disjoint_union(es.icosphere(1), es.shapes.grid(2, 2)), 3),
         (submesh(es.shapes.torus(20, 11), np.arange(440) % 5 > 0)[0], None),
         (es.TriangleMesh(np.eye(5, 3), [[0, 1, 2], [0, 1, 3], [0, 1, 4]]), 1),
     ],

@@ -104,7 +104,7 @@ def test_many_points_in_many_dimensions():
 
 
 def test_bad_input_is_named():
-    with pytest.raises(es.InvalidShapeError, match="A ball must have points to hold"):
+    with pytest.raises(es.InvalidShapeError, match="An enclosing ball must contain points"):
         es.geometry.enclosing_ball(np.empty((0, 3)))
     with pytest.raises(es.InvalidShapeError, match="point 1 is"):
         es.geometry.enclosing_ball([[0, 0], [np.nan, 1]])

@@ -1,12 +1,18 @@
 import numpy as np
 import pytest
 
-from eigenshape.geometry.facets import facet_components, facet_table, without_pinches
+from eigenshape.geometry.facets import (
+    boundary_facets,
+    facet_components,
+    facet_table,
+    without_pinches,
+)
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.topology import boundary_facets, edge_table
+from eigenshape.geometry.topology import edge_table
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.shapes.domains import ball, box, interval
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
+from eigenshape.shapes.surfaces import grid, icosphere
 
 BOWTIE = TriangleMesh(
     [[0, 0, 0], [1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]], [[0, 1, 2], [4, 3, 0]]
@@ -39,6 +45,16 @@ def test_a_facet_lies_opposite_to_its_corner(mesh):
         for corner, facet in zip(simplex, facets, strict=True):
             assert {corner, *table.facets[facet]} == set(simplex)
     np.testing.assert_array_equal(table.facets[table.boundary], boundary_facets(mesh))
+
+
+@pytest.mark.parametrize("mesh", [interval(4), grid(3, 2), box(2, 2, 2)])
+def test_facets_of_huge_meshes_are_sorted_as_rows(mesh, monkeypatch):
+    packed = facet_table(mesh)
+    monkeypatch.setattr("eigenshape.geometry.facets.PACKED_BELOW", 0)
+    rows = facet_table(mesh)
+    np.testing.assert_array_equal(rows.facets, packed.facets)
+    np.testing.assert_array_equal(rows.simplex_facets, packed.simplex_facets)
+    np.testing.assert_array_equal(rows.n_simplices, packed.n_simplices)
 
 
 def test_three_triangles_may_share_a_facet():

@@ -13,7 +13,8 @@ from eigenshape.geometry.geodesic import (
 )
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
+from eigenshape.geometry.union import disjoint_union
+from eigenshape.shapes.surfaces import grid, icosphere
 
 
 def test_on_a_flat_grid_the_way_is_straight():
@@ -94,7 +95,7 @@ def test_it_is_symmetric_and_the_same_in_five_dimensions():
 
 def test_curves_and_bad_radii_are_refused():
     with pytest.raises(
-        InvalidShapeError, match="are measured on surfaces; this mesh has dimension 1"
+        InvalidShapeError, match="need a mesh of dimension 2; this one has dimension 1"
     ):
         geodesic_balls(SimplicialMesh([[0.0], [1.0]], [[0, 1]]), 1.0)
     with pytest.raises(InvalidParameterError, match="radius must be positive and finite"):
@@ -171,7 +172,7 @@ def test_sources_must_be_vertices_of_a_surface():
     with pytest.raises(InvalidParameterError, match=r"A source must lie in 0\.\.41; it is 42"):
         geodesic_distance_to_set(icosphere(1), [3, 42])
     with pytest.raises(
-        InvalidShapeError, match="are measured on surfaces; this mesh has dimension 1"
+        InvalidShapeError, match="need a mesh of dimension 2; this one has dimension 1"
     ):
         geodesic_distance_to_set(SimplicialMesh([[0.0], [1.0]], [[0, 1]]), [0])
 

@@ -52,7 +52,7 @@ def test_powers_of_two_do_not_change_a_bit(normalize):
 def test_a_point_has_no_size(normalize):
     with pytest.raises(
         InvalidShapeError,
-        match=r"must have a size to be normalised; its 3 vertices span 0\.0 of it",
+        match=r"must have a size above zero to be normalized; its 3 vertices give size 0\.0",
     ):
         normalize(POINT)
 
@@ -60,7 +60,7 @@ def test_a_point_has_no_size(normalize):
 def test_a_line_has_length_and_no_area():
     assert np.ptp(normalize_box(LINE).vertices[:, 0]) == 1
     assert np.ptp(normalize_diameter(LINE).vertices[:, 0]) == 1
-    with pytest.raises(InvalidShapeError, match="a size to be normalised"):
+    with pytest.raises(InvalidShapeError, match="a size above zero to be normalized"):
         normalize_area(LINE)
 
 
@@ -69,7 +69,7 @@ def test_a_slanted_line_has_no_area():
     slanted = TriangleMesh(
         np.outer(along, [0.345, 0.822, 0.331]), [[i, i + 1, i + 2] for i in range(28)]
     )
-    with pytest.raises(InvalidShapeError, match=r"its 30 vertices span 0\.0 of it"):
+    with pytest.raises(InvalidShapeError, match=r"its 30 vertices give size 0\.0"):
         normalize_area(slanted)
     assert pdist(normalize_diameter(slanted).vertices).max() == pytest.approx(1, rel=1e-14)
 

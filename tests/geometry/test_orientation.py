@@ -8,6 +8,7 @@ from eigenshape.geometry.measure import enclosed_volume, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.repair import orient, repair
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.curvature import mean_curvature
 from eigenshape.retrieval.patches.patches import surface_patches
 from eigenshape.scans.partial import (
@@ -18,7 +19,7 @@ from eigenshape.scans.partial import (
     viewpoint,
 )
 from eigenshape.shapes.creatures import make_creature
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 
 def require_out(mesh):
@@ -127,7 +128,7 @@ def test_faces_that_disagree_have_no_outside():
         surface_patches,
     ):
         with pytest.raises(
-            InvalidShapeError, match=r"Faces must be turned one way; .* Try repair\(mesh,"
+            InvalidShapeError, match=r"faces must be turned the same way; .* Try repair\(mesh,"
         ):
             needs(ball)
         needs(repair(ball, ["auto"]).mesh)

@@ -56,7 +56,7 @@ def test_uniform_points_share_one():
             [1.0],
             1,
             InvalidParameterError,
-            "weights must be one a point; there are 1 for 2 points",
+            "weights must hold one number per point; there are 1 for 2 points",
         ),
         (
             np.eye(2),

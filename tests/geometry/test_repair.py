@@ -26,9 +26,10 @@ from eigenshape.geometry.topology import (
     is_closed,
     is_manifold,
 )
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.retrieval.baselines.shape_dna import shape_dna
 from eigenshape.shapes.creatures import make_creature
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
+from eigenshape.shapes.surfaces import grid, icosphere
 
 
 def test_a_welded_soup_is_whole_again():
@@ -238,15 +239,15 @@ def test_tetrahedra_are_repaired_too():
 
 def test_copies_of_points_go():
     cloud = PointCloud([[0, 0, 0], [1, 0, 0], [0, -0.0, 0], [1, 0, 0], [2, 0, 0]], 1)
-    assert suggest_repairs(cloud) == ("drop_copies",)
+    assert suggest_repairs(cloud) == ("drop_duplicate_points",)
     done = repair(cloud, ["auto"])
     assert done.cloud.points.tolist() == [[0, 0, 0], [1, 0, 0], [2, 0, 0]]
     assert (done.cloud.dim, done.source_points.tolist()) == (1, [0, 1, 4])
-    assert done.report == ("drop_copies removed 2 points at the places of others",)
+    assert done.report == ("drop_duplicate_points removed 2 points at the places of others",)
     assert suggest_repairs(done.cloud) == ()
     assert repair(cloud, []).cloud is cloud
     with pytest.raises(
-        InvalidParameterError, match="must be among auto, drop_copies; name 1 is 'weld'"
+        InvalidParameterError, match="must be among auto, drop_duplicate_points; name 1 is 'weld'"
     ):
         repair(cloud, ["auto", "weld"])
 
@@ -292,7 +293,7 @@ def test_specks_and_holes_are_suggested_up_to_a_share_of_the_area():
         open_ball = TriangleMesh(
             ball.vertices, ball.faces[ball.vertices[ball.faces, 2].max(axis=1) < height]
         )
-        assert ("seal_holes" in suggest_repairs(open_ball)) == few
+        assert ("fill_holes" in suggest_repairs(open_ball)) == few
     assert suggest_repairs(grid(4, 4)) == ()
 
 

@@ -24,6 +24,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.quadrature import mesh_quadrature
 from eigenshape.geometry.repair import REPAIRS, repair
 from eigenshape.geometry.requirements import require_joined
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.anisotropic import curvature_tensors
 from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
@@ -44,7 +45,7 @@ from eigenshape.retrieval.patches.patches import extract_patches, surface_patche
 from eigenshape.retrieval.store.index import describe_to_store
 from eigenshape.scans.partial import partial_scan, viewpoint
 from eigenshape.shapes.spheres import fibonacci_sphere
-from eigenshape.shapes.surfaces import disjoint_union, icosphere
+from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
 from eigenshape.spectral.solve import solve_spectrum
 
@@ -153,11 +154,11 @@ def test_what_hides_a_shape_has_one_remedy(name):
     "name", ["describe by patches", "surface_patches", "find_parts", "transfer_labels"]
 )
 def test_what_looks_from_outside_needs_an_orientation(name):
-    require_remedy(DESCRIBERS[name], flipped(BALL, rng()), "Faces must be turned one way; ")
+    require_remedy(DESCRIBERS[name], flipped(BALL, rng()), "faces must be turned the same way; ")
     require_remedy(
         lambda mesh: curvature_tensors(mesh, 1.0),
         flipped(BALL, rng()),
-        "Faces must be turned one way; ",
+        "faces must be turned the same way; ",
     )
 
 

@@ -4,9 +4,9 @@ import pytest
 from eigenshape.geometry.facets import facet_components, facet_table
 from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.subdivision import pieces
+from eigenshape.geometry.subdivision import pieces, subdivide
 from eigenshape.shapes.domains import ball, circle, interval
-from eigenshape.shapes.surfaces import grid, subdivide
+from eigenshape.shapes.surfaces import grid
 
 
 def test_an_interval_by_hand():

@@ -19,7 +19,8 @@ from eigenshape.geometry.topology import (
     unreferenced_vertices,
     vertex_components,
 )
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.geometry.union import disjoint_union
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 
 def mesh_of(*faces):

@@ -1,5 +1,6 @@
 """Compiled loops are kept where the machine lets them be kept, and run where it does not."""
 
+import gc
 import os
 import re
 import shutil
@@ -7,9 +8,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import pytest
+from numba.core import event
 
-from eigenshape._compile import make_private, temporary_folder
+from eigenshape._compile import make_private, njit, temporary_folder
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 MEASURE = """
@@ -74,6 +77,97 @@ def test_without_any_folder_loops_are_compiled_each_time_and_it_is_said_once(clo
         f"import warnings; warnings.simplefilter('always')\n{MEASURE}", closed_copy
     )
     assert done.stderr.count("Set NUMBA_CACHE_DIR to such a folder") == 1
+
+
+class CollectorRecorder(event.Listener):
+    """Whether the garbage collector runs when compilations start."""
+
+    def __init__(self):
+        self.collects = []
+
+    def on_start(self, event):
+        self.collects.append(gc.isenabled())
+
+    def on_end(self, event):
+        pass
+
+
+@pytest.mark.parametrize("collects", [True, False])
+def test_the_garbage_collector_pauses_while_loops_compile_and_not_longer(
+    tmp_path, monkeypatch, collects
+):
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+
+    @njit
+    def inner(value):
+        return value + 1
+
+    @njit
+    def outer(value):
+        return inner(value) + 1
+
+    @njit
+    def failing(value):
+        return value.no_such_attribute
+
+    theirs = numba.njit(inner.py_func)
+    before = gc.isenabled()
+    try:
+        (gc.enable if collects else gc.disable)()
+        with event.install_listener("numba:compile", CollectorRecorder()) as recorder:
+            assert outer(1) == 3
+            assert gc.isenabled() is collects
+            with pytest.raises(numba.TypingError, match="no_such_attribute"):
+                failing(1)
+            assert gc.isenabled() is collects
+            assert recorder.collects == [False] * 3
+            assert theirs(1) == 2
+            assert recorder.collects[3:] == [collects]
+    finally:
+        (gc.enable if before else gc.disable)()
+
+
+def stderr_on_a_terminal(code, cache):
+    """Run code in a new process whose stderr is a terminal, and return what it writes there."""
+    ours, theirs = os.openpty()
+    settings = {"PYTHONPATH": str(SOURCE), "NUMBA_CACHE_DIR": str(cache)}
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", code], check=False, env=os.environ | settings, stderr=theirs
+        )
+        assert done.returncode == 0
+        os.write(theirs, b"END")
+        written = b""
+        while not written.endswith(b"END"):
+            written += os.read(ours, 4096)
+    finally:
+        os.close(ours)
+        os.close(theirs)
+    return written.decode().removesuffix("END")
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="a terminal that is no window needs a pty")
+def test_a_terminal_is_told_once_that_loops_compile_and_only_when_they_do(tmp_path):
+    two_threads = f"""
+from concurrent.futures import ThreadPoolExecutor
+import eigenshape as es
+with ThreadPoolExecutor(2) as pool:
+    list(pool.map(lambda source: es.geodesic_distances(es.icosphere(1), [source]), range(2)))
+{MEASURE}"""
+    assert stderr_on_a_terminal(two_threads, tmp_path).count("eigenshape compiles its loops") == 1
+    assert list(tmp_path.rglob("*.nbi"))
+    assert stderr_on_a_terminal(two_threads, tmp_path) == ""
+
+
+@pytest.mark.long
+def test_nothing_is_written_about_compiling_where_there_is_no_terminal(tmp_path):
+    settings = {"PYTHONPATH": str(SOURCE), "NUMBA_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", MEASURE], check=True, env=os.environ | settings, capture_output=True
+    )
+    assert list(tmp_path.rglob("*.nbi"))
+    assert done.stderr == b""
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="folders are closed by their owner's number")

@@ -11,7 +11,7 @@ some = settings(deadline=None, max_examples=60)
 seeds = st.integers(0, 2**32 - 1)
 SHAPES = (
     es.icosphere(1), es.shapes.torus(6, 5), es.shapes.grid(5, 4),
-    es.shapes.disjoint_union(es.icosphere(0), es.shapes.torus(4, 3)),
+    es.geometry.disjoint_union(es.icosphere(0), es.shapes.torus(4, 3)),
     es.shapes.projective_plane(1),
 )  # fmt: skip
 

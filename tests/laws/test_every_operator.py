@@ -19,6 +19,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import drop_duplicate_faces
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
 from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.connection import connection_laplacian
@@ -30,7 +31,7 @@ from eigenshape.operators.kernel import neighbor_distance
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.shapes.creatures import make_creature
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 from eigenshape.spectral.laws.operator_laws import check_operator
 from eigenshape.spectral.laws.report import DEFAULT_PROMISES
 from eigenshape.spectral.laws.transformations import random_rotation

@@ -10,7 +10,8 @@ from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.segmentation import segment
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import submesh
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.geometry.union import disjoint_union
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 seeds = st.integers(0, 2**32 - 1)
 spreads = st.sampled_from([1, 3, 10, 1000])

@@ -8,8 +8,9 @@ from scipy.spatial.transform import Rotation
 from eigenshape.geometry.measure import enclosed_volume, face_areas, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import inconsistent_edges
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 seeds = st.integers(0, 2**32 - 1)
 masses = st.sampled_from(["lumped", "consistent", "averaged"])

@@ -23,8 +23,9 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import repair, suggest_repairs
 from eigenshape.geometry.requirements import require_describable, require_oriented, require_sound
 from eigenshape.geometry.topology import is_closed
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.shapes.creatures import make_creature
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 BASES = {
     "ball": icosphere(1),

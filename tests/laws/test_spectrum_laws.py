@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.shapes.surfaces import disjoint_union, icosphere, torus
+from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import strategy as roads
 
@@ -28,7 +29,7 @@ def shape(seed: int) -> TriangleMesh:
 def lanczos_for_all():
     """Take the road of large operators, which is the one with something to lose."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(roads, "SMALL", 0)
+        patch.setattr(roads, "DENSE_POINTS", 0)
         yield
 
 

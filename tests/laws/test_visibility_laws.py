@@ -11,10 +11,11 @@ from scipy.ndimage import binary_fill_holes
 
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import unreferenced_vertices
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.scans import raster
 from eigenshape.scans.partial import cut_by_planes, partial_scan, random_planes, rotation_towards
 from eigenshape.scans.raster import rasterize
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 SPHERE = icosphere(3)
 seeds = st.integers(0, 2**32 - 1)

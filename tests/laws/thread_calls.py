@@ -280,6 +280,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "crouzeix_raviart_laplacian": lambda v: es.operators.crouzeix_raviart_laplacian(v.ball),
     "curvature_tensors": lambda v: es.operators.curvature_tensors(v.animal, 2.0),
     "cut_by_planes": lambda v: es.scans.cut_by_planes(v.animal, [[0, 1, 0, 0.3]]),
+    "default_codebook": lambda v: es.retrieval.default_codebook(),
     "default_energies": lambda v: es.spectral.default_energies(v.spectrum),
     "default_times": lambda v: es.spectral.default_times(v.spectrum),
     "deform": lambda v: es.deform(v.rig, v.region, v.move, fixed=v.fixed),
@@ -291,8 +292,8 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ),
     "disc": lambda v: es.shapes.disc(4),
     "disc_eigenvalues": lambda v: es.shapes.disc_eigenvalues(9),
-    "disjoint_union": lambda v: es.shapes.disjoint_union(v.ball, v.torus),
-    "drop_copies": lambda v: es.geometry.drop_copies(v.cloud),
+    "disjoint_union": lambda v: es.geometry.disjoint_union(v.ball, v.torus),
+    "drop_duplicate_points": lambda v: es.geometry.drop_duplicate_points(v.cloud),
     "collapse_needles": lambda v: es.geometry.collapse_needles(v.animal),
     "drop_degenerate": lambda v: es.geometry.drop_degenerate(v.animal),
     "drop_duplicate_faces": lambda v: es.geometry.drop_duplicate_faces(v.animal),
@@ -388,14 +389,15 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "largest_component": lambda v: es.geometry.largest_component(v.animal),
     "light_field": lambda v: es.retrieval.baselines.light_field(v.ball, n_fields=1, size=32),
     "light_field_distance": lambda v: es.retrieval.baselines.light_field_distance(*v.light),
-    "default_codebook": lambda v: es.retrieval.default_codebook(),
     "make_creature": lambda v: es.make_creature("quadruped", 3, n_vertices=700),
     "map_closeness": lambda v: es.stability.map_closeness(v.ball, 1.01 * v.ball.vertices),
     "map_from_points": lambda v: es.spectral.map_from_points(
         v.many_spectrum, v.many_spectrum, np.arange(v.many.n_vertices), n_modes=6
     ),
     "match_features": lambda v: es.retrieval.match_features(*v.by_heat),
-    "match_patches": lambda v: es.retrieval.match_patches(*v.points),
+    "match_patches": lambda v: es.retrieval.match_patches(
+        *(descriptor.points[0] for descriptor in v.by_patches)
+    ),
     "matching_reach": lambda v: es.stability.matching_reach(2.0),
     "matching_score": lambda v: es.retrieval.matching_score(*v.by_heat),
     "maximum_matching": lambda v: es.stability.maximum_matching(
@@ -463,7 +465,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         len(saved(v, ".svg")),
     ],  # random names in SVG
     "scale_invariant_signature": lambda v: es.spectral.scale_invariant_signature(v.many_spectrum),
-    "seal_holes": lambda v: es.geometry.seal_holes(v.grid),
+    "fill_holes": lambda v: es.geometry.fill_holes(v.grid),
     "segment": lambda v: es.segment(v.tree, n_regions=4),
     "self_intersections": lambda v: es.geometry.self_intersections(v.animal),
     "separated_groups": lambda v: es.spectral.separated_groups(v.spectrum.eigenvalues),
@@ -494,7 +496,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "sphere_harmonics": lambda v: es.shapes.sphere_harmonics(v.ball.vertices, 3),
     "sphere_hull": lambda v: es.shapes.sphere_hull(v.ball.vertices),
     "sphere_quadrature": lambda v: es.geometry.sphere_quadrature(90),
-    "subdivide": lambda v: [es.shapes.subdivide(v.solid), es.shapes.subdivide(v.ball)],
+    "subdivide": lambda v: [es.geometry.subdivide(v.solid), es.geometry.subdivide(v.ball)],
     "suggest_repairs": lambda v: es.suggest_repairs(v.animal),
     "surface_area": lambda v: es.geometry.surface_area(v.many),
     "tangent_frames": lambda v: es.operators.tangent_frames(v.animal),

@@ -8,11 +8,12 @@ from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.measure import surface_area, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import boundary_vertices
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
-from eigenshape.operators.connection import connection_laplacian, flattened, tangent_frames
+from eigenshape.operators.connection import connection_laplacian, flatten_turns, tangent_frames
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.directions import vertex_directions
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 from eigenshape.spectral.solve import solve_spectrum
 
 few = settings(deadline=None, max_examples=15)
@@ -96,7 +97,7 @@ def test_a_weight_below_zero_is_outweighed_where_the_published_form_fails():
 
 def test_around_a_flattened_face_a_vector_comes_back():
     angles = np.random.default_rng(0).uniform(-1, 1, 12)
-    turns = flattened(np.exp(1j * angles))
+    turns = flatten_turns(np.exp(1j * angles))
     np.testing.assert_allclose(turns.reshape(-1, 3).prod(axis=1), 1, rtol=1e-14)
     share = angles.reshape(-1, 3).sum(axis=1) / 3
     np.testing.assert_allclose(np.angle(turns) + np.repeat(share, 3), angles, atol=1e-14)
@@ -157,7 +158,7 @@ def test_the_axis_of_a_sphere_turns_into_a_field_of_energy_one():
 
 
 def test_the_regular_tetrahedron_by_hand():
-    # Around a vertex 180°, scaled to 360°: neighbours at 0°, 120°, 240°. All weights are 1/√3, and the diagonal is √3.
+    # Around a vertex 180°, scaled to 360°: neighbors at 0°, 120°, 240°. All weights are 1/√3, and the diagonal is √3.
     stiffness = connection_laplacian(TETRAHEDRON).stiffness.toarray()
     blocks = stiffness.reshape(4, 2, 4, 2).transpose(0, 2, 1, 3)
     for i in range(4):
@@ -285,7 +286,7 @@ def test_two_fans_at_a_vertex_are_refused():
 def test_faces_turned_against_each_other_are_refused():
     points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]
     with pytest.raises(
-        InvalidShapeError, match=r"turned one way; the two at edge \(1, 2\) are turned against"
+        InvalidShapeError, match=r"turned the same way; the two at edge \(1, 2\) are turned against"
     ):
         connection_laplacian(TriangleMesh(points, [[0, 1, 2], [1, 2, 3]]))
 

@@ -17,6 +17,7 @@ from eigenshape.geometry.quadrature import (
 )
 from eigenshape.geometry.simplices import dual_volumes, mean_side_length
 from eigenshape.geometry.simplicial import SimplicialMesh
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators import kernel
 from eigenshape.operators.gaussian import (
     functional_laplacian,
@@ -24,7 +25,7 @@ from eigenshape.operators.gaussian import (
     mesh_laplacian,
     quadrature_laplacian,
 )
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
+from eigenshape.shapes.surfaces import grid, icosphere
 
 
 def by_the_book(points, weights, t, dim):
@@ -196,7 +197,7 @@ def test_weights_that_are_volumes_make_the_mesh_laplacian():
         ({"edge_factor": np.nan}, "edge_factor must be positive and finite; entry 0 is nan"),
         (
             {"edge_factor": 0.9},
-            r"A kernel must reach the neighbours, h ≥ e; h = 2√t is 0.9 of the mean edge length",
+            r"A kernel must reach the neighbors, h ≥ e; h = 2√t is 0.9 of the mean edge length",
         ),
         ({"cutoff": 0.0}, "cutoff must be positive"),
     ],
@@ -241,7 +242,7 @@ def test_a_time_that_leaves_nothing_is_warned_of():
 
 def test_weights_of_one_over_n_are_corrected_in_the_random_walk_form_only():
     with pytest.raises(
-        InvalidParameterError, match="Weights of 1/n must be corrected in the random-walk form"
+        InvalidParameterError, match="A correction of weights 1/n needs the random-walk form"
     ):
         gaussian_laplacian(np.random.default_rng(0).random((50, 2)), 0.1, 2, correct="log")
 

@@ -150,7 +150,7 @@ def test_a_point_without_edge_is_no_harm_unless_degrees_divide():
         ),
         ([[0, np.nan], [np.nan, 0]], r"must be finite and not negative; entry \(0, 1\) is nan"),
         ([[0, np.inf], [np.inf, 0]], r"must be finite and not negative; entry \(0, 1\) is inf"),
-        ([[0, 1], [1, 4.0]], r"must not be its own neighbour; entry \(1, 1\) is 4\.0 \(1 such\)"),
+        ([[0, 1], [1, 4.0]], r"must not be its own neighbor; entry \(1, 1\) is 4\.0 \(1 such\)"),
         ([[0, 1j], [1j, 0]], r"Weights of edges must be real numbers; the type is complex128"),
     ],
 )

@@ -59,7 +59,7 @@ def test_two_clouds_are_two_components_and_one_that_is_torn_is_refused():
     values = solve_spectrum(point_cloud_laplacian(two), 3).eigenvalues
     np.testing.assert_allclose(values[:2], 0, atol=1e-10)
     assert values[2] > 1
-    # A curve of two dense ends and a long sparse middle: its mean distance of neighbours says nothing of the middle.
+    # A curve of two dense ends and a long sparse middle: its mean distance of neighbors says nothing of the middle.
     steps = np.concatenate([np.linspace(0, 1, 200), [4.0, 7.0], np.linspace(10, 11, 200)])
     curve = PointCloud(np.column_stack([steps, 0.01 * steps**2]), 1)
     with pytest.raises(
@@ -73,6 +73,6 @@ def test_scales_are_as_for_meshes():
     with pytest.raises(InvalidParameterError, match="One of t, h and edge_factor sets the scale"):
         point_cloud_laplacian(cloud, t=1.0, h=1.0)
     with pytest.raises(
-        InvalidParameterError, match=r"A kernel must reach the neighbours, h ≥ e; h = 2√t is 0\.5"
+        InvalidParameterError, match=r"A kernel must reach the neighbors, h ≥ e; h = 2√t is 0\.5"
     ):
         point_cloud_laplacian(cloud, edge_factor=0.5)

@@ -14,17 +14,18 @@ from eigenshape._errors import (
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import drop_duplicate_faces
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.operators.tufted import (
     Triangulation,
     edge_keys,
-    flipped_to_delaunay,
-    mollified,
+    flip_to_delaunay,
+    mollify_lengths,
     tufted_cover,
 )
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 from eigenshape.spectral.solve import solve_spectrum
 
 few = settings(deadline=None, max_examples=15)
@@ -185,7 +186,7 @@ def test_powers_of_two_scale_bit_for_bit(seed, power):
 @pytest.mark.parametrize("order", [[4, 0, 1, 2, 3], [0, 1, 2, 3, 4], [2, 4, 0, 3, 1]])
 def test_a_face_without_area_does_not_hide_the_order_of_the_others(order):
     # Low roofs over the edge 0-1 at 0°, 80°, 200° and 290°, listed out of turn; flips carry edges over to their
-    # neighbours. The flat face has no angle; it lies before or behind the highest roof, where angles start.
+    # neighbors. The flat face has no angle; it lies before or behind the highest roof, where angles start.
     angles, heights = np.radians([200, 0, 290, 80]), np.array([0.2, 0.4, 0.25, 0.3])
     roofs = np.column_stack([np.full(4, 0.5), heights * np.cos(angles), heights * np.sin(angles)])
     points = np.concatenate([[[0, 0, 0], [1, 0, 0]], roofs, [[0.5, 0, 0]]])
@@ -227,7 +228,7 @@ def test_flips_keep_the_surface_and_end_delaunay(seed):
         mesh.vertices[mesh.faces] - mesh.vertices[np.roll(mesh.faces, -1, axis=1)], axis=2
     ).ravel()
     before = tufted_cover(mesh.vertices, mesh.faces, lengths)
-    after = flipped_to_delaunay(before)
+    after = flip_to_delaunay(before)
     sides = np.arange(len(after.tails))
     np.testing.assert_array_equal(after.twins[after.twins], sides)
     np.testing.assert_array_equal(after.lengths[after.twins], after.lengths)
@@ -253,10 +254,10 @@ def around(cover: Triangulation, n: int) -> np.ndarray:
 
 def test_mollification_by_hand():
     # Sides 3, 4, 7 have no slack; the mean edge is 14/3, so ε = .3 of it wants 1.4 more.
-    found = mollified(np.array([3.0, 4.0, 7.0]), np.arange(3), 0.3)
+    found = mollify_lengths(np.array([3.0, 4.0, 7.0]), np.arange(3), 0.3)
     np.testing.assert_allclose(found, [4.4, 5.4, 8.4], rtol=1e-15)
     np.testing.assert_array_equal(
-        mollified(np.array([3.0, 4.0, 5.0]), np.arange(3), 0.3), [3, 4, 5]
+        mollify_lengths(np.array([3.0, 4.0, 5.0]), np.arange(3), 0.3), [3, 4, 5]
     )
 
 
@@ -326,7 +327,7 @@ def test_flips_without_end_are_an_error():
     with pytest.raises(
         ConvergenceError, match=r"Flips to Delaunay must end; 48000 flips of 24 edges did not"
     ):
-        flipped_to_delaunay(
+        flip_to_delaunay(
             tufted_cover(points, faces, lengths), tolerance=-1.0
         )  # flips what is Delaunay, too
 

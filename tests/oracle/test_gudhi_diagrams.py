@@ -25,7 +25,7 @@ SHAPES = {
     "sphere": es.icosphere(1),
     "torus": es.shapes.torus(7, 5),
     "flat": es.shapes.grid(6, 5),
-    "pieces": es.shapes.disjoint_union(
+    "pieces": es.geometry.disjoint_union(
         es.shapes.torus(6, 4), es.shapes.torus(5, 4), es.shapes.grid(3, 3)
     ),
     "holes": some_faces(es.shapes.torus(12, 9), 0.8),

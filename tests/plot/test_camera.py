@@ -4,6 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.plot import fields, poses, sheet, stability
 from eigenshape.plot.camera import in_picture, three_quarter_view
@@ -11,7 +12,7 @@ from eigenshape.plot.fields import figure_field, figure_segments
 from eigenshape.plot.poses import figure_poses
 from eigenshape.plot.render import draw
 from eigenshape.plot.sheet import Panel, figure_contact_sheet
-from eigenshape.shapes.surfaces import disjoint_union, icosphere, torus
+from eigenshape.shapes.surfaces import icosphere, torus
 
 BALL = icosphere(2)
 

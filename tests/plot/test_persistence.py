@@ -9,7 +9,7 @@ from eigenshape.plot.render import palette
 
 MESH = es.shapes.torus(30, 16)
 NOISE = np.random.default_rng(0).standard_normal(MESH.n_vertices)
-PIECES = es.shapes.disjoint_union(es.shapes.torus(20, 12), es.icosphere(2))
+PIECES = es.geometry.disjoint_union(es.shapes.torus(20, 12), es.icosphere(2))
 
 
 def parts_by_targets(tree, persistence):

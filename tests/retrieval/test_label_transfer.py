@@ -5,11 +5,12 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.features.parts import find_parts
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.plot.sheet import figure_label_transfer
 from eigenshape.retrieval import label_transfer as transfer
 from eigenshape.retrieval.label_transfer import transfer_labels
 from eigenshape.shapes.creatures import make_creature
-from eigenshape.shapes.surfaces import disjoint_union, icosphere
+from eigenshape.shapes.surfaces import icosphere
 
 
 def right_share(kind, pose, labels_of):

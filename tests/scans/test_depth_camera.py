@@ -7,11 +7,12 @@ from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.measure import face_normals, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import boundary_loops, vertex_components
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.scans.depth_camera import DepthCamera, simulate_scan
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
+from eigenshape.shapes.surfaces import grid, icosphere
 
 BALL = icosphere(4)
-PERFECT = DepthCamera(noise=0.0, lost_from=84.9, lost=0.0, n_holes=0)
+PERFECT = DepthCamera(noise=0.0, dropout_angle=84.9, dropout=0.0, n_holes=0)
 AHEAD = [0.0, 0.0, 1.0]
 
 
@@ -80,7 +81,7 @@ def test_noise_grows_with_the_square_of_the_depth():
 
 
 def test_grazing_sides_get_lost():
-    found = scanned(BALL, replace(PERFECT, lost_from=50.0))
+    found = scanned(BALL, replace(PERFECT, dropout_angle=50.0))
     turned = np.rad2deg(np.arccos(np.clip(face_normals(BALL)[found.source_faces] @ AHEAD, -1, 1)))
     assert turned.max() < 80  # 85 towards the camera, which stands near
     share = len(found.pixels) / len(scanned(BALL, PERFECT).pixels)
@@ -92,7 +93,7 @@ def test_holes_and_lost_pixels():
     pierced = scanned(grid(8, 8), replace(PERFECT, n_holes=5))
     assert surface_area(pierced.mesh) < surface_area(whole.mesh)
     assert len(boundary_loops(pierced.mesh)) > 1
-    thinned = scanned(grid(8, 8), replace(PERFECT, lost=0.1))
+    thinned = scanned(grid(8, 8), replace(PERFECT, dropout=0.1))
     assert len(thinned.pixels) / len(whole.pixels) == pytest.approx(0.9, abs=0.02)
 
 
@@ -153,14 +154,17 @@ def test_scans_stand_where_the_shape_stands():
     [
         ({"resolution": 8}, r"resolution must lie in 16..4096; it is 8"),
         ({"n_holes": -1}, r"n_holes must lie in 0..1000; it is -1"),
-        ({"distance": 0.5}, r"distance must be more than half a diagonal, and finite; it is 0.5"),
+        ({"distance": 0.5}, r"distance must be finite and more than 0.5 diagonals; it is 0.5"),
         (
             {"distance": np.inf},
-            r"distance must be more than half a diagonal, and finite; it is inf",
+            r"distance must be finite and more than 0.5 diagonals; it is inf",
         ),
         ({"noise": -0.1}, r"noise must lie in 0..1 diagonals; it is -0.1"),
-        ({"lost_from": 85.0}, r"lost_from must lie in 0..85 degrees, 85 excluded; it is 85.0"),
-        ({"lost": 1.0}, r"lost must lie in 0..1, 1 excluded; it is 1.0"),
+        (
+            {"dropout_angle": 85.0},
+            r"dropout_angle must be at least 0 and less than 85 degrees; it is 85.0",
+        ),
+        ({"dropout": 1.0}, r"dropout must be at least 0 and less than 1; it is 1.0"),
     ],
 )
 def test_cameras_out_of_range_are_refused(changes, message):
@@ -171,14 +175,15 @@ def test_cameras_out_of_range_are_refused(changes, message):
 def test_what_cannot_be_scanned_is_refused():
     point = TriangleMesh(np.ones((3, 3)), [[0, 1, 2]])
     with pytest.raises(
-        InvalidShapeError, match=r"must have a size to be scanned; all its vertices are equal"
+        InvalidShapeError,
+        match=r"must have a size above zero to be scanned; all its vertices are equal",
     ):
         scanned(point, PERFECT)
     with pytest.raises(
-        InvalidShapeError, match=r"No three neighbouring pixels see one surface from there"
+        InvalidShapeError, match=r"no three neighboring pixels see one surface from this view"
     ):
         scanned(grid(4, 4), PERFECT, view=[0, 1.0, 0])
     with pytest.raises(
-        InvalidParameterError, match=r"view must be three finite numbers, not all zero"
+        InvalidParameterError, match=r"view must be three finite numbers that are not all zero"
     ):
         scanned(BALL, PERFECT, view=[0, 0, 0])

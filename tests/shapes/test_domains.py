@@ -164,7 +164,7 @@ def test_what_cannot_be_is_refused():
         InvalidParameterError, match=r"jitter must be at least 0 and less than 0\.5; it is 0\.5"
     ):
         irregular_grid(3, 3, jitter=0.5, rng=RNG(0))
-    with pytest.raises(InvalidParameterError, match="sides must be three lengths; they are 2"):
+    with pytest.raises(InvalidParameterError, match="sides must be three lengths; there are 2"):
         box(2, 2, 2, sides=(1.0, 2.0))
     with pytest.raises(InvalidParameterError, match=r"ratio must lie in 1\.\.1e6; it is 0\.5"):
         graded_sphere(30, ratio=0.5)
@@ -174,10 +174,11 @@ def test_what_cannot_be_is_refused():
         exact.box_eigenvalues.__wrapped__(3, [1.0], "robin")
     with pytest.raises(
         InvalidShapeError,
-        match="Points of a sphere must have a hull with volume; these 4 have none",
+        match="Points of a sphere must have a convex hull with volume; these 4 have none",
     ):
         sphere_hull([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
     with pytest.raises(
-        InvalidShapeError, match=r"must lie on their hull; point 4 is \[0\.0, 0\.0\] \(1 such\)"
+        InvalidShapeError,
+        match=r"must lie on their hull; point 4 at \[0\.0, 0\.0\] does not \(1 such\)",
     ):
         sphere_hull([[1.0, 0], [0, 1], [-1, 0], [0, -1], [0, 0]])

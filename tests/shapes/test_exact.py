@@ -100,7 +100,7 @@ def test_periods_are_two_in_a_plane(periods):
 def test_periods_that_span_next_to_nothing_are_refused(periods):
     with pytest.raises(
         InvalidParameterError,
-        match=r"must span a plane and not be too slim for k; 3 eigenvalues of \[",
+        match=r"must span a plane and must not be too slender for k; 3 eigenvalues of \[",
     ):
         exact.flat_torus_eigenvalues(3, periods)
 

@@ -4,7 +4,7 @@ import pytest
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.measure import enclosed_volume
 from eigenshape.geometry.topology import euler_characteristic, is_closed, is_manifold
-from eigenshape.shapes.isosurface import isosurface, spacing_for
+from eigenshape.shapes.isosurface import find_spacing, isosurface
 
 
 def ball(points):
@@ -35,14 +35,14 @@ def test_a_torus_has_its_hole():
 
 def test_a_surface_in_two_parts_is_refused():
     with pytest.raises(
-        InvalidShapeError, match=r"smooth at the size of the grid; at spacing 0\.25 it is not"
+        InvalidShapeError, match=r"smooth at the spacing of the grid; at spacing 0\.25 it is not"
     ):
         isosurface(two_balls, -np.ones(3), np.array([5.0, 1, 1]), 0.25)
 
 
 def test_the_spacing_gives_about_the_vertices_asked_for():
     for n_vertices in (300, 3000):
-        spacing = spacing_for(ball, -np.ones(3), np.ones(3), n_vertices)
+        spacing = find_spacing(ball, -np.ones(3), np.ones(3), n_vertices)
         assert isosurface(ball, -np.ones(3), np.ones(3), spacing).n_vertices == pytest.approx(
             n_vertices, rel=0.1
         )

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from eigenshape.shapes.isosurface import isosurface
-from eigenshape.shapes.skinning import Joints, diffused, turned
+from eigenshape.shapes.skinning import Joints, bend_at_joints, diffuse
 
 
 def rod(points):
@@ -26,7 +26,7 @@ ROD = isosurface(rod, np.array([-1.2, -0.2, -0.2]), np.array([1.2, 0.2, 0.2]), 0
 
 def test_a_step_spreads_to_a_bell_of_the_width_asked_for():
     step = (ROD.vertices[:, :1] > 0).astype(float)
-    smooth = diffused(ROD, np.hstack([step, step]), np.array([0.12, 0.24]))
+    smooth = diffuse(ROD, np.hstack([step, step]), np.array([0.12, 0.24]))
     x = ROD.vertices[:, 0]
     for column, width in zip(smooth.T, (0.12, 0.24), strict=True):
         before = (x > -0.7) & (x <= 0)
@@ -40,7 +40,7 @@ def test_a_step_spreads_to_a_bell_of_the_width_asked_for():
 def test_nothing_leaks_to_a_limb_that_is_only_near_in_space():
     mesh = isosurface(two_rods, np.array([-1.3, -0.3, -0.3]), np.array([1.3, 0.75, 0.3]), 0.05)
     x, y, _ = mesh.vertices.T
-    share = diffused(mesh, ((x > 0) & (y < 0.225)).astype(float)[:, None], np.array([0.15]))[:, 0]
+    share = diffuse(mesh, ((x > 0) & (y < 0.225)).astype(float)[:, None], np.array([0.15]))[:, 0]
     assert share[(x > 0.5) & (y < 0.2)].min() > 0.98
     assert share[(x > -0.5) & (y > 0.25)].max() < 0.02
 
@@ -52,5 +52,7 @@ def test_a_full_share_turns_rigidly_and_none_stays():
         np.array([[1.0, 0, 0]]), np.array([[0, 0, 1.0]]), np.array([[-1.0, 1.0]]), follows
     )
     np.testing.assert_allclose(
-        turned(points, joint, np.array([np.pi / 2])), [[1, 1, 0], [1, -1, 0], [2, 0, 0]], atol=1e-15
+        bend_at_joints(points, joint, np.array([np.pi / 2])),
+        [[1, 1, 0], [1, -1, 0], [2, 0, 0]],
+        atol=1e-15,
     )

@@ -3,8 +3,10 @@ import pytest
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.measure import enclosed_volume, face_normals, surface_area
+from eigenshape.geometry.subdivision import subdivide
 from eigenshape.geometry.topology import boundary_loops, inconsistent_edges, is_closed, is_manifold
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, subdivide, torus
+from eigenshape.geometry.union import disjoint_union
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 
 @pytest.mark.parametrize("level", [0, 1, 3])
@@ -79,7 +81,7 @@ def test_a_union_keeps_every_coordinate():
             lambda: torus(5, 5, inner=np.nan),
             r"outer and inner must be positive and finite; entry 1 is nan",
         ),
-        (disjoint_union, "disjoint_union must be given a mesh; it was given none"),
+        (disjoint_union, "disjoint_union must be given at least one mesh; it was given none"),
     ],
 )
 def test_sizes_out_of_range_are_refused(make, match):

@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -8,6 +10,8 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.domains import box
 from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.sparse.elimination import analyse, factorise
+from eigenshape.sparse.front_loops import WIDE
+from eigenshape.sparse.sort_loops import sort_part
 
 
 def random_symmetric(n, density, seed):
@@ -46,6 +50,49 @@ def test_any_pattern_is_factored_counted_and_solved(n, density, seed):
         np.testing.assert_allclose(
             dense @ found, right, atol=1e-7 * np.abs(found).max() * np.abs(dense).max()
         )
+
+
+def fronts_by_definition(matrix, elimination):
+    """The rows of each front, from the dense pattern: its columns eliminated, what children left passed on."""
+    e = elimination
+    pattern = matrix.toarray()[np.ix_(e.order, e.order)] != 0
+    rows = []
+    for s, (low, high) in enumerate(itertools.pairwise(e.first)):
+        below = set(np.flatnonzero(pattern[:, low:high].any(axis=1)))
+        for child in np.flatnonzero(e.above == s):
+            below |= set(rows[child])
+        rows.append([*range(low, high), *sorted(row for row in below if row >= high)])
+    return rows
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(1, 150), st.floats(0, 0.2), st.integers(0, 10**6))
+def test_fronts_have_the_rows_of_their_definition_and_the_room_for_them(n, density, seed):
+    matrix = random_symmetric(n, density, seed)
+    e = analyse(matrix)
+    expected = fronts_by_definition(matrix, e)
+    found = [e.rows[start:stop].tolist() for start, stop in itertools.pairwise(e.begins)]
+    assert found == expected
+    parents = [
+        next((s for s in range(len(expected)) if rows[width] < e.first[s + 1]), -1)
+        if width < len(rows)
+        else -1
+        for rows, width in zip(expected, np.diff(e.first), strict=True)
+    ]
+    assert e.above.tolist() == parents
+    sizes = [
+        sum((len(rows) - start) * min(WIDE, width - start) for start in range(0, width, WIDE))
+        for rows, width in zip(expected, np.diff(e.first), strict=True)
+    ]
+    assert np.diff(e.places).tolist() == sizes
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 5, 40, 3000])
+def test_a_part_is_sorted_and_nothing_beside_it(count):
+    values = np.random.default_rng(count).permutation(count + 20)
+    expected = np.concatenate([values[:7], np.sort(values[7 : 7 + count]), values[7 + count :]])
+    sort_part(values, 7, 7 + count)
+    np.testing.assert_array_equal(values, expected)
 
 
 @pytest.mark.parametrize("mesh", [fibonacci_sphere(5000), box(9, 9, 9)])

@@ -50,7 +50,9 @@ def test_points_out_of_range_are_refused(bad):
 
 
 def test_all_points_fixed_are_refused():
-    with pytest.raises(InvalidParameterError, match="Some point must be free; all 25 are fixed"):
+    with pytest.raises(
+        InvalidParameterError, match="At least one point must be free; all 25 are fixed"
+    ):
         solve_spectrum(cotangent_laplacian(grid(4, 4)), 1, fixed=np.arange(25))
 
 

@@ -117,7 +117,7 @@ def test_heat_times_are_trusted_between_the_change_and_the_last_eigenvalue():
     )
     none = es.stability.admissible_times(delta=0.5, spacing=0.1, eigenvalue=20.0)
     assert none.empty
-    assert "No heat time serves" in none.explain()
+    assert "No heat time is reliable" in none.explain()
 
 
 def test_bad_input_is_named(monkeypatch):
@@ -151,5 +151,5 @@ def test_bad_input_is_named(monkeypatch):
     )
     line = es.Laplacian(path.tocsr(), sp.eye_array(n).tocsr())
     half = es.Laplacian((path / 2).tocsr(), sp.eye_array(n).tocsr())
-    with pytest.raises(es.ConvergenceError, match="not found in 1 steps"):
+    with pytest.raises(es.ConvergenceError, match="it was not found in 1 steps"):
         es.stability.weyl_bound(line, half)

@@ -77,8 +77,8 @@ def test_bad_input_is_named():
     above = es.solve_spectrum(es.cotangent_laplacian(mesh), above=1.0, below=10.0)
     with pytest.raises(es.InvalidParameterError, match="begins at number 1"):
         es.stability.cheeger_estimate(mesh, above)
-    pair = es.shapes.disjoint_union(mesh, es.TriangleMesh(mesh.vertices + 5.0, mesh.faces))
-    with pytest.raises(es.InvalidParameterError, match="falls into pieces; eigenvalue 1 is"):
+    pair = es.geometry.disjoint_union(mesh, es.TriangleMesh(mesh.vertices + 5.0, mesh.faces))
+    with pytest.raises(es.InvalidParameterError, match="must be connected; eigenvalue 1 is"):
         es.stability.cheeger_estimate(pair, es.solve_spectrum(es.cotangent_laplacian(pair), 5))
     with pytest.raises(es.InvalidParameterError, match="n_modes must be"):
         es.stability.cheeger_estimate(mesh, spectrum, n_modes=0)

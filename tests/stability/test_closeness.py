@@ -23,7 +23,7 @@ def test_a_stretched_square_by_hand():
     assert not len(found.radii)
     moved = es.stability.map_closeness(mesh, mesh.vertices + np.array([0, 0, 0.3]))
     assert (moved.delta, moved.limited_by) == (pytest.approx(0.3), "displacement")
-    assert "how far points move decides" in moved.explain()
+    assert "the displacement of points is the largest change" in moved.explain()
     shrunk = es.stability.map_closeness(mesh, mesh.vertices * [0.5, 0.5, 1])
     assert (shrunk.delta, shrunk.limited_by) == (pytest.approx(0.75), "Jacobian")
     same = es.stability.map_closeness(mesh, mesh.vertices)
@@ -58,7 +58,7 @@ def test_a_changed_cap():
     assert "the volume of a region" in found.explain()
     low = closeness_of(*bumped(height=0.01))
     assert low.limited_by == "ball"
-    assert "the size of the regions decides" in low.explain()
+    assert "the size of the regions is the largest change" in low.explain()
 
 
 def test_topology_may_change_inside():
@@ -160,7 +160,7 @@ def test_what_is_no_perturbation_is_named():
     with pytest.raises(es.InvalidParameterError, match="regions_two has no face in region 0"):
         es.stability.measure_perturbation(mesh, other, regions_one=labels)
     with pytest.raises(
-        es.InvalidParameterError, match=r"regions_one must hold one whole number a face.*\(3,\)"
+        es.InvalidParameterError, match=r"regions_one must hold one whole number per face.*\(3,\)"
     ):
         es.stability.measure_perturbation(mesh, other, regions_one=[0, 0, 0])
     with pytest.raises(
@@ -189,7 +189,7 @@ def test_regions_must_be_apart_and_their_boundaries_correspond():
 def test_a_map_needs_an_image_of_each_vertex_and_areas():
     mesh = es.shapes.grid(2, 2)
     with pytest.raises(
-        es.InvalidParameterError, match="one image a vertex; there are 8 images of 9 vertices"
+        es.InvalidParameterError, match="one image per vertex; there are 8 images of 9 vertices"
     ):
         es.stability.map_closeness(mesh, mesh.vertices[:8])
     with pytest.raises(es.InvalidShapeError, match="must have area"):

@@ -184,7 +184,7 @@ def test_nodes_are_apart_and_cover(delta):
 
 
 def test_each_piece_has_its_nodes():
-    mesh = es.shapes.disjoint_union(es.icosphere(1), es.icosphere(1))
+    mesh = es.geometry.disjoint_union(es.icosphere(1), es.icosphere(1))
     found = es.stability.anchor_nodes(mesh, 4.0)
     assert len(found.vertices) == 2
 

@@ -64,7 +64,9 @@ def test_bad_input_is_named():
         es.stability.theorem_rate("9.9", 2)
     with pytest.raises(es.InvalidParameterError, match=r"dim must lie in 1\.\.100; it is 0"):
         es.stability.theorem_rate("3.1.1", 0)
-    with pytest.raises(es.InvalidParameterError, match=r"equally many; they are \[2, 2, 1\]"):
+    with pytest.raises(
+        es.InvalidParameterError, match=r"must have the same length; the lengths are \[2, 2, 1\]"
+    ):
         es.stability.bounding_rate(es.stability.Rate(1, 1), [1, 2], [1, 2], [1])
     with pytest.raises(es.InvalidParameterError, match="measured must be positive"):
         es.stability.bounding_rate(es.stability.Rate(1, 1), [1, 2], [1, 2], [1, 0])

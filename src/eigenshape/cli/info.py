@@ -18,7 +18,7 @@ from eigenshape.cli.inputs import (
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.measure import bounding_box, edge_lengths, enclosed_volume, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import drop_copies, suggest_repairs
+from eigenshape.geometry.repair import drop_duplicate_points, suggest_repairs
 from eigenshape.geometry.simplices import degenerate_simplices, mean_side_length, simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import (
@@ -73,7 +73,7 @@ def cloud_facts(cloud: PointCloud) -> dict[str, Any]:
         "points": cloud.n_points,
         "dimension": cloud.dim,
         "coordinates": cloud.points.shape[1],
-        "coinciding_points": cloud.n_points - drop_copies(cloud).cloud.n_points,
+        "coinciding_points": cloud.n_points - drop_duplicate_points(cloud).cloud.n_points,
         "mean_near_distance": _near_distance(cloud),
         "box_low": low.tolist(),
         "box_high": high.tolist(),

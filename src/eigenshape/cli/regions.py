@@ -17,10 +17,11 @@ from eigenshape.deformation.region import (
     region_mask,
 )
 from eigenshape.features.boundaries import smooth_boundaries
-from eigenshape.features.parts import PART_CONTRAST, facing_outward, find_parts
+from eigenshape.features.parts import PART_CONTRAST, find_parts
 from eigenshape.features.segmentation import segment
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.orientation import orient_closed_outward
 
 REGIONS = (
     "'y>0.5' or 'y>0.5, x<0' (coordinates, or percent of the bounding box: 'y>60%'); 'vertex 17 within 0.2' "
@@ -67,7 +68,7 @@ def _box(conditions: list[re.Match[str]], mesh: TriangleMesh) -> BoxRegion:
 
 def _part(mesh: TriangleMesh, number: int, progress: Progress) -> Region:
     parts = segment(find_parts(mesh, progress=progress).tree, persistence=PART_CONTRAST)
-    labels = smooth_boundaries(facing_outward(mesh), parts).labels
+    labels = smooth_boundaries(orient_closed_outward(mesh), parts).labels
     whole_number(number, "A part", 0, int(labels.max()))
     return np.unique(mesh.faces[labels == number])
 

@@ -59,7 +59,7 @@ def repair(
     rows = [
         [name.replace("_", " "), *(_shown(fact[name]) for fact in facts.values())] for name in ROWS
     ]
-    print_table("Repaired", ["", *facts], rows)
+    print_table("RepairedMesh", ["", *facts], rows)
 
 
 def _shown(value: bool | int) -> str:

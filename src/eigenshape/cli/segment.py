@@ -14,9 +14,10 @@ from eigenshape.cli.outputs import require_picture, save_picture
 from eigenshape.cli.parts import part_rows, print_rows, require_label_path, save_labels
 from eigenshape.features import segmentation
 from eigenshape.features.boundaries import smooth_boundaries
-from eigenshape.features.parts import PART_CONTRAST, facing_outward, find_parts
+from eigenshape.features.parts import PART_CONTRAST, find_parts
 from eigenshape.features.segmentation import Segmentation, Tree, merge_targets
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.orientation import orient_closed_outward
 from eigenshape.plot.fields import figure_segments, part_colors
 from eigenshape.retrieval.heat.descriptor import PRESETS
 from eigenshape.retrieval.heat.features import find_heat_features
@@ -96,7 +97,7 @@ def segment(
     chosen = n_parts is not None or persistence is not None or largest_gap
     parts = segmentation.segment(tree, **(rule if chosen else usual))
     if smooth if smooth is not None else method == PARTS:
-        parts = smooth_boundaries(facing_outward(surface), parts)
+        parts = smooth_boundaries(orient_closed_outward(surface), parts)
     rows = _rows(surface, tree, parts)
     if as_json:
         print_json(

@@ -135,8 +135,8 @@ def _facts(report: StabilityReport) -> dict[str, Any]:
             "median_relative": compared.median_relative,
         },
         "distance": report.distance,
-        "matched": report.matched,
-        "matched_floor": report.matched_floor,
+        "matching_distance": report.matching_distance,
+        "sampling_distance": report.sampling_distance,
         "delta": report.delta,
         "delta_of_the_map": report.closeness.delta if report.closeness else None,
         "times": {
@@ -169,10 +169,10 @@ def _print(report: StabilityReport) -> None:
             f"{row.change:.3g}",
             f"{row.floor:.3g}",
             f"{row.weyl:.3g}",
-            "yes" if row.trusted else "no",
+            "yes" if row.admissible else "no",
         ]
         for row in report.changes
     ]
     title = f"Largest change of {len(rows)} eigenvalues of graph Laplacians, over the last, at heat time t (length²)"
-    print_table(title, ["t", "shapes", "samples", "Weyl's bound", "trusted"], heat)
+    print_table(title, ["t", "shapes", "samples", "Weyl's bound", "admissible"], heat)
     out.print(report.explain())

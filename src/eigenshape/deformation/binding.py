@@ -7,7 +7,7 @@ from typing import SupportsIndex
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._arguments import named_value, require_type
+from eigenshape._arguments import describe_value, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
@@ -121,7 +121,7 @@ def bind(
     require_type(rig, EigenRig, "rig")
     if not isinstance(regions, Sequence) or isinstance(regions, str):
         raise InvalidParameterError(
-            f"regions must be a list of regions; it is {named_value(regions)}. Pass [region]."
+            f"regions must be a list of regions; it is {describe_value(regions)}. Pass [region]."
         )
     n = rig.mesh.n_vertices
     masks = np.array([region_mask(rig.mesh, region) for region in regions]).reshape(-1, n)

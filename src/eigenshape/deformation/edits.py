@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from eigenshape._arguments import named_value, require_each, require_type
+from eigenshape._arguments import describe_value, require_each, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape.deformation.binding import bind
@@ -220,7 +220,7 @@ def edits_from_json(content: Any, mesh: TriangleMesh) -> list[Edit]:
     """
     if not isinstance(content, Mapping):
         raise FileFormatError(
-            f"Edits must be a JSON object of kind {KIND!r}; this is {named_value(content)}."
+            f"Edits must be a JSON object of kind {KIND!r}; this is {describe_value(content)}."
         )
     if content.get("kind") != KIND:
         raise FileFormatError(

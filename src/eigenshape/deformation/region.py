@@ -7,8 +7,9 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
+from typing_extensions import TypeAliasType
 
-from eigenshape._arguments import named_value
+from eigenshape._arguments import describe_value
 from eigenshape._arrays import as_array, frozen, positive_values, real_numbers, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
@@ -99,7 +100,7 @@ class BrushRegion:
         object.__setattr__(self, "radius", float(positive_values(radius, "radius")[0]))
 
 
-Region = BoxRegion | BrushRegion | np.ndarray | Iterable[int]
+Region = TypeAliasType("Region", BoxRegion | BrushRegion | np.ndarray | Iterable[int])
 
 
 def copy_region(region: Region) -> Region:
@@ -120,7 +121,7 @@ def _entries(region: np.ndarray | Iterable[int]) -> np.ndarray:
         pass
     raise InvalidParameterError(
         "A region must be a BoxRegion, a BrushRegion, a mask, or a list of vertices; "
-        f"it is {named_value(region)}. Pass region_mask(mesh, region)."
+        f"it is {describe_value(region)}. Pass region_mask(mesh, region)."
     )
 
 

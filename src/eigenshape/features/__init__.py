@@ -1,4 +1,4 @@
-"""Feature points and parts that persist."""
+"""Feature points and parts of surfaces, by persistence."""
 
 import lazy_loader
 

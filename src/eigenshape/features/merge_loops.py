@@ -1,24 +1,20 @@
 """Compiled loops of `merge_tree`: sides of faces in the order of their edges, and faces joined over them.
 
 Vertices are named by rank here, the lowest 0. A side is filed under the higher vertex of its edge, so that a walk over
-the ranks from the top meets all edges in falling order, and only the few sides at one vertex are ever sorted.
+the ranks from the top meets all edges in falling order, and only the few sides at one vertex are ever sorted. The
+caller allocates all arrays: compiling an allocation takes longer than compiling a small loop.
 """
 
 from typing import no_type_check
 
-import numpy as np
-
 from eigenshape._compile import njit
 from eigenshape.features.union_loops import find_root
-
-FEW = 48  # sides of a vertex up to which insertion sort is the faster one
 
 
 @njit
 @no_type_check
-def falling_corners(faces, rank):
-    """Return the ranks of each face's corners, highest first."""
-    corners = np.empty((len(faces), 3), dtype=rank.dtype)
+def find_corners(faces, rank, corners):
+    """Fill the ranks of each face's corners, highest first."""
     for face in range(len(faces)):
         a, b, c = rank[faces[face, 0]], rank[faces[face, 1]], rank[faces[face, 2]]
         if a < b:
@@ -28,43 +24,36 @@ def falling_corners(faces, rank):
         if a < b:
             a, b = b, a
         corners[face, 0], corners[face, 1], corners[face, 2] = a, b, c
-    return corners
 
 
 @njit
 @no_type_check
-def sides_by_vertex(corners, n):
-    """File the three sides of each face under the higher vertex: where each vertex' sides start, lower vertex, face."""
-    starts = np.zeros(n + 1, dtype=np.int64)
+def file_sides(corners, place, lower, owner):
+    """File the three sides of each face under the higher vertex: the lower vertex, and the face.
+
+    Those of vertex v are filed from place[v] on, which is moved to their end.
+    """
     for face in range(len(corners)):
-        starts[corners[face, 0] + 1] += 2
-        starts[corners[face, 1] + 1] += 1
-    for vertex in range(n):
-        starts[vertex + 1] += starts[vertex]
-    place = starts[:-1].copy()
-    lower = np.empty(3 * len(corners), dtype=corners.dtype)
-    owner = np.empty(3 * len(corners), dtype=corners.dtype)
-    for face in range(len(corners)):
-        for high, low in ((0, 1), (0, 2), (1, 2)):
+        for side in range(3):
+            high = 1 if side == 2 else 0
+            low = 1 if side == 0 else 2
             vertex = corners[face, high]
             lower[place[vertex]] = corners[face, low]
             owner[place[vertex]] = face
             place[vertex] += 1
-    return starts, lower, owner
 
 
 @njit
 @no_type_check
-def join_faces(corners, starts, lower, owner):
-    """Join faces over falling edges: for each, the face it climbs to; of each basin that ends, itself, edge, neighbour.
+def join_faces(corners, starts, lower, owner, climbs_to, highest, ended):
+    """Join faces over falling edges: fill for each the face it climbs to; return how many basins end.
+
+    Of each that does, `ended` is filled with itself, the edge, and the neighbor. `climbs_to` and `highest` come filled
+    with the number of each face; the second is scratch.
 
     A face whose highest edge leads to a higher face joins its basin at once. Basins are joined as in Kruskal's
     algorithm: the one with the lower maximum ends.
     """
-    n_faces = len(corners)
-    climbs_to = np.arange(n_faces).astype(corners.dtype)
-    highest = climbs_to.copy()
-    ended = np.empty((n_faces, 4), dtype=corners.dtype)
     n_ended = 0
     for high in range(len(starts) - 2, -1, -1):
         first, end = starts[high], starts[high + 1]
@@ -91,7 +80,7 @@ def join_faces(corners, starts, lower, owner):
                     ended[n_ended, 2], ended[n_ended, 3] = low, two
                     n_ended += 1
             first = last + 1
-    return climbs_to, ended[:n_ended].copy()
+    return n_ended
 
 
 @njit
@@ -107,33 +96,23 @@ def _is_lower(corners, one, two):
 @njit
 @no_type_check
 def _sort_sides(corners, lower, owner, first, end):
-    """Sort the sides of a vertex by falling lower vertex, of equals the lower face first."""
-    if end - first > FEW:
-        _sort_many(corners, lower, owner, first, end)
-        return
-    for place in range(first + 1, end):
-        low, face = lower[place], owner[place]
-        into = place
-        while into > first and (
-            lower[into - 1] < low
-            or (lower[into - 1] == low and _is_lower(corners, face, owner[into - 1]))
-        ):
-            lower[into], owner[into] = lower[into - 1], owner[into - 1]
-            into -= 1
-        lower[into], owner[into] = low, face
+    """Sort the sides of a vertex by falling lower vertex, of equals the lower face first.
 
-
-@njit
-@no_type_check
-def _sort_many(corners, lower, owner, first, end):
-    # Sides come by number of their face, and of two faces at one edge that with the lower corners is lower: stable
-    # sorts by sum of corners, then by falling lower vertex.
-    count = end - first
-    sums = np.empty(count, dtype=np.int64)
-    for place in range(count):
-        face = owner[first + place]
-        sums[place] = np.int64(corners[face, 0]) + corners[face, 1] + corners[face, 2]
-    order = np.argsort(sums, kind="mergesort")
-    order = order[np.argsort(-lower[first:end][order], kind="mergesort")]
-    lower[first:end] = lower[first:end][order]
-    owner[first:end] = owner[first:end][order]
+    By insertion at gaps that shrink to 1 (Shell 1959, gaps of Knuth 1973): most vertices have six sides, but the apex
+    of a fan may have a million.
+    """
+    gap = 1
+    while 9 * gap < end - first:  # up to nine sides plain insertion is as fast
+        gap = 3 * gap + 1
+    while gap:
+        for place in range(first + gap, end):
+            low, face = lower[place], owner[place]
+            into = place
+            while into >= first + gap and (
+                lower[into - gap] < low
+                or (lower[into - gap] == low and _is_lower(corners, face, owner[into - gap]))
+            ):
+                lower[into], owner[into] = lower[into - gap], owner[into - gap]
+                into -= gap
+            lower[into], owner[into] = low, face
+        gap //= 3

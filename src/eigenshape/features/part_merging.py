@@ -73,7 +73,7 @@ def part_tree(mesh: MeshLike, spectrum: Spectrum, *, time: float = PART_TIME) ->
     Two separate spheres are two parts, each with infinite persistence:
 
     >>> import eigenshape as es
-    >>> mesh = es.shapes.disjoint_union(es.icosphere(1), es.icosphere(2))
+    >>> mesh = es.geometry.disjoint_union(es.icosphere(1), es.icosphere(2))
     >>> tree = es.features.part_tree(mesh, es.features.part_spectrum(mesh, n_modes=4))
     >>> es.segment(tree, persistence=1).features.persistence
     array([inf, inf])

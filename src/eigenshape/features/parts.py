@@ -13,10 +13,10 @@ from eigenshape.features.region_tree import PartTree
 from eigenshape.features.segmentation import Segmentation, segment
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.fragments import fragment_vertices
-from eigenshape.geometry.measure import enclosed_volume
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.orientation import orient_closed_outward
 from eigenshape.geometry.requirements import require_describable
-from eigenshape.geometry.topology import is_closed, vertex_components
+from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
 from eigenshape.spectral.signatures.heat import heat_kernel_signature
 from eigenshape.spectral.solve import solve_spectrum
@@ -124,7 +124,7 @@ def find_parts(
     1
     """
     mesh = as_mesh(mesh)
-    outward = facing_outward(mesh)
+    outward = orient_closed_outward(mesh)
     spectrum = part_spectrum(outward, n_modes=n_modes, progress=progress)
     tree = part_tree(outward, spectrum)
     heat = heat_kernel_signature(spectrum, [SEED_TIME * float(spectrum.mass.sum())])[:, 0]
@@ -173,10 +173,3 @@ def part_spectrum(
     laplacian = anisotropic_laplacian(mesh, curvature_tensors(mesh, CONCAVITY, concave=True))
     n_pairs = min(wanted, mesh.n_vertices - len(fragments))
     return solve_spectrum(laplacian, n_pairs, fixed=fragments, progress=progress)
-
-
-def facing_outward(mesh: TriangleMesh) -> TriangleMesh:
-    """Return a closed mesh with its faces oriented outward, and an open mesh unchanged."""
-    if not is_closed(mesh) or enclosed_volume(mesh) >= 0:
-        return mesh
-    return TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])

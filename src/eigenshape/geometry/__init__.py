@@ -1,4 +1,4 @@
-"""What a shape is: meshes, their topology, repairs, samples of them, and made-up ones."""
+"""Meshes and point clouds: measurements, topology, geodesics, repairs and sampling."""
 
 import lazy_loader
 

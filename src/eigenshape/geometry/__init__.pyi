@@ -31,17 +31,17 @@ from .quadrature import mesh_quadrature as mesh_quadrature
 from .quadrature import sphere_quadrature as sphere_quadrature
 from .quadrature import torus_quadrature as torus_quadrature
 from .quadrature import uniform_quadrature as uniform_quadrature
-from .repair import Repaired as Repaired
 from .repair import RepairedCloud as RepairedCloud
+from .repair import RepairedMesh as RepairedMesh
 from .repair import collapse_needles as collapse_needles
-from .repair import drop_copies as drop_copies
 from .repair import drop_degenerate as drop_degenerate
 from .repair import drop_duplicate_faces as drop_duplicate_faces
+from .repair import drop_duplicate_points as drop_duplicate_points
 from .repair import drop_unreferenced as drop_unreferenced
+from .repair import fill_holes as fill_holes
 from .repair import largest_component as largest_component
 from .repair import orient as orient
 from .repair import repair as repair
-from .repair import seal_holes as seal_holes
 from .repair import suggest_repairs as suggest_repairs
 from .repair import weld as weld
 from .repair import weld_seams as weld_seams
@@ -49,6 +49,7 @@ from .simplices import dual_volumes as dual_volumes
 from .simplices import mean_side_length as mean_side_length
 from .simplices import simplex_volumes as simplex_volumes
 from .simplicial import SimplicialMesh as SimplicialMesh
+from .subdivision import subdivide as subdivide
 from .surface_points import SurfacePoints as SurfacePoints
 from .surface_points import sample_surface as sample_surface
 from .topology import EdgeTable as EdgeTable
@@ -60,3 +61,4 @@ from .topology import euler_characteristic as euler_characteristic
 from .topology import is_closed as is_closed
 from .topology import is_manifold as is_manifold
 from .topology import vertex_components as vertex_components
+from .union import disjoint_union as disjoint_union

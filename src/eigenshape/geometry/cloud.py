@@ -1,4 +1,4 @@
-"""A point cloud is a value: points of a hidden manifold whose dimension is known."""
+"""Point clouds: points that sample a manifold of known dimension."""
 
 from dataclasses import dataclass
 from typing import SupportsIndex, TypeAlias
@@ -19,9 +19,9 @@ class PointCloud:
     Parameters
     ----------
     points : (n, d) float
-        Coordinates, in any length unit. Copied, then read-only.
+        Coordinates, in any length unit. They are copied, and the copy is read-only.
     dim : int
-        m, 1 to d; 2 for the scan of a surface.
+        Dimension m of the manifold, 1 to d; 2 for the scan of a surface.
 
     Raises
     ------
@@ -29,6 +29,17 @@ class PointCloud:
         If there is no point, or a coordinate is not finite.
     InvalidParameterError
         If `dim` is not in 1..d.
+
+    See Also
+    --------
+    point_cloud_laplacian : The Laplacian of a point cloud.
+    read_points : Read a point cloud from a file.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.PointCloud([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], dim=2)
+    PointCloud(4 points in R^3, dim=2)
     """
 
     points: Float[np.ndarray, "n d"]

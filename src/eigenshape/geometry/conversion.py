@@ -1,4 +1,4 @@
-"""What a caller may hand over as a shape, and what is said of everything else."""
+"""Conversion of arguments to shapes, and errors that name the call that converts the rest."""
 
 import os
 from collections.abc import Sequence
@@ -7,7 +7,7 @@ from typing import Any, Literal, Protocol, SupportsIndex, TypeAlias, runtime_che
 import numpy as np
 from typing_extensions import TypeAliasType
 
-from eigenshape._arguments import attribute_of, named_value
+from eigenshape._arguments import attribute_of, describe_value
 from eigenshape._arrays import as_array
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
@@ -20,7 +20,7 @@ Cells = Literal["tetrahedra", "quads"]
 
 @runtime_checkable
 class HasFaces(Protocol):
-    """What has arrays of vertices and faces, as a trimesh.Trimesh has."""
+    """An object with arrays of vertices and faces, such as a trimesh.Trimesh."""
 
     @property
     def vertices(self) -> Any:
@@ -33,7 +33,10 @@ class HasFaces(Protocol):
 
 @runtime_checkable
 class HasPolygons(Protocol):
-    """What has arrays of points and of polygons, each after the number of its corners, as a pyvista.PolyData has."""
+    """An object with points and polygons, such as a pyvista.PolyData.
+
+    Each polygon is stored as the number of its corners followed by their indices.
+    """
 
     @property
     def points(self) -> Any:
@@ -52,23 +55,32 @@ Pair: TypeAlias = tuple[ArrayLike, ArrayLike]
 MeshLike = TypeAliasType("MeshLike", TriangleMesh | SimplicialMesh | HasFaces | HasPolygons | Pair)
 ShapeLike = TypeAliasType("ShapeLike", MeshLike | PointCloud)
 
+# What to pass instead of an object of another library that is no triangle mesh.
 BRIDGES = {
-    "trimesh": "Pass scene.to_mesh() of a scene, from_trimesh(cloud, dim=2) of points.",
-    "pyvista": "Pass dataset.extract_surface().triangulate() for its surface, or from_pyvista(dataset).",
+    "trimesh": "Pass scene.to_mesh() for a scene, or from_trimesh(cloud, dim=2) for points.",
+    "pyvista": (
+        "Pass dataset.extract_surface().triangulate() for its surface, or from_pyvista(dataset)."
+    ),
 }
-TAKEN = "Pass a TriangleMesh, a trimesh.Trimesh, a pyvista.PolyData of triangles, or a pair (vertices, faces)."
+ACCEPTED = (
+    "Pass a TriangleMesh, a trimesh.Trimesh, a pyvista.PolyData of triangles, "
+    "or a pair (vertices, faces)."
+)
 
 
 def as_mesh(value: object, name: str = "mesh") -> TriangleMesh:
-    """Return as a TriangleMesh what is one in all but type; every function that takes a mesh begins with this.
+    """Convert a mesh of another library, or a pair of arrays, to a TriangleMesh.
+
+    Every function that takes a triangle mesh calls this, so it is rarely needed by itself.
 
     Parameters
     ----------
     value : MeshLike
-        A TriangleMesh, which is returned as it is; a trimesh.Trimesh; a pyvista.PolyData of triangles; a pair
-        (vertices, faces) of arrays; or a SimplicialMesh of triangles in R³. Vertices and faces keep their order.
+        One of: a TriangleMesh, which is returned unchanged; a trimesh.Trimesh; a pyvista.PolyData
+        of triangles; a pair (vertices, faces) of arrays; a SimplicialMesh of triangles in R³.
+        Vertices and faces keep their order.
     name : str
-        What to call it in a message.
+        Name of the argument in error messages.
 
     Returns
     -------
@@ -77,9 +89,14 @@ def as_mesh(value: object, name: str = "mesh") -> TriangleMesh:
     Raises
     ------
     InvalidParameterError
-        If it is anything else; the message names its type and the call that converts it.
+        If the value has another type. The message names the type and the call that converts it.
     InvalidShapeError
-        As TriangleMesh, if its arrays are not those of a mesh.
+        If the arrays do not form a mesh, as in `TriangleMesh`.
+
+    See Also
+    --------
+    from_arrays : Build a shape of any kind from arrays.
+    read_mesh : Read a mesh from a file.
 
     Examples
     --------
@@ -94,32 +111,47 @@ def as_mesh(value: object, name: str = "mesh") -> TriangleMesh:
         return shape
     if isinstance(shape, SimplicialMesh) and (shape.dim, shape.points.shape[1]) == (2, 3):
         return TriangleMesh(shape.points, shape.simplices)
-    raise _refused(value, shape, f"{name} must be a triangle mesh", "read_mesh")
+    raise _conversion_error(value, shape, f"{name} must be a triangle mesh", "read_mesh")
 
 
 def as_simplicial(value: object, name: str = "mesh") -> Mesh:
-    """Return as a mesh of any dimension what is one in all but type: a SimplicialMesh, or what `as_mesh` takes.
+    """Convert a value to a mesh of any dimension: a SimplicialMesh, or whatever `as_mesh` takes.
 
     Raises
     ------
     InvalidParameterError, InvalidShapeError
-        As `as_mesh`.
+        As in `as_mesh`.
     """
     if isinstance(value, TriangleMesh | SimplicialMesh):
         return value
     shape = _converted(value)
     if isinstance(shape, TriangleMesh | SimplicialMesh):
         return shape
-    raise _refused(value, shape, f"{name} must be a mesh", "read_shape")
+    raise _conversion_error(value, shape, f"{name} must be a mesh", "read_shape")
 
 
 def as_shape(value: object, name: str = "shape") -> Shape:
-    """Return as a shape what is one in all but type: a mesh of any dimension, a PointCloud, or what `as_mesh` takes.
+    """Convert a value to a shape: a mesh of any dimension, or a point cloud.
+
+    Parameters
+    ----------
+    value : ShapeLike
+        A SimplicialMesh or a PointCloud, which are returned unchanged, or whatever `as_mesh` takes.
+    name : str
+        Name of the argument in error messages.
+
+    Returns
+    -------
+    TriangleMesh, SimplicialMesh or PointCloud
 
     Raises
     ------
     InvalidParameterError, InvalidShapeError
-        As `as_mesh`.
+        As in `as_mesh`.
+
+    See Also
+    --------
+    as_mesh : The same, for functions that need a triangle mesh.
 
     Examples
     --------
@@ -132,11 +164,11 @@ def as_shape(value: object, name: str = "shape") -> Shape:
     shape = _converted(value)
     if shape is not None:
         return shape
-    raise _refused(value, None, f"{name} must be a mesh or a cloud of points", "read_shape")
+    raise _conversion_error(value, None, f"{name} must be a mesh or a point cloud", "read_shape")
 
 
 def _converted(value: object) -> Shape | None:
-    """Return a value as the shape that it is in all but type, None where it is none."""
+    """Return the shape that a value describes, or None if it describes none."""
     if isinstance(value, TriangleMesh | SimplicialMesh | PointCloud):
         return value
     if isinstance(value, HasFaces):
@@ -148,21 +180,24 @@ def _converted(value: object) -> Shape | None:
     return None
 
 
-def _refused(value: object, shape: Shape | None, needed: str, reader: str) -> InvalidParameterError:
+def _conversion_error(
+    value: object, shape: Shape | None, needed: str, reader: str
+) -> InvalidParameterError:
     """Return the error that names a value, the shape it was taken for, and what to pass instead."""
-    given = (
-        named_value(value)
-        if shape is None or shape is value
-        else f"{named_value(value)} that is a {shape!r}"
-    )
+    given = describe_value(value)
+    if shape is not None and shape is not value:
+        given += f" that is a {shape!r}"
     remedy = _remedy(value, reader) if shape is None else _use_of(shape)
     return InvalidParameterError(f"{needed}; it is {given}. {remedy}")
 
 
 def _use_of(shape: Shape) -> str:
-    """Say how a shape becomes the mesh that is needed, or what it serves."""
+    """Say how to turn a shape into the mesh that is needed, or which functions take the shape."""
     if isinstance(shape, PointCloud):
-        return "A cloud has no faces; point_cloud_laplacian(cloud) and persistence_diagram(cloud, values) take it."
+        return (
+            "A point cloud has no faces; "
+            "point_cloud_laplacian(cloud) and persistence_diagram(cloud, values) take it."
+        )
     if shape.dim == 3:
         return "Pass boundary_surface(mesh), the triangles around the tetrahedra."
     if shape.dim == 2 and shape.points.shape[1] == 2:
@@ -171,14 +206,17 @@ def _use_of(shape: Shape) -> str:
 
 
 def _remedy(value: object, reader: str) -> str:
-    """Say what makes a shape of a value that is none."""
+    """Say which call makes a shape of a value that is none."""
     module = type(value).__module__.partition(".")[0]
     part = attribute_of(value, TriangleMesh | SimplicialMesh | PointCloud)
     if isinstance(value, str | os.PathLike):
         return f"Pass {reader}({os.fspath(value)!r})."
     if isinstance(value, np.ndarray):
-        return "Pass PointCloud(points, dim=2) if it is points without faces; a mesh is a pair (vertices, faces)."
-    return f"Pass its attribute {part}." if part else BRIDGES.get(module, TAKEN)
+        return (
+            "Pass PointCloud(points, dim=2) if these are points without faces; "
+            "a mesh is a pair (vertices, faces)."
+        )
+    return f"Pass its attribute {part}." if part else BRIDGES.get(module, ACCEPTED)
 
 
 def from_arrays(
@@ -188,24 +226,36 @@ def from_arrays(
     dim: SupportsIndex = 2,
     cells: Cells | None = None,
 ) -> Shape:
-    """Return the shape that arrays describe: a TriangleMesh where they can be one.
+    """Build a shape from arrays of points and simplices.
 
     Parameters
     ----------
     points : (n, d) float
+        Coordinates, in any length unit.
     simplices : (s, m+1) int, optional
-        Without them the points are a cloud of dimension `dim`.
+        Corners of each simplex: 2 for segments, 3 for triangles, 4 for tetrahedra or quads. Without
+        simplices the shape is a point cloud.
     dim : int
+        Dimension of a point cloud; not used for meshes.
     cells : "tetrahedra" or "quads", optional
-        What rows of four indices are, which nothing else can tell. Quads become two triangles each, by the diagonal
-        from their first corner.
+        Meaning of rows of four indices; required for such rows. A quad becomes two triangles that
+        share the diagonal from its first corner.
+
+    Returns
+    -------
+    TriangleMesh, SimplicialMesh or PointCloud
+        A TriangleMesh for triangles in R³.
 
     Raises
     ------
     InvalidParameterError
-        If rows have four indices and `cells` does not say what they are, or `cells` is given with other rows.
-    InvalidShapeError, InvalidParameterError
-        As the three classes.
+        If rows have four indices and `cells` is not given, or `cells` is given for other rows.
+    InvalidShapeError
+        If the arrays do not form a shape, as in the three classes.
+
+    See Also
+    --------
+    as_mesh : Convert a mesh of another library.
 
     Examples
     --------
@@ -221,12 +271,14 @@ def from_arrays(
     corners = _width(simplices)
     if corners == 4 and cells is None:
         raise InvalidParameterError(
-            "Rows of four indices are tetrahedra or quads, and it must be said which; simplices has such rows. Pass "
-            "from_arrays(points, simplices, cells='tetrahedra') or from_arrays(points, simplices, cells='quads')."
+            "cells must be given for rows of four indices; simplices has such rows. "
+            "Pass from_arrays(points, simplices, cells='tetrahedra') "
+            "or from_arrays(points, simplices, cells='quads')."
         )
     if corners != 4 and cells is not None:
         raise InvalidParameterError(
-            f"cells is for rows of four indices; cells is {cells!r} and rows of simplices have {corners}. Leave it out."
+            f"cells must be given only for rows of four indices; cells is {cells!r} "
+            f"and rows of simplices have {corners}. Leave cells out."
         )
     if cells == "quads":
         simplices = np.asarray(simplices)[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
@@ -236,7 +288,10 @@ def from_arrays(
 
 
 def _width(rows: ArrayLike) -> int | None:
-    """Return the number of columns; None of what is no table, which the class of the shape refuses."""
+    """Return the number of columns, or None if the value is not two-dimensional.
+
+    The class of the shape raises the error for such a value.
+    """
     try:
         array = as_array(rows, "simplices")
     except ValueError:

@@ -10,7 +10,7 @@ import numpy as np
 from eigenshape._compile import njit
 from eigenshape.geometry.predicate_loops import same_place, side_of_line, side_of_plane
 
-LEAF = 4  # faces at most
+LEAF = 4  # most faces of a leaf; more means fewer nodes but more pairs of faces to compare
 
 
 @njit

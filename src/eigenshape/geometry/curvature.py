@@ -19,43 +19,63 @@ def face_angles(mesh: TriangleMesh) -> Float[np.ndarray, "f 3"]:
 
 
 def angle_defects(mesh: TriangleMesh) -> Float[np.ndarray, " n"]:
-    """Return at each vertex what its angles lack of a full turn; of half a turn on a boundary, which turns by the rest.
+    """Return the angle defect at each vertex: the full turn minus the angles of its faces.
 
-    K_i = 2π - Σ θ - (π/2) Σ (2 - faces at the edge), over the angles and the edges at the vertex. The last sum is π on
-    a boundary, 2π where a boundary passes twice. The sum over all vertices is 2π times the Euler characteristic
-    (Gauss-Bonnet), on any mesh.
+    K_i = 2π - Σ θ - (π/2) Σ (2 - number of faces at the edge), with sums over the angles and the
+    edges at the vertex. The last sum is 0 inside, π on a boundary and 2π where a boundary passes
+    twice. The sum of all defects is 2π times the Euler characteristic (Gauss-Bonnet) on any mesh.
     """
     table = edge_table(mesh)
-    n, at_edges = mesh.n_vertices, np.repeat(2.0 - table.n_faces, 2)
-    turned = np.bincount(mesh.faces.ravel(), weights=face_angles(mesh).ravel(), minlength=n)
-    return (
-        2 * np.pi
-        - turned
-        - np.pi / 2 * np.bincount(table.edges.ravel(), weights=at_edges, minlength=n)
-    )
+    n = mesh.n_vertices
+    angles = np.bincount(mesh.faces.ravel(), weights=face_angles(mesh).ravel(), minlength=n)
+    missing_faces = np.repeat(2.0 - table.n_faces, 2)
+    missing = np.bincount(table.edges.ravel(), weights=missing_faces, minlength=n)
+    return 2 * np.pi - angles - np.pi / 2 * missing
 
 
 def gaussian_curvature(mesh: MeshLike) -> Float[np.ndarray, " n"]:
-    """Measure the Gaussian curvature at each vertex: the angle defect over the area around it.
+    """Compute the Gaussian curvature at each vertex: its angle defect divided by its area.
 
-    K_i / A_i with A_i a third of the faces' area (Meyer, Desbrun, Schröder and Barr 2003, with that area; thesis 5.4
-    compares its extrema as feature points). On a boundary the defect is the turn of the boundary within the surface,
-    so the value there is not that of a curvature inside; its sum with the areas is right. Pointwise it converges on
-    regular meshes, where six faces meet; elsewhere a share of the error stays.
+    K_i / A_i with A_i a third of the area of the faces at the vertex (Meyer, Desbrun, Schröder and
+    Barr 2003, with that area).
 
     Parameters
     ----------
     mesh : MeshLike
+        In any length unit.
 
     Returns
     -------
     (n,) float
-        In 1/length². Its sum with `dual_volumes` is 2π times the Euler characteristic.
+        Curvature of each vertex, in 1/length². The sum of the curvatures times `dual_volumes` is 2π
+        times the Euler characteristic.
 
     Raises
     ------
     InvalidShapeError
-        If a face has no area or is there twice, a vertex has no face, or floats cannot hold areas.
+        If a face has no area or occurs twice, a vertex has no face, or areas overflow.
+
+    See Also
+    --------
+    dual_volumes : The areas A_i.
+
+    Notes
+    -----
+    At a boundary vertex the defect measures the turn of the boundary within the surface, so the
+    value is not comparable with the curvature inside. The values converge pointwise on regular
+    meshes, where six faces meet at each vertex; on others a part of the error remains. Section 5.4
+    of the thesis compares the extrema of this function as feature points.
+
+    Examples
+    --------
+    The total curvature of a sphere is 4π.
+
+    >>> import eigenshape as es
+    >>> sphere = es.icosphere(2)
+    >>> curvature = es.geometry.gaussian_curvature(sphere)
+    >>> total = (curvature * es.geometry.dual_volumes(sphere)).sum()
+    >>> bool(abs(total - 4 * 3.14159265) < 1e-6)
+    True
     """
     mesh = as_mesh(mesh)
     require_sound(mesh)

@@ -1,4 +1,4 @@
-"""The smallest ball around some points."""
+"""The smallest ball around given points."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -17,14 +17,14 @@ Support = list[int]
 
 @dataclass(frozen=True, eq=False)
 class EnclosingBall:
-    """A Euclidean ball in R^d.
+    """A ball in R^d, as found by `enclosing_ball`.
 
     Attributes
     ----------
     center : (d,) float
-        In length.
+        Center of the ball, in length.
     radius : float
-        In length.
+        Radius of the ball, in length.
     """
 
     center: Float[np.ndarray, " d"]
@@ -32,16 +32,14 @@ class EnclosingBall:
 
 
 def enclosing_ball(points: ArrayLike) -> EnclosingBall:
-    """Find the smallest ball that holds all points.
+    """Find the smallest ball that contains all points.
 
-    It is the smallest ball of some d + 1 of them at most. Starting with one, the farthest point outside the ball joins
-    those that hold it, and the largest of the balls of some of these replaces it, until no point is outside (an active
-    set method; the ball grows with every step: Welzl 1991; Gärtner 1999). Exact up to rounding; time grows as 2^d.
+    The result is exact up to rounding. The time grows as 2^d with the dimension.
 
     Parameters
     ----------
     points : (n, d) float
-        At least one.
+        At least one point, in any length unit.
 
     Returns
     -------
@@ -51,10 +49,24 @@ def enclosing_ball(points: ArrayLike) -> EnclosingBall:
     ------
     InvalidShapeError
         If there is no point, or a coordinate is not finite.
+
+    Notes
+    -----
+    An active set method (Welzl 1991; Gärtner 1999). The smallest ball touches at most d + 1 of the
+    points, its support. Starting from one point, the farthest point outside the ball joins the
+    support, and the ball is replaced by the largest of the balls around subsets of the support. The
+    ball grows with every step, until no point lies outside.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.geometry.enclosing_ball([[0, 0], [2, 0], [1, 0.5]])
+    >>> ball.center.round(6).tolist(), round(ball.radius, 6)
+    ([1.0, 0.0], 1.0)
     """
     rows = finite_rows(points, "points")
     if not rows.size:
-        raise InvalidShapeError("A ball must have points to hold; there are none.")
+        raise InvalidShapeError("An enclosing ball must contain points; there are none.")
     unit, scale = size_one(rows)
     middle = (unit.min(axis=0) + unit.max(axis=0)) / 2
     unit, inner = size_one(unit - middle)
@@ -64,34 +76,32 @@ def enclosing_ball(points: ArrayLike) -> EnclosingBall:
 
 
 def _center(points: Points) -> Float[np.ndarray, " d"]:
+    dim = points.shape[1]
     support, center, value = [0], points[0], 0.0
     while True:
         far = int(((points - center) ** 2).sum(axis=1).argmax())
         if far in support:
             return center
-        grown = max(
-            (_held(points, some) for some in _with(far, support, points.shape[1])),
-            key=lambda held: held[0],
-        )
-        if grown[0] <= value:  # what is left is rounding
+        # The new ball touches the far point and at most d points of the old support.
+        candidates = [
+            _circumscribed_ball(points, [*subset, far])
+            for size in range(min(dim, len(support)) + 1)
+            for subset in combinations(support, size)
+        ]
+        grown = max(candidates, key=lambda ball: ball[0])
+        if grown[0] <= value:  # the far point is outside by rounding only
             return center
         value, center, support = grown
 
 
-def _with(far: int, support: Support, dim: int) -> list[Support]:
-    """List the sets of at most d + 1 points that may hold a ball, and have the new one."""
-    return [
-        [*some, far]
-        for size in range(min(dim, len(support)) + 1)
-        for some in combinations(support, size)
-    ]
+def _circumscribed_ball(
+    points: Points, support: Support
+) -> tuple[float, Float[np.ndarray, " d"], Support]:
+    """Return the squared radius of the ball that all support points touch, its center, the support.
 
-
-def _held(points: Points, support: Support) -> tuple[float, Float[np.ndarray, " d"], Support]:
-    """Return the squared radius of the ball that all points of a support touch, its centre, and the support.
-
-    The radius comes from the centre's barycentric coordinates, Σ w |p - c|²: whatever coordinates ≥ 0 rounding has
-    left, no ball around these points is smaller. With one below 0 fewer points hold the ball, and 0 is returned.
+    The radius comes from the barycentric coordinates w of the center, as Σ w |p - c|²: if all w are
+    at least 0, no ball around these points is smaller, whatever the rounding of w. If one is
+    negative, fewer points determine the ball, and the radius returned is 0.
     """
     base, sides = points[support[-1]], points[support[:-1]] - points[support[-1]]
     offset, _, rank, _ = np.linalg.lstsq(2 * sides, (sides**2).sum(axis=1), rcond=None)

@@ -1,4 +1,4 @@
-"""The facets of a mesh, its simplices' sides of one dimension less, and what holds together through them."""
+"""The facets of a mesh, and the components that are connected through facets."""
 
 from dataclasses import dataclass
 
@@ -13,19 +13,27 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 
+# The corners of a facet are packed into one integer while that stays below this bound: sorting
+# integers is several times as fast as sorting rows.
+PACKED_BELOW = 2**63
+
 
 @dataclass(frozen=True, eq=False)
 class FacetTable:
-    """The facets of a mesh once each: edges of triangles, triangles of tetrahedra, ends of segments.
+    """The facets of a mesh without duplicates, and where each simplex has them.
+
+    The facets of triangles are edges, those of tetrahedra are triangles, those of segments are
+    their end points.
 
     Attributes
     ----------
     facets : (q, m) int
-        Corners of each facet, ascending, and the facets in the order of their corners.
+        Corners of each facet, ascending; the facets are in lexicographic order.
     simplex_facets : (s, m+1) int
         Facet of each simplex opposite to its corner 0, 1, ..., m.
     n_simplices : (q,) int
-        Simplices at each facet: 1 on a boundary, 2 inside, more where the mesh is not a manifold.
+        Number of simplices at each facet: 1 on the boundary, 2 inside, more where the mesh is not
+        a manifold.
     """
 
     facets: Int[np.ndarray, "q m"]
@@ -34,34 +42,93 @@ class FacetTable:
 
     @property
     def boundary(self) -> Int[np.ndarray, " b"]:
-        """The facets that one simplex alone has, ascending."""
+        """Indices of the facets that belong to one simplex only, ascending."""
         return np.flatnonzero(self.n_simplices == 1)
 
 
 def facet_table(mesh: MeshLike) -> FacetTable:
-    """List the facets of the mesh once each, with the simplices' way to them."""
+    """List the facets of a mesh without duplicates, and the facets of each simplex.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Of any dimension.
+
+    Returns
+    -------
+    FacetTable
+
+    See Also
+    --------
+    edge_table : The same for triangle meshes, where facets are called edges.
+    boundary_surface : The facets on the boundary of tetrahedra, as a triangle mesh.
+
+    Examples
+    --------
+    Two tetrahedra with a triangle in common have seven facets.
+
+    >>> import eigenshape as es
+    >>> points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, -1]]
+    >>> mesh = es.SimplicialMesh(points, [[0, 1, 2, 3], [0, 1, 2, 4]])
+    >>> table = es.geometry.facet_table(mesh)
+    >>> len(table.facets), table.facets[table.n_simplices == 2].tolist()
+    (7, [[0, 1, 2]])
+    """
     mesh = as_simplicial(mesh)
-    named = mesh.simplices[np.arange(len(mesh.simplices))[:, None, None], _corners_of_facets(mesh)]
-    facets, inverse, counts = np.unique(
-        named.reshape(-1, mesh.dim), axis=0, return_inverse=True, return_counts=True
-    )
-    return FacetTable(facets, inverse.reshape(mesh.simplices.shape), counts)
+    corners = np.arange(mesh.dim + 1)
+    opposite = np.array([np.delete(corners, corner) for corner in corners])
+    # One row for each corner of a facet, one column for each facet: those opposite to corner 0 of
+    # all simplices first, then those opposite to corner 1, and so on.
+    ends = np.sort(mesh.simplices.T[opposite], axis=1).swapaxes(0, 1).reshape(mesh.dim, -1)
+    if mesh.n_points**mesh.dim < PACKED_BELOW:
+        shape = (mesh.n_points,) * mesh.dim
+        packed = np.ravel_multi_index(tuple(ends), shape)
+        keys, inverse, counts = np.unique(packed, return_inverse=True, return_counts=True)
+        facets = np.stack(np.unravel_index(keys, shape), axis=1)
+    else:
+        facets, inverse, counts = np.unique(ends.T, axis=0, return_inverse=True, return_counts=True)
+    return FacetTable(facets, inverse.reshape(mesh.dim + 1, -1).T, counts)
+
+
+def boundary_facets(mesh: Mesh) -> Int[np.ndarray, "b m"]:
+    """Return the corners of the facets that belong to one simplex only, in lexicographic order."""
+    table = facet_table(mesh)
+    return table.facets[table.boundary]
 
 
 def boundary_surface(mesh: MeshLike) -> TriangleMesh:
-    """Return the surface around tetrahedra in R³: the triangles that one tetrahedron alone has, turned outward.
+    """Return the boundary surface of a mesh of tetrahedra, facing outward.
 
-    Points inside are left out; the others keep their order.
+    Parameters
+    ----------
+    mesh : MeshLike
+        Tetrahedra in R³.
+
+    Returns
+    -------
+    TriangleMesh
+        The triangles that belong to one tetrahedron only. Points inside the mesh are left out; the
+        others keep their order.
 
     Raises
     ------
     InvalidShapeError
-        If the mesh is not one of tetrahedra in R³.
+        If the mesh does not consist of tetrahedra in R³.
+
+    See Also
+    --------
+    facet_table : All facets of a mesh, also inside.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.geometry.boundary_surface(es.shapes.box(2, 2, 2))
+    TriangleMesh(26 vertices, 48 faces)
     """
     solid = as_simplicial(mesh)
     if (solid.dim, solid.points.shape[1]) != (3, 3):
         raise InvalidShapeError(
-            f"Only tetrahedra in R^3 have a surface around them; the mesh is a {solid!r}."
+            f"boundary_surface must be given tetrahedra in R^3; the mesh is a {solid!r}."
         )
     table = facet_table(solid)
     owner, apex = np.nonzero(table.n_simplices[table.simplex_facets] == 1)
@@ -76,15 +143,18 @@ def boundary_surface(mesh: MeshLike) -> TriangleMesh:
 
 
 def _corners_of_facets(mesh: Mesh) -> Int[np.ndarray, "s corners m"]:
-    """Return which corners of each simplex lie opposite to each of its corners, in the order of their points."""
+    """Return for each corner of each simplex the other corners, sorted by their points."""
     corners = np.arange(mesh.dim + 1)
     others = np.array([np.delete(corners, corner) for corner in corners])
     order = np.argsort(mesh.simplices[:, others], axis=2)
     return np.take_along_axis(np.broadcast_to(others, order.shape), order, axis=2)
 
 
-def _neighbours(table: FacetTable) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
-    """Return sides that lie on one facet, by pairs that chain all of its sides; side (m+1)·s + a is facet a of s."""
+def _neighbors(table: FacetTable) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
+    """Return pairs of sides that lie on one facet; they chain all sides of the facet.
+
+    Side (m+1)·s + a is the one of simplex s opposite to its corner a.
+    """
     at = table.simplex_facets.ravel()
     order = np.argsort(at, kind="stable")
     same = at[order][1:] == at[order][:-1]
@@ -92,25 +162,28 @@ def _neighbours(table: FacetTable) -> tuple[Int[np.ndarray, " k"], Int[np.ndarra
 
 
 def facet_components(table: FacetTable) -> tuple[int, Int[np.ndarray, " s"]]:
-    """Count the parts that facets hold together, and number each simplex with its own.
+    """Count the components that are connected through facets, and return that of each simplex.
 
-    Parts that touch in less than a facet, as two triangles in a point, are two: no heat flows through there.
+    Components that touch in less than a facet, such as two triangles with one vertex in common, are
+    separate: no heat flows through there.
     """
     n, corners = table.simplex_facets.shape
-    one, two = (side // corners for side in _neighbours(table))
+    one, two = (side // corners for side in _neighbors(table))
     return _components(n, one, two)
 
 
 def without_pinches(mesh: Mesh) -> SimplicialMesh:
-    """Give each point a copy for every group of its simplices that facets at the point hold together.
+    """Split each point whose simplices are not connected through facets at that point.
 
-    Continuous functions on the new mesh are continuous across facets of the old one, and may jump where simplices touch
-    in less than a facet. The simplices keep their order, copies stand where their point did, and loose points go.
+    Each connected group of its simplices gets a copy of the point. So continuous functions on the
+    new mesh are continuous across facets of the old one and may jump where simplices touch in less
+    than a facet. Simplices keep their order, copies take the place of their point in the order of
+    points, and points without simplices are removed.
     """
     corners, table = _corners_of_facets(mesh), facet_table(mesh)
     n, n_corners = mesh.simplices.shape
     ids = (np.arange(n)[:, None, None] * n_corners + corners).reshape(-1, mesh.dim)
-    one, two = _neighbours(table)
+    one, two = _neighbors(table)
     count, fans = _components(n * n_corners, ids[one].ravel(), ids[two].ravel())
     points = np.empty(count, dtype=np.int64)
     points[fans] = mesh.simplices.ravel()

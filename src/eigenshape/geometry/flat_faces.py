@@ -1,4 +1,4 @@
-"""Faces without area, taken out of a surface without leaving a slit."""
+"""Removal of faces without area that does not open the surface."""
 
 import numpy as np
 from jaxtyping import Bool, Int
@@ -9,14 +9,15 @@ from eigenshape.geometry.topology import edge_table
 
 
 def flip_flat_faces(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
-    """Flip the longest edge of faces without area, and return the mesh with the number of flips.
+    """Flip the longest edge of each face without area; return the mesh and the number of flips.
 
-    A face (a, b, m) without area has its vertex m on the edge (a, b). If it were only dropped, the edges (a, m) and
-    (m, b) would part from (a, b): heat would not cross there, and a closed surface would be open. So the face (a, b, d)
-    on the other side is split at m, into (a, m, d) and (m, b, d). The surface stays the same set of points.
+    A face (a, b, m) without area has its vertex m on the edge (a, b). If the face were only
+    removed, the edges (a, m) and (m, b) would separate from (a, b): heat would not cross there, and
+    a closed surface would become open. So the face (a, b, d) on the other side of the edge is split
+    at m into (a, m, d) and (m, b, d). The surface stays the same set of points.
 
-    No edge is flipped that has another number of faces than two, whose place the edge (m, d) takes already, or that
-    leaves a face without area again, as where m lies on a.
+    An edge is left alone if it does not have exactly two faces, if the edge (m, d) exists already,
+    or if the flip would create another face without area, as where m coincides with a.
     """
     n_flips = 0
     while True:
@@ -31,9 +32,9 @@ def flip_flat_faces(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
 def _flips(
     mesh: TriangleMesh,
 ) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"], Int[np.ndarray, "2 k 3"]]:
-    """Return flat faces, the neighbors that are split at their vertices, and the faces that replace both.
+    """Return flat faces, the neighbors to be split, and the faces that replace both.
 
-    No two of these flips share a face or make the same edge, so that all can be done at once.
+    No two of these flips share a face or create the same edge, so all can be done at once.
     """
     table = edge_table(mesh)
     is_flat = np.zeros(mesh.n_faces, dtype=bool)
@@ -63,7 +64,7 @@ def _flips(
 def _across(
     face_edges: Int[np.ndarray, "f 3"], edges: Int[np.ndarray, " k"], faces: Int[np.ndarray, " k"]
 ) -> Int[np.ndarray, " k"]:
-    """Return another face at each edge than the given one, or that one where there is none."""
+    """Return for each edge a face other than the given one, or the given one if it is alone."""
     order = np.argsort(face_edges.ravel(), kind="stable")
     ordered = face_edges.ravel()[order]
     first = order[np.searchsorted(ordered, edges)] // 3

@@ -1,4 +1,4 @@
-"""Loose fragments of a shape: components too small to be sampled."""
+"""Loose fragments of a shape: components too small to be worth sampling."""
 
 import numpy as np
 from jaxtyping import Int
@@ -8,16 +8,21 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import scaled_corners
 from eigenshape.geometry.topology import require_simplices_everywhere, vertex_components
 
-N_SHARES = 100  # a component with less than one in so many of the area is a fragment,
-MOST = 0.5  # unless the others do not have even this share of the area together
-EQUAL_DIGITS = 9  # of areas over the largest: copies of a part in other places differ by rounding
+# A component with less than 1/100 of the area is a fragment.
+N_SHARES = 100
+# If the components that are large enough have less than this share of the area together, the shape
+# consists of small parts, and its largest N_SHARES components are kept instead.
+LEAST_SHARE_KEPT = 0.5
+# Areas, relative to the largest, are compared to this many decimals: copies of one part at
+# different places differ by rounding and must count as equal.
+EQUAL_DIGITS = 9
 
 
 def fragment_vertices(mesh: TriangleMesh, n_shares: int = N_SHARES) -> Int[np.ndarray, " c"]:
-    """Return the vertices of the loose fragments of a shape: components with less than 1/n of its area.
+    """Return the vertices of loose fragments: components with less than 1/n of the area.
 
-    Where most of the area is in such components, all but the n largest are fragments; of equal ones those with the
-    lowest vertices count as larger.
+    If most of the area is in such components, all but the n largest components are fragments. Of
+    components with equal areas those with the lowest vertices are kept first.
 
     Parameters
     ----------
@@ -28,7 +33,7 @@ def fragment_vertices(mesh: TriangleMesh, n_shares: int = N_SHARES) -> Int[np.nd
     Returns
     -------
     (c,) int
-        Ascending; empty where there is one component.
+        Vertices, ascending; empty if the mesh is connected.
 
     Raises
     ------
@@ -42,7 +47,7 @@ def fragment_vertices(mesh: TriangleMesh, n_shares: int = N_SHARES) -> Int[np.nd
     if count == 1 or not areas.any():
         return np.empty(0, dtype=np.int64)
     small = n_shares * areas < areas.sum()
-    if areas[~small].sum() < MOST * areas.sum():
+    if areas[~small].sum() < LEAST_SHARE_KEPT * areas.sum():
         sizes = np.round(areas / areas.max(), EQUAL_DIGITS)
         largest = np.argsort(-sizes, kind="stable")[:n_shares]
         small = np.isin(np.arange(count), largest, invert=True)

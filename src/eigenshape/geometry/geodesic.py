@@ -1,4 +1,4 @@
-"""Geodesic distances between all vertices that lie near each other on a triangle mesh."""
+"""Geodesic distances on surfaces, and farthest points."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -17,43 +17,63 @@ from eigenshape.geometry.geodesic_loops import balls
 from eigenshape.geometry.simplices import in_length, scaled_corners
 from eigenshape.geometry.simplicial import Mesh
 
-SOURCES = 256  # a task
+# Sources of one task of the thread pool: enough that starting a task costs nothing beside it, few
+# enough that all cores have work.
+SOURCES_PER_TASK = 256
 
 
 def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
-    """Measure along the surface from each vertex to all vertices within a radius.
-
-    Waves leave each vertex as in Dijkstra's algorithm, and cross each triangle as if what lies behind were flat: the
-    source is laid into the triangle's plane by the distances of two corners (Novotni and Klein 2002). Exact on flat
-    regions; the shorter of the two directions counts, so that the result is symmetric.
+    """Compute the geodesic distances between all vertices within a radius of each other.
 
     Parameters
     ----------
     mesh : MeshLike
-        Of dimension 2, in any R^d.
+        A surface, in any R^d.
     radius : float
-        In length.
+        Largest distance, in length.
 
     Returns
     -------
-    (n, n) sparse
-        Distances, in length, between different vertices; symmetric, columns ascending.
+    (n, n) scipy.sparse.csr_array
+        Distances between different vertices, in length; symmetric, with sorted columns.
 
     Raises
     ------
     InvalidShapeError
-        If the mesh is no surface.
+        If the mesh does not have dimension 2.
     InvalidParameterError
-        If the radius is not positive.
+        If the radius is not positive and finite.
+
+    See Also
+    --------
+    geodesic_distances : Distances from some vertices to all others.
+
+    Notes
+    -----
+    Waves start at each vertex as in Dijkstra's algorithm. A wave crosses a triangle as if the
+    surface behind it were flat: the source is placed in the plane of the triangle by the distances
+    of two corners (Novotni and Klein 2002). The result is exact on flat regions. Of the distances
+    in the two directions the smaller one is returned.
+
+    Examples
+    --------
+    On a flat grid with unit squares, vertex 0 has two neighbors at distance 1 and one at √2.
+
+    >>> import eigenshape as es
+    >>> grid = es.shapes.grid(3, 3, width=3, height=3)
+    >>> es.geometry.geodesic_balls(grid, 1.5)[[0]].data.round(4).tolist()
+    [1.0, 1.0, 1.4142]
     """
     mesh = as_simplicial(mesh)
     _require_surface(mesh)
     positive_values(radius, "radius")
     corners, scale = scaled_corners(mesh)
     starts, others, sides = _fans(mesh, corners)
-    firsts = range(0, mesh.n_points, SOURCES)
+    firsts = range(0, mesh.n_points, SOURCES_PER_TASK)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        sources = [np.arange(first, min(first + SOURCES, mesh.n_points)) for first in firsts]
+        sources = [
+            np.arange(first, min(first + SOURCES_PER_TASK, mesh.n_points)) for first in firsts
+        ]
         waves = pool.map(
             lambda some: balls(
                 starts, *others, sides, radius / scale, some, np.arange(len(some) + 1)
@@ -64,32 +84,45 @@ def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
     rows = np.concatenate([[0], np.cumsum(counts)])
     found = sp.csr_array((in_length(values, scale, 1), columns, rows), shape=(mesh.n_points,) * 2)
     found.sort_indices()
-    return found.minimum(found.T)  # what one direction alone reached counts as out of reach
+    # An entry that only one direction has is 0 in the other, and the minimum removes it.
+    return found.minimum(found.T)
 
 
 def geodesic_distances(mesh: MeshLike, sources: ArrayLike) -> Float[np.ndarray, "k n"]:
-    """Measure along the surface from some vertices to all others.
+    """Compute the geodesic distances from some vertices to all vertices.
 
-    As `geodesic_balls`, without limit, and in one direction: from the sources.
+    The method is that of `geodesic_balls`, in the direction from the sources only.
 
     Parameters
     ----------
     mesh : MeshLike
-        Of dimension 2, in any R^d.
+        A surface, in any R^d.
     sources : (k,) int
         Vertices.
 
     Returns
     -------
     (k, n) float
-        In length; infinite from one component to another.
+        Distance from each source to each vertex, in length; infinite between components.
 
     Raises
     ------
     InvalidShapeError
-        If the mesh is no surface.
+        If the mesh does not have dimension 2.
     InvalidParameterError
-        If a source is no vertex.
+        If a source is not a vertex.
+
+    See Also
+    --------
+    geodesic_distance_to_set : Distance to the nearest of several vertices.
+    geodesic_balls : Distances between all near vertices.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> grid = es.shapes.grid(2, 2, width=2, height=2)
+    >>> es.geometry.geodesic_distances(grid, [0]).round(4).tolist()
+    [[0.0, 1.0, 2.0, 1.0, 1.4142, 2.2361, 2.0, 2.2361, 2.8284]]
     """
     mesh = as_simplicial(mesh)
     wave = waves_on(mesh)
@@ -100,30 +133,45 @@ def geodesic_distances(mesh: MeshLike, sources: ArrayLike) -> Float[np.ndarray, 
 def geodesic_distance_to_set(
     mesh: MeshLike, sources: ArrayLike, *, reach: float = np.inf
 ) -> Float[np.ndarray, " n"]:
-    """Measure along the surface from each vertex to the nearest of some; one wave leaves all of them at once.
+    """Compute the geodesic distance from each vertex to the nearest of several sources.
 
-    As `geodesic_distances`; an edge between two of them is a source all along.
+    One wave starts from all sources at once. An edge between two sources is a source along its
+    whole length.
 
     Parameters
     ----------
     mesh : MeshLike
-        Of dimension 2, in any R^d.
+        A surface, in any R^d.
     sources : (k,) int
         Vertices.
     reach : float
-        Length up to which distances are wanted; shorter ones are quicker.
+        Largest distance that is needed, in length. A smaller reach takes less time.
 
     Returns
     -------
     (n,) float
-        In length; infinite beyond `reach`, and where there is none on the same component.
+        Distance of each vertex, in length; infinite beyond `reach`, and on components without a
+        source.
 
     Raises
     ------
     InvalidShapeError
-        If the mesh is no surface.
+        If the mesh does not have dimension 2.
     InvalidParameterError
-        If a source is no vertex.
+        If a source is not a vertex.
+
+    See Also
+    --------
+    geodesic_distances : Distances from each source by itself.
+
+    Examples
+    --------
+    The distance of each vertex of a grid from its left side.
+
+    >>> import eigenshape as es
+    >>> grid = es.shapes.grid(2, 2, width=2, height=2)
+    >>> es.geometry.geodesic_distance_to_set(grid, [0, 1, 2]).round(6).tolist()
+    [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0]
     """
     mesh = as_simplicial(mesh)
     wave = waves_on(mesh)
@@ -131,7 +179,11 @@ def geodesic_distance_to_set(
 
 
 def waves_on(mesh: Mesh) -> Callable[..., Float[np.ndarray, " n"]]:
-    """Return a function from one vertex or some, and a length, to all vertices' distances, infinite beyond it."""
+    """Return a function that computes distances from one or several vertices.
+
+    The function takes the sources and a reach, and returns the distance of each vertex, infinite
+    beyond the reach. What it needs of the mesh is computed once.
+    """
     _require_surface(mesh)
     corners, scale = scaled_corners(mesh)
     starts, others, sides = _fans(mesh, corners)
@@ -151,25 +203,46 @@ def waves_on(mesh: Mesh) -> Callable[..., Float[np.ndarray, " n"]]:
 def farthest_points(
     mesh: MeshLike, count: int, *, reach: float = np.inf
 ) -> tuple[Int[np.ndarray, " c"], Float[np.ndarray, "c n"], Int[np.ndarray, " n"]]:
-    """Choose vertices of a surface, each as far along it from those before as can be (Eldar and others 1997).
+    """Choose vertices of a surface, each as far as possible from those chosen before.
 
-    The first is the one farthest from vertex 0; another piece is farther than all else.
+    The first is the vertex farthest from vertex 0 (Eldar and others 1997). A component without a
+    chosen vertex is farther than everything else.
 
     Parameters
     ----------
     mesh : MeshLike
+        A surface, in any R^d.
     count : int
+        Number c of vertices to choose.
     reach : float
-        Length up to which distances are wanted; shorter ones are quicker.
+        Largest distance that is needed in `distances`, in length. A smaller reach takes less time.
 
     Returns
     -------
     chosen : (c,) int
-        Vertices.
+        Vertices, in the order in which they were chosen.
     distances : (c, n) float
-        From each to all vertices, in length; infinite from one piece to another, and perhaps beyond `reach`.
+        Geodesic distance from each of them to all vertices, in length; infinite between
+        components, and possibly beyond `reach`.
     nearest : (n,) int
-        For each vertex the number of the nearest.
+        For each vertex, the position in `chosen` of the nearest chosen vertex.
+
+    Raises
+    ------
+    InvalidShapeError
+        If the mesh does not have dimension 2.
+
+    See Also
+    --------
+    geodesic_distances : Distances from given vertices.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> strip = es.shapes.grid(4, 1, width=4, height=0.1)
+    >>> chosen, _, nearest = es.geometry.farthest_points(strip, 2)
+    >>> strip.vertices[chosen, 0].tolist()
+    [4.0, 0.0]
     """
     mesh = as_simplicial(mesh)
     wave, n = waves_on(mesh), mesh.n_points
@@ -188,22 +261,23 @@ def farthest_points(
 def farthest_first(
     wave: Callable[..., Float[np.ndarray, " n"]], n: int, first: int, *, reach: float = 0.0
 ) -> Iterator[tuple[int, Float[np.ndarray, " n"]]]:
-    """Go through n vertices by the waves of their surface, each as far from those before as can be, without end.
+    """Yield vertices without end, each as far as possible from those before, and their distances.
 
-    With each come the distances from it, as those of `farthest_points`; at least those below what they were before.
+    Distances are computed up to `reach`, and always as far as they are smaller than those from all
+    vertices before.
     """
-    least, following = np.full(n, np.inf), first
+    least, vertex = np.full(n, np.inf), first
     while True:
-        row = wave(following, max(reach, least.max()))
-        yield following, row
+        row = wave(vertex, max(reach, least.max()))
+        yield vertex, row
         np.minimum(least, row, out=least)
-        following = int(least.argmax())
+        vertex = int(least.argmax())
 
 
 def _require_surface(mesh: Mesh) -> None:
     if mesh.dim != 2:
         raise InvalidShapeError(
-            f"Geodesic distances are measured on surfaces; this mesh has dimension {mesh.dim}."
+            f"Geodesic distances need a mesh of dimension 2; this one has dimension {mesh.dim}."
         )
 
 
@@ -214,16 +288,18 @@ def _fans(
     tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]],
     Float[np.ndarray, "k 3"],
 ]:
-    """List at each vertex its triangles by their other two corners, with the lengths to these and between them."""
+    """List the triangles at each vertex: where they start, their other two corners, three lengths.
+
+    The lengths of a triangle are those from the vertex to each other corner and between these two.
+    """
     turns = [np.roll(np.arange(3), -turn) for turn in range(3)]
     triples = np.concatenate([mesh.simplices[:, turn] for turn in turns])
-    lengths = np.concatenate([_lengths(corners[:, turn]) for turn in turns])
+    lengths = []
+    for turn in turns:
+        a, b, c = corners[:, turn].transpose(1, 0, 2)
+        sides = [np.linalg.norm(side, axis=1) for side in (b - a, c - a, c - b)]
+        lengths.append(np.column_stack(sides))
     order = np.argsort(triples[:, 0], kind="stable")
     starts = np.searchsorted(triples[order, 0], np.arange(mesh.n_points + 1))
     one, two = (np.ascontiguousarray(triples[order, place]) for place in (1, 2))
-    return starts, (one, two), lengths[order]
-
-
-def _lengths(corners: Float[np.ndarray, "f 3 d"]) -> Float[np.ndarray, "f 3"]:
-    a, b, c = corners.transpose(1, 0, 2)
-    return np.column_stack([np.linalg.norm(side, axis=1) for side in (b - a, c - a, c - b)])
+    return starts, (one, two), np.concatenate(lengths)[order]

@@ -6,7 +6,7 @@ import numpy as np
 
 from eigenshape._compile import njit
 
-FRONT = -1
+FRONT = -1  # sender of a vertex that several sources reached as one straight front
 
 
 @njit

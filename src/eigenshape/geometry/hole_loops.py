@@ -6,8 +6,12 @@ import numpy as np
 
 from eigenshape._compile import njit
 
-SHAPE = 0.01  # of the squares of a triangle's sides, beside its area: in flat holes slivers lose
-FLAT = 1e-7  # of the squares of a triangle's sides, up to which it has no area
+# Share of the squared sides of a triangle in its cost, beside the area. In a flat hole all
+# triangulations have the same area, and this term chooses the one without slivers.
+SHAPE = 0.01
+# A triangle with at most this share of its squared sides as area counts as degenerate and is not
+# used.
+FLAT = 1e-7
 
 
 @njit

@@ -1,4 +1,4 @@
-"""Holes, triangulated between the vertices around them."""
+"""Triangulation of holes between the vertices around them."""
 
 from dataclasses import dataclass
 
@@ -14,14 +14,16 @@ from eigenshape.geometry.topology import EdgeTable, boundary_loops, edge_table, 
 
 @dataclass(frozen=True, eq=False)
 class Fillings:
-    """What closes holes.
+    """Faces that close holes.
 
     Attributes
     ----------
     faces : tuple of (t, 3) int
-        For each hole that is closed.
-    n_long, n_open : int
-        How many holes have too many edges, and how many others no good faces close.
+        The new faces of each hole that can be closed.
+    n_long : int
+        Number of holes with too many edges.
+    n_open : int
+        Number of other holes that no sound faces close.
     """
 
     faces: tuple[Int[np.ndarray, "_ 3"], ...]
@@ -29,8 +31,8 @@ class Fillings:
     n_open: int
 
 
-def fillings(mesh: TriangleMesh, most_edges: int) -> Fillings:
-    """Triangulate each boundary loop of at most so many edges."""
+def triangulate_holes(mesh: TriangleMesh, most_edges: int) -> Fillings:
+    """Triangulate each boundary loop that has at most `most_edges` edges."""
     table = edge_table(mesh)
     edges, face_of = table.edges, _faces_on_boundary(mesh, table)
     graph = sp.csr_array((np.ones(len(edges), dtype=bool), edges.T), shape=(mesh.n_vertices,) * 2)
@@ -39,7 +41,8 @@ def fillings(mesh: TriangleMesh, most_edges: int) -> Fillings:
     for loop in boundary_loops(mesh):
         ahead = zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
         behind = {face_of.get(side) for side in ahead}
-        # None: the chain is not closed. A single face would be closed by itself, turned over.
+        # None means that the chain is not closed. The boundary of a single face would be closed by
+        # that face itself, turned over.
         if len(loop) < 3 or None in behind or len(behind) == 1:
             n_open += 1
         elif len(loop) > most_edges:
@@ -54,7 +57,7 @@ def fillings(mesh: TriangleMesh, most_edges: int) -> Fillings:
 
 
 def _faces_on_boundary(mesh: TriangleMesh, table: EdgeTable) -> dict[tuple[int, int], int]:
-    """Return the face of each side that no other face has, by its vertices in the order of that face."""
+    """Map each boundary edge, as a pair of vertices directed as in its face, to that face."""
     places = np.flatnonzero(table.n_faces[table.face_edges.T.ravel()] == 1)
     sides = map(tuple, half_edges(mesh)[places].tolist())
     return dict(zip(sides, (places % mesh.n_faces).tolist(), strict=True))
@@ -63,13 +66,11 @@ def _faces_on_boundary(mesh: TriangleMesh, table: EdgeTable) -> dict[tuple[int, 
 def _taken(
     graph: sp.csr_array, loop: Int[np.ndarray, " k"], added: list[Int[np.ndarray, "_ 3"]]
 ) -> Bool[np.ndarray, "k k"]:
-    """Mark the pairs of the loop that are edges already, of the mesh or of faces added before."""
+    """Mark the pairs of loop vertices that are edges already, of the mesh or of added faces."""
     taken = np.array(graph[loop][:, loop].toarray(), dtype=bool)
     if added:
-        faces, places = (
-            np.concatenate(added),
-            {vertex: place for place, vertex in enumerate(loop.tolist())},
-        )
+        faces = np.concatenate(added)
+        places = {vertex: place for place, vertex in enumerate(loop.tolist())}
         drawn = np.concatenate([faces[:, :2], faces[:, 1:], faces[:, ::2]])
         for one, other in drawn[np.isin(drawn, loop).all(axis=1)].tolist():
             taken[places[one], places[other]] = taken[places[other], places[one]] = True

@@ -1,4 +1,4 @@
-"""Lengths, areas and normals, right at any scale of the coordinates."""
+"""Lengths, areas, volumes and normals, accurate at any scale of the coordinates."""
 
 import numpy as np
 from jaxtyping import Float
@@ -12,10 +12,10 @@ from eigenshape.geometry.topology import edge_table
 
 
 def unit_scaled(mesh: TriangleMesh) -> tuple[Float[np.ndarray, "n 3"], float]:
-    """Return the vertices about their mean, divided by a power of two that brings them to size 1, and that power.
+    """Return the vertices relative to their mean, scaled to size 1, and the scale.
 
-    Squares and cubes of these neither overflow nor underflow, whatever the unit of the mesh, and dividing by a
-    power of two costs no digit.
+    The scale is a power of two, so dividing by it is exact. Squares and cubes of the scaled
+    coordinates neither overflow nor underflow, whatever the unit of the mesh.
     """
     points, scale = size_one(mesh.vertices)
     points, inner_scale = size_one(points - points.mean(axis=0))
@@ -23,31 +23,92 @@ def unit_scaled(mesh: TriangleMesh) -> tuple[Float[np.ndarray, "n 3"], float]:
 
 
 def area_vectors(corners: Float[np.ndarray, "f 3 3"]) -> Float[np.ndarray, "f 3"]:
-    """Return for each triple of corners their normal times their area."""
+    """Return the unit normal of each triangle times its area."""
     a, b, c = corners.transpose(1, 0, 2)
     return 0.5 * np.cross(b - a, c - a)
 
 
 def face_areas(mesh: MeshLike) -> Float[np.ndarray, " f"]:
-    """Return the area of each face, in length^2."""
+    """Compute the area of each face.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        In any length unit.
+
+    Returns
+    -------
+    (f,) float
+        Areas, in length²; 0 for a degenerate face.
+
+    See Also
+    --------
+    surface_area : The sum of the areas.
+    dual_volumes : The area at each vertex.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.geometry.face_areas(es.shapes.grid(1, 1)).tolist()
+    [0.5, 0.5]
+    """
     mesh = as_mesh(mesh)
     corners, scale = scaled_corners(mesh)
     return in_length(np.linalg.norm(area_vectors(corners), axis=1), scale, 2)
 
 
 def surface_area(mesh: MeshLike) -> float:
-    """Return the total area, in length^2."""
+    """Compute the total area of a surface.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        In any length unit.
+
+    Returns
+    -------
+    float
+        Area, in length².
+
+    See Also
+    --------
+    face_areas : The area of each face.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.geometry.surface_area(es.shapes.grid(4, 4, width=2, height=3))
+    6.0
+    """
     mesh = as_mesh(mesh)
     return float(face_areas(mesh).sum())
 
 
 def enclosed_volume(mesh: MeshLike) -> float:
-    """Return the signed volume under the surface, in length^3: positive for a closed mesh that faces outward.
+    """Compute the signed volume that a surface encloses.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Closed, in any length unit. For an open mesh the result is the volume between the surface
+        and the mean of its corners.
+
+    Returns
+    -------
+    float
+        Volume, in length³; positive if the faces of a closed mesh face outward.
 
     Raises
     ------
     InvalidShapeError
         If two neighboring faces are turned against each other.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> cube = es.geometry.boundary_surface(es.shapes.box(2, 2, 2, sides=(1, 2, 3)))
+    >>> round(es.geometry.enclosed_volume(cube), 6)
+    6.0
     """
     mesh = as_mesh(mesh)
     require_oriented(mesh)
@@ -57,18 +118,64 @@ def enclosed_volume(mesh: MeshLike) -> float:
 
 
 def face_normals(mesh: MeshLike) -> Float[np.ndarray, "f 3"]:
-    """Return the unit normal of each face; zero where the face has no area."""
+    """Compute the unit normal of each face.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        In any length unit.
+
+    Returns
+    -------
+    (f, 3) float
+        Normals, pointing to the side from which the corners are seen counter-clockwise; zero for a
+        face without area.
+
+    See Also
+    --------
+    vertex_normals : Normals at the vertices.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.geometry.face_normals(es.shapes.grid(1, 1)).tolist()
+    [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]]
+    """
     mesh = as_mesh(mesh)
     return _unit(area_vectors(scaled_corners(mesh)[0]))
 
 
 def vertex_normals(mesh: MeshLike) -> Float[np.ndarray, "n 3"]:
-    """Return at each vertex the unit mean of its faces' normals, weighted by area; zero where there is none.
+    """Compute the unit normal at each vertex: the mean of its faces' normals, weighted by area.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Consistently oriented.
+
+    Returns
+    -------
+    (n, 3) float
+        Normals; zero at a vertex without faces, or where the normals cancel.
 
     Raises
     ------
     InvalidShapeError
         If two neighboring faces are turned against each other.
+
+    See Also
+    --------
+    face_normals : Normals of the faces.
+
+    Examples
+    --------
+    At each vertex of a sphere around the origin, the normal points away from the origin.
+
+    >>> import eigenshape as es
+    >>> sphere = es.icosphere(2)
+    >>> cosines = (es.geometry.vertex_normals(sphere) * sphere.vertices).sum(axis=1)
+    >>> bool(cosines.min() > 0.999)
+    True
     """
     mesh = as_mesh(mesh)
     require_oriented(mesh)
@@ -76,7 +183,7 @@ def vertex_normals(mesh: MeshLike) -> Float[np.ndarray, "n 3"]:
 
 
 def mean_normals(mesh: TriangleMesh) -> Float[np.ndarray, "n 3"]:
-    """Return `vertex_normals` of any mesh; where neighbors disagree their normals cancel, in part or all."""
+    """Return `vertex_normals` of any mesh; normals of neighbors that disagree cancel in part."""
     vectors = area_vectors(scaled_corners(mesh)[0])
     sums = [
         np.bincount(
@@ -93,7 +200,29 @@ def _unit(vectors: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
 
 
 def edge_lengths(mesh: MeshLike) -> Float[np.ndarray, " e"]:
-    """Return the length of each edge of `edge_table`."""
+    """Compute the length of each edge.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        In any length unit.
+
+    Returns
+    -------
+    (e,) float
+        Lengths, in the order of the edges of `edge_table`.
+
+    See Also
+    --------
+    edge_table : The edges.
+    mean_side_length : The mean over the sides of all faces.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.geometry.edge_lengths(es.shapes.grid(1, 1)).round(4).tolist()
+    [1.0, 1.0, 1.4142, 1.0, 1.0]
+    """
     mesh = as_mesh(mesh)
     ends, scale = size_one(mesh.vertices[edge_table(mesh).edges])
     return in_length(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1), scale, 1)

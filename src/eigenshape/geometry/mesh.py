@@ -1,4 +1,4 @@
-"""A triangle mesh is a value: checked once, then read-only."""
+"""Triangle meshes: arrays that are checked once and then read-only."""
 
 from dataclasses import dataclass
 
@@ -12,24 +12,41 @@ from eigenshape._typing import ArrayLike
 
 @dataclass(frozen=True, eq=False, init=False)
 class TriangleMesh:
-    """Points in space and the triangles between them.
+    """A triangle mesh in R³.
 
-    What is checked here is structure: finite coordinates, also of vertices that no face uses, and faces that
-    index them. Whether the geometry serves (no zero-area face, no loose vertex) is asked by whoever needs it,
-    so that a repair can start from a mesh that is valid and not yet good.
+    The constructor checks the structure: coordinates are finite, also those of vertices without a
+    face, and faces index vertices. It accepts degenerate faces and vertices without a face, so that
+    `repair` can be applied to such a mesh; functions that cannot work with them raise an error.
 
     Parameters
     ----------
     vertices : (n, 3) float
-        Coordinates, in any length unit. Copied, then read-only.
+        Coordinates, in any length unit. They are copied, and the copy is read-only.
     faces : (f, 3) int
-        Corners of each triangle, counter-clockwise seen from outside. Copied, then read-only.
+        Corners of each triangle, counter-clockwise if seen from outside. They are copied, and the
+        copy is read-only.
 
     Raises
     ------
     InvalidShapeError
-        If an array has the wrong shape or is empty, a coordinate is not finite, or a face does not index
-        `vertices`; the message names the first row at fault.
+        If an array has the wrong shape or is empty, a coordinate is not finite, or a face does not
+        index `vertices`. The message names the first row at fault.
+
+    See Also
+    --------
+    as_mesh : Convert a mesh of another library.
+    read_mesh : Read a mesh from a file.
+    SimplicialMesh : Meshes of other dimensions.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> mesh = es.TriangleMesh(vertices, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    >>> mesh
+    TriangleMesh(4 vertices, 4 faces)
+    >>> mesh.vertices[3]
+    array([0., 0., 1.])
     """
 
     vertices: Float[np.ndarray, "n 3"]
@@ -42,7 +59,8 @@ class TriangleMesh:
         corners = index_rows(faces, "faces", 3, len(points))
         if not len(corners):
             raise InvalidShapeError(
-                f"A mesh must have faces; it has {len(points)} vertices and no face."
+                f"A mesh must have faces; it has {len(points)} vertices and no face. "
+                "Use PointCloud for points without faces."
             )
         object.__setattr__(self, "vertices", frozen(points))
         object.__setattr__(self, "faces", frozen(corners))
@@ -59,12 +77,12 @@ class TriangleMesh:
 
     @property
     def points(self) -> Float[np.ndarray, "n 3"]:
-        """The vertices, by the name that they have in meshes of any dimension."""
+        """The vertices, under the name used for meshes of any dimension."""
         return self.vertices
 
     @property
     def simplices(self) -> Int[np.ndarray, "f 3"]:
-        """The faces, by the name that they have in meshes of any dimension."""
+        """The faces, under the name used for meshes of any dimension."""
         return self.faces
 
     @property

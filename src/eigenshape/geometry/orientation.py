@@ -1,4 +1,4 @@
-"""Which side of a surface is out, where its faces do not say."""
+"""Orientation of surfaces: which side is outside."""
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -6,39 +6,64 @@ from scipy.spatial import ConvexHull, QhullError
 
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import area_vectors, mean_normals, unit_scaled
+from eigenshape.geometry.measure import area_vectors, enclosed_volume, mean_normals, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented
 from eigenshape.geometry.simplices import scaled_corners, size_one
-from eigenshape.geometry.topology import edge_table, face_turns, submesh, with_turned_faces
-
-FLAT = (
-    1e-10  # volume over area^1.5 up to which rounding decides which side is out; a ball has 0.094
+from eigenshape.geometry.topology import (
+    edge_table,
+    face_turns,
+    is_closed,
+    submesh,
+    with_turned_faces,
 )
+
+# Signed volumes up to this share of area^1.5 are rounding, and do not tell which side is outside.
+# A ball has 0.094.
+NEGLIGIBLE_VOLUME = 1e-10
 
 
 @one_blas_thread()
 def orient_outward(mesh: MeshLike) -> TriangleMesh:
-    """Turn all faces over if more of what lies on the convex hull faces into it than out of it.
+    """Turn all faces of a surface over if they face inward where it touches its convex hull.
 
-    Where a surface touches its convex hull, its outside is the hull's outside, also on a part or a one-sided scan,
-    whose signed volume says nothing. Corners of the hull's facets vote by N · n, by the area of the facet with normal
-    n. Sound for what is seen from outside; a room from within, or a bowl without an outer side, is turned over.
+    Where a surface touches its convex hull, its outside is the outside of the hull. This also holds
+    for a part or for a scan from one side, whose signed volume says nothing.
 
     Parameters
     ----------
     mesh : MeshLike
-        One decision is made for all faces, so neighbors must agree.
+        Consistently oriented, because all faces are turned together.
 
     Returns
     -------
     TriangleMesh
-        The same mesh where it faces out already, or is flat and has no outside.
+        The mesh itself if it faces outward already, or is flat.
 
     Raises
     ------
     InvalidShapeError
         If two neighboring faces are turned against each other.
+
+    See Also
+    --------
+    orient : Turn single faces over so that neighbors agree.
+
+    Notes
+    -----
+    The corners of each facet of the hull vote by N · n, weighted by the area of the facet, with N
+    the normal of the surface and n that of the facet. The result is right for a surface seen from
+    outside. A room scanned from within, or a bowl without its outer side, is turned over.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> sphere = es.icosphere(1)
+    >>> inverted = es.TriangleMesh(sphere.vertices, sphere.faces[:, ::-1])
+    >>> es.geometry.enclosed_volume(inverted) < 0
+    True
+    >>> es.geometry.enclosed_volume(es.geometry.orient_outward(inverted)) > 0
+    True
     """
     mesh = as_mesh(mesh)
     require_oriented(mesh)
@@ -53,22 +78,41 @@ def orient_outward(mesh: MeshLike) -> TriangleMesh:
     return mesh if vote >= 0 else TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
 
 
+def orient_closed_outward(mesh: TriangleMesh) -> TriangleMesh:
+    """Turn all faces of a closed mesh over if its signed volume is negative.
+
+    An open mesh, whose signed volume says nothing, is returned as it is; `orient_outward` decides
+    for those.
+
+    Raises
+    ------
+    InvalidShapeError
+        If two neighboring faces of a closed mesh are turned against each other.
+    """
+    if not is_closed(mesh) or enclosed_volume(mesh) >= 0:
+        return mesh
+    return TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
+
+
 def faces_to_turn(
     mesh: TriangleMesh,
 ) -> tuple[Bool[np.ndarray, " f"], Bool[np.ndarray, " f"], Int[np.ndarray, " f"]]:
-    """Find which faces to turn over so that neighbors agree and pieces face out.
+    """Find which faces to turn over so that neighbors agree and pieces face outward.
 
-    A closed piece faces out where its signed volume is positive. One inside another is turned with the outermost: it
-    may be a cavity, whose faces look into it. An open piece whose faces agree is left as it is; any other is turned as
-    a whole by `orient_outward`. A piece here ends at edges with more than two faces.
+    A closed piece faces outward if its signed volume is positive. A closed piece inside another one
+    is turned together with the outermost, because it may be a cavity, whose faces look into it. An
+    open piece whose faces agree is left as it is; any other open piece is turned as a whole by
+    `orient_outward`. Pieces end at edges with more than two faces.
 
     Returns
     -------
     turned : (f,) bool
+        Whether to turn each face over.
     one_sided : (f,) bool
-        Faces of pieces that cannot be oriented, such as a Möbius strip; none of them is turned.
+        Whether the piece of each face cannot be oriented, such as a Möbius strip. Such a piece is
+        not turned.
     piece : (f,) int
-        Number of the piece of each face.
+        The piece of each face.
     """
     turns = face_turns(mesh)
     agreed = with_turned_faces(mesh, turns.turned)
@@ -89,14 +133,14 @@ def faces_to_turn(
 def _faces_in(
     mesh: TriangleMesh, piece: Int[np.ndarray, " f"], closed: Int[np.ndarray, " c"]
 ) -> Bool[np.ndarray, " c"]:
-    """Say of each closed piece whether it, or the outermost piece around it, faces in."""
+    """Tell for each closed piece whether it, or the outermost piece around it, faces inward."""
     corners, _ = scaled_corners(mesh)
     rows = np.argsort(piece, kind="stable")
     starts = np.searchsorted(piece[rows], closed)
     ends = np.searchsorted(piece[rows], closed, side="right")
     pieces = [corners[rows[start:end]] for start, end in zip(starts, ends, strict=True)]
     volumes = np.array([_relative_volume(faces) for faces in pieces])
-    inward = volumes < -FLAT
+    inward = volumes < -NEGLIGIBLE_VOLUME
     if not inward.any() or len(pieces) == 1:
         return inward
     low, high = (
@@ -114,15 +158,19 @@ def _faces_in(
 
 
 def _relative_volume(corners: Float[np.ndarray, "f 3 3"]) -> float:
-    """Return the signed volume under some faces, over the power 1.5 of their area; 0 where they have none."""
-    corners, _ = size_one(corners - corners.mean(axis=(0, 1)))  # a speck's cubes would be no floats
+    """Return the signed volume under faces divided by area^1.5; 0 if the faces have no area."""
+    # A tiny piece is scaled up first, because its volume would underflow.
+    corners, _ = size_one(corners - corners.mean(axis=(0, 1)))
     a, b, c = corners.transpose(1, 0, 2)
     area = float(np.linalg.norm(area_vectors(corners), axis=1).sum())
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum()) / 6 / area**1.5 if area else 0.0
 
 
 def _winding_number(corners: Float[np.ndarray, "f 3 3"], point: Float[np.ndarray, "3"]) -> float:
-    """Count how often closed faces wind around a point: ±1 inside, 0 outside (Van Oosterom and Strackee 1983)."""
+    """Return how often closed faces wind around a point: ±1 inside, 0 outside.
+
+    The sum of the faces' solid angles (Van Oosterom and Strackee 1983).
+    """
     a, b, c = (corners - point).transpose(1, 0, 2)
     one, two, three = (np.linalg.norm(side, axis=1) for side in (a, b, c))
     volume = np.einsum("ij,ij->i", a, np.cross(b, c))

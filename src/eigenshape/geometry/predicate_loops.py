@@ -12,11 +12,15 @@ import numpy as np
 
 from eigenshape._compile import njit
 
-UNIT = 2.0**-53  # half the distance from 1 to the next float
+UNIT = 2.0**-53  # unit roundoff: half the distance from 1 to the next float
+# Largest rounding error of the two determinants, relative to the sum of the absolute products
+# (Shewchuk 1997, bounds A of figures 21 and 22).
 LINE_BOUND = (3 + 16 * UNIT) * UNIT
 PLANE_BOUND = (7 + 56 * UNIT) * UNIT
-SPLITTER = 2.0**27 + 1
-MOST_TERMS = 192  # 6 products of three differences, each of two floats, each product of three floats being four
+SPLITTER = 2.0**27 + 1  # splits a float into halves of 26 bits, whose products are exact (Dekker)
+# Most terms of an exact determinant: 6 products of three differences, each difference being two
+# floats (8 products of three floats), each of these products being four floats.
+MOST_TERMS = 192
 
 
 @njit

@@ -1,4 +1,4 @@
-"""Points with weights: ∫ f over a shape is about Σ w_i f(x_i)."""
+"""Quadrature: points with weights, so that ∫ f over a shape is about Σ w_i f(x_i)."""
 
 from dataclasses import dataclass
 from typing import SupportsIndex
@@ -16,23 +16,37 @@ from eigenshape.geometry.simplices import dual_volumes
 
 @dataclass(frozen=True, eq=False, init=False)
 class Quadrature:
-    """Points of an m-dimensional shape in R^d and the measure that each stands for.
+    """Points of an m-dimensional shape in R^d with positive weights.
 
     Parameters
     ----------
     points : (n, d) float
-        Coordinates, in any length unit. Copied, then read-only.
+        Coordinates, in any length unit. They are copied, and the copy is read-only.
     weights : (n,) float
-        Measure of each point, positive: in length^m, or without unit where they sum to 1. Copied, then read-only.
+        Weight of each point, positive: in length^m, or without unit if the weights sum to 1. They
+        are copied, and the copy is read-only.
     dim : int
-        m, 1 to d.
+        Dimension m of the shape, 1 to d.
 
     Raises
     ------
     InvalidShapeError
         If there is no point, or a coordinate is not finite.
     InvalidParameterError
-        If a weight is not positive and finite, they are not one a point, or `dim` is not in 1..d.
+        If a weight is not positive and finite, the number of weights is not the number of points,
+        or `dim` is not in 1..d.
+
+    See Also
+    --------
+    mesh_quadrature, cloud_quadrature, uniform_quadrature
+
+    Examples
+    --------
+    Simpson's rule on the interval from 0 to 1.
+
+    >>> import eigenshape as es
+    >>> es.geometry.Quadrature([[0], [0.5], [1]], [1 / 6, 4 / 6, 1 / 6], dim=1)
+    Quadrature(3 points in R^1, dim=1)
     """
 
     points: Float[np.ndarray, "n d"]
@@ -46,7 +60,8 @@ class Quadrature:
         measure = positive_values(weights, "weights")
         if len(measure) != len(coordinates):
             raise InvalidParameterError(
-                f"weights must be one a point; there are {len(measure)} for {len(coordinates)} points."
+                "weights must hold one number per point; "
+                f"there are {len(measure)} for {len(coordinates)} points."
             )
         object.__setattr__(self, "dim", whole_number(dim, "dim", 1, coordinates.shape[1]))
         object.__setattr__(self, "points", frozen(coordinates))
@@ -62,12 +77,34 @@ class Quadrature:
 
 
 def mesh_quadrature(mesh: MeshLike) -> Quadrature:
-    """Weigh each point of a mesh with 1/(m+1) of the volume of its simplices: exact for linear functions.
+    """Give each point of a mesh 1/(m+1) of the volume of its simplices as weight.
+
+    The rule is exact for functions that are linear on each simplex.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Of any dimension m.
+
+    Returns
+    -------
+    Quadrature
+        The points of the mesh with weights in length^m.
 
     Raises
     ------
     InvalidShapeError
-        If a simplex has no volume or the corners of another, or a point no simplex.
+        If a simplex has no volume, two simplices have the same corners, or a point has no simplex.
+
+    See Also
+    --------
+    cloud_quadrature : Weights for points without a mesh.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.geometry.mesh_quadrature(es.shapes.interval(4)).weights.tolist()
+    [0.125, 0.25, 0.25, 0.25, 0.125]
     """
     mesh = as_simplicial(mesh)
     require_sound(mesh)
@@ -75,13 +112,67 @@ def mesh_quadrature(mesh: MeshLike) -> Quadrature:
 
 
 def uniform_quadrature(points: ArrayLike, dim: SupportsIndex) -> Quadrature:
-    """Give n points of a uniform sample the weight 1/n each (thesis 2.2)."""
+    """Give each of n points the weight 1/n, as for a uniform random sample (thesis 2.2).
+
+    Parameters
+    ----------
+    points : (n, d) float
+        Coordinates, in any length unit.
+    dim : int
+        Dimension m of the sampled shape, 1 to d.
+
+    Returns
+    -------
+    Quadrature
+        The points, with weights that have no unit and sum to 1.
+
+    Raises
+    ------
+    InvalidShapeError
+        If there is no point, or a coordinate is not finite.
+    InvalidParameterError
+        If `dim` is not in 1..d.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.geometry.uniform_quadrature([[0, 0], [1, 0], [0, 1], [1, 1]], dim=2).weights.tolist()
+    [0.25, 0.25, 0.25, 0.25]
+    """
     coordinates = finite_rows(points, "points")
     return Quadrature(coordinates, np.full(len(coordinates), 1 / max(len(coordinates), 1)), dim)
 
 
 def sphere_quadrature(n: SupportsIndex) -> Quadrature:
-    """Integrate over the unit sphere, polynomials up to degree 2n - 1 exactly: n Gauss latitudes, 2n longitudes."""
+    """Return a quadrature of the unit sphere that is exact for polynomials up to degree 2n - 1.
+
+    The product of a Gauss rule with n latitudes and 2n equal steps of longitude.
+
+    Parameters
+    ----------
+    n : int
+        Number of latitudes, 2 to 10,000.
+
+    Returns
+    -------
+    Quadrature
+        2n² points, with weights that sum to 4π.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `n` is out of range.
+
+    Examples
+    --------
+    The integral of z² over the unit sphere is 4π/3.
+
+    >>> import eigenshape as es
+    >>> rule = es.geometry.sphere_quadrature(4)
+    >>> integral = (rule.weights * rule.points[:, 2] ** 2).sum()
+    >>> bool(abs(integral - 4 * 3.141592653589793 / 3) < 1e-12)
+    True
+    """
     count = whole_number(n, "n", 2, 10**4)
     heights, weights = np.polynomial.legendre.leggauss(count)
     angles = np.pi * np.arange(2 * count) / count
@@ -94,7 +185,41 @@ def sphere_quadrature(n: SupportsIndex) -> Quadrature:
 def torus_quadrature(
     n_around: SupportsIndex, n_across: SupportsIndex, *, outer: float = 1.0, inner: float = 0.4
 ) -> Quadrature:
-    """Integrate over a torus by the rectangle rule, which for smooth periodic functions errs by less than any power."""
+    """Return a quadrature of a torus, with equal steps in both angles.
+
+    For smooth functions the error falls faster than any power of the number of points, because the
+    integrand is periodic.
+
+    Parameters
+    ----------
+    n_around, n_across : int
+        Number of points around the axis and across the tube, 3 to 100,000 each.
+    outer, inner : float
+        Radius of the circle in the middle of the tube, and radius of the tube, in length.
+
+    Returns
+    -------
+    Quadrature
+        Points of the torus, with weights in length².
+
+    Raises
+    ------
+    InvalidParameterError
+        If a number is out of range or a radius is not positive.
+
+    See Also
+    --------
+    torus : A mesh of the same torus.
+
+    Examples
+    --------
+    The area of a torus is 4π² times both radii.
+
+    >>> import eigenshape as es
+    >>> rule = es.geometry.torus_quadrature(12, 12, outer=1, inner=0.4)
+    >>> bool(abs(rule.weights.sum() - 4 * 3.141592653589793**2 * 0.4) < 1e-12)
+    True
+    """
     around = whole_number(n_around, "n_around", 3, 10**5)
     across = whole_number(n_across, "n_across", 3, 10**5)
     positive_values([outer, inner], "outer and inner")

@@ -1,6 +1,6 @@
-"""What a mesh must be before it is measured or described, each asked by whoever needs it.
+"""Checks of meshes for the functions that need them.
 
-Each check costs a few sorts, refuses by index and value, and names the repair that helps.
+Each check costs a few sorts. Its error names the first offender by index and value, and the repair.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ from eigenshape.geometry.topology import (
 
 
 def require_sound(mesh: Mesh) -> None:
-    """Refuse a mesh that has no finite elements, or counts some of them twice.
+    """Raise an error if a mesh cannot carry finite elements.
 
     Raises
     ------
@@ -33,33 +33,36 @@ def require_sound(mesh: Mesh) -> None:
 
 
 def require_different_simplices(mesh: Mesh) -> None:
-    """Refuse a mesh with two simplices of the same corners, in any order: their volume would count twice.
+    """Raise an error if two simplices have the same corners, in any order.
+
+    Their volume would count twice.
 
     Raises
     ------
     InvalidShapeError
-        With the index of the first such pair, its corners, and the number of such simplices.
+        With the indices and corners of the first such pair, and the number of such simplices.
     """
     repeated = repeated_simplices(mesh)
     if len(repeated):
         first, second = repeated[0]
         noun = "faces" if mesh.dim == 2 else "simplices"
         raise InvalidShapeError(
-            f"{noun.capitalize()} must differ, or they count twice; {noun} {first} and {second} both have the corners "
-            f"{mesh.simplices[first].tolist()} ({len(repeated)} such). {try_auto()}"
+            f"{noun.capitalize()} must differ, or they count twice; {noun} {first} and {second} "
+            f"both have the corners {mesh.simplices[first].tolist()} ({len(repeated)} such). "
+            f"{try_auto()}"
         )
 
 
 def require_joined(mesh: Mesh) -> None:
-    """Refuse a soup: a mesh that falls apart where its pieces lie edge on edge and do not share vertices.
+    """Raise an error if pieces of a mesh lie edge on edge without sharing vertices.
 
-    Heat does not cross such an edge, so that descriptors would be those of the pieces. Pieces that touch elsewhere, or
-    are closed, are parts in their own right.
+    Heat does not cross such an edge, so descriptors would be those of the pieces. Pieces that touch
+    elsewhere, and closed pieces, are accepted as separate parts.
 
     Raises
     ------
     InvalidShapeError
-        With the first such edge and the number of them.
+        With the first such edge and the number of such edges.
     """
     n_components, labels = vertex_components(mesh)
     if n_components == 1:
@@ -69,20 +72,20 @@ def require_joined(mesh: Mesh) -> None:
     if len(apart):
         one, two = apart[0]
         raise InvalidShapeError(
-            "Pieces that lie edge on edge must share their vertices; those at vertices "
-            f"{one.tolist()} and {two.tolist()} do not, at {mesh.points[one].tolist()} ({len(apart)} such). "
-            f"{try_auto()}"
+            "Pieces that lie edge on edge must share their vertices; "
+            f"those at vertices {one.tolist()} and {two.tolist()} do not, "
+            f"at {mesh.points[one].tolist()} ({len(apart)} such). {try_auto()}"
         )
 
 
 def require_describable(mesh: Mesh) -> None:
-    """Refuse a mesh whose descriptor would be that of something else.
+    """Raise an error if a descriptor of the mesh would not describe the shape.
 
     Raises
     ------
     InvalidShapeError
-        If a point has no simplex, two simplices have the same corners, or pieces lie edge on edge without sharing
-        vertices.
+        If a point has no simplex, two simplices have the same corners, or pieces lie edge on edge
+        without sharing vertices.
     """
     require_simplices_everywhere(mesh)
     require_different_simplices(mesh)
@@ -90,12 +93,12 @@ def require_describable(mesh: Mesh) -> None:
 
 
 def require_oriented(mesh: TriangleMesh) -> None:
-    """Refuse a mesh in which two neighboring faces are turned against each other.
+    """Raise an error if two neighboring faces are turned against each other.
 
     Raises
     ------
     InvalidShapeError
-        With the first such edge and the number of them.
+        With the first such edge and the number of such edges.
     """
     edges = inconsistent_edges(mesh)
     if not len(edges):
@@ -104,8 +107,12 @@ def require_oriented(mesh: TriangleMesh) -> None:
     remedy = try_auto()
     if not orientable.all():
         one_sided = int(np.argmin(orientable))
-        remedy = f"No repair helps: the piece of face {one_sided} has one side only, like a Möbius strip."
+        remedy = (
+            f"No repair helps: the piece of face {one_sided} has one side only, "
+            "like a Möbius strip."
+        )
     raise InvalidShapeError(
-        f"Faces must be turned one way; the two at edge ({edges[0, 0]}, {edges[0, 1]}) are turned against each other "
+        "Neighboring faces must be turned the same way; "
+        f"the two at edge ({edges[0, 0]}, {edges[0, 1]}) are turned against each other "
         f"({len(edges)} such). {remedy}"
     )

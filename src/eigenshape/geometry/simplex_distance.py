@@ -11,8 +11,9 @@ def squared_distances(
 ) -> Float[np.ndarray, "p s"]:
     """Return the squared distance of each point to each simplex, in length².
 
-    The nearest point of a simplex lies inside one of its sides, of some dimension: the simplex itself, a facet, down to
-    a corner. It is the foot of the perpendicular to that side's flat, and feet within their sides are what is compared.
+    The nearest point of a simplex lies in the interior of one of its sides: the simplex itself, a
+    facet, and so on down to a corner. There it is the foot of the perpendicular to the flat of that
+    side. So the least distance over all sides that contain their foot is returned.
     """
     least = np.full((len(points), len(corners)), np.inf)
     numbers = range(corners.shape[1])
@@ -25,7 +26,7 @@ def squared_distances(
 def _to_inside(
     points: Float[np.ndarray, "p d"], corners: Float[np.ndarray, "s corners d"]
 ) -> Float[np.ndarray, "p s"]:
-    """Return squared distances to the flats of simplices; infinite where the foot is outside."""
+    """Return squared distances to the flats of simplices; infinite if the foot is outside."""
     sides = corners[:, 1:] - corners[:, :1]
     ways = points[:, None] - corners[None, :, 0]
     weights = np.einsum("sda,psd->psa", np.linalg.pinv(sides), ways)

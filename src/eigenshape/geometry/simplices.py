@@ -1,4 +1,4 @@
-"""Volumes of simplices in any dimension and codimension, right at any scale of the coordinates."""
+"""Volumes of simplices in any dimension and codimension, accurate at any scale."""
 
 from itertools import combinations
 from math import factorial
@@ -10,13 +10,17 @@ from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.simplicial import Mesh
 
-# A simplex thinner than this, volume over that of a cube on its longest side, is flat as far as rounding can tell.
+# A simplex counts as degenerate if its volume is at most this share of a cube on its longest side:
+# below, the volume is mostly rounding of the coordinates.
 THINNEST = 1e-14
-# Points nearer than this to a line or a plane lie in it as far as the rounding of coordinates of size 1 can tell.
+# Points of size 1 nearer than this to a line or plane lie in it, up to rounding: some tens of
+# roundings of one coordinate.
 SPAN_ROUNDING = 64 * float(np.finfo(np.float64).eps)
 FLATS = {1: "on a line", 2: "in a plane"}
-# Powers of two up to which areas and volumes are handed out: beyond, sums overflow or small simplices lose digits.
+# Areas and volumes are returned if their scale is within 2^-1000..2^1000. Beyond, sums would
+# overflow, or small simplices would lose digits (floats end at 2^1024 and 2^-1074).
 LARGEST_EXPONENT = 1000
+# Plural, singular and measure of simplices, by dimension, for messages.
 MEASURES = {
     1: ("Segments", "segment", "length"),
     2: ("Faces", "face", "area"),
@@ -25,10 +29,10 @@ MEASURES = {
 
 
 def scaled_corners(mesh: Mesh) -> tuple[Float[np.ndarray, "s corners d"], float]:
-    """Return the corners of each simplex, divided by a power of two that brings them to size 1, and that power.
+    """Return the corners of each simplex, scaled to size 1, and the scale, a power of two.
 
-    Nothing is moved: what is measured between corners depends on them alone, to the last digit, and not on the order
-    of the vertices, nor on those that no simplex uses.
+    The corners are not translated. So measurements between them depend on these corners only, to
+    the last digit, and not on the order of the vertices or on unreferenced ones.
     """
     corners = mesh.points[mesh.simplices]
     scale = _size(corners)
@@ -37,26 +41,26 @@ def scaled_corners(mesh: Mesh) -> tuple[Float[np.ndarray, "s corners d"], float]
 
 
 def size_one(coordinates: Float[np.ndarray, "..."]) -> tuple[Float[np.ndarray, "..."], float]:
-    """Return coordinates divided by a power of two that brings the largest to size 1, and that power."""
+    """Return coordinates divided by a power of two that brings the largest to size 1, and it."""
     scale = _size(coordinates)
     return coordinates / scale, scale
 
 
 def _size(coordinates: Float[np.ndarray, "..."]) -> float:
     largest = max(coordinates.max(), -coordinates.min())
-    # One below the exponent of frexp, so that the largest of all numbers has a power too.
+    # One less than the exponent of frexp, so that the power exists for the largest float too.
     return float(2.0 ** (np.frexp(largest)[1] - 1)) if largest > 0 else 1.0
 
 
 def in_length(
     values: Float[np.ndarray, "..."], scale: float, power: int
 ) -> Float[np.ndarray, "..."]:
-    """Return values times scale to a whole power; `scale` is a power of two.
+    """Return values times `scale` to the given power; `scale` is a power of two.
 
     Raises
     ------
     InvalidShapeError
-        If floats cannot hold lengths to that power.
+        If floats cannot represent lengths to that power.
     """
     exponent = power * (int(np.frexp(scale)[1]) - 1)
     if abs(exponent) > LARGEST_EXPONENT:
@@ -65,8 +69,8 @@ def in_length(
         )
         most = 301 // abs(power)
         raise InvalidShapeError(
-            f"To measure {noun} the largest coordinate must lie within 1e-{most}..1e{most}; it is about {scale:.0e}. "
-            "Choose another unit, or normalize_box."
+            f"To measure {noun} the largest coordinate must lie within 1e-{most}..1e{most}; "
+            f"it is about {scale:.0e}. Choose another unit, or call normalize_box."
         )
     return np.ldexp(values, exponent)
 
@@ -74,11 +78,12 @@ def in_length(
 def triangular_sides(
     corners: Float[np.ndarray, "s corners d"],
 ) -> tuple[Float[np.ndarray, "s d m"], Float[np.ndarray, "s m m"]]:
-    """Write the sides from corner 0 of each simplex in an orthonormal basis of its own, as an upper triangle R.
+    """Factor the sides of each simplex: an orthonormal basis and an upper triangular matrix R.
 
-    Column i of R is the side to corner i + 1. RᵀR is the Gram matrix of the sides; the factor keeps the digits that
-    forming that matrix would lose. Gram-Schmidt (modified), all simplices at once; a simplex without volume has zeros
-    on the diagonal, and in the basis.
+    Column i of R is the side from corner 0 to corner i + 1 in that basis. RᵀR is the Gram matrix of
+    the sides; R keeps digits that forming the Gram matrix would lose. The method is modified
+    Gram-Schmidt on all simplices at once. A degenerate simplex has zeros on the diagonal of R and
+    in its basis.
     """
     sides = np.ascontiguousarray((corners[:, 1:] - corners[:, :1]).transpose(1, 2, 0))
     dim, _, n = sides.shape
@@ -99,25 +104,69 @@ def volumes(corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndarray, " s"
 
 
 def volumes_of(triangles: Float[np.ndarray, "s m m"]) -> Float[np.ndarray, " s"]:
-    """Return the m-volume of each simplex from its triangle of sides."""
+    """Return the m-volume of each simplex from its triangular factor."""
     return np.einsum("sii->si", triangles).prod(axis=1) / factorial(triangles.shape[1])
 
 
 def simplex_volumes(mesh: MeshLike) -> Float[np.ndarray, " s"]:
-    """Return the m-volume of each simplex, in length^m."""
+    """Compute the m-volume of each simplex: lengths, areas, volumes and so on.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Of any dimension m, in any length unit.
+
+    Returns
+    -------
+    (s,) float
+        Volumes, in length^m; 0 for a degenerate simplex.
+
+    See Also
+    --------
+    dual_volumes : The volume at each point.
+
+    Examples
+    --------
+    A unit cube of six equal tetrahedra.
+
+    >>> import eigenshape as es
+    >>> (6 * es.geometry.simplex_volumes(es.shapes.box(1, 1, 1))).round(6).tolist()
+    [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]
+    """
     mesh = as_simplicial(mesh)
     corners, scale = scaled_corners(mesh)
     return in_length(volumes(corners), scale, mesh.dim)
 
 
 def dual_volumes(mesh: MeshLike) -> Float[np.ndarray, " n"]:
-    """Return A_j = 1/(m+1) of the volume of the simplices at each point, in length^m (thesis 2.1)."""
+    """Compute the volume at each point: 1/(m+1) of that of its simplices (A_j of thesis 2.1).
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Of any dimension m, in any length unit.
+
+    Returns
+    -------
+    (n,) float
+        Volumes, in length^m. They sum to the volume of the mesh; a point without simplices has 0.
+
+    See Also
+    --------
+    simplex_volumes : The volume of each simplex.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> (6 * es.geometry.dual_volumes(es.shapes.grid(1, 1))).round(6).tolist()
+    [2.0, 1.0, 1.0, 2.0]
+    """
     mesh = as_simplicial(mesh)
     return at_points(mesh, simplex_volumes(mesh) / (mesh.dim + 1))
 
 
 def at_points(mesh: Mesh, values: Float[np.ndarray, " s"]) -> Float[np.ndarray, " n"]:
-    """Sum at each point a number of each of its simplices."""
+    """Return for each point the sum of the values of its simplices."""
     corners = mesh.simplices.shape[1]
     return np.bincount(
         mesh.simplices.ravel(), weights=np.repeat(values, corners), minlength=mesh.n_points
@@ -125,7 +174,30 @@ def at_points(mesh: Mesh, values: Float[np.ndarray, " s"]) -> Float[np.ndarray, 
 
 
 def mean_side_length(mesh: MeshLike) -> float:
-    """Return e, the mean length of the sides of all simplices: a side that two share counts twice, in length."""
+    """Compute the mean length e of the sides of all simplices.
+
+    A side counts once for each simplex that has it, so sides inside a surface count twice.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Of any dimension m, in any length unit.
+
+    Returns
+    -------
+    float
+        Mean length of the sides, in length.
+
+    See Also
+    --------
+    edge_lengths : The length of each edge of a triangle mesh.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> round(es.geometry.mean_side_length(es.shapes.grid(1, 1)), 6)  # (2 + 2**0.5) / 3
+    1.138071
+    """
     mesh = as_simplicial(mesh)
     corners, scale = scaled_corners(mesh)
     first, second = np.triu_indices(corners.shape[1], 1)
@@ -134,7 +206,7 @@ def mean_side_length(mesh: MeshLike) -> float:
 
 
 def degenerate_simplices(mesh: Mesh) -> Int[np.ndarray, " k"]:
-    """Return the simplices without volume: at most 1e-14 of the cube on their longest side."""
+    """Return the simplices with at most 1e-14 of the volume of a cube on their longest side."""
     corners, _ = scaled_corners(mesh)
     longest = np.zeros(len(corners))
     for first, second in combinations(range(corners.shape[1]), 2):
@@ -144,12 +216,12 @@ def degenerate_simplices(mesh: Mesh) -> Int[np.ndarray, " k"]:
 
 
 def require_span(points: Float[np.ndarray, "n d"], dim: int, noun: str) -> None:
-    """Refuse points that lie in a flat of fewer than `dim` dimensions, as far as the rounding of coordinates can tell.
+    """Raise an error if points lie in a flat of fewer than `dim` dimensions, up to rounding.
 
     Raises
     ------
     InvalidShapeError
-        With that flat.
+        The message names the flat.
     """
     offsets = size_one(points)[0]
     offsets = offsets - offsets[0]
@@ -166,31 +238,32 @@ def require_span(points: Float[np.ndarray, "n d"], dim: int, noun: str) -> None:
         else:
             flat = FLATS.get(found, f"in a flat of {found} dimensions")
             raise InvalidShapeError(
-                f"{noun} must span {dim} dimensions; all {len(points)} lie {flat} through point 0, "
-                f"{points[0].tolist()}."
+                f"{noun} must span {dim} dimensions; "
+                f"all {len(points)} lie {flat} through point 0, {points[0].tolist()}."
             )
 
 
 def require_volumes(mesh: Mesh) -> None:
-    """Refuse a mesh with a simplex that has no volume, naming the first.
+    """Raise an error if a simplex has no volume.
 
     Raises
     ------
     InvalidShapeError
-        With the index, corners and number of such simplices; or if rounding alone gives them volume.
+        With the index and corners of the first such simplex and their number; or if the points of
+        the mesh lie in a flat, so that simplices have volume by rounding only.
     """
     flat = degenerate_simplices(mesh)
-    all_of, one, measure = MEASURES.get(mesh.dim, ("Simplices", "simplex", "volume"))
+    plural, singular, measure = MEASURES.get(mesh.dim, ("Simplices", "simplex", "volume"))
     if flat.size == len(mesh.simplices):
         raise InvalidShapeError(
-            f"{all_of} must have {measure}; all {flat.size} have none: their points are equal or "
+            f"{plural} must have {measure}; all {flat.size} have none: their points are equal or "
             f"{'on a line' if mesh.dim == 2 else 'in a flat of lower dimension'}."
         )
     if flat.size:
         corners = mesh.simplices[flat[0]]
         raise InvalidShapeError(
-            f"{all_of} must have {measure}; {one} {flat[0]} is {corners.tolist()} with corners "
-            f"{mesh.points[corners].tolist()} ({flat.size} such). {try_auto()}"
+            f"{plural} must have {measure}; {singular} {flat[0]} is {corners.tolist()} "
+            f"with corners {mesh.points[corners].tolist()} ({flat.size} such). {try_auto()}"
         )
     used = np.zeros(mesh.n_points, dtype=bool)
     used[mesh.simplices] = True

@@ -1,4 +1,4 @@
-"""A simplicial mesh of any dimension is a value: checked once, then read-only."""
+"""Simplicial meshes of any dimension: arrays that are checked once and then read-only."""
 
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -14,23 +14,36 @@ from eigenshape.geometry.mesh import TriangleMesh
 
 @dataclass(frozen=True, eq=False, init=False)
 class SimplicialMesh:
-    """Points in R^d and the m-simplices between them: segments, triangles, tetrahedra and so on, of any codimension.
+    """A mesh of m-simplices in R^d: segments, triangles, tetrahedra and so on.
 
-    What is checked here is structure, as in `TriangleMesh`; whether each simplex has volume is asked by whoever
-    needs it.
+    The constructor checks the structure, as that of `TriangleMesh` does. It accepts simplices
+    without volume.
 
     Parameters
     ----------
     points : (n, d) float
-        Coordinates, in any length unit, d ≥ 1. Copied, then read-only.
+        Coordinates, in any length unit, d ≥ 1. They are copied, and the copy is read-only.
     simplices : (s, m+1) int
-        Corners of each simplex, 1 ≤ m ≤ d. Copied, then read-only.
+        Corners of each simplex, 1 ≤ m ≤ d. They are copied, and the copy is read-only.
 
     Raises
     ------
     InvalidShapeError
-        If an array has the wrong shape or is empty, m is not in 1..d, a coordinate is not finite, or a simplex does
-        not index `points`; the message names the first row at fault.
+        If an array has the wrong shape or is empty, m is not in 1..d, a coordinate is not finite,
+        or a simplex does not index `points`. The message names the first row at fault.
+
+    See Also
+    --------
+    TriangleMesh : Triangle meshes in R³.
+    read_shape : Read a mesh of any dimension from a file.
+
+    Examples
+    --------
+    A square in the plane, of two triangles.
+
+    >>> import eigenshape as es
+    >>> es.SimplicialMesh([[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1, 2], [0, 2, 3]])
+    SimplicialMesh(4 points in R^2, 2 simplices of dimension 2)
     """
 
     points: Float[np.ndarray, "n d"]
@@ -43,13 +56,14 @@ class SimplicialMesh:
         corners = index_rows(simplices, "simplices", None, len(coordinates))
         if not corners.size:
             raise InvalidShapeError(
-                f"A mesh must have simplices; it has {len(coordinates)} points and no simplex."
+                f"A mesh must have simplices; it has {len(coordinates)} points and no simplex. "
+                "Use PointCloud for points without simplices."
             )
         dim, ambient = corners.shape[1] - 1, coordinates.shape[1]
         if not 1 <= dim <= ambient:
             raise InvalidShapeError(
-                f"Simplices in R^{ambient} must have dimension 1..{ambient}; these have {dim + 1} corners, which is "
-                f"dimension {dim}."
+                f"Simplices in R^{ambient} must have dimension 1..{ambient}; "
+                f"these have {dim + 1} corners, which is dimension {dim}."
             )
         object.__setattr__(self, "points", frozen(coordinates))
         object.__setattr__(self, "simplices", frozen(corners))

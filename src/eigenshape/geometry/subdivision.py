@@ -1,23 +1,82 @@
-"""Simplices cut into smaller ones at the middles of their edges, in any dimension."""
+"""Subdivision of simplices at the midpoints of their edges, in any dimension."""
 
 from functools import lru_cache
 from itertools import permutations
+from typing import overload
 
 import numpy as np
 from jaxtyping import Int
 
 from eigenshape._arrays import frozen
-from eigenshape.geometry.simplicial import SimplicialMesh
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
+from eigenshape.geometry.topology import edge_table
 
 
-def halve_simplices(mesh: SimplicialMesh) -> SimplicialMesh:
-    """Split each simplex in 2^m at the middles of its edges, so that neighbours match.
+@overload
+def subdivide(mesh: TriangleMesh) -> TriangleMesh: ...
+@overload
+def subdivide(mesh: SimplicialMesh) -> SimplicialMesh: ...
+@overload
+def subdivide(mesh: MeshLike) -> Mesh: ...
+def subdivide(mesh: MeshLike) -> Mesh:
+    """Split each simplex at the midpoints of its edges into 2^m simplices.
 
-    The edgewise subdivision (Edelsbrunner and Grayson 2000), whose pieces have at most m!/2 shapes however often it is
-    repeated. It takes the corners of each simplex in their order, if neighbours agree on it, and gives such an order to
-    the pieces; otherwise it begins with the order of the points.
+    A triangle becomes four triangles with the same orientation, a tetrahedron eight tetrahedra. No
+    point moves: the shape stays the same set of points.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Of any dimension m.
+
+    Returns
+    -------
+    TriangleMesh or SimplicialMesh
+        The old points come first, in their order, then the midpoints.
+
+    See Also
+    --------
+    icosphere : A subdivided icosahedron on the unit sphere.
+
+    Notes
+    -----
+    Simplices that are not triangles in R³ are split by the edgewise subdivision (Edelsbrunner and
+    Grayson 2000). Its pieces have at most m!/2 shapes however often it is repeated.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.geometry.subdivide(es.shapes.grid(1, 1))
+    TriangleMesh(9 vertices, 8 faces)
     """
-    corners = mesh.simplices if _agree(mesh.simplices) else np.sort(mesh.simplices, axis=1)
+    mesh = as_simplicial(mesh)
+    return _split_triangles(mesh) if isinstance(mesh, TriangleMesh) else _split_simplices(mesh)
+
+
+def _split_triangles(mesh: TriangleMesh) -> TriangleMesh:
+    table = edge_table(mesh)
+    middles = mesh.vertices[table.edges].mean(axis=1)
+    a, b, c = mesh.faces.T
+    at_a, at_b, at_c = (table.face_edges + mesh.n_vertices).T
+    quarters = [(a, at_c, at_b), (b, at_a, at_c), (c, at_b, at_a), (at_a, at_b, at_c)]
+    faces = np.stack([np.column_stack(quarter) for quarter in quarters], axis=1).reshape(-1, 3)
+    return TriangleMesh(np.concatenate([mesh.vertices, middles]), faces)
+
+
+def _split_simplices(mesh: SimplicialMesh) -> SimplicialMesh:
+    """Split each simplex so that the pieces of neighbors match.
+
+    The pieces depend on the order of the corners. If all simplices with an edge have its ends in
+    the same order, that order is used, and the pieces have such an order again; otherwise corners
+    are sorted by their points.
+    """
+    corners = mesh.simplices
+    edges = corners[:, np.column_stack(np.triu_indices(corners.shape[1], 1))].reshape(-1, 2)
+    n_directed, n_edges = (len(np.unique(ends, axis=0)) for ends in (edges, np.sort(edges, axis=1)))
+    if n_directed != n_edges:
+        corners = np.sort(corners, axis=1)
     ends = np.sort(corners[:, pieces(mesh.dim)], axis=-1)
     simplices = ends[..., 0].copy()
     between = ends[..., 0] < ends[..., 1]
@@ -27,17 +86,12 @@ def halve_simplices(mesh: SimplicialMesh) -> SimplicialMesh:
     return SimplicialMesh(points, simplices.reshape(-1, mesh.dim + 1))
 
 
-def _agree(simplices: Int[np.ndarray, "s corners"]) -> bool:
-    """Say whether each edge has the same end first in all of its simplices."""
-    edges = simplices[:, np.column_stack(np.triu_indices(simplices.shape[1], 1))].reshape(-1, 2)
-    return len(np.unique(edges, axis=0)) == len(np.unique(np.sort(edges, axis=1), axis=0))
-
-
 @lru_cache
 def pieces(dim: int) -> Int[np.ndarray, "pieces corners 2"]:
-    """Return the pieces of one simplex, each corner as the two corners of the whole that it lies midway between.
+    """Return the pieces of one simplex; each corner is the midpoint of two corners of the whole.
 
-    In the simplex 2 ≥ x_1 ≥ ... ≥ x_m ≥ 0 these are Kuhn's simplices of the whole numbers: walks of unit steps.
+    In the simplex 2 ≥ x_1 ≥ ... ≥ x_m ≥ 0 these are Kuhn's simplices of the integer grid: walks of
+    unit steps, one along each axis.
     """
     starts = np.tril(np.ones((dim + 1, dim), dtype=np.int64), -1)
     steps = np.array(

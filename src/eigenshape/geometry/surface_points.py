@@ -1,4 +1,4 @@
-"""Points anywhere on a surface, each known by its face and its place in it."""
+"""Points anywhere on a mesh, given by a simplex and barycentric coordinates."""
 
 from dataclasses import dataclass
 from typing import SupportsIndex
@@ -12,21 +12,23 @@ from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.simplices import require_volumes, scaled_corners, volumes
 from eigenshape.geometry.simplicial import Mesh
 
-MOST = 10**8  # points: gigabytes
+# More points would take many gigabytes: a point on a surface takes 56 bytes, and twice that while
+# it is drawn.
+MOST_POINTS = 10**8
 
 
 @dataclass(frozen=True, eq=False)
 class SurfacePoints:
-    """Points of a mesh of dimension m.
+    """Points on a mesh of dimension m, as drawn by `sample_surface`.
 
     Attributes
     ----------
     points : (p, d) float
         Coordinates, in length.
     simplices : (p,) int
-        The simplex that each lies in; on a surface, its face.
+        Simplex in which each point lies; for a surface, its face.
     weights : (p, m+1) float
-        Barycentric coordinates there, ≥ 0, with sum 1.
+        Barycentric coordinates of each point in its simplex, at least 0, with sum 1.
     """
 
     points: Float[np.ndarray, "p d"]
@@ -40,14 +42,16 @@ class SurfacePoints:
 
 
 def sample_surface(mesh: MeshLike, n: SupportsIndex, *, rng: np.random.Generator) -> SurfacePoints:
-    """Throw n points on a mesh, uniformly by volume and independently (thesis 4.1).
+    """Draw random points on a mesh, uniformly by volume and independently (thesis 4.1).
 
     Parameters
     ----------
     mesh : MeshLike
+        Of any dimension m: for a surface, uniformly by area.
     n : int
-        At least 1.
+        Number of points, 1 to 10⁸.
     rng : numpy.random.Generator
+        Source of random numbers.
 
     Returns
     -------
@@ -58,15 +62,27 @@ def sample_surface(mesh: MeshLike, n: SupportsIndex, *, rng: np.random.Generator
     InvalidShapeError
         If a simplex has no volume.
     InvalidParameterError
-        If n is not in range.
+        If `n` is out of range.
+
+    See Also
+    --------
+    farthest_points : Choose evenly spread vertices.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> drawn = es.geometry.sample_surface(es.icosphere(2), 5, rng=np.random.default_rng(0))
+    >>> drawn.points.shape, drawn.simplices.shape, drawn.weights.shape
+    ((5, 3), (5,), (5, 3))
     """
     mesh = as_simplicial(mesh)
     require_type(rng, np.random.Generator, "rng")
-    count = whole_number(n, "n", 1, MOST)
+    count = whole_number(n, "n", 1, MOST_POINTS)
     require_volumes(mesh)
     shares = np.cumsum(volumes(scaled_corners(mesh)[0]))
     simplices = np.searchsorted(shares, rng.random(count) * shares[-1], side="right")
-    # Spacings of exponential variables are uniform on a simplex.
+    # Exponential variables divided by their sum are uniform on a simplex.
     spacings = rng.standard_exponential((count, mesh.dim + 1))
     return place_points(mesh, simplices, spacings / spacings.sum(axis=1, keepdims=True))
 
@@ -74,6 +90,6 @@ def sample_surface(mesh: MeshLike, n: SupportsIndex, *, rng: np.random.Generator
 def place_points(
     mesh: Mesh, simplices: Int[np.ndarray, " p"], weights: Float[np.ndarray, "p corners"]
 ) -> SurfacePoints:
-    """Return the points with these barycentric coordinates in these simplices."""
+    """Return the points with given barycentric coordinates in given simplices."""
     points = np.einsum("pc,pcd->pd", weights, mesh.points[mesh.simplices[simplices]])
     return SurfacePoints(frozen(points), frozen(simplices), frozen(weights))

@@ -1,4 +1,4 @@
-"""How the triangles of a mesh hang together."""
+"""Connectivity of meshes: edges, boundaries, components, manifoldness and orientation."""
 
 from dataclasses import dataclass
 
@@ -9,26 +9,29 @@ from scipy.sparse.csgraph import connected_components
 
 from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
+from eigenshape.geometry.facets import boundary_facets, facet_table
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
 
-MIXER = np.uint64(
-    0x9E3779B97F4A7C15
-)  # 2^64 over the golden ratio, odd: the multiplier of Fibonacci hashing
+# Multiplier of Fibonacci hashing: 2^64 divided by the golden ratio, rounded to an odd number.
+HASH_MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)
 
 
 @dataclass(frozen=True, eq=False)
 class EdgeTable:
-    """The edges of a mesh and the sides of its faces that lie on them.
+    """The edges of a triangle mesh without duplicates, and the edges of each face.
+
+    This is the `FacetTable` of a triangle mesh, under the names used for surfaces.
 
     Attributes
     ----------
     edges : (e, 2) int
-        Vertex pairs, the lower index first, in ascending order.
+        Vertices of each edge, the lower index first; the edges are in lexicographic order.
     face_edges : (f, 3) int
         Edge of each face opposite to its corner 0, 1, 2.
     n_faces : (e,) int
-        Faces at each edge: 1 on a boundary, 2 inside, more where the mesh is not a manifold.
+        Number of faces at each edge: 1 on the boundary, 2 inside, more where the mesh is not a
+        manifold.
     """
 
     edges: Int[np.ndarray, "e 2"]
@@ -37,18 +40,39 @@ class EdgeTable:
 
 
 def edge_table(mesh: MeshLike) -> EdgeTable:
-    """List the edges of the mesh once each, with the faces' way to them."""
-    mesh = as_mesh(mesh)
-    sides = np.sort(half_edges(mesh), axis=1)
-    keys, inverse, counts = np.unique(
-        sides[:, 0] * mesh.n_vertices + sides[:, 1], return_inverse=True, return_counts=True
-    )
-    edges = np.column_stack(np.divmod(keys, mesh.n_vertices))
-    return EdgeTable(edges, inverse.reshape(3, -1).T, counts)
+    """List the edges of a triangle mesh without duplicates, and the edges of each face.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+
+    Returns
+    -------
+    EdgeTable
+
+    See Also
+    --------
+    facet_table : The same for meshes of any dimension.
+    edge_lengths : The length of each edge.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> table = es.geometry.edge_table(es.shapes.grid(1, 1))
+    >>> table.edges.tolist()
+    [[0, 1], [0, 2], [0, 3], [1, 3], [2, 3]]
+    >>> table.n_faces.tolist()
+    [1, 1, 2, 1, 1]
+    """
+    table = facet_table(as_mesh(mesh))
+    return EdgeTable(table.facets, table.simplex_facets, table.n_simplices)
 
 
 def face_pairs(table: EdgeTable) -> tuple[Int[np.ndarray, "p 2"], Int[np.ndarray, " p"]]:
-    """Return the pairs of faces that share an edge, and that edge; more than two at one edge are chained."""
+    """Return the pairs of faces that share an edge, and that edge.
+
+    More than two faces at one edge give the pairs of a chain through all of them.
+    """
     at_edge = table.face_edges.ravel()
     order = np.argsort(at_edge, kind="stable")
     first = np.flatnonzero(at_edge[order][1:] == at_edge[order][:-1])
@@ -56,13 +80,38 @@ def face_pairs(table: EdgeTable) -> tuple[Int[np.ndarray, "p 2"], Int[np.ndarray
 
 
 def half_edges(mesh: TriangleMesh) -> Int[np.ndarray, "s 2"]:
-    """Return the directed sides of all faces: first those opposite to corner 0, then 1, then 2."""
+    """Return the directed edges of all faces: those opposite to corner 0 first, then 1, then 2."""
     a, b, c = mesh.faces.T
     return np.concatenate([np.column_stack(side) for side in ((b, c), (c, a), (a, b))])
 
 
 def vertex_components(mesh: MeshLike) -> tuple[int, Int[np.ndarray, " n"]]:
-    """Count the connected components and number each point with its own; a loose point is one by itself."""
+    """Find the connected components of a mesh.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Of any dimension.
+
+    Returns
+    -------
+    n_components : int
+        Number of components. A point without simplices is a component by itself.
+    labels : (n,) int
+        Component of each point.
+
+    See Also
+    --------
+    largest_component : Keep the component with the largest area.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> two = es.geometry.disjoint_union(es.shapes.grid(1, 1), es.shapes.grid(1, 1))
+    >>> n_components, labels = es.geometry.vertex_components(two)
+    >>> n_components, labels.tolist()
+    (2, [0, 0, 0, 0, 1, 1, 1, 1])
+    """
     mesh = as_simplicial(mesh)
     corners = mesh.simplices
     ends = np.column_stack([np.repeat(corners[:, 0], mesh.dim), corners[:, 1:].ravel()])
@@ -79,36 +128,26 @@ def unreferenced_vertices(mesh: Mesh) -> Int[np.ndarray, " k"]:
 
 
 def require_simplices_everywhere(mesh: Mesh) -> None:
-    """Refuse a mesh with a point that no simplex uses, naming the first.
+    """Raise an error if a point has no simplex.
 
     Raises
     ------
     InvalidShapeError
-        With the index, coordinates and number of such points.
+        With the index and coordinates of the first such point, and the number of such points.
     """
     loose = unreferenced_vertices(mesh)
     if loose.size:
         point, simplex = ("vertex", "face") if mesh.dim == 2 else ("point", "simplex")
         raise InvalidShapeError(
-            f"Every {point} must belong to a {simplex}; {point} {loose[0]} at {mesh.points[loose[0]].tolist()} has "
-            f"none ({loose.size} such). {try_auto()}"
+            f"Every {point} must belong to a {simplex}; {point} {loose[0]} "
+            f"at {mesh.points[loose[0]].tolist()} has none ({loose.size} such). {try_auto()}"
         )
-
-
-def boundary_facets(mesh: Mesh) -> Int[np.ndarray, "b m"]:
-    """Return the sides of simplices that one simplex alone has, by their corners, ascending."""
-    facets = np.concatenate(
-        [np.delete(mesh.simplices, corner, axis=1) for corner in range(mesh.dim + 1)]
-    )
-    facets, repeats = sorted_rows(np.sort(facets, axis=1))[1:]
-    alone = ~repeats & ~np.append(repeats[1:], False)
-    return facets[alone]
 
 
 def sorted_rows(
     rows: Int[np.ndarray, "r c"],
 ) -> tuple[Int[np.ndarray, " r"], Int[np.ndarray, "r c"], Bool[np.ndarray, " r"]]:
-    """Return the stable order that sorts rows, the sorted rows, and which of them repeat the row before."""
+    """Sort rows: return the stable order, the sorted rows, and which repeat the row before."""
     order = np.lexsort(rows.T[::-1])
     ordered = rows[order]
     repeats = np.zeros(len(rows), dtype=bool)
@@ -117,11 +156,15 @@ def sorted_rows(
 
 
 def repeated_simplices(mesh: Mesh) -> Int[np.ndarray, "k 2"]:
-    """Return each simplex that has the corners of an earlier one, in any order, after that earlier one."""
+    """Return pairs of simplices with the same corners in any order: the first one, and a later one.
+
+    The pairs are in the order of the later ones.
+    """
     rows = np.sort(mesh.simplices, axis=1)
-    # Different rows rarely share this number, taken modulo 2^64: to sort numbers takes a fifth of the time.
+    # Most meshes have no repeats. Sorting one hash per row, modulo 2^64, shows this in a fifth of
+    # the time that sorting the rows takes.
     keys = np.sort(
-        rows.astype(np.uint64) @ MIXER ** np.arange(1, rows.shape[1] + 1, dtype=np.uint64)
+        rows.astype(np.uint64) @ HASH_MULTIPLIER ** np.arange(1, rows.shape[1] + 1, dtype=np.uint64)
     )
     if (keys[1:] != keys[:-1]).all():
         return np.empty((0, 2), dtype=np.int64)
@@ -133,13 +176,13 @@ def repeated_simplices(mesh: Mesh) -> Int[np.ndarray, "k 2"]:
 
 
 def seams(mesh: Mesh) -> Int[np.ndarray, "k 2 m"]:
-    """Return pairs of sides on the boundary that lie on each other, corner by corner, with vertices of their own.
+    """Return pairs of boundary facets with corners at the same places but different vertices.
 
-    Of several in one place each is paired with the next, so that the pairs join all of them.
+    Of several facets at one place each is paired with the next, so that the pairs connect them all.
     """
     facets = boundary_facets(mesh)
     used, numbers = np.unique(facets, return_inverse=True)
-    # Adding 0.0 makes -0.0 equal to 0.0 also where bytes are compared.
+    # np.unique compares bytes; adding 0.0 turns -0.0 into 0.0.
     _, place = np.unique(mesh.points[used] + 0.0, axis=0, return_inverse=True)
     places = place.ravel()[numbers.reshape(facets.shape)]
     by_place = np.argsort(places, axis=1, kind="stable")
@@ -150,25 +193,89 @@ def seams(mesh: Mesh) -> Int[np.ndarray, "k 2 m"]:
 
 
 def boundary_vertices(mesh: MeshLike) -> Int[np.ndarray, " k"]:
-    """Return the points on the boundary, ascending: the corners of `boundary_facets`."""
+    """Return the points on the boundary of a mesh.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Of any dimension.
+
+    Returns
+    -------
+    (k,) int
+        The corners of all facets that belong to one simplex only, ascending.
+
+    See Also
+    --------
+    boundary_edges, boundary_loops
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.geometry.boundary_vertices(es.shapes.grid(2, 2)).tolist()
+    [0, 1, 2, 3, 5, 6, 7, 8]
+    """
     mesh = as_simplicial(mesh)
     return np.unique(boundary_facets(mesh))
 
 
 def boundary_edges(mesh: MeshLike) -> Int[np.ndarray, "b 2"]:
-    """Return the sides that only one face has, directed as in that face."""
+    """Return the edges that belong to one face only.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+
+    Returns
+    -------
+    (b, 2) int
+        The two vertices of each edge, in the direction of its face.
+
+    See Also
+    --------
+    boundary_loops : The same edges chained into loops.
+    boundary_vertices : Their vertices.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.geometry.boundary_edges(es.shapes.grid(1, 1)).tolist()
+    [[2, 3], [3, 1], [1, 0], [0, 2]]
+    """
     mesh = as_mesh(mesh)
     table = edge_table(mesh)
-    lonely = table.n_faces[table.face_edges.T.ravel()] == 1
-    return half_edges(mesh)[lonely]
+    on_boundary = table.n_faces[table.face_edges.T.ravel()] == 1
+    return half_edges(mesh)[on_boundary]
 
 
 def boundary_loops(mesh: MeshLike) -> list[Int[np.ndarray, " k"]]:
-    """Chain the boundary edges into closed loops of vertices.
+    """Chain the boundary edges into loops of vertices.
 
-    A vertex where several loops touch is passed once by each of them; the loops are sorted by length, longest
-    first, then by their first vertex. Where neighbouring faces are turned against each other, or more than two share
-    an edge, a chain may stay open.
+    Parameters
+    ----------
+    mesh : MeshLike
+
+    Returns
+    -------
+    list of (k,) int
+        The loops, the one with the most vertices first, then by their first vertex. A loop passes
+        each of its vertices once; a vertex where loops touch belongs to each of them.
+
+    See Also
+    --------
+    boundary_edges : The edges themselves.
+    fill_holes : Close the loops with faces.
+
+    Notes
+    -----
+    A chain may stay open where neighboring faces are turned against each other, or where more than
+    two faces share an edge.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> [loop.tolist() for loop in es.geometry.boundary_loops(es.shapes.grid(1, 1))]
+    [[0, 2, 3, 1]]
     """
     mesh = as_mesh(mesh)
     sides = boundary_edges(mesh)
@@ -183,7 +290,10 @@ def boundary_loops(mesh: MeshLike) -> list[Int[np.ndarray, " k"]]:
 
 
 def _walks(leaving: dict[int, list[int]], first: int) -> list[list[int]]:
-    """Use up the sides that can be reached from a vertex, cutting a loop off wherever the way meets itself."""
+    """Follow unused edges from a vertex, and cut off a loop whenever the path meets itself.
+
+    The edges are removed from `leaving`. The last walk is open if the path does not return.
+    """
     loops, path, place = [], [first], {first: 0}
     while leaving.get(path[-1]):
         end = leaving[path[-1]].pop()
@@ -211,13 +321,16 @@ def non_manifold_vertices(mesh: TriangleMesh) -> Int[np.ndarray, " k"]:
 
 
 def _corner_fans(mesh: TriangleMesh) -> tuple[Int[np.ndarray, " c"], Int[np.ndarray, " k"]]:
-    """Group the corners of the faces into fans: the fan of each corner, the vertex of each fan."""
+    """Group the corners of faces into fans; return the fan of each corner, and each fan's vertex.
+
+    A fan consists of faces at one vertex that are connected through edges at that vertex.
+    """
     table, f = edge_table(mesh), mesh.n_faces
     corners = np.arange(3 * f).reshape(f, 3)
     at_edge = table.face_edges.ravel()
     order = np.argsort(at_edge, kind="stable")
-    neighbours = at_edge[order][1:] == at_edge[order][:-1]
-    one, two = order[:-1][neighbours], order[1:][neighbours]
+    neighbors = at_edge[order][1:] == at_edge[order][:-1]
+    one, two = order[:-1][neighbors], order[1:][neighbors]
     links = []
     for shift_one in (1, 2):
         for shift_two in (1, 2):
@@ -234,12 +347,14 @@ def _corner_fans(mesh: TriangleMesh) -> tuple[Int[np.ndarray, " c"], Int[np.ndar
 
 
 def inconsistent_edges(mesh: TriangleMesh) -> Int[np.ndarray, "k 2"]:
-    """Return the edges that two faces pass in the same direction: one of the two is turned over."""
+    """Return the edges that two faces traverse in the same direction.
+
+    One of the two faces is turned over.
+    """
     sides = half_edges(mesh)
     directed = np.sort(sides[:, 0] * mesh.n_vertices + sides[:, 1])
-    if (
-        directed[1:] != directed[:-1]
-    ).all():  # the usual case, told at a third of the cost of a table
+    # The usual case; this check takes a third of the time of an edge table.
+    if (directed[1:] != directed[:-1]).all():
         return np.empty((0, 2), dtype=np.int64)
     forward = (sides[:, 0] < sides[:, 1]).astype(np.int64)
     table = edge_table(mesh)
@@ -251,15 +366,17 @@ def inconsistent_edges(mesh: TriangleMesh) -> Int[np.ndarray, "k 2"]:
 class FaceTurns:
     """Which faces to turn over so that neighbors agree.
 
-    Faces are neighbors at an edge that has no third face; patches are what hangs together by neighbors.
+    Two faces are neighbors if they share an edge that has no third face. A patch is a set of faces
+    connected through neighbors.
 
     Attributes
     ----------
     turned : (f,) bool
-        In each patch the fewer of its faces; of equally many those that disagree with the first. None in a patch that
-        cannot be oriented, such as a Möbius strip.
+        Whether to turn each face over. In each patch the smaller group is turned, or of equal
+        groups the one without the first face. Nothing is turned in a patch that cannot be oriented,
+        such as a Möbius strip.
     patches : (f,) int
-        The patch of each face; numbers need not follow one another.
+        The patch of each face; the numbers have gaps.
     orientable : (f,) bool
         Whether the patch of each face can be oriented.
     """
@@ -272,8 +389,9 @@ class FaceTurns:
 def face_turns(mesh: TriangleMesh) -> FaceTurns:
     """Find which faces to turn over so that neighbors agree.
 
-    Each face has two sides. Sides of neighbors that look the same way are linked; a patch can be oriented if and only
-    if no chain of links leads from one side of a face to the other (the orientation double cover).
+    The method is the orientation double cover: each face has two sides, and sides of neighbors that
+    look the same way are linked. A patch can be oriented if and only if no chain of links leads
+    from one side of a face to its other side.
     """
     table, f = edge_table(mesh), mesh.n_faces
     at_edge = table.face_edges.ravel()
@@ -287,41 +405,100 @@ def face_turns(mesh: TriangleMesh) -> FaceTurns:
     links = sp.coo_array((np.ones(len(ends[0]), dtype=np.int8), ends), shape=(2 * f, 2 * f))
     count, labels = connected_components(links, directed=False)
     as_is, over = labels[:f].astype(np.int64), labels[f:].astype(np.int64)
-    # Components are numbered by their first side, so that of two halves the lower has the first face as it is.
+    # Components are numbered in the order of their first side, so of the two halves of a patch the
+    # one with the lower number contains the first face unturned.
     n_kept = np.bincount(as_is, minlength=count)
     turned = np.where(n_kept[as_is] == n_kept[over], as_is > over, n_kept[as_is] < n_kept[over])
     return FaceTurns(turned, np.minimum(as_is, over), as_is != over)
 
 
 def with_turned_faces(mesh: TriangleMesh, turned: Bool[np.ndarray, " f"]) -> TriangleMesh:
-    """Return the mesh with some faces turned over; itself where there are none."""
+    """Return the mesh with some faces turned over; the mesh itself if there are none."""
     if not turned.any():
         return mesh
     return TriangleMesh(mesh.vertices, np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces))
 
 
-def agreeing(mesh: TriangleMesh) -> TriangleMesh:
-    """Return the mesh with faces turned so that neighbors agree; itself where they do."""
+def consistently_oriented(mesh: TriangleMesh) -> TriangleMesh:
+    """Return the mesh with faces turned so that neighbors agree; the mesh itself if they do."""
     if not len(inconsistent_edges(mesh)):
         return mesh
     return with_turned_faces(mesh, face_turns(mesh).turned)
 
 
 def euler_characteristic(mesh: MeshLike) -> int:
-    """Return V - E + F, over the vertices that faces use."""
+    """Compute the Euler characteristic V - E + F, without vertices that have no face.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+
+    Returns
+    -------
+    int
+        2 for a sphere, 0 for a torus, 1 for a disc.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> [es.geometry.euler_characteristic(mesh) for mesh in (es.icosphere(1), es.shapes.torus())]
+    [2, 0]
+    """
     mesh = as_mesh(mesh)
     n_used = mesh.n_vertices - len(unreferenced_vertices(mesh))
     return n_used - len(edge_table(mesh).edges) + mesh.n_faces
 
 
 def is_closed(mesh: MeshLike) -> bool:
-    """Say whether every edge has exactly two faces."""
+    """Tell whether every edge has exactly two faces.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+
+    Returns
+    -------
+    bool
+
+    See Also
+    --------
+    is_manifold, boundary_edges
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.geometry.is_closed(es.icosphere(1)), es.geometry.is_closed(es.shapes.grid(2, 2))
+    (True, False)
+    """
     mesh = as_mesh(mesh)
     return bool((edge_table(mesh).n_faces == 2).all())
 
 
 def is_manifold(mesh: MeshLike) -> bool:
-    """Say whether every edge has at most two faces and every vertex one fan."""
+    """Tell whether every edge has at most two faces and every vertex a single fan of faces.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+
+    Returns
+    -------
+    bool
+        Whether the mesh is a manifold, possibly with boundary.
+
+    See Also
+    --------
+    is_closed, self_intersections
+
+    Examples
+    --------
+    Two triangles with one vertex in common are not a manifold.
+
+    >>> import eigenshape as es
+    >>> points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]]
+    >>> es.geometry.is_manifold((points, [[0, 1, 2], [0, 3, 4]]))
+    False
+    """
     mesh = as_mesh(mesh)
     return not len(non_manifold_edges(mesh)) and not len(non_manifold_vertices(mesh))
 
@@ -329,7 +506,7 @@ def is_manifold(mesh: MeshLike) -> bool:
 def submesh(
     mesh: TriangleMesh, keep_faces: Bool[np.ndarray, " f"]
 ) -> tuple[TriangleMesh, Int[np.ndarray, " k"]]:
-    """Keep some faces and the vertices they use: the smaller mesh, and the old index of each of its vertices."""
+    """Return the mesh of some faces and their vertices, and the old index of each vertex."""
     faces = mesh.faces[keep_faces]
     vertices, renumbered = np.unique(faces, return_inverse=True)
     return TriangleMesh(mesh.vertices[vertices], renumbered.reshape(-1, 3)), vertices

@@ -1,4 +1,4 @@
-"""Diffusion that is quicker in some directions."""
+"""Diffusion that depends on the direction."""
 
 import numpy as np
 from jaxtyping import Float
@@ -13,22 +13,23 @@ from eigenshape.operators import elements
 from eigenshape.operators.cotangent import Mass, linear_mass, require_mass
 from eigenshape.operators.laplacian import Laplacian
 
-ROUNDING = 1e-12  # of the largest entry of a tensor: what may be asymmetric, or lie below zero
+# Asymmetry and negative eigenvalues up to this share of the largest entry count as rounding.
+TENSOR_ROUNDING = 1e-12
 
 
 def anisotropic_laplacian(
     mesh: MeshLike, tensors: Float[np.ndarray, "s d d"], mass: Mass = "lumped"
 ) -> Laplacian:
-    """Build the Laplacian -div(D grad) of linear elements, with one conductivity tensor a simplex.
+    """Build the Laplacian -div(D grad) of linear elements, with one conductivity tensor per simplex.
 
-    W has the energy Σ V ∇fᵀD∇f. With the identity everywhere it is the cotangent Laplacian.
+    The energy of W is Σ V ∇fᵀD∇f. With the identity everywhere it is the cotangent Laplacian.
 
     Parameters
     ----------
     mesh : MeshLike
     tensors : (s, d, d) float
-        Symmetric, positive semidefinite, without unit; only the part along the simplex counts.
-    mass : "lumped", "consistent" or "averaged"
+        Symmetric, positive semidefinite, without unit. Only the part along the simplex matters.
+    mass : {"lumped", "consistent", "averaged"}
         As in `cotangent_laplacian`.
 
     Returns
@@ -38,9 +39,18 @@ def anisotropic_laplacian(
     Raises
     ------
     InvalidParameterError
-        If a tensor is not finite, not symmetric or has a negative eigenvalue, or there is not one a simplex.
+        If a tensor is not finite, not symmetric or has a negative eigenvalue, or their number is not
+        that of the simplices.
     InvalidShapeError
-        As `cotangent_laplacian`.
+        As in `cotangent_laplacian`.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.make_creature("quadruped", n_vertices=500)
+    >>> tensors = es.operators.curvature_tensors(mesh, 2.0)
+    >>> es.operators.anisotropic_laplacian(mesh, tensors).n_points == mesh.n_vertices
+    True
     """
     mesh = as_simplicial(mesh)
     require_mass(mass)
@@ -62,7 +72,7 @@ def _require_tensors(mesh: Mesh, tensors: np.ndarray) -> None:
         raise InvalidParameterError(
             f"tensors must be finite; that of {noun} {bad[0]} is {tensors[bad[0]].tolist()} ({bad.size} such)."
         )
-    allowed = ROUNDING * np.abs(tensors).max(axis=(1, 2))
+    allowed = TENSOR_ROUNDING * np.abs(tensors).max(axis=(1, 2))
     bad = np.flatnonzero(np.abs(tensors - tensors.transpose(0, 2, 1)).max(axis=(1, 2)) > allowed)
     if bad.size:
         raise InvalidParameterError(
@@ -80,32 +90,42 @@ def _require_tensors(mesh: Mesh, tensors: np.ndarray) -> None:
 def curvature_tensors(
     mesh: MeshLike, alpha: float, *, concave: bool = False
 ) -> Float[np.ndarray, "f 3 3"]:
-    """Return tensors that slow diffusion down across bends (Andreux, Rodolà, Aubry, Cremers 2014).
+    """Compute tensors that reduce diffusion across bends (Andreux, Rodolà, Aubry, Cremers 2014).
 
-    Along each principal direction of a face the conductivity is 1 / (1 + α |κ| √area), with κ the principal curvature
-    from the vertex normals and the area that of the whole surface: without unit. At α = 0 it is 1.
+    Along each principal direction of a face the conductivity is 1 / (1 + α |κ| √area), with κ the
+    principal curvature from the vertex normals and the area of the whole surface. It is without unit,
+    and 1 at α = 0.
 
     Parameters
     ----------
     mesh : MeshLike
-        Its faces turned one way.
+        With consistently oriented faces.
     alpha : float
         At least 0.
     concave : bool
-        Whether only bends inward count, on a surface whose faces are seen from outside counter-clockwise: along such
-        creases people divide things into parts (the minima rule of Hoffman and Richards 1984).
+        Whether only concave bends count, on a surface whose faces are counter-clockwise seen from
+        outside. People divide objects into parts along such creases (the minima rule of Hoffman and
+        Richards 1984).
 
     Returns
     -------
     (f, 3, 3) float
-        Symmetric, positive semidefinite, zero along the face's normal.
+        Symmetric, positive semidefinite, zero along the normal of the face.
 
     Raises
     ------
     InvalidParameterError
         If alpha is negative or not finite.
     InvalidShapeError
-        If a face has no area, or neighboring faces are turned against each other.
+        If a face has no area, or neighboring faces have opposite orientations.
+
+    Examples
+    --------
+    On a plane the tensors are projections on the plane:
+
+    >>> import eigenshape as es
+    >>> es.operators.curvature_tensors(es.shapes.grid(1, 1), 5.0)[0].round(9).tolist()
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]
     """
     mesh = as_mesh(mesh)
     if not 0 <= alpha < np.inf:

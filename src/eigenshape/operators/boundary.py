@@ -1,7 +1,7 @@
-"""Boundary conditions, by the points where functions are held at zero.
+"""Boundary conditions, by the points at which functions are fixed at zero.
 
-Every operator here has the Neumann condition by itself: what is not held is free. Holding the whole boundary gives the
-Dirichlet condition, a part of it the mixed one.
+Every operator has the Neumann condition by default: points that are not fixed are free. Fixing the
+whole boundary gives the Dirichlet condition, fixing a part of it the mixed one.
 """
 
 from dataclasses import replace
@@ -22,26 +22,40 @@ Condition = Literal["neumann", "dirichlet"]
 def dirichlet_laplacian(
     laplacian: Laplacian, fixed: ArrayLike
 ) -> tuple[Laplacian, Int[np.ndarray, " free"]]:
-    """Cut an operator down to the functions that are zero at the fixed points.
+    """Restrict an operator to functions that are zero at some points.
 
     Parameters
     ----------
     laplacian : Laplacian
     fixed : (c,) int
-        Points, each once or more; `boundary_vertices(mesh)` for the whole boundary of a mesh.
+        Points where functions are zero; duplicates are allowed. `es.geometry.boundary_vertices(mesh)`
+        is the whole boundary of a mesh.
 
     Returns
     -------
     inner : Laplacian
-        On the free points: rows of W no longer sum to zero, and W is positive definite on each component that has a
-        fixed point.
+        On the free points. Rows of W no longer sum to zero, and W is positive definite on each
+        component that has a fixed point.
     free : (n - c,) int
         The free points, ascending: row i of `inner` is point free[i].
 
     Raises
     ------
     InvalidParameterError
-        If a fixed point is out of range, or none is free.
+        If a fixed point is out of range, or no point is free.
+
+    See Also
+    --------
+    solve_spectrum : Its argument `fixed` solves this operator and returns all points.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> square = es.shapes.grid(3, 3)
+    >>> rim = es.geometry.boundary_vertices(square)
+    >>> inner, free = es.operators.dirichlet_laplacian(es.cotangent_laplacian(square), rim)
+    >>> inner.n_points, free.tolist()
+    (4, [5, 6, 9, 10])
     """
     require_type(laplacian, Laplacian, "laplacian")
     points = np.atleast_1d(as_array(fixed, "fixed"))
@@ -57,6 +71,8 @@ def dirichlet_laplacian(
         )
     free = np.setdiff1d(np.arange(laplacian.n_points), points)
     if not free.size:
-        raise InvalidParameterError(f"Some point must be free; all {laplacian.n_points} are fixed.")
+        raise InvalidParameterError(
+            f"At least one point must be free; all {laplacian.n_points} are fixed."
+        )
     cut = {name: getattr(laplacian, name)[free][:, free] for name in ("stiffness", "mass")}
     return replace(laplacian, **cut), free

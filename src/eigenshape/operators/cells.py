@@ -1,6 +1,6 @@
 """Sums over all pairs of points that a Gaussian reaches: a grid of cells, walked by compiled loops.
 
-Points are sorted by cell. A point's partners lie in runs of that order, one run for each neighbouring column of cells,
+Points are sorted by cell. A point's partners lie in runs of that order, one run for each neighboring column of cells,
 so that no list of pairs is ever stored. Each row is computed by itself, in an order of its own: the entries (i, j) and
 (j, i) come out equal to the last digit, and nothing depends on the number of threads.
 """
@@ -18,6 +18,7 @@ from jaxtyping import Float, Int
 from eigenshape.operators import pair_loops
 
 AXES = 3  # axes that are cut into cells, those along which the points spread most
+# Cells along an axis at most: 2^60 cells have numbers that fit 64 bits.
 CELLS_PER_AXIS = 2**20
 CHUNK = 64  # cells a task
 
@@ -48,7 +49,7 @@ class CellGrid:
 
 
 def cell_grid(points: Float[np.ndarray, "n d"], reach: float) -> CellGrid:
-    """Sort points into cells of a grid on which partners are neighbours."""
+    """Sort points into cells of a grid on which partners are neighbors."""
     keys, sizes = _cell_keys(points, reach)
     order = np.argsort(keys, kind="stable")
     keys = keys[order]
@@ -62,7 +63,7 @@ def cell_grid(points: Float[np.ndarray, "n d"], reach: float) -> CellGrid:
 def _cell_keys(
     points: np.ndarray, reach: float
 ) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, "3"]]:
-    """Give each point the number of its cell; neighbours along the last axis follow each other."""
+    """Give each point the number of its cell; neighbors along the last axis follow each other."""
     spread = np.ptp(points, axis=0)
     axes = np.sort(np.argsort(-spread, kind="stable")[:AXES])
     side = max(reach, float(spread.max()) / CELLS_PER_AXIS)
@@ -117,8 +118,18 @@ def gaussian_rows(
     """
     kind = np.int32 if max(len(weights), starts[-1]) < 2**31 else np.int64
     columns, values = np.empty(starts[-1], dtype=kind), np.empty(starts[-1])
-    fill = partial(pair_loops.fill, grid.points, grid.order, grid.cells, grid.runs, grid.reach**2)
-    _each_cell(grid, partial(fill, weights, 1 / (4 * t), starts, columns, values))
+    place = np.empty_like(grid.order)
+    place[grid.order] = np.arange(len(place))
+    most = int(np.diff(grid.runs, axis=2).sum(axis=(1, 2)).max())  # points that one cell may reach
+
+    def fill(first: int, last: int) -> None:
+        scratch = np.empty(most, dtype=np.int64), np.empty((most, grid.points.shape[1]))
+        known = grid.points, grid.order, grid.cells, grid.runs, grid.reach**2, place
+        pair_loops.fill(
+            *known, weights, 1 / (4 * t), starts, columns, values, *scratch, first, last
+        )
+
+    _each_cell(grid, fill)
     return columns, values
 
 

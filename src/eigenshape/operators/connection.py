@@ -14,78 +14,112 @@ from eigenshape.operators.directions import corner_products, vertex_directions
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.tufted import edge_keys
 
-MASS_SHARES = {
-    "lumped": 0.0,
-    "consistent": 1 / 12,
-    "averaged": 1 / 24,
-}  # of a face's area, for two of its corners
-COCIRCULAR = 1e-14  # a sum of cotangents that rounding may leave below zero
+# Entry of the mass matrix for two corners of a face, as a share of the area of the face.
+MASS_SHARES = {"lumped": 0.0, "consistent": 1 / 12, "averaged": 1 / 24}
+# Sums of cotangents down to minus this count as zero: those of cocircular points come out there.
+COCIRCULAR = 1e-14
 
 
 def connection_laplacian(mesh: MeshLike, mass: Mass = "lumped") -> Laplacian:
-    """Build the Laplacian of tangent vectors, with the Levi-Civita connection of the mesh.
+    """Build the Laplacian of tangent vector fields, with the Levi-Civita connection of the mesh.
 
-    W has the energy sum_ij w_ij |v_j - r_ij v_i|²: cotangent weights w_ij, and r_ij the rotation that carries a vector
-    along the edge from vertex i to vertex j (Knöppel, Crane, Pinkall, Schröder 2013; Sharp, Soliman, Crane 2019). The
-    angles around an inner vertex are scaled to 2π, those at a boundary vertex left as they are; the boundary is free.
+    The energy of W is Σ_ij w_ij |v_j - r_ij v_i|², with cotangent weights w_ij and r_ij the rotation
+    that transports a vector along the edge from vertex i to vertex j (Knöppel, Crane, Pinkall,
+    Schröder 2013; Sharp, Soliman, Crane 2019). The angles around an inner vertex are scaled to 2π;
+    those at a boundary vertex are not scaled, and the boundary is free.
 
-    W is positive semidefinite on any mesh. Where w_ij ≥ 0, as on a Delaunay mesh, each term says so, and W is the
-    published one. Elsewhere the published sum may give a field an energy below zero. A weight below zero is outweighed
-    within its face once the face is flat: in such faces, few on a good mesh, the three r_ij are turned by a third of
-    the face's curvature each, so that the way around it leads back to the same vector. What is turned is of the order
-    of curvature times squared edge length, as is the error of the whole.
+    W is positive semidefinite on any mesh. If all w_ij ≥ 0, as on a Delaunay mesh, each term is, and W
+    is the published operator. Otherwise the published sum may be negative for some fields. The
+    energy of a face with negative weights is a sum of squares if the face is flat. So in such faces,
+    few on a good mesh, each r_ij is rotated by a third of the curvature of the face, such that the
+    transport around the face is the identity. The rotation is of the order of curvature times
+    squared edge length, as is the discretization error.
 
-    Unlike in a scalar Laplacian the rows of W do not sum to 0: only parallel fields have no energy, and a curved
-    surface has none.
+    Unlike in a scalar Laplacian the rows of W do not sum to 0: only parallel fields have no energy,
+    and on a curved surface there are none.
 
     Parameters
     ----------
     mesh : MeshLike
-        A manifold, with or without boundary, its faces turned one way.
-    mass : "lumped", "consistent" or "averaged"
-        As in `cotangent_laplacian`; the consistent one carries vectors as W does, in faces made flat.
+        A manifold, with or without boundary, with consistently oriented faces.
+    mass : {"lumped", "consistent", "averaged"}
+        As in `cotangent_laplacian`. The consistent mass transports vectors as W does, in faces made
+        flat.
 
     Returns
     -------
     Laplacian
-        On 2n numbers; 2i and 2i + 1 are the coordinates of the vector at vertex i in row i of `tangent_frames`.
-        W without unit, B in length².
+        On 2n numbers: 2i and 2i + 1 are the coordinates of the vector at vertex i in row i of
+        `tangent_frames`. W without unit, B in length².
 
     Raises
     ------
     InvalidShapeError
-        If an edge has more than two faces, a vertex more than one fan or none, two neighbouring faces are turned
-        against each other, or a face has no area; or if coordinates are beyond 1e±150.
+        If an edge has more than two faces, a vertex has no face or more than one fan of faces, two
+        neighboring faces have opposite orientations, a face has no area, or coordinates are beyond
+        1e±150.
     InvalidParameterError
-        If `mass` is none of the three.
+        If `mass` is not one of the three.
+
+    See Also
+    --------
+    es.operators.tangent_frames : The frames in which vectors are given.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(2)
+    >>> laplacian = es.operators.connection_laplacian(ball)
+    >>> laplacian.n_points == 2 * ball.n_vertices
+    True
+    >>> bool(es.solve_spectrum(laplacian, 1).eigenvalues[0] > 0.9)  # no parallel field
+    True
     """
     mesh = as_mesh(mesh)
     scalar = cotangent_laplacian(mesh, mass)
     sides = vertex_directions(mesh)
     turns = np.exp(1j * (sides.at_head + np.pi - sides.at_tail))
-    flat_turns = flattened(turns)
+    flat_turns = flatten_turns(turns)
     weights = _weights(mesh)
     flat = np.repeat(_faces_to_flatten(mesh, weights), 3)
-    stiffness = _carried(
+    stiffness = _transport_matrix(
         mesh, scalar.stiffness.diagonal(), -weights * np.where(flat, flat_turns, turns)
     )
     shares = np.repeat(MASS_SHARES[mass] * face_areas(mesh), 3)
     return Laplacian(
-        _real(stiffness), _real(_carried(mesh, scalar.mass.diagonal(), shares * flat_turns))
+        _real(stiffness),
+        _real(_transport_matrix(mesh, scalar.mass.diagonal(), shares * flat_turns)),
     )
 
 
 def tangent_frames(mesh: MeshLike) -> Float[np.ndarray, "n 2 3"]:
-    """Return two orthonormal tangent vectors at each vertex.
+    """Compute two orthonormal tangent vectors at each vertex.
 
-    The first is the direction of the vertex' first edge, made orthogonal to the mean normal of its faces (weighted by
-    area); the second is a quarter turn on, counter-clockwise seen from outside. The first edge is at an inner vertex
-    that of the first face that has the vertex, at a boundary vertex the boundary edge with a face on its left.
+    The first is the direction of the first edge of the vertex, made orthogonal to the area-weighted
+    mean normal of its faces. The second is a quarter turn further, counter-clockwise seen from
+    outside. The first edge of an inner vertex is that of its first face; the first edge of a
+    boundary vertex is the boundary edge with a face on its left.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+
+    Returns
+    -------
+    (n, 2, 3) float
+        Without unit.
 
     Raises
     ------
     InvalidShapeError
-        As in `connection_laplacian`; or if at a vertex the normals of the faces cancel, or the first edge is normal.
+        As in `connection_laplacian`; or if the normals of the faces at a vertex cancel, or its first
+        edge is parallel to the normal.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.operators.tangent_frames(es.shapes.grid(1, 1)).shape
+    (4, 2, 3)
     """
     mesh = as_mesh(mesh)
     sides = vertex_directions(mesh)
@@ -111,7 +145,7 @@ def _weights(mesh: TriangleMesh) -> Float[np.ndarray, " h"]:
     return np.roll((cosines / sines).reshape(-1, 3), 1, axis=1).ravel() / 2
 
 
-def flattened(turns: Complex[np.ndarray, " h"]) -> Complex[np.ndarray, " h"]:
+def flatten_turns(turns: Complex[np.ndarray, " h"]) -> Complex[np.ndarray, " h"]:
     """Turn the three of each face by a third of its curvature each, so that they lead back to the same vector."""
     around = turns.reshape(-1, 3).prod(axis=1)
     return turns * np.repeat(np.exp(-1j * np.angle(around) / 3), 3)
@@ -135,7 +169,7 @@ def _faces_to_flatten(
         flat |= more
 
 
-def _carried(
+def _transport_matrix(
     mesh: TriangleMesh, diagonal: Float[np.ndarray, " n"], entries: Complex[np.ndarray, " h"]
 ) -> sp.csr_array:
     """Put the entry of each side where it acts on its tail and counts at its head, and the conjugate the other way."""

@@ -1,7 +1,7 @@
 """Crouzeix-Raviart elements: linear on each simplex, and equal in the mean over each facet between two.
 
 Such functions jump across facets, so their eigenvalues are no upper bounds; with the constants here they become lower
-bounds (`spectral.brackets`).
+bounds (`spectral.bounds.brackets`).
 """
 
 from math import pi
@@ -23,18 +23,19 @@ from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators import elements
 from eigenshape.operators.laplacian import Laplacian
 
-TRIANGLE = 0.1893  # of the longest edge
-REGULAR_TETRAHEDRON = 0.147  # of its edge
+TRIANGLE = 0.1893  # interpolation constant of triangles over their longest edge (Liu 2015)
+REGULAR_TETRAHEDRON = 0.147  # that of a regular tetrahedron over its edge
 
 
 def crouzeix_raviart_laplacian(mesh: MeshLike) -> Laplacian:
-    """Build the Laplacian of nonconforming linear elements, whose unknowns are means over facets.
+    """Build the Laplacian of Crouzeix-Raviart elements, whose unknowns are means over facets.
 
-    The function of a facet is ψ_a = 1 - m λ_a on a simplex where corner a lies opposite: 1 on that facet, 0 in the mean
-    on the others. So W sums up m² V ∇λ_a·∇λ_b, and B sums up V (m² - m + 2) / ((m+1)(m+2)) on the diagonal and
-    V (2 - m) / ((m+1)(m+2)) beside it: V/3 and 0 on triangles, 2V/5 and -V/20 on tetrahedra (Crouzeix and Raviart
-    1973). A facet may lie on any number of simplices, which then share one mean; what touches in less than a
-    facet is apart. On segments, where facets are points, these are the linear elements themselves.
+    On a simplex, the function of the facet opposite to corner a is ψ_a = 1 - m λ_a: its mean is 1 on
+    that facet and 0 on the others. So W sums up m² V ∇λ_a·∇λ_b, and B sums up
+    V (m² - m + 2) / ((m+1)(m+2)) on the diagonal and V (2 - m) / ((m+1)(m+2)) off it: V/3 and 0 on
+    triangles, 2V/5 and -V/20 on tetrahedra (Crouzeix and Raviart 1973). Any number of simplices may
+    share a facet; simplices that share less than a facet are not connected. On segments, whose
+    facets are points, these are the linear elements.
 
     Parameters
     ----------
@@ -43,14 +44,21 @@ def crouzeix_raviart_laplacian(mesh: MeshLike) -> Laplacian:
     Returns
     -------
     Laplacian
-        On the facets, in the order of `facet_table(mesh).facets`; its `boundary` is what to hold for the Dirichlet
-        condition. W in length^(m-2), B, the exact mass, in length^m.
+        On the facets, in the order of `es.geometry.facet_table(mesh).facets`, whose `boundary` is to
+        be fixed for the Dirichlet condition. W in length^(m-2), B, the exact mass, in length^m.
 
     Raises
     ------
     InvalidShapeError
-        If a simplex has no volume or the corners of another, a point no simplex, or floats cannot hold
-        lengths to these powers.
+        If a simplex has no volume or the same corners as another, a point belongs to no simplex, or
+        floats cannot hold these powers of lengths.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> square = es.shapes.grid(1, 1)
+    >>> es.operators.crouzeix_raviart_laplacian(square).n_points  # five edges
+    5
     """
     mesh = as_simplicial(mesh)
     require_sound(mesh)
@@ -65,7 +73,7 @@ def facet_mass(table: FacetTable, measure: Float[np.ndarray, " s"]) -> sp.csr_ar
     """Assemble ∫ ψ_a ψ_b for a measure of each simplex."""
     m = table.facets.shape[1]
     reference = (m * m * np.eye(m + 1) + 2 - m) / ((m + 1) * (m + 2))
-    return elements.weighed_mass(measure, table.simplex_facets, reference)
+    return elements.weighted_mass(measure, table.simplex_facets, reference)
 
 
 def mass_floor(dim: int) -> float:

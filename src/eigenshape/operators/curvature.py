@@ -11,12 +11,13 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 
 
 def mean_curvature(mesh: MeshLike) -> Float[np.ndarray, " n"]:
-    """Measure the mean curvature at each vertex, the half sum of the principal ones.
+    """Compute the mean curvature at each vertex, half the sum of the principal curvatures.
 
-    L x = 2 H N for positions x and the outer normal N (L is positive; Meyer, Desbrun, Schröder and Barr 2003, with the
-    lumped mass): H = (L x)·N / 2, with N of `vertex_normals`. Positive where the surface bulges to the side that its
-    faces are seen from counter-clockwise: 1/R on a sphere that faces outward. On a boundary L x holds the pull of the
-    missing half, which lies in the surface and drops out with N as far as the boundary is straight.
+    L x = 2 H N for positions x and the outer normal N (L is positive; Meyer, Desbrun, Schröder and Barr
+    2003, with lumped mass): H = (L x)·N / 2, with N of `vertex_normals`. H is positive where the
+    surface is convex seen from the side on which its faces are counter-clockwise: 1/R on a sphere
+    that faces outward. On a boundary, L x includes the missing half of the neighborhood, which lies
+    in the surface and so vanishes with N if the boundary is straight.
 
     Parameters
     ----------
@@ -30,8 +31,15 @@ def mean_curvature(mesh: MeshLike) -> Float[np.ndarray, " n"]:
     Raises
     ------
     InvalidShapeError
-        If a face has no area or is there twice, a vertex has no face, or neighboring faces are turned against each
-        other.
+        If a face has no area or occurs twice, a vertex belongs to no face, or neighboring faces have
+        opposite orientations.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.TriangleMesh(2 * es.icosphere(3).vertices, es.icosphere(3).faces)
+    >>> es.operators.mean_curvature(ball).mean().round(2).item()
+    0.5
     """
     mesh = as_mesh(mesh)
     points, scale = unit_scaled(mesh)

@@ -43,7 +43,7 @@ def vertex_directions(mesh: TriangleMesh) -> Directions:
     Raises
     ------
     InvalidShapeError
-        If the mesh is no manifold, two neighbouring faces are turned against each other, a face has no area or a
+        If the mesh is no manifold, two neighboring faces are turned against each other, a face has no area or a
         vertex no face; the message names the first.
     """
     require_sound(mesh)
@@ -51,7 +51,7 @@ def vertex_directions(mesh: TriangleMesh) -> Directions:
     twins = _twins(mesh)
     first, inner = _first_sides(mesh, twins)
     cosines, sines = corner_products(mesh)
-    at_tail, at_head, around = _turned(mesh, first, twins, np.arctan2(sines, cosines))
+    at_tail, at_head, around = _walk_around(mesh, first, twins, np.arctan2(sines, cosines))
     scale = np.where(inner, 2 * np.pi / around, 1.0)
     tails, heads = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     return Directions(at_tail * scale[tails], at_head * scale[heads], first)
@@ -88,7 +88,7 @@ def _first_sides(mesh: TriangleMesh, twins: Int[np.ndarray, " h"]) -> tuple[np.n
     return first, inner
 
 
-def _turned(
+def _walk_around(
     mesh: TriangleMesh,
     first: Int[np.ndarray, " n"],
     twins: Int[np.ndarray, " h"],

@@ -50,28 +50,26 @@ def stiffness(
     dim = products.shape[1] - 1
     with one_blas_thread():  # threads would cut the product where they like, and change last digits
         local = np.einsum("sab,abij->sij", products, reference_stiffness(dim, order), optimize=True)
-    weights = _assembled(nodes, local)
+    weights = _assemble(nodes, local)
     return (weights - sp.diags_array(weights.sum(axis=1))).tocsr()
 
 
 def mass(mesh: Mesh, nodes: Int[np.ndarray, "s nodes"], order: int) -> sp.csr_array:
     """Assemble ∫ N_i N_j, in length^m."""
-    return weighed_mass(simplex_volumes(mesh), nodes, reference_mass(mesh.dim, order))
+    return weighted_mass(simplex_volumes(mesh), nodes, reference_mass(mesh.dim, order))
 
 
-def weighed_mass(
+def weighted_mass(
     measure: Float[np.ndarray, " s"],
     nodes: Int[np.ndarray, "s nodes"],
     reference: Float[np.ndarray, "nodes nodes"],
 ) -> sp.csr_array:
     """Assemble a measure of each simplex times one matrix for all."""
     diagonal = np.bincount(nodes.ravel(), weights=np.outer(measure, np.diag(reference)).ravel())
-    return (
-        sp.diags_array(diagonal) + _assembled(nodes, measure[:, None, None] * reference)
-    ).tocsr()
+    return (sp.diags_array(diagonal) + _assemble(nodes, measure[:, None, None] * reference)).tocsr()
 
 
-def _assembled(
+def _assemble(
     nodes: Int[np.ndarray, "s nodes"], local: Float[np.ndarray, "s nodes nodes"]
 ) -> sp.csr_array:
     """Sum up what lies off the diagonal, each pair once and then mirrored."""

@@ -1,4 +1,4 @@
-"""Laplacians made from a Gaussian kernel: on meshes of any dimension, on samples, on surfaces that are known."""
+"""Laplacians from a Gaussian kernel: on meshes of any dimension, on samples, and on known surfaces."""
 
 from dataclasses import replace
 from typing import Literal, SupportsIndex, TypedDict, Unpack
@@ -37,7 +37,7 @@ Distance = Literal["euclidean", "geodesic"]
 
 
 class KernelChoice(TypedDict, total=False):
-    """What else there is to choose of a kernel."""
+    """Further options of a kernel, as in `mesh_laplacian`."""
 
     correct: Correction | None
     form: Form
@@ -161,8 +161,8 @@ def gaussian_laplacian(
 
     L f(p_i) = 1/n · 1/(t (4πt)^{m/2}) Σ_j exp(-|p_i - p_j|²/4t) (f_i - f_j)   (thesis eq. 2.1, 2.2)
 
-    It is the mesh Laplacian with the weight 1/n at every point: where the manifold has volume V, its eigenvalues are
-    those of Δ over V.
+    This is the mesh Laplacian with weight 1/n at every point. On a manifold of volume V its
+    eigenvalues are those of Δ divided by V.
 
     Parameters
     ----------
@@ -172,26 +172,35 @@ def gaussian_laplacian(
     dim : int
         Dimension m of the manifold, 1 to d.
     correct, form, cutoff
-        As in `mesh_laplacian`. A correction takes weights in length^m, as `quadrature_laplacian` has them; here it
-        takes the random-walk form, which needs no volume.
+        As in `mesh_laplacian`. A correction needs weights in length^m, as those of
+        `quadrature_laplacian`; here it requires the random-walk form, which needs no volume.
 
     Returns
     -------
     Laplacian
-        W in 1/length^(m+2), B without unit: 1/n.
+        W in 1/length^(m+2), B, 1/n, without unit.
 
     Raises
     ------
     InvalidParameterError
-        If t is not positive, less than a quarter of the squared distance of neighbours, or dim is not in 1..d.
+        If t is not positive or less than a quarter of the squared distance of neighbors, or dim is not
+        in 1..d.
     InvalidShapeError
-        If a point is not finite or alone, two are equal, all lie in a flat of fewer than m dimensions, or the matrix
-        would not fit into half of the memory.
+        If a point is not finite or isolated, two points are equal, all points lie in a flat of fewer
+        than m dimensions, or the matrix needs more than half of the memory.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> points = es.shapes.fibonacci_sphere(500).vertices
+    >>> laplacian = es.operators.gaussian_laplacian(points, 0.05, 2)
+    >>> laplacian.mass.diagonal().sum().round(9).item()
+    1.0
     """
     if correct and form == "literal":
         raise InvalidParameterError(
-            "Weights of 1/n must be corrected in the random-walk form; form is 'literal', whose eigenvalues are over "
-            "the unknown volume. Choose form='random-walk', or quadrature_laplacian with weights in length^m."
+            "A correction of weights 1/n needs the random-walk form; form is 'literal', whose eigenvalues are divided "
+            "by the unknown volume. Choose form='random-walk', or quadrature_laplacian with weights in length^m."
         )
     laplacian = quadrature_laplacian(
         uniform_quadrature(points, dim), t, correct=correct, form=form, cutoff=cutoff
@@ -200,7 +209,7 @@ def gaussian_laplacian(
 
 
 def _over_volume(laplacian: Laplacian, dim: int) -> Laplacian:
-    """Tell the kernel the volume that it sees: where weights are in length^m, they sum to 1 under the kernel."""
+    """Record the volume that the kernel sees: weights in length^m sum to 1 under the kernel."""
     kernel, n = laplacian.kernel, laplacian.n_points
     if kernel is None:
         return laplacian
@@ -218,11 +227,12 @@ def quadrature_laplacian(
     form: Form = "literal",
     cutoff: float = 4.0,
 ) -> Laplacian:
-    """Build the Gaussian Laplacian of points with any weights: the functional approximation 𝓛_t as a pencil.
+    """Build the Gaussian Laplacian of points with given weights: the functional 𝓛_t as a pencil.
 
     Parameters
     ----------
     measure : Quadrature
+        Points with weights in length^m.
     t : float
         Heat time, in length².
     correct, form, cutoff
@@ -231,11 +241,20 @@ def quadrature_laplacian(
     Returns
     -------
     Laplacian
+        W in length^(m-2), B in length^m.
 
     Raises
     ------
     InvalidParameterError, InvalidShapeError
-        As `mesh_laplacian` and `gaussian_laplacian`.
+        As in `mesh_laplacian` and `gaussian_laplacian`.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> measure = es.geometry.mesh_quadrature(es.icosphere(3))
+    >>> laplacian = es.operators.quadrature_laplacian(measure, 0.02, correct="log")
+    >>> es.solve_spectrum(laplacian, 4).eigenvalues.round(1).tolist()
+    [0.0, 2.0, 2.0, 2.0]
     """
     require_type(measure, Quadrature, "measure")
     edge = neighbor_distance(measure.points, measure.dim)
@@ -311,30 +330,45 @@ def point_cloud_laplacian(
 
 
 def functional_laplacian(measure: Quadrature, t: float, *, cutoff: float = 6.0) -> LinearOperator:
-    """Approximate Δ by the functional 𝓛_t, its integral by a quadrature; no matrix is stored.
+    """Build the functional approximation 𝓛_t of Δ as a linear operator, without storing a matrix.
 
-    𝓛_t f(x) = 1/(t (4πt)^{m/2}) ∫ exp(-|x - y|²/4t) (f(x) - f(y)) dy             (thesis eq. 3.1; Belkin, Niyogi 2008)
+    𝓛_t f(x) = 1/(t (4πt)^{m/2}) ∫ exp(-|x - y|²/4t) (f(x) - f(y)) dy
+
+    (thesis eq. 3.1; Belkin, Niyogi 2008), with the integral evaluated by a quadrature.
 
     Parameters
     ----------
     measure : Quadrature
-        Of a made-up surface (`sphere_quadrature`, `torus_quadrature`), or of a mesh (`mesh_quadrature`): then this
-        is the mesh Laplacian without its matrix, for kernels too dense to store.
+        Of a known surface (`sphere_quadrature`, `torus_quadrature`) or of a mesh (`mesh_quadrature`).
+        On a mesh this is the mesh Laplacian without its matrix, for kernels that are too dense to
+        store.
     t : float
         Heat time, in length².
     cutoff : float
-        In widths h: beyond 6 the kernel is below rounding.
+        Distance, in widths h, beyond which the kernel is set to zero. Beyond 6 it is below rounding.
 
     Returns
     -------
     LinearOperator
-        (n, n): values at the points to values of 𝓛_t f there, in 1/length². Self-adjoint in the inner product of the
-        weights; the weights times it are W of `quadrature_laplacian`.
+        (n, n), maps values at the points to values of 𝓛_t f there, in 1/length². Self-adjoint in the
+        inner product of the weights; multiplied by the weights it is W of `quadrature_laplacian`.
 
     Raises
     ------
     InvalidParameterError
         If t or cutoff is not positive.
+
+    Examples
+    --------
+    On the unit sphere Δz = 2z; the functional has a bias that vanishes with t:
+
+    >>> import eigenshape as es
+    >>> from numpy import median
+    >>> measure = es.geometry.mesh_quadrature(es.icosphere(4))
+    >>> operator = es.operators.functional_laplacian(measure, 0.01)
+    >>> z = measure.points[:, 2]
+    >>> median((operator @ z)[z > 0.5] / z[z > 0.5]).round(1).item()
+    2.0
     """
     require_type(measure, Quadrature, "measure")
     positive_values([t, cutoff], "t and cutoff")

@@ -15,43 +15,57 @@ from eigenshape.operators.laplacian import Laplacian
 Kind = Literal["combinatorial", "weighted", "normalized"]
 EdgeWeights = Literal["unit", "inverse_length"]
 
-ASYMMETRY = 1e-12  # of a pair of weights, relative to the larger: what rounding may leave
+# Relative difference of the weights (i, j) and (j, i) that counts as rounding.
+WEIGHT_ASYMMETRY = 1e-12
 
 
 def graph_laplacian(
     graph: sp.sparray | sp.spmatrix | MeshLike, kind: Kind = "combinatorial"
 ) -> Laplacian:
-    """Build the Laplacian of a graph: W = D - A with D the row sums of A (thesis 1.1.2).
+    """Build the Laplacian of a graph: W = D - A, with D the row sums of A (thesis 1.1.2).
 
     Parameters
     ----------
     graph : (n, n) sparse, or MeshLike
-        Symmetric adjacency matrix, entry (i, j) the weight of the edge, > 0; explicit zeros are no edges. Or a mesh
-        of any dimension, whose graph has the sides of all its simplices.
-    kind : "combinatorial", "weighted" or "normalized"
-        combinatorial: every edge weighs 1, B = I (the Kirchhoff operator). weighted: the weights of the matrix, on
-        a mesh 1 / length, and B = I. normalized: the weights of the matrix, on a mesh 1, and B = D; the eigenvalues
-        are those of I - D^{-1/2} A D^{-1/2}, in [0, 2].
+        Symmetric adjacency matrix whose entry (i, j) is the weight of the edge, > 0. Or a mesh of any
+        dimension, whose graph consists of the sides of all its simplices.
+    kind : {"combinatorial", "weighted", "normalized"}
+        "combinatorial": every edge has weight 1, B = I (the Kirchhoff operator). "weighted": the
+        weights of the matrix, or 1 / length on a mesh, and B = I. "normalized": the weights of the
+        matrix, or 1 on a mesh, and B = D; the eigenvalues are those of I - D^{-1/2} A D^{-1/2}, in
+        [0, 2].
 
     Returns
     -------
     Laplacian
-        W in the unit of the weights. B without unit, but normalized in that of the weights.
+        W in the unit of the weights. B without unit, or in that of the weights if normalized.
 
     Raises
     ------
     InvalidParameterError
-        If the matrix is not sparse, square and symmetric, a weight is negative or not finite, a point is its own
-        neighbour, `kind` is none of the three, or a point has no edge and `kind` is normalized.
+        If the matrix is not sparse, square and symmetric; a weight is negative or not finite; a point
+        is its own neighbor; `kind` is not one of the three; or a point has no edge and `kind` is
+        "normalized".
     InvalidShapeError
-        If a simplex has a corner twice, or an edge of a mesh no length where `kind` is weighted.
+        If a simplex has a corner twice, or an edge of a mesh has no length and `kind` is "weighted".
+
+    Examples
+    --------
+    A path of three points has the eigenvalues 0, 1 and 3:
+
+    >>> import eigenshape as es
+    >>> from scipy.sparse import csr_array
+    >>> path = csr_array([[0, 1, 0], [1, 0, 1], [0, 1, 0]])
+    >>> laplacian = es.operators.graph_laplacian(path)
+    >>> es.solve_spectrum(laplacian, 3).eigenvalues.round(9).tolist()
+    [0.0, 1.0, 3.0]
     """
     if kind not in ("combinatorial", "weighted", "normalized"):
         raise InvalidParameterError(
             f"kind must be 'combinatorial', 'weighted' or 'normalized'; it is {kind!r}."
         )
     if sp.issparse(graph) or isinstance(graph, np.ndarray):
-        adjacency = _checked_adjacency(graph)
+        adjacency = _as_adjacency(graph)
     else:
         adjacency = edge_graph(
             as_simplicial(graph, "graph"), "inverse_length" if kind == "weighted" else "unit"
@@ -65,7 +79,7 @@ def graph_laplacian(
     return Laplacian((degrees - adjacency).tocsr(), sp.eye_array(adjacency.shape[0], format="csr"))
 
 
-def _checked_adjacency(graph: sp.sparray | sp.spmatrix) -> sp.csr_array:
+def _as_adjacency(graph: sp.sparray | sp.spmatrix) -> sp.csr_array:
     if (
         not sp.issparse(graph)
         or graph.ndim != 2
@@ -103,13 +117,13 @@ def _require_no_loops(adjacency: sp.csr_array) -> None:
     loops = np.flatnonzero(adjacency.diagonal())
     if loops.size:
         raise InvalidParameterError(
-            f"A point must not be its own neighbour; entry ({loops[0]}, {loops[0]}) is "
+            f"A point must not be its own neighbor; entry ({loops[0]}, {loops[0]}) is "
             f"{adjacency.diagonal()[loops[0]]} ({loops.size} such). Loops cancel in D - A: set the diagonal to zero."
         )
 
 
 def _require_symmetric(adjacency: sp.csr_array) -> None:
-    off = (abs(adjacency - adjacency.T) - ASYMMETRY * adjacency.maximum(adjacency.T)).tocoo()
+    off = (abs(adjacency - adjacency.T) - WEIGHT_ASYMMETRY * adjacency.maximum(adjacency.T)).tocoo()
     bad = np.flatnonzero(off.data > 0)
     if bad.size:
         row, column = off.row[bad[0]], off.col[bad[0]]
@@ -129,25 +143,33 @@ def _require_neighbors(adjacency: sp.csr_array) -> None:
 
 
 def edge_graph(mesh: MeshLike, weights: EdgeWeights = "unit") -> sp.csr_array:
-    """Return the adjacency matrix of the edges of a mesh: the sides of all its simplices, in any dimension.
+    """Build the adjacency matrix of the edges of a mesh: the sides of all its simplices.
 
     Parameters
     ----------
     mesh : MeshLike
-    weights : "unit" or "inverse_length"
+        Of any dimension.
+    weights : {"unit", "inverse_length"}
         1, or 1 / length of the edge, in 1/length.
 
     Returns
     -------
     (n, n) sparse
-        Symmetric, without diagonal; a point that no simplex uses has an empty row.
+        Symmetric, with zero diagonal. A point that belongs to no simplex has an empty row.
 
     Raises
     ------
     InvalidShapeError
-        If a simplex has a corner twice, or an edge has no length and `weights` needs it.
+        If a simplex has a corner twice, or an edge has no length and `weights` is "inverse_length".
     InvalidParameterError
-        If `weights` is neither of the two.
+        If `weights` is not one of the two.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> triangle = es.TriangleMesh([[0, 0, 0], [2, 0, 0], [0, 2, 0]], [[0, 1, 2]])
+    >>> es.operators.edge_graph(triangle).toarray().tolist()
+    [[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 0.0]]
     """
     mesh = as_simplicial(mesh)
     if weights not in ("unit", "inverse_length"):

@@ -27,13 +27,20 @@ from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 Correction = Literal["log"]
 Form = Literal["literal", "random-walk"]
 
-EDGE_FACTOR = 2.0  # h / e
-NARROWEST = 1.0  # half of it loses half of every eigenvalue even on the most regular points
-NARROW = 1.5  # irregular points lose 5 % there
+# Width of a kernel by default, h / e; t = e².
+EDGE_FACTOR = 2.0
+# Narrowest kernel, h / e: at half of it eigenvalues are half as large even on the most regular points.
+NARROWEST = 1.0
+# h / e below which eigenvalues of irregular points are 5 % too low or worse.
+NARROW = 1.5
+# Eigenvalues that can be distinguished at least, without a warning.
 FEWEST_PAIRS = 10
-LAST = 2.9  # t λ up to which the correction can still tell one eigenvalue from the next
+# t λ up to which the correction distinguishes one eigenvalue from the next.
+LAST = 2.9
+# Rows from which the number of entries of the matrix is estimated.
 SAMPLED_ROWS = 512
-PEAK = 30  # bytes an entry while the matrix is built and checked
+# Bytes per entry while the matrix is built and checked.
+PEAK = 30
 
 
 @dataclass(frozen=True)
@@ -63,7 +70,7 @@ def choose_kernel(options: KernelOptions, edge: float) -> GaussianKernel:
     factor = 2 * t**0.5 / edge
     if factor < NARROWEST:
         raise InvalidParameterError(
-            f"A kernel must reach the neighbours, h ≥ e; h = 2√t is {factor:.3g} of the mean edge length "
+            f"A kernel must reach the neighbors, h ≥ e; h = 2√t is {factor:.3g} of the mean edge length "
             f"e = {edge:.4g}, t = {t:.4g}. Choose t ≥ {edge**2 / 4:.4g}; t = e² is the default."
         )
     return GaussianKernel(
@@ -125,13 +132,13 @@ def kernel_laplacian(measure: Quadrature, kernel: GaussianKernel) -> Laplacian:
     weights, unit = size_one(measure.weights)
     t = kernel.t / scale / scale
     grid = cell_grid(points, kernel.cutoff * 2 * t**0.5)
-    _require_room(grid)
+    _require_memory(grid)
     counts = count_partners(grid)
     _require_partners(measure, counts - 1, kernel)
     starts = np.concatenate([[0], np.cumsum(counts)])
     columns, values = gaussian_rows(grid, weights, t, starts)
     matrix = sp.csr_array((values, columns, starts), shape=(measure.n_points,) * 2)
-    return _assembled(measure, kernel, matrix, (unit, scale))
+    return _assemble(measure, kernel, matrix, (unit, scale))
 
 
 def geodesic_laplacian(mesh: Mesh, measure: Quadrature, kernel: GaussianKernel) -> Laplacian:
@@ -145,7 +152,7 @@ def geodesic_laplacian(mesh: Mesh, measure: Quadrature, kernel: GaussianKernel) 
     points, scale = size_one(measure.points)
     weights, unit = size_one(measure.weights)
     radius = kernel.cutoff * kernel.width
-    _require_room(
+    _require_memory(
         cell_grid(points, radius / scale)
     )  # no ball along the surface holds more than one through space
     matrix = geodesic_balls(mesh, radius)
@@ -154,10 +161,10 @@ def geodesic_laplacian(mesh: Mesh, measure: Quadrature, kernel: GaussianKernel) 
     matrix.data = (
         weights[rows] * weights[matrix.indices] * np.exp(-((matrix.data / kernel.width) ** 2))
     )
-    return _assembled(measure, kernel, (matrix + sp.diags_array(weights**2)).tocsr(), (unit, scale))
+    return _assemble(measure, kernel, (matrix + sp.diags_array(weights**2)).tocsr(), (unit, scale))
 
 
-def _assembled(
+def _assemble(
     measure: Quadrature, kernel: GaussianKernel, matrix: sp.csr_array, units: tuple[float, float]
 ) -> Laplacian:
     """Make W and B of the matrix w_i w_j exp(-d_ij²/4t), in whose place W is written.
@@ -169,16 +176,18 @@ def _assembled(
     matrix.data /= (4 * pi * t) ** (measure.dim / 2)
     exponent = 2 * of_weight - measure.dim * of_length
     mass = (
-        _raised(matrix.sum(axis=1), exponent) if kernel.form == "random-walk" else measure.weights
+        _scale_by_power(matrix.sum(axis=1), exponent)
+        if kernel.form == "random-walk"
+        else measure.weights
     )
     matrix.setdiag(0)
     matrix.data /= -t
     matrix.setdiag(-matrix.sum(axis=1))
-    matrix.data = _raised(matrix.data, exponent - 2 * of_length)
+    matrix.data = _scale_by_power(matrix.data, exponent - 2 * of_length)
     return Laplacian(matrix, sp.diags_array(mass).tocsr(), kernel)
 
 
-def _raised(values: Float[np.ndarray, " z"], exponent: int) -> Float[np.ndarray, " z"]:
+def _scale_by_power(values: Float[np.ndarray, " z"], exponent: int) -> Float[np.ndarray, " z"]:
     if abs(exponent) > LARGEST_EXPONENT:
         raise InvalidShapeError(
             f"Entries of a kernel matrix must be floats; theirs are about 2^{exponent}. Choose another unit."
@@ -233,7 +242,7 @@ def warn_of_few(measure: Quadrature, kernel: GaussianKernel) -> None:
         )
 
 
-def _require_room(grid: CellGrid) -> None:
+def _require_memory(grid: CellGrid) -> None:
     """Estimate the matrix from some of its rows and refuse what would not fit."""
     n = len(grid.order)
     sample = np.unique(np.linspace(0, n - 1, min(n, SAMPLED_ROWS)).astype(np.int64))

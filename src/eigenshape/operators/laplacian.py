@@ -101,7 +101,7 @@ class Laplacian:
 
     def __post_init__(self) -> None:
         for name in ("stiffness", "mass"):
-            object.__setattr__(self, name, _checked(name, getattr(self, name)))
+            object.__setattr__(self, name, _as_symmetric(name, getattr(self, name)))
         if self.stiffness.shape != self.mass.shape:
             raise InvalidParameterError(
                 f"stiffness and mass must have the same shape; the shapes are {self.stiffness.shape} and "
@@ -120,7 +120,7 @@ class Laplacian:
         return int(self.stiffness.shape[0])
 
 
-def _checked(name: str, value: sp.sparray) -> sp.csr_array:
+def _as_symmetric(name: str, value: sp.sparray) -> sp.csr_array:
     _require_square(name, value)
     matrix = sp.csr_array(value, dtype=np.float64)
     if not matrix.has_canonical_format:
@@ -154,7 +154,10 @@ def _require_finite(name: str, matrix: sp.csr_array) -> None:
 
 
 def _require_symmetric(name: str, matrix: sp.csr_array) -> None:
-    worst, row, column = worst_asymmetry(matrix.indptr, matrix.indices, matrix.data)
+    # One type of indices where they fit, whatever SciPy chose: the loop is compiled once.
+    kind = np.int32 if max(matrix.shape[0], matrix.nnz) < 2**31 else np.int64
+    starts, columns = (each.astype(kind, copy=False) for each in (matrix.indptr, matrix.indices))
+    worst, row, column = worst_asymmetry(starts, columns, matrix.data)
     if worst > ASYMMETRY * max(matrix.data.max(initial=0.0), -matrix.data.min(initial=0.0)):
         raise InvalidParameterError(
             f"{name} must be symmetric; entry ({row}, {column}) is {matrix[row, column]} "

@@ -1,4 +1,4 @@
-"""Graphs of points and their nearest neighbours."""
+"""Graphs of points and their nearest neighbors."""
 
 from typing import SupportsIndex
 
@@ -13,16 +13,18 @@ from eigenshape._typing import ArrayLike
 from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.graph import adjacency_matrix
 
-SPARE = 8  # neighbours asked for beyond those wanted, so that most ties are seen whole
+SPARE = 8  # neighbors requested beyond those wanted, so that most ties are found in one query
 
 
 def neighbor_graph(
     points: ArrayLike, n_neighbors: SupportsIndex, *, t: float | None = None
 ) -> sp.csr_array:
-    """Join each point to its nearest ones: two are joined where either is among the nearest of the other.
+    """Build the graph of nearest neighbors of points.
 
-    Weights are exp(-|x - y|²/4t) (Belkin and Niyogi 2003; thesis reference 5), or 1 where no t is given. Of points
-    equally far that with the lower index is the nearer; a point's equals are neighbours at distance 0.
+    Two points are joined if one of them is among the nearest neighbors of the other. Weights are
+    exp(-|x - y|²/4t) (Belkin and Niyogi 2003; thesis reference 5), or 1 if t is not given. Of points at
+    the same distance the one with the lower index counts as nearer; duplicates of a point are
+    neighbors at distance 0.
 
     Parameters
     ----------
@@ -35,14 +37,22 @@ def neighbor_graph(
     Returns
     -------
     (n, n) sparse
-        Symmetric adjacency matrix without diagonal.
+        Symmetric adjacency matrix with zero diagonal.
 
     Raises
     ------
     InvalidShapeError
         If a coordinate is not finite.
     InvalidParameterError
-        If `n_neighbors` is not in 1..n - 1, t is not positive, or so small that the weight of an edge is no float.
+        If `n_neighbors` is not in 1..n - 1, or t is not positive or so small that a weight
+        underflows.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> graph = es.operators.neighbor_graph([[0.0], [1.0], [3.0]], 1)
+    >>> graph.toarray().tolist()
+    [[0.0, 1.0, 0.0], [1.0, 0.0, 1.0], [0.0, 1.0, 0.0]]
     """
     rows = finite_rows(points, "points")
     wanted = whole_number(n_neighbors, "n_neighbors", 1, len(rows) - 1)
@@ -59,16 +69,16 @@ def _nearest(points: Float[np.ndarray, "n d"], wanted: int) -> Int[np.ndarray, "
     """Return the nearest others of each point, of equals the lower index first."""
     tree, n = cKDTree(points), len(points)
     nearest = np.empty((n, wanted), dtype=np.int64)
-    left, asked = np.arange(n), min(wanted + 1 + SPARE, n)
-    while left.size:
-        distance, found = tree.query(points[left], asked)
-        distance[found == left[:, None]] = -1.0  # itself goes first
+    rest, requested = np.arange(n), min(wanted + 1 + SPARE, n)
+    while rest.size:
+        distance, found = tree.query(points[rest], requested)
+        distance[found == rest[:, None]] = -1.0  # itself goes first
         order = np.lexsort((found, distance), axis=1)[:, 1 : wanted + 1]
-        nearest[left] = np.take_along_axis(found, order, axis=1)
+        nearest[rest] = np.take_along_axis(found, order, axis=1)
         # Where the last found is no farther than the last wanted, nearer indices may lie beyond.
         cut = distance.max(axis=1) <= np.take_along_axis(distance, order[:, -1:], axis=1)[:, 0]
-        left = left[cut] if asked < n else left[:0]
-        asked = min(2 * asked, n)
+        rest = rest[cut] if requested < n else rest[:0]
+        requested = min(2 * requested, n)
     return nearest
 
 

@@ -9,6 +9,7 @@ from typing import no_type_check
 import numpy as np
 
 from eigenshape._compile import njit
+from eigenshape.sparse.sort_loops import sort_part
 
 
 @njit
@@ -37,40 +38,58 @@ def count(points, order, cells, runs, farthest, wanted, counts, first, last):
 
 @njit
 @no_type_check
-def _candidates(points, order, runs, cell):
-    """Return what may lie within reach of a cell, by its number before sorting, ascending, and its coordinates."""
-    total = 0
-    for run in range(runs.shape[1]):
-        total += runs[cell, run, 1] - runs[cell, run, 0]
-    places = np.empty(total, dtype=np.int64)
+def _find_candidates(points, order, place, runs, cell, numbers, near):
+    """Fill what may lie within reach of a cell, by its number before sorting, ascending, and its coordinates.
+
+    Returns how many; `place` is the inverse of `order`.
+    """
     total = 0
     for run in range(runs.shape[1]):
         for j in range(runs[cell, run, 0], runs[cell, run, 1]):
-            places[total] = j
+            numbers[total] = order[j]
             total += 1
-    numbers = order[places]
-    ascending = np.argsort(numbers)
-    return numbers[ascending], points[places[ascending]]
+    sort_part(numbers, 0, total)
+    for candidate in range(total):
+        for axis in range(points.shape[1]):
+            near[candidate, axis] = points[place[numbers[candidate]], axis]
+    return total
 
 
 @njit
 @no_type_check
-def fill(points, order, cells, runs, farthest, weights, rate, starts, columns, values, first, last):
+def fill(
+    points,
+    order,
+    cells,
+    runs,
+    farthest,
+    place,
+    weights,
+    rate,
+    starts,
+    columns,
+    values,
+    numbers,
+    near,
+    first,
+    last,
+):
+    """Fill columns and values of the rows of some cells; `numbers` and `near` have room for what one cell may reach."""
     for cell in range(first, last):
-        numbers, near = _candidates(points, order, runs, cell)
+        total = _find_candidates(points, order, place, runs, cell, numbers, near)
         for i in range(cells[cell], cells[cell + 1]):
             row = order[i]
-            place = starts[row]
-            for candidate in range(len(numbers)):
+            entry = starts[row]
+            for candidate in range(total):
                 square = 0.0
                 for axis in range(points.shape[1]):
                     step = points[i, axis] - near[candidate, axis]
                     square += step * step
                 if square <= farthest:
                     other = numbers[candidate]
-                    columns[place] = other
-                    values[place] = weights[row] * weights[other] * np.exp(-rate * square)
-                    place += 1
+                    columns[entry] = other
+                    values[entry] = weights[row] * weights[other] * np.exp(-rate * square)
+                    entry += 1
 
 
 @njit

@@ -22,8 +22,8 @@ from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.tufted import (
     Triangulation,
     edge_keys,
-    flipped_to_delaunay,
-    mollified,
+    flip_to_delaunay,
+    mollify_lengths,
     tufted_cover,
 )
 
@@ -93,7 +93,7 @@ def robust_laplacian(mesh: MeshLike, *, mollify: float = 1e-5) -> Laplacian:
     ):  # no face: all area would be that of mollifying
         require_volumes(mesh)
     cover, scale = _cover(mesh, mollify)
-    delaunay = flipped_to_delaunay(cover)
+    delaunay = flip_to_delaunay(cover)
     areas = in_length(_areas(delaunay, mesh.n_points), scale, 2)
     return Laplacian(_stiffness(delaunay, mesh.n_points), sp.diags_array(areas).tocsr())
 
@@ -103,7 +103,7 @@ def _cover(mesh: TriangleMesh, mollify: float) -> tuple[Triangulation, float]:
     lengths = np.linalg.norm(
         points[mesh.faces] - points[np.roll(mesh.faces, -1, axis=1)], axis=2
     ).ravel()
-    lengths = mollified(lengths, edge_keys(mesh.faces, mesh.n_vertices), mollify)
+    lengths = mollify_lengths(lengths, edge_keys(mesh.faces, mesh.n_vertices), mollify)
     flat = np.flatnonzero(flip_loops.areas(lengths) == 0)
     if flat.size:
         sides = lengths.reshape(-1, 3)[flat[0]] * scale

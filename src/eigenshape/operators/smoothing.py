@@ -1,4 +1,4 @@
-"""Noise of vertices: how much there is, and surfaces without most of it."""
+"""Noise on the vertices of surfaces: how to measure it, and how to remove it."""
 
 import numpy as np
 import scipy.sparse as sp
@@ -8,30 +8,44 @@ from eigenshape._arrays import positive_values
 from eigenshape._errors import InvalidShapeError
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.facets import boundary_facets
 from eigenshape.geometry.measure import edge_lengths, mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import mean_side_length, size_one
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.topology import agreeing, boundary_facets, boundary_vertices, edge_table
+from eigenshape.geometry.topology import boundary_vertices, consistently_oriented, edge_table
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.sparse.elimination import analyse, factorise
 
-ONE_EDGE = 0.165  # noise level, that of Gaussian noise of a quarter of an edge, at which heat flows one mean edge far
+# Noise level at which `denoise` lets heat flow one mean edge length: that of Gaussian noise of a
+# quarter of an edge. A larger value smooths less.
+ONE_EDGE = 0.165
 
 
 @one_blas_thread()
 def noise_level(mesh: MeshLike) -> float:
-    """Measure the noise of vertices in mean edges, as far as it stands off the surface.
+    """Measure the noise of the vertices normal to the surface, in mean edge lengths.
 
-    The median, over vertices that are not on the boundary, of |N · (mean of neighbours - vertex)|. What is finely
-    meshed and smooth has next to none; Gaussian noise of .1, .25 and .5 mean edges in each coordinate gives about .09,
-    .17 and .25 on real meshes of 5,000 vertices, and these meshes have up to .11 of their own (coarse sharp ones).
+    This is the median, over vertices that are not on the boundary, of |N · (mean of neighbors - vertex)|.
+    It is almost zero on finely meshed smooth surfaces. Gaussian noise of 0.1, 0.25 and 0.5 mean edge
+    lengths in each coordinate gives about 0.09, 0.17 and 0.25 on real meshes of 5,000 vertices; without
+    noise these meshes have up to 0.11 (coarse ones with sharp features).
+
+    Parameters
+    ----------
+    mesh : MeshLike
 
     Returns
     -------
     float
-        Without unit, the same at any scale; 0 where all vertices are on the boundary.
+        Without unit, independent of scale; 0 if all vertices are on the boundary.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.operators.noise_level(es.shapes.grid(10, 10))  # a plane
+    0.0
     """
     mesh = as_mesh(mesh)
     points, _ = size_one(mesh.vertices)
@@ -45,24 +59,26 @@ def noise_level(mesh: MeshLike) -> float:
     if not inside.any():
         return 0.0
     away = links[inside] @ points / degrees[inside, None] - points[inside]
-    normals = mean_normals(agreeing(unit))[inside]  # which side is out does not matter
+    normals = mean_normals(consistently_oriented(unit))[inside]  # which side is out does not matter
     heights = np.abs(np.einsum("ni,ni->n", away, normals))
     return float(np.median(heights) / edge_lengths(unit).mean())
 
 
 def denoise(mesh: MeshLike, *, reach: float | None = None) -> TriangleMesh:
-    """Take the noise out of a surface's vertices by a step of heat flow, as long as the noise asks for.
+    """Remove noise from the vertices of a surface by a step of heat flow that depends on its noise.
 
-    H solves (B + h² W) y = B x: implicit fairing (Desbrun, Meyer, Schröder and Barr 1999). Twicing, H x + H (x - H x),
-    gives back most of what one step takes from the shape (Tukey 1977). The boundary flows along itself alone, and
-    the rest flows from there, so that nothing shrinks away from it.
+    H solves (B + h² W) y = B x: implicit fairing (Desbrun, Meyer, Schröder and Barr 1999). Twicing,
+    H x + H (x - H x), restores most of the shape that one step removes (Tukey 1977). The boundary
+    flows only along itself, and the rest of the surface flows with the boundary fixed there, so that
+    the surface does not shrink away from its boundary.
 
     Parameters
     ----------
     mesh : MeshLike
-        Without faces that have no area.
+        Without faces of zero area.
     reach : float, optional
-        h in mean edges; by default (`noise_level` / .165)², so that what has little noise hardly moves.
+        h in mean edge lengths. The default is (`noise_level` / 0.165)², so that surfaces with little
+        noise hardly move.
 
     Returns
     -------
@@ -74,7 +90,17 @@ def denoise(mesh: MeshLike, *, reach: float | None = None) -> TriangleMesh:
     InvalidParameterError
         If reach is not positive.
     InvalidShapeError
-        If a face has no area or next to no angles, or a vertex no face.
+        If a face has no area or angles too close to 0, or a vertex belongs to no face.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> import numpy as np
+    >>> ball = es.icosphere(3)
+    >>> noise = 0.02 * np.random.default_rng(0).standard_normal(ball.vertices.shape)
+    >>> noisy = es.TriangleMesh(ball.vertices + noise, ball.faces)
+    >>> es.operators.noise_level(es.operators.denoise(noisy)) < es.operators.noise_level(noisy)
+    True
     """
     mesh = as_mesh(mesh)
     edges = (
@@ -91,26 +117,28 @@ def denoise(mesh: MeshLike, *, reach: float | None = None) -> TriangleMesh:
     found = points.copy()
     if len(rim):
         curves = SimplicialMesh(points[rim], np.searchsorted(rim, boundary_facets(mesh)))
-        found[rim] = _flowed(cotangent_laplacian(curves), time, points[rim], np.arange(len(rim)))
+        found[rim] = _flow(cotangent_laplacian(curves), time, points[rim], np.arange(len(rim)))
     inside = np.setdiff1d(np.arange(mesh.n_vertices), rim)
     if len(inside):
-        found[inside] = _flowed(laplacian, time, found, inside)
+        found[inside] = _flow(laplacian, time, found, inside)
     return TriangleMesh(found * scale, mesh.faces)
 
 
-def _flowed(
+def _flow(
     laplacian: Laplacian, time: float, points: Float[np.ndarray, "n d"], free: Int[np.ndarray, " k"]
 ) -> Float[np.ndarray, "k d"]:
     """Return where a step and its twicing take the free points, while the others stay."""
     pencil = (laplacian.mass + time * laplacian.stiffness).tocsr()[free]
-    mass, held = laplacian.mass.diagonal()[free, None], np.setdiff1d(np.arange(len(points)), free)
+    mass = laplacian.mass.diagonal()[free, None]
+    fixed = np.setdiff1d(np.arange(len(points)), free)
     matrix = pencil[:, free].tocsc()
     matrix.sort_indices()
     with one_blas_thread():
         factor = factorise(analyse(matrix), matrix.data)
     if factor is None:
         raise InvalidShapeError(
-            "A surface must have angles to be smoothed; some are too near to 0 for the equations."
+            "All triangles must have angles well above 0 for the surface to be smoothed; some have angles so close to "
+            "0 that the equations cannot be factored."
         )
-    once = factor.solve(mass * points[free] - pencil[:, held] @ points[held])
-    return once + factor.solve(mass * (points[free] - once))
+    smooth = factor.solve(mass * points[free] - pencil[:, fixed] @ points[fixed])
+    return smooth + factor.solve(mass * (points[free] - smooth))

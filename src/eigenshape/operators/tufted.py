@@ -34,7 +34,7 @@ class Triangulation:
     lengths: Float[np.ndarray, " h"]
 
 
-def mollified(
+def mollify_lengths(
     lengths: Float[np.ndarray, " h"], edges: Int[np.ndarray, " h"], factor: float
 ) -> Float[np.ndarray, " h"]:
     """Lengthen all sides by one amount, the least that leaves every triangle inequality a margin.
@@ -126,7 +126,7 @@ def _angles(
     return angles, np.where(between, -face, face)
 
 
-def flipped_to_delaunay(cover: Triangulation, tolerance: float = TOLERANCE) -> Triangulation:
+def flip_to_delaunay(cover: Triangulation, tolerance: float = TOLERANCE) -> Triangulation:
     """Flip edges until the two angles opposite to each sum to 180° at most (Sharp and Crane 2020).
 
     Raises

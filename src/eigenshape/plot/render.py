@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import agreeing, boundary_edges
+from eigenshape.geometry.topology import boundary_edges, consistently_oriented
 from eigenshape.plot.camera import Camera, in_picture
 from eigenshape.scans.raster import Raster, rasterize
 
@@ -110,7 +110,7 @@ def _blend(
 
 
 def _brightness(mesh: TriangleMesh, camera: Camera, raster: Raster) -> Float[np.ndarray, "h w"]:
-    normals = _blend(mean_normals(agreeing(mesh)) @ camera.rotation.T, mesh, raster)
+    normals = _blend(mean_normals(consistently_oriented(mesh)) @ camera.rotation.T, mesh, raster)
     normals = normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-12)
     normals = np.where(
         normals[..., 2:] < 0, -normals, normals

@@ -1,4 +1,4 @@
-"""What a scanner sees: partial scans, depth images, and the rasterizer behind them."""
+"""Simulated scans: the visible part of a shape, depth images, and the rasterizer behind them."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""What a depth camera would deliver: perspective, noise, grazing sides and holes."""
+"""Simulated scans of a depth camera: perspective, noise, dropout at grazing angles, and holes."""
 
 from dataclasses import dataclass
 
@@ -18,53 +18,73 @@ from eigenshape.geometry.topology import submesh
 from eigenshape.scans.partial import rotation_towards, unit_direction
 from eigenshape.scans.raster import rasterize
 
-SLANT_NOISE = 0.025  # of the noise face on, times (θ / (π/2 - θ))²
-STEEPEST_NOISE = 20.0  # times the noise face on, at most
-ALL_LOST = np.deg2rad(85.0)  # slant from which nothing comes back
-LARGEST_JUMP = 4.0  # pixels of depth between corners of one triangle
-HOLE_SIZES = (0.01, 0.03)  # radii of holes, of the picture
+# The noise grows with the slant θ by this number times (θ / (π/2 - θ))², relative to the noise at θ
+# = 0 (Nguyen, Izadi and Lovell 2012, equation 3, at 1.5 m).
+SLANT_NOISE = 0.025
+LARGEST_SLANT_NOISE = 20.0  # upper bound of that growth, which is infinite at θ = π/2
+FULL_DROPOUT = np.deg2rad(85.0)  # slant from which no depth is measured
+# Neighboring pixels are connected if their depths differ by at most this many times the width of a
+# pixel at that depth. A larger value connects limbs with what lies behind them.
+LARGEST_JUMP = 4.0
+HOLE_SIZES = (0.01, 0.03)  # smallest and largest radius of a hole, as a share of the picture
 
 
 @dataclass(frozen=True)
 class DepthCamera:
-    """How a depth camera stands and how well it sees.
+    """Position and quality of a simulated depth camera.
 
     Attributes
     ----------
     resolution : int
-        Pixels along each side of the picture, which the sphere around the bounding box just fills; 16 to 4096.
+        Number of pixels along each side of the picture, 16 to 4096. The sphere around the bounding
+        box of the shape just fits into the picture.
     distance : float
-        From the middle of the box, in its diagonals, more than .5.
+        Distance from the middle of the bounding box, in diagonals of the box; more than 0.5.
     noise : float
-        Standard deviation of the depth of what is seen face on at that distance, in diagonals.
-    lost_from : float
-        Slant, in degrees below 85, from which pixels get lost; the share grows to all of them at 85.
-    lost : float
-        Share of pixels that get lost wherever they are, in 0..1.
+        Standard deviation of the depth of a surface that faces the camera at that distance, in
+        diagonals, 0 to 1.
+    dropout_angle : float
+        Slant in degrees, 0 to 85, from which pixels get lost. Their share grows linearly to 1 at 85
+        degrees.
+    dropout : float
+        Share of pixels that get lost at any slant, at least 0 and less than 1.
     n_holes : int
-        Round holes, of .01 to .03 of the picture in radius: shiny spots, say.
+        Number of round holes, such as at shiny spots, 0 to 1000. Their radii are 0.01 to 0.03 of
+        the picture.
+
+    See Also
+    --------
+    simulate_scan : Scan a shape with such a camera.
+
+    Examples
+    --------
+    A camera without noise, dropout or holes.
+
+    >>> import eigenshape as es
+    >>> es.scans.DepthCamera(resolution=64, noise=0, dropout_angle=84.9, dropout=0, n_holes=0)
+    DepthCamera(resolution=64, distance=1.5, noise=0, dropout_angle=84.9, dropout=0, n_holes=0)
     """
 
     resolution: int = 160
     distance: float = 1.5
     noise: float = 0.002
-    lost_from: float = 60.0
-    lost: float = 0.01
+    dropout_angle: float = 60.0
+    dropout: float = 0.01
     n_holes: int = 3
 
 
 @dataclass(frozen=True, eq=False)
 class DepthScan:
-    """What a depth camera saw.
+    """A simulated scan of a depth camera.
 
     Attributes
     ----------
     mesh : TriangleMesh
-        In the place and unit of the shape; it faces the camera.
+        The scanned surface, facing the camera, in the position and unit of the shape.
     source_faces : (n,) int
-        For each vertex the face of the shape that its pixel saw.
+        For each vertex, the face of the shape that is visible in its pixel.
     pixels : (n, 2) int
-        Column and row of each vertex, to the right and upward.
+        Column and row of the pixel of each vertex, counted to the right and upward.
     """
 
     mesh: TriangleMesh
@@ -74,7 +94,7 @@ class DepthScan:
 
 @dataclass(frozen=True, eq=False)
 class _Picture:
-    """Pixels of a pinhole camera in its own frame: sight along -z, the camera at the origin."""
+    """The pixels of a pinhole camera at the origin that looks along -z."""
 
     focal: float
     depth: Float[np.ndarray, "h w"]
@@ -90,25 +110,23 @@ def simulate_scan(
     camera: DepthCamera | None = None,
     all_pieces: bool = False,
 ) -> DepthScan:
-    """Scan a shape from one side by a depth camera, as simulated.
+    """Simulate a scan of a shape from one side by a depth camera.
 
-    Perspective of a pinhole; one depth a pixel, at its middle. Depths err as a structured-light camera's: the standard
-    deviation grows with the square of the depth, and with the slant θ by (θ / (π/2 - θ))² (Nguyen, Izadi and Lovell,
-    Modeling Kinect sensor noise, 2012, eq. 3, at 1.5 m). Pixels get lost at grazing angles, here and there, and in
-    round holes. Neighbours are joined where depths within a triangle differ by no more than four pixels, and of what
-    hangs together the piece with the most area is kept.
+    The simulation includes perspective, noise, dropout at grazing angles and holes.
 
     Parameters
     ----------
     mesh : MeshLike
+        In any length unit.
     rng : numpy.random.Generator
-        Source of noise and losses, and of the direction where none is given.
+        Source of noise and dropout, and of the direction if none is given.
     view : (3,) float, optional
-        Direction from the shape to the camera.
+        Direction from the shape to the camera, of any length.
     camera : DepthCamera, optional
-        `DepthCamera()` by default.
+        The camera; `DepthCamera()` by default.
     all_pieces : bool
-        Keep every piece, and not only the one with the most area: an arm before the body, say.
+        Keep every piece, such as an arm in front of the body. By default only the piece with the
+        largest area is kept.
 
     Returns
     -------
@@ -119,28 +137,51 @@ def simulate_scan(
     InvalidParameterError
         If the direction is zero or not finite, or a number of the camera is out of range.
     InvalidShapeError
-        If the shape has no size, or no face is seen.
+        If all vertices are equal, or no face is visible.
+
+    See Also
+    --------
+    partial_scan : The visible faces of the mesh itself, without noise.
+
+    Notes
+    -----
+    A pinhole camera measures one depth at the middle of each pixel. The noise is that of a
+    structured-light camera: its standard deviation grows with the square of the depth, and with the
+    slant θ by (θ / (π/2 - θ))² (Nguyen, Izadi and Lovell, "Modeling Kinect sensor noise", 2012,
+    equation 3, at 1.5 m). Neighboring pixels form triangles if their depths differ by at most four
+    widths of a pixel.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> camera = es.scans.DepthCamera(resolution=64)
+    >>> scan = es.scans.simulate_scan(
+    ...     es.icosphere(3), np.random.default_rng(0), view=[0, 0, 1], camera=camera
+    ... )
+    >>> scan.pixels.shape == (scan.mesh.n_vertices, 2)
+    True
     """
     mesh = as_mesh(mesh)
     require_type(rng, np.random.Generator, "rng")
     require_type(camera, DepthCamera | None, "camera")
-    camera = _checked(camera or DepthCamera())
+    camera = _require_in_range(camera or DepthCamera())
     towards = unit_direction(rng if view is None else view)
     points, scale = size_one(mesh.vertices)
     low, high = points.min(axis=0), points.max(axis=0)
     diagonal = float(np.linalg.norm(high - low))
     if not diagonal > 0:
         raise InvalidShapeError(
-            "A shape must have a size to be scanned; all its vertices are equal."
+            "A shape must have a size above zero to be scanned; all its vertices are equal."
         )
     turn, middle = rotation_towards(towards), low + (high - low) / 2
     ahead = np.array([0, 0, camera.distance])
     placed = TriangleMesh((points - middle) @ turn.T / diagonal - ahead, mesh.faces)
-    picture = _taken(placed, camera)
-    kept = _kept(picture, camera, rng)
-    joined = _joined(picture, _noisy(picture, camera, rng), kept)
-    wanted = np.ones(joined.n_faces, dtype=bool) if all_pieces else faces_of_largest(joined)
-    seen, source = submesh(joined, wanted)
+    picture = _ideal_picture(placed, camera)
+    kept = _kept_pixels(picture, camera, rng)
+    surface = _triangulate_pixels(picture, _noisy_depth(picture, camera, rng), kept)
+    wanted = np.ones(surface.n_faces, dtype=bool) if all_pieces else faces_of_largest(surface)
+    seen, source = submesh(surface, wanted)
     back = ((seen.vertices + ahead) * diagonal @ turn + middle) * scale
     columns = source % camera.resolution
     pixels = np.column_stack([columns, source // camera.resolution])
@@ -149,26 +190,32 @@ def simulate_scan(
     )
 
 
-def _checked(camera: DepthCamera) -> DepthCamera:
+def _require_in_range(camera: DepthCamera) -> DepthCamera:
     whole_number(camera.resolution, "resolution", 16, 4096)
     whole_number(camera.n_holes, "n_holes", 0, 1000)
     if not 0.5 < camera.distance < np.inf:
         raise InvalidParameterError(
-            f"distance must be more than half a diagonal, and finite; it is {camera.distance}."
+            f"distance must be finite and more than 0.5 diagonals; it is {camera.distance}."
         )
     if not 0 <= camera.noise <= 1:
         raise InvalidParameterError(f"noise must lie in 0..1 diagonals; it is {camera.noise}.")
-    if not 0 <= camera.lost_from < np.rad2deg(ALL_LOST):
+    if not 0 <= camera.dropout_angle < np.rad2deg(FULL_DROPOUT):
         raise InvalidParameterError(
-            f"lost_from must lie in 0..85 degrees, 85 excluded; it is {camera.lost_from}."
+            "dropout_angle must be at least 0 and less than 85 degrees; "
+            f"it is {camera.dropout_angle}."
         )
-    if not 0 <= camera.lost < 1:
-        raise InvalidParameterError(f"lost must lie in 0..1, 1 excluded; it is {camera.lost}.")
+    if not 0 <= camera.dropout < 1:
+        raise InvalidParameterError(
+            f"dropout must be at least 0 and less than 1; it is {camera.dropout}."
+        )
     return camera
 
 
-def _taken(placed: TriangleMesh, camera: DepthCamera) -> _Picture:
-    """Take a picture without faults; 1/z is linear in a picture, so that depths inside faces are exact."""
+def _ideal_picture(placed: TriangleMesh, camera: DepthCamera) -> _Picture:
+    """Return depth, slant and face of each pixel without noise.
+
+    1/z is a linear function of the pixel within a face, so interpolating it gives exact depths.
+    """
     size, points = camera.resolution, placed.vertices
     focal = (size / 2 - 1) * float(np.sqrt(4 * camera.distance**2 - 1))
     ahead = -points[:, 2]
@@ -183,16 +230,16 @@ def _taken(placed: TriangleMesh, camera: DepthCamera) -> _Picture:
 
 
 def _rays(size: int, focal: float) -> Float[np.ndarray, "h w 3"]:
-    """Return the way from the camera through each pixel, one unit ahead."""
+    """Return the vector from the camera to each pixel in the plane at distance 1."""
     across = (np.arange(size) + 0.5 - size / 2) / focal
     return np.stack([*np.meshgrid(across, across), np.full((size, size), -1.0)], axis=2)
 
 
-def _kept(
+def _kept_pixels(
     picture: _Picture, camera: DepthCamera, rng: np.random.Generator
 ) -> Bool[np.ndarray, "h w"]:
-    begins = np.deg2rad(camera.lost_from)
-    odds = np.clip((picture.slant - begins) / (ALL_LOST - begins), camera.lost, 1)
+    begins = np.deg2rad(camera.dropout_angle)
+    odds = np.clip((picture.slant - begins) / (FULL_DROPOUT - begins), camera.dropout, 1)
     kept = (picture.face >= 0) & (rng.random(odds.shape) >= odds)
     seen = np.argwhere(picture.face >= 0)
     if len(seen):
@@ -203,11 +250,11 @@ def _kept(
     return kept
 
 
-def _noisy(
+def _noisy_depth(
     picture: _Picture, camera: DepthCamera, rng: np.random.Generator
 ) -> Float[np.ndarray, "h w"]:
     slanted = SLANT_NOISE * (picture.slant / np.maximum(np.pi / 2 - picture.slant, 1e-9)) ** 2
-    growth = (picture.depth / camera.distance) ** 2 + np.minimum(slanted, STEEPEST_NOISE)
+    growth = (picture.depth / camera.distance) ** 2 + np.minimum(slanted, LARGEST_SLANT_NOISE)
     away = rng.standard_normal(picture.depth.shape)
     return np.where(
         picture.face >= 0,
@@ -216,10 +263,10 @@ def _noisy(
     )
 
 
-def _joined(
+def _triangulate_pixels(
     picture: _Picture, depth: Float[np.ndarray, "h w"], kept: Bool[np.ndarray, "h w"]
 ) -> TriangleMesh:
-    """Make triangles of squares of neighbours, cut along the diagonal with the lesser jump."""
+    """Make two triangles of each square of pixels, along the diagonal with the smaller jump."""
     size = len(depth)
     corner = np.arange(size * size).reshape(size, size)
     a, b, c, d = (
@@ -237,7 +284,8 @@ def _joined(
     faces = faces[np.ptp(depths, axis=1) <= LARGEST_JUMP * depths.mean(axis=1) / picture.focal]
     if not len(faces):
         raise InvalidShapeError(
-            "A scan must have a face. No three neighbouring pixels see one surface from there."
+            "A scan must have a face; no three neighboring pixels see one surface from this view. "
+            "Choose another view, or a camera with a higher resolution."
         )
     points = (_rays(size, picture.focal) * np.where(kept, depth, 0)[:, :, None]).reshape(-1, 3)
     return TriangleMesh(points, faces)

@@ -1,4 +1,4 @@
-"""Parts of a shape as the world gives them: seen from one side, or with portions missing (thesis 5.4)."""
+"""Parts of a shape: what is visible from one side, or what planes leave (thesis 5.4)."""
 
 from dataclasses import dataclass
 
@@ -14,24 +14,29 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import mean_normals, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import faces_of_largest
-from eigenshape.geometry.topology import agreeing, is_closed, submesh
+from eigenshape.geometry.topology import consistently_oriented, is_closed, submesh
 from eigenshape.scans.raster import rasterize
 
-SLACK = 1.5  # pixels that a vertex may lie off the place where the surface was seen
-STEEPEST = 10.0  # slope up to which that may hide it behind its own surface
+# A vertex may be this many pixels away from the middle of the pixel in which the surface was seen,
+# so it may lie deeper than that surface by SLACK times (1 + slope).
+SLACK = 1.5
+# Slopes are limited to this value. A larger one would keep vertices seen from their edge that
+# another part of the surface hides.
+STEEPEST = 10.0
 
 
 @dataclass(frozen=True, eq=False)
 class MeshPart:
-    """A part of a mesh, and where its vertices were.
+    """A part of a mesh, and the indices of its vertices and faces in the whole mesh.
 
     Attributes
     ----------
     mesh : TriangleMesh
+        The part.
     source_vertices : (n,) int
-        For each vertex of `mesh`, its index in the whole.
+        For each vertex of `mesh`, its index in the whole mesh.
     source_faces : (f,) int
-        For each face of `mesh`, its index in the whole.
+        For each face of `mesh`, its index in the whole mesh.
     """
 
     mesh: TriangleMesh
@@ -47,25 +52,26 @@ def partial_scan(
     resolution: int = 512,
     all_pieces: bool = False,
 ) -> MeshPart:
-    """Keep what is visible from far away in one direction.
+    """Keep the part of a mesh that is visible from one direction.
 
-    A face stays if all its corners are visible in a z-buffer. Visible is what lies no deeper than the slope of the
-    surface explains, so a rim that just turns away is kept: on real shapes, 4 % of the kept area on average.
+    The viewer is infinitely far away. A face is kept if all its corners are visible.
 
     Parameters
     ----------
     mesh : MeshLike
+        In any length unit.
     view : (3,) float or numpy.random.Generator
-        Direction from the shape to the viewer, or the source of a random one.
+        Direction from the shape to the viewer, of any length; or a generator that draws one.
     resolution : int
-        Pixels along the longest side of the picture, 16 to 8192.
+        Number of pixels along the longest side of the z-buffer, 16 to 8192.
     all_pieces : bool
-        Keep every visible piece, and not only the one with the most area. Small islands have heat of their own that
-        has nothing to do with the shape.
+        Keep every visible piece. By default only the piece with the largest area is kept, because
+        heat on small islands has nothing to do with the shape.
 
     Returns
     -------
     MeshPart
+        The visible part, with the indices of its vertices and faces in `mesh`.
 
     Raises
     ------
@@ -73,6 +79,26 @@ def partial_scan(
         If the direction is zero or not finite, or the resolution is out of range.
     InvalidShapeError
         If no face is visible.
+
+    See Also
+    --------
+    simulate_scan : A scan with perspective, noise and holes.
+    cut_by_planes : Remove what lies beyond planes.
+
+    Notes
+    -----
+    A vertex is visible if it lies no deeper than the z-buffer plus what the slope of the surface
+    allows within a pixel. So a narrow rim that already faces away is kept; on real shapes it has
+    4 % of the kept area on average.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> scan = es.partial_scan(es.icosphere(3), [0, 0, 1])
+    >>> scan.mesh
+    TriangleMesh(337 vertices, 624 faces)
+    >>> scan.source_vertices.shape
+    (337,)
     """
     mesh = as_mesh(mesh)
     whole_number(resolution, "resolution", 16, 8192)
@@ -80,13 +106,14 @@ def partial_scan(
     keep = visible[mesh.faces].all(axis=1)
     if keep.any() and not all_pieces:
         keep[keep] = faces_of_largest(TriangleMesh(mesh.vertices, mesh.faces[keep]))
-    return _kept(mesh, keep, "No face is visible as a whole from there.")
+    return _part(mesh, keep, "No face is visible as a whole from this direction.")
 
 
 def viewpoint(number: int) -> Float[np.ndarray, "3"]:
-    """Return a unit direction; the first few, and the first many, lie evenly around the sphere.
+    """Return one of a sequence of unit directions that are evenly distributed on the sphere.
 
-    They come from the additive recurrence of the plastic number (Roberts 2018), so that more of them keep the first.
+    The first k directions are evenly distributed for every k. They come from the additive
+    recurrence of the plastic number (Roberts 2018).
     """
     u, v = (0.5 + (number + 1) * np.array([0.7548776662466927, 0.5698402909980532])) % 1
     height, around = 2 * u - 1, 2 * np.pi * v
@@ -95,14 +122,17 @@ def viewpoint(number: int) -> Float[np.ndarray, "3"]:
 
 
 def views_of(mesh: TriangleMesh, n_views: int) -> list[MeshPart]:
-    """Return what the first few viewpoints see of a closed shape; nothing of an open one, which is a part already."""
-    return [
-        partial_scan(mesh, viewpoint(view)) for view in range(n_views if is_closed(mesh) else 0)
-    ]
+    """Return what is visible of a closed shape from the first `n_views` viewpoints.
+
+    An open shape is a part already and has no views.
+    """
+    if not is_closed(mesh):
+        return []
+    return [partial_scan(mesh, viewpoint(number)) for number in range(n_views)]
 
 
 def unit_direction(view: ArrayLike | np.random.Generator) -> Float[np.ndarray, "3"]:
-    """Return a direction at length 1, or draw one.
+    """Scale a direction to length 1, or draw a random one.
 
     Raises
     ------
@@ -116,7 +146,7 @@ def unit_direction(view: ArrayLike | np.random.Generator) -> Float[np.ndarray, "
     )
     if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
         raise InvalidParameterError(
-            f"view must be three finite numbers, not all zero; it is {vector.tolist()}."
+            f"view must be three finite numbers that are not all zero; it is {vector.tolist()}."
         )
     vector = vector / np.abs(vector).max()
     return vector / np.linalg.norm(vector)
@@ -138,12 +168,14 @@ def _visible_vertices(
     span = float((points.max(axis=0) - low)[:2].max())
     if not span > 0:
         raise InvalidShapeError(
-            "A shape must have a size to be scanned; all its vertices are in one line of sight."
+            "A shape must have a size as seen by the viewer; "
+            "all its vertices lie on one line of sight. Choose another view."
         )
     pixels = (points - low) * ((resolution - 2) / span) + 1
     raster = rasterize(pixels, mesh.faces, resolution, resolution)
     column, row = pixels[:, :2].astype(np.int64).T
-    towards = np.abs(mean_normals(agreeing(mesh)) @ view)  # which side is out does not matter
+    # The slope is the same on both sides of the surface, so it does not matter which is outside.
+    towards = np.abs(mean_normals(consistently_oriented(mesh)) @ view)
     slope = np.minimum(
         np.sqrt(1 - np.minimum(towards, 1) ** 2) / np.maximum(towards, 1 / STEEPEST), STEEPEST
     )
@@ -151,24 +183,41 @@ def _visible_vertices(
 
 
 def cut_by_planes(mesh: MeshLike, planes: ArrayLike) -> MeshPart:
-    """Remove the portions of a mesh that lie beyond planes.
+    """Remove the parts of a mesh that lie beyond planes.
+
+    Faces are removed as a whole, so the cut follows the edges of the mesh.
 
     Parameters
     ----------
     mesh : MeshLike
     planes : (p, 4) float
-        Rows (a, b, c, d): a vertex with a x + b y + c z > d for any row goes, and every face that it belongs to.
+        One plane (a, b, c, d) in each row. Every vertex with a x + b y + c z > d for any plane is
+        removed, together with its faces.
 
     Returns
     -------
     MeshPart
+        The rest, with the indices of its vertices and faces in `mesh`.
 
     Raises
     ------
     InvalidParameterError
-        If a plane is not four finite numbers or has no normal.
+        If a plane does not consist of four finite numbers, or its normal is zero.
     InvalidShapeError
-        If nothing is left.
+        If no face remains.
+
+    See Also
+    --------
+    random_planes : Planes that cut off a given share of the vertices.
+    partial_scan : The part that is visible from one direction.
+
+    Examples
+    --------
+    Keep the lower half of a sphere.
+
+    >>> import eigenshape as es
+    >>> es.scans.cut_by_planes(es.icosphere(2), [[0, 0, 1, 0]]).mesh
+    TriangleMesh(89 vertices, 152 faces)
     """
     mesh = as_mesh(mesh)
     rows = np.atleast_2d(real_numbers(planes, "planes").astype(np.float64))
@@ -177,21 +226,51 @@ def cut_by_planes(mesh: MeshLike, planes: ArrayLike) -> MeshPart:
     bad = np.flatnonzero(~np.isfinite(rows).all(axis=1) | ~rows[:, :3].any(axis=1))
     if bad.size:
         raise InvalidParameterError(
-            f"planes must be finite with a normal that is not zero; row {bad[0]} is {rows[bad[0]].tolist()}."
+            "planes must be finite and have a normal other than zero; "
+            f"row {bad[0]} is {rows[bad[0]].tolist()}."
         )
     kept = np.all(mesh.vertices @ rows[:, :3].T <= rows[:, 3], axis=1)
-    return _kept(mesh, kept[mesh.faces].all(axis=1), "The planes leave no face.")
+    return _part(mesh, kept[mesh.faces].all(axis=1), "The planes leave no face.")
 
 
 def random_planes(
     mesh: MeshLike, rng: np.random.Generator, *, n_planes: int = 1, share: float = 0.2
 ) -> Float[np.ndarray, "p 4"]:
-    """Draw planes in random directions that each cut off a share of the vertices.
+    """Draw planes in random directions that each cut off a given share of the vertices.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+    rng : numpy.random.Generator
+        Source of the directions.
+    n_planes : int
+        Number p of planes, 1 to 100.
+    share : float
+        Share of the vertices beyond each plane, between 0 and 1.
+
+    Returns
+    -------
+    (p, 4) float
+        Planes (a, b, c, d), as `cut_by_planes` takes them.
 
     Raises
     ------
     InvalidParameterError
-        If the share is not within 0..1 or there is no plane to draw.
+        If a number is out of range.
+
+    See Also
+    --------
+    cut_by_planes : Remove what lies beyond the planes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> sphere = es.icosphere(3)
+    >>> planes = es.scans.random_planes(sphere, np.random.default_rng(0), share=0.25)
+    >>> beyond = sphere.vertices @ planes[0, :3] > planes[0, 3]
+    >>> bool(0.24 < beyond.mean() < 0.26)
+    True
     """
     mesh = as_mesh(mesh)
     require_type(rng, np.random.Generator, "rng")
@@ -203,8 +282,8 @@ def random_planes(
     return np.column_stack([normals, offsets])
 
 
-def _kept(mesh: TriangleMesh, keep: Bool[np.ndarray, " f"], otherwise: str) -> MeshPart:
+def _part(mesh: TriangleMesh, keep: Bool[np.ndarray, " f"], reason_if_empty: str) -> MeshPart:
     if not keep.any():
-        raise InvalidShapeError(f"A part must have a face. {otherwise}")
+        raise InvalidShapeError(f"A part must have a face. {reason_if_empty}")
     part, vertices = submesh(mesh, keep)
     return MeshPart(part, vertices, np.flatnonzero(keep))

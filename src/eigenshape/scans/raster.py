@@ -1,4 +1,4 @@
-"""What is seen: a z-buffer in plain numpy, for partial scans and for pictures."""
+"""A z-buffer in NumPy, for partial scans and for pictures."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -6,9 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+# Pairs of a face and a pixel in its bounding box that are tested at a time; a pair takes about 100
+# bytes.
 CANDIDATES_AT_ONCE = 2_000_000
-THINNEST = 1e-12  # square pixels of a face that is seen from its edge and covers nothing
-EDGE_SLACK = 1e-9  # in barycentric coordinates, so that two faces leave no gap between them
+# Twice the area, in square pixels, up to which a face is seen from its edge and covers no pixel.
+THINNEST = 1e-12
+# Pixels this far outside a face, in barycentric coordinates, count as inside, so that rounding
+# leaves no gap between two faces.
+EDGE_SLACK = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,11 +23,11 @@ class Raster:
     Attributes
     ----------
     face : (h, w) int
-        -1 where there is none.
+        Index of the face, or -1 where there is none.
     weights : (h, w, 3) float
-        Barycentric coordinates of the pixel's middle in its face.
+        Barycentric coordinates of the middle of the pixel in its face.
     depth : (h, w) float
-        Third coordinate there; minus infinity where there is no face.
+        Third coordinate of that point; minus infinity where there is no face.
     """
 
     face: Int[np.ndarray, "h w"]
@@ -38,16 +43,17 @@ def rasterize(
     Parameters
     ----------
     points : (n, 3) float
-        Columns: pixels to the right, pixels down, and height towards the viewer. The middle of the first pixel is at
-        (0.5, 0.5).
+        Columns: pixels to the right, pixels down, and height towards the viewer. The middle of the
+        first pixel is at (0.5, 0.5).
     faces : (f, 3) int
+        Corners of each face.
     width, height : int
-        Of the picture.
+        Size of the picture, in pixels.
 
     Returns
     -------
     Raster
-        Of two faces at the same height the one with the lower index is seen.
+        Of two faces at the same height the one with the lower index is visible.
     """
     depth = np.full(width * height, -np.inf)
     face = np.full(width * height, -1, dtype=np.int64)
@@ -58,8 +64,8 @@ def rasterize(
         height_there = np.einsum("ij,ij->i", inside, corners[index, :, 2])
         before = depth[pixel]
         np.maximum.at(depth, pixel, height_there)
-        # Of equal heights the lowest face stays: those of earlier chunks are not written over, and in one chunk
-        # writing goes backwards.
+        # Of faces at equal height the one with the lowest index must win: faces of earlier chunks
+        # are not overwritten, and within a chunk faces are written in reverse order.
         nearest = np.flatnonzero((height_there == depth[pixel]) & (height_there > before))[::-1]
         face[pixel[nearest]] = index[nearest]
         weights[pixel[nearest]] = inside[nearest]
@@ -71,7 +77,7 @@ def rasterize(
 def _chunks(
     corners: Float[np.ndarray, "f 3 3"], width: int, height: int
 ) -> Iterator[Int[np.ndarray, "k 5"]]:
-    """Yield rows of (face, left, top, columns, rows): the box of pixels whose middles a face may cover."""
+    """Yield rows (face, left, top, columns, rows): the box of pixels that a face may cover."""
     size = np.array([width, height])
     low = np.clip(np.ceil(corners[:, :, :2].min(axis=1) - 0.5), 0, size).astype(np.int64)
     high = np.clip(np.floor(corners[:, :, :2].max(axis=1) - 0.5) + 1, 0, size).astype(np.int64)
@@ -80,23 +86,18 @@ def _chunks(
     boxes = _bands(np.column_stack([seen, low[seen], span[seen]]))
     ends = np.cumsum(boxes[:, 3] * boxes[:, 4])
     if len(boxes):
-        yield from np.split(
-            boxes,
-            np.unique(
-                np.searchsorted(ends, np.arange(CANDIDATES_AT_ONCE, ends[-1], CANDIDATES_AT_ONCE))
-            ),
-        )
+        limits = np.arange(CANDIDATES_AT_ONCE, ends[-1], CANDIDATES_AT_ONCE)
+        yield from np.split(boxes, np.unique(np.searchsorted(ends, limits)))
 
 
 def _bands(boxes: Int[np.ndarray, "k 5"]) -> Int[np.ndarray, "b 5"]:
-    """Split boxes that are too large to be looked at at once into bands of rows; leave the others as they are."""
+    """Split boxes with too many pixels into bands of rows; leave the other boxes as they are."""
     columns, rows = boxes[:, 3:].T
     rows_at_once = np.clip(CANDIDATES_AT_ONCE // columns, 1, rows)
     counts = -(-rows // rows_at_once)
     box = np.repeat(np.arange(len(boxes)), counts)
-    above = (np.arange(len(box)) - np.repeat(np.cumsum(counts) - counts, counts)) * rows_at_once[
-        box
-    ]
+    band = np.arange(len(box)) - np.repeat(np.cumsum(counts) - counts, counts)
+    above = band * rows_at_once[box]
     bands = boxes[box]
     bands[:, 2] += above
     bands[:, 4] = np.minimum(rows_at_once[box], rows[box] - above)
@@ -106,7 +107,7 @@ def _bands(boxes: Int[np.ndarray, "k 5"]) -> Int[np.ndarray, "b 5"]:
 def _covered(
     corners: Float[np.ndarray, "f 3 3"], boxes: Int[np.ndarray, "k 5"], width: int
 ) -> tuple[Int[np.ndarray, " c"], Int[np.ndarray, " c"], Float[np.ndarray, "c 3"]]:
-    """Return face, pixel and barycentric coordinates of every pixel middle that lies in a face of these boxes."""
+    """Return face, pixel and barycentric coordinates wherever a pixel lies in the face of a box."""
     face, left, top, columns, rows = boxes.T
     counts = columns * rows
     place = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -125,7 +126,10 @@ def _covered(
 def _weight_planes(
     corners: Float[np.ndarray, "k 3 3"], left: Int[np.ndarray, " k"], top: Int[np.ndarray, " k"]
 ) -> tuple[Float[np.ndarray, "k 2"], Float[np.ndarray, "k 2"], Float[np.ndarray, "k 2"]]:
-    """Return the weights of corners 1 and 2 at the first pixel, and how they change by column and by row."""
+    """Return the weights of corners 1 and 2 at the first pixel, and their change per pixel.
+
+    The second result is the change per column, the third the change per row.
+    """
     origin, one, two = corners[:, :, :2].transpose(1, 0, 2)
     to_one, to_two = one - origin, two - origin
     here = np.column_stack([left + 0.5, top + 0.5]) - origin

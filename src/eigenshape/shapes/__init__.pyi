@@ -20,8 +20,6 @@ from .spheres import projective_plane as projective_plane
 from .spheres import random_sphere as random_sphere
 from .spheres import sphere_hull as sphere_hull
 from .spheres import three_sphere as three_sphere
-from .surfaces import disjoint_union as disjoint_union
 from .surfaces import grid as grid
 from .surfaces import icosphere as icosphere
-from .surfaces import subdivide as subdivide
 from .surfaces import torus as torus

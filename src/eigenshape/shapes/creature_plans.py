@@ -1,6 +1,7 @@
-"""Body plans of the made-up creatures, as tables.
+"""Body plans of the synthetic creatures, as tables.
 
-A creature faces +x, stands upright along +z, and its left is +y. A plan is a list of limbs.
+A creature faces +x and stands upright along +z; its left is +y. It is about two units long. A plan is a
+list of limbs.
 """
 
 from math import cos, pi, sin
@@ -16,11 +17,24 @@ X, Y, Z = (1, 0, 0), (0, 1, 0), (0, 0, 1)
 class Limb(NamedTuple):
     """A smooth tube through nodes, and how it bends at some of them.
 
-    name: a trailing * makes a mirrored pair, left and right; limbs with the same first word vary together.
-    nodes: x, y, z and radius; parent: the limb and its node that this one hangs on, "" for the first.
-    swings: node, axis, least and most angle in degrees; what lies beyond the node, seen from the hub, turns with it.
-    Turning about +y leans what points up towards +x. squash: thickness along x, y and z as a share of the radius.
-    power: 2 for round cross-sections, more for boxes. hub: the node that stays where it is.
+    Attributes
+    ----------
+    name : str
+        A trailing * makes a mirrored pair, left and right. Limbs with the same first word vary
+        together between individuals.
+    parent : str
+        Name and node number of the limb to which this one is attached; empty for the first limb.
+    nodes : tuple of (x, y, z, radius)
+        Points along the middle of the tube.
+    swings : tuple of (node, axis, smallest angle, largest angle)
+        Joints, with angles in degrees. The part of the limb beyond the node, as seen from the hub,
+        turns. A positive rotation about +y leans what points up towards +x.
+    squash : (x, y, z)
+        Thickness along each axis, as a share of the radius.
+    power : float
+        Exponent of the cross-section: 2 for an ellipse, more for a rounded box.
+    hub : int
+        The node that keeps its place.
     """
 
     name: str
@@ -195,7 +209,7 @@ FISH = [
     Limb("eye*", "body 1", ((0.48, 0.06, 0.05, 0.05), (0.48, 0.08, 0.05, 0.05))),
 ]  # fmt: skip
 
-# A wave that dies out towards the head, so that it looks ahead.
+# The wave of the body fades out towards the head, so that the snake looks ahead.
 SNAKE = [
     Limb("body", "",
         tuple(

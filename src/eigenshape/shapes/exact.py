@@ -1,4 +1,4 @@
-"""Eigenvalues of Δ that are known exactly, ascending, each as often as its multiplicity says, in 1/length²."""
+"""Exact eigenvalues of Δ, ascending and repeated by multiplicity, in 1/length²."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -16,16 +16,44 @@ from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.boundary import Condition
 
-GAUSS = 600  # nodes: enough for degree 300 over the whole sphere
-NEGLIGIBLE = 60.0  # exp(-60) is far below rounding
-MOST_HARMONICS = 10**5
-HIGHEST = 1000  # frequency along a period: (2 · 1000 + 1)² of them are looked at, 64 MB of numbers
+# Nodes of the Gauss rule of `sphere_functional_eigenvalues`: enough for harmonics of degree 300
+# over the whole sphere.
+N_GAUSS_NODES = 600
+# The integral of exp(-u) ends here: exp(-60) is 1e-26, far below rounding.
+NEGLIGIBLE_EXPONENT = 60.0
+MOST_HARMONICS = 10**5  # up to degree 316, which N_GAUSS_NODES is made for
+# Frequencies of a flat torus are looked for up to this number along each period: (2·1000 + 1)²
+# pairs of them take 64 MB.
+MOST_FREQUENCY = 1000
 
 
 def sphere_eigenvalues(k: SupportsIndex, dim: SupportsIndex = 2) -> Float[np.ndarray, " k"]:
-    """Return l(l + m - 1) of the unit m-sphere, for l = 0, 1, ...; on the 2-sphere each 2l + 1 times.
+    """Return the first eigenvalues of the unit m-sphere: l(l + m - 1) for l = 0, 1, ...
 
-    The multiplicity is that of harmonic polynomials of degree l in m + 1 variables (Chavel 1984, II.4).
+    The multiplicity is the number of harmonic polynomials of degree l in m + 1 variables (Chavel
+    1984, II.4); on the 2-sphere it is 2l + 1.
+
+    Parameters
+    ----------
+    k : int
+        Number of eigenvalues, at least 1.
+    dim : int
+        Dimension m of the sphere, 1 to 20; 1 for a circle.
+
+    Returns
+    -------
+    (k,) float
+        Eigenvalues in 1/length², ascending, repeated by multiplicity.
+
+    See Also
+    --------
+    sphere_harmonics : The eigenfunctions on the 2-sphere.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.shapes.sphere_eigenvalues(5).tolist()
+    [0.0, 2.0, 2.0, 2.0, 6.0]
     """
     count, m = whole_number(k, "k", 1, None), whole_number(dim, "dim", 1, 20)
     values: list[float] = []
@@ -41,32 +69,47 @@ def sphere_eigenvalues(k: SupportsIndex, dim: SupportsIndex = 2) -> Float[np.nda
 
 @one_blas_thread()
 def sphere_functional_eigenvalues(k: SupportsIndex, t: float) -> Float[np.ndarray, " k"]:
-    """Return the first k eigenvalues of the functional approximation 𝓛_t on the unit sphere (thesis eq. 3.1).
-
-    A kernel of the distance multiplies all harmonics of one degree by one number (Funk and Hecke). With
-    |x - y|² = 2 - 2s and u = (1 - s)/2t that of 𝓛_t is (1/t) ∫ exp(-u) (1 - P_l(1 - 2tu)) du from 0 to 1/t, taken by
-    Gauss' rule up to where exp(-u) is below rounding.
+    """Return eigenvalues of the functional Laplacian 𝓛_t on the unit sphere (thesis eq. 3.1).
 
     Parameters
     ----------
     k : int
+        Number of eigenvalues, 1 to 100,000.
     t : float
         Heat time, in squared radii.
 
     Returns
     -------
     (k,) float
-        In the order of `sphere_eigenvalues`, which they tend to as t → 0. Not always ascending: for large degrees they
-        come near their limit (1 - exp(-1/t))/t from both sides.
+        Eigenvalues in the order of `sphere_eigenvalues`, to which they converge as t → 0. They are
+        not always ascending: for large degrees they approach their limit (1 - exp(-1/t))/t from
+        both sides.
 
     Raises
     ------
     InvalidParameterError
-        If k is not in range, or t not positive.
+        If `k` is out of range or `t` is not positive.
+
+    See Also
+    --------
+    functional_laplacian : The operator 𝓛_t on a quadrature.
+
+    Notes
+    -----
+    A kernel that depends on the distance only multiplies all harmonics of one degree by one number
+    (Funk and Hecke). With |x - y|² = 2 - 2s and u = (1 - s)/2t the number of 𝓛_t for degree l is
+    (1/t) ∫ exp(-u) (1 - P_l(1 - 2tu)) du from 0 to 1/t. The integral is computed by a Gauss rule up
+    to where exp(-u) is below rounding.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.shapes.sphere_functional_eigenvalues(4, 0.01).round(4).tolist()
+    [0.0, 2.0, 2.0, 2.0]
     """
     count, time = whole_number(k, "k", 1, MOST_HARMONICS), float(positive_values(t, "t")[0])
-    nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
-    reach = min(1 / time, NEGLIGIBLE) / 2
+    nodes, weights = np.polynomial.legendre.leggauss(N_GAUSS_NODES)
+    reach = min(1 / time, NEGLIGIBLE_EXPONENT) / 2
     u = reach * (nodes + 1)
     degrees = np.arange(isqrt(count - 1) + 1)
     missing = 1 - eval_legendre(degrees[:, None], 1 - 2 * time * u)
@@ -75,7 +118,30 @@ def sphere_functional_eigenvalues(k: SupportsIndex, t: float) -> Float[np.ndarra
 
 
 def projective_plane_eigenvalues(k: SupportsIndex) -> Float[np.ndarray, " k"]:
-    """Return l(l + 1) for even l, each 2l + 1 times: the unit sphere with antipodes made one."""
+    """Return the first eigenvalues of the projective plane: l(l + 1) for even l, each 2l + 1 times.
+
+    The projective plane is the unit sphere with antipodes identified.
+
+    Parameters
+    ----------
+    k : int
+        Number of eigenvalues, at least 1.
+
+    Returns
+    -------
+    (k,) float
+        Eigenvalues in 1/length², ascending, repeated by multiplicity.
+
+    See Also
+    --------
+    projective_plane : A mesh of the projective plane.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.shapes.projective_plane_eigenvalues(7).tolist()
+    [0.0, 6.0, 6.0, 6.0, 6.0, 6.0, 20.0]
+    """
     count = whole_number(k, "k", 1, None)
     degrees = 2 * np.arange(isqrt(count) + 1)  # up to even l there are (l + 1)(l + 2) / 2
     return np.repeat(degrees * (degrees + 1.0), 2 * degrees + 1)[:count]
@@ -84,9 +150,39 @@ def projective_plane_eigenvalues(k: SupportsIndex) -> Float[np.ndarray, " k"]:
 def box_eigenvalues(
     k: SupportsIndex, sides: Sequence[float] = (1.0, 1.0), condition: Condition = "neumann"
 ) -> Float[np.ndarray, " k"]:
-    """Return π² Σ (p_i / a_i)² of a box with sides a_i: an interval, a rectangle, and so on.
+    """Return the first eigenvalues of a box: an interval, a rectangle, a cuboid and so on.
 
-    p_i = 0, 1, ... with the Neumann condition, and 1, 2, ... with Dirichlet's.
+    The eigenvalues are π² Σ (p_i / a_i)² with sides a_i and integers p_i, which start at 0 for the
+    Neumann condition and at 1 for the Dirichlet condition.
+
+    Parameters
+    ----------
+    k : int
+        Number of eigenvalues, at least 1.
+    sides : sequence of float
+        Lengths of the sides; their number is the dimension.
+    condition : "neumann" or "dirichlet"
+        Boundary condition.
+
+    Returns
+    -------
+    (k,) float
+        Eigenvalues in 1/length², ascending, repeated by multiplicity.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `k` is out of range, a side is not positive, or the condition is unknown.
+
+    See Also
+    --------
+    interval, grid, box : Meshes of boxes.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> (es.shapes.box_eigenvalues(4, [1, 1]) / 3.141592653589793**2).round(6).tolist()
+    [0.0, 1.0, 1.0, 2.0]
     """
     count, lengths = whole_number(k, "k", 1, None), positive_values(list(sides), "sides")
     first = int(_require_condition(condition) == "dirichlet")
@@ -100,29 +196,55 @@ def box_eigenvalues(
 def _lowest_sums(
     one: Float[np.ndarray, " k"], two: Float[np.ndarray, " k"]
 ) -> Float[np.ndarray, " k"]:
-    """Return the k lowest sums of one number of each of two ascending lists of k.
+    """Return the k lowest sums of one number from each of two ascending lists of length k.
 
-    The sum of the i-th and the j-th has i·j sums that are no higher, itself among them: where that is over k, it need
-    not be formed.
+    At least i·j sums are at most the sum of the i-th and the j-th number. So sums with i·j > k are
+    not needed.
     """
     count = len(one)
-    return np.sort(np.concatenate([one[: count // j] + two[j - 1] for j in range(1, count + 1)]))[
-        :count
-    ]
+    sums = np.concatenate([one[: count // j] + two[j - 1] for j in range(1, count + 1)])
+    return np.sort(sums)[:count]
 
 
 def flat_torus_eigenvalues(k: SupportsIndex, periods: ArrayLike) -> Float[np.ndarray, " k"]:
-    """Return 4π² |ξ|² over the frequencies ξ that are whole on both periods, the rows of a 2 x 2 matrix."""
+    """Return the first eigenvalues of a flat torus: 4π² |ξ|² for ξ in the dual lattice.
+
+    Parameters
+    ----------
+    k : int
+        Number of eigenvalues, at least 1.
+    periods : (2, 2) float
+        The two periods of the torus, as rows, in length.
+
+    Returns
+    -------
+    (k,) float
+        Eigenvalues in 1/length², ascending, repeated by multiplicity.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `k` is out of range, the periods are not finite, or they do not span the plane well
+        enough for k.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> values = es.shapes.flat_torus_eigenvalues(5, [[1, 0], [0, 1]])
+    >>> (values / (2 * 3.141592653589793) ** 2).round(6).tolist()
+    [0.0, 1.0, 1.0, 1.0, 1.0]
+    """
     count, rows = whole_number(k, "k", 1, None), real_numbers(periods, "periods").astype(np.float64)
     if rows.shape != (2, 2) or not np.isfinite(rows).all():
         raise InvalidParameterError(
             f"periods must be a finite 2 x 2 matrix; they are {rows.tolist()}."
         )
     reach = np.ceil(np.sqrt(count) * np.linalg.cond(rows)) + 1
-    if not reach <= HIGHEST:
+    if not reach <= MOST_FREQUENCY:
         raise InvalidParameterError(
-            f"periods must span a plane and not be too slim for k; {count} eigenvalues of {rows.tolist()} ask for "
-            f"frequencies up to {reach:.0e}, over {HIGHEST}."
+            "periods must span a plane and must not be too slender for k; "
+            f"{count} eigenvalues of {rows.tolist()} need frequencies up to {reach:.0e}, "
+            f"more than {MOST_FREQUENCY}."
         )
     lattice = np.linalg.inv(rows).T
     steps = np.arange(-reach, reach + 1)
@@ -131,22 +253,85 @@ def flat_torus_eigenvalues(k: SupportsIndex, periods: ArrayLike) -> Float[np.nda
 
 
 def disc_eigenvalues(k: SupportsIndex, condition: Condition = "neumann") -> Float[np.ndarray, " k"]:
-    """Return the squared zeros of Bessel functions J_p, or of their derivatives, twice where p > 0: the unit disc."""
+    """Return the first eigenvalues of the unit disc.
+
+    The eigenvalues are the squared zeros of the Bessel functions J_p for the Dirichlet condition,
+    and of their derivatives for the Neumann condition; each occurs twice for p > 0.
+
+    Parameters
+    ----------
+    k : int
+        Number of eigenvalues, 1 to 10,000.
+    condition : "neumann" or "dirichlet"
+        Boundary condition.
+
+    Returns
+    -------
+    (k,) float
+        Eigenvalues in 1/length², ascending, repeated by multiplicity.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `k` is out of range or the condition is unknown.
+
+    See Also
+    --------
+    disc : A mesh of the disc.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.shapes.disc_eigenvalues(3, "dirichlet").round(4).tolist()
+    [5.7832, 14.682, 14.682]
+    """
     count = whole_number(k, "k", 1, 10_000)
     zeros = jn_zeros if _require_condition(condition) == "dirichlet" else jnp_zeros
     values = [0.0] if condition == "neumann" else []
-    order, radial = 0, int(count**0.5) + 4  # more zeros of one order than lie so low
+    # More zeros of each order than can be among the first `count` eigenvalues.
+    order, radial = 0, int(count**0.5) + 4
     while True:
         found = zeros(order, radial) ** 2
         values = sorted([*values, *np.repeat(found, 2 if order else 1)])[: count + 1]
         order += 1
-        # The least zero grows with the order from p = 1 on; J_0' alone starts beyond J_1'.
+        # From order 1 on the first zero grows with the order. Only J_0' has a larger one than J_1'.
         if order > 2 and len(values) > count and found[0] > values[count]:
             return np.array(values[:count])
 
 
 def ball_eigenvalues(k: SupportsIndex, condition: Condition = "neumann") -> Float[np.ndarray, " k"]:
-    """Return the squared zeros of spherical Bessel functions j_l, or of their derivatives, each 2l + 1 times."""
+    """Return the first eigenvalues of the unit ball in R³.
+
+    The eigenvalues are the squared zeros of the spherical Bessel functions j_l for the Dirichlet
+    condition, and of their derivatives for the Neumann condition, each 2l + 1 times.
+
+    Parameters
+    ----------
+    k : int
+        Number of eigenvalues, 1 to 2,000.
+    condition : "neumann" or "dirichlet"
+        Boundary condition.
+
+    Returns
+    -------
+    (k,) float
+        Eigenvalues in 1/length², ascending, repeated by multiplicity.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `k` is out of range or the condition is unknown.
+
+    See Also
+    --------
+    ball : A mesh of the ball.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.shapes.ball_eigenvalues(2, "dirichlet").round(4).tolist()
+    [9.8696, 20.1907]
+    """
     count = whole_number(k, "k", 1, 2_000)
     derivative = _require_condition(condition) == "neumann"
     values = [0.0] if derivative else []
@@ -160,7 +345,10 @@ def ball_eigenvalues(k: SupportsIndex, condition: Condition = "neumann") -> Floa
 
 
 def _zeros(function: Callable[[float], float], start: int, count: int) -> Float[np.ndarray, " z"]:
-    """Return positive zeros of an oscillation whose zeros lie about π apart, beyond the place where it sets in."""
+    """Return positive zeros of an oscillating function, beyond about `start`.
+
+    The zeros must be about π apart.
+    """
     grid = np.arange(max(0.5, 0.5 * start), start + np.pi * (count ** (1 / 2) + 4) * 2, 0.1)
     signs = np.sign([function(x) for x in grid])
     changes = np.flatnonzero(signs[1:] * signs[:-1] < 0)

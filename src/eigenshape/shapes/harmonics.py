@@ -1,4 +1,4 @@
-"""Eigenfunctions of Δ that are known exactly, in the order of their eigenvalues in `geometry.exact`."""
+"""Exact eigenfunctions of Δ, in the order of their eigenvalues in `shapes.exact`."""
 
 from math import isqrt
 from typing import SupportsIndex
@@ -10,36 +10,54 @@ from eigenshape._arrays import finite_rows, frozen, whole_number
 from eigenshape._errors import InvalidShapeError
 from eigenshape._typing import ArrayLike
 
-MOST = 10**5  # degrees up to 316; beyond 1400 the functions over (1 - z²)^{m/2} are no floats
+# Degrees up to 316. Beyond degree 1400 the functions divided by (1 - z²)^{m/2} overflow.
+MOST_HARMONICS = 10**5
 
 
 def sphere_harmonics(points: ArrayLike, k: SupportsIndex) -> Float[np.ndarray, "n k"]:
-    """Evaluate the first k eigenfunctions of the unit sphere: real spherical harmonics, orthonormal in its area.
+    """Evaluate real spherical harmonics: eigenfunctions of the unit sphere.
 
-    Y_l^0 = N P_l(z) and Y_l^±m = √2 N P_l^m(z) times cos mφ (plus) or sin mφ (minus), from the normalised associated
-    Legendre functions by their recurrence upwards in l, which is stable (Press and others 2007, section 6.7).
+    The functions are orthonormal with respect to area. Y_l^0 = N P_l(z), and Y_l^±m = √2 N P_l^m(z)
+    times cos mφ for +m and sin mφ for -m.
 
     Parameters
     ----------
     points : (n, 3) float
-        A point stands for its direction from the origin.
+        Points in any length unit; only their directions from the origin count.
     k : int
-        1 to 100,000. Number l² + l + m has degree l, order m = -l..l and the eigenvalue l (l + 1), as in
-        `sphere_eigenvalues`.
+        Number of functions, 1 to 100,000. Function l² + l + m has degree l, order m = -l..l and the
+        eigenvalue l(l + 1), as in `sphere_eigenvalues`.
 
     Returns
     -------
     (n, k) float
-        Without unit: on a sphere of radius r divide by r.
+        Values on the unit sphere. On a sphere of radius r divide them by r.
 
     Raises
     ------
     InvalidParameterError
-        If k is not in range.
+        If `k` is out of range.
     InvalidShapeError
         If a point is not finite or is the origin.
+
+    See Also
+    --------
+    sphere_eigenvalues : The eigenvalues.
+
+    Notes
+    -----
+    The normalized associated Legendre functions come from their recurrence upwards in l, which is
+    stable (Press and others 2007, section 6.7).
+
+    Examples
+    --------
+    The first function is constant, 1/√(4π).
+
+    >>> import eigenshape as es
+    >>> es.shapes.sphere_harmonics([[1, 0, 0], [0, 0, 1]], 1).round(4).tolist()
+    [[0.2821], [0.2821]]
     """
-    count = whole_number(k, "k", 1, MOST)
+    count = whole_number(k, "k", 1, MOST_HARMONICS)
     directions = _directions(points)
     last = isqrt(count - 1)
     harmonics = np.empty((len(directions), (last + 1) ** 2))
@@ -64,16 +82,15 @@ def _directions(points: ArrayLike) -> Float[np.ndarray, "n 3"]:
         raise InvalidShapeError(
             f"points must have a direction from the origin; point {origin[0]} is the origin."
         )
-    rows = np.ldexp(
-        rows, -np.frexp(sizes)[1][:, None]
-    )  # squares of tiny or huge coordinates are no floats
+    # Scale each point to size 1 first: squares of tiny or huge coordinates underflow or overflow.
+    rows = np.ldexp(rows, -np.frexp(sizes)[1][:, None])
     return rows / np.linalg.norm(rows, axis=1, keepdims=True)
 
 
 def _over_degrees(
     heights: Float[np.ndarray, " n"], order: int, last: int, top: float
 ) -> Float[np.ndarray, "n l"]:
-    """Return N P_l^m(z) / (1 - z²)^{m/2} for l = m..last, where that of l = m is `top`."""
+    """Return N P_l^m(z) / (1 - z²)^{m/2} for l = m..last, given its value `top` for l = m."""
     values = np.empty((last - order + 1, len(heights)))
     values[0] = top
     if order < last:

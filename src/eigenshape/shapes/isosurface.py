@@ -1,4 +1,4 @@
-"""The surface where a smooth function is zero, as a closed mesh of even triangles."""
+"""Meshing of the zero set of a smooth function, as a closed surface of even triangles."""
 
 from collections.abc import Callable
 
@@ -12,14 +12,20 @@ from eigenshape.geometry.topology import edge_table, is_closed, is_manifold, ver
 
 Field = Callable[[Float[np.ndarray, "p 3"]], Float[np.ndarray, " p"]]
 
-STAGES, ROUNDS = 3, 5  # of choosing diagonals, and of smoothing along the surface before each
-BLOCK = 3  # lattice points along a block that is left out where the surface is far
-STEEP = 1.3  # most slope of a field that is about a distance
-CHUNK = 1 << 16  # points at a time
-CLOSE_ENOUGH = 0.04  # of the number of vertices asked for
-# Places of the grid against the surface, in cells, none a symmetric one: sheets that meet in a cell at one place of it
-# are apart at another.
-PLACES = np.array([[0.5, 0.5, 0.5]]) + np.arange(12)[:, None] * np.array(
+# The quads are split into triangles N_STAGES times anew, with N_ROUNDS of smoothing along the
+# surface before each. More of either makes triangles a little more even and takes longer.
+N_STAGES = 3
+N_ROUNDS = 5
+SMOOTHING_STEP = 0.6  # share of the way to the mean of its neighbors that a vertex moves in a round
+# Lattice points along a block. If the surface is far from a block, the field is evaluated at its
+# middle only.
+BLOCK = 3
+STEEPEST = 1.3  # largest slope of a field that is approximately a distance
+POINTS_AT_ONCE = 1 << 16  # points at which a field is evaluated at a time, to bound memory
+CLOSE_ENOUGH = 0.04  # relative error of the number of vertices that `find_spacing` accepts
+# Offsets of the grid relative to the surface, in cells: a sequence without symmetric positions.
+# Sheets that meet in one cell of a grid are apart in another grid.
+OFFSETS = np.array([[0.5, 0.5, 0.5]]) + np.arange(12)[:, None] * np.array(
     [[0.7548777, 0.5698403, 0.3247180]]
 )
 
@@ -27,33 +33,37 @@ PLACES = np.array([[0.5, 0.5, 0.5]]) + np.arange(12)[:, None] * np.array(
 def isosurface(
     field: Field, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"], spacing: float
 ) -> TriangleMesh:
-    """Mesh the zero set of about a signed distance, negative inside, by surface nets that are drawn onto it and evened.
+    """Mesh the zero set of a field that is approximately a signed distance, negative inside.
 
-    Each sheet in a cell has a vertex of its own (Gibson 1998 gives the nets, Nielson 2004 the sheets). Two neighbouring
-    cells can still join sheets that are apart, so the result is checked, and where it is no manifold another place of
+    Surface nets (Gibson 1998) with one vertex for each sheet of the surface in a cell (Nielson
+    2004) are projected onto the zero set and smoothed along it. Neighboring cells can still join
+    sheets that are apart. So the result is checked, and if it is not a manifold, another offset of
     the grid is tried.
 
     Raises
     ------
     InvalidShapeError
-        If no place of the grid gives a closed connected manifold: the surface has details finer than the grid.
+        If no offset of the grid gives a closed connected manifold, because the surface has details
+        finer than the grid.
     """
-    for place in PLACES % 1:
-        points, quads = _nets(field, low - spacing * (1 + place), high + 2 * spacing, spacing)
+    for offset in OFFSETS % 1:
+        points, quads = _nets(field, low - spacing * (1 + offset), high + 2 * spacing, spacing)
         if _is_sound(TriangleMesh(points, _split(points, quads))):
-            mesh = _evened(field, points, quads, spacing)
+            mesh = _smooth(field, points, quads, spacing)
             if _is_sound(mesh):
                 return mesh
     raise InvalidShapeError(
-        f"A surface must be smooth at the size of the grid; at spacing {spacing:.3g} it is not."
+        "A surface must be smooth at the spacing of the grid; "
+        f"at spacing {spacing:.3g} it is not. Use a smaller spacing."
     )
 
 
-def spacing_for(
+def find_spacing(
     field: Field, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"], n_vertices: int
 ) -> float:
-    """Find the spacing at which surface nets have about so many vertices: they go with 1 / spacing^2."""
+    """Find the spacing at which surface nets have about `n_vertices` vertices."""
     spacing = float((high - low).max()) / 30
+    # The number of vertices is proportional to 1 / spacing², so a few steps are enough.
     for _ in range(4):
         ratio = len(_nets(field, low - 1.5 * spacing, high + 2 * spacing, spacing)[0]) / n_vertices
         if abs(ratio - 1) < CLOSE_ENOUGH:
@@ -82,11 +92,14 @@ def _nets(
 def _lattice_values(
     field: Field, low: Float[np.ndarray, "3"], shape: Int[np.ndarray, "3"], spacing: float
 ) -> Float[np.ndarray, "x y z"]:
-    """Evaluate a field where its surface may pass; in a block that is far from it, its middle stands for all."""
+    """Evaluate a field at the points of a lattice near its surface.
+
+    In a block far from the surface all points get the value at the middle of the block.
+    """
     blocks = tuple(-(-shape // BLOCK))
     middles = BLOCK * np.indices(blocks).reshape(3, -1).T + (BLOCK - 1) / 2
     coarse = _in_chunks(field, low + spacing * middles).reshape(blocks)
-    reach = STEEP * spacing * np.sqrt(3) * (BLOCK + 1) / 2
+    reach = STEEPEST * spacing * np.sqrt(3) * (BLOCK + 1) / 2
     values, near = coarse, np.abs(coarse) < reach
     for axis in range(3):
         values, near = values.repeat(BLOCK, axis), near.repeat(BLOCK, axis)
@@ -97,7 +110,10 @@ def _lattice_values(
 
 def _in_chunks(field: Field, points: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, " p"]:
     return np.concatenate(
-        [field(points[start : start + CHUNK]) for start in range(0, len(points), CHUNK)]
+        [
+            field(points[start : start + POINTS_AT_ONCE])
+            for start in range(0, len(points), POINTS_AT_ONCE)
+        ]
     )
 
 
@@ -108,6 +124,7 @@ def _edge(axis: int, corner: tuple[int, ...]) -> int:
 
 
 def _corner(corner: tuple[int, ...]) -> int:
+    """Return the number of a corner of a cell: 0 to 7."""
     return 4 * corner[0] + 2 * corner[1] + corner[2]
 
 
@@ -131,7 +148,8 @@ FACES = [_face(normal, side) for normal in range(3) for side in (0, 1)]
 
 def _crossed_cells(values: Float[np.ndarray, "x y z"]) -> Int[np.ndarray, "c 3"]:
     inside = (values < 0).astype(np.int8)
-    for axis in range(3):  # counts over pairs, squares, then cubes of lattice points
+    # Count the inside corners of pairs, then squares, then cubes of lattice points.
+    for axis in range(3):
         here, there = (inside.take(np.arange(s, inside.shape[axis] - 1 + s), axis) for s in (0, 1))
         inside = here + there
     return np.argwhere((inside > 0) & (inside < 8))
@@ -140,9 +158,10 @@ def _crossed_cells(values: Float[np.ndarray, "x y z"]) -> Int[np.ndarray, "c 3"]
 def _sheet_points(
     cells: Int[np.ndarray, "c 3"], corners: Float[np.ndarray, "c 8"]
 ) -> tuple[Int[np.ndarray, "c 12"], Float[np.ndarray, "p 3"]]:
-    """Put a point on each sheet of the surface in each cell, in the middle of where it crosses the cell's edges.
+    """Place a point on each sheet of the surface in each cell.
 
-    Returns the point of each edge of each cell, -1 where the surface does not cross it, and the points.
+    The point is the mean of the crossings of the sheet with the edges of the cell. Returns the
+    point of each edge of each cell, -1 where the surface does not cross the edge, and the points.
     """
     ends = [
         (_corner(tuple(start.tolist())), _corner(tuple((start + UNIT[axis]).tolist())))
@@ -169,13 +188,14 @@ def _sheet_points(
 def _sheets(
     inside: Bool[np.ndarray, "c 8"], crosses: Bool[np.ndarray, "c 12"]
 ) -> Int[np.ndarray, "c 12"]:
-    """Label the crossings of each cell by the sheet that they lie on (Nielson 2004).
+    """Label the crossings of each cell by the sheet on which they lie (Nielson 2004).
 
-    The sheet runs over each face of the cell from crossing to crossing; where all four edges of a face are crossed it
-    runs around the corners that are inside.
+    A sheet connects two crossings of a face of the cell. If all four edges of a face are crossed,
+    it connects the two crossings next to a corner that is inside.
     """
     sheet = np.broadcast_to(np.arange(12), crosses.shape).copy()
-    for _ in range(6):  # a sheet has 12 crossings at most, and labels run both ways around it
+    # A sheet has at most 12 crossings, and labels travel around it in both directions.
+    for _ in range(6):
         for edges, corners in FACES:
             plain = crosses[:, edges].sum(axis=1) == 2
             for one in range(4):
@@ -194,7 +214,10 @@ def _quads(
     number: Int[np.ndarray, "k 12"],
     axis: int,
 ) -> Int[np.ndarray, "q 4"]:
-    """Join the points around each lattice edge along `axis` that the surface crosses, one from each of four cells."""
+    """Make a quad around each lattice edge along `axis` that the surface crosses.
+
+    Its corners are the points of the four cells at the edge.
+    """
     n = values.shape[axis]
     here, there = values.take(np.arange(n - 1), axis), values.take(np.arange(1, n), axis)
     edges = np.argwhere((here < 0) != (there < 0))
@@ -213,12 +236,11 @@ def _quads(
 def _split(
     points: Float[np.ndarray, "p 3"], quads: Int[np.ndarray, "q 4"]
 ) -> Int[np.ndarray, "f 3"]:
-    """Cut each quad along the diagonal with the lesser angles opposite to it (Delaunay)."""
+    """Split each quad along the diagonal with the smaller opposite angles (Delaunay)."""
     a, b, c, d = points[quads].transpose(1, 0, 2)
-    turn = np.where(
-        (_cotangent(b, a, c) + _cotangent(d, a, c) < 0)[:, None], np.roll(quads, -1, axis=1), quads
-    )
-    return np.concatenate([turn[:, [0, 1, 2]], turn[:, [0, 2, 3]]])
+    other_diagonal = _cotangent(b, a, c) + _cotangent(d, a, c) < 0
+    quads = np.where(other_diagonal[:, None], np.roll(quads, -1, axis=1), quads)
+    return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
 def _cotangent(
@@ -229,33 +251,36 @@ def _cotangent(
     return np.einsum("ij,ij->i", one, two) / np.maximum(twice_area, np.finfo(np.float64).tiny)
 
 
-def _evened(
+def _smooth(
     field: Field, points: Float[np.ndarray, "p 3"], quads: Int[np.ndarray, "q 4"], spacing: float
 ) -> TriangleMesh:
-    points = _drawn(field, points, spacing)[0]
-    for _ in range(STAGES):
-        points = relaxed(field, TriangleMesh(points, _split(points, quads)), spacing).vertices
+    points = _project(field, points, spacing)[0]
+    for _ in range(N_STAGES):
+        points = relax(field, TriangleMesh(points, _split(points, quads)), spacing).vertices
     return TriangleMesh(points, _split(points, quads))
 
 
-def relaxed(field: Field, mesh: TriangleMesh, spacing: float) -> TriangleMesh:
-    """Move vertices along the surface towards the middle of their neighbours."""
+def relax(field: Field, mesh: TriangleMesh, spacing: float) -> TriangleMesh:
+    """Move vertices along the surface towards the mean of their neighbors."""
     one, two = edge_table(mesh).edges.T
     links = sp.coo_array((np.ones(len(one)), (one, two)), shape=(mesh.n_vertices,) * 2)
     links = (links + links.T).tocsr()
     degree = links.sum(axis=1)[:, None]
-    points, normals = _drawn(field, mesh.vertices, spacing)
-    for _ in range(ROUNDS):
+    points, normals = _project(field, mesh.vertices, spacing)
+    for _ in range(N_ROUNDS):
         pull = links @ points / degree - points
         pull -= np.einsum("ij,ij->i", pull, normals)[:, None] * normals
-        points, normals = _drawn(field, points + 0.6 * pull, spacing)
+        points, normals = _project(field, points + SMOOTHING_STEP * pull, spacing)
     return TriangleMesh(points, mesh.faces)
 
 
-def _drawn(
+def _project(
     field: Field, points: Float[np.ndarray, "p 3"], spacing: float
 ) -> tuple[Float[np.ndarray, "p 3"], Float[np.ndarray, "p 3"]]:
-    """Move points onto the zero set by one Newton step, not longer than half a cell; return also the normals."""
+    """Move points towards the zero set by one Newton step; return the points and the normals.
+
+    A step is at most half a cell long.
+    """
     width = 1e-3 * spacing
     values = field(points)
     slopes = np.column_stack(

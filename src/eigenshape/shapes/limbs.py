@@ -1,4 +1,4 @@
-"""A body made of limbs: smooth tubes that melt into each other, as a function that is zero on the skin."""
+"""Bodies made of limbs: smooth tubes blended together, as a function that is zero on the skin."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,15 +9,22 @@ from scipy.interpolate import CubicHermiteSpline
 
 from eigenshape.shapes.creature_plans import Limb, Swing
 
-BLEND = 0.1  # difference of distances below which limbs melt into each other
-FINE = 4  # straight pieces between two nodes
-TINY = 1e-12  # keeps a distance of zero apart from a division by it
-VARIATION = 0.1  # of lengths and widths between individuals
+# Limbs are blended where the difference of their distances is below this length (a creature is
+# about two units long). A larger value makes joints thicker and fuses limbs that are near each
+# other.
+BLEND = 0.1
+PIECES_PER_SEGMENT = 4  # straight pieces between two nodes of a limb; more are smoother and slower
+TINY_SIZE = 1e-12  # lower bound of a size that is divided by
+VARIATION = 0.1  # largest logarithm of the lengths and widths of an individual
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedLimb:
-    """A limb in space: nodes and the pieces between them as rows of x, y, z and radius; parent is -1 for none."""
+    """A limb in space.
+
+    Nodes, and the ends of the pieces between them, are rows of x, y, z and radius. The parent is
+    the index of another limb, or -1.
+    """
 
     nodes: Float[np.ndarray, "k 4"]
     pieces: Float[np.ndarray, "s 4"]
@@ -31,24 +38,27 @@ class PlacedLimb:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """Limbs, each after the one that it hangs on."""
+    """Limbs, each after its parent."""
 
     limbs: tuple[PlacedLimb, ...]
 
     @property
     def box(self) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
-        """Corners of a box that holds the skin."""
+        """Lowest and highest corner of a box that contains the skin."""
         pieces = np.concatenate([limb.pieces for limb in self.limbs])
         reach = pieces[:, 3:] + BLEND
         return (pieces[:, :3] - reach).min(axis=0), (pieces[:, :3] + reach).max(axis=0)
 
     @property
     def thinnest(self) -> float:
-        """Least radius of a limb, along its least side."""
+        """Smallest radius of a limb, along the axis in which it is thinnest."""
         return float(min(limb.nodes[:, 3].min() * limb.squash.min() for limb in self.limbs))
 
-    def hangs_at(self, ancestor: int) -> Float[np.ndarray, " l"]:
-        """Return the node of a limb at which each other one hangs, directly or by others; NaN where it does not."""
+    def attachment_nodes(self, ancestor: int) -> Float[np.ndarray, " l"]:
+        """Return the node of limb `ancestor` at which each limb is attached, directly or not.
+
+        NaN for limbs that are not attached to it.
+        """
         at = np.full(len(self.limbs), np.nan)
         for number, limb in enumerate(self.limbs):
             if limb.parent == ancestor:
@@ -58,8 +68,11 @@ class Body:
         return at
 
 
-def body_of(plan: Sequence[Limb], individual: int = 0) -> Body:
-    """Place the limbs of a plan; the seed of an individual, unless it is 0, varies their lengths and widths."""
+def place_limbs(plan: Sequence[Limb], individual: int = 0) -> Body:
+    """Place the limbs of a plan in space.
+
+    The seed of an individual varies the lengths and widths of the limbs, unless it is 0.
+    """
     growth = _growth(plan, individual)
     drawn = {
         _sided(limb.name, side): _mirrored(limb, side) for limb in plan for side in _sides(limb)
@@ -70,16 +83,18 @@ def body_of(plan: Sequence[Limb], individual: int = 0) -> Body:
         nodes = np.array(limb.nodes, dtype=np.float64)
         start, (parent, _, node) = nodes[0, :3], limb.parent.rpartition(" ")
         if parent:
-            # What hangs on a wider limb hangs further from its middle.
+            # A limb attached to a wider one starts farther from its middle.
             arm = start - drawn[parent].nodes[int(node)][:3]
             start = placed[numbers[parent]].nodes[int(node), :3] + growth[_group(parent)][1] * arm
-        nodes = _grown(nodes, start, *growth[_group(name)])
-        placed.append(_placed(limb, nodes, numbers.get(parent, -1), int(node or 0)))
+        longer, wider = growth[_group(name)]
+        lengthened = start + longer * (nodes[:, :3] - nodes[0, :3])
+        nodes = np.column_stack([lengthened, wider * nodes[:, 3]])
+        placed.append(_place(limb, nodes, numbers.get(parent, -1), int(node or 0)))
     return Body(tuple(placed))
 
 
 def _growth(plan: Sequence[Limb], individual: int) -> dict[str, Float[np.ndarray, "2"]]:
-    """Draw how much longer and wider limbs are: those whose names begin with the same word alike."""
+    """Draw how much longer and wider limbs are; names with the same first word vary together."""
     rng = np.random.default_rng(individual)
     groups = dict.fromkeys(_group(limb.name) for limb in plan)
     return {
@@ -101,7 +116,10 @@ def _sided(name: str, side: int) -> str:
 
 
 def _mirrored(limb: Limb, side: int) -> Limb:
-    """Return one of a pair: in a mirror a turn about y stays the same, and one about x or z changes its sense."""
+    """Return one limb of a mirrored pair.
+
+    In the mirror a rotation about y stays the same, and one about x or z changes its sense.
+    """
     nodes = tuple((x, side * y, z, radius) for x, y, z, radius in limb.nodes)
     swings = tuple(
         (node, (side * x, y, side * z), low, high) for node, (x, y, z), low, high in limb.swings
@@ -109,18 +127,12 @@ def _mirrored(limb: Limb, side: int) -> Limb:
     return limb._replace(parent=_sided(limb.parent, side), nodes=nodes, swings=swings)
 
 
-def _grown(
-    nodes: Float[np.ndarray, "k 4"], start: Float[np.ndarray, "3"], longer: float, wider: float
-) -> Float[np.ndarray, "k 4"]:
-    return np.column_stack([start + longer * (nodes[:, :3] - nodes[0, :3]), wider * nodes[:, 3]])
-
-
-def _placed(
+def _place(
     limb: Limb, nodes: Float[np.ndarray, "k 4"], parent: int, parent_node: int
 ) -> PlacedLimb:
-    """Draw a smooth curve through the nodes (Catmull and Rom 1974), in straight pieces."""
+    """Place a limb on a smooth curve through its nodes (Catmull and Rom 1974)."""
     curve = CubicHermiteSpline(np.arange(len(nodes)), nodes, np.gradient(nodes, axis=0))
-    pieces = curve(np.linspace(0, len(nodes) - 1, FINE * (len(nodes) - 1) + 1))
+    pieces = curve(np.linspace(0, len(nodes) - 1, PIECES_PER_SEGMENT * (len(nodes) - 1) + 1))
     squash = np.array(limb.squash, dtype=np.float64)
     return PlacedLimb(
         nodes, pieces, squash, float(limb.power), parent, parent_node, limb.hub, limb.swings
@@ -128,20 +140,21 @@ def _placed(
 
 
 def distance_to_body(points: Float[np.ndarray, "p 3"], body: Body) -> Float[np.ndarray, " p"]:
-    """Return about the signed distance to the skin: that to the nearest limb, and less where limbs melt together.
+    """Return the approximate signed distance to the skin: a smooth minimum over the limbs.
 
-    The minimum is smooth by a cubic in the differences, which counts only limbs that are within BLEND of the nearest.
+    The distance to the nearest limb is reduced by a cubic in the differences to other limbs, which
+    counts only limbs within BLEND of the nearest.
     """
-    apart = np.column_stack([distance_to_limb(points, limb)[0] for limb in body.limbs])
-    nearest = apart.min(axis=1)
-    melting = np.clip(1 - (apart - nearest[:, None]) / BLEND, 0, None) ** 3
-    return nearest - BLEND / 6 * (melting.sum(axis=1) - 1)
+    distances = np.column_stack([distance_to_limb(points, limb)[0] for limb in body.limbs])
+    nearest = distances.min(axis=1)
+    blended = np.clip(1 - (distances - nearest[:, None]) / BLEND, 0, None) ** 3
+    return nearest - BLEND / 6 * (blended.sum(axis=1) - 1)
 
 
 def nearest_limbs(
     points: Float[np.ndarray, "p 3"], body: Body
 ) -> tuple[Int[np.ndarray, " p"], Float[np.ndarray, " p"]]:
-    """Return the limb nearest to each point and the place along it, in nodes."""
+    """Return the limb nearest to each point and the position along it, in nodes."""
     columns = [distance_to_limb(points, limb) for limb in body.limbs]
     owner = np.argmin([apart for apart, _ in columns], axis=0)
     return owner, np.array([place for _, place in columns])[owner, np.arange(len(points))]
@@ -150,32 +163,35 @@ def nearest_limbs(
 def distance_to_limb(
     points: Float[np.ndarray, "p 3"], limb: PlacedLimb
 ) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
-    """Return about the signed distance to the skin of a limb, and the nearest place along it, in nodes.
+    """Return the approximate signed distance to a limb, and the position along it, in nodes.
 
-    Further than 2 BLEND from its box, the distance to the box stands in for it.
+    Farther than 2 BLEND from the box around the limb, the distance to that box is returned.
     """
-    centres, radii = limb.pieces[:, :3], limb.pieces[:, 3:]
-    low, high = (centres - radii).min(axis=0), (centres + radii).max(axis=0)
+    centers, radii = limb.pieces[:, :3], limb.pieces[:, 3:]
+    low, high = (centers - radii).min(axis=0), (centers + radii).max(axis=0)
     apart = np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0), axis=1)
     place = np.zeros(len(points))
     close = np.flatnonzero(apart < 2 * BLEND)
     piece, share = _nearest_piece(points[close], limb)
-    centre = limb.pieces[piece] + share[:, None] * (limb.pieces[piece + 1] - limb.pieces[piece])
-    apart[close] = _beyond_skin(points[close] - centre[:, :3], centre[:, 3], limb)
-    place[close] = (piece + share) / FINE
+    center = limb.pieces[piece] + share[:, None] * (limb.pieces[piece + 1] - limb.pieces[piece])
+    apart[close] = _distance_to_section(points[close] - center[:, :3], center[:, 3], limb)
+    place[close] = (piece + share) / PIECES_PER_SEGMENT
     return apart, place
 
 
 def _nearest_piece(
     points: Float[np.ndarray, "p 3"], limb: PlacedLimb
 ) -> tuple[Int[np.ndarray, " p"], Float[np.ndarray, " p"]]:
-    """Return the piece of a limb, as if it were round, whose skin is nearest, and how far along it."""
+    """Return the piece of a limb with the nearest skin, and the position along the piece, 0 to 1.
+
+    The cross-section is taken to be round.
+    """
     begins, radii = limb.pieces[:-1, :3], limb.pieces[:, 3]
     along = np.diff(limb.pieces[:, :3], axis=0)
     length2 = np.square(along).sum(axis=1)
     reach = _products(points, along) - (begins * along).sum(axis=1)
     share = np.clip(reach / length2, 0, 1)
-    # |p - b - s a|² with the squares taken apart: no array has both all points and all pieces and three coordinates.
+    # |p - b - s a|² is expanded, so that no array has the size points by pieces by coordinates.
     apart2 = (
         np.square(points).sum(axis=1)[:, None]
         - 2 * _products(points, begins)
@@ -190,17 +206,21 @@ def _nearest_piece(
 def _products(
     one: Float[np.ndarray, "p 3"], two: Float[np.ndarray, "s 3"]
 ) -> Float[np.ndarray, "p s"]:
-    # Not by a matrix product: nothing promises that its last digits are free of the number of threads.
+    # A matrix product by BLAS may change its last digits with the number of threads; einsum does
+    # not.
     return np.einsum("pi,si->ps", one, two)
 
 
-def _beyond_skin(
+def _distance_to_section(
     arm: Float[np.ndarray, "p 3"], radius: Float[np.ndarray, " p"], limb: PlacedLimb
 ) -> Float[np.ndarray, " p"]:
-    """Return the distance to the squashed ball of a radius, to first order: value over slope of the norm it is of."""
+    """Return the distance to the cross-section of a limb, a superellipsoid, to first order.
+
+    That is the value of the norm that defines it, minus the radius, divided by its slope.
+    """
     if limb.power == 2 and (limb.squash == 1).all():
         return np.sqrt(np.einsum("ij,ij->i", arm, arm)) - radius
     scaled = np.abs(arm) / limb.squash
-    size = np.maximum((scaled**limb.power).sum(axis=1) ** (1 / limb.power), TINY)
+    size = np.maximum((scaled**limb.power).sum(axis=1) ** (1 / limb.power), TINY_SIZE)
     slope = np.linalg.norm((scaled / size[:, None]) ** (limb.power - 1) / limb.squash, axis=1)
     return (size - radius) / np.maximum(slope, 0.5)

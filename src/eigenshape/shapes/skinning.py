@@ -11,18 +11,21 @@ from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
 
-STEPS = 3  # of diffusion for the narrowest bend
+# Implicit diffusion steps of the narrowest bend; wider bends take more steps of the same length.
+# Three steps are close to a Gaussian profile.
+STEPS = 3
 
 
 @dataclass(frozen=True, eq=False)
 class Joints:
-    """Where skin turns, the outermost joints first.
+    """The joints of a creature, the outermost first.
 
     Attributes
     ----------
     pivots, axes : (j, 3) float
+        A point and the unit direction of the axis of each joint.
     limits : (j, 2) float
-        Least and most angle, in radians.
+        Smallest and largest angle of each joint, in radians.
     follows : (n, j) float
         Share of the angle by which each vertex turns: 1 beyond the joint, 0 before it.
     """
@@ -33,12 +36,12 @@ class Joints:
     follows: Float[np.ndarray, "n j"]
 
 
-def diffused(
+def diffuse(
     mesh: TriangleMesh, values: Float[np.ndarray, "n j"], widths: Float[np.ndarray, " j"]
 ) -> Float[np.ndarray, "n j"]:
-    """Spread functions over a mesh of even triangles, as heat does, until a point has a given standard deviation.
+    """Diffuse functions on a mesh of even triangles, each by a given standard deviation in length.
 
-    Heat stays on the skin, so nothing leaks from one limb to another that is only near in space.
+    Diffusion stays on the skin, so nothing leaks to another limb that is only near in space.
     """
     edges = edge_table(mesh).edges
     ends = mesh.vertices[edges]
@@ -47,25 +50,24 @@ def diffused(
     links = sp.coo_array((np.ones(len(edges)), (one, two)), shape=(mesh.n_vertices,) * 2)
     links = links + links.T
     step = widths.min() ** 2 / STEPS
-    # Over six neighbours at one length, differences add up to 3/2 length² times the Laplacian; variance is twice time.
+    # With six neighbors at equal distance the sum of differences is 3/2 length² times the
+    # Laplacian, and the variance of diffused heat is twice the time.
     pencil = sp.eye_array(mesh.n_vertices) + step / (3 * length2) * (
         sp.diags_array(links.sum(axis=1)) - links
     )
     spread, n_steps = values.copy(), np.rint(widths**2 / step)
     with one_blas_thread():
-        solve = splu(
-            pencil.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
-        ).solve
-        for done in range(int(n_steps.max())):
-            going = n_steps > done
-            spread[:, going] = solve(spread[:, going])
+        factor = splu(pencil.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        for step_number in range(int(n_steps.max())):
+            unfinished = n_steps > step_number
+            spread[:, unfinished] = factor.solve(spread[:, unfinished])
     return spread
 
 
-def turned(
+def bend_at_joints(
     points: Float[np.ndarray, "n 3"], joints: Joints, angles: Float[np.ndarray, " j"]
 ) -> Float[np.ndarray, "n 3"]:
-    """Turn each point about each joint by its share of the joint's angle (Rodrigues)."""
+    """Rotate each point about each joint by its share of the angle (Rodrigues' formula)."""
     for pivot, axis, angle, share in zip(
         joints.pivots, joints.axes, angles, joints.follows.T, strict=True
     ):

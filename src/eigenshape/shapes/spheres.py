@@ -1,4 +1,4 @@
-"""Made-up spheres of any dimension, with points spread in several ways, and the projective plane."""
+"""Synthetic spheres with points distributed in several ways, and the projective plane."""
 
 from typing import SupportsIndex
 
@@ -14,35 +14,124 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.shapes.surfaces import icosphere
 
-GOLDEN = (1 + 5**0.5) / 2
-MOST = 10**7
+GOLDEN = (1 + 5**0.5) / 2  # golden ratio; steps of 1/GOLDEN of a turn never line up
+MOST_POINTS = 10**7  # the convex hull of more points takes gigabytes
 
 
 def fibonacci_sphere(n: SupportsIndex = 1000) -> TriangleMesh:
-    """Spread n points evenly over the unit sphere, along a spiral; eigenvalues are `sphere_eigenvalues(k)`."""
-    count = whole_number(n, "n", 6, MOST)
-    return _outward(_spiral(1 - 2 * (np.arange(count) + 0.5) / count))
+    """Make a triangle mesh of the unit sphere with n evenly distributed points on a spiral.
+
+    Parameters
+    ----------
+    n : int
+        Number of vertices, 6 to 10⁷.
+
+    Returns
+    -------
+    TriangleMesh
+        Closed and facing outward.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `n` is out of range.
+
+    See Also
+    --------
+    sphere_eigenvalues : The exact eigenvalues of the sphere.
+    icosphere, random_sphere, graded_sphere
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.shapes.fibonacci_sphere(100)
+    TriangleMesh(100 vertices, 196 faces)
+    """
+    count = whole_number(n, "n", 6, MOST_POINTS)
+    return _outward_hull(_spiral(1 - 2 * (np.arange(count) + 0.5) / count))
 
 
 def random_sphere(n: SupportsIndex = 1000, *, rng: np.random.Generator) -> TriangleMesh:
-    """Throw n points on the unit sphere, uniformly and independently."""
+    """Make a triangle mesh of the unit sphere with n independent, uniformly random points.
+
+    Parameters
+    ----------
+    n : int
+        Number of vertices, 20 to 10⁷.
+    rng : numpy.random.Generator
+        Source of random numbers.
+
+    Returns
+    -------
+    TriangleMesh
+        Closed and facing outward.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `n` is out of range.
+
+    See Also
+    --------
+    fibonacci_sphere : Evenly distributed points.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> es.shapes.random_sphere(100, rng=np.random.default_rng(0))
+    TriangleMesh(100 vertices, 196 faces)
+    """
     require_type(rng, np.random.Generator, "rng")
-    count = whole_number(n, "n", 20, MOST)
-    return _outward(_unit(rng.standard_normal((count, 3))))
+    count = whole_number(n, "n", 20, MOST_POINTS)
+    directions = rng.standard_normal((count, 3))
+    return _outward_hull(directions / np.linalg.norm(directions, axis=1, keepdims=True))
 
 
 def graded_sphere(n: SupportsIndex = 1000, *, ratio: float = 4.0) -> TriangleMesh:
-    """Spread n points over the unit sphere whose density falls linearly in z, by a ratio from the top to the bottom."""
-    count = whole_number(n, "n", 6, MOST)
+    """Make a triangle mesh of the unit sphere with more points near the top than near the bottom.
+
+    The density of the points is a linear function of z.
+
+    Parameters
+    ----------
+    n : int
+        Number of vertices, 6 to 10⁷.
+    ratio : float
+        Density at the top divided by the density at the bottom, 1 to 10⁶.
+
+    Returns
+    -------
+    TriangleMesh
+        Closed and facing outward.
+
+    Raises
+    ------
+    InvalidParameterError
+        If a number is out of range.
+
+    See Also
+    --------
+    fibonacci_sphere : The same with constant density.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> sphere = es.shapes.graded_sphere(100, ratio=4)
+    >>> int((sphere.vertices[:, 2] > 0).sum())
+    65
+    """
+    count = whole_number(n, "n", 6, MOST_POINTS)
     if not 1 <= ratio < 1e6:
         raise InvalidParameterError(f"ratio must lie in 1..1e6; it is {ratio}.")
-    # Density (1 + s z) / 2 has the distribution function ((1 + z) - s (1 - z²) / 2) / 2: a quadratic to be inverted.
+    # The density (1 + s z) / 2 has the distribution function ((1 + z) - s (1 - z²) / 2) / 2.
+    # Heights are found by inverting this quadratic.
     slope = (ratio - 1) / (ratio + 1)
     share = (np.arange(count) + 0.5) / count
     if slope == 0:
-        return _outward(_spiral(2 * share - 1))
+        return _outward_hull(_spiral(2 * share - 1))
     root = np.sqrt(1 - slope * (2 - slope - 4 * share))
-    return _outward(_spiral(np.clip((root - 1) / slope, -1, 1)))
+    return _outward_hull(_spiral(np.clip((root - 1) / slope, -1, 1)))
 
 
 def _spiral(heights: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
@@ -51,22 +140,52 @@ def _spiral(heights: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
     return np.column_stack([rings * np.cos(angles), rings * np.sin(angles), heights])
 
 
-def _outward(points: Float[np.ndarray, "n 3"]) -> TriangleMesh:
+def _outward_hull(points: Float[np.ndarray, "n 3"]) -> TriangleMesh:
     faces = sphere_hull(points).simplices.copy()
-    inside = points.mean(axis=0)  # the hull of few points may leave the origin out
+    # The mean of the points is inside their hull; for few points the origin may be outside.
+    inside = points.mean(axis=0)
     inward = np.linalg.det(points[faces] - inside) < 0
     faces[inward] = faces[inward][:, ::-1]
     return TriangleMesh(points, faces)
 
 
 def three_sphere(n: SupportsIndex = 1000) -> SimplicialMesh:
-    """Spread n points evenly over the unit sphere in R⁴ and join them by tetrahedra.
+    """Make a mesh of tetrahedra of the unit sphere in R⁴, with n evenly distributed points.
 
-    A lattice with two irrational steps on the tori of Hopf's fibration; eigenvalues are `sphere_eigenvalues(k, 3)`.
+    Parameters
+    ----------
+    n : int
+        Number of points, 20 to 10⁷.
+
+    Returns
+    -------
+    SimplicialMesh
+        Of dimension 3 in R⁴, closed.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `n` is out of range.
+
+    See Also
+    --------
+    sphere_eigenvalues : The exact eigenvalues, with ``dim=3``.
+
+    Notes
+    -----
+    The points are a lattice with two irrational steps on the tori of the Hopf fibration.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> sphere = es.shapes.three_sphere(100)
+    >>> sphere.n_points, sphere.dim, sphere.points.shape[1]
+    (100, 3, 4)
     """
-    count = whole_number(n, "n", 20, MOST)
+    count = whole_number(n, "n", 20, MOST_POINTS)
     places = np.arange(count)
-    share = (places + 0.5) / count  # sin² of the torus' angle is uniform
+    share = (places + 0.5) / count  # sin² of the angle that chooses the torus is uniform
+    # Steps 1/ρ and 1/ρ² with ρ the plastic number, 1.3247: the two-dimensional golden ratio.
     one, two = 2 * np.pi * places * 0.7548776662466927, 2 * np.pi * places * 0.5698402909980532
     near, far = np.sqrt(share), np.sqrt(1 - share)
     return sphere_hull(
@@ -77,42 +196,86 @@ def three_sphere(n: SupportsIndex = 1000) -> SimplicialMesh:
 
 
 def sphere_hull(points: ArrayLike) -> SimplicialMesh:
-    """Join points of a sphere around the origin of R^d, in any d ≥ 2, by the simplices of their convex hull.
+    """Make a mesh of points on a sphere in R^d, from the simplices of their convex hull.
+
+    Parameters
+    ----------
+    points : (n, d) float
+        Points on a sphere around the origin, d ≥ 2, in any length unit.
+
+    Returns
+    -------
+    SimplicialMesh
+        Of dimension d - 1. Its simplices are not oriented.
 
     Raises
     ------
     InvalidShapeError
-        If a point is not on the hull, as copies are not, or there is no hull with volume.
+        If a point is not a vertex of the hull, such as the second of two equal points, or the hull
+        has no volume.
+
+    See Also
+    --------
+    fibonacci_sphere, three_sphere
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.shapes.sphere_hull([[1, 0], [0, 1], [-1, 0], [0, -1]])
+    SimplicialMesh(4 points in R^2, 4 simplices of dimension 1)
     """
     rows = finite_rows(points, "points")
     try:
         hull = ConvexHull(rows)
     except (QhullError, ValueError) as err:
         raise InvalidShapeError(
-            f"Points of a sphere must have a hull with volume; these {len(rows)} have none."
+            f"Points of a sphere must have a convex hull with volume; these {len(rows)} have none."
         ) from err
     inside = np.setdiff1d(np.arange(len(rows)), hull.vertices)
     if inside.size:
         raise InvalidShapeError(
-            f"Points of a sphere must lie on their hull; point {inside[0]} is {rows[inside[0]].tolist()} "
-            f"({inside.size} such)."
+            f"Points of a sphere must lie on their hull; point {inside[0]} at "
+            f"{rows[inside[0]].tolist()} does not ({inside.size} such). Remove duplicate points."
         )
     return SimplicialMesh(rows, hull.simplices)
 
 
-def _unit(vectors: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "n d"]:
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
-
-
 def projective_plane(level: SupportsIndex = 3) -> SimplicialMesh:
-    """Embed the unit sphere with antipodes made one in R⁵, without stretching it: Veronese's surface.
+    """Make a triangle mesh of the projective plane in R⁵: the unit sphere with antipodes joined.
 
-    x ↦ (yz, xz, xy, (x² - y²)/2, (x² + y² - 2z²)/(2√3)) on an icosphere; eigenvalues are
-    `projective_plane_eigenvalues(k)`.
+    Parameters
+    ----------
+    level : int
+        Number of subdivisions of the icosphere whose antipodes are joined, 1 to 9.
+
+    Returns
+    -------
+    SimplicialMesh
+        Of dimension 2 in R⁵, closed, with 5·4^level + 1 points.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `level` is out of range.
+
+    See Also
+    --------
+    projective_plane_eigenvalues : The exact eigenvalues.
+
+    Notes
+    -----
+    The embedding is Veronese's surface, which keeps all lengths:
+    (x, y, z) ↦ (yz, xz, xy, (x² - y²)/2, (x² + y² - 2z²)/(2√3)).
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.shapes.projective_plane(1)
+    SimplicialMesh(21 points in R^5, 40 simplices of dimension 2)
     """
     sphere = icosphere(whole_number(level, "level", 1, 9))
     x, y, z = sphere.vertices.T
-    # Of each pair of antipodes the one that comes first stands for both.
+    # The first of two antipodes represents both.
     _, first, names = np.unique(
         _signless(sphere.vertices), axis=0, return_index=True, return_inverse=True
     )
@@ -125,6 +288,7 @@ def projective_plane(level: SupportsIndex = 3) -> SimplicialMesh:
 
 
 def _signless(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+    """Return points rounded, and negated so that antipodes are equal."""
     rounded = np.round(points, 9) + 0.0
     leading = np.argmax(rounded != 0, axis=1)
     signs = np.sign(rounded[np.arange(len(rounded)), leading])

@@ -1,23 +1,41 @@
-"""Made-up surfaces whose spectra are known."""
-
-from typing import overload
+"""Synthetic surfaces whose spectra are known."""
 
 import numpy as np
 from jaxtyping import Int
 
 from eigenshape._arrays import positive_values, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
-from eigenshape.geometry.subdivision import halve_simplices
-from eigenshape.geometry.topology import edge_table
+from eigenshape.geometry.subdivision import subdivide
 
 
 def icosphere(level: int = 3) -> TriangleMesh:
-    """Subdivide an icosahedron `level` times onto the unit sphere: 10·4^level + 2 vertices.
+    """Make a triangle mesh of the unit sphere by subdividing an icosahedron.
 
-    The sphere's eigenvalues are l(l+1), each 2l+1 times.
+    Parameters
+    ----------
+    level : int
+        Number of subdivisions, 0 to 9. The mesh has 10·4^level + 2 vertices.
+
+    Returns
+    -------
+    TriangleMesh
+        Closed, facing outward, with vertices on the unit sphere.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `level` is out of range.
+
+    See Also
+    --------
+    sphere_eigenvalues : The exact eigenvalues of the sphere.
+    fibonacci_sphere : A sphere with any number of vertices.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.icosphere(3)
+    TriangleMesh(642 vertices, 1280 faces)
     """
     whole_number(level, "level", 0, 9)
     mesh = _icosahedron()
@@ -40,7 +58,7 @@ def _icosahedron() -> TriangleMesh:
 
 
 def _faces_around_origin(points: np.ndarray) -> Int[np.ndarray, "f 3"]:
-    """Return the triangles of three mutually nearest points, turned outward."""
+    """Return the triangles of points that are nearest neighbors of each other, facing outward."""
     distance = np.linalg.norm(points[:, None] - points[None], axis=2)
     near = (distance < 1.01 * distance[distance > 0].min()) & (distance > 0)
     n = len(points)
@@ -57,37 +75,38 @@ def _faces_around_origin(points: np.ndarray) -> Int[np.ndarray, "f 3"]:
     return np.array(outward, dtype=np.int64)
 
 
-@overload
-def subdivide(mesh: TriangleMesh) -> TriangleMesh: ...
-@overload
-def subdivide(mesh: SimplicialMesh) -> SimplicialMesh: ...
-@overload
-def subdivide(mesh: MeshLike) -> Mesh: ...
-def subdivide(mesh: MeshLike) -> Mesh:
-    """Split each simplex at the middles of its edges: a triangle in four, which face as it does, in general in 2^m.
-
-    Nothing moves: it is the same shape with finer simplices.
-    """
-    mesh = as_simplicial(mesh)
-    if isinstance(mesh, TriangleMesh):
-        return _quartered(mesh)
-    return halve_simplices(mesh)
-
-
-def _quartered(mesh: TriangleMesh) -> TriangleMesh:
-    table = edge_table(mesh)
-    middles = mesh.vertices[table.edges].mean(axis=1)
-    a, b, c = mesh.faces.T
-    at_a, at_b, at_c = (table.face_edges + mesh.n_vertices).T
-    quarters = [(a, at_c, at_b), (b, at_a, at_c), (c, at_b, at_a), (at_a, at_b, at_c)]
-    faces = np.stack([np.column_stack(quarter) for quarter in quarters], axis=1).reshape(-1, 3)
-    return TriangleMesh(np.concatenate([mesh.vertices, middles]), faces)
-
-
 def torus(
     n_around: int = 48, n_across: int = 24, *, outer: float = 1.0, inner: float = 0.4
 ) -> TriangleMesh:
-    """Sweep a circle of radius `inner` around the z axis at distance `outer`, on a regular grid."""
+    """Make a triangle mesh of a torus around the z axis, on a regular grid of its two angles.
+
+    Parameters
+    ----------
+    n_around, n_across : int
+        Number of vertices around the axis and across the tube, at least 3 each.
+    outer, inner : float
+        Radius of the circle in the middle of the tube, and radius of the tube, in length.
+
+    Returns
+    -------
+    TriangleMesh
+        n_around · n_across vertices; closed and facing outward.
+
+    Raises
+    ------
+    InvalidParameterError
+        If a number is out of range or a radius is not positive.
+
+    See Also
+    --------
+    torus_quadrature : A quadrature of the same torus.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.shapes.torus(12, 6)
+    TriangleMesh(72 vertices, 144 faces)
+    """
     whole_number(n_around, "n_around", 3, 10**6)
     whole_number(n_across, "n_across", 3, 10**6)
     positive_values([outer, inner], "outer and inner")
@@ -110,7 +129,37 @@ def _wrapped_grid(rows: int, columns: int) -> Int[np.ndarray, "f 3"]:
 
 
 def grid(n_x: int = 20, n_y: int = 20, *, width: float = 1.0, height: float = 1.0) -> TriangleMesh:
-    """Triangulate a flat rectangle with n_x by n_y squares; its Neumann eigenvalues are π²(p²/w² + q²/h²)."""
+    """Make a triangle mesh of a flat rectangle, of n_x by n_y cells with two triangles each.
+
+    Parameters
+    ----------
+    n_x, n_y : int
+        Number of cells along x and y, at least 1 each.
+    width, height : float
+        Length of the sides along x and y.
+
+    Returns
+    -------
+    TriangleMesh
+        (n_x + 1)·(n_y + 1) vertices in the plane z = 0; vertex i·(n_y + 1) + j is the i-th along x
+        and the j-th along y.
+
+    Raises
+    ------
+    InvalidParameterError
+        If a number is out of range or a side is not positive.
+
+    See Also
+    --------
+    box_eigenvalues : The exact eigenvalues, with sides (width, height).
+    irregular_grid : A square with randomly moved vertices.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.shapes.grid(4, 2)
+    TriangleMesh(15 vertices, 16 faces)
+    """
     whole_number(n_x, "n_x", 1, 10**6)
     whole_number(n_y, "n_y", 1, 10**6)
     positive_values([width, height], "width and height")
@@ -125,13 +174,3 @@ def grid(n_x: int = 20, n_y: int = 20, *, width: float = 1.0, height: float = 1.
         [np.column_stack([here, below, across]), np.column_stack([here, across, right])]
     )
     return TriangleMesh(points, faces)
-
-
-def disjoint_union(*meshes: MeshLike) -> TriangleMesh:
-    """Put meshes into one, as separate components with their coordinates unchanged."""
-    if not meshes:
-        raise InvalidParameterError("disjoint_union must be given a mesh; it was given none.")
-    parts = [as_mesh(mesh, f"meshes[{index}]") for index, mesh in enumerate(meshes)]
-    starts = np.cumsum([0, *(mesh.n_vertices for mesh in parts)])[:-1]
-    faces = [mesh.faces + start for mesh, start in zip(parts, starts, strict=True)]
-    return TriangleMesh(np.concatenate([mesh.vertices for mesh in parts]), np.concatenate(faces))

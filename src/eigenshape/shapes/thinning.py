@@ -1,4 +1,4 @@
-"""Fewer vertices on a closed mesh of the same topology."""
+"""Decimation: fewer vertices on a closed mesh of the same topology."""
 
 import heapq
 import math
@@ -9,15 +9,18 @@ from jaxtyping import Float, Int
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
 
-FEWEST, MOST = 4, 8  # neighbours that a collapse may leave a vertex with
+# Numbers of neighbors that a collapse may leave a vertex with. Outside this range triangles become
+# slivers; in a regular mesh every vertex has 6.
+FEWEST_NEIGHBORS, MOST_NEIGHBORS = 4, 8
 
 
-def thinned(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh:
-    """Collapse the shortest edges of a closed manifold into their middles until it has as many vertices as asked for.
+def decimate(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh:
+    """Collapse the shortest edges of a closed manifold until it has at most `n_vertices` vertices.
 
-    An edge collapses only if its ends have two neighbours in common, so that the surface stays a manifold of the same
-    genus (the link condition: Dey, Edelsbrunner, Guha, Nekhayev 1999), and no vertex gets too few or too many
-    neighbours. Where no edge may collapse, vertices are left over.
+    An edge collapses to its midpoint if its ends have exactly two neighbors in common, so that the
+    surface stays a manifold of the same genus (the link condition: Dey, Edelsbrunner, Guha and
+    Nekhayev 1999), and if no vertex gets too few or too many neighbors. If no edge may collapse,
+    more vertices remain.
     """
     points, edges = mesh.vertices.tolist(), edge_table(mesh).edges.tolist()
     around: list[set[int]] = [set() for _ in points]
@@ -30,6 +33,7 @@ def thinned(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh:
     surplus = mesh.n_vertices - n_vertices
     while surplus > 0 and shortest:
         length, kept, gone = heapq.heappop(shortest)
+        # The heap still holds edges that have collapsed or changed their length since.
         out_of_date = gone not in around[kept] or length != math.dist(points[kept], points[gone])
         if out_of_date or not _may_collapse(around, kept, gone):
             continue
@@ -39,15 +43,15 @@ def thinned(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh:
         for other in sorted(around[kept]):
             heapq.heappush(shortest, (math.dist(points[kept], points[other]), kept, other))
         surplus -= 1
-    return _relabelled(np.array(points), mesh.faces, np.array(target))
+    return _relabel_faces(np.array(points), mesh.faces, np.array(target))
 
 
 def _may_collapse(around: list[set[int]], kept: int, gone: int) -> bool:
     common = around[kept] & around[gone]
     return (
         len(common) == 2
-        and FEWEST <= len(around[kept]) + len(around[gone]) - 4 <= MOST
-        and all(len(around[other]) > FEWEST for other in common)
+        and FEWEST_NEIGHBORS <= len(around[kept]) + len(around[gone]) - 4 <= MOST_NEIGHBORS
+        and all(len(around[other]) > FEWEST_NEIGHBORS for other in common)
     )
 
 
@@ -60,10 +64,10 @@ def _join(around: list[set[int]], kept: int, gone: int) -> None:
     around[gone] = set()
 
 
-def _relabelled(
+def _relabel_faces(
     points: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"], target: Int[np.ndarray, " n"]
 ) -> TriangleMesh:
-    """Let faces use what their corners have collapsed to, and drop those that have collapsed."""
+    """Replace the corners of faces by what they have collapsed to; remove collapsed faces."""
     while (target[target] != target).any():
         target = target[target]
     stays, number = np.unique(target, return_inverse=True)

@@ -51,7 +51,10 @@ def eliminate_blocked(front, width, pivots, times, blas):
         if end < width:
             _update(front, times, max(end - span, 0), end, min(end + span, width), blas[0])
     if width < height:
-        _update(front, times, 0, width, height, blas[0])
+        zero = np.int64(
+            0
+        )  # a literal 0 would be another type, for which `_update` is compiled again
+        _update(front, times, zero, width, height, blas[0])
     return True
 
 

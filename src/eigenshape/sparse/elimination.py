@@ -9,13 +9,14 @@ from jaxtyping import Float, Int
 from eigenshape.sparse import front_loops as fronts
 from eigenshape.sparse import symbolic_loops as symbolic
 from eigenshape.sparse.blas_loops import addresses
-from eigenshape.sparse.dissection_loops import dissect
+from eigenshape.sparse.dense_loops import LONG
+from eigenshape.sparse.dissection import dissect
 from eigenshape.sparse.lane_loops import LANES
 
 EPS = float(np.finfo(np.float64).eps)
 
 Indices = Int[np.ndarray, " ..."]
-Scratch = tuple[Float[np.ndarray, "n 8"], Float[np.ndarray, "t 8"]]
+Scratch = tuple[Float[np.ndarray, "n 8"], Float[np.ndarray, "t 8"], Float[np.ndarray, " p"]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,12 +82,16 @@ class SymmetricFactor:
         return solution
 
     def scratch(self) -> Scratch:
-        """Return fresh memory for solves: right-hand sides in the order of elimination, and those of one front.
+        """Return fresh memory for solves: right-hand sides in the order of elimination, those of one front, a panel.
 
         Whoever solves often keeps it, and shares it with no other thread: a factor is a value and holds none.
         """
         e = self.elimination
-        return np.empty((len(e.order), LANES)), np.empty((e.room[1], LANES))
+        return (
+            np.empty((len(e.order), LANES)),
+            np.empty((e.room[1], LANES)),
+            np.empty(fronts.NEAR * fronts.WIDE),
+        )
 
     def solve_lanes(
         self, right: Float[np.ndarray, "n 8"], out: Float[np.ndarray, "n 8"], scratch: Scratch
@@ -106,16 +111,13 @@ class SymmetricFactor:
         sums of its sizes: |xᵀEx| ≤ Σ r_i x_i², and r is returned.
         """
         e = self.elimination
-        weights, sizes, terms = (
-            np.empty_like(self.pivots),
-            np.empty_like(self.pivots),
-            np.empty(len(e.order), np.int64),
-        )
+        n, n_fronts = len(e.order), len(e.above)
+        weights, sizes, terms = np.empty(n), np.zeros(n), np.zeros(n, dtype=np.int64)
         fronts.column_sizes(e.first, e.begins, e.places, self.panels, weights)
         weights *= np.abs(self.pivots)
         fronts.row_sizes(e.first, e.begins, e.rows, e.places, self.panels, weights, sizes, terms)
-        lengths = np.empty(len(e.above), dtype=np.int64)
-        fronts.sum_lengths(e.first, e.begins, e.above, lengths)
+        lengths = np.full(n_fronts, LONG)
+        fronts.sum_lengths(e.first, e.begins, e.above, np.zeros(n_fronts, dtype=np.int64), lengths)
         bounds = np.empty_like(sizes)
         bounds[e.order] = (
             EPS * (np.minimum(terms, np.repeat(lengths, np.diff(e.first))) + 4) * sizes
@@ -125,30 +127,80 @@ class SymmetricFactor:
 
 def analyse(pattern: sp.csc_array) -> Elimination:
     """Order the elimination of a symmetric matrix, given by all its entries, and find the fronts of its factor."""
+    n = pattern.shape[0]
     indptr, indices = pattern.indptr.astype(np.int64), pattern.indices.astype(np.int64)
     order = dissect(indptr, indices)
-    parent = symbolic.elimination_tree(indptr, indices, order)
-    post = symbolic.postordered(parent)
-    order, renamed = order[post], np.empty_like(post)
-    renamed[post] = np.arange(len(post))
-    parent = np.where(parent[post] >= 0, renamed[parent[post]], -1)
-    first = symbolic.supernodes(parent, symbolic.column_counts(indptr, indices, order, parent))
-    begins, rows, above = symbolic.front_rows(indptr, indices, order, parent, first)
-    lower_ptr, lower_rows, source = _lower(indptr, indices, order)
-    places = fronts.panel_places(first, begins)
-    room = fronts.stack_size(first, begins, above)
+    parent = _parents(indptr, indices, order)
+    # Number the columns again so that every subtree is in one piece: supernodes are runs of columns.
+    post = np.empty(n, dtype=np.int64)
+    symbolic.postorder(parent, _unknown(n), _unknown(n), np.empty_like(post), post)
+    order = order[post]
+    parent = np.where(parent[post] >= 0, _inverse(post)[parent[post]], -1)
+    place = _inverse(order)
+    first, heights = _supernodes(indptr, indices, order, place, parent)
+    size = len(heights)
+    begins = np.concatenate([[0], np.cumsum(heights)])
+    rows, above = np.empty(begins[-1], dtype=np.int64), _unknown(size)
+    scratch = np.empty(n, dtype=np.int64), _unknown(size), _unknown(size), _unknown(n)
+    symbolic.find_front_rows(
+        indptr, indices, order, place, parent, first, begins, rows, above, *scratch
+    )
+    lower_ptr, lower_rows, source = _lower(indptr, indices, place)
+    places = _panel_places(np.diff(first), heights)
+    room = fronts.stack_size(first, begins, above, np.zeros(size, dtype=np.int64))
     return Elimination(
         order, first, begins, rows, above, places, room, lower_ptr, lower_rows, source
     )
 
 
-def _lower(indptr: Indices, indices: Indices, order: Indices) -> tuple[Indices, Indices, Indices]:
+def _unknown(n: int) -> Indices:
+    """Return -1 for each of n rows or fronts."""
+    return np.full(n, -1, dtype=np.int64)
+
+
+def _inverse(order: Indices) -> Indices:
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
+    return place
+
+
+def _parents(indptr: Indices, indices: Indices, order: Indices) -> Indices:
+    """Return the parent of each column of the factor; -1 at a root."""
+    parent = _unknown(len(order))
+    symbolic.find_parents(indptr, indices, order, _inverse(order), parent, _unknown(len(order)))
+    return parent
+
+
+def _supernodes(
+    indptr: Indices, indices: Indices, order: Indices, place: Indices, parent: Indices
+) -> tuple[Indices, Indices]:
+    """Return the first column of each supernode, n at the end; and the number of rows of its front."""
+    n = len(order)
+    counts = np.ones(n, dtype=np.int64)
+    symbolic.count_entries(indptr, indices, order, place, parent, _unknown(n), counts)
+    first, heights = np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int64)
+    scratch = np.empty(n, dtype=np.int64), np.zeros(n), np.ones(n, dtype=np.bool_)
+    size = symbolic.find_supernodes(parent, counts, first, heights, *scratch)
+    return first[: size + 1].copy(), heights[:size]
+
+
+def _panel_places(widths: Indices, heights: Indices) -> Indices:
+    """Return where the panels of each front begin among all entries: at most WIDE columns to a panel.
+
+    The panel that begins at column b of its front has the rows from b on.
+    """
+    full = widths // fronts.WIDE  # panels of WIDE columns; one of what remains comes last
+    above = fronts.WIDE * full
+    entries = above * heights - fronts.WIDE**2 * full * (full - 1) // 2
+    entries += (heights - above) * (widths - above)
+    return np.concatenate([[0], np.cumsum(entries)])
+
+
+def _lower(indptr: Indices, indices: Indices, place: Indices) -> tuple[Indices, Indices, Indices]:
     columns, rows = np.repeat(place, np.diff(indptr)), place[indices]
     kept = np.flatnonzero(rows >= columns)
     kept = kept[np.argsort(columns[kept], kind="stable")]
-    pointers = np.concatenate([[0], np.cumsum(np.bincount(columns[kept], minlength=len(order)))])
+    pointers = np.concatenate([[0], np.cumsum(np.bincount(columns[kept], minlength=len(place)))])
     return pointers, rows[kept], kept
 
 
@@ -164,6 +216,8 @@ def factorise(
     lower = e.lower_ptr, e.lower_rows, data[e.source]
     tree = e.first, e.begins, e.rows, e.above, e.places
     waiting, tallest = e.room
-    workspace = np.empty(waiting), np.empty(tallest**2), np.empty(tallest**2)
-    sound = fronts.factor_fronts(*lower, *tree, panels, pivots, workspace, addresses())
+    places = np.empty(len(e.order), dtype=np.int64), np.empty(len(e.above), dtype=np.int64)
+    workspace = np.empty(waiting), np.empty(tallest**2), np.empty(tallest**2), *places
+    children = np.bincount(e.above[e.above >= 0], minlength=len(e.above))
+    sound = fronts.factor_fronts(*lower, *tree, panels, pivots, workspace, children, addresses())
     return SymmetricFactor(e, panels, pivots) if sound else None

@@ -1,41 +1,28 @@
-"""Compiled loops of `elimination`: L D Lᵀ front by front, and solves with it."""
+"""Compiled loops of `elimination`: L D Lᵀ front by front, and solves with it.
+
+The caller allocates all arrays: compiling an allocation takes longer than compiling a small loop.
+"""
 
 from typing import no_type_check
-
-import numpy as np
 
 from eigenshape._compile import njit
 from eigenshape.sparse.dense_loops import LONG, NARROW, eliminate_blocked, eliminate_plain
 from eigenshape.sparse.lane_loops import LANES, subtract_four_sums, subtract_sum
 
-WIDE = 64  # columns to a panel of L
-SMALL = 40  # rows of a front up to which plain loops are the faster ones
+WIDE = 64  # columns to a panel of L: 32 rows of them are 16 KiB, half of the nearest cache
+SMALL = 40  # rows of a front up to which plain loops are the faster ones (measured)
 NEAR = 32  # rows of a panel that stay in the nearest cache
 
 
 @njit
 @no_type_check
-def panel_places(first, begins):
-    """Return where the panels of each front begin among all entries: at most WIDE columns to a panel."""
-    size = len(first) - 1
-    places = np.zeros(size + 1, dtype=np.int64)
-    for s in range(size):
-        rows, columns = begins[s + 1] - begins[s], first[s + 1] - first[s]
-        total = 0
-        for start in range(0, columns, WIDE):
-            total += (rows - start) * min(WIDE, columns - start)
-        places[s + 1] = places[s] + total
-    return places
+def stack_size(first, begins, above, waiting):
+    """Return the most numbers that updates waiting for their parents take, and the rows of the largest front.
 
-
-@njit
-@no_type_check
-def stack_size(first, begins, above):
-    """Return the most numbers that updates waiting for their parents take, and the rows of the largest front."""
-    size = len(first) - 1
-    waiting = np.zeros(size, dtype=np.int64)
+    `waiting` is scratch, filled with 0.
+    """
     now = most = tallest = 0
-    for s in range(size):
+    for s in range(len(above)):
         rows = begins[s + 1] - begins[s]
         tallest = max(tallest, rows)
         now -= waiting[s]
@@ -49,13 +36,12 @@ def stack_size(first, begins, above):
 
 @njit
 @no_type_check
-def sum_lengths(first, begins, above, lengths):
-    """Fill how many roundings a product may see in each front, on its way from below: at most LONG in its own sum.
+def sum_lengths(first, begins, above, children, lengths):
+    """Raise `lengths`, filled with LONG, to how many roundings a product may see in each front, on its way from below.
 
-    A front adds what each child left; then halves of its columns update others, LONG terms at a time.
+    A front adds what each child left; then halves of its columns update others, LONG terms at a time. `children` is
+    scratch, filled with 0.
     """
-    children = np.zeros(len(lengths), dtype=np.int64)
-    lengths[:] = LONG
     for s in range(len(lengths)):
         height, width = begins[s + 1] - begins[s], first[s + 1] - first[s]
         own = width
@@ -72,32 +58,44 @@ def sum_lengths(first, begins, above, lengths):
 @njit
 @no_type_check
 def factor_fronts(
-    lower_ptr, lower_rows, values, first, begins, rows, above, places, panels, pivots, room, blas
+    lower_ptr,
+    lower_rows,
+    values,
+    first,
+    begins,
+    rows,
+    above,
+    places,
+    panels,
+    pivots,
+    room,
+    children,
+    blas,
 ):
     """Fill panels and pivots with L and D of a matrix whose lower triangle is given by columns; tell if it could be.
 
     Multifrontal (Duff and Reid 1983), pivots in their order: a front gathers the entries of its columns and what its
     children left, eliminates its columns, and leaves the rest to its parent.
+
+    `room` is memory for the updates that wait, for two fronts, for a place of each row (n) and for the fronts that wait
+    (s); `children` counts those of each front.
     """
     size = len(first) - 1
-    stack, space, times = room
-    local = np.empty(len(pivots), dtype=np.int64)
-    n_children = np.zeros(size, dtype=np.int64)
-    for s in range(size):
-        if above[s] >= 0:
-            n_children[above[s]] += 1
-    waiting, n_waiting, top = np.empty(size, dtype=np.int64), 0, 0
+    stack, space, times, local, waiting = room
+    n_waiting = top = 0
     for s in range(size):
         low, high, start = first[s], first[s + 1], begins[s]
         height, width = begins[s + 1] - start, high - low
         front = space[: height * height].reshape(height, height)
-        front[:] = 0.0
+        for i in range(height):
+            for j in range(height):
+                front[i, j] = 0.0
         for i in range(height):
             local[rows[start + i]] = i
         for j in range(low, high):
             for at in range(lower_ptr[j], lower_ptr[j + 1]):
                 front[local[lower_rows[at]], j - low] += values[at]
-        for _ in range(n_children[s]):
+        for _ in range(children[s]):
             n_waiting -= 1
             child = waiting[n_waiting]
             skip = begins[child] + first[child + 1] - first[child]
@@ -138,8 +136,7 @@ def factor_fronts(
 def solve_fronts(order, first, begins, rows, places, panels, pivots, right, solution, room):
     """Solve for LANES right-hand sides (n, LANES); the solution may take the place of the right-hand sides."""
     n, size = len(pivots), len(first) - 1
-    lanes, gathered = room
-    near = np.empty(NEAR * WIDE)
+    lanes, gathered, near = room
     for i in range(n):
         for lane in range(LANES):
             lanes[i, lane] = right[order[i], lane]
@@ -175,7 +172,9 @@ def _forward(panels, at, columns, rows, lanes, gathered):
     for i in range(1, columns):
         subtract_sum(panels, at + i * columns, 1, 0, lanes, mine, i, lanes, mine + i)
     rest = height - columns
-    gathered[:rest] = 0.0
+    for i in range(rest):
+        for lane in range(LANES):
+            gathered[i, lane] = 0.0
     four = rest // 4 * 4
     for i in range(0, four, 4):
         subtract_four_sums(
@@ -229,20 +228,19 @@ def column_sizes(first, begins, places, panels, sizes):
         at, height, width = places[s], begins[s + 1] - begins[s], first[s + 1] - first[s]
         for block in range(0, width, WIDE):
             columns = min(WIDE, width - block)
-            sums = sizes[first[s] + block : first[s] + block + columns]
-            sums[:] = 0.0
+            mine = first[s] + block
+            for j in range(columns):
+                sizes[mine + j] = 0.0
             for _ in range(block, height):
                 for j in range(columns):
-                    sums[j] += abs(panels[at + j])
+                    sizes[mine + j] += abs(panels[at + j])
                 at += columns
 
 
 @njit
 @no_type_check
 def row_sizes(first, begins, rows, places, panels, weights, sizes, terms):
-    """Fill |L| weights, and how many entries of L each row has."""
-    sizes[:] = 0.0
-    terms[:] = 0
+    """Add |L| weights to `sizes`, and how many entries of L each row has to `terms`."""
     for s in range(len(first) - 1):
         at, start, height, width = (
             places[s],
@@ -252,11 +250,11 @@ def row_sizes(first, begins, rows, places, panels, weights, sizes, terms):
         )
         for block in range(0, width, WIDE):
             columns = min(WIDE, width - block)
-            mine = weights[first[s] + block : first[s] + block + columns]
+            mine = first[s] + block
             for i in range(block, height):
                 total = 0.0
                 for j in range(columns):
-                    total += abs(panels[at + j]) * mine[j]
+                    total += abs(panels[at + j]) * weights[mine + j]
                 sizes[rows[start + i]] += total
                 terms[rows[start + i]] += min(columns, i - block + 1)
                 at += columns

@@ -14,10 +14,13 @@ from eigenshape._errors import FileFormatError
 from eigenshape._files import replacing, require_regular
 from eigenshape.spectral.certificate import Certificate
 
+# Version of the file format; a file of another version is refused.
 FORMAT = 2
 ARRAYS = ("eigenvalues", "eigenvectors", "residuals")
 MASS = ("data", "indices", "indptr")
-ROUNDING = 1e-6  # of the largest eigenvalue: how far below 0 rounding may put one, as in Certificate.resolution
+# Negative eigenvalues down to minus this share of the largest are accepted in files, as
+# `Certificate.resolution` takes them for 0.
+ARCHIVE_ROUNDING = 1e-6
 
 
 def write_archive(
@@ -48,7 +51,7 @@ def read_archive(path: str | Path, key: str | None) -> dict[str, Any]:
     require_regular(Path(path))
     try:
         with Path(path).open("rb") as file:
-            _require_stored(path, file)
+            _require_uncompressed(path, file)
             with np.load(file, allow_pickle=False) as archive:
                 certificate = _certificate(path, json.loads(str(archive["head"])), key)
                 arrays = {name: archive[name] for name in ARRAYS}
@@ -66,7 +69,7 @@ def read_archive(path: str | Path, key: str | None) -> dict[str, Any]:
     return {**arrays, "mass": mass, "certificate": certificate}
 
 
-def _require_stored(path: str | Path, file: typing.BinaryIO) -> None:
+def _require_uncompressed(path: str | Path, file: typing.BinaryIO) -> None:
     """Refuse compressed parts: a spectrum has none, and a few bytes of them could fill the memory."""
     for part in zipfile.ZipFile(file).infolist():
         if part.compress_type != zipfile.ZIP_STORED:
@@ -132,7 +135,7 @@ def _require_sound(
         raise FileFormatError(
             f"{path} must hold ascending eigenvalues; number {at} is {values[at]} after {values[at - 1]}."
         )
-    if k and values[0] < -max(certificate.resolution, ROUNDING * values[-1]):
+    if k and values[0] < -max(certificate.resolution, ARCHIVE_ROUNDING * values[-1]):
         raise FileFormatError(
             f"{path} must hold eigenvalues of at least 0; number 0 is {values[0]}."
         )

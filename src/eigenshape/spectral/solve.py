@@ -20,15 +20,15 @@ from eigenshape.spectral.multilevel.start import require_accuracy, require_lumpe
 from eigenshape.spectral.solver.cache import content_key, keep, load_kept, require_writable
 from eigenshape.spectral.solver.certified import certified_pairs
 from eigenshape.spectral.solver.kernel_values import to_pencil
-from eigenshape.spectral.solver.pencil import normalise
+from eigenshape.spectral.solver.pencil import normalize
 from eigenshape.spectral.solver.result import spectrum_of
 from eigenshape.spectral.spectrum import Spectrum
 
 Method = Literal["certified", "approximate"]
 
-# Relative error of approximate eigenvalues. The default is what pictures and signatures need; below 1e-10 rounding
-# decides, and at such accuracies the certified solver is the quicker one anyway.
+# Relative error of approximate eigenvalues by default.
 DEFAULT_ACCURACY = 1e-3
+# Smallest `accuracy` and `max_residual` that can be requested; below it rounding dominates.
 LEAST_ACCURACY = 1e-10
 
 
@@ -175,7 +175,7 @@ def solve_spectrum(  # noqa: PLR0913 - one keyword for each choice: which pairs,
     report = progress or silent
     with one_blas_thread():
         report(0.0, "scaling the operator")
-        pencil = normalise(operator)
+        pencil = normalize(operator)
         if method == "certified":
             pairs, certificate = certified_pairs(pencil, wanted, interval, report)
         else:

@@ -1,4 +1,4 @@
-"""How stable a spectrum is: closeness of shapes, one-to-one correspondences, perturbation bounds (thesis ch. 3, 4)."""
+"""Stability of spectra: closeness of shapes, correspondences, bounds (thesis chapters 3, 4)."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Anchor-nodes spread over a shape, and the regions around them on it and on a changed shape (thesis 4.2.1)."""
+"""Anchor nodes spread over a shape, and the regions around them (thesis 4.2.1)."""
 
 from dataclasses import dataclass
 
@@ -17,25 +17,30 @@ from eigenshape.geometry.surface_points import SurfacePoints, place_points
 from eigenshape.operators.crouzeix_raviart import longest_edges
 from eigenshape.stability.perturbation import OUTSIDE, Perturbation
 
-SLACK = 1e-12  # of a distance: more than its rounding
+# Relative margin for the rounding of a distance; a larger one tests a few more nodes exactly.
+SLACK = 1e-12
 Points = Float[np.ndarray, "_ d"]
 
 
 @dataclass(frozen=True, eq=False)
 class AnchorNodes:
-    """A (δ, δ)-sample of a surface, among its vertices.
+    """A (δ, δ)-sample of a surface, chosen among its vertices.
 
     Attributes
     ----------
     vertices : (r,) int
-        In the order in which they were chosen. Any two are at least δ apart along the surface.
+        The nodes, in the order of choice. Any two are at least δ apart along the surface.
     points : (r, d) float
-        Where they lie, in length.
+        Coordinates of the nodes, in length.
     reached : float
-        Largest distance of a vertex to the nearest node, below δ, in length.
+        Largest distance of a vertex to the nearest node, in length; less than δ.
     cover : float
-        Distance to the nearest node that no point of the surface exceeds, in length: `reached`, and at most 1/√3 of the
-        longest edge from a point to a vertex. With short edges it is below δ too.
+        Upper bound of the distance of any point of the surface to the nearest node, in length:
+        `reached` plus 1/√3 of the longest edge.
+
+    See Also
+    --------
+    anchor_nodes : Choose nodes.
     """
 
     vertices: Int[np.ndarray, " r"]
@@ -45,10 +50,11 @@ class AnchorNodes:
 
 
 def anchor_nodes(mesh: MeshLike, delta: float, *, start: int = 0) -> AnchorNodes:
-    """Choose anchor-nodes: at least δ apart, and none of the surface farther than δ from all (thesis 4.2.1).
+    """Choose anchor nodes by farthest-point sampling (thesis 4.2.1).
 
-    Vertices stand for the points of the surface. The one that is farthest from all before, along the surface, is the
-    next, until it is less than δ away.
+    The next node is the vertex with the largest geodesic distance to all earlier nodes, until that
+    distance is less than δ. Nodes are then at least δ apart, and each vertex is less than δ from
+    one.
 
     Parameters
     ----------
@@ -66,9 +72,16 @@ def anchor_nodes(mesh: MeshLike, delta: float, *, start: int = 0) -> AnchorNodes
     Raises
     ------
     InvalidShapeError
-        If the mesh is no surface.
+        If the mesh is not a surface.
     InvalidParameterError
-        If δ is not positive, or `start` no vertex.
+        If δ is not positive, or `start` is not a vertex.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> nodes = es.stability.anchor_nodes(es.shapes.grid(4, 1), 0.9)
+    >>> nodes.vertices
+    array([0, 9, 1, 8])
     """
     mesh = as_simplicial(mesh)
     positive_values(delta, "delta")
@@ -89,14 +102,14 @@ def anchor_nodes(mesh: MeshLike, delta: float, *, start: int = 0) -> AnchorNodes
 
 
 def anchor_region(points: Points, nodes: Points, delta: float) -> Bool[np.ndarray, " _"]:
-    """Say which points of M are in R_M(A), within Euclidean δ of a set of nodes (thesis 4.2.1).
+    """Say which points of M are within Euclidean distance δ of some nodes (thesis 4.2.1).
 
     Parameters
     ----------
     points : (p, d) float
         Points of M, in length.
     nodes : (a, d) float
-        The set A.
+        The set A of nodes, in length.
     delta : float
         δ, in length.
 
@@ -108,23 +121,34 @@ def anchor_region(points: Points, nodes: Points, delta: float) -> Bool[np.ndarra
     ------
     InvalidParameterError
         If δ is not positive.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> points = np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]])
+    >>> es.stability.anchor_region(points, points[:1], 1.5)
+    array([ True,  True, False])
     """
     positive_values(delta, "delta")
-    return _nearest(points, nodes) <= delta
+    return _distance_to_nodes(points, nodes) <= delta
 
 
 def witness_region(
     perturbation: Perturbation, points: SurfacePoints, nodes: Points, delta: float, *, rho: float
 ) -> Bool[np.ndarray, " _"]:
-    """Say which points of N are in R_N⁺(A), the region that witnesses for the anchor-region R_M(A) (thesis 4.2.1).
+    """Say which points of N are in the witness region of an anchor region of M (thesis 4.2.1).
 
-    R_M(A) grown by ρδ is R_N, a region of M. Taken to N it is Φ(R_N) outside the anomalous regions, and all of those
-    Y_i whose X_i meets R_N. Here R_N is {x in M: d(x, A) ≤ (ρ+1)δ}, which holds {x: d(x, R_M) ≤ ρδ} by the triangle
-    inequality, is the same on a flat M, and lies in the same with ρ + 1 for ρ. What the thesis proves of R_N holds for
-    it: it has all within ρδ of R_M along M, and Observation 4.2.2 (i) is exact.
+    The witness region R_N⁺(A) belongs to the anchor region R_M(A) of `anchor_region`. R_N is the
+    region R_M(A), grown by ρδ. The witness region consists of Φ(R_N), outside the anomalous
+    regions, and of all regions Y_i whose X_i meets R_N. Here R_N = {x in M: d(x, A) ≤ (ρ+1)δ}. It
+    contains {x: d(x, R_M) ≤ ρδ} by the triangle inequality, equals it on a flat M, and lies in the
+    same set with ρ + 1 in place of ρ. The statements of the thesis hold for it: it contains all
+    points within ρδ of R_M along M, and Observation 4.2.2 (i) is exact.
 
-    Of Observation 4.2.2 (ii), d(a, y) ≤ (ρ+2)δ, the proof holds outside. A y in Y_i is in a ball of radius δ with some
-    x of X_i for which d(a, x) ≤ (ρ+1)δ, so that d(a, y) ≤ (ρ+3)δ, and not less in general.
+    The proof of Observation 4.2.2 (ii), d(a, y) ≤ (ρ+2)δ, is valid outside the anomalous regions. A
+    point y in Y_i lies in a ball of radius δ with some x of X_i for which d(a, x) ≤ (ρ+1)δ, so
+    d(a, y) ≤ (ρ+3)δ, and no better bound holds in general.
 
     Parameters
     ----------
@@ -132,7 +156,7 @@ def witness_region(
     points : SurfacePoints
         Points of N.
     nodes : (a, d) float
-        The set A.
+        The set A of nodes, in length.
     delta : float
         δ, in length.
     rho : float
@@ -145,14 +169,18 @@ def witness_region(
     Raises
     ------
     InvalidParameterError
-        If δ or ρ is not positive, or a point lies in no simplex of N.
+        If δ or ρ is not positive, or a point is in no simplex of N.
+
+    See Also
+    --------
+    correspondence_graph : Join points by witness regions.
     """
     require_type(perturbation, Perturbation, "perturbation")
     require_type(points, SurfacePoints, "points")
     reach = (positive_values(rho, "rho")[0] + 1) * positive_values(delta, "delta")[0]
     labels, before = preimages(perturbation, points)
     inside = np.zeros(points.n_points, dtype=bool)
-    inside[labels == OUTSIDE] = _nearest(before, nodes) <= reach
+    inside[labels == OUTSIDE] = _distance_to_nodes(before, nodes) <= reach
     met = np.any(regions_met(perturbation, nodes, reach), axis=0)
     inside[labels != OUTSIDE] = np.take(met, labels[labels != OUTSIDE])
     return inside
@@ -161,19 +189,21 @@ def witness_region(
 def preimages(
     perturbation: Perturbation, points: SurfacePoints
 ) -> tuple[Int[np.ndarray, " q"], Float[np.ndarray, "k d"]]:
-    """Return the region of each point of N, and Φ⁻¹ of those outside: in the same place of the corresponding simplex.
+    """Return the region of each point of N, and Φ⁻¹ of the points outside the regions.
+
+    Φ⁻¹ keeps the barycentric coordinates and takes the corresponding simplex.
 
     Raises
     ------
     InvalidParameterError
-        If a point lies in no simplex of N.
+        If a point is in no simplex of N.
     """
     n = len(perturbation.regions_two)
     wrong = np.flatnonzero((points.simplices < 0) | (points.simplices >= n))
     if wrong.size:
         raise InvalidParameterError(
-            f"Points must lie on the second shape, in its simplices 0..{n - 1}; point {wrong[0]} is in "
-            f"{points.simplices[wrong[0]]}."
+            f"Points must lie on the second shape, in its simplices 0..{n - 1}; "
+            f"point {wrong[0]} is in {points.simplices[wrong[0]]}."
         )
     labels = perturbation.regions_two[points.simplices]
     counterpart = np.full(n, OUTSIDE)
@@ -186,10 +216,11 @@ def preimages(
 
 
 def regions_met(perturbation: Perturbation, nodes: Points, reach: float) -> Bool[np.ndarray, "_ r"]:
-    """Say which regions X_i have a point within reach of each node.
+    """Say, for each node, which regions X_i have a point within reach.
 
-    A corner within reach says so. The squared distance to a simplex is at most the squared radius of a ball around it
-    less than that to its nearest corner, so that few nodes are left to be told by the simplices.
+    A corner within reach is sufficient. The squared distance of a node to a simplex is less than
+    that to its nearest corner by at most the squared length of its longest edge, so the distance to
+    simplices is computed for few nodes.
     """
     mesh, found = perturbation.one, np.empty((len(nodes), perturbation.n_regions), dtype=bool)
     for region in range(perturbation.n_regions):
@@ -203,11 +234,10 @@ def regions_met(perturbation: Perturbation, nodes: Points, reach: float) -> Bool
         unsure = np.flatnonzero(~found[:, region] & np.isfinite(away))
         for node, point in zip(unsure, nodes[unsure] / scale, strict=True):
             near = some[(np.linalg.norm(some - point, axis=2) <= farthest).any(axis=1)]
-            found[node, region] = (
-                squared_distances(point[None], near).min(initial=np.inf) <= within**2
-            )
+            least = squared_distances(point[None], near).min(initial=np.inf)
+            found[node, region] = least <= within**2
     return found
 
 
-def _nearest(points: Points, nodes: Points) -> Float[np.ndarray, " _"]:
+def _distance_to_nodes(points: Points, nodes: Points) -> Float[np.ndarray, " _"]:
     return cKDTree(nodes).query(points)[0]

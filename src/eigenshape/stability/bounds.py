@@ -1,4 +1,4 @@
-"""How far apart eigenvalues of two operators can be at most, and at which heat times they can be trusted."""
+"""Bounds for the change of eigenvalues, and the heat times at which eigenvalues are reliable."""
 
 from dataclasses import dataclass
 
@@ -14,22 +14,31 @@ from eigenshape._typing import ArrayLike
 from eigenshape.operators.kernel import EDGE_FACTOR, LAST
 from eigenshape.operators.laplacian import Laplacian
 
-DENSE = 64  # points, up to which all eigenvalues of the difference are taken
+# Points up to which the norm comes from a dense eigensolver: Lanczos' method needs more points than
+# vectors.
+DENSE = 64
+# Largest number of iterations of Lanczos' method; one that needs more is an error.
 MOST_STEPS = 3000
-TOLERANCE = 1e-6  # of the norm
+# Relative accuracy of the norm.
+TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
 class WeylBound:
-    """How far any eigenvalue of one operator is from that of the same number of the other, at most.
+    """Upper bounds for the difference of two eigenvalues of the same number.
 
     Attributes
     ----------
     norm : float
-        ‖D‖₂ of D = S - S', S = B^(-1/2) W B^(-1/2), in 1/length²: what Weyl's theorem asks for, found by Lanczos'
-        method, which errs downwards by a share of 1e-6 or so.
+        ‖D‖₂ of D = S - S' with S = B^(-1/2) W B^(-1/2), in 1/length²: the bound of Weyl's theorem.
+        It is computed by Lanczos' method, and may be too small by a relative error of about 1e-6.
     proven : float
-        The largest row sum of |D|, √(‖D‖₁ ‖D‖_∞) as in the proof of Theorem 4.3.1: never below the norm.
+        Largest row sum of |D|, √(‖D‖₁ ‖D‖_∞) as in the proof of Theorem 4.3.1, in 1/length². It is
+        never below the norm.
+
+    See Also
+    --------
+    weyl_bound : Compute the bounds.
     """
 
     norm: float
@@ -38,14 +47,16 @@ class WeylBound:
 
 @one_blas_thread()
 def weyl_bound(one: Laplacian, two: Laplacian, partners: ArrayLike | None = None) -> WeylBound:
-    """Bound |λ_i - ω_i| for all eigenvalues of two operators on as many points (Weyl 1912; thesis 4.3).
+    """Bound |λ_i - ω_i| for all eigenvalues of two operators (Weyl 1912; thesis 4.3).
 
     Parameters
     ----------
     one, two : Laplacian
-        With diagonal mass, not corrected: the bound is for the eigenvalues of the pencils.
+        On the same number of points, with diagonal mass and without correction: the bound is for
+        the eigenvalues of the pencils.
     partners : (n,) int, optional
-        The point of `two` that belongs to each point of `one`, each once; by default the one of the same number.
+        For each point of `one`, the corresponding point of `two`, without duplicates. By default,
+        the point of the same number.
 
     Returns
     -------
@@ -55,16 +66,24 @@ def weyl_bound(one: Laplacian, two: Laplacian, partners: ArrayLike | None = None
     Raises
     ------
     InvalidParameterError
-        If the operators differ in size, one is corrected or has a mass that is not diagonal, or `partners` are no
-        permutation.
+        If the operators differ in size, one is corrected or has a mass that is not diagonal, or
+        `partners` is not a permutation.
     ConvergenceError
-        If Lanczos' method does not settle.
+        If Lanczos' method does not converge.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> one = es.cotangent_laplacian(es.icosphere(2))
+    >>> es.stability.weyl_bound(one, one).norm
+    0.0
     """
     require_type(one, Laplacian, "one")
     require_type(two, Laplacian, "two")
     if one.n_points != two.n_points:
         raise InvalidParameterError(
-            f"Weyl's bound takes operators on as many points; they have {one.n_points} and {two.n_points}."
+            "Weyl's bound needs operators on the same number of points; "
+            f"they have {one.n_points} and {two.n_points}."
         )
     order = _permutation(partners, two.n_points)
     first, second = _symmetric(one, "one"), _symmetric(two, "two")
@@ -77,14 +96,15 @@ def _permutation(partners: ArrayLike | None, n: int) -> np.ndarray:
     if partners is None:
         return np.arange(n)
     order = whole_numbers(partners, "partners", 0, n - 1)
-    times = np.bincount(order, minlength=n)
-    if len(order) != n or times.max() > 1:
-        fact = (
-            f"there are {len(order)} of {n}"
-            if len(order) != n
-            else f"point {times.argmax()} has {times.max()}"
+    if len(order) != n:
+        raise InvalidParameterError(
+            f"partners must name each point once; there are {len(order)} of {n}."
         )
-        raise InvalidParameterError(f"partners must name each point once; {fact}.")
+    times = np.bincount(order, minlength=n)
+    if times.max() > 1:
+        raise InvalidParameterError(
+            f"partners must name each point once; point {times.argmax()} has {times.max()}."
+        )
     return order
 
 
@@ -92,15 +112,19 @@ def _symmetric(laplacian: Laplacian, name: str) -> sp.csr_array:
     """Return B^(-1/2) W B^(-1/2)."""
     if laplacian.kernel is not None and laplacian.kernel.corrected:
         raise InvalidParameterError(
-            f"Weyl's bound is for the eigenvalues of a pencil; those of {name} are corrected. Build it without correct."
+            "Weyl's bound is for the eigenvalues of a pencil; "
+            f"those of {name} are corrected. Build it with correct=None."
         )
     if laplacian.mass.nnz > laplacian.n_points:
-        raise InvalidParameterError(f"Weyl's bound takes a diagonal mass; that of {name} is not.")
+        raise InvalidParameterError(
+            f"Weyl's bound needs a diagonal mass; that of {name} is not. Build it with lumped mass."
+        )
     roots = sp.diags_array(1 / np.sqrt(laplacian.mass.diagonal()))
     return (roots @ laplacian.stiffness @ roots).tocsr()
 
 
 def _norm(matrix: sp.csr_array) -> float:
+    """Return the largest absolute eigenvalue."""
     n = matrix.shape[0]
     if n <= DENSE:
         return float(np.abs(np.linalg.eigvalsh(matrix.toarray())).max())
@@ -118,21 +142,26 @@ def _norm(matrix: sp.csr_array) -> float:
         )
     except ArpackNoConvergence as err:
         raise ConvergenceError(
-            f"The norm of a difference of operators was not found in {MOST_STEPS} steps."
+            "The norm of the difference of two operators must converge; "
+            f"it was not found in {MOST_STEPS} steps of Lanczos' method."
         ) from err
     return size * float(np.abs(values[0]))
 
 
 @dataclass(frozen=True)
 class TimeRange:
-    """The heat times at which the lowest eigenvalues of a kernel can be trusted.
+    """Range of heat times at which the lowest eigenvalues of a kernel are reliable.
 
     Attributes
     ----------
     low, high : float
-        In length²; none can be trusted where low > high.
+        Smallest and largest admissible time, in length². The range is empty if low > high.
     reach : float
-        The least at which a kernel reaches the neighbours, in length².
+        Smallest time at which the kernel reaches neighboring points, in length².
+
+    See Also
+    --------
+    admissible_times : Compute the range.
     """
 
     low: float
@@ -141,50 +170,63 @@ class TimeRange:
 
     @property
     def low_reason(self) -> str:
-        """What asks for the least: "closeness", t ≥ δ² (Theorem 4.1.1), or "spacing"."""
+        """What determines `low`: "closeness", t ≥ δ² (Theorem 4.1.1), or "spacing" of points."""
         return "closeness" if self.low > self.reach else "spacing"
 
     @property
     def empty(self) -> bool:
-        """Whether no heat time serves."""
+        """Whether no heat time is admissible."""
         return self.low > self.high
 
     def explain(self) -> str:
-        """Say it in plain words."""
+        """Describe the range in plain words."""
         smaller = {
-            "closeness": "smaller ones hear the change and not the shape, as t is under δ²",
-            "spacing": "smaller ones do not reach from point to point",
+            "closeness": "smaller times, below δ², measure the change and not the shape",
+            "spacing": "at smaller times the kernel does not reach from point to point",
         }[self.low_reason]
         low = f"{self.low:.3g} ({smaller})"
-        high = f"{self.high:.3g} (larger ones press the last eigenvalues into what a kernel cannot tell apart)"
+        high = f"{self.high:.3g} (at larger times the kernel cannot separate the last eigenvalues)"
         if self.empty:
-            return f"No heat time serves: it would have to be over {low} and under {high}."
-        return f"Trust heat times from {low} to {high}."
+            return f"No heat time is reliable: it would have to be above {low} and below {high}."
+        return f"Reliable heat times are from {low} to {high}."
 
 
 def admissible_times(
     *, delta: float, spacing: float, eigenvalue: float, corrected: bool = False
 ) -> TimeRange:
-    """Say at which heat times the eigenvalues of a kernel up to a given one can be trusted.
+    """Compute the heat times at which the eigenvalues of a kernel, up to a given one, are reliable.
 
-    At least δ² (Theorem 4.1.1 asks for more than any δ^(2-ε)), and at least what makes the width h = 2√t twice the
-    spacing (narrower kernels lose 5 to 20 % on irregular points). At most what keeps the last eigenvalue under the
-    essential spectrum 1/(2t) (thesis, Claim 3.2.2), or, corrected, tλ where the correction can still tell.
+    The smallest time is δ² (Theorem 4.1.1 needs more than any δ^(2-ε)), and at least the time at
+    which the width h = 2√t is twice the spacing (narrower kernels lose 5 to 20 % on irregular
+    points). The largest time keeps the last eigenvalue below the essential spectrum 1/(2t) (thesis,
+    Claim 3.2.2); for a corrected kernel, it keeps tλ within the range of the correction.
 
     Parameters
     ----------
     delta : float
-        How far points move, in length; 0 where nothing does.
+        Largest displacement of a point, in length; 0 if no point moves.
     spacing : float
-        Mean distance of neighbours, in length.
+        Mean distance of neighboring points, in length.
     eigenvalue : float
-        Of the Laplace operator, the last one asked for, in 1/length².
+        Largest eigenvalue of interest of the Laplace operator, in 1/length².
     corrected : bool
+        Whether the eigenvalues of the kernel are corrected for bias.
+
+    Returns
+    -------
+    TimeRange
 
     Raises
     ------
     InvalidParameterError
-        If a value is not positive and finite (delta may be 0).
+        If a value is not positive and finite (`delta` may be 0).
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> times = es.stability.admissible_times(delta=0.2, spacing=0.1, eigenvalue=5.0)
+    >>> round(times.low, 6), round(times.high, 6), times.low_reason
+    (0.04, 0.1, 'closeness')
     """
     positive_values([spacing, eigenvalue], "spacing and eigenvalue")
     if delta:

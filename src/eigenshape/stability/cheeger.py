@@ -1,4 +1,4 @@
-"""How narrow the narrowest neck of a surface is: estimates of its isoperimetric constant."""
+"""Estimates of the isoperimetric (Cheeger) constant of a surface: how narrow its neck is."""
 
 from dataclasses import dataclass
 from typing import SupportsIndex
@@ -14,27 +14,41 @@ from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.spectral.spectrum import Spectrum
 
-N_LEVELS = 128  # of each kind, and again between the best one's neighbours
+# Levels of each kind (evenly spaced, and quantiles), and again between the neighbors of the best
+# one. Time grows in proportion.
+N_LEVELS = 128
+# Eigenfunctions whose level lines are tried. More find necks between smaller parts.
 N_MODES = 6
+# An eigenvalue 1 below this share of the last eigenvalue, plus its residual, counts as zero: the
+# mesh is disconnected.
+LEAST_RELATIVE_VALUE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class CheegerEstimate:
-    """What is known of μ, the least ratio of a cut's length to the smaller of the two areas that it parts.
+    """Bounds for the isoperimetric constant μ of a surface.
+
+    μ is the smallest ratio of the length of a cut to the smaller of the two areas that it
+    separates.
 
     Attributes
     ----------
     upper : float
-        The least ratio among the cuts that were tried: μ is at most this, in 1/length. Times √area it is the μ of
-        Theorem 4.2.1, whose manifold has volume 1.
+        Smallest ratio among the cuts that were tried, in 1/length; μ is at most this. Multiplied by
+        √area it is the μ of Theorem 4.2.1, whose manifold has volume 1.
     spectral : float
         2√λ₁ ≥ μ, Cheeger's inequality, in 1/length.
     lower : float
-        Buser's inequality λ₁ ≤ 2aμ + 10μ² solved for μ, with the Gaussian curvature ≥ -a²; 0 where that is not told.
+        Lower bound of μ in 1/length: Buser's inequality λ₁ ≤ 2aμ + 10μ² solved for μ, for a
+        Gaussian curvature of at least -a²; 0 if no curvature was given.
     mode : int
         Number of the eigenfunction whose level line is the best cut.
     part : (n,) bool
-        Vertices on its higher side.
+        Vertices on the higher side of the best cut.
+
+    See Also
+    --------
+    cheeger_estimate : Compute the bounds.
     """
 
     upper: float
@@ -51,37 +65,51 @@ def cheeger_estimate(
     n_modes: SupportsIndex = N_MODES,
     least_curvature: float | None = None,
 ) -> CheegerEstimate:
-    """Estimate the isoperimetric constant of a closed surface (thesis 4.1; Cheeger 1970, Buser 1982).
+    """Estimate the isoperimetric constant of a closed surface (thesis 4.1).
 
-    Level lines of the first eigenfunctions are tried as cuts: their lengths and the areas that they part are exact on
-    the flat faces, so `upper` bounds the constant of the polyhedral surface. On a surface with boundary, lines end
-    there, and what lies along the boundary is no cut.
+    Bounds are those of Cheeger (1970) and Buser (1982). Level lines of the first eigenfunctions are
+    tried as cuts. Their lengths, and the areas that they separate, are exact on the flat faces, so
+    `upper` bounds the constant of the polyhedral surface. On a surface with boundary, level lines
+    end at the boundary, whose own edges do not count.
 
     Parameters
     ----------
     mesh : MeshLike
-        In one piece.
+        A connected mesh.
     spectrum : Spectrum
-        Of the mesh, from number 0 on, e.g. of `cotangent_laplacian(mesh)`.
+        Spectrum of the mesh from number 0 on, for example of `cotangent_laplacian(mesh)`.
     n_modes : int
-        Eigenfunctions above the constant to try; fewer where the spectrum has fewer.
+        Number of eigenfunctions to try, without the constant one; fewer if the spectrum has fewer.
     least_curvature : float, optional
-        Of the smooth surface, in 1/length²; for `lower`.
+        Least Gaussian curvature of the smooth surface, in 1/length², for `lower`.
+
+    Returns
+    -------
+    CheegerEstimate
 
     Raises
     ------
     InvalidParameterError
-        If the spectrum is that of another shape, begins higher up, holds the constant alone, or tells that the mesh
-        is in several pieces (then μ = 0).
+        If the spectrum belongs to another shape, does not begin at number 0 or has fewer than two
+        eigenvalues, or if the mesh is disconnected (then μ = 0).
+
+    Examples
+    --------
+    The best cut of the unit sphere is the equator, of length 2π and with areas 2π, so μ = 1:
+
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(3)
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(mesh), 4)
+    >>> round(es.stability.cheeger_estimate(mesh, spectrum).upper, 1)
+    1.0
     """
     mesh = as_mesh(mesh)
     require_type(spectrum, Spectrum, "spectrum")
     values = _first_values(mesh, spectrum)
     count = min(whole_number(n_modes, "n_modes", 1), len(values) - 1)
-    cuts = [
+    upper, level, mode = min(
         (*_best_cut(mesh, spectrum.eigenvectors[:, mode]), mode) for mode in range(1, count + 1)
-    ]
-    upper, level, mode = min(cuts)
+    )
     a = np.sqrt(max(-least_curvature, 0.0)) if least_curvature is not None else np.inf
     lower = (np.sqrt(a**2 + 10 * values[1]) - a) / 10 if np.isfinite(a) else 0.0
     part = frozen(spectrum.eigenvectors[:, mode] > level)
@@ -92,28 +120,32 @@ def _first_values(mesh: TriangleMesh, spectrum: Spectrum) -> Float[np.ndarray, "
     values, n_vertices = spectrum.eigenvalues, len(spectrum.eigenvectors)
     if n_vertices != mesh.n_vertices:
         raise InvalidParameterError(
-            f"The spectrum must be that of the mesh; it has {n_vertices} points, the mesh {mesh.n_vertices} vertices."
+            "The spectrum must be that of the mesh; "
+            f"it has {n_vertices} points, the mesh {mesh.n_vertices} vertices."
         )
     if spectrum.certificate.first or len(values) < 2:
         raise InvalidParameterError(
-            f"Cuts need the spectrum from number 0 on, with two eigenvalues at least; it begins at number "
-            f"{spectrum.certificate.first} and holds {len(values)}."
+            "The spectrum must begin at number 0 and have at least two eigenvalues; it begins at "
+            f"number {spectrum.certificate.first} and holds {len(values)}."
         )
-    if values[1] <= spectrum.residuals[1] + 1e-9 * values[-1]:
+    if values[1] <= spectrum.residuals[1] + LEAST_RELATIVE_VALUE * values[-1]:
         raise InvalidParameterError(
-            f"The isoperimetric constant is 0 where a mesh falls into pieces; eigenvalue 1 is {values[1]:.3g}."
+            "The mesh must be connected; eigenvalue 1 is "
+            f"{values[1]:.3g}, so it falls into pieces and the constant is 0. "
+            "Take one component of it."
         )
     return values
 
 
 def _best_cut(mesh: TriangleMesh, function: Float[np.ndarray, " n"]) -> tuple[float, float]:
-    """Return the least ratio of length to smaller area among level lines, and its level."""
+    """Return the smallest ratio of length to smaller area among level lines, and its level."""
     corners = np.sort(function[mesh.faces], axis=1)
     areas = face_areas(mesh)
     slopes = _slopes(mesh, function, areas)
     shares = np.linspace(0, 1, N_LEVELS + 2)[1:-1]
     low, high = function.min(), function.max()
-    # Evenly spaced levels meet necks, which have few vertices and much slope; quantiles meet the rest.
+    # Evenly spaced levels sample necks, which have few vertices and a steep slope; quantiles sample
+    # the rest.
     levels = np.union1d(np.quantile(function, shares), low + (high - low) * shares)
     best = int(np.argmin([_ratio(corners, areas, slopes, level) for level in levels]))
     near = levels[max(best - 1, 0) : best + 2]
@@ -129,7 +161,7 @@ def _slopes(
     """Return |∇f| on each face, in value/length."""
     p, q, r = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
     a, b, c = (function[mesh.faces[:, corner]][:, None] for corner in range(3))
-    # f is constant along a(r - q) + b(p - r) + c(q - p), which is as long as the gradient times twice the area.
+    # f is constant along a(r - q) + b(p - r) + c(q - p), whose length is |∇f| times twice the area.
     return np.linalg.norm(a * (r - q) + b * (p - r) + c * (q - p), axis=1) / (2 * areas)
 
 
@@ -139,7 +171,7 @@ def _ratio(
     slopes: Float[np.ndarray, " f"],
     level: float,
 ) -> float:
-    """Return length over smaller area of the line at a level; corners hold ascending values."""
+    """Return the length of a level line divided by the smaller area; corner values ascend."""
     low, middle, high = corners.T
     lower = (low < level) & (level <= middle)
     upper = (middle < level) & (level < high)
@@ -147,12 +179,12 @@ def _ratio(
     length = 0.0
     for chosen, end, other in ((lower, low, middle), (upper, high, middle)):
         reach, spread = np.abs(level - end[chosen]), high[chosen] - low[chosen]
-        # Between its lowest corner and the middle one, the part of a triangle below a level is similar to that corner.
+        # Between its lowest and its middle corner, a level line cuts off a smaller triangle, whose
+        # area is the product of the shares of the two sides that it meets.
         share = reach / np.abs(other[chosen] - end[chosen]) * (reach / spread)
         below[chosen] = areas[chosen] * (share if end is low else 1 - share)
         length += float((2 * areas[chosen] * slopes[chosen] * share / reach).sum())
     part = float(below.sum())
     smaller = min(part, float(areas.sum()) - part)
-    return (
-        length / smaller if smaller > 0 else np.inf
-    )  # a level at a vertex of few faces may part nothing
+    # A level at an extremal vertex may separate nothing.
+    return length / smaller if smaller > 0 else np.inf

@@ -1,4 +1,4 @@
-"""How close two shapes are: the least δ of thesis 3.1 and 4.1."""
+"""Closeness of two shapes: the smallest δ of thesis 3.1 and 4.1."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -22,26 +22,32 @@ Limit = Literal["nothing", "displacement", "Jacobian", "ball", "volume"]
 
 @dataclass(frozen=True, eq=False)
 class Closeness:
-    """What condition C1 and C2 of δ-closeness ask about, measured (thesis 4.1).
+    """The quantities in conditions C1 and C2 of δ-closeness (thesis 4.1).
 
     Attributes
     ----------
     displacement : (v,) float
-        |x - Φ(x)| at the vertices outside the regions, in the order of `vertex_pairs`, in length. On a face it is
-        largest at a corner.
+        |x - Φ(x)| at the vertices outside the regions, in the order of `vertex_pairs`, in length.
+        On a face it is largest at a corner.
     jacobians : (f,) float
-        Volume of Φ(face) over that of the face, for the faces outside, without unit.
+        Volume of Φ(face) divided by that of the face, for the faces outside the regions.
     radii : (r,) float
-        Radius of the smallest ball that holds X_i and Y_i together, in length.
+        Radius of the smallest ball that contains X_i and Y_i, in length.
     volume_ratios : (r,) float
         vol(Y_i) / vol(X_i), without unit.
     size : float
-        vol(M)^(1/m), in length. The thesis measures lengths on an M of volume 1: all are divided by this.
+        vol(M)^(1/m), in length. The thesis measures lengths on an M of volume 1: all lengths are
+        divided by this.
     delta : float
-        The least δ for which the shapes are δ-close, without unit: the largest of displacement/size, |jacobian - 1|,
-        radius/size and |volume ratio - 1|.
+        Smallest δ for which the shapes are δ-close, without unit: the largest of displacement/size,
+        |jacobian - 1|, radius/size and |volume ratio - 1|.
     limited_by : "nothing", "displacement", "Jacobian", "ball" or "volume"
-        Which of these it is; "nothing" where δ = 0.
+        Which of these quantities determines δ; "nothing" if δ = 0.
+
+    See Also
+    --------
+    map_closeness : Closeness of a mesh and its image under a map.
+    measure_closeness : Closeness of a shape and a changed shape.
     """
 
     displacement: Float[np.ndarray, " v"]
@@ -53,34 +59,41 @@ class Closeness:
     limited_by: Limit
 
     def explain(self) -> str:
-        """Say in plain words how close the shapes are, and what decides it."""
-        parts = _parts(self.displacement, self.jacobians, self.radii, self.volume_ratios, self.size)
-        outside = (
-            f"{'Outside the anomalous regions points' if len(self.radii) else 'Points'} move by up to "
-            f"{_most(self.displacement):.3g} ({_most(parts['displacement']):.3g} of the size {self.size:.3g}), "
-            f"and the volumes of simplices change by up to {_most(parts['Jacobian']):.3g} of themselves."
+        """Describe in plain words how close the shapes are, and what limits δ."""
+        parts = _relative_changes(
+            self.displacement, self.jacobians, self.radii, self.volume_ratios, self.size
         )
-        inside = (
-            f" Each of the {len(self.radii)} anomalous regions lies, with what replaces it, in a ball of radius at "
-            f"most {_most(self.radii):.3g} ({_most(parts['ball']):.3g} of the size), and its volume changes by up to "
-            f"{_most(parts['volume']):.3g} of itself."
+        points = "Outside the anomalous regions points" if len(self.radii) else "Points"
+        text = (
+            f"{points} move by up to {_largest(self.displacement):.3g} "
+            f"({_largest(parts['displacement']):.3g} of the size {self.size:.3g}), and the volumes "
+            f"of simplices change by a factor of up to 1 ± {_largest(parts['Jacobian']):.3g}."
         )
-        decides = {
+        if len(self.radii):
+            text += (
+                f" Each of the {len(self.radii)} anomalous regions and its replacement lie in a "
+                f"ball of radius {_largest(self.radii):.3g} or less "
+                f"({_largest(parts['ball']):.3g} of the size), and its volume changes by a factor "
+                f"of up to 1 ± {_largest(parts['volume']):.3g}."
+            )
+        limit = {
             "nothing": "the shapes are the same",
-            "displacement": "how far points move decides",
-            "Jacobian": "how much volumes outside change decides",
-            "ball": "the size of the regions decides",
-            "volume": "how much the volume of a region changes decides",
+            "displacement": "the displacement of points is the largest change",
+            "Jacobian": "the volume of simplices outside the regions is the largest change",
+            "ball": "the size of the regions is the largest change",
+            "volume": "the volume of a region is the largest change",
         }[self.limited_by]
-        regions = inside if len(self.radii) else ""
-        return f"{outside}{regions} The shapes are δ-close from δ = {self.delta:.3g}: {decides}."
+        return (
+            f"{text} The smallest δ for which the shapes are δ-close is {self.delta:.3g}: {limit}."
+        )
 
 
 def measure_closeness(perturbation: Perturbation) -> Closeness:
-    """Measure for which δ two shapes are δ-close (thesis 4.1; without regions δ_H of 3.1, with factor 1 in its O).
+    """Compute the smallest δ for which two shapes are δ-close (thesis 4.1).
 
-    C1: outside the regions |x - Φ(x)| ≤ δ and 1 - δ ≤ JΦ ≤ 1 + δ. C2: X_i and Y_i lie in one ball of radius δ, the same
-    for both, and (1 - δ) vol(X_i) ≤ vol(Y_i) ≤ (1 + δ) vol(X_i). Lengths are those of the shapes scaled to vol(M) = 1.
+    C1: outside the regions, |x - Φ(x)| ≤ δ and 1 - δ ≤ JΦ ≤ 1 + δ. C2: X_i and Y_i lie in one ball
+    of radius δ, and (1 - δ) vol(X_i) ≤ vol(Y_i) ≤ (1 + δ) vol(X_i). Lengths are those of the shapes
+    scaled to vol(M) = 1. Without regions, this is δ_H of thesis 3.1, with factor 1 in its O.
 
     Parameters
     ----------
@@ -94,33 +107,41 @@ def measure_closeness(perturbation: Perturbation) -> Closeness:
     ------
     InvalidShapeError
         If a simplex of M has no volume.
+
+    See Also
+    --------
+    measure_perturbation : Describe how one shape became another.
+    map_closeness : The same for a mesh and its image under a map.
     """
     require_type(perturbation, Perturbation, "perturbation")
     require_volumes(perturbation.one)
-    here, there, scale = _scaled(perturbation)
+    here, there, scale = _scale_points(perturbation)
     pairs = vertex_pairs(perturbation)
     volumes_one, volumes_two = (
         volumes(points[mesh.simplices])
         for points, mesh in ((here, perturbation.one), (there, perturbation.two))
     )
-    regions = range(perturbation.n_regions)
+    radii = [
+        _enclosing_radius(perturbation, here, there, region)
+        for region in range(perturbation.n_regions)
+    ]
     return _closeness(
         scale * np.linalg.norm(here[pairs[:, 0]] - there[pairs[:, 1]], axis=1),
         volumes_two[perturbation.outside_two] / volumes_one[perturbation.outside_one],
-        scale * np.array([_radius(perturbation, here, there, region) for region in regions]),
+        scale * np.array(radii),
         _sums(volumes_two, perturbation.regions_two) / _sums(volumes_one, perturbation.regions_one),
         scale * float(volumes_one.sum()) ** (1 / perturbation.one.dim),
     )
 
 
 def map_closeness(mesh: MeshLike, images: ArrayLike) -> Closeness:
-    """Measure for which δ_H a shape and its image are δ_H-close (thesis 3.1).
+    """Compute the smallest δ_H for which a shape and its image are δ_H-close (thesis 3.1).
 
     Parameters
     ----------
     mesh : MeshLike
     images : (n, d) float
-        Where the map takes the vertices, in length; it is linear on each face.
+        Images of the vertices, in length; the map is linear on each face.
 
     Returns
     -------
@@ -132,19 +153,28 @@ def map_closeness(mesh: MeshLike, images: ArrayLike) -> Closeness:
     InvalidShapeError
         If a simplex has no volume, or an image is not finite.
     InvalidParameterError
-        If there is not one image a vertex.
+        If the number of images differs from the number of vertices.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> closeness = es.stability.map_closeness(mesh, mesh.vertices + [0.1, 0, 0])
+    >>> closeness.limited_by, closeness.displacement.max().round(6).tolist()
+    ('displacement', 0.1)
     """
     mesh = as_simplicial(mesh)
     places = finite_rows(images, "points", mesh.points.shape[1])
     if len(places) != mesh.n_points:
         raise InvalidParameterError(
-            f"A map must have one image a vertex; there are {len(places)} images of {mesh.n_points} vertices."
+            "A map must have one image per vertex; "
+            f"there are {len(places)} images of {mesh.n_points} vertices."
         )
     kind = TriangleMesh if isinstance(mesh, TriangleMesh) else SimplicialMesh
     return measure_closeness(measure_perturbation(mesh, kind(places, mesh.simplices)))
 
 
-def _scaled(
+def _scale_points(
     perturbation: Perturbation,
 ) -> tuple[Float[np.ndarray, "n d"], Float[np.ndarray, "k d"], float]:
     """Return the points of both shapes divided by one power of two, and that power."""
@@ -153,7 +183,7 @@ def _scaled(
     return points[:n], points[n:], scale
 
 
-def _radius(
+def _enclosing_radius(
     perturbation: Perturbation,
     here: Float[np.ndarray, "n d"],
     there: Float[np.ndarray, "k d"],
@@ -166,7 +196,7 @@ def _radius(
     ).radius
 
 
-def _parts(
+def _relative_changes(
     displacement: Float[np.ndarray, " v"],
     jacobians: Float[np.ndarray, " f"],
     radii: Float[np.ndarray, " r"],
@@ -188,8 +218,8 @@ def _closeness(
     volume_ratios: Float[np.ndarray, " r"],
     size: float,
 ) -> Closeness:
-    parts = _parts(displacement, jacobians, radii, volume_ratios, size)
-    largest = {name: _most(part) for name, part in parts.items()}
+    parts = _relative_changes(displacement, jacobians, radii, volume_ratios, size)
+    largest = {name: _largest(part) for name, part in parts.items()}
     limit = max(largest, key=lambda name: largest[name])
     return Closeness(
         displacement=frozen(displacement),
@@ -209,5 +239,5 @@ def _sums(
     return np.bincount(labels + 1, weights=values, minlength=labels.max() + 2)[1:]
 
 
-def _most(values: Float[np.ndarray, " _"]) -> float:
+def _largest(values: Float[np.ndarray, " _"]) -> float:
     return float(values.max(initial=0.0))

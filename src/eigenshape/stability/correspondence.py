@@ -1,4 +1,4 @@
-"""One-to-one correspondences of two point sets: that of Theorem 4.2.1, and the one that moves points least."""
+"""One-to-one correspondences of two point sets: Theorem 4.2.1, and bottleneck matchings."""
 
 from dataclasses import dataclass
 
@@ -21,15 +21,20 @@ from eigenshape.stability.perturbation import OUTSIDE, Perturbation
 
 @dataclass(frozen=True, eq=False)
 class MaximumMatching:
-    """A matching of the rows of a bipartite graph with its columns that no other has more of.
+    """A largest matching of the rows of a bipartite graph with its columns.
 
     Attributes
     ----------
     partners : (n,) int
-        Column of each row; -1 without.
+        Column of each row; -1 for a row without partner.
     blocked : (b,) int
-        Rows that together have fewer columns than they are, by as many as are without partner; none where all have one
-        (Hall 1935).
+        Proof that no matching is larger (Hall 1935): rows that together have entries in fewer
+        columns than their number, by the number of rows without partner. Empty if all rows have a
+        partner.
+
+    See Also
+    --------
+    maximum_matching : Compute a matching.
     """
 
     partners: Int[np.ndarray, " n"]
@@ -48,14 +53,18 @@ class MaximumMatching:
 
 @dataclass(frozen=True, eq=False)
 class BottleneckMatching:
-    """The one-to-one correspondence of two point sets whose longest move is shortest.
+    """The one-to-one correspondence of two point sets with the smallest largest distance.
 
     Attributes
     ----------
     partners : (n,) int
-        For each point of the first set its partner in the second.
+        For each point of the first set, its partner in the second.
     distance : float
-        The longest distance of partners, in length.
+        Largest distance of two partners, in length.
+
+    See Also
+    --------
+    bottleneck_matching : Compute the correspondence.
     """
 
     partners: Int[np.ndarray, " n"]
@@ -63,17 +72,31 @@ class BottleneckMatching:
 
 
 def matching_reach(mu: float) -> float:
-    """Return ρ = max(3, 8/μ + 2), how far Theorem 4.2.1 grows a region, in multiples of δ.
+    """Return ρ = max(3, 8/μ + 2), by which Theorem 4.2.1 grows a region, in multiples of δ.
 
     Parameters
     ----------
     mu : float
-        μ, the isoperimetric constant of the shape scaled to volume 1; without unit there.
+        μ, the isoperimetric constant of the shape scaled to volume 1, without unit.
+
+    Returns
+    -------
+    float
 
     Raises
     ------
     InvalidParameterError
         If μ is not positive.
+
+    See Also
+    --------
+    cheeger_estimate : Estimate μ.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.stability.matching_reach(2.0)
+    6.0
     """
     return max(3.0, 8 / float(positive_values(mu, "mu")[0]) + 2)
 
@@ -87,20 +110,21 @@ def correspondence_graph(
     delta: float,
     rho: float,
 ) -> sp.csr_array:
-    """Join each point of M with those points of N to which Theorem 4.2.1 may send it (thesis 4.2.1).
+    """Join each point of M with its possible partners on N (thesis 4.2.1).
 
-    p is joined to all points of the witness region R_N⁺ of its nearest anchor-node (see `witness_region`). So partners
-    are at most (ρ+3)δ apart outside the anomalous regions, where nodes cover M within δ (Claim 4.2.1). In a region Y_i
-    it is (ρ+4)δ: the claim leans on Observation 4.2.2 (ii), which is short by δ there.
+    A point is joined with all points of the witness region R_N⁺ of its nearest anchor node (see
+    `witness_region`). If the nodes cover M within δ, partners outside the anomalous regions are at
+    most (ρ+3)δ apart (Claim 4.2.1). In a region Y_i the bound is (ρ+4)δ, because Observation 4.2.2
+    (ii), on which the claim rests, is too small by δ there.
 
     Parameters
     ----------
     perturbation : Perturbation
         Of M into N.
     points_one, points_two : SurfacePoints
-        n points of M, and k of N.
+        n points of M, and k points of N.
     nodes : (a, d) float
-        Anchor-nodes, in length.
+        Anchor nodes, in length.
     delta : float
         δ, in length.
     rho : float
@@ -109,26 +133,30 @@ def correspondence_graph(
     Returns
     -------
     (n, k) sparse
-        1 where joined; columns ascending. Memory grows with the number of joined pairs.
+        1 for each joined pair; columns ascend. Memory grows with the number of pairs.
 
     Raises
     ------
     InvalidParameterError
-        If δ or ρ is not positive, or a point of N lies in no simplex of it.
+        If δ or ρ is not positive, or a point is in no simplex of N.
+
+    See Also
+    --------
+    maximum_matching : Find a one-to-one correspondence in the graph.
     """
     require_type(perturbation, Perturbation, "perturbation")
     require_type(points_one, SurfacePoints, "points_one")
     require_type(points_two, SurfacePoints, "points_two")
     reach = float((positive_values(rho, "rho")[0] + 1) * positive_values(delta, "delta")[0])
     used, node = np.unique(cKDTree(nodes).query(points_one.points)[1], return_inverse=True)
-    witnessed = _witnessed(perturbation, points_two, nodes[used], reach)
-    return sp.csr_array(witnessed[node])
+    witnesses = _list_witnesses(perturbation, points_two, nodes[used], reach)
+    return sp.csr_array(witnesses[node])
 
 
-def _witnessed(
+def _list_witnesses(
     perturbation: Perturbation, points: SurfacePoints, nodes: Float[np.ndarray, "a d"], reach: float
 ) -> sp.csr_array:
-    """Return for each node the points of N in its witness region."""
+    """Return, for each node, the points of N in its witness region, as rows of a matrix."""
     labels, before = preimages(perturbation, points)
     near = near_pairs(nodes, before, reach, 2.0)
     rows, columns = [near.i], [np.flatnonzero(labels == OUTSIDE)[near.j]]
@@ -146,19 +174,25 @@ def _witnessed(
 
 
 def maximum_matching(graph: sp.sparray) -> MaximumMatching:
-    """Match as many rows of a bipartite graph as can be, each with a column that it has an entry in.
-
-    By alternating paths, all shortest ones at a time (Hopcroft and Karp 1973).
+    """Find a largest matching of a bipartite graph (Hopcroft and Karp 1973).
 
     Parameters
     ----------
     graph : (n, k) sparse
-        Joined where it stores an entry that is not 0.
+        Row i may be matched with column j if entry (i, j) is not zero.
 
     Returns
     -------
     MaximumMatching
         With the rows that prove that no matching is larger.
+
+    Examples
+    --------
+    >>> from scipy.sparse import csr_array
+    >>> import eigenshape as es
+    >>> matching = es.stability.maximum_matching(csr_array([[1, 1, 0], [1, 0, 0], [1, 1, 0]]))
+    >>> matching.n_matched, matching.blocked
+    (2, array([0, 1, 2]))
     """
     joined = sp.csr_array(graph)
     if joined.data.size and not joined.data.all():
@@ -171,11 +205,12 @@ def maximum_matching(graph: sp.sparray) -> MaximumMatching:
 
 
 def bottleneck_matching(one: ArrayLike, two: ArrayLike) -> BottleneckMatching:
-    """Find the one-to-one correspondence of two point sets whose largest Euclidean distance is least.
+    """Find the one-to-one correspondence with the smallest largest Euclidean distance.
 
-    Exact: maximum matchings tell which distances suffice, and the least of all distances of two points that does is
-    searched for (Efrat, Itai and Katz 2001, with a tree of the points in place of their structures). Memory grows with
-    the number of pairs within one and a half times the distance.
+    The result is exact. A maximum matching decides whether a distance is sufficient, and bisection
+    among the distances of two points finds the smallest sufficient one (Efrat, Itai and Katz 2001,
+    with a tree of the points in place of their structures). Memory grows with the number of pairs
+    within 1.5 times the distance.
 
     Parameters
     ----------
@@ -189,15 +224,21 @@ def bottleneck_matching(one: ArrayLike, two: ArrayLike) -> BottleneckMatching:
     Raises
     ------
     InvalidShapeError
-        If a coordinate is not finite, or the pairs would not fit into half of the memory.
+        If a coordinate is not finite, or the pairs do not fit into half of the memory.
     InvalidParameterError
         If there are no points, or the two sets differ in number or dimension.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.stability.bottleneck_matching([[0.0], [1.0]], [[1.5], [0.0]])
+    BottleneckMatching(partners=array([1, 0]), distance=0.5)
     """
     first, second = finite_rows(one, "points"), finite_rows(two, "points")
     if first.shape != second.shape or not first.size:
         raise InvalidParameterError(
-            f"Two point sets must have the same shape (n, d), n ≥ 1, to correspond one to one; these are "
-            f"{first.shape} and {second.shape}."
+            "Two point sets must have the same shape (n, d), n ≥ 1, to correspond one to one; "
+            f"these are {first.shape} and {second.shape}."
         )
     both, scale = size_one(np.stack([first, second]))
     distance, partners = least_perfect(both[0], both[1], 2.0)

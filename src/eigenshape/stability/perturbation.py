@@ -1,4 +1,4 @@
-"""One shape and a changed one: which faces correspond, and where anything may have happened."""
+"""A shape and a changed shape: which faces correspond, and which regions are anomalous."""
 
 from dataclasses import dataclass
 
@@ -13,26 +13,32 @@ from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.simplicial import Mesh
 
-OUTSIDE = -1
+OUTSIDE = -1  # label of a face that is in no anomalous region
 
 Labels = Int[np.ndarray, " _"]
 
 
 @dataclass(frozen=True, eq=False)
 class Perturbation:
-    """A shape M, a changed shape N, and a map Φ between what is outside their anomalous regions (thesis 4.1).
+    """A shape M, a changed shape N, and the map Φ between them (thesis 4.1).
 
-    Outside, the faces of the two correspond in order, corner by corner; Φ is linear on each. Inside, M has the
-    regions X_0, X_1, ... and N the regions Y_0, Y_1, ..., which have nothing in common but their boundaries.
+    Outside the anomalous regions, the faces of the two correspond in order, corner by corner, and Φ
+    is linear on each. The regions X_0, X_1, ... of M and Y_0, Y_1, ... of N have only their
+    boundaries in common.
 
     Attributes
     ----------
     one, two : TriangleMesh or SimplicialMesh
         M and N.
     regions_one : (s1,) int
-        For each face of M, or simplex, the i of the region X_i that it is in; -1 outside.
+        For each face or simplex of M, the number i of its region X_i; -1 outside.
     regions_two : (s2,) int
         The same for N and Y_i.
+
+    See Also
+    --------
+    measure_perturbation : Check and label two shapes.
+    measure_closeness : Compute how close the shapes are.
     """
 
     one: Mesh
@@ -47,12 +53,12 @@ class Perturbation:
 
     @property
     def outside_one(self) -> Int[np.ndarray, " f"]:
-        """The faces of M outside, ascending; each corresponds to that of `outside_two` in the same place."""
+        """Faces of M outside the regions, ascending; they correspond to `outside_two` in order."""
         return np.flatnonzero(self.regions_one == OUTSIDE)
 
     @property
     def outside_two(self) -> Int[np.ndarray, " f"]:
-        """The faces of N outside, ascending."""
+        """Faces of N outside the regions, ascending."""
         return np.flatnonzero(self.regions_two == OUTSIDE)
 
 
@@ -63,18 +69,18 @@ def measure_perturbation(
     regions_one: ArrayLike | None = None,
     regions_two: ArrayLike | None = None,
 ) -> Perturbation:
-    """Say how one shape became another: by a map, and by anything at all in some regions.
+    """Describe how one shape became another: by a map outside some regions, and arbitrarily inside.
 
-    Surgery that cuts faces out and adds others leaves the rest in order: that is what corresponds. Without regions all
-    faces do, as for shapes that are δ_H-close (thesis 3.1).
+    The faces outside the regions correspond in order. Surgery that removes some faces and appends
+    others keeps that order. Without regions, all faces correspond (δ_H-closeness, thesis 3.1).
 
     Parameters
     ----------
     one, two : MeshLike
-        Of the same dimensions.
+        Two meshes of the same dimensions.
     regions_one, regions_two : (s1,) and (s2,) int, optional
-        For each face the number of its anomalous region, from 0; -1 outside. Closures of two regions are disjoint: no
-        vertex is in both.
+        For each face, the number of its anomalous region, from 0; -1 outside. Two regions must not
+        share a vertex.
 
     Returns
     -------
@@ -83,21 +89,34 @@ def measure_perturbation(
     Raises
     ------
     InvalidParameterError
-        If dimensions differ; labels are not as said, or differ between the shapes; two regions touch; the numbers of
-        faces outside differ; a vertex would go to two places, or two to one; or the boundary of a region X_i does not
-        go to that of Y_i (condition C1).
+        If the dimensions differ; if labels have another form, or the shapes have different regions;
+        if two regions touch; if the numbers of faces outside differ; if Φ maps a vertex to two
+        vertices, or two vertices to one; or if Φ does not map the boundary of X_i onto that of Y_i
+        (condition C1).
+
+    See Also
+    --------
+    measure_closeness : Compute how close the shapes are.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> longer = es.TriangleMesh(mesh.vertices * [1, 1, 1.1], mesh.faces)
+    >>> perturbation = es.stability.measure_perturbation(mesh, longer)
+    >>> perturbation.n_regions, len(perturbation.outside_one)
+    (0, 320)
     """
     one = as_simplicial(one, "one")
     two = as_simplicial(two, "two")
     dims = [(mesh.dim, mesh.points.shape[1]) for mesh in (one, two)]
     if dims[0] != dims[1]:
         raise InvalidParameterError(
-            f"Two shapes must have the same dimensions to correspond; these have (m, d) = {dims[0]} and {dims[1]}."
+            "Two shapes must have the same dimensions to correspond; "
+            f"these have (m, d) = {dims[0]} and {dims[1]}."
         )
-    labels_one, labels_two = (
-        _labels(regions_one, one, "regions_one"),
-        _labels(regions_two, two, "regions_two"),
-    )
+    labels_one = _check_labels(regions_one, one, "regions_one")
+    labels_two = _check_labels(regions_two, two, "regions_two")
     _require_same_regions(labels_one, labels_two)
     found = Perturbation(one, two, frozen(labels_one), frozen(labels_two))
     _require_rims(found, vertex_pairs(found))
@@ -105,12 +124,21 @@ def measure_perturbation(
 
 
 def vertex_pairs(perturbation: Perturbation) -> Int[np.ndarray, "v 2"]:
-    """List the vertices of the faces outside: that of M, ascending, and the one of N that Φ takes it to.
+    """List the vertices outside the anomalous regions and their images under Φ.
+
+    Parameters
+    ----------
+    perturbation : Perturbation
+
+    Returns
+    -------
+    (v, 2) int
+        Vertices of M, ascending, and the corresponding vertices of N.
 
     Raises
     ------
     InvalidParameterError
-        If a vertex would go to two places, or two vertices to one.
+        If Φ maps a vertex to two vertices, or two vertices to one.
     """
     require_type(perturbation, Perturbation, "perturbation")
     here, there = (
@@ -127,27 +155,29 @@ def vertex_pairs(perturbation: Perturbation) -> Int[np.ndarray, "v 2"]:
         if twice.size:
             ends = sorted(places[twice[0] : twice[0] + 2, 1 - column].tolist())
             raise InvalidParameterError(
-                f"Faces outside the regions must correspond corner by corner; vertex {places[twice[0], column]} of "
-                f"`{name}` would be vertices {ends[0]} and {ends[1]} of `{other}`. Keep the order of faces and corners."
+                "Faces outside the regions must correspond corner by corner; vertex "
+                f"{places[twice[0], column]} of `{name}` would be vertices {ends[0]} and {ends[1]} "
+                f"of `{other}`. Keep the order of faces and corners."
             )
     return pairs
 
 
-def _labels(regions: ArrayLike | None, mesh: Mesh, name: str) -> Labels:
+def _check_labels(regions: ArrayLike | None, mesh: Mesh, name: str) -> Labels:
     n = len(mesh.simplices)
     if regions is None:
         return np.full(n, OUTSIDE)
     labels = as_array(regions, name)
     if labels.shape != (n,) or labels.dtype.kind not in "iu":
         raise InvalidParameterError(
-            f"{name} must hold one whole number a face, shape ({n},); it has shape {labels.shape} and type "
-            f"{labels.dtype}."
+            f"{name} must hold one whole number per face, shape ({n},); "
+            f"it has shape {labels.shape} and type {labels.dtype}."
         )
     labels = labels.astype(np.int64)
     wrong = np.flatnonzero((labels < OUTSIDE) | (labels >= n))
     if wrong.size:
         raise InvalidParameterError(
-            f"{name} must number regions from 0, with -1 outside; face {wrong[0]} has {labels[wrong[0]]}."
+            f"{name} must number regions from 0, with -1 outside; "
+            f"face {wrong[0]} has {labels[wrong[0]]}."
         )
     _require_apart(mesh, labels, name)
     return labels
@@ -162,8 +192,8 @@ def _require_apart(mesh: Mesh, labels: Labels, name: str) -> None:
     if shared.size:
         vertex = shared[0]
         raise InvalidParameterError(
-            f"Anomalous regions must not touch; in {name}, vertex {vertex} is in regions {least[vertex]} and "
-            f"{most[vertex]}. Make them one region."
+            f"Anomalous regions must not touch; in {name}, vertex {vertex} is in regions "
+            f"{least[vertex]} and {most[vertex]}. Make them one region."
         )
 
 
@@ -173,18 +203,19 @@ def _require_same_regions(one: Labels, two: Labels) -> None:
         missing = np.flatnonzero(np.bincount(labels[labels != OUTSIDE], minlength=n_regions) == 0)
         if missing.size:
             raise InvalidParameterError(
-                f"Both shapes must have the same anomalous regions, numbered 0..{n_regions - 1}; {name} has no face in "
-                f"region {missing[0]}."
+                f"Both shapes must have the same anomalous regions, numbered 0..{n_regions - 1}; "
+                f"{name} has no face in region {missing[0]}."
             )
-    left = [int((labels == OUTSIDE).sum()) for labels in (one, two)]
-    if left[0] != left[1]:
+    outside = [int((labels == OUTSIDE).sum()) for labels in (one, two)]
+    if outside[0] != outside[1]:
         raise InvalidParameterError(
-            f"As many faces of one shape as of the other must lie outside the regions; {left[0]} and {left[1]} do."
+            "The same number of faces of both shapes must lie outside the regions; "
+            f"{outside[0]} and {outside[1]} do."
         )
 
 
 def _require_rims(perturbation: Perturbation, pairs: Int[np.ndarray, "v 2"]) -> None:
-    """Refuse a region X_i whose boundary Φ does not take to that of Y_i (C1)."""
+    """Raise an error if Φ does not map the boundary of each X_i onto that of Y_i (C1)."""
     image = np.full(perturbation.one.n_points, OUTSIDE)
     image[pairs[:, 0]] = pairs[:, 1]
     here = _rims(perturbation.one, perturbation.regions_one)
@@ -194,13 +225,13 @@ def _require_rims(perturbation: Perturbation, pairs: Int[np.ndarray, "v 2"]) -> 
     if different:
         region, *corners = min(different)
         raise InvalidParameterError(
-            f"The boundary of a region must be mapped onto that of its counterpart (C1); for region {region} vertices "
-            f"{corners} of `two` span a side of only one of the two boundaries."
+            "The boundary of a region must be mapped onto that of its counterpart (C1); for region "
+            f"{region} vertices {corners} of `two` span a side of only one of the two boundaries."
         )
 
 
 def _rims(mesh: Mesh, labels: Labels) -> Int[np.ndarray, "k _"]:
-    """List the facets between a region and the outside: the region's number, then the corners, ascending."""
+    """List the facets between regions and the outside: number of the region, then corners."""
     table = facet_table(mesh)
     at, label = table.simplex_facets.ravel(), np.repeat(labels, mesh.dim + 1)
     outside = np.zeros(len(table.facets), dtype=bool)

@@ -1,4 +1,4 @@
-"""How far eigenvalues may move, as powers of the closeness δ and the heat time t, and what is measured of it."""
+"""Rates at which eigenvalues change, as powers of the closeness δ and the heat time t."""
 
 from dataclasses import dataclass
 from math import e, exp, lgamma, pi, sqrt
@@ -13,19 +13,31 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 
 THEOREMS = ("3.1.1", "3.1.3", "3.1.4", "3.1.5", "4.1.1", "4.3.1", "lipschitz", "dense")
+# Largest dimension m of a manifold. The constants are finite far beyond, but no data reach there.
 MOST_DIM = 100
 
 
 @dataclass(frozen=True)
 class Rate:
-    """A law: constant · δ^`delta` · t^`t`.
+    """A power law: constant · δ^`delta` · t^`t`.
 
     Attributes
     ----------
     delta, t : float
         Exponents of the closeness and of the heat time.
     constant : float
-        1 where theory hides it.
+        The factor; 1 if the theorem does not give it.
+
+    See Also
+    --------
+    theorem_rate : Rates that theorems prove.
+    fit_rate : Rate fitted to measurements.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> float(es.stability.Rate(delta=1, t=-0.5, constant=2).at(3, 4))
+    3.0
     """
 
     delta: float
@@ -33,33 +45,58 @@ class Rate:
     constant: float = 1.0
 
     def at(self, delta: ArrayLike, t: ArrayLike) -> Float[np.ndarray, "..."]:
-        """Return the law's value at each closeness and heat time."""
+        """Return the value of the law at each closeness and heat time."""
         return np.asarray(self.constant * np.asarray(delta) ** self.delta * np.asarray(t) ** self.t)
 
 
 def theorem_rate(theorem: str, dim: SupportsIndex) -> Rate:
-    """Return what a theorem proves of the distance of eigenvalues on m-manifolds.
+    """Return the rate that a theorem proves for the distance of eigenvalues on m-manifolds.
 
     - "3.1.1": t^(2/(m+6)) between Δ and the functional approximation 𝓛_t (Belkin and Niyogi 2008).
-    - "3.1.3": ε t^-(m/2+3) between 𝓛_t and the mesh Laplacian of an ε-approximation; δ stands for ε.
-    - "3.1.4": δ t^-(m/4+2), the Hausdorff distance between the spectra of 𝓛_t on two δ_H-close manifolds.
-    - "3.1.5": δ^(8/(m²+14m+56)) between the eigenvalues of Δ on them: 3.1.1 and 3.1.4 at the t that makes them equal.
-    - 3.1.6 has no rate: mesh Laplacians on such meshes have eigenvalues that come together when t, 3.1.3 and 3.1.4 all
-      go to 0.
-    - "4.1.1", "4.3.1": δ^(4/5) t^-(m/2+7/5) between Gaussian graph Laplacians of points at most δ apart one by one;
-      δ^(1/3) where t ≥ δ^(14/(15m+42)). 4.1.1 says it of random samples of δ-close manifolds.
-    - "lipschitz": δ t^-(m/2+3/2), ours for the same, with its constant. A Gaussian exp(-r²/4t) changes by at most
-      e^(-1/2)/√(2t) a unit of r, and r by at most 2δ; D = L_P - L_Q has rows whose entries sum to 0, those off its
-      diagonal being at most that over n, so ‖D‖₂ ≤ ‖D‖_∞ ≤ 4δ e^(-1/2)/√(2t) / (t (4πt)^(m/2)). Weyl's theorem makes
-      it a bound for every eigenvalue, at any t. It is (δ²/t)^(1/10) of 4.3.1, smaller wherever t > δ².
-    - "dense": δ t^(-3/2), ours, what "lipschitz" comes to where points sample a manifold of volume 1 ever more densely,
-      and δ ≪ √t ≪ 1/curvature. A row then sums to an integral instead of n times its largest term: on average the slope
-      of a Gaussian is Γ((m+1)/2)/Γ(m/2)/√t, and ‖D‖₂ ≤ 4δ Γ((m+1)/2)/Γ(m/2) t^(-3/2).
+    - "3.1.3": ε t^-(m/2+3) between 𝓛_t and the mesh Laplacian of an ε-approximation; δ stands for
+      ε.
+    - "3.1.4": δ t^-(m/4+2), the Hausdorff distance between the spectra of 𝓛_t on two δ_H-close
+      manifolds.
+    - "3.1.5": δ^(8/(m²+14m+56)) between the eigenvalues of Δ on such manifolds: 3.1.1 and 3.1.4 at
+      the t at which they are equal.
+    - 3.1.6 has no rate: the eigenvalues of mesh Laplacians on such meshes converge to each other if
+      t and the bounds of 3.1.3 and 3.1.4 tend to 0.
+    - "4.1.1", "4.3.1": δ^(4/5) t^-(m/2+7/5) between Gaussian graph Laplacians of points at most δ
+      apart one by one; δ^(1/3) if t ≥ δ^(14/(15m+42)). 4.1.1 is for random samples of δ-close
+      manifolds.
+    - "lipschitz": δ t^-(m/2+3/2), with its constant; derived here for the same situation. A
+      Gaussian exp(-r²/4t) changes by at most e^(-1/2)/√(2t) per unit of r, and r by at most 2δ. The
+      rows of D = L_P - L_Q sum to 0, and the entries off the diagonal are at most the change
+      divided by n, so ‖D‖₂ ≤ ‖D‖_∞ ≤ 4δ e^(-1/2)/√(2t) / (t (4πt)^(m/2)). By Weyl's theorem it
+      bounds every eigenvalue, at any t. It is (δ²/t)^(1/10) times the rate of 4.3.1, so it is
+      smaller if t > δ².
+    - "dense": δ t^(-3/2), derived here: the limit of "lipschitz" for points that sample a manifold
+      of volume 1 densely, with δ ≪ √t ≪ 1/curvature. A row then sums to an integral, instead of n
+      times its largest term. The mean slope of a Gaussian is Γ((m+1)/2)/Γ(m/2)/√t, so ‖D‖₂ ≤ 4δ
+      Γ((m+1)/2)/Γ(m/2) t^(-3/2).
+
+    Parameters
+    ----------
+    theorem : str
+        One of `THEOREMS`: "3.1.1", "3.1.3", "3.1.4", "3.1.5", "4.1.1", "4.3.1", "lipschitz" or
+        "dense".
+    dim : int
+        Dimension m of the manifolds, 1 to 100.
+
+    Returns
+    -------
+    Rate
 
     Raises
     ------
     InvalidParameterError
-        If the theorem is none of these, or `dim` is not in 1..100.
+        If the theorem is unknown, or `dim` is not in 1..100.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.stability.theorem_rate("3.1.4", dim=2)
+    Rate(delta=1.0, t=-2.5, constant=1.0)
     """
     m = whole_number(dim, "dim", 1, MOST_DIM)
     rates = {
@@ -80,56 +117,81 @@ def theorem_rate(theorem: str, dim: SupportsIndex) -> Rate:
 
 
 def bounding_rate(rate: Rate, delta: ArrayLike, t: ArrayLike, measured: ArrayLike) -> Rate:
-    """Give a law the least constant with which it covers all that was measured.
+    """Return a rate with the smallest constant that bounds all measurements from above.
 
     Parameters
     ----------
     rate : Rate
+        The exponents; its constant is ignored.
     delta, t, measured : (q,) float
-        All > 0.
+        Closeness, heat time and measured change of each measurement; all positive.
+
+    Returns
+    -------
+    Rate
 
     Raises
     ------
     InvalidParameterError
-        If a value is not positive and finite, or their numbers differ.
+        If a value is not positive and finite, or the lengths differ.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> linear = es.stability.Rate(delta=1, t=0)
+    >>> es.stability.bounding_rate(linear, [1, 2], [1, 1], [3, 4]).constant
+    3.0
     """
     require_type(rate, Rate, "rate")
-    deltas, times, values = _measurements(delta, t, measured)
+    deltas, times, values = _check_measurements(delta, t, measured)
     shape = Rate(rate.delta, rate.t)
     return Rate(rate.delta, rate.t, float((values / shape.at(deltas, times)).max()))
 
 
 def fit_rate(delta: ArrayLike, t: ArrayLike, measured: ArrayLike) -> Rate:
-    """Fit the exponents and the constant to what was measured, by least squares of the logarithms.
+    """Fit exponents and constant to measurements, by least squares of the logarithms.
 
-    The exponent of what has one value throughout is 0.
+    If `delta` or `t` is constant, its exponent is 0.
 
     Parameters
     ----------
     delta, t, measured : (q,) float
-        All > 0.
+        Closeness, heat time and measured change of each measurement; all positive.
+
+    Returns
+    -------
+    Rate
 
     Raises
     ------
     InvalidParameterError
-        If a value is not positive and finite, their numbers differ, or too few differ to tell exponents apart.
+        If a value is not positive and finite, the lengths differ, or the measurements do not
+        determine the exponents.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> rate = es.stability.fit_rate([1, 2, 4], [1, 1, 1], [3, 12, 48])
+    >>> round(rate.delta, 6), round(rate.constant, 6)
+    (2.0, 3.0)
     """
-    deltas, times, values = _measurements(delta, t, measured)
+    deltas, times, values = _check_measurements(delta, t, measured)
     columns = np.log(np.column_stack([deltas, times]))
-    centred = columns - columns.mean(axis=0)
+    centered = columns - columns.mean(axis=0)
     varied = np.ptp(columns, axis=0) > 0
-    if not varied.any() or np.linalg.matrix_rank(centred[:, varied]) < np.count_nonzero(varied):
+    if not varied.any() or np.linalg.matrix_rank(centered[:, varied]) < np.count_nonzero(varied):
         raise InvalidParameterError(
-            f"delta and t must vary, and not together, to tell their exponents; {len(values)} measurements do not."
+            "delta and t must vary, and not together, to determine their exponents; "
+            f"in these {len(values)} measurements they do not."
         )
     exponents = np.zeros(2)
     logs = np.log(values)
-    exponents[varied] = np.linalg.lstsq(centred[:, varied], logs - logs.mean(), rcond=None)[0]
+    exponents[varied] = np.linalg.lstsq(centered[:, varied], logs - logs.mean(), rcond=None)[0]
     constant = float(np.exp(logs.mean() - columns.mean(axis=0) @ exponents))
     return Rate(float(exponents[0]), float(exponents[1]), constant)
 
 
-def _measurements(
+def _check_measurements(
     delta: ArrayLike, t: ArrayLike, measured: ArrayLike
 ) -> tuple[Float[np.ndarray, " q"], ...]:
     named = {"delta": delta, "t": t, "measured": measured}
@@ -137,6 +199,6 @@ def _measurements(
     counts = [len(row) for row in rows]
     if len(set(counts)) > 1:
         raise InvalidParameterError(
-            f"delta, t and measured must be equally many; they are {counts}."
+            f"delta, t and measured must have the same length; the lengths are {counts}."
         )
     return tuple(rows)

@@ -1,4 +1,4 @@
-"""Two shapes side by side: how close they lie, how far their spectra are apart, and which heat times to trust."""
+"""Compare two shapes: their closeness, their spectra, and the heat times that are reliable."""
 
 from dataclasses import dataclass
 
@@ -24,32 +24,45 @@ from eigenshape.stability.closeness import Closeness, map_closeness
 from eigenshape.stability.sampled import (
     ChangeAtTime,
     changes_over_times,
+    default_sample_times,
     distances_between,
     matched_samples,
-    spaced_times,
 )
 
+# Fewest matched points: the fewer points, the larger the effect of sampling.
 FEWEST_SAMPLES = 100
+# Most matched points: memory of the kernels and of the matching grows faster than their number.
 MOST_SAMPLES = 20_000
+# Eigenvalues to compare by default.
 USUAL_K = 20
 
 
 @dataclass(frozen=True)
 class StabilityPlan:
-    """What a stability report is made of.
+    """Options of `compare_shapes`.
 
-    Attributes
+    Parameters
     ----------
     k : int, optional
-        Eigenvalues to compare; by default 20, or as many as the smaller shape has to compare.
+        Number of eigenvalues to compare; by default 20, or fewer if the smaller shape has fewer.
     n_samples : int
-        Points to throw on each shape, 100 to 20,000; of a cloud at most half of its points.
+        Number of random points of each shape, 100 to 20,000; of a cloud at most half of its points.
     times : sequence of float, optional
-        Heat times in length²; by default four over the range that can be trusted.
+        Heat times in length²; by default four over the admissible range.
     seed : int
-        Of the random points.
+        Seed of the random points.
     brackets : bool
-        Whether to bound each eigenvalue of both meshes, so that changes are proved of the shapes themselves.
+        Whether to compute guaranteed bounds of each eigenvalue of both meshes, which prove changes
+        for the shapes themselves.
+
+    See Also
+    --------
+    compare_shapes : Compare two shapes.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> plan = es.stability.StabilityPlan(k=8, n_samples=500)
     """
 
     k: int | None = None
@@ -61,34 +74,44 @@ class StabilityPlan:
 
 @dataclass(frozen=True, eq=False)
 class StabilityReport:
-    """How stable a spectrum is between two shapes.
+    """Result of `compare_shapes`.
 
     Attributes
     ----------
     spectra : SpectrumComparison
-        Of the shapes, by the operator that serves them best.
+        Spectra of the shapes, by the usual operator of each (`build_laplacian`).
     closeness : Closeness or None
-        Of the map from vertex to vertex, where both meshes have the same simplices.
+        Closeness of the map from vertex to vertex; None if the vertices do not correspond.
     distance : float
-        Hausdorff distance of the shapes as they lie, in length.
-    matched, matched_floor : float
-        Longest move of the best one-to-one correspondence of samples of both, and of two samples of the first.
+        Hausdorff distance of the shapes in space, in length.
+    matching_distance, sampling_distance : float
+        Largest distance of partners in the bottleneck matching of samples of both shapes, and of
+        two samples of the first shape, in length.
     delta : float
-        The closeness that heat times are judged by, in length: how far the map moves points, or else `distance`.
+        Closeness that determines the admissible heat times, in length: the largest displacement of
+        a vertex, or `distance` if the vertices do not correspond.
     times : TimeRange
+        The admissible heat times.
     changes : tuple of ChangeAtTime
+        Changes of the eigenvalues of graph Laplacians, one entry per heat time.
     angles : EigenspaceAngles
-        From vertex to vertex where both have the same simplices, else between the matched samples.
+        Angles of eigenspaces, from vertex to vertex if the vertices correspond, and between the
+        matched samples otherwise.
     n_samples : int
+        Number of random points of each shape.
     distances : ((n1,), (n2,)) float
-        Of each point of each shape from the other shape, in length.
+        Distance of each point of each shape to the other shape, in length.
+
+    See Also
+    --------
+    compare_shapes : Compute a report.
     """
 
     spectra: SpectrumComparison
     closeness: Closeness | None
     distance: float
-    matched: float
-    matched_floor: float
+    matching_distance: float
+    sampling_distance: float
     delta: float
     times: TimeRange
     changes: tuple[ChangeAtTime, ...]
@@ -97,43 +120,50 @@ class StabilityReport:
     distances: tuple[Float[np.ndarray, " n1"], Float[np.ndarray, " n2"]]
 
     def explain(self) -> str:
-        """Say in plain words what was found, a paragraph each."""
+        """Describe the results in plain words, in one paragraph each."""
         where = (
             "from vertex to vertex"
             if self.closeness
             else f"between {self.n_samples} matched points of each"
         )
-        lines = [self.spectra.explain(), self._lie()]
+        lines = [self.spectra.explain(), self._explain_distance()]
         if self.closeness:
             lines.append(self.closeness.explain())
         lines += [
             self.times.explain(),
-            self._heard(),
+            self._explain_changes(),
             f"Eigenspaces, {where}: {self.angles.explain()}",
         ]
         if not self.closeness and self.times.low_reason == "closeness":
             lines.append(
-                "Points were matched as the shapes lie. Of one shape in two poses that tells little: bring a map "
-                "between their vertices, or look at the eigenvalues alone."
+                "Points were matched by their places in space, which says little about one shape "
+                "in two poses. Pass partners, the map between the vertices, or compare eigenvalues "
+                "only."
             )
         return "\n\n".join(lines)
 
-    def _lie(self) -> str:
+    def _explain_distance(self) -> str:
         return (
-            f"As they lie, no point of one shape is further than {self.distance:.3g} from the other. The best "
-            f"one-to-one correspondence of {self.n_samples} random points of each moves them by up to "
-            f"{self.matched:.3g}; two such samples of the first shape alone take {self.matched_floor:.3g}."
+            f"In space, each point of one shape is within {self.distance:.3g} of the other. The "
+            f"best one-to-one correspondence of {self.n_samples} random points of each moves them "
+            f"by up to {self.matching_distance:.3g}; for two such samples of the first shape it is "
+            f"{self.sampling_distance:.3g}."
         )
 
-    def _heard(self) -> str:
-        seen = [change for change in self.changes if change.significant]
-        if not seen:
-            return "At no heat time do graph Laplacians of such samples tell the shapes apart: sampling does as much."
-        worst = max(seen, key=lambda change: change.change / change.floor)
+    def _explain_changes(self) -> str:
+        significant = [change for change in self.changes if change.significant]
+        if not significant:
+            return (
+                "Graph Laplacians of such samples do not distinguish the shapes at any heat time: "
+                "sampling alone changes them as much."
+            )
+        clearest = max(significant, key=lambda change: change.change / change.floor)
         return (
-            f"Graph Laplacians of such samples tell the shapes apart at {len(seen)} of {len(self.changes)} heat times, "
-            f"most clearly at t = {worst.t:.3g}: eigenvalues change by up to {worst.change:.3g} of the last, two "
-            f"samples of the first shape by {worst.floor:.3g}, and Weyl's bound allows {worst.weyl:.3g}."
+            "Graph Laplacians of such samples distinguish the shapes at "
+            f"{len(significant)} of {len(self.changes)} heat times, most clearly at "
+            f"t = {clearest.t:.3g}: eigenvalues change by up to {clearest.change:.3g} of the last, "
+            f"those of two samples of the first shape by {clearest.floor:.3g}, and Weyl's bound is "
+            f"{clearest.weyl:.3g}."
         )
 
 
@@ -145,21 +175,22 @@ def compare_shapes(
     partners: ArrayLike | None = None,
     progress: Progress | None = None,
 ) -> StabilityReport:
-    """Measure how stable the spectrum is from one shape to another (thesis, chapters 3 and 4).
+    """Compare two shapes by closeness, spectra and graph Laplacians (thesis chapters 3 and 4).
 
-    The shapes are compared as they lie and in their own unit: neither is moved, nor scaled. Meshes with the same
-    simplices correspond vertex by vertex, others by `partners`; for all others random points of both are matched one
-    to one, as Theorem 4.2.1 does.
+    The shapes are compared in their given places and units; neither is moved or scaled. Meshes with
+    the same simplices correspond vertex by vertex. Other meshes correspond by `partners`, if it is
+    given. Random points of both shapes are matched one to one, as in Theorem 4.2.1.
 
     Parameters
     ----------
     one, two : ShapeLike
-        Of one dimension, in one space.
+        Two shapes of the same dimension, in the same space.
     plan : StabilityPlan, optional
+        Number of eigenvalues, of samples, heat times and seed.
     partners : (n1,) int, optional
-        The point of the second mesh on which each point of the first lies.
+        For each point of the first mesh, the corresponding point of the second.
     progress : callable, optional
-        Called as progress(fraction_done, message).
+        Called as ``progress(fraction_done, message)``.
 
     Returns
     -------
@@ -168,31 +199,52 @@ def compare_shapes(
     Raises
     ------
     InvalidParameterError
-        If the shapes differ in dimension or space, a number of the plan is not in range, or `partners` are for other
-        meshes or for clouds.
+        If the shapes differ in dimension or space, an option is out of range, `partners` has
+        another length, or `partners` or brackets are requested for a point cloud.
     InvalidShapeError
-        As the operators say.
+        If an operator cannot be built; see `build_laplacian`.
     ConvergenceError
         If a spectrum cannot be proved complete.
+
+    See Also
+    --------
+    map_closeness : Closeness of a mesh and its image.
+    theorem_rate : Rates of change that theorems prove.
+
+    Examples
+    --------
+    A sphere and an ellipsoid that is 5 % longer:
+
+    >>> import eigenshape as es
+    >>> sphere = es.icosphere(3)
+    >>> ellipsoid = es.TriangleMesh(sphere.vertices * [1, 1, 1.05], sphere.faces)
+    >>> plan = es.stability.StabilityPlan(k=6, n_samples=200)
+    >>> report = es.compare_shapes(sphere, ellipsoid, plan)
+    >>> round(report.delta, 3)
+    0.05
+    >>> report.closeness.limited_by
+    'Jacobian'
     """
     one = as_shape(one, "one")
     two = as_shape(two, "two")
     require_type(plan, StabilityPlan | None, "plan")
     chosen = plan or StabilityPlan()
-    tell = progress or (lambda share, what: None)
+    report_progress = progress or (lambda share, what: None)
     meshes = _meshes(one, two, chosen, partners)
-    n_samples, k = _checked(chosen, one, two)
-    told = _partners(*meshes, partners) if meshes else None
-    tell(0.0, "spectra")
+    n_samples, k = _check_plan(chosen, one, two)
+    images = _find_partners(*meshes, partners) if meshes else None
+    report_progress(0.0, "spectra")
     laplacians = [build_laplacian(shape) for shape in (one, two)]
     spectra = [solve_spectrum(laplacian, k) for laplacian in laplacians]
     brackets = _brackets(*meshes, k) if meshes and chosen.brackets else None
-    tell(0.3, "matching points")
+    report_progress(0.3, "matching points")
     rng = np.random.default_rng(chosen.seed)
     samples = matched_samples(one, two, n_samples, rng)
     distances = distances_between(one, two, n_samples, rng)
     distance = float(max(each.max() for each in distances))
-    closeness = map_closeness(meshes[0], two.points[told]) if meshes and told is not None else None
+    closeness = None
+    if meshes is not None and images is not None:
+        closeness = map_closeness(meshes[0], two.points[images])
     delta = float(closeness.displacement.max()) if closeness else distance
     spacing = max(
         neighbor_distance(points, one.dim) for points in (samples.one, samples.two, samples.again)
@@ -203,19 +255,19 @@ def compare_shapes(
     changes, angles = changes_over_times(
         samples,
         k,
-        chosen.times or spaced_times(times),
+        chosen.times or default_sample_times(times),
         times,
-        lambda share, what: tell(0.5 + share / 2, what),
+        lambda share, what: report_progress(0.5 + share / 2, what),
     )
-    if told is not None:
-        angles = eigenspace_angles(*spectra, points=told, laplacian=laplacians[0])
-    tell(1.0, "compared")
+    if images is not None:
+        angles = eigenspace_angles(*spectra, points=images, laplacian=laplacians[0])
+    report_progress(1.0, "compared")
     return StabilityReport(
         spectra=compare_spectra(*spectra, brackets=brackets),
         closeness=closeness,
         distance=distance,
-        matched=samples.matched.distance,
-        matched_floor=samples.floor.distance,
+        matching_distance=samples.matching.distance,
+        sampling_distance=samples.resampling.distance,
         delta=delta,
         times=times,
         changes=changes,
@@ -225,23 +277,25 @@ def compare_shapes(
     )
 
 
-def _checked(plan: StabilityPlan, one: Shape, two: Shape) -> tuple[int, int]:
-    """Return how many points to throw on each shape, and how many eigenvalues to compare."""
+def _check_plan(plan: StabilityPlan, one: Shape, two: Shape) -> tuple[int, int]:
+    """Check the options; return the number of samples and the number of eigenvalues."""
     kinds = [(shape.dim, shape.points.shape[1]) for shape in (one, two)]
     if kinds[0] != kinds[1]:
-        said = " and ".join(f"{dim} in R^{d}" for dim, d in kinds)
+        dims = " and ".join(f"{dim} in R^{d}" for dim, d in kinds)
         raise InvalidParameterError(
-            f"Shapes to compare must have one dimension, in one space; theirs are {said}."
+            f"Shapes must have the same dimension, in the same space; theirs are {dims}."
         )
     if plan.times:
         positive_values(np.array(plan.times), "times")
     clouds = [shape for shape in (one, two) if isinstance(shape, PointCloud)]
     wanted = whole_number(plan.n_samples, "n_samples", FEWEST_SAMPLES, MOST_SAMPLES)
+    # Two samples of one cloud must be disjoint, so that their difference is that of sampling.
     n_samples = min([wanted, *(len(cloud.points) // 2 for cloud in clouds)])
     if n_samples < FEWEST_SAMPLES:
         smallest = min(clouds, key=lambda cloud: len(cloud.points))
         raise InvalidParameterError(
-            f"A cloud to compare is halved, and takes {2 * FEWEST_SAMPLES} points; it is {smallest!r}."
+            f"A point cloud must have at least {2 * FEWEST_SAMPLES} points, because it is halved; "
+            f"it is {smallest!r}."
         )
     most = min(n_samples, len(one.points), len(two.points)) - 1
     k = min(USUAL_K, max(most, 2)) if plan.k is None else plan.k
@@ -260,8 +314,10 @@ def _meshes(
     return None
 
 
-def _partners(one: Mesh, two: Mesh, partners: ArrayLike | None) -> Int[np.ndarray, " n"] | None:
-    """Return the point of the second mesh for each of the first, where that is known."""
+def _find_partners(
+    one: Mesh, two: Mesh, partners: ArrayLike | None
+) -> Int[np.ndarray, " n"] | None:
+    """Return, for each point of the first mesh, the point of the second; None if unknown."""
     n = one.n_points
     if partners is None:
         same = n == two.n_points and np.array_equal(one.simplices, two.simplices)
@@ -269,7 +325,8 @@ def _partners(one: Mesh, two: Mesh, partners: ArrayLike | None) -> Int[np.ndarra
     found = whole_numbers(partners, "partners", 0, two.n_points - 1)
     if len(found) != n:
         raise InvalidParameterError(
-            f"partners must be one a point of the first mesh; there are {len(found)} for {n}."
+            "partners must have one entry per point of the first mesh; "
+            f"there are {len(found)} for {n}."
         )
     return found
 

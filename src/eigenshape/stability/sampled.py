@@ -1,4 +1,4 @@
-"""Random points of two shapes, matched one to one, and what their graph Laplacians hear at several heat times."""
+"""Random points of two shapes, matched one to one, and how the spectra of their graphs differ."""
 
 from dataclasses import dataclass, replace
 
@@ -28,35 +28,41 @@ from eigenshape.stability.bounds import TimeRange, weyl_bound
 from eigenshape.stability.correspondence import BottleneckMatching, bottleneck_matching
 from eigenshape.stability.rates import theorem_rate
 
+# Heat times over the admissible range. Each costs three solves.
 N_TIMES = 4
-DENSER = 20  # times as many points to measure distances to, as are matched
-ABOVE_SAMPLING = (
-    2.0  # a change that is so much more than that of two samples of one shape is the shapes'
-)
+# Points of a shape to which distances are measured, as a multiple of the matched points. More of
+# them lower the distance of points to the surface that sampling adds.
+DENSER = 20
+# A change is significant if it exceeds that between two samples of one shape by this factor.
+ABOVE_SAMPLING = 2.0
 
 Points = Float[np.ndarray, "n d"]
 
 
 @dataclass(frozen=True)
 class ChangeAtTime:
-    """How far the graph Laplacians of samples of two shapes are apart at one heat time.
+    """Difference of the graph Laplacians of samples of two shapes at one heat time.
 
-    Shares are of the last eigenvalue of the first shape's sample.
+    All numbers but `t` are shares of the last eigenvalue of the first shape's sample.
 
     Attributes
     ----------
     t : float
         Heat time, in length².
     change : float
-        Largest |λ_i - ω_i|, as a share.
+        Largest |λ_i - ω_i| between the two shapes.
     floor : float
-        The same between two samples of the first shape: what sampling alone does.
+        Largest |λ_i - ω_i| between two samples of the first shape: the effect of sampling alone.
     weyl : float
-        ‖L_P - L_Q‖₂ of the matched points, as a share: no eigenvalue can change by more.
+        ‖L_P - L_Q‖₂ of the matched points: no eigenvalue can change by more.
     bound : float
-        What theory allows for points so far apart (`theorem_rate("lipschitz")`), as a share.
-    trusted : bool
-        Whether the time lies in the range that can be trusted.
+        Bound by theory for points at this distance (`theorem_rate("lipschitz")`).
+    admissible : bool
+        Whether the time is in the admissible range.
+
+    See Also
+    --------
+    compare_shapes : Compute these changes.
     """
 
     t: float
@@ -64,11 +70,11 @@ class ChangeAtTime:
     floor: float
     weyl: float
     bound: float
-    trusted: bool
+    admissible: bool
 
     @property
     def significant(self) -> bool:
-        """Whether the change stands out from what sampling does."""
+        """Whether the change is more than twice the effect of sampling."""
         return self.change > ABOVE_SAMPLING * self.floor
 
 
@@ -79,29 +85,30 @@ class Samples:
     Attributes
     ----------
     one, two, again : (n, d) float
-        Of the first shape, of the second, and others of the first.
-    matched, floor : BottleneckMatching
-        From `one` to `two`, and from `one` to `again`.
+        Points of the first shape, of the second, and further points of the first, in length.
+    matching, resampling : BottleneckMatching
+        Between `one` and `two`, and between `one` and `again`.
     dim : int
+        m.
     """
 
     one: Points
     two: Points
     again: Points
-    matched: BottleneckMatching
-    floor: BottleneckMatching
+    matching: BottleneckMatching
+    resampling: BottleneckMatching
     dim: int
 
 
 def matched_samples(one: Shape, two: Shape, n: int, rng: np.random.Generator) -> Samples:
-    """Throw n points on each of two shapes, 2n on the first, and match them one to one."""
-    both, other = _thrown(one, 2 * n, rng), _thrown(two, n, rng)
+    """Draw 2n points of the first shape and n of the second, and match them one to one."""
+    both, other = _draw_points(one, 2 * n, rng), _draw_points(two, n, rng)
     first, again = both[:n], both[n:]
-    matched, floor = bottleneck_matching(first, other), bottleneck_matching(first, again)
-    return Samples(first, other, again, matched, floor, one.dim)
+    matching, resampling = bottleneck_matching(first, other), bottleneck_matching(first, again)
+    return Samples(first, other, again, matching, resampling, one.dim)
 
 
-def _thrown(shape: Shape, n: int, rng: np.random.Generator) -> Points:
+def _draw_points(shape: Shape, n: int, rng: np.random.Generator) -> Points:
     if isinstance(shape, PointCloud):
         return shape.points[rng.choice(len(shape.points), n, replace=False)]
     return sample_surface(shape, n, rng=rng).points
@@ -110,51 +117,55 @@ def _thrown(shape: Shape, n: int, rng: np.random.Generator) -> Points:
 def distances_between(
     one: Shape, two: Shape, n: int, rng: np.random.Generator
 ) -> tuple[Float[np.ndarray, " n1"], Float[np.ndarray, " n2"]]:
-    """Return how far each point of each shape is from the other, of which n points a match are known beside its own."""
-    clouds = [_dense(shape, DENSER * n, rng) for shape in (one, two)]
+    """Return the distance of each point of each shape to the other shape.
+
+    A mesh is represented by its vertices and 20 n random points.
+    """
+    clouds = [_dense_points(shape, DENSER * n, rng) for shape in (one, two)]
     pairs = zip((one, two), clouds[::-1], strict=True)
     first, second = (frozen(cKDTree(cloud).query(shape.points)[0]) for shape, cloud in pairs)
     return first, second
 
 
-def _dense(shape: Shape, n: int, rng: np.random.Generator) -> Points:
+def _dense_points(shape: Shape, n: int, rng: np.random.Generator) -> Points:
     if isinstance(shape, PointCloud):
         return shape.points
     return np.vstack([shape.points, sample_surface(shape, n, rng=rng).points])
 
 
-def spaced_times(times: TimeRange) -> tuple[float, ...]:
-    """Return heat times over the range that can be trusted; where that is empty, over what at least can be computed."""
+def default_sample_times(times: TimeRange) -> tuple[float, ...]:
+    """Return heat times over the admissible range; if it is empty, over the computable one."""
     low = times.reach if times.empty else times.low
     return tuple(np.geomspace(low, times.high, N_TIMES).tolist()) if low < times.high else (low,)
 
 
 def changes_over_times(
-    samples: Samples, k: int, asked: tuple[float, ...], trusted: TimeRange, progress: Progress
+    samples: Samples, k: int, times: tuple[float, ...], admissible: TimeRange, progress: Progress
 ) -> tuple[tuple[ChangeAtTime, ...], EigenspaceAngles]:
-    """Return what changes at each heat time, and how far eigenspaces turn at the one in the middle."""
+    """Return the changes at each heat time, and the angles of eigenspaces at the middle one."""
     changes = []
-    pieces = [
-        (points, _pieces(points, samples.dim))
-        for points in (samples.one, samples.two, samples.again)
-    ]
-    for place, t in enumerate(asked):
-        progress(place / len(asked), f"heat time {t:.3g}")
-        laplacians = [_whole(points, t, samples.dim, labels) for points, labels in pieces]
+    clouds = (samples.one, samples.two, samples.again)
+    pieces = [(points, _label_pieces(points, samples.dim)) for points in clouds]
+    for place, t in enumerate(times):
+        progress(place / len(times), f"heat time {t:.3g}")
+        laplacians = [_graph_laplacian(points, t, samples.dim, labels) for points, labels in pieces]
         spectra = [solve_spectrum(laplacian, k) for laplacian in laplacians]
-        changes.append(_change(samples, laplacians, spectra, t, trusted))
-        if place == len(asked) // 2:
+        changes.append(_measure_change(samples, laplacians, spectra, t, admissible))
+        if place == len(times) // 2:
             angles = eigenspace_angles(
-                *spectra[:2], points=samples.matched.partners, laplacian=laplacians[0]
+                *spectra[:2], points=samples.matching.partners, laplacian=laplacians[0]
             )
     return tuple(changes), angles
 
 
-def _whole(points: Points, t: float, dim: int, labels: Int[np.ndarray, " n"]) -> Laplacian:
-    """Build `gaussian_laplacian`, which must hold together what has one label, without its kernel.
+def _graph_laplacian(
+    points: Points, t: float, dim: int, labels: Int[np.ndarray, " n"]
+) -> Laplacian:
+    """Build the Gaussian graph Laplacian of some points, which must connect points of one label.
 
-    Nobody is warned of heat times that do not serve: `ChangeAtTime.trusted` tells. (To silence
-    warnings would silence those of other threads too.)
+    The kernel is removed from the result, so that the solver does not warn about heat times out of
+    range: `ChangeAtTime.admissible` reports them. (A filter of warnings would act on other threads
+    too.)
     """
     measure = uniform_quadrature(points, dim)
     kernel = choose_kernel(KernelOptions(t=t), neighbor_distance(measure.points, dim))
@@ -163,27 +174,27 @@ def _whole(points: Points, t: float, dim: int, labels: Int[np.ndarray, " n"]) ->
     return replace(laplacian, kernel=None)
 
 
-def _pieces(points: Points, dim: int) -> Int[np.ndarray, " n"]:
-    """Label the points that nearest neighbours hold together."""
+def _label_pieces(points: Points, dim: int) -> Int[np.ndarray, " n"]:
+    """Label the connected components of the graph of nearest neighbors."""
     joined = neighbor_graph(points, min(dim * (dim + 1), len(points) - 1))
     return connected_components(joined, directed=False)[1]
 
 
-def _change(
+def _measure_change(
     samples: Samples,
     laplacians: list[Laplacian],
     spectra: list[Spectrum],
     t: float,
-    trusted: TimeRange,
+    admissible: TimeRange,
 ) -> ChangeAtTime:
     values = [spectrum.eigenvalues for spectrum in spectra]
     last = float(values[0][-1])
-    moved = samples.matched
+    moved = samples.matching
     return ChangeAtTime(
         t=t,
         change=float(np.abs(values[1] - values[0]).max()) / last,
         floor=float(np.abs(values[2] - values[0]).max()) / last,
         weyl=weyl_bound(laplacians[0], laplacians[1], moved.partners).norm / last,
         bound=float(theorem_rate("lipschitz", samples.dim).at(moved.distance, t)) / last,
-        trusted=trusted.low <= t <= trusted.high,
+        admissible=admissible.low <= t <= admissible.high,
     )

@@ -57,7 +57,7 @@ def test_resolution_drops_out():
 
 def test_pieces_without_a_way_between_them_have_no_affinity():
     piece = es.icosphere(1)
-    both = es.shapes.disjoint_union(piece, piece)
+    both = es.geometry.disjoint_union(piece, piece)
     one = es.retrieval.baselines.affinity_eigenvalues(piece, n_values=4, n_samples=piece.n_vertices)
     two = es.retrieval.baselines.affinity_eigenvalues(both, n_values=8, n_samples=both.n_vertices)
     np.testing.assert_allclose(two, np.repeat(one, 2) / 2, rtol=1e-9)

@@ -46,7 +46,7 @@ def test_moments_are_those_of_the_definition():
 
 
 def test_a_disc_has_no_moments_and_no_waves():
-    assert np.abs(lf._described(disc())).max() < 0.01
+    assert np.abs(lf._describe_silhouette(disc())).max() < 0.01
 
 
 def test_a_square_has_only_waves_of_its_symmetry():
@@ -87,11 +87,15 @@ def test_turns_by_a_quarter_and_mirrors_leave_the_numbers(seed):
     for _ in range(4):
         row, column = rng.integers(5, 40, 2)
         image[row : row + rng.integers(5, 20), column : column + rng.integers(5, 20)] = True
-    expected = lf._described(image)
+    expected = lf._describe_silhouette(image)
     for other in (np.rot90(image), image[:, ::-1]):
-        np.testing.assert_allclose(lf._described(other.copy())[:35], expected[:35], atol=1e-12)
+        np.testing.assert_allclose(
+            lf._describe_silhouette(other.copy())[:35], expected[:35], atol=1e-12
+        )
         # The outline starts elsewhere, so that its samples lie between the old ones.
-        np.testing.assert_allclose(lf._described(other.copy())[35:], expected[35:], atol=0.02)
+        np.testing.assert_allclose(
+            lf._describe_silhouette(other.copy())[35:], expected[35:], atol=0.02
+        )
 
 
 def test_the_sixty_pairings_are_a_group():

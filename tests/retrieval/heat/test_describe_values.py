@@ -25,6 +25,6 @@ def test_features_are_the_maxima_of_the_function_and_vectors_those_of_heat(funct
 def test_values_are_checked():
     mesh = es.icosphere(1)
     with pytest.raises(
-        InvalidParameterError, match=r"values must hold one number a vertex, shape \(42,\)"
+        InvalidParameterError, match=r"values must hold one number per vertex, shape \(42,\)"
     ):
         es.retrieval.find_heat_features(mesh, values=np.ones(3))

@@ -31,8 +31,8 @@ SYMMETRIC = {
     "sphere": lambda: es.icosphere(3),
     "icosahedron": lambda: es.icosphere(0),
     "box": lambda: BOX,
-    "two spheres": lambda: es.shapes.disjoint_union(BALL, moved(BALL, 3)),
-    "twelve boxes": lambda: es.shapes.disjoint_union(
+    "two spheres": lambda: es.geometry.disjoint_union(BALL, moved(BALL, 3)),
+    "twelve boxes": lambda: es.geometry.disjoint_union(
         *(moved(BOX, 2 * number) for number in range(12))
     ),
 }

@@ -102,7 +102,7 @@ def test_few_vertices_have_few_patches():
 
 def test_each_piece_is_sampled():
     one, two = es.icosphere(2), es.icosphere(2)
-    pair = es.shapes.disjoint_union(one, es.TriangleMesh(two.vertices + 3, two.faces))
+    pair = es.geometry.disjoint_union(one, es.TriangleMesh(two.vertices + 3, two.faces))
     found = surface_patches(pair, n_samples=30)
     assert (found.vertices < one.n_vertices).sum() == pytest.approx(15, abs=2)
 

@@ -56,7 +56,10 @@ BAD = {
         "mesh must be a triangle mesh; it is None. Pass a TriangleMesh, a trimesh.Trimesh, "
         "a pyvista.PolyData of triangles, or a pair (vertices, faces)."
     ),
-    "loose": "LOOSE",
+    "loose": (
+        "Every vertex must belong to a face; vertex 42 at [9.0, 9.0, 9.0] has none (1 such). "
+        'Try repair(mesh, ["auto"]), or --repair auto on the command line.'
+    ),
     "surprise": "ValueError: invalid literal for int() with base 10: 'surprise'",
 }
 

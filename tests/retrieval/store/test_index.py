@@ -375,15 +375,15 @@ def test_a_copy_without_its_log_is_named(index, tmp_path):
 
 
 def test_a_second_writer_is_told(index, monkeypatch):
-    monkeypatch.setattr(store, "WAIT", 0.05)
+    monkeypatch.setattr(store, "LONGEST_WAIT", 0.05)
     with (
         FileLock(index.folder / store.LOCK),
-        pytest.raises(StoreError, match="An index has one writer; another process"),
+        pytest.raises(StoreError, match="An index has one writer at a time; another process"),
     ):
         index.add_descriptors("one", [descriptor(1)])
     with (
         store.writing(index.folder),
-        pytest.raises(StoreError, match=r"one writer; process \d+ on .* has held"),
+        pytest.raises(StoreError, match=r"one writer at a time; process \d+ on .* has held"),
     ):
         index.add_descriptors("one", [descriptor(1)])
     index.add_descriptors("one", [descriptor(1)])
@@ -460,7 +460,7 @@ def test_reading_needs_no_right_to_write(index, open_folder):
             "one",
             "two",
         }
-        with pytest.raises(StoreError, match="An index changes only where one may write"):
+        with pytest.raises(StoreError, match="An index can change only in a writable folder"):
             ShapeIndex.open(folder).remove("one")
     with (
         read_only(open_folder / "with log") as folder,

@@ -16,19 +16,21 @@ def moved(mesh, scale, to):
 
 def with_specks(body, n, scale=0.004):
     places = np.random.default_rng(0).standard_normal((n, 3))
-    return es.shapes.disjoint_union(
+    return es.geometry.disjoint_union(
         body, *[moved(es.icosphere(0), scale, place) for place in places]
     )
 
 
 BODY = es.make_creature("quadruped", 0, n_vertices=800)
 SPECKED = with_specks(BODY, 70)
-SOUP = es.shapes.disjoint_union(*[moved(es.icosphere(1), 1.0, [3 * i, 0, 0]) for i in range(40)])
-DUST = es.shapes.disjoint_union(*[moved(es.icosphere(0), 1.0, [3 * i, 0, 0]) for i in range(1000)])
+SOUP = es.geometry.disjoint_union(*[moved(es.icosphere(1), 1.0, [3 * i, 0, 0]) for i in range(40)])
+DUST = es.geometry.disjoint_union(
+    *[moved(es.icosphere(0), 1.0, [3 * i, 0, 0]) for i in range(1000)]
+)
 
 
 def test_fragments_by_hand():
-    mesh = es.shapes.disjoint_union(
+    mesh = es.geometry.disjoint_union(
         es.icosphere(1),
         moved(es.icosphere(1), 0.09, [3, 0, 0]),
         moved(es.icosphere(1), 0.2, [5, 0, 0]),
@@ -88,7 +90,7 @@ def test_an_open_body_with_specks():
     """The boundary of fragments frees no heat of reflections: they are left out of both spectra."""
     half = es.scans.cut_by_planes(BODY, [[1, 0, 0, 0.1]]).mesh
     speck = es.TriangleMesh(0.01 * np.eye(3), [[0, 1, 2]])
-    mesh = es.shapes.disjoint_union(half, *[moved(speck, 1, [2 + i, 0, 0]) for i in range(20)])
+    mesh = es.geometry.disjoint_union(half, *[moved(speck, 1, [2 + i, 0, 0]) for i in range(20)])
     alone, found = (
         es.retrieval.find_heat_features(half, RECIPE).descriptor,
         es.retrieval.find_heat_features(mesh, RECIPE).descriptor,

@@ -7,11 +7,12 @@ from intervals import assert_around, finer
 from eigenshape.geometry.facets import without_pinches
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import repair
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.io.shape_files import read_shape
 from eigenshape.operators.fem import fem_laplacian
 from eigenshape.shapes import exact
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
+from eigenshape.shapes.surfaces import grid, icosphere
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
 from eigenshape.spectral.solve import solve_spectrum
 

@@ -7,16 +7,17 @@ from intervals import assert_around, finer
 from pencils import TETRAHEDRON
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape.geometry.facets import boundary_facets
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.topology import boundary_facets
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import interpolation_constants
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
 from eigenshape.shapes import exact
 from eigenshape.shapes.domains import ball, box, circle, disc, interval, irregular_grid
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
 from eigenshape.spectral.solve import solve_spectrum
 

@@ -40,7 +40,7 @@ def test_uneven_edges_are_bracketed_and_the_weights_pay(condition, monkeypatch):
     mesh, known = graded(24), exact.box_eigenvalues(20, (1, 1), condition)
     found = bracket_eigenvalues(mesh, 20, boundary=condition)
     assert_around(found, known)
-    monkeypatch.setattr("eigenshape.spectral.bounds.nonconforming.EVEN", np.inf)
+    monkeypatch.setattr("eigenshape.spectral.bounds.nonconforming.EVEN_CONSTANTS", np.inf)
     unweighed = bracket_eigenvalues(mesh, 20, boundary=condition)
     assert_around(unweighed, known)
     assert (unweighed.lower <= found.lower).all()
@@ -65,7 +65,7 @@ def test_a_weight_that_cannot_be_solved_is_left_out(monkeypatch):
     assert len(solves) > 2
     assert solves == sorted(solves, reverse=True)
     monkeypatch.undo()
-    monkeypatch.setattr("eigenshape.spectral.bounds.nonconforming.EVEN", np.inf)
+    monkeypatch.setattr("eigenshape.spectral.bounds.nonconforming.EVEN_CONSTANTS", np.inf)
     np.testing.assert_array_equal(found.lower, bracket_eigenvalues(mesh, 10).lower)
 
 

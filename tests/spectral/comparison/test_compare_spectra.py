@@ -7,8 +7,10 @@ from hypothesis import strategies as st
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.subdivision import subdivide
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.shapes.surfaces import disjoint_union, icosphere, subdivide, torus
+from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
 from eigenshape.spectral.comparison.spectra import compare_spectra, spectral_hausdorff_distance
 from eigenshape.spectral.solve import solve_spectrum
@@ -103,7 +105,7 @@ def test_hausdorff_by_hand():
     assert spectral_hausdorff_distance([0, 1, 4], [4, 1, 0, 0, 1]) == 0  # sets: copies do not count
     assert (
         spectral_hausdorff_distance([0, 5], [0, 1, 2]) == 2
-    )  # 5 may have a neighbour beyond 2; 2 has none
+    )  # 5 may have a neighbor beyond 2; 2 has none
     assert spectral_hausdorff_distance([0.0], [3.0]) == 3
 
 
@@ -142,7 +144,9 @@ def test_bad_input():
     with pytest.raises(InvalidParameterError, match="two must begin with the lowest eigenvalue"):
         compare_spectra(SPECTRUM, interval)
     few, enough = bracket_eigenvalues(SPHERE, 5), bracket_eigenvalues(SPHERE, 20)
-    with pytest.raises(InvalidParameterError, match="there are 20 of these, and 5 brackets of two"):
+    with pytest.raises(
+        InvalidParameterError, match="there are 20 eigenvalues, and 5 brackets of two"
+    ):
         compare_spectra(SPECTRUM, SPECTRUM, brackets=(enough, few))
     with pytest.raises(InvalidParameterError, match="two must be finite; entry 1 is nan"):
         spectral_hausdorff_distance([0.0], [0.0, np.nan])

@@ -109,7 +109,7 @@ def test_bad_input_to_errors():
         eigenspace_errors(SPECTRUM, [0, 2, 1, 3], HARMONICS[:, :3])
     with pytest.raises(
         InvalidParameterError,
-        match="to show that their last group is whole; there are 16 eigenvalues",
+        match="to show that the last group is complete; there are 16 eigenvalues",
     ):
         eigenspace_errors(SPECTRUM, EXACT[:16], HARMONICS)
     with pytest.raises(

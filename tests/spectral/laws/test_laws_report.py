@@ -18,11 +18,12 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import mean_side_length
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices, edge_table, vertex_components
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 from eigenshape.spectral.laws import comparison as sameness
 from eigenshape.spectral.laws import laplacian_laws, operator_laws
 from eigenshape.spectral.laws import transformations as changes
@@ -33,7 +34,7 @@ from eigenshape.spectral.laws.report import (
     Law,
     OperatorReport,
     SkippedLaw,
-    known_promises,
+    check_promises,
 )
 
 
@@ -259,7 +260,7 @@ def test_a_boundary_condition_is_definite_and_a_free_boundary_is_not():
 
 
 def test_where_no_factor_serves_nothing_is_taken_for_proved(monkeypatch):
-    monkeypatch.setattr(laplacian_laws, "factorise", lambda *_: None)
+    monkeypatch.setattr(laplacian_laws, "factorize", lambda *_: None)
     report = check_laplacian(cotangent_laplacian(SPHERE), promises=["constants", "definite"])
     assert broken(report) == {"positive semidefinite", "kernel", "definite"}
     assert (
@@ -539,16 +540,16 @@ def test_changes_keep_or_turn_the_orientation_as_they_say(dim):
     )
     before = np.sort(oriented_volumes(mesh))
     for same in (
-        changes.reordered(mesh, rng),
-        changes.mirrored(mesh),
-        changes.renumbered(mesh, rng.permutation(12)),
+        changes.reorder(mesh, rng),
+        changes.mirror(mesh),
+        changes.renumber(mesh, rng.permutation(12)),
     ):
         np.testing.assert_allclose(np.sort(oriented_volumes(same)), before, atol=1e-12)
-    turned = oriented_volumes(changes.turned_over(mesh, rng)) / oriented_volumes(mesh)
+    turned = oriented_volumes(changes.turn_over(mesh, rng)) / oriented_volumes(mesh)
     np.testing.assert_allclose(np.abs(turned), 1)
     assert turned[0] == pytest.approx(-1)
     assert 1 < (turned < 0).sum() < 40
-    twice = changes.doubled(mesh)
+    twice = changes.double(mesh)
     assert vertex_components(twice)[0] == 2 * vertex_components(mesh)[0]
 
 
@@ -556,7 +557,7 @@ def test_a_promise_that_is_unknown_is_refused():
     with pytest.raises(
         InvalidParameterError, match=r"promises must be among constants, .*; 'symmetry' is not\."
     ):
-        known_promises.__wrapped__(["symmetry"])  # past the check of types, which only tests have
+        check_promises.__wrapped__(["symmetry"])  # past the check of types, which only tests have
 
 
 def test_what_is_no_laplacian_is_refused():

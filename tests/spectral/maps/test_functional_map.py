@@ -211,17 +211,15 @@ def test_point_maps_of_another_form_are_refused(hand):
     for bad in (np.zeros(3, int), np.zeros(HAND.n_vertices)):
         with pytest.raises(
             es.InvalidParameterError,
-            match="A point map must hold one whole number a vertex of the targ",
+            match="points must hold one whole number for each vertex of the targ",
         ):
             es.spectral.map_from_points(hand, hand, bad)
-    with pytest.raises(
-        es.InvalidParameterError, match=r"A point map must name vertices .* entry 0 is -1"
-    ):
+    with pytest.raises(es.InvalidParameterError, match=r"points must be vertices .* entry 0 is -1"):
         es.spectral.map_from_points(hand, hand, np.arange(HAND.n_vertices) - 1)
 
 
 def test_shapes_in_pieces_are_refused(hand):
-    two = solve(es.shapes.disjoint_union(HAND, HAND), 30)
+    two = solve(es.geometry.disjoint_union(HAND, HAND), 30)
     with pytest.raises(
         es.InvalidParameterError,
         match=r"Shapes to be mapped must be connected; the target has the eigenvalues",

@@ -5,10 +5,11 @@ import pytest
 import scipy.sparse as sp
 from pencils import cycle, dense_eigenvalues, graph, path, wild
 
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.csr_loops import component_labels
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.shapes.surfaces import disjoint_union, icosphere
+from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.multilevel.aggregation import build_levels
 from eigenshape.spectral.multilevel.multilevel_loops import grow_aggregates
 
@@ -24,13 +25,13 @@ def test_a_path_is_cut_into_runs_by_hand():
     assert count == 3
 
 
-def test_a_fragment_joins_its_neighbour():
+def test_a_fragment_joins_its_neighbor():
     labels, count = grown(graph(path(9)), 8)  # one point is left over, less than a quarter of eight
     assert labels.tolist() == [0] * 9
     assert count == 1
 
 
-def test_points_without_neighbours_stay_alone():
+def test_points_without_neighbors_stay_alone():
     labels, count = grown(Laplacian(sp.csr_array((4, 4)), sp.csr_array(sp.eye_array(4))), 3)
     assert labels.tolist() == [0, 1, 2, 3]
     assert count == 4

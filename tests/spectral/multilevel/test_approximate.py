@@ -8,13 +8,14 @@ from pencils import cycle, dense_eigenvalues, graph, hypercube, path, tetrahedra
 
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes.spheres import fibonacci_sphere
-from eigenshape.shapes.surfaces import disjoint_union, icosphere, torus
+from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.multilevel import approximate
 from eigenshape.spectral.multilevel import davidson as refinement
 from eigenshape.spectral.multilevel import start as climbing
@@ -27,7 +28,7 @@ solve_roughly = partial(solve_spectrum, method="approximate")
 @pytest.fixture
 def always_coarsen(monkeypatch):
     """Take the road of large operators, also for small ones."""
-    monkeypatch.setattr(climbing, "SMALL", 0)
+    monkeypatch.setattr(climbing, "EXACT_POINTS", 0)
     monkeypatch.setattr(climbing, "COARSENED", 3)
 
 

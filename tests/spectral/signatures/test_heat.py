@@ -4,8 +4,9 @@ import pytest
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import boundary_edges
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere, torus
+from eigenshape.shapes.surfaces import grid, icosphere, torus
 from eigenshape.spectral.signatures.heat import (
     default_times,
     heat_kernel_signature,
@@ -165,7 +166,7 @@ def test_times_of_the_scale_invariant_signature_are_a_geometric_sequence():
     ):
         scale_invariant_signature(spectrum, [1.0, 2.0, 3.0])
     with pytest.raises(
-        InvalidParameterError, match="there are 1, with ratios of neighbours from 1 to 1"
+        InvalidParameterError, match="there are 1, with ratios of neighbors from 1 to 1"
     ):
         scale_invariant_signature(spectrum, [1.0])
     with pytest.raises(InvalidParameterError, match=r"n_frequencies must lie in 1\.\.2; it is 3"):

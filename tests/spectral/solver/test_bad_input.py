@@ -7,13 +7,14 @@ from pencils import cycle, dense_eigenvalues, graph, path
 
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.shapes.surfaces import disjoint_union, icosphere
+from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver.diagnosis import require_solvable
-from eigenshape.spectral.solver.pencil import normalise
+from eigenshape.spectral.solver.pencil import normalize
 
 TRIANGLE, PAIR = np.ones((3, 3)) - np.eye(3), np.ones((2, 2)) - np.eye(2)
 
@@ -160,7 +161,7 @@ def test_an_operator_that_is_sound_is_not_blamed():
         copies(PAIR, 4),
         Laplacian(0 * unit(5), unit(5)),
     ):
-        require_solvable(normalise(laplacian), ConvergenceError("no"))
+        require_solvable(normalize(laplacian), ConvergenceError("no"))
 
 
 @pytest.mark.long

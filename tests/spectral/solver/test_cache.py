@@ -31,7 +31,7 @@ def nothing_computed(monkeypatch):
         message = "computed"
         raise AssertionError(message)
 
-    return lambda: monkeypatch.setattr(solve, "normalise", refuse)
+    return lambda: monkeypatch.setattr(solve, "normalize", refuse)
 
 
 def require_same(one, two):

@@ -5,20 +5,21 @@ from pencils import cycle, dense_eigenvalues, graph, hypercube, path, tetrahedra
 
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.shapes.surfaces import disjoint_union, icosphere, torus
+from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import strategy as roads
 from eigenshape.spectral.solver.certify import certify
-from eigenshape.spectral.solver.pencil import normalise
+from eigenshape.spectral.solver.pencil import normalize
 
 
 @pytest.fixture
 def always_lanczos(monkeypatch):
     """Take the road of large operators, also for small ones."""
-    monkeypatch.setattr(roads, "SMALL", 0)
+    monkeypatch.setattr(roads, "DENSE_POINTS", 0)
     monkeypatch.setattr(roads, "DENSE_SHARE", 2.5)
 
 
@@ -122,12 +123,12 @@ def test_all_eigenvalues():
 def test_a_shift_on_an_eigenvalue_moves_away(monkeypatch):
     laplacian = cotangent_laplacian(icosphere(3))
     expected = solve_spectrum(laplacian, 40)
-    pencil = normalise(laplacian)
+    pencil = normalize(laplacian)
     on_it = float(np.ldexp(expected.eigenvalues[25], -pencil.value_exponent))
-    from eigenshape.spectral.solver.shift import factorise_near
+    from eigenshape.spectral.solver.shift import factorize_near
 
     monkeypatch.setattr(
-        roads, "shift_inside", lambda pencil, k: factorise_near(pencil, on_it * (1 + 1e-12))
+        roads, "shift_inside", lambda pencil, k: factorize_near(pencil, on_it * (1 + 1e-12))
     )
     found = solve_spectrum(laplacian, 40)
     np.testing.assert_allclose(found.eigenvalues, expected.eigenvalues, rtol=1e-12, atol=1e-12)
@@ -224,7 +225,7 @@ def test_lanczos_that_never_finds_a_pair_is_refused(monkeypatch, always_lanczos)
         return values[1:], vectors[:, 1:]
 
     monkeypatch.setattr(roads, "block_lanczos", lossy)
-    monkeypatch.setattr(roads, "RUNS", 1)
+    monkeypatch.setattr(roads, "MOST_RUNS", 1)
     with pytest.raises(ConvergenceError, match=r"19 of 20 were found in 1 runs and 1 are missing"):
         solve_spectrum(cotangent_laplacian(icosphere(3)), 20)
 

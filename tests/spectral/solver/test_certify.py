@@ -97,7 +97,7 @@ def test_rounding_is_allowed_for():
 
 def test_no_usable_factor_is_an_error(bumpy, monkeypatch):
     laplacian, spectrum = bumpy
-    monkeypatch.setattr(count, "factorise", lambda *args: None)
+    monkeypatch.setattr(count, "factorize", lambda *args: None)
     with pytest.raises(
         ConvergenceError, match=r"counted only where rounding takes less than their distance"
     ):

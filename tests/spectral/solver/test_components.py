@@ -6,13 +6,14 @@ import scipy.sparse as sp
 from pencils import cycle, dense_eigenvalues, graph, path
 
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.gaussian import mesh_laplacian
-from eigenshape.shapes.surfaces import disjoint_union, grid, icosphere
+from eigenshape.shapes.surfaces import grid, icosphere
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import strategy as roads
 from eigenshape.spectral.solver.certify import certify
-from eigenshape.spectral.solver.pencil import normalise
+from eigenshape.spectral.solver.pencil import normalize
 
 
 def moved(mesh: TriangleMesh, scale: float, along: float) -> TriangleMesh:
@@ -57,13 +58,13 @@ def test_parts_of_many_sizes_by_hand():
 def test_a_part_that_has_more_low_eigenvalues_than_expected_is_asked_again(monkeypatch):
     """A path has √λ low eigenvalues where a grid has λ: Weyl's law of surfaces says nothing of it."""
     asked = []
-    honest = roads._connected
+    honest = roads._solve_connected
 
     def listening(pencil, k, report):
         asked.append((pencil.n, k))
         return honest(pencil, k, report)
 
-    monkeypatch.setattr(roads, "_connected", listening)
+    monkeypatch.setattr(roads, "_solve_connected", listening)
     square = sp.kronsum(path(25), path(25))
     laplacian = graph(sp.block_diag([square, path(400)]))
     found = solve_spectrum(laplacian, 60)
@@ -128,11 +129,11 @@ def test_kernels_on_many_parts():
 
 def test_connected_parts_and_their_level():
     """Tiny parts have few of the low eigenvalues, and do not set the unit."""
-    alone = normalise(cotangent_laplacian(grid(30, 30)))
+    alone = normalize(cotangent_laplacian(grid(30, 30)))
     specks = cotangent_laplacian(
         disjoint_union(grid(30, 30), *[moved(icosphere(0), 1e-4, 2.0 + i) for i in range(5)])
     )
-    pencil = normalise(specks)
+    pencil = normalize(specks)
     level, own = (
         pencil.values_out(np.array([pencil.level]))[0],
         alone.values_out(np.array([alone.level]))[0],

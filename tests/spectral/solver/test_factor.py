@@ -9,9 +9,9 @@ from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes.surfaces import icosphere
 from eigenshape.sparse.front_loops import WIDE
 from eigenshape.spectral.solver import shift as shift_module
-from eigenshape.spectral.solver.factor import factorise, rounding
-from eigenshape.spectral.solver.pencil import normalise, residual_norms
-from eigenshape.spectral.solver.shift import factorise_near, shift_inside
+from eigenshape.spectral.solver.factor import factorize, rounding
+from eigenshape.spectral.solver.pencil import normalize, residual_norms
+from eigenshape.spectral.solver.shift import factorize_near, shift_inside
 
 
 def scaled_back(pencil, value):
@@ -19,9 +19,9 @@ def scaled_back(pencil, value):
 
 
 def test_pivots_count_the_eigenvalues_below_the_shift():
-    pencil = normalise(graph(path(3)))  # eigenvalues 0, 1, 3
+    pencil = normalize(graph(path(3)))  # eigenvalues 0, 1, 3
     counts = [
-        factorise(pencil, scaled_back(pencil, shift)).count for shift in (-0.5, 0.5, 1.5, 2.9, 3.1)
+        factorize(pencil, scaled_back(pencil, shift)).count for shift in (-0.5, 0.5, 1.5, 2.9, 3.1)
     ]
     assert counts == [0, 1, 2, 2, 3]
 
@@ -29,18 +29,18 @@ def test_pivots_count_the_eigenvalues_below_the_shift():
 @pytest.mark.parametrize("mass", ["lumped", "consistent"])
 def test_counts_agree_with_a_dense_solve(mass):
     laplacian = cotangent_laplacian(icosphere(2), mass)
-    pencil, reference = normalise(laplacian), dense_eigenvalues(laplacian)
+    pencil, reference = normalize(laplacian), dense_eigenvalues(laplacian)
     for shift in np.linspace(0.7, 0.99 * reference[-1], 23):
-        assert factorise(pencil, scaled_back(pencil, shift)).count == np.count_nonzero(
+        assert factorize(pencil, scaled_back(pencil, shift)).count == np.count_nonzero(
             reference < shift
         )
 
 
 def test_a_zero_pivot_is_no_factor():
-    pencil = normalise(graph(path(2)))  # at σ = 1 the diagonal is zero and pivots would leave it
-    assert factorise(pencil, scaled_back(pencil, 1.0)) is None
+    pencil = normalize(graph(path(2)))  # at σ = 1 the diagonal is zero and pivots would leave it
+    assert factorize(pencil, scaled_back(pencil, 1.0)) is None
     assert (
-        factorise(normalise(Laplacian(sp.csr_array((2, 2)), sp.csr_array(sp.eye_array(2)))), 0.0)
+        factorize(normalize(Laplacian(sp.csr_array((2, 2)), sp.csr_array(sp.eye_array(2)))), 0.0)
         is None
     )
 
@@ -62,8 +62,8 @@ def unpacked(factor):
 @pytest.mark.parametrize("laplacian", [wild(16), cotangent_laplacian(icosphere(2), "consistent")])
 @pytest.mark.parametrize("share", [0.1, 0.3, 1.0])
 def test_the_rounding_bound_covers_the_rounding(laplacian, share):
-    pencil = normalise(laplacian)
-    factor = factorise(pencil, share * pencil.level)
+    pencil = normalize(laplacian)
+    factor = factorize(pencil, share * pencil.level)
     lower, pivots = np.longdouble(unpacked(factor.lower)), np.longdouble(factor.lower.pivots)
     order = factor.lower.elimination.order
     matrix = (pencil.stiffness - factor.shift * pencil.mass).toarray()[np.ix_(order, order)]
@@ -75,13 +75,13 @@ def test_the_rounding_bound_covers_the_rounding(laplacian, share):
 
 
 def test_slack_is_taken_off_the_diagonal():
-    pencil = normalise(graph(path(30)))
+    pencil = normalize(graph(path(30)))
     slack = np.full(30, 0.11)
     one, two = (
-        factorise(pencil, 0.37, slack),
-        factorise(pencil, 0.48),
+        factorize(pencil, 0.37, slack),
+        factorize(pencil, 0.48),
     )  # B is 1, so slack is a shift
-    assert one.count == two.count > factorise(pencil, 0.37).count
+    assert one.count == two.count > factorize(pencil, 0.37).count
     right = np.arange(30.0)[:, None]
     np.testing.assert_allclose(one.solve(right), two.solve(right))
 
@@ -89,23 +89,23 @@ def test_slack_is_taken_off_the_diagonal():
 @pytest.mark.parametrize("k", [1, 2, 10, 60])
 @pytest.mark.parametrize("laplacian", [cotangent_laplacian(icosphere(3)), graph(path(500)), wild()])
 def test_the_shift_stands_among_the_wanted(laplacian, k):
-    count = shift_inside(normalise(laplacian), k).count
+    count = shift_inside(normalize(laplacian), k).count
     assert 0.45 * k - 3 <= count <= min(0.78 * k + 1, k)
 
 
 def test_a_shift_without_a_factor_is_an_error(monkeypatch):
-    monkeypatch.setattr(shift_module, "factorise", lambda *args: None)
+    monkeypatch.setattr(shift_module, "factorize", lambda *args: None)
     with pytest.raises(
         ConvergenceError,
         match=r"must have its pivots on the diagonal, and little rounding; none has",
     ):
-        factorise_near(normalise(graph(path(9))), 0.3)
+        factorize_near(normalize(graph(path(9))), 0.3)
 
 
 def test_units_are_powers_of_two_and_leave_digits_alone():
     laplacian = cotangent_laplacian(icosphere(1))
     far = Laplacian(laplacian.stiffness, sp.csr_array(laplacian.mass * 2.0**600))
-    one, two = normalise(laplacian), normalise(far)
+    one, two = normalize(laplacian), normalize(far)
     assert one.value_exponent - two.value_exponent == 600
     assert np.array_equal(one.mass.toarray(), two.mass.toarray())
     assert 1 <= one.mass_diagonal.max() < 4
@@ -113,7 +113,7 @@ def test_units_are_powers_of_two_and_leave_digits_alone():
 
 def test_residual_bounds_hold_for_a_full_mass():
     laplacian = cotangent_laplacian(icosphere(1), "consistent")
-    pencil = normalise(laplacian)
+    pencil = normalize(laplacian)
     reference = np.ldexp(dense_eigenvalues(laplacian), -pencil.value_exponent)
     vectors = np.random.default_rng(0).standard_normal((pencil.n, 7))
     values = np.linspace(0, reference[-1], 7)
@@ -125,4 +125,4 @@ def test_residual_bounds_hold_for_a_full_mass():
 def test_an_indefinite_mass_is_refused():
     mass = sp.csr_array(np.array([[1.0, 1.5], [1.5, 2.0]]))
     with pytest.raises(InvalidParameterError, match=r"mass must be positive definite"):
-        normalise(Laplacian(sp.csr_array((2, 2)), mass))
+        normalize(Laplacian(sp.csr_array((2, 2)), mass))

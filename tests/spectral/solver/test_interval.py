@@ -13,7 +13,7 @@ from eigenshape.spectral.signatures.heat import heat_kernel_signature
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import certified, interval, slices
 from eigenshape.spectral.solver import strategy as roads
-from eigenshape.spectral.solver.pencil import normalise
+from eigenshape.spectral.solver.pencil import normalize
 from eigenshape.spectral.spectrum import Spectrum
 
 
@@ -22,9 +22,9 @@ def thin(monkeypatch):
     """Send small operators the sparse road, in slices."""
     for module, name, value in (
         (slices, "SLICE", 14),
-        (roads, "WHOLE", 20),
-        (roads, "SMALL", 0),
-        (certified, "FEW", 0),
+        (roads, "ONE_SHIFT_PAIRS", 20),
+        (roads, "DENSE_POINTS", 0),
+        (certified, "FEW_BELOW", 0),
         (roads, "DENSE_SHARE", 0),
     ):
         monkeypatch.setattr(module, name, value)
@@ -182,7 +182,7 @@ def test_where_counts_and_finds_never_agree_nothing_is_returned(monkeypatch):
     laplacian = cotangent_laplacian(
         TriangleMesh(np.tile(small.vertices, (20, 1)), np.concatenate(faces))
     )
-    pencil = normalise(laplacian)
+    pencil = normalize(laplacian)
     values = dense_eigenvalues(laplacian) * np.ldexp(1.0, -pencil.value_exponent)
     low, high = middle(values, 90, 130)
     counted = interval.count_interval(pencil, low, high)
@@ -196,7 +196,7 @@ def test_where_counts_and_finds_never_agree_nothing_is_returned(monkeypatch):
     monkeypatch.setattr(interval, "walk_on", forgetful)
     _, again = interval.solve_interval(pencil, counted, lambda done: None)
     assert again.count == again.n_found == certificate.count
-    monkeypatch.setattr(interval, "RUNS", 1)
+    monkeypatch.setattr(interval, "INTERVAL_RUNS", 1)
     with pytest.raises(
         ConvergenceError, match=r"Every eigenvalue that inertia counts .* in the interval were"
     ):

@@ -5,9 +5,9 @@ from pencils import dense_eigenvalues, graph, path, tetrahedra
 from eigenshape._errors import ConvergenceError
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import icosphere
-from eigenshape.spectral.solver.factor import factorise
+from eigenshape.spectral.solver.factor import factorize
 from eigenshape.spectral.solver.lanczos import Wanted, block_lanczos
-from eigenshape.spectral.solver.pencil import normalise, rayleigh_residuals
+from eigenshape.spectral.solver.pencil import normalize, rayleigh_residuals
 
 
 def run(pencil, factor, wanted, locked=None):
@@ -17,9 +17,9 @@ def run(pencil, factor, wanted, locked=None):
 
 def test_finds_both_sides_of_the_shift_orthonormal():
     laplacian = cotangent_laplacian(icosphere(3), "consistent")
-    pencil = normalise(laplacian)
+    pencil = normalize(laplacian)
     reference = np.ldexp(dense_eigenvalues(laplacian), -pencil.value_exponent)
-    factor = factorise(pencil, float(reference[15] + reference[16]) / 2)
+    factor = factorize(pencil, float(reference[15] + reference[16]) / 2)
     assert factor.count == 16
     vectors = run(pencil, factor, Wanted(below=16, above=9))
     values, residuals = rayleigh_residuals(pencil, vectors)
@@ -29,8 +29,8 @@ def test_finds_both_sides_of_the_shift_orthonormal():
 
 
 def test_a_second_run_finds_the_copies_that_the_block_was_too_narrow_for():
-    pencil = normalise(cotangent_laplacian(tetrahedra(100)))  # the eigenvalue 0 a hundred times
-    factor = factorise(pencil, 0.01 * pencil.level)
+    pencil = normalize(cotangent_laplacian(tetrahedra(100)))  # the eigenvalue 0 a hundred times
+    factor = factorize(pencil, 0.01 * pencil.level)
     assert factor.count == 100
     first = run(pencil, factor, Wanted(below=5, above=0))
     second = run(pencil, factor, Wanted(below=5, above=0), locked=first)
@@ -41,8 +41,8 @@ def test_a_second_run_finds_the_copies_that_the_block_was_too_narrow_for():
 
 
 def test_nothing_above_the_ceiling_is_returned():
-    pencil = normalise(graph(path(300)))
-    factor = factorise(pencil, 0.002)
+    pencil = normalize(graph(path(300)))
+    factor = factorize(pencil, 0.002)
     below = factor.count
     everything = run(pencil, factor, Wanted(below=below, above=5))
     values = np.sort(rayleigh_residuals(pencil, everything)[0])
@@ -51,7 +51,7 @@ def test_nothing_above_the_ceiling_is_returned():
 
 
 def test_too_little_room_is_an_error():
-    pencil = normalise(graph(path(40)))
-    factor = factorise(pencil, 0.1)
+    pencil = normalize(graph(path(40)))
+    factor = factorize(pencil, 0.1)
     with pytest.raises(ConvergenceError, match=r"Block Lanczos must converge within 32 vectors"):
         run(pencil, factor, Wanted(below=factor.count, above=40))

@@ -9,7 +9,7 @@ from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian, fa
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes.domains import box
 from eigenshape.spectral.solver import shift
-from eigenshape.spectral.solver.pencil import normalise
+from eigenshape.spectral.solver.pencil import normalize
 
 
 @pytest.mark.parametrize("seed", [1, 2, 16, 24, 40])
@@ -17,14 +17,14 @@ def test_where_no_factor_serves_a_lower_shift_does(seed, monkeypatch):
     mesh, rng = box(5, 5, 5), np.random.default_rng(seed)
     uneven = simplex_volumes(mesh) * np.exp(2 * rng.standard_normal(mesh.n_simplices))
     mass = facet_mass(facet_table(mesh), uneven)
-    pencil = normalise(Laplacian(crouzeix_raviart_laplacian(mesh).stiffness, mass))
-    asked, serving = [], shift.factorise_near
+    pencil = normalize(Laplacian(crouzeix_raviart_laplacian(mesh).stiffness, mass))
+    asked, serving = [], shift.factorize_near
 
     def watched(pencil, sigma):
         asked.append(sigma)
         return serving(pencil, sigma)
 
-    monkeypatch.setattr(shift, "factorise_near", watched)
+    monkeypatch.setattr(shift, "factorize_near", watched)
     factor = shift.shift_inside(pencil, 100)
     assert shift.ACCEPTED[0] * 100 - 3 <= factor.count <= shift.ACCEPTED[1] * 100 + 1
     assert any(later == pytest.approx(shift.LOWER[1] * sooner) for sooner, later in pairwise(asked))

@@ -9,15 +9,15 @@ from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import slices
 from eigenshape.spectral.solver import strategy as roads
-from eigenshape.spectral.solver.pencil import normalise, rayleigh_residuals
+from eigenshape.spectral.solver.pencil import normalize, rayleigh_residuals
 from eigenshape.spectral.solver.slices import walk
 
 
 @pytest.fixture
 def thin(monkeypatch):
     monkeypatch.setattr(slices, "SLICE", 14)
-    monkeypatch.setattr(roads, "WHOLE", 20)
-    monkeypatch.setattr(roads, "SMALL", 0)
+    monkeypatch.setattr(roads, "ONE_SHIFT_PAIRS", 20)
+    monkeypatch.setattr(roads, "DENSE_POINTS", 0)
 
 
 def irregular(n):
@@ -47,7 +47,7 @@ def test_slices_miss_nothing(thin, laplacian):
 
 def test_a_walk_takes_several_slices_and_finds_all_of_a_simple_spectrum(monkeypatch):
     monkeypatch.setattr(slices, "SLICE", 14)
-    pencil, told = normalise(cotangent_laplacian(irregular(24))), []
+    pencil, told = normalize(cotangent_laplacian(irregular(24))), []
     vectors, factor = walk(pencil, 60, told.append)
     reference = np.ldexp(
         dense_eigenvalues(cotangent_laplacian(irregular(24)))[:60], -pencil.value_exponent
@@ -60,10 +60,10 @@ def test_a_walk_takes_several_slices_and_finds_all_of_a_simple_spectrum(monkeypa
 
 
 def test_a_slice_needs_a_gap_to_end_in():
-    assert slices._cut(np.array([0.5, 4.0, 2.0, 2.1, 2.2]), 1.0) == (3, 3.1)
+    assert slices._find_cut(np.array([0.5, 4.0, 2.0, 2.1, 2.2]), 1.0) == (3, 3.1)
     for values in (np.full(20, 2.0), np.array([0.5, 2.0]), np.array([0.5])):
         with pytest.raises(ConvergenceError, match="A slice must end in a clear gap"):
-            slices._cut(values, 1.0)
+            slices._find_cut(values, 1.0)
 
 
 def test_slices_that_lean_on_each_other_are_not_taken(thin, monkeypatch):
@@ -90,10 +90,10 @@ def test_slices_that_lean_on_each_other_are_not_taken(thin, monkeypatch):
 
 def test_a_shift_that_does_not_move_on_is_an_error(monkeypatch):
     monkeypatch.setattr(slices, "SLICE", 14)
-    first = slices.shift_inside(normalise(cotangent_laplacian(irregular(24))), 5)
-    monkeypatch.setattr(slices, "factorise_near", lambda pencil, shift: first)
+    first = slices.shift_inside(normalize(cotangent_laplacian(irregular(24))), 5)
+    monkeypatch.setattr(slices, "factorize_near", lambda pencil, shift: first)
     with pytest.raises(
         ConvergenceError,
         match=r"The shift of a slice must lie beyond the one before; -\d+ eigenvalues",
     ):
-        walk(normalise(cotangent_laplacian(irregular(24))), 60, lambda done: None)
+        walk(normalize(cotangent_laplacian(irregular(24))), 60, lambda done: None)

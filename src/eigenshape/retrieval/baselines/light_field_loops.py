@@ -1,4 +1,4 @@
-"""Compiled loops of `light_field`: silhouettes, moments, outlines, and the best pairing of views."""
+"""Compiled loops of `light_field`: silhouettes, moments, outlines, pairings of views."""
 
 from typing import no_type_check
 
@@ -93,7 +93,7 @@ def outline(image, row, column):
 @njit
 @no_type_check
 def least_difference(first, second, pairings):
-    """Return the least sum of L1 distances of paired views, over all pairs of light fields and all pairings.
+    """Return the least sum of L1 distances of paired views, over light fields and pairings.
 
     `first` and `second` are (fields, views, numbers), `pairings` (p, views).
     """

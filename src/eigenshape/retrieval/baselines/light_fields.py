@@ -45,7 +45,7 @@ def light_field(
     area (35), and of the first 10 Fourier coefficients of the distance of its outline from its
     center, over the mean distance and doubled. Both are taken about the center of the silhouette,
     in units of its radius, so that they do not change if it is turned or mirrored. Several
-    dodecahedra, turned against each other, make the descriptor less dependent on how the shape lies.
+    dodecahedra, turned against each other, make the descriptor depend less on how the shape lies.
 
     Parameters
     ----------
@@ -167,7 +167,10 @@ def _describe_silhouette(image: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, "4
 
 
 def zernike_magnitudes(sums: Complex[np.ndarray, "m j"]) -> Float[np.ndarray, "35"]:
-    """Return |Σ R_n^m(r) e^{imθ}| over the number of points, from sums of z^m |z|^2j; each in 0..1."""
+    """Return |Σ R_n^m(r) e^{imθ}| over the number of points, each in 0..1.
+
+    The argument holds the sums of z^m |z|^2j over the points.
+    """
     moments = [
         sum(c * sums[m, j] for j, c in enumerate(_radial(n, m)))
         for n in range(1, ORDER + 1)
@@ -194,7 +197,7 @@ def _fourier(
     """Return Fourier magnitudes of the distance from the center along the outline."""
     pieces, _ = label(image, np.ones((3, 3)))
     names, away = pieces[image] - 1, np.square(np.argwhere(image) - center).sum(axis=1)
-    # Take the largest piece; of equal ones the outer one, so that the choice turns with the picture.
+    # Take the largest piece; of equal ones the outer one, so the choice turns with the picture.
     largest = pieces == 1 + np.lexsort((np.bincount(names, away), np.bincount(names)))[-1]
     start = int(largest.argmax())
     path = outline(largest, start // image.shape[1], start % image.shape[1]).astype(np.float64)

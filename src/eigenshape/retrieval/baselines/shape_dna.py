@@ -99,7 +99,8 @@ def shape_dna_distance(first: Float[np.ndarray, " k"], second: Float[np.ndarray,
     --------
     >>> import eigenshape as es
     >>> baselines = es.retrieval.baselines
-    >>> one, two = (baselines.shape_dna(mesh) for mesh in (es.icosphere(2), es.shapes.torus(20, 10)))
+    >>> shapes = es.icosphere(2), es.shapes.torus(20, 10)
+    >>> one, two = (baselines.shape_dna(mesh) for mesh in shapes)
     >>> baselines.shape_dna_distance(one, one), baselines.shape_dna_distance(one, two) > 5
     (0.0, True)
     """

@@ -93,7 +93,7 @@ def shifted(
     shift: int,
     recipe: HeatRecipe,
 ) -> tuple[Float[np.ndarray, "m c"], Float[np.ndarray, "r c"]]:
-    """Return the columns that compare if the first shape has ratio^-shift of the area of the second.
+    """Return the columns that compare if the first shape has ratio^-shift of the second's area.
 
     Scale s of the first is then scale s - shift of the second, and its heat times area is
     ratio^-shift times that of the second.

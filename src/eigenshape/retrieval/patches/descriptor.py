@@ -54,7 +54,7 @@ class PatchDescriptor:
     Attributes
     ----------
     codes : (1 + w, b, s, v) int8
-        Fisher vectors (`encode_patches`) of the shape and of its views, at b base radii and s sizes.
+        Fisher vectors of the shape and of its views, at b base radii and s sizes.
         Each is rounded so that its largest entry is 127.
     points : tuple of 1 + w PatchPoints
         Points of the shape and of its views, at vertices of the whole.

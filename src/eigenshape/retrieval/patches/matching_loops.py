@@ -1,4 +1,4 @@
-"""Compiled loops of `matching`: mutual nearest neighbors, and the largest consistent set of matches."""
+"""Compiled loops of `matching`: mutual nearest neighbors, consistent sets of matches."""
 
 from typing import no_type_check
 
@@ -41,9 +41,10 @@ def nearest_of_each_other(apart):
 def leading(ours, theirs, shares, ratio, slack, least):
     """Return the largest eigenvalue of the agreement of matches, and the support of each match.
 
-    `ours` and `theirs` are distances between matched points, `ratio` what the first are multiplied by. Two matches
-    agree by A = 1 - (error / slack)^2, where the error is a share of the longer distance. Of √s A √s with the shares s,
-    and its eigenvector v, the support is A √s v over the eigenvalue: v / √s, and finite also where a share is 0.
+    `ours` and `theirs` are distances between matched points; the first are multiplied by `ratio`.
+    Two matches agree by A = 1 - (error / slack)^2, where the error is a share of the longer
+    distance. For the matrix √s A √s with the shares s, and its eigenvector v, the support is
+    A √s v over the eigenvalue: this is v / √s, but finite even if a share is 0.
     """
     count = len(ours)
     agreeing = np.zeros((count, count))

@@ -1,4 +1,4 @@
-"""Compiled loops of `patches`: describe the discs around points, ring by ring."""
+"""Compiled loops of `patches`: what lies in the discs around a point, ring by ring."""
 
 from typing import no_type_check
 
@@ -18,52 +18,40 @@ LEAST_AREA = 1e-3  # of a flat disc's, added before the logarithm
 
 @njit
 @no_type_check
-def describe_discs(rows, chosen, surface, radii, found):
-    """Describe the discs around each chosen point; `surface` holds points, normals and areas."""
-    for sample in range(len(chosen)):
-        reach = np.flatnonzero(rows[sample] <= radii[-1])
-        order = reach[np.argsort(rows[sample][reach], kind="mergesort")]
-        for place in range(len(radii)):
-            _describe_disc(
-                rows[sample],
-                surface[0][chosen[sample]],
-                order,
-                surface,
-                radii[place],
-                found[sample, place],
-            )
+def describe_disc(distances, center, order, surface, radius, kept, straight, found):
+    """Write NUMBERS for the disc of some radius around one point.
 
-
-@njit
-@no_type_check
-def _describe_disc(distances, center, order, surface, radius, found):
+    `order` are vertices by distance, as far as the disc reaches or farther; `surface` are points, normals and areas of
+    all vertices. `kept` and `straight` have RINGS numbers and are scratch.
+    """
     points, normals, areas = surface
-    normal = np.zeros(3)
+    x = y = z = 0.0
     for i in order:
         if distances[i] > INNER * radius:
             break
-        for axis in range(3):
-            normal[axis] += areas[i] * normals[i, axis]
-    length = np.sqrt((normal * normal).sum())
+        x += areas[i] * normals[i, 0]
+        y += areas[i] * normals[i, 1]
+        z += areas[i] * normals[i, 2]
+    length = np.sqrt(x * x + y * y + z * z)
     if length > 0:
-        normal /= length
-    found[:] = 0
-    kept, straight = np.zeros(RINGS), np.zeros(RINGS)
+        x, y, z = x / length, y / length, z / length
+    for place in range(NUMBERS):
+        found[place] = 0.0
+    for ring in range(RINGS):
+        kept[ring] = straight[ring] = 0.0
     for i in order:
         if distances[i] > radius:
             break
-        turn, height, beeline = 0.0, 0.0, 0.0
-        for axis in range(3):
-            away = points[i, axis] - center[axis]
-            turn += normals[i, axis] * normal[axis]
-            height += away * normal[axis]
-            beeline += away * away
+        u, v, w = points[i, 0] - center[0], points[i, 1] - center[1], points[i, 2] - center[2]
+        turn = normals[i, 0] * x + normals[i, 1] * y + normals[i, 2] * z
+        height = u * x + v * y + w * z
+        beeline = np.sqrt(u * u + v * v + w * w)
         if turn <= 0:
             continue
         ring = min(int(RINGS * distances[i] / radius), RINGS - 1)
         first = ring * RING_NUMBERS
         kept[ring] += areas[i]
-        straight[ring] += areas[i] * (np.sqrt(beeline) / distances[i] if distances[i] > 0 else 1.0)
+        straight[ring] += areas[i] * (beeline / distances[i] if distances[i] > 0 else 1.0)
         _add(found[first : first + TURN_BINS], turn, areas[i])
         _add(
             found[first + TURN_BINS : first + TURN_BINS + HEIGHT_BINS],
@@ -77,7 +65,8 @@ def _describe_disc(distances, center, order, surface, radius, found):
         if kept[ring] > 0:
             for place in range(first, first + TURN_BINS + HEIGHT_BINS):
                 found[place] = np.sqrt(found[place] / kept[ring])
-        flat = np.pi * (radius * (ring + 1) / RINGS) ** 2
+        across = radius * (ring + 1) / RINGS
+        flat = np.pi * (across * across)
         found[first + RING_NUMBERS - 2] = np.log(LEAST_AREA + covered / flat)
         found[first + RING_NUMBERS - 1] = straight[ring] / kept[ring] if kept[ring] > 0 else 1.0
 

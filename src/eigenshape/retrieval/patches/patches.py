@@ -20,7 +20,7 @@ from eigenshape.geometry.requirements import require_describable, require_orient
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import boundary_vertices, submesh
 from eigenshape.operators.smoothing import denoise
-from eigenshape.retrieval.patches.patch_loops import NUMBERS, describe_discs
+from eigenshape.retrieval.patches.patch_loops import NUMBERS, RINGS, describe_disc
 from eigenshape.scans.partial import views_of
 
 N_SAMPLES = 150  # points of a surface; time and stored bytes grow with their square
@@ -144,7 +144,13 @@ def surface_patches(mesh: TriangleMesh, *, n_samples: int = N_SAMPLES) -> Patche
     n_points = min(n_samples, mesh.n_vertices)
     chosen, rows, nearest = farthest_points(mesh, n_points, reach=RADII[-1])
     numbers = np.empty((len(chosen), len(RADII), NUMBERS), dtype=np.float32)
-    describe_discs(rows, chosen, (mesh.vertices, mean_normals(mesh), areas), RADII, numbers)
+    surface = mesh.vertices, mean_normals(mesh), areas
+    scratch = np.empty(RINGS), np.empty(RINGS)
+    for point, distances, discs in zip(chosen, rows, numbers, strict=True):
+        reached = np.flatnonzero(distances <= RADII[-1])
+        order = reached[np.argsort(distances[reached], kind="stable")]
+        for radius, found in zip(RADII, discs, strict=True):
+            describe_disc(distances, mesh.vertices[point], order, surface, radius, *scratch, found)
 
     # Weigh each disc by the share of the surface that is nearest to its point.
     cells = np.bincount(nearest, weights=areas / areas.sum(), minlength=len(chosen))

@@ -1,4 +1,4 @@
-"""The rows of an index's database: read all together, and checked against a digest of them all."""
+"""The rows of the database of an index: read all together, and checked against their digest."""
 
 import json
 import sqlite3
@@ -73,7 +73,7 @@ class DescriptorRow(NamedTuple):
 
 @dataclass(frozen=True)
 class Catalog:
-    """All rows of the database, in the order of their numbers. Blobs are read when asked for."""
+    """All rows of the database, in the order of their numbers. Blobs are read when needed."""
 
     path: Path
     database: sqlite3.Connection
@@ -97,18 +97,18 @@ class Catalog:
             ) from err
 
     def recipe_id(self, recipe: AnyRecipe) -> int | None:
-        """Return the number of a recipe, None where no descriptor was made by it.
+        """Return the number of a recipe, or None if it is not stored.
 
-        A field that a stored recipe lacks, since it is younger, counts as its default.
+        A field that a stored recipe lacks, since it was introduced later, has its default.
         """
         return next((number for number, other in self.recipes() if other == recipe), None)
 
     def shape(self, name: str) -> ShapeRow | None:
-        """Return the shape of a name, None where there is none."""
+        """Return the shape of a name, or None if there is none."""
         return next((shape for shape in self.shapes if shape.name == name), None)
 
     def without(self, shape: ShapeRow) -> "Catalog":
-        """Delete a shape and its descriptors, and return the catalog of what stays."""
+        """Delete a shape and its descriptors, and return the catalog of the rest."""
         self.database.execute("DELETE FROM shape WHERE id = ?", (shape.id,))
         shapes = [other for other in self.shapes if other != shape]
         descriptors = [row for row in self.descriptors if row.shape != shape.id]
@@ -124,13 +124,14 @@ class Catalog:
         if not isinstance(blob, bytes) or crc32(blob) != row.blob_checksum:
             kind = type(row).__name__.removesuffix("Row").lower()
             raise StoreError(
-                f"{self.path} must hold what was written; the bytes of {kind} {row.id} differ. Index the shapes again."
+                f"{self.path} must hold what was written; the bytes of {kind} {row.id} differ. "
+                "Index the shapes again."
             )
         return blob
 
 
 def create_tables(database: sqlite3.Connection) -> None:
-    """Make the tables of an empty index, in the transaction that is open."""
+    """Make the tables of an empty index, in the open transaction."""
     for statement in SCHEMA.split(";"):
         database.execute(statement)
     database.execute(f"PRAGMA application_id = {APPLICATION}")
@@ -140,17 +141,20 @@ def create_tables(database: sqlite3.Connection) -> None:
 
 
 def read_catalog(path: Path, database: sqlite3.Connection) -> Catalog:
-    """Read all rows of an open database, and refuse them unless each is what was written and none is missing.
+    """Read all rows of an open database, and check that they are as written and none is missing.
 
     Raises
     ------
     StoreError
-        If the database is not an index of this format, or rows differ from the digest of them all.
+        If the database is not an index of this format, or its rows differ from their digest.
     """
     (application,) = database.execute("PRAGMA application_id").fetchone()
     (version,) = database.execute("PRAGMA user_version").fetchone()
     if application != APPLICATION:
-        raise StoreError(f"{path} must be an index of eigenshape; it belongs to another program.")
+        raise StoreError(
+            f"{path} must be an index of eigenshape; it belongs to another program. Choose another "
+            "folder."
+        )
     if version != FORMAT:
         raise StoreError(
             f"{path} must be an index of format {FORMAT}; it is of format {version}. "
@@ -160,13 +164,14 @@ def read_catalog(path: Path, database: sqlite3.Connection) -> Catalog:
     sealed = database.execute("SELECT n_changes, digest FROM seal").fetchall()
     if len(sealed) != 1 or sealed[0][1] != _digest(sealed[0][0], rows):
         raise StoreError(
-            f"{path} must hold what was written; its rows differ from the digest of them all. Index the shapes again."
+            f"{path} must hold what was written; its rows differ from their digest. "
+            "Index the shapes again."
         )
     return Catalog(path, database, *rows, sealed[0][0])
 
 
 def seal(database: sqlite3.Connection, n_changes: int) -> None:
-    """Keep the digest of all rows, before a writer commits them."""
+    """Store the digest of all rows, before a writer commits them."""
     digest = _digest(n_changes, _all_rows(database))
     database.execute("UPDATE seal SET n_changes = ?, digest = ?", (n_changes, digest))
 
@@ -182,15 +187,15 @@ def _all_rows(
 
 
 def _rows_of(database: sqlite3.Connection, table: str, row: Any) -> list[Any]:
-    # A walk through the table itself: a search by number or by an index of SQLite can miss a row
-    # without a word where one bit of an inner page is wrong.
+    # NOT INDEXED walks through the table itself: a search by number or by an index of SQLite can
+    # silently miss rows if one bit of an inner page is wrong.
     query = f"SELECT {', '.join(row._fields)} FROM {table} NOT INDEXED"
     return [row(*values) for values in database.execute(query).fetchall()]
 
 
 def _digest(n_changes: Any, rows: tuple[list[Any], ...]) -> str:
-    # Of JSON, whose text is the same in every version of Python; `default` is for a value whose
-    # type was damaged.
+    # JSON is the same text in every version of Python; `default` is for a value whose type was
+    # damaged.
     return sha256(json.dumps([n_changes, rows], default=repr).encode()).hexdigest()
 
 

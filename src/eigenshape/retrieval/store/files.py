@@ -1,9 +1,11 @@
-"""Rows of numbers beside a SQLite database that says which of them count.
+"""The files of an index: rows of numbers, and a SQLite database that says which of them count.
 
-A descriptor is written behind the last row that the database knows of, forced to disk, and then committed by one SQLite
-transaction. A writer that dies before the commit leaves bytes that nobody owns; the next writer takes their place.
-Readers see what is committed and never wait. What they read is verified: rows by their checksum, the database by
-`catalog`, and that no change is lost with the log of SQLite by the number of changes in a file of its own.
+A descriptor is written behind the last row that the database lists, forced to disk, and then
+committed by one SQLite transaction. If the writer dies before the commit, its bytes belong to no
+descriptor, and the next writer overwrites them. Readers see what is committed and never wait. What
+they read is verified: rows by their checksums, the database by `catalog`. SQLite keeps the latest
+changes in a log beside the database; a file of its own holds the number of all changes, so that a
+lost log is noticed.
 """
 
 import os
@@ -28,21 +30,22 @@ from eigenshape.retrieval.store.catalog import (
 )
 
 DATABASE = "index.sqlite"
-DRAFT = "draft.sqlite"
+DRAFT = "draft.sqlite"  # the database until it is complete
 LOCK = "writer.lock"
-HOLDER = "writer.txt"
-COMMITTED = "committed.txt"
-WAIT = 5.0  # seconds for another writer
-DAMAGE = (sqlite3.Error, UnicodeError)  # SQLite passes on its messages with bytes of a damaged file
+WRITER = "writer.txt"  # names the process that writes, for messages
+COMMITTED = "committed.txt"  # the number of all changes, twice
+LONGEST_WAIT = 5.0  # seconds for another writer to end; adding a shape takes milliseconds
+# Errors that a damaged file causes: SQLite quotes bytes of it in messages, which may be no text.
+DAMAGE = (sqlite3.Error, UnicodeError)
 
 
 def create(folder: Path) -> None:
-    """Make an empty store; whoever dies on the way leaves a folder in which it can be made.
+    """Make an empty store. If the process dies meanwhile, the same call can be repeated.
 
     Raises
     ------
     StoreError
-        If there is one already, or the folder holds something else or cannot be made.
+        If the folder holds a store or anything else, or cannot be made.
     """
     with _creating(folder):
         _require_empty(folder)
@@ -50,14 +53,14 @@ def create(folder: Path) -> None:
 
 
 def create_if_missing(folder: Path) -> None:
-    """Make an empty store where there is none; of several callers at once, one makes it.
+    """Make an empty store if there is none; of several callers at once, one makes it.
 
     Raises
     ------
     StoreError
         If the folder holds something else or cannot be made.
     """
-    if (folder / DATABASE).is_file():  # also where one may only read
+    if (folder / DATABASE).is_file():  # without the lock, which needs the right to write
         return
     with _creating(folder):
         if not (folder / DATABASE).is_file():
@@ -67,12 +70,13 @@ def create_if_missing(folder: Path) -> None:
 
 @contextmanager
 def _creating(folder: Path) -> Iterator[None]:
-    """Lock a folder that is new, empty or a store; the lock's file appears in no other."""
+    """Lock a folder that is new, empty or a store; leave any other folder untouched."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as err:
         raise StoreError(
-            f"An index needs a folder; {folder} cannot be made: {err.strerror}."
+            f"An index needs a folder; {folder} cannot be made: {err.strerror}. "
+            "Choose another folder."
         ) from err
     _require_empty(folder, or_store=True)
     with _lock(folder):
@@ -80,14 +84,14 @@ def _creating(folder: Path) -> Iterator[None]:
 
 
 def _require_empty(folder: Path, *, or_store: bool = False) -> None:
-    names = {entry.name for entry in folder.iterdir()} - {LOCK, HOLDER, COMMITTED}
-    if (
-        or_store and (folder / DATABASE).is_file()
-    ):  # asked after the list, into which another may just have put it
+    names = {entry.name for entry in folder.iterdir()} - {LOCK, WRITER, COMMITTED}
+    # Looked for after the names, since another process may have made it meanwhile.
+    if or_store and (folder / DATABASE).is_file():
         return
     if not all(name.startswith(DRAFT) for name in names):
         raise StoreError(
-            f"{folder} must be empty to become an index; it is not. Open it, or choose another folder."
+            f"{folder} must be empty to become an index; it is not. Open it if it is an index, or "
+            "choose another folder."
         )
 
 
@@ -105,7 +109,7 @@ def _make(folder: Path) -> None:
 
 
 def _sync(folder: Path) -> None:
-    """Force the names of new files to disk, where a folder can be opened for that."""
+    """Force the names of new files to disk, on systems where a folder can be opened for that."""
     if os.name == "posix":
         handle = os.open(folder, os.O_RDONLY)
         try:
@@ -116,12 +120,14 @@ def _sync(folder: Path) -> None:
 
 def _require_database(folder: Path) -> None:
     if not (folder / DATABASE).is_file():
-        raise StoreError(f"{folder} must be an index; it has no {DATABASE}.")
+        raise StoreError(
+            f"{folder} must be an index; it has no {DATABASE}. Make one with ShapeIndex.create."
+        )
 
 
 @contextmanager
 def reading(folder: Path) -> Iterator[Catalog]:
-    """Open the database to read one consistent state, also where the folder cannot be written.
+    """Open the database to read one consistent state, even if the folder is read-only.
 
     Raises
     ------
@@ -131,11 +137,13 @@ def reading(folder: Path) -> Iterator[Catalog]:
     _require_database(folder)
     try:
         with closing(_connect_to_read(folder)) as database:
-            committed = _read_count(folder)  # before the state is chosen that is read
+            committed = _read_count(folder)  # before BEGIN, so that the state is not older
             database.execute("BEGIN")
             yield _whole_catalog(folder, database, committed)
     except DAMAGE as err:
-        raise StoreError(f"{folder / DATABASE} must be a readable index; {err}.") from err
+        raise StoreError(
+            f"{folder / DATABASE} must be a readable index; {err}. Index the shapes again."
+        ) from err
 
 
 def _connect_to_read(folder: Path) -> sqlite3.Connection:
@@ -150,7 +158,7 @@ def _connect_to_read(folder: Path) -> sqlite3.Connection:
         if log.exists() and log.stat().st_size:
             raise StoreError(
                 f"{folder} must be writable to be read as long as {log.name} holds changes. "
-                "Read it once from where it can be written, or copy it to such a place."
+                "Read it once with the right to write, or copy it to a writable folder."
             ) from err
         database = _connect(folder, "mode=ro&immutable=1")
     return database
@@ -162,21 +170,23 @@ def _connect(folder: Path, mode: str) -> sqlite3.Connection:
 
 
 def _whole_catalog(folder: Path, database: sqlite3.Connection, committed: bytes) -> Catalog:
-    """Read the catalog, and refuse one that lacks committed changes.
+    """Read the catalog, and raise an error if it lacks committed changes.
 
-    Changes stay in a log beside the database as long as somebody reads, and SQLite ignores all of
-    it that follows a damaged bit.
+    Changes stay in a log beside the database as long as a process reads, and SQLite ignores all of
+    the log that follows a damaged bit.
     """
     catalog = read_catalog(folder / DATABASE, database)
     count, _, again = committed.partition(b" ")
     if count != again or not count.isdigit():
         raise StoreError(
-            f"{folder / COMMITTED} must hold a number twice; it holds {committed!r}. Index the shapes again."
+            f"{folder / COMMITTED} must hold a number twice; it holds {committed!r}. "
+            "Index the shapes again."
         )
     if catalog.n_changes < int(count):
         raise StoreError(
-            f"{folder} must hold all {int(count)} changes that were committed; it holds {catalog.n_changes}. Its file "
-            f"{DATABASE}-wal is damaged, or was not copied with the others. Copy all files, or index the shapes again."
+            f"{folder} must hold all {int(count)} changes that were committed; it holds "
+            f"{catalog.n_changes}. Its file {DATABASE}-wal is damaged, or was not copied with the "
+            "others. Copy all files, or index the shapes again."
         )
     return catalog
 
@@ -198,14 +208,15 @@ def _keep_count(folder: Path, n_changes: int) -> None:
 
 @contextmanager
 def writing(folder: Path) -> Iterator[Catalog]:
-    """Open the database as its one writer; what the block did is committed whole at its end, or not at all.
+    """Open the database to write. At the end of the block all changes are committed, or none.
 
     The catalog is that from before the block.
 
     Raises
     ------
     StoreError
-        If the folder is not a store of this format, something in it is damaged, or another process is writing.
+        If the folder is not a store of this format, something in it is damaged, or another process
+        is writing.
     """
     _require_database(folder)
     try:
@@ -216,26 +227,30 @@ def writing(folder: Path) -> Iterator[Catalog]:
             catalog = _whole_catalog(folder, database, _read_count(folder))
             yield catalog
             seal(database, catalog.n_changes + 1)
-            database.execute("COMMIT")  # whatever ends the block before, closing rolls back
+            database.execute("COMMIT")  # if the block raises before, closing rolls back
             _keep_count(folder, catalog.n_changes + 1)
     except DAMAGE as err:
-        raise StoreError(f"{folder / DATABASE} must be a writable index; {err}.") from err
+        raise StoreError(
+            f"{folder / DATABASE} must be a writable index; {err}. Index the shapes again."
+        ) from err
 
 
 @contextmanager
 def _lock(folder: Path) -> Iterator[None]:
-    lock = FileLock(folder / LOCK, timeout=WAIT)
-    holder = folder / HOLDER
+    lock = FileLock(folder / LOCK, timeout=LONGEST_WAIT)
+    holder = folder / WRITER
     try:
         lock.acquire()
     except Timeout as err:
         who = holder.read_text(errors="replace") if holder.exists() else "another process"
         raise StoreError(
-            f"An index has one writer; {who} has held {folder / LOCK} for more than {WAIT:g} s. Wait for it to end."
+            f"An index has one writer at a time; {who} has held {folder / LOCK} for more than "
+            f"{LONGEST_WAIT:g} s. Wait for it to end."
         ) from err
     except OSError as err:
         raise StoreError(
-            f"An index changes only where one may write; of {folder}: {err.strerror}."
+            f"An index can change only in a writable folder; {folder}: {err.strerror}. "
+            "Copy it to a writable folder."
         ) from err
     try:
         holder.write_text(f"process {os.getpid()} on {socket.gethostname()}")
@@ -251,7 +266,7 @@ def rows_path(folder: Path, recipe: int) -> Path:
 
 
 def append_rows(folder: Path, database: sqlite3.Connection, recipe: int, rows: np.ndarray) -> int:
-    """Write rows behind the last committed ones and force them to disk; the byte at which they begin."""
+    """Write rows behind the committed ones, force them to disk, and return where they begin."""
     (offset,) = database.execute("SELECT size FROM recipe WHERE id = ?", (recipe,)).fetchone()
     data = rows.tobytes()
     path = rows_path(folder, recipe)
@@ -269,23 +284,24 @@ def append_rows(folder: Path, database: sqlite3.Connection, recipe: int, rows: n
 
 
 def read_rows(
-    data: memoryview, kept: DescriptorRow, row: "np.dtype[Any]", path: Path
+    data: memoryview, row: DescriptorRow, row_type: "np.dtype[Any]", path: Path
 ) -> np.ndarray:
-    """Return the rows of a descriptor, of a type.
+    """Return the rows of a descriptor, as numbers of a type.
 
     Raises
     ------
     StoreError
         If they are not there, or not what was written.
     """
-    begin, count = kept.offset, kept.n_rows * kept.n_columns
-    end = begin + count * row.itemsize
+    begin, count = row.offset, row.n_rows * row.n_columns
+    end = begin + count * row_type.itemsize
     if end > len(data):
         raise StoreError(
             f"{path} must hold {end} bytes; it holds {len(data)}. Index the shapes again."
         )
-    if crc32(data[begin:end]) != kept.checksum:
+    if crc32(data[begin:end]) != row.checksum:
         raise StoreError(
-            f"{path} must hold what was written; bytes {begin} to {end} differ. Index the shapes again."
+            f"{path} must hold what was written; bytes {begin} to {end} differ. "
+            "Index the shapes again."
         )
-    return np.frombuffer(data, row, count, begin).reshape(kept.n_rows, kept.n_columns)
+    return np.frombuffer(data, row_type, count, begin).reshape(row.n_rows, row.n_columns)

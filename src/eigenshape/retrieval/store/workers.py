@@ -21,9 +21,9 @@ from eigenshape._errors import EigenshapeError
 
 T = TypeVar("T")
 NO_WORKERS = (
-    "Worker processes import the script that starts them, and must reach its end; all of them ended "
-    "before they took a file. Put what the script does, from its first call of eigenshape on, "
-    'under `if __name__ == "__main__":`.'
+    "Worker processes import the script that starts them, and must reach its end; all of them "
+    "ended before they took a file. Put what the script does, from its first call of eigenshape "
+    'on, under `if __name__ == "__main__":`, and define the function that reads files above it.'
 )
 
 
@@ -111,7 +111,7 @@ def run_in_workers(
     count = max(min(workers.count, len(items)), 1)
     pool = ProcessPool(max_workers=count, initializer=_start_worker, context=context)
     try:
-        with _sigint_deferred():
+        with _ctrl_c_deferred():
             _ = pool.active  # starts the processes, and the threads that replace those that die
         futures = {
             pool.schedule(_work, args=[work, item.path], timeout=workers.timeout): item
@@ -130,7 +130,7 @@ def run_in_workers(
 
 
 @contextmanager
-def _sigint_deferred() -> Iterator[None]:
+def _ctrl_c_deferred() -> Iterator[None]:
     """Start processes and threads with Ctrl-C blocked; if it was pressed, raise it at the end.
 
     Processes and threads inherit the mask of blocked signals, so Ctrl-C never reaches a worker:
@@ -138,12 +138,12 @@ def _sigint_deferred() -> Iterator[None]:
     traceback.
     """
     resource_tracker.ensure_running()  # its start, by multiprocessing, would unblock Ctrl-C
-    with _mask_of_sigint(), _handler_of_sigint():
+    with _ctrl_c_masked(), _ctrl_c_held():
         yield
 
 
 @contextmanager
-def _mask_of_sigint() -> Iterator[None]:
+def _ctrl_c_masked() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):  # on Windows
         yield
         return
@@ -155,8 +155,8 @@ def _mask_of_sigint() -> Iterator[None]:
 
 
 @contextmanager
-def _handler_of_sigint() -> Iterator[None]:
-    """Hold Ctrl-C until the end of the block: a BLAS thread may receive it though this one does not."""
+def _ctrl_c_held() -> Iterator[None]:
+    """Hold Ctrl-C until the end of the block: a BLAS thread may receive it if this one does not."""
     before = signal.getsignal(signal.SIGINT)
     if not callable(before) or threading.current_thread() is not threading.main_thread():
         yield

@@ -25,7 +25,7 @@ from eigenshape.spectral.solve import solve_spectrum
 
 # Largest c with B ≥ c diag(B) for the consistent mass of linear elements, in any dimension.
 LINEAR_FLOOR = 0.5
-NOTHING = np.empty(0, dtype=np.int64)
+NO_POINTS = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +172,7 @@ def bracket_eigenvalues(
     points, scale = size_one(mesh.points)
     unit = SimplicialMesh(points, mesh.simplices)
     table = facet_table(unit)
-    held = table.boundary if boundary == "dirichlet" else NOTHING
+    held = table.boundary if boundary == "dirichlet" else NO_POINTS
     upper, rounding = _upper_bounds(unit, k, boundary, progress)
     lower = lower_bounds(unit, table, len(upper), held, progress)
     n_zero = min(_n_zero(table, held), len(upper))
@@ -195,7 +195,7 @@ def _upper_bounds(
 ) -> tuple[Float[np.ndarray, " k"], float]:
     """Return the upper ends, and the share of the last that is rounding."""
     conforming = without_pinches(mesh)
-    held = boundary_vertices(conforming) if boundary == "dirichlet" else NOTHING
+    held = boundary_vertices(conforming) if boundary == "dirichlet" else NO_POINTS
     n_free = conforming.n_points - len(held)
     if boundary == "dirichlet" and not (len(held) and n_free):
         fact = f"{mesh!r} has {len(held)} points on its boundary and {n_free} inside"

@@ -20,10 +20,14 @@ from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.bounds.rounding import enclose, relative_rounding
 from eigenshape.spectral.solve import solve_spectrum
 
-EVEN = 1.5  # largest over mean C² up to which one constant serves all simplices
-STEP = 2.0  # from one weight to the next
-MOST = 10  # weights
-NEAREST = 0.9  # of the weights' pole
+# Largest over mean C² up to which one constant serves all simplices.
+EVEN_CONSTANTS = 1.5
+# Factor between the weights μ that are tried,
+WEIGHT_STEP = 2.0
+# and how many are tried at most: each takes a solve.
+MOST_WEIGHTS = 10
+# Largest weight, relative to the pole at μ C_T² = 1.
+NEAREST_POLE = 0.9
 
 Values = Float[np.ndarray, " k"]
 
@@ -45,7 +49,7 @@ def lower_bounds(
     done = 0.6
     for weight in _weights(values, mean, largest):
         n_served = min(int(np.count_nonzero(best <= weight)) + 1, k)
-        after = min(done + 0.4 / STEP * (n_served / k), 1.0)
+        after = min(done + 0.4 / WEIGHT_STEP * (n_served / k), 1.0)
         report, done = partly(progress, done, after), after
         try:
             found = solve(measure / (1 - weight * squares), n_served, report)
@@ -59,12 +63,12 @@ def lower_bounds(
 def _weights(values: Values, mean: float, largest: float) -> list[float]:
     """Return values μ: near the last eigenvalue, and in steps from there to the first above 0."""
     positive = values[values > 0]
-    if not positive.size or largest <= EVEN * mean:
+    if not positive.size or largest <= EVEN_CONSTANTS * mean:
         return []
     last = float(positive[-1])
-    top = min(last / (1 + mean * last), NEAREST / largest)
-    n_steps = int(np.ceil(np.log(max(top / float(positive[0]), 1.0)) / np.log(STEP)))
-    return [top / STEP**step for step in range(min(n_steps + 1, MOST))]
+    top = min(last / (1 + mean * last), NEAREST_POLE / largest)
+    n_steps = int(np.ceil(np.log(max(top / float(positive[0]), 1.0)) / np.log(WEIGHT_STEP)))
+    return [top / WEIGHT_STEP**step for step in range(min(n_steps + 1, MOST_WEIGHTS))]
 
 
 def _solver(

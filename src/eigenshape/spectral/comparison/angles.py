@@ -19,8 +19,8 @@ from eigenshape.spectral.comparison.eigenspaces import (
 )
 from eigenshape.spectral.solver.certify import quality
 from eigenshape.spectral.solver.kernel_values import to_pencil
-from eigenshape.spectral.solver.pairs import Pairs, spread
-from eigenshape.spectral.solver.pencil import Pencil, normalise, residual_norms
+from eigenshape.spectral.solver.pairs import Pairs, error_bound
+from eigenshape.spectral.solver.pencil import Pencil, normalize, residual_norms
 from eigenshape.spectral.spectrum import Spectrum, require_lowest
 
 Vectors = Float[np.ndarray, "n p"]
@@ -199,7 +199,7 @@ def _unit_pairs(one: Spectrum, laplacian: Laplacian) -> tuple[Pencil, Pairs]:
             "Bounds of angles need a certified spectrum; the eigenvalues of one were not counted. Solve with "
             "method='certified'."
         )
-    pencil = normalise(laplacian)
+    pencil = normalize(laplacian)
     values = np.ldexp(to_pencil(laplacian.kernel, one.eigenvalues), -pencil.value_exponent)
     vectors = np.ldexp(one.eigenvectors, -pencil.vector_exponent)
     pairs = Pairs(values, vectors, residual_norms(pencil, values, vectors))
@@ -224,7 +224,7 @@ def _bound(pencil: Pencil, pairs: Pairs, group: slice, pulled: Vectors) -> float
 
 def _distance(pairs: Pairs, group: slice, inside: Float[np.ndarray, " p"]) -> float:
     """Return how far the interval of some values is from the eigenvalues outside a group."""
-    stray = np.sqrt(2) * spread(pairs)
+    stray = np.sqrt(2) * error_bound(pairs)
     above = pairs.values[group.stop] - stray - inside[-1]
     if group.start == 0:
         return float(above)

@@ -16,13 +16,12 @@ from eigenshape.spectral.spectrum import Spectrum, require_lowest
 
 # Exact eigenvalues that differ by less than this share of the larger one are copies of one eigenvalue:
 # formulas evaluate them to about 1e-15.
-EQUAL = 1e-9
-# Least ratio of the gap around a group to its spread. With 4 the bound sin θ ≤ ‖R‖/δ can hold for
-# perturbations as large as the spread; larger ratios give fewer and smaller groups.
+EQUAL_EIGENVALUES = 1e-9
+# Least ratio of the gap around a group to its spread. A larger ratio gives smaller groups.
 SEPARATED = 4.0
 # Least eigenvalue of the Gram matrix of unit columns that count as independent. Cholesky loses about
-# 1e-16 / DEPENDENT of orthonormality at once, so two steps still reach rounding.
-DEPENDENT = 1e-12
+# 1e-16 / DEPENDENT_FUNCTIONS of orthonormality at once, so two steps still reach rounding.
+DEPENDENT_FUNCTIONS = 1e-12
 
 
 @one_blas_thread()
@@ -120,7 +119,7 @@ def _require_functions(
 
 
 def _equal_runs(values: Float[np.ndarray, " k"]) -> list[slice]:
-    cuts = np.flatnonzero(np.diff(values) > EQUAL * np.abs(values[1:])) + 1
+    cuts = np.flatnonzero(np.diff(values) > EQUAL_EIGENVALUES * np.abs(values[1:])) + 1
     return _slices([0, *cuts.tolist(), len(values)])
 
 
@@ -199,7 +198,7 @@ def orthonormal(
     basis = columns / np.abs(columns).max(axis=0).clip(np.finfo(np.float64).tiny)
     basis = basis / norms(basis, mass).clip(np.finfo(np.float64).tiny)
     least = float(np.linalg.eigvalsh(basis.T @ (mass @ basis))[0])
-    if least < DEPENDENT:
+    if least < DEPENDENT_FUNCTIONS:
         raise InvalidParameterError(
             f"{name} must be independent at the points; the least eigenvalue of their Gram matrix is {least:.1e}."
         )

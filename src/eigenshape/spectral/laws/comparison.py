@@ -7,12 +7,14 @@ from jaxtyping import Float, Int
 from eigenshape._errors import ConvergenceError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.sparse.elimination import EPS
-from eigenshape.spectral.laws.report import Law, Outcome, SkippedLaw, judged
+from eigenshape.spectral.laws.report import Law, Outcome, SkippedLaw, make_law
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
+# Lowest eigenvalues that are compared if rows are not points.
 N_EIGENVALUES = 20
-MOST_ROUNDING = 1e-4  # above, a comparison would prove nothing
+# Tolerance above which a comparison would prove nothing.
+MOST_ROUNDING = 1e-4
 
 
 def sizes_of(matrix: sp.csr_array) -> Float[np.ndarray, " n"]:
@@ -24,9 +26,9 @@ def sizes_of(matrix: sp.csr_array) -> Float[np.ndarray, " n"]:
 def same_entries(name: str, found: Laplacian, expected: Laplacian, allowed: float) -> Law:
     """Compare entry by entry."""
     if found.n_points != expected.n_points:
-        return judged(name, np.inf, allowed, _other_rows(found.n_points, expected.n_points))
+        return make_law(name, np.inf, allowed, _other_rows(found.n_points, expected.n_points))
     measured, explanation = distance(expected, found)
-    return judged(name, measured, allowed, f"{explanation}; rounding takes up to {allowed:.1e}.")
+    return make_law(name, measured, allowed, f"{explanation}; rounding takes up to {allowed:.1e}.")
 
 
 def _other_rows(found: int, expected: int) -> str:
@@ -59,7 +61,7 @@ def same_eigenvalues(
     """Compare the lowest eigenvalues, whatever the order of the rows, with those of so many copies of an operator."""
     n_rows, k = copies * len(spectrum.eigenvectors), len(spectrum.eigenvalues)
     if found.n_points != n_rows:
-        return judged(name, np.inf, allowed, _other_rows(found.n_points, n_rows))
+        return make_law(name, np.inf, allowed, _other_rows(found.n_points, n_rows))
     try:
         lowest = lowest_eigenvalues(found, k)
     except ConvergenceError as err:
@@ -77,7 +79,7 @@ def same_eigenvalues(
         f"of the {len(expected)} lowest eigenvalues, {worst} changes most, from {expected[worst]:.6g} to "
         f"{lowest.eigenvalues[worst]:.6g}, {change:.1e} of the last; rounding takes up to {allowed:.1e}."
     )
-    return judged(name, change, allowed, explanation)
+    return make_law(name, change, allowed, explanation)
 
 
 def spectral_distance(
@@ -96,7 +98,7 @@ def lowest_eigenvalues(laplacian: Laplacian, k: int = N_EIGENVALUES) -> Spectrum
     )
 
 
-def permuted(laplacian: Laplacian, old_of_new: Int[np.ndarray, " n"]) -> Laplacian:
+def permute(laplacian: Laplacian, old_of_new: Int[np.ndarray, " n"]) -> Laplacian:
     """Return the operator with its rows in another order."""
     return Laplacian(*(matrix[old_of_new][:, old_of_new] for matrix in matrices(laplacian)))
 

@@ -23,26 +23,29 @@ from eigenshape.spectral.laws.report import (
     Outcome,
     Promise,
     SkippedLaw,
-    gathered,
-    judged,
-    known_promises,
+    check_promises,
+    make_law,
+    make_report,
 )
 from eigenshape.spectral.laws.transformations import Subject, as_subject
-from eigenshape.spectral.solver.factor import Factor, factorise, rounding
-from eigenshape.spectral.solver.pencil import Pencil, normalise
+from eigenshape.spectral.solver.factor import Factor, factorize, rounding
+from eigenshape.spectral.solver.pencil import Pencil, normalize
 
 ROW_SUM = 1e-11  # of the largest √(W_ii W_jj) in the row
 WEIGHT = 1e-11  # of √(W_ii W_jj): weights that are 0 in exact arithmetic come out on either side
+# Entry between two components, relative to √(W_ii W_jj), that counts as rounding.
 LINK = 1e-14
+# Relative difference of the sum of B and the volume that counts as rounding.
 VOLUME = 1e-11
 NEGATIVE = 1e-9  # of trace W / trace B
 # Shifts in trace W / trace B, from what rounding leaves of a zero upwards.
 LADDER = 10.0 ** np.arange(-12, 4)
 FIRST_LINE = 1e-14  # in the same unit: between zero and not zero
-LARGEST_ZERO = (
-    1e-6  # up to where rounding, or constants that are not annihilated, may move that line
-)
-NUDGES = (1.0, 1.07, 0.93, 1.15)
+# Largest line between zero and positive eigenvalues, in the same unit: rounding, or constants with
+# energy, may move it up to here.
+LARGEST_ZERO = 1e-6
+# Multiples of a shift that are tried if a pivot is exactly zero.
+COUNT_NUDGES = (1.0, 1.07, 0.93, 1.15)
 
 
 @one_blas_thread()
@@ -89,7 +92,7 @@ def check_laplacian(
     True
     """
     require_type(laplacian, Laplacian, "laplacian")
-    promised, subject = known_promises(promises), None if shape is None else as_subject(shape)
+    promised, subject = check_promises(promises), None if shape is None else as_subject(shape)
     mass, pencil = _mass(laplacian)
     optional: dict[Promise, Callable[[], list[Outcome]]] = {
         "constants": lambda: [_row_sums(laplacian), _kernel(laplacian, pencil)],
@@ -108,14 +111,14 @@ def check_laplacian(
         found += (
             laws() if name in promised else [SkippedLaw(name.replace("_", " "), "not promised")]
         )
-    return gathered(found)
+    return make_report(found)
 
 
 def _symmetry(name: str, matrix: sp.csr_array) -> Law:
     off = abs(matrix - matrix.T).tocoo()
     largest = float(np.abs(matrix.data).max(initial=0.0)) or 1.0
     worst = float(off.data.max(initial=0.0)) / largest
-    return judged(
+    return make_law(
         name,
         worst,
         ASYMMETRY,
@@ -127,10 +130,10 @@ def _mass(laplacian: Laplacian) -> tuple[Law, Pencil]:
     """Prove B ≥ c diag(B) with c > 0; where that fails, the other laws are judged with diag(B) for B."""
     name = "positive mass"
     try:
-        pencil = normalise(laplacian)
+        pencil = normalize(laplacian)
     except InvalidParameterError as err:
         diagonal = sp.diags_array(laplacian.mass.diagonal()).tocsr()
-        return Law(name, False, 1.0, 0.0, str(err)), normalise(
+        return Law(name, False, 1.0, 0.0, str(err)), normalize(
             Laplacian(laplacian.stiffness, diagonal)
         )
     floor = pencil.mass_floor
@@ -141,7 +144,7 @@ def _mass(laplacian: Laplacian) -> tuple[Law, Pencil]:
 
 def _factor(pencil: Pencil, share: float) -> Factor | None:
     """Factor at a share of trace W / trace B, or within a few per cent of it where a pivot is exactly zero."""
-    tries = (factorise(pencil, nudge * share * pencil.level) for nudge in NUDGES)
+    tries = (factorize(pencil, nudge * share * pencil.level) for nudge in COUNT_NUDGES)
     return next((factor for factor in tries if factor), None)
 
 
@@ -155,17 +158,17 @@ def _semidefinite(pencil: Pencil) -> Law:
     for share in LADDER:
         factor = _factor(pencil, -float(share))
         if factor and factor.count == 0:
-            return judged(
+            return make_law(
                 "positive semidefinite",
                 float(share),
                 NEGATIVE,
-                _bounded_below(pencil, factor, float(share)),
+                _lower_bound_text(pencil, factor, float(share)),
             )
     explanation = f"eigenvalues lie below -{LADDER[-1]:.0e} trace W / trace B."
-    return judged("positive semidefinite", np.inf, NEGATIVE, explanation)
+    return make_law("positive semidefinite", np.inf, NEGATIVE, explanation)
 
 
-def _bounded_below(pencil: Pencil, factor: Factor, share: float) -> str:
+def _lower_bound_text(pencil: Pencil, factor: Factor, share: float) -> str:
     bound = (
         -factor.shift + float((rounding(factor) / pencil.mass_diagonal).max()) / pencil.mass_floor
     )
@@ -188,7 +191,7 @@ def _row_sums(laplacian: Laplacian) -> Law:
         f"the largest sum of a row is that of row {worst}, {sums[worst]:.3g} where W_ii is "
         f"{W[worst, worst]:.3g}."
     )
-    return judged("row sums", relative[worst], ROW_SUM, explanation)
+    return make_law("row sums", relative[worst], ROW_SUM, explanation)
 
 
 def _kernel(laplacian: Laplacian, pencil: Pencil) -> Law:
@@ -210,7 +213,7 @@ def _kernel(laplacian: Laplacian, pencil: Pencil) -> Law:
         f"within {line:.0e} trace W / trace B of zero lie {zeros} of the eigenvalues; "
         f"components of W: {n_parts}."
     )
-    return judged("kernel", abs(zeros - n_parts), 0, explanation)
+    return make_law("kernel", abs(zeros - n_parts), 0, explanation)
 
 
 def _zeros(pencil: Pencil, line: float) -> int:
@@ -240,12 +243,12 @@ def _components(laplacian: Laplacian, shape: Subject | None) -> Outcome:
         if size > worst:
             worst = size
             explanation = f"entry {place} of {name} joins two of them: it is {size:.1e} of √({name}_ii {name}_jj)."
-    return judged("components", worst, LINK, f"the shape has {n_parts}; {explanation}")
+    return make_law("components", worst, LINK, f"the shape has {n_parts}; {explanation}")
 
 
 def _number_of_parts(laplacian: Laplacian, n_parts: int) -> Law:
     found = _graph_parts(laplacian.stiffness)[0]
-    return judged(
+    return make_law(
         "components", abs(found - n_parts), 0, f"the shape has {n_parts}, and W has {found}."
     )
 
@@ -266,8 +269,10 @@ def _definite(pencil: Pencil) -> Law:
     share = float(LADDER[0])
     count = _count(pencil, share)
     if count is None:
-        return judged("definite", np.inf, 0, "no factor near zero has its pivots on the diagonal.")
-    return judged(
+        return make_law(
+            "definite", np.inf, 0, "no factor near zero has its pivots on the diagonal."
+        )
+    return make_law(
         "definite", count, 0, f"below {share:.0e} trace W / trace B lie {count} of the eigenvalues."
     )
 
@@ -277,7 +282,7 @@ def _volume(laplacian: Laplacian, shape: Subject | None) -> Outcome:
         return SkippedLaw("volume", "only a mesh has one to compare with")
     volume, total = float(simplex_volumes(shape).sum()), float(laplacian.mass.sum())
     explanation = f"the entries of B sum to {total:.12g}, and the shape has volume {volume:.12g}."
-    return judged("volume", abs(total / volume - 1), VOLUME, explanation)
+    return make_law("volume", abs(total / volume - 1), VOLUME, explanation)
 
 
 def _weights(laplacian: Laplacian) -> Law:
@@ -286,7 +291,7 @@ def _weights(laplacian: Laplacian) -> Law:
     rows, columns, weights = entries.row[off], entries.col[off], -entries.data[off]
     relative = -weights / (roots[rows] * roots[columns])
     if not relative.size:
-        return judged("nonnegative weights", 0, WEIGHT, "there is no pair of points to weigh.")
+        return make_law("nonnegative weights", 0, WEIGHT, "there is no pair of points to weigh.")
     worst = int(relative.argmax())
     explanation = f"the lowest weight, {weights[worst]:.3g}, is that of points {rows[worst]} and {columns[worst]}."
-    return judged("nonnegative weights", max(relative[worst], 0.0), WEIGHT, explanation)
+    return make_law("nonnegative weights", max(relative[worst], 0.0), WEIGHT, explanation)

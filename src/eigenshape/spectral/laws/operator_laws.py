@@ -18,7 +18,7 @@ from eigenshape.spectral.laws.comparison import (
     distance,
     lowest_eigenvalues,
     matrices,
-    permuted,
+    permute,
     same_eigenvalues,
     same_entries,
     spectral_distance,
@@ -31,10 +31,10 @@ from eigenshape.spectral.laws.report import (
     Outcome,
     Promise,
     SkippedLaw,
-    gathered,
-    judged,
-    judgements,
-    known_promises,
+    all_outcomes,
+    check_promises,
+    make_law,
+    make_report,
 )
 from eigenshape.spectral.laws.transformations import Subject
 from eigenshape.spectral.spectrum import Spectrum
@@ -43,8 +43,11 @@ Build: TypeAlias = Callable[[Any], Laplacian]
 
 # Powers of two near 1e±100, 1e±50 and 1e±20, which round no coordinate; the first for which W and B stay floats serves.
 DOUBLINGS = (332, 166, 66)
+# Powers of two that W and B may grow by: floats end at 2^1023.
 LARGEST_EXPONENT = 900
-ROUNDING = 1e-12  # of √(W_ii W_jj), whatever the shape
+# Tolerance at least, of √(W_ii W_jj).
+LEAST_ROUNDING = 1e-12
+# Perturbations of the coordinates by which rounding is measured.
 JIGGLES = 3
 HEADROOM = 32  # over what jiggles by rounding change: an entry takes ten roundings or more, that may all go one way
 
@@ -148,7 +151,7 @@ def check_operator(
     ['rigid motion']
     """
     require_type(rng, np.random.Generator | None, "rng")
-    promised = known_promises(promises)
+    promised = check_promises(promises)
     random = rng or np.random.default_rng(0)
     subject = changes.as_subject(shape)
     laplacian = build(subject)
@@ -161,7 +164,7 @@ def check_operator(
     spectrum = None if rows_are_points else _spectrum(laplacian)
     rounding = _rounding(build, subject, spectrum or laplacian, random)
     trial = Trial(build, subject, laplacian, random, spectrum, rows_are_points, rounding)
-    return gathered([*judgements(report), *_rebuilt(trial, promised)])
+    return make_report([*all_outcomes(report), *_rebuilding_laws(trial, promised)])
 
 
 def _spectrum(laplacian: Laplacian) -> Spectrum | None:
@@ -171,7 +174,7 @@ def _spectrum(laplacian: Laplacian) -> Spectrum | None:
         return None
 
 
-def _rebuilt(trial: Trial, promised: frozenset[Promise]) -> Iterator[Outcome]:
+def _rebuilding_laws(trial: Trial, promised: frozenset[Promise]) -> Iterator[Outcome]:
     yield _attempt("repetition", _repetition, trial)
     yield _attempt("point order", _point_order, trial)
     yield _attempt("simplex order", _simplex_order, trial)
@@ -207,12 +210,12 @@ def _rounding(
     build: Build, subject: Subject, expected: Laplacian | Spectrum, rng: np.random.Generator
 ) -> float:
     if isinstance(subject, sp.csr_array):
-        return ROUNDING
+        return LEAST_ROUNDING
     try:
-        others = [build(changes.jiggled(subject, rng)) for _ in range(JIGGLES)]
-        return max(ROUNDING, HEADROOM * max(_jiggle(expected, other) for other in others))
+        others = [build(changes.jiggle(subject, rng)) for _ in range(JIGGLES)]
+        return max(LEAST_ROUNDING, HEADROOM * max(_jiggle(expected, other) for other in others))
     except (EigenshapeError, ValueError, ArithmeticError):
-        return ROUNDING  # the laws that change coordinates will find the refusal
+        return LEAST_ROUNDING  # the laws that change coordinates will find the refusal
 
 
 def _jiggle(expected: Laplacian | Spectrum, other: Laplacian) -> float:
@@ -228,47 +231,47 @@ def _repetition(trial: Trial) -> Outcome:
     n_changed = sum(
         (one != two).nnz if one.shape == two.shape else max(one.nnz, two.nnz) for one, two in pairs
     )
-    return judged("repetition", n_changed, 0, f"built twice, {n_changed} entries differ.")
+    return make_law("repetition", n_changed, 0, f"built twice, {n_changed} entries differ.")
 
 
 def _point_order(trial: Trial) -> Outcome:
     old_of_new = trial.rng.permutation(_n_points(trial.subject))
-    other = trial.build(changes.renumbered(trial.subject, old_of_new))
+    other = trial.build(changes.renumber(trial.subject, old_of_new))
     return _agree(
         "point order",
         trial,
         other,
-        permuted(trial.laplacian, old_of_new) if trial.by_points else None,
+        permute(trial.laplacian, old_of_new) if trial.by_points else None,
     )
 
 
 def _simplex_order(trial: Trial) -> Outcome:
     if isinstance(trial.subject, PointCloud | sp.csr_array):
         return SkippedLaw("simplex order", "the shape has no simplices")
-    return _same("simplex order", trial, changes.reordered(trial.subject, trial.rng))
+    return _same("simplex order", trial, changes.reorder(trial.subject, trial.rng))
 
 
 def _orientation(trial: Trial) -> Outcome:
     if isinstance(trial.subject, PointCloud | sp.csr_array):
         return SkippedLaw("orientation", "the shape has no simplices")
-    return _same("orientation", trial, changes.turned_over(trial.subject, trial.rng))
+    return _same("orientation", trial, changes.turn_over(trial.subject, trial.rng))
 
 
 def _rigid_motion(trial: Trial) -> Outcome:
     if isinstance(trial.subject, sp.csr_array):
         return SkippedLaw("rigid motion", "a graph lies nowhere")
-    return _same("rigid motion", trial, changes.moved(trial.subject, trial.rng))
+    return _same("rigid motion", trial, changes.move(trial.subject, trial.rng))
 
 
 def _reflection(trial: Trial) -> Outcome:
     if isinstance(trial.subject, sp.csr_array):
         return SkippedLaw("reflection", "a graph lies nowhere")
-    return _same("reflection", trial, changes.mirrored(trial.subject))
+    return _same("reflection", trial, changes.mirror(trial.subject))
 
 
 def _scaling(trial: Trial) -> Outcome:
     doublings = _doublings(trial)
-    laws = [_scaled(trial, power) for power in (doublings, -doublings)]
+    laws = [_scaling_by(trial, power) for power in (doublings, -doublings)]
     return next((law for law in laws if not law.holds), max(laws, key=lambda law: law.measured))
 
 
@@ -276,26 +279,26 @@ def _doublings(trial: Trial) -> int:
     """Measure how W and B grow with the shape, and say how far it may."""
     few = 20
     traces = [
-        _unit_traces(trial.build(changes.rescaled(trial.subject, 2.0**power)))[2:]
+        _unit_traces(trial.build(changes.rescale(trial.subject, 2.0**power)))[2:]
         for power in (0, few)
     ]
     growth = max(np.abs(np.log2(traces[1]) - np.log2(traces[0]))) / few
     return next((power for power in DOUBLINGS if growth * power <= LARGEST_EXPONENT), few)
 
 
-def _scaled(trial: Trial, power: int) -> Law:
+def _scaling_by(trial: Trial, power: int) -> Law:
     """Compare W and B after division by their traces, and the ratio of the traces with 1/length²."""
-    other = trial.build(changes.rescaled(trial.subject, 2.0**power))
+    other = trial.build(changes.rescale(trial.subject, 2.0**power))
     here, there = _unit_traces(trial.laplacian), _unit_traces(other)
     law = same_entries(
         "scaling", Laplacian(there[0], there[1]), Laplacian(here[0], here[1]), trial.allowed
     )
     unit = f"in a unit 2^{power} (1e{power * np.log10(2):+.0f}) times as large,"
     if not law.holds or isinstance(trial.subject, sp.csr_array):
-        return judged("scaling", law.measured, law.allowed, f"{unit} {law.explanation}")
+        return make_law("scaling", law.measured, law.allowed, f"{unit} {law.explanation}")
     ratio = (there[2] / here[2]) / (there[3] / here[3]) * 2.0**power * 2.0**power
     explanation = f"{unit} W and B change by one factor each, and eigenvalues times length² by {abs(ratio - 1):.1e}."
-    return judged("scaling", max(law.measured, abs(ratio - 1)), law.allowed, explanation)
+    return make_law("scaling", max(law.measured, abs(ratio - 1)), law.allowed, explanation)
 
 
 def _unit_traces(laplacian: Laplacian) -> tuple[sp.csr_array, sp.csr_array, float, float]:
@@ -305,39 +308,39 @@ def _unit_traces(laplacian: Laplacian) -> tuple[sp.csr_array, sp.csr_array, floa
 
 
 def _union(trial: Trial) -> Outcome:
-    other = trial.build(changes.doubled(trial.subject))
+    other = trial.build(changes.double(trial.subject))
     rounding = trial.rounding
     if not isinstance(trial.subject, sp.csr_array):
         rounding *= (
             changes.APART
         )  # the coordinates of a copy that far away are so many times coarser
     if rounding > MOST_ROUNDING:
-        return _drowned("union", rounding)
+        return _too_rough("union", rounding)
     if trial.by_points:
         twice = Laplacian(
             *(sp.csr_array(sp.block_diag([matrix, matrix])) for matrix in matrices(trial.laplacian))
         )
         return same_entries("union", other, twice, rounding)
     if trial.spectrum is None:
-        return _unsolved("union")
+        return _no_spectrum("union")
     return same_eigenvalues("union", other, trial.spectrum, rounding, copies=2)
 
 
-def _drowned(name: str, rounding: float) -> SkippedLaw:
+def _too_rough(name: str, rounding: float) -> SkippedLaw:
     return SkippedLaw(
         name,
         f"rounding of coordinates may change W by {rounding:.0e}: simplices are thin, or the operator is unstable",
     )
 
 
-def _unsolved(name: str) -> SkippedLaw:
+def _no_spectrum(name: str) -> SkippedLaw:
     return SkippedLaw(name, "rows are no points, and the lowest eigenvalues cannot be proved")
 
 
 def _same(name: str, trial: Trial, subject: Subject) -> Outcome:
     """Compare with the operator of the same points; rows that are not points may have changed places, or frames."""
     if trial.rounding > MOST_ROUNDING:
-        return _drowned(name, trial.rounding)
+        return _too_rough(name, trial.rounding)
     return _agree(name, trial, trial.build(subject), trial.laplacian)
 
 
@@ -345,7 +348,7 @@ def _agree(name: str, trial: Trial, found: Laplacian, expected: Laplacian | None
     if trial.by_points and expected is not None:
         return same_entries(name, found, expected, trial.allowed)
     if trial.spectrum is None:
-        return _unsolved(name)
+        return _no_spectrum(name)
     return same_eigenvalues(name, found, trial.spectrum, trial.allowed)
 
 

@@ -90,7 +90,7 @@ class OperatorReport:
         )
 
 
-def judged(name: str, measured: float, allowed: float, explanation: str) -> Law:
+def make_law(name: str, measured: float, allowed: float, explanation: str) -> Law:
     """Return the law, which holds where what was measured is allowed."""
     return Law(name, bool(measured <= allowed), float(measured), float(allowed), explanation)
 
@@ -98,14 +98,14 @@ def judged(name: str, measured: float, allowed: float, explanation: str) -> Law:
 Outcome: TypeAlias = Law | SkippedLaw
 
 
-def gathered(found: Iterable[Law | SkippedLaw]) -> OperatorReport:
+def make_report(found: Iterable[Law | SkippedLaw]) -> OperatorReport:
     """Sort what was judged from what was not."""
     rows = list(found)
     laws = tuple(law for law in rows if isinstance(law, Law))
     return OperatorReport(laws, tuple(law for law in rows if isinstance(law, SkippedLaw)))
 
 
-def known_promises(promises: Iterable[Promise]) -> frozenset[Promise]:
+def check_promises(promises: Iterable[Promise]) -> frozenset[Promise]:
     """Return the promises as a set, refusing one that is unknown."""
     given = frozenset(promises)
     unknown = sorted(given - frozenset(get_args(Promise)), key=str)
@@ -116,7 +116,7 @@ def known_promises(promises: Iterable[Promise]) -> frozenset[Promise]:
     return given
 
 
-def judgements(report: OperatorReport) -> Iterator[Law | SkippedLaw]:
+def all_outcomes(report: OperatorReport) -> Iterator[Law | SkippedLaw]:
     """Return what was judged, then what was not."""
     yield from report.laws
     yield from report.skipped

@@ -32,13 +32,13 @@ def with_simplices(mesh: Mesh, simplices: Int[np.ndarray, "s corners"]) -> Mesh:
     return type(mesh)(mesh.points, simplices)
 
 
-def jiggled(shape: Shape, rng: np.random.Generator) -> Shape:
+def jiggle(shape: Shape, rng: np.random.Generator) -> Shape:
     """Move each coordinate as far as rounding would, were the shape turned and moved by its own size."""
     reach = 8 * np.finfo(np.float64).eps * np.abs(shape.points).max()
     return with_points(shape, shape.points + reach * rng.uniform(-1, 1, shape.points.shape))
 
 
-def moved(shape: Shape, rng: np.random.Generator) -> Shape:
+def move(shape: Shape, rng: np.random.Generator) -> Shape:
     """Turn the shape about the origin at random, and move it by about its own size."""
     points = shape.points
     step = np.abs(points).max() * rng.uniform(-1, 1, points.shape[1])
@@ -53,28 +53,28 @@ def random_rotation(d: int, rng: np.random.Generator) -> Float[np.ndarray, "d d"
     return turn
 
 
-def mirrored(shape: Shape) -> Shape:
+def mirror(shape: Shape) -> Shape:
     """Mirror the shape at the plane x = 0, so that what was outside stays outside."""
     signs = np.append(-1.0, np.ones(shape.points.shape[1] - 1))
     mirror = with_points(shape, shape.points * signs)
     if isinstance(mirror, PointCloud):
         return mirror
-    return with_simplices(mirror, _turned_over(mirror.simplices))
+    return with_simplices(mirror, _turn_over(mirror.simplices))
 
 
-def turned_over(mesh: Mesh, rng: np.random.Generator) -> Mesh:
+def turn_over(mesh: Mesh, rng: np.random.Generator) -> Mesh:
     """Swap two corners in a random half of the simplices, the first among them."""
     chosen = np.append(True, rng.random(len(mesh.simplices) - 1) < 0.5)
     return with_simplices(
-        mesh, np.where(chosen[:, None], _turned_over(mesh.simplices), mesh.simplices)
+        mesh, np.where(chosen[:, None], _turn_over(mesh.simplices), mesh.simplices)
     )
 
 
-def _turned_over(simplices: Int[np.ndarray, "s corners"]) -> Int[np.ndarray, "s corners"]:
+def _turn_over(simplices: Int[np.ndarray, "s corners"]) -> Int[np.ndarray, "s corners"]:
     return np.column_stack([simplices[:, 1], simplices[:, 0], simplices[:, 2:]])
 
 
-def renumbered(subject: Subject, old_of_new: Int[np.ndarray, " n"]) -> Subject:
+def renumber(subject: Subject, old_of_new: Int[np.ndarray, " n"]) -> Subject:
     """Give the points new numbers: new point i is point old_of_new[i]."""
     if isinstance(subject, sp.csr_array):
         return subject[old_of_new][:, old_of_new]
@@ -83,7 +83,7 @@ def renumbered(subject: Subject, old_of_new: Int[np.ndarray, " n"]) -> Subject:
     return type(subject)(subject.points[old_of_new], np.argsort(old_of_new)[subject.simplices])
 
 
-def reordered(mesh: Mesh, rng: np.random.Generator) -> Mesh:
+def reorder(mesh: Mesh, rng: np.random.Generator) -> Mesh:
     """Shuffle the simplices, and turn three corners of each round, which keeps its orientation."""
     simplices = mesh.simplices[rng.permutation(len(mesh.simplices))]
     if mesh.dim > 1:
@@ -95,7 +95,7 @@ def reordered(mesh: Mesh, rng: np.random.Generator) -> Mesh:
     return with_simplices(mesh, simplices)
 
 
-def rescaled(subject: Subject, factor: float) -> Subject:
+def rescale(subject: Subject, factor: float) -> Subject:
     """Multiply coordinates, or the weights of a graph."""
     return (
         subject * factor
@@ -104,7 +104,7 @@ def rescaled(subject: Subject, factor: float) -> Subject:
     )
 
 
-def doubled(subject: Subject) -> Subject:
+def double(subject: Subject) -> Subject:
     """Put a copy beside the shape, 16 diameters away."""
     if isinstance(subject, sp.csr_array):
         return sp.csr_array(sp.block_diag([subject, subject]))

@@ -201,7 +201,7 @@ def functional_map(
     require_type(source, Spectrum, "source")
     require_type(target, Spectrum, "target")
     k = modes_of_both(source, target, n_modes)
-    ends = _checked_pairs(pairs, len(source.eigenvectors), len(target.eigenvectors))
+    ends = _as_pairs(pairs, len(source.eigenvectors), len(target.eigenvectors))
     ours, theirs = unit_modes(source, k)[ends[:, 0]], unit_modes(target, k)[ends[:, 1]]
     weights = (np.linalg.norm(ours, axis=1) * np.linalg.norm(theirs, axis=1))[:, None] ** -0.5
     return FunctionalMap(
@@ -234,7 +234,7 @@ def _least_squares(
     return matrix
 
 
-def _checked_pairs(pairs: ArrayLike, n_source: int, n_target: int) -> Int[np.ndarray, "p 2"]:
+def _as_pairs(pairs: ArrayLike, n_source: int, n_target: int) -> Int[np.ndarray, "p 2"]:
     rows = as_array(pairs, "pairs")
     if rows.ndim != 2 or rows.shape[1] != 2 or not len(rows) or rows.dtype.kind not in "iu":
         raise InvalidParameterError(

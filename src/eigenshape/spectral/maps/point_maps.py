@@ -22,12 +22,12 @@ from eigenshape.spectral.maps.functional_map import (
 )
 from eigenshape.spectral.spectrum import Spectrum
 
-STEP = 5  # modes added in each round; 1 takes five times as many rounds
+MODE_STEP = 5  # modes added in each round; 1 takes five times as many rounds
 # Samples of the target per mode: on nine pairs of animals 10 give the error of all vertices (0.016
 # √area), 5 slightly more (0.017).
 SAMPLES_A_MODE = 10
 SPREAD_MODES = 20  # modes in which the samples are spread: low ones, which see the shape as a whole
-AT_ONCE = 2**22  # distances computed at a time: 32 MiB of float64
+DISTANCES_AT_ONCE = 2**22  # distances computed at a time: 32 MiB of float64
 
 
 @one_blas_thread()
@@ -67,7 +67,7 @@ def point_map(mapping: FunctionalMap) -> Int[np.ndarray, " n2"]:
 def _nearest(
     points: Float[np.ndarray, "n k"], queries: Float[np.ndarray, "q k"]
 ) -> Int[np.ndarray, " q"]:
-    halves, rows = (points**2).sum(axis=1) / 2, max(AT_ONCE // len(points), 1)
+    halves, rows = (points**2).sum(axis=1) / 2, max(DISTANCES_AT_ONCE // len(points), 1)
     found = [
         (halves - queries[i : i + rows] @ points.T).argmin(axis=1)
         for i in range(0, len(queries), rows)
@@ -139,7 +139,7 @@ def refine_map(
     start: FunctionalMap,
     n_modes: SupportsIndex,
     *,
-    step: SupportsIndex = STEP,
+    step: SupportsIndex = MODE_STEP,
     n_samples: SupportsIndex | None = None,
     progress: Progress | None = None,
 ) -> FunctionalMap:
@@ -203,12 +203,12 @@ def refine_map(
         nearest = _nearest(
             modes[:, : matrix.shape[1]] @ matrix.T, samples.modes[:, : matrix.shape[0]]
         )
-        matrix = _fitted(samples, modes[nearest, :k1], k2)
+        matrix = _fit(samples, modes[nearest, :k1], k2)
     report(1.0, f"{k} modes")
     return FunctionalMap(matrix, *ends)
 
 
-def _fitted(
+def _fit(
     samples: _Samples, pulled: Float[np.ndarray, "s k1"], k2: int
 ) -> Float[np.ndarray, "k2 k1"]:
     weighed = samples.weighed[:, :k2].T
@@ -219,12 +219,14 @@ def _samples(spectrum: Spectrum, count: int, k: int) -> _Samples:
     modes, areas = unit_modes(spectrum, k), point_areas(spectrum)
     if count == len(modes):
         return _Samples(modes, spectrum.mass @ modes / areas.sum())
-    chosen, cells = _spread(spectrum, count)
+    chosen, cells = _spread_samples(spectrum, count)
     shares = np.bincount(cells, weights=areas / areas.sum(), minlength=count)
     return _Samples(modes[chosen], shares[:, None] * modes[chosen])
 
 
-def _spread(spectrum: Spectrum, count: int) -> tuple[Int[np.ndarray, " s"], Int[np.ndarray, " n"]]:
+def _spread_samples(
+    spectrum: Spectrum, count: int
+) -> tuple[Int[np.ndarray, " s"], Int[np.ndarray, " n"]]:
     """Choose vertices one by one, each farthest from those before in φ/√λ; tell which is nearest to each vertex."""
     k = min(SPREAD_MODES, len(spectrum.eigenvalues))
     places = unit_modes(spectrum, k)[:, 1:] / np.sqrt(

@@ -15,8 +15,11 @@ DEGREE = 1.0  # steps of smoothing per edge that an aggregate is across
 MESH_ROW = 7.0  # entries in a row of a triangle mesh, whose steps reach one edge far
 PASSED = 4.0  # points of an aggregate to the wavelength from which functions are kept
 LEAST_RATIO = 2.5  # of the top to the least of these zeros' interval
-LANCZOS = 12
-ROUNDING = 1e-12  # of the energy that functions of a component would have without their neighbours
+# Steps of Lanczos that bound the largest eigenvalue of diag(A)⁻¹ A.
+LANCZOS_STEPS = 12
+ENERGY_ROUNDING = (
+    1e-12  # of the energy that functions of a component would have without their neighbors
+)
 SMOOTHED = 0.6  # of an aggregate's points: how far below the top of the spectrum smoothing reaches
 LEAST_SPREADS = (6.0, 20.0)  # of operators whose rows are full, and of those of a triangle mesh
 
@@ -86,12 +89,12 @@ def build_levels(
         if indicators is None or n < TOO_LITTLE * indicators.shape[1]:
             levels.append(Level(stiffness, mass, top, LEAST_SPREADS[0], None, None))
             return levels
-        down = _smoothed(stiffness, top, indicators) if smooth else indicators
+        down = _smooth(stiffness, top, indicators) if smooth else indicators
         spread = max(SMOOTHED * n / down.shape[1], _least_spread(stiffness))
         up = _by_rows(down.T)
         levels.append(Level(stiffness, mass, top, spread, down, up))
         energies = up.power(2) @ stiffness.diagonal()
-        stiffness, mass = _projected(up, stiffness, down), _projected(up, mass, down)
+        stiffness, mass = _project(up, stiffness, down), _project(up, mass, down)
         _clear_rounding(stiffness, energies)
 
 
@@ -139,7 +142,7 @@ def _aggregates(stiffness: sp.csr_array, n_coarsest: int) -> sp.csr_array:
     return sp.csr_array((np.ones(n), labels, np.arange(n + 1, dtype=np.int32)), shape=(n, count))
 
 
-def _smoothed(stiffness: sp.csr_array, top: float, columns: sp.csr_array) -> sp.csr_array:
+def _smooth(stiffness: sp.csr_array, top: float, columns: sp.csr_array) -> sp.csr_array:
     """Smooth columns by a polynomial in diag(A)⁻¹A that is 1 at 0, so that constants stay.
 
     Its zeros are those of a Chebyshev polynomial on the part of the spectrum that steps from aggregate to aggregate
@@ -160,7 +163,7 @@ def _smoothed(stiffness: sp.csr_array, top: float, columns: sp.csr_array) -> sp.
     return _by_rows(sp.csr_array((rows[2], rows[1], rows[0]), shape=columns.shape))
 
 
-def _projected(up: sp.csr_array, matrix: sp.csr_array, down: sp.csr_array) -> sp.csr_array:
+def _project(up: sp.csr_array, matrix: sp.csr_array, down: sp.csr_array) -> sp.csr_array:
     product = up @ (matrix @ down)
     return _by_rows((product + product.T) * 0.5)
 
@@ -172,7 +175,7 @@ def _clear_rounding(stiffness: sp.csr_array, energies: Float[np.ndarray, " m"]) 
     """
     alone = np.flatnonzero(np.diff(stiffness.indptr) == 1)
     places = stiffness.indptr[alone]
-    rounding = np.abs(stiffness.data[places]) <= ROUNDING * energies[alone]
+    rounding = np.abs(stiffness.data[places]) <= ENERGY_ROUNDING * energies[alone]
     stiffness.data[places[rounding]] = 0.0
 
 
@@ -201,7 +204,7 @@ def _lanczos_top(matrix: sp.csr_array, roots: Float[np.ndarray, " n"]) -> float:
     column = np.random.default_rng(0).standard_normal(len(roots))
     column /= np.linalg.norm(column)
     before, rest, diagonal, beside = np.zeros_like(column), 0.0, [], []
-    for _ in range(LANCZOS):
+    for _ in range(LANCZOS_STEPS):
         image = roots * (matrix @ (roots * column)) - rest * before
         diagonal.append(float(column @ image))
         image -= diagonal[-1] * column

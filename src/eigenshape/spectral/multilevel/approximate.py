@@ -6,12 +6,12 @@ import numpy as np
 
 from eigenshape._progress import Progress
 from eigenshape.spectral.certificate import Certificate
-from eigenshape.spectral.multilevel.davidson import Goal, refine, settled
+from eigenshape.spectral.multilevel.davidson import Goal, finish_vectors, refine
 from eigenshape.spectral.multilevel.start import ROUNDS, SINGLE, climb, on_finest
 from eigenshape.spectral.solver.certify import require_orthonormal
 from eigenshape.spectral.solver.pairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil, residual_norms
-from eigenshape.spectral.solver.strategy import proved
+from eigenshape.spectral.solver.strategy import solve_lowest
 
 
 def approximate_pairs(
@@ -37,16 +37,16 @@ def approximate_pairs(
     dtype = np.float32 if accuracy >= SINGLE and np.isinf(max_residual) else np.float64
     start = climb(pencil, k, report, dtype=dtype, kept=16 * pencil.n * k)
     if start is None:
-        return proved(pencil, k, report)
+        return solve_lowest(pencil, k, report)
     columns, values, estimate = refine(start.tower, start.below, goal, on_finest(report, start))
-    columns, values = settled(start.tower, columns[:, :k], values[:k])
+    columns, values = finish_vectors(start.tower, columns[:, :k], values[:k])
     vectors = np.empty((pencil.n, k))
     vectors[start.order] = columns
     pairs = Pairs(values, vectors, residual_norms(pencil, values, vectors))
-    return pairs, replace(_uncounted(pencil, pairs), estimate=estimate)
+    return pairs, replace(_uncounted_certificate(pencil, pairs), estimate=estimate)
 
 
-def _uncounted(pencil: Pencil, pairs: Pairs) -> Certificate:
+def _uncounted_certificate(pencil: Pencil, pairs: Pairs) -> Certificate:
     return Certificate(
         n_pairs=len(pairs.values),
         shift=np.inf,

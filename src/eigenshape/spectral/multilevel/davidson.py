@@ -8,25 +8,27 @@ from jaxtyping import Float
 
 from eigenshape._errors import ConvergenceError
 from eigenshape.spectral.multilevel.residuals import (
-    chosen,
     images,
     keep_outside,
     norms_of_residuals,
+    pick_columns,
     residual_block,
     row_chunks,
 )
 from eigenshape.spectral.multilevel.vcycle import Tower, correct, multiply, smooth
 
 WIDTH = 32  # columns that are corrected at once
-STEPS = (8, 30)  # of smoothing, fewest and most
+SMOOTHING_STEPS = (8, 30)  # of smoothing, fewest and most
 FIRST_STEPS = 2.0  # of smoothing alone, times the root of what is to be smoothed
-DEPENDENT = {
+DEPENDENT_COLUMNS = {
     4: 1e-6,
     8: 1e-13,
 }  # of the largest eigenvalue of a Gram matrix of unit columns, by their bytes
-NOTHING = 1e-6
+# A k-th eigenvalue below this share of `Goal.least` counts as 0.
+ZERO_SHARE = 1e-6
 FIRST_SHARE = 0.3  # of the work, told while the columns are smoothed the first time
 PROBES = 8  # random columns of a last look
+# Steps of inverse iteration on these random columns.
 PROBE_STEPS = 4
 MOST_LEFT = 10.0  # times what a round has lowered
 EARLY = 0.5  # of the bound, or:
@@ -85,7 +87,7 @@ def refine(
         If a strict goal is not reached in its rounds, or columns overflow or become dependent.
     """
     values, m = below[1], len(below[1])
-    space = _prolonged(tower, below[0])
+    space = _prolong(tower, below[0])
     standing = _standing(goal, values, _smooth_all(tower, space, values, report), np.inf, np.inf)
     before, values = values, _ritz(tower, space, values, slice(0, m))
     first, looked = standing.worst, not goal.strict
@@ -118,7 +120,9 @@ def refine(
     )
 
 
-def settled(tower: Tower, columns: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def finish_vectors(
+    tower: Tower, columns: np.ndarray, values: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return Ritz vectors and values of the columns in double precision."""
     columns = columns.astype(np.float64)
     return columns, _ritz(tower, Space(columns, columns[:, :0]), values, slice(0, len(values)))
@@ -133,13 +137,13 @@ def _standing(
     round lowered q / (1 - q) is left; no more than ten times is taken to be left, lest rounding in residuals decides.
     """
     last = float(values[goal.k - 1])
-    scale = last if last > NOTHING * goal.least else goal.least
+    scale = last if last > ZERO_SHARE * goal.least else goal.least
     worst = float(residuals[: goal.k].max()) / scale
     factor = worst / before if np.isfinite(before) and before > 0 else 1.0
     return Standing(scale, worst, lowered / scale * min(factor / max(1 - factor, 0.01), MOST_LEFT))
 
 
-def _prolonged(tower: Tower, vectors: np.ndarray) -> Space:
+def _prolong(tower: Tower, vectors: np.ndarray) -> Space:
     # M and A of the level below are PᵀMP and PᵀAP: P keeps orthonormality and Ritz values.
     level, shape = tower.levels[0], (tower.levels[0].n, vectors.shape[1])
     columns, added = (np.empty(shape, dtype=level.prolong.dtype) for _ in range(2))
@@ -158,7 +162,7 @@ def _smooth_all(
         report(FIRST_SHARE * start / len(values))
         some = np.arange(start, min(start + WIDTH, len(values)))
         block, norms[some] = residual_block(
-            tower, chosen(tower, space.columns, some), values[some], np.ones(len(some))
+            tower, pick_columns(tower, space.columns, some), values[some], np.ones(len(some))
         )
         corrections = smooth(tower, block, values[some].astype(np.float32), steps)
         _require_finite(corrections, some)
@@ -182,13 +186,15 @@ def _add_corrections(
         If they overflow.
     """
     steps = int(
-        np.clip(np.ceil(0.5 * np.sqrt(tower.levels[0].spread) * np.log(8 * excess)), *STEPS)
+        np.clip(
+            np.ceil(0.5 * np.sqrt(tower.levels[0].spread) * np.log(8 * excess)), *SMOOTHING_STEPS
+        )
     )
     values, residuals = state
     for start in range(0, len(late), WIDTH):
         some = late[start : start + WIDTH]
         block, _ = residual_block(
-            tower, chosen(tower, space.columns, some), values[some], 1 / residuals[some]
+            tower, pick_columns(tower, space.columns, some), values[some], 1 / residuals[some]
         )
         corrections = correct(tower, block, values[some].astype(np.float32), steps)
         _require_finite(corrections, some)
@@ -218,7 +224,7 @@ def _look_again(
     block = np.random.default_rng(seed).standard_normal((level.n, PROBES), dtype=np.float32)
     for _ in range(PROBE_STEPS):
         block *= level.rough_scales[0] / np.abs(block).max(axis=0)
-        block = correct(tower, block, shifts, STEPS[0])
+        block = correct(tower, block, shifts, SMOOTHING_STEPS[0])
         keep_outside(tower, space.columns, block)
     space = Space(space.columns, block)
     lower, weights = _combination(tower, space, values, slice(m, m + PROBES))
@@ -258,7 +264,7 @@ def _combination(
     projected[:known, :known] = np.diag(values[:known])
     scales = 1 / np.sqrt(np.diagonal(gram))
     sizes, axes = np.linalg.eigh(gram * scales * scales[:, None])
-    kept = sizes > DEPENDENT[space.columns.dtype.itemsize] * sizes[-1]
+    kept = sizes > DEPENDENT_COLUMNS[space.columns.dtype.itemsize] * sizes[-1]
     if np.count_nonzero(kept) < len(values):
         raise ConvergenceError(
             f"Smoothed eigenvectors must be independent; fewer than {len(values)} are. {TOO_FAR}"

@@ -6,7 +6,7 @@ import numpy as np
 
 from eigenshape._compile import njit
 
-STRONG = 0.25  # of a row's strongest coupling, below which points are not neighbours
+STRONG = 0.25  # of a row's strongest coupling, below which points are not neighbors
 FRAGMENT = 0.25  # of the size aimed at, below which an aggregate is given away
 
 

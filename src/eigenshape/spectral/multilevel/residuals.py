@@ -57,7 +57,7 @@ def _squares(tower: Tower, rows: slice, rest: np.ndarray) -> np.ndarray:
     return rest.sum(axis=0)
 
 
-def chosen(tower: Tower, columns: np.ndarray, some: np.ndarray) -> np.ndarray:
+def pick_columns(tower: Tower, columns: np.ndarray, some: np.ndarray) -> np.ndarray:
     """Return some of the columns, beside each other."""
     picked = np.empty((len(columns), len(some)), dtype=columns.dtype)
     for rows in row_chunks(tower):

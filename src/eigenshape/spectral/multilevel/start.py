@@ -17,20 +17,32 @@ from eigenshape.spectral.multilevel.aggregation import Level, build_levels, load
 from eigenshape.spectral.multilevel.davidson import WIDTH, Goal, refine
 from eigenshape.spectral.multilevel.vcycle import Coarsest, Tower
 from eigenshape.spectral.solver.pencil import Pencil, as_pencil
-from eigenshape.spectral.solver.shift import factorise_near
-from eigenshape.spectral.solver.strategy import proved
+from eigenshape.spectral.solver.shift import factorize_near
+from eigenshape.spectral.solver.strategy import solve_lowest
 
-SMALL = 600  # points up to which the exact solve is the quicker one
-GUARDS = 8  # more pairs than asked for, at least, and in all a multiple of it
+# Points up to which the exact solve is faster.
+EXACT_POINTS = 600
+# Pairs refined beyond the k requested: at least these, a multiple of them in all,
+GUARDS = 8
+# and at least this multiple of k, so that copies of a multiple eigenvalue are found.
 GUARD_SHARE = 1.125
-COARSEST = 3000  # points of the coarsest level, at least; and times k:
+# Points of the coarsest level: at least these,
+COARSEST = 3000
+# and this many times k. More make the exact solve slow, fewer the refinement.
 COARSEST_PER_PAIR = 30
-COARSENED = 8  # times, at least
-SHIFTS = (0.2, 0.5, 0.75, 0.93)  # of the k-th eigenvalue
+# Factor at least between the points of the operator and those of the coarsest level.
+COARSENED = 8
+# Shifts of the factors of the coarsest level, as shares of the k-th eigenvalue.
+SHIFTS = (0.2, 0.5, 0.75, 0.93)
+# Rounds of refinement before an error is raised.
 ROUNDS = 100
-SINGLE = 1e-4  # accuracy from which vectors are kept in single precision while they are refined
+# Accuracy from which vectors are refined in single precision.
+SINGLE = 1e-4
+# Largest `accuracy` that can be requested.
 LEAST_ACCURATE = 0.1
-INNER_ACCURACY = 0.03  # on levels between, within so many rounds
+# Residual at which refinement on levels in between stops,
+INNER_ACCURACY = 0.03
+# or the rounds after which it does.
 INNER_ROUNDS = 3
 
 
@@ -67,16 +79,14 @@ def climb(
         If the memory is too small.
     """
     m = -(-max(k + GUARDS, int(GUARD_SHARE * k)) // GUARDS) * GUARDS
-    if pencil.n <= max(SMALL, COARSENED * m):
+    if pencil.n <= max(EXACT_POINTS, COARSENED * m):
         return None
     bases = pencil.n * (2 * np.dtype(dtype).itemsize * m + 20 * WIDTH)
     parts = {"bases": bases + kept, "levels of their operator": 100 * pencil.stiffness.nnz}
     require_memory(f"{k} pairs of {pencil.n} points", parts, "Ask for fewer pairs")
     report(0.01, "making coarser levels")
     order = reverse_cuthill_mckee(sp.csr_matrix(pencil.stiffness), symmetric_mode=True)
-    coarsened = _coarsened(
-        _reordered(pencil.stiffness, order), _reordered(pencil.mass, order), k, m
-    )
+    coarsened = _coarsen(_reorder(pencil.stiffness, order), _reorder(pencil.mass, order), k, m)
     if coarsened is None:
         return None
     levels, coarsest, values = coarsened
@@ -116,11 +126,11 @@ def on_finest(report: Progress, start: Start) -> Callable[[float], None]:
     return lambda done: report(0.35 + 0.6 * done, f"refining on level {n_levels} of {n_levels}")
 
 
-def _reordered(matrix: sp.sparray, order: Int[np.ndarray, " n"]) -> sp.csr_array:
+def _reorder(matrix: sp.sparray, order: Int[np.ndarray, " n"]) -> sp.csr_array:
     return sp.csr_array(sp.csr_array(matrix)[order][:, order])
 
 
-def _coarsened(
+def _coarsen(
     stiffness: sp.csr_array, mass: sp.csr_array, k: int, m: int
 ) -> tuple[list[Level], Coarsest, Float[np.ndarray, " m"]] | None:
     """Return the levels with the solved coarsest one, and its values; None where nothing can be joined."""
@@ -129,16 +139,16 @@ def _coarsened(
     if len(levels) == 1:
         return None
     with suppress(ConvergenceError, InvalidParameterError):
-        return levels, *_solved_coarsest(levels[-1], k, m)
+        return levels, *_solve_coarsest(levels[-1], k, m)
     levels = build_levels(stiffness, mass, n_coarsest, smooth=False)  # weights over many decades
-    return levels, *_solved_coarsest(levels[-1], k, m)
+    return levels, *_solve_coarsest(levels[-1], k, m)
 
 
-def _solved_coarsest(level: Level, k: int, m: int) -> tuple[Coarsest, Float[np.ndarray, " m"]]:
+def _solve_coarsest(level: Level, k: int, m: int) -> tuple[Coarsest, Float[np.ndarray, " m"]]:
     pencil = as_pencil(level.stiffness, level.mass)
-    pairs, _ = proved(pencil, m, silent)
+    pairs, _ = solve_lowest(pencil, m, silent)
     last = max(float(pairs.values[k - 1]), pencil.level / pencil.n)  # where all that is wanted is 0
-    factors = tuple(factorise_near(pencil, share * last) for share in SHIFTS)
+    factors = tuple(factorize_near(pencil, share * last) for share in SHIFTS)
     return Coarsest(pencil, pairs.vectors, factors), pairs.values
 
 

@@ -14,9 +14,9 @@ from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.multilevel.davidson import Goal, refine
 from eigenshape.spectral.multilevel.residuals import (
-    chosen,
     images,
     keep_outside,
+    pick_columns,
     residual_block,
     row_chunks,
 )
@@ -33,15 +33,16 @@ from eigenshape.spectral.multilevel.vcycle import Tower, correct
 from eigenshape.spectral.signatures.heat import heat_kernel_signature
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver.kernel_values import from_pencil, require_readable
-from eigenshape.spectral.solver.pencil import Pencil, normalise
+from eigenshape.spectral.solver.pencil import Pencil, normalize
 
 LARGE = 100_000  # points beyond which the command line computes approximate signatures
 USUAL_ACCURACY = 1e-2  # of eigenvalues; the heat then has a relative error of about 1e-3
-SAMPLES = (
-    16  # pairs that are corrected further to estimate their error; those between are interpolated
+# Pairs that are corrected further to estimate their error; those in between are interpolated.
+SAMPLED_PAIRS = 16
+CORRECTION_STEPS = (
+    30  # smoothing steps of these corrections, more than those of a round of refinement
 )
-STEPS = 30  # smoothing steps of these corrections, more than those of a round of refinement
-ROUNDING = 1e-6  # relative error of single precision sums, added to every estimate
+SINGLE_ROUNDING = 1e-6  # relative error of single precision sums, added to every estimate
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,25 +134,25 @@ def approximate_heat_signature(
     require_lumped(laplacian)
     report = progress or silent
     with one_blas_thread():
-        pencil = normalise(laplacian)
+        pencil = normalize(laplacian)
         start = climb(pencil, wanted, report)
         if start is None:
-            return _proved(laplacian, wanted, clock, report)
+            return _certified_signature(laplacian, wanted, clock, report)
         goal = Goal(wanted, float(accuracy), np.inf, pencil.level / pencil.n, ROUNDS, strict=True)
-        return _refined(pencil, start, goal, clock, report)
+        return _approximate_signature(pencil, start, goal, clock, report)
 
 
-def _proved(
+def _certified_signature(
     laplacian: Laplacian, k: int, times: Float[np.ndarray, " q"], report: Progress
 ) -> ApproximateSignature:
     found = solve_spectrum(laplacian, k, progress=report)
-    values, errors = heat_kernel_signature(found, times), np.full(len(times), ROUNDING)
+    values, errors = heat_kernel_signature(found, times), np.full(len(times), SINGLE_ROUNDING)
     return ApproximateSignature(
         frozen(values), frozen(times), frozen(errors), found.eigenvalues, complete=True
     )
 
 
-def _refined(
+def _approximate_signature(
     pencil: Pencil, start: Start, goal: Goal, times: Float[np.ndarray, " q"], report: Progress
 ) -> ApproximateSignature:
     columns, ritz, _ = refine(start.tower, start.below, goal, on_finest(report, start))
@@ -172,7 +173,7 @@ def _refined(
     return ApproximateSignature(
         frozen(values),
         frozen(times),
-        frozen(errors / sizes + ROUNDING),
+        frozen(errors / sizes + SINGLE_ROUNDING),
         frozen(lowest),
         complete=False,
     )
@@ -190,7 +191,7 @@ def _errors(
     The mean of φ² over the shape is 1 / its measure, so of the constant of that height is a change of eigenvalues.
     """
     k = len(decay)
-    sample = np.unique(np.linspace(0, k - 1, min(k, SAMPLES)).round().astype(np.int64))
+    sample = np.unique(np.linspace(0, k - 1, min(k, SAMPLED_PAIRS)).round().astype(np.int64))
     squares, falls = (
         np.interp(np.arange(k), sample, found) for found in _changes(tower, columns, ritz, sample)
     )
@@ -206,9 +207,13 @@ def _changes(
 
     Only what lies outside the span of all columns counts: within it Ritz vectors are what they can be.
     """
-    vectors, values, mass = chosen(tower, columns, sample), ritz[sample], tower.levels[0].weights
+    vectors, values, mass = (
+        pick_columns(tower, columns, sample),
+        ritz[sample],
+        tower.levels[0].weights,
+    )
     residual, _ = residual_block(tower, vectors, values, np.ones(len(sample)))
-    step = correct(tower, residual, values.astype(np.float32), STEPS)
+    step = correct(tower, residual, values.astype(np.float32), CORRECTION_STEPS)
     keep_outside(tower, columns, step)
     before, step = vectors.astype(np.float64), step.astype(np.float64)
     step /= np.sqrt((mass * step**2).sum(axis=0)) + np.finfo(np.float32).tiny

@@ -14,8 +14,8 @@ from eigenshape.spectral.spectrum import Spectrum, require_lowest
 
 # Relative difference between steps of log t up to which times count as a geometric sequence; the
 # rounding of numpy.geomspace stays far below it.
-EVEN = 1e-9
-# Eigenvalues below this multiple of the largest one count as 0. Solvers are off by about 1e-12 of it.
+EQUAL_STEPS = 1e-9
+# Eigenvalues below this multiple of the largest one count as 0.
 NULL = 1e-9
 N_TIMES = 100  # times by default, as in Sun, Ovsjanikov and Guibas 2009
 
@@ -217,9 +217,9 @@ def scale_invariant_signature(
     require_type(spectrum, Spectrum, "spectrum")
     moments = default_times(spectrum) if times is None else positive_values(times, "times")
     steps = np.diff(np.log(moments))
-    if len(moments) < 3 or np.ptp(steps) > EVEN * np.abs(steps).max():
+    if len(moments) < 3 or np.ptp(steps) > EQUAL_STEPS * np.abs(steps).max():
         raise InvalidParameterError(
-            f"times must be a geometric sequence of at least 3; there are {len(moments)}, with ratios of neighbours "
+            f"times must be a geometric sequence of at least 3; there are {len(moments)}, with ratios of neighbors "
             f"from {np.exp(steps.min(initial=0.0)):.6g} to {np.exp(steps.max(initial=0.0)):.6g}. Use numpy.geomspace."
         )
     kept = whole_number(n_frequencies, "n_frequencies", 1, len(moments) // 2)

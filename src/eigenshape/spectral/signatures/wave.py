@@ -14,10 +14,9 @@ from eigenshape.spectral.spectrum import Spectrum
 
 # All three from Aubry, Schlickewei and Cremers 2011, section 4.
 N_ENERGIES = 100
-SPREAD = 7.0  # standard deviation of the bands, in steps between energies
-MARGIN = (
-    2.0  # distance of the first and last energy from the ends of the spectrum, in the same unit σ
-)
+BAND_STEPS = 7.0  # standard deviation of the bands, in steps between energies
+# Distance of the first and last energy from the ends of the spectrum, in σ.
+MARGIN = 2.0
 
 
 def default_energies(
@@ -58,7 +57,7 @@ def default_energies(
     require_type(spectrum, Spectrum, "spectrum")
     count = whole_number(n_energies, "n_energies", 2)
     ends = np.log(positive_eigenvalues(spectrum)[[0, -1]])
-    sigma = SPREAD * float(ends[1] - ends[0]) / (count - 1 + 2 * MARGIN * SPREAD)
+    sigma = BAND_STEPS * float(ends[1] - ends[0]) / (count - 1 + 2 * MARGIN * BAND_STEPS)
     positive_values(sigma, "the range of logarithms of eigenvalues")
     return np.linspace(ends[0] + MARGIN * sigma, ends[1] - MARGIN * sigma, count), sigma
 

@@ -8,16 +8,18 @@ from jaxtyping import Float
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape.spectral.certificate import Certificate
-from eigenshape.spectral.solver.certify import part
+from eigenshape.spectral.solver.certify import take_pairs
 from eigenshape.spectral.solver.diagnosis import require_solvable
 from eigenshape.spectral.solver.interval import count_interval, solve_interval
 from eigenshape.spectral.solver.pairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil
 from eigenshape.spectral.solver.shift import factor_below
-from eigenshape.spectral.solver.strategy import dense_serves, proved, require_memory_for_pairs
+from eigenshape.spectral.solver.strategy import dense_serves, require_memory_for_pairs, solve_lowest
 
-MORE = 8  # pairs that are added where a guess was too low
-FEW = 50  # eigenvalues below an interval that are not worth a second count
+# Pairs added if a trial factor counted too few eigenvalues below the limit.
+RETRY_PAIRS = 8
+# Eigenvalues below an interval up to which they are computed too: cheaper than a second count.
+FEW_BELOW = 50
 
 
 def certified_pairs(
@@ -34,15 +36,15 @@ def certified_pairs(
     """
     try:
         if k:
-            return proved(pencil, k, report)
+            return solve_lowest(pencil, k, report)
         low, high = np.ldexp(interval, -pencil.value_exponent).tolist()
-        return _proved_between(pencil, low, high, report)
+        return _solve_between(pencil, low, high, report)
     except ConvergenceError as error:
         require_solvable(pencil, error)
         raise
 
 
-def _proved_between(
+def _solve_between(
     pencil: Pencil, low: float, high: float, report: Progress
 ) -> tuple[Pairs, Certificate]:
     report(0.01, "counting eigenvalues")
@@ -50,7 +52,7 @@ def _proved_between(
     start, stop = np.searchsorted(pairs.values, [low, high]).tolist()
     if start == stop:
         raise InvalidParameterError(_nothing(pencil, pairs, certificate.first + start, low, high))
-    return part(pencil, pairs, certificate, start, stop)
+    return take_pairs(pencil, pairs, certificate, start, stop)
 
 
 def _far_up(
@@ -61,7 +63,7 @@ def _far_up(
         return None
     interval = count_interval(pencil, low, high)
     within = interval.below_high - interval.below_low
-    if interval.below_low < max(within, FEW) or dense_serves(pencil, interval.below_high):
+    if interval.below_low < max(within, FEW_BELOW) or dense_serves(pencil, interval.below_high):
         return None
     require_memory_for_pairs(pencil, within)
     with suppress(ConvergenceError):
@@ -75,11 +77,11 @@ def _lowest_below(pencil: Pencil, limit: float, report: Progress) -> tuple[Pairs
     """Prove one pair more than lie below the limit: then none of them is missing."""
     k = min(factor_below(pencil, limit).count + 1, pencil.n)
     while True:
-        pairs, certificate = proved(pencil, k, report)
+        pairs, certificate = solve_lowest(pencil, k, report)
         count = int(np.count_nonzero(pairs.values < limit))
         if count < k or k == pencil.n:
             return pairs, certificate
-        k = min(k + max(k // 10, MORE), pencil.n)
+        k = min(k + max(k // 10, RETRY_PAIRS), pencil.n)
 
 
 def _nothing(pencil: Pencil, pairs: Pairs, number: int, low: float, high: float) -> str:

@@ -13,15 +13,22 @@ from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.inertia import count_beside
-from eigenshape.spectral.solver.kernel_values import reported, to_pencil
-from eigenshape.spectral.solver.pairs import Pairs, spread
-from eigenshape.spectral.solver.pencil import Pencil, column_chunks, normalise, residual_norms
+from eigenshape.spectral.solver.kernel_values import reported_certificate, to_pencil
+from eigenshape.spectral.solver.pairs import Pairs, error_bound
+from eigenshape.spectral.solver.pencil import Pencil, column_chunks, normalize, residual_norms
 
-RESOLUTION = 1e-6  # relative to the largest eigenvalue: what is closer counts as one cluster
-WIDEST_CLUSTER = 1e-3  # relative too: a chain of close eigenvalues longer than this proves nothing
+# Eigenvalues closer than this, relative to the largest one, form a cluster.
+RESOLUTION = 1e-6
+# Extent, relative to the largest eigenvalue, beyond which a chain of close eigenvalues is no cluster
+# and proves nothing.
+WIDEST_CLUSTER = 1e-3
+# Largest entry of |ΦᵀBΦ - I| with which eigenvectors count as orthonormal. Solvers
+# correct what is above 1e-12; a large tolerance would let one eigenvector count twice.
 ORTHONORMAL = 1e-8
+# Largest residual, relative to the largest eigenvalue, of an eigenpair that counts as found.
 LARGEST_RESIDUAL = 1e-5
-FARTHER = 10.0
+# Second attempt to count below a cluster: this many times farther below it.
+CLUSTER_STEP = 10.0
 
 
 def certify(
@@ -70,19 +77,19 @@ def certify(
     True
     """
     require_type(laplacian, Laplacian, "laplacian")
-    values, vectors = _checked(
+    values, vectors = _as_eigenpairs(
         laplacian, as_array(eigenvalues, "eigenvalues"), as_array(eigenvectors, "eigenvectors")
     )
     values = to_pencil(laplacian.kernel, values)
     with one_blas_thread():
-        pencil = normalise(laplacian)
+        pencil = normalize(laplacian)
         values, vectors = (
             np.ldexp(values, -pencil.value_exponent),
             np.ldexp(vectors, -pencil.vector_exponent),
         )
         certificate = prove(pencil, Pairs(values, vectors, residual_norms(pencil, values, vectors)))
     last = float(np.ldexp(values[-1], pencil.value_exponent))
-    certificate = reported(laplacian.kernel, in_user_units(pencil, certificate), last)
+    certificate = reported_certificate(laplacian.kernel, in_user_units(pencil, certificate), last)
     if not certificate.complete:
         raise ConvergenceError(certificate.explain())
     return certificate
@@ -102,7 +109,7 @@ def prove(pencil: Pencil, pairs: Pairs) -> Certificate:
     if k == pencil.n:
         return certificate
     above = count_beside(pencil, pairs, k - 1, certificate.resolution)
-    certificate = _counted(certificate, pairs, above)
+    certificate = _with_count(certificate, pairs, above)
     return certificate if above.count <= k else _below_cluster(pencil, pairs, certificate, above)
 
 
@@ -114,7 +121,7 @@ def quality(pencil: Pencil, pairs: Pairs) -> Certificate:
     ConvergenceError
         If the pairs are not B-orthonormal eigenvectors.
     """
-    resolution = max(RESOLUTION * _scale(pencil, pairs), 4 * spread(pairs))
+    resolution = max(RESOLUTION * _scale(pencil, pairs), 4 * error_bound(pairs))
     return Certificate(
         n_pairs=len(pairs.values),
         shift=np.inf,
@@ -137,7 +144,7 @@ def in_user_units(pencil: Pencil, certificate: Certificate) -> Certificate:
     return replace(certificate, shift=shift, floor=floor, gap=(low, high), resolution=resolution)
 
 
-def part(
+def take_pairs(
     pencil: Pencil, pairs: Pairs, certificate: Certificate, start: int, stop: int
 ) -> tuple[Pairs, Certificate]:
     """Return the pairs from one number to another; what proves them all proves these."""
@@ -163,24 +170,24 @@ def _below_cluster(pencil: Pencil, pairs: Pairs, above: Certificate, beside: Fac
     factor = count_beside(pencil, pairs, first, -above.resolution, beside)
     if factor.count > first:
         # Slack may have taken copies of the cluster below σ that are not among the pairs: once more, from farther off.
-        farther = FARTHER * (factor.shift - float(pairs.values[first]))
+        farther = CLUSTER_STEP * (factor.shift - float(pairs.values[first]))
         factor = count_beside(pencil, pairs, first, farther, factor)
     resolution = float(pairs.values[-1]) - factor.shift
     if resolution > WIDEST_CLUSTER * _scale(pencil, pairs):
         raise ConvergenceError(
-            f"Neighbouring eigenvalues must differ by more than rounding takes; the last {len(pairs.values) - first} "
+            f"Neighboring eigenvalues must differ by more than rounding takes; the last {len(pairs.values) - first} "
             f"of {len(pairs.values)} do not. Repair nearly degenerate elements."
         )
     return replace(
-        _counted(above, pairs, factor),
+        _with_count(above, pairs, factor),
         resolution=resolution,
         n_split=beside.count - len(pairs.values),
     )
 
 
-def _counted(certificate: Certificate, pairs: Pairs, factor: Factor) -> Certificate:
+def _with_count(certificate: Certificate, pairs: Pairs, factor: Factor) -> Certificate:
     n_found = int(np.count_nonzero(pairs.values < factor.shift))
-    low = float(pairs.values[n_found - 1]) + spread(pairs) if n_found else -np.inf
+    low = float(pairs.values[n_found - 1]) + error_bound(pairs) if n_found else -np.inf
     return replace(
         certificate,
         shift=factor.shift,
@@ -232,7 +239,7 @@ def _require_eigenpairs(pencil: Pencil, pairs: Pairs) -> float:
     return float(relative[worst])
 
 
-def _checked(
+def _as_eigenpairs(
     laplacian: Laplacian, values: Float[np.ndarray, " k"], vectors: Float[np.ndarray, "n k"]
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, "n k"]]:
     fits = values.ndim == 1 and values.size and vectors.shape == (laplacian.n_points, len(values))

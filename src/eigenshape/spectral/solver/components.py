@@ -10,11 +10,12 @@ from jaxtyping import Float, Int
 from eigenshape.spectral.solver.pairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil, part_pencil, residual_norms
 
-AT_ONCE = 2**22  # numbers in the blocks that are solved together
-FOUR = 4  # residuals: what is nearer to 0 is 0, as in `positive_eigenvalues`
-EQUAL = (
-    1e-12  # relative: eigenvalues of congruent parts differ so much where coordinates are rounded
-)
+# Numbers in the blocks of small parts that are solved together: 32 MiB.
+BLOCK_NUMBERS = 2**22
+# An eigenvalue below this many residuals counts as 0, as in `positive_eigenvalues`.
+ZERO_RESIDUALS = 4
+# Relative difference of eigenvalues of congruent parts whose coordinates are rounded.
+CONGRUENT = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +81,7 @@ def solve_small(parts: Parts, largest: int, k: int) -> list[Pairs]:
     known = np.empty(0)
     sizes, counts = np.unique(parts.sizes[parts.sizes <= largest], return_counts=True)
     for size, count in zip(sizes.tolist(), counts.tolist(), strict=True):
-        n_chunks = -(-count * size**2 // AT_ONCE)
+        n_chunks = -(-count * size**2 // BLOCK_NUMBERS)
         for chunk in np.array_split(np.arange(count) + len(found), n_chunks):
             values, vectors, residuals = _solve_blocks(parts, int(chunk[0]), len(chunk))
             known = np.concatenate([known, values.ravel()])
@@ -127,7 +128,7 @@ def widths(
     values: Float[np.ndarray, "*k"], residuals: Float[np.ndarray, "*k"]
 ) -> Float[np.ndarray, "*k"]:
     """Return how far from each value another may lie that is equal to it but for rounding."""
-    return FOUR * residuals + EQUAL * np.abs(values)
+    return ZERO_RESIDUALS * residuals + CONGRUENT * np.abs(values)
 
 
 def merge_pairs(parts: Parts, found: list[Pairs], k: int) -> Pairs:

@@ -10,10 +10,14 @@ from eigenshape.spectral.solver.inertia import count_beside
 from eigenshape.spectral.solver.pairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil
 
-DIGITS = 1e10  # of W_ii/B_ii from the stiffest point to the softest: beyond it rounding at one hides the other
-BELOW_ZERO = 1e-12  # of the pencil's level
-LOWER = 8.0
-DEPTH = 60
+# Ratio of W_ii/B_ii between two points beyond which rounding at the one hides the eigenvalues of the other.
+DIGITS = 1e10
+# First negative value at which eigenvalues are counted, in the pencil's level: rounding of a zero stays above.
+BELOW_ZERO = 1e-12
+# Factor between the negative values at which eigenvalues are counted,
+STEP_DOWN = 8.0
+# and how many there are at most: 8^60 is 1e54.
+MOST_STEPS_DOWN = 60
 
 
 def require_solvable(pencil: Pencil, error: ConvergenceError) -> None:
@@ -44,22 +48,24 @@ def _require_near_scales(pencil: Pencil, error: ConvergenceError) -> None:
 
 
 def _require_semidefinite(pencil: Pencil, error: ConvergenceError) -> None:
-    first = last = _counted_below(pencil, -BELOW_ZERO * pencil.level)
+    first = last = _count_below(pencil, -BELOW_ZERO * pencil.level)
     if first is None or last is None:
         return
-    for _ in range(DEPTH):
-        farther = _counted_below(pencil, LOWER * last.shift)
+    for _ in range(MOST_STEPS_DOWN):
+        farther = _count_below(pencil, STEP_DOWN * last.shift)
         if farther is None:
             break
         last = farther
-    high, low, least = pencil.values_out(np.array([first.shift, last.shift, LOWER * last.shift]))
+    high, low, least = pencil.values_out(
+        np.array([first.shift, last.shift, STEP_DOWN * last.shift])
+    )
     raise InvalidParameterError(
         f"stiffness must be positive semidefinite; eigenvalue 0 lies between {least:.3g} and {low:.3g}, and "
         f"{first.count} lie below {high:.1e}."
     ) from error
 
 
-def _counted_below(pencil: Pencil, shift: float) -> Factor | None:
+def _count_below(pencil: Pencil, shift: float) -> Factor | None:
     """Count eigenvalues below a negative value, or one farther off, whatever the rounding; None where none surely is.
 
     No eigenpair is known. 0 and the constant should be one, and `count_beside` keeps rounding away from it.

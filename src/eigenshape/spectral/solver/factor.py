@@ -36,7 +36,7 @@ class Factor:
         return self.lower.solve(right)
 
 
-def factorise(
+def factorize(
     pencil: Pencil,
     shift: float,
     slack: Float[np.ndarray, " n"] | None = None,

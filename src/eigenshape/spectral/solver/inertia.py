@@ -6,12 +6,14 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._errors import ConvergenceError
-from eigenshape.spectral.solver.factor import Factor, factorise, rounding
-from eigenshape.spectral.solver.pairs import Pairs, spread
+from eigenshape.spectral.solver.factor import Factor, factorize, rounding
+from eigenshape.spectral.solver.pairs import Pairs, error_bound
 from eigenshape.spectral.solver.pencil import Pencil
 
+# Factor by which σ moves away from the eigenvalue if rounding could move it across.
 WIDENING = 3.7
-TRIALS = 12
+# Factors for one count before giving up.
+COUNT_TRIALS = 12
 
 
 def count_beside(
@@ -39,7 +41,7 @@ def count_beside(
         pairs.vectors[:, index] ** 2,
         1.0 if most else -1.0,
     )
-    found_error = spread(pairs)
+    found_error = error_bound(pairs)
 
     def taken(slack: Float[np.ndarray, " n"]) -> float:
         return found_error + float(slack @ shape)  # from this eigenvalue, to first order
@@ -49,15 +51,15 @@ def count_beside(
 
     factor, none, sigma = beside, np.zeros(pencil.n), value + step
     slack = none if beside is None or too_much(taken(beside.slack), sigma) else beside.slack
-    for _ in range(TRIALS):
-        factor = factorise(pencil, sigma, side * slack, factor)
+    for _ in range(COUNT_TRIALS):
+        factor = factorize(pencil, sigma, side * slack, factor)
         loss = rounding(factor) if factor else np.full(pencil.n, np.inf)
         # What is above the slack moves σ: W - σB - S + E ≤ W - (σ - ρ)B where no row has more than ρ c D of it.
         over = float(((loss - slack) / pencil.mass_diagonal).max(initial=0.0)) / pencil.mass_floor
         moved = sigma - side * over
         if factor and not too_much(taken(slack) + over, moved):
             return replace(factor, shift=moved)
-        slack = wanted = np.maximum(slack, _padded(pencil, loss))
+        slack = wanted = np.maximum(slack, _pad(pencil, loss))
         if too_much(taken(slack), sigma):
             step, slack = WIDENING * step, none
             sigma = value + step
@@ -68,6 +70,6 @@ def count_beside(
     )
 
 
-def _padded(pencil: Pencil, loss: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+def _pad(pencil: Pencil, loss: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     # Rounding wanders from factor to factor, most in rows where there was little.
     return 3 * loss + 0.1 * float(np.median(loss / pencil.mass_diagonal)) * pencil.mass_diagonal

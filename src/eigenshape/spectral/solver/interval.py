@@ -11,9 +11,9 @@ from eigenshape.spectral.solver.certify import quality
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.inertia import count_beside
 from eigenshape.spectral.solver.lanczos import Wanted, block_lanczos
-from eigenshape.spectral.solver.pairs import Pairs, lowest, polished, spread
+from eigenshape.spectral.solver.pairs import Pairs, error_bound, lowest_pairs, polish
 from eigenshape.spectral.solver.pencil import Pencil
-from eigenshape.spectral.solver.shift import factorise_near
+from eigenshape.spectral.solver.shift import factorize_near
 from eigenshape.spectral.solver.slices import (
     CLEAR_GAP,
     OVERLAP,
@@ -23,8 +23,10 @@ from eigenshape.spectral.solver.slices import (
     walk_on,
 )
 
-RUNS = 20
-FARTHER = 4  # times as many pairs past the ends, where there was no gap among them
+# Runs of block Lanczos for missing pairs of an interval before giving up.
+INTERVAL_RUNS = 20
+# Factor by which the search past the ends grows if there was no clear gap.
+WIDER_OVERLAP = 4
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class Interval:
 
 def count_interval(pencil: Pencil, low: float, high: float) -> Interval:
     """Count the eigenvalues below both ends, or near them."""
-    below = sorted(factorise_near(pencil, end).count for end in (low, high))
+    below = sorted(factorize_near(pencil, end).count for end in (low, high))
     return Interval(low, high, *below)
 
 
@@ -62,17 +64,17 @@ def solve_interval(pencil: Pencil, interval: Interval, report: Report) -> tuple[
         start = interval.low - spacing * min(extra, interval.below_low)
         factor = factor_beyond(pencil, max(start, interval.low / 2), spacing, first, target)
         vectors, factor = walk_on(pencil, factor, first, last, report)
-        found = _completed(pencil, factor, vectors, interval, report)
+        found = _complete(pencil, factor, vectors, interval, report)
         if found:
             return found
         if first == 0 and last == pencil.n:
             raise ConvergenceError(
                 "An interval must end between eigenvalues that can be told apart; there are none."
             )
-        extra *= FARTHER
+        extra *= WIDER_OVERLAP
 
 
-def _completed(
+def _complete(
     pencil: Pencil,
     factor: Factor,
     vectors: Float[np.ndarray, "n j"],
@@ -80,8 +82,8 @@ def _completed(
     report: Report,
 ) -> tuple[Pairs, Certificate] | None:
     """Search for what the counts find missing; None where no gap is clear on one of the sides."""
-    for _ in range(RUNS):
-        pairs = polished(pencil, factor, lowest(pencil, vectors, vectors.shape[1]))
+    for _ in range(INTERVAL_RUNS):
+        pairs = polish(pencil, factor, lowest_pairs(pencil, vectors, vectors.shape[1]))
         report(0.9)
         gaps = _clear_gaps(pairs.values, interval)
         if gaps is None:
@@ -136,6 +138,6 @@ def _between(
         first=lower.count,
         shift=upper.shift,
         count=upper.count - lower.count,
-        gap=(float(pairs.values[after[0]]) + spread(pairs), upper.shift),
+        gap=(float(pairs.values[after[0]]) + error_bound(pairs), upper.shift),
         resolution=float(np.abs(pairs.values - upper.shift).min()),
     )

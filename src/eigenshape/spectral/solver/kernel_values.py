@@ -14,11 +14,13 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.operators.laplacian import GaussianKernel
 from eigenshape.spectral.certificate import Certificate
 
-LAST_CORRECTED = (
-    0.945  # t μ at t λ = 2.9: of a surface with n = 5 k t/e² points the k-th eigenvalue
-)
-ESSENTIAL = 0.5  # t μ from which the literal form's eigenvalues say nothing of λ; n = 21 k t/e²
-BIASED = 0.181  # t μ at t λ = .2, ten per cent low; n = 72 k t/e²
+# t μ at t λ = 2.9, beyond which corrected eigenvalues cannot be distinguished: on a surface that is the
+# k-th eigenvalue of n = 5 k t/e² points.
+LAST_CORRECTED = 0.945
+# t μ from which eigenvalues of the literal form do not depend on λ: n = 21 k t/e².
+ESSENTIAL = 0.5
+# t μ at t λ = 0.2, where the bias is ten per cent: n = 72 k t/e².
+BIASED = 0.181
 
 
 def to_pencil(
@@ -62,13 +64,13 @@ def require_readable(
             f"{np.count_nonzero(shares <= BIASED)} are; or pass correct='log'"
         )
         warnings.warn(
-            f"Eigenvalues from number {late} on lie too near to {_named(kernel)} = {top:.4g} to tell those of the "
+            f"Eigenvalues from number {late} on lie too near to {_limit_name(kernel)} = {top:.4g} to tell those of the "
             f"shape: {advice}. Choose a smaller t, or more points.",
             stacklevel=stacklevel,
         )
 
 
-def _named(kernel: GaussianKernel) -> str:
+def _limit_name(kernel: GaussianKernel) -> str:
     return "1/t" if kernel.volume == 1 else "1/(t × volume)"
 
 
@@ -83,7 +85,7 @@ def from_pencil(
     )
 
 
-def widened(
+def reported_residuals(
     kernel: GaussianKernel | None,
     values: Float[np.ndarray, " k"],
     residuals: Float[np.ndarray, " k"],
@@ -96,7 +98,9 @@ def widened(
     return above - from_pencil(kernel, values)
 
 
-def reported(kernel: GaussianKernel | None, certificate: Certificate, last: float) -> Certificate:
+def reported_certificate(
+    kernel: GaussianKernel | None, certificate: Certificate, last: float
+) -> Certificate:
     """Return a certificate whose shift, gap and resolution are in the values that are reported.
 
     `last` is the largest eigenvalue of the pencil that was found. A shift at 1/t or beyond is moved down in its gap,

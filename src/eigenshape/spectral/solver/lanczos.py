@@ -14,17 +14,20 @@ from eigenshape.sparse.lane_loops import LANES
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.pencil import Pencil
 
-TOLERANCE = 5e-12  # of a residual, relative to the shift
-FLOOR = 32 * float(
-    np.finfo(np.float64).eps
-)  # of a residual, relative to the largest θ: rounding goes no lower
-SHRUNK = 1e-2  # a column that projection shortened this much is projected once more
+# Residual of a converged pair, relative to the shift.
+TOLERANCE = 5e-12
+# Residual that rounding leaves, relative to the largest θ.
+FLOOR = 32 * float(np.finfo(np.float64).eps)
+# A column that projection shortens below this share of its length is projected once more.
+SHRUNK = 1e-2
+# Projections of a block at most.
 REPEATS = 5
-NEGLIGIBLE = 1e-13  # a column this short against what it was is rounding: the space is invariant
-ALIKE = (
-    1e-4  # a pivot of a Gram matrix this small, in lengths: too many digits are lost in its square
-)
-UNLIKE = 0.1  # and this large: none are
+# A column that projection shortens to this share is rounding: the space is invariant.
+NEGLIGIBLE = 1e-13
+# Pivots of a Gram matrix, relative to lengths: below this one Cholesky has lost too many digits,
+DEPENDENT_PIVOT = 1e-4
+# and above this one none.
+INDEPENDENT_PIVOT = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +123,7 @@ def block_lanczos(
     """Return eigenvalues around the shift, and B-orthonormal eigenvectors, orthogonal to the B-orthonormal `locked`.
 
     Unrestarted block Lanczos on (W - σB)⁻¹B in the inner product of B (Grimes, Lewis and Simon 1994), in blocks of
-    `groups` times eight columns, every block orthogonalised against all before it. It stops when what the space has
+    `groups` times eight columns, every block orthogonalized against all before it. It stops when what the space has
     seen of `wanted` has converged; copies of an eigenvalue beyond the width of the block may be missing, which an
     inertia count tells afterwards.
 
@@ -137,7 +140,7 @@ def block_lanczos(
     )  # pages are touched only as it grows
     space[:first] = packed(inner.enter(locked))
     projected = np.zeros((capacity, capacity))
-    _orthonormalise(
+    _orthonormalize(
         inner, space[: first + groups], rng.standard_normal((groups, pencil.n, LANES)), rng
     )
     missing = wanted.below + wanted.above
@@ -145,7 +148,7 @@ def block_lanczos(
     for size in range(block, capacity + 1, block):
         filled = first + size // LANES
         image = inner.image(space[filled - groups : filled])
-        along, coupling = _orthonormalise(inner, space[: filled + groups], image, rng)
+        along, coupling = _orthonormalize(inner, space[: filled + groups], image, rng)
         projected[:size, size - block : size] = along[first * LANES :]
         if size >= check:
             krylov = Krylov(space[first : filled + groups], projected[:size, :size], coupling)
@@ -167,7 +170,7 @@ def _capacity(pencil: Pencil, wanted: Wanted, n_locked: int, block: int) -> int:
     return max(min(room, most) // block, 1) * block
 
 
-def _orthonormalise(
+def _orthonormalize(
     inner: Operator, space: Slots, columns: Block, rng: np.random.Generator
 ) -> tuple[Float[np.ndarray, "m b"], Float[np.ndarray, "b b"]]:
     """Split columns = known along + fresh upper, with [known, fresh] = space orthonormal; return along and upper.
@@ -207,7 +210,7 @@ def _gram_schmidt(
     lengths: Float[np.ndarray, " b"],
     rng: np.random.Generator,
 ) -> tuple[Float[np.ndarray, "b b"], bool]:
-    """Orthonormalise a block into `fresh`; return the triangle, and whether a column became short against what it was.
+    """Orthonormalize a block into `fresh`; return the triangle, and whether a column became short against what it was.
 
     By the Cholesky factor of the Gram matrix, twice where the first leaves digits to be gained (Yamamoto and others
     2015), and column by column where it fails. The columns are used up.
@@ -215,7 +218,7 @@ def _gram_schmidt(
     upper = _by_cholesky(inner, columns, fresh)
     if upper is None:
         return _one_by_one(inner, columns, fresh, lengths, rng)
-    if np.diag(upper).min() <= UNLIKE * np.linalg.norm(upper, axis=0).max():
+    if np.diag(upper).min() <= INDEPENDENT_PIVOT * np.linalg.norm(upper, axis=0).max():
         columns[:] = fresh
         second = _by_cholesky(inner, columns, fresh)
         if second is None:
@@ -241,7 +244,7 @@ def _cholesky(gram: Float[np.ndarray, "b b"]) -> Float[np.ndarray, "b b"] | None
         triangle = sl.cholesky(gram / np.outer(sizes, sizes))
     except np.linalg.LinAlgError:
         return None
-    return triangle * sizes if np.diag(triangle).min() > ALIKE else None
+    return triangle * sizes if np.diag(triangle).min() > DEPENDENT_PIVOT else None
 
 
 def _one_by_one(
@@ -251,15 +254,15 @@ def _one_by_one(
     lengths: Float[np.ndarray, " b"],
     rng: np.random.Generator,
 ) -> tuple[Float[np.ndarray, "b b"], bool]:
-    """Orthonormalise a block; a negligible column is replaced by a random one that the triangle R leaves out."""
+    """Orthonormalize a block; a negligible column is replaced by a random one that the triangle R leaves out."""
     columns, width = np.concatenate(list(block), axis=1), len(lengths)
     upper, short = np.zeros((width, width)), False
     for i in range(width):
         for _ in range(2):
-            part = columns[:, :i].T @ _weighed(inner, columns[:, i])
+            part = columns[:, :i].T @ _weigh(inner, columns[:, i])
             columns[:, i] -= columns[:, :i] @ part
             upper[:i, i] += part
-        length = float(np.sqrt(columns[:, i] @ _weighed(inner, columns[:, i])))
+        length = float(np.sqrt(columns[:, i] @ _weigh(inner, columns[:, i])))
         short |= bool(length < SHRUNK * lengths[i])
         if length <= NEGLIGIBLE * lengths[i]:
             columns[:, i] = _random_unit(inner, columns[:, :i], rng)
@@ -275,11 +278,11 @@ def _random_unit(
 ) -> Float[np.ndarray, " n"]:
     column = rng.standard_normal(len(against))
     for _ in range(2):
-        column -= against @ (against.T @ _weighed(inner, column))
-    return np.asarray(column / np.sqrt(column @ _weighed(inner, column)))
+        column -= against @ (against.T @ _weigh(inner, column))
+    return np.asarray(column / np.sqrt(column @ _weigh(inner, column)))
 
 
-def _weighed(inner: Operator, column: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+def _weigh(inner: Operator, column: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     return inner.weigh(column[None, :, None])[0, :, 0]
 
 

@@ -9,8 +9,12 @@ from eigenshape._errors import ConvergenceError
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.pencil import Pencil, rayleigh_residuals
 
+# Largest entry of |ΦᵀBΦ - I| that needs no correction.
 LOOSE = 1e-12
+# Largest entry that one Newton step corrects to rounding, since its error is the square; beyond it the
+# vectors of different runs are wrong.
 SKEW = 1e-5
+# Residual, relative to the largest eigenvalue, above which a pair takes one more solve.
 POLISHED = 2e-9
 
 
@@ -23,12 +27,12 @@ class Pairs:
     residuals: Float[np.ndarray, " k"]
 
 
-def spread(pairs: Pairs) -> float:
+def error_bound(pairs: Pairs) -> float:
     """Bound of the distance of all values together to eigenvalues, one to one (Kahan 1967)."""
     return float(np.linalg.norm(pairs.residuals))
 
 
-def polished(pencil: Pencil, factor: Factor, pairs: Pairs) -> Pairs:
+def polish(pencil: Pencil, factor: Factor, pairs: Pairs) -> Pairs:
     """Refine the pairs whose residual the rounding of the factor has kept large.
 
     One step of (W - σB)⁻¹ on a residual gives the error of the vector outside the space of those found.
@@ -45,9 +49,9 @@ def polished(pencil: Pencil, factor: Factor, pairs: Pairs) -> Pairs:
     return Pairs(values[order], vectors[:, order], residuals[order])
 
 
-def lowest(pencil: Pencil, vectors: Float[np.ndarray, "n j"], k: int) -> Pairs:
+def lowest_pairs(pencil: Pencil, vectors: Float[np.ndarray, "n j"], k: int) -> Pairs:
     """Return the lowest k of the pairs that these nearly B-orthonormal vectors stand for."""
-    vectors = _orthonormal(pencil, vectors)
+    vectors = _orthonormalize(pencil, vectors)
     values, residuals = rayleigh_residuals(pencil, vectors)
     order = np.argsort(values, kind="stable")[:k]
     if not np.array_equal(order, np.arange(vectors.shape[1])):
@@ -55,7 +59,7 @@ def lowest(pencil: Pencil, vectors: Float[np.ndarray, "n j"], k: int) -> Pairs:
     return Pairs(values[order], vectors, residuals[order])
 
 
-def _orthonormal(pencil: Pencil, vectors: Float[np.ndarray, "n j"]) -> Float[np.ndarray, "n j"]:
+def _orthonormalize(pencil: Pencil, vectors: Float[np.ndarray, "n j"]) -> Float[np.ndarray, "n j"]:
     # One Newton step towards the nearest B-orthonormal columns: they are so up to the tolerance of the iteration.
     gram = vectors.T @ pencil.weigh(vectors)
     identity = np.eye(len(gram))

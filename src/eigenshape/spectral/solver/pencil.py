@@ -11,11 +11,15 @@ from scipy.sparse.csgraph import connected_components
 from eigenshape._errors import InvalidParameterError
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 from eigenshape.sparse.elimination import Elimination, analyse, factorise
-from eigenshape.spectral.solver.residual_loops import quotient_sums, residual_sums
+from eigenshape.spectral.solver.residual_loops import add_sums
 
+# Columns of a Gram matrix that are computed together: enough for fast products, little memory.
 COLUMNS_AT_ONCE = 64
-WIDEST = 1e140  # of two entries on a diagonal: squares of vectors must fit into floats
-ALIKE = 1e11
+# Largest ratio of two diagonal entries: squares of vectors must be floats.
+WIDEST_RANGE = 1e140
+# If trace W / trace B exceeds the median of W_ii/B_ii by this factor, the median is the pencil's level:
+# a few points must not set the unit of all tolerances.
+LARGEST_LEVEL_RATIO = 1e11
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +84,7 @@ class Pencil:
     @cached_property
     def shifted(self) -> Shifted:
         """W and B in one pattern, analysed once for the factors at all shifts."""
-        return _shifted(self.stiffness, self.mass)
+        return _shifted_pattern(self.stiffness, self.mass)
 
     def weigh(self, vectors: Float[np.ndarray, "n b"]) -> Float[np.ndarray, "n b"]:
         """Multiply by B."""
@@ -97,7 +101,7 @@ class Pencil:
         return np.ldexp(vectors, self.vector_exponent)
 
 
-def normalise(laplacian: Laplacian) -> Pencil:
+def normalize(laplacian: Laplacian) -> Pencil:
     """Scale W and B by powers of two, and find a lower bound of B.
 
     Raises
@@ -107,13 +111,13 @@ def normalise(laplacian: Laplacian) -> Pencil:
     """
     _require_range("stiffness", laplacian.stiffness.diagonal())
     _require_range("mass", laplacian.mass.diagonal())
-    return _normalised(laplacian.stiffness, laplacian.mass, (0, 0), laplacian.kernel)
+    return _normalize_matrices(laplacian.stiffness, laplacian.mass, (0, 0), laplacian.kernel)
 
 
 def part_pencil(whole: Pencil, stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
     """Scale some rows and columns of W and B of a pencil, apart from all others, to units of their own."""
     exponents = whole.value_exponent, whole.vector_exponent
-    return _normalised(stiffness, mass, exponents, whole.kernel)
+    return _normalize_matrices(stiffness, mass, exponents, whole.kernel)
 
 
 def as_pencil(stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
@@ -124,10 +128,10 @@ def as_pencil(stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
     InvalidParameterError
         If B is not positive definite.
     """
-    return _pencil(_scaled(stiffness, 0), _scaled(mass, 0), (0, 0), None)
+    return _pencil(_scale(stiffness, 0), _scale(mass, 0), (0, 0), None)
 
 
-def _normalised(
+def _normalize_matrices(
     stiffness: sp.sparray,
     mass: sp.sparray,
     exponents: tuple[int, int],
@@ -137,7 +141,7 @@ def _normalised(
     up_w, up_b = _exponent(stiffness), _exponent(mass)
     up_b -= up_b % 2  # an even power, so that its square root is a power of two as well
     exponents = exponents[0] + up_w - up_b, exponents[1] - up_b // 2
-    return _pencil(_scaled(stiffness, -up_w), _scaled(mass, -up_b), exponents, kernel)
+    return _pencil(_scale(stiffness, -up_w), _scale(mass, -up_b), exponents, kernel)
 
 
 def _pencil(
@@ -168,9 +172,9 @@ def _require_range(name: str, diagonal: Float[np.ndarray, " n"]) -> None:
     if np.isnan(sizes).all():
         return
     low, high = int(np.nanargmin(sizes)), int(np.nanargmax(sizes))
-    if sizes[high] / WIDEST > sizes[low]:
+    if sizes[high] / WIDEST_RANGE > sizes[low]:
         raise InvalidParameterError(
-            f"Entries on the diagonal of {name} must lie within a factor of {WIDEST:.0e}; entry {high} is "
+            f"Entries on the diagonal of {name} must lie within a factor of {WIDEST_RANGE:.0e}; entry {high} is "
             f"{diagonal[high]:.3g} and entry {low} is {diagonal[low]:.3g}."
         )
 
@@ -185,7 +189,7 @@ def _level(
     if mean <= 0 or not ratios.size:
         return 1.0
     median = float(np.median(ratios))
-    return mean if mean < median * ALIKE else median
+    return mean if mean < median * LARGEST_LEVEL_RATIO else median
 
 
 def _harmonic_mean(
@@ -202,23 +206,23 @@ def _exponent(matrix: sp.sparray) -> int:
     return int(np.frexp(largest)[1]) - 1 if largest > 0 else 0
 
 
-def _scaled(matrix: sp.sparray, exponent: int) -> sp.csc_array:
+def _scale(matrix: sp.sparray, exponent: int) -> sp.csc_array:
     scaled = sp.csc_array(matrix, dtype=np.float64, copy=True)
     scaled.data = np.ldexp(scaled.data, exponent)
     scaled.sum_duplicates()
     return scaled
 
 
-def _shifted(stiffness: sp.csc_array, mass: sp.csc_array) -> Shifted:
+def _shifted_pattern(stiffness: sp.csc_array, mass: sp.csc_array) -> Shifted:
     parts = [_ones(stiffness), _ones(mass), sp.eye_array(stiffness.shape[0], format="csc")]
     union = sp.csc_array(parts[0] + parts[1] + parts[2])
     union.sort_indices()
     keys = _keys(union)
     diagonal = np.searchsorted(keys, np.arange(union.shape[1]) * (union.shape[1] + 1))
-    return Shifted(analyse(union), _spread(stiffness, keys), _spread(mass, keys), diagonal)
+    return Shifted(analyse(union), _scatter(stiffness, keys), _scatter(mass, keys), diagonal)
 
 
-def _spread(matrix: sp.csc_array, keys: Int[np.ndarray, " e"]) -> Float[np.ndarray, " e"]:
+def _scatter(matrix: sp.csc_array, keys: Int[np.ndarray, " e"]) -> Float[np.ndarray, " e"]:
     if matrix.nnz == len(keys):
         return matrix.data
     data = np.zeros(len(keys))
@@ -240,7 +244,7 @@ def _mass_floor(mass: sp.csc_array, diagonal: Float[np.ndarray, " n"]) -> float:
     # B - cD is positive definite exactly when all its pivots are positive. Linear elements have c = 1/2.
     if (mass - sp.diags_array(diagonal)).count_nonzero() == 0:
         return 1.0
-    shifted = _shifted(mass, sp.csc_array(sp.diags_array(diagonal)))
+    shifted = _shifted_pattern(mass, sp.csc_array(sp.diags_array(diagonal)))
     for halvings in range(12):
         floor = 0.49 * 0.5**halvings
         lower = factorise(shifted.elimination, shifted.stiffness - floor * shifted.mass)
@@ -276,20 +280,24 @@ def _residuals(
     pencil: Pencil, vectors: Float[np.ndarray, "n k"], given: Float[np.ndarray, " k"] | None
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     values, norms = np.empty(vectors.shape[1]), np.empty(vectors.shape[1])
+    # One type of indices, whatever SciPy chose: the loop is compiled once.
     matrices = tuple(
-        (part.indptr, part.indices, part.data) for part in (pencil.stiffness, pencil.mass)
+        (part.indptr.astype(np.int64), part.indices.astype(np.int64), part.data)
+        for part in (pencil.stiffness, pencil.mass)
     )
     for columns in column_chunks(vectors.shape[1]):
         part = np.ascontiguousarray(vectors[:, columns])
+        k = part.shape[1]
+        scratch = np.empty((2, k)), np.zeros((3, k))
         if given is None:
-            products, sizes = sums = np.zeros((2, part.shape[1]))
-            quotient_sums(*matrices, part, sums)
-            values[columns] = products / sizes
+            sums = np.zeros((3, k))
+            add_sums(*matrices, part, values[columns], pencil.mass_diagonal, False, *scratch, sums)
+            values[columns] = sums[0] / sums[1]
         else:
             values[columns] = given[columns]
-        squares, sizes = sums = np.zeros((2, part.shape[1]))
-        residual_sums(*matrices, part, values[columns], pencil.mass_diagonal, sums)
-        norms[columns] = np.sqrt(squares / pencil.mass_floor / sizes)
+        sums = np.zeros((3, k))
+        add_sums(*matrices, part, values[columns], pencil.mass_diagonal, True, *scratch, sums)
+        norms[columns] = np.sqrt(sums[2] / pencil.mass_floor / sums[1])
     return values, norms
 
 
@@ -298,7 +306,7 @@ def column_chunks(k: int) -> list[slice]:
     return [slice(start, min(start + COLUMNS_AT_ONCE, k)) for start in range(0, k, COLUMNS_AT_ONCE)]
 
 
-def finished(pencil: Pencil, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+def to_user_vectors(pencil: Pencil, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
     """Return the vectors in the user's units, with the sign that `Spectrum` promises, read-only and in their place."""
     vectors = np.ascontiguousarray(vectors)
     signs = np.ones(vectors.shape[1])

@@ -10,15 +10,16 @@ from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.solver.certify import in_user_units
 from eigenshape.spectral.solver.kernel_values import (
     from_pencil,
-    reported,
+    reported_certificate,
+    reported_residuals,
     require_readable,
-    widened,
 )
 from eigenshape.spectral.solver.pairs import Pairs
-from eigenshape.spectral.solver.pencil import Pencil, finished
+from eigenshape.spectral.solver.pencil import Pencil, to_user_vectors
 from eigenshape.spectral.spectrum import Spectrum
 
-ROUNDING = 1e-9  # of the mean eigenvalue
+# Negative eigenvalues down to minus this share of the mean eigenvalue may be rounding.
+NEGATIVE_ROUNDING = 1e-9
 
 
 def spectrum_of(
@@ -38,10 +39,10 @@ def spectrum_of(
     require_readable(laplacian.kernel, values, stacklevel=4)
     return Spectrum(
         eigenvalues=frozen(from_pencil(laplacian.kernel, values)),
-        eigenvectors=finished(pencil, pairs.vectors),
+        eigenvectors=to_user_vectors(pencil, pairs.vectors),
         mass=laplacian.mass,
-        residuals=frozen(widened(laplacian.kernel, values, residuals)),
-        certificate=reported(
+        residuals=frozen(reported_residuals(laplacian.kernel, values, residuals)),
+        certificate=reported_certificate(
             laplacian.kernel, in_user_units(pencil, certificate), float(values[-1])
         ),
     )
@@ -49,7 +50,9 @@ def spectrum_of(
 
 def _without_negatives(pencil: Pencil, pairs: Pairs) -> Float[np.ndarray, " k"]:
     # A Rayleigh quotient below zero shows an eigenvalue below zero, however large its residual, but for rounding.
-    rounding = np.minimum(4 * pairs.residuals, ROUNDING * pencil.level) + 1e-14 * pencil.level
+    rounding = (
+        np.minimum(4 * pairs.residuals, NEGATIVE_ROUNDING * pencil.level) + 1e-14 * pencil.level
+    )
     bad = np.flatnonzero(pairs.values < -rounding)
     if bad.size:
         value, bound = pencil.values_out(np.array([pairs.values[bad[0]], rounding[bad[0]]]))

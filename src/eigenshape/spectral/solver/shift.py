@@ -4,18 +4,23 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._errors import ConvergenceError
-from eigenshape.spectral.solver.factor import Factor, factorise
+from eigenshape.spectral.solver.factor import Factor, factorize
 from eigenshape.spectral.solver.pencil import Pencil
 
 # Of the k wanted eigenvalues this share lies below the shift. On a surface counts grow like eigenvalues (Weyl), and
-# below the shift the spectrum ends at 0, so that side converges sooner: measured best, and flat around it.
-SHARE = 0.62
-ACCEPTED = (0.45, 0.78)
-TRIALS = 12
+# below the shift the spectrum ends at 0, so that side converges sooner. Measured best, and flat around it.
+SHARE_BELOW = 0.62
+# Shares of the k eigenvalues below the shift that are accepted. A narrower range would cost more
+# trial factors.
+ACCEPTED_SHARES = (0.45, 0.78)
+# Trial factors before the highest shift with fewer than k eigenvalues below it is used.
+SHIFT_TRIALS = 12
 UNIFORM_MESH = 3.6  # λ_k ≈ 3.6 (k/n) trace W / trace B on a surface of equilateral triangles
 LOWEST = 1e-6  # of the first guess: where more eigenvalues than wanted lie lower still, they form a cluster at 0
-LOWER = (1.0, 0.7, 0.4, 0.2)
-NUDGES = (1.0, 1.01, 0.985, 1.03, 0.96)
+# Shares of a shift that are tried if no factor near the shift itself is good enough.
+LOWER_SHARES = (1.0, 0.7, 0.4, 0.2)
+# Multiples of a shift that are tried if a pivot is poor or an eigenvalue is too close to it.
+SHIFT_NUDGES = (1.0, 1.01, 0.985, 1.03, 0.96)
 BACKWARD_ERROR = 1e-8  # of a solve, entry by entry; a poor pivot shows here
 CLEAR = 1e-5  # relative distance of the shift to an eigenvalue, below which rounding shows in the others
 
@@ -27,18 +32,18 @@ def shift_inside(pencil: Pencil, k: int) -> Factor:
     counts, whatever the dimension of the shape. Where a cluster leaves no such shift (k smaller than the number of
     components, say), the highest shift with fewer than k eigenvalues below it serves, or one below zero.
     """
-    guess = float(expected_values(pencil, np.array([SHARE * k]))[0])
+    guess = float(expected_values(pencil, np.array([SHARE_BELOW * k]))[0])
     low: Factor | None = None
     high: Factor | None = None
     factor = factor_below(pencil, guess)
-    for _ in range(TRIALS):
-        if ACCEPTED[0] * k - 3 <= factor.count <= ACCEPTED[1] * k + 1:
+    for _ in range(SHIFT_TRIALS):
+        if ACCEPTED_SHARES[0] * k - 3 <= factor.count <= ACCEPTED_SHARES[1] * k + 1:
             return factor
-        low, high = (factor, high) if factor.count < SHARE * k else (low, factor)
+        low, high = (factor, high) if factor.count < SHARE_BELOW * k else (low, factor)
         if high and high.shift < (1.02 * low.shift if low else LOWEST * guess):
             break
-        factor = factor_below(pencil, _next_shift(factor, low, high, SHARE * k))
-    return low or factorise_near(pencil, -guess)
+        factor = factor_below(pencil, _next_shift(factor, low, high, SHARE_BELOW * k))
+    return low or factorize_near(pencil, -guess)
 
 
 def expected_values(pencil: Pencil, numbers: Float[np.ndarray, " j"]) -> Float[np.ndarray, " j"]:
@@ -53,15 +58,15 @@ def expected_values(pencil: Pencil, numbers: Float[np.ndarray, " j"]) -> Float[n
 
 def factor_below(pencil: Pencil, shift: float) -> Factor:
     """Factor near `shift`, or at a share of it: solids and uneven masses may put a guess far up among eigenvalues."""
-    for share in LOWER:
+    for share in LOWER_SHARES:
         try:
-            return factorise_near(pencil, share * shift)
+            return factorize_near(pencil, share * shift)
         except ConvergenceError:
             continue
-    return factorise_near(pencil, shift)
+    return factorize_near(pencil, shift)
 
 
-def factorise_near(pencil: Pencil, shift: float) -> Factor:
+def factorize_near(pencil: Pencil, shift: float) -> Factor:
     """Factor at `shift`, or within a few per cent of it where pivots there are poor or an eigenvalue is too near.
 
     Raises
@@ -69,8 +74,8 @@ def factorise_near(pencil: Pencil, shift: float) -> Factor:
     ConvergenceError
         If that is so at all of them.
     """
-    for nudge in NUDGES:
-        factor = factorise(pencil, nudge * shift)
+    for nudge in SHIFT_NUDGES:
+        factor = factorize(pencil, nudge * shift)
         if factor and _serves(pencil, factor):
             return factor
     raise ConvergenceError(

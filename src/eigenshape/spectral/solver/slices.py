@@ -9,15 +9,20 @@ from eigenshape._errors import ConvergenceError
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.lanczos import Wanted, block_lanczos
 from eigenshape.spectral.solver.pencil import Pencil
-from eigenshape.spectral.solver.shift import factorise_near, shift_inside
+from eigenshape.spectral.solver.shift import factorize_near, shift_inside
 
 Report = Callable[[float], None]
 
-SLICE = 250  # eigenvalues to a slice: more make the space dear, fewer the factors
-OVERLAP = 12  # eigenvalues past the end of a slice, among which it is cut
-CLEAR_GAP = 1e-5  # of the last eigenvalue: over a gap this wide two slices come out orthogonal
-TRIALS = 5
-FAIR = (0.2, 0.9)  # share of a slice that may lie below its shift
+# Eigenvalues in a slice: with more the orthogonalization is slow, with fewer there are more factors.
+SLICE = 250
+# Eigenvalues found past the end of a slice, in whose widest gap it ends.
+OVERLAP = 12
+# Gap, relative to the last eigenvalue, across which two slices are orthogonal to rounding.
+CLEAR_GAP = 1e-5
+# Trial factors for the shift of a slice; any shift beyond the last one is correct, some are slow.
+SLICE_TRIALS = 5
+# Shares of a slice that may lie below its shift.
+FAIR = (0.2, 0.9)
 
 
 def walk(pencil: Pencil, k: int, report: Report) -> tuple[Float[np.ndarray, "n j"], Factor]:
@@ -59,7 +64,7 @@ def walk_on(
         )
         if last:
             return np.hstack([*parts, vectors]), factor
-        kept, floor = _cut(values, factor.shift)
+        kept, floor = _find_cut(values, factor.shift)
         parts.append(vectors[:, values < floor])
         known = factor.count + kept
         upper_half = np.sort(values[values < floor])[parts[-1].shape[1] // 2 :]
@@ -77,7 +82,7 @@ def _within(report: Report, start: float, share: float) -> Report:
     return lambda done: report(start + share * done)
 
 
-def _cut(values: Float[np.ndarray, " j"], shift: float) -> tuple[int, float]:
+def _find_cut(values: Float[np.ndarray, " j"], shift: float) -> tuple[int, float]:
     """Return how many eigenvalues above the shift the slice keeps, and the middle of the gap it ends in."""
     above = np.sort(values[values > shift])
     gaps = np.diff(above[-(OVERLAP + 1) :])
@@ -99,8 +104,8 @@ def factor_beyond(pencil: Pencil, floor: float, spacing: float, known: int, targ
         If none is found beyond `floor`.
     """
     step = spacing * target / 2
-    for _ in range(TRIALS):
-        factor = factorise_near(pencil, floor + step)
+    for _ in range(SLICE_TRIALS):
+        factor = factorize_near(pencil, floor + step)
         between = factor.count - known
         if FAIR[0] * target <= between <= FAIR[1] * target:
             break

@@ -23,7 +23,7 @@ from eigenshape.spectral.solver.components import (
 )
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.lanczos import Wanted, block_lanczos
-from eigenshape.spectral.solver.pairs import Pairs, lowest, polished
+from eigenshape.spectral.solver.pairs import Pairs, lowest_pairs, polish
 from eigenshape.spectral.solver.pencil import Pencil
 from eigenshape.spectral.solver.shift import expected_values, factor_below, shift_inside
 from eigenshape.spectral.solver.slices import walk
@@ -31,18 +31,28 @@ from eigenshape.spectral.solver.slices import walk
 Start = Callable[[Pencil, int, Callable[[float], None]], tuple[np.ndarray, Factor]]
 Road = Callable[[Pencil, int, Progress], tuple[Pairs, Certificate]]
 
-SMALL = 300  # points up to which a dense solve is the faster one
-DENSE_SHARE = 4  # and where more than one in so many pairs is wanted,
-DENSE_LIMIT = 6000  # while the matrix still fits
-WHOLE = 400  # pairs up to which one shift serves
-FEWEST_VECTORS = 150  # of a space, however few pairs are wanted
-WIDEST = 8  # groups of eight columns to a block
-RUNS = 40
-MARGIN = 1.1  # times as many pairs of a part as Weyl's law says are among the k lowest of all,
-MORE = 2  # and so many more: asking once for a few too many is cheaper than asking twice
+# Points up to which a dense solve is faster than a sparse one.
+DENSE_POINTS = 300
+# A dense solve is also used if k is more than n / DENSE_SHARE,
+DENSE_SHARE = 4
+# and n is at most this: it takes 32 n² bytes, 1.1 GiB for 6,000 points.
+DENSE_LIMIT = 6000
+# Pairs up to which one shift is used; more are found slice by slice, because orthogonalization
+# grows with the square of the pairs.
+ONE_SHIFT_PAIRS = 400
+# Vectors of a Lanczos space at least, for the estimate of memory.
+FEWEST_VECTORS = 150
+# Groups of eight columns in a block at most; wider blocks find more copies of an eigenvalue at once.
+MOST_GROUPS = 8
+# Runs of block Lanczos before giving up. Each run finds at least one missing pair or is the last.
+MOST_RUNS = 40
+# A part is solved for this many times the pairs that Weyl's law expects of it,
+PART_MARGIN = 1.1
+# plus these: a few pairs too many are cheaper than a second solve.
+EXTRA_PAIRS = 2
 
 
-def proved(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+def solve_lowest(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
     """Return the k lowest pairs of a pencil and their proof, by the quickest road that reaches it.
 
     Raises
@@ -53,16 +63,16 @@ def proved(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate
         If none does.
     """
     if pencil.labels.any():
-        return _in_parts(connected_parts(pencil), k, report)
-    return _connected(pencil, k, report)
+        return _solve_parts(connected_parts(pencil), k, report)
+    return _solve_connected(pencil, k, report)
 
 
-def _connected(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+def _solve_connected(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
     if dense_serves(pencil, k):
-        return _dense(pencil, k, report)
-    roads: list[Road] = [partial(_sparse, start=walk)] if k > WHOLE else []
-    roads += [partial(_sparse, start=_at_once)]
-    roads += [_dense] if pencil.n <= DENSE_LIMIT else []  # nothing there can fail to converge
+        return _solve_dense(pencil, k, report)
+    roads: list[Road] = [partial(_solve_sparse, start=walk)] if k > ONE_SHIFT_PAIRS else []
+    roads += [partial(_solve_sparse, start=_at_once)]
+    roads += [_solve_dense] if pencil.n <= DENSE_LIMIT else []  # nothing there can fail to converge
     for road in roads[:-1]:
         with suppress(ConvergenceError):
             return road(pencil, k, report)
@@ -71,22 +81,22 @@ def _connected(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certifi
 
 def dense_serves(pencil: Pencil, k: int) -> bool:
     """Tell whether a dense solve finds k pairs sooner than a sparse one."""
-    return pencil.n <= SMALL or (DENSE_SHARE * k > pencil.n and pencil.n <= DENSE_LIMIT)
+    return pencil.n <= DENSE_POINTS or (DENSE_SHARE * k > pencil.n and pencil.n <= DENSE_LIMIT)
 
 
-def _dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+def _solve_dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
     require_memory_for_pairs(pencil, k, 32 * pencil.n**2)
     report(0.1, f"solving {pencil.n} points densely")
     roots = np.sqrt(pencil.mass_diagonal)
     stiffness = pencil.stiffness.toarray() / np.outer(roots, roots)
     mass = None if pencil.mass_floor == 1.0 else pencil.mass.toarray() / np.outer(roots, roots)
     _, vectors = sl.eigh(stiffness, mass)
-    pairs = lowest(pencil, vectors[:, :k] / roots[:, None], k)
+    pairs = lowest_pairs(pencil, vectors[:, :k] / roots[:, None], k)
     report(0.8, "counting eigenvalues")
     return _complete(pencil, pairs)
 
 
-def _in_parts(parts: Parts, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+def _solve_parts(parts: Parts, k: int, report: Progress) -> tuple[Pairs, Certificate]:
     """Solve each part by itself, and prove what is merged of them as a whole.
 
     A Krylov space of all of them would see few copies of an eigenvalue at a time, and 0 has as many as there are parts.
@@ -95,7 +105,7 @@ def _in_parts(parts: Parts, k: int, report: Progress) -> tuple[Pairs, Certificat
     """
     require_memory_for_pairs(parts.pencil, k)
     report(0.02, f"solving {len(parts.sizes)} parts")
-    found = dict(enumerate(solve_small(parts, SMALL, k)))
+    found = dict(enumerate(solve_small(parts, DENSE_POINTS, k)))
     large = {number: parts.only(number) for number in range(len(found), len(parts.sizes))}
     wanted = _expected_counts(parts, large, found, k)
     progress = report
@@ -124,7 +134,7 @@ def _expected_counts(
     last = np.partition(known, k - 1)[k - 1]
     counts = {number: int(np.count_nonzero(values <= last)) for number, values in expected.items()}
     return {
-        number: min(int(MARGIN * count) + MORE, k, large[number].n)
+        number: min(int(PART_MARGIN * count) + EXTRA_PAIRS, k, large[number].n)
         for number, count in counts.items()
     }
 
@@ -141,7 +151,7 @@ def _missing_counts(
         n_found = len(found[number].values)
         if n_found < min(k, pencil.n) and found[number].values[-1] < last:
             n_below = factor_below(pencil, float(np.ldexp(last, -parts.exponent(pencil)))).count
-            counts[number] = min(max(n_below, n_found) + MORE, k, pencil.n)
+            counts[number] = min(max(n_below, n_found) + EXTRA_PAIRS, k, pencil.n)
     return counts
 
 
@@ -155,7 +165,7 @@ def _share(report: Progress, parts: Parts, number: int) -> Progress:
 
 
 def _solve_part(parts: Parts, pencil: Pencil, k: int, report: Progress) -> Pairs:
-    pairs, _ = _connected(pencil, k, report)
+    pairs, _ = _solve_connected(pencil, k, report)
     up = pencil.vector_exponent - parts.pencil.vector_exponent
     values, residuals = np.ldexp([pairs.values, pairs.residuals], parts.exponent(pencil))
     return Pairs(values, np.ldexp(pairs.vectors, up), residuals)
@@ -168,20 +178,22 @@ def _complete(pencil: Pencil, pairs: Pairs) -> tuple[Pairs, Certificate]:
     return pairs, certificate
 
 
-def _sparse(pencil: Pencil, k: int, report: Progress, *, start: Start) -> tuple[Pairs, Certificate]:
+def _solve_sparse(
+    pencil: Pencil, k: int, report: Progress, *, start: Start
+) -> tuple[Pairs, Certificate]:
     require_memory_for_pairs(pencil, k)
     report(0.02, "looking for a shift")
     vectors, factor = start(pencil, k, _in_run(report, 0))
-    for run in range(1, RUNS + 1):
-        pairs = polished(pencil, factor, lowest(pencil, vectors, k))
+    for run in range(1, MOST_RUNS + 1):
+        pairs = polish(pencil, factor, lowest_pairs(pencil, vectors, k))
         report(0.9, "counting eigenvalues")
-        certificate, wanted = _still_wanted(pencil, factor, pairs, k)
+        certificate, wanted = _remaining(pencil, factor, pairs, k)
         missing = wanted.below + wanted.above
         if certificate is not None and certificate.complete:
             return pairs, certificate
-        if missing == 0 or run == RUNS:
+        if missing == 0 or run == MOST_RUNS:
             break
-        groups, more = min(1 + -(-missing // LANES), WIDEST), _in_run(report, run)
+        groups, more = min(1 + -(-missing // LANES), MOST_GROUPS), _in_run(report, run)
         _, found = block_lanczos(
             pencil, factor, wanted, locked=pairs.vectors, groups=groups, report=more
         )
@@ -205,7 +217,7 @@ def require_memory_for_pairs(pencil: Pencil, k: int, factors: int | None = None)
     if factors is None:
         factors = 24 * pencil.shifted.elimination.n_entries  # two at once, and their making
     bases = (
-        8 * pencil.n * (3 * k + FEWEST_VECTORS + 2 * min(k, WHOLE))
+        8 * pencil.n * (3 * k + FEWEST_VECTORS + 2 * min(k, ONE_SHIFT_PAIRS))
     )  # a space of twice the pairs, results, a copy
     advice = (
         "Request fewer pairs, or pass method='approximate' to solve_spectrum, which needs no factor"
@@ -231,7 +243,7 @@ def _in_run(report: Progress, run: int) -> Callable[[float], None]:
     return lambda done: report(0.05 + 0.8 * done, f"run {run + 1} of block Lanczos")
 
 
-def _still_wanted(
+def _remaining(
     pencil: Pencil, factor: Factor, pairs: Pairs, k: int
 ) -> tuple[Certificate | None, Wanted]:
     """Return the proof as far as it goes, and what a further run has to find."""
