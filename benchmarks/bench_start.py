@@ -10,6 +10,7 @@ installed are left out.
 """
 
 import importlib.util
+import resource
 import statistics
 import subprocess
 import sys
