@@ -78,7 +78,7 @@ def test_a_broken_file_is_named_with_what_is_wrong_in_it(tmp_path, verb):
             ("index", "{folder}/db", "{missing}", "--method", "best"),
             "--method takes patches, scale-free, th",
         ),
-        (("index", "{folder}/db", "{missing}", "--repair", "all"), "it was given 'all'"),
+        (("index", "{folder}/db", "{missing}", "--repair", "all"), "'all' is none of them"),
     ],
 )
 def test_a_bad_option_is_refused_before_any_file_is_looked_at(tmp_path, arguments, message):

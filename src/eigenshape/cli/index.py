@@ -11,14 +11,14 @@ import typer
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import batch_reporter, out, print_json, progress_bar, shown
 from eigenshape.cli.inputs import JsonOption, RepairOption, read_repaired, repair_names
-from eigenshape.cli.methods import PATCHES, MethodOption, recipe_to_fill, require_method
+from eigenshape.cli.methods import PATCHES, MethodOption, index_recipe, require_method
 from eigenshape.io.parsing import MESH_FORMATS
 from eigenshape.retrieval.kinds import AnyRecipe
 from eigenshape.retrieval.store.batch import BatchReport, build_index
 from eigenshape.retrieval.store.index import ShapeIndex
 from eigenshape.retrieval.store.workers import Item, Workers
 
-SOME_FAILED = 3
+SOME_FAILED = 3  # exit code
 
 NewIndexArgument = Annotated[
     Path, typer.Argument(help="Folder of the index. It is created if it does not exist.")
@@ -62,7 +62,7 @@ def index(
     require_method(method)
     items, repairs, processes = _items(sources), repair_names(repair), Workers(workers, timeout)
     shelf = ShapeIndex.open_or_create(index)
-    recipe = recipe_to_fill(shelf, method, items, repairs, processes)
+    recipe = index_recipe(shelf, method, items, repairs, processes)
     report = describe_all(shelf, items, recipe, processes, repairs=repairs, n_views=views)
     if as_json:
         print_json({"index": str(index), "shapes": len(shelf), **vars(report)})

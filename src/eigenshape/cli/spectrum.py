@@ -37,7 +37,7 @@ from eigenshape.spectral.bounds.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
-N_PICTURED = 8
+N_PICTURED = 8  # eigenfunctions in a picture: two rows of four
 USUAL = 20  # pairs
 ORDERS = {"p2": 2, "p3": 3}
 
@@ -165,7 +165,7 @@ def spectrum(
             "instead of --below, or leave out --accuracy."
         )
     scale = {"t": t, "h": h, "edge_factor": edge_factor, "cutoff": cutoff}
-    asked = {
+    given = {
         "mass": mass,
         "mollify": mollify,
         **scale,
@@ -173,7 +173,7 @@ def spectrum(
         "form": form,
         "distance": distance,
     }
-    options = {name: value for name, value in asked.items() if value is not None}
+    options = {name: value for name, value in given.items() if value is not None}
     found = load_shape(shape, repair, dim, drop_missing=drop_missing, cells=cells)
     _require_drawable(found, eigenfunctions)
     bounded = _require_mesh(found) if brackets else None

@@ -16,7 +16,7 @@ from eigenshape.plot.fields import PANEL, show
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import draw
 
-N_COLUMNS = 4
+N_COLUMNS = 4  # poses in a row
 MOVED = ("#c9c9c9", "#f3c27b", "#d9541e")  # colors of shares 0, 1/2 and 1
 
 
