@@ -290,7 +290,7 @@ def test_a_match_without_its_file_leaves_its_place_empty(zoo, tmp_path):
         "changed": str(changed),
         "there": str(path),
     }.items():
-        index.add(name, [descriptor], source=source)
+        index.add_descriptors(name, [descriptor], source=source)
     done = run("query", index.folder, path, "--picture", tmp_path / "sheet.png")
     for said in (
         "not drawn: loose: A match is drawn from its mesh file; it was added to the index without one",
