@@ -10,6 +10,7 @@ installed are left out.
 """
 
 import importlib.util
+import resource
 import statistics
 import subprocess
 import sys
@@ -34,12 +35,10 @@ REPEATS = 7
 
 def start_seconds(arguments: list[str]) -> float:
     """Run Python once; return the CPU seconds that it took."""
-    before = os.times()
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run([sys.executable, *arguments], check=True, stdout=subprocess.DEVNULL)
-    after = os.times()
-    return (
-        after.children_user + after.children_system - before.children_user - before.children_system
-    )
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
 
 
 def is_installed(name: str) -> bool:

@@ -64,7 +64,7 @@ def zoo(tmp_path_factory):
 def database(zoo, tmp_path_factory):
     db = tmp_path_factory.mktemp("db") / "index"
     done = run("index", db, zoo, "--views", 1, code=3)
-    assert "4 described, 0 known already, 1 failed; the index holds 4 shapes" in done.stdout
+    assert "4 described, 0 indexed already, 1 failed; the index holds 4 shapes" in done.stdout
     assert "broken: " in done.output
     assert "vertex 2 is [2.0, 0.0, nan]" in done.output
     return db
@@ -290,7 +290,7 @@ def test_a_match_without_its_file_leaves_its_place_empty(zoo, tmp_path):
         "changed": str(changed),
         "there": str(path),
     }.items():
-        index.add(name, [descriptor], source=source)
+        index.add_descriptors(name, [descriptor], source=source)
     done = run("query", index.folder, path, "--picture", tmp_path / "sheet.png")
     for said in (
         "not drawn: loose: A match is drawn from its mesh file; it was added to the index without one",

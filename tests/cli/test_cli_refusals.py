@@ -78,7 +78,7 @@ def test_a_broken_file_is_named_with_what_is_wrong_in_it(tmp_path, verb):
             ("index", "{folder}/db", "{missing}", "--method", "best"),
             "--method takes patches, scale-free, th",
         ),
-        (("index", "{folder}/db", "{missing}", "--repair", "all"), "it was given 'all'"),
+        (("index", "{folder}/db", "{missing}", "--repair", "all"), "'all' is none of them"),
     ],
 )
 def test_a_bad_option_is_refused_before_any_file_is_looked_at(tmp_path, arguments, message):
@@ -113,7 +113,7 @@ def test_index_names_the_broken_file_takes_the_rest_and_knows_it_again(fish, tmp
     (folder / "broken.off").write_text(BROKEN)
     command = ("index", tmp_path / "db", folder, fish, "--workers", 1, "--views", 0)
     first = run(*command, code=3)
-    assert "2 described, 0 known already, 1 failed; the index holds 2 shapes" in first.stdout
+    assert "2 described, 0 indexed already, 1 failed; the index holds 2 shapes" in first.stdout
     assert "broken.off: faces must index vertices 0..2" in first.stdout
     again = json.loads(run(*command, "--json", code=3).stdout)
     assert (again["shapes"], again["added"], sorted(again["skipped"])) == (2, [], ["ball", "fish"])

@@ -172,11 +172,11 @@ def test_operators_are_listed():
         ),
         (
             ("spectrum", "sphere.xyz", "--boundary", "dirichlet"),
-            "--boundary dirichlet is for meshes; a cloud",
+            "--boundary dirichlet is for meshes; a point cloud",
         ),
         (
             ("spectrum", "sphere.xyz", "--brackets"),
-            "--brackets is for meshes; a cloud of points has no flat pieces",
+            "--brackets is for meshes; the shape is a point cloud",
         ),
         (
             ("spectrum", "sphere.xyz", "--eigenfunctions", "a.png"),
@@ -197,7 +197,7 @@ def test_refusals(folder, arguments, said):
 
 def test_missing_points_are_left_out_when_asked(tmp_path):
     (tmp_path / "a.xyz").write_text("0 0 0\n1 0 0\nnan 0 0\n0 1 0\n1 1 0\n2 0 0\n2 1 0\n0 2 0\n")
-    assert "--drop-missing, leaves it out" in run("info", tmp_path / "a.xyz", code=1).stderr
+    assert "--drop-missing, leaves them out" in run("info", tmp_path / "a.xyz", code=1).stderr
     assert run_json("info", tmp_path / "a.xyz", "--drop-missing")["points"] == 7
 
 

@@ -30,7 +30,7 @@ def tiny(request, tmp_path):
 def test_all_pairs_are_computed_where_there_are_fewer_than_usual(tiny):
     n = TINY[tiny.stem].n_vertices
     done = run("spectrum", tiny)
-    assert f"note: 20 pairs are usual; this shape has {n}, and all are computed" in done.stderr
+    assert f"note: the default is 20 pairs; this shape has {n}, and all are computed" in done.stderr
     assert len(run_json("spectrum", tiny, "--operator", "robust")["eigenvalues"]) == n
     assert len(run_json("spectrum", tiny, "--brackets")["eigenvalues"]) == n
     assert len(run_json("spectrum", tiny, "--accuracy", "1e-2")["eigenvalues"]) == n
@@ -41,7 +41,7 @@ def test_inner_points_alone_count_where_the_boundary_is_held(tmp_path):
     path = tmp_path / "grid.obj"
     write_mesh(grid(3, 3), path)
     done = run("spectrum", path, "--boundary", "dirichlet")
-    assert "note: 20 pairs are usual; this shape has 4, and all are computed" in done.stderr
+    assert "note: the default is 20 pairs; this shape has 4, and all are computed" in done.stderr
 
 
 @pytest.mark.long

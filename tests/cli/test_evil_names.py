@@ -101,7 +101,7 @@ def test_an_index(zoo, tmp_path):
     descriptor = es.retrieval.find_heat_features(
         es.make_creature("fish", 0, n_vertices=500)
     ).descriptor
-    foreign.add(EVIL, [descriptor], label=EVIL, source=EVIL)
+    foreign.add_descriptors(EVIL, [descriptor], label=EVIL, source=EVIL)
     done = run("query", foreign.folder, zoo / f"{EVIL}0.ply", "--picture", sheet)
     assert done.stdout.count(SPELLED) == 2
     assert f"not drawn: {SPELLED}" in done.stderr

@@ -68,19 +68,20 @@ def test_curves_and_flat_shapes_in_pyvista():
 
 def test_what_does_not_fit_is_refused():
     with pytest.raises(
-        InvalidShapeError, match=r"Only triangle meshes and clouds in R\^3 fit into trimesh"
+        InvalidShapeError, match=r"trimesh holds triangle meshes and point clouds in R\^3"
     ):
         to_trimesh(box(1, 1, 1))
     with pytest.raises(
-        InvalidShapeError, match=r"Only shapes in R\^3 fit into PyVista; this one lies in R\^5"
+        InvalidShapeError,
+        match=r"PyVista holds shapes in up to three dimensions; this shape lies in R\^5",
     ):
         to_pyvista(projective_plane(1))
     with pytest.raises(
-        InvalidShapeError, match="A Trimesh or PointCloud of trimesh is taken; this is a list"
+        InvalidShapeError, match="mesh must be a Trimesh or a PointCloud of trimesh; it is a list"
     ):
         from_trimesh([])
     with pytest.raises(
-        InvalidShapeError, match="A PolyData or UnstructuredGrid is taken; this is a list"
+        InvalidShapeError, match="dataset must be a PolyData or an UnstructuredGrid; it is a list"
     ):
         from_pyvista([])
     with pytest.raises(

@@ -51,7 +51,7 @@ def deform(
         str,
         typer.Option(
             help="Which part must not move, written as for --region. By default everything outside the "
-            "region."
+            "region is held close to its place."
         ),
     ] = "",
     mode: Annotated[

@@ -1,4 +1,4 @@
-"""eigenshape demo: the whole road on made-up creatures."""
+"""eigenshape demo: index synthetic creatures, scan one, and search for it."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,10 +9,10 @@ import typer
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import out, progress_bar, shown
 from eigenshape.cli.index import WorkersOption, describe_all
-from eigenshape.cli.methods import PATCHES, recipe_to_fill
+from eigenshape.cli.methods import PATCHES, index_recipe
 from eigenshape.cli.outputs import save_picture
 from eigenshape.cli.query import print_matches
-from eigenshape.cli.sheets import CAPTION, asked, contact_sheet
+from eigenshape.cli.sheets import CAPTION, color_query, contact_sheet
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.retrieval.store.index import ShapeIndex
 from eigenshape.retrieval.store.workers import Item, Workers
@@ -20,16 +20,16 @@ from eigenshape.scans.partial import partial_scan
 from eigenshape.shapes.creatures import CREATURES, make_creature
 
 FOLDER = Path("eigenshape-demo")
-POSES = 3  # of each creature in the index
-UNSEEN = 11  # number of the pose that is scanned; the index has poses 0, 1, 2
-N_VERTICES = 2000  # of a creature: enough for all its parts, in under a minute for the whole demo
+POSES = 3  # of each kind in the index; more would make the demo slower
+UNSEEN = 11  # number of the scanned pose, which is not one of those in the index
+N_VERTICES = 2000  # of each creature: enough for fingers, and described in a second or two
 NEXT = """
 Read next:
-  eigenshape features {scan} --picture parts.png      what persists on that scan, and the parts around it
+  eigenshape features {scan} --picture parts.png      feature points of that scan, and the parts around them
   eigenshape spectrum {scan} -k 20 --picture spectrum.png  its eigenvalues, and the proof that none is missing
   eigenshape index my-index FOLDER                    the same for a folder of your own meshes
   eigenshape query my-index SCAN --picture sheet.png  and a scan of yours
-  README.md, docs/glossary.md                         the same road in ten lines of Python, and the words
+  README.md, docs/glossary.md                         the same steps in Python, and the terms
 """
 
 
@@ -46,9 +46,9 @@ def demo(
         raise InvalidParameterError(f"--kind takes {', '.join(CREATURES)}; it is {kind!r}.")
     items = _make(output / "creatures")
     shelf = ShapeIndex.open_or_create(output / "index")
-    recipe = recipe_to_fill(shelf, PATCHES, items, (), Workers(workers))
+    recipe = index_recipe(shelf, PATCHES, items, (), Workers(workers))
     report = describe_all(shelf, items, recipe, Workers(workers))
-    out.print(f"indexed {len(shelf)} shapes ({len(report.skipped)} known already)")
+    out.print(f"indexed {len(shelf)} shapes ({len(report.skipped)} indexed already)")
 
     scan_path = output / "scan.ply"
     scan = partial_scan(
@@ -58,7 +58,7 @@ def demo(
     out.print(
         f"scanned a {kind} from one side, in a pose that the index has not seen: {shown(scan_path)}"
     )
-    shape = asked(scan, recipe)
+    shape = color_query(scan, recipe)
     matches = shelf.query(shape.descriptor, n_matches=6)
     print_matches(matches)
 

@@ -49,8 +49,8 @@ def features(
         float | None,
         typer.Option(
             help=(
-                "Compute heat approximately, to this relative error: 0.0001 (slow) to 0.1. By "
-                "default exactly up to 100,000 vertices, and to 0.01 beyond."
+                "Compute heat approximately, to this relative error, from 0.0001 (slow) to 0.1. By "
+                "default exactly up to 100,000 vertices, and to 0.01 above."
             )
         ),
     ] = None,
@@ -66,7 +66,7 @@ def features(
 ) -> None:
     """Find the feature points of a mesh and the parts around them, most persistent first.
 
-    Beyond 100,000 vertices, or with --accuracy, heat is approximate, and its error is printed.
+    Above 100,000 vertices, or with --accuracy, heat is approximate, and its error is printed.
     """
     recipe = heat_recipe(method)
     require_picture(picture)
@@ -78,7 +78,7 @@ def features(
         shape = find_heat_features(surface, recipe, accuracy=accuracy, progress=progress)
     if shape.error is not None:
         err.print(
-            f"{surface.n_vertices:,} vertices: their heat is approximate, off by about "
+            f"{surface.n_vertices:,} vertices: heat is approximate, with a relative error of about "
             f"{100 * shape.error:.2g} %"
         )
     n_fragments = int(np.isin(shape.tree.maxima, shape.fragments).sum())
@@ -88,7 +88,7 @@ def features(
     )
     if n_fragments:
         err.print(
-            f"{n_fragments} fragments with less than 1 % of the area each are one region each, without a feature"
+            f"{n_fragments} fragments, each with less than 1 % of the area, are one part each, without a feature point"
         )
     rows = [
         row | {"heat": float(parts.features.values[i])}

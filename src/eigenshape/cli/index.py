@@ -1,4 +1,4 @@
-"""eigenshape index: describe folders of meshes and keep what they are known by."""
+"""eigenshape index: describe folders of meshes and store the descriptions."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -11,7 +11,7 @@ import typer
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import batch_reporter, out, print_json, progress_bar, shown
 from eigenshape.cli.inputs import JsonOption, RepairOption, read_repaired, repair_names
-from eigenshape.cli.methods import PATCHES, MethodOption, recipe_to_fill, require_method
+from eigenshape.cli.methods import PATCHES, MethodOption, index_recipe, require_method
 from eigenshape.io.parsing import MESH_FORMATS
 from eigenshape.retrieval.kinds import AnyRecipe
 from eigenshape.retrieval.store.batch import BatchReport, build_index
@@ -62,7 +62,7 @@ def index(
     require_method(method)
     items, repairs, processes = _items(sources), repair_names(repair), Workers(workers, timeout)
     shelf = ShapeIndex.open_or_create(index)
-    recipe = recipe_to_fill(shelf, method, items, repairs, processes)
+    recipe = index_recipe(shelf, method, items, repairs, processes)
     report = describe_all(shelf, items, recipe, processes, repairs=repairs, n_views=views)
     if as_json:
         print_json({"index": str(index), "shapes": len(shelf), **vars(report)})
@@ -122,7 +122,7 @@ def _items_of(source: Path) -> Iterator[Item]:
 
 def _print(shelf: ShapeIndex, report: BatchReport) -> None:
     out.print(
-        f"{len(report.added)} described, {len(report.skipped)} known already, {len(report.failed)} failed; "
+        f"{len(report.added)} described, {len(report.skipped)} indexed already, {len(report.failed)} failed; "
         f"the index holds {len(shelf)} shapes."
     )
     for name, reason in report.failed:

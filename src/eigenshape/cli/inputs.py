@@ -44,19 +44,20 @@ ShapeArgument = Annotated[
 DropMissingOption = Annotated[
     bool,
     typer.Option(
-        "--drop-missing", help="Leave out points of a point cloud whose coordinates are not finite."
+        "--drop-missing",
+        help="Leave out points whose coordinates are not finite, from a point cloud.",
     ),
 ]
 CellsOption = Annotated[
     CellKind | None,
     typer.Option(
-        help="Kind of cells to read from a file that holds several kinds, or does not say which."
+        help="Kind of cells to read, if the file holds several kinds or does not name the kind."
     ),
 ]
 DimOption = Annotated[
     int,
     typer.Option(
-        help="Dimension of what a point cloud samples: 1 a curve, 2 a surface, 3 a volume."
+        help="Dimension of the shape that a point cloud samples: 1 curve, 2 surface, 3 volume."
     ),
 ]
 
@@ -89,6 +90,6 @@ def repair_names(text: str) -> tuple[str, ...]:
     for name in names:
         if name not in KNOWN_REPAIRS:
             raise InvalidParameterError(
-                f"--repair takes {', '.join(KNOWN_REPAIRS)}; it was given {name!r}."
+                f"--repair takes {', '.join(KNOWN_REPAIRS)}; {name!r} is none of them."
             )
     return names

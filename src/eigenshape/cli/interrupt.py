@@ -20,16 +20,16 @@ def interruptible() -> Iterator[None]:
     if not callable(before) or threading.current_thread() is not threading.main_thread():
         yield  # ignored, as in a background job, or not ours to decide
         return
-    asked = threading.Event()
+    pressed = threading.Event()
 
     def stop(_number: int, _frame: FrameType | None) -> None:
-        asked.set()
+        pressed.set()
         raise KeyboardInterrupt
 
     def repeat(unraisable: Any) -> None:
         if unraisable.exc_type is KeyboardInterrupt:
             threading.Timer(0.01, signal.raise_signal, [signal.SIGINT]).start()
-        elif not asked.is_set():
+        elif not pressed.is_set():
             report(unraisable)
 
     signal.signal(signal.SIGINT, stop)
@@ -37,7 +37,7 @@ def interruptible() -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        if asked.is_set():
+        if pressed.is_set():
             raise KeyboardInterrupt from error
         raise
     finally:

@@ -1,4 +1,4 @@
-"""eigenshape label: the labels of one mesh, given to the parts of another."""
+"""eigenshape label: the labels of one mesh, copied to the parts of another."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -46,7 +46,7 @@ def label(
         typer.Option(
             "-n",
             "--n-parts",
-            help="Largest number of parts to cut each mesh into; by default as many as are found.",
+            help="Largest number of parts to cut each mesh into. By default as many as are found.",
         ),
     ] = None,
     repair: RepairOption = "",
@@ -66,7 +66,7 @@ def label(
 ) -> None:
     """Copy the labels of one mesh to the matching parts of another: label a horse, and get a labelled camel.
 
-    Left and right cannot be told apart. Repairs are applied to the mesh that gets the labels.
+    Left and right may be exchanged. Repairs are applied to the mesh that gets the labels.
     """
     require_picture(picture)
     require_label_path(output)

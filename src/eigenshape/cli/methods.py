@@ -54,7 +54,7 @@ def require_method(name: str, names: Sequence[str] = EVERY) -> None:
         raise InvalidParameterError(f"--method takes {', '.join(names)}; it is {name!r}.")
 
 
-def recipe_to_fill(
+def index_recipe(
     shelf: ShapeIndex, name: str, items: Sequence[Item], repairs: tuple[str, ...], workers: Workers
 ) -> AnyRecipe:
     """Return the recipe of a method for an index; for patches, learn a codebook if it has none."""
@@ -81,7 +81,7 @@ def recipe_to_fill(
     return recipe
 
 
-def recipe_to_ask(shelf: ShapeIndex, name: str | None) -> AnyRecipe:
+def query_recipe(shelf: ShapeIndex, name: str | None) -> AnyRecipe:
     """Return the recipe of a method by which an index can answer; without a name, its own."""
     if name is None:
         return shelf.default_recipe()

@@ -1,4 +1,4 @@
-"""eigenshape query: which shapes of an index are most like a scan, and which features correspond."""
+"""eigenshape query: which shapes of an index are most similar to a scan, and which features correspond."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,9 +9,9 @@ import typer
 
 from eigenshape.cli.console import out, print_json, print_table, progress_bar
 from eigenshape.cli.inputs import JsonOption, RepairOption, load_mesh, repair_names
-from eigenshape.cli.methods import StoredMethodOption, recipe_to_ask, require_method
+from eigenshape.cli.methods import StoredMethodOption, query_recipe, require_method
 from eigenshape.cli.outputs import require_picture, save_picture
-from eigenshape.cli.sheets import CAPTION, Asked, asked, contact_sheet
+from eigenshape.cli.sheets import CAPTION, ColoredQuery, color_query, contact_sheet
 from eigenshape.plot.figure import literal
 from eigenshape.retrieval.store.index import Match, ShapeIndex
 
@@ -44,11 +44,11 @@ def query(
     if method is not None:
         require_method(method)
     shelf = ShapeIndex.open(index)
-    recipe = recipe_to_ask(shelf, method)
+    recipe = query_recipe(shelf, method)
     surface = load_mesh(scan, repair)
     began = perf_counter()
     with progress_bar("describe") as progress:
-        shape = asked(surface, recipe, progress)
+        shape = color_query(surface, recipe, progress)
     described = perf_counter()
     matches = shelf.query(shape.descriptor, n_matches=n_matches)
     answered = perf_counter()
@@ -75,7 +75,7 @@ def query(
         )
 
 
-def _facts(shape: Asked, match: Match) -> dict[str, Any]:
+def _facts(shape: ColoredQuery, match: Match) -> dict[str, Any]:
     pairs = [
         {
             "query_vertex": int(shape.descriptor.vertices[one]),
@@ -93,7 +93,7 @@ def _facts(shape: Asked, match: Match) -> dict[str, Any]:
 
 
 def print_matches(matches: Sequence[Match]) -> None:
-    """Print matches, best first, with the vertices that correspond best."""
+    """Print matches, best first, with the number of corresponding points."""
     rows = [
         [match.name, match.label or "", f"{match.score:.4g}", str(len(match.correspondences))]
         for match in matches

@@ -24,8 +24,8 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_closed_outward
 
 REGIONS = (
-    "'y>0.5' or 'y>0.5, x<0' (coordinates, or per cent of the bounding box: 'y>60%'); 'vertex 17 within 0.2' "
-    "(distance along the surface, or per cent of the square root of the area: 'within 10%'); 'part 3' (a number that "
+    "'y>0.5' or 'y>0.5, x<0' (coordinates, or percent of the bounding box: 'y>60%'); 'vertex 17 within 0.2' "
+    "(distance along the surface, or percent of the square root of the area: 'within 10%'); 'part 3' (a number that "
     "`eigenshape segment` prints); or a file with one vertex index a line."
 )
 CONDITION = re.compile(r"\s*([xyz])\s*([<>])\s*(-?[\d.]+(?:e-?\d+)?)\s*(%?)\s*")

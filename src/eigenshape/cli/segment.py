@@ -41,8 +41,8 @@ def segment(
         str,
         typer.Option(
             help=(
-                f"{PARTS} finds limbs, head and torso, where little heat flows from one to the "
-                f"next; {' and '.join(PRESETS)} cut around the maxima of heat, as `features` does."
+                f"{PARTS} finds limbs, head and torso: regions between which little heat flows. "
+                f"{' and '.join(PRESETS)} cut around the maxima of heat, as `features` does."
             )
         ),
     ] = PARTS,
@@ -53,8 +53,8 @@ def segment(
         float | None,
         typer.Option(
             help=(
-                f"Keep parts of at least this persistence: from 0 to 1 for {PARTS}, where the "
-                f"default is {PART_CONTRAST}; otherwise in units of heat."
+                f"Keep parts of at least this persistence. For --method {PARTS} it lies from 0 to 1 "
+                f"and is {PART_CONTRAST} by default; otherwise it is in units of heat."
             )
         ),
     ] = None,
@@ -68,7 +68,8 @@ def segment(
         bool | None,
         typer.Option(
             "--smooth/--no-smooth",
-            help=f"Move the boundaries of parts to short cuts along creases; by default for {PARTS} only.",
+            help=f"Move the boundaries of parts to short cuts along creases. By default only for "
+            f"--method {PARTS}.",
         ),
     ] = None,
     repair: RepairOption = "",

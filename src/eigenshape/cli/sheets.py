@@ -29,17 +29,17 @@ REACH = 3.0  # times what a patch has of the surface, in length: farther from a 
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
-    """A query with the colours of its parts.
+class ColoredQuery:
+    """A query with the colors of its parts.
 
     Attributes
     ----------
     mesh : TriangleMesh
     descriptor : HeatDescriptor or PatchDescriptor
     labels : (f,) int
-        Colour of each face.
+        Color of each face.
     colors : (m,) int
-        Colour of each feature or patch.
+        Color of each feature or patch.
     dots : (p,) int
         Features or patches to mark.
     """
@@ -51,16 +51,18 @@ class Asked:
     dots: Int[np.ndarray, " p"]
 
 
-def asked(mesh: TriangleMesh, recipe: AnyRecipe, progress: Progress | None = None) -> Asked:
+def color_query(
+    mesh: TriangleMesh, recipe: AnyRecipe, progress: Progress | None = None
+) -> ColoredQuery:
     """Describe a query, and cut it into parts: around its features, or around the first of its patches."""
     if isinstance(recipe, HeatRecipe):
         shape = find_heat_features(mesh, recipe, progress=progress)
         every = np.arange(len(shape.descriptor.vertices))
-        return Asked(shape.mesh, shape.descriptor, shape.parts.labels, every, every)
+        return ColoredQuery(shape.mesh, shape.descriptor, shape.parts.labels, every, every)
     descriptor = describe(mesh, recipe)
     distances = geodesic_distances(mesh, descriptor.vertices[:N_CELLS])
     cells = distances.argmin(axis=0)
-    return Asked(
+    return ColoredQuery(
         mesh,
         descriptor,
         cells[mesh.faces[:, 0]],
@@ -70,7 +72,7 @@ def asked(mesh: TriangleMesh, recipe: AnyRecipe, progress: Progress | None = Non
 
 
 def contact_sheet(
-    query: Asked,
+    query: ColoredQuery,
     title: str,
     matches: Sequence[Match],
     *,
@@ -79,8 +81,8 @@ def contact_sheet(
 ) -> Figure:
     """Draw a query beside its matches, read from their files.
 
-    The parts of the query have colours of their own; a part of a match has the colour of the query's part that it
-    corresponds to, and is grey where there is none. A match whose file cannot be read is named on stderr, and its
+    The parts of the query have colors of their own; a part of a match has the color of the query's part that it
+    corresponds to, and is gray where there is none. A match whose file cannot be read is named on stderr, and its
     place stays empty.
     """
     first = Panel(
@@ -94,7 +96,7 @@ def contact_sheet(
     return figure_contact_sheet(first, panels, caption=caption)
 
 
-def _panel(query: Asked, match: Match, repairs: tuple[str, ...]) -> Panel:
+def _panel(query: ColoredQuery, match: Match, repairs: tuple[str, ...]) -> Panel:
     title = f"{literal(match.name)}\nscore {match.score:#.4g}"
     try:
         mesh = _read_match(match, repairs)
@@ -148,7 +150,7 @@ def _parts(mesh: TriangleMesh, recipe: HeatRecipe, match: Match) -> Int[np.ndarr
 def _cells(
     mesh: TriangleMesh, vertices: Int[np.ndarray, " p"], colors: Int[np.ndarray, " p"], reach: float
 ) -> Int[np.ndarray, " f"]:
-    """Give each face the colour of the matched patch that is nearest, -1 where none is near."""
+    """Give each face the color of the matched patch that is nearest, -1 where none is near."""
     if not len(vertices):
         return np.full(mesh.n_faces, -1)
     distances = geodesic_distances(mesh, vertices)

@@ -49,7 +49,8 @@ def spectrum(
         int | None,
         typer.Option(
             "-k",
-            help=f"Number of eigenpairs, the lowest ones; {USUAL}, or all if there are fewer, if --below is not given.",
+            help=f"Number of eigenpairs, from the lowest one. By default {USUAL}, or all if there are "
+            "fewer, unless --below is given.",
         ),
     ] = None,
     below: Annotated[
@@ -74,8 +75,8 @@ def spectrum(
         float | None,
         typer.Option(
             help=(
-                "Solve fast and approximately, without proof: errors up to this share of the "
-                "largest eigenvalue, such as 1e-3."
+                "Compute approximately, which is faster but proves nothing. Errors are at most this "
+                "share of the largest eigenvalue, such as 1e-3."
             )
         ),
     ] = None,
@@ -120,7 +121,8 @@ def spectrum(
     mollify: Annotated[
         float | None,
         typer.Option(
-            help="Smallest height of triangles that the robust operator sees, in mean edge lengths; 1e-5 by default."
+            help="Smallest height that the robust operator allows in a triangle, in mean edge lengths. "
+            "By default 1e-5."
         ),
     ] = None,
     dim: DimOption = 2,
@@ -148,7 +150,7 @@ def spectrum(
     cache: Annotated[
         Path | None,
         typer.Option(
-            help="Folder of finished spectra: one that is there is read instead of computed, a new one is added."
+            help="Folder that keeps spectra. A spectrum that is in it is read instead of computed."
         ),
     ] = None,
     as_json: JsonOption = False,
@@ -163,7 +165,7 @@ def spectrum(
             "instead of --below, or leave out --accuracy."
         )
     scale = {"t": t, "h": h, "edge_factor": edge_factor, "cutoff": cutoff}
-    asked = {
+    given = {
         "mass": mass,
         "mollify": mollify,
         **scale,
@@ -171,7 +173,7 @@ def spectrum(
         "form": form,
         "distance": distance,
     }
-    options = {name: value for name, value in asked.items() if value is not None}
+    options = {name: value for name, value in given.items() if value is not None}
     found = load_shape(shape, repair, dim, drop_missing=drop_missing, cells=cells)
     _require_drawable(found, eigenfunctions)
     bounded = _require_mesh(found) if brackets else None
@@ -224,7 +226,7 @@ def _usual_pairs(laplacian: Laplacian, fixed: Int[np.ndarray, " c"] | None) -> i
     most = laplacian.n_points - (0 if fixed is None else len(fixed))
     if most < USUAL:
         err.print(
-            f"[yellow]note:[/] {USUAL} pairs are usual; this shape has {most}, and all are computed"
+            f"[yellow]note:[/] the default is {USUAL} pairs; this shape has {most}, and all are computed"
         )
     return max(1, min(USUAL, most))
 
@@ -239,16 +241,14 @@ def _require_drawable(shape: Shape, eigenfunctions: Path | None) -> None:
 
 def _require_mesh(shape: Shape) -> Mesh:
     if isinstance(shape, PointCloud):
-        raise InvalidParameterError(
-            "--brackets is for meshes; a cloud of points has no flat pieces to be bounded on."
-        )
+        raise InvalidParameterError("--brackets is for meshes; the shape is a point cloud.")
     return shape
 
 
 def _boundary_points(shape: Shape, order: int) -> Int[np.ndarray, " c"]:
     if isinstance(shape, PointCloud):
         raise InvalidParameterError(
-            "--boundary dirichlet is for meshes; a cloud of points has no boundary."
+            "--boundary dirichlet is for meshes; a point cloud has no boundary."
         )
     nodes = fem_boundary_nodes(shape, order)
     if not nodes.size:

@@ -1,4 +1,4 @@
-"""eigenshape stability: two shapes, how far their spectra are apart, and which heat times can be trusted."""
+"""eigenshape stability: two shapes, the distance of their spectra, and which heat times can be trusted."""
 
 from collections.abc import Callable
 from dataclasses import asdict
@@ -42,7 +42,8 @@ def stability(
     k: Annotated[
         int | None,
         typer.Option(
-            "-k", help=f"Number of eigenvalues to compare; {USUAL_K}, or as many as there are."
+            "-k",
+            help=f"Number of eigenvalues to compare. By default {USUAL_K}, or all if there are fewer.",
         ),
     ] = None,
     t: Annotated[
@@ -62,7 +63,7 @@ def stability(
             "--map",
             help=(
                 "Text file with one line for each vertex of the first shape: the number of its "
-                "partner in the second, from 0."
+                "partner in the second shape, from 0."
             ),
         ),
     ] = None,

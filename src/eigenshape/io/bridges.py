@@ -1,4 +1,4 @@
-"""Bridges to plain arrays, trimesh and PyVista."""
+"""Conversion from and to plain arrays, trimesh and PyVista."""
 
 from importlib import import_module
 from types import ModuleType
@@ -17,18 +17,49 @@ POINTS, LINES = (1, 2), (3, 4)  # those of a point and of several, of a segment 
 
 
 def to_arrays(shape: ShapeLike) -> tuple[np.ndarray, np.ndarray | None]:
-    """Return copies of points (n, d) and simplices (s, m+1) that may be written to; None for a cloud's simplices."""
+    """Return the points and simplices of a shape as writable arrays.
+
+    Parameters
+    ----------
+    shape : ShapeLike
+
+    Returns
+    -------
+    points : (n, d) float
+    simplices : (s, m + 1) int, or None for a point cloud
+
+    See Also
+    --------
+    from_arrays : Make a shape of arrays.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> points, faces = es.io.to_arrays(es.icosphere(0))
+    >>> points.shape, faces.shape
+    ((12, 3), (20, 3))
+    """
     shape = as_shape(shape)
     return shape.points.copy(), None if isinstance(shape, PointCloud) else shape.simplices.copy()
 
 
 def from_trimesh(mesh: Any, *, dim: SupportsIndex = 2) -> TriangleMesh | PointCloud:
-    """Take over a trimesh.Trimesh, or a trimesh.PointCloud of dimension `dim`, vertex by vertex.
+    """Convert a mesh or a point cloud of trimesh. Vertices keep their order.
+
+    Parameters
+    ----------
+    mesh : trimesh.Trimesh or trimesh.PointCloud
+    dim : int
+        Dimension of the manifold that a point cloud samples.
+
+    Returns
+    -------
+    TriangleMesh or PointCloud
 
     Raises
     ------
     InvalidShapeError
-        If it is neither, or not a valid mesh.
+        If the object is neither a Trimesh nor a PointCloud, or is not a valid mesh.
     MissingExtraError
         If trimesh is not installed.
     """
@@ -37,18 +68,27 @@ def from_trimesh(mesh: Any, *, dim: SupportsIndex = 2) -> TriangleMesh | PointCl
         return PointCloud(np.asarray(mesh.vertices), dim)
     if not isinstance(mesh, trimesh.Trimesh):
         raise InvalidShapeError(
-            f"A Trimesh or PointCloud of trimesh is taken; this is a {type(mesh).__name__}."
+            f"mesh must be a Trimesh or a PointCloud of trimesh; it is a {type(mesh).__name__}."
         )
     return TriangleMesh(np.asarray(mesh.vertices), np.asarray(mesh.faces))
 
 
 def to_trimesh(shape: ShapeLike) -> Any:
-    """Return a trimesh.Trimesh or trimesh.PointCloud with the same points in the same order; nothing is merged.
+    """Convert a shape to trimesh. Vertices keep their order, and none are merged.
+
+    Parameters
+    ----------
+    shape : ShapeLike
+        A triangle mesh, or a point cloud in R³.
+
+    Returns
+    -------
+    trimesh.Trimesh or trimesh.PointCloud
 
     Raises
     ------
     InvalidShapeError
-        If the shape is neither a triangle mesh nor a cloud in R³.
+        If the shape is neither a triangle mesh nor a point cloud in R³.
     MissingExtraError
         If trimesh is not installed.
     """
@@ -58,27 +98,37 @@ def to_trimesh(shape: ShapeLike) -> Any:
         return trimesh.PointCloud(shape.points.copy())
     if not isinstance(shape, TriangleMesh):
         raise InvalidShapeError(
-            f"Only triangle meshes and clouds in R^3 fit into trimesh; this is {shape!r}."
+            f"trimesh holds triangle meshes and point clouds in R^3; the shape is {shape!r}."
         )
     return trimesh.Trimesh(shape.vertices.copy(), shape.faces.copy(), process=False)
 
 
 def from_pyvista(dataset: Any, *, dim: SupportsIndex = 2) -> Shape:
-    """Take over a PyVista PolyData or UnstructuredGrid: its simplices of the highest dimension, or its points.
+    """Convert a PolyData or UnstructuredGrid of PyVista.
 
-    Polylines become segments.
+    The simplices of the highest dimension are taken, or the points if there are none. Polylines become segments.
+
+    Parameters
+    ----------
+    dataset : pyvista.PolyData or pyvista.UnstructuredGrid
+    dim : int
+        Dimension of the manifold that a point cloud samples.
+
+    Returns
+    -------
+    TriangleMesh, SimplicialMesh or PointCloud
 
     Raises
     ------
     InvalidShapeError
-        If it is neither, or has cells that are no simplices.
+        If the object is neither, or has cells that are not simplices.
     MissingExtraError
         If PyVista is not installed.
     """
     pyvista = _extra("pyvista")
     if not isinstance(dataset, pyvista.PolyData | pyvista.UnstructuredGrid):
         raise InvalidShapeError(
-            f"A PolyData or UnstructuredGrid is taken; this is a {type(dataset).__name__}."
+            f"dataset must be a PolyData or an UnstructuredGrid; it is a {type(dataset).__name__}."
         )
     grid = dataset.cast_to_unstructured_grid()
     points = np.asarray(grid.points, dtype=np.float64)
@@ -114,14 +164,24 @@ def _require_simplices(kinds: np.ndarray) -> None:
 
 
 def to_pyvista(shape: ShapeLike) -> Any:
-    """Return a PolyData of a surface or a cloud, or an UnstructuredGrid of segments or tetrahedra, in R³.
+    """Convert a shape to PyVista.
 
-    Points of R¹ and R² get zeros for what they lack.
+    Points in R¹ and R² get zeros as their other coordinates.
+
+    Parameters
+    ----------
+    shape : ShapeLike
+        In R¹, R² or R³.
+
+    Returns
+    -------
+    pyvista.PolyData or pyvista.UnstructuredGrid
+        A PolyData for a surface or a point cloud, otherwise an UnstructuredGrid.
 
     Raises
     ------
     InvalidShapeError
-        If the shape lies beyond R³.
+        If the shape has more than three coordinates.
     MissingExtraError
         If PyVista is not installed.
     """
@@ -130,7 +190,7 @@ def to_pyvista(shape: ShapeLike) -> Any:
     ambient = shape.points.shape[1]
     if ambient > 3:
         raise InvalidShapeError(
-            f"Only shapes in R^3 fit into PyVista; this one lies in R^{ambient}."
+            f"PyVista holds shapes in up to three dimensions; this shape lies in R^{ambient}."
         )
     points = np.pad(shape.points, ((0, 0), (0, 3 - ambient)))
     if isinstance(shape, PointCloud):
@@ -145,5 +205,5 @@ def _extra(name: str) -> ModuleType:
         return import_module(name)
     except ImportError as err:
         raise MissingExtraError(
-            f"{name} must be installed; it is not. pip install 'eigenshape[bridges]' does it."
+            f"{name} must be installed; it is not. Run pip install 'eigenshape[bridges]'."
         ) from err

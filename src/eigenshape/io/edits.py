@@ -12,12 +12,27 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 
 
 def write_edits(edits: Sequence[Edit], mesh: MeshLike, path: str | Path) -> None:
-    """Write edits of a mesh to a JSON file, whole or not at all; numbers to the last digit.
+    """Write edits of a mesh to a JSON file.
+
+    The file appears complete or not at all, and holds numbers to the last digit.
+
+    Parameters
+    ----------
+    edits : sequence of Edit
+        Such as `DeformationSession.edits`.
+    mesh : MeshLike
+        The mesh that the edits were made on.
+    path : str or Path
 
     Raises
     ------
     OSError
-        If the system cannot write there.
+        If the system cannot write the file.
+
+    See Also
+    --------
+    read_edits : Read the edits.
+    eigenshape.deformation.replay : Apply edits.
     """
     require_each(edits, Edit, "edits")
     mesh = as_mesh(mesh)
@@ -27,14 +42,14 @@ def write_edits(edits: Sequence[Edit], mesh: MeshLike, path: str | Path) -> None
 
 
 def read_edits(path: str | Path, mesh: MeshLike) -> list[Edit]:
-    """Read edits that `write_edits` wrote.
+    """Read edits from a JSON file of `write_edits`.
 
     Parameters
     ----------
-    path : path
+    path : str or Path
     mesh : MeshLike
-        The one that they were made on, to the last digit. To do them on another mesh of the shape, pass this one on to
-        `replay` as `source`.
+        The mesh that the edits were made on, equal to the last digit. To apply the edits to another mesh of the same
+        shape, pass this mesh to `replay` as `source`.
 
     Returns
     -------
@@ -43,15 +58,29 @@ def read_edits(path: str | Path, mesh: MeshLike) -> list[Edit]:
     Raises
     ------
     OSError
-        If the system cannot read it.
+        If the system cannot read the file.
     FileFormatError
-        If it is no such file.
+        If the file does not hold edits.
     InvalidParameterError
-        If they were made on another mesh.
+        If the edits were made on another mesh.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> session = es.DeformationSession(es.rig_shape(mesh))
+    >>> top = es.deformation.BoxRegion([-2, 0.5, -2], [2, 2, 2])
+    >>> _ = session.drag(top, es.Translation([0, 0.2, 0]))
+    >>> _ = session.commit()
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "edits.json")
+    >>> es.io.write_edits(session.edits, mesh, path)
+    >>> len(es.io.read_edits(path, mesh))
+    1
     """
     mesh = as_mesh(mesh)
     try:
         content = json.loads(read_regular(Path(path), "edits"))
     except (ValueError, RecursionError) as err:
-        raise FileFormatError(f"{path} must hold JSON; {err}.") from err
+        raise FileFormatError(f"A file of edits must hold JSON; {path} does not: {err}.") from err
     return edits_from_json(content, mesh)

@@ -1,4 +1,4 @@
-"""Read and write meshes; what a reader returns is checked before anybody sees it."""
+"""Read and write meshes. The content of a file is checked before a mesh is returned."""
 
 from collections.abc import Callable
 from functools import partial
@@ -28,36 +28,53 @@ WRITTEN = tuple({**TEXT, **BINARY})
 def read_mesh(
     path: str | Path, *, file_format: str | None = None, cells: CellKind | None = None
 ) -> TriangleMesh:
-    """Read a triangle mesh from a file of any format that can hold one.
+    r"""Read a triangle mesh from a file.
 
-    Vertices keep their order and are neither joined nor split, but in STL, which cannot say that corners are shared:
-    there equal coordinates become one vertex. Polygons become fans of triangles around their first corner. Colors,
-    normals, textures and materials are passed over. The file is read whole into memory.
+    Vertices keep their order and are neither merged nor split. The exception is STL, which does not store shared
+    vertices: there, corners with equal coordinates become one vertex. Polygons become fans of triangles around their
+    first corner. Colors, normals, textures and materials are ignored. The whole file is read into memory.
 
     Parameters
     ----------
     path : str or Path
-        OFF, OBJ, PLY, STL, GLB, glTF; surfaces in .mesh, .msh, .vtk, .vtu.
+        A file in OFF, OBJ, PLY, STL, GLB or glTF, or a surface in .mesh, .msh, .vtk or .vtu.
     file_format : str, optional
-        One of these suffixes, with or without its dot, in any case; by default that of the path.
+        Suffix of the format, such as "ply" or ".ply". By default the suffix of the path.
     cells : {"triangles", "quads", "tetrahedra"}, optional
-        The cells to read, where the file holds several kinds or does not say which; see `read_shape`.
+        Kind of cells to read, if the file holds several kinds or does not name the kind; see `read_shape`.
 
     Returns
     -------
     TriangleMesh
+        With vertices (n, 3) in the unit of the file.
 
     Raises
     ------
     FileFormatError
-        If the format is unknown, the path is no regular file, the content is not what it declares, or it holds no
-        triangles in space.
+        If the format is unknown, the path is not a regular file, the content differs from what its header declares,
+        or it holds no triangles in R³.
     InvalidShapeError
-        If a coordinate is not finite, a face does not index the vertices, or there is none.
+        If a coordinate is not finite, or a face has an index that is not that of a vertex.
     InvalidParameterError
         If `cells` is unknown.
     OSError
-        If the system cannot open the file; FileNotFoundError where there is none.
+        If the system cannot open the file, such as FileNotFoundError.
+
+    See Also
+    --------
+    read_shape : Read a shape of any kind, also tetrahedra, curves and points.
+    write_mesh : Write a mesh.
+    repair : Repair a mesh with faults.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import eigenshape as es
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "square.off")
+    >>> _ = path.write_text("OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n")
+    >>> mesh = es.read_mesh(path)
+    >>> mesh.faces.tolist()
+    [[0, 1, 2], [0, 2, 3]]
     """
     path = Path(path)
     suffix = suffix_of(path, file_format, MESH_FORMATS)
@@ -96,30 +113,48 @@ def write_mesh(
     colors: UInt8[np.ndarray, "n 3"] | None = None,
     face_labels: Int[np.ndarray, " f"] | None = None,
 ) -> None:
-    """Write a mesh in the format that the suffix names; the file appears whole or not at all.
+    """Write a mesh to a file, in the format of its suffix.
 
-    OFF, OBJ and PLY read back exactly, vertex by vertex. STL keeps triangles only, GLB and binary STL single
-    precision.
+    The file appears complete or not at all. `read_mesh` reads OFF, OBJ and PLY back exactly. STL stores triangles
+    without shared vertices; GLB and binary STL store single precision.
 
     Parameters
     ----------
     mesh : MeshLike
+        With n vertices and f faces.
     path : str or Path
+        Must end in .off, .obj, .ply, .stl or .glb.
     binary : bool, optional
-        PLY and STL: binary by default. OFF and OBJ are text, GLB is binary.
+        Whether to write binary data. By default True for PLY and STL. OFF and OBJ are always text, GLB always binary.
     colors : (n, 3) uint8, optional
-        Red, green and blue of each vertex; PLY only.
+        Red, green and blue of each vertex; only for PLY.
     face_labels : (f,) int, optional
-        A whole number of 32 bits for each face, such as its part; PLY only, as the property `label` of faces.
+        A whole number of 32 bits for each face, such as the number of its part. Only for PLY, where it is the property
+        `label` of faces.
 
     Raises
     ------
     FileFormatError
-        If the suffix is unknown, or coordinates do not fit into single precision where the format has no other.
+        If the suffix is unknown, or the format has only single precision and coordinates do not fit into it.
     InvalidParameterError
-        If the format has no such kind, takes no colors or labels, or they are not one a vertex or face.
+        If the format has no such binary or text form, if it takes no colors or labels, or if their shapes are wrong.
     OSError
-        If the system cannot write there.
+        If the system cannot write the file.
+
+    See Also
+    --------
+    read_mesh : Read a mesh.
+    eigenshape.plot.value_colors, eigenshape.plot.part_colors : Compute colors.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(1)
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "ball.ply")
+    >>> es.write_mesh(mesh, path, colors=es.plot.value_colors(mesh.vertices[:, 1]))
+    >>> bool((es.read_mesh(path).vertices == mesh.vertices).all())
+    True
     """
     mesh = as_mesh(mesh)
     path = Path(path)

@@ -1,4 +1,4 @@
-"""Read and write shapes of any kind; what a reader returns is checked before anybody sees it."""
+"""Read and write shapes of any kind. The content of a file is checked before a shape is returned."""
 
 from pathlib import Path
 from typing import SupportsIndex
@@ -29,31 +29,31 @@ def read_shape(
     drop_missing: bool = False,
     cells: CellKind | None = None,
 ) -> Shape:
-    """Read a shape of any kind: what the file holds decides what comes back.
+    r"""Read a shape of any kind from a file.
 
-    Triangles in space become a TriangleMesh, tetrahedra, segments and flat triangles a SimplicialMesh, points without
-    anything between them a PointCloud. Where a file holds simplices of several dimensions the highest count: the
-    boundary triangles of a tetrahedral mesh are passed over. Points keep their order, those that nothing uses too.
-    Polylines become segments, in OBJ and in VTK files.
+    The content decides the type. Triangles in R³ become a TriangleMesh; tetrahedra, segments and triangles in the plane
+    a SimplicialMesh; points without cells a PointCloud. If a file holds simplices of several dimensions, those of the
+    highest dimension are read, and the others, such as the boundary triangles of a tetrahedral mesh, are ignored.
+    Points keep their order, and points that no simplex uses are kept. Polylines in OBJ and VTK files become segments.
 
-    Legacy VTK files of POLYDATA write tetrahedra and quads alike, as polygons of four corners. They are taken for quads
-    where all are flat or where they join as the faces of a surface do, and for tetrahedra where most share three
-    corners with another and some side belongs to more than two. Where neither is so, `cells` must say it.
+    Legacy VTK files with POLYDATA store tetrahedra and quads in the same way, as polygons of four corners. They are
+    read as quads if all are flat or if they join like the faces of a surface, and as tetrahedra if most share three
+    corners with another and some side belongs to more than two. In other cases `cells` must be given.
 
     Parameters
     ----------
     path : str or Path
-        OFF, OBJ, PLY, STL, GLB, glTF; .mesh, .msh, .vtk, .vtu; .pts, .xyz, .pcd.
+        A file in OFF, OBJ, PLY, STL, GLB, glTF, .mesh, .msh, .vtk, .vtu, .pts, .xyz or .pcd.
     file_format : str, optional
-        One of these suffixes, with or without its dot; by default that of the path.
+        Suffix of the format, such as "ply" or ".ply". By default the suffix of the path.
     dim : int
-        Dimension of the manifold that a cloud samples.
+        Dimension of the manifold that a point cloud samples.
     drop_missing : bool
-        Whether points of a cloud that are not finite, as scanners mark what they missed, are dropped. By default they
-        are refused.
+        Whether to leave out points of a cloud that are not finite. Scanners write such points if they measured nothing.
+        By default they raise an error.
     cells : {"triangles", "quads", "tetrahedra"}, optional
-        The cells to read, such as the boundary triangles of a tetrahedral mesh; "quads" become two triangles each and
-        bring the triangles between them along. By default those of the highest dimension.
+        Kind of cells to read, such as the boundary triangles of a tetrahedral mesh. Quads become two triangles each,
+        and triangles between them are read too. By default the cells of the highest dimension.
 
     Returns
     -------
@@ -62,14 +62,29 @@ def read_shape(
     Raises
     ------
     FileFormatError
-        If the format is unknown, the path is no regular file, the content is not what it declares, or cells are no
-        simplices.
+        If the format is unknown, the path is not a regular file, the content differs from what its header declares,
+        or cells are not simplices.
     InvalidShapeError
-        If a coordinate is not finite, a simplex does not index the points, or there is none.
+        If a coordinate is not finite, a simplex has an index that is not that of a point, or there are no points.
     InvalidParameterError
-        If `dim` is larger than the space around, or `cells` unknown.
+        If `dim` is larger than the number of coordinates, or `cells` is unknown.
     OSError
         If the system cannot open the file.
+
+    See Also
+    --------
+    read_mesh : Read triangles only.
+    read_points : Read points only.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import eigenshape as es
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "curve.obj")
+    >>> _ = path.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nl 1 2 3")
+    >>> curve = es.read_shape(path)
+    >>> curve.dim, curve.simplices.tolist()
+    (1, [[0, 1], [1, 2]])
     """
     path = Path(path)
     suffix = suffix_of(path, file_format, FORMATS)
@@ -93,7 +108,7 @@ def _finite(coordinates: Float[np.ndarray, "n d"], drop_missing: bool) -> Float[
     first = int(np.argmin(finite))
     raise InvalidShapeError(
         f"points must be finite; point {first} is {coordinates[first].tolist()} ({np.count_nonzero(~finite)} such). "
-        "Scanners mark so what they missed: drop_missing=True, or --drop-missing, leaves it out."
+        "Scanners write such points if they measured nothing: drop_missing=True, or --drop-missing, leaves them out."
     )
 
 
@@ -104,12 +119,18 @@ def read_points(
     dim: SupportsIndex = 2,
     drop_missing: bool = False,
 ) -> PointCloud:
-    """Read a cloud of points; faces and cells between them are passed over.
+    r"""Read a point cloud from a file. Faces and cells are ignored.
 
     Parameters
     ----------
-    path, file_format, dim, drop_missing
-        As in `read_shape`.
+    path : str or Path
+        A file of any format of `read_shape`.
+    file_format : str, optional
+        Suffix of the format. By default the suffix of the path.
+    dim : int
+        Dimension of the manifold that the points sample.
+    drop_missing : bool
+        Whether to leave out points that are not finite.
 
     Returns
     -------
@@ -118,23 +139,55 @@ def read_points(
     Raises
     ------
     FileFormatError, InvalidShapeError, InvalidParameterError, OSError
-        As `read_shape`.
+        As in `read_shape`.
+
+    See Also
+    --------
+    eigenshape.io.write_points : Write a point cloud.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import eigenshape as es
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "corners.xyz")
+    >>> _ = path.write_text("0 0 0\n1 0 0\n0 1 0\n")
+    >>> cloud = es.read_points(path, dim=2)
+    >>> cloud.points.shape, cloud.dim
+    ((3, 3), 2)
     """
     found = read_shape(path, file_format=file_format, dim=dim, drop_missing=drop_missing)
     return found if isinstance(found, PointCloud) else PointCloud(found.points, dim)
 
 
 def write_points(cloud: PointCloud, path: str | Path) -> None:
-    """Write the points of a cloud in space to an XYZ, PTS or binary PLY file, which reads back exactly.
+    """Write a point cloud in R³ to an XYZ, PTS or binary PLY file.
+
+    `read_points` reads the file back exactly.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    path : str or Path
+        Must end in .xyz, .pts or .ply.
 
     Raises
     ------
     FileFormatError
-        If the suffix is another.
+        If the path has another suffix.
     InvalidShapeError
         If the points are not in R³.
     OSError
-        If the system cannot write there.
+        If the system cannot write the file.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import eigenshape as es
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "ball.xyz")
+    >>> cloud = es.PointCloud(es.icosphere(1).vertices, dim=2)
+    >>> es.io.write_points(cloud, path)
+    >>> bool((es.read_points(path).points == cloud.points).all())
+    True
     """
     require_type(cloud, PointCloud, "cloud")
     path = Path(path)

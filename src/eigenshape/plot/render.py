@@ -15,7 +15,7 @@ from eigenshape.scans.raster import Raster, rasterize
 
 FINER = 2  # pixels drawn for each shown, along each side
 LIGHT = np.array([-0.35, -0.55, 0.76])  # from the upper left, towards the viewer
-AMBIENT = 0.42  # brightness of what faces away from the light, where full light is 1
+AMBIENT = 0.42  # brightness, of 1, of what faces away from the light
 INK = 0.12  # brightness of lines
 LINE = 1.6  # their width, in shown pixels
 BEHIND = 0.02  # share of the picture's size that a point may lie behind what is seen and still count as seen
@@ -59,9 +59,9 @@ def draw(
     mesh : TriangleMesh
     camera : Camera
     vertex_colors : (n, 3) float, optional
-        Colours in 0..1, blended across faces.
+        Colors in 0..1, blended across faces.
     face_colors : (f, 3) float, optional
-        Colours of whole faces, with dark lines where they change.
+        Colors of whole faces, with dark lines where they change.
     zero_set_of : (n,) float, optional
         A function whose zero set is drawn as a dark line.
 
@@ -187,7 +187,7 @@ def _shrunk(image: Image) -> Float[np.ndarray, "rows columns 4"]:
 
 
 def palette(labels: Int[np.ndarray, " k"]) -> Float[np.ndarray, "k 3"]:
-    """Return a colour for each label, 18 different ones in turn; below 0 is grey."""
+    """Return a color for each label, 18 different ones in turn; below 0 is gray."""
     pairs = mpl.colormaps["tab20"](np.arange(20))[:, :3].reshape(10, 2, 3)
     colors = np.concatenate(pairs[np.arange(10) != GREY_PAIR].transpose(1, 0, 2))
     return np.where(labels[:, None] < 0, 0.82, colors[labels % len(colors)])
