@@ -82,7 +82,7 @@ def test_edits_of_another_mesh_are_refused_or_carried(giraffe, tmp_path):
     write_mesh(subdivide(mesh), finer)
     refused = " ".join(run("deform", finer, "--edits", edits, "-o", bent, code=1).stderr.split())
     assert (
-        "edits.json: Edits name vertices of the mesh that they were made on; that has 900 vertices"
+        "edits.json: Edits name vertices of the mesh on which they were made; that has 900 vertices"
         in refused
     )
     assert "On the command line, --edits-mesh names it." in refused

@@ -203,7 +203,7 @@ def test_missing_points_are_left_out_when_asked(tmp_path):
 
 def test_a_warning_is_one_line_and_no_error(folder):
     done = run("spectrum", folder / "sphere.xyz", "-k", 3, "--edge-factor", 1.2, "--json")
-    assert done.stderr.startswith("warning: A kernel of width h = 1.2 e serves regular points only")
+    assert done.stderr.startswith("warning: A kernel of width h = 1.2 e suits regular points only")
     assert len(done.stderr.strip().splitlines()) == 1
     assert len(json.loads(done.stdout)["eigenvalues"]) == 3
 

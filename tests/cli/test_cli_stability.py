@@ -40,7 +40,7 @@ def test_people_see_tables_words_and_a_picture(folder, tmp_path):
         "Eigenvalues, in 1/length²",
         "heat time t",
         "Weyl's bound",
-        "heat time serves",
+        "heat time is reliable",
         "δ-close",
     ):
         assert words in printed

@@ -98,7 +98,9 @@ def test_the_first_of_equal_faces_stays():
     points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]
     done = drop_duplicate_faces(TriangleMesh(points, [[1, 2, 0], [0, 1, 2], [2, 1, 3], [2, 1, 0]]))
     assert done.mesh.faces.tolist() == [[1, 2, 0], [2, 1, 3]]
-    assert done.report == ("drop_duplicate_faces removed 2 faces that repeat an earlier one",)
+    assert done.report == (
+        "drop_duplicate_faces removed 2 faces with the corners of an earlier one",
+    )
 
 
 def test_loose_vertices_go():
@@ -113,7 +115,7 @@ def test_the_component_with_the_most_area_stays():
     done = largest_component(disjoint_union(small, large))
     np.testing.assert_array_equal(done.mesh.vertices, large.vertices)
     assert done.source_vertices.tolist() == list(range(36, 40))
-    assert done.report == ("largest_component removed 1 components with 50 faces",)
+    assert done.report == ("largest_component removed 1 component with 50 faces",)
 
 
 def test_of_equal_components_the_one_with_the_lowest_vertex_stays():
@@ -225,10 +227,10 @@ def test_tetrahedra_are_repaired_too():
     done = repair(ugly, ["auto"])
     assert (done.mesh.n_points, done.mesh.n_simplices) == (5, 2)
     assert done.report == (
-        "drop_duplicate_faces removed 1 tetrahedra that repeat an earlier one",
+        "drop_duplicate_faces removed 1 tetrahedron with the corners of an earlier one",
         "weld_seams joined 3 vertices along seams",
-        "drop_degenerate removed 1 tetrahedra without volume",
-        "drop_unreferenced removed 1 vertices without a simplex",
+        "drop_degenerate removed 1 tetrahedron without volume",
+        "drop_unreferenced removed 1 vertex without a simplex",
     )
     np.testing.assert_array_equal(done.mesh.points, ugly.points[done.source_vertices])
     with pytest.raises(
@@ -310,7 +312,7 @@ def test_a_face_without_area_leaves_no_slit():
     ]
     assert inconsistent_edges(done.mesh).size == 0
     assert len(boundary_edges(done.mesh)) == 4
-    report = "drop_degenerate removed 1 faces without area, and split 1 neighbor at their vertices"
+    report = "drop_degenerate removed 1 face without area, and split 1 neighbor at their vertices"
     assert done.report == (report,)
 
 
@@ -326,7 +328,7 @@ def test_needles_collapse_to_the_face_that_they_were_cut_from(share):
     np.testing.assert_array_equal(done.mesh.faces[1:], ball.faces[1:])
     np.testing.assert_array_equal(done.mesh.vertices, ball.vertices)
     assert done.report == (
-        "collapse_needles joined 1 vertices to others beside them, and removed 2 faces",
+        "collapse_needles joined 1 vertex to others beside them, and removed 2 faces",
     )
 
 
@@ -342,7 +344,7 @@ def test_a_flip_that_would_make_a_third_face_is_not_done():
     faces = [[0, 3, 2], [3, 1, 2], [0, 1, 3], [1, 0, 4], [3, 4, 5]]
     done = drop_degenerate(TriangleMesh(points, faces))
     assert done.mesh.faces.tolist() == [[0, 3, 2], [3, 1, 2], [1, 0, 4], [3, 4, 5]]
-    assert done.report == ("drop_degenerate removed 1 faces without area",)
+    assert done.report == ("drop_degenerate removed 1 face without area",)
 
 
 @pytest.mark.long

@@ -153,7 +153,7 @@ def test_a_terminal_is_told_once_that_loops_compile_and_only_when_they_do(tmp_pa
 from concurrent.futures import ThreadPoolExecutor
 import eigenshape as es
 with ThreadPoolExecutor(2) as pool:
-    list(pool.map(lambda source: es.geodesic_distances(es.icosphere(1), [source]), range(2)))
+    list(pool.map(lambda source: es.geometry.geodesic_distances(es.icosphere(1), [source]), range(2)))
 {MEASURE}"""
     assert stderr_on_a_terminal(two_threads, tmp_path).count("eigenshape compiles its loops") == 1
     assert list(tmp_path.rglob("*.nbi"))

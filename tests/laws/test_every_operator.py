@@ -287,7 +287,7 @@ def held(row, shape):
     return dirichlet_laplacian(row.build(shape), row.boundary(shape))[0]
 
 
-pytestmark = pytest.mark.filterwarnings("ignore:A heat time of t", "ignore:A kernel of width")
+pytestmark = pytest.mark.filterwarnings("ignore:With the heat time t", "ignore:A kernel of width")
 every = pytest.mark.parametrize("row", TABLE, ids=lambda row: row.name)
 with_boundary = pytest.mark.parametrize(
     "row", [row for row in TABLE if row.boundary], ids=lambda row: row.name

@@ -20,7 +20,7 @@ SHAPES = {
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("name", OPERATORS)
-@pytest.mark.filterwarnings("ignore:A heat time")
+@pytest.mark.filterwarnings("ignore:With the heat time")
 def test_each_takes_what_it_says_and_refuses_the_rest(shape, name):
     takes = isinstance(SHAPES[shape], OPERATORS[name].shapes)
     if takes:

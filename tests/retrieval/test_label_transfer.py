@@ -62,7 +62,7 @@ def test_parts_without_descriptors_are_told_by_their_distances_alone():
         points = rng.normal(size=(5, 3))
         shuffled = rng.permutation(5)
         apart = np.linalg.norm(points[:, None] - points[None], axis=2)
-        found = transfer._matched(np.zeros((5, 5)), apart, apart[np.ix_(shuffled, shuffled)])
+        found = transfer._match_parts(np.zeros((5, 5)), apart, apart[np.ix_(shuffled, shuffled)])
         assert np.array_equal(shuffled[found], np.arange(5))
 
 

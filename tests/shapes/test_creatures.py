@@ -132,7 +132,7 @@ def test_the_rest_pose_of_the_plan_is_as_wide_to_the_left_as_to_the_right(kind):
 @pytest.mark.long
 def test_the_same_seed_gives_the_same_bits():
     first = make_creature("fish", 5, n_vertices=800, individual=2)
-    creatures._at_rest.cache_clear()
+    creatures._rest_pose.cache_clear()
     again = make_creature("fish", 5, n_vertices=800, individual=2)
     np.testing.assert_array_equal(again.vertices, first.vertices)
     np.testing.assert_array_equal(again.faces, first.faces)
@@ -142,9 +142,9 @@ def test_the_same_seed_gives_the_same_bits():
 def test_the_number_of_threads_changes_no_bit():
     made = []
     for n_threads in (1, 4):
-        creatures._at_rest.cache_clear()
+        creatures._rest_pose.cache_clear()
         with threadpool_limits(n_threads, user_api="blas"):
-            made.append(creatures._at_rest("biped", 2500, 1))
+            made.append(creatures._rest_pose("biped", 2500, 1))
     (mesh, joints), (again, joints_again) = made
     np.testing.assert_array_equal(again.vertices, mesh.vertices)
     # Posed vertices may round the difference away, and the shares do not.

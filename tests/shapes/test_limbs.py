@@ -20,8 +20,8 @@ def test_pairs_are_mirrored_and_hang_on_their_own_side():
 
 def test_what_hangs_on_a_limb_hangs_on_its_parents_too():
     body = place_limbs(PLAN)
-    np.testing.assert_array_equal(body.hangs_at(0), [np.nan, 1, 1, 1, 1])
-    np.testing.assert_array_equal(body.hangs_at(1), [np.nan, np.nan, np.nan, 1, np.nan])
+    np.testing.assert_array_equal(body.attachment_nodes(0), [np.nan, 1, 1, 1, 1])
+    np.testing.assert_array_equal(body.attachment_nodes(1), [np.nan, np.nan, np.nan, 1, np.nan])
 
 
 def test_the_distance_is_that_to_a_tube_and_less_where_limbs_melt():

@@ -20,9 +20,9 @@ from eigenshape.scans.partial import partial_scan
 from eigenshape.shapes.creatures import CREATURES, make_creature
 
 FOLDER = Path("eigenshape-demo")
-POSES = 3  # of each kind in the index; more would make the demo slower
-UNSEEN = 11  # number of the scanned pose, which is not one of those in the index
-N_VERTICES = 2000  # of each creature: enough for fingers, and described in a second or two
+POSES = 3  # of each creature in the index
+UNSEEN = 11  # number of the pose that is scanned; the index has poses 0, 1, 2
+N_VERTICES = 2000  # of a creature: enough for all its parts, in under a minute for the whole demo
 NEXT = """
 Read next:
   eigenshape features {scan} --picture parts.png      feature points of that scan, and the parts around them

@@ -18,7 +18,7 @@ from eigenshape.retrieval.store.batch import BatchReport, build_index
 from eigenshape.retrieval.store.index import ShapeIndex
 from eigenshape.retrieval.store.workers import Item, Workers
 
-SOME_FAILED = 3  # exit code
+SOME_FAILED = 3  # exit code where some shapes could not be indexed
 
 NewIndexArgument = Annotated[
     Path, typer.Argument(help="Folder of the index. It is created if it does not exist.")

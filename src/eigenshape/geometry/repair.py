@@ -44,6 +44,10 @@ LARGEST_HOLE = 0.05  # a hole; for comparison, the open side of half a ball has 
 NEEDLE = 1e-6
 
 
+# Nouns of reports whose plural is not formed with an s.
+PLURALS = {"vertex": "vertices", "tetrahedron": "tetrahedra", "simplex": "simplices"}
+
+
 @dataclass(frozen=True, eq=False)
 class RepairedMesh(Generic[MeshT]):
     """A mesh after one or more repairs, and a report of what they changed.
@@ -131,7 +135,7 @@ def weld(mesh: MeshLike, *, tolerance: float = 0.0) -> RepairedMesh[Any]:
         group = _group_numbers(
             cKDTree(points).query_pairs(radius, output_type="ndarray"), mesh.n_points
         )
-    return _merge_vertices(mesh, group, "weld joined {} vertices to others at the same place")
+    return _merge_vertices(mesh, group, "weld joined {} to others at the same place")
 
 
 def weld_seams(mesh: MeshLike) -> RepairedMesh[Any]:
@@ -163,7 +167,7 @@ def weld_seams(mesh: MeshLike) -> RepairedMesh[Any]:
     mesh = as_simplicial(mesh)
     one, two = seams(mesh).transpose(1, 0, 2).reshape(2, -1)
     group = _group_numbers(np.column_stack([one, two]), mesh.n_points)
-    return _merge_vertices(mesh, group, "weld_seams joined {} vertices along seams")
+    return _merge_vertices(mesh, group, "weld_seams joined {} along seams")
 
 
 def _place_numbers(points: Float[np.ndarray, "n d"]) -> Int[np.ndarray, " n"]:
@@ -185,7 +189,9 @@ def _merge_vertices(mesh: MeshT, group: Int[np.ndarray, " n"], report: str) -> R
     order = np.argsort(first)
     rank = np.argsort(order)
     joined = type(mesh)(mesh.points[first[order]], rank[renumbered[mesh.simplices]])
-    return RepairedMesh(joined, (report.format(mesh.n_points - joined.n_points),), first[order])
+    return RepairedMesh(
+        joined, (report.format(_count(mesh.n_points - joined.n_points, "vertex")),), first[order]
+    )
 
 
 def drop_degenerate(mesh: MeshLike) -> RepairedMesh[Any]:
@@ -218,7 +224,7 @@ def drop_degenerate(mesh: MeshLike) -> RepairedMesh[Any]:
     >>> import eigenshape as es
     >>> points = [[0, 0, 0], [2, 0, 0], [0, 1, 0], [1, 0, 0]]
     >>> es.geometry.drop_degenerate((points, [[0, 1, 2], [0, 1, 3]])).report
-    ('drop_degenerate removed 1 faces without area, and split 1 neighbor at their vertices',)
+    ('drop_degenerate removed 1 face without area, and split 1 neighbor at their vertices',)
     """
     mesh = as_simplicial(mesh)
     n_flat = len(degenerate_simplices(mesh))
@@ -228,7 +234,7 @@ def drop_degenerate(mesh: MeshLike) -> RepairedMesh[Any]:
     keep = np.ones(len(mesh.simplices), dtype=bool)
     keep[degenerate_simplices(mesh)] = False
     measure = MEASURES.get(mesh.dim, MEASURES[3])[2]
-    report = f"drop_degenerate removed {n_flat} {_plural(mesh)} without {measure}"
+    report = f"drop_degenerate removed {_count(n_flat, _noun(mesh))} without {measure}"
     if n_split:
         report += f", and split {_count(n_split, 'neighbor')} at their vertices"
     return _keep_simplices(mesh, keep, report)
@@ -260,7 +266,7 @@ def collapse_needles(mesh: MeshLike) -> RepairedMesh[Any]:
     >>> import eigenshape as es
     >>> points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1e-8, 0]]
     >>> es.geometry.collapse_needles((points, [[0, 1, 2], [0, 1, 3]])).report
-    ('collapse_needles joined 1 vertices to others beside them, and removed 1 faces',)
+    ('collapse_needles joined 1 vertex to others beside them, and removed 1 face',)
     """
     mesh = as_simplicial(mesh)
     corners, _ = scaled_corners(mesh)
@@ -277,14 +283,13 @@ def collapse_needles(mesh: MeshLike) -> RepairedMesh[Any]:
     joined = _merge_vertices(
         mesh,
         _group_numbers(ends, mesh.n_points),
-        "collapse_needles joined {} vertices to others beside them",
+        "collapse_needles joined {} to others beside them",
     )
     ordered = np.sort(joined.mesh.simplices, axis=1)
     whole = (ordered[:, 1:] != ordered[:, :-1]).all(axis=1)
     kept = _keep_simplices(joined.mesh, whole | ~short.any(axis=1), "")
-    report = (
-        f"{joined.report[0]}, and removed {int((~whole & short.any(axis=1)).sum())} {_plural(mesh)}"
-    )
+    n_removed = int((~whole & short.any(axis=1)).sum())
+    report = f"{joined.report[0]}, and removed {_count(n_removed, _noun(mesh))}"
     return RepairedMesh(kept.mesh, (report,), joined.source_vertices)
 
 
@@ -305,13 +310,13 @@ def drop_duplicate_faces(mesh: MeshLike) -> RepairedMesh[Any]:
     >>> import eigenshape as es
     >>> points = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
     >>> es.geometry.drop_duplicate_faces((points, [[0, 1, 2], [2, 1, 0]])).report
-    ('drop_duplicate_faces removed 1 faces that repeat an earlier one',)
+    ('drop_duplicate_faces removed 1 face with the corners of an earlier one',)
     """
     mesh = as_simplicial(mesh)
     keep = np.ones(len(mesh.simplices), dtype=bool)
     keep[repeated_simplices(mesh)[:, 1]] = False
-    report = f"drop_duplicate_faces removed {int((~keep).sum())} {_plural(mesh)}"
-    report += " that repeat an earlier one"
+    report = f"drop_duplicate_faces removed {_count(int((~keep).sum()), _noun(mesh))}"
+    report += " with the corners of an earlier one"
     return _keep_simplices(mesh, keep, report)
 
 
@@ -320,8 +325,8 @@ def _keep_simplices(mesh: MeshT, keep: Bool[np.ndarray, " s"], report: str) -> R
     return RepairedMesh(kept, (report,), np.arange(mesh.n_points))
 
 
-def _plural(mesh: Mesh) -> str:
-    return MEASURES[mesh.dim][0].lower() if mesh.dim in MEASURES else "simplices"
+def _noun(mesh: Mesh) -> str:
+    return MEASURES[mesh.dim][1] if mesh.dim in MEASURES else "simplex"
 
 
 def drop_unreferenced(mesh: MeshLike) -> RepairedMesh[Any]:
@@ -342,7 +347,7 @@ def drop_unreferenced(mesh: MeshLike) -> RepairedMesh[Any]:
     >>> points = [[0, 0, 0], [1, 0, 0], [5, 5, 5], [0, 1, 0]]
     >>> result = es.geometry.drop_unreferenced((points, [[0, 1, 3]]))
     >>> result.report
-    ('drop_unreferenced removed 1 vertices without a face',)
+    ('drop_unreferenced removed 1 vertex without a face',)
     >>> result.source_vertices.tolist()
     [0, 1, 3]
     """
@@ -351,7 +356,7 @@ def drop_unreferenced(mesh: MeshLike) -> RepairedMesh[Any]:
     source, renumbered = np.unique(mesh.simplices, return_inverse=True)
     kept = type(mesh)(mesh.points[source], renumbered.reshape(mesh.simplices.shape))
     noun = "face" if mesh.dim == 2 else "simplex"
-    report = f"drop_unreferenced removed {n_loose} vertices without a {noun}"
+    report = f"drop_unreferenced removed {_count(n_loose, 'vertex')} without a {noun}"
     return RepairedMesh(kept, (report,), source)
 
 
@@ -403,7 +408,7 @@ def orient(mesh: MeshLike) -> RepairedMesh[TriangleMesh]:
 
 
 def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'s' * (number != 1)}"
+    return f"{number} {noun if number == 1 else PLURALS.get(noun, noun + 's')}"
 
 
 def largest_component(mesh: MeshLike) -> RepairedMesh[TriangleMesh]:
@@ -428,13 +433,14 @@ def largest_component(mesh: MeshLike) -> RepairedMesh[TriangleMesh]:
     >>> import eigenshape as es
     >>> two = es.geometry.disjoint_union(es.shapes.grid(1, 1), es.icosphere(0))
     >>> es.geometry.largest_component(two).report
-    ('largest_component removed 1 components with 2 faces',)
+    ('largest_component removed 1 component with 2 faces',)
     """
     mesh = as_mesh(mesh)
     count, _ = vertex_components(mesh)
     keep = faces_of_largest(mesh)
     kept, source = submesh(mesh, keep)
-    report = f"largest_component removed {count - 1} components with {int((~keep).sum())} faces"
+    removed = f"{_count(count - 1, 'component')} with {_count(int((~keep).sum()), 'face')}"
+    report = f"largest_component removed {removed}"
     return RepairedMesh(kept, (report,), source)
 
 
@@ -628,7 +634,7 @@ def repair(shape: ShapeLike, names: Sequence[str]) -> RepairedMesh[Any] | Repair
     >>> inverted = es.TriangleMesh(ball.vertices, [*ball.faces[:, ::-1], ball.faces[3]])
     >>> for sentence in es.repair(inverted, ["auto"]).report:
     ...     print(sentence)
-    drop_duplicate_faces removed 1 faces that repeat an earlier one
+    drop_duplicate_faces removed 1 face with the corners of an earlier one
     orient turned 80 faces over
     """
     shape = as_shape(shape)

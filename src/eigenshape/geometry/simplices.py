@@ -16,6 +16,7 @@ THINNEST = 1e-14
 # Points of size 1 nearer than this to a line or plane lie in it, up to rounding: some tens of
 # roundings of one coordinate.
 SPAN_ROUNDING = 64 * float(np.finfo(np.float64).eps)
+# Names of flats by dimension, for messages.
 FLATS = {1: "on a line", 2: "in a plane"}
 # Areas and volumes are returned if their scale is within 2^-1000..2^1000. Beyond, sums would
 # overflow, or small simplices would lose digits (floats end at 2^1024 and 2^-1074).

@@ -7,7 +7,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import weld
 from eigenshape.io.text import coordinates, lines_of, shown
 
-HEADER = 84  # bytes before the triangles of a binary file: 80 of text, 4 of their number
+HEADER = 84  # bytes: 80 of text, and 4 that count the triangles
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 FACET = (b"facet", b"outer", b"vertex", b"vertex", b"vertex", b"endloop", b"endfacet")
 

@@ -12,7 +12,7 @@ Line = tuple[int, bytes]  # where it stands in the file, and what it says
 PLAIN = b"+-.0123456789eE \t\n"
 PLAIN_WHOLE = b"+-0123456789 \t\n"
 EXACT = 2**53  # whole numbers below it are exact in double precision
-INT64 = 2**63  # whole numbers from -INT64 to below INT64 fit into 64 bits
+INT64 = 2**63  # whole numbers from -2**63 up to below it fit into int64
 
 
 def lines_of(data: bytes, first: int = 1) -> list[Line]:

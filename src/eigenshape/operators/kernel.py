@@ -45,7 +45,7 @@ PEAK = 30
 
 @dataclass(frozen=True)
 class KernelOptions:
-    """What a caller said of a kernel, as in `mesh_laplacian`."""
+    """Options of a kernel, as in `mesh_laplacian`."""
 
     t: float | None = None
     h: float | None = None
@@ -56,7 +56,7 @@ class KernelOptions:
 
 
 def choose_kernel(options: KernelOptions, edge: float) -> GaussianKernel:
-    """Return the kernel of a heat time t, of a width h = 2√t, or of a width in mean edge lengths e; by default 2e.
+    """Return the kernel of a heat time t, a width h = 2√t, or a width in mean edge lengths e (default 2e).
 
     Raises
     ------
@@ -86,7 +86,7 @@ def _require_options(options: KernelOptions) -> None:
     }
     if len(given) > 1:
         raise InvalidParameterError(
-            f"One of t, h and edge_factor sets the scale; given are {given}."
+            f"At most one of t, h and edge_factor must be given; given are {given}."
         )
     for name, value in {**given, "cutoff": options.cutoff}.items():
         positive_values(value, name)
@@ -201,56 +201,59 @@ def _require_partners(measure: Quadrature, n_partners: np.ndarray, kernel: Gauss
     alone = np.flatnonzero(n_partners == 0)
     if alone.size:
         raise InvalidShapeError(
-            f"A kernel must hold its points together; within {kernel.cutoff * kernel.width:.4g} of point {alone[0]} at "
-            f"{measure.points[alone[0]].tolist()} there is no other ({alone.size} such). Choose a larger t than "
-            f"{kernel.t:.4g}, or drop such points."
+            f"Every point must have another one within the cutoff of the kernel; point {alone[0]} at "
+            f"{measure.points[alone[0]].tolist()} has none within {kernel.cutoff * kernel.width:.4g} ({alone.size} "
+            f"such). Choose a larger t than {kernel.t:.4g}, or remove such points."
         )
 
 
 def require_whole(laplacian: Laplacian, labels: np.ndarray, kernel: GaussianKernel) -> None:
-    """Refuse a kernel graph that falls apart where the shape does not; `labels` number the shape's components."""
+    """Raise an error if the kernel graph of a component is not connected; `labels` number the components."""
     parts = component_labels(laplacian.stiffness.indptr, laplacian.stiffness.indices)
     pairs = np.unique(np.column_stack([labels, parts]), axis=0)
     torn = np.flatnonzero(np.bincount(pairs[:, 0]) > 1)
     if torn.size:
         raise InvalidShapeError(
-            f"A kernel must hold a shape together; at t = {kernel.t:.4g} component {torn[0]} falls into "
+            f"The kernel must connect each component of the shape; at t = {kernel.t:.4g} "
+            f"component {torn[0]} falls into "
             f"{np.count_nonzero(pairs[:, 0] == torn[0])} parts ({parts.max() + 1} in all). Choose a larger t."
         )
 
 
 def warn_of_narrow(kernel: GaussianKernel) -> None:
-    """Warn where the kernel hardly reaches the neighbors."""
+    """Warn if the kernel hardly reaches the neighbors."""
     if kernel.edge_factor < NARROW:
         warnings.warn(
-            f"A kernel of width h = {kernel.edge_factor:.3g} e serves regular points only; on irregular ones "
-            "eigenvalues come out 5 to 20 % low. h = 2e is the default.",
+            f"A kernel of width h = {kernel.edge_factor:.3g} e suits regular points only; on irregular points "
+            "eigenvalues are 5 to 20 % too low. The default is h = 2e.",
             stacklevel=3,
         )
 
 
 def warn_of_few(measure: Quadrature, kernel: GaussianKernel) -> None:
-    """Warn where t leaves fewer than ten eigenvalues that can be told apart, by Weyl's law."""
+    """Warn if fewer than ten eigenvalues can be distinguished at this t, by Weyl's law."""
     ball = pi ** (measure.dim / 2) / gamma(measure.dim / 2 + 1)
     length = (measure.weights / kernel.t ** (measure.dim / 2)).sum()
     n_pairs = int(length * ball * (LAST / (4 * pi**2)) ** (measure.dim / 2))
     if n_pairs < FEWEST_PAIRS:
         warnings.warn(
-            f"A heat time of t = {kernel.t:.4g} leaves about {n_pairs} eigenvalues that can be told (t λ < {LAST}); "
-            f"on a surface k takes n > 5 k t/e² points, and 21 k t/e² uncorrected. Choose a smaller t.",
+            f"With the heat time t = {kernel.t:.4g} about {n_pairs} eigenvalues can be distinguished "
+            f"(t λ < {LAST}); k eigenvalues of a surface need n > 5 k t/e² points, and 21 k t/e² without "
+            f"correction. Choose a smaller t.",
             stacklevel=3,
         )
 
 
 def _require_memory(grid: CellGrid) -> None:
-    """Estimate the matrix from some of its rows and refuse what would not fit."""
+    """Estimate the size of the matrix from some of its rows, and raise an error if it is too large."""
     n = len(grid.order)
     sample = np.unique(np.linspace(0, n - 1, min(n, SAMPLED_ROWS)).astype(np.int64))
     entries = count_partners(grid, sample)[sample].mean() * n
-    room = machine_memory() / 2
-    if entries * PEAK > room:
+    available = machine_memory() / 2
+    if entries * PEAK > available:
         raise InvalidShapeError(
-            f"A kernel matrix must fit into half of the memory, {room / 2**30:.1f} GiB; for {entries:.2g} entries, "
+            f"A kernel matrix must fit into half of the memory, {available / 2**30:.1f} GiB; "
+            f"for {entries:.2g} entries, "
             f"{entries / n:.0f} a row, it takes {entries * PEAK / 2**30:.1f} GiB. Choose a smaller t, or "
             "functional_laplacian, which stores none."
         )

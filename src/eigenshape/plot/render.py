@@ -15,7 +15,7 @@ from eigenshape.scans.raster import Raster, rasterize
 
 FINER = 2  # pixels drawn for each shown, along each side
 LIGHT = np.array([-0.35, -0.55, 0.76])  # from the upper left, towards the viewer
-AMBIENT = 0.42  # brightness, of 1, of what faces away from the light
+AMBIENT = 0.42  # brightness of what faces away from the light, where full light is 1
 INK = 0.12  # brightness of lines
 LINE = 1.6  # their width, in shown pixels
 BEHIND = 0.02  # share of the picture's size that a point may lie behind what is seen and still count as seen

@@ -22,7 +22,7 @@ from eigenshape.scans.raster import rasterize
 SLACK = 1.5
 # Slopes are limited to this value. A larger one would keep vertices seen from their edge that
 # another part of the surface hides.
-STEEPEST = 10.0
+STEEPEST_SURFACE = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +177,8 @@ def _visible_vertices(
     # The slope is the same on both sides of the surface, so it does not matter which is outside.
     towards = np.abs(mean_normals(consistently_oriented(mesh)) @ view)
     slope = np.minimum(
-        np.sqrt(1 - np.minimum(towards, 1) ** 2) / np.maximum(towards, 1 / STEEPEST), STEEPEST
+        np.sqrt(1 - np.minimum(towards, 1) ** 2) / np.maximum(towards, 1 / STEEPEST_SURFACE),
+        STEEPEST_SURFACE,
     )
     return pixels[:, 2] >= raster.depth[row, column] - SLACK * (1 + slope)
 

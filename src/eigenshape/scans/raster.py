@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 # bytes.
 CANDIDATES_AT_ONCE = 2_000_000
 # Twice the area, in square pixels, up to which a face is seen from its edge and covers no pixel.
-THINNEST = 1e-12
+LEAST_DOUBLED_AREA = 1e-12
 # Pixels this far outside a face, in barycentric coordinates, count as inside, so that rounding
 # leaves no gap between two faces.
 EDGE_SLACK = 1e-9
@@ -82,7 +82,9 @@ def _chunks(
     low = np.clip(np.ceil(corners[:, :, :2].min(axis=1) - 0.5), 0, size).astype(np.int64)
     high = np.clip(np.floor(corners[:, :, :2].max(axis=1) - 0.5) + 1, 0, size).astype(np.int64)
     span = np.maximum(high - low, 0)
-    seen = np.flatnonzero((span.prod(axis=1) > 0) & (np.abs(_doubled_area(corners)) > THINNEST))
+    seen = np.flatnonzero(
+        (span.prod(axis=1) > 0) & (np.abs(_doubled_area(corners)) > LEAST_DOUBLED_AREA)
+    )
     boxes = _bands(np.column_stack([seen, low[seen], span[seen]]))
     ends = np.cumsum(boxes[:, 3] * boxes[:, 4])
     if len(boxes):

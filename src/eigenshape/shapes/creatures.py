@@ -14,7 +14,7 @@ from eigenshape.shapes.limbs import Body, distance_to_body, nearest_limbs, place
 from eigenshape.shapes.skinning import Joints, bend_at_joints, diffuse
 from eigenshape.shapes.thinning import decimate
 
-CREATURES = tuple(sorted(PLANS))
+CREATURES = tuple(sorted(PLANS))  # the kinds of creatures, by name
 
 # The first mesh has this multiple of the requested number of vertices. The surplus lets `decimate`
 # remove the shortest edges; a larger surplus takes longer.

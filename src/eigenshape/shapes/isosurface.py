@@ -20,7 +20,7 @@ SMOOTHING_STEP = 0.6  # share of the way to the mean of its neighbors that a ver
 # Lattice points along a block. If the surface is far from a block, the field is evaluated at its
 # middle only.
 BLOCK = 3
-STEEPEST = 1.3  # largest slope of a field that is approximately a distance
+STEEPEST_FIELD = 1.3  # largest slope of a field that is approximately a distance
 POINTS_AT_ONCE = 1 << 16  # points at which a field is evaluated at a time, to bound memory
 CLOSE_ENOUGH = 0.04  # relative error of the number of vertices that `find_spacing` accepts
 # Offsets of the grid relative to the surface, in cells: a sequence without symmetric positions.
@@ -99,7 +99,7 @@ def _lattice_values(
     blocks = tuple(-(-shape // BLOCK))
     middles = BLOCK * np.indices(blocks).reshape(3, -1).T + (BLOCK - 1) / 2
     coarse = _in_chunks(field, low + spacing * middles).reshape(blocks)
-    reach = STEEPEST * spacing * np.sqrt(3) * (BLOCK + 1) / 2
+    reach = STEEPEST_FIELD * spacing * np.sqrt(3) * (BLOCK + 1) / 2
     values, near = coarse, np.abs(coarse) < reach
     for axis in range(3):
         values, near = values.repeat(BLOCK, axis), near.repeat(BLOCK, axis)
@@ -140,7 +140,9 @@ def _face(normal: int, side: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
     return edges, tuple(_corner(corner) for corner in (at(0, 0), at(1, 0), at(1, 1), at(0, 1)))
 
 
-UNIT = np.eye(3, dtype=np.int64)
+UNIT_VECTORS = np.eye(3, dtype=np.int64)
+# The corners, edges (axis and start) and faces (edges and corners) of a cell, in the order of their
+# numbers.
 CORNERS = np.array(list(np.ndindex(2, 2, 2)))
 EDGES = [(axis, np.insert(shift, axis, 0)) for axis in range(3) for shift in np.ndindex(2, 2)]
 FACES = [_face(normal, side) for normal in range(3) for side in (0, 1)]
@@ -164,7 +166,7 @@ def _sheet_points(
     point of each edge of each cell, -1 where the surface does not cross the edge, and the points.
     """
     ends = [
-        (_corner(tuple(start.tolist())), _corner(tuple((start + UNIT[axis]).tolist())))
+        (_corner(tuple(start.tolist())), _corner(tuple((start + UNIT_VECTORS[axis]).tolist())))
         for axis, start in EDGES
     ]
     here, there = corners[:, [one for one, _ in ends]], corners[:, [two for _, two in ends]]
@@ -222,7 +224,7 @@ def _quads(
     here, there = values.take(np.arange(n - 1), axis), values.take(np.arange(1, n), axis)
     edges = np.argwhere((here < 0) != (there < 0))
     leaves = here[tuple(edges.T)] < 0
-    one, two = UNIT[[(axis + 1) % 3, (axis + 2) % 3]]
+    one, two = UNIT_VECTORS[[(axis + 1) % 3, (axis + 2) % 3]]
     back = (one + two, two, 0 * one, one)
     quads = np.column_stack(
         [

@@ -11,7 +11,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-LANES = 8
+LANES = 8  # doubles in one vector instruction of 512 bits; two or four instructions where there are none
 VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 
 

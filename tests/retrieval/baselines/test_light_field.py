@@ -8,7 +8,7 @@ import eigenshape as es
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.retrieval.baselines import light_fields as lf
 from eigenshape.retrieval.baselines.light_field_loops import outline, power_sums, silhouette
-from eigenshape.scans.raster import EDGE_SLACK, THINNEST, rasterize
+from eigenshape.scans.raster import EDGE_SLACK, LEAST_DOUBLED_AREA, rasterize
 
 few = settings(deadline=None, max_examples=8)
 HAND, ANT = es.make_creature("hand", n_vertices=800), es.make_creature("quadruped", n_vertices=800)
@@ -21,7 +21,7 @@ def disc(size=201):
 
 def test_a_silhouette_is_what_the_depth_buffer_covers():
     points = HAND.vertices * 60 / np.abs(HAND.vertices).max() + 64
-    seen = silhouette(points[:, :2].copy(), HAND.faces, 128, EDGE_SLACK, THINNEST)
+    seen = silhouette(points[:, :2].copy(), HAND.faces, 128, EDGE_SLACK, LEAST_DOUBLED_AREA)
     assert seen.sum() > 500
     assert np.array_equal(seen, rasterize(points, HAND.faces, 128, 128).face >= 0)
 

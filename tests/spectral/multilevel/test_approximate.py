@@ -124,7 +124,7 @@ def test_kernels_are_corrected_as_by_the_exact_solver():
     assert not found.certificate.complete
     np.testing.assert_allclose(found.eigenvalues, exact.eigenvalues, rtol=1e-9, atol=1e-9)
     assert (np.abs(found.eigenvalues - exact.eigenvalues) <= found.residuals + 1e-10).all()
-    with pytest.warns(UserWarning, match=r"lie too near to 1/t"):
+    with pytest.warns(UserWarning, match=r"are too close to 1/t"):
         solve_roughly(mesh_laplacian(icosphere(3), edge_factor=2.0), 70)
 
 

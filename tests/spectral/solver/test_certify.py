@@ -98,9 +98,7 @@ def test_rounding_is_allowed_for():
 def test_no_usable_factor_is_an_error(bumpy, monkeypatch):
     laplacian, spectrum = bumpy
     monkeypatch.setattr(count, "factorize", lambda *args: None)
-    with pytest.raises(
-        ConvergenceError, match=r"counted only where rounding takes less than their distance"
-    ):
+    with pytest.raises(ConvergenceError, match=r"rounding must be smaller than their distance"):
         certify(laplacian, spectrum.eigenvalues, spectrum.eigenvectors)
 
 
@@ -108,7 +106,8 @@ def test_a_spectrum_that_is_all_one_chain_is_an_error(bumpy, monkeypatch):
     laplacian, spectrum = bumpy
     monkeypatch.setattr(certify_module, "RESOLUTION", 0.2)
     with pytest.raises(
-        ConvergenceError, match=r"differ by more than rounding takes; the last 30 of 30 do not"
+        ConvergenceError,
+        match=r"differ by more than the rounding of the factor; the last 30 of 30 do not",
     ):
         certify(laplacian, spectrum.eigenvalues, spectrum.eigenvectors)
 

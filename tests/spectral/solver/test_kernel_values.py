@@ -58,17 +58,18 @@ def test_a_doctored_corrected_spectrum_is_refused(kernels):
 
 def test_eigenvalues_at_the_end_of_the_kernel_are_refused_or_warned_of(kernels):
     with pytest.warns(
-        UserWarning, match=r"too near to 1/t = \S+ to tell .* k takes n > 5 k t/e² points of a"
+        UserWarning,
+        match=r"too close to 1/t = \S+ to represent .* k eigenvalues of a surface need n > 5 k t",
     ):
         solve_spectrum(kernels[1], 150)
     with pytest.warns(
         UserWarning,
-        match=r"n > 21 k t/e² points .* 72 k t/e² to be within 10 %, as the first \d+ are",
+        match=r"n > 21 k t/e² points.* 72 k t/e² for errors below 10 %, as the first \d+ have",
     ):
         solve_spectrum(kernels[0], 150)
 
 
-@pytest.mark.filterwarnings("ignore:A heat time:UserWarning")
+@pytest.mark.filterwarnings("ignore:With the heat time:UserWarning")
 def test_eigenvalues_beyond_the_end_of_the_kernel_are_refused():
     coarse = mesh_laplacian(torus(24, 12), correct="log")
     with pytest.raises(

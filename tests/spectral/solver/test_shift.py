@@ -26,5 +26,7 @@ def test_where_no_factor_serves_a_lower_shift_does(seed, monkeypatch):
 
     monkeypatch.setattr(shift, "factorize_near", watched)
     factor = shift.shift_inside(pencil, 100)
-    assert shift.ACCEPTED[0] * 100 - 3 <= factor.count <= shift.ACCEPTED[1] * 100 + 1
-    assert any(later == pytest.approx(shift.LOWER[1] * sooner) for sooner, later in pairwise(asked))
+    assert shift.ACCEPTED_SHARES[0] * 100 - 3 <= factor.count <= shift.ACCEPTED_SHARES[1] * 100 + 1
+    assert any(
+        later == pytest.approx(shift.LOWER_SHARES[1] * sooner) for sooner, later in pairwise(asked)
+    )

@@ -22,7 +22,7 @@ from eigenshape.retrieval.baselines.light_field_loops import (
     silhouette,
 )
 from eigenshape.scans.partial import rotation_towards
-from eigenshape.scans.raster import EDGE_SLACK, THINNEST
+from eigenshape.scans.raster import EDGE_SLACK, LEAST_DOUBLED_AREA
 
 N_FIELDS = 10  # dodecahedra, as in the paper
 N_VIEWS = 10  # silhouettes of each: 20 vertices, of which opposite ones see mirror images
@@ -92,7 +92,7 @@ def light_field(
         for view, axis in enumerate(_axes() @ turn.T):
             flat = (points @ rotation_towards(axis).T[:, :2]) * (pixels / 2 - MARGIN) + pixels / 2
             found[field, view] = _describe_silhouette(
-                silhouette(flat, mesh.faces, pixels, EDGE_SLACK, THINNEST)
+                silhouette(flat, mesh.faces, pixels, EDGE_SLACK, LEAST_DOUBLED_AREA)
             )
     return found
 

@@ -172,10 +172,10 @@ def bracket_eigenvalues(
     points, scale = size_one(mesh.points)
     unit = SimplicialMesh(points, mesh.simplices)
     table = facet_table(unit)
-    held = table.boundary if boundary == "dirichlet" else NO_POINTS
+    fixed = table.boundary if boundary == "dirichlet" else NO_POINTS
     upper, rounding = _upper_bounds(unit, k, boundary, progress)
-    lower = lower_bounds(unit, table, len(upper), held, progress)
-    n_zero = min(_n_zero(table, held), len(upper))
+    lower = lower_bounds(unit, table, len(upper), fixed, progress)
+    n_zero = min(_n_zero(table, fixed), len(upper))
     lower[:n_zero] = upper[:n_zero] = 0.0
     if progress:
         progress(1.0, "bracketed")
@@ -195,24 +195,24 @@ def _upper_bounds(
 ) -> tuple[Float[np.ndarray, " k"], float]:
     """Return the upper ends, and the share of the last that is rounding."""
     conforming = without_pinches(mesh)
-    held = boundary_vertices(conforming) if boundary == "dirichlet" else NO_POINTS
-    n_free = conforming.n_points - len(held)
-    if boundary == "dirichlet" and not (len(held) and n_free):
-        fact = f"{mesh!r} has {len(held)} points on its boundary and {n_free} inside"
+    fixed = boundary_vertices(conforming) if boundary == "dirichlet" else NO_POINTS
+    n_free = conforming.n_points - len(fixed)
+    if boundary == "dirichlet" and not (len(fixed) and n_free):
+        fact = f"{mesh!r} has {len(fixed)} points on its boundary and {n_free} inside"
         raise InvalidParameterError(
             f"boundary='dirichlet' needs a boundary and points inside; {fact}."
         )
     count = whole_number(k, "k", 1, n_free)
     laplacian = cotangent_laplacian(conforming, "consistent")
-    found = solve_spectrum(laplacian, count, fixed=held, progress=partly(progress, 0.0, 0.3))
+    found = solve_spectrum(laplacian, count, fixed=fixed, progress=partly(progress, 0.0, 0.3))
     ends = enclose(found, laplacian, LINEAR_FLOOR, relative_rounding(mesh))[1]
     return ends, float(1 - found.eigenvalues[-1] / ends[-1]) if ends[-1] else 0.0
 
 
-def _n_zero(table: FacetTable, held: Int[np.ndarray, " h"]) -> int:
+def _n_zero(table: FacetTable, fixed: Int[np.ndarray, " h"]) -> int:
     count, labels = facet_components(table)
-    with_held = np.isin(table.simplex_facets, held).any(axis=1)
-    return count - len(np.unique(labels[with_held]))
+    with_fixed = np.isin(table.simplex_facets, fixed).any(axis=1)
+    return count - len(np.unique(labels[with_fixed]))
 
 
 def _require_condition(boundary: str) -> None:

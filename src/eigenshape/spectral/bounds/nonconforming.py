@@ -33,17 +33,17 @@ Values = Float[np.ndarray, " k"]
 
 
 def lower_bounds(
-    mesh: Mesh, table: FacetTable, k: int, held: Int[np.ndarray, " h"], progress: Progress | None
+    mesh: Mesh, table: FacetTable, k: int, fixed: Int[np.ndarray, " h"], progress: Progress | None
 ) -> Values:
-    """Return lower bounds of the k lowest eigenvalues with some facets held at zero, in 1/length².
+    """Return lower bounds for the k lowest eigenvalues with some facets fixed at zero, in 1/length².
 
-    `bracket_eigenvalues` has the proof. Where the interpolation constants are even, the weight μ = 0 is all. Where they
-    are not, weights near the last eigenvalue and in steps below serve the eigenvalues up to each, so that later ones
-    cost less.
+    The proof is in `bracket_eigenvalues`. If the interpolation constants are even, the weight μ = 0 is
+    enough. Otherwise weights near the last eigenvalue and in steps below it improve the bounds of the
+    eigenvalues up to each of them, so that later solves are cheaper.
     """
     squares, measure = interpolation_constants(mesh) ** 2, simplex_volumes(mesh)
     mean, largest = float((squares * measure).sum() / measure.sum()), float(squares.max())
-    solve = _solver(mesh, table, held)
+    solve = _solver(mesh, table, fixed)
     values = solve(measure, k, partly(progress, 0.3, 0.6))
     best = values / (1 + largest * values)
     done = 0.6
@@ -54,14 +54,14 @@ def lower_bounds(
         try:
             found = solve(measure / (1 - weight * squares), n_served, report)
         except ConvergenceError:
-            continue  # a weight may only better the bounds, which stand without
+            continue  # weights only improve the bounds, which hold without them
         bounds = found / (1 + largest * np.maximum(found - weight, 0.0))
         best[:n_served] = np.maximum(best[:n_served], bounds)
     return np.maximum.accumulate(best)
 
 
 def _weights(values: Values, mean: float, largest: float) -> list[float]:
-    """Return values μ: near the last eigenvalue, and in steps from there to the first above 0."""
+    """Return the weights μ to try: near the last eigenvalue, and in steps down to the first above 0."""
     positive = values[values > 0]
     if not positive.size or largest <= EVEN_CONSTANTS * mean:
         return []
@@ -72,19 +72,19 @@ def _weights(values: Values, mean: float, largest: float) -> list[float]:
 
 
 def _solver(
-    mesh: Mesh, table: FacetTable, held: Int[np.ndarray, " h"]
+    mesh: Mesh, table: FacetTable, fixed: Int[np.ndarray, " h"]
 ) -> Callable[[Float[np.ndarray, " s"], int, Progress | None], Values]:
-    """Return what bounds from below the eigenvalues of Crouzeix-Raviart elements for a measure of each simplex."""
+    """Return a function that computes lower bounds of Crouzeix-Raviart eigenvalues for given measures."""
     stiffness, rounding = crouzeix_raviart_laplacian(mesh).stiffness, relative_rounding(mesh)
 
     def solve(measure: Float[np.ndarray, " s"], k: int, progress: Progress | None) -> Values:
         laplacian = Laplacian(stiffness, facet_mass(table, measure))
-        found = solve_spectrum(laplacian, k, fixed=held, progress=progress)
+        found = solve_spectrum(laplacian, k, fixed=fixed, progress=progress)
         return enclose(found, laplacian, mass_floor(mesh.dim), rounding)[0]
 
     return solve
 
 
 def partly(progress: Progress | None, start: float, end: float) -> Progress | None:
-    """Return what reports a part of the work as a share of all of it."""
+    """Return a progress function for a part of the work."""
     return progress and (lambda done, message: progress(start + done * (end - start), message))

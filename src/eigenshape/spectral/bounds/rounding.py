@@ -1,4 +1,4 @@
-"""How far rounding may have moved the eigenvalues of a finite-element pencil from those of exact arithmetic."""
+"""Bounds of the effect of rounding on the eigenvalues of a finite-element pencil."""
 
 import numpy as np
 from jaxtyping import Float
@@ -13,17 +13,17 @@ from eigenshape.spectral.spectrum import Spectrum
 def enclose(
     spectrum: Spectrum, laplacian: Laplacian, floor: float, relative: float
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
-    """Return two ends for each eigenvalue that the pencil would have in exact arithmetic, in 1/length².
+    """Return lower and upper bounds for the eigenvalues of the pencil in exact arithmetic, in 1/length².
 
-    The residuals bound all eigenvalues together, one to one: by √2 times their norm (Kahan 1967; Parlett 1998, theorem
-    11.5.1), and what the vectors lack of being orthonormal. What is absolute in rounding, in sums over rows and in the
-    residuals, is at most (row length + 4) eps times the largest row of |W| over B.
+    The errors of all eigenvalues, matched one to one, are at most √2 times the norm of the residuals (Kahan 1967;
+    Parlett 1998, theorem 11.5.1), plus the lack of orthonormality of the vectors. The absolute rounding errors, in sums
+    over rows and in the residuals, are at most (row length + 4) eps times the largest row of |W| over B.
 
     Parameters
     ----------
     spectrum : Spectrum
     laplacian : Laplacian
-        The operator that it is of, without conditions.
+        The operator of the spectrum, without boundary conditions.
     floor : float
         c with B ≥ c diag(B).
     relative : float
@@ -35,9 +35,8 @@ def enclose(
     rows = abs(laplacian.stiffness).sum(axis=1) / laplacian.mass.diagonal()
     longest_row = int(np.diff(laplacian.stiffness.indptr).max())
     stray += (longest_row + 4) * EPS * float(rows.max()) / floor
-    lower = np.maximum(values - stray, 0.0) * max(
-        1 - relative, 0.0
-    )  # slivers may leave no digit: then 0 is all
+    # With slivers rounding may exceed the eigenvalue: then the lower bound is 0.
+    lower = np.maximum(values - stray, 0.0) * max(1 - relative, 0.0)
     return lower, (values + stray) * (1 + relative)
 
 

@@ -7,9 +7,8 @@ from jaxtyping import Float
 
 from eigenshape.spectral.multilevel.vcycle import Tower, multiply
 
-ROWS = (
-    4096  # of tall blocks at once: two products of 32 columns then take 2 MiB, which a cache holds
-)
+# Rows of tall blocks at once: two products of 32 columns then take 2 MiB, which a cache holds.
+ROWS = 4096
 
 
 def row_chunks(tower: Tower) -> list[slice]:

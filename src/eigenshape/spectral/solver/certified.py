@@ -51,14 +51,16 @@ def _solve_between(
     pairs, certificate = _far_up(pencil, low, high, report) or _lowest_below(pencil, high, report)
     start, stop = np.searchsorted(pairs.values, [low, high]).tolist()
     if start == stop:
-        raise InvalidParameterError(_nothing(pencil, pairs, certificate.first + start, low, high))
+        raise InvalidParameterError(
+            _empty_interval(pencil, pairs, certificate.first + start, low, high)
+        )
     return take_pairs(pencil, pairs, certificate, start, stop)
 
 
 def _far_up(
     pencil: Pencil, low: float, high: float, report: Progress
 ) -> tuple[Pairs, Certificate] | None:
-    """Solve for an interval by itself where it is less work than all eigenvalues below its upper end."""
+    """Solve for the interval alone if that is less work than all eigenvalues below its upper end."""
     if low <= 0 or dense_serves(pencil, 1):
         return None
     interval = count_interval(pencil, low, high)
@@ -74,7 +76,7 @@ def _far_up(
 
 
 def _lowest_below(pencil: Pencil, limit: float, report: Progress) -> tuple[Pairs, Certificate]:
-    """Prove one pair more than lie below the limit: then none of them is missing."""
+    """Certify one pair more than there are below the limit; then none of those is missing."""
     k = min(factor_below(pencil, limit).count + 1, pencil.n)
     while True:
         pairs, certificate = solve_lowest(pencil, k, report)
@@ -84,12 +86,12 @@ def _lowest_below(pencil: Pencil, limit: float, report: Progress) -> tuple[Pairs
         k = min(k + max(k // 10, RETRY_PAIRS), pencil.n)
 
 
-def _nothing(pencil: Pencil, pairs: Pairs, number: int, low: float, high: float) -> str:
+def _empty_interval(pencil: Pencil, pairs: Pairs, number: int, low: float, high: float) -> str:
     below, above = pencil.values_out(np.array([high, low])).tolist()
     if number == 0:
         lowest = pencil.values_out(pairs.values[:1])[0]
         return f"below must exceed the lowest eigenvalue, {lowest:.6g}; it is {below:.6g}."
     return (
-        f"above and below must have eigenvalues between them; {number} lie below {above:.6g} and none from there to "
+        f"There must be eigenvalues between above and below; {number} lie below {above:.6g} and none from there to "
         f"{below:.6g}."
     )

@@ -1,4 +1,4 @@
-"""The proof that a spectrum has no eigenvalue missing and none too many."""
+"""The proof that no eigenvalue of a spectrum is missing, and none is extra."""
 
 from dataclasses import replace
 
@@ -96,7 +96,7 @@ def certify(
 
 
 def prove(pencil: Pencil, pairs: Pairs) -> Certificate:
-    """Count eigenvalues above the last pair, and below its cluster where the cluster goes on.
+    """Count the eigenvalues up to just above the last pair, or up to its cluster if more copies follow.
 
     The certificate, in the pencil's units, may be incomplete: then `count` differs from `n_found`.
 
@@ -114,7 +114,7 @@ def prove(pencil: Pencil, pairs: Pairs) -> Certificate:
 
 
 def quality(pencil: Pencil, pairs: Pairs) -> Certificate:
-    """Return what can be said of pairs without a count, in the pencil's units; it stands if these are all n.
+    """Return the certificate of pairs without a count, in the pencil's units; complete if these are all n.
 
     Raises
     ------
@@ -147,7 +147,7 @@ def in_user_units(pencil: Pencil, certificate: Certificate) -> Certificate:
 def take_pairs(
     pencil: Pencil, pairs: Pairs, certificate: Certificate, start: int, stop: int
 ) -> tuple[Pairs, Certificate]:
-    """Return the pairs from one number to another; what proves them all proves these."""
+    """Return the pairs start to stop - 1, and their certificate; the proof for all pairs includes them."""
     resolution = RESOLUTION * _scale(pencil, pairs)
     rest = pairs.values[stop:] - pairs.values[stop - 1]
     equal = int(np.count_nonzero(rest <= resolution))
@@ -164,18 +164,20 @@ def take_pairs(
 
 
 def _below_cluster(pencil: Pencil, pairs: Pairs, above: Certificate, beside: Factor) -> Certificate:
-    # Eigenvalues below the cluster are counted. The next ones lie above that count, and not above those found.
+    # Count the eigenvalues below the cluster. All further pairs are in the cluster, none above it.
     jumps = np.flatnonzero(np.diff(pairs.values) > 2 * above.resolution)
     first = int(jumps[-1]) + 1 if jumps.size else 0
     factor = count_beside(pencil, pairs, first, -above.resolution, beside)
     if factor.count > first:
-        # Slack may have taken copies of the cluster below σ that are not among the pairs: once more, from farther off.
+        # Slack may have moved copies of the cluster below σ that are not among the pairs: count
+        # again from farther below.
         farther = CLUSTER_STEP * (factor.shift - float(pairs.values[first]))
         factor = count_beside(pencil, pairs, first, farther, factor)
     resolution = float(pairs.values[-1]) - factor.shift
     if resolution > WIDEST_CLUSTER * _scale(pencil, pairs):
         raise ConvergenceError(
-            f"Neighboring eigenvalues must differ by more than rounding takes; the last {len(pairs.values) - first} "
+            f"Neighboring eigenvalues must differ by more than the rounding of the factor; the "
+            f"last {len(pairs.values) - first} "
             f"of {len(pairs.values)} do not. Repair nearly degenerate elements."
         )
     return replace(
@@ -204,12 +206,13 @@ def _clusters(values: Float[np.ndarray, " k"], resolution: float) -> tuple[int, 
 
 
 def _scale(pencil: Pencil, pairs: Pairs) -> float:
-    # level / n is far below the first positive eigenvalue of a surface, and serves where all that is found is 0.
+    # level / n is far below the first positive eigenvalue of a surface; it is the scale if all
+    # eigenvalues found are 0.
     return max(float(np.abs(pairs.values).max()), pencil.level / pencil.n)
 
 
 def require_orthonormal(pencil: Pencil, vectors: Float[np.ndarray, "n k"]) -> float:
-    """Return the largest entry of ΦᵀBΦ - I; raise a ConvergenceError where it is not small."""
+    """Return the largest entry of |ΦᵀBΦ - I|; raise a ConvergenceError if it is not small."""
     worst = 0.0
     for columns in column_chunks(vectors.shape[1]):
         weighed = pencil.weigh(vectors[:, columns])

@@ -1,4 +1,4 @@
-"""What is wrong with an operator that could not be solved."""
+"""Diagnosis of operators that could not be solved."""
 
 from contextlib import suppress
 
@@ -21,7 +21,7 @@ MOST_STEPS_DOWN = 60
 
 
 def require_solvable(pencil: Pencil, error: ConvergenceError) -> None:
-    """Refuse an operator that no solver could have solved, where that is why `error` was raised.
+    """Raise a specific error if `error` was caused by an operator that no solver can solve.
 
     Raises
     ------
@@ -42,8 +42,8 @@ def _require_near_scales(pencil: Pencil, error: ConvergenceError) -> None:
         low, high = pencil.values_out(scales[[soft, stiff]])
         raise InvalidParameterError(
             f"W_ii/B_ii must not span more digits than floats have; it is {high:.3g} at point {stiff} and {low:.3g} at "
-            f"point {soft}, and rounding at the one hides the eigenvalues of the other. Solve parts of so different "
-            f"sizes apart; where nearly degenerate elements are the cause, repair these. {try_auto()}"
+            f"point {soft}, and rounding at the one hides the eigenvalues of the other. Solve parts of such different "
+            f"sizes separately, or repair nearly degenerate elements. {try_auto()}"
         ) from error
 
 
@@ -66,7 +66,7 @@ def _require_semidefinite(pencil: Pencil, error: ConvergenceError) -> None:
 
 
 def _count_below(pencil: Pencil, shift: float) -> Factor | None:
-    """Count eigenvalues below a negative value, or one farther off, whatever the rounding; None where none surely is.
+    """Count eigenvalues below a negative value or a lower one, safely against rounding; None if none is proved.
 
     No eigenpair is known. 0 and the constant should be one, and `count_beside` keeps rounding away from it.
     """

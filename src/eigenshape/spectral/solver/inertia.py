@@ -1,4 +1,4 @@
-"""How many eigenvalues lie below σ, whatever the rounding of the factor that counts them."""
+"""Counts of the eigenvalues below σ that hold in spite of the rounding of the factor."""
 
 from dataclasses import replace
 
@@ -34,7 +34,7 @@ def count_beside(
     Raises
     ------
     ConvergenceError
-        If rounding takes more than the distance to the next value found, however far off.
+        If rounding exceeds the distance to the nearest value found at every σ that is tried.
     """
     value, shape, side = (
         float(pairs.values[index]),
@@ -64,8 +64,8 @@ def count_beside(
             step, slack = WIDENING * step, none
             sigma = value + step
     raise ConvergenceError(
-        f"Eigenvalues can be counted only where rounding takes less than their distance to σ; near "
-        f"{np.ldexp(value, pencil.value_exponent):.6g} (1/length²) it takes "
+        f"To count eigenvalues, rounding must be smaller than their distance to σ; near "
+        f"{np.ldexp(value, pencil.value_exponent):.6g} (1/length²) it is "
         f"{np.ldexp(taken(wanted), pencil.value_exponent):.1e}. Repair nearly degenerate elements."
     )
 

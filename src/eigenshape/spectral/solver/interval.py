@@ -69,7 +69,7 @@ def solve_interval(pencil: Pencil, interval: Interval, report: Report) -> tuple[
             return found
         if first == 0 and last == pencil.n:
             raise ConvergenceError(
-                "An interval must end between eigenvalues that can be told apart; there are none."
+                "An interval must end in a gap between eigenvalues; no gap is wider than rounding."
             )
         extra *= WIDER_OVERLAP
 
@@ -81,7 +81,7 @@ def _complete(
     interval: Interval,
     report: Report,
 ) -> tuple[Pairs, Certificate] | None:
-    """Search for what the counts find missing; None where no gap is clear on one of the sides."""
+    """Search for pairs that are missing by the counts; None if there is no clear gap on one of the sides."""
     for _ in range(INTERVAL_RUNS):
         pairs = polish(pencil, factor, lowest_pairs(pencil, vectors, vectors.shape[1]))
         report(0.9)
@@ -110,7 +110,7 @@ def _complete(
 def _clear_gaps(
     values: Float[np.ndarray, " k"], interval: Interval
 ) -> tuple[tuple[int, float], ...] | None:
-    """Return where to count on either side: a pair, and the step from it into the widest gap outside the interval."""
+    """Return where to count on each side: a pair, and the step from it into the widest gap outside the interval."""
     starts, ends = values[:-1], values[1:]
     before, after = (
         np.minimum(ends, interval.low) - starts,

@@ -1,7 +1,7 @@
-"""Between the eigenvalues of a kernel's pencil and those of Δ that they stand for.
+"""Conversion between the eigenvalues of a kernel's pencil and the eigenvalues of Δ that they approximate.
 
 On flat space an operator with a Gaussian kernel is (1 - e^{-tΔ})/t: its eigenvalue is μ = (1 - e^{-tλ})/t, and
-λ = -log(1 - tμ)/t. Near 1/t all λ crowd together, and nothing can be told any more.
+λ = -log(1 - tμ)/t. Near 1/t all λ are close together and cannot be distinguished.
 """
 
 import warnings
@@ -37,12 +37,12 @@ def to_pencil(
 def require_readable(
     kernel: GaussianKernel | None, values: Float[np.ndarray, " k"], *, stacklevel: int = 3
 ) -> None:
-    """Refuse corrected eigenvalues at 1/t or beyond, and warn of those that are hard to tell or far too low.
+    """Raise an error for corrected eigenvalues of 1/t or more, and warn of inaccurate ones.
 
     Raises
     ------
     InvalidParameterError
-        With the first eigenvalue that stands for none of Δ.
+        With the first eigenvalue that has no counterpart of Δ.
     """
     if kernel is None:
         return
@@ -52,19 +52,20 @@ def require_readable(
     if kernel.corrected and beyond.size:
         raise InvalidParameterError(
             f"An eigenvalue to be corrected must lie below 1/t; eigenvalue {beyond[0]} of the pencil is "
-            f"{values[beyond[0]]:.6g} and 1/t is {1 / kernel.t:.6g}. Ask for k ≤ {beyond[0]}, or choose a smaller t."
+            f"{values[beyond[0]]:.6g} and 1/t is {1 / kernel.t:.6g}. Request k ≤ {beyond[0]}, or choose a smaller t."
         )
     limit = LAST_CORRECTED if kernel.corrected else ESSENTIAL
     late = int(np.count_nonzero(shares <= limit))
     if late < len(values):
         advice = (
-            "k takes n > 5 k t/e² points of a surface"
+            "k eigenvalues of a surface need n > 5 k t/e² points"
             if kernel.corrected
-            else f"k takes n > 21 k t/e² points of a surface, and 72 k t/e² to be within 10 %, as the first "
-            f"{np.count_nonzero(shares <= BIASED)} are; or pass correct='log'"
+            else f"k eigenvalues of a surface need n > 21 k t/e² points, and 72 k t/e² for errors below 10 %, as the "
+            f"first {np.count_nonzero(shares <= BIASED)} have; or pass correct='log'"
         )
         warnings.warn(
-            f"Eigenvalues from number {late} on lie too near to {_limit_name(kernel)} = {top:.4g} to tell those of the "
+            f"Eigenvalues from number {late} on are too close to {_limit_name(kernel)} = "
+            f"{top:.4g} to represent those of the "
             f"shape: {advice}. Choose a smaller t, or more points.",
             stacklevel=stacklevel,
         )
@@ -77,7 +78,7 @@ def _limit_name(kernel: GaussianKernel) -> str:
 def from_pencil(
     kernel: GaussianKernel | None, values: Float[np.ndarray, " k"]
 ) -> Float[np.ndarray, " k"]:
-    """Return what is reported for eigenvalues μ of the pencil: λ where the kernel is corrected, μ itself elsewhere."""
+    """Convert eigenvalues μ of the pencil to reported ones: λ if the kernel is corrected, otherwise μ."""
     return (
         -np.log1p(-kernel.t * values) / kernel.t
         if kernel is not None and kernel.corrected

@@ -1,4 +1,4 @@
-"""Block Lanczos for the eigenvalues around a shift, with whatever was found before deflated."""
+"""Block Lanczos for the eigenvalues around a shift, with known eigenvectors deflated."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -74,14 +74,14 @@ class Operator:
 
 
 def operator(pencil: Pencil, factor: Factor) -> Operator:
-    """Choose the inner product, and make the memory of one run's solves."""
+    """Choose the inner product, and allocate the memory for the solves of one run."""
     roots = np.sqrt(pencil.mass_diagonal)[:, None] if pencil.mass_floor == 1.0 else None
     return Operator(pencil, factor, roots, factor.lower.scratch())
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a run is to find: so many eigenvalues on either side of the shift, the nearest ones, all within bounds."""
+    """What a run has to find: the nearest eigenvalues, this many on each side of the shift, all within bounds."""
 
     below: int
     above: int
@@ -160,14 +160,14 @@ def block_lanczos(
         report(size / (size + 0.6 * (wanted.below + wanted.above) + block))
     raise ConvergenceError(
         f"Block Lanczos must converge within {capacity} vectors; {missing} of {wanted.below + wanted.above} "
-        f"eigenvalues did not. Repair nearly degenerate elements, or ask for fewer pairs."
+        f"eigenvalues did not. Repair nearly degenerate elements, or request fewer pairs."
     )
 
 
 def _capacity(pencil: Pencil, wanted: Wanted, n_locked: int, block: int) -> int:
-    room = pencil.n - n_locked - block
+    available = pencil.n - n_locked - block
     most = 4 * (wanted.below + wanted.above) + 40 * block
-    return max(min(room, most) // block, 1) * block
+    return max(min(available, most) // block, 1) * block
 
 
 def _orthonormalize(

@@ -1,4 +1,4 @@
-"""Eigenpairs on their way: made orthonormal, put in order, refined."""
+"""Eigenpairs inside the solver: orthonormalized, sorted, refined."""
 
 from dataclasses import dataclass
 
@@ -28,14 +28,14 @@ class Pairs:
 
 
 def error_bound(pairs: Pairs) -> float:
-    """Bound of the distance of all values together to eigenvalues, one to one (Kahan 1967)."""
+    """Bound the distance of the values to eigenvalues, matched one to one (Kahan 1967)."""
     return float(np.linalg.norm(pairs.residuals))
 
 
 def polish(pencil: Pencil, factor: Factor, pairs: Pairs) -> Pairs:
-    """Refine the pairs whose residual the rounding of the factor has kept large.
+    """Refine the pairs whose residuals are large because of the rounding of the factor.
 
-    One step of (W - σB)⁻¹ on a residual gives the error of the vector outside the space of those found.
+    One step of (W - σB)⁻¹ on a residual gives the error of the vector outside the space of all vectors.
     """
     late = np.flatnonzero(pairs.residuals > POLISHED * np.abs(pairs.values).max(initial=0.0))
     if not late.size:
@@ -50,7 +50,7 @@ def polish(pencil: Pencil, factor: Factor, pairs: Pairs) -> Pairs:
 
 
 def lowest_pairs(pencil: Pencil, vectors: Float[np.ndarray, "n j"], k: int) -> Pairs:
-    """Return the lowest k of the pairs that these nearly B-orthonormal vectors stand for."""
+    """Return the k lowest eigenpairs of nearly B-orthonormal vectors, by their Rayleigh quotients."""
     vectors = _orthonormalize(pencil, vectors)
     values, residuals = rayleigh_residuals(pencil, vectors)
     order = np.argsort(values, kind="stable")[:k]
@@ -60,7 +60,8 @@ def lowest_pairs(pencil: Pencil, vectors: Float[np.ndarray, "n j"], k: int) -> P
 
 
 def _orthonormalize(pencil: Pencil, vectors: Float[np.ndarray, "n j"]) -> Float[np.ndarray, "n j"]:
-    # One Newton step towards the nearest B-orthonormal columns: they are so up to the tolerance of the iteration.
+    # One Newton step towards the nearest B-orthonormal columns; the columns are already
+    # orthonormal up to the tolerance of the iteration.
     gram = vectors.T @ pencil.weigh(vectors)
     identity = np.eye(len(gram))
     off = np.abs(gram - identity).max(initial=0.0)

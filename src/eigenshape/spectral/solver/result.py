@@ -1,4 +1,4 @@
-"""What every method ends with: a spectrum in the units of the user, corrected where the kernel is."""
+"""The last step of every method: a spectrum in the units of the user, corrected if the kernel is."""
 
 import numpy as np
 from jaxtyping import Float
@@ -25,17 +25,15 @@ NEGATIVE_ROUNDING = 1e-9
 def spectrum_of(
     laplacian: Laplacian, pencil: Pencil, pairs: Pairs, certificate: Certificate
 ) -> Spectrum:
-    """Return pairs of the pencil as what the user is told: in the user's units, corrected where the kernel is.
+    """Convert pairs of the pencil to a spectrum in the user's units, corrected if the kernel is.
 
     Raises
     ------
     InvalidParameterError
-        If an eigenvalue is below zero by more than its error, or stands for none of a corrected kernel's shape.
+        If an eigenvalue is negative by more than its error, or a corrected one is 1/t or more.
     """
-    values, residuals = (
-        pencil.values_out(_without_negatives(pencil, pairs)),
-        pencil.values_out(pairs.residuals),
-    )
+    values = pencil.values_out(_without_negatives(pencil, pairs))
+    residuals = pencil.values_out(pairs.residuals)
     require_readable(laplacian.kernel, values, stacklevel=4)
     return Spectrum(
         eigenvalues=frozen(from_pencil(laplacian.kernel, values)),
@@ -49,7 +47,8 @@ def spectrum_of(
 
 
 def _without_negatives(pencil: Pencil, pairs: Pairs) -> Float[np.ndarray, " k"]:
-    # A Rayleigh quotient below zero shows an eigenvalue below zero, however large its residual, but for rounding.
+    # A negative Rayleigh quotient proves a negative eigenvalue, however large its residual, up to
+    # rounding.
     rounding = (
         np.minimum(4 * pairs.residuals, NEGATIVE_ROUNDING * pencil.level) + 1e-14 * pencil.level
     )
@@ -57,6 +56,7 @@ def _without_negatives(pencil: Pencil, pairs: Pairs) -> Float[np.ndarray, " k"]:
     if bad.size:
         value, bound = pencil.values_out(np.array([pairs.values[bad[0]], rounding[bad[0]]]))
         raise InvalidParameterError(
-            f"stiffness must be positive semidefinite; eigenvalue {bad[0]} is {value:.6g}, its error under {bound:.1e}."
+            f"stiffness must be positive semidefinite; eigenvalue {bad[0]} is {value:.6g}, with "
+            f"an error below {bound:.1e}."
         )
     return np.maximum(pairs.values, 0.0)

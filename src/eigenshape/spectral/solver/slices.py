@@ -73,9 +73,9 @@ def walk_on(
 
 
 def next_slice(k: int, known: int) -> int:
-    """Return how many eigenvalues the next slice takes."""
-    left = k - known
-    return -(-left // max(-(-left // SLICE), 1))
+    """Return the number of eigenvalues of the next slice, such that the remaining slices are equal."""
+    remaining = k - known
+    return -(-remaining // max(-(-remaining // SLICE), 1))
 
 
 def _within(report: Report, start: float, share: float) -> Report:
@@ -83,13 +83,13 @@ def _within(report: Report, start: float, share: float) -> Report:
 
 
 def _find_cut(values: Float[np.ndarray, " j"], shift: float) -> tuple[int, float]:
-    """Return how many eigenvalues above the shift the slice keeps, and the middle of the gap it ends in."""
+    """Return the number of eigenvalues above the shift that the slice keeps, and the middle of the gap at its end."""
     above = np.sort(values[values > shift])
     gaps = np.diff(above[-(OVERLAP + 1) :])
     widest = int(gaps.argmax()) if gaps.size else 0
     if not gaps.size or gaps[widest] < CLEAR_GAP * above[-1]:
         raise ConvergenceError(
-            "A slice must end in a clear gap; there is none among the last eigenvalues seen."
+            "A slice must end in a clear gap; there is none among the last eigenvalues found."
         )
     kept = len(above) - len(gaps) + widest
     return kept, float(above[kept - 1] + above[kept]) / 2

@@ -1,4 +1,4 @@
-"""The roads to the lowest pairs of a pencil, and their proof: part by part, densely, at once, in slices."""
+"""Methods that find and certify the lowest pairs of a pencil: by parts, dense, with one shift, or in slices."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -29,7 +29,7 @@ from eigenshape.spectral.solver.shift import expected_values, factor_below, shif
 from eigenshape.spectral.solver.slices import walk
 
 Start = Callable[[Pencil, int, Callable[[float], None]], tuple[np.ndarray, Factor]]
-Road = Callable[[Pencil, int, Progress], tuple[Pairs, Certificate]]
+Solve = Callable[[Pencil, int, Progress], tuple[Pairs, Certificate]]
 
 # Points up to which a dense solve is faster than a sparse one.
 DENSE_POINTS = 300
@@ -53,14 +53,14 @@ EXTRA_PAIRS = 2
 
 
 def solve_lowest(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
-    """Return the k lowest pairs of a pencil and their proof, by the quickest road that reaches it.
+    """Compute the k lowest pairs of a pencil and their certificate, by the fastest method that converges.
 
     Raises
     ------
     InvalidParameterError
         If the memory is too small.
     ConvergenceError
-        If none does.
+        If no method converges.
     """
     if pencil.labels.any():
         return _solve_parts(connected_parts(pencil), k, report)
@@ -70,17 +70,20 @@ def solve_lowest(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certi
 def _solve_connected(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
     if dense_serves(pencil, k):
         return _solve_dense(pencil, k, report)
-    roads: list[Road] = [partial(_solve_sparse, start=walk)] if k > ONE_SHIFT_PAIRS else []
-    roads += [partial(_solve_sparse, start=_at_once)]
-    roads += [_solve_dense] if pencil.n <= DENSE_LIMIT else []  # nothing there can fail to converge
-    for road in roads[:-1]:
+    methods: list[Solve] = []
+    if k > ONE_SHIFT_PAIRS:
+        methods.append(partial(_solve_sparse, start=walk))
+    methods.append(partial(_solve_sparse, start=_at_once))
+    if pencil.n <= DENSE_LIMIT:
+        methods.append(_solve_dense)  # slow, but it always converges
+    for method in methods[:-1]:
         with suppress(ConvergenceError):
-            return road(pencil, k, report)
-    return roads[-1](pencil, k, report)
+            return method(pencil, k, report)
+    return methods[-1](pencil, k, report)
 
 
 def dense_serves(pencil: Pencil, k: int) -> bool:
-    """Tell whether a dense solve finds k pairs sooner than a sparse one."""
+    """Return whether a dense solve is faster than a sparse one for k pairs."""
     return pencil.n <= DENSE_POINTS or (DENSE_SHARE * k > pencil.n and pencil.n <= DENSE_LIMIT)
 
 
@@ -97,11 +100,11 @@ def _solve_dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certi
 
 
 def _solve_parts(parts: Parts, k: int, report: Progress) -> tuple[Pairs, Certificate]:
-    """Solve each part by itself, and prove what is merged of them as a whole.
+    """Solve each connected part separately, and certify the merged pairs as a whole.
 
-    A Krylov space of all of them would see few copies of an eigenvalue at a time, and 0 has as many as there are parts.
-    A large part is asked for as many pairs as Weyl's law expects of it, and for more until its last value is not below
-    the k-th of all: then nothing that it has beyond is among the k lowest.
+    A Krylov space of all parts finds few copies of an eigenvalue at a time, and 0 has as many copies as there are
+    parts. From a large part as many pairs are requested as Weyl's law expects, and more until its last eigenvalue is
+    not below the k-th of all parts: then none of its other eigenvalues is among the k lowest.
     """
     require_memory_for_pairs(parts.pencil, k)
     report(0.02, f"solving {len(parts.sizes)} parts")
@@ -115,7 +118,7 @@ def _solve_parts(parts: Parts, k: int, report: Progress) -> tuple[Pairs, Certifi
                 parts, large[number], count, _share(progress, parts, number)
             )
         wanted = _missing_counts(parts, large, found, k)
-        progress = silent  # it has come to the end once
+        progress = silent  # the fraction done has reached its end once
     report(0.9, "counting eigenvalues")
     return _complete(
         parts.pencil, merge_pairs(parts, [found[number] for number in range(len(found))], k)
@@ -125,7 +128,7 @@ def _solve_parts(parts: Parts, k: int, report: Progress) -> tuple[Pairs, Certifi
 def _expected_counts(
     parts: Parts, large: dict[int, Pencil], found: dict[int, Pairs], k: int
 ) -> dict[int, int]:
-    """Return how many of the k lowest pairs are expected of each large part, and some more."""
+    """Return how many of the k lowest pairs each large part is expected to have, with a margin."""
     expected = {}
     for number, pencil in large.items():
         values = expected_values(pencil, np.arange(min(k, pencil.n), dtype=float))
@@ -142,7 +145,7 @@ def _expected_counts(
 def _missing_counts(
     parts: Parts, large: dict[int, Pencil], found: dict[int, Pairs], k: int
 ) -> dict[int, int]:
-    """Return how many pairs each part has below the k-th of all where those found of it end before."""
+    """Return how many pairs to request from the parts whose pairs end below the k-th eigenvalue of all parts."""
     known = np.concatenate([pairs.values for pairs in found.values()])
     residuals = np.concatenate([pairs.residuals for pairs in found.values()])
     last = float(np.partition(known + widths(known, residuals), k - 1)[k - 1])
@@ -156,7 +159,7 @@ def _missing_counts(
 
 
 def _share(report: Progress, parts: Parts, number: int) -> Progress:
-    """Return what reports the solving of one part as a share of all points."""
+    """Return a progress function for one part, as a share of all points."""
     begin, end = (parts.starts[number : number + 2] / parts.pencil.n).tolist()
     label = f"part {number + 1} of {len(parts.sizes)}"
     return lambda done, message: report(
@@ -207,7 +210,14 @@ def _solve_sparse(
 
 
 def require_memory_for_pairs(pencil: Pencil, k: int, factors: int | None = None) -> None:
-    """Refuse a solve for so many pairs that would not fit, given the bytes of its factors.
+    """Raise an error if the memory is too small for a solve of k pairs.
+
+    Parameters
+    ----------
+    pencil : Pencil
+    k : int
+    factors : int, optional
+        Bytes of the factors; by default estimated from the elimination order.
 
     Raises
     ------
@@ -246,7 +256,7 @@ def _in_run(report: Progress, run: int) -> Callable[[float], None]:
 def _remaining(
     pencil: Pencil, factor: Factor, pairs: Pairs, k: int
 ) -> tuple[Certificate | None, Wanted]:
-    """Return the proof as far as it goes, and what a further run has to find."""
+    """Return the certificate, complete or not, and what the next run has to find."""
     certificate = prove(pencil, pairs) if len(pairs.values) == k else None
     missing = certificate.n_missing if certificate else k - len(pairs.values)
     missing = min(max(missing, 0), k)

@@ -1,0 +1,51 @@
+"""Docstrings of public names: their examples run, and the short door has one for each name."""
+
+import doctest
+import inspect
+
+import pytest
+from public_names import public_things
+
+import eigenshape as es
+
+THINGS = {
+    name: thing
+    for name, thing in public_things().items()
+    if inspect.isclass(thing) or inspect.isfunction(inspect.unwrap(thing))
+}
+FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
+
+
+def examples(name):
+    """Return the docstring's examples, those of methods included."""
+    finder = doctest.DocTestFinder(exclude_empty=True)
+    found = finder.find(inspect.unwrap(THINGS[name]), name, globs={"es": es})
+    return [test for test in found if test.examples]
+
+
+WITH_EXAMPLES = [name for name in THINGS if examples(name)]
+
+
+@pytest.mark.parametrize("name", WITH_EXAMPLES)
+def test_examples_run(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for test in examples(name):
+        runner = doctest.DocTestRunner(optionflags=FLAGS)
+        printed = []
+        assert not runner.run(test, out=printed.append).failed, "".join(printed)
+
+
+def test_every_name_of_the_short_door_has_an_example():
+    short = {name for name in es.__all__ if name in THINGS}
+    errors = {
+        name
+        for name in short
+        if isinstance(THINGS[name], type) and issubclass(THINGS[name], Exception)
+    }
+    assert not sorted(short - errors - set(WITH_EXAMPLES))
+
+
+def test_every_public_function_and_class_has_a_docstring_of_one_sentence_first():
+    for name, thing in THINGS.items():
+        first = inspect.getdoc(thing).split("\n\n")[0]
+        assert first.rstrip().endswith("."), name
