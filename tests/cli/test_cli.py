@@ -309,7 +309,10 @@ def test_features_of_large_meshes_say_how_far_heat_is_off(tmp_path, monkeypatch)
     monkeypatch.setattr("eigenshape.spectral.multilevel.start.COARSENED", 5)
     path = tmp_path / "large.ply"
     write_mesh(make_creature("hand", n_vertices=2500), path)
-    assert "2,500 vertices: their heat is approximate, off by about" in run("features", path).stderr
+    assert (
+        "2,500 vertices: heat is approximate, with a relative error of about"
+        in run("features", path).stderr
+    )
     found = run_json("features", path)
     assert len(found["features"]) == 15
     assert 0 < found["heat_error"] < 0.2
