@@ -113,7 +113,7 @@ def test_colours(tmp_path):
 def test_unknown_suffix_is_refused_with_the_list_of_known_ones(tmp_path, name):
     with pytest.raises(
         FileFormatError,
-        match=r"must be of a known format, \.off, .*, \.glb, \.gltf, .*, \.msh; it is",
+        match=r"must be of a known format, \.off, .*, \.glb, \.gltf, .*, \.vtu; it is",
     ):
         read_mesh(tmp_path / name)
     with pytest.raises(
