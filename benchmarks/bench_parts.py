@@ -97,7 +97,7 @@ PARTS: tuple[tuple[str, object, str, Callable[..., Work]], ...] = (
     ("factors", pencil, "factorise", _factor),
     ("factors", factor, "factorise_symmetric", _factor),
     ("solves", SymmetricFactor, "solve_lanes", _solve),
-    ("orthogonalisation", lanczos, "_orthonormalise", _orthogonal),
+    ("orthogonalisation", lanczos, "_orthonormalize", _orthogonal),
     ("Ritz values", lanczos, "_ritz", _eigh),
     ("Ritz vectors", lanczos, "_vectors", _combine),
     ("residuals", pairs, "rayleigh_residuals", _residuals),

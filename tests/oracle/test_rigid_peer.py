@@ -30,7 +30,7 @@ def energy(edges, rest, posed):
 @pytest.mark.parametrize("rounds", [1, 100])
 def test_libigl_finds_no_less_energy(kind, rounds, monkeypatch):
     """From our result, and from the shape at rest, with the same vertices held in the same places."""
-    monkeypatch.setattr(rigidity, "SETTLED", 0.0)
+    monkeypatch.setattr(rigidity, "ENERGY_TOLERANCE", 0.0)
     rig, z = rig_shape(LONG), LONG.vertices[:, 2]
     binding = bind(rig, [z > 1.5], fixed=z < -1.5)
     ours = as_rigid_as_possible(binding, [Rotation([0, 0, 0], [1, 0, 0], 0.5)], n_rounds=3000)
