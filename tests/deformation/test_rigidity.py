@@ -135,7 +135,8 @@ def test_one_by_one_and_all_at_once_agree():
 def test_weights_are_positive_and_on_every_edge():
     for mesh in (
         lump(),
-        grid(4, 4),
+        # Sheared: the weight of a diagonal across right angles is 0 up to rounding, and may drop out.
+        TriangleMesh(grid(4, 4).vertices @ [[1, 0.2, 0], [0, 1, 0], [0, 0, 1]], grid(4, 4).faces),
         tube(),
         TriangleMesh([[0, 0, 0], [9, 0, 0], [4, 1, 0], [5, -1, 0]], [[0, 1, 2], [1, 0, 3]]),
     ):

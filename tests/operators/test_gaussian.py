@@ -311,7 +311,7 @@ def test_graph_laplacians_know_the_volume_that_their_eigenvalues_are_over(size):
     es.solve_spectrum(
         laplacian, 20
     )  # whose eigenvalues are far from the last: no warning at any size
-    with pytest.warns(UserWarning, match=r"too near to 1/\(t × volume\)"):
+    with pytest.warns(UserWarning, match=r"too close to 1/\(t × volume\)"):
         es.solve_spectrum(laplacian, 200)
 
 

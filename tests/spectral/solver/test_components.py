@@ -104,7 +104,9 @@ def test_specks_of_any_size_leave_the_shape_its_eigenvalues(scale):
     expected = solve_spectrum(cotangent_laplacian(sphere), 16).eigenvalues
     own = solve_spectrum(cotangent_laplacian(moved(icosphere(2), 0.3 * scale, 0.0)), 4).eigenvalues
     merged = np.sort(np.concatenate([expected, np.tile(own, 20)]))[:36]
-    np.testing.assert_allclose(found.eigenvalues, merged, rtol=1e-8, atol=1e-7)
+    # The eigenvalue 0 of each part is found up to the rounding of the largest entries, those of the specks.
+    np.testing.assert_allclose(found.eigenvalues[:21], 0, atol=1e-13 * own[-1])
+    np.testing.assert_allclose(found.eigenvalues[21:], merged[21:], rtol=1e-8)
     assert found.certificate.complete
 
 
