@@ -286,11 +286,10 @@ def collapse_needles(mesh: MeshLike) -> RepairedMesh[Any]:
         "collapse_needles joined {} to others beside them",
     )
     ordered = np.sort(joined.mesh.simplices, axis=1)
-    whole = (ordered[:, 1:] != ordered[:, :-1]).all(axis=1)
-    kept = _keep_simplices(joined.mesh, whole | ~short.any(axis=1), "")
-    n_removed = int((~whole & short.any(axis=1)).sum())
-    report = f"{joined.report[0]}, and removed {_count(n_removed, _noun(mesh))}"
-    return RepairedMesh(kept.mesh, (report,), joined.source_vertices)
+    collapsed = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1) & short.any(axis=1)
+    report = f"{joined.report[0]}, and removed {_count(int(collapsed.sum()), _noun(mesh))}"
+    kept = _keep_simplices(joined.mesh, ~collapsed, report)
+    return RepairedMesh(kept.mesh, kept.report, joined.source_vertices)
 
 
 def drop_duplicate_faces(mesh: MeshLike) -> RepairedMesh[Any]:
