@@ -13,3 +13,14 @@ def printable(text: str) -> str:
     a\x1b[31mb\nc
     """
     return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
+
+
+def literal(text: str) -> str:
+    r"""Return text that a figure shows letter by letter, such as a file's name: no ``$`` begins a formula.
+
+    Examples
+    --------
+    >>> print(literal("a$b$.ply"))
+    a\$b\$.ply
+    """
+    return printable(text).replace("$", r"\$")

@@ -6,7 +6,8 @@ import pytest
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import fill_holes, repair
+from eigenshape.geometry.repair import repair
+from eigenshape.geometry.repair_steps import fill_holes
 from eigenshape.geometry.simplices import degenerate_simplices
 from eigenshape.geometry.topology import (
     euler_characteristic,

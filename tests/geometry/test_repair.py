@@ -5,16 +5,15 @@ from broken_meshes import moebius, soup, tetrahedra, with_slivers
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import (
-    REPAIRS,
+from eigenshape.geometry.repair import REPAIRS, repair, suggest_repairs
+from eigenshape.geometry.repair_names import MESH_REPAIRS
+from eigenshape.geometry.repair_steps import (
     collapse_needles,
     drop_degenerate,
     drop_duplicate_faces,
     drop_unreferenced,
     largest_component,
     orient,
-    repair,
-    suggest_repairs,
     weld,
     weld_seams,
 )
@@ -30,6 +29,10 @@ from eigenshape.geometry.union import disjoint_union
 from eigenshape.retrieval.baselines.shape_dna import shape_dna
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import grid, icosphere
+
+
+def test_the_names_that_help_lists_are_those_of_the_repairs():
+    assert tuple(REPAIRS) == MESH_REPAIRS
 
 
 def test_a_welded_soup_is_whole_again():

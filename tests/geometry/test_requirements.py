@@ -37,8 +37,8 @@ from eigenshape.operators.smoothing import noise_level
 from eigenshape.retrieval.baselines.affinity import affinity_eigenvalues
 from eigenshape.retrieval.baselines.shape_dna import shape_dna
 from eigenshape.retrieval.description import describe
-from eigenshape.retrieval.heat.descriptor import SCALE_FREE
 from eigenshape.retrieval.heat.features import find_heat_features
+from eigenshape.retrieval.heat.recipe import SCALE_FREE
 from eigenshape.retrieval.label_transfer import transfer_labels
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.patches.patches import extract_patches, surface_patches

@@ -5,13 +5,11 @@ from typing import Annotated
 
 import typer
 
+import eigenshape as es
+from eigenshape.cli import steps
 from eigenshape.cli.console import err, print_json, print_table, shown
-from eigenshape.cli.info import mesh_facts
 from eigenshape.cli.inputs import CellsOption, JsonOption, MeshArgument, repair_names
-from eigenshape.cli.outputs import require_mesh_path, save_like
-from eigenshape.geometry.repair import REPAIRS
-from eigenshape.geometry.repair import repair as repair_mesh
-from eigenshape.io.mesh_files import read_mesh
+from eigenshape.geometry.repair_names import MESH_REPAIRS
 
 USUAL = "auto"
 ROWS = (
@@ -33,7 +31,7 @@ def repair(
             "--repair",
             metavar="NAMES",
             help=(
-                f"Repairs to apply in this order, separated by commas: {', '.join(REPAIRS)}. "
+                f"Repairs to apply in this order, separated by commas: {', '.join(MESH_REPAIRS)}. "
                 "'' only converts the file."
             ),
         ),
@@ -45,14 +43,14 @@ def repair(
 
     For instance: eigenshape repair scan.ply --repair auto -o clean.ply
     """
-    require_mesh_path(output)
+    steps.require_mesh_path(output)
     chosen = repair_names(names)
-    before = read_mesh(mesh, cells=cells)
-    done = repair_mesh(before, chosen)
+    before = es.read_mesh(mesh, cells=cells)
+    done = es.repair(before, chosen)
     for line in done.report:
         err.print(f"[yellow]repair:[/] {shown(line)}")
-    facts = {"before": mesh_facts(before), "after": mesh_facts(done.mesh)}
-    save_like(mesh, done.mesh, output)
+    facts = {"before": steps.mesh_facts(before), "after": steps.mesh_facts(done.mesh)}
+    steps.save_like(mesh, done.mesh, output)
     if as_json:
         print_json({"path": str(mesh), "output": str(output), "report": list(done.report), **facts})
         return

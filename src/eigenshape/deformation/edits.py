@@ -12,8 +12,9 @@ from eigenshape._arguments import describe_value, require_each, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape.deformation.binding import bind
-from eigenshape.deformation.deform import Mode, bend, require_mode
+from eigenshape.deformation.deform import bend
 from eigenshape.deformation.handles import Handle, Rotation, Translation
+from eigenshape.deformation.modes import Mode, require_mode
 from eigenshape.deformation.region import BoxRegion, BrushRegion, Region, copy_region, region_mask
 from eigenshape.deformation.rig import EigenRig, pose_rig
 from eigenshape.geometry.mesh import TriangleMesh

@@ -9,7 +9,8 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError, InvalidShapeError
 from eigenshape.io import glb, gmsh, medit, obj, off, ply, stl, vtk_legacy, vtu
-from eigenshape.io.cells import SEGMENTS, Blocks, CellKind, chosen_cells
+from eigenshape.io.cell_kinds import CellKind
+from eigenshape.io.cells import SEGMENTS, Blocks, chosen_cells
 
 # Formats whose bytes alone give vertices, and triangles or segments.
 PARSERS = {

@@ -6,7 +6,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.cells import SEGMENTS, CellKind, four_cornered
+from eigenshape.io.cell_kinds import CellKind
+from eigenshape.io.cells import SEGMENTS, four_cornered
 from eigenshape.io.text import fans, numbers_of, shown, strip_triangles, wholes
 from eigenshape.io.vtk_cells import CellLists, cells_of_types
 

@@ -20,8 +20,8 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.retrieval.heat.descriptor import SCALE_FREE
 from eigenshape.retrieval.heat.features import heat_descriptor
+from eigenshape.retrieval.heat.recipe import SCALE_FREE
 from eigenshape.retrieval.heat.score import matching_scores, shifted
 from eigenshape.spectral.bounds.nonconforming import partly
 from eigenshape.spectral.signatures.heat import positive_eigenvalues

@@ -12,7 +12,7 @@ from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import faces_of_largest
+from eigenshape.geometry.repair_steps import faces_of_largest
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.topology import submesh
 from eigenshape.scans.partial import rotation_towards, unit_direction

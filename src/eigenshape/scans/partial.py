@@ -13,7 +13,7 @@ from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import mean_normals, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import faces_of_largest
+from eigenshape.geometry.repair_steps import faces_of_largest
 from eigenshape.geometry.topology import consistently_oriented, is_closed, submesh
 from eigenshape.scans.raster import rasterize
 

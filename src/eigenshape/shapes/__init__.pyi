@@ -1,4 +1,4 @@
-from .creatures import CREATURES as CREATURES
+from .creature_plans import CREATURES as CREATURES
 from .creatures import make_creature as make_creature
 from .domains import ball as ball
 from .domains import box as box

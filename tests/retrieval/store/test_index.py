@@ -20,7 +20,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eigenshape._errors import InvalidParameterError, StoreError
-from eigenshape.retrieval.heat.descriptor import HeatDescriptor, HeatRecipe
+from eigenshape.retrieval.heat.descriptor import HeatDescriptor
+from eigenshape.retrieval.heat.recipe import HeatRecipe
 from eigenshape.retrieval.heat.score import matching_score
 from eigenshape.retrieval.store import files as store
 from eigenshape.retrieval.store.index import ShapeIndex

@@ -22,7 +22,8 @@ from eigenshape.geometry.topology import boundary_edges, vertex_components
 from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.retrieval.heat.descriptor import SCALE_FREE, HeatDescriptor, HeatRecipe
+from eigenshape.retrieval.heat.descriptor import HeatDescriptor
+from eigenshape.retrieval.heat.recipe import SCALE_FREE, HeatRecipe
 from eigenshape.scans.partial import MeshPart, partial_scan, viewpoint, views_of
 from eigenshape.spectral.signatures.approximate_heat import approximate_heat_signature
 from eigenshape.spectral.signatures.heat import heat_kernel_signature, reflection_free_signature

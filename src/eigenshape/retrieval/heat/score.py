@@ -6,7 +6,8 @@ from scipy.spatial.distance import cdist
 
 from eigenshape._arguments import require_type
 from eigenshape._errors import InvalidParameterError
-from eigenshape.retrieval.heat.descriptor import HeatDescriptor, HeatRecipe
+from eigenshape.retrieval.heat.descriptor import HeatDescriptor
+from eigenshape.retrieval.heat.recipe import HeatRecipe
 
 NUMBERS_AT_ONCE = 4_000_000  # distances held at a time: 32 MB
 # Added to a score for each step of relative size and each number compared. A part has less area

@@ -16,7 +16,7 @@ from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import in_length, size_one
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
-from eigenshape.operators.boundary import Condition
+from eigenshape.operators.choices import Condition
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import interpolation_constants, longest_edges
 from eigenshape.spectral.bounds.nonconforming import lower_bounds, partly

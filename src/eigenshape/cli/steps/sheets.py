@@ -10,16 +10,16 @@ from matplotlib.figure import Figure
 
 from eigenshape._errors import EigenshapeError, StoreError
 from eigenshape._progress import Progress
+from eigenshape._text import literal
 from eigenshape.cli.console import err, progress_bar, shown
-from eigenshape.cli.inputs import read_repaired
+from eigenshape.cli.steps.reading import read_repaired
 from eigenshape.geometry.geodesic import geodesic_distances
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.plot.figure import literal
 from eigenshape.plot.sheet import Panel, figure_contact_sheet
 from eigenshape.retrieval.description import describe
-from eigenshape.retrieval.heat.descriptor import HeatRecipe
 from eigenshape.retrieval.heat.features import find_heat_features, find_view_features
+from eigenshape.retrieval.heat.recipe import HeatRecipe
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
 from eigenshape.retrieval.store.index import Match
 
