@@ -4,6 +4,7 @@ from broken_meshes import moebius, soup, tetrahedra, with_slivers
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import REPAIRS, repair, suggest_repairs
 from eigenshape.geometry.repair_names import MESH_REPAIRS
@@ -21,7 +22,6 @@ from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import (
     boundary_edges,
     euler_characteristic,
-    inconsistent_edges,
     is_closed,
     is_manifold,
 )

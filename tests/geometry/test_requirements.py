@@ -42,7 +42,7 @@ from eigenshape.retrieval.heat.recipe import SCALE_FREE
 from eigenshape.retrieval.label_transfer import transfer_labels
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.patches.patches import extract_patches, surface_patches
-from eigenshape.retrieval.store.index import describe_to_store
+from eigenshape.retrieval.store.writing import describe_to_store
 from eigenshape.scans.partial import partial_scan, viewpoint
 from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.shapes.surfaces import icosphere

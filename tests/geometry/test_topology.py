@@ -3,6 +3,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import (
     boundary_edges,
@@ -10,7 +11,6 @@ from eigenshape.geometry.topology import (
     edge_table,
     euler_characteristic,
     half_edges,
-    inconsistent_edges,
     is_closed,
     is_manifold,
     non_manifold_edges,

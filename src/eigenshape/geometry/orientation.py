@@ -6,17 +6,12 @@ from scipy.spatial import ConvexHull, QhullError
 
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.face_turns import face_turns, with_turned_faces
 from eigenshape.geometry.measure import area_vectors, enclosed_volume, mean_normals, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented
 from eigenshape.geometry.simplices import scaled_corners, size_one
-from eigenshape.geometry.topology import (
-    edge_table,
-    face_turns,
-    is_closed,
-    submesh,
-    with_turned_faces,
-)
+from eigenshape.geometry.topology import edge_table, is_closed, submesh
 
 # Signed volumes up to this share of area^1.5 are rounding, and do not tell which side is outside.
 # A ball has 0.094.

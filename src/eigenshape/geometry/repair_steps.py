@@ -12,6 +12,7 @@ from eigenshape._arguments import require_type
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
+from eigenshape.geometry.face_turns import with_turned_faces
 from eigenshape.geometry.flat_faces import flip_flat_faces
 from eigenshape.geometry.holes import triangulate_holes
 from eigenshape.geometry.measure import area_vectors
@@ -31,7 +32,6 @@ from eigenshape.geometry.topology import (
     submesh,
     unreferenced_vertices,
     vertex_components,
-    with_turned_faces,
 )
 
 # A face is a needle if one of its sides is shorter than this share of another. Cotangents of 1e6

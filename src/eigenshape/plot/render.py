@@ -7,9 +7,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._threads import one_blas_thread
+from eigenshape.geometry.face_turns import consistently_oriented
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import boundary_edges, consistently_oriented
+from eigenshape.geometry.topology import boundary_edges
 from eigenshape.plot.camera import Camera, in_picture
 from eigenshape.scans.raster import Raster, rasterize
 

@@ -11,10 +11,11 @@ from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.face_turns import consistently_oriented
 from eigenshape.geometry.measure import mean_normals, unit_scaled
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair_steps import faces_of_largest
-from eigenshape.geometry.topology import consistently_oriented, is_closed, submesh
+from eigenshape.geometry.topology import is_closed, submesh
 from eigenshape.scans.raster import rasterize
 
 # A vertex may be this many pixels away from the middle of the pixel in which the surface was seen,

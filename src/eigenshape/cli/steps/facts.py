@@ -6,6 +6,7 @@ import numpy as np
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud, Shape
+from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.measure import bounding_box, edge_lengths, enclosed_volume, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import suggest_repairs
@@ -16,7 +17,6 @@ from eigenshape.geometry.topology import (
     boundary_loops,
     boundary_vertices,
     euler_characteristic,
-    inconsistent_edges,
     is_closed,
     non_manifold_edges,
     non_manifold_vertices,
