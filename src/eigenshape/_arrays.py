@@ -23,7 +23,7 @@ BYTES_OF_ENTRY = 17  # memory per entry meanwhile: two copies of 8 bytes and one
 ArrayT = TypeVar("ArrayT", bound=NDArray[Any])
 
 
-def frozen(array: ArrayT) -> ArrayT:
+def freeze(array: ArrayT) -> ArrayT:
     """Return a contiguous copy that is read-only."""
     copy = np.array(array, order="C")
     copy.flags.writeable = False

@@ -172,4 +172,6 @@ def test_warnings(zoo, monkeypatch):
 
 
 def test_the_alphabet_of_a_name_stays():
-    assert console.shown(Path("Würfel 立方体 κύβος مكعب.ply")) == "Würfel 立方体 κύβος مكعب.ply"
+    assert (
+        console.escape_text(Path("Würfel 立方体 κύβος مكعب.ply")) == "Würfel 立方体 κύβος مكعب.ply"
+    )

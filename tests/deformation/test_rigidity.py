@@ -15,7 +15,7 @@ from eigenshape.deformation.rigidity import (
     free_part,
     relax,
 )
-from eigenshape.deformation.rigidity_loops import fit_rotations, turned_edges
+from eigenshape.deformation.rigidity_loops import fit_rotations, turn_edges
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
 from eigenshape.geometry.union import disjoint_union
@@ -158,7 +158,7 @@ def test_turned_edges_are_the_sum_that_they_say():
     turns = np.roll(Turn.random(42, random_state=RNG).as_quat(), 1, axis=1)
     spin = Turn.from_quat(np.roll(turns, -1, axis=1)).as_matrix() - np.eye(3)
     found = np.empty((42, 3))
-    turned_edges(
+    turn_edges(
         np.arange(42), edges.starts, edges.others, edges.weights, mesh.vertices, turns, found
     )
     dense = -edges.matrix.toarray()

@@ -9,7 +9,7 @@ from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.cloud_measure import _cell_volume, _cell_volumes, cloud_quadrature
 from eigenshape.geometry.measure import surface_area
 from eigenshape.shapes.domains import disc
-from eigenshape.shapes.spheres import fibonacci_sphere, graded_sphere, random_sphere, three_sphere
+from eigenshape.shapes.spheres import fibonacci_sphere, random_sphere, three_sphere, uneven_sphere
 
 
 @settings(max_examples=40, deadline=None)
@@ -32,7 +32,7 @@ def test_a_disc_has_its_area_up_to_the_rim():
     ("mesh", "lost", "spread"),
     [
         (fibonacci_sphere(2000), 1e-3, 2e-3),
-        (graded_sphere(2000), 1e-3, 3e-3),
+        (uneven_sphere(2000), 1e-3, 3e-3),
         (random_sphere(2000, rng=np.random.default_rng(0)), 1e-3, 0.01),
     ],
 )

@@ -10,7 +10,7 @@ from tetrahedra import FACES, FILES, TETRAHEDRON, VERTICES, read
 from eigenshape import FileFormatError, InvalidShapeError, TriangleMesh, read_mesh, write_mesh
 from eigenshape.geometry import enclosed_volume
 from eigenshape.io.glb import format_mesh, parse
-from eigenshape.io.gltf import Gltf, placed_triangles
+from eigenshape.io.gltf import Gltf, place_triangles
 
 GOOD = FILES["glb"][1]
 
@@ -232,11 +232,11 @@ def test_copies_are_bounded(copied):
         tree["nodes"] *= 10
     else:
         tree["meshes"][0]["primitives"] *= 10
-    assert len(placed_triangles(Gltf(tree, [binary], most=100))[1]) == 40
+    assert len(place_triangles(Gltf(tree, [binary], most=100))[1]) == 40
     with pytest.raises(
         FileFormatError, match="must stay within 50 vertices and faces; its copies make more"
     ):
-        placed_triangles(Gltf(tree, [binary], most=50))
+        place_triangles(Gltf(tree, [binary], most=50))
 
 
 def test_not_finite_coordinates_are_refused(tmp_path):

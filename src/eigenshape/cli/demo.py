@@ -10,7 +10,7 @@ import typer
 import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
-from eigenshape.cli.console import out, progress_bar, shown
+from eigenshape.cli.console import escape_text, out, progress_bar
 from eigenshape.cli.index import WorkersOption
 from eigenshape.cli.inputs import PATCHES
 from eigenshape.cli.query import print_matches
@@ -54,7 +54,7 @@ def demo(
     ).mesh
     es.write_mesh(scan, scan_path)
     out.print(
-        f"scanned a {kind} from one side, in a pose that the index has not seen: {shown(scan_path)}"
+        f"scanned a {kind} from one side, in a pose that the index has not seen: {escape_text(scan_path)}"
     )
     shape = steps.color_query(scan, recipe)
     matches = shelf.query(shape.descriptor, n_matches=6)
@@ -65,7 +65,7 @@ def demo(
         f"A partial scan of a {kind} in a new pose, and the most similar shapes ({steps.CAPTION})"
     )
     steps.save_picture(steps.contact_sheet(shape, "partial scan", matches, caption=caption), sheet)
-    out.print(NEXT.format(scan=shown(scan_path)))
+    out.print(NEXT.format(scan=escape_text(scan_path)))
 
 
 def _make(folder: Path) -> list[es.retrieval.Item]:
@@ -84,5 +84,7 @@ def _make(folder: Path) -> list[es.retrieval.Item]:
                     es.make_creature(item.label or "", done % POSES, n_vertices=N_VERTICES),
                     item.path,
                 )
-    out.print(f"made {len(CREATURES)} kinds of creatures in {POSES} poses each: {shown(folder)}")
+    out.print(
+        f"made {len(CREATURES)} kinds of creatures in {POSES} poses each: {escape_text(folder)}"
+    )
     return items

@@ -9,7 +9,7 @@ import typer
 
 import eigenshape as es
 from eigenshape.cli import steps
-from eigenshape.cli.console import out, print_json, shown
+from eigenshape.cli.console import escape_text, out, print_json
 from eigenshape.cli.inputs import (
     PATCHES,
     JsonOption,
@@ -81,4 +81,4 @@ def _print(shelf: es.ShapeIndex, report: es.retrieval.BatchReport) -> None:
         f"the index holds {len(shelf)} shapes."
     )
     for name, reason in report.failed:
-        out.print(f"  [yellow]{shown(name)}[/]: {shown(reason)}")
+        out.print(f"  [yellow]{escape_text(name)}[/]: {escape_text(reason)}")

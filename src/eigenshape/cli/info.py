@@ -3,7 +3,7 @@
 from typing import Any
 
 from eigenshape.cli import steps
-from eigenshape.cli.console import out, print_json, shown
+from eigenshape.cli.console import escape_text, out, print_json
 from eigenshape.cli.inputs import (
     CellsOption,
     DimOption,
@@ -29,16 +29,16 @@ def info(
     if as_json:
         print_json({"path": str(shape), **facts})
         return
-    out.print(f"[bold]{shown(shape)}[/]")
+    out.print(f"[bold]{escape_text(shape)}[/]")
     for name, value in facts.items():
-        out.print(f"  {name.replace('_', ' '):<24}{_shown(value)}")
+        out.print(f"  {name.replace('_', ' '):<24}{_format(value)}")
 
 
-def _shown(value: Any) -> str:
+def _format(value: Any) -> str:
     if value is None:
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, list):
-        return ", ".join(_shown(item) for item in value) or "none"
+        return ", ".join(_format(item) for item in value) or "none"
     return f"{value:.6g}" if isinstance(value, float) else str(value)

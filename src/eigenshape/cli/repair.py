@@ -7,7 +7,7 @@ import typer
 
 import eigenshape as es
 from eigenshape.cli import steps
-from eigenshape.cli.console import err, print_json, print_table, shown
+from eigenshape.cli.console import err, escape_text, print_json, print_table
 from eigenshape.cli.inputs import CellsOption, JsonOption, MeshArgument, repair_names
 from eigenshape.geometry.repair_names import MESH_REPAIRS
 
@@ -48,19 +48,19 @@ def repair(
     before = es.read_mesh(mesh, cells=cells)
     done = es.repair(before, chosen)
     for line in done.report:
-        err.print(f"[yellow]repair:[/] {shown(line)}")
+        err.print(f"[yellow]repair:[/] {escape_text(line)}")
     facts = {"before": steps.mesh_facts(before), "after": steps.mesh_facts(done.mesh)}
     steps.save_like(mesh, done.mesh, output)
     if as_json:
         print_json({"path": str(mesh), "output": str(output), "report": list(done.report), **facts})
         return
     rows = [
-        [name.replace("_", " "), *(_shown(fact[name]) for fact in facts.values())] for name in ROWS
+        [name.replace("_", " "), *(_format(fact[name]) for fact in facts.values())] for name in ROWS
     ]
     print_table("RepairedMesh", ["", *facts], rows)
 
 
-def _shown(value: bool | int) -> str:
+def _format(value: bool | int) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:,}"

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from scipy.linalg import cho_solve
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import finite_rows, frozen, whole_number
+from eigenshape._arrays import finite_rows, freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape._threads import one_blas_thread
@@ -68,7 +68,7 @@ class EigenRig:
     @cached_property
     def components(self) -> Int[np.ndarray, " n"]:
         """Component of each vertex, (n,) int."""
-        return frozen(vertex_components(self.mesh)[1])
+        return freeze(vertex_components(self.mesh)[1])
 
 
 def rig_shape(
@@ -132,8 +132,8 @@ def rig_shape(
         # Φ = QR gives ΦᵀΦ = RᵀR, without the squared condition number of forming ΦᵀΦ.
         factor = np.asarray(np.linalg.qr(modes, mode="r")).T
     edges = edge_weights(laplacian.stiffness)
-    areas = frozen(spectrum.mass @ np.ones(len(modes)))
-    return EigenRig(mesh, modes, spectrum.eigenvalues, areas, frozen(factor), edges)
+    areas = freeze(spectrum.mass @ np.ones(len(modes)))
+    return EigenRig(mesh, modes, spectrum.eigenvalues, areas, freeze(factor), edges)
 
 
 def pose_rig(rig: EigenRig, vertices: ArrayLike) -> EigenRig:

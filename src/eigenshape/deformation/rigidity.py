@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._threads import one_blas_thread
-from eigenshape.deformation.rigidity_loops import fit_rotations, turned_edges
+from eigenshape.deformation.rigidity_loops import fit_rotations, turn_edges
 from eigenshape.sparse.elimination import SymmetricFactor, analyse, factorise
 
 Points = Float[np.ndarray, "n 3"]
@@ -217,7 +217,7 @@ def relax(
             if least - energy <= ENERGY_TOLERANCE * energy and len(steps) > 1:
                 break
             least = energy
-            turned_edges(free, *links, rest, turns, sums)
+            turn_edges(free, *links, rest, turns, sums)
             # Solved for displacements, so that vertices without rotation or pull do not move.
             solved = rest[free] + part.factor.solve(sums + force, scratch)
             steps.append((solved - tried, solved))

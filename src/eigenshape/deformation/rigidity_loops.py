@@ -122,7 +122,7 @@ def _settle(covariance, turns, i):
 
 @njit
 @no_type_check
-def turned_edges(vertices, starts, others, weights, rest, turns, sums):
+def turn_edges(vertices, starts, others, weights, rest, turns, sums):
     """Write Σ_j w_ij ((R_i + R_j)/2 - 1) (x_i - x_j) for some vertices; nothing where nothing turns."""
     n = len(starts) - 1
     spin = np.empty((n, 9))

@@ -12,7 +12,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.distortion import require_poses
 from eigenshape.deformation.rigidity import edge_weights, fit_turns, free_part, nearest_rotations
-from eigenshape.deformation.rigidity_loops import turned_edges
+from eigenshape.deformation.rigidity_loops import turn_edges
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes, size_one
@@ -133,7 +133,7 @@ def _turn_edges(target: TriangleMesh, turns: Turns) -> Float[np.ndarray, "n 3"]:
     part = free_part(edges, fixed)
     sums = np.empty((len(part.free), 3))
     spins = np.roll(Rotation.from_matrix(turns).as_quat(), 1, axis=1)
-    turned_edges(part.free, edges.starts, edges.others, edges.weights, target.vertices, spins, sums)
+    turn_edges(part.free, edges.starts, edges.others, edges.weights, target.vertices, spins, sums)
     found = target.vertices.copy()
     if part.factor is not None:
         found[part.free] += part.factor.solve(sums)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import frozen, vertex_values
+from eigenshape._arrays import freeze, vertex_values
 from eigenshape._typing import ArrayLike
 from eigenshape.features.loops import extended_loops
 from eigenshape.features.union_loops import join_points
@@ -160,4 +160,4 @@ def _sort_pairs(
     births, deaths = height[vertices].T
     order = np.lexsort((vertices[:, 1], vertices[:, 0], -np.abs(births - deaths)))
     sorted_columns = (*vertices[order].T, births[order], deaths[order])
-    return PersistencePairs(*(frozen(column) for column in sorted_columns))
+    return PersistencePairs(*(freeze(column) for column in sorted_columns))

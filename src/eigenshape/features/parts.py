@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import frozen, whole_number
+from eigenshape._arrays import freeze, whole_number
 from eigenshape._progress import Progress
 from eigenshape.features.boundaries import CONCAVITY, smooth_boundaries
 from eigenshape.features.contrast import PART_CONTRAST
@@ -126,7 +126,7 @@ def find_parts(
     tree = part_tree(outward, spectrum)
     heat = heat_kernel_signature(spectrum, [SEED_TIME * float(spectrum.mass.sum())])[:, 0]
     parts = smooth_boundaries(outward, segment(tree, persistence=PART_CONTRAST))
-    return PartDecomposition(outward, spectrum, frozen(heat), tree, parts)
+    return PartDecomposition(outward, spectrum, freeze(heat), tree, parts)
 
 
 def part_spectrum(

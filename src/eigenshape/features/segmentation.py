@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import frozen, whole_number
+from eigenshape._arrays import freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.features.region_tree import MergeTree, PartTree, merge_regions
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -134,11 +134,11 @@ def segment(
     kept = np.flatnonzero(~ends)
     regions = merge_regions(np.maximum(tree.parent, 0), ends)[tree.basins]
     features = FeaturePoints(
-        vertices=frozen(tree.maxima[kept]),
-        values=frozen(tree.values[kept]),
-        persistence=frozen(tree.persistence[kept]),
+        vertices=freeze(tree.maxima[kept]),
+        values=freeze(tree.values[kept]),
+        persistence=freeze(tree.persistence[kept]),
     )
-    return Segmentation(frozen(np.searchsorted(kept, regions)), features)
+    return Segmentation(freeze(np.searchsorted(kept, regions)), features)
 
 
 def _above_largest_gap(tree: Tree) -> float:

@@ -77,15 +77,15 @@ def face_turns(mesh: TriangleMesh) -> FaceTurns:
     return FaceTurns(turned, np.minimum(as_is, over), as_is != over)
 
 
-def with_turned_faces(mesh: TriangleMesh, turned: Bool[np.ndarray, " f"]) -> TriangleMesh:
+def turn_faces(mesh: TriangleMesh, turned: Bool[np.ndarray, " f"]) -> TriangleMesh:
     """Return the mesh with some faces turned over; the mesh itself if there are none."""
     if not turned.any():
         return mesh
     return TriangleMesh(mesh.vertices, np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces))
 
 
-def consistently_oriented(mesh: TriangleMesh) -> TriangleMesh:
+def orient_consistently(mesh: TriangleMesh) -> TriangleMesh:
     """Return the mesh with faces turned so that neighbors agree; the mesh itself if they do."""
     if not len(inconsistent_edges(mesh)):
         return mesh
-    return with_turned_faces(mesh, face_turns(mesh).turned)
+    return turn_faces(mesh, face_turns(mesh).turned)

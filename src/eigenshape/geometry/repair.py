@@ -147,7 +147,7 @@ def repair(shape: ShapeLike, names: Sequence[str]) -> RepairedMesh[Any] | Repair
             source = done.source_points[step.source_points]
             done = RepairedCloud(step.cloud, done.report + step.report, source)
         return done
-    result = _unchanged(shape)
+    result = _start_report(shape)
     for name in names:
         result = _combine(result, REPAIRS[name](result.mesh))
     return result
@@ -201,7 +201,7 @@ def suggest_repairs(shape: ShapeLike) -> tuple[str, ...]:
 
 def _until_sound(mesh: MeshT, names: Sequence[str]) -> tuple[RepairedMesh[MeshT], tuple[str, ...]]:
     """Apply repairs in turn until none changes the mesh; return the result and what was applied."""
-    done = _unchanged(mesh)
+    done = _start_report(mesh)
     applied: list[str] = []
     known = names_of_repairs(mesh)
     n_before = -1
@@ -219,7 +219,7 @@ def _until_sound(mesh: MeshT, names: Sequence[str]) -> tuple[RepairedMesh[MeshT]
     return done, tuple(applied)
 
 
-def _unchanged(mesh: MeshT) -> RepairedMesh[MeshT]:
+def _start_report(mesh: MeshT) -> RepairedMesh[MeshT]:
     return RepairedMesh(mesh, (), np.arange(mesh.n_points))
 
 

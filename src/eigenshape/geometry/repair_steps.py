@@ -12,7 +12,7 @@ from eigenshape._arguments import require_type
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
-from eigenshape.geometry.face_turns import with_turned_faces
+from eigenshape.geometry.face_turns import turn_faces
 from eigenshape.geometry.flat_faces import flip_flat_faces
 from eigenshape.geometry.holes import triangulate_holes
 from eigenshape.geometry.measure import area_vectors
@@ -356,7 +356,7 @@ def orient(mesh: MeshLike) -> RepairedMesh[TriangleMesh]:
         names = ", ".join(map(str, first[:9]))
         report += f", left {count_nouns(len(first), 'piece')} with one side only, of face {names}"
         report += " and others" if len(first) > 9 else ""
-    return RepairedMesh(with_turned_faces(mesh, turned), (report,), np.arange(mesh.n_vertices))
+    return RepairedMesh(turn_faces(mesh, turned), (report,), np.arange(mesh.n_vertices))
 
 
 def largest_component(mesh: MeshLike) -> RepairedMesh[TriangleMesh]:

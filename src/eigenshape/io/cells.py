@@ -46,7 +46,7 @@ def require_splittable(others: Sequence[str]) -> None:
         )
 
 
-def chosen_cells(blocks: Blocks, cells: CellKind | None) -> Int[np.ndarray, "s corners"]:
+def select_cells(blocks: Blocks, cells: CellKind | None) -> Int[np.ndarray, "s corners"]:
     """Return the simplices that are to be read; quads become two triangles each, of shape (0, 3) where there is none.
 
     "quads" takes the triangles that lie between them, too.

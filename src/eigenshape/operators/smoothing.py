@@ -8,7 +8,7 @@ from eigenshape._arrays import positive_values
 from eigenshape._errors import InvalidShapeError
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.face_turns import consistently_oriented
+from eigenshape.geometry.face_turns import orient_consistently
 from eigenshape.geometry.facets import boundary_facets
 from eigenshape.geometry.measure import edge_lengths, mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -60,7 +60,7 @@ def noise_level(mesh: MeshLike) -> float:
     if not inside.any():
         return 0.0
     away = links[inside] @ points / degrees[inside, None] - points[inside]
-    normals = mean_normals(consistently_oriented(unit))[inside]  # which side is out does not matter
+    normals = mean_normals(orient_consistently(unit))[inside]  # which side is out does not matter
     heights = np.abs(np.einsum("ni,ni->n", away, normals))
     return float(np.median(heights) / edge_lengths(unit).mean())
 

@@ -138,12 +138,12 @@ def figure_field(
     axes = figure.subplots()
     scale, colors = Normalize(float(values.min()), float(values.max())), mpl.colormaps[color_map]
     camera = camera or three_quarter_view(mesh)
-    show(axes, draw(mesh, camera, vertex_colors=mapped(values, scale, colors)))
+    show(axes, draw(mesh, camera, vertex_colors=map_colors(values, scale, colors)))
     figure.colorbar(ScalarMappable(scale, colors), ax=axes, shrink=0.8).set_label(label)
     return figure
 
 
-def mapped(
+def map_colors(
     values: Float[np.ndarray, " n"], scale: Normalize, colors: Colormap
 ) -> Float[np.ndarray, "n 3"]:
     """Return the color of each value."""
@@ -271,7 +271,7 @@ def value_colors(
     [[0, 0, 0], [128, 128, 128], [255, 255, 255]]
     """
     return _bytes(
-        mapped(
+        map_colors(
             values, Normalize(float(values.min()), float(values.max())), mpl.colormaps[color_map]
         )
     )

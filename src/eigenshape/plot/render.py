@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._threads import one_blas_thread
-from eigenshape.geometry.face_turns import consistently_oriented
+from eigenshape.geometry.face_turns import orient_consistently
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import boundary_edges
@@ -82,7 +82,7 @@ def draw(
     if zero_set_of is not None:
         ink |= _changes(np.sign(_blend(zero_set_of[:, None], mesh, raster)[..., 0]), raster)
     seen = raster.face >= 0
-    shaded = np.where((_thickened(ink) & seen)[..., None], INK, shaded)
+    shaded = np.where((_thicken(ink) & seen)[..., None], INK, shaded)
     image = np.concatenate([np.clip(shaded, 0, 1), seen[..., None].astype(np.float64)], axis=2)
     return Drawing(_shrunk(image), points[:, :2] / FINER, _visible(points, raster))
 
@@ -111,7 +111,7 @@ def _blend(
 
 
 def _brightness(mesh: TriangleMesh, camera: Camera, raster: Raster) -> Float[np.ndarray, "h w"]:
-    normals = _blend(mean_normals(consistently_oriented(mesh)) @ camera.rotation.T, mesh, raster)
+    normals = _blend(mean_normals(orient_consistently(mesh)) @ camera.rotation.T, mesh, raster)
     normals = normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-12)
     normals = np.where(
         normals[..., 2:] < 0, -normals, normals
@@ -163,7 +163,7 @@ def _pixels(
     return column, row
 
 
-def _thickened(ink: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:
+def _thicken(ink: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:
     radius = int(np.ceil(LINE * FINER / 2 - 0.5))
     thick = ink.copy()
     for down in range(-radius, radius + 1):

@@ -7,7 +7,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from eigenshape._arrays import frozen
+from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape.spectral.archive import read_archive, write_archive
 from eigenshape.spectral.certificate import Certificate
@@ -100,7 +100,7 @@ class Spectrum:
         """
         parts = read_archive(path, key)
         arrays = {
-            name: frozen(parts[name]) for name in ("eigenvalues", "eigenvectors", "residuals")
+            name: freeze(parts[name]) for name in ("eigenvalues", "eigenvectors", "residuals")
         }
         return cls(**arrays, mass=parts["mass"], certificate=parts["certificate"])
 

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import finite_rows, frozen
+from eigenshape._arrays import finite_rows, freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -222,10 +222,10 @@ def _closeness(
     largest = {name: _largest(part) for name, part in parts.items()}
     limit = max(largest, key=lambda name: largest[name])
     return Closeness(
-        displacement=frozen(displacement),
-        jacobians=frozen(jacobians),
-        radii=frozen(radii),
-        volume_ratios=frozen(volume_ratios),
+        displacement=freeze(displacement),
+        jacobians=freeze(jacobians),
+        radii=freeze(radii),
+        volume_ratios=freeze(volume_ratios),
         size=size,
         delta=largest[limit],
         limited_by=limit if largest[limit] else "nothing",

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import as_array, frozen
+from eigenshape._arrays import as_array, freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -118,7 +118,7 @@ def measure_perturbation(
     labels_one = _check_labels(regions_one, one, "regions_one")
     labels_two = _check_labels(regions_two, two, "regions_two")
     _require_same_regions(labels_one, labels_two)
-    found = Perturbation(one, two, frozen(labels_one), frozen(labels_two))
+    found = Perturbation(one, two, freeze(labels_one), freeze(labels_two))
     _require_rims(found, vertex_pairs(found))
     return found
 

@@ -48,7 +48,7 @@ def parse_region(text: str, mesh: TriangleMesh, progress: Progress) -> Region:
     if all(conditions):
         return _box([found for found in conditions if found], mesh)
     if Path(text).is_file():
-        return _listed(Path(text))
+        return _read_list(Path(text))
     raise InvalidParameterError(f"A region is one of these: {REGIONS} It is {text!r}.")
 
 
@@ -69,7 +69,7 @@ def _part(mesh: TriangleMesh, number: int, progress: Progress) -> Region:
     return np.unique(mesh.faces[labels == number])
 
 
-def _listed(path: Path) -> Region:
+def _read_list(path: Path) -> Region:
     try:
         return np.array([int(line) for line in path.read_text().split()], dtype=np.int64)
     except ValueError as err:

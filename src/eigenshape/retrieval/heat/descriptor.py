@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import frozen
+from eigenshape._arrays import freeze
 from eigenshape.retrieval.heat.recipe import HeatRecipe
 
 
@@ -31,5 +31,5 @@ class HeatDescriptor:
     recipe: HeatRecipe
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "vectors", frozen(self.vectors))
-        object.__setattr__(self, "vertices", frozen(self.vertices))
+        object.__setattr__(self, "vectors", freeze(self.vectors))
+        object.__setattr__(self, "vertices", freeze(self.vertices))

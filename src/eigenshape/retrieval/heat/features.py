@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import frozen, vertex_values
+from eigenshape._arrays import freeze, vertex_values
 from eigenshape._progress import Progress
 from eigenshape._typing import ArrayLike
 from eigenshape.features.merge_tree import merge_tree
@@ -198,7 +198,7 @@ def find_heat_features(
     n_fragments = int(np.isin(tree.maxima, shape.fragments).sum())
     parts = segment(tree, n_regions=recipe.n_features + n_fragments)
     on_fragment = np.isin(parts.features.vertices, shape.fragments)
-    parts = _reordered(parts, np.argsort(on_fragment, kind="stable"))
+    parts = _reorder_parts(parts, np.argsort(on_fragment, kind="stable"))
 
     n_described = min(max(recipe.n_features, shape.n_components), int((~on_fragment).sum()))
     descriptor = _descriptor(heat.later, parts.features.vertices[:n_described], recipe, unit)
@@ -353,11 +353,11 @@ def _unit_and_times(area: float, recipe: HeatRecipe) -> tuple[float, Float[np.nd
     return unit, unit * recipe.time_unit * np.array([recipe.feature_scale, *recipe.scales])
 
 
-def _reordered(parts: Segmentation, order: Int[np.ndarray, " m"]) -> Segmentation:
+def _reorder_parts(parts: Segmentation, order: Int[np.ndarray, " m"]) -> Segmentation:
     features, number = parts.features, np.argsort(order)
     columns = (features.vertices, features.values, features.persistence)
     return Segmentation(
-        frozen(number[parts.labels]), FeaturePoints(*(frozen(column[order]) for column in columns))
+        freeze(number[parts.labels]), FeaturePoints(*(freeze(column[order]) for column in columns))
     )
 
 

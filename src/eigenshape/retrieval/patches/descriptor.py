@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float32, Int, Int8
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import frozen
+from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook, encode_patches
@@ -116,7 +116,7 @@ def patch_descriptor(patches: Sequence[Patches], recipe: PatchRecipe) -> PatchDe
     with one_blas_thread():
         codes = np.stack([rounded_codes(encode_patches(each, recipe.codebook)) for each in patches])
         points = tuple(patch_points(each, recipe.codebook) for each in patches)
-    return PatchDescriptor(frozen(codes), points, recipe)
+    return PatchDescriptor(freeze(codes), points, recipe)
 
 
 def rounded_codes(codes: Float32[np.ndarray, "*k v"]) -> Int8[np.ndarray, "*k v"]:

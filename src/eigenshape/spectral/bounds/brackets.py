@@ -6,7 +6,7 @@ from typing import SupportsIndex
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import frozen, whole_number
+from eigenshape._arrays import freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape._threads import one_blas_thread
@@ -180,8 +180,8 @@ def bracket_eigenvalues(
     if progress:
         progress(1.0, "bracketed")
     return Brackets(
-        lower=frozen(in_length(lower, scale, -2)),
-        upper=frozen(in_length(upper, scale, -2)),
+        lower=freeze(in_length(lower, scale, -2)),
+        upper=freeze(in_length(upper, scale, -2)),
         boundary=boundary,
         n_zero=n_zero,
         longest_edge=scale * float(longest_edges(unit).max()),

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import frozen, whole_numbers
+from eigenshape._arrays import freeze, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
@@ -153,11 +153,11 @@ def eigenspace_angles(
         for end in ("start", "stop")
     )
     return EigenspaceAngles(
-        starts=frozen(starts),
-        stops=frozen(stops),
-        angles=frozen(angles),
-        gaps=frozen(np.minimum(steps[starts], steps[stops])),
-        bounds=None if exact is None else frozen(bounds),
+        starts=freeze(starts),
+        stops=freeze(stops),
+        angles=freeze(angles),
+        gaps=freeze(np.minimum(steps[starts], steps[stops])),
+        bounds=None if exact is None else freeze(bounds),
     )
 
 

@@ -8,7 +8,7 @@ import scipy.linalg as sl
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import as_array, frozen, real_numbers, whole_number
+from eigenshape._arrays import as_array, freeze, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
@@ -82,7 +82,7 @@ class FunctionalMap:
             raise InvalidParameterError(
                 f"The matrix of a map must be finite; entry {bad[0].tolist()} is not."
             )
-        object.__setattr__(self, "matrix", frozen(self.matrix))
+        object.__setattr__(self, "matrix", freeze(self.matrix))
 
 
 def require_one_constant(spectrum: Spectrum, name: str) -> None:
