@@ -83,7 +83,7 @@ def measure_distortion(before: MeshLike, after: MeshLike) -> Distortion:
     change = edge_lengths(new) - lengths
     low, high = bounding_box(old)
     normals, turned = (area_vectors(mesh.vertices[mesh.faces]) for mesh in (old, new))
-    edges = edge_weights(cotangent_laplacian(old).stiffness)
+    edges = edge_weights(old, cotangent_laplacian(old).stiffness)
     turns = fit_turns(edges, old.vertices, new.vertices)[old.faces]
     # Scalar product of the new normal with the old one, turned by the rotation of each corner.
     away = np.einsum("fcij,fj,fi->f", turns, normals, turned) < 0

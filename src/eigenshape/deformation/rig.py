@@ -131,7 +131,7 @@ def rig_shape(
     with one_blas_thread():
         # Φ = QR gives ΦᵀΦ = RᵀR, without the squared condition number of forming ΦᵀΦ.
         factor = np.asarray(np.linalg.qr(modes, mode="r")).T
-    edges = edge_weights(laplacian.stiffness)
+    edges = edge_weights(mesh, laplacian.stiffness)
     areas = freeze(spectrum.mass @ np.ones(len(modes)))
     return EigenRig(mesh, modes, spectrum.eigenvalues, areas, freeze(factor), edges)
 

@@ -99,7 +99,7 @@ def transfer_deformation(
     wanted = mapping.matrix.shape[1] if n_modes is None else n_modes
     k = whole_number(wanted, "n_modes", 1, mapping.matrix.shape[1])
     few = FunctionalMap(mapping.matrix[:, :k], mapping.source, mapping.target)
-    weights = edge_weights(cotangent_laplacian(before).stiffness)
+    weights = edge_weights(before, cotangent_laplacian(before).stiffness)
     turns = fit_turns(weights, before.vertices, after.vertices)
     # A mean of rotations is no rotation: take the nearest one.
     carried = nearest_rotations(transfer_function(few, turns.reshape(-1, 9)).reshape(-1, 3, 3))
@@ -127,7 +127,8 @@ def _center(
 
 def _turn_edges(target: TriangleMesh, turns: Turns) -> Float[np.ndarray, "n 3"]:
     """Return the vertices of the target with its edges turned, and its center unchanged."""
-    edges, areas = edge_weights(cotangent_laplacian(target).stiffness), dual_volumes(target)
+    edges = edge_weights(target, cotangent_laplacian(target).stiffness)
+    areas = dual_volumes(target)
     # The equations know edges alone: vertex 0 is fixed, and the center is restored below.
     fixed = np.arange(target.n_vertices) == 0
     part = free_part(edges, fixed)
