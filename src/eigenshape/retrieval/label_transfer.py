@@ -8,8 +8,7 @@ from jaxtyping import Float, Int
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
-from eigenshape._arrays import as_array, frozen
-from eigenshape._errors import InvalidParameterError
+from eigenshape._arrays import face_labels, frozen
 from eigenshape._progress import Progress
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
@@ -125,12 +124,7 @@ def transfer_labels(
     """
     source = as_mesh(source, "source")
     target = as_mesh(target, "target")
-    labels = as_array(labels, "labels")
-    if labels.shape != (source.n_faces,) or labels.dtype.kind not in "iu":
-        raise InvalidParameterError(
-            f"labels must hold one integer for each of the {source.n_faces} faces; they have shape "
-            f"{labels.shape} and type {labels.dtype}."
-        )
+    labels = face_labels(labels, "labels", source.n_faces)
     found = find_parts(source, progress=partly(progress, 0, 0.25))
     source_parts = found.parts if n_parts is None else _cut(found, n_parts)
     found = find_parts(target, progress=partly(progress, 0.25, 0.5))

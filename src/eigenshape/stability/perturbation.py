@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import as_array, frozen
+from eigenshape._arrays import face_labels, frozen
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -166,13 +166,7 @@ def _check_labels(regions: ArrayLike | None, mesh: Mesh, name: str) -> Labels:
     n = len(mesh.simplices)
     if regions is None:
         return np.full(n, OUTSIDE)
-    labels = as_array(regions, name)
-    if labels.shape != (n,) or labels.dtype.kind not in "iu":
-        raise InvalidParameterError(
-            f"{name} must hold one whole number per face, shape ({n},); "
-            f"it has shape {labels.shape} and type {labels.dtype}."
-        )
-    labels = labels.astype(np.int64)
+    labels = face_labels(regions, name, n).astype(np.int64)
     wrong = np.flatnonzero((labels < OUTSIDE) | (labels >= n))
     if wrong.size:
         raise InvalidParameterError(
