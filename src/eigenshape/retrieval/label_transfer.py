@@ -10,6 +10,7 @@ from scipy.spatial.distance import cdist
 
 from eigenshape._arrays import face_labels, frozen
 from eigenshape._progress import Progress
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.features.boundaries import smooth_boundaries
@@ -60,6 +61,8 @@ class LabelTransfer:
     matches: Int[np.ndarray, " m"]
     part_labels: Int[np.ndarray, " m"]
     confidence: Float[np.ndarray, " m"]
+
+    __repr__ = short_repr
 
 
 @one_blas_thread()

@@ -8,6 +8,7 @@ from jaxtyping import Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import face_labels, frozen
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import facet_table
@@ -45,6 +46,8 @@ class Perturbation:
     two: Mesh
     regions_one: Labels
     regions_two: Labels
+
+    __repr__ = short_repr
 
     @property
     def n_regions(self) -> int:

@@ -8,6 +8,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._arrays import frozen
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import short_repr
 
 # Scales are a geometric sequence if the steps of their logarithms differ by less than this.
 EQUAL_STEPS = 1e-9
@@ -121,6 +122,8 @@ class HeatDescriptor:
     vectors: Float[np.ndarray, "m q"]
     vertices: Int[np.ndarray, " m"]
     recipe: HeatRecipe
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vectors", frozen(self.vectors))
