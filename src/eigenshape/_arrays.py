@@ -169,6 +169,17 @@ def vertex_values(value: ArrayLike, name: str, n_vertices: int) -> NDArray[np.fl
     return values
 
 
+def face_labels(value: ArrayLike, name: str, n_faces: int) -> NDArray[Any]:
+    """Return `value` as an array with one whole number per face, of any integer type."""
+    labels = as_array(value, name)
+    if labels.shape != (n_faces,) or labels.dtype.kind not in "iu":
+        raise InvalidParameterError(
+            f"{name} must hold one whole number per face, shape ({n_faces},); "
+            f"the shape is {labels.shape} and the type {labels.dtype}."
+        )
+    return labels
+
+
 def _require_finite(values: NDArray[np.float64], name: str) -> None:
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:

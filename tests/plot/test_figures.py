@@ -5,7 +5,13 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.plot.camera import in_picture, three_quarter_view
-from eigenshape.plot.fields import figure_eigenfunctions, figure_field, figure_segments
+from eigenshape.plot.fields import (
+    figure_eigenfunctions,
+    figure_field,
+    figure_segments,
+    part_colors,
+    value_colors,
+)
 from eigenshape.plot.render import AMBIENT, INK, draw, palette
 from eigenshape.plot.save import save_figure
 from eigenshape.plot.sheet import Panel, figure_contact_sheet
@@ -160,3 +166,31 @@ def test_files_are_whole_repeatable_and_of_a_known_kind(tmp_path):
         InvalidParameterError, match="A picture must be written to a folder that exists"
     ):
         save_figure(figure, tmp_path / "nowhere" / "one.png")
+
+
+def test_figures_take_lists_and_refuse_what_does_not_fit_the_mesh():
+    mesh = icosphere(1)  # 42 vertices, 80 faces
+    found = solve_spectrum(cotangent_laplacian(mesh), 4)
+    assert figure_eigenfunctions(mesh, found, 2).axes[0].get_title().startswith("φ$_{2}$")
+    with pytest.raises(InvalidParameterError, match=r"An index must lie in 0\.\.3; it is 4"):
+        figure_eigenfunctions(mesh, found, [1, 4])
+    with pytest.raises(InvalidParameterError, match="at least one eigenfunction"):
+        figure_eigenfunctions(mesh, found, [])
+    with pytest.raises(InvalidParameterError, match=r"which has 162 vertices; .* have 42 entries"):
+        figure_eigenfunctions(icosphere(2), found, [1])
+
+    assert figure_field(mesh, list(range(42))).axes[-1].get_ylim() == (0, 41)
+    with pytest.raises(InvalidParameterError, match=r"one number per vertex.*shape is \(42, 3\)"):
+        figure_field(mesh, mesh.vertices)
+
+    halves = [0] * 40 + [1] * 40
+    assert figure_segments(mesh, halves).axes[0].get_title() == "2 parts"
+    assert part_colors(mesh, halves).shape == (42, 3)
+    for draw_parts in (figure_segments, part_colors):
+        with pytest.raises(InvalidParameterError, match=r"per face, shape \(80,\); .* \(42,\)"):
+            draw_parts(mesh, [0] * 42)
+    with pytest.raises(InvalidParameterError, match=r"A feature point must lie in 0\.\.41"):
+        figure_segments(mesh, halves, [42])
+
+    with pytest.raises(InvalidParameterError, match="values must be finite; entry 1 is nan"):
+        value_colors([0.0, np.nan])

@@ -96,6 +96,6 @@ def test_one_label_a_face_is_asked_for():
     ball = icosphere(1)
     with pytest.raises(
         InvalidParameterError,
-        match=r"labels must hold one integer for each of the 80 faces; they have shape \(79,\)",
+        match=r"labels must hold one whole number per face, shape \(80,\); the shape is \(79,\)",
     ):
         transfer_labels(ball, np.zeros(79, dtype=np.int64), ball)

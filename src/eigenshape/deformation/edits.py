@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from eigenshape._arguments import describe_value, require_each, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
+from eigenshape._text import short_repr
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import bend
 from eigenshape.deformation.handles import Handle, Rotation, Translation
@@ -75,6 +76,8 @@ class Move:
     region: Region
     handle: Handle
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         require_type(self.handle, Handle, "handle")
         object.__setattr__(self, "region", copy_region(self.region))
@@ -109,6 +112,8 @@ class Edit:
     fixed: Region | None = None
     n_modes: int | None = None
     mode: Mode = "graded"
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         require_each(self.moves, Move, "moves")

@@ -47,7 +47,7 @@ def merge_tree(mesh: MeshLike, values: ArrayLike) -> MergeTree:
 
     Examples
     --------
-    -------- A strip of eight triangles, and a function with two ridges of heights 2 and 3 and a
+    A strip of eight triangles, and a function with two ridges of heights 2 and 3 and a
     valley of height 1 between:
 
     >>> import eigenshape as es

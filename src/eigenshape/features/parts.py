@@ -7,6 +7,7 @@ from jaxtyping import Float
 
 from eigenshape._arrays import freeze, whole_number
 from eigenshape._progress import Progress
+from eigenshape._text import short_repr
 from eigenshape.features.boundaries import CONCAVITY, smooth_boundaries
 from eigenshape.features.contrast import PART_CONTRAST
 from eigenshape.features.part_merging import SEED_TIME, part_tree
@@ -56,6 +57,8 @@ class PartDecomposition:
     heat: Float[np.ndarray, " n"]
     tree: PartTree
     parts: Segmentation
+
+    __repr__ = short_repr
 
 
 def find_parts(

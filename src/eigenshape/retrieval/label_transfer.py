@@ -8,9 +8,9 @@ from jaxtyping import Float, Int
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
-from eigenshape._arrays import as_array, freeze
-from eigenshape._errors import InvalidParameterError
+from eigenshape._arrays import face_labels, freeze
 from eigenshape._progress import Progress
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.features.boundaries import smooth_boundaries
@@ -61,6 +61,8 @@ class LabelTransfer:
     matches: Int[np.ndarray, " m"]
     part_labels: Int[np.ndarray, " m"]
     confidence: Float[np.ndarray, " m"]
+
+    __repr__ = short_repr
 
 
 @one_blas_thread()
@@ -125,12 +127,7 @@ def transfer_labels(
     """
     source = as_mesh(source, "source")
     target = as_mesh(target, "target")
-    labels = as_array(labels, "labels")
-    if labels.shape != (source.n_faces,) or labels.dtype.kind not in "iu":
-        raise InvalidParameterError(
-            f"labels must hold one integer for each of the {source.n_faces} faces; they have shape "
-            f"{labels.shape} and type {labels.dtype}."
-        )
+    labels = face_labels(labels, "labels", source.n_faces)
     found = find_parts(source, progress=partly(progress, 0, 0.25))
     source_parts = found.parts if n_parts is None else _cut_into_parts(found, n_parts)
     found = find_parts(target, progress=partly(progress, 0.25, 0.5))

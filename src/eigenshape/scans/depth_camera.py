@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import freeze, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_normals
@@ -90,6 +91,8 @@ class DepthScan:
     mesh: TriangleMesh
     source_faces: Int[np.ndarray, " n"]
     pixels: Int[np.ndarray, "n 2"]
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)

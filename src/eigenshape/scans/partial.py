@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -43,6 +44,8 @@ class MeshPart:
     mesh: TriangleMesh
     source_vertices: Int[np.ndarray, " n"]
     source_faces: Int[np.ndarray, " f"]
+
+    __repr__ = short_repr
 
 
 @one_blas_thread()

@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float
 from eigenshape._arguments import require_type
 from eigenshape._arrays import freeze, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
@@ -56,6 +57,8 @@ class CheegerEstimate:
     lower: float
     mode: int
     part: Bool[np.ndarray, " n"]
+
+    __repr__ = short_repr
 
 
 def cheeger_estimate(

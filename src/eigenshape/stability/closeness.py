@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_rows, freeze
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.enclosing_ball import enclosing_ball
@@ -57,6 +58,8 @@ class Closeness:
     size: float
     delta: float
     limited_by: Limit
+
+    __repr__ = short_repr
 
     def explain(self) -> str:
         """Describe in plain words how close the shapes are, and what limits δ."""

@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_rows, freeze, positive_values
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.features.least_matching import least_perfect, near_pairs
 from eigenshape.features.matching_loops import match_rows
@@ -40,6 +41,8 @@ class MaximumMatching:
     partners: Int[np.ndarray, " n"]
     blocked: Int[np.ndarray, " b"]
 
+    __repr__ = short_repr
+
     @property
     def n_matched(self) -> int:
         """Number of rows with a partner."""
@@ -69,6 +72,8 @@ class BottleneckMatching:
 
     partners: Int[np.ndarray, " n"]
     distance: float
+
+    __repr__ = short_repr
 
 
 def matching_reach(mu: float) -> float:

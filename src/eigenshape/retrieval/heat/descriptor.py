@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arrays import freeze
+from eigenshape._text import short_repr
 from eigenshape.retrieval.heat.recipe import HeatRecipe
 
 
@@ -29,6 +30,8 @@ class HeatDescriptor:
     vectors: Float[np.ndarray, "m q"]
     vertices: Int[np.ndarray, " m"]
     recipe: HeatRecipe
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vectors", freeze(self.vectors))

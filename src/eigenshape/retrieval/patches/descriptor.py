@@ -9,6 +9,7 @@ from jaxtyping import Float32, Int, Int8
 from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook, encode_patches
 from eigenshape.retrieval.patches.matching import PatchPoints, patch_points
@@ -68,6 +69,8 @@ class PatchDescriptor:
     codes: Int8[np.ndarray, "w b s v"]
     points: tuple[PatchPoints, ...]
     recipe: PatchRecipe
+
+    __repr__ = short_repr
 
     @property
     def vertices(self) -> Int[np.ndarray, " m"]:

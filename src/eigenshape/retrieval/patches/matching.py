@@ -8,6 +8,7 @@ from jaxtyping import Float, Float32, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.codebook import BASES, N_SIZES, PatchCodebook, whiten_numbers
 from eigenshape.retrieval.patches.matching_loops import leading, nearest_of_each_other
@@ -54,6 +55,8 @@ class PatchPoints:
     distances: Float32[np.ndarray, "m m"]
     vertices: Int[np.ndarray, " m"]
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class PatchMatch:
@@ -82,6 +85,8 @@ class PatchMatch:
     vertices: Int[np.ndarray, "p 2"]
     agreement: float
     step: int
+
+    __repr__ = short_repr
 
 
 def patch_points(shape: Patches, codebook: PatchCodebook) -> PatchPoints:

@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 from eigenshape._arrays import freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import FacetTable, facet_components, facet_table, without_pinches
@@ -71,6 +72,8 @@ class Brackets:
     longest_edge: float
     constant: float
     rounding: float
+
+    __repr__ = short_repr
 
     def explain(self) -> str:
         """Return a text that says what is bounded, and how tightly."""

@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import freeze, positive_values, whole_number
 from eigenshape._progress import Progress, silent
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian
@@ -69,6 +70,8 @@ class ApproximateSignature:
     errors: Float[np.ndarray, " q"]
     eigenvalues: Float[np.ndarray, " k"]
     complete: bool
+
+    __repr__ = short_repr
 
 
 def approximate_heat_signature(
