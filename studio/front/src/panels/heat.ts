@@ -26,8 +26,8 @@ export class HeatPanel implements Panel {
   private readonly choice = buildChoice(
     "heat", { signature: "Heat that stays", source: "Heat from a source" }, (id) => this.choose(id as View),
   );
-  private modes = new Float32Array();
-  private eigenvalues = new Float64Array();
+  private modes: Float32Array = new Float32Array();
+  private eigenvalues: Float64Array = new Float64Array();
   private view: View = "signature";
   private source = -1;
   private active = false;

@@ -28,12 +28,12 @@ export class PartsPanel implements Panel {
   private readonly maximum = new Slider("Maximum, by persistence", "maximum", (index) => this.select(index));
   private readonly chosen = h("p", { class: "note", "data-test": "chosen-part" });
   private plot: uPlot | null = null;
-  private finest = new Int32Array(); // region of each vertex
-  private labels = new Int32Array(); // part of each vertex, by the present cut
+  private finest: Int32Array = new Int32Array(); // region of each vertex
+  private labels: Int32Array = new Int32Array(); // part of each vertex, by the present cut
   private merges: Merges = { count: 0, rows: new Float64Array() };
-  private levels = new Float64Array();
-  private diagram = new Float64Array(); // (m, 4): birth, death, persistence, vertex
-  private areas = new Float32Array();
+  private levels: Float64Array = new Float64Array();
+  private diagram: Float64Array = new Float64Array(); // (m, 4): birth, death, persistence, vertex
+  private areas: Float32Array = new Float32Array();
   private part = -1;
   private index = -1; // of the chosen maximum
   private active = false;

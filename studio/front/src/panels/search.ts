@@ -90,7 +90,7 @@ export class SearchPanel implements Panel {
     const [vertices, faces, own] = arrays.map(({ data }) => data);
     if (found !== this.found) return;
     this.closeMatch();
-    const stage = viewer.element;
+    const stage = viewer.stage;
     stage.after(this.beside);
     stage.parentElement!.classList.add("compare");
     this.second = new Viewer(this.beside);
@@ -111,7 +111,7 @@ export class SearchPanel implements Panel {
     this.second = null;
     this.beside.remove();
     this.beside.replaceChildren();
-    this.app.viewer.element.parentElement!.classList.remove("compare");
+    this.app.viewer.stage.parentElement!.classList.remove("compare");
     this.app.viewer.setPoints([], "red");
     for (const card of this.list.children) card.classList.remove("chosen");
   }

@@ -34,7 +34,7 @@ export class ShapePanel implements Panel {
     );
     if (can("open")) {
       app.shortcut("O", "Open a file", () => this.choose());
-      acceptDrops(app.viewer.element, (name, file) => this.open(name, file));
+      acceptDrops(app.viewer.stage, (name, file) => this.open(name, file));
     }
     return h(
       "div",

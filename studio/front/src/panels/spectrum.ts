@@ -29,7 +29,7 @@ export class SpectrumPanel implements Panel {
   private readonly proof = h("p", { class: "note", "data-test": "certificate" });
   private readonly results: HTMLElement;
   private plot: uPlot | null = null;
-  private eigenvalues = new Float64Array();
+  private eigenvalues: Float64Array = new Float64Array();
   private brackets: Float64Array | null = null;
   private index = 1;
   private ticket = 0; // of the last request: earlier ones that arrive late are not shown
