@@ -60,6 +60,7 @@ export class Viewer {
   private readonly skeleton: three.Mesh<three.BufferGeometry, three.ShaderMaterial>;
   private readonly discs: three.Points<three.BufferGeometry, three.ShaderMaterial>;
   private readonly layers = new Map<string, { vertices: ArrayLike<number>; color: string }>();
+  private readonly watch = new ResizeObserver(() => this.resize());
   private readonly listeners = new Set<(hit: Hit, event: PointerEvent) => void>();
   private legend: HTMLElement | null = null;
   private mode: PointerMode = "orbit";
@@ -68,7 +69,7 @@ export class Viewer {
   private up: Vec3 = [0, 1, 0];
   private front: Vec3 = [0, 0, 1];
 
-  constructor(private readonly stage: HTMLElement) {
+  constructor(readonly stage: HTMLElement) {
     stage.append(this.canvas);
     this.canvas.setAttribute("aria-label", "The shape. Arrow keys turn it, + and - zoom.");
     this.surface = new three.Mesh(this.geometry, this.surfaceMaterial(PLAIN));
@@ -90,7 +91,7 @@ export class Viewer {
     this.picker = this.renderer && new Picker(this.renderer, this.geometry, this.motion);
     this.controls = this.startControls();
     this.listenToPointer();
-    new ResizeObserver(() => this.resize()).observe(stage);
+    this.watch.observe(stage);
   }
 
   setMesh(vertices: Float32Array, faces: Uint32Array, up: Vec3, front: Vec3): void {
@@ -226,11 +227,16 @@ export class Viewer {
     this.replace("mark", marks);
   }
 
-  /** Mark vertices by discs of constant size on the screen. */
-  setPoints(vertices: ArrayLike<number>, color: string): void {
+  /** Mark vertices by discs of constant size on the screen, of one color or one each. */
+  setPoints(vertices: ArrayLike<number>, colors: string | string[]): void {
     this.discs.visible = vertices.length > 0;
     this.shareBuffers(this.discs.geometry, Uint32Array.from(vertices));
-    this.discs.material.uniforms.plain!.value = this.colorOf(color);
+    const tints = new Float32Array(this.vertices.length);
+    for (let place = 0; place < vertices.length; place++) {
+      const color = this.colorOf(typeof colors === "string" ? colors : colors[place]!);
+      tints.set(color.toArray(), 3 * vertices[place]!);
+    }
+    this.discs.geometry.setAttribute("tint", new three.BufferAttribute(tints, 3));
     this.invalidate();
   }
 
@@ -276,6 +282,16 @@ export class Viewer {
     return new Promise((resolve, reject) =>
       this.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("There is no picture.")))),
     );
+  }
+
+  /** Give the graphics memory back: browsers allow only few pictures at a time. */
+  dispose(): void {
+    cancelAnimationFrame(this.frame);
+    this.watch.disconnect();
+    this.controls.dispose();
+    this.renderer?.dispose();
+    this.renderer?.forceContextLoss();
+    this.canvas.remove();
   }
 
   /** Draw soon, once, however often this is called. */
@@ -443,7 +459,6 @@ export class Viewer {
       transparent: true,
       uniforms: {
         ...this.motion,
-        plain: { value: this.colorOf(PLAIN) },
         size: { value: 14 * Math.min(devicePixelRatio, MOST_PIXELS) },
       },
     });
