@@ -210,15 +210,22 @@ def test_parts_cut_in_the_browser_are_those_of_segment():
     assert np.isinf(persistence[0])
 
 
-def test_a_pose_is_transferred_to_another_shape(page, top):
-    bend(page, top, PULL)
-    larger = es.TriangleMesh(2 * stretched_ball().vertices, stretched_ball().faces)
+def test_a_pose_is_transferred_to_another_shape():
+    mesh = es.make_creature("quadruped", n_vertices=800)
+    page = Page(Workspace(mesh))
+    assert page.workspace.analysis.rig.wait(120)
+    height = float(np.quantile(mesh.vertices[:, 1], 0.75))
+    top = np.flatnonzero(mesh.vertices[:, 1] > height).astype("<u4")
+    turn = {"type": "rotation", "pivot": [0, height, 0], "axis": [0, 0, 1], "angle": 0.6}
+    bend(page, top, turn)
+    expected = 2 * page.workspace.mesh.vertices
+    larger = es.TriangleMesh(2 * mesh.vertices, mesh.faces)
     call = {"kind": "transfer", "name": "larger.ply"}
     facts, _ = page.call("finish", call, {"file": file_of(larger)})
-    assert facts["state"]["shape"] == 1
-    bent = page.workspace.mesh.vertices
-    expected = 2 * es.deform(es.rig_shape(stretched_ball()), top.astype(int), TRANSLATION).vertices
-    assert np.abs(bent - expected).max() < 0.1 * np.abs(expected - larger.vertices).max()
+    assert (facts["state"]["shape"], facts["state"]["name"]) == (1, "larger.ply")
+    # The map carries rotations by its lowest modes, so a tenth of the motion is lost.
+    error = np.linalg.norm(page.workspace.mesh.vertices - expected)
+    assert error < 0.15 * np.linalg.norm(expected - larger.vertices)
 
 
 def test_values_are_shown_with_their_unit():
