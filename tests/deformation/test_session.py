@@ -5,6 +5,7 @@ from bent_shapes import lump, lump_rig
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.deform import deform
 from eigenshape.deformation.edits import Edit, Move
+from eigenshape.deformation.graded_bend import move_by_shares
 from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.region import BoxRegion, BrushRegion
 from eigenshape.deformation.rig import rig_shape
@@ -46,6 +47,25 @@ def test_by_the_thesis_if_the_session_is():
     expected = deform(lump_rig(), HEAD, TURN, mode="thesis").vertices
     np.testing.assert_array_equal(session.commit().vertices, expected)
     assert session.edits[0].mode == "thesis"
+
+
+def test_a_preview_moves_by_shares_and_is_nearer_to_the_commit_than_the_skeleton(session):
+    skeleton = session.drag(HEAD, TURN)
+    shown = session.preview()
+    np.testing.assert_array_equal(shown, move_by_shares(session.binding, [TURN]))
+    np.testing.assert_array_equal(session.mesh.vertices, lump().vertices)
+    bent = session.commit().vertices
+    assert np.linalg.norm(shown - bent) < np.linalg.norm(skeleton - bent)
+
+
+def test_a_commit_in_another_mode_is_an_edit_of_that_mode(session):
+    session.drag(HEAD, TURN)
+    bent = session.commit(mode="thesis")
+    expected = deform(lump_rig(), HEAD, TURN, mode="thesis")
+    np.testing.assert_array_equal(bent.vertices, expected.vertices)
+    assert [edit.mode for edit in session.edits] == ["thesis"]
+    again = replay(lump_rig(), session.edits)
+    np.testing.assert_array_equal(again.mesh.vertices, bent.vertices)
 
 
 def test_undo_and_redo_go_back_and_forth_to_the_last_digit(session):

@@ -1,0 +1,39 @@
+import { expect, test } from "vitest";
+import { findTimeRange, heatFromSource, heatKernelSignature, lowpass } from "../src/core/heat";
+import cases from "./cases.json";
+
+const { heat } = cases;
+const modes = Float32Array.from(heat.modes);
+
+function expectClose(found: ArrayLike<number>, expected: number[]): void {
+  const scale = Math.max(...expected.map(Math.abs));
+  const errors = expected.map((value, i) => Math.abs(value - found[i]!) / scale);
+  expect(found.length).toBe(expected.length);
+  expect(Math.max(...errors)).toBeLessThan(2e-6); // single precision
+}
+
+test("heat kernel signature equals the library's", () => {
+  heat.times.forEach((time, i) => expectClose(heatKernelSignature(modes, heat.eigenvalues, time), heat.signatures[i]!));
+});
+
+test("heat from a source equals the heat kernel", () => {
+  expectClose(heatFromSource(modes, heat.eigenvalues, heat.times[0]!, heat.source), heat.kernel);
+});
+
+test("heat from a source keeps its amount", () => {
+  const spread = heatFromSource(modes, heat.eigenvalues, 3.7, 5);
+  const amount = spread.reduce((sum, value, x) => sum + value * heat.areas[x]!, 0);
+  expect(amount).toBeCloseTo(1, 5);
+});
+
+test("the times of the slider are the library's default times", () => {
+  expectClose(findTimeRange(heat.eigenvalues)!, heat.times);
+  expect(findTimeRange([0])).toBeNull();
+});
+
+test("lowpass keeps what the first modes express", () => {
+  const areas = Float32Array.from(heat.areas);
+  const smooth = lowpass(Float32Array.from(heat.vertices), modes, areas, 5);
+  expectClose(smooth, heat.lowpass5);
+  expectClose(lowpass(smooth, modes, areas, 5), heat.lowpass5);
+});

@@ -1,0 +1,180 @@
+"""A mesh, and what is computed of it in the background."""
+
+import copy
+from functools import cached_property
+from typing import Any
+
+import eigenshape as es
+import numpy as np
+import scipy.sparse as sp
+from eigenshape_studio.jobs import NO_JOB, Job, Progress
+
+# Modes that are solved for when a shape is opened, beside one for each further component: as many
+# as `es.rig_shape` takes, so that both give the same rig.
+N_MODES = 300
+# Angle in radians between the front of a shape and the view of `three_quarter_view`.
+ASIDE = np.arctan2(0.48, 0.78)
+LEVEL = 1e-9  # largest part, of 1, of a level direction along the upward axis
+
+
+class Analysis:
+    """A mesh, and the jobs that compute its health, spectrum, rig and parts.
+
+    The health, the spectrum and the rig start at once, the parts by `find_parts`.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    name : str
+        Shown on the page.
+    shared : bool
+        Whether several tabs show this mesh, so that none may cancel its jobs.
+    """
+
+    def __init__(self, mesh: es.TriangleMesh, name: str, *, shared: bool = False) -> None:
+        self.mesh = mesh
+        self.name = name
+        self.health: Job[dict[str, Any]] = Job(lambda _: assess_health(mesh), shared=shared)
+        self.spectrum: Job[es.Spectrum] = Job(self._solve_default, shared=shared)
+        solved = self.spectrum
+        self.rig: Job[es.deformation.EigenRig] = Job(lambda _: _rig(mesh, solved), shared=shared)
+        self.parts: Job[es.features.PartDecomposition] | None = None
+        self.brackets: es.spectral.Brackets | None = None
+
+    def solve(self, k: int) -> None:
+        """Compute another number of eigenpairs; the rig keeps its own."""
+        mesh = self.mesh
+        self.spectrum.cancel()
+        self.spectrum = Job(lambda progress: _solve(mesh, k, progress))
+
+    def find_parts(self) -> None:
+        """Start to compute the parts, unless they are there or on the way."""
+        mesh = self.mesh
+        if self.parts is None or self.parts.status in ("none", "failed"):
+            self.parts = Job(lambda progress: es.find_parts(mesh, progress=progress))
+
+    def cancel(self) -> None:
+        """Stop all jobs that are not shared."""
+        for job in (self.health, self.spectrum, self.rig, self.parts):
+            if job is not None:
+                job.cancel()
+
+    def fork(self) -> "Analysis":
+        """Return an analysis of the same mesh that shares the jobs which have been started."""
+        return copy.copy(self)
+
+    @cached_property
+    def view(self) -> dict[str, Any]:
+        """How to look at the mesh: center and diagonal of its box, its upward axis and its front."""
+        low, high = self.mesh.vertices.min(axis=0), self.mesh.vertices.max(axis=0)
+        right, down, towards = es.plot.three_quarter_view(self.mesh).rotation
+        # The camera stands upright: its row to the right is orthogonal to the upward axis.
+        level = np.abs(right) < LEVEL
+        up = np.eye(3)[np.argmax(np.where(level, -down, -np.inf))]
+        # It looks from the front, turned to the left about that axis.
+        along = towards - (towards @ up) * up
+        along /= np.linalg.norm(along)
+        front = np.cos(ASIDE) * along - np.sin(ASIDE) * np.cross(up, along)
+        return {
+            "center": ((low + high) / 2).tolist(),
+            "extent": float(np.linalg.norm(high - low)),
+            "up": up.tolist(),
+            "front": front.tolist(),
+        }
+
+    @cached_property
+    def areas(self) -> np.ndarray:
+        """The area around each vertex."""
+        return es.geometry.dual_volumes(self.mesh)
+
+    def health_facts(self) -> dict[str, Any]:
+        """Return what is known of the faults of the mesh so far."""
+        nothing = ("components", "boundary_loops", "closed", "manifold", "area", "volume")
+        found = self.health.result or {**dict.fromkeys(nothing), "findings": []}
+        return {"status": self.health.status, **found}
+
+    def spectrum_facts(self) -> dict[str, Any]:
+        """Return how far the spectrum is, and what is proved of it."""
+        found = self.spectrum.result
+        proof = None if found is None else found.certificate
+        return {
+            **self.spectrum.facts(),
+            "k": 0 if found is None else len(found.eigenvalues),
+            "certificate": "" if proof is None else proof.explain(),
+            "complete": proof is not None and proof.complete,
+        }
+
+    def parts_facts(self) -> dict[str, Any]:
+        """Return how far the parts are, and how persistent each is."""
+        found = None if self.parts is None else self.parts.result
+        return {
+            **(NO_JOB if self.parts is None else self.parts.facts()),
+            "n_regions": 0 if found is None else len(found.parts.features.vertices),
+            "levels": [] if found is None else found.tree.persistence.tolist(),
+        }
+
+    def _solve_default(self, progress: Progress) -> es.Spectrum:
+        n_components, _ = es.geometry.vertex_components(self.mesh)
+        wanted = min(N_MODES + n_components - 1, self.mesh.n_vertices)
+        return _solve(self.mesh, wanted, progress)
+
+
+def _solve(mesh: es.TriangleMesh, k: int, progress: Progress) -> es.Spectrum:
+    return es.solve_spectrum(es.cotangent_laplacian(mesh), k, progress=progress)
+
+
+def _rig(mesh: es.TriangleMesh, solved: Job[es.Spectrum]) -> es.deformation.EigenRig:
+    solved.wait()
+    if solved.result is None:
+        raise es.EigenshapeError(solved.message or "The spectrum was cancelled.")
+    return es.rig_shape(mesh, solved.result)
+
+
+def assess_health(mesh: es.TriangleMesh) -> dict[str, Any]:
+    """Return counts and faults of a mesh, and what each suggested repair would do."""
+    closed = es.geometry.is_closed(mesh)
+    names = es.suggest_repairs(mesh)
+    report = es.repair(mesh, names).report
+    return {
+        "components": es.geometry.vertex_components(mesh)[0],
+        "boundary_loops": len(es.geometry.boundary_loops(mesh)),
+        "closed": closed,
+        "manifold": es.geometry.is_manifold(mesh),
+        "area": es.geometry.surface_area(mesh),
+        "volume": _volume(mesh) if closed else None,
+        "findings": [
+            {"name": name, "why": why} for name, why in zip(names, report, strict=True)
+        ],
+    }
+
+
+def _volume(mesh: es.TriangleMesh) -> float | None:
+    try:
+        return es.geometry.enclosed_volume(mesh)
+    except es.InvalidShapeError:  # some faces are oriented against others
+        return None
+
+
+def vertex_labels(mesh: es.TriangleMesh, labels: np.ndarray) -> np.ndarray:
+    """Return, for each vertex, the region that has most of the area around it."""
+    areas = np.repeat(es.geometry.face_areas(mesh), 3)
+    shape = (mesh.n_vertices, int(labels.max()) + 1)
+    around = sp.coo_array((areas, (mesh.faces.ravel(), np.repeat(labels, 3))), shape=shape)
+    return np.asarray(around.tocsr().argmax(axis=1)).ravel().astype(np.int32)
+
+
+def merge_rows(tree: es.features.PartTree) -> np.ndarray:
+    """Return the merges of a tree: for each region with a parent its number, parent and level."""
+    merged = np.flatnonzero(tree.parent >= 0)
+    rows = [merged, tree.parent[merged], tree.persistence[merged]]
+    return np.column_stack(rows).astype(np.float64)
+
+
+def diagram_rows(mesh: es.TriangleMesh, heat: np.ndarray) -> np.ndarray:
+    """Return the persistence diagram of heat: birth, death, persistence and vertex of each maximum.
+
+    A maximum that never merges dies, for the picture, at the least heat; its persistence is inf.
+    """
+    tree = es.merge_tree(mesh, heat)
+    deaths = np.where(np.isinf(tree.persistence), heat.min(), tree.values - tree.persistence)
+    return np.column_stack([tree.values, deaths, tree.persistence, tree.maxima])

@@ -1,0 +1,232 @@
+"""Who may talk to the studio: checks of every request, before it is routed.
+
+The page listens on this machine, where any web page that is open in a browser can send requests to
+it. A request must therefore name this server (against names that are bound anew to 127.0.0.1), come
+from the studio's own page (Origin, Sec-Fetch-Site), and bring the token of the printed address.
+"""
+
+import asyncio
+import ipaddress
+import secrets
+from collections.abc import Awaitable, Callable, Collection, MutableMapping
+from dataclasses import dataclass
+from time import monotonic
+from typing import Any
+from urllib.parse import parse_qs
+
+Scope = MutableMapping[str, Any]
+Message = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[Message]]
+Send = Callable[[Message], Awaitable[None]]
+App = Callable[[Scope, Receive, Send], Awaitable[None]]
+
+COOKIE = "eigenshape-studio"
+MESSAGE_TYPE = b"application/octet-stream"
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+HEADERS = (
+    (b"content-security-policy", POLICY.encode()),
+    (b"x-content-type-options", b"nosniff"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-opener-policy", b"same-origin"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+    (b"cache-control", b"no-store"),
+)
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What the guard lets through.
+
+    Attributes
+    ----------
+    token : str
+        The secret of the printed address.
+    hosts : collection of str
+        Values of the header Host that name this server, with the port.
+    any_address : bool
+        Whether any numeric address is accepted too. A numeric address cannot be a name that was
+        bound anew. Only for servers on other addresses than that of this machine itself.
+    port : int
+    most_bytes : int
+        Of the body of one request.
+    pause, deadline : float
+        Seconds without a byte, and in all, after which the sender of a body is given up.
+    """
+
+    token: str
+    hosts: Collection[str]
+    port: int
+    any_address: bool = False
+    most_bytes: int = 256 << 20
+    pause: float = 10.0
+    deadline: float = 120.0
+
+
+class RefusedError(Exception):
+    """A request is refused, with a status of HTTP."""
+
+    def __init__(self, status: int, reason: str) -> None:
+        super().__init__(reason)
+        self.status, self.reason = status, reason
+
+
+class Guard:
+    """An ASGI application that lets the requests of the studio's own page through to another."""
+
+    def __init__(self, app: App, rules: Rules) -> None:
+        self.app, self.rules = app, rules
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Check a request and pass it on, or refuse it."""
+        if scope["type"] == "lifespan":
+            await self.app(scope, receive, send)
+            return
+        if scope["type"] != "http":  # the studio has no web sockets
+            await send({"type": "websocket.close", "code": 1008})
+            return
+        answered = _Answer(send)
+        try:
+            self._check_source(scope)
+            if self._is_entrance(scope):
+                await self._enter(answered)
+                return
+            self._check_token(scope)
+            self._check_kind(scope)
+            await self.app(scope, self._capped(receive), answered)
+        except RefusedError as error:
+            await answered.refuse(error)
+
+    def _check_source(self, scope: Scope) -> None:
+        """Refuse requests that another page, or for another name, sends."""
+        host = _only(scope, b"host")
+        if not self._is_ours(host):
+            raise RefusedError(421, "This address is not that of the studio.")
+        origin = _only(scope, b"origin", default=f"http://{host}")
+        if origin != f"http://{host}":
+            raise RefusedError(403, "Only the studio's own page may send requests.")
+        if _only(scope, b"sec-fetch-site", default="none") not in ("same-origin", "none"):
+            raise RefusedError(403, "Only the studio's own page may send requests.")
+
+    def _is_ours(self, host: str) -> bool:
+        if host in self.rules.hosts:
+            return True
+        name, _, port = host.rpartition(":")
+        if not self.rules.any_address or port != str(self.rules.port):
+            return False
+        try:
+            ipaddress.ip_address(name.strip("[]"))
+        except ValueError:
+            return False
+        return True
+
+    def _is_entrance(self, scope: Scope) -> bool:
+        """Say whether this is the printed address, with the right token."""
+        if scope["method"] != "GET" or scope["path"] != "/" or not scope["query_string"]:
+            return False
+        given = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])
+        return len(given) == 1 and self._is_token(given[0])
+
+    async def _enter(self, answered: "_Answer") -> None:
+        """Turn the token of the address into a cookie, so that it leaves the address bar."""
+        cookie = f"{self._cookie_name}={self.rules.token}; Path=/; HttpOnly; SameSite=Strict"
+        headers = [(b"set-cookie", cookie.encode()), (b"location", b"/")]
+        await answered.text(303, "Opening the studio.", headers)
+
+    @property
+    def _cookie_name(self) -> str:
+        # Cookies belong to a host whatever the port: two studios must not take each other's.
+        return f"{COOKIE}-{self.rules.port}"
+
+    def _check_token(self, scope: Scope) -> None:
+        given = [
+            value
+            for header in _all(scope, b"cookie")
+            for name, _, value in (part.strip().partition("=") for part in header.split(";"))
+            if name == self._cookie_name
+        ]
+        if not any(self._is_token(value) for value in given):
+            raise RefusedError(403, "Open the address that `eigenshape studio` has printed.")
+
+    def _is_token(self, given: str) -> bool:
+        return secrets.compare_digest(given.encode(), self.rules.token.encode())
+
+    def _check_kind(self, scope: Scope) -> None:
+        """Refuse methods, types and sizes that no call of the page has."""
+        if scope["method"] in ("GET", "HEAD"):
+            return
+        if scope["method"] != "POST":
+            raise RefusedError(405, "The studio takes GET and POST.")
+        # A form of another page cannot have this type.
+        if _only(scope, b"content-type").encode() != MESSAGE_TYPE:
+            raise RefusedError(415, "The body must be application/octet-stream.")
+        length = _only(scope, b"content-length", default="0")
+        if not length.isdecimal() or int(length[:20]) > self.rules.most_bytes:
+            raise RefusedError(413, f"The body may have {self.rules.most_bytes:,} bytes.")
+
+    def _capped(self, receive: Receive) -> Receive:
+        """Return a `receive` that counts the bytes, and that does not wait for ever."""
+        end = monotonic() + self.rules.deadline
+        received, complete = 0, False
+
+        async def receive_capped() -> Message:
+            nonlocal received, complete
+            if complete:  # what comes now is only that the page has gone
+                return await receive()
+            wait = min(self.rules.pause, end - monotonic())
+            try:
+                message = await asyncio.wait_for(receive(), max(wait, 0.0))
+            except TimeoutError as err:
+                raise RefusedError(408, "The body came too slowly.") from err
+            received += len(message.get("body", b""))
+            if received > self.rules.most_bytes:
+                raise RefusedError(413, f"The body may have {self.rules.most_bytes:,} bytes.")
+            complete = message["type"] != "http.request" or not message.get("more_body", False)
+            return message
+
+        return receive_capped
+
+
+class _Answer:
+    """A `send` that adds the headers of every answer, and that knows whether one has begun."""
+
+    def __init__(self, send: Send) -> None:
+        self._send, self._begun = send, False
+
+    async def __call__(self, message: Message) -> None:
+        if message["type"] == "http.response.start":
+            self._begun = True
+            given = [pair for pair in message.get("headers", []) if pair[0] != b"cache-control"]
+            message = {**message, "headers": [*given, *HEADERS]}
+        await self._send(message)
+
+    async def refuse(self, error: RefusedError) -> None:
+        if not self._begun:
+            # The rest of the body is not read, so the connection cannot serve another request.
+            await self.text(error.status, error.reason, [(b"connection", b"close")])
+
+    async def text(self, status: int, text: str, headers: list[tuple[bytes, bytes]]) -> None:
+        data = f"{text}\n".encode()
+        kind = (b"content-type", b"text/plain; charset=utf-8")
+        size = (b"content-length", str(len(data)).encode())
+        await self({"type": "http.response.start", "status": status, "headers": [kind, size, *headers]})
+        await self({"type": "http.response.body", "body": data})
+
+
+def _all(scope: Scope, name: bytes) -> list[str]:
+    return [value.decode("latin-1") for key, value in scope["headers"] if key == name]
+
+
+def _only(scope: Scope, name: bytes, default: str | None = None) -> str:
+    """Return the value of a header; refuse a request in which it stands twice, or is missing."""
+    values = _all(scope, name)
+    if len(values) > 1 or (not values and default is None):
+        raise RefusedError(400, f"The header {name.decode()} must be given once.")
+    return values[0] if values else str(default)
+
+
+def local_hosts(port: int) -> tuple[str, ...]:
+    """Return the names of this machine itself, as a browser sends them."""
+    return tuple(f"{name}:{port}" for name in ("127.0.0.1", "localhost"))

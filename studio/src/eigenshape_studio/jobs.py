@@ -1,0 +1,74 @@
+"""Work in the background, which the page follows by its progress."""
+
+import threading
+from collections.abc import Callable
+from typing import Any, Generic, Literal, TypeVar
+
+T = TypeVar("T")
+Status = Literal["none", "running", "ready", "failed"]
+Progress = Callable[[float, str], None]
+
+
+class JobCancelledError(Exception):
+    """Nobody waits for a job any more; raised inside it at its next report of progress."""
+
+
+class Job(Generic[T]):
+    """One computation in a thread of its own.
+
+    Parameters
+    ----------
+    work : callable
+        Called as work(progress); `progress` takes the fraction done and a short message.
+    shared : bool
+        Whether several tabs wait for the job, so that none may cancel it.
+    """
+
+    def __init__(self, work: Callable[[Progress], T], *, shared: bool = False) -> None:
+        self.status: Status = "running"
+        self.progress = 0.0
+        self.message = ""
+        self.shared = shared
+        self._work = work
+        self._result: T | None = None
+        self._cancelled = threading.Event()
+        self._done = threading.Event()
+        threading.Thread(target=self._run, daemon=True).start()
+
+    @property
+    def result(self) -> T | None:
+        """What the work returned; None until it is ready."""
+        return self._result
+
+    def cancel(self) -> None:
+        """Stop the work at its next report of progress, unless it is shared."""
+        if not self.shared:
+            self._cancelled.set()
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until the work has ended; return whether it has."""
+        return self._done.wait(timeout)
+
+    def facts(self) -> dict[str, Any]:
+        """Return what the page shows of the job."""
+        return {"status": self.status, "progress": self.progress, "message": self.message}
+
+    def _report(self, fraction: float, message: str) -> None:
+        if self._cancelled.is_set():
+            raise JobCancelledError
+        self.progress, self.message = float(fraction), message
+
+    def _run(self) -> None:
+        try:
+            self._result = self._work(self._report)
+        except JobCancelledError:
+            self.status, self.message = "none", ""
+        except Exception as error:  # noqa: BLE001  whatever happens, the page must learn of it
+            self.status, self.message = "failed", str(error) or type(error).__name__
+        else:
+            self.progress, self.status, self.message = 1.0, "ready", ""
+        finally:
+            self._done.set()
+
+
+NO_JOB: dict[str, Any] = {"status": "none", "progress": 0.0, "message": ""}

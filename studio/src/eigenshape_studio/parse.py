@@ -1,0 +1,141 @@
+"""Mesh files from outside, parsed in a child process with limits of memory and time.
+
+Run as a module, this reads a file from the standard input and writes a message (`wire`) to the
+standard output: the mesh, or the reason why there is none.
+"""
+
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+import eigenshape as es
+import numpy as np
+from eigenshape_studio.wire import WireError, decode, encode
+
+SUFFIXES = (".ply", ".obj", ".off", ".stl", ".glb", ".gltf", ".mesh", ".msh", ".vtk", ".vtu")
+LONGEST_NAME = 120  # characters that are kept of a file's name
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What parsing one file may take.
+
+    Attributes
+    ----------
+    seconds : float
+        Of processor time and of waiting.
+    memory : int
+        Address space in bytes. The library takes about 1 GB of it before it reads anything.
+    n_faces : int
+        Faces that the studio shows at most.
+    """
+
+    seconds: float = 60.0
+    memory: int = 6 << 30
+    n_faces: int = 2_000_000
+
+
+def display_name(name: object) -> str:
+    """Return the last part of a file's name, printable and short."""
+    text = PurePosixPath(str(name).replace("\\", "/")).name
+    return "".join(letter for letter in text if letter.isprintable())[:LONGEST_NAME] or "shape"
+
+
+def parse_mesh(name: str, data: bytes, limits: Limits | None = None) -> es.TriangleMesh:
+    """Parse a mesh file in a child process.
+
+    Parameters
+    ----------
+    name : str
+        Name of the file; only its suffix counts.
+    data : bytes
+    limits : Limits, optional
+
+    Returns
+    -------
+    TriangleMesh
+
+    Raises
+    ------
+    FileFormatError
+        If the suffix is unknown, the file does not hold a mesh, or a limit is reached.
+    """
+    limits = limits or Limits()
+    suffix = Path(name).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise es.FileFormatError(
+            f"A mesh file must end in {', '.join(SUFFIXES)}; {display_name(name)} does not."
+        )
+    command = [sys.executable, "-m", "eigenshape_studio.parse", suffix]
+    numbers = [limits.seconds, limits.memory, limits.n_faces]
+    try:
+        done = subprocess.run(
+            [*command, *map(str, numbers)],
+            input=data,
+            capture_output=True,
+            check=False,
+            timeout=limits.seconds,
+        )
+        meta, arrays = decode(done.stdout)
+    except subprocess.TimeoutExpired as err:
+        raise es.FileFormatError(
+            f"A mesh file must be read within {limits.seconds:g} s; {display_name(name)} is not."
+        ) from err
+    except WireError as err:  # the child died before it wrote anything
+        raise es.FileFormatError(
+            f"{display_name(name)} cannot be read within the limits of {limits.seconds:g} s and "
+            f"{limits.memory / 1e9:.3g} GB."
+        ) from err
+    if "error" in meta:
+        raise es.FileFormatError(meta["error"])
+    return es.TriangleMesh(arrays["vertices"], arrays["faces"])
+
+
+def main() -> None:
+    """Read a file from the standard input, and write a mesh or an error to the standard output."""
+    suffix, seconds, memory, n_faces = sys.argv[1:]
+    _limit(float(seconds), int(memory))
+    try:
+        mesh = _read(suffix, sys.stdin.buffer.read(), int(n_faces))
+        message = encode({}, {"vertices": mesh.vertices, "faces": mesh.faces.astype("<u4")})
+    except MemoryError:
+        message = encode({"error": "The file takes more memory than a mesh may."})
+    except (es.EigenshapeError, OSError) as error:
+        message = encode({"error": str(error)})
+    sys.stdout.buffer.write(message)
+
+
+def _limit(seconds: float, memory: int) -> None:
+    """Limit the processor time and the address space of this process, where the system can."""
+    try:
+        import resource  # noqa: PLC0415  not on Windows, where only the time is limited, outside
+    except ImportError:
+        return
+    resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 1))
+    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _read(suffix: str, data: bytes, n_faces: int) -> es.TriangleMesh:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, f"shape{suffix}")
+        path.write_bytes(data)
+        try:
+            mesh = es.read_mesh(path)
+        except es.EigenshapeError as error:
+            # The folder is ours; the person knows the file by another name.
+            text = str(error).replace(str(path), "The file")
+            raise es.FileFormatError(text) from error
+    if mesh.n_faces > n_faces:
+        raise es.FileFormatError(
+            f"The studio shows at most {n_faces:,} faces; the file has {mesh.n_faces:,}."
+        )
+    if not np.abs(mesh.vertices).max() < np.finfo(np.float32).max:
+        raise es.FileFormatError("Coordinates must fit into single precision; some do not.")
+    return mesh
+
+
+if __name__ == "__main__":
+    main()

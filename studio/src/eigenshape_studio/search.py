@@ -1,0 +1,82 @@
+"""An index to search in: matches, their pictures, and their meshes."""
+
+from functools import lru_cache
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import eigenshape as es
+import numpy as np
+from eigenshape.plot.render import draw
+from matplotlib.image import imsave
+
+THUMBNAIL = 144  # pixels
+N_KEPT = 256  # pictures that are kept in memory, about 10 kB each
+
+
+class Shelf:
+    """An index that the studio was opened with.
+
+    Only shapes of the index are read, by their names: a page cannot name a path.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+        self.index = es.ShapeIndex.open(self.folder)
+
+    def facts(self) -> dict[str, Any]:
+        """Return what the page shows of the index."""
+        return {"path": str(self.folder), "n_shapes": len(self.index)}
+
+    def mesh(self, name: str) -> es.TriangleMesh:
+        """Read the mesh of a shape from the file that was indexed.
+
+        Raises
+        ------
+        StoreError
+            If the index holds no such shape, or was built without files.
+        """
+        sources = {record.name: record.source for record in self.index.records()}
+        if name not in sources:
+            raise es.StoreError(f"A shape must be in the index to be opened; {name[:80]!r} is not.")
+        source = sources[name]
+        if source is None:
+            raise es.StoreError(f"{name!r} was added to the index without its file.")
+        return es.read_mesh(source)
+
+    def query(
+        self, mesh: es.TriangleMesh, n_matches: int
+    ) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+        """Search for shapes like a mesh; return names and scores, pictures and pairs of vertices."""
+        descriptor = es.describe(mesh, self.index.default_recipe())
+        matches, arrays = [], {}
+        for number, match in enumerate(self.index.query(descriptor, n_matches=n_matches)):
+            facts = {"name": match.name, "label": match.label, "score": match.score}
+            matches.append({**facts, "path": match.source})
+            ours, theirs = match.correspondences.T
+            pairs = np.column_stack([descriptor.vertices[ours], match.vertices[theirs]])
+            arrays[f"pairs{number}"] = pairs.astype("<u4")
+            picture = _picture(match.source)
+            if picture is not None:
+                arrays[f"thumbnail{number}"] = np.frombuffer(picture, np.uint8)
+        return {"matches": matches}, arrays
+
+
+def _picture(source: str | None) -> bytes | None:
+    """Return the picture of a mesh file as PNG, or None if the file cannot be read."""
+    if source is None:
+        return None
+    try:
+        return _draw_file(source, Path(source).stat().st_mtime_ns)
+    except (es.EigenshapeError, OSError):
+        return None
+
+
+@lru_cache(maxsize=N_KEPT)
+def _draw_file(source: str, _changed: int) -> bytes:
+    """Draw a mesh file; a file that changes is drawn again."""
+    mesh = es.read_mesh(source)
+    camera = es.plot.three_quarter_view(mesh, size=THUMBNAIL)
+    file = BytesIO()
+    imsave(file, draw(mesh, camera).image, format="png")
+    return file.getvalue()

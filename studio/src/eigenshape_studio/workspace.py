@@ -1,0 +1,594 @@
+"""One shape of one tab, and the five calls of the page: the same for all hosts."""
+
+import json
+import threading
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import Any
+
+import eigenshape as es
+import numpy as np
+from eigenshape_studio.analysis import Analysis, diagram_rows, merge_rows, vertex_labels
+from eigenshape_studio.jobs import NO_JOB
+from eigenshape_studio.parse import display_name, parse_mesh
+from eigenshape_studio.search import Shelf
+from eigenshape_studio.wire import WireError, decode, encode
+
+MOST_REGIONS = 4  # one component each of the attribute `shares` of the vertex shader
+MOST_MODES = 2000  # that the page may request
+N_BRACKETS = 20  # bracketing costs a solve with three times as many unknowns
+N_CARRIED = 40  # modes of a functional map that carry a pose, as in experiments/ch6_deformation
+N_SOLVED = 100  # modes that are solved for to refine that map
+# Modes of the map before it is refined, for exact pairs and for those of patches; as the
+# documentation of `functional_map` recommends.
+N_EXACT, N_INEXACT = 20, 10
+CAPABILITIES = ("rig", "finish", "query", "open", "repair", "solve")
+CALLS = ("meta", "array", "rig", "finish", "query")
+MODES = ("graded", "uncrossed", "thesis")
+# The filters of warnings belong to the whole process, so only one thread may listen at a time.
+# Only the mode "uncrossed" warns.
+LISTENING = threading.Lock()
+
+Arrays = Mapping[str, np.ndarray]
+Reply = tuple[Any, dict[str, np.ndarray]]
+
+
+class RequestError(ValueError):
+    """A call asks for what cannot be; the text says what."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The message that answers a call.
+
+    Attributes
+    ----------
+    message : bytes
+    status : int
+        As in HTTP: 200, 400 if the call was at fault, 500 if the studio was.
+    """
+
+    message: bytes
+    status: int
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """A function on the vertices that was passed to the studio, with its unit."""
+
+    values: np.ndarray
+    title: str
+    unit: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Bound:
+    """What the handles of the present drag move: vertices of each region, and those that stay."""
+
+    regions: list[np.ndarray]
+    fixed: np.ndarray | None
+    n_modes: int | None
+
+
+class Workspace:
+    """One shape of one tab: its analysis, its deformation session, and the five calls.
+
+    Calls of one workspace that change anything run one after the other; `meta` and `array` never
+    wait for them. Workspaces do not share anything that changes.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    name : str
+    values : {title: (n,) array}, optional
+        Functions on the vertices.
+    index : path, optional
+        Folder of an index to search in.
+    shared : bool
+        Whether the workspace is forked for several tabs.
+    """
+
+    def __init__(
+        self,
+        mesh: es.types.MeshLike,
+        name: str = "shape",
+        *,
+        values: Mapping[str, Any] | None = None,
+        index: str | Path | None = None,
+        shared: bool = False,
+    ) -> None:
+        surface = es.as_mesh(mesh)
+        self.fields = _fields(values or {}, surface.n_vertices)
+        self.analysis = Analysis(surface, display_name(name), shared=shared)
+        self.shelf = None if index is None else Shelf(index)
+        self.session: es.DeformationSession | None = None
+        self.bound: Bound | None = None
+        self.matches: list[str] = []  # names, of the last query
+        self.mode = "graded"
+        # How often the vertices, and how often the mesh, has changed.
+        self.pose, self.shape = 0, 0
+        self._changing = threading.RLock()
+
+    def fork(self) -> "Workspace":
+        """Return a workspace of the same shape for another tab, without its edits."""
+        twin = object.__new__(Workspace)
+        twin.__dict__.update(self.__dict__)
+        twin.analysis, twin.fields = self.analysis.fork(), dict(self.fields)
+        twin.session, twin.bound, twin.mode = None, None, "graded"
+        twin._changing = threading.RLock()
+        return twin
+
+    def close(self) -> None:
+        """Stop what is still computed."""
+        self.analysis.cancel()
+
+    @property
+    def mesh(self) -> es.TriangleMesh:
+        """The shape in its present pose."""
+        return self.analysis.mesh if self.session is None else self.session.mesh
+
+    def answer(self, call: str, message: bytes) -> Answer:
+        """Answer a call; whatever is wrong with it becomes an answer, too."""
+        try:
+            meta, arrays = decode(message)
+            if call not in CALLS:
+                raise RequestError(f"A call must be one of {', '.join(CALLS)}; it is {call!r}.")
+            if not isinstance(meta, dict):
+                raise RequestError("The meta of a call must be an object.")
+            work: Callable[[dict[str, Any], Arrays], Reply] = getattr(self, f"call_{call}")
+            return Answer(encode(*work(meta, arrays)), 200)
+        except (es.EigenshapeError, WireError, RequestError, OSError) as error:
+            return Answer(error_message(type(error).__name__, str(error)), 400)
+        except MemoryError:
+            return Answer(error_message("MemoryError", "There is not enough memory for this."), 400)
+        except Exception as error:  # noqa: BLE001  the other tabs must go on
+            return Answer(error_message("InternalError", f"{type(error).__name__}: {error}"), 500)
+
+    def call_meta(self, _meta: dict[str, Any], _arrays: Arrays) -> Reply:
+        """Return the state."""
+        return self.state(), {}
+
+    def state(self) -> dict[str, Any]:
+        """Return what the page shows beside the arrays."""
+        analysis = self.analysis
+        capabilities = [name for name in CAPABILITIES if name != "query" or self.shelf is not None]
+        return {
+            "name": analysis.name,
+            "n_vertices": analysis.mesh.n_vertices,
+            "n_faces": analysis.mesh.n_faces,
+            **analysis.view,
+            "capabilities": capabilities,
+            "health": analysis.health_facts(),
+            "values": [_field_facts(name, field) for name, field in self.fields.items()],
+            "spectrum": analysis.spectrum_facts(),
+            "parts": analysis.parts_facts(),
+            "deformation": self._deformation_facts(),
+            "index": None if self.shelf is None else self.shelf.facts(),
+            "pose": self.pose,
+            "shape": self.shape,
+        }
+
+    def _deformation_facts(self) -> dict[str, Any]:
+        session, bound = self.session, self.bound
+        return {
+            **NO_JOB,
+            **self.analysis.rig.facts(),
+            "mode": self.mode,
+            "n_edits": 0 if session is None else len(session.edits),
+            "n_redoable": 0 if session is None else session.n_redoable,
+            "regions": [] if bound is None else [len(region) for region in bound.regions],
+        }
+
+    def call_array(self, meta: dict[str, Any], _arrays: Arrays) -> Reply:
+        """Return one array by its name."""
+        name = meta.get("name")
+        if not isinstance(name, str):
+            raise RequestError(f"The name of an array must be text; it is {name!r}.")
+        head, _, tail = name.partition("/")
+        if head == "match":
+            return {}, {name: self._match_array(tail)}
+        makers: dict[str, Callable[..., np.ndarray]] = {
+            "vertices": self._vertices,
+            "faces": lambda: self.analysis.mesh.faces.astype("<u4"),
+            "areas": lambda: self.analysis.areas.astype("<f4"),
+            "modes": lambda: self._modes(meta),
+            "eigenvalues": lambda: self._spectrum().eigenvalues.astype("<f8"),
+            "brackets": lambda: self._brackets(meta),
+            "diagram": self._diagram,
+            "crossings": self._crossings,
+        }
+        families: dict[str, Callable[[str], np.ndarray]] = {
+            "parts": self._parts_array,
+            "values": self._values_array,
+            "skeleton": self._skeleton,
+            "file": self._file,
+        }
+        if not tail and head in makers:
+            return {}, {name: makers[head]()}
+        if tail and head in families:
+            return {}, {name: families[head](tail)}
+        raise RequestError(f"There must be an array of the requested name; {name[:80]!r} is none.")
+
+    def _vertices(self) -> np.ndarray:
+        return self.mesh.vertices.astype("<f4")
+
+    def _spectrum(self) -> es.Spectrum:
+        found = self.analysis.spectrum.result
+        if found is None:
+            raise RequestError("The spectrum must be ready; it is not. Wait for it, or solve again.")
+        return found
+
+    def _modes(self, meta: dict[str, Any]) -> np.ndarray:
+        modes = self._spectrum().eigenvectors
+        start = whole(meta, "start", 0, modes.shape[1], 0)
+        stop = whole(meta, "stop", start, modes.shape[1], modes.shape[1])
+        return np.ascontiguousarray(modes[:, start:stop].T, dtype="<f4")
+
+    def _brackets(self, meta: dict[str, Any]) -> np.ndarray:
+        k = whole(meta, "stop", 1, min(300, self.analysis.mesh.n_vertices), N_BRACKETS)
+        found = self.analysis.brackets
+        if found is None or len(found.lower) < k:
+            found = es.bracket_eigenvalues(self.analysis.mesh, k)
+            self.analysis.brackets = found
+        return np.column_stack([found.lower, found.upper])[:k]
+
+    def _require_parts(self) -> es.features.PartDecomposition:
+        found = None if self.analysis.parts is None else self.analysis.parts.result
+        if found is None:
+            raise RequestError("The parts must be ready; they are not. Find the parts first.")
+        return found
+
+    def _diagram(self) -> np.ndarray:
+        found = self._require_parts()
+        return diagram_rows(found.mesh, found.heat)
+
+    def _parts_array(self, tail: str) -> np.ndarray:
+        found = self._require_parts()
+        if tail == "labels":
+            return vertex_labels(found.mesh, found.tree.basins)
+        if tail == "merges":
+            return merge_rows(found.tree)
+        raise RequestError(f"Of parts there are labels and merges; {tail[:80]!r} was requested.")
+
+    def _values_array(self, tail: str) -> np.ndarray:
+        if tail not in self.fields:
+            raise RequestError(f"Values must be among {list(self.fields)}; {tail[:80]!r} is not.")
+        return self.fields[tail].values.astype("<f4")
+
+    def _crossings(self) -> np.ndarray:
+        return es.geometry.self_intersections(self.mesh).astype("<u4").reshape(-1, 2)
+
+    def _skeleton(self, tail: str) -> np.ndarray:
+        rig = self._require_session().rig
+        if not tail.isdecimal() or not 1 <= int(tail) <= rig.n_modes:
+            raise RequestError(f"A skeleton must be of 1 to {rig.n_modes} modes; not {tail[:80]!r}.")
+        return es.deformation.eigen_skeleton(rig, int(tail)).astype("<f4")
+
+    def _file(self, tail: str) -> np.ndarray:
+        if tail not in ("ply", "obj", "glb", "edits"):
+            raise RequestError(f"A file must be ply, obj, glb or edits; {tail[:80]!r} was requested.")
+        with TemporaryDirectory() as folder:
+            path = Path(folder, f"shape.{tail}")
+            if tail == "edits":
+                session = self._require_session()
+                es.io.write_edits(session.edits, self.analysis.mesh, path)
+            else:
+                es.write_mesh(self.mesh, path)
+            return np.frombuffer(path.read_bytes(), np.uint8)
+
+    def _require_session(self) -> es.DeformationSession:
+        """Return the session, which begins when the rig is ready."""
+        with self._changing:
+            if self.session is None:
+                self.session = es.DeformationSession(self._rig_at_rest())
+            return self.session
+
+    def _rig_at_rest(self) -> es.deformation.EigenRig:
+        rig = self.analysis.rig.result
+        if rig is None:
+            reason = self.analysis.rig.message or "its modes are being computed."
+            raise RequestError(f"The shape must be prepared for deformation: {reason}")
+        return rig
+
+    def _require_shelf(self) -> Shelf:
+        if self.shelf is None:
+            raise RequestError("There must be an index to search in; open the studio with --index.")
+        return self.shelf
+
+    def call_rig(self, meta: dict[str, Any], arrays: Arrays) -> Reply:
+        """Bind regions, and return the share by which each vertex follows each of them."""
+        n_regions = whole(meta, "n_regions", 1, MOST_REGIONS)
+        n_modes = None if meta.get("n_modes") is None else whole(meta, "n_modes", 1, MOST_MODES)
+        names = [f"region{number}" for number in range(n_regions)]
+        names += ["fixed"] if meta.get("fixed") else []
+        missing = [name for name in names if name not in arrays]
+        if missing:
+            raise RequestError(f"A rig must have an array for each region; {missing[0]} is missing.")
+        regions = [np.unique(arrays[name].astype(np.int64)) for name in names]
+        fixed = regions.pop() if meta.get("fixed") else None
+        began = perf_counter()
+        with self._changing:
+            self._require_session()
+            self.bound = None
+            binding = self._drag(Bound(regions, fixed, n_modes), [None] * n_regions)
+        facts = {"n_modes": binding.n_modes.tolist(), "seconds": perf_counter() - began}
+        return facts, {"shares": binding.shares.astype("<f4")}
+
+    def _drag(self, bound: Bound, handles: list[Any]) -> es.deformation.Binding:
+        """Drag the bound regions by handles, and return by how much each vertex follows."""
+        session = self._require_session()
+        moves = [
+            es.deformation.Move(region, handle_from(entry))
+            for region, entry in zip(bound.regions, handles, strict=True)
+        ]
+        session.drag_all(moves, fixed=bound.fixed, n_modes=bound.n_modes)
+        self.bound = bound
+        return session.binding
+
+    def call_finish(self, meta: dict[str, Any], arrays: Arrays) -> Reply:
+        """Change something, and return the new state."""
+        kind = meta.get("kind")
+        works: dict[Any, Callable[[dict[str, Any], Arrays], np.ndarray | None]] = {
+            "preview": self._preview,
+            "commit": self._commit,
+            "undo": lambda *_: self._posed(self._require_session().undo()),
+            "redo": lambda *_: self._posed(self._require_session().redo()),
+            "reset": self._reset,
+            "cancel": self._cancel,
+            "replay": self._replay,
+            "repair": self._repair,
+            "open": self._open,
+            "solve": self._solve,
+            "parts": lambda *_: self.analysis.find_parts(),
+            "transfer": self._transfer,
+        }
+        if not isinstance(kind, str) or kind not in works:
+            raise RequestError(f"kind must be one of {', '.join(works)}; it is {kind!r:.80}.")
+        began = perf_counter()
+        with self._changing:
+            self._warnings: list[str] = []
+            vertices = works[kind](meta, arrays)
+            told = self._warnings
+            state = self.state()
+        facts = {"state": state, "seconds": perf_counter() - began, "warnings": told}
+        return facts, {} if vertices is None else {"vertices": vertices.astype("<f4")}
+
+    def _posed(self, mesh: es.TriangleMesh) -> np.ndarray:
+        self.pose += 1
+        self.bound = None
+        return mesh.vertices
+
+    def _preview(self, meta: dict[str, Any], _arrays: Arrays) -> np.ndarray:
+        """Return the exact result of a motion, which is not kept."""
+        bound, entries, mode = self._motion(meta)
+        binding = self._drag(bound, entries)
+        handles = [handle_from(entry) for entry in entries]
+        return self._listen(
+            mode, lambda: es.deformation.bend(binding, handles, mode=mode).vertices
+        )
+
+    def _commit(self, meta: dict[str, Any], _arrays: Arrays) -> np.ndarray:
+        bound, entries, mode = self._motion(meta)
+        self._drag(bound, entries)
+        session = self._require_session()
+        bent = self._listen(mode, lambda: session.commit(mode=mode))
+        self.mode = mode
+        return self._posed(bent)
+
+    def _motion(self, meta: dict[str, Any]) -> tuple[Bound, list[Any], Any]:
+        """Return what a call moves, by which handles and in which mode."""
+        entries, mode = meta.get("handles"), meta.get("mode", self.mode)
+        if self.bound is None:
+            raise RequestError("A region must be bound before it moves; none is. Call rig first.")
+        if not isinstance(entries, list) or len(entries) != len(self.bound.regions):
+            raise RequestError(
+                f"There must be one handle for each of the {len(self.bound.regions)} regions."
+            )
+        if mode not in MODES:
+            raise RequestError(f"mode must be one of {', '.join(MODES)}; it is {mode!r:.80}.")
+        return self.bound, entries, mode
+
+    def _listen(self, mode: str, work: Callable[[], Any]) -> Any:
+        """Do some work, and keep what it warns of for the page."""
+        if mode != "uncrossed":
+            return work()
+        with LISTENING, warnings.catch_warnings(record=True) as heard:
+            warnings.simplefilter("always", UserWarning)
+            result = work()
+        self._warnings += [str(warning.message) for warning in heard]
+        return result
+
+    def _cancel(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
+        self.bound = None
+        self._require_session().cancel()
+
+    def _reset(self, _meta: dict[str, Any], _arrays: Arrays) -> np.ndarray:
+        session = self._require_session()
+        session.cancel()
+        while session.edits:
+            session.undo()
+        return self._posed(session.mesh)
+
+    def _replay(self, meta: dict[str, Any], arrays: Arrays) -> np.ndarray:
+        """Apply stored edits; of another mesh of the shape if the array `source` holds its file."""
+        self._require_session()
+        source = None
+        if "source" in arrays:
+            source = parse_mesh(str(meta.get("source")), _bytes(arrays, "source"))
+        with TemporaryDirectory() as folder:
+            path = Path(folder, "edits.json")
+            path.write_text(json.dumps(meta.get("edits")))
+            edits = es.io.read_edits(path, source or self.analysis.mesh)
+        self.session = es.deformation.replay(self._rig_at_rest(), edits, source=source)
+        return self._posed(self.session.mesh)
+
+    def _repair(self, meta: dict[str, Any], _arrays: Arrays) -> None:
+        """Repair the shape in its present pose, which becomes the shape."""
+        names = meta.get("names")
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+            raise RequestError("names must be a list of the names of repairs.")
+        done = es.repair(self.mesh, names)
+        self._show(done.mesh, self.analysis.name)
+        self._warnings += done.report
+
+    def _open(self, meta: dict[str, Any], arrays: Arrays) -> None:
+        """Show the mesh of a file, or a shape of the index by its name."""
+        if "match" in meta:
+            name = self._match_name(meta["match"])
+            self._show(self._require_shelf().mesh(name), name)
+            return
+        name = display_name(meta.get("name"))
+        self._show(parse_mesh(name, _bytes(arrays, "file")), name)
+
+    def _solve(self, meta: dict[str, Any], _arrays: Arrays) -> None:
+        most = min(MOST_MODES, self.analysis.mesh.n_vertices)
+        self.analysis.solve(whole(meta, "k", 1, most))
+
+    def _transfer(self, meta: dict[str, Any], arrays: Arrays) -> None:
+        """Bend another shape as this one was bent; the result becomes the shape."""
+        session = self._require_session()
+        name = display_name(meta.get("name"))
+        target = parse_mesh(name, _bytes(arrays, "file"))
+        source = self.analysis.mesh
+        pairs = arrays["pairs"].astype(np.int64) if "pairs" in arrays else None
+        bent = carry_pose(source, session.mesh, target, pairs)
+        self._show(bent, name)
+
+    def _show(self, mesh: es.TriangleMesh, name: str) -> None:
+        """Replace the shape."""
+        self.analysis.cancel()
+        self.analysis = Analysis(mesh, name)
+        self.session, self.bound, self.mode, self.fields = None, None, "graded", {}
+        self.pose += 1
+        self.shape += 1
+
+    def call_query(self, meta: dict[str, Any], arrays: Arrays) -> Reply:
+        """Search an index for shapes like the present one, or like that of a file."""
+        shelf = self._require_shelf()
+        n_matches = whole(meta, "n_matches", 1, 100, 5)
+        mesh = self.mesh
+        if "file" in arrays:
+            mesh = parse_mesh(display_name(meta.get("name")), _bytes(arrays, "file"))
+        found = shelf.query(mesh, n_matches)
+        self.matches = [match["name"] for match in found[0]["matches"]]
+        return found
+
+    def _match_array(self, tail: str) -> np.ndarray:
+        """Return the array "N/vertices" or "N/faces" of match N of the last query."""
+        number, _, what = tail.partition("/")
+        if not number.isdecimal() or what not in ("vertices", "faces"):
+            raise RequestError(f"Of a match there are vertices and faces; not {tail[:80]!r}.")
+        mesh = self._require_shelf().mesh(self._match_name(int(number[:9])))
+        return mesh.faces.astype("<u4") if what == "faces" else mesh.vertices.astype("<f4")
+
+    def _match_name(self, number: Any) -> str:
+        place = whole({"match": number}, "match", 0, len(self.matches) - 1)
+        return self.matches[place]
+
+
+def error_message(kind: str, text: str) -> bytes:
+    """Return the message that answers a call which failed."""
+    return encode({"error": {"kind": kind, "message": text}})
+
+
+def whole(
+    meta: dict[str, Any], name: str, low: int, high: int, default: int | None = None
+) -> int:
+    """Return a whole number of a call; `default` is its value if it is missing.
+
+    Raises
+    ------
+    RequestError
+        If it is not in low..high.
+    """
+    value = meta.get(name)
+    value = default if value is None else value
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise RequestError(f"{name} must be a whole number in {low}..{high}; it is {value!r:.80}.")
+    return value
+
+
+def handle_from(entry: Any) -> es.types.Handle:
+    """Return the handle that an entry of a call stands for; null stands for no motion.
+
+    Raises
+    ------
+    RequestError, InvalidParameterError
+        If it is no handle.
+    """
+    if entry is None:
+        return es.Translation([0.0, 0.0, 0.0])
+    try:
+        if entry["type"] == "rotation":
+            return es.Rotation(entry["pivot"], entry["axis"], entry["angle"])
+        if entry["type"] == "translation":
+            return es.Translation(entry["vector"])
+    except (KeyError, TypeError) as err:
+        raise RequestError(f"A handle must have all its entries; {err} is missing.") from err
+    raise RequestError("The type of a handle must be rotation or translation.")
+
+
+def carry_pose(
+    source: es.TriangleMesh,
+    posed: es.TriangleMesh,
+    target: es.TriangleMesh,
+    pairs: np.ndarray | None = None,
+) -> es.TriangleMesh:
+    """Bend a target as a source was bent.
+
+    Parameters
+    ----------
+    source, posed : TriangleMesh
+    target : TriangleMesh
+    pairs : (p, 2) int, optional
+        Corresponding vertices of source and target. By default vertices of the same number if both
+        have the same faces, else points whose patches match.
+
+    Returns
+    -------
+    TriangleMesh
+    """
+    n_pairs_modes = N_EXACT
+    if pairs is None and np.array_equal(source.faces, target.faces):
+        pairs = np.repeat(np.arange(source.n_vertices)[:, None], 2, axis=1)
+    if pairs is None:
+        one, two = (es.describe(mesh, es.retrieval.PatchRecipe()) for mesh in (source, target))
+        pairs = es.retrieval.match_patches(one.points[0], two.points[0]).vertices
+        n_pairs_modes = N_INEXACT
+    k = min(N_SOLVED, source.n_vertices, target.n_vertices)
+    spectra = [es.solve_spectrum(es.cotangent_laplacian(mesh), k) for mesh in (source, target)]
+    rough = es.functional_map(*spectra, pairs, n_modes=min(n_pairs_modes, k))
+    mapping = es.spectral.refine_map(rough, min(N_CARRIED, k))
+    return es.deformation.transfer_deformation(source, posed, target, mapping)
+
+
+def _bytes(arrays: Arrays, name: str) -> bytes:
+    if name not in arrays or arrays[name].dtype != np.uint8 or arrays[name].ndim != 1:
+        raise RequestError(f"The call must have an array {name!r} with the bytes of a file.")
+    return arrays[name].tobytes()
+
+
+def _fields(values: Mapping[str, Any], n_vertices: int) -> dict[str, Field]:
+    """Return the functions that were passed, checked."""
+    fields = {}
+    for title, given in values.items():
+        numbers = np.asarray(given, dtype=np.float64)
+        if numbers.shape != (n_vertices,) or not np.isfinite(numbers).all():
+            raise es.InvalidParameterError(
+                f"values must hold one finite number for each of the {n_vertices} vertices; "
+                f"{title!r} has the shape {numbers.shape}."
+            )
+        # "height (m)" is a title with its unit.
+        text, _, unit = str(title).removesuffix(")").partition(" (")
+        fields[str(title).replace("/", " ")] = Field(numbers, text, unit)
+    return fields
+
+
+def _field_facts(name: str, field: Field) -> dict[str, Any]:
+    low, high = float(field.values.min()), float(field.values.max())
+    return {"name": name, "title": field.title, "unit": field.unit, "min": low, "max": high}
+

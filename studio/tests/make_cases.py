@@ -1,0 +1,110 @@
+"""Write what the front end and its tests take from the library: color tables and small results."""
+
+import base64
+import json
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+
+import eigenshape as es
+from eigenshape.plot.render import palette
+
+FRONT = Path(__file__).parents[1] / "front"
+TABLES = FRONT / "src" / "core" / "color_tables.json"
+CASES = FRONT / "test" / "cases.json"
+N_PART_COLORS = 18  # palette() repeats after them
+DIGITS = 12  # of stored numbers, so that the file does not depend on the last digits of a CPU
+
+
+def color_tables() -> dict:
+    """Return the color maps and the part palette, base64 of red, green and blue."""
+    steps = np.linspace(0, 1, 256)
+    maps = {name: _pack(mpl.colormaps[name](steps)) for name in ("viridis", "inferno", "RdBu_r")}
+    return {"maps": maps, "parts": _pack(palette(np.arange(N_PART_COLORS)))}
+
+
+def _pack(colors: np.ndarray) -> str:
+    return base64.b64encode(np.round(255 * colors[:, :3]).astype(np.uint8).tobytes()).decode()
+
+
+def cases() -> dict:
+    """Return parts, heat and colors of small shapes, as the library computes them."""
+    mesh = _bumpy_sphere()
+    found = es.find_parts(mesh)
+    pair = es.geometry.disjoint_union(mesh, es.icosphere(1))
+    x, y, z = pair.vertices.T
+    waves = es.merge_tree(pair, np.sin(9 * x) * np.cos(7 * y) + 0.3 * np.sin(11 * z))
+    spectrum = es.solve_spectrum(es.cotangent_laplacian(mesh), 12)
+    times = es.spectral.default_times(spectrum, 2)
+    heat = es.heat_kernel_signature(spectrum, times)
+    source = 17
+    kernel = spectrum.eigenvectors @ (
+        np.exp(-times[0] * spectrum.eigenvalues) * spectrum.eigenvectors[source]
+    )
+    weights = spectrum.eigenvectors[:, :5].T @ (spectrum.mass @ mesh.vertices)
+    values = np.linspace(-2.0, 3.0, 37)
+    return {
+        "trees": [_tree_case(found.tree), _tree_case(waves)],
+        "heat": {
+            "modes": _plain(spectrum.eigenvectors.T.ravel()),
+            "eigenvalues": _plain(spectrum.eigenvalues),
+            "areas": _plain(spectrum.mass.diagonal()),
+            "vertices": _plain(mesh.vertices.ravel()),
+            "times": _plain(times),
+            "signatures": [_plain(column) for column in heat.T],
+            "source": source,
+            "kernel": _plain(kernel),
+            "lowpass5": _plain((spectrum.eigenvectors[:, :5] @ weights).ravel()),
+        },
+        "colors": {
+            "values": _plain(values),
+            "viridis": es.plot.value_colors(values).ravel().tolist(),
+        },
+    }
+
+
+def _bumpy_sphere() -> es.TriangleMesh:
+    ball = es.icosphere(2)
+    x, y, z = ball.vertices.T
+    bumps = 1 + 0.35 * np.cos(4 * np.arctan2(y, x)) * (x**2 + y**2) + 0.3 * x * z
+    return es.TriangleMesh(ball.vertices * bumps[:, None], ball.faces)
+
+
+def _tree_case(tree: es.features.MergeTree | es.features.PartTree) -> dict:
+    """Return a tree as the wire carries it, and its cuts by number and by persistence."""
+    ends = np.flatnonzero(tree.parent >= 0)
+    rows = np.column_stack([ends, tree.parent[ends], tree.persistence[ends]])
+    levels = np.unique(tree.persistence[ends])
+    steps = max(1, len(tree.maxima) // 6)  # a few cuts of a large tree are enough
+    counts = [*range(1, len(tree.maxima) + 2)][::steps]
+    thresholds = [0.0, *[*levels, *(levels[1:] + levels[:-1]) / 2][::steps], 2 * levels[-1]]
+    by_count = [(count, es.segment(tree, n_regions=count)) for count in counts]
+    by_level = [(level, es.segment(tree, persistence=level)) for level in thresholds]
+    return {
+        "count": len(tree.maxima),
+        "rows": rows.ravel().tolist(),
+        "maxima": tree.maxima.tolist(),
+        "labels": tree.basins.tolist(),
+        "by_count": [{"count": count, **_cut(cut)} for count, cut in by_count],
+        "by_persistence": [{"persistence": float(level), **_cut(cut)} for level, cut in by_level],
+    }
+
+
+def _cut(cut: es.features.Segmentation) -> dict:
+    return {"labels": cut.labels.tolist(), "vertices": cut.features.vertices.tolist()}
+
+
+def _plain(numbers: np.ndarray) -> list[float]:
+    return [float(f"{number:.{DIGITS}g}") for number in numbers]
+
+
+def main() -> None:
+    """Write both files."""
+    TABLES.write_text(json.dumps(color_tables(), indent=2) + "\n", encoding="utf-8")
+    CASES.parent.mkdir(exist_ok=True)
+    CASES.write_text(json.dumps(cases()) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,339 @@
+"""The five calls on a real shape: what the page gets is what the library computes."""
+
+import json
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import Page, stretched_ball
+from eigenshape_studio.wire import decode, encode
+from eigenshape_studio.workspace import Workspace
+
+import eigenshape as es
+
+TURN = {"type": "rotation", "pivot": [0, 0.9, 0], "axis": [0, 0, 2], "angle": 0.6}
+PULL = {"type": "translation", "vector": [0, 0.4, 0.1]}
+ROTATION, TRANSLATION = es.Rotation([0, 0.9, 0], [0, 0, 2], 0.6), es.Translation([0, 0.4, 0.1])
+
+
+def file_of(mesh, suffix=".ply"):
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, f"shape{suffix}")
+        es.write_mesh(mesh, path)
+        return np.frombuffer(path.read_bytes(), np.uint8)
+
+
+def bend(page, top, handle=TURN, mode="graded"):
+    page.call("rig", {"n_modes": None, "n_regions": 1, "fixed": False}, {"region0": top})
+    return page.call("finish", kind="commit", handles=[handle], mode=mode)
+
+
+def test_the_state_is_that_of_the_shape(page):
+    state, arrays = page.call("meta")
+    mesh = stretched_ball()
+    assert not arrays
+    assert (state["name"], state["n_vertices"], state["n_faces"]) == ("ball.ply", 642, 1280)
+    np.testing.assert_allclose(state["center"], 0, atol=1e-12)
+    assert state["extent"] == pytest.approx(2 * np.linalg.norm([1.0, 1.7, 0.8]), rel=1e-2)
+    assert state["up"] == [0, 1, 0]
+    np.testing.assert_allclose(np.abs(state["front"]), [0, 0, 1], atol=1e-9)
+    assert state["health"]["closed"]
+    assert state["health"]["findings"] == []
+    assert state["health"]["volume"] == es.geometry.enclosed_volume(mesh)
+    assert state["spectrum"]["status"] == "ready"
+    assert state["spectrum"]["k"] == 300
+    assert state["spectrum"]["complete"]
+    assert "none is missing" in state["spectrum"]["certificate"]
+    assert state["deformation"]["status"] == "ready"
+    assert state["parts"]["status"] == "none"
+    assert state["index"] is None
+    assert "query" not in state["capabilities"]
+
+
+def test_arrays_are_those_of_the_library(page):
+    mesh, spectrum = stretched_ball(), page.workspace.analysis.spectrum.result
+    np.testing.assert_array_equal(page.array("vertices"), mesh.vertices.astype("<f4"))
+    np.testing.assert_array_equal(page.array("faces"), mesh.faces)
+    modes = page.array("modes", start=2, stop=5)
+    np.testing.assert_array_equal(modes, spectrum.eigenvectors[:, 2:5].T.astype("<f4"))
+    np.testing.assert_array_equal(page.array("eigenvalues"), spectrum.eigenvalues)
+    assert page.array("areas").sum() == pytest.approx(es.geometry.surface_area(mesh))
+    lower, upper = page.array("brackets", stop=8).T
+    assert (lower <= upper).all()
+    assert page.array("crossings").shape == (0, 2)
+    skeleton = es.deformation.eigen_skeleton(page.workspace.analysis.rig.result, 12)
+    np.testing.assert_array_equal(page.array("skeleton/12"), skeleton.astype("<f4"))
+
+
+def test_shares_are_those_of_bind(page, top):
+    facts, arrays = page.call("rig", n_modes=20, n_regions=1, fixed=False, _arrays={"region0": top})
+    binding = es.deformation.bind(es.rig_shape(stretched_ball()), [top.astype(int)], n_modes=20)
+    assert facts["n_modes"] == [20]
+    np.testing.assert_array_equal(arrays["shares"], binding.shares.astype("<f4"))
+    assert page.call("meta")[0]["deformation"]["regions"] == [len(top)]
+
+
+@pytest.mark.parametrize("mode", ["graded", "uncrossed", "thesis"])
+def test_a_commit_equals_deform_exactly(page, top, mode):
+    shown = bend(page, top, TURN, mode)
+    bent = es.deform(es.rig_shape(stretched_ball()), top.astype(int), ROTATION, mode=mode)
+    np.testing.assert_array_equal(page.workspace.mesh.vertices, bent.vertices)
+    np.testing.assert_array_equal(shown[1]["vertices"], bent.vertices.astype("<f4"))
+    np.testing.assert_array_equal(page.array("vertices"), bent.vertices.astype("<f4"))
+    state = shown[0]["state"]
+    assert (state["pose"], state["shape"]) == (1, 0)
+    assert state["deformation"]["mode"] == mode
+    assert (state["deformation"]["n_edits"], state["deformation"]["n_redoable"]) == (1, 0)
+
+
+def test_two_regions_and_fixed_vertices_are_those_of_bend(page, top):
+    mesh = stretched_ball()
+    bottom = np.flatnonzero(mesh.vertices[:, 1] < -0.9).astype("<u4")
+    belt = np.flatnonzero(np.abs(mesh.vertices[:, 1]) < 0.2).astype("<u4")
+    arrays = {"region0": top, "region1": bottom, "fixed": belt}
+    page.call("rig", {"n_modes": 40, "n_regions": 2, "fixed": True}, arrays)
+    _, found = page.call("finish", kind="commit", handles=[TURN, None], mode="graded")
+    regions = [top.astype(int), bottom.astype(int)]
+    rig = es.rig_shape(mesh)
+    binding = es.deformation.bind(rig, regions, fixed=belt.astype(int), n_modes=40)
+    bent = es.deformation.bend(binding, [ROTATION, es.Translation([0, 0, 0])])
+    np.testing.assert_array_equal(found["vertices"], bent.vertices.astype("<f4"))
+
+
+def test_a_preview_is_exact_and_changes_nothing(page, top):
+    page.call("rig", n_modes=None, n_regions=1, fixed=False, _arrays={"region0": top})
+    facts, shown = page.call("finish", kind="preview", handles=[PULL], mode="graded")
+    bent = es.deform(es.rig_shape(stretched_ball()), top.astype(int), TRANSLATION)
+    np.testing.assert_array_equal(shown["vertices"], bent.vertices.astype("<f4"))
+    assert facts["state"]["pose"] == 0
+    np.testing.assert_array_equal(page.workspace.mesh.vertices, stretched_ball().vertices)
+
+
+def test_undo_redo_and_reset_restore_the_poses(page, top):
+    first = bend(page, top)[1]["vertices"]
+    second = bend(page, top, PULL)[1]["vertices"]
+    np.testing.assert_array_equal(page.call("finish", kind="undo")[1]["vertices"], first)
+    np.testing.assert_array_equal(page.call("finish", kind="redo")[1]["vertices"], second)
+    facts, arrays = page.call("finish", kind="reset")
+    np.testing.assert_array_equal(arrays["vertices"], stretched_ball().vertices.astype("<f4"))
+    assert facts["state"]["deformation"]["n_redoable"] == 2
+    page.call("finish", kind="redo")
+    error = page.error("finish", kind="commit", handles=[PULL], mode="graded")
+    assert "A region must be bound" in error["message"]
+
+
+def test_edits_are_saved_and_replayed_on_another_resolution(page, top):
+    bend(page, top)
+    edits = json.loads(page.array("file/edits").tobytes())
+    page.call("finish", kind="reset")
+    again = page.call("finish", kind="replay", edits=edits)[1]["vertices"]
+    bent = es.deform(es.rig_shape(stretched_ball()), top.astype(int), ROTATION)
+    np.testing.assert_array_equal(again, bent.vertices.astype("<f4"))
+
+    fine = Page(Workspace(stretched_ball(4)))
+    assert fine.workspace.analysis.rig.wait(300)
+    assert "original mesh" in fine.error("finish", kind="replay", edits=edits)["message"]
+    arrays = {"source": file_of(stretched_ball())}
+    found = fine.call("finish", {"kind": "replay", "edits": edits, "source": "ball.ply"}, arrays)
+    assert found[0]["state"]["deformation"]["n_edits"] == 1
+    edit = es.deformation.Edit((es.deformation.Move(top.astype(int), ROTATION),))
+    rig = es.rig_shape(stretched_ball(4))
+    expected = es.deformation.replay(rig, [edit], source=stretched_ball()).mesh
+    np.testing.assert_array_equal(found[1]["vertices"], expected.vertices.astype("<f4"))
+
+
+@pytest.mark.parametrize("suffix", ["ply", "obj", "glb"])
+def test_a_file_holds_the_present_pose(page, top, tmp_path, suffix):
+    bend(page, top)
+    path = tmp_path / f"bent.{suffix}"
+    path.write_bytes(page.array(f"file/{suffix}").tobytes())
+    single = suffix == "glb"
+    expected = page.workspace.mesh.vertices.astype("<f4") if single else page.workspace.mesh.vertices
+    np.testing.assert_array_equal(es.read_mesh(path).vertices, expected)
+
+
+def test_an_opened_file_becomes_the_shape(page):
+    ball = es.icosphere(2)
+    facts, _ = page.call("finish", {"kind": "open", "name": "a/b\\ball.ply"}, {"file": file_of(ball)})
+    state = facts["state"]
+    assert (state["name"], state["n_vertices"], state["shape"]) == ("ball.ply", 162, 1)
+    np.testing.assert_array_equal(page.array("vertices"), ball.vertices.astype("<f4"))
+
+
+def test_a_repair_is_suggested_and_done():
+    ball = es.icosphere(2)
+    page = Page(Workspace(es.TriangleMesh(ball.vertices, ball.faces[1:, ::-1])))
+    assert page.workspace.analysis.health.wait(60)
+    findings = page.call("meta")[0]["health"]["findings"]
+    assert [finding["name"] for finding in findings] == ["fill_holes", "orient"]
+    facts, _ = page.call("finish", kind="repair", names=["fill_holes", "orient"])
+    assert facts["state"]["n_faces"] == 320
+    assert len(facts["warnings"]) == 2
+    assert page.workspace.analysis.health.wait(60)
+    assert page.call("meta")[0]["health"]["closed"]
+
+
+def test_another_number_of_modes_is_solved_for_and_the_rig_stays(page, top):
+    before = page.workspace.analysis.rig.result
+    facts, _ = page.call("finish", kind="solve", k=12)
+    assert facts["state"]["spectrum"]["status"] == "running"
+    assert page.workspace.analysis.spectrum.wait(60)
+    assert page.call("meta")[0]["spectrum"]["k"] == 12
+    assert page.array("modes").shape == (12, 642)
+    bend(page, top)
+    assert page.workspace.analysis.rig.result is before
+
+
+def test_parts_cut_in_the_browser_are_those_of_segment():
+    mesh = es.make_creature("quadruped", n_vertices=800)
+    page = Page(Workspace(mesh))
+    assert "must be ready" in page.error("array", name="parts/labels")["message"]
+    page.call("finish", kind="parts")
+    assert page.workspace.analysis.parts.wait(120)
+    state = page.call("meta")[0]["parts"]
+    found = page.workspace.analysis.parts.result
+    assert state["n_regions"] == len(found.parts.features.vertices)
+    labels, merges = page.array("parts/labels"), page.array("parts/merges")
+    assert labels.shape == (800,)
+    # What the page does: unite each region that ends with its parent.
+    n_regions = 5
+    became = np.arange(len(found.tree.maxima))
+    for merged, parent, _ in merges[merges[:, 0] >= n_regions].astype(int).tolist():
+        one, two = sorted([became[merged], became[parent]])
+        became[became == two] = one
+    cut = es.segment(found.tree, n_regions=n_regions)
+    np.testing.assert_array_equal(became[found.tree.basins], cut.labels)
+    births, deaths, persistence, vertices = page.array("diagram").T
+    assert (births >= deaths).all()
+    np.testing.assert_allclose(births, found.heat[vertices.astype(int)])
+    assert np.isinf(persistence[0])
+
+
+def test_a_pose_is_transferred_to_another_shape():
+    mesh = es.make_creature("quadruped", n_vertices=800)
+    page = Page(Workspace(mesh))
+    assert page.workspace.analysis.rig.wait(120)
+    height = float(np.quantile(mesh.vertices[:, 1], 0.75))
+    top = np.flatnonzero(mesh.vertices[:, 1] > height).astype("<u4")
+    turn = {"type": "rotation", "pivot": [0, height, 0], "axis": [0, 0, 1], "angle": 0.6}
+    bend(page, top, turn)
+    expected = 2 * page.workspace.mesh.vertices
+    larger = es.TriangleMesh(2 * mesh.vertices, mesh.faces)
+    call = {"kind": "transfer", "name": "larger.ply"}
+    facts, _ = page.call("finish", call, {"file": file_of(larger)})
+    assert (facts["state"]["shape"], facts["state"]["name"]) == (1, "larger.ply")
+    # The map carries rotations by its lowest modes, so a tenth of the motion is lost.
+    error = np.linalg.norm(page.workspace.mesh.vertices - expected)
+    assert error < 0.15 * np.linalg.norm(expected - larger.vertices)
+
+
+def test_values_are_shown_with_their_unit():
+    mesh = es.icosphere(2)
+    page = Page(Workspace(mesh, values={"height (m)": mesh.vertices[:, 2]}))
+    (facts,) = page.call("meta")[0]["values"]
+    assert (facts["title"], facts["unit"], facts["max"]) == ("height", "m", 1.0)
+    shown = page.array(f"values/{facts['name']}")
+    np.testing.assert_array_equal(shown, mesh.vertices[:, 2].astype("<f4"))
+    with pytest.raises(es.InvalidParameterError, match="one finite number for each"):
+        Workspace(mesh, values={"height": [1, 2]})
+
+
+def test_an_index_is_searched(tmp_path):
+    fish, bird = (es.make_creature(kind, n_vertices=500) for kind in ("fish", "bird"))
+    index = es.ShapeIndex.create(tmp_path / "index")
+    es.write_mesh(fish, tmp_path / "fish.ply")
+    index.add("fish", fish, label="animal", source=str(tmp_path / "fish.ply"), n_views=0)
+    index.add("bird", bird, n_views=0)
+    page = Page(Workspace(es.make_creature("fish", 1, n_vertices=500), index=tmp_path / "index"))
+    assert page.call("meta")[0]["index"]["n_shapes"] == 2
+    facts, arrays = page.call("query", n_matches=2)
+    assert [match["name"] for match in facts["matches"]] == ["fish", "bird"]
+    assert arrays["thumbnail0"].tobytes().startswith(b"\x89PNG")
+    assert "thumbnail1" not in arrays
+    assert arrays["pairs0"].max() < 500
+    np.testing.assert_array_equal(page.array("match/0/faces"), fish.faces)
+    call = {"n_matches": 1, "name": "bird.ply"}
+    facts, _ = page.call("query", call, {"file": file_of(bird)})
+    assert facts["matches"][0]["name"] == "bird"
+    assert "without its file" in page.error("finish", kind="open", match=0)["message"]
+    page.call("query", n_matches=1)
+    assert page.call("finish", kind="open", match=0)[0]["state"]["name"] == "fish"
+
+
+def test_two_tabs_share_the_analysis_and_nothing_else(page, top):
+    other = Page(page.workspace.fork())
+    bend(page, top)
+    np.testing.assert_array_equal(other.workspace.mesh.vertices, stretched_ball().vertices)
+    assert other.call("meta")[0]["pose"] == 0
+    assert other.workspace.analysis.rig is page.workspace.analysis.rig
+    other.call("finish", kind="open", name="b.ply", _arrays={"file": file_of(es.icosphere(1))})
+    assert page.call("meta")[0]["n_vertices"] == 642
+
+
+WRONG = [
+    ("rig", {"n_regions": 5}, {}, "n_regions must be a whole number in 1..4"),
+    ("rig", {"n_regions": True}, {}, "n_regions must be"),
+    ("rig", {"n_regions": 1}, {}, "region0 is missing"),
+    ("rig", {"n_regions": 1}, {"region0": [9999]}, "must lie in 0..641"),
+    ("rig", {"n_regions": 1}, {"region0": []}, "must have a boundary"),
+    ("finish", {"kind": "explode"}, {}, "kind must be one of"),
+    ("finish", {"kind": ["undo"]}, {}, "kind must be one of"),
+    ("finish", {"kind": "undo"}, {}, "an edit to undo"),
+    ("finish", {"kind": "commit"}, {}, "must be bound"),
+    ("finish", {"kind": "solve", "k": 0}, {}, "k must be a whole number"),
+    ("finish", {"kind": "repair", "names": ["explode"]}, {}, "must be among"),
+    ("finish", {"kind": "repair"}, {}, "must be a list"),
+    ("finish", {"kind": "open", "name": "a.ply"}, {}, "with the bytes of a file"),
+    ("finish", {"kind": "open", "name": "a.exe"}, {"file": b"MZ"}, "must end in .ply"),
+    ("finish", {"kind": "open", "name": "a.ply"}, {"file": b"ply"}, "The file"),
+    ("finish", {"kind": "replay", "edits": {"kind": "x"}}, {}, "of kind"),
+    ("finish", {"kind": "open", "match": 0}, {}, "match must be a whole number"),
+    ("array", {"name": "nothing"}, {}, "must be an array of the requested name"),
+    ("array", {"name": 3}, {}, "must be text"),
+    ("array", {"name": "file/../../etc/passwd"}, {}, "must be ply"),
+    ("array", {"name": "values/x"}, {}, "Values must be among"),
+    ("array", {"name": "skeleton/9999999999"}, {}, "of 1 to 300 modes"),
+    ("array", {"name": "modes", "start": 5, "stop": 4}, {}, "stop must be"),
+    ("query", {"n_matches": 3}, {}, "must be an index"),
+    ("explode", {}, {}, "must be one of meta"),
+]
+
+
+@pytest.mark.parametrize(("call", "meta", "arrays", "reason"), WRONG)
+def test_a_wrong_call_is_answered_with_its_reason(page, call, meta, arrays, reason):
+    given = {
+        name: np.frombuffer(value, "|u1") if isinstance(value, bytes) else np.array(value, "<u4")
+        for name, value in arrays.items()
+    }
+    assert reason in page.error(call, meta, given)["message"]
+    assert page.call("meta")[0]["shape"] == 0
+
+
+HANDLES = [
+    [],
+    {},
+    [3],
+    [{"type": "rotation"}],
+    [{"type": "scale"}],
+    [{**TURN, "axis": [0, 0, 0]}],
+    [{**TURN, "pivot": "here"}],
+    [{**TURN, "angle": None}],
+    [{"type": "translation", "vector": [1e999, 0, 0]}],
+    [{"type": "translation", "vector": [[1, 2], 3]}],
+]
+
+
+@pytest.mark.parametrize("handles", HANDLES)
+def test_a_wrong_handle_is_refused(page, top, handles):
+    page.call("rig", n_modes=None, n_regions=1, fixed=False, _arrays={"region0": top})
+    page.error("finish", kind="commit", handles=handles, mode="graded")
+    assert page.call("meta")[0]["deformation"]["n_edits"] == 0
+
+
+def test_a_message_that_is_none_is_answered():
+    workspace = Workspace(es.icosphere(1))
+    for message in (b"", b"nonsense", encode([1, 2])):
+        answer = workspace.answer("meta", message)
+        assert answer.status == 400
+        assert "error" in decode(answer.message)[0]
