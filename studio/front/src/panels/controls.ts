@@ -138,7 +138,7 @@ type Place = [number, number];
 export interface PlotOptions {
   labels: [string, string];
   series: uPlot.Series[];
-  draw(context: CanvasRenderingContext2D, pixel: (x: number, y: number) => Place): void;
+  draw(plot: uPlot, pixel: (x: number, y: number) => Place): void;
   choose(plot: uPlot, left: number, top: number): void; // a click
 }
 
@@ -155,15 +155,8 @@ export function buildPlot(host: HTMLElement, data: uPlot.AlignedData, options: P
     grid: { stroke: () => pageColor(host, "--line"), width: 1 },
     ticks: { stroke: () => pageColor(host, "--line"), size: 4 },
   }));
-  const draw = (plot: uPlot) => {
-    const { left, top, width, height } = plot.bbox;
-    plot.ctx.save();
-    plot.ctx.beginPath();
-    plot.ctx.rect(left, top, width, height);
-    plot.ctx.clip();
-    options.draw(plot.ctx, (x, y) => [plot.valToPos(x, "x", true), plot.valToPos(y, "y", true)]);
-    plot.ctx.restore();
-  };
+  const draw = (plot: uPlot) =>
+    options.draw(plot, (x, y) => [plot.valToPos(x, "x", true), plot.valToPos(y, "y", true)]);
   const plot = new uPlot(
     {
       width: host.clientWidth,
@@ -194,19 +187,21 @@ export function pageColor(element: Element, name: string): string {
   return getComputedStyle(element).getPropertyValue(name).trim();
 }
 
-export function drawLine(context: CanvasRenderingContext2D, from: Place, to: Place, color: string, width = 1): void {
-  context.beginPath();
-  context.moveTo(...from);
-  context.lineTo(...to);
-  context.strokeStyle = color;
-  context.lineWidth = width * devicePixelRatio;
-  context.stroke();
+export function drawLine(plot: uPlot, from: Place, to: Place, color: string, width = 1): void {
+  plot.ctx.beginPath();
+  plot.ctx.moveTo(...from);
+  plot.ctx.lineTo(...to);
+  drawPath(plot, color, width);
 }
 
-export function drawRing(context: CanvasRenderingContext2D, place: Place, color: string): void {
-  context.beginPath();
-  context.arc(...place, 5 * devicePixelRatio, 0, 2 * Math.PI);
-  context.strokeStyle = color;
-  context.lineWidth = 2 * devicePixelRatio;
-  context.stroke();
+export function drawRing(plot: uPlot, place: Place, color: string): void {
+  plot.ctx.beginPath();
+  plot.ctx.arc(...place, 5 * devicePixelRatio, 0, 2 * Math.PI);
+  drawPath(plot, color, 2);
+}
+
+function drawPath({ ctx }: uPlot, color: string, width: number): void {
+  ctx.strokeStyle = color;
+  ctx.lineWidth = width * devicePixelRatio;
+  ctx.stroke();
 }

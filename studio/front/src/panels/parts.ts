@@ -21,7 +21,7 @@ export class PartsPanel extends ColoringPanel {
   private readonly level = new Slider("Least persistence", "persistence", (step) => this.cut({ persistence: this.levelAt(step) }));
   private readonly chosen = h("p", { class: "note", "data-test": "chosen-part" });
   private readonly plotHost = h("div", { class: "plot", "data-test": "diagram" });
-  private readonly maximum = new Slider("Maximum, by persistence", "maximum", (index) => this.select(index));
+  private readonly maximum = new Slider("Maximum and its persistence", "maximum", (index) => this.select(index));
   private readonly results: HTMLElement;
   private plot: uPlot | null = null;
   private finest: Int32Array = new Int32Array(); // region of each vertex
@@ -146,7 +146,7 @@ export class PartsPanel extends ColoringPanel {
   private select(index: number): void {
     const [, , persistence, vertex] = this.diagram.subarray(4 * index, 4 * index + 4);
     [this.part, this.index] = [this.labels[vertex!]!, index];
-    this.maximum.show(index, `${index}: ${formatNumber(persistence!)} /length²`);
+    this.maximum.show(index, `${index}: ${formatNumber(persistence!)}`);
     this.paint();
   }
 
@@ -158,10 +158,11 @@ export class PartsPanel extends ColoringPanel {
     this.plot = buildPlot(this.plotHost, data, {
       labels: ["birth: heat at the maximum, 1/length²", "death: at the saddle"],
       series: [dots(this.plotHost, 6)],
-      draw: (context, pixel) => {
-        const highest = Math.max(...numbers.map((i) => this.birth(i)));
-        drawLine(context, pixel(0, 0), pixel(highest, highest), pageColor(this.plotHost, "--faint"));
-        if (this.index >= 0) drawRing(context, pixel(this.birth(this.index), this.death(this.index)), POINT);
+      draw: (plot, pixel) => {
+        const { x, y } = plot.scales;
+        const [low, high] = [Math.max(x!.min!, y!.min!), Math.min(x!.max!, y!.max!)];
+        drawLine(plot, pixel(low, low), pixel(high, high), pageColor(this.plotHost, "--faint"));
+        if (this.index >= 0) drawRing(plot, pixel(this.birth(this.index), this.death(this.index)), POINT);
       },
       choose: (plot, left, top) => this.select(this.findNearest(plot, left, top)),
     });

@@ -23,6 +23,7 @@ export class SpectrumPanel extends ColoringPanel {
   private readonly nodal = h("input", { type: "checkbox", checked: true, "data-test": "nodal", onchange: () => this.start() });
   private readonly proof = h("p", { class: "note", "data-test": "certificate" });
   private readonly bracket = button("Bracket the lowest 20", "bracket", "Compute bounds of the shape's own eigenvalues", () => this.loadBrackets());
+  private readonly bounds = h("p", { class: "note", "data-test": "bounds" });
   private readonly results: HTMLElement;
   private plot: uPlot | null = null;
   private eigenvalues: Float64Array = new Float64Array();
@@ -43,10 +44,10 @@ export class SpectrumPanel extends ColoringPanel {
     this.results = h(
       "div",
       {},
-      h("h3", {}, "Eigenvalues"),
       this.plotHost,
       h("p", { class: "keys-of-plot" }, ...keys),
       this.slider.element,
+      this.bounds,
       choice,
       h("div", { class: "row" }, h("label", {}, this.nodal, "Nodal lines")),
       h("h3", {}, "Proof"),
@@ -132,11 +133,11 @@ export class SpectrumPanel extends ColoringPanel {
     return buildPlot(host, data, {
       labels: ["number i", "eigenvalue λ, 1/length²"],
       series: [weyl, dots(host, 4)],
-      draw: (context, pixel) => {
+      draw: (plot, pixel) => {
         const { brackets, index, eigenvalues } = this;
         for (let i = 0; 2 * i < brackets.length; i++)
-          drawLine(context, pixel(i, brackets[2 * i]!), pixel(i, brackets[2 * i + 1]!), BRACKET, 3);
-        drawRing(context, pixel(index, eigenvalues[index]!), pageColor(host, "--text"));
+          drawLine(plot, pixel(i, brackets[2 * i]!), pixel(i, brackets[2 * i + 1]!), BRACKET, 3);
+        drawRing(plot, pixel(index, eigenvalues[index]!), pageColor(host, "--text"));
       },
       choose: (plot, left) => this.select(plot.posToIdx(left)),
     });
@@ -149,6 +150,7 @@ export class SpectrumPanel extends ColoringPanel {
     this.plot?.setScale("x", { min: 0, max: this.brackets.length / 2 });
     this.plot?.setScale("y", { min: 0, max: 1.05 * this.brackets.at(-1)! });
     this.results.classList.add("bracketed");
+    this.showIndex(this.index);
   }
 
   private select(index: number): void {
@@ -159,6 +161,8 @@ export class SpectrumPanel extends ColoringPanel {
   private showIndex(index: number): void {
     this.index = index;
     this.slider.show(index, `${index}: λ = ${formatNumber(this.eigenvalues[index]!, this.eigenvalues.at(-1))}`);
+    const [low, high] = Array.from(this.brackets.subarray(2 * index, 2 * index + 2), (bound) => bound.toPrecision(6));
+    this.bounds.textContent = low ? `That of the surface itself lies between ${low} and ${high}.` : "";
     this.plot?.redraw(false);
   }
 }
