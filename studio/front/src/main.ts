@@ -5,6 +5,7 @@ import type { Backend } from "./core/backend";
 import { httpBackend } from "./hosts/http";
 import { inlineBackend } from "./hosts/inline";
 import { widgetBackend, type WidgetModel } from "./hosts/widget";
+import { DeformPanel } from "./panels/deform";
 import { HeatPanel } from "./panels/heat";
 import { PartsPanel } from "./panels/parts";
 import { SearchPanel } from "./panels/search";
@@ -12,7 +13,7 @@ import { ShapePanel } from "./panels/shape";
 import { SpectrumPanel } from "./panels/spectrum";
 
 function makePanels(): Panel[] {
-  return [new ShapePanel(), new SpectrumPanel(), new HeatPanel(), new PartsPanel(), new SearchPanel()];
+  return [new DeformPanel(), new ShapePanel(), new SpectrumPanel(), new HeatPanel(), new PartsPanel(), new SearchPanel()];
 }
 
 /** Return the number of this tab, which the server knows its session by; it survives a reload. */
@@ -37,6 +38,12 @@ function start(backend: Backend, host: HTMLElement, settings: Settings, keys: Ev
 
 const page = document.getElementById("eigenshape-studio");
 const data = document.getElementById("eigenshape-data");
+// The page around the studio; a notebook has its own.
+if (page || data) {
+  const sheet = new CSSStyleSheet();
+  sheet.replaceSync("html, body, body > div { height: 100%; margin: 0; }");
+  document.adoptedStyleSheets = [sheet];
+}
 if (page) {
   const settings = new Settings(sessionStorage);
   // For tests.

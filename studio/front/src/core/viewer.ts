@@ -46,6 +46,7 @@ export class Viewer {
   vertices: Float32Array = new Float32Array(0);
   faces: Uint32Array = new Uint32Array(0);
   labels: Int32Array | null = null;
+  extent = 1; // diagonal of the box around the mesh
   private readonly renderer: three.WebGLRenderer | null;
   private readonly picker: Picker | null;
   private readonly motion = {
@@ -118,7 +119,7 @@ export class Viewer {
     this.setScalars(null);
     this.setHandles([]);
     const box = new three.Box3().setFromArray(vertices);
-    const size = box.getSize(new three.Vector3()).length() || 1;
+    const size = (this.extent = box.getSize(new three.Vector3()).length() || 1);
     this.space.scale.setScalar(1 / size);
     this.space.position.copy(box.getCenter(new three.Vector3())).multiplyScalar(-1 / size);
     this.space.updateMatrixWorld(true);
@@ -349,6 +350,13 @@ export class Viewer {
     this.controls.target.set(...view.target);
     this.controls.update();
     this.invalidate();
+  }
+
+  /** Return how many pixels of the page a length has at the point that the camera turns about. */
+  pixelsOf(length: number): number {
+    const distance = this.camera.position.distanceTo(this.controls.target);
+    const seen = 2 * Math.tan((FIELD_OF_VIEW * Math.PI) / 360) * distance * this.extent;
+    return (this.canvas.clientHeight * length) / seen;
   }
 
   /** Return the ray through a place of the canvas, in the coordinates of the mesh. */
