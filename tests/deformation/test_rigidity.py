@@ -76,7 +76,7 @@ def test_from_near_the_fit_is_that_of_singular_values(kind):
 
 @pytest.mark.parametrize("kind", ["bent", "flat", "anything", "mirrored"])
 def test_from_anywhere_it_is_nearly_always(kind):
-    """Far away there are rotations that are neither best nor worse than their neighbours: a fit may linger there."""
+    """Far away there are rotations that are neither best nor worse than their neighbors: a fit may linger there."""
     gaps = []
     for _ in range(500):
         edges = star(6, kind)

@@ -174,7 +174,7 @@ def test_submesh_keeps_coordinates_and_tells_where_vertices_were():
 
 
 def has_several_fans(faces, vertex):
-    """Grow one fan over shared neighbours, and see whether a face is left."""
+    """Grow one fan over shared neighbors, and see whether a face is left."""
     rims = [set(face) - {vertex} for face in faces if vertex in face]
     reached = rims[0] if rims else set()
     for _ in rims:

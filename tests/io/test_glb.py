@@ -149,7 +149,7 @@ def test_parts_of_one_mesh_share_the_vertices_they_share_in_the_file():
     assert (mesh.n_vertices, mesh.n_faces) == (6, 6)
 
 
-def test_interleaved_and_normalised_numbers_and_data_uris():
+def test_interleaved_and_normalized_numbers_and_data_uris():
     rows = b"".join(
         struct.pack("<hhhH", *row, 77) for row in [(0, 0, 0), (32767, 0, 0), (0, -32768, 0)]
     )

@@ -90,7 +90,7 @@ def test_rigid_motion_changes_nothing(seed, mass):
 
 @few
 @given(seeds, masses)
-def test_relabelling_permutes(seed, mass):
+def test_relabeling_permutes(seed, mass):
     mesh, rng = shape(seed), np.random.default_rng(seed)
     old_of_new = rng.permutation(mesh.n_vertices)
     faces = np.argsort(old_of_new)[mesh.faces][rng.permutation(mesh.n_faces)]

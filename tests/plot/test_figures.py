@@ -26,7 +26,7 @@ RED, BLUE = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 
 def colors_at(drawing, mask):
-    """Mean colour of the opaque pixels under a mask."""
+    """Mean color of the opaque pixels under a mask."""
     opaque = drawing.image[..., 3] > 0.99
     return drawing.image[opaque & mask][:, :3].mean(axis=0)
 
@@ -56,7 +56,7 @@ def test_a_scan_is_looked_at_from_where_it_was_seen():
     assert towards @ (view / np.linalg.norm(view)) > 0.9
 
 
-def test_halves_have_their_colours_on_their_sides():
+def test_halves_have_their_colors_on_their_sides():
     camera = three_quarter_view(SPHERE, size=160)
     high = SPHERE.vertices[SPHERE.faces].mean(axis=1)[:, 1] > 0
     drawing = draw(SPHERE, camera, face_colors=np.where(high[:, None], RED, BLUE))
@@ -106,7 +106,7 @@ def test_the_same_picture_twice_and_at_any_scale():
     assert np.array_equal(first, draw(larger, three_quarter_view(larger, size=80)).image)
 
 
-def test_palette_tells_fifteen_labels_apart_and_greys_the_rest():
+def test_palette_tells_fifteen_labels_apart_and_grays_the_rest():
     colors = palette(np.arange(15))
     apart = np.linalg.norm(colors[:, None] - colors[None], axis=2)[np.triu_indices(15, 1)]
     assert apart.min() > 0.14
@@ -115,7 +115,7 @@ def test_palette_tells_fifteen_labels_apart_and_greys_the_rest():
 
 
 @pytest.mark.long
-def test_figures_are_labelled(tmp_path):
+def test_figures_are_labeled(tmp_path):
     mesh = icosphere(2)
     found = solve_spectrum(cotangent_laplacian(mesh), 12)
     functions = figure_eigenfunctions(mesh, found, range(1, 4))
@@ -123,8 +123,8 @@ def test_figures_are_labelled(tmp_path):
         f"φ$_{{{i}}}$,  λ = {found.eigenvalues[i]:.4g}" for i in (1, 2, 3)
     ]
     assert "eigenfunction" in functions.axes[-1].get_ylabel()
-    field = figure_field(mesh, mesh.vertices[:, 0], "x, in metres")
-    assert field.axes[-1].get_ylabel() == "x, in metres"
+    field = figure_field(mesh, mesh.vertices[:, 0], "x, in meters")
+    assert field.axes[-1].get_ylabel() == "x, in meters"
     curve = figure_spectrum(found, area=12.5, brackets=bracket_eigenvalues(mesh, 12))
     (axes,) = curve.axes
     assert "λ" in axes.get_ylabel()

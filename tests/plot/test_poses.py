@@ -57,8 +57,8 @@ def test_what_moves_more_is_redder():
     )
     seen = np.abs(cold - warm).max(axis=2) > 1e-3
     assert seen.any()
-    grey, red = (np.mean(picture[seen], axis=0) for picture in (cold, warm))
-    assert np.ptp(grey[:3]) < 0.05 * grey[:3].max()
+    gray, red = (np.mean(picture[seen], axis=0) for picture in (cold, warm))
+    assert np.ptp(gray[:3]) < 0.05 * gray[:3].max()
     assert red[0] > 1.5 * red[2]
 
 

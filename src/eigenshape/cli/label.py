@@ -59,7 +59,7 @@ def label(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Copy the labels of one mesh to the matching parts of another: label a horse, and get a labelled camel.
+    """Copy the labels of one mesh to the matching parts of another: label a horse, and get a labeled camel.
 
     Left and right may be exchanged. Repairs are applied to the mesh that gets the labels.
     """

@@ -27,7 +27,7 @@ VERBS = {
     "first.",
     "segment": "Cut a mesh into its parts: limbs, head, torso.",
     "label": "Copy the labels of one mesh to the matching parts of another: label a horse, and get "
-    "a labelled camel.",
+    "a labeled camel.",
     "deform": "Bend, twist or stretch a mesh: a region is turned or moved, and the rest follows "
     "smoothly.",
     "stability": "Compare two shapes: how close they lie, what changes in their spectra, and which "

@@ -14,7 +14,7 @@ from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.rigidity_loops import fit_rotations, turn_edges
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
-from eigenshape.sparse.elimination import SymmetricFactor, analyse, factorise
+from eigenshape.sparse.elimination import SymmetricFactor, analyze_pattern, factorize_symmetric
 
 Points = Float[np.ndarray, "n 3"]
 Step = tuple[Points, Points]  # change of the free vertices in a round, and their new places
@@ -154,7 +154,7 @@ def factor_equations(square: sp.csr_array) -> SymmetricFactor:
     matrix = square.tocsc()
     matrix.sort_indices()
     with one_blas_thread():
-        factor = factorise(analyse(matrix), matrix.data)
+        factor = factorize_symmetric(analyze_pattern(matrix), matrix.data)
     if factor is None or not (factor.pivots > 0).all():
         raise InvalidShapeError(
             "Every triangle must have angles well above zero to be bent; the equations of the "

@@ -1,4 +1,4 @@
-"""The one form that every discretisation of the Laplace operator takes."""
+"""The one form that every discretization of the Laplace operator takes."""
 
 from dataclasses import dataclass
 

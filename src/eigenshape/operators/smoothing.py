@@ -17,7 +17,7 @@ from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices, edge_table
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.sparse.elimination import analyse, factorise
+from eigenshape.sparse.elimination import analyze_pattern, factorize_symmetric
 
 # Noise level at which `denoise` lets heat flow one mean edge length: that of Gaussian noise of a
 # quarter of an edge. A larger value smooths less.
@@ -135,7 +135,7 @@ def _flow(
     matrix = pencil[:, free].tocsc()
     matrix.sort_indices()
     with one_blas_thread():
-        factor = factorise(analyse(matrix), matrix.data)
+        factor = factorize_symmetric(analyze_pattern(matrix), matrix.data)
     if factor is None:
         raise InvalidShapeError(
             "All triangles must have angles well above 0 for the surface to be smoothed; some have angles so close to "

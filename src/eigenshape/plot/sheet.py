@@ -143,9 +143,7 @@ def figure_label_transfer(source: MeshLike, target: MeshLike, transfer: LabelTra
     require_type(transfer, LabelTransfer, "transfer")
     figure = Figure(figsize=(4.4 * PANEL, 2.2 * PANEL + 0.4), layout="constrained")
     left, right = figure.subplots(1, 2)
-    _fill(
-        left, Panel(source, "labelled", transfer.source.labels, transfer.source.features.vertices)
-    )
+    _fill(left, Panel(source, "labeled", transfer.source.labels, transfer.source.features.vertices))
     colors = transfer.matches[transfer.target.labels]
     drawing = draw(target, three_quarter_view(target), face_colors=palette(colors))
     show(right, drawing)

@@ -42,7 +42,7 @@ class Elimination:
         The most roundings that a product may see in each front and below.
     lower_ptr, lower_rows, source : int
         The lower triangle by columns, in the order of elimination, and the place of each entry in the data of the
-        matrix that was analysed.
+        matrix that was analyzed.
     """
 
     order: Indices
@@ -126,7 +126,7 @@ class SymmetricFactor:
         return bounds
 
 
-def analyse(pattern: sp.csc_array) -> Elimination:
+def analyze_pattern(pattern: sp.csc_array) -> Elimination:
     """Order the elimination of a symmetric matrix, given by all its entries, and find the fronts of its factor."""
     n = pattern.shape[0]
     indptr, indices = pattern.indptr.astype(np.int64), pattern.indices.astype(np.int64)
@@ -211,7 +211,7 @@ def _lower(indptr: Indices, indices: Indices, place: Indices) -> tuple[Indices, 
     return pointers, rows[kept], kept
 
 
-def factorise(
+def factorize_symmetric(
     elimination: Elimination, data: Float[np.ndarray, " e"], spent: SymmetricFactor | None = None
 ) -> SymmetricFactor | None:
     """Factor the matrix with these entries, in the room of a spent factor; None where a pivot is zero or not finite."""
