@@ -7,7 +7,7 @@ import numpy as np
 import typer
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import print_json, print_table, print_written, progress_bar
+from eigenshape.cli.console import err, print_json, print_table, print_written, progress_bar
 from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, load_mesh
 from eigenshape.cli.outputs import (
     require_mesh_path,
@@ -40,7 +40,8 @@ def deform(
             metavar="ROTATION",
             help=(
                 "Turn the region about an axis, in degrees: 'x by 90', '0,1,1 by 30', or 'z by "
-                "45 @ 0,0.1,0' about a point."
+                "45 @ 0,0.1,0' about a point. By default the axis passes through the middle of the "
+                "region's boundary."
             ),
         ),
     ] = "",
@@ -182,15 +183,18 @@ def _report(
     if as_json:
         print_json(values)
         return
+    n_crossing, n_before = len(values["crossing_faces"]), len(self_intersections(before))
     rows = [
         ["edits", f"{len(edits)}"],
         ["vertices that moved", f"{values['vertices_moved']:,} of {before.n_vertices:,}"],
         ["edges stretched, RMS", f"{100 * found.edge_error:.2f} %"],
         ["least area, after over before", f"{values['least_area_ratio']:.2f}"],
         ["faces flipped", f"{len(found.flipped):,}"],
-        [
-            "pairs of faces that cross",
-            f"{len(values['crossing_faces']):,} ({len(self_intersections(before)):,} before)",
-        ],
+        ["pairs of faces that cross", f"{n_crossing:,} ({n_before:,} before)"],
     ]
     print_table("Bent", ["", "value"], rows)
+    if n_crossing > n_before:
+        err.print(
+            "Faces cross that did not before. A wider bend may help (--fixed with a smaller part), "
+            "or --mode uncrossed."
+        )

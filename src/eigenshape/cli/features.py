@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from eigenshape.cli.console import err, print_json, progress_bar
+from eigenshape.cli.console import err, out, print_json, progress_bar
 from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, load_mesh
 from eigenshape.cli.methods import HeatMethodOption, heat_recipe
 from eigenshape.cli.outputs import require_picture, save_picture
@@ -108,6 +108,9 @@ def features(
             row | {"feature": i} for i, row in enumerate(rows) if row["vertex"] not in loose
         ]
         print_rows("Feature points", COLUMNS, features_alone)
+        time = recipe.feature_scale * recipe.time_unit
+        unit = "the area" if recipe.unit == "area" else "the square of the longest side of the box"
+        out.print(f"heat at time t = {time:g} of {unit}, in 1/length²")
     if picture:
         save_picture(figure_segments(surface, parts.labels, parts.features.vertices), picture)
     if output:

@@ -127,3 +127,23 @@ def _print(shelf: ShapeIndex, report: BatchReport) -> None:
     )
     for name, reason in report.failed:
         out.print(f"  [yellow]{shown(name)}[/]: {shown(reason)}")
+    for one, two in _doubles(shelf, report):
+        out.print(f"  [yellow]{shown(two)}[/]: the same file content as {shown(one)}")
+
+
+def _doubles(shelf: ShapeIndex, report: BatchReport) -> list[tuple[str, str]]:
+    """Pair each shape that was added with one of another name and the same content, if there is one.
+
+    A folder and one of its own folders name the same files differently, so both are indexed.
+    """
+    added = set(report.added)
+    records = sorted(shelf.records(), key=lambda record: record.name in added)
+    first: dict[str, str] = {}
+    pairs = []
+    for record in records:
+        if record.digest is None:
+            continue
+        known = first.setdefault(record.digest, record.name)
+        if known != record.name and record.name in added:
+            pairs.append((known, record.name))
+    return pairs

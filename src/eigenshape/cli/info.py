@@ -55,7 +55,9 @@ def info(
         return
     out.print(f"[bold]{shown(shape)}[/]")
     for name, value in facts.items():
-        out.print(f"  {name.replace('_', ' '):<24}{_shown(value)}")
+        inward = name == "enclosed_volume" and value is not None and value < 0
+        remark = " (faces point inward)" if inward else ""
+        out.print(f"  {name.replace('_', ' '):<24}{_shown(value)}{remark}")
 
 
 def shape_facts(shape: Shape) -> dict[str, Any]:
