@@ -70,8 +70,8 @@ def deform(
             "-n",
             "--n-modes",
             help=(
-                "Number of eigenfunctions: few bend over a wide zone, many bend sharply. The "
-                "default depends on --mode: 8, 50 or 300."
+                "Number of eigenfunctions: few bend over a wide zone, many bend sharply. By default "
+                "8, 50 or 300: the smaller the region beside the rest, the more."
             ),
         ),
     ] = None,
