@@ -46,6 +46,19 @@ test("damaged messages are refused", () => {
   expect(() => decode(message.slice(0, message.length - 16))).toThrow("Array");
 });
 
+test("half precision comes as single precision, times its scale", () => {
+  const halves = Uint16Array.of(0x3c00, 0xc000, 0x3555, 0x0001, 0x7bff); // 1, -2, 1/3, 2^-24, 65504
+  const entry = { dtype: "<f2", shape: [5], scale: 3, offset: 0 };
+  const header = JSON.stringify({ meta: {}, arrays: { h: entry } }).padEnd(92);
+  const message = new Uint8Array(96 + halves.byteLength);
+  message.set(new TextEncoder().encode(header), 4);
+  message.set(new Uint8Array(halves.buffer), 96);
+  message[0] = 92;
+  const found = decode(message).arrays.h!;
+  expect(found.data).toBeInstanceOf(Float32Array);
+  [3, -6, 1, 3 * 2 ** -24, 3 * 65504].forEach((value, i) => expect(found.data[i]! / value).toBeCloseTo(1, 3));
+});
+
 test("calls become messages, and errors of the library are thrown", async () => {
   const seen: unknown[] = [];
   const send: Send = async (call, message) => {

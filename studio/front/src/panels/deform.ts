@@ -4,7 +4,7 @@ import type { App, Panel } from "../app";
 import type { Change, DeformMode, Handle, State, Vec3 } from "../core/backend";
 import { BoxTool } from "../core/box";
 import { partColors } from "../core/colors";
-import { button, chooseFile, download, h } from "../core/dom";
+import { button, chooseFile, chooseFiles, download, h } from "../core/dom";
 import { selectBox, Surface } from "../core/geodesic";
 import { MotionTool, type MotionKind } from "../core/gizmo";
 import { add, middleOf, regionBoundary } from "../core/motion";
@@ -133,7 +133,7 @@ export class DeformPanel implements Panel {
       h("h3", {}, "Edits"),
       h("div", { class: "row tight" }, this.undo, this.redo, this.reset,
         button("Save", "save-edits", "Save the edits as JSON", () => this.save("edits", "json")),
-        button("Load", "load-edits", "Apply saved edits", () => this.replay()),
+        button("Load", "load-edits", "Apply saved edits. If they were made on another mesh of this shape, choose its file, too", () => this.replay()),
       ),
       h("h3", {}, "Show"),
       h("div", { class: "row" }, this.skeleton.element, this.skeletonModes, "modes"),
@@ -495,9 +495,13 @@ export class DeformPanel implements Panel {
   }
 
   private async replay(): Promise<void> {
-    const { bytes } = await chooseFile(".json");
-    const edits = JSON.parse(new TextDecoder().decode(bytes));
-    await this.change({ kind: "replay", edits }, "Applying the edits");
+    const files = await chooseFiles(`.json,${LOADABLE}`);
+    const written = files.find(({ name }) => name.endsWith(".json"));
+    const source = files.find((file) => file !== written);
+    if (!written) return this.app.say("Choose a JSON file of edits.");
+    const edits = JSON.parse(new TextDecoder().decode(written.bytes));
+    const change: Change = { kind: "replay", edits, source: source?.name, sourceFile: source?.bytes };
+    await this.change(change, "Applying the edits");
   }
 
   private async transfer(): Promise<void> {
