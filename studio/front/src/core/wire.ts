@@ -60,16 +60,26 @@ export function decode(message: ArrayBuffer | ArrayBufferView): Message {
   const header = JSON.parse(new TextDecoder().decode(bytes.subarray(4, begin)));
   const arrays: Arrays = {};
   for (const [name, entry] of Object.entries<any>(header.arrays ?? {})) {
-    const type = TYPES[entry.dtype as Dtype];
+    const half = entry.dtype === "<f2";
+    const type = half ? Uint16Array : TYPES[entry.dtype as Dtype];
     if (!type) throw new TypeError(`Array ${name} has the unknown type ${entry.dtype}.`);
     const length = entry.shape.reduce((product: number, side: number) => product * side, 1);
     const end = begin + entry.offset + length * type.BYTES_PER_ELEMENT;
     if (entry.offset % ALIGNMENT || end > bytes.length)
       throw new RangeError(`Array ${name} ends at byte ${end} of ${bytes.length}.`);
     const data = new type(bytes.buffer as ArrayBuffer, bytes.byteOffset + begin + entry.offset, length);
-    arrays[name] = { data, shape: entry.shape };
+    arrays[name] = { data: data instanceof Uint16Array ? fromHalves(data, entry.scale) : data, shape: entry.shape };
   }
   return { meta: header.meta, arrays };
+}
+
+/** Return numbers of half precision, which reports use to be small, times their scale. */
+function fromHalves(halves: Uint16Array, scale: number): Float32Array {
+  return Float32Array.from(halves, (bits) => {
+    const [exponent, fraction] = [(bits >> 10) & 31, bits & 1023];
+    const size = exponent ? 2 ** (exponent - 25) * (1024 + fraction) : 2 ** -24 * fraction;
+    return (bits >> 15 ? -scale : scale) * size;
+  });
 }
 
 /** Return the bytes, copied only if they start at an address that typed arrays cannot view. */
