@@ -23,7 +23,7 @@ BYTES_OF_ENTRY = 17  # memory per entry meanwhile: two copies of 8 bytes and one
 ArrayT = TypeVar("ArrayT", bound=NDArray[Any])
 
 
-def frozen(array: ArrayT) -> ArrayT:
+def freeze(array: ArrayT) -> ArrayT:
     """Return a contiguous copy that is read-only."""
     copy = np.array(array, order="C")
     copy.flags.writeable = False
@@ -167,6 +167,17 @@ def vertex_values(value: ArrayLike, name: str, n_vertices: int) -> NDArray[np.fl
     values = values.astype(np.float64)
     _require_finite(values, name)
     return values
+
+
+def face_labels(value: ArrayLike, name: str, n_faces: int) -> NDArray[Any]:
+    """Return `value` as an array with one whole number per face, of any integer type."""
+    labels = as_array(value, name)
+    if labels.shape != (n_faces,) or labels.dtype.kind not in "iu":
+        raise InvalidParameterError(
+            f"{name} must hold one whole number per face, shape ({n_faces},); "
+            f"the shape is {labels.shape} and the type {labels.dtype}."
+        )
+    return labels
 
 
 def _require_finite(values: NDArray[np.float64], name: str) -> None:

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from eigenshape.cli import app
-from eigenshape.cli.regions import parse_region, parse_rotation, parse_translation
+from eigenshape.cli.steps.regions import parse_region, parse_rotation, parse_translation
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import bend
 from eigenshape.deformation.region import BoxRegion, BrushRegion, region_boundary, region_mask

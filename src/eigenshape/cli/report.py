@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
+from eigenshape.cli import steps
 from eigenshape.cli.console import print_written, progress_bar
-from eigenshape.cli.inputs import MeshArgument, RepairOption, load_mesh
-from eigenshape.cli.outputs import require_output
+from eigenshape.cli.inputs import MeshArgument, RepairOption
 from eigenshape.plot.view import studio_module
 
 
@@ -29,9 +29,9 @@ def report(
 
     For instance: eigenshape report scan.ply -o scan.html
     """
-    require_output(output, (".html",), "A report")
+    steps.require_output(output, (".html",), "A report")
     writer = studio_module("report")
-    surface = load_mesh(mesh, repair)
+    surface = steps.load_mesh(mesh, repair)
     with progress_bar("report") as progress:
         writer.write_report(surface, output, name=mesh.name, n_modes=n_modes, progress=progress)
     print_written(output)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from eigenshape.cli.console import out, shown
+from eigenshape.cli.console import escape_text, out
 from eigenshape.plot.view import studio_module
 
 
@@ -46,7 +46,7 @@ def studio(
     server = studio_module("server")
 
     def announce(url: str) -> None:
-        out.print(f"The studio is open at {shown(url)}")
+        out.print(f"The studio is open at {escape_text(url)}")
         out.file.flush()
 
     server.serve(

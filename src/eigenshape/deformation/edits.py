@@ -11,9 +11,11 @@ from scipy.spatial import cKDTree
 from eigenshape._arguments import describe_value, require_each, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
+from eigenshape._text import short_repr
 from eigenshape.deformation.binding import bind
-from eigenshape.deformation.deform import Mode, bend, require_mode
+from eigenshape.deformation.deform import bend
 from eigenshape.deformation.handles import Handle, Rotation, Translation
+from eigenshape.deformation.modes import Mode, require_mode
 from eigenshape.deformation.region import BoxRegion, BrushRegion, Region, copy_region, region_mask
 from eigenshape.deformation.rig import EigenRig, pose_rig
 from eigenshape.geometry.mesh import TriangleMesh
@@ -74,6 +76,8 @@ class Move:
     region: Region
     handle: Handle
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         require_type(self.handle, Handle, "handle")
         object.__setattr__(self, "region", copy_region(self.region))
@@ -108,6 +112,8 @@ class Edit:
     fixed: Region | None = None
     n_modes: int | None = None
     mode: Mode = "graded"
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         require_each(self.moves, Move, "moves")

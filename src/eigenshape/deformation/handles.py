@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import finite_values, frozen
+from eigenshape._arrays import finite_values, freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 
@@ -61,8 +61,8 @@ class Rotation:
         if abs(length - 1) > 4 * np.finfo(float).eps:
             direction = direction / largest
             direction = direction / np.linalg.norm(direction)
-        object.__setattr__(self, "pivot", frozen(vector(pivot, "pivot")))
-        object.__setattr__(self, "axis", frozen(direction))
+        object.__setattr__(self, "pivot", freeze(vector(pivot, "pivot")))
+        object.__setattr__(self, "axis", freeze(direction))
         object.__setattr__(self, "angle", float(finite_values(angle, "angle")[0]))
 
     @property
@@ -112,7 +112,7 @@ class Translation:
     vector: Float[np.ndarray, " 3"]
 
     def __init__(self, vector_: ArrayLike) -> None:
-        object.__setattr__(self, "vector", frozen(vector(vector_, "vector")))
+        object.__setattr__(self, "vector", freeze(vector(vector_, "vector")))
 
     @property
     def turn(self) -> Float[np.ndarray, " 3"]:

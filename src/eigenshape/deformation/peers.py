@@ -18,7 +18,7 @@ from eigenshape.deformation.graded_bend import move_by_shares, quaternions
 from eigenshape.deformation.handles import Handle
 from eigenshape.deformation.rig import eigen_skeleton
 from eigenshape.deformation.rigidity import factor_equations, relax
-from eigenshape.deformation.rigidity_loops import fit_rotations, turned_edges
+from eigenshape.deformation.rigidity_loops import fit_rotations, turn_edges
 from eigenshape.operators.cotangent import cotangent_laplacian
 
 Points = Float[np.ndarray, "n 3"]
@@ -143,7 +143,7 @@ def spectral_rigid(
     sums = np.empty_like(rest)
     moved = skeleton
     for _ in range(n_rounds):
-        turned_edges(everyone, *links, skeleton, turns, sums)
+        turn_edges(everyone, *links, skeleton, turns, sums)
         change = _turn(turns[fixed], details[fixed]) - details[fixed]
         right = modes.T @ sums + weight * modes[fixed].T @ (goal - change)
         moved = skeleton + modes @ lu_solve(factor, right)

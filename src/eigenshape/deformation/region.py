@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from typing_extensions import TypeAliasType
 
 from eigenshape._arguments import describe_value
-from eigenshape._arrays import as_array, frozen, positive_values, real_numbers, whole_numbers
+from eigenshape._arrays import as_array, freeze, positive_values, real_numbers, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 from eigenshape.deformation.handles import vector
@@ -66,8 +66,8 @@ class BoxRegion:
             raise InvalidParameterError(
                 f"low must lie below high; along axis {axis[0]} they are {below} and {above}."
             )
-        object.__setattr__(self, "low", frozen(corners[0]))
-        object.__setattr__(self, "high", frozen(corners[1]))
+        object.__setattr__(self, "low", freeze(corners[0]))
+        object.__setattr__(self, "high", freeze(corners[1]))
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -96,7 +96,7 @@ class BrushRegion:
     radius: float
 
     def __init__(self, center: ArrayLike, radius: float) -> None:
-        object.__setattr__(self, "center", frozen(vector(center, "center")))
+        object.__setattr__(self, "center", freeze(vector(center, "center")))
         object.__setattr__(self, "radius", float(positive_values(radius, "radius")[0]))
 
 
@@ -107,7 +107,7 @@ def copy_region(region: Region) -> Region:
     """Return a region that can be used many times, and that the caller cannot change."""
     if isinstance(region, BoxRegion | BrushRegion):
         return region
-    return frozen(_entries(region))
+    return freeze(_entries(region))
 
 
 def _entries(region: np.ndarray | Iterable[int]) -> np.ndarray:

@@ -11,10 +11,11 @@ from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.binding import Binding, bind
-from eigenshape.deformation.deform import Mode, bend, require_mode
+from eigenshape.deformation.deform import bend
 from eigenshape.deformation.edits import Edit, Move, apply_edit, carry_edit
 from eigenshape.deformation.graded_bend import move_by_shares
 from eigenshape.deformation.handles import Handle
+from eigenshape.deformation.modes import Mode, require_mode
 from eigenshape.deformation.region import Region, region_mask
 from eigenshape.deformation.rig import EigenRig, pose_rig
 from eigenshape.deformation.skeleton import SkeletonResponse, move_skeleton, skeleton_response

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arguments import require_each, require_type
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.binding import Binding
 from eigenshape.deformation.details import (
@@ -52,6 +53,8 @@ class DetailedSkeleton:
     fine: Points
     first: FramedDetails
     second: FramedDetails
+
+    __repr__ = short_repr
 
 
 @one_blas_thread()

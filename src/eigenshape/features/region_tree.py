@@ -7,6 +7,8 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import connected_components
 
+from eigenshape._text import short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class RegionTree:
@@ -55,6 +57,8 @@ class MergeTree(RegionTree):
 
     saddles: Int[np.ndarray, "m 2"]
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class PartTree(RegionTree):
@@ -83,6 +87,8 @@ class PartTree(RegionTree):
     part_tree : Compute the tree.
     find_parts : Compute the tree of a mesh and cut it.
     """
+
+    __repr__ = short_repr
 
 
 def number_regions(

@@ -6,7 +6,7 @@ from typing import SupportsIndex, TypeAlias
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import finite_rows, frozen, whole_number
+from eigenshape._arrays import finite_rows, freeze, whole_number
 from eigenshape._errors import InvalidShapeError
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.simplicial import Mesh
@@ -50,7 +50,7 @@ class PointCloud:
         if not coordinates.size:
             raise InvalidShapeError("A point cloud must have points; it has none.")
         object.__setattr__(self, "dim", whole_number(dim, "dim", 1, coordinates.shape[1]))
-        object.__setattr__(self, "points", frozen(coordinates))
+        object.__setattr__(self, "points", freeze(coordinates))
 
     @property
     def n_points(self) -> int:

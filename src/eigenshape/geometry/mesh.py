@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import finite_rows, frozen, index_rows
+from eigenshape._arrays import finite_rows, freeze, index_rows
 from eigenshape._errors import InvalidShapeError
 from eigenshape._typing import ArrayLike
 
@@ -62,8 +62,8 @@ class TriangleMesh:
                 f"A mesh must have faces; it has {len(points)} vertices and no face. "
                 "Use PointCloud for points without faces."
             )
-        object.__setattr__(self, "vertices", frozen(points))
-        object.__setattr__(self, "faces", frozen(corners))
+        object.__setattr__(self, "vertices", freeze(points))
+        object.__setattr__(self, "faces", freeze(corners))
 
     @property
     def n_vertices(self) -> int:

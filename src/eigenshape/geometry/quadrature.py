@@ -6,7 +6,7 @@ from typing import SupportsIndex
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import finite_rows, frozen, positive_values, whole_number
+from eigenshape._arrays import finite_rows, freeze, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -64,8 +64,8 @@ class Quadrature:
                 f"there are {len(measure)} for {len(coordinates)} points."
             )
         object.__setattr__(self, "dim", whole_number(dim, "dim", 1, coordinates.shape[1]))
-        object.__setattr__(self, "points", frozen(coordinates))
-        object.__setattr__(self, "weights", frozen(measure))
+        object.__setattr__(self, "points", freeze(coordinates))
+        object.__setattr__(self, "weights", freeze(measure))
 
     @property
     def n_points(self) -> int:

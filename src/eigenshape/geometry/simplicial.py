@@ -6,7 +6,7 @@ from typing import TypeAlias
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import finite_rows, frozen, index_rows
+from eigenshape._arrays import finite_rows, freeze, index_rows
 from eigenshape._errors import InvalidShapeError
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.mesh import TriangleMesh
@@ -65,8 +65,8 @@ class SimplicialMesh:
                 f"Simplices in R^{ambient} must have dimension 1..{ambient}; "
                 f"these have {dim + 1} corners, which is dimension {dim}."
             )
-        object.__setattr__(self, "points", frozen(coordinates))
-        object.__setattr__(self, "simplices", frozen(corners))
+        object.__setattr__(self, "points", freeze(coordinates))
+        object.__setattr__(self, "simplices", freeze(corners))
 
     @property
     def n_points(self) -> int:

@@ -46,7 +46,8 @@ class Operator:
     description: str
 
 
-OPERATORS = {
+# The operator of each name in `OPERATOR_NAMES`.
+OPERATORS: dict[str, Operator] = {
     "cotangent": Operator(cotangent_laplacian, MESHES, ("mass",), "linear finite elements"),
     "p2": Operator(
         partial(fem_laplacian, order=2), MESHES, (), "quadratic finite elements, nodes on edges too"

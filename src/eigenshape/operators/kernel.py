@@ -6,7 +6,6 @@ W_ij = -w_i w_j G(x_i, x_j) / t with G(x, y) = exp(-|x - y|²/4t) / (4πt)^{m/2}
 import warnings
 from dataclasses import dataclass
 from math import gamma, pi
-from typing import Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,11 +20,9 @@ from eigenshape.geometry.quadrature import Quadrature
 from eigenshape.geometry.simplices import LARGEST_EXPONENT, size_one
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.cells import CellGrid, cell_grid, count_partners, gaussian_rows
+from eigenshape.operators.choices import Correction, Form
 from eigenshape.operators.csr_loops import component_labels
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
-
-Correction = Literal["log"]
-Form = Literal["literal", "random-walk"]
 
 # Width of a kernel by default, h / e; t = e².
 EDGE_FACTOR = 2.0

@@ -14,7 +14,7 @@ from eigenshape._arrays import positive_values, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.operators.boundary import Condition
+from eigenshape.operators.choices import Condition
 
 # Nodes of the Gauss rule of `sphere_functional_eigenvalues`: enough for harmonics of degree 300
 # over the whole sphere.

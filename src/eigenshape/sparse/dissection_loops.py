@@ -6,13 +6,9 @@ needs only while it runs: compiling an allocation takes longer than compiling a 
 
 from typing import no_type_check
 
-import numpy as np
-
 from eigenshape._compile import njit
 
 LEAF = 160  # points that minimum degree orders
-WORD = 64  # bits of a number in which neighbors are marked
-FINE = 64  # steps to an edge in which distances are told: smoothing needs some between whole edges
 SMOOTHINGS = 4  # passes over the differences of distances; a ragged cut is a long one
 
 
@@ -61,13 +57,8 @@ def breadth_first(indptr, indices, root, owner, name, distance, queue):
 
 @njit
 @no_type_check
-def tell_apart(indptr, indices, segment, owner, name, one, two, key):
-    """Fill `key` with the difference of two distances, smoothed: a ragged cut is a long one. The first is used up.
-
-    Returns the least and the largest difference.
-    """
-    for i in range(len(segment)):
-        key[segment[i]] = FINE * (one[segment[i]] - two[segment[i]])
+def smooth_keys(indptr, indices, segment, owner, name, key, smoothed):
+    """Smooth the keys within a segment: a ragged cut is a long one. `smoothed` is scratch."""
     for _ in range(SMOOTHINGS):
         for i in range(len(segment)):
             node = segment[i]
@@ -76,30 +67,22 @@ def tell_apart(indptr, indices, segment, owner, name, one, two, key):
                 if owner[indices[at]] == name:
                     total += key[indices[at]]
                     degree += 1
-            one[node] = (key[node] + total // degree) // 2
+            smoothed[node] = (key[node] + total // degree) // 2
         for i in range(len(segment)):
-            key[segment[i]] = one[segment[i]]
-    low = high = key[segment[0]]
-    for i in range(len(segment)):
-        low = min(low, key[segment[i]])
-        high = max(high, key[segment[i]])
-    return low, high
+            key[segment[i]] = smoothed[segment[i]]
 
 
 @njit
 @no_type_check
-def cheapest_cut(indptr, indices, segment, owner, name, key, low, below, from_above, from_below):
-    """Return the value to cut at, whether the cut is taken from above it (key < value | key ≥ value), and a warning.
+def count_cuts(indptr, indices, segment, owner, name, key, low, below, from_above, from_below):
+    """Return how many ends of edges lie within a segment, and count what cuts at each key would hold.
 
-    `low` is the least key. The arrays are scratch, filled with 0, a place for each value from there to one above the
+    `low` is the least key. The other arrays, filled with 0, have a place for each value from there to one above the
     largest: how many keys are less by 1, and how many points the cut has more than that before it if it is taken from
     above or from below.
-
-    The warning says that half of all pairs are joined: no order saves much then, and one point a cut takes long.
     """
-    size = len(segment)
     joined = 0
-    for i in range(size):
+    for i in range(len(segment)):
         node = segment[i]
         least = most = key[node]
         for at in range(indptr[node], indptr[node + 1]):
@@ -114,75 +97,53 @@ def cheapest_cut(indptr, indices, segment, owner, name, key, low, below, from_ab
         from_above[key[node] - low + 1] -= 1
         from_below[key[node] - low + 1] += 1
         from_below[most - low + 1] -= 1
-    best, level, above = np.inf, low + 1, True
-    first = cut_above = cut_below = 0
-    for place in range(len(below)):
-        first += below[place]
-        cut_above += from_above[place]
-        cut_below += from_below[place]
-        smaller = min(first, size - first)
-        if smaller > 0:
-            if (cut_above + 1) / smaller < best:
-                best, level, above = (cut_above + 1) / smaller, low + place, True
-            if (cut_below + 1) / smaller < best:
-                best, level, above = (cut_below + 1) / smaller, low + place, False
-    return level, above, 2 * joined >= size * size
+    return joined
 
 
 @njit
 @no_type_check
 def take_sides(indptr, indices, segment, owner, name, key, level, above, side):
-    """Fill `side` with 0 below the level, 1 above, 2 on the cut; return how many are 0, and how many 2."""
-    n_first = n_cut = 0
+    """Fill `side` with 0 below the level, 1 above, 2 on the cut, point by point of the segment."""
     for i in range(len(segment)):
         node = segment[i]
-        side[node] = 0 if key[node] < level else 1
-        if (side[node] == 1) == above:
+        side[i] = key[node] >= level
+        if (side[i] == 1) == above:
             for at in range(indptr[node], indptr[node + 1]):
                 other = indices[at]
                 if owner[other] == name and (key[other] < level) == above:
-                    side[node] = 2
-                    break
-        if side[node] == 2:
-            n_cut += 1
-        elif side[node] == 0:
-            n_first += 1
-    return n_first, n_cut
+                    side[i] = 2
 
 
 @njit
 @no_type_check
-def order_leaf(indptr, indices, nodes, start, stop, owner, place, local, order, degree, bits):
-    """Order a leaf by minimum degree, its neighbors outside counted, its elimination graph in bits.
+def order_leaf(indptr, indices, nodes, start, stop, owner, place, local, order, degree, joined):
+    """Order a leaf by minimum degree, its neighbors outside counted.
 
     The segment is nodes[start:stop]. The rest is scratch: `local` has a number for each point of the graph, -1 on entry
-    and again on return; `order` and `degree` have LEAF; `bits` has a bit for each of LEAF and each point of the graph.
+    and again on return; `order` and `degree` have LEAF; `joined` (LEAF, points and neighbors of a leaf) says what is
+    joined in the elimination graph.
     """
     count = stop - start
     for i in range(count):
         local[nodes[start + i]] = i
     total = count
     for i in range(start, stop):
-        node = nodes[i]
-        for at in range(indptr[node], indptr[node + 1]):
+        for at in range(indptr[nodes[i]], indptr[nodes[i] + 1]):
             if local[indices[at]] < 0:
                 local[indices[at]] = total
                 total += 1
-    words = (total + WORD - 1) // WORD
-    for i in range(count * words):
-        bits[i] = 0
-    one = np.uint64(1)
     for i in range(count):
-        node = nodes[start + i]
-        for at in range(indptr[node], indptr[node + 1]):
-            j = local[indices[at]]
-            if j != i:
-                bits[i * words + j // WORD] |= one << np.uint64(j % WORD)
-        degree[i] = _count_ones(bits, i * words, words)
+        for j in range(total):
+            joined[i, j] = 0
+        for at in range(indptr[nodes[start + i]], indptr[nodes[start + i] + 1]):
+            joined[i, local[indices[at]]] = 1
+        joined[i, i] = 0
+        degree[i] = 0
+        for j in range(total):
+            degree[i] += joined[i, j]
     for i in range(start, stop):
-        node = nodes[i]
-        local[node] = -1
-        for at in range(indptr[node], indptr[node + 1]):
+        local[nodes[i]] = -1
+        for at in range(indptr[nodes[i]], indptr[nodes[i] + 1]):
             local[indices[at]] = -1
     for step in range(count):
         pivot = -1
@@ -191,30 +152,16 @@ def order_leaf(indptr, indices, nodes, start, stop, owner, place, local, order, 
                 pivot = i
         order[step] = nodes[start + pivot]
         degree[pivot] = -1
-        clear = ~(one << np.uint64(pivot % WORD))
         for i in range(count):
-            if degree[i] >= 0 and (bits[pivot * words + i // WORD] >> np.uint64(i % WORD)) & one:
-                for word in range(words):
-                    bits[i * words + word] |= bits[pivot * words + word]
-                bits[i * words + pivot // WORD] &= clear
-                bits[i * words + i // WORD] &= ~(one << np.uint64(i % WORD))
-                degree[i] = _count_ones(bits, i * words, words)
+            if degree[i] >= 0 and joined[pivot, i]:
+                for j in range(total):
+                    joined[i, j] |= joined[pivot, j]
+                joined[i, pivot] = joined[i, i] = 0
+                n_joined = 0
+                for j in range(total):
+                    n_joined += joined[i, j]
+                degree[i] = n_joined
     for i in range(count):
         nodes[start + i] = order[i]
         place[order[i]] = start + i
         owner[order[i]] = -1
-
-
-@njit
-@no_type_check
-def _count_ones(bits, start, words):
-    total = 0
-    for word in range(start, start + words):
-        x = bits[word]
-        x = x - ((x >> np.uint64(1)) & np.uint64(0x5555555555555555))
-        x = (x & np.uint64(0x3333333333333333)) + (
-            (x >> np.uint64(2)) & np.uint64(0x3333333333333333)
-        )
-        x = (x + (x >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
-        total += np.int64((x * np.uint64(0x0101010101010101)) >> np.uint64(56))
-    return total

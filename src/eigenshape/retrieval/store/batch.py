@@ -15,8 +15,9 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook, train_codebook
 from eigenshape.retrieval.patches.patches import Patches, extract_patches
-from eigenshape.retrieval.store.index import Record, ShapeIndex, describe_to_store
+from eigenshape.retrieval.store.index import Record, ShapeIndex
 from eigenshape.retrieval.store.workers import Item, Workers, run_in_workers
+from eigenshape.retrieval.store.writing import describe_to_store
 
 Read = Callable[[Path], MeshLike]
 Callback = Callable[[int, int, str, str | None], None]

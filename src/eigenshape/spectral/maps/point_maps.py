@@ -8,7 +8,7 @@ import scipy.linalg as sl
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import as_array, frozen, whole_number
+from eigenshape._arrays import as_array, freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
@@ -61,7 +61,7 @@ def point_map(mapping: FunctionalMap) -> Int[np.ndarray, " n2"]:
     require_type(mapping, FunctionalMap, "mapping")
     k2, k1 = mapping.matrix.shape
     carried = unit_modes(mapping.source, k1) @ mapping.matrix.T
-    return frozen(_nearest(carried, unit_modes(mapping.target, k2)))
+    return freeze(_nearest(carried, unit_modes(mapping.target, k2)))
 
 
 def _nearest(

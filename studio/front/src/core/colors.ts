@@ -1,5 +1,7 @@
-// Colors of values and parts: the same tables as the library's pictures (eigenshape.plot).
+/** Colors of values and parts: the same tables as the library's pictures (eigenshape.plot). */
+
 import tables from "./color_tables.json";
+import { h } from "./dom";
 
 function bytes(base64: string): Uint8Array {
   return Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
@@ -50,25 +52,14 @@ export function findRange(values: ArrayLike<number>): [number, number] {
 
 /** The bar of a color map with its title and unit, and the numbers at its ends and in the middle. */
 export function buildLegend(title: string, unit: string, map: string, range: [number, number]): HTMLElement {
-  const legend = document.createElement("figure");
-  legend.className = "legend";
-  legend.dataset.test = "legend";
-  const heading = document.createElement("figcaption");
-  heading.textContent = unit ? `${title}, ${unit}` : title;
-  const bar = document.createElement("canvas");
-  [bar.width, bar.height] = [256, 1];
-  const image = new ImageData(256, 1);
+  const bar = h("canvas", { class: "bar", width: 256, height: 1 });
   const colors = colorMap(map);
-  for (let i = 0; i < 256; i++) image.data.set([...colors.slice(3 * i, 3 * i + 3), 255], 4 * i);
+  const image = new ImageData(256, 1);
+  for (let i = 0; i < 256; i++) image.data.set([...colors.subarray(3 * i, 3 * i + 3), 255], 4 * i);
   bar.getContext("2d")?.putImageData(image, 0, 0);
-  const numbers = document.createElement("div");
-  const [low, high] = range;
-  const scale = Math.max(Math.abs(low), Math.abs(high));
-  for (const value of [low, (low + high) / 2, high]) {
-    const number = document.createElement("span");
-    number.textContent = formatNumber(value, scale);
-    numbers.append(number);
-  }
-  legend.append(heading, bar, numbers);
-  return legend;
+  const scale = Math.max(...range.map(Math.abs));
+  const numbers = [range[0], (range[0] + range[1]) / 2, range[1]];
+  const texts = numbers.map((number) => h("span", {}, formatNumber(number, scale)));
+  const heading = h("div", {}, unit ? `${title}, ${unit}` : title);
+  return h("div", { class: "legend", "data-test": "legend" }, heading, bar, h("div", { class: "numbers" }, ...texts));
 }

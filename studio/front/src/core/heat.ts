@@ -1,4 +1,4 @@
-// Heat out of eigenpairs, in the browser. Modes are k rows of n numbers, orthonormal in the areas.
+/** Heat out of eigenpairs, in the browser. Modes are k rows of n numbers, orthonormal in the areas. */
 
 const NULL = 1e-9; // eigenvalues below this share of the largest count as 0, as in the library
 

@@ -1,4 +1,4 @@
-// Unite the finest regions of a merge tree: what `eigenshape.segment` does, at once in the browser.
+/** Unite the finest regions of a merge tree: what `eigenshape.segment` does, at once in the browser. */
 
 export interface Merges {
   count: number; // of the finest regions, numbered by falling persistence

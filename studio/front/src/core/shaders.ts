@@ -108,9 +108,12 @@ void main() {
 /** Points on vertices: feature points, a heat source. They lie a little before the surface. */
 export const POINT_VERTEX = /* glsl */ `
 ${MOVED}
+in vec3 tint;
 uniform float size;
+out vec3 v_tint;
 void main() {
   vec3 turn;
+  v_tint = tint;
   gl_Position = projectionMatrix * (modelViewMatrix * vec4(moved(turn), 1.0));
   gl_Position.z -= 0.002 * gl_Position.w;
   gl_PointSize = size;
@@ -119,14 +122,14 @@ void main() {
 
 export const POINT_FRAGMENT = /* glsl */ `
 precision highp float;
-uniform vec3 plain;
+in vec3 v_tint;
 out vec4 color;
 void main() {
   float radius = 2.0 * length(gl_PointCoord - 0.5);
   float edge = fwidth(radius);
   float disc = 1.0 - smoothstep(1.0 - edge, 1.0, radius);
   if (disc <= 0.0) discard;
-  color = vec4(mix(plain, vec3(0.08), smoothstep(0.68, 0.74, radius)), disc);
+  color = vec4(mix(v_tint, vec3(0.08), smoothstep(0.68, 0.74, radius)), disc);
 }
 `;
 

@@ -46,6 +46,7 @@ export class Viewer {
   vertices: Float32Array = new Float32Array(0);
   faces: Uint32Array = new Uint32Array(0);
   labels: Int32Array | null = null;
+  extent = 1; // diagonal of the box around the mesh
   private readonly renderer: three.WebGLRenderer | null;
   private readonly picker: Picker | null;
   private readonly motion = {
@@ -60,6 +61,7 @@ export class Viewer {
   private readonly skeleton: three.Mesh<three.BufferGeometry, three.ShaderMaterial>;
   private readonly discs: three.Points<three.BufferGeometry, three.ShaderMaterial>;
   private readonly layers = new Map<string, { vertices: ArrayLike<number>; color: string }>();
+  private readonly watch = new ResizeObserver(() => this.resize());
   private readonly listeners = new Set<(hit: Hit, event: PointerEvent) => void>();
   private legend: HTMLElement | null = null;
   private mode: PointerMode = "orbit";
@@ -68,7 +70,7 @@ export class Viewer {
   private up: Vec3 = [0, 1, 0];
   private front: Vec3 = [0, 0, 1];
 
-  constructor(private readonly stage: HTMLElement) {
+  constructor(readonly stage: HTMLElement) {
     stage.append(this.canvas);
     this.canvas.setAttribute("aria-label", "The shape. Arrow keys turn it, + and - zoom.");
     this.surface = new three.Mesh(this.geometry, this.surfaceMaterial(PLAIN));
@@ -90,7 +92,8 @@ export class Viewer {
     this.picker = this.renderer && new Picker(this.renderer, this.geometry, this.motion);
     this.controls = this.startControls();
     this.listenToPointer();
-    new ResizeObserver(() => this.resize()).observe(stage);
+    this.watch.observe(stage);
+    this.resize();
   }
 
   setMesh(vertices: Float32Array, faces: Uint32Array, up: Vec3, front: Vec3): void {
@@ -116,7 +119,7 @@ export class Viewer {
     this.setScalars(null);
     this.setHandles([]);
     const box = new three.Box3().setFromArray(vertices);
-    const size = box.getSize(new three.Vector3()).length() || 1;
+    const size = (this.extent = box.getSize(new three.Vector3()).length() || 1);
     this.space.scale.setScalar(1 / size);
     this.space.position.copy(box.getCenter(new three.Vector3())).multiplyScalar(-1 / size);
     this.space.updateMatrixWorld(true);
@@ -226,11 +229,16 @@ export class Viewer {
     this.replace("mark", marks);
   }
 
-  /** Mark vertices by discs of constant size on the screen. */
-  setPoints(vertices: ArrayLike<number>, color: string): void {
+  /** Mark vertices by discs of constant size on the screen, of one color or one each. */
+  setPoints(vertices: ArrayLike<number>, colors: string | string[]): void {
     this.discs.visible = vertices.length > 0;
     this.shareBuffers(this.discs.geometry, Uint32Array.from(vertices));
-    this.discs.material.uniforms.plain!.value = this.colorOf(color);
+    const tints = new Float32Array(this.vertices.length);
+    for (let place = 0; place < vertices.length; place++) {
+      const color = this.colorOf(typeof colors === "string" ? colors : colors[place]!);
+      tints.set(color.toArray(), 3 * vertices[place]!);
+    }
+    this.discs.geometry.setAttribute("tint", new three.BufferAttribute(tints, 3));
     this.invalidate();
   }
 
@@ -276,6 +284,16 @@ export class Viewer {
     return new Promise((resolve, reject) =>
       this.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("There is no picture.")))),
     );
+  }
+
+  /** Give the graphics memory back: browsers allow only few pictures at a time. */
+  dispose(): void {
+    cancelAnimationFrame(this.frame);
+    this.watch.disconnect();
+    this.controls.dispose();
+    this.renderer?.dispose();
+    this.renderer?.forceContextLoss();
+    this.canvas.remove();
   }
 
   /** Draw soon, once, however often this is called. */
@@ -332,6 +350,13 @@ export class Viewer {
     this.controls.target.set(...view.target);
     this.controls.update();
     this.invalidate();
+  }
+
+  /** Return how many pixels of the page a length has at the point that the camera turns about. */
+  pixelsOf(length: number): number {
+    const distance = this.camera.position.distanceTo(this.controls.target);
+    const seen = 2 * Math.tan((FIELD_OF_VIEW * Math.PI) / 360) * distance * this.extent;
+    return (this.canvas.clientHeight * length) / seen;
   }
 
   /** Return the ray through a place of the canvas, in the coordinates of the mesh. */
@@ -443,7 +468,6 @@ export class Viewer {
       transparent: true,
       uniforms: {
         ...this.motion,
-        plain: { value: this.colorOf(PLAIN) },
         size: { value: 14 * Math.min(devicePixelRatio, MOST_PIXELS) },
       },
     });

@@ -1,0 +1,69 @@
+/** The regions of an edit: each vertex is free, fixed, or in one of at most four regions. */
+
+import { MAX_REGIONS } from "./shaders";
+
+export const FIXED = MAX_REGIONS; // number of the fixed vertices, after those of the regions
+const FREE = 255;
+
+export class Regions {
+  private owner: Uint8Array;
+
+  constructor(nVertices: number) {
+    this.owner = new Uint8Array(nVertices).fill(FREE);
+  }
+
+  /** Return the number of the region of a vertex, or null. */
+  of(vertex: number): number | null {
+    const owner = this.owner[vertex]!;
+    return owner === FREE ? null : owner;
+  }
+
+  /** Return the vertices of a region, ascending. */
+  vertices(region: number): Uint32Array {
+    const found: number[] = [];
+    this.owner.forEach((owner, vertex) => owner === region && found.push(vertex));
+    return Uint32Array.from(found);
+  }
+
+  /** Return for each vertex whether it is in a region. */
+  mask(region: number): Uint8Array {
+    return this.owner.map((owner) => (owner === region ? 1 : 0));
+  }
+
+  /** Add vertices to a region; they leave the region that had them. */
+  add(region: number, vertices: Iterable<number>): void {
+    for (const vertex of vertices) this.owner[vertex] = region;
+  }
+
+  remove(region: number, vertices: Iterable<number>): void {
+    for (const vertex of vertices) if (this.owner[vertex] === region) this.owner[vertex] = FREE;
+  }
+
+  clear(region: number): void {
+    this.owner.forEach((owner, vertex) => {
+      if (owner === region) this.owner[vertex] = FREE;
+    });
+  }
+
+  /** Return the regions as text for the storage of the tab: owner and length of each run. */
+  write(): string {
+    const runs: number[] = [];
+    let begin = 0;
+    for (let vertex = 1; vertex <= this.owner.length; vertex++)
+      if (this.owner[vertex] !== this.owner[begin]) {
+        runs.push(this.owner[begin]!, vertex - begin);
+        begin = vertex;
+      }
+    return runs.join(" ");
+  }
+
+  /** Take what `write` returned; text of another mesh is ignored. */
+  read(text: string): void {
+    const runs = text.split(" ").map(Number);
+    const owner = new Uint8Array(this.owner.length);
+    let vertex = 0;
+    for (let place = 0; place < runs.length; place += 2)
+      owner.fill(runs[place]!, vertex, (vertex += runs[place + 1]!));
+    if (vertex === owner.length) this.owner = owner;
+  }
+}
