@@ -93,7 +93,7 @@ export class DeformPanel implements Panel {
 
   build(app: App): HTMLElement {
     this.app = app;
-    this.box = new BoxTool(app.viewer, () => this.boxMoved());
+    this.box = new BoxTool(app.viewer, () => this.boxMoved(), () => this.bind());
     this.mover = new MotionTool(app.viewer, {
       canDrag: (vertex) => this.canDrag(vertex),
       moved: (handle) => this.moved(handle),
