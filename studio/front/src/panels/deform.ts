@@ -112,6 +112,7 @@ export class DeformPanel implements Panel {
     this.skeletonModes.valueAsNumber = 50;
     this.nModes.placeholder = "auto";
     this.amount.placeholder = "amount";
+    this.amount.addEventListener("keydown", ({ key }) => key === "Enter" && this.moveExactly());
     this.exactKind.className = "wide";
     for (const [tool, key] of Object.entries(SHORTCUTS)) {
       const label = { ...SELECTORS, ...MOTIONS }[tool as Tool];
@@ -207,6 +208,7 @@ export class DeformPanel implements Panel {
     for (let axis = 0; axis < 3; axis++) [low[axis], high[axis]] = [low[axis]! - room, high[axis]! + room];
     if (up >= 0) low[up] = (low[up]! + high[up]!) / 2;
     [this.box.low, this.box.high] = [low, high];
+    this.writeBox();
   }
 
   private chooseRegion(region: number): void {
@@ -242,7 +244,6 @@ export class DeformPanel implements Panel {
     viewer.tool = !on ? null : tool === "brush" ? this.brush : tool === "box" ? this.box : this.mover;
     if (on && tool === "box") this.box.show(this.box.low, this.box.high);
     else this.box.hide();
-    this.writeBox();
     const row = this.rows.indexOf(this.region);
     const ready = this.root.dataset.ready === "true";
     if (on && !selects && ready && row >= 0) this.mover.show(this.pivotOf(this.region), tool as MotionKind);
@@ -282,7 +283,9 @@ export class DeformPanel implements Panel {
 
   private boxMoved(): void {
     this.regions.clear(this.region);
-    this.regions.add(this.region, selectBox(this.app.viewer.vertices, this.box.low, this.box.high));
+    // A box that passes over another region leaves that region as it is.
+    const inside = selectBox(this.app.viewer.vertices, this.box.low, this.box.high);
+    this.regions.add(this.region, inside.filter((vertex) => this.regions.of(vertex) === null));
     this.writeBox();
     this.remember();
     this.root.dataset.ready = "false";
