@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from eigenshape_studio.wire import decode, encode
-from eigenshape_studio.workspace import Workspace
 
 import eigenshape as es
+from eigenshape_studio.wire import decode, encode
+from eigenshape_studio.workspace import Workspace
 
 
 def stretched_ball(level=3):

@@ -5,6 +5,7 @@ import struct
 
 import numpy as np
 import pytest
+
 from eigenshape_studio.wire import DTYPES, WireError, decode, encode, encode_halves
 
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import Page, stretched_ball
-from eigenshape_studio.wire import decode, encode
-from eigenshape_studio.workspace import Workspace
 
 import eigenshape as es
+from eigenshape_studio.wire import decode, encode
+from eigenshape_studio.workspace import Workspace
 
 TURN = {"type": "rotation", "pivot": [0, 0.9, 0], "axis": [0, 0, 2], "angle": 0.6}
 PULL = {"type": "translation", "vector": [0, 0.4, 0.1]}
@@ -149,13 +149,17 @@ def test_a_file_holds_the_present_pose(page, top, tmp_path, suffix):
     path = tmp_path / f"bent.{suffix}"
     path.write_bytes(page.array(f"file/{suffix}").tobytes())
     single = suffix == "glb"
-    expected = page.workspace.mesh.vertices.astype("<f4") if single else page.workspace.mesh.vertices
+    expected = (
+        page.workspace.mesh.vertices.astype("<f4") if single else page.workspace.mesh.vertices
+    )
     np.testing.assert_array_equal(es.read_mesh(path).vertices, expected)
 
 
 def test_an_opened_file_becomes_the_shape(page):
     ball = es.icosphere(2)
-    facts, _ = page.call("finish", {"kind": "open", "name": "a/b\\ball.ply"}, {"file": file_of(ball)})
+    facts, _ = page.call(
+        "finish", {"kind": "open", "name": "a/b\\ball.ply"}, {"file": file_of(ball)}
+    )
     state = facts["state"]
     assert (state["name"], state["n_vertices"], state["shape"]) == ("ball.ply", 162, 1)
     np.testing.assert_array_equal(page.array("vertices"), ball.vertices.astype("<f4"))

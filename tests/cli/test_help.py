@@ -112,7 +112,16 @@ def spellings(of):
 
 def test_the_main_output_of_every_verb_is_called_output():
     written = [verb for verb, parameter in ALL if parameter.name == "output"]
-    assert written == ["repair", "spectrum", "features", "segment", "label", "deform", "demo"]
+    assert written == [
+        "repair",
+        "spectrum",
+        "features",
+        "segment",
+        "label",
+        "deform",
+        "report",
+        "demo",
+    ]
     assert spellings(lambda parameter: parameter.name == "output") == {("-o", "--output")}
     assert spellings(lambda parameter: "-o" in parameter.opts) == {("-o", "--output")}
 

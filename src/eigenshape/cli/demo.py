@@ -29,6 +29,7 @@ Read next:
   eigenshape spectrum {scan} -k 20 --picture spectrum.png  its eigenvalues, and the proof that none is missing
   eigenshape index my-index FOLDER                    the same for a folder of your own meshes
   eigenshape query my-index SCAN --picture sheet.png  and a scan of yours
+  eigenshape studio {scan} --index {index}            a window in the browser: bend it, and search
   README.md, docs/glossary.md                         the same steps in Python, and the terms
 """
 
@@ -65,7 +66,7 @@ def demo(
     sheet = output / "sheet.png"
     caption = f"A partial scan of a {kind} in a new pose, and the most similar shapes ({CAPTION})"
     save_picture(contact_sheet(shape, "partial scan", matches, caption=caption), sheet)
-    out.print(NEXT.format(scan=shown(scan_path)))
+    out.print(NEXT.format(scan=shown(scan_path), index=shown(output / "index")))
 
 
 def _make(folder: Path) -> list[Item]:

@@ -36,10 +36,14 @@ VERBS = {
     "are still added.",
     "query": "Find the shapes of an index that are most like a scan, and which features "
     "correspond.",
+    "studio": "Open a window in the browser: bend a shape by hand, see its spectrum, heat and parts, "
+    "and search.",
+    "report": "Write a shape with its spectrum, heat and parts to one HTML file that any browser "
+    "opens.",
     "demo": "Try everything: make creatures, index them, scan one from one side in a new pose, and "
     "find its kind.",
 }
-NEED_NO_ARGUMENT = ("operators", "demo")
+NEED_NO_ARGUMENT = ("operators", "studio", "demo")
 MARKUP: Any = "markdown"  # leaves plain brackets alone, which rich markup would take for its own
 
 # typer brings its own copy of click since version 0.20 and used the package before; this is the

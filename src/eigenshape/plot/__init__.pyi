@@ -15,3 +15,4 @@ from .sheet import figure_label_transfer as figure_label_transfer
 from .spectra import figure_spectra as figure_spectra
 from .spectra import figure_spectrum as figure_spectrum
 from .stability import figure_stability as figure_stability
+from .view import view as view

@@ -23,6 +23,13 @@ function tabNumber(settings: Settings): string {
   return number;
 }
 
+/** Let the studio fill the window. */
+function fillWindow(host: HTMLElement): HTMLElement {
+  document.body.style.margin = "0";
+  host.style.height = "100vh";
+  return host;
+}
+
 function start(backend: Backend, host: HTMLElement, settings: Settings, keys: EventTarget): Studio {
   const studio = new Studio(backend, host, makePanels(), settings, keys);
   studio.start().catch((error) => studio.fail(error));
@@ -40,9 +47,9 @@ if (page || data) {
 if (page) {
   const settings = new Settings(sessionStorage);
   // For tests.
-  (window as any).eigenshape = start(httpBackend(tabNumber(settings)), page, settings, window);
+  (window as any).eigenshape = start(httpBackend(tabNumber(settings)), fillWindow(page), settings, window);
 } else if (data) {
-  const host = document.body.appendChild(document.createElement("div"));
+  const host = fillWindow(document.body.appendChild(document.createElement("div")));
   // All files share one storage, so each report has a key of its own.
   const settings = new Settings(sessionStorage, `eigenshape ${location.pathname}`);
   inlineBackend(data).then((backend) => ((window as any).eigenshape = start(backend, host, settings, window)));
@@ -51,7 +58,7 @@ if (page) {
 /** Show the studio in the output of a notebook's cell (anywidget). */
 function render({ model, el }: { model: WidgetModel; el: HTMLElement }): () => void {
   const host = el.appendChild(document.createElement("div"));
-  host.style.height = "600px";
+  host.style.height = `${model.get("height") ?? 640}px`;
   const { viewer } = start(widgetBackend(model), host, new Settings(null), host);
   return () => viewer.dispose();
 }

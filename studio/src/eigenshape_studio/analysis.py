@@ -4,9 +4,10 @@ import copy
 from functools import cached_property
 from typing import Any
 
-import eigenshape as es
 import numpy as np
 import scipy.sparse as sp
+
+import eigenshape as es
 from eigenshape_studio.jobs import NO_JOB, Job, Progress
 
 # Modes that are solved for when a shape is opened, beside one for each further component: as many
@@ -27,13 +28,18 @@ class Analysis:
     mesh : TriangleMesh
     name : str
         Shown on the page.
+    n_modes : int
+        Number of eigenpairs, beside one for each further component.
     shared : bool
         Whether several tabs show this mesh, so that none may cancel its jobs.
     """
 
-    def __init__(self, mesh: es.TriangleMesh, name: str, *, shared: bool = False) -> None:
+    def __init__(
+        self, mesh: es.TriangleMesh, name: str, *, n_modes: int = N_MODES, shared: bool = False
+    ) -> None:
         self.mesh = mesh
         self.name = name
+        self._n_modes = n_modes
         self.health: Job[dict[str, Any]] = Job(lambda _: assess_health(mesh), shared=shared)
         self.spectrum: Job[es.Spectrum] = Job(self._solve_default, shared=shared)
         solved = self.spectrum
@@ -115,7 +121,7 @@ class Analysis:
 
     def _solve_default(self, progress: Progress) -> es.Spectrum:
         n_components, _ = es.geometry.vertex_components(self.mesh)
-        wanted = min(N_MODES + n_components - 1, self.mesh.n_vertices)
+        wanted = min(self._n_modes + n_components - 1, self.mesh.n_vertices)
         return _solve(self.mesh, wanted, progress)
 
 
@@ -142,9 +148,7 @@ def assess_health(mesh: es.TriangleMesh) -> dict[str, Any]:
         "manifold": es.geometry.is_manifold(mesh),
         "area": es.geometry.surface_area(mesh),
         "volume": _volume(mesh) if closed else None,
-        "findings": [
-            {"name": name, "why": why} for name, why in zip(names, report, strict=True)
-        ],
+        "findings": [{"name": name, "why": why} for name, why in zip(names, report, strict=True)],
     }
 
 

@@ -211,7 +211,9 @@ class _Answer:
         data = f"{text}\n".encode()
         kind = (b"content-type", b"text/plain; charset=utf-8")
         size = (b"content-length", str(len(data)).encode())
-        await self({"type": "http.response.start", "status": status, "headers": [kind, size, *headers]})
+        await self(
+            {"type": "http.response.start", "status": status, "headers": [kind, size, *headers]}
+        )
         await self({"type": "http.response.body", "body": data})
 
 

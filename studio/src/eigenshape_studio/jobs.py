@@ -30,6 +30,7 @@ class Job(Generic[T]):
         self.message = ""
         self.shared = shared
         self._work = work
+        self.error: Exception | None = None
         self._result: T | None = None
         self._cancelled = threading.Event()
         self._done = threading.Event()
@@ -64,6 +65,7 @@ class Job(Generic[T]):
         except JobCancelledError:
             self.status, self.message = "none", ""
         except Exception as error:  # noqa: BLE001  whatever happens, the page must learn of it
+            self.error = error
             self.status, self.message = "failed", str(error) or type(error).__name__
         else:
             self.progress, self.status, self.message = 1.0, "ready", ""

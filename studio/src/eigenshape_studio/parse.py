@@ -10,8 +10,9 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-import eigenshape as es
 import numpy as np
+
+import eigenshape as es
 from eigenshape_studio.wire import WireError, decode, encode
 
 SUFFIXES = (".ply", ".obj", ".off", ".stl", ".glb", ".gltf", ".mesh", ".msh", ".vtk", ".vtu")

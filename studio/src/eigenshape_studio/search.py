@@ -5,10 +5,11 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import eigenshape as es
 import numpy as np
-from eigenshape.plot.render import draw
 from matplotlib.image import imsave
+
+import eigenshape as es
+from eigenshape.plot.render import draw
 
 THUMBNAIL = 144  # pixels
 N_KEPT = 256  # pictures that are kept in memory, about 10 kB each

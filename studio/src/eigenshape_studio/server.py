@@ -13,17 +13,18 @@ from pathlib import Path
 from typing import Any
 
 import anyio.to_thread
-import eigenshape as es
 import uvicorn
-from eigenshape_studio.guard import App, Guard, Rules, local_hosts
-from eigenshape_studio.workspace import Answer, Workspace, error_message
 from starlette.applications import Starlette
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-STATIC = Path(__file__).parent / "static"
+import eigenshape as es
+from eigenshape_studio.bundle import NotBuiltError, read_static
+from eigenshape_studio.guard import App, Guard, Rules, local_hosts
+from eigenshape_studio.workspace import Answer, Workspace, error_message
+
 FILES = {"index.html": "text/html; charset=utf-8", "studio.js": "text/javascript; charset=utf-8"}
 LOCAL = ("127.0.0.1", "localhost")
 TAB = re.compile(r"[A-Za-z0-9_-]{8,64}")
@@ -113,10 +114,10 @@ def make_app(first: Workspace, rules: Rules) -> App:
         name = request.path_params.get("name", "index.html")
         if name not in FILES:
             return PlainTextResponse("There is no such page.\n", 404)
-        path = STATIC / name
-        if not path.exists():
-            return PlainTextResponse(NOT_BUILT, 500)
-        return Response(path.read_bytes(), media_type=FILES[name])
+        try:
+            return Response(read_static(name), media_type=FILES[name])
+        except NotBuiltError as error:
+            return PlainTextResponse(f"{error}\n", 500)
 
     async def call(request: Request) -> Response:
         tab = request.headers.get("x-eigenshape-tab", "")
@@ -145,17 +146,11 @@ def make_app(first: Workspace, rules: Rules) -> App:
     return Guard(Starlette(routes=routes), rules)
 
 
-NOT_BUILT = (
-    "The page of the studio is not built. Install the package with pip, which builds it, or run "
-    "`python hatch_build.py` in its folder.\n"
-)
-
-
 def _respond(answer: Answer) -> Response:
     return Response(answer.message, answer.status, media_type="application/octet-stream")
 
 
-def serve(
+def serve(  # noqa: PLR0913  one for each option of the command
     mesh: str | Path | es.types.MeshLike | None = None,
     *,
     index: str | Path | None = None,
@@ -205,7 +200,7 @@ def serve(
     if allow_remote:
         hosts += tuple(f"{name}:{port}" for name in (host, socket.gethostname()))
     rules = Rules(token, frozenset(hosts), port, any_address=allow_remote)
-    shown = host if host not in ("0.0.0.0", "::") else socket.gethostname()  # noqa: S104
+    shown = host if host not in ("0.0.0.0", "::") else socket.gethostname()
     url = f"http://{shown}:{port}/?token={token}"
     config = uvicorn.Config(
         make_app(first, rules),

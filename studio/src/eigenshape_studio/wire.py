@@ -47,7 +47,9 @@ def encode(meta: Any, arrays: Mapping[str, np.ndarray] | None = None) -> bytes:
     offset = 0
     for name, array in (arrays or {}).items():
         if array.dtype.str not in DTYPES:
-            raise WireError(f"Array {name!r} must have a type of {DTYPES}; it has {array.dtype.str}.")
+            raise WireError(
+                f"Array {name!r} must have a type of {DTYPES}; it has {array.dtype.str}."
+            )
         data = np.ascontiguousarray(array).tobytes()
         entries[name] = {"dtype": array.dtype.str, "shape": list(array.shape), "offset": offset}
         padding = -len(data) % ALIGNMENT
@@ -107,7 +109,9 @@ def _split(message: bytes | bytearray | memoryview) -> tuple[Any, memoryview]:
         raise WireError(f"A message must begin with 4 bytes of length; it has {len(view)} bytes.")
     length = int.from_bytes(view[:4], "little")
     if (4 + length) % ALIGNMENT:
-        raise WireError(f"4 + the length of the header must be a multiple of 8; it is {4 + length}.")
+        raise WireError(
+            f"4 + the length of the header must be a multiple of 8; it is {4 + length}."
+        )
     if length > min(len(view) - 4, LONGEST_HEADER):
         raise WireError(
             f"The header must lie in the message and have at most {LONGEST_HEADER} bytes; "
@@ -129,7 +133,7 @@ def _array(name: str, entry: Any, data: memoryview) -> np.ndarray:
     keys = {"dtype", "shape", "offset"}
     if not isinstance(entry, dict) or not keys <= set(entry) <= keys | {"scale"}:
         raise WireError(f"The entry of array {name!r} must have dtype, shape and offset.")
-    kind, shape, offset, scale = (entry.get(key) for key in ("dtype", "shape", "offset", "scale"))
+    kind, shape, offset = entry["dtype"], entry["shape"], entry["offset"]
     if kind not in DTYPES:
         raise WireError(f"The dtype of array {name!r} must be one of {DTYPES}; it is {kind!r}.")
     if not isinstance(shape, list) or len(shape) > MOST_AXES or not all(map(_is_count, shape)):
@@ -143,10 +147,16 @@ def _array(name: str, entry: Any, data: memoryview) -> np.ndarray:
             f"Array {name!r} must lie in the data; bytes {offset} to {offset + size} are declared, "
             f"and there are {len(data)}."
         )
-    array = np.frombuffer(data, kind, count, offset).reshape(shape) if count else np.empty(shape, kind)
+    array = (
+        np.frombuffer(data, kind, count, offset).reshape(shape) if count else np.empty(shape, kind)
+    )
     if kind == "<f2":
-        factor = 1.0 if scale is None else scale
-        if isinstance(factor, bool) or not isinstance(factor, int | float) or not math.isfinite(factor):
+        factor = entry.get("scale", 1.0)
+        if (
+            isinstance(factor, bool)
+            or not isinstance(factor, int | float)
+            or not math.isfinite(factor)
+        ):
             raise WireError(f"The scale of array {name!r} must be a number; it is {factor!r}.")
         array = (array.astype(np.float64) * factor).astype(np.float32)
     array.flags.writeable = False

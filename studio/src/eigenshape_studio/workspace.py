@@ -10,22 +10,19 @@ from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
 
-import eigenshape as es
 import numpy as np
-from eigenshape_studio.analysis import Analysis, diagram_rows, merge_rows, vertex_labels
+
+import eigenshape as es
+from eigenshape_studio.analysis import N_MODES, Analysis, diagram_rows, merge_rows, vertex_labels
 from eigenshape_studio.jobs import NO_JOB
 from eigenshape_studio.parse import display_name, parse_mesh
+from eigenshape_studio.poses import carry_pose
 from eigenshape_studio.search import Shelf
 from eigenshape_studio.wire import WireError, decode, encode
 
 MOST_REGIONS = 4  # one component each of the attribute `shares` of the vertex shader
 MOST_MODES = 2000  # that the page may request
 N_BRACKETS = 20  # bracketing costs a solve with three times as many unknowns
-N_CARRIED = 40  # modes of a functional map that carry a pose, as in experiments/ch6_deformation
-N_SOLVED = 100  # modes that are solved for to refine that map
-# Modes of the map before it is refined, for exact pairs and for those of patches; as the
-# documentation of `functional_map` recommends.
-N_EXACT, N_INEXACT = 20, 10
 CAPABILITIES = ("rig", "finish", "query", "open", "repair", "solve")
 CALLS = ("meta", "array", "rig", "finish", "query")
 MODES = ("graded", "uncrossed", "thesis")
@@ -88,6 +85,8 @@ class Workspace:
         Functions on the vertices.
     index : path, optional
         Folder of an index to search in.
+    n_modes : int
+        Number of eigenpairs to compute at first; a rig of fewer than 300 bends less sharply.
     shared : bool
         Whether the workspace is forked for several tabs.
     """
@@ -99,11 +98,13 @@ class Workspace:
         *,
         values: Mapping[str, Any] | None = None,
         index: str | Path | None = None,
+        n_modes: int = N_MODES,
         shared: bool = False,
     ) -> None:
         surface = es.as_mesh(mesh)
         self.fields = _fields(values or {}, surface.n_vertices)
-        self.analysis = Analysis(surface, display_name(name), shared=shared)
+        title = display_name(name)
+        self.analysis = Analysis(surface, title, n_modes=n_modes, shared=shared)
         self.shelf = None if index is None else Shelf(index)
         self.session: es.DeformationSession | None = None
         self.bound: Bound | None = None
@@ -135,18 +136,21 @@ class Workspace:
         """Answer a call; whatever is wrong with it becomes an answer, too."""
         try:
             meta, arrays = decode(message)
-            if call not in CALLS:
-                raise RequestError(f"A call must be one of {', '.join(CALLS)}; it is {call!r}.")
-            if not isinstance(meta, dict):
-                raise RequestError("The meta of a call must be an object.")
-            work: Callable[[dict[str, Any], Arrays], Reply] = getattr(self, f"call_{call}")
-            return Answer(encode(*work(meta, arrays)), 200)
+            return Answer(encode(*self._dispatch(call, meta, arrays)), 200)
         except (es.EigenshapeError, WireError, RequestError, OSError) as error:
             return Answer(error_message(type(error).__name__, str(error)), 400)
         except MemoryError:
             return Answer(error_message("MemoryError", "There is not enough memory for this."), 400)
         except Exception as error:  # noqa: BLE001  the other tabs must go on
             return Answer(error_message("InternalError", f"{type(error).__name__}: {error}"), 500)
+
+    def _dispatch(self, call: str, meta: Any, arrays: Arrays) -> Reply:
+        if call not in CALLS:
+            raise RequestError(f"A call must be one of {', '.join(CALLS)}; it is {call!r:.80}.")
+        if not isinstance(meta, dict):
+            raise RequestError("The meta of a call must be an object.")
+        work: Callable[[dict[str, Any], Arrays], Reply] = getattr(self, f"call_{call}")
+        return work(meta, arrays)
 
     def call_meta(self, _meta: dict[str, Any], _arrays: Arrays) -> Reply:
         """Return the state."""
@@ -187,10 +191,19 @@ class Workspace:
         """Return one array by its name."""
         name = meta.get("name")
         if not isinstance(name, str):
-            raise RequestError(f"The name of an array must be text; it is {name!r}.")
+            raise RequestError(f"The name of an array must be text; it is {name!r:.80}.")
+        return {}, {name: self.array(name, meta)}
+
+    def array(self, name: str, meta: dict[str, Any] | None = None) -> np.ndarray:
+        """Return one array by its name; `meta` may hold the range start..stop.
+
+        Raises
+        ------
+        RequestError
+            If there is no such array, or not yet.
+        """
+        meta = meta or {}
         head, _, tail = name.partition("/")
-        if head == "match":
-            return {}, {name: self._match_array(tail)}
         makers: dict[str, Callable[..., np.ndarray]] = {
             "vertices": self._vertices,
             "faces": lambda: self.analysis.mesh.faces.astype("<u4"),
@@ -206,11 +219,12 @@ class Workspace:
             "values": self._values_array,
             "skeleton": self._skeleton,
             "file": self._file,
+            "match": self._match_array,
         }
         if not tail and head in makers:
-            return {}, {name: makers[head]()}
+            return makers[head]()
         if tail and head in families:
-            return {}, {name: families[head](tail)}
+            return families[head](tail)
         raise RequestError(f"There must be an array of the requested name; {name[:80]!r} is none.")
 
     def _vertices(self) -> np.ndarray:
@@ -219,7 +233,9 @@ class Workspace:
     def _spectrum(self) -> es.Spectrum:
         found = self.analysis.spectrum.result
         if found is None:
-            raise RequestError("The spectrum must be ready; it is not. Wait for it, or solve again.")
+            raise RequestError(
+                "The spectrum must be ready; it is not. Wait for it, or solve again."
+            )
         return found
 
     def _modes(self, meta: dict[str, Any]) -> np.ndarray:
@@ -265,12 +281,16 @@ class Workspace:
     def _skeleton(self, tail: str) -> np.ndarray:
         rig = self._require_session().rig
         if not tail.isdecimal() or not 1 <= int(tail) <= rig.n_modes:
-            raise RequestError(f"A skeleton must be of 1 to {rig.n_modes} modes; not {tail[:80]!r}.")
+            raise RequestError(
+                f"A skeleton must be of 1 to {rig.n_modes} modes; not {tail[:80]!r}."
+            )
         return es.deformation.eigen_skeleton(rig, int(tail)).astype("<f4")
 
     def _file(self, tail: str) -> np.ndarray:
         if tail not in ("ply", "obj", "glb", "edits"):
-            raise RequestError(f"A file must be ply, obj, glb or edits; {tail[:80]!r} was requested.")
+            raise RequestError(
+                f"A file must be ply, obj, glb or edits; {tail[:80]!r} was requested."
+            )
         with TemporaryDirectory() as folder:
             path = Path(folder, f"shape.{tail}")
             if tail == "edits":
@@ -307,7 +327,9 @@ class Workspace:
         names += ["fixed"] if meta.get("fixed") else []
         missing = [name for name in names if name not in arrays]
         if missing:
-            raise RequestError(f"A rig must have an array for each region; {missing[0]} is missing.")
+            raise RequestError(
+                f"A rig must have an array for each region; {missing[0]} is missing."
+            )
         regions = [np.unique(arrays[name].astype(np.int64)) for name in names]
         fixed = regions.pop() if meta.get("fixed") else None
         began = perf_counter()
@@ -367,9 +389,7 @@ class Workspace:
         bound, entries, mode = self._motion(meta)
         binding = self._drag(bound, entries)
         handles = [handle_from(entry) for entry in entries]
-        return self._listen(
-            mode, lambda: es.deformation.bend(binding, handles, mode=mode).vertices
-        )
+        return self._listen(mode, lambda: es.deformation.bend(binding, handles, mode=mode).vertices)
 
     def _commit(self, meta: dict[str, Any], _arrays: Arrays) -> np.ndarray:
         bound, entries, mode = self._motion(meta)
@@ -495,9 +515,7 @@ def error_message(kind: str, text: str) -> bytes:
     return encode({"error": {"kind": kind, "message": text}})
 
 
-def whole(
-    meta: dict[str, Any], name: str, low: int, high: int, default: int | None = None
-) -> int:
+def whole(meta: dict[str, Any], name: str, low: int, high: int, default: int | None = None) -> int:
     """Return a whole number of a call; `default` is its value if it is missing.
 
     Raises
@@ -532,40 +550,6 @@ def handle_from(entry: Any) -> es.types.Handle:
     raise RequestError("The type of a handle must be rotation or translation.")
 
 
-def carry_pose(
-    source: es.TriangleMesh,
-    posed: es.TriangleMesh,
-    target: es.TriangleMesh,
-    pairs: np.ndarray | None = None,
-) -> es.TriangleMesh:
-    """Bend a target as a source was bent.
-
-    Parameters
-    ----------
-    source, posed : TriangleMesh
-    target : TriangleMesh
-    pairs : (p, 2) int, optional
-        Corresponding vertices of source and target. By default vertices of the same number if both
-        have the same faces, else points whose patches match.
-
-    Returns
-    -------
-    TriangleMesh
-    """
-    n_pairs_modes = N_EXACT
-    if pairs is None and np.array_equal(source.faces, target.faces):
-        pairs = np.repeat(np.arange(source.n_vertices)[:, None], 2, axis=1)
-    if pairs is None:
-        one, two = (es.describe(mesh, es.retrieval.PatchRecipe()) for mesh in (source, target))
-        pairs = es.retrieval.match_patches(one.points[0], two.points[0]).vertices
-        n_pairs_modes = N_INEXACT
-    k = min(N_SOLVED, source.n_vertices, target.n_vertices)
-    spectra = [es.solve_spectrum(es.cotangent_laplacian(mesh), k) for mesh in (source, target)]
-    rough = es.functional_map(*spectra, pairs, n_modes=min(n_pairs_modes, k))
-    mapping = es.spectral.refine_map(rough, min(N_CARRIED, k))
-    return es.deformation.transfer_deformation(source, posed, target, mapping)
-
-
 def _bytes(arrays: Arrays, name: str) -> bytes:
     if name not in arrays or arrays[name].dtype != np.uint8 or arrays[name].ndim != 1:
         raise RequestError(f"The call must have an array {name!r} with the bytes of a file.")
@@ -591,4 +575,3 @@ def _fields(values: Mapping[str, Any], n_vertices: int) -> dict[str, Field]:
 def _field_facts(name: str, field: Field) -> dict[str, Any]:
     low, high = float(field.values.min()), float(field.values.max())
     return {"name": name, "title": field.title, "unit": field.unit, "min": low, "max": high}
-

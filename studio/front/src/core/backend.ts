@@ -85,6 +85,8 @@ export interface Match {
   label: string | null;
   score: number;
   path?: string;
+  up?: Vec3; // how to look at it
+  front?: Vec3;
 }
 export interface Matches {
   matches: Match[];

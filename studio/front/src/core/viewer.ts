@@ -96,6 +96,7 @@ export class Viewer {
     this.controls = this.startControls();
     this.listenToPointer();
     this.watch.observe(stage);
+    this.resize();
   }
 
   setMesh(vertices: Float32Array, faces: Uint32Array, up: Vec3, front: Vec3): void {

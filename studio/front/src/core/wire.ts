@@ -12,6 +12,7 @@ export interface Message {
 }
 
 const TYPES = {
+  "<f2": Uint16Array, // only received: decoded into single precision
   "<f4": Float32Array,
   "<f8": Float64Array,
   "<u4": Uint32Array,
@@ -68,17 +69,19 @@ export function decode(message: ArrayBuffer | ArrayBufferView): Message {
     if (entry.offset % ALIGNMENT || end > bytes.length)
       throw new RangeError(`Array ${name} ends at byte ${end} of ${bytes.length}.`);
     const data = new type(bytes.buffer as ArrayBuffer, bytes.byteOffset + begin + entry.offset, length);
-    arrays[name] = { data: data instanceof Uint16Array ? fromHalves(data, entry.scale) : data, shape: entry.shape };
+    const numbers = data instanceof Uint16Array ? fromHalves(data, entry.scale ?? 1) : data;
+    arrays[name] = { data: numbers, shape: entry.shape };
   }
   return { meta: header.meta, arrays };
 }
 
-/** Return numbers of half precision, which reports use to be small, times their scale. */
+/** Return half precision in single; only the newest browsers have arrays of it. */
 function fromHalves(halves: Uint16Array, scale: number): Float32Array {
-  return Float32Array.from(halves, (bits) => {
-    const [exponent, fraction] = [(bits >> 10) & 31, bits & 1023];
-    const size = exponent ? 2 ** (exponent - 25) * (1024 + fraction) : 2 ** -24 * fraction;
-    return (bits >> 15 ? -scale : scale) * size;
+  return Float32Array.from(halves, (half) => {
+    const exponent = (half >> 10) & 31;
+    const fraction = (half & 1023) / 1024;
+    const size = exponent ? 2 ** (exponent - 15) * (1 + fraction) : 2 ** -14 * fraction;
+    return scale * (half >> 15 ? -size : size);
   });
 }
 

@@ -1,19 +1,81 @@
-/** What several panels are built of: sliders, choices, progress, plots, a place to drop files. */
+/** What panels are built of: arrays that are kept, sliders, choices, progress, plots, drops. */
 
 import uPlot from "uplot";
+import type { App, Panel } from "../app";
 import type { State } from "../core/backend";
 import { h } from "../core/dom";
+import type { TypedArray } from "../core/wire";
+
+/** A panel that colors the shape while it is shown, by arrays that it loads once. */
+export abstract class ColoringPanel implements Panel {
+  abstract readonly id: string;
+  abstract readonly title: string;
+  readonly needs: string[] = [];
+  protected app!: App;
+  protected active = false;
+  private version = "";
+  private ticket = 0;
+  private readonly kept = new Map<string, Promise<TypedArray>>();
+
+  abstract build(app: App): HTMLElement;
+  /** What the arrays belong to: when it changes they are loaded again. */
+  protected abstract versionOf(state: State): string;
+  /** Load what is missing, and color the shape. */
+  protected abstract show(): Promise<void>;
+
+  refresh(state: State): void {
+    const version = this.versionOf(state);
+    if (version === this.version) return;
+    this.version = version;
+    this.kept.clear();
+    if (this.active) this.start();
+  }
+
+  shown(): void {
+    this.active = true;
+    this.start();
+  }
+
+  hidden(): void {
+    this.active = false;
+    const { viewer } = this.app;
+    viewer.setMode("orbit");
+    viewer.setScalars(null);
+    viewer.setPoints([], []);
+  }
+
+  protected start(): void {
+    this.show().catch((error) => this.app.fail(error));
+  }
+
+  protected get<T extends TypedArray>(name: string, start?: number, stop?: number): Promise<T> {
+    const key = `${name} ${start} ${stop}`;
+    let array = this.kept.get(key);
+    if (!array) {
+      array = this.app.backend.array(name, start, stop).then(({ data }) => data);
+      array.catch(() => this.kept.delete(key)); // the next request tries again
+      this.kept.set(key, array);
+    }
+    return array as Promise<T>;
+  }
+
+  /** Wait for work; for ever if the panel is left, or waits for something newer, before it ends. */
+  protected async latest<T>(work: Promise<T>): Promise<T> {
+    const ticket = ++this.ticket;
+    const result = await work;
+    return this.active && ticket === this.ticket ? result : new Promise<T>(() => {});
+  }
+}
 
 /** A slider with its name, and its value in words. */
 export class Slider {
   readonly input: HTMLInputElement;
-  private readonly output = h("output");
   readonly element: HTMLElement;
+  private readonly output: HTMLElement;
 
   constructor(label: string, name: string, onInput: (value: number) => void) {
-    this.input = h("input", { type: "range", "data-test": name });
-    this.input.addEventListener("input", () => onInput(this.value));
-    this.output.dataset.test = `${name}-value`;
+    this.input = h("input", { type: "range", "data-test": name, oninput: () => onInput(this.value) });
+    this.output = h("output", { "data-test": `${name}-value` });
     this.element = h("label", { class: "slider" }, h("span", {}, label), this.output, this.input);
   }
 
@@ -21,7 +83,7 @@ export class Slider {
     return this.input.valueAsNumber;
   }
 
-  setRange(min: number, max: number, step: number): void {
+  setRange(min: number, max: number, step = 1): void {
     Object.assign(this.input, { min, max, step });
   }
 
@@ -60,59 +122,57 @@ export class ProgressBar {
     this.element.hidden = status !== "running" && status !== "failed";
     this.bar.hidden = status === "failed";
     this.bar.value = progress;
-    const share = `${Math.round(100 * progress)} %`;
-    this.text.textContent = status === "failed" ? message : `${share} ${message}`;
+    this.text.textContent = status === "failed" ? message : `${Math.round(100 * progress)} % ${message}`;
   }
 }
 
 /** Let files be dropped on an element. */
 export function acceptDrops(element: HTMLElement, onFile: (name: string, file: Uint8Array) => void): void {
-  const mark = (on: boolean) => (event: DragEvent) => {
+  const mark = (event: DragEvent) => {
     event.preventDefault(); // otherwise the browser leaves the page for the file
-    element.classList.toggle("dropping", on);
+    element.classList.toggle("dropping", event.type === "dragover");
   };
-  element.addEventListener("dragover", mark(true));
-  element.addEventListener("dragleave", mark(false));
+  for (const type of ["dragover", "dragleave", "drop"] as const) element.addEventListener(type, mark);
   element.addEventListener("drop", async (event) => {
-    mark(false)(event);
     const file = event.dataTransfer?.files[0];
     if (file) onFile(file.name, new Uint8Array(await file.arrayBuffer()));
   });
 }
 
+type Place = [number, number];
 export interface PlotOptions {
   labels: [string, string];
   series: uPlot.Series[];
-  draw(plot: uPlot, pixel: (x: number, y: number) => [number, number]): void;
+  draw(plot: uPlot, pixel: (x: number, y: number) => Place): void;
   choose(plot: uPlot, left: number, top: number): void; // a click
 }
 
 /** Return a plot in the colors of the page, dark or light, that answers to clicks. */
 export function buildPlot(host: HTMLElement, data: uPlot.AlignedData, options: PlotOptions): uPlot {
-  const color = (name: string) => () => readColor(host, name);
-  const [x, y] = options.labels.map((label) => ({
+  const axes = options.labels.map((label, i) => ({
     label,
-    stroke: color("--text"),
-    grid: { stroke: color("--line"), width: 1 },
-    ticks: { stroke: color("--line"), size: 4 },
-    font: "11px system-ui, sans-serif",
-    labelFont: "12px system-ui, sans-serif",
     labelSize: 18,
+    labelFont: "12px system-ui, sans-serif",
+    font: "11px system-ui, sans-serif",
+    size: [26, 42][i]!,
     gap: 3,
+    stroke: () => pageColor(host, "--text"),
+    grid: { stroke: () => pageColor(host, "--line"), width: 1 },
+    ticks: { stroke: () => pageColor(host, "--line"), size: 4 },
   }));
-  const pixel = (plot: uPlot) => (one: number, two: number): [number, number] => [
-    plot.valToPos(one, "x", true), plot.valToPos(two, "y", true),
-  ];
+  const draw = (plot: uPlot) =>
+    options.draw(plot, (x, y) => [plot.valToPos(x, "x", true), plot.valToPos(y, "y", true)]);
   const plot = new uPlot(
     {
       width: host.clientWidth,
-      height: 210,
+      height: 200,
+      padding: [8, 10, 0, 0],
       legend: { show: false },
       scales: { x: { time: false } },
       cursor: { drag: { x: false, y: false }, points: { show: false } },
-      axes: [{ ...x!, size: 26 }, { ...y!, size: 44 }],
+      axes,
       series: [{}, ...options.series],
-      hooks: { draw: [(drawn) => options.draw(drawn, pixel(drawn))] },
+      hooks: { draw: [draw] },
     },
     data,
     host,
@@ -123,15 +183,30 @@ export function buildPlot(host: HTMLElement, data: uPlot.AlignedData, options: P
   return plot;
 }
 
-export function readColor(element: Element, name: string): string {
+/** A series of dots in the color of the page. */
+export function dots(host: HTMLElement, size: number): uPlot.Series {
+  return { paths: () => null, points: { show: true, size, width: 0, fill: () => pageColor(host, "--accent") } };
+}
+
+export function pageColor(element: Element, name: string): string {
   return getComputedStyle(element).getPropertyValue(name).trim();
 }
 
-/** Draw a ring around a point of a plot. */
-export function drawRing(plot: uPlot, [x, y]: [number, number], color: string): void {
+export function drawLine(plot: uPlot, from: Place, to: Place, color: string, width = 1): void {
   plot.ctx.beginPath();
-  plot.ctx.arc(x, y, 5 * devicePixelRatio, 0, 2 * Math.PI);
-  plot.ctx.strokeStyle = color;
-  plot.ctx.lineWidth = 2 * devicePixelRatio;
-  plot.ctx.stroke();
+  plot.ctx.moveTo(...from);
+  plot.ctx.lineTo(...to);
+  drawPath(plot, color, width);
+}
+
+export function drawRing(plot: uPlot, place: Place, color: string): void {
+  plot.ctx.beginPath();
+  plot.ctx.arc(...place, 5 * devicePixelRatio, 0, 2 * Math.PI);
+  drawPath(plot, color, 2);
+}
+
+function drawPath({ ctx }: uPlot, color: string, width: number): void {
+  ctx.strokeStyle = color;
+  ctx.lineWidth = width * devicePixelRatio;
+  ctx.stroke();
 }

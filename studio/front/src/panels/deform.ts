@@ -14,7 +14,7 @@ import type { PointerTool } from "../core/viewer";
 import { buildChoice, ProgressBar, Slider } from "./controls";
 
 const REST = 150; // ms without motion after which the exact result is requested
-const COLORS = ["#e08a2e", "#3b8fd4", "#46a564", "#b468c8", "#77716a"]; // of the regions, and fixed
+const COLORS = ["#e08a2e", "#3b8fd4", "#46a564", "#b468c8", "#4f6072"]; // of the regions, and fixed
 const NAMES = { 0: "1", 1: "2", 2: "3", 3: "4", [FIXED]: "Fixed" };
 const SELECTORS = { box: "Box", brush: "Brush", part: "Part" };
 const MOTIONS = { rotate: "Rotate", move: "Move", pull: "Pull", swing: "Swing", pivot: "Pivot" };

@@ -1,118 +1,104 @@
-/** Parts: how many, applied at once, and the persistence of the maxima that they grow around. */
+/** Parts: how many, applied at once, and the persistence diagram of heat. */
 
-import uPlot from "uplot";
-import type { App, Panel } from "../app";
+import type uPlot from "uplot";
+import type { App } from "../app";
 import type { State } from "../core/backend";
 import { formatNumber, partColors } from "../core/colors";
 import { button, h } from "../core/dom";
 import { cutTree, findLevels, relabel, type Merges, type Rule } from "../core/parts";
-import { Store } from "../core/store";
-import { buildPlot, drawRing, ProgressBar, readColor, Slider } from "./controls";
+import { buildPlot, ColoringPanel, dots, drawLine, drawRing, pageColor, ProgressBar, Slider } from "./controls";
 
 const STEPS = 1000; // of the slider of persistence
 const POINT = "#d62728"; // as in es.plot.figure_segments
-const PALE = 0.72; // how much of the other parts' color is taken away beside a chosen one
+const PALE = 0.72; // how much of the color of other parts is taken away beside a chosen one
 
-export class PartsPanel implements Panel {
+export class PartsPanel extends ColoringPanel {
   readonly id = "parts";
   readonly title = "Parts";
-  readonly needs: string[] = [];
-  private app!: App;
-  private readonly store = new Store();
   private readonly progress = new ProgressBar("parts-progress");
-  private readonly start = h("div");
-  private readonly results: HTMLElement;
+  private readonly begin = h("div", {}, h("p", {}, "Limbs, head, torso: regions between which heat flows slowly."));
   private readonly number = new Slider("Number of parts", "n-parts", (count) => this.cut({ count }));
   private readonly level = new Slider("Least persistence", "persistence", (step) => this.cut({ persistence: this.levelAt(step) }));
-  private readonly plotHost = h("div", { class: "plot", "data-test": "diagram" });
-  private readonly maximum = new Slider("Maximum, by persistence", "maximum", (index) => this.select(index));
   private readonly chosen = h("p", { class: "note", "data-test": "chosen-part" });
+  private readonly plotHost = h("div", { class: "plot", "data-test": "diagram" });
+  private readonly maximum = new Slider("Maximum and its persistence", "maximum", (index) => this.select(index));
+  private readonly results: HTMLElement;
   private plot: uPlot | null = null;
   private finest: Int32Array = new Int32Array(); // region of each vertex
   private labels: Int32Array = new Int32Array(); // part of each vertex, by the present cut
   private merges: Merges = { count: 0, rows: new Float64Array() };
   private levels: Float64Array = new Float64Array();
-  private diagram: Float64Array = new Float64Array(); // (m, 4): birth, death, persistence, vertex
+  private diagram: Float64Array = new Float64Array(); // birth, death, persistence, vertex in turn
   private areas: Float32Array = new Float32Array();
-  private part = -1;
+  private nParts = 0;
+  private part = -1; // that is shown alone
   private index = -1; // of the chosen maximum
-  private active = false;
-  private forget = () => {};
 
   constructor() {
-    const clear = button("Show all parts", "all-parts", "End the choice of a part", () => this.selectPart(-1));
-    const explained =
-      "A maximum of heat far from the diagonal is a limb or a tip; one near it is a mere bump. " +
-      "Click one, or the shape.";
+    super();
+    const all = button("Show all parts", "all-parts", "End the choice of a part", () => this.selectPart(-1));
+    const note = "A maximum of heat far from the diagonal is a limb or a tip; one near it is a bump.";
     this.results = h(
-      "div", {}, this.number.element, this.level.element, this.chosen, h("div", { class: "row" }, clear),
-      h("h3", {}, "Persistence diagram of heat"), this.plotHost, this.maximum.element, h("p", { class: "note" }, explained),
+      "div",
+      {},
+      this.number.element,
+      this.level.element,
+      this.chosen,
+      all,
+      h("h3", {}, "Persistence diagram of heat"),
+      this.plotHost,
+      this.maximum.element,
+      h("p", { class: "note" }, note),
     );
   }
 
   build(app: App): HTMLElement {
     this.app = app;
     const find = () => app.change({ kind: "parts" }, "Starting to find parts").catch(() => {});
-    const begin = button("Find the parts", "find-parts", "Compute the parts of this shape", find);
-    begin.classList.add("primary");
-    this.start.append(h("p", {}, "Limbs, head, torso: regions between which heat flows slowly."), begin);
-    return h("div", {}, this.start, this.progress.element, this.results);
+    const start = button("Find the parts", "find-parts", "Compute the parts of this shape", find);
+    start.classList.add("primary");
+    this.begin.append(start);
+    app.viewer.onPick(({ vertex }) => {
+      const part = this.labels[vertex] ?? -1;
+      if (this.active) this.selectPart(part === this.part ? -1 : part);
+    });
+    return h("div", {}, this.begin, this.progress.element, this.results);
   }
 
-  refresh(state: State): void {
+  protected versionOf(state: State): string {
+    return `${state.shape} ${state.parts.status}`;
+  }
+
+  override refresh(state: State): void {
     const { parts, capabilities } = state;
     this.progress.show(parts);
     this.results.hidden = parts.status !== "ready";
-    this.start.hidden = !["none", "failed"].includes(parts.status) || !capabilities.includes("finish");
-    const fresh = this.store.renew(`${state.shape} ${parts.status}`);
-    if (fresh) [this.part, this.index] = [-1, -1];
-    if (fresh && this.active) this.load();
+    this.begin.hidden = !["none", "failed"].includes(parts.status) || !capabilities.includes("finish");
+    super.refresh(state);
   }
 
-  shown(): void {
-    this.active = true;
-    this.app.viewer.setMode("part");
-    this.forget = this.app.viewer.onPick((hit) => this.selectPart(this.labels[hit.vertex] ?? -1));
-    this.load();
+  protected async show(): Promise<void> {
+    const { viewer, state } = this.app;
+    viewer.setMode("part");
+    if (state.parts.status !== "ready") return viewer.setScalars(null);
+    const finest = await this.get<Int32Array>("parts/labels");
+    const fresh = finest !== this.finest;
+    const names = ["parts/merges", "diagram", "areas"];
+    const [rows, diagram, areas] = await this.latest(Promise.all(names.map((name) => this.get(name))));
+    if (fresh) {
+      Object.assign(this, { finest, diagram, areas });
+      this.merges = { count: state.parts.levels.length, rows: rows as Float64Array };
+      this.levels = findLevels(this.merges);
+      this.number.setRange(this.merges.count - this.levels.length, this.merges.count);
+      this.level.setRange(0, STEPS);
+      this.maximum.setRange(0, this.diagram.length / 4 - 1);
+      this.plotDiagram();
+      this.cut({ count: state.parts.n_regions });
+    }
+    this.paint();
   }
 
-  hidden(): void {
-    this.active = false;
-    this.forget();
-    this.app.viewer.setMode("orbit");
-    this.clear();
-  }
-
-  private clear(): void {
-    this.app.viewer.setLabels(null, partColors(0));
-    this.app.viewer.setPoints([], POINT);
-  }
-
-  private async load(): Promise<void> {
-    const { backend, state } = this.app;
-    if (state.parts.status !== "ready") return this.clear();
-    const [finest, rows, diagram, areas] = await this.app.run("Loading the parts", Promise.all([
-      this.store.get<Int32Array>(backend, "parts/labels"),
-      this.store.get<Float64Array>(backend, "parts/merges"),
-      this.store.get<Float64Array>(backend, "diagram"),
-      this.store.get<Float32Array>(backend, "areas"),
-    ]));
-    if (!this.active) return;
-    Object.assign(this, { finest, diagram, areas });
-    this.merges = { count: state.parts.levels.length, rows };
-    this.levels = findLevels(this.merges);
-    this.number.setRange(this.merges.count - this.levels.length, this.merges.count, 1);
-    this.level.setRange(0, STEPS, 1);
-    this.maximum.setRange(0, diagram.length / 4 - 1, 1);
-    this.maximum.show(0, "none chosen");
-    const order = sortByBirth(diagram);
-    const data: uPlot.AlignedData = [order.map((i) => diagram[4 * i]!), order.map((i) => diagram[4 * i + 1]!)];
-    if (this.plot) this.plot.setData(data);
-    else this.plot = this.buildPlot(data);
-    this.cut({ count: state.parts.n_regions });
-  }
-
-  /** Persistence on the slider: squared, because most levels are small. */
+  /** Return the persistence of a step; steps are finer below, where most levels are. */
   private levelAt(step: number): number {
     return 1.02 * (this.levels[0] ?? 1) * (step / STEPS) ** 2;
   }
@@ -121,26 +107,23 @@ export class PartsPanel implements Panel {
   private cut(rule: Rule): void {
     const { parts, kept } = cutTree(this.merges, rule);
     this.labels = relabel(this.finest, parts);
-    const roots = this.merges.count - this.levels.length;
-    // With so many parts, the next to merge has the level after the last that is kept.
-    const persistence = "persistence" in rule ? rule.persistence : (this.levels[kept.length - roots - 1] ?? this.levelAt(STEPS));
+    this.nParts = kept.length;
+    // The level of a number: the persistence of the last part that has not merged.
+    const merged = this.merges.count - kept.length;
+    const last = this.levels[this.levels.length - merged - 1] ?? this.levelAt(STEPS);
+    const persistence = "count" in rule ? last : rule.persistence;
     this.number.show(kept.length, `${kept.length}`);
-    this.level.show(STEPS * Math.sqrt(persistence / this.levelAt(STEPS)), formatNumber(persistence, 1));
-    this.part = -1;
-    this.paint();
+    this.level.show(STEPS * Math.sqrt(persistence / this.levelAt(STEPS)), formatNumber(persistence));
+    this.selectPart(-1);
   }
 
   private paint(): void {
-    const count = this.labels.reduce((largest, label) => Math.max(largest, label), -1) + 1;
-    const colors = partColors(count);
     const { viewer } = this.app;
-    if (this.part >= 0)
-      colors.forEach((value, i) => {
-        if (Math.floor(i / 3) !== this.part) colors[i] = value + PALE * (215 - value);
-      });
-    viewer.setLabels(this.labels, colors);
+    const colors = partColors(this.nParts);
+    const pale = (value: number, i: number) => (Math.floor(i / 3) === this.part ? value : value + PALE * (215 - value));
+    viewer.setLabels(this.labels, this.part < 0 ? colors : colors.map(pale));
     viewer.setPoints(this.index < 0 ? [] : [this.diagram[4 * this.index + 3]!], POINT);
-    this.chosen.textContent = this.part < 0 ? "Click a part of the shape to see it alone." : this.describePart();
+    this.chosen.textContent = this.part < 0 ? "Click a part, and it is shown alone." : this.describePart();
     this.plot?.redraw(false);
   }
 
@@ -154,58 +137,50 @@ export class PartsPanel implements Panel {
   }
 
   private selectPart(part: number): void {
-    this.part = part === this.part ? -1 : part;
-    this.index = -1;
+    [this.part, this.index] = [part, -1];
     this.maximum.show(0, "none chosen");
     this.paint();
   }
 
+  /** Mark a maximum of the diagram and the part around it. */
   private select(index: number): void {
     const [, , persistence, vertex] = this.diagram.subarray(4 * index, 4 * index + 4);
-    this.index = index;
-    this.part = this.labels[vertex!]!;
+    [this.part, this.index] = [this.labels[vertex!]!, index];
     this.maximum.show(index, `${index}: ${formatNumber(persistence!)}`);
     this.paint();
   }
 
-  private buildPlot(data: uPlot.AlignedData): uPlot {
-    const dots = { size: 6, width: 0, show: true, fill: () => readColor(this.plotHost, "--accent") };
-    return buildPlot(this.plotHost, data, {
-      labels: ["birth: heat at the maximum", "death"],
-      series: [{ paths: () => null, points: dots }],
+  private plotDiagram(): void {
+    const numbers = Array.from({ length: this.diagram.length / 4 }, (_, i) => i);
+    numbers.sort((a, b) => this.birth(a) - this.birth(b)); // uPlot wants rising numbers along x
+    const data: uPlot.AlignedData = [numbers.map((i) => this.birth(i)), numbers.map((i) => this.death(i))];
+    if (this.plot) return this.plot.setData(data);
+    this.plot = buildPlot(this.plotHost, data, {
+      labels: ["birth: heat at the maximum, 1/length²", "death: at the saddle"],
+      series: [dots(this.plotHost, 6)],
       draw: (plot, pixel) => {
-        const { ctx } = plot;
-        const [low, high] = [plot.scales.x!.min!, plot.scales.x!.max!];
-        ctx.save();
-        ctx.rect(plot.bbox.left, plot.bbox.top, plot.bbox.width, plot.bbox.height);
-        ctx.clip();
-        ctx.beginPath();
-        ctx.moveTo(...pixel(low, low));
-        ctx.lineTo(...pixel(high, high));
-        ctx.strokeStyle = readColor(this.plotHost, "--faint");
-        ctx.lineWidth = devicePixelRatio;
-        ctx.stroke();
-        ctx.restore();
-        const at = 4 * this.index;
-        if (this.index >= 0) drawRing(plot, pixel(this.diagram[at]!, this.diagram[at + 1]!), POINT);
+        const { x, y } = plot.scales;
+        const [low, high] = [Math.max(x!.min!, y!.min!), Math.min(x!.max!, y!.max!)];
+        drawLine(plot, pixel(low, low), pixel(high, high), pageColor(this.plotHost, "--faint"));
+        if (this.index >= 0) drawRing(plot, pixel(this.birth(this.index), this.death(this.index)), POINT);
       },
       choose: (plot, left, top) => this.select(this.findNearest(plot, left, top)),
     });
   }
 
+  private birth(index: number): number {
+    return this.diagram[4 * index]!;
+  }
+
+  private death(index: number): number {
+    return this.diagram[4 * index + 1]!;
+  }
+
   private findNearest(plot: uPlot, left: number, top: number): number {
-    let [best, least] = [0, Infinity];
-    for (let i = 0; i < this.diagram.length / 4; i++) {
-      const x = plot.valToPos(this.diagram[4 * i]!, "x") - left;
-      const y = plot.valToPos(this.diagram[4 * i + 1]!, "y") - top;
-      if (x * x + y * y < least) [best, least] = [i, x * x + y * y];
-    }
+    const away = (i: number) =>
+      Math.hypot(plot.valToPos(this.birth(i), "x") - left, plot.valToPos(this.death(i), "y") - top);
+    let best = 0;
+    for (let i = 1; 4 * i < this.diagram.length; i++) if (away(i) < away(best)) best = i;
     return best;
   }
-}
-
-/** uPlot wants rising numbers along x. */
-function sortByBirth(diagram: Float64Array): number[] {
-  const order = Array.from({ length: diagram.length / 4 }, (_, i) => i);
-  return order.sort((a, b) => diagram[4 * a]! - diagram[4 * b]!);
 }

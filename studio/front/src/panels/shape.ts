@@ -1,124 +1,110 @@
 /** The shape: its counts and health, repairs, values, and files to open and to save. */
 
-import type { App, Panel } from "../app";
+import type { App } from "../app";
 import type { State } from "../core/backend";
 import { formatNumber } from "../core/colors";
 import { button, chooseFile, download, h } from "../core/dom";
-import { Store } from "../core/store";
-import { acceptDrops } from "./controls";
+import { acceptDrops, ColoringPanel } from "./controls";
 
 export const MESH_FILES = ".ply,.obj,.off,.stl,.glb,.gltf,.vtk,.vtu,.mesh,.msh";
 const FORMATS = ["ply", "obj", "glb"];
 
-export class ShapePanel implements Panel {
+export class ShapePanel extends ColoringPanel {
   readonly id = "shape";
   readonly title = "Shape";
-  readonly needs: string[] = [];
-  private app!: App;
-  private readonly store = new Store();
   private readonly facts = h("table", { class: "facts", "data-test": "facts" });
   private readonly health = h("ul", { class: "health", "data-test": "health" });
-  private readonly values = h("select", { "data-test": "values", "aria-label": "Values" });
+  private readonly values = h("select", { "data-test": "values", "aria-label": "Values", onchange: () => this.start() });
   private readonly valuesPart = h("div", {}, h("h3", {}, "Values"), this.values);
-  private active = false;
 
   build(app: App): HTMLElement {
     this.app = app;
-    this.values.addEventListener("change", () => this.paint());
-    const can = (capability: string) => (app.state.capabilities as string[]).includes(capability);
-    const open = button("Open a file …", "open", "Read a mesh; it becomes the shape (O)", () => this.choose());
-    open.classList.add("primary");
-    const picture = button("Picture", "save-png", "Save what is shown as PNG", () => this.savePicture());
-    const files = FORMATS.map((format) =>
-      button(format.toUpperCase(), `save-${format}`, `Save the shape as ${format.toUpperCase()}`, () => this.save(format)),
-    );
-    if (can("open")) {
-      app.shortcut("O", "Open a file", () => this.choose());
-      acceptDrops(app.viewer.stage, (name, file) => this.open(name, file));
+    const can = app.state.capabilities;
+    const choose = async () => this.open(await chooseFile(MESH_FILES));
+    const open = button("Open a file …", "open", "Read a mesh; it becomes the shape (O)", choose);
+    const save = [button("Picture", "save-png", "Save what is shown as PNG", () => this.savePicture())];
+    if (can.includes("finish"))
+      for (const format of FORMATS) {
+        const name = format.toUpperCase();
+        save.push(button(name, `save-${format}`, `Save the shape as ${name}`, () => this.save(format)));
+      }
+    if (can.includes("open")) {
+      app.shortcut("O", "Open a file", choose);
+      acceptDrops(app.viewer.stage, (name, bytes) => this.open({ name, bytes }));
     }
+    const hint = h("span", { class: "faint" }, "or drop one on the shape");
     return h(
       "div",
       {},
-      can("open") && h("div", { class: "row" }, open, h("span", { class: "faint" }, "or drop one on the shape")),
+      can.includes("open") && h("div", { class: "row" }, open, hint),
       this.valuesPart,
       h("h3", {}, "Size"),
       this.facts,
       h("h3", {}, "Health"),
       this.health,
       h("h3", {}, "Save"),
-      h("div", { class: "row" }, picture, ...(can("finish") ? files : [])),
+      h("div", { class: "row" }, ...save),
     );
   }
 
-  refresh(state: State): void {
+  protected versionOf(state: State): string {
+    return `${state.shape}`;
+  }
+
+  override refresh(state: State): void {
     const { health, values } = state;
-    const count = (number: number | null) => (number === null ? "…" : number.toLocaleString("en"));
-    const rows: [string, string][] = [
-      ["Vertices", count(state.n_vertices)],
-      ["Faces", count(state.n_faces)],
-      ["Area", `${formatNumber(health.area)} length²`],
-      ["Volume", health.volume === null ? "none: it is not closed" : `${formatNumber(health.volume)} length³`],
-    ];
-    const known = health.components !== null; // large meshes are still examined
-    if (!known) rows.splice(2);
-    this.facts.replaceChildren(...rows.map(([name, text]) => h("tr", {}, h("th", {}, name), h("td", {}, text))));
-    this.health.replaceChildren(...(known ? this.describe(state) : [h("li", {}, "The shape is being examined …")]));
-    if (this.store.renew(`${state.shape}`)) {
+    const names = values.map(({ name }) => name).join();
+    if (names !== this.values.dataset.names) {
       const options = values.map(({ name, title }) => h("option", { value: name }, title));
       this.values.replaceChildren(...options, h("option", { value: "" }, "none: the plain surface"));
-      this.valuesPart.hidden = !values.length;
-      if (this.active) this.paint();
+      this.values.dataset.names = names;
     }
-  }
-
-  shown(): void {
-    this.active = true;
-    this.paint();
-  }
-
-  hidden(): void {
-    this.active = false;
-    this.app.viewer.setScalars(null);
+    this.valuesPart.hidden = !values.length;
+    const known = health.components !== null; // a large mesh is examined for some seconds
+    const rows = [
+      ["Vertices", state.n_vertices.toLocaleString("en")],
+      ["Faces", state.n_faces.toLocaleString("en")],
+    ];
+    if (known) {
+      const volume = health.volume === null ? "none: it is not closed" : `${formatNumber(health.volume)} length³`;
+      rows.push(["Area", `${formatNumber(health.area)} length²`], ["Volume", volume]);
+    }
+    this.facts.replaceChildren(...rows.map(([name, text]) => h("tr", {}, h("th", {}, name), h("td", {}, text))));
+    this.health.replaceChildren(...(known ? this.describe(state) : [h("li", {}, "It is being examined …")]));
+    super.refresh(state);
   }
 
   /** Return a line for each fact of health, and one with a button for each repair. */
   private describe({ health, capabilities }: State): HTMLElement[] {
-    const { components, boundary_loops: loops } = health;
-    const holes = loops === 1 ? "1 boundary" : `${loops.toLocaleString("en")} boundaries`;
-    const facts: [boolean, string][] = [
-      [components === 1, components === 1 ? "It is one piece." : `It consists of ${components.toLocaleString("en")} separate pieces.`],
-      [health.closed, health.closed ? "It is closed: it has an inside and an outside." : `It is open, with ${holes}.`],
-      [health.manifold, health.manifold ? "It is a clean surface (manifold)." : "Some edges or vertices join more than one sheet (not manifold)."],
+    const { components, boundary_loops: loops, closed, manifold } = health;
+    const rims = loops === 1 ? "1 boundary" : `${loops.toLocaleString("en")} boundaries`;
+    const pieces = `It consists of ${components.toLocaleString("en")} separate pieces.`;
+    const line = (good: boolean, text: string) => h("li", { class: good ? "good" : "fair" }, text);
+    const lines = [
+      line(components === 1, components === 1 ? "It is one piece." : pieces),
+      line(closed, closed ? "It is closed: it has an inside and an outside." : `It is open, with ${rims}.`),
+      line(manifold, manifold ? "It is a clean surface (manifold)." : "Some edges or vertices join more than one sheet."),
     ];
-    const lines = facts.map(([good, text]) => h("li", { class: good ? "good" : "fair" }, text));
     for (const { name, why } of health.findings) {
-      const label = name.replaceAll("_", " ");
-      const repair = () =>
-        this.app.change({ kind: "repair", names: [name] }, `Repairing: ${label}`).catch(() => {});
-      const act = capabilities.includes("repair") && button(`Repair: ${label}`, `repair-${name}`, why, repair);
-      lines.push(h("li", { class: "bad" }, why, act));
+      const label = `Repair: ${name.replaceAll("_", " ")}`;
+      const repair = () => this.app.change({ kind: "repair", names: [name] }, label).catch(() => {});
+      const act = capabilities.includes("repair") && button(label, `repair-${name}`, why, repair);
+      lines.push(h("li", { class: "bad" }, `It would help: ${why}.`, act));
     }
-    if (!health.findings.length) lines.push(h("li", { class: "good" }, "No repair is needed."));
-    return lines;
+    return health.findings.length ? lines : [...lines, line(true, "No repair is needed.")];
   }
 
-  private async paint(): Promise<void> {
-    const chosen = this.app.state.values.find(({ name }) => name === this.values.value);
-    if (!chosen) return this.app.viewer.setScalars(null);
+  protected async show(): Promise<void> {
+    const { viewer, state } = this.app;
+    const chosen = state.values.find(({ name }) => name === this.values.value);
+    if (!chosen) return viewer.setScalars(null);
     const { name, title, unit, min, max } = chosen;
-    const values = await this.app.run(`Loading ${title}`, this.store.get<Float32Array>(this.app.backend, `values/${name}`));
-    if (!this.active || this.values.value !== name) return;
-    const text = unit ? `${title}, ${unit}` : title;
-    this.app.viewer.setScalars(values, { map: "viridis", range: [min, max], title: text });
+    const values = await this.latest(this.get<Float32Array>(`values/${name}`));
+    viewer.setScalars(values, { map: "viridis", range: [min, max], title, unit });
   }
 
-  private async choose(): Promise<void> {
-    const { name, bytes } = await chooseFile(MESH_FILES);
-    this.open(name, bytes);
-  }
-
-  private open(name: string, file: Uint8Array): void {
-    this.app.change({ kind: "open", name, file }, `Reading ${name}`).catch(() => {});
+  private open({ name, bytes }: { name: string; bytes: Uint8Array }): void {
+    this.app.change({ kind: "open", name, file: bytes }, `Reading ${name}`).catch(() => {});
   }
 
   private fileName(ending: string): string {
@@ -126,7 +112,8 @@ export class ShapePanel implements Panel {
   }
 
   private async savePicture(): Promise<void> {
-    download(await this.app.run("Drawing the picture", this.app.viewer.screenshot()), this.fileName("png"), "image/png");
+    const picture = await this.app.run("Drawing the picture", this.app.viewer.screenshot());
+    download(picture, this.fileName("png"), "image/png");
   }
 
   private async save(format: string): Promise<void> {

@@ -1,0 +1,60 @@
+"""eigenshape studio: a window in the browser."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from eigenshape.cli.console import out, shown
+from eigenshape.plot.view import studio_module
+
+
+def studio(
+    mesh: Annotated[
+        Path | None,
+        typer.Argument(help="Mesh file to open. By default a creature that is made for it."),
+    ] = None,
+    *,
+    shelf: Annotated[
+        Path | None,
+        typer.Option("--index", help="Folder of an index to search in, as `index` writes it."),
+    ] = None,
+    host: Annotated[
+        str, typer.Option(help="Address to listen on; another one takes --allow-remote.")
+    ] = "127.0.0.1",
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port to listen on; 0 takes any that is free.")
+    ] = 0,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Open the address in a browser.")
+    ] = True,
+    allow_remote: Annotated[
+        bool,
+        typer.Option(
+            "--allow-remote",
+            help="Let other machines in. Who has the address controls the studio, and nothing is "
+            "encrypted.",
+        ),
+    ] = False,
+) -> None:
+    """Open a window in the browser: bend a shape by hand, see its spectrum, heat and parts, and search.
+
+    It takes the package eigenshape-studio. Ctrl-C ends it.
+
+    For instance: eigenshape studio scan.ply --index my-index
+    """
+    server = studio_module("server")
+
+    def announce(url: str) -> None:
+        out.print(f"The studio is open at {shown(url)}")
+        out.file.flush()
+
+    server.serve(
+        mesh,
+        index=shelf,
+        host=host,
+        port=port,
+        allow_remote=allow_remote,
+        announce=announce,
+        browse=browser,
+    )

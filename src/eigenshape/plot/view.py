@@ -1,0 +1,79 @@
+"""The door to the studio, a package of its own."""
+
+from collections.abc import Mapping
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+from eigenshape._errors import MissingExtraError
+from eigenshape._typing import ArrayLike
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+
+
+def view(
+    mesh: MeshLike,
+    values: Mapping[str, ArrayLike] | ArrayLike | None = None,
+    *,
+    height: int = 640,
+) -> Any:
+    """Show a shape in a notebook, where it can be turned, bent and examined.
+
+    This is the studio as a widget for JupyterLab, VS Code and marimo. It has the panels of
+    `eigenshape studio`: deformation, repairs, spectrum, heat and parts. `widget.mesh` is the shape
+    in its present pose.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        With n vertices.
+    values : (n,) float, or {title: (n,) float}, optional
+        Functions on the vertices to choose from. A title can end with a unit in parentheses.
+    height : int
+        Height of the widget in pixels.
+
+    Returns
+    -------
+    ShapeWidget
+        A widget of anywidget; the last line of a cell shows it.
+
+    Raises
+    ------
+    InvalidParameterError
+        If a function does not have one finite value per vertex.
+    MissingExtraError
+        If the package eigenshape-studio or anywidget is not installed.
+
+    See Also
+    --------
+    figure_field : Draw a function as a picture.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(3)
+    >>> values = {"height (m)": mesh.vertices[:, 2]}
+    >>> widget = es.view(mesh, values)  # doctest: +SKIP
+    """
+    surface = as_mesh(mesh)
+    if values is None:
+        values = {}
+    fields = values if isinstance(values, Mapping) else {"values": values}
+    return studio_module("widget").ShapeWidget(surface, fields, height=height)
+
+
+def studio_module(name: str) -> ModuleType:
+    """Return a module of the studio.
+
+    Raises
+    ------
+    MissingExtraError
+        If the studio, or what this module needs, is not installed.
+    """
+    try:
+        return import_module(f"eigenshape_studio.{name}")
+    except ImportError as err:
+        extra = "'eigenshape-studio[notebook]'" if name == "widget" else "eigenshape-studio"
+        missing = str(err.name).partition(".")[0]
+        raise MissingExtraError(
+            f"{missing} must be installed; it is not. Run pip install {extra}."
+        ) from err

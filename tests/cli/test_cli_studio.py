@@ -1,0 +1,64 @@
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from typer.testing import CliRunner
+
+import eigenshape as es
+from eigenshape.cli.app import app
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.mark.parametrize("verb", ["studio", "report"])
+def test_without_the_studio_its_verbs_say_what_to_install(monkeypatch, tmp_path, verb):
+    monkeypatch.setitem(sys.modules, "eigenshape_studio", None)
+    done = run(verb, "nowhere.ply", *(["-o", tmp_path / "a.html"] if verb == "report" else []))
+    assert done.exit_code == 1
+    assert "eigenshape_studio must be installed" in done.stderr
+    assert "pip install eigenshape-studio" in done.stderr
+
+
+def test_studio_passes_its_options_on_and_prints_the_address(monkeypatch):
+    calls = []
+
+    def serve(mesh, *, announce, **options):
+        calls.append((mesh, options))
+        announce("http://127.0.0.1:5/?token=abc")
+
+    monkeypatch.setitem(sys.modules, "eigenshape_studio", ModuleType("eigenshape_studio"))
+    module = ModuleType("eigenshape_studio.server")
+    monkeypatch.setattr(module, "serve", serve, raising=False)
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    done = run("studio", "a.ply", "--index", "shelf", "--port", 5, "--no-browser")
+    assert done.stdout == "The studio is open at http://127.0.0.1:5/?token=abc\n"
+    run("studio", "--host", "0.0.0.0", "--allow-remote")
+    local = {"host": "127.0.0.1", "port": 5, "allow_remote": False, "browse": False}
+    assert calls[0] == (Path("a.ply"), {"index": Path("shelf"), **local})
+    remote = {"host": "0.0.0.0", "port": 0, "allow_remote": True, "browse": True}
+    assert calls[1] == (None, {"index": None, **remote})
+
+
+def test_report_reads_repairs_and_writes(monkeypatch, tmp_path):
+    calls = []
+
+    def write_report(mesh, path, **options):
+        calls.append((mesh, path, options))
+
+    monkeypatch.setitem(sys.modules, "eigenshape_studio", ModuleType("eigenshape_studio"))
+    module = ModuleType("eigenshape_studio.report")
+    monkeypatch.setattr(module, "write_report", write_report, raising=False)
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    ball = es.icosphere(2)
+    es.write_mesh(es.TriangleMesh(ball.vertices, ball.faces[:, ::-1]), tmp_path / "ball.ply")
+    done = run("report", tmp_path / "ball.ply", "-o", tmp_path / "a.html", "--repair", "orient")
+    assert "wrote" in done.stderr
+    (mesh, path, options) = calls[0]
+    assert es.geometry.enclosed_volume(mesh) > 0
+    assert path == tmp_path / "a.html"
+    assert (options["name"], options["n_modes"]) == ("ball.ply", 20)
+    refused = run("report", tmp_path / "ball.ply", "-o", tmp_path / "a.txt")
+    assert "A report must be written to a file that ends in .html" in refused.stderr
