@@ -81,9 +81,11 @@ export class Viewer {
     this.skeleton = new three.Mesh(new three.BufferGeometry(), this.surfaceMaterial("#3f7fae"));
     this.discs = new three.Points(new three.BufferGeometry(), this.pointMaterial());
     this.crossing.visible = this.skeleton.visible = this.discs.visible = false;
-    this.surface.renderOrder = 1; // after the skeleton, which it may cover with a veil
-    this.crossing.renderOrder = 2;
-    this.discs.renderOrder = 3;
+    this.surface.renderOrder = 1;
+    this.skeleton.renderOrder = 2; // over the veil of the surface, also where it lies behind it
+    this.skeleton.material.transparent = true;
+    this.crossing.renderOrder = 3;
+    this.discs.renderOrder = 4;
     for (const object of [this.skeleton, this.surface, this.crossing, this.discs]) {
       object.frustumCulled = false; // the shader moves vertices out of the box of the geometry
       this.space.add(object);
@@ -254,7 +256,7 @@ export class Viewer {
     this.invalidate();
   }
 
-  /** Show the eigen-skeleton inside a veil of the surface. */
+  /** Show the eigen-skeleton in a veil of the surface. */
   setSkeleton(points: Float32Array | null): void {
     this.skeleton.visible = points !== null;
     if (points) {

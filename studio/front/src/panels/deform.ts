@@ -14,7 +14,7 @@ import type { PointerTool } from "../core/viewer";
 import { buildChoice, ProgressBar, Slider } from "./controls";
 
 const REST = 150; // ms without motion after which the exact result is requested
-const COLORS = ["#e08a2e", "#3b8fd4", "#46a564", "#b468c8", "#77716a"]; // of the regions, and fixed
+const COLORS = ["#e08a2e", "#3b8fd4", "#46a564", "#b468c8", "#4f6072"]; // of the regions, and fixed
 const NAMES = { 0: "1", 1: "2", 2: "3", 3: "4", [FIXED]: "Fixed" };
 const SELECTORS = { box: "Box", brush: "Brush", part: "Part" };
 const MOTIONS = { rotate: "Rotate", move: "Move", pull: "Pull", swing: "Swing", pivot: "Pivot" };
@@ -93,7 +93,7 @@ export class DeformPanel implements Panel {
 
   build(app: App): HTMLElement {
     this.app = app;
-    this.box = new BoxTool(app.viewer, () => this.boxMoved());
+    this.box = new BoxTool(app.viewer, () => this.boxMoved(), () => this.bind());
     this.mover = new MotionTool(app.viewer, {
       canDrag: (vertex) => this.canDrag(vertex),
       moved: (handle) => this.moved(handle),
@@ -112,6 +112,7 @@ export class DeformPanel implements Panel {
     this.skeletonModes.valueAsNumber = 50;
     this.nModes.placeholder = "auto";
     this.amount.placeholder = "amount";
+    this.amount.addEventListener("keydown", ({ key }) => key === "Enter" && this.moveExactly());
     this.exactKind.className = "wide";
     for (const [tool, key] of Object.entries(SHORTCUTS)) {
       const label = { ...SELECTORS, ...MOTIONS }[tool as Tool];
@@ -207,6 +208,7 @@ export class DeformPanel implements Panel {
     for (let axis = 0; axis < 3; axis++) [low[axis], high[axis]] = [low[axis]! - room, high[axis]! + room];
     if (up >= 0) low[up] = (low[up]! + high[up]!) / 2;
     [this.box.low, this.box.high] = [low, high];
+    this.writeBox();
   }
 
   private chooseRegion(region: number): void {
@@ -242,7 +244,6 @@ export class DeformPanel implements Panel {
     viewer.tool = !on ? null : tool === "brush" ? this.brush : tool === "box" ? this.box : this.mover;
     if (on && tool === "box") this.box.show(this.box.low, this.box.high);
     else this.box.hide();
-    this.writeBox();
     const row = this.rows.indexOf(this.region);
     const ready = this.root.dataset.ready === "true";
     if (on && !selects && ready && row >= 0) this.mover.show(this.pivotOf(this.region), tool as MotionKind);
@@ -282,7 +283,9 @@ export class DeformPanel implements Panel {
 
   private boxMoved(): void {
     this.regions.clear(this.region);
-    this.regions.add(this.region, selectBox(this.app.viewer.vertices, this.box.low, this.box.high));
+    // A box that passes over another region leaves that region as it is.
+    const inside = selectBox(this.app.viewer.vertices, this.box.low, this.box.high);
+    this.regions.add(this.region, inside.filter((vertex) => this.regions.of(vertex) === null));
     this.writeBox();
     this.remember();
     this.root.dataset.ready = "false";
