@@ -167,7 +167,8 @@ def test_nodal_lines_are_drawn_where_the_function_is_zero(page, mesh, spectrum):
     lines = picture(page).astype(int)
     find(page, "nodal").uncheck()
     wait_until_still(page)
-    rows, columns = np.nonzero(np.abs(lines - picture(page)).max(axis=2) > 60)
+    inside = lines[..., 3] == 255  # pixels at the rim of the shape are mixed with the ground
+    rows, columns = np.nonzero(inside & (np.abs(lines - picture(page)).max(axis=2) > 60))
     assert len(rows) > 300
     for place in np.linspace(0, len(rows) - 1, 12).astype(int):
         at = [float(columns[place]) + 0.5, float(rows[place]) + 0.5]
