@@ -277,6 +277,7 @@ export class Studio implements App {
     const target = event.composedPath()[0];
     const typing = target instanceof HTMLInputElement && !["range", "checkbox", "radio"].includes(target.type);
     if (typing || target instanceof HTMLSelectElement || this.help.open) return;
+    if (target instanceof HTMLButtonElement && event.key === "Enter") return; // it presses the button
     const letter = event.key.length === 1 ? event.key.toUpperCase() : event.key;
     const control = event.ctrlKey || event.metaKey;
     // Shift is part of "?" itself, but tells "Ctrl+Shift+Z" from "Ctrl+Z".

@@ -18,6 +18,7 @@ export class BoxTool implements PointerTool {
   constructor(
     private readonly viewer: Viewer,
     private readonly onChange: () => void,
+    private readonly onEnd: () => void,
   ) {
     const unit = new three.EdgesGeometry(new three.BoxGeometry());
     this.edges = new three.LineSegments(unit, new three.LineBasicMaterial({ color: COLOR }));
@@ -86,6 +87,7 @@ export class BoxTool implements PointerTool {
 
   up(): void {
     this.held = null;
+    this.onEnd();
   }
 
   private sides() {

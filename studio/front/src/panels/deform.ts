@@ -4,7 +4,7 @@ import type { App, Panel } from "../app";
 import type { Change, DeformMode, Handle, State, Vec3 } from "../core/backend";
 import { BoxTool } from "../core/box";
 import { partColors } from "../core/colors";
-import { button, chooseFile, download, h } from "../core/dom";
+import { button, chooseFile, chooseFiles, download, h } from "../core/dom";
 import { selectBox, Surface } from "../core/geodesic";
 import { MotionTool, type MotionKind } from "../core/gizmo";
 import { add, middleOf, regionBoundary } from "../core/motion";
@@ -14,7 +14,7 @@ import type { PointerTool } from "../core/viewer";
 import { buildChoice, ProgressBar, Slider } from "./controls";
 
 const REST = 150; // ms without motion after which the exact result is requested
-const COLORS = ["#e08a2e", "#3b8fd4", "#46a564", "#b468c8", "#77716a"]; // of the regions, and fixed
+const COLORS = ["#e08a2e", "#3b8fd4", "#46a564", "#b468c8", "#4f6072"]; // of the regions, and fixed
 const NAMES = { 0: "1", 1: "2", 2: "3", 3: "4", [FIXED]: "Fixed" };
 const SELECTORS = { box: "Box", brush: "Brush", part: "Part" };
 const MOTIONS = { rotate: "Rotate", move: "Move", pull: "Pull", swing: "Swing", pivot: "Pivot" };
@@ -44,7 +44,7 @@ export class DeformPanel implements Panel {
   private app!: App;
   private regions = new Regions(0);
   private region = 0; // that the tools change
-  private tool: Tool = "box";
+  private tool: Tool = "brush";
   private box!: BoxTool;
   private mover!: MotionTool;
   private surface: Surface | null = null;
@@ -70,11 +70,13 @@ export class DeformPanel implements Panel {
   private readonly corners = ["low", "high"].map((name) =>
     AXES.map((axis, i) => numberInput(`box-${name}-${i}`, `${name} ${axis}`, () => this.readBox())),
   );
-  private readonly boxOptions = h("div", { class: "corners" }, ...this.corners.flat());
+  private readonly boxOptions = h(
+    "div", { class: "corners" }, "low", ...this.corners[0]!, "high", ...this.corners[1]!,
+  );
   private readonly radius = new Slider("Radius, of the extent", "brush-radius", (value) => this.setRadius(value));
   private readonly nParts = new Slider("Number of parts", "region-parts", (value) => this.showParts(value));
   private readonly mode = choice("mode", "Method", ["graded", "uncrossed", "thesis"]);
-  private readonly nModes = numberInput("n-modes", "Modes (automatic if empty)", () => this.bind());
+  private readonly nModes = numberInput("n-modes", "Number of modes that spread the motion; automatic if empty", () => this.bind());
   private readonly several = checkbox("several", "Several motions at once", () => this.showTools());
   private readonly apply = button("Apply", "apply", "Apply the motions (Enter)", () => this.commit());
   private readonly exactKind = choice("exact-kind", "Motion in numbers", [
@@ -91,7 +93,7 @@ export class DeformPanel implements Panel {
 
   build(app: App): HTMLElement {
     this.app = app;
-    this.box = new BoxTool(app.viewer, () => this.boxMoved());
+    this.box = new BoxTool(app.viewer, () => this.boxMoved(), () => this.bind());
     this.mover = new MotionTool(app.viewer, {
       canDrag: (vertex) => this.canDrag(vertex),
       moved: (handle) => this.moved(handle),
@@ -108,6 +110,10 @@ export class DeformPanel implements Panel {
     this.radius.show(app.settings.get("radius", 0.1), "");
     this.nParts.setRange(2, 30, 1);
     this.skeletonModes.valueAsNumber = 50;
+    this.nModes.placeholder = "auto";
+    this.amount.placeholder = "amount";
+    this.amount.addEventListener("keydown", ({ key }) => key === "Enter" && this.moveExactly());
+    this.exactKind.className = "wide";
     for (const [tool, key] of Object.entries(SHORTCUTS)) {
       const label = { ...SELECTORS, ...MOTIONS }[tool as Tool];
       app.shortcut(key, `Deform: ${label.toLowerCase()}`, () => (app.open(this.id), this.chooseTool(tool as Tool)));
@@ -122,13 +128,13 @@ export class DeformPanel implements Panel {
       this.boxOptions, this.radius.element, this.nParts.element,
       h("div", { class: "row" }, clear, this.count),
       h("h3", {}, "Motion"), this.motionChoice.element, this.hint,
-      h("div", { class: "row" }, this.exactKind, this.amount, exact),
-      h("div", { class: "row" }, this.mode, this.nModes), this.bound,
+      h("div", { class: "row tight" }, this.exactKind, this.amount, exact), this.bound,
+      h("div", { class: "row tight" }, "Method", this.mode, "Modes", this.nModes),
       h("div", { class: "row" }, this.several.element, this.apply),
       h("h3", {}, "Edits"),
-      h("div", { class: "row" }, this.undo, this.redo, this.reset,
+      h("div", { class: "row tight" }, this.undo, this.redo, this.reset,
         button("Save", "save-edits", "Save the edits as JSON", () => this.save("edits", "json")),
-        button("Load", "load-edits", "Apply saved edits", () => this.replay()),
+        button("Load", "load-edits", "Apply saved edits. If they were made on another mesh of this shape, choose its file, too", () => this.replay()),
       ),
       h("h3", {}, "Show"),
       h("div", { class: "row" }, this.skeleton.element, this.skeletonModes, "modes"),
@@ -183,7 +189,7 @@ export class DeformPanel implements Panel {
   private startShape({ shape, n_vertices }: State): void {
     this.regions = new Regions(n_vertices);
     [this.pivots, this.labels] = [[], null];
-    const kept = this.app.settings.get("regions", { shape: -1, text: "", tool: "box" as Tool, region: 0 });
+    const kept = this.app.settings.get("regions", { shape: -1, text: "", tool: this.tool, region: 0 });
     if (kept.shape === shape) {
       this.regions.read(kept.text);
       [this.tool, this.region] = [kept.tool, kept.region];
@@ -202,6 +208,7 @@ export class DeformPanel implements Panel {
     for (let axis = 0; axis < 3; axis++) [low[axis], high[axis]] = [low[axis]! - room, high[axis]! + room];
     if (up >= 0) low[up] = (low[up]! + high[up]!) / 2;
     [this.box.low, this.box.high] = [low, high];
+    this.writeBox();
   }
 
   private chooseRegion(region: number): void {
@@ -237,7 +244,6 @@ export class DeformPanel implements Panel {
     viewer.tool = !on ? null : tool === "brush" ? this.brush : tool === "box" ? this.box : this.mover;
     if (on && tool === "box") this.box.show(this.box.low, this.box.high);
     else this.box.hide();
-    this.writeBox();
     const row = this.rows.indexOf(this.region);
     const ready = this.root.dataset.ready === "true";
     if (on && !selects && ready && row >= 0) this.mover.show(this.pivotOf(this.region), tool as MotionKind);
@@ -277,7 +283,9 @@ export class DeformPanel implements Panel {
 
   private boxMoved(): void {
     this.regions.clear(this.region);
-    this.regions.add(this.region, selectBox(this.app.viewer.vertices, this.box.low, this.box.high));
+    // A box that passes over another region leaves that region as it is.
+    const inside = selectBox(this.app.viewer.vertices, this.box.low, this.box.high);
+    this.regions.add(this.region, inside.filter((vertex) => this.regions.of(vertex) === null));
     this.writeBox();
     this.remember();
     this.root.dataset.ready = "false";
@@ -490,9 +498,13 @@ export class DeformPanel implements Panel {
   }
 
   private async replay(): Promise<void> {
-    const { bytes } = await chooseFile(".json");
-    const edits = JSON.parse(new TextDecoder().decode(bytes));
-    await this.change({ kind: "replay", edits }, "Applying the edits");
+    const files = await chooseFiles(`.json,${LOADABLE}`);
+    const written = files.find(({ name }) => name.endsWith(".json"));
+    const source = files.find((file) => file !== written);
+    if (!written) return this.app.say("Choose a JSON file of edits.");
+    const edits = JSON.parse(new TextDecoder().decode(written.bytes));
+    const change: Change = { kind: "replay", edits, source: source?.name, sourceFile: source?.bytes };
+    await this.change(change, "Applying the edits");
   }
 
   private async transfer(): Promise<void> {
@@ -503,7 +515,7 @@ export class DeformPanel implements Panel {
 
 function numberInput(name: string, label: string, onChange: () => void): HTMLInputElement {
   const attributes = { type: "number", step: "any", title: label, "aria-label": label, "data-test": name };
-  return h("input", { ...attributes, placeholder: label, onchange: onChange });
+  return h("input", { ...attributes, onchange: onChange });
 }
 
 function checkbox(name: string, label: string, onChange: () => void) {
