@@ -3,16 +3,20 @@
 Chromium is that of the system (Debian's package `chromium`), or the one that CHROMIUM names.
 """
 
+import base64
 import os
 import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
+from time import monotonic
 
 import numpy as np
 import pytest
+from PIL import Image
 from playwright.sync_api import Browser, Locator, Page, sync_playwright
 
 STUDIO = Path(__file__).parents[1]
@@ -85,7 +89,7 @@ def open_page(browser: Browser, url: str, *, dark: bool = False) -> Iterator[Pag
     )
     page.on("request", lambda request: is_local(request.url) or seen.append(request.url))
     page.goto(url)
-    page.wait_for_function("window.eigenshape?.viewer.vertices.length > 0")
+    wait_until(page, "window.eigenshape?.viewer.vertices.length > 0")
     yield page
     context.close()
     assert not seen, "\n".join(seen)
@@ -104,6 +108,17 @@ def find(page: Page, name: str) -> Locator:
 def move_slider(page: Page, name: str, value: float) -> None:
     """Set a slider, as a person does: the page hears of it."""
     find(page, name).fill(str(value))
+
+
+def wait_until(page: Page, condition: str, seconds: float = 60.0) -> None:
+    """Wait until an expression is true.
+
+    `page.wait_for_function` would call eval, which the policy of the page forbids.
+    """
+    end = monotonic() + seconds
+    while not page.evaluate(condition):
+        assert monotonic() < end, f"not true within {seconds} s: {condition}"
+        page.wait_for_timeout(50)
 
 
 def wait_until_still(page: Page) -> None:
@@ -126,15 +141,10 @@ def vertex_labels(page: Page) -> np.ndarray:
 def picture(page: Page) -> np.ndarray:
     """Return what is drawn on the canvas, (height, width, 4), without what lies over it."""
     code = """async () => {
-        const image = await createImageBitmap(await eigenshape.viewer.screenshot());
-        const canvas = new OffscreenCanvas(image.width, image.height);
-        const context = canvas.getContext("2d");
-        context.drawImage(image, 0, 0);
-        const { data } = context.getImageData(0, 0, image.width, image.height);
-        return [image.width, image.height, Array.from(data)];
+        const bytes = new Uint8Array(await (await eigenshape.viewer.screenshot()).arrayBuffer());
+        return btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""));
     }"""
-    width, height, data = page.evaluate(code)
-    return np.array(data, dtype=np.uint8).reshape(height, width, 4)
+    return np.asarray(Image.open(BytesIO(base64.b64decode(page.evaluate(code)))))
 
 
 def drop_file(page: Page, name: str, path: Path) -> None:

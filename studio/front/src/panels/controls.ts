@@ -139,6 +139,7 @@ export function acceptDrops(element: HTMLElement, onFile: (name: string, file: U
   });
 }
 
+const MARGIN = 0.04; // of the range along x, so that points at its ends are seen whole
 type Place = [number, number];
 export interface PlotOptions {
   labels: [string, string];
@@ -168,7 +169,7 @@ export function buildPlot(host: HTMLElement, data: uPlot.AlignedData, options: P
       height: 200,
       padding: [8, 10, 0, 0],
       legend: { show: false },
-      scales: { x: { time: false } },
+      scales: { x: { time: false, range: (_, low, high) => [low - MARGIN * (high - low), high + MARGIN * (high - low)] } },
       cursor: { drag: { x: false, y: false }, points: { show: false } },
       axes,
       series: [{}, ...options.series],

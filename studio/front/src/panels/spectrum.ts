@@ -19,7 +19,7 @@ export class SpectrumPanel extends ColoringPanel {
   private readonly k = h("input", { type: "number", min: 2, value: 300, "data-test": "k", "aria-label": "Number of eigenpairs" });
   private readonly solver = h("div", { class: "row" }, this.k, "eigenpairs");
   private readonly plotHost = h("div", { class: "plot", "data-test": "eigenvalues" });
-  private readonly slider = new Slider("Number i", "mode", (i) => this.select(i));
+  private readonly slider = new Slider("Number i", "eigenfunction", (i) => this.select(i));
   private readonly nodal = h("input", { type: "checkbox", checked: true, "data-test": "nodal", onchange: () => this.start() });
   private readonly proof = h("p", { class: "note", "data-test": "certificate" });
   private readonly bracket = button("Bracket the lowest 20", "bracket", "Compute bounds of the shape's own eigenvalues", () => this.loadBrackets());
