@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from eigenshape._arguments import describe_value
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._memory import machine_memory
+from eigenshape._memory import require_memory
 from eigenshape._typing import ArrayLike
 
 # Names of rows in messages, and what rows of indices refer to.
@@ -56,12 +56,13 @@ def as_array(
             f"{name} must not be masked; entry {place[0] if len(place) == 1 else place} is "
             f"({masked.sum()} such). Fill masked entries with numbers, or remove them."
         )
-    size, most = array.size * BYTES_OF_ENTRY, SHARE_OF_ARRAYS * machine_memory()
-    if size > most:
-        raise error(
-            f"{name} must fit into half of the memory, {most / 2**30:.1f} GiB; "
-            f"checking and copying an array of shape {array.shape} takes {size / 2**30:.1f} GiB."
-        )
+    require_memory(
+        name,
+        f"checking and copying an array of shape {array.shape}",
+        {"copies": array.size * BYTES_OF_ENTRY},
+        share=SHARE_OF_ARRAYS,
+        error=error,
+    )
     return np.asarray(array)
 
 

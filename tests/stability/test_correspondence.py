@@ -329,10 +329,10 @@ def test_many_points_of_two_close_shapes_have_a_perfect_matching_and_few_have_no
 
 
 def test_pairs_that_would_not_fit_are_refused(monkeypatch):
-    monkeypatch.setattr("eigenshape.features.least_matching.machine_memory", lambda: 1e5)
+    monkeypatch.setattr("eigenshape._memory.machine_memory", lambda: 1e5)
     near, far = np.random.default_rng(0).random((2, 40, 3))
     es.stability.bottleneck_matching(near, near + 1e-3)  # few pairs
     with pytest.raises(
-        es.InvalidShapeError, match=r"Pairs of near points must fit .*; 1.6e\+03 pairs within"
+        es.InvalidShapeError, match=r"Pairs of near points must fit .*; for 1.6e\+03 pairs within"
     ):
         es.stability.bottleneck_matching(near, far + 100)

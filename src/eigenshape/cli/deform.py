@@ -23,7 +23,8 @@ def deform(
             metavar="ROTATION",
             help=(
                 "Turn the region about an axis, in degrees: 'x by 90', '0,1,1 by 30', or 'z by "
-                "45 @ 0,0.1,0' about a point."
+                "45 @ 0,0.1,0' about a point. By default the axis passes through the middle of the "
+                "region's boundary."
             ),
         ),
     ] = "",
@@ -52,8 +53,8 @@ def deform(
             "-n",
             "--n-modes",
             help=(
-                "Number of eigenfunctions: few bend over a wide zone, many bend sharply. The "
-                "default depends on --mode: 8, 50 or 300."
+                "Number of eigenfunctions: few bend over a wide zone, many bend sharply. By default "
+                "8, 50 or 300: the smaller the region beside the rest, the more."
             ),
         ),
     ] = None,

@@ -7,7 +7,7 @@ import typer
 
 import eigenshape as es
 from eigenshape.cli import steps
-from eigenshape.cli.console import err, print_json, progress_bar
+from eigenshape.cli.console import err, out, print_json, progress_bar
 from eigenshape.cli.inputs import HeatMethodOption, JsonOption, MeshArgument, RepairOption
 from eigenshape.retrieval.heat.recipe import SCALE_FREE
 
@@ -100,6 +100,9 @@ def features(
             row | {"feature": i} for i, row in enumerate(rows) if row["vertex"] not in loose
         ]
         steps.print_rows("Feature points", COLUMNS, features_alone)
+        time = recipe.feature_scale * recipe.time_unit
+        unit = "the area" if recipe.unit == "area" else "the square of the longest side of the box"
+        out.print(f"heat at time t = {time:g} of {unit}, in 1/length²")
     if picture:
         steps.save_picture(
             es.plot.figure_segments(surface, parts.labels, parts.features.vertices), picture

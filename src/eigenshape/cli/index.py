@@ -82,3 +82,23 @@ def _print(shelf: es.ShapeIndex, report: es.retrieval.BatchReport) -> None:
     )
     for name, reason in report.failed:
         out.print(f"  [yellow]{escape_text(name)}[/]: {escape_text(reason)}")
+    for one, two in _doubles(shelf, report):
+        out.print(f"  [yellow]{escape_text(two)}[/]: the same file content as {escape_text(one)}")
+
+
+def _doubles(shelf: es.ShapeIndex, report: es.retrieval.BatchReport) -> list[tuple[str, str]]:
+    """Pair each shape that was added with one of another name and the same content, if there is one.
+
+    A folder and one of its own folders name the same files differently, so both are indexed.
+    """
+    added = set(report.added)
+    records = sorted(shelf.records(), key=lambda record: record.name in added)
+    first: dict[str, str] = {}
+    pairs = []
+    for record in records:
+        if record.digest is None:
+            continue
+        known = first.setdefault(record.digest, record.name)
+        if known != record.name and record.name in added:
+            pairs.append((known, record.name))
+    return pairs

@@ -31,7 +31,9 @@ def info(
         return
     out.print(f"[bold]{escape_text(shape)}[/]")
     for name, value in facts.items():
-        out.print(f"  {name.replace('_', ' '):<24}{_format(value)}")
+        inward = name == "enclosed_volume" and value is not None and value < 0
+        remark = " (faces point inward)" if inward else ""
+        out.print(f"  {name.replace('_', ' '):<24}{_format(value)}{remark}")
 
 
 def _format(value: Any) -> str:

@@ -69,6 +69,7 @@ def query(
         )
     else:
         print_matches(matches)
+        out.print("score: 0 for the same description, about 1 if nothing is alike")
         out.print(
             f"described in {described - began:.2f} s, answered in {1000 * (answered - described):.0f} ms"
         )

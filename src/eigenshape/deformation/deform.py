@@ -3,11 +3,10 @@
 from collections.abc import Sequence
 from typing import SupportsIndex
 
-from eigenshape._arguments import require_each, require_type
-from eigenshape._errors import InvalidParameterError
+from eigenshape._arguments import require_type
 from eigenshape.deformation.binding import Binding, bind
 from eigenshape.deformation.graded_bend import bend_graded, bend_uncrossed
-from eigenshape.deformation.handles import Handle
+from eigenshape.deformation.handles import Handle, require_handles
 from eigenshape.deformation.modes import Mode, require_mode
 from eigenshape.deformation.region import Region
 from eigenshape.deformation.rig import EigenRig
@@ -119,12 +118,7 @@ def bend(binding: Binding, handles: Sequence[Handle], *, mode: Mode = "graded") 
     1.5
     """
     require_type(binding, Binding, "binding")
-    require_each(handles, Handle, "handles")
-    if len(handles) != len(binding.regions):
-        raise InvalidParameterError(
-            "Each region must have one handle; "
-            f"there are {len(binding.regions)} regions and {len(handles)} handles."
-        )
+    require_handles(handles, len(binding.regions))
     if require_mode(mode) == "thesis":
         vertices = eigen_deformation(detailed_skeleton(binding), handles)
     elif mode == "uncrossed":

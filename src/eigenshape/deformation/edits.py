@@ -107,6 +107,19 @@ class Edit:
     --------
     apply_edit : Apply an edit to a rig.
     replay : Apply several edits one after the other.
+
+    Examples
+    --------
+    Pull two ends of a sphere apart at the same time:
+
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> top = es.deformation.Move(mesh.vertices[:, 2] > 0.5, es.Translation([0, 0, 0.5]))
+    >>> bottom = es.deformation.Move(mesh.vertices[:, 2] < -0.5, es.Translation([0, 0, -0.5]))
+    >>> egg = es.deformation.apply_edit(es.rig_shape(mesh), es.deformation.Edit((top, bottom)))
+    >>> heights = egg.mesh.vertices[:, 2]
+    >>> heights.max().round(1).item(), heights.min().round(1).item()
+    (1.5, -1.5)
     """
 
     moves: tuple[Move, ...]

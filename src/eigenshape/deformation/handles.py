@@ -1,10 +1,12 @@
 """Handles: the motions of regions."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._arguments import require_each
 from eigenshape._arrays import finite_values, freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr
@@ -132,6 +134,16 @@ class Translation:
 
 
 Handle = Rotation | Translation
+
+
+def require_handles(handles: Sequence[Handle], n_regions: int) -> None:
+    """Raise an error if there is not one handle for each region."""
+    require_each(handles, Handle, "handles")
+    if len(handles) != n_regions:
+        raise InvalidParameterError(
+            "Each region must have one handle; "
+            f"there are {n_regions} regions and {len(handles)} handles."
+        )
 
 
 def affine_offset(handle: Handle) -> Float[np.ndarray, "3 4"]:

@@ -93,6 +93,13 @@ class BrushRegion:
     --------
     BoxRegion : The vertices inside a box.
     region_mask : Select the vertices of a region.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> cap = es.deformation.BrushRegion(center=[0, 0, 1], radius=0.5)
+    >>> int(es.deformation.region_mask(es.icosphere(2), cap).sum())
+    7
     """
 
     center: Float[np.ndarray, " 3"]

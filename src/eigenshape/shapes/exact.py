@@ -45,6 +45,11 @@ def sphere_eigenvalues(k: SupportsIndex, dim: SupportsIndex = 2) -> Float[np.nda
     (k,) float
         Eigenvalues in 1/length², ascending, repeated by multiplicity.
 
+    Raises
+    ------
+    InvalidParameterError
+        If `k` is less than 1, or `dim` is not in 1..20.
+
     See Also
     --------
     sphere_harmonics : The eigenfunctions on the 2-sphere.
@@ -131,6 +136,11 @@ def projective_plane_eigenvalues(k: SupportsIndex) -> Float[np.ndarray, " k"]:
     -------
     (k,) float
         Eigenvalues in 1/length², ascending, repeated by multiplicity.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `k` is less than 1.
 
     See Also
     --------

@@ -5,6 +5,7 @@ from jaxtyping import Int
 
 from eigenshape.sparse.dissection_loops import (
     LEAF,
+    WORD,
     breadth_first,
     count_cuts,
     find_pieces,
@@ -38,10 +39,8 @@ def dissect(indptr: Indices, indices: Indices) -> Indices:
         n, dtype=np.int64
     )  # the name of the segment that a point lies in; -1 when its place is final
     one, two, queue, key = (np.empty(n, dtype=np.int64) for _ in range(4))
-    # Points of a leaf and their neighbors.
-    most = min(n, LEAF * (1 + int(np.diff(indptr).max(initial=0))))
-    joined = np.empty((LEAF, most), dtype=np.uint8)
-    leaf = np.full(n, -1), np.empty(LEAF, dtype=np.int64), np.empty(LEAF, dtype=np.int64), joined
+    bits = np.empty(LEAF * -(-n // WORD), dtype=np.uint64)
+    leaf = np.full(n, -1), np.empty(LEAF, dtype=np.int64), np.empty(LEAF, dtype=np.int64), bits
     waiting = [(0, n, False)]
     name = 0
     while waiting:

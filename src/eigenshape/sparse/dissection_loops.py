@@ -6,9 +6,12 @@ needs only while it runs: compiling an allocation takes longer than compiling a 
 
 from typing import no_type_check
 
+import numpy as np
+
 from eigenshape._compile import njit
 
 LEAF = 160  # points that minimum degree orders
+WORD = 64  # bits of a number in which neighbors are marked
 SMOOTHINGS = 4  # passes over the differences of distances; a ragged cut is a long one
 
 
@@ -116,34 +119,37 @@ def take_sides(indptr, indices, segment, owner, name, key, level, above, side):
 
 @njit
 @no_type_check
-def order_leaf(indptr, indices, nodes, start, stop, owner, place, local, order, degree, joined):
-    """Order a leaf by minimum degree, its neighbors outside counted.
+def order_leaf(indptr, indices, nodes, start, stop, owner, place, local, order, degree, bits):
+    """Order a leaf by minimum degree, its neighbors outside counted, its elimination graph in bits.
 
     The segment is nodes[start:stop]. The rest is scratch: `local` has a number for each point of the graph, -1 on entry
-    and again on return; `order` and `degree` have LEAF; `joined` (LEAF, points and neighbors of a leaf) says what is
-    joined in the elimination graph.
+    and again on return; `order` and `degree` have LEAF; `bits` has a bit for each of LEAF and each point of the graph.
     """
     count = stop - start
     for i in range(count):
         local[nodes[start + i]] = i
     total = count
     for i in range(start, stop):
-        for at in range(indptr[nodes[i]], indptr[nodes[i] + 1]):
+        node = nodes[i]
+        for at in range(indptr[node], indptr[node + 1]):
             if local[indices[at]] < 0:
                 local[indices[at]] = total
                 total += 1
+    words = (total + WORD - 1) // WORD
+    for i in range(count * words):
+        bits[i] = 0
+    one = np.uint64(1)
     for i in range(count):
-        for j in range(total):
-            joined[i, j] = 0
-        for at in range(indptr[nodes[start + i]], indptr[nodes[start + i] + 1]):
-            joined[i, local[indices[at]]] = 1
-        joined[i, i] = 0
-        degree[i] = 0
-        for j in range(total):
-            degree[i] += joined[i, j]
+        node = nodes[start + i]
+        for at in range(indptr[node], indptr[node + 1]):
+            j = local[indices[at]]
+            if j != i:
+                bits[i * words + j // WORD] |= one << np.uint64(j % WORD)
+        degree[i] = _count_ones(bits, i * words, words)
     for i in range(start, stop):
-        local[nodes[i]] = -1
-        for at in range(indptr[nodes[i]], indptr[nodes[i] + 1]):
+        node = nodes[i]
+        local[node] = -1
+        for at in range(indptr[node], indptr[node + 1]):
             local[indices[at]] = -1
     for step in range(count):
         pivot = -1
@@ -152,16 +158,30 @@ def order_leaf(indptr, indices, nodes, start, stop, owner, place, local, order, 
                 pivot = i
         order[step] = nodes[start + pivot]
         degree[pivot] = -1
+        clear = ~(one << np.uint64(pivot % WORD))
         for i in range(count):
-            if degree[i] >= 0 and joined[pivot, i]:
-                for j in range(total):
-                    joined[i, j] |= joined[pivot, j]
-                joined[i, pivot] = joined[i, i] = 0
-                n_joined = 0
-                for j in range(total):
-                    n_joined += joined[i, j]
-                degree[i] = n_joined
+            if degree[i] >= 0 and (bits[pivot * words + i // WORD] >> np.uint64(i % WORD)) & one:
+                for word in range(words):
+                    bits[i * words + word] |= bits[pivot * words + word]
+                bits[i * words + pivot // WORD] &= clear
+                bits[i * words + i // WORD] &= ~(one << np.uint64(i % WORD))
+                degree[i] = _count_ones(bits, i * words, words)
     for i in range(count):
         nodes[start + i] = order[i]
         place[order[i]] = start + i
         owner[order[i]] = -1
+
+
+@njit
+@no_type_check
+def _count_ones(bits, start, words):
+    total = 0
+    for word in range(start, start + words):
+        x = bits[word]
+        x = x - ((x >> np.uint64(1)) & np.uint64(0x5555555555555555))
+        x = (x & np.uint64(0x3333333333333333)) + (
+            (x >> np.uint64(2)) & np.uint64(0x3333333333333333)
+        )
+        x = (x + (x >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
+        total += np.int64((x * np.uint64(0x0101010101010101)) >> np.uint64(56))
+    return total

@@ -86,7 +86,7 @@ export class Studio implements App {
     const sheet = new CSSStyleSheet();
     sheet.replaceSync(style);
     root.adoptedStyleSheets = [sheet];
-    const stage = h("div", { class: "stage" });
+    const stage = h("div", { class: "stage", "data-test": "stage" });
     const bar = h(
       "header",
       {},

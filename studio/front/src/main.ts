@@ -58,7 +58,7 @@ if (page) {
 /** Show the studio in the output of a notebook's cell (anywidget). */
 function render({ model, el }: { model: WidgetModel; el: HTMLElement }): () => void {
   const host = el.appendChild(document.createElement("div"));
-  host.style.height = "600px";
+  host.style.height = `${model.get("height") ?? 640}px`;
   const { viewer } = start(widgetBackend(model), host, new Settings(null), host);
   return () => viewer.dispose();
 }

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import print_json, print_table
+from eigenshape.cli.console import err, print_json, print_table
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.distortion import measure_distortion
 from eigenshape.deformation.edits import Edit
@@ -51,18 +51,21 @@ def print_bend(
     if as_json:
         print_json(values)
         return
+    n_crossing, n_before = len(values["crossing_faces"]), len(self_intersections(before))
     rows = [
         ["edits", f"{len(edits)}"],
         ["vertices that moved", f"{values['vertices_moved']:,} of {before.n_vertices:,}"],
         ["edges stretched, RMS", f"{100 * found.edge_error:.2f} %"],
         ["least area, after over before", f"{values['least_area_ratio']:.2f}"],
         ["faces flipped", f"{len(found.flipped):,}"],
-        [
-            "pairs of faces that cross",
-            f"{len(values['crossing_faces']):,} ({len(self_intersections(before)):,} before)",
-        ],
+        ["pairs of faces that cross", f"{n_crossing:,} ({n_before:,} before)"],
     ]
     print_table("Bent", ["", "value"], rows)
+    if n_crossing > n_before:
+        err.print(
+            "Faces cross that did not before. A wider bend may help (--fixed with a smaller part), "
+            "or --mode uncrossed."
+        )
 
 
 def displacement_shares(

@@ -53,13 +53,14 @@ def query_recipe(shelf: ShapeIndex, name: str | None) -> AnyRecipe:
     """Return the recipe of a method by which an index can answer; without a name, its own."""
     if name is None:
         return shelf.default_recipe()
-    if name != PATCHES:
-        return PRESETS[name]
-    recipe = _patch_recipe(shelf)
+    if name == PATCHES:
+        recipe: AnyRecipe | None = _patch_recipe(shelf)
+    else:
+        recipe = PRESETS[name] if PRESETS[name] in shelf.recipes() else None
     if recipe is None:
         raise StoreError(
             f"An index answers by the methods that it was made with; {shelf.folder} has no "
-            "patches. Run `eigenshape index` with --method patches first."
+            f"descriptions by {name}. Run `eigenshape index` with --method {name} first."
         )
     return recipe
 

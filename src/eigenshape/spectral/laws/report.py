@@ -51,7 +51,18 @@ class Law:
 
 @dataclass(frozen=True)
 class SkippedLaw:
-    """A law that was not checked, and the reason."""
+    """A law that was not checked, and the reason.
+
+    Attributes
+    ----------
+    name : str
+    reason : str
+        One sentence.
+
+    See Also
+    --------
+    OperatorReport : Holds laws of both kinds.
+    """
 
     name: str
     reason: str

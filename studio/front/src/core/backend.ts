@@ -55,7 +55,7 @@ export interface State {
 export type Change =
   | { kind: "preview" | "commit"; handles: Handle[]; mode: DeformMode }
   | { kind: "undo" | "redo" | "reset" | "cancel" | "parts" }
-  | { kind: "replay"; edits: unknown; source?: string }
+  | { kind: "replay"; edits: unknown; source?: string; sourceFile?: Uint8Array }
   | { kind: "repair"; names: string[] }
   | { kind: "solve"; k: number }
   | { kind: "open" | "transfer"; name: string; file: Uint8Array };
@@ -85,6 +85,8 @@ export interface Match {
   label: string | null;
   score: number;
   path?: string;
+  up?: Vec3; // how to look at it
+  front?: Vec3;
 }
 export interface Matches {
   matches: Match[];
@@ -136,8 +138,9 @@ export function backendOver(send: Send): Backend {
       return { ...meta, shares: arrays.shares!.data as Float32Array };
     },
     async finish(change) {
-      const { file, ...meta } = change as { file?: Uint8Array; kind: string };
-      const answer = await ask("finish", meta, file ? { file } : {});
+      const { file, sourceFile, ...meta } = change as { file?: Uint8Array; sourceFile?: Uint8Array };
+      const files = { ...(file && { file }), ...(sourceFile && { source: sourceFile }) };
+      const answer = await ask("finish", meta, files);
       return { ...answer.meta, arrays: answer.arrays };
     },
     async query({ file, ...meta }) {

@@ -31,14 +31,19 @@ export function download(data: BlobPart, name: string, type = "application/octet
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
-/** Let the person choose a file, and return its name and bytes. */
-export function chooseFile(accept: string): Promise<{ name: string; bytes: Uint8Array }> {
+export interface ChosenFile {
+  name: string;
+  bytes: Uint8Array<ArrayBuffer>;
+}
+
+/** Let the person choose files, and return their names and bytes. */
+export function chooseFiles(accept: string, multiple = true): Promise<ChosenFile[]> {
+  const read = async (file: File) => ({ name: file.name, bytes: new Uint8Array(await file.arrayBuffer()) });
   return new Promise((resolve) => {
-    const input = h("input", { type: "file", accept });
-    input.addEventListener("change", async () => {
-      const file = input.files?.[0];
-      if (file) resolve({ name: file.name, bytes: new Uint8Array(await file.arrayBuffer()) });
-    });
+    const input = h("input", { type: "file", accept, multiple });
+    input.addEventListener("change", () => resolve(Promise.all([...(input.files ?? [])].map(read))));
     input.click();
   });
 }
+
+export const chooseFile = async (accept: string) => (await chooseFiles(accept, false))[0]!;

@@ -47,7 +47,7 @@ export class MotionTool implements PointerTool {
     [this.pivot, this.kind] = [pivot, kind];
     this.anchor.position.set(...pivot);
     this.anchor.quaternion.identity();
-    this.anchor.visible = true;
+    this.anchor.visible = kind !== "pull"; // which needs no pivot
     this.viewer.space.updateMatrixWorld(true);
     if (kind === "pull" || kind === "swing") this.gizmo.detach();
     else this.gizmo.attach(this.anchor).setMode(kind === "rotate" ? "rotate" : "translate");

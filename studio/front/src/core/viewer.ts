@@ -50,6 +50,7 @@ export class Viewer {
   private readonly renderer: three.WebGLRenderer | null;
   private readonly picker: Picker | null;
   private readonly motion = {
+    n_moving: { value: 0 },
     kind: { value: new Int32Array(MAX_REGIONS) },
     pivot: { value: Array.from({ length: MAX_REGIONS }, () => new three.Vector3()) },
     direction: { value: Array.from({ length: MAX_REGIONS }, () => new three.Vector3()) },
@@ -150,6 +151,7 @@ export class Viewer {
   /** Show the motion of the regions by shares, computed in the shader. */
   setHandles(handles: Handle[]): void {
     const { kind, pivot, direction, angle } = this.motion;
+    this.motion.n_moving.value = handles.some((handle) => handle) ? handles.length : 0;
     for (let region = 0; region < MAX_REGIONS; region++) {
       const handle = handles[region] ?? null;
       kind.value[region] = handle ? (handle.type === "rotation" ? 1 : 2) : 0;
@@ -370,12 +372,13 @@ export class Viewer {
   }
 
   private startRenderer(): three.WebGLRenderer | null {
-    const context = this.canvas.getContext("webgl2", { antialias: true, alpha: true });
+    const antialias = !rendersInSoftware();
+    const context = this.canvas.getContext("webgl2", { antialias, alpha: true });
     if (!context?.getExtension("EXT_color_buffer_float")) {
       this.showNotice("This browser has no WebGL2 with float buffers, which the picture needs. Enable hardware acceleration, or use a recent Chrome, Edge, Firefox or Safari.");
       return null;
     }
-    const renderer = new three.WebGLRenderer({ canvas: this.canvas, context, antialias: true });
+    const renderer = new three.WebGLRenderer({ canvas: this.canvas, context });
     renderer.setClearColor(0, 0);
     renderer.setPixelRatio(Math.min(devicePixelRatio, MOST_PIXELS));
     let notice: HTMLElement | null = null;
@@ -507,4 +510,15 @@ export class Viewer {
     this.frame = 0;
     if (this.vertices.length) this.renderer?.render(this.scene, this.camera);
   }
+}
+
+/** Say whether there is no graphics card: smoothing edges would then double the time of a frame. */
+function rendersInSoftware(): boolean {
+  const context = document.createElement("canvas").getContext("webgl2");
+  if (!context) return false;
+  let name = String(context.getParameter(context.RENDERER));
+  const info = name === "WebKit WebGL" && context.getExtension("WEBGL_debug_renderer_info");
+  if (info) name = String(context.getParameter(info.UNMASKED_RENDERER_WEBGL));
+  context.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
 }

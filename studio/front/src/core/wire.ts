@@ -12,6 +12,7 @@ export interface Message {
 }
 
 const TYPES = {
+  "<f2": Uint16Array, // only received: decoded into single precision
   "<f4": Float32Array,
   "<f8": Float64Array,
   "<u4": Uint32Array,
@@ -60,16 +61,28 @@ export function decode(message: ArrayBuffer | ArrayBufferView): Message {
   const header = JSON.parse(new TextDecoder().decode(bytes.subarray(4, begin)));
   const arrays: Arrays = {};
   for (const [name, entry] of Object.entries<any>(header.arrays ?? {})) {
-    const type = TYPES[entry.dtype as Dtype];
+    const half = entry.dtype === "<f2";
+    const type = half ? Uint16Array : TYPES[entry.dtype as Dtype];
     if (!type) throw new TypeError(`Array ${name} has the unknown type ${entry.dtype}.`);
     const length = entry.shape.reduce((product: number, side: number) => product * side, 1);
     const end = begin + entry.offset + length * type.BYTES_PER_ELEMENT;
     if (entry.offset % ALIGNMENT || end > bytes.length)
       throw new RangeError(`Array ${name} ends at byte ${end} of ${bytes.length}.`);
     const data = new type(bytes.buffer as ArrayBuffer, bytes.byteOffset + begin + entry.offset, length);
-    arrays[name] = { data, shape: entry.shape };
+    const numbers = data instanceof Uint16Array ? fromHalves(data, entry.scale ?? 1) : data;
+    arrays[name] = { data: numbers, shape: entry.shape };
   }
   return { meta: header.meta, arrays };
+}
+
+/** Return half precision in single; only the newest browsers have arrays of it. */
+function fromHalves(halves: Uint16Array, scale: number): Float32Array {
+  return Float32Array.from(halves, (half) => {
+    const exponent = (half >> 10) & 31;
+    const fraction = (half & 1023) / 1024;
+    const size = exponent ? 2 ** (exponent - 15) * (1 + fraction) : 2 ** -14 * fraction;
+    return scale * (half >> 15 ? -size : size);
+  });
 }
 
 /** Return the bytes, copied only if they start at an address that typed arrays cannot view. */

@@ -3,6 +3,7 @@
 import { backendOver, type Backend } from "../core/backend";
 
 export interface WidgetModel {
+  get(trait: "height"): number | undefined;
   send(content: unknown, callbacks?: unknown, buffers?: ArrayBufferView[]): void;
   on(event: "msg:custom", callback: (content: { id?: string }, buffers: DataView[]) => void): void;
 }

@@ -83,8 +83,8 @@ export class Slider {
     return this.input.valueAsNumber;
   }
 
-  setRange(min: number, max: number): void {
-    Object.assign(this.input, { min, max });
+  setRange(min: number, max: number, step = 1): void {
+    Object.assign(this.input, { min, max, step });
   }
 
   show(value: number, text: string): void {
@@ -94,24 +94,29 @@ export class Slider {
   }
 }
 
-/** Return a row of buttons of which one is pressed: at first the first. */
-export function buildChoice(options: Record<string, string>, onChoose: (id: string) => void): HTMLElement {
-  const buttons = Object.entries(options).map(([id, label], i) =>
-    h("button", { type: "button", "data-test": id, "aria-pressed": String(i === 0) }, label),
-  );
-  for (const one of buttons)
-    one.addEventListener("click", () => {
-      for (const each of buttons) each.setAttribute("aria-pressed", String(each === one));
-      onChoose(one.dataset.test!);
-    });
-  return h("div", { class: "row choice", role: "group" }, ...buttons);
+/** Return a row of buttons of which one is pressed, and a function that presses one. */
+export function buildChoice(name: string, options: Record<string, string>, onChoose: (id: string) => void) {
+  const element = h("div", { class: "row choice", role: "group" });
+  const press = (id: string) => {
+    for (const each of element.querySelectorAll("button"))
+      each.setAttribute("aria-pressed", String(each.dataset.test === `${name}-${id}`));
+  };
+  for (const [id, label] of Object.entries(options)) {
+    const choose = () => (press(id), onChoose(id));
+    element.append(h("button", { type: "button", "data-test": `${name}-${id}`, onclick: choose }, label));
+  }
+  return { element, press };
 }
 
 /** The progress of work on the server; hidden unless it runs or has failed. */
 export class ProgressBar {
   private readonly bar = h("progress", { max: 1 });
   private readonly text = h("span");
-  readonly element = h("div", { class: "progress", "data-test": "progress" }, this.bar, this.text);
+  readonly element: HTMLElement;
+
+  constructor(name: string) {
+    this.element = h("div", { class: "progress", "data-test": name }, this.bar, this.text);
+  }
 
   show({ status, progress, message }: Pick<State["spectrum"], "status" | "progress" | "message">): void {
     this.element.hidden = status !== "running" && status !== "failed";

@@ -4,7 +4,7 @@ import type { App, Panel } from "../app";
 import type { Change, DeformMode, Handle, State, Vec3 } from "../core/backend";
 import { BoxTool } from "../core/box";
 import { partColors } from "../core/colors";
-import { button, chooseFile, download, h } from "../core/dom";
+import { button, chooseFile, chooseFiles, download, h } from "../core/dom";
 import { selectBox, Surface } from "../core/geodesic";
 import { MotionTool, type MotionKind } from "../core/gizmo";
 import { add, middleOf, regionBoundary } from "../core/motion";
@@ -44,7 +44,7 @@ export class DeformPanel implements Panel {
   private app!: App;
   private regions = new Regions(0);
   private region = 0; // that the tools change
-  private tool: Tool = "box";
+  private tool: Tool = "brush";
   private box!: BoxTool;
   private mover!: MotionTool;
   private surface: Surface | null = null;
@@ -70,11 +70,13 @@ export class DeformPanel implements Panel {
   private readonly corners = ["low", "high"].map((name) =>
     AXES.map((axis, i) => numberInput(`box-${name}-${i}`, `${name} ${axis}`, () => this.readBox())),
   );
-  private readonly boxOptions = h("div", { class: "corners" }, ...this.corners.flat());
+  private readonly boxOptions = h(
+    "div", { class: "corners" }, "low", ...this.corners[0]!, "high", ...this.corners[1]!,
+  );
   private readonly radius = new Slider("Radius, of the extent", "brush-radius", (value) => this.setRadius(value));
   private readonly nParts = new Slider("Number of parts", "region-parts", (value) => this.showParts(value));
   private readonly mode = choice("mode", "Method", ["graded", "uncrossed", "thesis"]);
-  private readonly nModes = numberInput("n-modes", "Modes (automatic if empty)", () => this.bind());
+  private readonly nModes = numberInput("n-modes", "Number of modes that spread the motion; automatic if empty", () => this.bind());
   private readonly several = checkbox("several", "Several motions at once", () => this.showTools());
   private readonly apply = button("Apply", "apply", "Apply the motions (Enter)", () => this.commit());
   private readonly exactKind = choice("exact-kind", "Motion in numbers", [
@@ -108,6 +110,9 @@ export class DeformPanel implements Panel {
     this.radius.show(app.settings.get("radius", 0.1), "");
     this.nParts.setRange(2, 30, 1);
     this.skeletonModes.valueAsNumber = 50;
+    this.nModes.placeholder = "auto";
+    this.amount.placeholder = "amount";
+    this.exactKind.className = "wide";
     for (const [tool, key] of Object.entries(SHORTCUTS)) {
       const label = { ...SELECTORS, ...MOTIONS }[tool as Tool];
       app.shortcut(key, `Deform: ${label.toLowerCase()}`, () => (app.open(this.id), this.chooseTool(tool as Tool)));
@@ -122,13 +127,13 @@ export class DeformPanel implements Panel {
       this.boxOptions, this.radius.element, this.nParts.element,
       h("div", { class: "row" }, clear, this.count),
       h("h3", {}, "Motion"), this.motionChoice.element, this.hint,
-      h("div", { class: "row" }, this.exactKind, this.amount, exact),
-      h("div", { class: "row" }, this.mode, this.nModes), this.bound,
+      h("div", { class: "row tight" }, this.exactKind, this.amount, exact), this.bound,
+      h("div", { class: "row tight" }, "Method", this.mode, "Modes", this.nModes),
       h("div", { class: "row" }, this.several.element, this.apply),
       h("h3", {}, "Edits"),
-      h("div", { class: "row" }, this.undo, this.redo, this.reset,
+      h("div", { class: "row tight" }, this.undo, this.redo, this.reset,
         button("Save", "save-edits", "Save the edits as JSON", () => this.save("edits", "json")),
-        button("Load", "load-edits", "Apply saved edits", () => this.replay()),
+        button("Load", "load-edits", "Apply saved edits. If they were made on another mesh of this shape, choose its file, too", () => this.replay()),
       ),
       h("h3", {}, "Show"),
       h("div", { class: "row" }, this.skeleton.element, this.skeletonModes, "modes"),
@@ -183,7 +188,7 @@ export class DeformPanel implements Panel {
   private startShape({ shape, n_vertices }: State): void {
     this.regions = new Regions(n_vertices);
     [this.pivots, this.labels] = [[], null];
-    const kept = this.app.settings.get("regions", { shape: -1, text: "", tool: "box" as Tool, region: 0 });
+    const kept = this.app.settings.get("regions", { shape: -1, text: "", tool: this.tool, region: 0 });
     if (kept.shape === shape) {
       this.regions.read(kept.text);
       [this.tool, this.region] = [kept.tool, kept.region];
@@ -490,9 +495,13 @@ export class DeformPanel implements Panel {
   }
 
   private async replay(): Promise<void> {
-    const { bytes } = await chooseFile(".json");
-    const edits = JSON.parse(new TextDecoder().decode(bytes));
-    await this.change({ kind: "replay", edits }, "Applying the edits");
+    const files = await chooseFiles(`.json,${LOADABLE}`);
+    const written = files.find(({ name }) => name.endsWith(".json"));
+    const source = files.find((file) => file !== written);
+    if (!written) return this.app.say("Choose a JSON file of edits.");
+    const edits = JSON.parse(new TextDecoder().decode(written.bytes));
+    const change: Change = { kind: "replay", edits, source: source?.name, sourceFile: source?.bytes };
+    await this.change(change, "Applying the edits");
   }
 
   private async transfer(): Promise<void> {
@@ -503,7 +512,7 @@ export class DeformPanel implements Panel {
 
 function numberInput(name: string, label: string, onChange: () => void): HTMLInputElement {
   const attributes = { type: "number", step: "any", title: label, "aria-label": label, "data-test": name };
-  return h("input", { ...attributes, placeholder: label, onchange: onChange });
+  return h("input", { ...attributes, onchange: onChange });
 }
 
 function checkbox(name: string, label: string, onChange: () => void) {

@@ -13,7 +13,7 @@ const SOURCE = "#35c9e0"; // in no color of heat
 export class HeatPanel extends ColoringPanel {
   readonly id = "heat";
   readonly title = "Heat";
-  private readonly progress = new ProgressBar();
+  private readonly progress = new ProgressBar("heat-progress");
   private readonly time = new Slider("Time t", "time", () => this.paint());
   private readonly explained = h("p", { class: "note", "data-test": "heat-explained" });
   private readonly results: HTMLElement;
@@ -25,13 +25,14 @@ export class HeatPanel extends ColoringPanel {
   constructor() {
     super();
     const views = { signature: "Heat that stays", source: "From a source" };
-    const choice = buildChoice(views, (view) => {
+    const choice = buildChoice("heat", views, (view) => {
       this.view = view;
       this.paint();
     });
+    choice.press(this.view);
     this.time.setRange(0, STEPS);
     this.time.show(STEPS / 2, "");
-    this.results = h("div", {}, choice, this.time.element, this.explained);
+    this.results = h("div", {}, choice.element, this.time.element, this.explained);
   }
 
   build(app: App): HTMLElement {

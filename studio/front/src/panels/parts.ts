@@ -15,7 +15,7 @@ const PALE = 0.72; // how much of the color of other parts is taken away beside 
 export class PartsPanel extends ColoringPanel {
   readonly id = "parts";
   readonly title = "Parts";
-  private readonly progress = new ProgressBar();
+  private readonly progress = new ProgressBar("parts-progress");
   private readonly begin = h("div", {}, h("p", {}, "Limbs, head, torso: regions between which heat flows slowly."));
   private readonly number = new Slider("Number of parts", "n-parts", (count) => this.cut({ count }));
   private readonly level = new Slider("Least persistence", "persistence", (step) => this.cut({ persistence: this.levelAt(step) }));

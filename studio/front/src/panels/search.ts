@@ -37,7 +37,7 @@ export class SearchPanel implements Panel {
 
   refresh(state: State): void {
     const { index } = state;
-    if (index) this.about.textContent = `${index.n_shapes.toLocaleString("en")} shapes in ${index.path}. Drop a file here to search with it.`;
+    if (index) this.about.textContent = `${index.n_shapes.toLocaleString("en")} shapes in ${index.path}. A smaller score is more alike. Drop a file here to search with it.`;
     if (state.shape !== this.shape) this.clear();
   }
 
@@ -89,14 +89,15 @@ export class SearchPanel implements Panel {
     const arrays = await app.run("Loading the match", Promise.all(names.map((name) => backend.array(name))));
     const [vertices, faces, own] = arrays.map(({ data }) => data);
     if (found !== this.found) return;
+    const { name, up = state.up, front = state.front } = found!.matches[number]!;
     this.closeMatch();
     const stage = viewer.stage;
     stage.after(this.beside);
     stage.parentElement!.classList.add("compare");
     this.second = new Viewer(this.beside);
     const close = button("Close", "close-match", "Close the match", () => this.closeMatch());
-    this.beside.append(h("div", { class: "caption" }, found!.matches[number]!.name, close));
-    this.second.setMesh(vertices as Float32Array, faces as Uint32Array, state.up, state.front);
+    this.beside.append(h("div", { class: "caption" }, name, close));
+    this.second.setMesh(vertices as Float32Array, faces as Uint32Array, up, front);
     viewer.fit();
     const pairs = found!.arrays[`pairs${number}`]?.data ?? new Uint32Array();
     const [here, there] = [0, 1].map((side) => pairs.filter((_, i) => i % 2 === side) as Uint32Array);

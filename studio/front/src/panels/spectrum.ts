@@ -15,7 +15,7 @@ const FLAT = 1e-5; // relative range below which a mode is constant, and has no 
 export class SpectrumPanel extends ColoringPanel {
   readonly id = "spectrum";
   readonly title = "Spectrum";
-  private readonly progress = new ProgressBar();
+  private readonly progress = new ProgressBar("solve-progress");
   private readonly k = h("input", { type: "number", min: 2, value: 300, "data-test": "k", "aria-label": "Number of eigenpairs" });
   private readonly solver = h("div", { class: "row" }, this.k, "eigenpairs");
   private readonly plotHost = h("div", { class: "plot", "data-test": "eigenvalues" });
@@ -37,10 +37,11 @@ export class SpectrumPanel extends ColoringPanel {
     const key = (name: string, text: string) => h("span", { class: name }, text);
     const keys = [key("dot", "eigenvalues"), key("line", "Weyl’s law, 4π i / area"), key("bracket", "brackets")];
     const views = { eigenfunction: "Eigenfunction", lowpass: "Shape of 0 … i" };
-    const choice = buildChoice(views, (view) => {
+    const choice = buildChoice("view", views, (view) => {
       this.view = view;
       this.start();
     });
+    choice.press(this.view);
     this.results = h(
       "div",
       {},
@@ -48,7 +49,7 @@ export class SpectrumPanel extends ColoringPanel {
       h("p", { class: "keys-of-plot" }, ...keys),
       this.slider.element,
       this.bounds,
-      choice,
+      choice.element,
       h("div", { class: "row" }, h("label", {}, this.nodal, "Nodal lines")),
       h("h3", {}, "Proof"),
       this.proof,

@@ -1,0 +1,148 @@
+"""The studio in a real browser, for tests: a server, and pages on which no error goes unseen.
+
+Chromium is that of the system (Debian's package `chromium`), or the one that CHROMIUM names.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Locator, Page, sync_playwright
+
+STUDIO = Path(__file__).parents[1]
+# WebGL2 in software, the same on every machine, and no request of the browser's own.
+FLAGS = (
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+)
+SERVE = """
+import sys
+from eigenshape_studio.server import serve
+
+mesh, index = sys.argv[1:]
+serve(mesh, index=index or None, announce=lambda url: print(url, flush=True), browse=False)
+"""
+
+
+@contextmanager
+def start_browser() -> Iterator[Browser]:
+    """Start Chromium without a window; skip the test where there is none, unless one is required."""
+    path = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
+    if path is None:
+        needed = "The browser tests need Chromium: apt-get install chromium."
+        if os.environ.get("EIGENSHAPE_REQUIRE_BROWSER"):
+            raise FileNotFoundError(needed)
+        pytest.skip(needed)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=list(FLAGS))
+        yield browser
+        browser.close()
+
+
+def build_page() -> None:
+    """Build the page if its sources have changed."""
+    subprocess.run([sys.executable, "hatch_build.py"], cwd=STUDIO, check=True)
+
+
+@contextmanager
+def serve_studio(mesh: Path, index: Path | None = None) -> Iterator[str]:
+    """Serve the studio in a process of its own, and yield its address."""
+    build_page()
+    command = [sys.executable, "-c", SERVE, str(mesh), str(index or "")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            yield str(process.stdout.readline().strip())  # type: ignore[union-attr]
+        finally:
+            process.terminate()
+
+
+@contextmanager
+def open_page(browser: Browser, url: str, *, dark: bool = False) -> Iterator[Page]:
+    """Open the studio as on a laptop, and wait until it shows a shape.
+
+    At the end every error, warning and request to another machine fails the test.
+    """
+    scheme = "dark" if dark else "light"
+    context = browser.new_context(viewport={"width": 1280, "height": 800}, color_scheme=scheme)
+    page = context.new_page()
+    seen: list[str] = []
+    page.on("pageerror", lambda error: seen.append(f"page error: {error}"))
+    page.on(
+        "console",
+        lambda line: line.type in ("error", "warning") and seen.append(f"{line.type}: {line.text}"),
+    )
+    page.on("request", lambda request: is_local(request.url) or seen.append(request.url))
+    page.goto(url)
+    page.wait_for_function("window.eigenshape?.viewer.vertices.length > 0")
+    yield page
+    context.close()
+    assert not seen, "\n".join(seen)
+
+
+def is_local(url: str) -> bool:
+    """Say whether a request stays on this machine."""
+    return url.startswith(("http://127.0.0.1:", "file:", "data:", "blob:"))
+
+
+def find(page: Page, name: str) -> Locator:
+    """Return the element with this name in `data-test`."""
+    return page.locator(f'[data-test="{name}"]')
+
+
+def move_slider(page: Page, name: str, value: float) -> None:
+    """Set a slider, as a person does: the page hears of it."""
+    find(page, name).fill(str(value))
+
+
+def wait_until_still(page: Page) -> None:
+    """Wait until nothing is loaded any more, and two frames have been drawn."""
+    page.wait_for_load_state("networkidle")
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def vertex_values(page: Page, name: str = "value") -> np.ndarray:
+    """Return an attribute of the vertices that the graphics card has: value, paint, position."""
+    code = f"Array.from(eigenshape.viewer.geometry.getAttribute('{name}').array)"
+    return np.array(page.evaluate(code))
+
+
+def vertex_labels(page: Page) -> np.ndarray:
+    """Return the part that each vertex is colored by."""
+    return np.array(page.evaluate("Array.from(eigenshape.viewer.labels)"))
+
+
+def picture(page: Page) -> np.ndarray:
+    """Return what is drawn on the canvas, (height, width, 4), without what lies over it."""
+    code = """async () => {
+        const image = await createImageBitmap(await eigenshape.viewer.screenshot());
+        const canvas = new OffscreenCanvas(image.width, image.height);
+        const context = canvas.getContext("2d");
+        context.drawImage(image, 0, 0);
+        const { data } = context.getImageData(0, 0, image.width, image.height);
+        return [image.width, image.height, Array.from(data)];
+    }"""
+    width, height, data = page.evaluate(code)
+    return np.array(data, dtype=np.uint8).reshape(height, width, 4)
+
+
+def drop_file(page: Page, name: str, path: Path) -> None:
+    """Drop a file on an element."""
+    make = """([name, text]) => {
+        const files = new DataTransfer();
+        files.items.add(new File([text], name));
+        return files;
+    }"""
+    files = page.evaluate_handle(make, [path.name, path.read_text(encoding="utf-8")])
+    find(page, name).dispatch_event("drop", {"dataTransfer": files})

@@ -1,0 +1,350 @@
+"""The panels in a real browser: what they show is what the library computes."""
+
+import io
+
+import numpy as np
+import pytest
+from browser import (
+    drop_file,
+    find,
+    move_slider,
+    open_page,
+    picture,
+    serve_studio,
+    start_browser,
+    vertex_labels,
+    vertex_values,
+    wait_until_still,
+)
+
+import eigenshape as es
+from eigenshape.plot.render import palette
+from eigenshape_studio.analysis import N_MODES
+from eigenshape_studio.analysis import vertex_labels as label_vertices
+from eigenshape_studio.report import write_report
+
+pytestmark = pytest.mark.long
+
+SINGLE = 2e-5  # relative error of sums of 300 products in single precision
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with start_browser() as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with a quadruped, and an index of four shapes."""
+    folder = tmp_path_factory.mktemp("studio")
+    shapes = {
+        "quadruped": es.make_creature("quadruped", n_vertices=1500),
+        "biped": es.make_creature("biped", n_vertices=1500),
+        "torus": es.shapes.torus(40, 20),
+        "ball": es.icosphere(3),
+    }
+    for name, mesh in shapes.items():
+        es.write_mesh(mesh, folder / f"{name}.ply")
+    index = es.ShapeIndex.create(folder / "index")
+    for name in shapes:
+        path = folder / f"{name}.ply"
+        index.add(name, es.read_mesh(path), source=str(path))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def mesh(folder):
+    return es.read_mesh(folder / "quadruped.ply")
+
+
+@pytest.fixture(scope="module")
+def spectrum(mesh):
+    return es.solve_spectrum(es.cotangent_laplacian(mesh), N_MODES)
+
+
+@pytest.fixture(scope="module")
+def url(folder):
+    with serve_studio(folder / "quadruped.ply", folder / "index") as address:
+        yield address
+
+
+@pytest.fixture
+def page(browser, url):
+    with open_page(browser, url) as opened:
+        yield opened
+
+
+def open_panel(page, name, ready=None):
+    find(page, f"tab-{name}").click()
+    if ready:
+        find(page, ready).wait_for()
+    wait_until_still(page)
+
+
+def assert_close(found, expected, tolerance=SINGLE):
+    assert found.shape == expected.shape
+    assert np.abs(found - expected).max() <= tolerance * np.abs(expected).max()
+
+
+def test_heat_slider_shows_the_heat_kernel_signature(page, spectrum):
+    open_panel(page, "heat", "legend")
+    first, last = es.spectral.default_times(spectrum, 2)
+    for step in (0, 130, 400):
+        move_slider(page, "time", step)
+        time = first * (last / first) ** (step / 400)
+        assert_close(vertex_values(page), es.heat_kernel_signature(spectrum, [time])[:, 0])
+    low, middle, high = find(page, "legend").locator("span").all_inner_texts()
+    heat = vertex_values(page)
+    shown = [float(text.replace("−", "-")) for text in (low, middle, high)]
+    np.testing.assert_allclose(shown, [heat.min(), heat.mean(), heat.max()], rtol=0.2)
+
+
+def test_colors_of_the_picture_follow_the_slider(page):
+    open_panel(page, "heat", "legend")
+    move_slider(page, "time", 40)
+    early = picture(page)
+    move_slider(page, "time", 360)
+    late = picture(page)
+    shape = early[..., 3] > 0
+    assert 0.05 < shape.mean() < 0.9
+    assert np.array_equal(shape, late[..., 3] > 0)
+    assert np.abs(early[shape].astype(int) - late[shape]).mean() > 10
+
+
+def test_heat_starts_where_the_shape_is_clicked(page, spectrum):
+    open_panel(page, "heat", "legend")
+    find(page, "heat-source").click()
+    x, y, vertex = click_shape(page)
+    hit = page.evaluate("([x, y]) => eigenshape.viewer.pick(x, y)", [x, y])
+    assert hit["vertex"] == vertex
+    assert f"vertex {vertex}" in find(page, "heat-explained").inner_text()
+    first, last = es.spectral.default_times(spectrum, 2)
+    time = (first * last) ** 0.5
+    modes = spectrum.eigenvectors
+    assert_close(
+        vertex_values(page), modes @ (np.exp(-time * spectrum.eigenvalues) * modes[vertex])
+    )
+    assert find(page, "legend").inner_text().startswith("heat, 1/length²")
+
+
+def click_shape(page):
+    """Click the middle of what is drawn; return where, and the vertex there."""
+    box = find(page, "canvas").bounding_box()
+    inside = picture(page)[..., 3] > 0
+    rows, columns = np.nonzero(inside)
+    row = int(np.median(rows))
+    column = int(np.median(columns[rows == row]))
+    x = column * box["width"] / inside.shape[1]
+    y = row * box["height"] / inside.shape[0]
+    vertex = page.evaluate("([x, y]) => eigenshape.viewer.pick(x, y).vertex", [x, y])
+    page.mouse.click(box["x"] + x, box["y"] + y)
+    wait_until_still(page)
+    return x, y, vertex
+
+
+def test_spectrum_shows_eigenfunctions_and_the_proof(page, spectrum):
+    open_panel(page, "spectrum", "legend")
+    for index in (1, 7, 60):
+        move_slider(page, "mode", index)
+        wait_until_still(page)
+        assert_close(vertex_values(page), spectrum.eigenvectors[:, index], 1e-6)
+        assert (
+            f"{index}: λ = {spectrum.eigenvalues[index]:.4g}"
+            == find(page, "mode-value").inner_text()
+        )
+    assert find(page, "certificate").inner_text() == spectrum.certificate.explain()
+    find(page, "mode").press("ArrowRight")
+    wait_until_still(page)
+    assert_close(vertex_values(page), spectrum.eigenvectors[:, 61], 1e-6)
+
+
+def test_nodal_lines_are_drawn(page):
+    open_panel(page, "spectrum", "legend")
+    with_lines = count_dark(picture(page))
+    find(page, "nodal").uncheck()
+    wait_until_still(page)
+    assert with_lines > 5 * count_dark(picture(page)) + 100
+
+
+def count_dark(image):
+    return int(((image[..., :3].max(axis=2) < 40) & (image[..., 3] == 255)).sum())
+
+
+def test_click_on_an_eigenvalue_selects_it(page):
+    open_panel(page, "spectrum", "legend")
+    plot = find(page, "eigenvalues").locator(".u-over")
+    width = plot.bounding_box()["width"]
+    plot.click(position={"x": width / 2, "y": 60})
+    wait_until_still(page)
+    assert find(page, "mode").input_value() in ("149", "150")
+
+
+def test_shape_of_few_modes_is_the_eigen_skeleton(page, mesh, spectrum):
+    open_panel(page, "spectrum", "legend")
+    move_slider(page, "mode", 11)
+    find(page, "view-lowpass").click()
+    wait_until_still(page)
+    page.wait_for_function("eigenshape.viewer.geometry.getAttribute('position').version > 1")
+    modes = spectrum.eigenvectors[:, :12]
+    smooth = modes @ (modes.T @ (spectrum.mass @ mesh.vertices))
+    assert_close(vertex_values(page, "position").reshape(-1, 3), smooth)
+    open_panel(page, "shape")
+    assert_close(vertex_values(page, "position").reshape(-1, 3), mesh.vertices, 1e-6)
+
+
+def test_brackets_hold_the_eigenvalues(page, mesh):
+    open_panel(page, "spectrum", "legend")
+    find(page, "bracket").click()
+    page.locator(".bracketed").wait_for(timeout=120_000)
+    move_slider(page, "mode", 3)
+    brackets = es.bracket_eigenvalues(mesh, 20)
+    text = f"between {brackets.lower[3]:.6g} and {brackets.upper[3]:.6g}."
+    assert find(page, "bounds").inner_text().endswith(text)
+
+
+def test_solving_for_fewer_eigenpairs(page):
+    open_panel(page, "spectrum", "legend")
+    find(page, "k").fill("30")
+    find(page, "solve").click()
+    page.wait_for_function("eigenshape.state.spectrum.k === 30", timeout=60_000)
+    wait_until_still(page)
+    assert find(page, "mode").get_attribute("max") == "29"
+    assert "30 lowest eigenvalues" in find(page, "certificate").inner_text()
+
+
+def test_parts_equal_those_of_segment(page, mesh):
+    open_panel(page, "parts", "find-parts")
+    find(page, "find-parts").click()
+    find(page, "diagram").locator("canvas").wait_for(timeout=120_000)
+    wait_until_still(page)
+    found = es.find_parts(mesh)
+    assert find(page, "n-parts-value").inner_text() == str(len(found.parts.features.vertices))
+    finest = label_vertices(mesh, found.tree.basins)
+    for count in (1, 4, 9, len(found.tree.maxima)):
+        move_slider(page, "n-parts", count)
+        cut = es.segment(found.tree, n_regions=count)
+        assert_parts(page, cut, found.tree, finest)
+    for step in (300, 700):
+        move_slider(page, "persistence", step)
+        level = 1.02 * found.tree.persistence[1] * (step / 1000) ** 2
+        cut = es.segment(found.tree, persistence=level)
+        assert_parts(page, cut, found.tree, finest)
+        assert find(page, "n-parts").input_value() == str(len(cut.features.vertices))
+
+    move_slider(page, "n-parts", 5)
+    colors = np.round(255 * palette(vertex_labels(page)))
+    assert np.array_equal(vertex_values(page, "paint").reshape(-1, 3), colors)
+    check_clicks_on_parts(page, found)
+
+
+def assert_parts(page, cut, tree, finest):
+    """Check the part of each vertex: that of its finest region."""
+    part_of_region = np.full(len(tree.maxima), -1)
+    part_of_region[tree.basins] = cut.labels
+    assert np.array_equal(vertex_labels(page), part_of_region[finest])
+
+
+def check_clicks_on_parts(page, found):
+    """A click on the shape shows its part alone; one on the diagram marks a maximum and its part."""
+    _, _, vertex = click_shape(page)
+    part = vertex_labels(page)[vertex]
+    assert find(page, "chosen-part").inner_text().startswith(f"Part {part}:")
+    paint, labels = vertex_values(page, "paint").reshape(-1, 3), vertex_labels(page)
+    full = np.round(255 * palette(labels))
+    assert np.array_equal(paint[labels == part], full[labels == part])
+    assert (paint[labels != part] != full[labels != part]).any(axis=1).all()
+
+    tree = es.merge_tree(found.mesh, found.heat)
+    births, deaths = tree.values, tree.values - tree.persistence
+    # The finite maximum that lies farthest from all others, so that a click can only mean it.
+    places = np.column_stack([births, np.where(np.isinf(deaths), found.heat.min(), deaths)])
+    gaps = np.linalg.norm((places[:, None] - places[None]) / np.ptp(places, axis=0), axis=2)
+    np.fill_diagonal(gaps, np.inf)
+    index = int(gaps.min(axis=1).argmax())
+    at = """([x, y]) => {
+        const panel = [...eigenshape.pages.values()].find(({ panel }) => panel.id === "parts").panel;
+        return [panel.plot.valToPos(x, "x"), panel.plot.valToPos(y, "y")];
+    }"""
+    x, y = page.evaluate(at, places[index].tolist())
+    find(page, "diagram").locator(".u-over").click(position={"x": x, "y": y})
+    assert find(page, "maximum").input_value() == str(index)
+    marked = page.evaluate("Array.from(eigenshape.viewer.discs.geometry.index.array)")
+    assert marked == [tree.maxima[index]]
+    part = vertex_labels(page)[tree.maxima[index]]
+    assert find(page, "chosen-part").inner_text().startswith(f"Part {part}:")
+
+
+def test_shape_panel_opens_repairs_and_saves(page, folder, mesh):
+    open_panel(page, "shape")
+    assert "It is closed" in find(page, "health").inner_text()
+    with page.expect_download() as download:
+        find(page, "save-ply").click()
+    saved = es.read_mesh(download.value.path().rename(folder / "saved.ply"))
+    assert np.array_equal(saved.faces, mesh.faces)
+    with page.expect_download() as download:
+        find(page, "save-png").click()
+    png = io.BytesIO(download.value.path().read_bytes())
+    assert png.read(8) == b"\x89PNG\r\n\x1a\n"
+    assert download.value.suggested_filename == "quadruped.png"
+
+    turned = es.TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
+    es.write_mesh(turned, folder / "turned.obj")
+    with page.expect_file_chooser() as chooser:
+        find(page, "open").click()
+    chooser.value.set_files(folder / "turned.obj")
+    find(page, "repair-orient").wait_for()
+    assert find(page, "name").inner_text() == "turned.obj"
+    find(page, "repair-orient").click()
+    find(page, "repair-orient").wait_for(state="detached")
+    page.get_by_text("No repair is needed.").wait_for()
+
+    es.write_mesh(es.icosphere(2), folder / "dropped.obj")
+    drop_file(page, "stage", folder / "dropped.obj")
+    page.wait_for_function("eigenshape.state.name === 'dropped.obj'")
+    assert page.evaluate("eigenshape.viewer.vertices.length") == 3 * 162
+
+
+def test_search_ranks_shapes_and_shows_corresponding_points(page, folder, mesh):
+    open_panel(page, "search")
+    find(page, "search").click()
+    find(page, "match-0").wait_for(timeout=60_000)
+    index = es.ShapeIndex.open(folder / "index")
+    matches = index.query(mesh, n_matches=10)
+    cards = find(page, "matches").locator("button").all_inner_texts()
+    assert len(cards) == len(matches)
+    for card, match in zip(cards, matches, strict=True):
+        assert match.name in card
+        assert f"{match.score:.3f}" in card
+    find(page, "match-1").click()
+    find(page, "close-match").wait_for()
+    wait_until_still(page)
+    assert page.locator('[data-test="canvas"]').count() == 2
+    marked = page.evaluate("eigenshape.viewer.discs.geometry.index.count")
+    assert marked == len(matches[1].correspondences)
+    find(page, "close-match").click()
+    assert page.locator('[data-test="canvas"]').count() == 1
+
+
+def test_report_opens_from_a_file_without_a_server(browser, folder, mesh):
+    path = folder / "report.html"
+    height = mesh.vertices[:, 1]
+    write_report(mesh, path, name="quadruped", values={"height (m)": height})
+    with open_page(browser, path.as_uri()) as page:
+        assert find(page, "tab-deform").count() == find(page, "tab-search").count() == 0
+        find(page, "legend").wait_for()
+        assert_close(vertex_values(page), height, 1e-6)
+        assert find(page, "legend").inner_text().startswith("height, m")
+        open_panel(page, "spectrum", "legend")
+        move_slider(page, "mode", 5)
+        wait_until_still(page)
+        modes = es.solve_spectrum(es.cotangent_laplacian(mesh), 20).eigenvectors
+        assert_close(vertex_values(page), modes[:, 5], 1e-3)  # three digits, half precision
+        assert not find(page, "solve").is_visible()
+        open_panel(page, "heat", "legend")
+        open_panel(page, "parts", "diagram")
+        move_slider(page, "n-parts", 4)
+        found = es.find_parts(mesh)
+        cut = es.segment(found.tree, n_regions=4)
+        assert_parts(page, cut, found.tree, label_vertices(mesh, found.tree.basins))
+        assert picture(page)[..., 3].any()
