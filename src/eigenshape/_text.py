@@ -1,6 +1,7 @@
 """Text for people: names from outside made safe to print, and values in one line."""
 
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
+from html import escape
 from typing import Any
 
 LONGEST = 60  # characters of an entry that stands in full in the text of a value
@@ -53,7 +54,36 @@ def short_repr(value: Any) -> str:
     return f"{type(value).__name__}({', '.join(entries)})"
 
 
+def html_repr(value: Any) -> str:
+    """Return a value as a small table, which notebooks show: one row for each field.
+
+    All public values take it as their `_repr_html_`. A value without fields stands as its `repr`.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @dataclass
+    ... class Step:
+    ...     side: str
+    ...     _repr_html_ = html_repr
+    >>> print(Step("<left>")._repr_html_())
+    <table>
+    <caption>Step</caption>
+    <tr><th>side</th><td><code>&#x27;&lt;left&gt;&#x27;</code></td></tr>
+    </table>
+    """
+    if not is_dataclass(value):
+        return f"<code>{escape(repr(value))}</code>"
+    rows = []
+    for field in fields(value):
+        text = escape(_shorten(getattr(value, field.name)))
+        rows.append(f"<tr><th>{field.name}</th><td><code>{text}</code></td></tr>")
+    title = f"<caption>{type(value).__name__}</caption>"
+    return "\n".join(["<table>", title, *rows, "</table>"])
+
+
 def _shorten(entry: Any) -> str:
+    """Return a field as text of at most `LONGEST` characters, or its type and size."""
     text = repr(entry)
     in_full = len(text) <= LONGEST and "\n" not in text and "..." not in text
     if in_full:

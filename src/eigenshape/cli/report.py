@@ -8,7 +8,6 @@ import typer
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_written, progress_bar
 from eigenshape.cli.inputs import MeshArgument, RepairOption
-from eigenshape.plot.view import studio_module
 
 
 def report(
@@ -30,7 +29,7 @@ def report(
     For instance: eigenshape report scan.ply -o scan.html
     """
     steps.require_output(output, (".html",), "A report")
-    writer = studio_module("report")
+    writer = steps.studio_module("report")
     surface = steps.load_mesh(mesh, repair)
     with progress_bar("report") as progress:
         writer.write_report(surface, output, name=mesh.name, n_modes=n_modes, progress=progress)

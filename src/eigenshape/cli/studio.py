@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
+from eigenshape.cli import steps
 from eigenshape.cli.console import escape_text, out
-from eigenshape.plot.view import studio_module
 
 
 def studio(
@@ -43,7 +43,7 @@ def studio(
 
     For instance: eigenshape studio scan.ply --index my-index
     """
-    server = studio_module("server")
+    server = steps.studio_module("server")
 
     def announce(url: str) -> None:
         out.print(f"The studio is open at {escape_text(url)}")

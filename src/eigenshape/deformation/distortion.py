@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape.deformation.rigidity import edge_weights, fit_turns
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, bounding_box, edge_lengths
@@ -43,6 +43,7 @@ class Distortion:
     flipped: Int[np.ndarray, " k"]
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def measure_distortion(before: MeshLike, after: MeshLike) -> Distortion:

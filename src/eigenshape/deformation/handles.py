@@ -9,6 +9,7 @@ from jaxtyping import Float
 from eigenshape._arguments import require_each
 from eigenshape._arrays import finite_values, freeze
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 
 # Sine over cosine of two directions, below which they are parallel or opposite: far above the
@@ -52,6 +53,8 @@ class Rotation:
     pivot: Float[np.ndarray, " 3"]
     axis: Float[np.ndarray, " 3"]
     angle: float
+
+    _repr_html_ = html_repr
 
     def __init__(self, pivot: ArrayLike, axis: ArrayLike, angle: float) -> None:
         direction = vector(axis, "axis")
@@ -112,6 +115,8 @@ class Translation:
     """
 
     vector: Float[np.ndarray, " 3"]
+
+    _repr_html_ = html_repr
 
     def __init__(self, vector_: ArrayLike) -> None:
         object.__setattr__(self, "vector", freeze(vector(vector_, "vector")))

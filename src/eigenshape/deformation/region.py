@@ -12,6 +12,7 @@ from typing_extensions import TypeAliasType
 from eigenshape._arguments import describe_value
 from eigenshape._arrays import as_array, freeze, positive_values, real_numbers, whole_numbers
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.deformation.handles import vector
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -50,6 +51,8 @@ class BoxRegion:
 
     low: Float[np.ndarray, " 3"]
     high: Float[np.ndarray, " 3"]
+
+    _repr_html_ = html_repr
 
     def __init__(self, low: ArrayLike, high: ArrayLike) -> None:
         corners = [
@@ -101,6 +104,8 @@ class BrushRegion:
 
     center: Float[np.ndarray, " 3"]
     radius: float
+
+    _repr_html_ = html_repr
 
     def __init__(self, center: ArrayLike, radius: float) -> None:
         object.__setattr__(self, "center", freeze(vector(center, "center")))

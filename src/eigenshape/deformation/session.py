@@ -10,6 +10,7 @@ from jaxtyping import Float
 from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr
 from eigenshape.deformation.binding import Binding, bind
 from eigenshape.deformation.deform import bend
 from eigenshape.deformation.edits import Edit, Move, apply_edit, carry_edit
@@ -68,6 +69,12 @@ class DeformationSession:
         # Number of edits in the present pose; later edits were undone and can be redone.
         self._place = 0
         self._pending: tuple[Edit, Binding, SkeletonResponse] | None = None
+
+    def __repr__(self) -> str:
+        mesh, n_edits = self.mesh, self._place
+        return f"DeformationSession({mesh!r}, {n_edits} edits, {self.n_redoable} to redo)"
+
+    _repr_html_ = html_repr
 
     @property
     def rig(self) -> EigenRig:

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arguments import require_type
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.binding import Binding
 from eigenshape.deformation.handles import Handle, affine_offset, require_handles
@@ -39,6 +39,7 @@ class SkeletonResponse:
     weights: Float[np.ndarray, "r n 4"]
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 @one_blas_thread()

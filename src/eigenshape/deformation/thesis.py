@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arguments import require_type
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.binding import Binding
 from eigenshape.deformation.details import (
@@ -55,6 +55,7 @@ class DetailedSkeleton:
     second: FramedDetails
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 @one_blas_thread()

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arrays import freeze, vertex_values
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.features.loops import extended_loops
 from eigenshape.features.union_loops import join_points
@@ -39,6 +39,7 @@ class PersistencePairs:
     deaths: Float[np.ndarray, " p"]
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
     @property
     def persistence(self) -> Float[np.ndarray, " p"]:
@@ -79,6 +80,7 @@ class PersistenceDiagram:
     loops: PersistencePairs | None
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def persistence_diagram(

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from eigenshape._arrays import freeze, whole_number
 from eigenshape._progress import Progress
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape.features.boundaries import CONCAVITY, smooth_boundaries
 from eigenshape.features.contrast import PART_CONTRAST
 from eigenshape.features.part_merging import SEED_TIME, part_tree
@@ -59,6 +59,7 @@ class PartDecomposition:
     parts: Segmentation
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def find_parts(

@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +58,7 @@ class MergeTree(RegionTree):
     saddles: Int[np.ndarray, "m 2"]
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +90,7 @@ class PartTree(RegionTree):
     """
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def number_regions(

@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from eigenshape._arrays import finite_rows, freeze, whole_number
 from eigenshape._errors import InvalidShapeError
+from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.simplicial import Mesh
 
@@ -44,6 +45,8 @@ class PointCloud:
 
     points: Float[np.ndarray, "n d"]
     dim: int
+
+    _repr_html_ = html_repr
 
     def __init__(self, points: ArrayLike, dim: SupportsIndex = 2) -> None:
         coordinates = finite_rows(points, "points")

@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from eigenshape._arrays import finite_rows, freeze
 from eigenshape._errors import InvalidShapeError
+from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.simplices import size_one
 
@@ -29,6 +30,9 @@ class EnclosingBall:
 
     center: Float[np.ndarray, " d"]
     radius: float
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def enclosing_ball(points: ArrayLike) -> EnclosingBall:

@@ -7,6 +7,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._arrays import finite_rows, freeze, index_rows
 from eigenshape._errors import InvalidShapeError
+from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 
 
@@ -51,6 +52,8 @@ class TriangleMesh:
 
     vertices: Float[np.ndarray, "n 3"]
     faces: Int[np.ndarray, "f 3"]
+
+    _repr_html_ = html_repr
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
         points = finite_rows(vertices, "vertices", 3)

@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from eigenshape._arrays import finite_rows, freeze, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.requirements import require_sound
@@ -52,6 +53,8 @@ class Quadrature:
     points: Float[np.ndarray, "n d"]
     weights: Float[np.ndarray, " n"]
     dim: int
+
+    _repr_html_ = html_repr
 
     def __init__(self, points: ArrayLike, weights: ArrayLike, dim: SupportsIndex) -> None:
         coordinates = finite_rows(points, "points")

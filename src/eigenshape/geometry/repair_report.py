@@ -6,6 +6,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from jaxtyping import Int
 
+from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.simplices import MEASURES
 from eigenshape.geometry.simplicial import Mesh
@@ -34,6 +35,9 @@ class RepairedMesh(Generic[MeshT]):
     report: tuple[str, ...]
     source_vertices: Int[np.ndarray, " n"]
 
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
 
 @dataclass(frozen=True, eq=False)
 class RepairedCloud:
@@ -53,6 +57,9 @@ class RepairedCloud:
     cloud: PointCloud
     report: tuple[str, ...]
     source_points: Int[np.ndarray, " n"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def count_nouns(number: int, noun: str) -> str:

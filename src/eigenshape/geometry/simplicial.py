@@ -8,6 +8,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._arrays import finite_rows, freeze, index_rows
 from eigenshape._errors import InvalidShapeError
+from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.mesh import TriangleMesh
 
@@ -48,6 +49,8 @@ class SimplicialMesh:
 
     points: Float[np.ndarray, "n d"]
     simplices: Int[np.ndarray, "s corners"]
+
+    _repr_html_ = html_repr
 
     def __init__(self, points: ArrayLike, simplices: ArrayLike) -> None:
         coordinates = finite_rows(points, "points")

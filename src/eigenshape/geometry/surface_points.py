@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import freeze, whole_number
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.simplices import require_volumes, scaled_corners, volumes
 from eigenshape.geometry.simplicial import Mesh
@@ -37,6 +37,7 @@ class SurfacePoints:
     weights: Float[np.ndarray, "p corners"]
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
     @property
     def n_points(self) -> int:

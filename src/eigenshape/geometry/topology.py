@@ -8,6 +8,7 @@ from jaxtyping import Bool, Int
 from scipy.sparse.csgraph import connected_components
 
 from eigenshape._errors import InvalidShapeError, try_auto
+from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.facets import boundary_facets, facet_table
 from eigenshape.geometry.mesh import TriangleMesh
@@ -37,6 +38,9 @@ class EdgeTable:
     edges: Int[np.ndarray, "e 2"]
     face_edges: Int[np.ndarray, "f 3"]
     n_faces: Int[np.ndarray, " e"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def edge_table(mesh: MeshLike) -> EdgeTable:

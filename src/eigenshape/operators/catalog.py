@@ -8,6 +8,7 @@ from typing import Any
 import scipy.sparse as sp
 
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
@@ -44,6 +45,9 @@ class Operator:
     shapes: tuple[type, ...]
     options: tuple[str, ...]
     description: str
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 # The operator of each name in `OPERATOR_NAMES`.

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
 
+from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, scale_to_unit
@@ -51,6 +52,8 @@ class Camera:
 
     rotation: Float[np.ndarray, "3 3"]
     size: int
+
+    _repr_html_ = html_repr
 
 
 @one_blas_thread()

@@ -8,7 +8,7 @@ from jaxtyping import Int
 from matplotlib.axes import Axes
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.plot.camera import three_quarter_view
@@ -47,6 +47,7 @@ class Panel:
     vertices: Int[np.ndarray, " m"]
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
         if self.mesh is not None:

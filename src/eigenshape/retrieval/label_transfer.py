@@ -10,7 +10,7 @@ from scipy.spatial.distance import cdist
 
 from eigenshape._arrays import face_labels, freeze
 from eigenshape._progress import Progress
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.features.boundaries import smooth_boundaries
@@ -63,6 +63,7 @@ class LabelTransfer:
     confidence: Float[np.ndarray, " m"]
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 @one_blas_thread()

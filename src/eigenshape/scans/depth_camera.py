@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import freeze, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_normals
@@ -73,6 +73,8 @@ class DepthCamera:
     dropout: float = 0.01
     n_holes: int = 3
 
+    _repr_html_ = html_repr
+
 
 @dataclass(frozen=True, eq=False)
 class DepthScan:
@@ -93,6 +95,7 @@ class DepthScan:
     pixels: Int[np.ndarray, "n 2"]
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 @dataclass(frozen=True, eq=False)

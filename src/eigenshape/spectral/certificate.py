@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 
 
 @dataclass(frozen=True)
@@ -79,6 +79,7 @@ class Certificate:
     estimate: float | None = None
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
     @property
     def complete(self) -> bool:

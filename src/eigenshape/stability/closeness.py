@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_rows, freeze
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.enclosing_ball import enclosing_ball
@@ -60,6 +60,7 @@ class Closeness:
     limited_by: Limit
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
     def explain(self) -> str:
         """Describe in plain words how close the shapes are, and what limits δ."""

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_rows, freeze, positive_values
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.features.least_matching import least_perfect, near_pairs
 from eigenshape.features.matching_loops import match_rows
@@ -42,6 +42,7 @@ class MaximumMatching:
     blocked: Int[np.ndarray, " b"]
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
     @property
     def n_matched(self) -> int:
@@ -74,6 +75,7 @@ class BottleneckMatching:
     distance: float
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def matching_reach(mu: float) -> float:

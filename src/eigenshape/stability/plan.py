@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from eigenshape._text import html_repr
+
 # Eigenvalues to compare by default.
 USUAL_K = 20
 
@@ -39,3 +41,5 @@ class StabilityPlan:
     times: tuple[float, ...] = ()
     seed: int = 0
     brackets: bool = False
+
+    _repr_html_ = html_repr

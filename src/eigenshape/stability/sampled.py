@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from eigenshape._arrays import freeze
 from eigenshape._progress import Progress
+from eigenshape._text import html_repr
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.quadrature import uniform_quadrature
 from eigenshape.geometry.surface_points import sample_surface
@@ -71,6 +72,8 @@ class ChangeAtTime:
     weyl: float
     bound: float
     admissible: bool
+
+    _repr_html_ = html_repr
 
     @property
     def significant(self) -> bool:

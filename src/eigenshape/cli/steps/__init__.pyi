@@ -48,3 +48,4 @@ from .spectra import require_bracketable as require_bracketable
 from .spectra import require_drawable as require_drawable
 from .spectra import spectrum_facts as spectrum_facts
 from .spectra import usual_pairs as usual_pairs
+from .studio import studio_module as studio_module

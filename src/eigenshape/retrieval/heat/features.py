@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import freeze, vertex_values
 from eigenshape._progress import Progress
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.region_tree import MergeTree
@@ -74,6 +74,7 @@ class HeatFeatures:
     fragments: Int[np.ndarray, " c"]
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def heat_descriptor(

@@ -16,6 +16,7 @@ from scipy.special import logsumexp
 from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.patches import Patches
 
@@ -64,6 +65,8 @@ class PatchCodebook:
     shares: Float32[np.ndarray, "b w"]
     centers: Float32[np.ndarray, "b w d"]
     variances: Float32[np.ndarray, "b w d"]
+
+    _repr_html_ = html_repr
 
     @cached_property
     def digest(self) -> str:

@@ -9,7 +9,7 @@ from jaxtyping import Float32, Int, Int8
 from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook, encode_patches
 from eigenshape.retrieval.patches.matching import PatchPoints, patch_points
@@ -42,6 +42,9 @@ class PatchRecipe:
 
     codebook: PatchCodebook = field(default_factory=default_codebook)
 
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
     @property
     def name(self) -> str:
         """Return a short name for messages and tables."""
@@ -71,6 +74,7 @@ class PatchDescriptor:
     recipe: PatchRecipe
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
     @property
     def vertices(self) -> Int[np.ndarray, " m"]:

@@ -8,7 +8,7 @@ from jaxtyping import Float, Float32, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.codebook import BASES, N_SIZES, PatchCodebook, whiten_numbers
 from eigenshape.retrieval.patches.matching_loops import leading, nearest_of_each_other
@@ -56,6 +56,7 @@ class PatchPoints:
     vertices: Int[np.ndarray, " m"]
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +88,7 @@ class PatchMatch:
     step: int
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def patch_points(shape: Patches, codebook: PatchCodebook) -> PatchPoints:

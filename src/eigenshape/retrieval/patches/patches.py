@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import shortest_path
 
 from eigenshape._arrays import freeze, whole_number
 from eigenshape._errors import InvalidShapeError
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.fragments import fragment_vertices
 from eigenshape.geometry.geodesic import farthest_points
@@ -58,6 +58,7 @@ class Patches:
     distances: Float32[np.ndarray, "m m"]
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def extract_patches(

@@ -11,6 +11,7 @@ from jaxtyping import Int
 from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import StoreError
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
@@ -56,6 +57,9 @@ class Record:
     digest: str | None
     recipes: tuple[AnyRecipe, ...]
 
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
 
 @dataclass(frozen=True, eq=False)
 class Match:
@@ -89,6 +93,9 @@ class Match:
     correspondences: Int[np.ndarray, "p 2"]
     vertices: Int[np.ndarray, " m"]
     view: int
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 @dataclass(frozen=True)
@@ -124,6 +131,8 @@ class ShapeIndex:
     """
 
     folder: Path
+
+    _repr_html_ = html_repr
 
     @classmethod
     def create(cls, folder: str | Path) -> "ShapeIndex":

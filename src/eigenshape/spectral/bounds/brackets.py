@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from eigenshape._arrays import freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import FacetTable, facet_components, facet_table, without_pinches
@@ -74,6 +74,7 @@ class Brackets:
     rounding: float
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
     def explain(self) -> str:
         """Return a text that says what is bounded, and how tightly."""

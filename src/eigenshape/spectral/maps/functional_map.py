@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import as_array, freeze, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.spectral.signatures.heat import NULL
@@ -68,6 +68,7 @@ class FunctionalMap:
     target: Spectrum
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
         require_one_constant(self.source, "source")

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import freeze, positive_values, whole_number
 from eigenshape._progress import Progress, silent
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian
@@ -72,6 +72,7 @@ class ApproximateSignature:
     complete: bool
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def approximate_heat_signature(
