@@ -6,6 +6,7 @@ from math import log
 from typing import Literal
 
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import repr_of_changes
 
 # Scales are a geometric sequence if the steps of their logarithms differ by less than this.
 EQUAL_STEPS = 1e-9
@@ -72,6 +73,8 @@ class HeatRecipe:
     n_modes: int = 150
     reflections: bool = False
     n_shifts: int = 5
+
+    __repr__ = repr_of_changes
 
     def __post_init__(self) -> None:
         geometric = False

@@ -11,6 +11,7 @@ from jaxtyping import Int
 from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import StoreError
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
@@ -80,6 +81,20 @@ class Match:
     See Also
     --------
     ShapeIndex.query
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import eigenshape as es
+    >>> recipe = es.retrieval.SCALE_FREE
+    >>> index = es.ShapeIndex.create(tempfile.mkdtemp())
+    >>> for name in ("fish", "biped"):
+    ...     mesh = es.make_creature(name, n_vertices=500)
+    ...     index.add_descriptors(name, [es.describe(mesh, recipe)], label="creature")
+    >>> scan = es.make_creature("fish", pose=1, n_vertices=500)
+    >>> match = index.query(es.describe(scan, recipe), n_matches=1)[0]
+    >>> match.name, match.label, len(match.vertices)
+    ('fish', 'creature', 15)
     """
 
     name: str
@@ -89,6 +104,8 @@ class Match:
     correspondences: Int[np.ndarray, "p 2"]
     vertices: Int[np.ndarray, " m"]
     view: int
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
