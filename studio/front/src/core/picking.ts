@@ -2,7 +2,7 @@
 
 import * as three from "three";
 import type { Vec3 } from "./backend";
-import { cross, dot, length, subtract, vertexOf } from "./motion";
+import { length, subtract, vertexOf } from "./motion";
 import { PICK_FRAGMENT, PICK_VERTEX, POSITION_FRAGMENT, POSITION_VERTEX } from "./shaders";
 
 export interface Hit {
@@ -26,8 +26,6 @@ export class Picker {
   private readonly pixel: three.WebGLRenderTarget;
   private readonly scene = new three.Scene();
   private readonly space = new three.Group();
-  private facesOf: Uint32Array = new Uint32Array(0); // faces sorted by their last corner
-  private begins: Uint32Array = new Uint32Array(0);
 
   constructor(
     private readonly renderer: three.WebGLRenderer,
@@ -58,17 +56,6 @@ export class Picker {
     this.scene.add(this.space);
   }
 
-  /** Take a new list of faces. */
-  setFaces(faces: Uint32Array, nVertices: number): void {
-    const count = faces.length / 3;
-    this.begins = new Uint32Array(nVertices + 1);
-    for (let face = 0; face < count; face++) this.begins[faces[3 * face + 2]! + 1]!++;
-    for (let vertex = 0; vertex < nVertices; vertex++) this.begins[vertex + 1]! += this.begins[vertex]!;
-    const next = this.begins.slice();
-    this.facesOf = new Uint32Array(count);
-    for (let face = 0; face < count; face++) this.facesOf[next[faces[3 * face + 2]!]!++] = face;
-  }
-
   /** Return what lies under a place of the picture, in pixels of the page. */
   pick(x: number, y: number, width: number, height: number, camera: three.PerspectiveCamera, world: three.Matrix4) {
     const mesh = this.addToScene(new three.Mesh(this.geometry, this.surface), world);
@@ -82,7 +69,7 @@ export class Picker {
       return values;
     }) as [Float32Array, Float32Array];
     if (!rest[3]) return null;
-    const face = this.findFace(Math.round(rest[3]) - 1, vertexOf(rest, 0));
+    const face = this.findFace(Math.round(rest[3]) - 1, new three.Vector3().fromArray(rest));
     const corners = vertexOf(this.geometry.index!.array, face);
     const points = this.geometry.getAttribute("position").array;
     const away = (vertex: number) => length(subtract(vertexOf(points, vertex), vertexOf(rest, 0)));
@@ -129,28 +116,23 @@ export class Picker {
     this.renderer.setClearColor(color, opacity);
   }
 
-  /** Return the face with this last corner whose plane and inside are nearest to a point. */
-  private findFace(last: number, point: Vec3): number {
-    const faces = this.facesOf.subarray(this.begins[last], this.begins[last + 1]);
-    let [best, least] = [faces[0]!, Infinity];
-    for (const face of faces) {
+  /** Return the face with this last corner that is nearest to a point. */
+  private findFace(last: number, point: three.Vector3): number {
+    const corners = this.geometry.index!.array;
+    let [best, least] = [-1, Infinity];
+    for (let face = 0; 3 * face < corners.length; face++) {
+      if (corners[3 * face + 2] !== last) continue;
       const away = this.distanceToFace(face, point);
       if (away < least) [best, least] = [face, away];
     }
     return best;
   }
 
-  private distanceToFace(face: number, point: Vec3): number {
-    const points = this.geometry.getAttribute("position").array;
-    const [a, b, c] = vertexOf(this.geometry.index!.array, face).map((v) => vertexOf(points, v)) as [Vec3, Vec3, Vec3];
-    const normal = cross(subtract(b, a), subtract(c, a));
-    const size = length(normal) || 1e-300;
-    let outside = Math.abs(dot(normal, subtract(point, a))) / size;
-    for (const [one, two] of [[a, b], [b, c], [c, a]] as [Vec3, Vec3][]) {
-      const inward = cross(normal, subtract(two, one));
-      const depth = dot(inward, subtract(point, one)) / (length(inward) || 1e-300);
-      outside += Math.max(-depth, 0);
-    }
-    return outside;
+  private distanceToFace(face: number, point: three.Vector3): number {
+    const points = this.geometry.getAttribute("position");
+    const triangle = new three.Triangle();
+    const [a, b, c] = vertexOf(this.geometry.index!.array, face);
+    triangle.setFromAttributeAndIndices(points, a, b, c);
+    return triangle.closestPointToPoint(point, new three.Vector3()).distanceTo(point);
   }
 }

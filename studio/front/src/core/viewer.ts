@@ -46,7 +46,8 @@ export class Viewer {
   vertices: Float32Array = new Float32Array(0);
   faces: Uint32Array = new Uint32Array(0);
   labels: Int32Array | null = null;
-  extent = 1; // diagonal of the box around the mesh
+  readonly box = new three.Box3(); // around the mesh, as it was loaded
+  extent = 1; // its diagonal
   private readonly renderer: three.WebGLRenderer | null;
   private readonly picker: Picker | null;
   private readonly motion = {
@@ -58,7 +59,6 @@ export class Viewer {
     blend: { value: 0 },
   };
   private readonly surface: three.Mesh<three.BufferGeometry, three.ShaderMaterial>;
-  private readonly crossing: three.Mesh<three.BufferGeometry, three.ShaderMaterial>;
   private readonly skeleton: three.Mesh<three.BufferGeometry, three.ShaderMaterial>;
   private readonly discs: three.Points<three.BufferGeometry, three.ShaderMaterial>;
   private readonly layers = new Map<string, { vertices: ArrayLike<number>; color: string }>();
@@ -75,18 +75,14 @@ export class Viewer {
     stage.append(this.canvas);
     this.canvas.setAttribute("aria-label", "The shape. Arrow keys turn it, + and - zoom.");
     this.surface = new three.Mesh(this.geometry, this.surfaceMaterial(PLAIN));
-    this.crossing = new three.Mesh(new three.BufferGeometry(), this.surfaceMaterial("#d8301f"));
-    this.crossing.material.polygonOffset = true;
-    this.crossing.material.polygonOffsetFactor = this.crossing.material.polygonOffsetUnits = -2;
     this.skeleton = new three.Mesh(new three.BufferGeometry(), this.surfaceMaterial("#3f7fae"));
     this.discs = new three.Points(new three.BufferGeometry(), this.pointMaterial());
-    this.crossing.visible = this.skeleton.visible = this.discs.visible = false;
+    this.skeleton.visible = this.discs.visible = false;
     this.surface.renderOrder = 1;
     this.skeleton.renderOrder = 2; // over the veil of the surface, also where it lies behind it
     this.skeleton.material.transparent = true;
-    this.crossing.renderOrder = 3;
-    this.discs.renderOrder = 4;
-    for (const object of [this.skeleton, this.surface, this.crossing, this.discs]) {
+    this.discs.renderOrder = 3;
+    for (const object of [this.skeleton, this.surface, this.discs]) {
       object.frustumCulled = false; // the shader moves vertices out of the box of the geometry
       this.space.add(object);
     }
@@ -114,17 +110,15 @@ export class Viewer {
     attribute("value", new Float32Array(count), 1);
     attribute("paint", new Uint8Array(3 * count), 3);
     attribute("mark", new Uint8Array(4 * count), 4);
-    this.picker?.setFaces(faces, count);
     this.layers.clear();
-    this.markFaces([]);
     this.setPoints([], PLAIN);
     this.setSkeleton(null);
     this.setScalars(null);
     this.setHandles([]);
-    const box = new three.Box3().setFromArray(vertices);
-    const size = (this.extent = box.getSize(new three.Vector3()).length() || 1);
+    const size = this.box.setFromArray(vertices).getSize(new three.Vector3()).length() || 1;
+    this.extent = size;
     this.space.scale.setScalar(1 / size);
-    this.space.position.copy(box.getCenter(new three.Vector3())).multiplyScalar(-1 / size);
+    this.space.position.copy(this.box.getCenter(new three.Vector3())).multiplyScalar(-1 / size);
     this.space.updateMatrixWorld(true);
     this.camera.up.set(...up);
     this.controls.dispose();
@@ -246,14 +240,10 @@ export class Viewer {
     this.invalidate();
   }
 
-  /** Show faces in red. */
+  /** Tint the corners of faces in red. */
   markFaces(faces: ArrayLike<number>): void {
-    this.crossing.visible = faces.length > 0;
-    const corners = new Uint32Array(3 * faces.length);
-    for (let place = 0; place < faces.length; place++)
-      corners.set(this.faces.subarray(3 * faces[place]!, 3 * faces[place]! + 3), 3 * place);
-    this.shareBuffers(this.crossing.geometry, corners);
-    this.invalidate();
+    const corners = Array.from(faces, (face) => [...this.faces.subarray(3 * face, 3 * face + 3)]);
+    this.setMarks(corners.flat(), "#d8301f", "crossing");
   }
 
   /** Show the eigen-skeleton in a veil of the surface. */
