@@ -82,7 +82,11 @@ def _deformation_case(mesh: es.TriangleMesh) -> dict:
         "box": {"low": box.low.tolist(), "high": box.high.tolist(), "vertices": _where(mask)},
         "rim": es.deformation.region_boundary(mesh, mask).tolist(),
         "brushes": [
-            {"vertex": at, "radius": radius, "vertices": _where(es.deformation.region_mask(mesh, disc))}
+            {
+                "vertex": at,
+                "radius": radius,
+                "vertices": _where(es.deformation.region_mask(mesh, disc)),
+            }
             for (at, radius), disc in zip(brushes, discs, strict=True)
         ],
         "shares": _plain(shares),
