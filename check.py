@@ -1,7 +1,7 @@
 """Run the checks: format, lint, types, layers, tests. CI runs this same file.
 
 python check.py           all of it but the long tests; under three minutes on two cores
-python check.py --all     the long tests and the docs site, too
+python check.py --all     the long tests, the docs site and the studio in a browser, too
 python check.py --fast    without the tests
 """
 
@@ -16,6 +16,7 @@ CHECKS = {
     "layers": ["-c", "from importlinter.cli import lint_imports_command as main; main()"],
 }
 TESTS = ["-m", "pytest", "-n", "2"]
+STUDIO = ["-m", "pytest", "studio/tests"]
 DOCS = ["-m", "sphinx", "-q", "-W", "--keep-going", "docs"]
 
 
@@ -27,6 +28,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as site:
         if "--all" in options:
             checks["docs"] = [*DOCS, site]
+            checks["studio"] = STUDIO
             checks["all tests"] = TESTS
         elif "--fast" not in options:
             checks["tests"] = [*TESTS, "-m", "not long"]

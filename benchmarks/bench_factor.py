@@ -21,7 +21,7 @@ from report import Report, Row, in_process, options_of
 from scipy.sparse.linalg import splu
 
 import eigenshape as es
-from eigenshape.sparse.elimination import analyse, factorise
+from eigenshape.sparse.elimination import analyze_pattern, factorize_symmetric
 
 PACKAGES = [
     "eigenshape",
@@ -72,8 +72,8 @@ def clock(work: Callable[[], object]) -> tuple[float, object]:
 def ours(a: sp.csc_array, right: np.ndarray) -> tuple[Timed, np.ndarray, dict[str, float]]:
     """Nested dissection, multifrontal L D Lᵀ."""
     a.sort_indices()
-    analysis, elimination = clock(lambda: analyse(a))
-    factoring, factor = clock(lambda: factorise(elimination, a.data))
+    analysis, elimination = clock(lambda: analyze_pattern(a))
+    factoring, factor = clock(lambda: factorize_symmetric(elimination, a.data))
     solution = np.empty_like(right)
     scratch = factor.scratch()
     solving, _ = clock(lambda: factor.solve_lanes(right, solution, scratch))

@@ -103,9 +103,9 @@ def lapy(mesh: es.TriangleMesh) -> tuple[np.ndarray, np.ndarray, float]:
 def tomato(mesh: es.TriangleMesh, heat: np.ndarray) -> np.ndarray:
     """Return the vertices of the most persistent maxima, highest first in each of ToMATo's clusters."""
     graph = sp.csr_array(es.operators.edge_graph(mesh))
-    neighbours = np.split(graph.indices, graph.indptr[1:-1])
+    neighbors = np.split(graph.indices, graph.indptr[1:-1])
     found = Tomato(graph_type="manual", density_type="manual", n_clusters=N_FEATURES).fit(
-        neighbours, weights=heat
+        neighbors, weights=heat
     )
     order = np.lexsort((-heat, found.labels_))
     return order[np.unique(found.labels_[order], return_index=True)[1]]

@@ -4,7 +4,7 @@
     python benchmarks/bench_kernel.py --repeats 1
 
 Points lie on the unit sphere. The first size is that of the mesh Laplacian at t = e²; the second a million points with
-100 neighbours each. Every method ends with the same matrix, W as sparse rows; each runs in a process of its own, after
+100 neighbors each. Every method ends with the same matrix, W as sparse rows; each runs in a process of its own, after
 one small run that loads and compiles what it needs. Wall seconds, median; a ratio under 1.4 is a tie. What bounds the
 work is memory: a matrix of z entries has 12 z bytes, to be written once, and z exponentials.
 """
@@ -25,7 +25,7 @@ from sklearn.neighbors import radius_neighbors_graph
 
 from eigenshape.operators import gaussian_laplacian
 
-SIZES = {"mesh Laplacian, t = e²": (160_000, 247), "graph, 100 neighbours": (1_000_000, 100)}
+SIZES = {"mesh Laplacian, t = e²": (160_000, 247), "graph, 100 neighbors": (1_000_000, 100)}
 CUTOFF = 4.0
 
 
@@ -52,7 +52,7 @@ def kd_tree(points: np.ndarray, t: float) -> sp.csr_array:
 
 
 def scikit_learn(points: np.ndarray, t: float) -> sp.csr_array:
-    """Take all distances from scikit-learn's neighbour graph, on two processes' worth of threads."""
+    """Take all distances from scikit-learn's neighbor graph, on two processes' worth of threads."""
     graph = sp.csr_array(
         radius_neighbors_graph(points, CUTOFF * 2 * t**0.5, mode="distance", n_jobs=2)
     )
@@ -69,12 +69,12 @@ def _stiffness(kernel: sp.csr_array, t: float) -> sp.csr_array:
 METHODS = {"eigenshape": ours, "cKDTree": kd_tree, "scikit-learn": scikit_learn}
 
 
-def measured(method: str, n: int, neighbours: int, repeats: int) -> tuple[float, float, float, int]:
+def measured(method: str, n: int, neighbors: int, repeats: int) -> tuple[float, float, float, int]:
     """Return seconds, peak GiB, a checksum and the number of entries; run in a process of its own."""
     warnings.simplefilter("ignore")
     build: Callable[[np.ndarray, float], sp.csr_array] = METHODS[method]
     build(sphere_points(2000), 0.002)
-    points, t = sphere_points(n), neighbours / (CUTOFF**2 * n)  # π (4h)² of 4π holds so many
+    points, t = sphere_points(n), neighbors / (CUTOFF**2 * n)  # π (4h)² of 4π holds so many
     times = []
     for _ in range(repeats):
         start = time.perf_counter()
@@ -95,12 +95,12 @@ def main() -> None:
         f"{'':<26} {'n':>8} {'entries':>10} {'seconds':>8} {'ratio':>6} {'peak GiB':>9} {'trace':>14}\n"
     )
     context = multiprocessing.get_context("spawn")
-    for size, (n, neighbours) in SIZES.items():
+    for size, (n, neighbors) in SIZES.items():
         base = 0.0
         for method in METHODS:
             with context.Pool(1) as pool:
                 seconds, peak, checksum, entries = pool.apply(
-                    measured, (method, n, neighbours, repeats)
+                    measured, (method, n, neighbors, repeats)
                 )
             base = base or seconds
             sys.stdout.write(

@@ -79,8 +79,8 @@ def _complex(mesh: es.TriangleMesh, height: np.ndarray) -> gudhi.SimplexTree:
 def gudhi_tomato(mesh: es.TriangleMesh, height: np.ndarray) -> np.ndarray:
     """Let ToMATo climb and merge on the graph of edges."""
     graph = sp.csr_array(es.operators.edge_graph(mesh))
-    neighbours = np.split(graph.indices, graph.indptr[1:-1])
-    found = Tomato(graph_type="manual", density_type="manual").fit(neighbours, weights=height)
+    neighbors = np.split(graph.indices, graph.indptr[1:-1])
+    found = Tomato(graph_type="manual", density_type="manual").fit(neighbors, weights=height)
     finite = -np.diff(found.diagram_, axis=1)[:, 0]
     return np.sort(np.append(finite[finite > 0], np.full(len(found.max_weight_per_cc_), np.inf)))[
         ::-1

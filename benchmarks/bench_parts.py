@@ -93,11 +93,11 @@ def _rounding(of: Any) -> Work:
 
 
 PARTS: tuple[tuple[str, object, str, Callable[..., Work]], ...] = (
-    ("order and analysis", pencil, "analyse", _analysis),
-    ("factors", pencil, "factorise", _factor),
-    ("factors", factor, "factorise_symmetric", _factor),
+    ("order and analysis", pencil, "analyze_pattern", _analysis),
+    ("factors", pencil, "factorize_symmetric", _factor),
+    ("factors", factor, "factorize_symmetric", _factor),
     ("solves", SymmetricFactor, "solve_lanes", _solve),
-    ("orthogonalisation", lanczos, "_orthonormalize", _orthogonal),
+    ("orthogonalization", lanczos, "_orthonormalize", _orthogonal),
     ("Ritz values", lanczos, "_ritz", _eigh),
     ("Ritz vectors", lanczos, "_vectors", _combine),
     ("residuals", pairs, "rayleigh_residuals", _residuals),

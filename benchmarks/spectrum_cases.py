@@ -1,4 +1,4 @@
-"""The shapes of `bench_spectrum.py`: made-up ones with multiple eigenvalues, real ones, graphs of neighbours."""
+"""The shapes of `bench_spectrum.py`: made-up ones with multiple eigenvalues, real ones, graphs of neighbors."""
 
 import os
 from collections.abc import Callable
@@ -15,7 +15,7 @@ DATA = Path(os.environ.get("EIGENSHAPE_DATA", ROOT.parent / "shared" / "data"))
 
 @dataclass(frozen=True)
 class Case:
-    """A shape and how many eigenpairs of it; `make` returns a mesh, or the points of a graph of neighbours."""
+    """A shape and how many eigenpairs of it; `make` returns a mesh, or the points of a graph of neighbors."""
 
     title: str
     make: Callable[[], es.TriangleMesh | np.ndarray]
@@ -53,13 +53,13 @@ FULL = {
     "armadillo": real("armadillo", "classics/armadillo.obj"),
     "dragon": real("dragon", "classics/dragon.off"),
     "graph-sphere": Case(
-        "10 neighbours, sphere",
+        "10 neighbors, sphere",
         lambda: np.array(es.shapes.fibonacci_sphere(10_000).vertices),
         50,
         10,
     ),
     "graph-bunny": Case(
-        "10 neighbours, bunny",
+        "10 neighbors, bunny",
         lambda: np.asarray(es.read_points(DATA / "points" / "bunny16k.pts").points),
         50,
         10,
@@ -69,6 +69,6 @@ QUICK = {
     "sphere": Case("icosphere", lambda: es.icosphere(3), 30),
     "torus": Case("torus", lambda: es.shapes.torus(36, 24), 30),
     "graph": Case(
-        "8 neighbours, sphere", lambda: np.array(es.shapes.fibonacci_sphere(800).vertices), 20, 8
+        "8 neighbors, sphere", lambda: np.array(es.shapes.fibonacci_sphere(800).vertices), 20, 8
     ),
 }

@@ -21,11 +21,8 @@ def main(folder: Path) -> dict[str, es.TriangleMesh]:
     rim = es.deformation.region_boundary(giraffe, es.deformation.region_mask(giraffe, head))
 
     session = es.DeformationSession(es.rig_shape(giraffe))
-    for degrees in (
-        10,
-        20,
-        30,
-    ):  # as a hand would drag: each shows the eigen-skeleton, and costs a millisecond
+    # As a hand would drag: each step shows the eigen-skeleton and costs a millisecond
+    for degrees in (10, 20, 30):
         session.drag(
             head, es.Rotation(giraffe.vertices[rim].mean(axis=0), [1, 0, 0], np.deg2rad(degrees))
         )
@@ -42,7 +39,8 @@ def main(folder: Path) -> dict[str, es.TriangleMesh]:
 
     es.io.write_edits(session.edits, giraffe, folder / "edits.json")
     edits = es.io.read_edits(folder / "edits.json", giraffe)
-    again = es.deformation.replay(es.rig_shape(es.geometry.subdivide(giraffe)), edits).mesh
+    finer = es.rig_shape(es.geometry.subdivide(giraffe))
+    again = es.deformation.replay(finer, edits, source=giraffe).mesh
     es.save_figure(
         es.plot.figure_poses({"as made": giraffe, "bent": lifted}, session_shares(giraffe, lifted)),
         folder / "giraffe.png",

@@ -13,7 +13,7 @@ import eigenshape as es
 
 
 def figure_variants(surgeries: Mapping[str, Surgery], caption: str) -> Figure:
-    """Draw M and each N, the anomalous regions in colour."""
+    """Draw M and each N, the anomalous regions in color."""
     first = next(iter(surgeries.values()))
     query = es.plot.Panel(
         first.one, "M", np.full(first.one.n_faces, -1), np.array([], dtype=np.int64)

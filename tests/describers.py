@@ -8,7 +8,8 @@ from filelock import FileLock
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.retrieval.heat.descriptor import HeatDescriptor, HeatRecipe
+from eigenshape.retrieval.heat.descriptor import HeatDescriptor
+from eigenshape.retrieval.heat.recipe import HeatRecipe
 from eigenshape.shapes.surfaces import icosphere
 
 RECIPE = HeatRecipe(name="test", scales=(1.0, 2.0, 4.0), n_features=2, n_shifts=0)

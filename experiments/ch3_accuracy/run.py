@@ -94,7 +94,7 @@ Case = tuple[
 CASES: dict[str, Case] = {
     "sphere, Fibonacci": (es.shapes.fibonacci_sphere, es.shapes.sphere_eigenvalues, CLOSED, False),
     "sphere, icosphere": (icosphere, es.shapes.sphere_eigenvalues, CLOSED, False),
-    "sphere, 4:1 density": (es.shapes.graded_sphere, es.shapes.sphere_eigenvalues, CLOSED, False),
+    "sphere, 4:1 density": (es.shapes.uneven_sphere, es.shapes.sphere_eigenvalues, CLOSED, False),
     "sphere, random": (random_sphere, es.shapes.sphere_eigenvalues, CLOSED, False),
     "flat torus in R⁴": (
         flat_torus,

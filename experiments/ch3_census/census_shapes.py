@@ -132,7 +132,7 @@ GRAPHS: dict[str, Callable[[], sp.csr_array]] = {
     "lattice 20 x 20": lambda: product(cycle(20), cycle(20)),
     "hypercube 9": lambda: product(*[sp.csr_array(np.ones((2, 2)) - np.eye(2))] * 9),
     "lattice 8 x 8 x 8": lambda: product(cycle(8), cycle(8), cycle(8)),
-    "8 neighbours, icosphere": lambda: es.operators.neighbor_graph(es.icosphere(3).vertices, 8),
+    "8 neighbors, icosphere": lambda: es.operators.neighbor_graph(es.icosphere(3).vertices, 8),
     "complete 320": lambda: sp.csr_array(np.ones((320, 320)) - np.eye(320)),
 }
 MASSES = ("lumped", "consistent", "averaged")

@@ -45,15 +45,15 @@ def figure_law(points: list[dict], samples: list[dict], setup: dict) -> Figure:
             color=color,
         )
         right.plot(deltas / t**0.5, means * t, "o-", ms=4, lw=0.8, color=color, label=f"t = {t:g}")
-    left.plot([], [], "-", color="grey", label="our bound, δ t$^{-5/2}$ with its constant")
-    left.plot([], [], "--", color="grey", label="our bound for dense samples, 3.54 δ t$^{-3/2}$")
-    left.plot([], [], ":", color="grey", label="slope of Theorem 4.3.1, δ$^{4/5}$ t$^{-12/5}$")
+    left.plot([], [], "-", color="gray", label="our bound, δ t$^{-5/2}$ with its constant")
+    left.plot([], [], "--", color="gray", label="our bound for dense samples, 3.54 δ t$^{-3/2}$")
+    left.plot([], [], ":", color="gray", label="slope of Theorem 4.3.1, δ$^{4/5}$ t$^{-12/5}$")
     t = samples[0]["t"]
     deltas, changes = columns(samples, "delta", "change")
     right.plot(deltas / t**0.5, changes * t, "k^", ms=4, label="independent samples, matched")
     ends = np.array(right.get_xlim())
     right.plot(
-        ends, dense.constant * ends, "--", lw=1, color="grey", label="our bound for dense samples"
+        ends, dense.constant * ends, "--", lw=1, color="gray", label="our bound for dense samples"
     )
     right.axvspan(
         1, right.get_xlim()[1], color="#f5e3df", zorder=0, label="t < δ², which the theorem forbids"
@@ -83,7 +83,7 @@ def figure_forbidden(points: list[dict], setup: dict) -> Figure:
     axes.axvspan(
         1, axes.get_xlim()[1], color="#f5e3df", zorder=0, label="t < δ², which the theorem forbids"
     )
-    axes.axhline(1, color="grey", lw=0.8, ls="--")
+    axes.axhline(1, color="gray", lw=0.8, ls="--")
     label(
         axes,
         "δ / √t",

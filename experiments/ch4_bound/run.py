@@ -146,7 +146,7 @@ def exponents(rows: list[dict], measured: str = "change") -> dict[str, float]:
     return {"delta": law.delta, "t": law.t, "constant": law.constant}
 
 
-def summarise(points: list[dict], samples: list[dict], surfaces: list[dict]) -> dict[str, object]:
+def summarize(points: list[dict], samples: list[dict], surfaces: list[dict]) -> dict[str, object]:
     """Gather exponents and constants beside those that are proven."""
     allowed = [row for row in points if row["t"] >= SHORT * row["delta"] ** 2]
     forbidden = [row for row in points if row["t"] <= row["delta"] ** 2 / SHORT]
@@ -267,7 +267,7 @@ def main() -> None:
         "forbidden": figure_forbidden(points, setup),
         "surfaces": figure_surfaces(surfaces, setup),
     }
-    finish(rounded(summarise(points, samples, surfaces)), pictures, arguments)
+    finish(rounded(summarize(points, samples, surfaces)), pictures, arguments)
 
 
 if __name__ == "__main__":

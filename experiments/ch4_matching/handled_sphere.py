@@ -42,7 +42,7 @@ def make_pair(
 
 
 def draw_together(points: np.ndarray, centers: np.ndarray, share: float) -> np.ndarray:
-    """Move points of the unit sphere towards the centres near them: on the sphere, edges at a centre shrink so much."""
+    """Move points of the unit sphere towards the centers near them: on the sphere, edges at a center shrink so much."""
     moved = points.copy()
     for center in centers:
         angle = np.arccos(np.clip(points @ center, -1, 1))

@@ -1,4 +1,4 @@
-"""How well automatic parts agree with those that people see: Rand index over labelled shapes.
+"""How well automatic parts agree with those that people see: Rand index over labeled shapes.
 
 What is done is kept in a folder, so that a stopped run goes on where it was.
 """
@@ -37,16 +37,16 @@ Labels = np.ndarray
 
 
 def shapes(quick: bool) -> list[tuple[str, str, Path]]:
-    """List name, class and file of the labelled shapes by class and number, or two of each of some classes."""
+    """List name, class and file of the labeled shapes by class and number, or two of each of some classes."""
     found = [(row["cls"], Path(row["path"])) for row in manifest()]
-    labelled = [
+    labeled = [
         (cls, path) for cls, path in found if (DATA / "parts" / f"{cls}-{path.stem}.npy").exists()
     ]
-    labelled.sort(key=lambda one: (one[0], int(one[1].stem.removeprefix("psb"))))
+    labeled.sort(key=lambda one: (one[0], int(one[1].stem.removeprefix("psb"))))
     if quick:
-        members = {cls: [one for one in labelled if one[0] == cls] for cls in QUICK}
-        labelled = [one for cls in QUICK for one in (members[cls][0], members[cls][-1])]
-    return [(f"{cls}-{path.stem}", cls, DATA / path) for cls, path in labelled]
+        members = {cls: [one for one in labeled if one[0] == cls] for cls in QUICK}
+        labeled = [one for cls in QUICK for one in (members[cls][0], members[cls][-1])]
+    return [(f"{cls}-{path.stem}", cls, DATA / path) for cls, path in labeled]
 
 
 def tuning_names() -> set[str]:
@@ -60,7 +60,7 @@ def tuning_names() -> set[str]:
     }
 
 
-def face_neighbours(mesh: es.TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
+def face_neighbors(mesh: es.TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
     """Return the pairs of faces at an edge, and the edge."""
     table = es.geometry.edge_table(mesh)
     order = np.argsort(table.face_edges.ravel(), kind="stable")
@@ -71,7 +71,7 @@ def face_neighbours(mesh: es.TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
 
 def pieces(mesh: es.TriangleMesh, labels: Labels) -> Labels:
     """Tell apart the connected pieces of one label: two legs have one label, and are two parts."""
-    pairs, _ = face_neighbours(mesh)
+    pairs, _ = face_neighbors(mesh)
     ends = pairs[labels[pairs[:, 0]] == labels[pairs[:, 1]]].T
     graph = sp.coo_array((np.ones(ends.shape[1], dtype=np.int8), ends), shape=(len(labels),) * 2)
     return connected_components(graph, directed=False)[1]
@@ -89,9 +89,9 @@ def rand_error(one: Labels, two: Labels) -> float:
 
 
 def clustered(coordinates: np.ndarray, count: int) -> Labels:
-    """Cluster faces by k-means; a quarter of them is enough to find the centres."""
-    centres = KMeans(count, n_init=3, random_state=0).fit(coordinates[::4])
-    return centres.predict(coordinates)
+    """Cluster faces by k-means; a quarter of them is enough to find the centers."""
+    centers = KMeans(count, n_init=3, random_state=0).fit(coordinates[::4])
+    return centers.predict(coordinates)
 
 
 def spectral_coordinates(mesh: es.TriangleMesh) -> np.ndarray:
@@ -103,10 +103,10 @@ def spectral_coordinates(mesh: es.TriangleMesh) -> np.ndarray:
 
 def cut_affinity(mesh: es.TriangleMesh) -> sp.csr_array:
     """Return how strongly faces hang together: edge length / (1 + bend / mean bend), convex bends a fifth."""
-    pairs, edges = face_neighbours(mesh)
-    normals, centres = es.geometry.face_normals(mesh), mesh.vertices[mesh.faces].mean(axis=1)
+    pairs, edges = face_neighbors(mesh)
+    normals, centers = es.geometry.face_normals(mesh), mesh.vertices[mesh.faces].mean(axis=1)
     one, two = normals[pairs[:, 0]], normals[pairs[:, 1]]
-    concave = np.einsum("pi,pi->p", two - one, centres[pairs[:, 1]] - centres[pairs[:, 0]]) < 0
+    concave = np.einsum("pi,pi->p", two - one, centers[pairs[:, 1]] - centers[pairs[:, 0]]) < 0
     bend = np.where(concave, 1.0, 0.2) * (1 - np.einsum("pi,pi->p", one, two))
     lengths = es.geometry.edge_lengths(mesh)[edges]
     weights = lengths / lengths.mean() / (1 + bend / bend.mean())
@@ -114,7 +114,7 @@ def cut_affinity(mesh: es.TriangleMesh) -> sp.csr_array:
     return sp.coo_array((np.tile(weights, 2), both), shape=(mesh.n_faces,) * 2).tocsr()
 
 
-def normalised_cut_coordinates(mesh: es.TriangleMesh) -> np.ndarray:
+def normalized_cut_coordinates(mesh: es.TriangleMesh) -> np.ndarray:
     """Return the embedding in which scikit-learn's spectral clustering finds its clusters (Shi and Malik 2000)."""
     affinity = sp.csr_matrix(cut_affinity(mesh))
     return spectral_embedding(
@@ -138,11 +138,11 @@ def segmentations(mesh: es.TriangleMesh) -> dict[str, Callable[[], Labels]]:
     }
     for name, coordinates in (
         ("k-means", spectral_coordinates),
-        ("normalised cut", normalised_cut_coordinates),
+        ("normalized cut", normalized_cut_coordinates),
     ):
         place = coordinates(mesh)
         for clusters in COUNTS:
-            width = clusters if name == "normalised cut" else N_COORDINATES
+            width = clusters if name == "normalized cut" else N_COORDINATES
             ways[f"{name}, {clusters}"] = lambda place=place, k=clusters, w=width: clustered(
                 place[:, :w], k
             )
@@ -189,7 +189,7 @@ def summary(rows: dict[str, dict[str, dict[str, float]]], tuning: set[str]) -> d
         return float(np.mean([rows[name][way][what] for name in names]))
 
     shown = [way for way in ways if not way.split(", ")[-1].isdigit()]
-    for baseline in ("k-means", "normalised cut"):
+    for baseline in ("k-means", "normalized cut"):
         shown.append(
             min(
                 (f"{baseline}, {count}" for count in COUNTS),

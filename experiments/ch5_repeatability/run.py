@@ -197,7 +197,7 @@ def upright(mesh: es.TriangleMesh) -> es.TriangleMesh:
 
 
 def picture(stem: str, n_poses: int) -> object:
-    """Draw poses with a partial and an incomplete version; parts have the colour of the feature that they answer."""
+    """Draw poses with a partial and an incomplete version; parts have the color of the feature that they answer."""
     paths = sorted((DATA / "retrieval").glob(f"{stem}*.ply"))[:n_poses]
     meshes = [upright(es.read_mesh(path)) for path in paths]
     find = FUNCTIONS["HKS, scale-free"]
@@ -214,14 +214,14 @@ def picture(stem: str, n_poses: int) -> object:
             panel(part.mesh, f"the first, {name}", part.source_vertices, (meshes[0], known))
         )
     return es.plot.figure_contact_sheet(
-        panels[0], panels[1:], caption="grey: no partner within 5 % of √area"
+        panels[0], panels[1:], caption="gray: no partner within 5 % of √area"
     )
 
 
 def panel(
     mesh: es.TriangleMesh, title: str, to: np.ndarray, reference: tuple[es.TriangleMesh, object]
 ) -> es.plot.Panel:
-    """Colour each part by the reference's feature nearest to its own, where one is near."""
+    """Color each part by the reference's feature nearest to its own, where one is near."""
     whole, known = reference
     parts = FUNCTIONS["HKS, scale-free"](mesh)
     distances = es.geometry.geodesic_distances(whole, known.features.vertices)[

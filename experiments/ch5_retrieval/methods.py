@@ -27,7 +27,7 @@ class Method(Protocol):
 
 @runtime_checkable
 class Trainable(Protocol):
-    """A method that learns from unlabelled complete shapes of the other half before it describes any."""
+    """A method that learns from unlabeled complete shapes of the other half before it describes any."""
 
     def train(self, meshes: Iterable[es.TriangleMesh]) -> Method:
         """Return the method that has learnt; its `repr` must name what it has learnt."""

@@ -24,7 +24,7 @@ from run import answers, ready
 
 import eigenshape as es
 
-RIGHT, WRONG, QUERY = 2, 1, -1  # green, orange, grey
+RIGHT, WRONG, QUERY = 2, 1, -1  # green, orange, gray
 N_ANSWERS = 5
 
 
@@ -54,7 +54,7 @@ def ask(
 
 
 def panel(version: Version, title: str, color: int) -> es.plot.Panel:
-    """Return a shape in one colour, as it stood before it was turned."""
+    """Return a shape in one color, as it stood before it was turned."""
     mesh = make(version, turned=False)
     return es.plot.Panel(mesh, title, np.full(mesh.n_faces, color), np.empty(0, dtype=np.int64))
 
@@ -74,7 +74,7 @@ def sheet(asked: Asked) -> Figure:
 
 
 def right_or_wrong(version: Version, asked: Asked) -> int:
-    """Return the colour of an answer."""
+    """Return the color of an answer."""
     return RIGHT if version.shape.label == asked.query.shape.label else WRONG
 
 

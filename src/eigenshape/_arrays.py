@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from eigenshape._arguments import describe_value
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._memory import machine_memory
+from eigenshape._memory import require_memory
 from eigenshape._typing import ArrayLike
 
 # Names of rows in messages, and what rows of indices refer to.
@@ -23,7 +23,7 @@ BYTES_OF_ENTRY = 17  # memory per entry meanwhile: two copies of 8 bytes and one
 ArrayT = TypeVar("ArrayT", bound=NDArray[Any])
 
 
-def frozen(array: ArrayT) -> ArrayT:
+def freeze(array: ArrayT) -> ArrayT:
     """Return a contiguous copy that is read-only."""
     copy = np.array(array, order="C")
     copy.flags.writeable = False
@@ -56,12 +56,13 @@ def as_array(
             f"{name} must not be masked; entry {place[0] if len(place) == 1 else place} is "
             f"({masked.sum()} such). Fill masked entries with numbers, or remove them."
         )
-    size, most = array.size * BYTES_OF_ENTRY, SHARE_OF_ARRAYS * machine_memory()
-    if size > most:
-        raise error(
-            f"{name} must fit into half of the memory, {most / 2**30:.1f} GiB; "
-            f"checking and copying an array of shape {array.shape} takes {size / 2**30:.1f} GiB."
-        )
+    require_memory(
+        name,
+        f"checking and copying an array of shape {array.shape}",
+        {"copies": array.size * BYTES_OF_ENTRY},
+        share=SHARE_OF_ARRAYS,
+        error=error,
+    )
     return np.asarray(array)
 
 
@@ -167,6 +168,17 @@ def vertex_values(value: ArrayLike, name: str, n_vertices: int) -> NDArray[np.fl
     values = values.astype(np.float64)
     _require_finite(values, name)
     return values
+
+
+def face_labels(value: ArrayLike, name: str, n_faces: int) -> NDArray[Any]:
+    """Return `value` as an array with one whole number per face, of any integer type."""
+    labels = as_array(value, name)
+    if labels.shape != (n_faces,) or labels.dtype.kind not in "iu":
+        raise InvalidParameterError(
+            f"{name} must hold one whole number per face, shape ({n_faces},); "
+            f"the shape is {labels.shape} and the type {labels.dtype}."
+        )
+    return labels
 
 
 def _require_finite(values: NDArray[np.float64], name: str) -> None:

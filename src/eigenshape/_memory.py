@@ -1,8 +1,9 @@
 """How much memory the machine has, and an error before work starts that would need more."""
 
 import os
+from collections.abc import Mapping
 
-from eigenshape._errors import InvalidParameterError
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
 
 SHARE_OF_MEMORY = 0.9  # of the machine's memory; the rest is left to the operating system
 
@@ -15,26 +16,46 @@ def machine_memory() -> float:
         return 8 * 2.0**30
 
 
-def require_memory(what: str, sizes: dict[str, int], advice: str) -> None:
-    """Raise an error if a spectrum would need more memory than the machine has.
+def available_memory(share: float = SHARE_OF_MEMORY) -> float:
+    """Return the bytes that a task may take, as a share of the memory of the machine."""
+    return share * machine_memory()
+
+
+def require_memory(
+    what: str,
+    task: str,
+    sizes: Mapping[str, float],
+    advice: str = "",
+    *,
+    share: float = SHARE_OF_MEMORY,
+    error: type[InvalidShapeError | InvalidParameterError] = InvalidParameterError,
+) -> None:
+    """Raise an error if a task would need more than its share of the memory.
 
     Parameters
     ----------
     what : str
-        What is computed, such as "300 pairs of 5000 points".
-    sizes : dict
+        What must fit into memory, such as "A spectrum".
+    task : str
+        How much is requested, such as "300 pairs of 5000 points".
+    sizes : mapping
         Bytes, by the name of what takes them.
     advice : str
-        A remedy, without its full stop.
+        A remedy, as a sentence.
+    share : float
+        Largest share of the memory of the machine.
+    error : type
+        Class of the error.
 
     Raises
     ------
-    InvalidParameterError
+    InvalidParameterError or InvalidShapeError
         With the size of each part.
     """
-    available = SHARE_OF_MEMORY * machine_memory()
+    available = available_memory(share)
     if sum(sizes.values()) > available:
-        listed = ", ".join(f"{name} {size / 2**30:.1f} GiB" for name, size in sizes.items())
-        raise InvalidParameterError(
-            f"A spectrum must fit into memory, {available / 2**30:.1f} GiB; {what} take about {listed}. {advice}."
+        listed = ", ".join(f"{size / 2**30:.1f} GiB of {name}" for name, size in sizes.items())
+        raise error(
+            f"{what} must fit into {100 * share:.0f} % of the memory, {available / 2**30:.1f} GiB; "
+            f"for {task} that is about {listed}. {advice}".rstrip()
         )

@@ -2,8 +2,10 @@
 
 from collections.abc import Callable
 
-# Called with the fraction done, in 0..1, and a short message.
-Progress = Callable[[float, str], None]
+from typing_extensions import TypeAliasType
+
+# Called with the fraction done, in 0..1, and a short message. `help` shows the name.
+Progress = TypeAliasType("Progress", Callable[[float, str], None])
 
 
 def silent(fraction: float, message: str) -> None:

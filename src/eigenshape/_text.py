@@ -1,4 +1,10 @@
-"""Text from outside, such as names of files and labels, made safe to print."""
+"""Text for people: names from outside made safe to print, and values in one line."""
+
+from dataclasses import fields, is_dataclass
+from html import escape
+from typing import Any
+
+LONGEST = 60  # characters of an entry that stands in full in the text of a value
 
 
 def printable(text: str) -> str:
@@ -13,3 +19,77 @@ def printable(text: str) -> str:
     a\x1b[31mb\nc
     """
     return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
+
+
+def literal(text: str) -> str:
+    r"""Return text that a figure shows letter by letter, such as a file's name: no ``$`` begins a formula.
+
+    Examples
+    --------
+    >>> print(literal("a$b$.ply"))
+    a\$b\$.ply
+    """
+    return printable(text).replace("$", r"\$")
+
+
+def short_repr(value: Any) -> str:
+    """Return a dataclass in one line: of long arrays the type and the shape, of long values the type.
+
+    A spectrum of 50,000 vertices would fill a screen with numbers otherwise. Values with large
+    arrays take it as their `__repr__`.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> import numpy as np
+    >>> @dataclass(repr=False)
+    ... class Walk:
+    ...     steps: np.ndarray
+    ...     names: tuple
+    ...     __repr__ = short_repr
+    >>> Walk(np.zeros((900, 3)), ("left", "right"))
+    Walk(steps=<float64 (900, 3)>, names=('left', 'right'))
+    """
+    entries = [f"{field.name}={_shorten(getattr(value, field.name))}" for field in fields(value)]
+    return f"{type(value).__name__}({', '.join(entries)})"
+
+
+def html_repr(value: Any) -> str:
+    """Return a value as a small table, which notebooks show: one row for each field.
+
+    All public values take it as their `_repr_html_`. A value without fields stands as its `repr`.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @dataclass
+    ... class Step:
+    ...     side: str
+    ...     _repr_html_ = html_repr
+    >>> print(Step("<left>")._repr_html_())
+    <table>
+    <caption>Step</caption>
+    <tr><th>side</th><td><code>&#x27;&lt;left&gt;&#x27;</code></td></tr>
+    </table>
+    """
+    if not is_dataclass(value):
+        return f"<code>{escape(repr(value))}</code>"
+    rows = []
+    for field in fields(value):
+        text = escape(_shorten(getattr(value, field.name)))
+        rows.append(f"<tr><th>{field.name}</th><td><code>{text}</code></td></tr>")
+    title = f"<caption>{type(value).__name__}</caption>"
+    return "\n".join(["<table>", title, *rows, "</table>"])
+
+
+def _shorten(entry: Any) -> str:
+    """Return a field as text of at most `LONGEST` characters, or its type and size."""
+    text = repr(entry)
+    in_full = len(text) <= LONGEST and "\n" not in text and "..." not in text
+    if in_full:
+        return text
+    # NumPy arrays and sparse matrices have both
+    if hasattr(entry, "dtype") and hasattr(entry, "shape"):
+        return f"<{entry.dtype} {entry.shape}>"
+    count = f"{len(entry)} entries" if isinstance(entry, list | tuple | dict) else "..."
+    return f"{type(entry).__name__}({count})"

@@ -9,7 +9,7 @@ from eigenshape.deformation.region import Region
 from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.conversion import MeshLike, ShapeLike
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.operators.boundary import Condition
+from eigenshape.operators.choices import Condition
 from eigenshape.spectral.laws.report import Promise
 
 __all__ = [

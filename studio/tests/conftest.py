@@ -37,12 +37,18 @@ class Page:
         return self.call("array", name=name, **more)[1][name]
 
 
-@pytest.fixture
-def page():
-    workspace = Workspace(stretched_ball(), "ball.ply")
+@pytest.fixture(scope="session")
+def ball_workspace():
+    workspace = Workspace(stretched_ball(), "ball.ply", shared=True)
     assert workspace.analysis.rig.wait(120)
     assert workspace.analysis.health.wait(120)
-    return Page(workspace)
+    return workspace
+
+
+@pytest.fixture
+def page(ball_workspace):
+    """Return a page of a tab of its own; the modes are computed once."""
+    return Page(ball_workspace.fork())
 
 
 @pytest.fixture

@@ -254,7 +254,9 @@ def test_an_index_is_searched(tmp_path):
     facts, arrays = page.call("query", n_matches=2)
     assert [match["name"] for match in facts["matches"]] == ["fish", "bird"]
     assert arrays["thumbnail0"].tobytes().startswith(b"\x89PNG")
+    assert facts["matches"][0]["up"] == [0, 1, 0]
     assert "thumbnail1" not in arrays
+    assert "up" not in facts["matches"][1]
     assert arrays["pairs0"].max() < 500
     np.testing.assert_array_equal(page.array("match/0/faces"), fish.faces)
     call = {"n_matches": 1, "name": "bird.ply"}

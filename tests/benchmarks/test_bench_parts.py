@@ -32,7 +32,7 @@ def test_parts_sum_to_the_whole_and_none_beats_its_bound(run_quick):
     assert sum(row["share"] for row in rows) == pytest.approx(1.0, abs=1e-6)
     calls = {row["part"]: row["calls"] for row in rows}
     assert calls["order and analysis"] == calls["Ritz vectors"] == 1
-    assert calls["solves"] > calls["orthogonalisation"] / 2 > 1
+    assert calls["solves"] > calls["orthogonalization"] / 2 > 1
     assert calls["factors"] >= 2
     for row in rows:
         assert row["bound"] is None or row["seconds"] > 0.2 * row["bound"], row[

@@ -305,7 +305,7 @@ def test_a_match_without_its_file_leaves_its_place_empty(zoo, tmp_path):
 
 @pytest.mark.long
 def test_features_of_large_meshes_say_how_far_heat_is_off(tmp_path, monkeypatch):
-    monkeypatch.setattr("eigenshape.cli.features.LARGE", 1000)
+    monkeypatch.setattr("eigenshape.cli.steps.heat.LARGE", 1000)
     monkeypatch.setattr("eigenshape.spectral.multilevel.start.COARSENED", 5)
     path = tmp_path / "large.ply"
     write_mesh(make_creature("hand", n_vertices=2500), path)
@@ -323,3 +323,34 @@ def test_features_of_large_meshes_say_how_far_heat_is_off(tmp_path, monkeypatch)
         run_json("features", small, "--accuracy", share)["heat_error"] for share in ("0.1", "1e-4")
     )
     assert rough > fine > 0
+
+
+def test_an_index_names_files_that_it_holds_twice_and_the_methods_that_it_lacks(tmp_path):
+    folder = tmp_path / "meshes" / "fish"
+    folder.mkdir(parents=True)
+    write_mesh(make_creature("fish", n_vertices=500), folder / "one.ply")
+    options = ("--method", "scale-free", "--views", 0, "--workers", 1)
+    whole = run("index", tmp_path / "db", tmp_path / "meshes", *options)
+    assert "same file content" not in whole.stdout
+    again = run("index", tmp_path / "db", folder, *options)
+    assert "one: the same file content as fish/one" in again.stdout
+
+    found = run("query", tmp_path / "db", folder / "one.ply", "--method", "scale-free")
+    assert "about 1 if nothing is alike" in found.stdout
+    for method in ("thesis", "patches"):
+        done = run("query", tmp_path / "db", folder / "one.ply", "--method", method, code=1)
+        assert f"has no descriptions by {method}. Run `eigenshape index`" in done.stderr
+        assert done.stderr.count("\n") == 1
+
+
+def test_info_says_why_a_closed_mesh_should_be_oriented(sphere, tmp_path):
+    mesh = read_mesh(sphere)
+    path = tmp_path / "inward.ply"
+    write_mesh((mesh.vertices, mesh.faces[:, ::-1]), path)
+    assert "(faces point inward)" in run("info", path).stdout
+    assert "inward" not in run("info", sphere).stdout
+
+
+def test_features_print_the_time_of_the_heat(sphere):
+    assert "heat at time t = 0.004 of the area" in run("features", sphere).stdout
+    assert "t = 0.001 of the square" in run("features", sphere, "--method", "thesis").stdout

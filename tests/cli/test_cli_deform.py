@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from eigenshape.cli import app
-from eigenshape.cli.regions import parse_region, parse_rotation, parse_translation
+from eigenshape.cli.steps.regions import parse_region, parse_rotation, parse_translation
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import bend
 from eigenshape.deformation.region import BoxRegion, BrushRegion, region_boundary, region_mask
@@ -202,3 +202,11 @@ def test_a_list_that_is_none_is_named(giraffe, tmp_path):
     listed.write_text("3\nx\n")
     done = run("deform", giraffe, "--region", listed, "--move", "0,1,0", code=1)
     assert "has one vertex index a line" in " ".join(done.stderr.split())
+
+
+@pytest.mark.long
+def test_faces_that_cross_are_pointed_out_with_what_may_help(giraffe):
+    hint = "--fixed with a smaller part"
+    folded = run("deform", giraffe, "--region", "y>60%", "--rotate", "x by 170")
+    assert hint in folded.stderr
+    assert hint not in run("deform", giraffe, "--region", "y>60%", "--rotate", "x by 1").stderr

@@ -86,7 +86,7 @@ def test_label_prints_a_table_and_takes_what_segment_prints(poses, tmp_path):
     [
         (
             ("--labels", "{short}"),
-            "labels must hold one integer for each of the 2396 faces; they have shape (2,)",
+            "labels must hold one whole number per face, shape (2396,); the shape is (2,)",
         ),
         (("--labels", "{bad}"), "A label must be a whole number; line 2 has 'head'"),
         (("--labels", "{bad}", "--picture", "a.bmp"), "A picture must end in"),

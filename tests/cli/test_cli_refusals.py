@@ -130,4 +130,4 @@ def test_index_names_the_broken_file_takes_the_rest_and_knows_it_again(fish, tmp
 
 @pytest.mark.parametrize("verb", VERBS[:-1])
 def test_an_unknown_option_is_wrong_usage(verb):
-    assert "No such option" in run(verb, "--colour", code=2).output
+    assert "No such option" in run(verb, "--color", code=2).output

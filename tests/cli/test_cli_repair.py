@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from eigenshape import TriangleMesh, deform, read_mesh, repair, rig_shape, write_mesh
 from eigenshape.cli import app
-from eigenshape.cli.index import _items
+from eigenshape.cli.steps import find_items
 from eigenshape.deformation.handles import Translation
 from eigenshape.geometry.repair import REPAIRS
 from eigenshape.io.labels import read_labels
@@ -209,7 +209,7 @@ def test_triangles_of_other_formats_serve_verbs_for_meshes(tmp_path, suffix):
     assert len(json.loads(done.stdout)["face_labels"]) == BALL.n_faces
     run("repair", path, "--repair", "", "-o", tmp_path / "again.ply")
     np.testing.assert_array_equal(read_mesh(tmp_path / "again.ply").faces, BALL.faces)
-    assert {item.path.name for item in _items([tmp_path])} == {path.name, "again.ply"}
+    assert {item.path.name for item in find_items([tmp_path])} == {path.name, "again.ply"}
 
 
 def test_cells_say_what_polygons_of_four_corners_are(tmp_path):

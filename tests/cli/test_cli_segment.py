@@ -1,4 +1,4 @@
-"""`eigenshape segment`, and the colours that `eigenshape features` writes."""
+"""`eigenshape segment`, and the colors that `eigenshape features` writes."""
 
 import json
 
@@ -34,7 +34,7 @@ def biped(tmp_path_factory):
 
 
 def colors_in(path):
-    """Read the colours of a binary PLY file by its own header."""
+    """Read the colors of a binary PLY file by its own header."""
     head, body = path.read_bytes().split(b"end_header\n", 1)
     assert b"property uchar red\nproperty uchar green\nproperty uchar blue" in head
     n = int(head.split(b"element vertex ")[1].split()[0])
@@ -136,4 +136,4 @@ def test_features_write_their_heat_as_colors(biped, tmp_path):
     colors = colors_in(path)
     assert len(np.unique(colors, axis=0)) > 50
     hottest = run_json("features", biped)["features"][0]["vertex"]
-    assert tuple(colors[hottest]) == (253, 231, 37), "the highest colour of viridis"
+    assert tuple(colors[hottest]) == (253, 231, 37), "the highest color of viridis"

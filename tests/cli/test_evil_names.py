@@ -9,7 +9,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 import eigenshape as es
-from eigenshape.cli import app, console, inputs
+from eigenshape.cli import app, console
 
 EVIL = "a\x1b[31m\x07\n\u202e$x_[bold]\x9b$"
 SPELLED = r"a\x1b[31m\x07\n\u202e$x_[bold]\x9b$"
@@ -167,9 +167,11 @@ def test_warnings(zoo, monkeypatch):
         warnings.warn(f"{path} is odd", UserWarning, stacklevel=1)
         return es.icosphere(0)
 
-    monkeypatch.setattr(inputs, "read_mesh", warn)
+    monkeypatch.setattr("eigenshape.cli.steps.reading.read_mesh", warn)
     assert f"{SPELLED}0.ply is odd" in run("features", zoo / f"{EVIL}0.ply", "-n", 2).stderr
 
 
 def test_the_alphabet_of_a_name_stays():
-    assert console.shown(Path("Würfel 立方体 κύβος مكعب.ply")) == "Würfel 立方体 κύβος مكعب.ply"
+    assert (
+        console.escape_text(Path("Würfel 立方体 κύβος مكعب.ply")) == "Würfel 立方体 κύβος مكعب.ply"
+    )

@@ -54,8 +54,10 @@ def test_every_module_with_a_verb_is_in_the_list():
     assert names == VERBS.keys()
 
 
-@pytest.mark.parametrize("arguments", [["--help"], [], ["--version"], ["quary"]])
-def test_the_list_of_verbs_loads_nothing_heavy(arguments):
+@pytest.mark.parametrize(
+    "arguments", [["--help"], [], ["--version"], ["quary"], *([verb, "--help"] for verb in VERBS)]
+)
+def test_help_loads_nothing_heavy(arguments):
     code = (
         "import sys, eigenshape_command\n"
         "try: eigenshape_command.main()\n"

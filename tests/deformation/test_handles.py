@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.handles import Rotation, Translation, affine_offset, rotation_from_drag
 
@@ -123,3 +124,22 @@ def test_bad_numbers_are_refused_by_name():
         Rotation([0, 0, 0], [0, 0, 1], np.inf)
     with pytest.raises(InvalidParameterError, match="vector must be finite; entry 1 is nan"):
         Translation([0, np.nan, 0])
+
+
+def test_every_method_asks_for_one_handle_a_region():
+    mesh = es.icosphere(1)
+    binding = es.deformation.bind(es.rig_shape(mesh), [mesh.vertices[:, 2] > 0.2])
+    response = es.deformation.skeleton_response(binding)
+    detailed = es.deformation.detailed_skeleton(binding)
+    two = [es.Translation([0, 0, 1])] * 2
+    calls = (
+        lambda: es.deformation.bend(binding, two),
+        lambda: es.deformation.move_skeleton(response, two),
+        lambda: es.deformation.eigen_deformation(detailed, two),
+        lambda: es.deformation.as_rigid_as_possible(binding, two),
+        lambda: es.deformation.biharmonic_blend(binding, two),
+        lambda: es.deformation.spectral_rigid(binding, two),
+    )
+    for call in calls:
+        with pytest.raises(es.InvalidParameterError, match="there are 1 regions and 2 handles"):
+            call()

@@ -51,10 +51,10 @@ def test_errors_of_parts():
     }
     assert f"disagree with people on {errors['default']} of pairs" in README
     cuts, means = (
-        errors[f"{way}, as many as the default"] for way in ("normalised cut", "k-means")
+        errors[f"{way}, as many as the default"] for way in ("normalized cut", "k-means")
     )
     assert (
-        f"thesis preset {errors['thesis preset']}, normalised cuts {cuts}, k-means {means};"
+        f"thesis preset {errors['thesis preset']}, normalized cuts {cuts}, k-means {means};"
         in README
     )
 

@@ -65,7 +65,7 @@ def test_a_bridge_joins_two_spheres_into_one(spheres, radius, bulge):
     volume = es.geometry.enclosed_volume(joined.two)
     assert volume > es.geometry.enclosed_volume(
         spheres
-    )  # which neighbours turned against each other would not give
+    )  # which neighbors turned against each other would not give
 
 
 def test_a_bridge_on_one_surface_is_a_handle():

@@ -49,7 +49,7 @@ def test_a_constant_function_has_its_components_alone():
     assert found.components.births.tolist() == found.components.deaths.tolist() == [3.0, 3.0]
 
 
-def test_points_are_joined_to_their_neighbours():
+def test_points_are_joined_to_their_neighbors():
     angles = 2 * np.pi * np.arange(40) / 40
     cloud = es.PointCloud(np.column_stack([np.cos(angles), np.sin(angles)]), dim=1)
     found = es.features.persistence_diagram(cloud, np.cos(3 * angles), n_neighbors=2)

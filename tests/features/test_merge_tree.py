@@ -159,7 +159,7 @@ def test_labels_around_a_vertex_of_many_faces_equal_literal_merging(step, apex):
         assert np.array_equal(parts.features.vertices[parts.labels], literal.labels())
 
 
-def test_pages_of_a_book_are_all_neighbours_at_its_spine():
+def test_pages_of_a_book_are_all_neighbors_at_its_spine():
     # 60 faces at one edge, more than are sorted by insertion: page i ends at the spine, the next higher page beyond it.
     heights = np.random.default_rng(0).permutation(60) + 1.0
     points = np.column_stack([np.cos(heights), np.sin(heights), np.zeros(60)])
@@ -178,7 +178,7 @@ def test_faces_that_repeat_a_vertex_or_each_other_are_merged_too():
     assert parts.features.vertices.tolist() == [3, 3]
 
 
-def test_three_faces_at_an_edge_are_all_neighbours():
+def test_three_faces_at_an_edge_are_all_neighbors():
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]], dtype=float)
     mesh = TriangleMesh(vertices, [[0, 1, 2], [0, 1, 3], [0, 1, 4]])
     parts = segment(merge_tree(mesh, [0.0, 1.0, 3.0, 2.0, 4.0]), n_regions=1)
@@ -265,11 +265,11 @@ def test_a_bow_tie_is_two_regions_that_no_edge_joins():
 @pytest.mark.parametrize("step", STEPS)
 def test_a_boundary_that_passes_a_vertex_twice(step):
     sheet = grid(8, 8)
-    centre = sheet.vertices[sheet.faces].mean(axis=1) - [0.5, 0.5, 0.0]
+    center = sheet.vertices[sheet.faces].mean(axis=1) - [0.5, 0.5, 0.0]
     around = np.flatnonzero(
         (sheet.vertices[sheet.faces] == [0.5, 0.5, 0.0]).all(axis=2).any(axis=1)
     )
-    around = around[np.argsort(np.arctan2(centre[around, 1], centre[around, 0]))]
+    around = around[np.argsort(np.arctan2(center[around, 1], center[around, 0]))]
     mesh = submesh(sheet, ~np.isin(np.arange(sheet.n_faces), around[[0, 3]]))[0]
     assert len(non_manifold_vertices(mesh)) == 1
     values = wavy(mesh, step)

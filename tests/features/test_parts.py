@@ -41,10 +41,10 @@ def test_a_dumbbell_has_two_parts_and_the_cut_is_at_the_neck():
     mesh = dumbbell()
     found = find_parts(mesh)
     assert len(found.parts.features.vertices) == 2
-    centres = mesh.vertices[mesh.faces].mean(axis=1)[:, 0]
-    one = np.mean(centres[found.parts.labels == 0]) > 0
-    agree = (centres > 0) == ((found.parts.labels == 0) == one)
-    assert agree[np.abs(centres) > 0.15].all()
+    centers = mesh.vertices[mesh.faces].mean(axis=1)[:, 0]
+    one = np.mean(centers[found.parts.labels == 0]) > 0
+    agree = (centers > 0) == ((found.parts.labels == 0) == one)
+    assert agree[np.abs(centers) > 0.15].all()
 
 
 def test_a_ball_is_one_part():
@@ -175,8 +175,8 @@ def cut_length(mesh, labels):
 
 
 def two_halves(mesh, ragged):
-    centres = mesh.vertices[mesh.faces].mean(axis=1)
-    labels = (centres[:, 0] > ragged * np.sin(5 * np.arctan2(centres[:, 2], centres[:, 1]))).astype(
+    centers = mesh.vertices[mesh.faces].mean(axis=1)
+    labels = (centers[:, 0] > ragged * np.sin(5 * np.arctan2(centers[:, 2], centers[:, 1]))).astype(
         np.int64
     )
     tips = np.array([mesh.vertices[:, 0].argmin(), mesh.vertices[:, 0].argmax()])

@@ -4,7 +4,6 @@ import sys
 import numpy as np
 import pytest
 
-from eigenshape import _arrays
 from eigenshape._arrays import (
     finite_values,
     positive_values,
@@ -164,8 +163,8 @@ except EigenshapeError as error:
 
 
 def test_an_array_is_measured_against_the_memory(monkeypatch):
-    monkeypatch.setattr(_arrays, "machine_memory", lambda: 2.0**10)
-    fact = r"points must fit into half of the memory, 0\.0 GiB; checking and copying an array of shape \(20, 2\) takes"
+    monkeypatch.setattr("eigenshape._memory.machine_memory", lambda: 2.0**10)
+    fact = r"points must fit into 50 % of the memory, 0\.0 GiB; for checking and copying an array of shape \(20, 2\) "
     with pytest.raises(InvalidShapeError, match=fact):
         PointCloud(np.arange(40.0).reshape(20, 2))
 

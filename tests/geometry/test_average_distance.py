@@ -20,15 +20,15 @@ def test_with_all_bases_it_is_the_weighted_mean_of_all_distances():
 
 
 def test_on_a_square_it_is_the_mean_of_straight_lines():
-    # From the centre of a unit square (√2 + ln(1 + √2)) / 6, from a corner twice that.
+    # From the center of a unit square (√2 + ln(1 + √2)) / 6, from a corner twice that.
     mesh = es.shapes.grid(24, 24)
     found = es.geometry.average_geodesic_distance(mesh, n_bases=mesh.n_vertices)
     exact = (np.sqrt(2) + np.log(1 + np.sqrt(2))) / 6
-    centre = np.abs(mesh.vertices[:, :2] - 0.5).max(axis=1) < 1e-9
+    center = np.abs(mesh.vertices[:, :2] - 0.5).max(axis=1) < 1e-9
     corner = (mesh.vertices[:, :2] == 0).all(axis=1)
-    assert found[centre] == pytest.approx(exact, rel=0.003)
+    assert found[center] == pytest.approx(exact, rel=0.003)
     assert found[corner] == pytest.approx(2 * exact, rel=0.003)
-    assert found.argmin() == np.flatnonzero(centre)[0]
+    assert found.argmin() == np.flatnonzero(center)[0]
 
 
 @pytest.mark.long

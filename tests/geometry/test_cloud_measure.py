@@ -9,7 +9,7 @@ from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.cloud_measure import _cell_volume, _cell_volumes, cloud_quadrature
 from eigenshape.geometry.measure import surface_area
 from eigenshape.shapes.domains import disc
-from eigenshape.shapes.spheres import fibonacci_sphere, graded_sphere, random_sphere, three_sphere
+from eigenshape.shapes.spheres import fibonacci_sphere, random_sphere, three_sphere, uneven_sphere
 
 
 @settings(max_examples=40, deadline=None)
@@ -32,7 +32,7 @@ def test_a_disc_has_its_area_up_to_the_rim():
     ("mesh", "lost", "spread"),
     [
         (fibonacci_sphere(2000), 1e-3, 2e-3),
-        (graded_sphere(2000), 1e-3, 3e-3),
+        (uneven_sphere(2000), 1e-3, 3e-3),
         (random_sphere(2000, rng=np.random.default_rng(0)), 1e-3, 0.01),
     ],
 )
@@ -63,7 +63,7 @@ def test_units_scale_exactly(size):
     np.testing.assert_allclose(other.weights / size / size, one.weights, rtol=1e-9)
 
 
-def test_neighbours_that_do_not_span_are_named():
+def test_neighbors_that_do_not_span_are_named():
     line = np.column_stack([np.arange(40.0), np.zeros(40), np.zeros(40)])
     with pytest.raises(
         InvalidShapeError, match=r"must span 2 dimensions; those of point 0 at \[0\.0, 0"
@@ -81,7 +81,7 @@ def test_equal_points_are_named():
         cloud_quadrature(PointCloud(points))
 
 
-def test_too_few_points_and_neighbours_are_refused():
+def test_too_few_points_and_neighbors_are_refused():
     with pytest.raises(
         InvalidShapeError,
         match="A cloud of dimension 2 must have at least 4 points; this one has 3",

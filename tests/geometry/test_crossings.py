@@ -207,7 +207,7 @@ def test_a_grid_folded_flat(size):
     assert not pairs(lifted, flat.faces)
 
 
-def test_neighbours_at_an_edge():
+def test_neighbors_at_an_edge():
     flat = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
     faces = [[0, 1, 2], [0, 3, 1]]
     assert not pairs([*flat, [0.3, -0.3, 0]], faces)
@@ -277,7 +277,7 @@ def test_creatures_at_rest_have_none(kind):
 
 @pytest.mark.long
 def test_an_ant_crosses_its_legs():
-    """Poses are drawn, not examined: legs may meet, and what crosses is two legs, not neighbours."""
+    """Poses are drawn, not examined: legs may meet, and what crosses is two legs, not neighbors."""
     ant = make_creature("ant", 3)
     found = self_intersections(ant)
     assert len(found)

@@ -13,7 +13,7 @@ some = settings(deadline=None, max_examples=100)
 
 
 def circumscribed(points):
-    """Centre in the flat of some points, as far from all of them; None where there is none."""
+    """Center in the flat of some points, as far from all of them; None where there is none."""
     sides = points[1:] - points[0]
     gram = sides @ sides.T
     if len(sides) and np.linalg.cond(gram) > 1e12:
@@ -94,7 +94,7 @@ def test_many_points_in_many_dimensions():
     ball = es.geometry.enclosing_ball(points)
     away = np.linalg.norm(points - ball.center, axis=1)
     assert away.max() == pytest.approx(ball.radius, rel=1e-14)
-    # The centre of the smallest ball is a convex combination of the points on its boundary.
+    # The center of the smallest ball is a convex combination of the points on its boundary.
     touching = points[away > ball.radius * (1 - 1e-9)]
     weights = np.linalg.lstsq(
         np.vstack([touching.T, np.ones(len(touching))]), np.append(ball.center, 1), rcond=None

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from eigenshape._errors import InvalidParameterError
+from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import fill_holes, repair
+from eigenshape.geometry.repair import repair
+from eigenshape.geometry.repair_steps import fill_holes
 from eigenshape.geometry.simplices import degenerate_simplices
 from eigenshape.geometry.topology import (
     euler_characteristic,
-    inconsistent_edges,
     is_closed,
     is_manifold,
     non_manifold_edges,

@@ -30,9 +30,9 @@ def test_mean_goes_to_the_origin_and_orientation_stays(normalize):
     done = normalize(MOVED)
     np.testing.assert_allclose(done.vertices.mean(axis=0), 0, atol=1e-14)
     np.testing.assert_array_equal(done.faces, MOVED.faces)
-    centred = MOVED.vertices - MOVED.vertices.mean(axis=0)
-    ratio = np.linalg.norm(centred) / np.linalg.norm(done.vertices)
-    np.testing.assert_allclose(done.vertices * ratio, centred, atol=1e-12)
+    centered = MOVED.vertices - MOVED.vertices.mean(axis=0)
+    ratio = np.linalg.norm(centered) / np.linalg.norm(done.vertices)
+    np.testing.assert_allclose(done.vertices * ratio, centered, atol=1e-12)
 
 
 @pytest.mark.parametrize("normalize", ALL)

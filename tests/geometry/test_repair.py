@@ -4,17 +4,17 @@ from broken_meshes import moebius, soup, tetrahedra, with_slivers
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import (
-    REPAIRS,
+from eigenshape.geometry.repair import REPAIRS, repair, suggest_repairs
+from eigenshape.geometry.repair_names import MESH_REPAIRS
+from eigenshape.geometry.repair_steps import (
     collapse_needles,
     drop_degenerate,
     drop_duplicate_faces,
     drop_unreferenced,
     largest_component,
     orient,
-    repair,
-    suggest_repairs,
     weld,
     weld_seams,
 )
@@ -22,7 +22,6 @@ from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import (
     boundary_edges,
     euler_characteristic,
-    inconsistent_edges,
     is_closed,
     is_manifold,
 )
@@ -30,6 +29,10 @@ from eigenshape.geometry.union import disjoint_union
 from eigenshape.retrieval.baselines.shape_dna import shape_dna
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import grid, icosphere
+
+
+def test_the_names_that_help_lists_are_those_of_the_repairs():
+    assert tuple(REPAIRS) == MESH_REPAIRS
 
 
 def test_a_welded_soup_is_whole_again():

@@ -37,12 +37,12 @@ from eigenshape.operators.smoothing import noise_level
 from eigenshape.retrieval.baselines.affinity import affinity_eigenvalues
 from eigenshape.retrieval.baselines.shape_dna import shape_dna
 from eigenshape.retrieval.description import describe
-from eigenshape.retrieval.heat.descriptor import SCALE_FREE
 from eigenshape.retrieval.heat.features import find_heat_features
+from eigenshape.retrieval.heat.recipe import SCALE_FREE
 from eigenshape.retrieval.label_transfer import transfer_labels
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.patches.patches import extract_patches, surface_patches
-from eigenshape.retrieval.store.index import describe_to_store
+from eigenshape.retrieval.store.writing import describe_to_store
 from eigenshape.scans.partial import partial_scan, viewpoint
 from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.shapes.surfaces import icosphere

@@ -39,7 +39,7 @@ def test_the_pieces_are_2_to_the_m_of_equal_volume(dim):
     "mesh",
     [circle(5), SimplicialMesh(grid(3, 2).vertices, grid(3, 2).faces), ball(4), subdivide(ball(2))],
 )
-def test_neighbours_match(mesh):
+def test_neighbors_match(mesh):
     rng = np.random.default_rng(0)
     names = rng.permutation(mesh.n_points)
     points = np.empty_like(mesh.points)

@@ -3,6 +3,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import (
     boundary_edges,
@@ -10,7 +11,6 @@ from eigenshape.geometry.topology import (
     edge_table,
     euler_characteristic,
     half_edges,
-    inconsistent_edges,
     is_closed,
     is_manifold,
     non_manifold_edges,
@@ -174,7 +174,7 @@ def test_submesh_keeps_coordinates_and_tells_where_vertices_were():
 
 
 def has_several_fans(faces, vertex):
-    """Grow one fan over shared neighbours, and see whether a face is left."""
+    """Grow one fan over shared neighbors, and see whether a face is left."""
     rims = [set(face) - {vertex} for face in faces if vertex in face]
     reached = rims[0] if rims else set()
     for _ in rims:

@@ -16,7 +16,7 @@ from tetrahedra import TETRAHEDRON
 from eigenshape import FileFormatError, read_shape
 from eigenshape.io import parsing
 from eigenshape.io.mesh_files import read_mesh, write_mesh
-from eigenshape.io.unpacking import LZMA, ZLIB, unpacked_block
+from eigenshape.io.unpacking import LZMA, ZLIB, unpack_block
 
 GIGABYTES = 2**32 - 2**24
 BLOCK = 2**24
@@ -187,17 +187,17 @@ def test_what_nobody_reads_is_not_unpacked(outcomes):
 @pytest.mark.parametrize("compressor", [ZLIB, LZMA])
 def test_blocks_unpack_to_what_they_declare_or_not_at_all(compressor):
     block = PACK[compressor](bytes(1000))
-    assert unpacked_block(block, 1000, compressor) == bytes(1000)
+    assert unpack_block(block, 1000, compressor) == bytes(1000)
     with pytest.raises(
         FileFormatError, match="unpack to the size it declares, 999; it unpacks to more"
     ):
-        unpacked_block(block, 999, compressor)
+        unpack_block(block, 999, compressor)
     with pytest.raises(
         FileFormatError, match="unpack to the size it declares, 1001; it unpacks to 1000"
     ):
-        unpacked_block(block, 1001, compressor)
+        unpack_block(block, 1001, compressor)
     with pytest.raises(FileFormatError, match="A compressed block must be whole; one is damaged"):
-        unpacked_block(b"nonsense", 1000, compressor)
+        unpack_block(b"nonsense", 1000, compressor)
 
 
 def test_too_little_memory_has_a_name(tmp_path, monkeypatch):

@@ -10,7 +10,7 @@ from tetrahedra import FACES, FILES, TETRAHEDRON, VERTICES, read
 from eigenshape import FileFormatError, InvalidShapeError, TriangleMesh, read_mesh, write_mesh
 from eigenshape.geometry import enclosed_volume
 from eigenshape.io.glb import format_mesh, parse
-from eigenshape.io.gltf import Gltf, placed_triangles
+from eigenshape.io.gltf import Gltf, place_triangles
 
 GOOD = FILES["glb"][1]
 
@@ -149,7 +149,7 @@ def test_parts_of_one_mesh_share_the_vertices_they_share_in_the_file():
     assert (mesh.n_vertices, mesh.n_faces) == (6, 6)
 
 
-def test_interleaved_and_normalised_numbers_and_data_uris():
+def test_interleaved_and_normalized_numbers_and_data_uris():
     rows = b"".join(
         struct.pack("<hhhH", *row, 77) for row in [(0, 0, 0), (32767, 0, 0), (0, -32768, 0)]
     )
@@ -232,11 +232,11 @@ def test_copies_are_bounded(copied):
         tree["nodes"] *= 10
     else:
         tree["meshes"][0]["primitives"] *= 10
-    assert len(placed_triangles(Gltf(tree, [binary], most=100))[1]) == 40
+    assert len(place_triangles(Gltf(tree, [binary], most=100))[1]) == 40
     with pytest.raises(
         FileFormatError, match="must stay within 50 vertices and faces; its copies make more"
     ):
-        placed_triangles(Gltf(tree, [binary], most=50))
+        place_triangles(Gltf(tree, [binary], most=50))
 
 
 def test_not_finite_coordinates_are_refused(tmp_path):

@@ -92,7 +92,7 @@ def test_binary_where_there_is_none_is_refused(tmp_path, name, binary):
         write_mesh(TETRAHEDRON, tmp_path / name, binary=binary)
 
 
-def test_colours(tmp_path):
+def test_colors(tmp_path):
     colors = np.full((4, 3), 200, dtype=np.uint8)
     for binary in (False, True):
         write_mesh(TETRAHEDRON, tmp_path / "a.ply", colors=colors, binary=binary)

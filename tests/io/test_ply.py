@@ -72,7 +72,7 @@ def test_rows_that_begin_with_a_line_feed_belong_to_the_rows():
     assert vertices.tolist() == [[10, 0, 0], [1, 0, 0], [0, 1, 0]]
 
 
-def test_plain_text_with_colours_of_faces():
+def test_plain_text_with_colors_of_faces():
     text = FILES["ply text"][1].decode().replace("end_header", "property uchar red\nend_header")
     text = "\n".join(line + (" 255" if line.startswith("3 ") else "") for line in text.splitlines())
     assert parse(text.encode())[1].tolist() == FACES
@@ -224,7 +224,7 @@ def test_wrong_values_are_refused():
 
 
 @pytest.mark.parametrize("write", [format_text, format_binary])
-def test_colours_stand_with_the_vertices(write):
+def test_colors_stand_with_the_vertices(write):
     colors = np.arange(12, dtype=np.uint8).reshape(4, 3)
     data = write(TETRAHEDRON, colors=colors)
     assert b"property uchar red\nproperty uchar green\nproperty uchar blue\nelement face" in data

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import drop_duplicate_faces
+from eigenshape.geometry.repair_steps import drop_duplicate_faces
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.geometry.union import disjoint_union

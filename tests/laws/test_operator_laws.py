@@ -5,9 +5,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.measure import enclosed_volume, face_areas, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import inconsistent_edges
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import grid, icosphere, torus
@@ -90,7 +90,7 @@ def test_rigid_motion_changes_nothing(seed, mass):
 
 @few
 @given(seeds, masses)
-def test_relabelling_permutes(seed, mass):
+def test_relabeling_permutes(seed, mass):
     mesh, rng = shape(seed), np.random.default_rng(seed)
     old_of_new = rng.permutation(mesh.n_vertices)
     faces = np.argsort(old_of_new)[mesh.faces][rng.permutation(mesh.n_faces)]

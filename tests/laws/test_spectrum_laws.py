@@ -35,7 +35,7 @@ def lanczos_for_all():
 
 @few
 @given(seeds, masses, st.integers(1, 30))
-def test_eigenvectors_are_orthonormal_and_diagonalise(seed, mass, k):
+def test_eigenvectors_are_orthonormal_and_diagonalize(seed, mass, k):
     laplacian = cotangent_laplacian(shape(seed), mass)
     spectrum = solve_spectrum(laplacian, k)
     phi = spectrum.eigenvectors
@@ -71,7 +71,7 @@ def test_eigenvalues_scale_as_inverse_area(seed, mass, power):
 
 @few
 @given(seeds, masses)
-def test_relabelling_permutes_the_rows(seed, mass):
+def test_relabeling_permutes_the_rows(seed, mass):
     mesh, rng = shape(seed), np.random.default_rng(seed)
     new_of_old = rng.permutation(mesh.n_vertices)
     vertices = np.empty_like(mesh.vertices)

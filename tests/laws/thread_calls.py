@@ -375,7 +375,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "geodesic_balls": lambda v: es.geometry.geodesic_balls(v.ball, 0.5),
     "geodesic_distance_to_set": lambda v: es.geometry.geodesic_distance_to_set(v.animal, [0, 9]),
     "geodesic_distances": lambda v: es.geometry.geodesic_distances(v.animal, [0, 9]),
-    "graded_sphere": lambda v: es.shapes.graded_sphere(200),
+    "uneven_sphere": lambda v: es.shapes.uneven_sphere(200),
     "graph_laplacian": lambda v: es.operators.graph_laplacian(v.animal, "normalized"),
     "grid": lambda v: es.shapes.grid(3, 4),
     "heat_descriptor": lambda v: es.retrieval.heat_descriptor(v.spectrum, v.parts.features),

@@ -5,6 +5,7 @@ import scipy.sparse as sp
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.operators.catalog import OPERATORS, build_laplacian
+from eigenshape.operators.choices import OPERATOR_NAMES
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.domains import box, interval
 from eigenshape.shapes.surfaces import icosphere
@@ -16,6 +17,10 @@ SHAPES = {
     "points": PointCloud(icosphere(2).vertices),
     "graph": sp.csr_array(np.ones((5, 5)) - np.eye(5)),
 }
+
+
+def test_the_names_that_help_lists_are_those_of_the_operators():
+    assert tuple(OPERATORS) == OPERATOR_NAMES
 
 
 @pytest.mark.parametrize("shape", SHAPES)

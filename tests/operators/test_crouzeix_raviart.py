@@ -194,8 +194,8 @@ def test_no_function_breaks_the_constant(mesh):
 
 def _mean_of_square(points):
     m = len(points) - 1
-    centre = points.mean(axis=0)
-    return (centre**2).sum() + ((points - centre) ** 2).sum() / ((m + 1) * (m + 2))
+    center = points.mean(axis=0)
+    return (center**2).sum() + ((points - center) ** 2).sum() / ((m + 1) * (m + 2))
 
 
 def test_flat_simplices_and_loose_points_are_refused():

@@ -273,9 +273,9 @@ def test_a_component_that_falls_apart_is_refused():
 
 
 def test_a_matrix_beyond_memory_is_refused_before_it_is_built(monkeypatch):
-    monkeypatch.setattr(kernel, "machine_memory", lambda: 1e6)
+    monkeypatch.setattr("eigenshape._memory.machine_memory", lambda: 1e6)
     with pytest.raises(
-        InvalidShapeError, match=r"half of the memory, 0.0 GiB; for \S+ entries, \d+ a row"
+        InvalidShapeError, match=r"50 % of the memory, 0.0 GiB; for \S+ entries, \d+ a row"
     ):
         mesh_laplacian(icosphere(3))
 

@@ -6,11 +6,11 @@ from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.cloud_measure import cloud_quadrature
 from eigenshape.operators.gaussian import gaussian_laplacian, point_cloud_laplacian
 from eigenshape.shapes.exact import sphere_eigenvalues
-from eigenshape.shapes.spheres import fibonacci_sphere, graded_sphere, three_sphere
+from eigenshape.shapes.spheres import fibonacci_sphere, three_sphere, uneven_sphere
 from eigenshape.spectral.solve import solve_spectrum
 
 
-@pytest.mark.parametrize("mesh", [fibonacci_sphere(1500), graded_sphere(1500)])
+@pytest.mark.parametrize("mesh", [fibonacci_sphere(1500), uneven_sphere(1500)])
 @pytest.mark.parametrize("form", ["literal", "random-walk"])
 def test_points_hear_the_sphere_also_at_uneven_density(mesh, form):
     laplacian = point_cloud_laplacian(PointCloud(mesh.vertices), correct="log", form=form)
@@ -19,7 +19,7 @@ def test_points_hear_the_sphere_also_at_uneven_density(mesh, form):
 
 
 def test_the_graph_laplacian_does_not_bear_uneven_density():
-    points = graded_sphere(1500).vertices
+    points = uneven_sphere(1500).vertices
     t = point_cloud_laplacian(PointCloud(points)).kernel.t
     found = solve_spectrum(
         gaussian_laplacian(points, t, 2, correct="log", form="random-walk"), 16

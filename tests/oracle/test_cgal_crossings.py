@@ -51,7 +51,7 @@ def test_real_meshes(data, name):
 
 
 @pytest.mark.data
-def test_neighbours_folded_flat_are_ours_alone(data):
+def test_neighbors_folded_flat_are_ours_alone(data):
     """The dragon's coordinates have two decimals, so that some of its slivers lie upon each other to the last digit."""
     mesh = read_mesh(data / "classics" / "dragon.off")
     found, known = ours(mesh), theirs(mesh)

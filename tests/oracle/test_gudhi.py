@@ -1,4 +1,4 @@
-"""Persistence and pairs beside GUDHI's, bit for bit, on real meshes: closed, open, and with quantised values."""
+"""Persistence and pairs beside GUDHI's, bit for bit, on real meshes: closed, open, and with quantized values."""
 
 import gudhi
 import numpy as np
@@ -77,41 +77,41 @@ def our_pairs(mesh, values):
     return sorted(zip(*(column.tolist() for column in columns), strict=True))
 
 
-def waves(mesh, quantised):
+def waves(mesh, quantized):
     x, y, z = (mesh.vertices - mesh.vertices.mean(axis=0)).T / np.ptp(mesh.vertices, axis=0).max()
     heights = np.sin(9 * x + 1) * np.cos(11 * y) + 0.4 * np.sin(14 * z)
-    return np.round(8 * heights) / 8 if quantised else heights
+    return np.round(8 * heights) / 8 if quantized else heights
 
 
-@pytest.mark.parametrize("quantised", [False, True])
+@pytest.mark.parametrize("quantized", [False, True])
 @pytest.mark.parametrize(
     "mesh", [icosphere(3), torus(30, 18), grid(17, 13)], ids=["sphere", "torus", "flat"]
 )
-def test_made_up_surfaces(mesh, quantised):
-    values = waves(mesh, quantised)
+def test_made_up_surfaces(mesh, quantized):
+    values = waves(mesh, quantized)
     expected = pairs_by_gudhi(mesh, values)
     assert expected
     assert our_pairs(mesh, values) == expected
 
 
 @pytest.mark.data
-@pytest.mark.parametrize("quantised", [False, True])
+@pytest.mark.parametrize("quantized", [False, True])
 @pytest.mark.parametrize("path", CLOSED)
-def test_closed_shapes(data, path, quantised):
+def test_closed_shapes(data, path, quantized):
     mesh = read_mesh(data / path)
     assert is_closed(mesh)
-    values = waves(mesh, quantised)
+    values = waves(mesh, quantized)
     expected = pairs_by_gudhi(mesh, values)
     assert expected
     assert our_pairs(mesh, values) == expected
 
 
 @pytest.mark.data
-@pytest.mark.parametrize("quantised", [False, True])
+@pytest.mark.parametrize("quantized", [False, True])
 @pytest.mark.parametrize("path", OPEN)
-def test_open_shapes(data, path, quantised):
+def test_open_shapes(data, path, quantized):
     mesh = read_mesh(data / path)
-    values = waves(mesh, quantised)
+    values = waves(mesh, quantized)
     assert boundary_loops(mesh)
     assert is_manifold(mesh)
     assert our_pairs(mesh, values) == pairs_by_gudhi(mesh, values)
@@ -129,6 +129,6 @@ def test_shapes_cut_open(data, path):
             break
     else:
         pytest.fail("no cut of this shape is a manifold")
-    values = waves(part, quantised=True)
+    values = waves(part, quantized=True)
     assert boundary_loops(part)
     assert our_pairs(part, values) == pairs_by_gudhi(part, values)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.measure import edge_lengths, enclosed_volume, face_normals, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import degenerate_simplices
@@ -14,7 +15,6 @@ from eigenshape.geometry.topology import (
     boundary_loops,
     edge_table,
     euler_characteristic,
-    inconsistent_edges,
     is_closed,
     non_manifold_edges,
     vertex_components,

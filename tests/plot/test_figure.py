@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape.plot.figure import Figure, literal
+from eigenshape._text import literal
+from eigenshape.plot.figure import Figure
 
 EVIL = "a\x1b[31mb\x07c\u202ed\x00e"
 BALL = es.icosphere(1)

@@ -5,7 +5,13 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.plot.camera import in_picture, three_quarter_view
-from eigenshape.plot.fields import figure_eigenfunctions, figure_field, figure_segments
+from eigenshape.plot.fields import (
+    figure_eigenfunctions,
+    figure_field,
+    figure_segments,
+    part_colors,
+    value_colors,
+)
 from eigenshape.plot.render import AMBIENT, INK, draw, palette
 from eigenshape.plot.save import save_figure
 from eigenshape.plot.sheet import Panel, figure_contact_sheet
@@ -20,7 +26,7 @@ RED, BLUE = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 
 def colors_at(drawing, mask):
-    """Mean colour of the opaque pixels under a mask."""
+    """Mean color of the opaque pixels under a mask."""
     opaque = drawing.image[..., 3] > 0.99
     return drawing.image[opaque & mask][:, :3].mean(axis=0)
 
@@ -50,7 +56,7 @@ def test_a_scan_is_looked_at_from_where_it_was_seen():
     assert towards @ (view / np.linalg.norm(view)) > 0.9
 
 
-def test_halves_have_their_colours_on_their_sides():
+def test_halves_have_their_colors_on_their_sides():
     camera = three_quarter_view(SPHERE, size=160)
     high = SPHERE.vertices[SPHERE.faces].mean(axis=1)[:, 1] > 0
     drawing = draw(SPHERE, camera, face_colors=np.where(high[:, None], RED, BLUE))
@@ -100,7 +106,7 @@ def test_the_same_picture_twice_and_at_any_scale():
     assert np.array_equal(first, draw(larger, three_quarter_view(larger, size=80)).image)
 
 
-def test_palette_tells_fifteen_labels_apart_and_greys_the_rest():
+def test_palette_tells_fifteen_labels_apart_and_grays_the_rest():
     colors = palette(np.arange(15))
     apart = np.linalg.norm(colors[:, None] - colors[None], axis=2)[np.triu_indices(15, 1)]
     assert apart.min() > 0.14
@@ -109,7 +115,7 @@ def test_palette_tells_fifteen_labels_apart_and_greys_the_rest():
 
 
 @pytest.mark.long
-def test_figures_are_labelled(tmp_path):
+def test_figures_are_labeled(tmp_path):
     mesh = icosphere(2)
     found = solve_spectrum(cotangent_laplacian(mesh), 12)
     functions = figure_eigenfunctions(mesh, found, range(1, 4))
@@ -117,8 +123,8 @@ def test_figures_are_labelled(tmp_path):
         f"φ$_{{{i}}}$,  λ = {found.eigenvalues[i]:.4g}" for i in (1, 2, 3)
     ]
     assert "eigenfunction" in functions.axes[-1].get_ylabel()
-    field = figure_field(mesh, mesh.vertices[:, 0], "x, in metres")
-    assert field.axes[-1].get_ylabel() == "x, in metres"
+    field = figure_field(mesh, mesh.vertices[:, 0], "x, in meters")
+    assert field.axes[-1].get_ylabel() == "x, in meters"
     curve = figure_spectrum(found, area=12.5, brackets=bracket_eigenvalues(mesh, 12))
     (axes,) = curve.axes
     assert "λ" in axes.get_ylabel()
@@ -160,3 +166,31 @@ def test_files_are_whole_repeatable_and_of_a_known_kind(tmp_path):
         InvalidParameterError, match="A picture must be written to a folder that exists"
     ):
         save_figure(figure, tmp_path / "nowhere" / "one.png")
+
+
+def test_figures_take_lists_and_refuse_what_does_not_fit_the_mesh():
+    mesh = icosphere(1)  # 42 vertices, 80 faces
+    found = solve_spectrum(cotangent_laplacian(mesh), 4)
+    assert figure_eigenfunctions(mesh, found, 2).axes[0].get_title().startswith("φ$_{2}$")
+    with pytest.raises(InvalidParameterError, match=r"An index must lie in 0\.\.3; it is 4"):
+        figure_eigenfunctions(mesh, found, [1, 4])
+    with pytest.raises(InvalidParameterError, match="at least one eigenfunction"):
+        figure_eigenfunctions(mesh, found, [])
+    with pytest.raises(InvalidParameterError, match=r"which has 162 vertices; .* have 42 entries"):
+        figure_eigenfunctions(icosphere(2), found, [1])
+
+    assert figure_field(mesh, list(range(42))).axes[-1].get_ylim() == (0, 41)
+    with pytest.raises(InvalidParameterError, match=r"one number per vertex.*shape is \(42, 3\)"):
+        figure_field(mesh, mesh.vertices)
+
+    halves = [0] * 40 + [1] * 40
+    assert figure_segments(mesh, halves).axes[0].get_title() == "2 parts"
+    assert part_colors(mesh, halves).shape == (42, 3)
+    for draw_parts in (figure_segments, part_colors):
+        with pytest.raises(InvalidParameterError, match=r"per face, shape \(80,\); .* \(42,\)"):
+            draw_parts(mesh, [0] * 42)
+    with pytest.raises(InvalidParameterError, match=r"A feature point must lie in 0\.\.41"):
+        figure_segments(mesh, halves, [42])
+
+    with pytest.raises(InvalidParameterError, match="values must be finite; entry 1 is nan"):
+        value_colors([0.0, np.nan])

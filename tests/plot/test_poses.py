@@ -57,6 +57,16 @@ def test_what_moves_more_is_redder():
     )
     seen = np.abs(cold - warm).max(axis=2) > 1e-3
     assert seen.any()
-    grey, red = (np.mean(picture[seen], axis=0) for picture in (cold, warm))
-    assert np.ptp(grey[:3]) < 0.05 * grey[:3].max()
+    gray, red = (np.mean(picture[seen], axis=0) for picture in (cold, warm))
+    assert np.ptp(gray[:3]) < 0.05 * gray[:3].max()
     assert red[0] > 1.5 * red[2]
+
+
+def test_poses_may_be_meshes_of_several_sizes_but_shares_belong_to_one():
+    finer = es.icosphere(3)
+    figure = es.plot.figure_poses({"coarse": BALL, "fine": finer})
+    assert [axes.get_title() for axes in figure.axes] == ["coarse", "fine"]
+    with pytest.raises(es.InvalidParameterError, match=r"shares .* per vertex, shape \(642,\)"):
+        es.plot.figure_poses({"coarse": BALL, "fine": finer}, SHARES)
+    with pytest.raises(es.InvalidParameterError, match="at least one mesh"):
+        es.plot.figure_poses({})

@@ -35,8 +35,8 @@ def test_parts_of_a_pose_take_the_labels_of_the_same_parts_in_another(kind):
 @pytest.mark.long
 def test_labels_of_a_person_reach_the_quadruped_in_another_pose():
     def named(mesh):
-        centres = mesh.vertices[mesh.faces].mean(axis=1)
-        _, up, front = centres.T
+        centers = mesh.vertices[mesh.faces].mean(axis=1)
+        _, up, front = centers.T
         return np.select([(front > 0.55) & (up > 0.2), up < -0.2], [7, 3], 5)
 
     share, given = right_share("quadruped", 3, named)
@@ -83,7 +83,7 @@ def test_parts_beyond_the_others_number_take_the_nearest():
 
 
 @pytest.mark.long
-def test_the_picture_gives_matched_parts_one_colour_and_says_how_sure():
+def test_the_picture_gives_matched_parts_one_color_and_says_how_sure():
     mesh = make_creature("lizard", n_vertices=800)
     given = transfer_labels(mesh, find_parts(mesh).parts.labels, mesh)
     left, right = figure_label_transfer(mesh, mesh, given).axes
@@ -96,6 +96,6 @@ def test_one_label_a_face_is_asked_for():
     ball = icosphere(1)
     with pytest.raises(
         InvalidParameterError,
-        match=r"labels must hold one integer for each of the 80 faces; they have shape \(79,\)",
+        match=r"labels must hold one whole number per face, shape \(80,\); the shape is \(79,\)",
     ):
         transfer_labels(ball, np.zeros(79, dtype=np.int64), ball)

@@ -4,11 +4,11 @@ from each_creature import KINDS
 from threadpoolctl import threadpool_limits
 
 from eigenshape._errors import InvalidParameterError
+from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.measure import edge_lengths, enclosed_volume
 from eigenshape.geometry.simplices import degenerate_simplices
 from eigenshape.geometry.topology import (
     euler_characteristic,
-    inconsistent_edges,
     is_closed,
     is_manifold,
     unreferenced_vertices,

@@ -15,11 +15,11 @@ from eigenshape.shapes import exact
 from eigenshape.shapes.domains import ball, box, circle, disc, interval, irregular_grid
 from eigenshape.shapes.spheres import (
     fibonacci_sphere,
-    graded_sphere,
     projective_plane,
     random_sphere,
     sphere_hull,
     three_sphere,
+    uneven_sphere,
 )
 from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.solve import solve_spectrum
@@ -40,7 +40,7 @@ DOMAINS = {
         0.006,
         exact.sphere_eigenvalues(25),
     ),
-    "graded": (lambda: graded_sphere(1500), 4 * np.pi, 0.004, exact.sphere_eigenvalues(25)),
+    "uneven": (lambda: uneven_sphere(1500), 4 * np.pi, 0.004, exact.sphere_eigenvalues(25)),
     "three-sphere": (
         lambda: three_sphere(2500),
         2 * np.pi**2,
@@ -85,7 +85,7 @@ def test_held_at_their_boundary_they_are_drums(mesh, eigenvalues):
 
 
 @pytest.mark.parametrize(
-    "mesh", [fibonacci_sphere(60), graded_sphere(60), random_sphere(60, rng=RNG(3))]
+    "mesh", [fibonacci_sphere(60), uneven_sphere(60), random_sphere(60, rng=RNG(3))]
 )
 def test_spheres_are_closed_and_face_outward(mesh):
     assert is_closed(mesh)
@@ -136,11 +136,11 @@ def test_a_hull_that_leaves_the_origin_out_faces_outward():
     assert np.linalg.det(mesh.vertices[mesh.faces]).min() < 0
 
 
-def test_the_density_of_a_graded_sphere_falls_as_told():
-    heights = graded_sphere(20_000, ratio=4.0).vertices[:, 2]
+def test_the_density_of_an_uneven_sphere_falls_as_told():
+    heights = uneven_sphere(20_000, ratio=4.0).vertices[:, 2]
     bands, _ = np.histogram(heights, np.linspace(-1, 1, 11))
     np.testing.assert_allclose(bands / 20_000, np.linspace(0.046, 0.154, 10), atol=0.001)
-    assert np.ptp(np.histogram(graded_sphere(5000, ratio=1.0).vertices[:, 2], 10)[0]) <= 1
+    assert np.ptp(np.histogram(uneven_sphere(5000, ratio=1.0).vertices[:, 2], 10)[0]) <= 1
 
 
 def test_antipodes_become_one_and_no_length_changes():
@@ -167,7 +167,7 @@ def test_what_cannot_be_is_refused():
     with pytest.raises(InvalidParameterError, match="sides must be three lengths; there are 2"):
         box(2, 2, 2, sides=(1.0, 2.0))
     with pytest.raises(InvalidParameterError, match=r"ratio must lie in 1\.\.1e6; it is 0\.5"):
-        graded_sphere(30, ratio=0.5)
+        uneven_sphere(30, ratio=0.5)
     with pytest.raises(
         InvalidParameterError, match="condition must be 'neumann' or 'dirichlet'; it is 'robin'"
     ):

@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 
 from eigenshape._errors import InvalidParameterError
+from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.measure import enclosed_volume, face_normals, surface_area
 from eigenshape.geometry.subdivision import subdivide
-from eigenshape.geometry.topology import boundary_loops, inconsistent_edges, is_closed, is_manifold
+from eigenshape.geometry.topology import boundary_loops, is_closed, is_manifold
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 

@@ -3,14 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import (
-    edge_table,
-    euler_characteristic,
-    inconsistent_edges,
-    is_closed,
-    is_manifold,
-)
+from eigenshape.geometry.topology import edge_table, euler_characteristic, is_closed, is_manifold
 from eigenshape.shapes.isosurface import isosurface
 from eigenshape.shapes.thinning import FEWEST_NEIGHBORS, MOST_NEIGHBORS, decimate
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.domains import box
 from eigenshape.shapes.spheres import fibonacci_sphere
-from eigenshape.sparse.elimination import analyse, factorise
+from eigenshape.sparse.elimination import analyze_pattern, factorize_symmetric
 from eigenshape.sparse.front_loops import WIDE
 from eigenshape.sparse.sort_loops import sort_part
 
@@ -27,7 +27,7 @@ def random_symmetric(n, density, seed):
 
 
 def solved(matrix, width=3):
-    factor = factorise(analyse(matrix), matrix.data)
+    factor = factorize_symmetric(analyze_pattern(matrix), matrix.data)
     right = np.random.default_rng(0).normal(size=(matrix.shape[0], width))
     return factor, right, factor.solve(right)
 
@@ -69,7 +69,7 @@ def fronts_by_definition(matrix, elimination):
 @given(st.integers(1, 150), st.floats(0, 0.2), st.integers(0, 10**6))
 def test_fronts_have_the_rows_of_their_definition_and_the_room_for_them(n, density, seed):
     matrix = random_symmetric(n, density, seed)
-    e = analyse(matrix)
+    e = analyze_pattern(matrix)
     expected = fronts_by_definition(matrix, e)
     found = [e.rows[start:stop].tolist() for start, stop in itertools.pairwise(e.begins)]
     assert found == expected
@@ -98,10 +98,10 @@ def test_a_part_is_sorted_and_nothing_beside_it(count):
 @pytest.mark.parametrize("mesh", [fibonacci_sphere(5000), box(9, 9, 9)])
 def test_meshes_below_zero_and_among_their_eigenvalues(mesh):
     stiffness = sp.csc_array(cotangent_laplacian(mesh).stiffness)
-    elimination = analyse(stiffness)
+    elimination = analyze_pattern(stiffness)
     for shift, negative in ((-0.1, 0), (0.1 * stiffness.diagonal().mean(), None)):
         matrix = sp.csc_array(stiffness - shift * sp.eye_array(mesh.n_points))
-        factor = factorise(elimination, matrix.data)
+        factor = factorize_symmetric(elimination, matrix.data)
         right = np.random.default_rng(1).normal(size=(mesh.n_points, 11))
         np.testing.assert_allclose(matrix @ factor.solve(right), right, atol=1e-8)
         count = np.count_nonzero(factor.pivots < 0)
@@ -147,14 +147,14 @@ def test_a_pivot_that_is_none(bad):
     chain = sp.csc_array(
         sp.diags_array([-np.ones(9), np.full(10, 2.0), -np.ones(9)], offsets=[-1, 0, 1])
     )
-    assert factorise(analyse(chain), chain.data) is not None
+    assert factorize_symmetric(analyze_pattern(chain), chain.data) is not None
     alone = sp.csc_array(sp.eye_array(4))
-    assert factorise(analyse(alone), np.array([1.0, bad, 1.0, 1.0])) is None
+    assert factorize_symmetric(analyze_pattern(alone), np.array([1.0, bad, 1.0, 1.0])) is None
 
 
 def test_nothing_depends_on_the_run():
     matrix = sp.csc_array(
         cotangent_laplacian(fibonacci_sphere(2000)).stiffness + 0.1 * sp.eye_array(2000)
     )
-    one, two = (factorise(analyse(matrix), matrix.data) for _ in range(2))
+    one, two = (factorize_symmetric(analyze_pattern(matrix), matrix.data) for _ in range(2))
     np.testing.assert_array_equal(one.panels, two.panels)

@@ -32,7 +32,7 @@ def test_a_bottleneck_by_hand():
     found = es.stability.bottleneck_matching(one, two)
     assert found.partners.tolist() == [1, 2, 0]
     assert found.distance == 0.5
-    # The nearest neighbours' greedy choice would leave the last point a move of 3.
+    # The nearest neighbors' greedy choice would leave the last point a move of 3.
     greedy = es.stability.bottleneck_matching([[0.0], [1.0]], [[1.1], [3.0]])
     assert greedy.partners.tolist() == [0, 1]
     assert greedy.distance == 2.0
@@ -108,7 +108,7 @@ def test_point_sets_that_do_not_correspond_are_named():
 # Matching.
 
 
-def neighbours(graph, rows):
+def neighbors(graph, rows):
     return np.unique(
         np.concatenate([graph.indices[graph.indptr[row] : graph.indptr[row + 1]] for row in rows])
     )
@@ -128,7 +128,7 @@ def test_as_many_are_matched_as_by_scipy_and_the_blocked_prove_it(seed, n, k, sh
     if found.is_perfect:
         assert not len(found.blocked)
     else:
-        assert len(found.blocked) - len(neighbours(graph, found.blocked)) == n - found.n_matched
+        assert len(found.blocked) - len(neighbors(graph, found.blocked)) == n - found.n_matched
 
 
 def test_a_planted_matching_is_found():
@@ -329,10 +329,10 @@ def test_many_points_of_two_close_shapes_have_a_perfect_matching_and_few_have_no
 
 
 def test_pairs_that_would_not_fit_are_refused(monkeypatch):
-    monkeypatch.setattr("eigenshape.features.least_matching.machine_memory", lambda: 1e5)
+    monkeypatch.setattr("eigenshape._memory.machine_memory", lambda: 1e5)
     near, far = np.random.default_rng(0).random((2, 40, 3))
     es.stability.bottleneck_matching(near, near + 1e-3)  # few pairs
     with pytest.raises(
-        es.InvalidShapeError, match=r"Pairs of near points must fit .*; 1.6e\+03 pairs within"
+        es.InvalidShapeError, match=r"Pairs of near points must fit .*; for 1.6e\+03 pairs within"
     ):
         es.stability.bottleneck_matching(near, far + 100)

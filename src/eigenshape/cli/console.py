@@ -21,7 +21,7 @@ err = Console(stderr=True, highlight=False, soft_wrap=True)
 LONGEST_NUMBER = 16  # characters of a column that stay however narrow the terminal is
 
 
-def shown(text: object) -> str:
+def escape_text(text: object) -> str:
     """Return outside text, such as a file's name, as a terminal can show it: no control codes and no markup."""
     return escape(printable(str(text)))
 
@@ -54,19 +54,19 @@ def print_table(title: str, columns: list[str], rows: list[list[str]]) -> None:
             column, justify=justify, no_wrap=True, min_width=min(widest, LONGEST_NUMBER)
         )
     for row in rows:
-        table.add_row(*map(shown, row))
+        table.add_row(*map(escape_text, row))
     out.print(table)
 
 
 def print_repairs(report: tuple[str, ...]) -> None:
     """Print on stderr what repairs did."""
     for line in report:
-        err.print(f"[yellow]repair:[/] {shown(line)}")
+        err.print(f"[yellow]repair:[/] {escape_text(line)}")
 
 
 def print_written(path: Path) -> None:
     """Print on stderr that a file was written."""
-    err.print(f"wrote {shown(path)}")
+    err.print(f"wrote {escape_text(path)}")
 
 
 @contextmanager
@@ -87,7 +87,7 @@ def progress_bar(title: str) -> Iterator[Callable[[float, str], None]]:
         task = bar.add_task(title, total=1.0)
 
         def update(share: float, step: str) -> None:
-            description = f"{title}: {shown(step)}" if step else title
+            description = f"{title}: {escape_text(step)}" if step else title
             bar.update(task, completed=share, description=description)
 
         yield update
@@ -101,6 +101,6 @@ def batch_reporter(
     def report(n_done: int, n_items: int, name: str, error: str | None) -> None:
         progress(n_done / n_items, f"{n_done} of {n_items}, {name}")
         if error is not None:
-            err.print(f"[yellow]not indexed:[/] {shown(name)}: {shown(error)}")
+            err.print(f"[yellow]not indexed:[/] {escape_text(name)}: {escape_text(error)}")
 
     return report

@@ -1,23 +1,20 @@
 """eigenshape demo: index synthetic creatures, scan one, and search for it."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
+import eigenshape as es
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import out, progress_bar, shown
-from eigenshape.cli.index import WorkersOption, describe_all
-from eigenshape.cli.methods import PATCHES, index_recipe
-from eigenshape.cli.outputs import save_picture
+from eigenshape.cli import steps
+from eigenshape.cli.console import escape_text, out, progress_bar
+from eigenshape.cli.index import WorkersOption
+from eigenshape.cli.inputs import PATCHES
 from eigenshape.cli.query import print_matches
-from eigenshape.cli.sheets import CAPTION, color_query, contact_sheet
-from eigenshape.io.mesh_files import write_mesh
-from eigenshape.retrieval.store.index import ShapeIndex
-from eigenshape.retrieval.store.workers import Item, Workers
-from eigenshape.scans.partial import partial_scan
-from eigenshape.shapes.creatures import CREATURES, make_creature
+from eigenshape.shapes.creature_plans import CREATURES
 
 FOLDER = Path("eigenshape-demo")
 POSES = 3  # of each kind in the index; more would make the demo slower
@@ -45,34 +42,37 @@ def demo(
     """Try everything: make creatures, index them, scan one from one side in a new pose, and find its kind."""
     if kind not in CREATURES:
         raise InvalidParameterError(f"--kind takes {', '.join(CREATURES)}; it is {kind!r}.")
+    processes = es.retrieval.Workers(workers)
     items = _make(output / "creatures")
-    shelf = ShapeIndex.open_or_create(output / "index")
-    recipe = index_recipe(shelf, PATCHES, items, (), Workers(workers))
-    report = describe_all(shelf, items, recipe, Workers(workers))
+    shelf = es.ShapeIndex.open_or_create(output / "index")
+    recipe = steps.index_recipe(shelf, PATCHES, items, (), processes)
+    report = steps.describe_all(shelf, items, recipe, processes)
     out.print(f"indexed {len(shelf)} shapes ({len(report.skipped)} indexed already)")
 
     scan_path = output / "scan.ply"
-    scan = partial_scan(
-        make_creature(kind, UNSEEN, n_vertices=N_VERTICES), np.array([0.9, 0.25, 0.45])
+    scan = es.partial_scan(
+        es.make_creature(kind, UNSEEN, n_vertices=N_VERTICES), [0.9, 0.25, 0.45]
     ).mesh
-    write_mesh(scan, scan_path)
+    es.write_mesh(scan, scan_path)
     out.print(
-        f"scanned a {kind} from one side, in a pose that the index has not seen: {shown(scan_path)}"
+        f"scanned a {kind} from one side, in a pose that the index has not seen: {escape_text(scan_path)}"
     )
-    shape = color_query(scan, recipe)
+    shape = steps.color_query(scan, recipe)
     matches = shelf.query(shape.descriptor, n_matches=6)
     print_matches(matches)
 
     sheet = output / "sheet.png"
-    caption = f"A partial scan of a {kind} in a new pose, and the most similar shapes ({CAPTION})"
-    save_picture(contact_sheet(shape, "partial scan", matches, caption=caption), sheet)
-    out.print(NEXT.format(scan=shown(scan_path), index=shown(output / "index")))
+    caption = (
+        f"A partial scan of a {kind} in a new pose, and the most similar shapes ({steps.CAPTION})"
+    )
+    steps.save_picture(steps.contact_sheet(shape, "partial scan", matches, caption=caption), sheet)
+    out.print(NEXT.format(scan=escape_text(scan_path), index=escape_text(output / "index")))
 
 
-def _make(folder: Path) -> list[Item]:
+def _make(folder: Path) -> list[es.retrieval.Item]:
     """Write each kind in some poses, those that are not there yet."""
     items = [
-        Item(f"{kind}/{kind}-{pose}", folder / kind / f"{kind}-{pose}.ply", kind)
+        es.retrieval.Item(f"{kind}/{kind}-{pose}", folder / kind / f"{kind}-{pose}.ply", kind)
         for kind in CREATURES
         for pose in range(POSES)
     ]
@@ -81,8 +81,11 @@ def _make(folder: Path) -> list[Item]:
             progress(done / len(items), item.name)
             if not item.path.exists():
                 item.path.parent.mkdir(parents=True, exist_ok=True)
-                write_mesh(
-                    make_creature(item.label or "", done % POSES, n_vertices=N_VERTICES), item.path
+                es.write_mesh(
+                    es.make_creature(item.label or "", done % POSES, n_vertices=N_VERTICES),
+                    item.path,
                 )
-    out.print(f"made {len(CREATURES)} kinds of creatures in {POSES} poses each: {shown(folder)}")
+    out.print(
+        f"made {len(CREATURES)} kinds of creatures in {POSES} poses each: {escape_text(folder)}"
+    )
     return items

@@ -3,19 +3,13 @@
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
-from eigenshape.cli.console import err, print_json, progress_bar
-from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, load_mesh
-from eigenshape.cli.methods import HeatMethodOption, heat_recipe
-from eigenshape.cli.outputs import require_picture, save_picture
-from eigenshape.cli.parts import part_rows, print_rows, require_colored_path, save_colors
-from eigenshape.features.segmentation import segment
-from eigenshape.plot.fields import figure_segments, value_colors
-from eigenshape.retrieval.heat.descriptor import SCALE_FREE
-from eigenshape.retrieval.heat.features import find_heat_features
-from eigenshape.spectral.signatures.approximate_heat import LARGE, USUAL_ACCURACY
+import eigenshape as es
+from eigenshape.cli import steps
+from eigenshape.cli.console import err, out, print_json, progress_bar
+from eigenshape.cli.inputs import HeatMethodOption, JsonOption, MeshArgument, RepairOption
+from eigenshape.retrieval.heat.recipe import SCALE_FREE
 
 COLUMNS = {
     "feature": "feature",
@@ -68,22 +62,20 @@ def features(
 
     Above 100,000 vertices, or with --accuracy, heat is approximate, and its error is printed.
     """
-    recipe = heat_recipe(method)
-    require_picture(picture)
-    require_colored_path(output)
-    surface = load_mesh(mesh, repair)
+    recipe = steps.heat_recipe(method)
+    steps.require_picture(picture)
+    steps.require_colored_path(output)
+    surface = steps.load_mesh(mesh, repair)
     with progress_bar("features") as progress:
-        if accuracy is None and surface.n_vertices > LARGE:
-            accuracy = USUAL_ACCURACY
-        shape = find_heat_features(surface, recipe, accuracy=accuracy, progress=progress)
+        shape = steps.find_features(surface, recipe, accuracy, progress)
     if shape.error is not None:
         err.print(
             f"{surface.n_vertices:,} vertices: heat is approximate, with a relative error of about "
             f"{100 * shape.error:.2g} %"
         )
-    n_fragments = int(np.isin(shape.tree.maxima, shape.fragments).sum())
+    n_fragments = steps.count_fragments(shape)
     by_number = n_parts + n_fragments if persistence is None and not largest_gap else None
-    parts = segment(
+    parts = es.segment(
         shape.tree, n_regions=by_number, persistence=persistence, largest_gap=largest_gap
     )
     if n_fragments:
@@ -92,7 +84,7 @@ def features(
         )
     rows = [
         row | {"heat": float(parts.features.values[i])}
-        for i, row in enumerate(part_rows(shape.mesh, parts))
+        for i, row in enumerate(steps.part_rows(shape.mesh, parts))
     ]
     loose = set(shape.fragments.tolist())
     if as_json:
@@ -107,10 +99,13 @@ def features(
         features_alone = [
             row | {"feature": i} for i, row in enumerate(rows) if row["vertex"] not in loose
         ]
-        print_rows("Feature points", COLUMNS, features_alone)
+        steps.print_rows("Feature points", COLUMNS, features_alone)
+        time = recipe.feature_scale * recipe.time_unit
+        unit = "the area" if recipe.unit == "area" else "the square of the longest side of the box"
+        out.print(f"heat at time t = {time:g} of {unit}, in 1/length²")
     if picture:
-        save_picture(figure_segments(surface, parts.labels, parts.features.vertices), picture)
-    if output:
-        save_colors(
-            surface, value_colors(np.log(np.maximum(shape.heat, np.finfo(np.float64).tiny))), output
+        steps.save_picture(
+            es.plot.figure_segments(surface, parts.labels, parts.features.vertices), picture
         )
+    if output:
+        steps.save_heat(surface, shape.heat, output)

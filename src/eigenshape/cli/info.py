@@ -2,10 +2,8 @@
 
 from typing import Any
 
-import numpy as np
-
-from eigenshape._errors import InvalidShapeError
-from eigenshape.cli.console import out, print_json, shown
+from eigenshape.cli import steps
+from eigenshape.cli.console import escape_text, out, print_json
 from eigenshape.cli.inputs import (
     CellsOption,
     DimOption,
@@ -13,30 +11,7 @@ from eigenshape.cli.inputs import (
     JsonOption,
     RepairOption,
     ShapeArgument,
-    load_shape,
 )
-from eigenshape.geometry.cloud import PointCloud, Shape
-from eigenshape.geometry.measure import bounding_box, edge_lengths, enclosed_volume, surface_area
-from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import drop_duplicate_points, suggest_repairs
-from eigenshape.geometry.simplices import degenerate_simplices, mean_side_length, simplex_volumes
-from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.topology import (
-    boundary_loops,
-    boundary_vertices,
-    euler_characteristic,
-    inconsistent_edges,
-    is_closed,
-    non_manifold_edges,
-    non_manifold_vertices,
-    repeated_simplices,
-    seams,
-    unreferenced_vertices,
-    vertex_components,
-)
-from eigenshape.operators.kernel import neighbor_distance
-
-MEASURES = {1: "length", 2: "area"}
 
 
 def info(
@@ -49,103 +24,23 @@ def info(
     as_json: JsonOption = False,
 ) -> None:
     """Show the size, topology and faults of a shape, and which repairs would help."""
-    facts = shape_facts(load_shape(shape, repair, dim, drop_missing=drop_missing, cells=cells))
+    found = steps.load_shape(shape, repair, dim, drop_missing=drop_missing, cells=cells)
+    facts = steps.shape_facts(found)
     if as_json:
         print_json({"path": str(shape), **facts})
         return
-    out.print(f"[bold]{shown(shape)}[/]")
+    out.print(f"[bold]{escape_text(shape)}[/]")
     for name, value in facts.items():
-        out.print(f"  {name.replace('_', ' '):<24}{_shown(value)}")
+        inward = name == "enclosed_volume" and value is not None and value < 0
+        remark = " (faces point inward)" if inward else ""
+        out.print(f"  {name.replace('_', ' '):<24}{_format(value)}{remark}")
 
 
-def shape_facts(shape: Shape) -> dict[str, Any]:
-    """Gather what there is to say about a shape, in its own length unit."""
-    if isinstance(shape, TriangleMesh):
-        return mesh_facts(shape)
-    return cloud_facts(shape) if isinstance(shape, PointCloud) else simplicial_facts(shape)
-
-
-def cloud_facts(cloud: PointCloud) -> dict[str, Any]:
-    """Gather what there is to say about a cloud."""
-    low, high = bounding_box(cloud)
-    return {
-        "kind": "point cloud",
-        "points": cloud.n_points,
-        "dimension": cloud.dim,
-        "coordinates": cloud.points.shape[1],
-        "coinciding_points": cloud.n_points - drop_duplicate_points(cloud).cloud.n_points,
-        "mean_near_distance": _near_distance(cloud),
-        "box_low": low.tolist(),
-        "box_high": high.tolist(),
-        "repairs_to_try": list(suggest_repairs(cloud)),
-    }
-
-
-def _near_distance(cloud: PointCloud) -> float | None:
-    try:
-        return neighbor_distance(cloud.points, cloud.dim)
-    except InvalidShapeError:  # too few points to have one; the other facts stand
-        return None
-
-
-def simplicial_facts(mesh: SimplicialMesh) -> dict[str, Any]:
-    """Gather what there is to say about a mesh of any dimension."""
-    low, high = bounding_box(mesh)
-    return {
-        "kind": {1: "curve", 2: "surface", 3: "tetrahedral mesh"}.get(mesh.dim, "simplicial mesh"),
-        "points": mesh.n_points,
-        "simplices": mesh.n_simplices,
-        "dimension": mesh.dim,
-        "coordinates": mesh.points.shape[1],
-        "components": vertex_components(mesh)[0],
-        "boundary_points": len(boundary_vertices(mesh)),
-        MEASURES.get(mesh.dim, "volume"): float(simplex_volumes(mesh).sum()),
-        "mean_side_length": mean_side_length(mesh),
-        "without_volume": len(degenerate_simplices(mesh)),
-        "duplicates": len(repeated_simplices(mesh)),
-        "loose_points": len(unreferenced_vertices(mesh)),
-        "box_low": low.tolist(),
-        "box_high": high.tolist(),
-        "repairs_to_try": list(suggest_repairs(mesh)),
-    }
-
-
-def mesh_facts(mesh: TriangleMesh) -> dict[str, Any]:
-    """Gather what there is to say about a mesh, in the mesh's own length unit."""
-    n_components, _ = vertex_components(mesh)
-    low, high = bounding_box(mesh)
-    closed, n_turned = is_closed(mesh), len(inconsistent_edges(mesh))
-    facts = {
-        "vertices": mesh.n_vertices,
-        "faces": mesh.n_faces,
-        "components": n_components,
-        "boundary_loops": len(boundary_loops(mesh)),
-        "closed": closed,
-        "euler_characteristic": euler_characteristic(mesh),
-        "area": surface_area(mesh),
-        "enclosed_volume": enclosed_volume(mesh) if closed and not n_turned else None,
-        "mean_edge_length": float(edge_lengths(mesh).mean()),
-        "box_low": low.tolist(),
-        "box_high": high.tolist(),
-    }
-    faults = {
-        "faces_without_area": len(degenerate_simplices(mesh)),
-        "duplicate_faces": len(repeated_simplices(mesh)),
-        "loose_vertices": len(unreferenced_vertices(mesh)),
-        "coinciding_vertices": mesh.n_vertices - len(np.unique(mesh.vertices + 0.0, axis=0)),
-        "edges_on_seams": len(seams(mesh)),
-        "non_manifold_edges": len(non_manifold_edges(mesh)),
-        "non_manifold_vertices": len(non_manifold_vertices(mesh)),
-        "turned_over_edges": n_turned,
-    }
-    return facts | faults | {"repairs_to_try": list(suggest_repairs(mesh))}
-
-
-def _shown(value: Any) -> str:
+def _format(value: Any) -> str:
     if value is None:
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, list):
-        return ", ".join(_shown(item) for item in value) or "none"
+        return ", ".join(_format(item) for item in value) or "none"
     return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,21 +1,18 @@
-"""The options that name a shape and its repairs, and reading what they name."""
+"""The options that several verbs have. Nothing heavy is imported here, so that `--help` is quick."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import print_repairs
-from eigenshape.geometry.cloud import Shape
-from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import CLOUD_REPAIRS, REPAIRS, RepairedCloud, repair
-from eigenshape.io.cells import CellKind
-from eigenshape.io.mesh_files import read_mesh
-from eigenshape.io.shape_files import read_shape
+from eigenshape.geometry.repair_names import CLOUD_REPAIRS, MESH_REPAIRS
+from eigenshape.io.cell_kinds import CellKind
+from eigenshape.retrieval.heat.recipe import PRESETS
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")]
-KNOWN_REPAIRS = tuple(dict.fromkeys((*REPAIRS, *CLOUD_REPAIRS)))
+KNOWN_REPAIRS = tuple(dict.fromkeys((*MESH_REPAIRS, *CLOUD_REPAIRS)))
 RepairOption = Annotated[
     str,
     typer.Option(
@@ -60,28 +57,36 @@ DimOption = Annotated[
         help="Dimension of the shape that a point cloud samples: 1 curve, 2 surface, 3 volume."
     ),
 ]
+Scale = Literal["none", "area", "diameter"]
+PATCHES = "patches"  # a method of `index` and `query`
+PARTS = "parts"  # a method of `segment`
+METHODS = (PATCHES, *PRESETS)
 
-
-def load_mesh(path: Path, repairs: str) -> TriangleMesh:
-    """Read a mesh, apply the requested repairs, and print on stderr what they did."""
-    done = repair(read_mesh(path), repair_names(repairs))
-    print_repairs(done.report)
-    return done.mesh
-
-
-def load_shape(
-    path: Path, repairs: str, dim: int, *, drop_missing: bool, cells: CellKind | None = None
-) -> Shape:
-    """Read a shape of any kind, apply the requested repairs, and print on stderr what they did."""
-    names = repair_names(repairs)
-    done = repair(read_shape(path, dim=dim, drop_missing=drop_missing, cells=cells), names)
-    print_repairs(done.report)
-    return done.cloud if isinstance(done, RepairedCloud) else done.mesh
-
-
-def read_repaired(path: Path, names: tuple[str, ...]) -> TriangleMesh:
-    """Read a mesh and apply repairs without printing, as for one of many."""
-    return repair(read_mesh(path), names).mesh
+HeatMethodOption = Annotated[
+    str, typer.Option("--method", help=f"How shapes are described: {' or '.join(PRESETS)}.")
+]
+MethodOption = Annotated[
+    str,
+    typer.Option(
+        "--method",
+        help=f"How shapes are described: {', '.join(METHODS)}. patches is best for partial scans.",
+    ),
+]
+StoredMethodOption = Annotated[
+    str | None,
+    typer.Option(
+        "--method",
+        help=(
+            f"Which descriptions to compare: {', '.join(METHODS)}. By default the index's "
+            "own, or patches if it has several."
+        ),
+    ),
+]
+REGIONS = (
+    "'y>0.5' or 'y>0.5, x<0' (coordinates, or percent of the bounding box: 'y>60%'); 'vertex 17 within 0.2' "
+    "(distance along the surface, or percent of the square root of the area: 'within 10%'); 'part 3' (a number that "
+    "`eigenshape segment` prints); or a file with one vertex index a line."
+)
 
 
 def repair_names(text: str) -> tuple[str, ...]:
@@ -93,3 +98,9 @@ def repair_names(text: str) -> tuple[str, ...]:
                 f"--repair takes {', '.join(KNOWN_REPAIRS)}; {name!r} is none of them."
             )
     return names
+
+
+def require_method(name: str, names: Sequence[str] = METHODS) -> None:
+    """Raise an error if the name is not one of the allowed names."""
+    if name not in names:
+        raise InvalidParameterError(f"--method takes {', '.join(names)}; it is {name!r}.")

@@ -1,21 +1,16 @@
 """eigenshape label: the labels of one mesh, copied to the parts of another."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 
+import eigenshape as es
+from eigenshape.cli import steps
 from eigenshape.cli.console import print_json, progress_bar
-from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, load_mesh
-from eigenshape.cli.outputs import require_picture, save_picture
-from eigenshape.cli.parts import part_rows, print_rows, require_label_path, save_labels
-from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.labels import read_labels
-from eigenshape.io.mesh_files import read_mesh
-from eigenshape.plot.fields import part_colors
-from eigenshape.plot.sheet import figure_label_transfer
-from eigenshape.retrieval.label_transfer import LabelTransfer, transfer_labels
+from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption
 
 COLUMNS = {
     "part": "part",
@@ -64,31 +59,31 @@ def label(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Copy the labels of one mesh to the matching parts of another: label a horse, and get a labelled camel.
+    """Copy the labels of one mesh to the matching parts of another: label a horse, and get a labeled camel.
 
     Left and right may be exchanged. Repairs are applied to the mesh that gets the labels.
     """
-    require_picture(picture)
-    require_label_path(output)
-    given = read_labels(labels)
-    source, target = read_mesh(like), load_mesh(mesh, repair)
+    steps.require_picture(picture)
+    steps.require_label_path(output)
+    given = steps.read_labels(labels)
+    source, target = es.read_mesh(like), steps.load_mesh(mesh, repair)
     with progress_bar("label") as progress:
-        found = transfer_labels(source, given, target, n_parts=n_parts, progress=progress)
+        found = es.transfer_labels(source, given, target, n_parts=n_parts, progress=progress)
     rows = _rows(target, found)
     if as_json:
         print_json(
             {"path": str(mesh), "like": str(like), "parts": rows, "face_labels": found.labels}
         )
     else:
-        print_rows("Labels", COLUMNS, rows)
+        steps.print_rows("Labels", COLUMNS, rows)
     if output:
-        colors = part_colors(target, np.searchsorted(np.unique(given), found.labels))
-        save_labels(target, found.labels, colors, output)
+        colors = steps.label_colors(target, found.labels, given)
+        steps.save_labels(target, found.labels, colors, output)
     if picture:
-        save_picture(figure_label_transfer(source, target, found), picture)
+        steps.save_picture(es.plot.figure_label_transfer(source, target, found), picture)
 
 
-def _rows(target: TriangleMesh, found: LabelTransfer) -> list[dict[str, Any]]:
+def _rows(target: es.TriangleMesh, found: es.retrieval.LabelTransfer) -> list[dict[str, Any]]:
     return [
         {
             "part": number,
@@ -97,5 +92,5 @@ def _rows(target: TriangleMesh, found: LabelTransfer) -> list[dict[str, Any]]:
             "confidence": float(found.confidence[number]),
             "like_part": int(found.matches[number]),
         }
-        for number, row in enumerate(part_rows(target, found.target))
+        for number, row in enumerate(steps.part_rows(target, found.target))
     ]

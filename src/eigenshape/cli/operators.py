@@ -1,8 +1,8 @@
 """eigenshape operators: what there is to choose from."""
 
+import eigenshape as es
 from eigenshape.cli.console import out, print_json
 from eigenshape.cli.inputs import JsonOption
-from eigenshape.operators.catalog import OPERATORS
 
 NAMES = {
     "TriangleMesh": "triangles",
@@ -16,10 +16,13 @@ def operators(*, as_json: JsonOption = False) -> None:
     """List the operators that `spectrum --operator` takes, with the shapes and options of each."""
     if as_json:
         print_json(
-            {name: {**_facts(name), "is": entry.description} for name, entry in OPERATORS.items()}
+            {
+                name: {**_facts(name), "is": entry.description}
+                for name, entry in es.operators.OPERATORS.items()
+            }
         )
         return
-    for name, entry in OPERATORS.items():
+    for name, entry in es.operators.OPERATORS.items():
         facts = _facts(name)
         options = "".join(f" --{option.replace('_', '-')}" for option in facts["options"])
         takes = ", ".join(facts["takes"]) + (";" if options else "")
@@ -27,7 +30,7 @@ def operators(*, as_json: JsonOption = False) -> None:
 
 
 def _facts(name: str) -> dict[str, list[str]]:
-    entry = OPERATORS[name]
+    entry = es.operators.OPERATORS[name]
     return {
         "takes": [NAMES[kind.__name__] for kind in entry.shapes],
         "options": list(entry.options),

@@ -1,5 +1,7 @@
 """eigenshape query: which shapes of an index are most similar to a scan, and which features correspond."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
@@ -7,13 +9,17 @@ from typing import Annotated, Any
 
 import typer
 
+import eigenshape as es
+from eigenshape._text import literal
+from eigenshape.cli import steps
 from eigenshape.cli.console import out, print_json, print_table, progress_bar
-from eigenshape.cli.inputs import JsonOption, RepairOption, load_mesh, repair_names
-from eigenshape.cli.methods import StoredMethodOption, query_recipe, require_method
-from eigenshape.cli.outputs import require_picture, save_picture
-from eigenshape.cli.sheets import CAPTION, ColoredQuery, color_query, contact_sheet
-from eigenshape.plot.figure import literal
-from eigenshape.retrieval.store.index import Match, ShapeIndex
+from eigenshape.cli.inputs import (
+    JsonOption,
+    RepairOption,
+    StoredMethodOption,
+    repair_names,
+    require_method,
+)
 
 
 def query(
@@ -40,15 +46,15 @@ def query(
     as_json: JsonOption = False,
 ) -> None:
     """Find the shapes of an index that are most like a scan, and which features correspond."""
-    require_picture(picture)
+    steps.require_picture(picture)
     if method is not None:
         require_method(method)
-    shelf = ShapeIndex.open(index)
-    recipe = query_recipe(shelf, method)
-    surface = load_mesh(scan, repair)
+    shelf = es.ShapeIndex.open(index)
+    recipe = steps.query_recipe(shelf, method)
+    surface = steps.load_mesh(scan, repair)
     began = perf_counter()
     with progress_bar("describe") as progress:
-        shape = color_query(surface, recipe, progress)
+        shape = steps.color_query(surface, recipe, progress)
     described = perf_counter()
     matches = shelf.query(shape.descriptor, n_matches=n_matches)
     answered = perf_counter()
@@ -63,19 +69,22 @@ def query(
         )
     else:
         print_matches(matches)
+        out.print("score: 0 for the same description, about 1 if nothing is alike")
         out.print(
             f"described in {described - began:.2f} s, answered in {1000 * (answered - described):.0f} ms"
         )
     if picture:
         names = literal(scan.name), literal(index.name)
-        caption = f"{names[0]} and the {len(matches)} most similar shapes in {names[1]} ({CAPTION})"
+        caption = (
+            f"{names[0]} and the {len(matches)} most similar shapes in {names[1]} ({steps.CAPTION})"
+        )
         title, repairs = literal(scan.stem), repair_names(repair)
-        save_picture(
-            contact_sheet(shape, title, matches, repairs=repairs, caption=caption), picture
+        steps.save_picture(
+            steps.contact_sheet(shape, title, matches, repairs=repairs, caption=caption), picture
         )
 
 
-def _facts(shape: ColoredQuery, match: Match) -> dict[str, Any]:
+def _facts(shape: steps.ColoredQuery, match: es.retrieval.Match) -> dict[str, Any]:
     pairs = [
         {
             "query_vertex": int(shape.descriptor.vertices[one]),
@@ -92,7 +101,7 @@ def _facts(shape: ColoredQuery, match: Match) -> dict[str, Any]:
     }
 
 
-def print_matches(matches: Sequence[Match]) -> None:
+def print_matches(matches: Sequence[es.retrieval.Match]) -> None:
     """Print matches, best first, with the number of corresponding points."""
     rows = [
         [match.name, match.label or "", f"{match.score:.4g}", str(len(match.correspondences))]

@@ -5,13 +5,11 @@ from typing import Annotated
 
 import typer
 
-from eigenshape.cli.console import err, print_json, print_table, shown
-from eigenshape.cli.info import mesh_facts
+import eigenshape as es
+from eigenshape.cli import steps
+from eigenshape.cli.console import err, escape_text, print_json, print_table
 from eigenshape.cli.inputs import CellsOption, JsonOption, MeshArgument, repair_names
-from eigenshape.cli.outputs import require_mesh_path, save_like
-from eigenshape.geometry.repair import REPAIRS
-from eigenshape.geometry.repair import repair as repair_mesh
-from eigenshape.io.mesh_files import read_mesh
+from eigenshape.geometry.repair_names import MESH_REPAIRS
 
 USUAL = "auto"
 ROWS = (
@@ -33,7 +31,7 @@ def repair(
             "--repair",
             metavar="NAMES",
             help=(
-                f"Repairs to apply in this order, separated by commas: {', '.join(REPAIRS)}. "
+                f"Repairs to apply in this order, separated by commas: {', '.join(MESH_REPAIRS)}. "
                 "'' only converts the file."
             ),
         ),
@@ -45,24 +43,24 @@ def repair(
 
     For instance: eigenshape repair scan.ply --repair auto -o clean.ply
     """
-    require_mesh_path(output)
+    steps.require_mesh_path(output)
     chosen = repair_names(names)
-    before = read_mesh(mesh, cells=cells)
-    done = repair_mesh(before, chosen)
+    before = es.read_mesh(mesh, cells=cells)
+    done = es.repair(before, chosen)
     for line in done.report:
-        err.print(f"[yellow]repair:[/] {shown(line)}")
-    facts = {"before": mesh_facts(before), "after": mesh_facts(done.mesh)}
-    save_like(mesh, done.mesh, output)
+        err.print(f"[yellow]repair:[/] {escape_text(line)}")
+    facts = {"before": steps.mesh_facts(before), "after": steps.mesh_facts(done.mesh)}
+    steps.save_like(mesh, done.mesh, output)
     if as_json:
         print_json({"path": str(mesh), "output": str(output), "report": list(done.report), **facts})
         return
     rows = [
-        [name.replace("_", " "), *(_shown(fact[name]) for fact in facts.values())] for name in ROWS
+        [name.replace("_", " "), *(_format(fact[name]) for fact in facts.values())] for name in ROWS
     ]
     print_table("RepairedMesh", ["", *facts], rows)
 
 
-def _shown(value: bool | int) -> str:
+def _format(value: bool | int) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:,}"

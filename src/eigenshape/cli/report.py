@@ -5,10 +5,9 @@ from typing import Annotated
 
 import typer
 
+from eigenshape.cli import steps
 from eigenshape.cli.console import print_written, progress_bar
-from eigenshape.cli.inputs import MeshArgument, RepairOption, load_mesh
-from eigenshape.cli.outputs import require_output
-from eigenshape.plot.view import studio_module
+from eigenshape.cli.inputs import MeshArgument, RepairOption
 
 
 def report(
@@ -29,9 +28,9 @@ def report(
 
     For instance: eigenshape report scan.ply -o scan.html
     """
-    require_output(output, (".html",), "A report")
-    writer = studio_module("report")
-    surface = load_mesh(mesh, repair)
+    steps.require_output(output, (".html",), "A report")
+    writer = steps.studio_module("report")
+    surface = steps.load_mesh(mesh, repair)
     with progress_bar("report") as progress:
         writer.write_report(surface, output, name=mesh.name, n_modes=n_modes, progress=progress)
     print_written(output)

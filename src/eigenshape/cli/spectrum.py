@@ -1,15 +1,14 @@
 """eigenshape spectrum: the lowest eigenvalues of a shape by any operator, with their proof."""
 
-from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-import numpy as np
 import typer
-from jaxtyping import Int
 
+import eigenshape as es
 from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import err, out, print_json, print_table, print_written, progress_bar
+from eigenshape.cli import steps
+from eigenshape.cli.console import print_json, print_written, progress_bar
 from eigenshape.cli.inputs import (
     CellsOption,
     DimOption,
@@ -17,27 +16,9 @@ from eigenshape.cli.inputs import (
     JsonOption,
     RepairOption,
     ShapeArgument,
-    load_shape,
 )
-from eigenshape.cli.outputs import require_output, require_picture, save_picture
-from eigenshape.geometry.cloud import PointCloud, Shape
-from eigenshape.geometry.measure import surface_area
-from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplicial import Mesh
-from eigenshape.operators.boundary import Condition
-from eigenshape.operators.catalog import OPERATORS, build_laplacian, default_operator
-from eigenshape.operators.cotangent import Mass
-from eigenshape.operators.fem import fem_boundary_nodes
-from eigenshape.operators.gaussian import Distance
-from eigenshape.operators.kernel import Correction, Form
-from eigenshape.operators.laplacian import Laplacian
-from eigenshape.plot.fields import figure_eigenfunctions
-from eigenshape.plot.spectra import figure_spectrum
-from eigenshape.spectral.bounds.brackets import Brackets, bracket_eigenvalues
-from eigenshape.spectral.solve import solve_spectrum
-from eigenshape.spectral.spectrum import Spectrum
+from eigenshape.operators.choices import OPERATOR_NAMES, Condition, Correction, Distance, Form, Mass
 
-N_PICTURED = 8  # eigenfunctions in a picture: two rows of four
 USUAL = 20  # pairs
 ORDERS = {"p2": 2, "p3": 3}
 
@@ -66,7 +47,7 @@ def spectrum(
         typer.Option(
             "--operator",
             help=(
-                f"{', '.join(OPERATORS)} (see `eigenshape operators`). By default cotangent for "
+                f"{', '.join(OPERATOR_NAMES)} (see `eigenshape operators`). By default cotangent for "
                 "meshes, point-cloud for points."
             ),
         ),
@@ -156,9 +137,9 @@ def spectrum(
     as_json: JsonOption = False,
 ) -> None:
     """Compute the lowest eigenvalues of a shape and prove that none is missing."""
-    require_picture(picture)
-    require_picture(eigenfunctions)
-    require_output(output, (".npz",), "A spectrum")
+    steps.require_picture(picture)
+    steps.require_picture(eigenfunctions)
+    steps.require_output(output, (".npz",), "A spectrum")
     if accuracy is not None and below is not None:
         raise InvalidParameterError(
             "--accuracy needs -k, because the approximate method cannot count the eigenvalues below a value. Pass -k "
@@ -174,16 +155,16 @@ def spectrum(
         "distance": distance,
     }
     options = {name: value for name, value in given.items() if value is not None}
-    found = load_shape(shape, repair, dim, drop_missing=drop_missing, cells=cells)
-    _require_drawable(found, eigenfunctions)
-    bounded = _require_mesh(found) if brackets else None
-    name = operator or default_operator(found)
-    fixed = _boundary_points(found, ORDERS.get(name, 1)) if boundary == "dirichlet" else None
+    found = steps.load_shape(shape, repair, dim, drop_missing=drop_missing, cells=cells)
+    steps.require_drawable(found, eigenfunctions)
+    bounded = steps.require_bracketable(found) if brackets else None
+    name = operator or steps.default_operator(found)
+    fixed = steps.boundary_points(found, ORDERS.get(name, 1)) if boundary == "dirichlet" else None
     with progress_bar("spectrum") as progress:
         progress(0.0, "building the operator")
-        laplacian = build_laplacian(found, name, **options)
-        n_pairs = _usual_pairs(laplacian, fixed) if k is None and below is None else k
-        solved = solve_spectrum(
+        laplacian = es.build_laplacian(found, name, **options)
+        n_pairs = steps.usual_pairs(laplacian, fixed, USUAL) if k is None and below is None else k
+        solved = es.solve_spectrum(
             laplacian,
             n_pairs,
             fixed=fixed,
@@ -196,7 +177,7 @@ def spectrum(
         )
         count = solved.certificate.first + len(solved.eigenvalues)
         bounds = (
-            bracket_eigenvalues(bounded, count, boundary=boundary, progress=progress)
+            es.bracket_eigenvalues(bounded, count, boundary=boundary, progress=progress)
             if bounded
             else None
         )
@@ -207,90 +188,15 @@ def spectrum(
                 "operator": name,
                 "boundary": boundary,
                 **options,
-                **_facts(solved, bounds),
+                **steps.spectrum_facts(solved, bounds),
             }
         )
     else:
-        _print(solved, bounds)
+        steps.print_spectrum(solved, bounds)
     if picture:
-        _draw_eigenvalues(found, solved, bounds, picture)
-    if eigenfunctions and isinstance(found, TriangleMesh):
-        _draw_eigenfunctions(found, solved, eigenfunctions)
+        steps.draw_eigenvalues(found, solved, bounds, picture)
+    if eigenfunctions and isinstance(found, es.TriangleMesh):
+        steps.draw_eigenfunctions(found, solved, eigenfunctions)
     if output:
         solved.save(output)
         print_written(output)
-
-
-def _usual_pairs(laplacian: Laplacian, fixed: Int[np.ndarray, " c"] | None) -> int:
-    """Return the default number of pairs, with a note on stderr if the shape has fewer."""
-    most = laplacian.n_points - (0 if fixed is None else len(fixed))
-    if most < USUAL:
-        err.print(
-            f"[yellow]note:[/] the default is {USUAL} pairs; this shape has {most}, and all are computed"
-        )
-    return max(1, min(USUAL, most))
-
-
-def _require_drawable(shape: Shape, eigenfunctions: Path | None) -> None:
-    if eigenfunctions and not isinstance(shape, TriangleMesh):
-        raise InvalidParameterError(
-            f"--eigenfunctions draws triangle meshes; the shape is {shape!r}. --picture draws the "
-            "eigenvalues of any shape."
-        )
-
-
-def _require_mesh(shape: Shape) -> Mesh:
-    if isinstance(shape, PointCloud):
-        raise InvalidParameterError("--brackets is for meshes; the shape is a point cloud.")
-    return shape
-
-
-def _boundary_points(shape: Shape, order: int) -> Int[np.ndarray, " c"]:
-    if isinstance(shape, PointCloud):
-        raise InvalidParameterError(
-            "--boundary dirichlet is for meshes; a point cloud has no boundary."
-        )
-    nodes = fem_boundary_nodes(shape, order)
-    if not nodes.size:
-        raise InvalidParameterError(f"--boundary dirichlet needs a boundary; {shape!r} is closed.")
-    return nodes
-
-
-def _facts(found: Spectrum, bounds: Brackets | None) -> dict[str, Any]:
-    facts = {
-        "eigenvalues": found.eigenvalues,
-        "residuals": found.residuals,
-        "certificate": asdict(found.certificate),
-    }
-    return facts if bounds is None else {**facts, "brackets": asdict(bounds)}
-
-
-def _print(found: Spectrum, bounds: Brackets | None) -> None:
-    columns, first = ["i", "λ", "error at most"], found.certificate.first
-    rows = [
-        [str(index), f"{value:.10g}", f"{residual:.1e}"]
-        for index, (value, residual) in enumerate(
-            zip(found.eigenvalues, found.residuals, strict=True), first
-        )
-    ]
-    if bounds:
-        columns += ["lower", "upper"]
-        ends = zip(bounds.lower[first:], bounds.upper[first:], strict=True)
-        rows = [
-            [*row, f"{low:.6g}", f"{high:.6g}"] for row, (low, high) in zip(rows, ends, strict=True)
-        ]
-    print_table("Eigenvalues, in 1/length²", columns, rows)
-    out.print(found.certificate.explain())
-    if bounds:
-        out.print(bounds.explain())
-
-
-def _draw_eigenvalues(shape: Shape, found: Spectrum, bounds: Brackets | None, path: Path) -> None:
-    area = surface_area(shape) if isinstance(shape, TriangleMesh) else None
-    save_picture(figure_spectrum(found, area=area, brackets=bounds), path)
-
-
-def _draw_eigenfunctions(mesh: TriangleMesh, found: Spectrum, path: Path) -> None:
-    first, k = found.certificate.first, len(found.eigenvalues)
-    start = min(1, k - 1) if first == 0 else 0  # the lowest is constant
-    save_picture(figure_eigenfunctions(mesh, found, range(start, min(k, start + N_PICTURED))), path)

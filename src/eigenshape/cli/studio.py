@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from eigenshape.cli.console import out, shown
-from eigenshape.plot.view import studio_module
+from eigenshape.cli import steps
+from eigenshape.cli.console import escape_text, out
 
 
 def studio(
@@ -43,10 +43,10 @@ def studio(
 
     For instance: eigenshape studio scan.ply --index my-index
     """
-    server = studio_module("server")
+    server = steps.studio_module("server")
 
     def announce(url: str) -> None:
-        out.print(f"The studio is open at {shown(url)}")
+        out.print(f"The studio is open at {escape_text(url)}")
         out.file.flush()
 
     server.serve(

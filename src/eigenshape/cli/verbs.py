@@ -11,7 +11,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from eigenshape._errors import EigenshapeError
 from eigenshape._text import printable
-from eigenshape.cli.console import err, shown
+from eigenshape.cli.console import err, escape_text
 from eigenshape.cli.interrupt import interruptible
 
 # The first line of each verb's docstring stands here again, because `eigenshape --help` lists the
@@ -27,7 +27,7 @@ VERBS = {
     "first.",
     "segment": "Cut a mesh into its parts: limbs, head, torso.",
     "label": "Copy the labels of one mesh to the matching parts of another: label a horse, and get "
-    "a labelled camel.",
+    "a labeled camel.",
     "deform": "Bend, twist or stretch a mesh: a region is turned or moved, and the rest follows "
     "smoothly.",
     "stability": "Compare two shapes: how close they lie, what changes in their spectra, and which "
@@ -67,7 +67,7 @@ class Verb(TyperCommand):
                 warnings.showwarning = _print_warning
                 return super().invoke(ctx)
         except (EigenshapeError, OSError) as error:
-            err.print(f"[bold red]error:[/] {shown(error)}")
+            err.print(f"[bold red]error:[/] {escape_text(error)}")
             raise typer.Exit(1) from error
         except KeyboardInterrupt as error:
             err.print("stopped; what was finished is kept")
@@ -117,4 +117,4 @@ def _printable_usage() -> Iterator[None]:
 
 
 def _print_warning(message: Warning | str, *_: object, **__: object) -> None:
-    err.print(f"[yellow]warning:[/] {shown(message)}")
+    err.print(f"[yellow]warning:[/] {escape_text(message)}")

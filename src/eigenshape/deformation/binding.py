@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 from eigenshape._arguments import describe_value, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.region import Region, region_mask, require_boundary
 from eigenshape.deformation.rig import EigenRig
@@ -60,6 +61,9 @@ class Binding:
     distances: Float[np.ndarray, "r n"]
     shares: Float[np.ndarray, "r n"]
     part: FreePart
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 @one_blas_thread()

@@ -1,19 +1,17 @@
 """Bend a shape: regions follow handles, and the rest follows smoothly."""
 
 from collections.abc import Sequence
-from typing import Literal, SupportsIndex, cast, get_args
+from typing import SupportsIndex
 
-from eigenshape._arguments import require_each, require_type
-from eigenshape._errors import InvalidParameterError
+from eigenshape._arguments import require_type
 from eigenshape.deformation.binding import Binding, bind
 from eigenshape.deformation.graded_bend import bend_graded, bend_uncrossed
-from eigenshape.deformation.handles import Handle
+from eigenshape.deformation.handles import Handle, require_handles
+from eigenshape.deformation.modes import Mode, require_mode
 from eigenshape.deformation.region import Region
 from eigenshape.deformation.rig import EigenRig
 from eigenshape.deformation.thesis import detailed_skeleton, eigen_deformation
 from eigenshape.geometry.mesh import TriangleMesh
-
-Mode = Literal["graded", "uncrossed", "thesis"]
 
 
 def deform(
@@ -120,12 +118,7 @@ def bend(binding: Binding, handles: Sequence[Handle], *, mode: Mode = "graded") 
     1.5
     """
     require_type(binding, Binding, "binding")
-    require_each(handles, Handle, "handles")
-    if len(handles) != len(binding.regions):
-        raise InvalidParameterError(
-            "Each region must have one handle; "
-            f"there are {len(binding.regions)} regions and {len(handles)} handles."
-        )
+    require_handles(handles, len(binding.regions))
     if require_mode(mode) == "thesis":
         vertices = eigen_deformation(detailed_skeleton(binding), handles)
     elif mode == "uncrossed":
@@ -133,17 +126,3 @@ def bend(binding: Binding, handles: Sequence[Handle], *, mode: Mode = "graded") 
     else:
         vertices = bend_graded(binding, handles)
     return TriangleMesh(vertices, binding.rig.mesh.faces)
-
-
-def require_mode(mode: str) -> Mode:
-    """Return the mode; raise an error if it is unknown.
-
-    Raises
-    ------
-    InvalidParameterError
-    """
-    if mode not in get_args(Mode):
-        raise InvalidParameterError(
-            f"mode must be 'graded', 'uncrossed' or 'thesis'; it is {mode!r}."
-        )
-    return cast(Mode, mode)

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 from eigenshape.deformation.rigidity import edge_weights, fit_turns
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, bounding_box, edge_lengths
@@ -40,6 +41,9 @@ class Distortion:
     edge_error_of_box: float
     area_ratios: Float[np.ndarray, " f"]
     flipped: Int[np.ndarray, " k"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def measure_distortion(before: MeshLike, after: MeshLike) -> Distortion:
@@ -83,7 +87,7 @@ def measure_distortion(before: MeshLike, after: MeshLike) -> Distortion:
     change = edge_lengths(new) - lengths
     low, high = bounding_box(old)
     normals, turned = (area_vectors(mesh.vertices[mesh.faces]) for mesh in (old, new))
-    edges = edge_weights(cotangent_laplacian(old).stiffness)
+    edges = edge_weights(old, cotangent_laplacian(old).stiffness)
     turns = fit_turns(edges, old.vertices, new.vertices)[old.faces]
     # Scalar product of the new normal with the old one, turned by the rotation of each corner.
     away = np.einsum("fcij,fj,fi->f", turns, normals, turned) < 0

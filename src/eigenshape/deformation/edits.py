@@ -11,9 +11,11 @@ from scipy.spatial import cKDTree
 from eigenshape._arguments import describe_value, require_each, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 from eigenshape.deformation.binding import bind
-from eigenshape.deformation.deform import Mode, bend, require_mode
+from eigenshape.deformation.deform import bend
 from eigenshape.deformation.handles import Handle, Rotation, Translation
+from eigenshape.deformation.modes import Mode, require_mode
 from eigenshape.deformation.region import BoxRegion, BrushRegion, Region, copy_region, region_mask
 from eigenshape.deformation.rig import EigenRig, pose_rig
 from eigenshape.geometry.mesh import TriangleMesh
@@ -74,6 +76,9 @@ class Move:
     region: Region
     handle: Handle
 
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
     def __post_init__(self) -> None:
         require_type(self.handle, Handle, "handle")
         object.__setattr__(self, "region", copy_region(self.region))
@@ -102,12 +107,28 @@ class Edit:
     --------
     apply_edit : Apply an edit to a rig.
     replay : Apply several edits one after the other.
+
+    Examples
+    --------
+    Pull two ends of a sphere apart at the same time:
+
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> top = es.deformation.Move(mesh.vertices[:, 2] > 0.5, es.Translation([0, 0, 0.5]))
+    >>> bottom = es.deformation.Move(mesh.vertices[:, 2] < -0.5, es.Translation([0, 0, -0.5]))
+    >>> egg = es.deformation.apply_edit(es.rig_shape(mesh), es.deformation.Edit((top, bottom)))
+    >>> heights = egg.mesh.vertices[:, 2]
+    >>> heights.max().round(1).item(), heights.min().round(1).item()
+    (1.5, -1.5)
     """
 
     moves: tuple[Move, ...]
     fixed: Region | None = None
     n_modes: int | None = None
     mode: Mode = "graded"
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
         require_each(self.moves, Move, "moves")

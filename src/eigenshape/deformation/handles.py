@@ -1,12 +1,15 @@
 """Handles: the motions of regions."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import finite_values, frozen
+from eigenshape._arguments import require_each
+from eigenshape._arrays import finite_values, freeze
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 
 # Sine over cosine of two directions, below which they are parallel or opposite: far above the
@@ -51,6 +54,8 @@ class Rotation:
     axis: Float[np.ndarray, " 3"]
     angle: float
 
+    _repr_html_ = html_repr
+
     def __init__(self, pivot: ArrayLike, axis: ArrayLike, angle: float) -> None:
         direction = vector(axis, "axis")
         largest = np.abs(direction).max()
@@ -61,8 +66,8 @@ class Rotation:
         if abs(length - 1) > 4 * np.finfo(float).eps:
             direction = direction / largest
             direction = direction / np.linalg.norm(direction)
-        object.__setattr__(self, "pivot", frozen(vector(pivot, "pivot")))
-        object.__setattr__(self, "axis", frozen(direction))
+        object.__setattr__(self, "pivot", freeze(vector(pivot, "pivot")))
+        object.__setattr__(self, "axis", freeze(direction))
         object.__setattr__(self, "angle", float(finite_values(angle, "angle")[0]))
 
     @property
@@ -111,8 +116,10 @@ class Translation:
 
     vector: Float[np.ndarray, " 3"]
 
+    _repr_html_ = html_repr
+
     def __init__(self, vector_: ArrayLike) -> None:
-        object.__setattr__(self, "vector", frozen(vector(vector_, "vector")))
+        object.__setattr__(self, "vector", freeze(vector(vector_, "vector")))
 
     @property
     def turn(self) -> Float[np.ndarray, " 3"]:
@@ -127,6 +134,16 @@ class Translation:
 
 
 Handle = Rotation | Translation
+
+
+def require_handles(handles: Sequence[Handle], n_regions: int) -> None:
+    """Raise an error if there is not one handle for each region."""
+    require_each(handles, Handle, "handles")
+    if len(handles) != n_regions:
+        raise InvalidParameterError(
+            "Each region must have one handle; "
+            f"there are {n_regions} regions and {len(handles)} handles."
+        )
 
 
 def affine_offset(handle: Handle) -> Float[np.ndarray, "3 4"]:

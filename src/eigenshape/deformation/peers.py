@@ -11,14 +11,14 @@ from jaxtyping import Float
 from scipy.linalg import lu_factor, lu_solve
 from scipy.spatial.transform import Rotation
 
-from eigenshape._arguments import require_each, require_type
+from eigenshape._arguments import require_type
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.binding import Binding
 from eigenshape.deformation.graded_bend import move_by_shares, quaternions
-from eigenshape.deformation.handles import Handle
+from eigenshape.deformation.handles import Handle, require_handles
 from eigenshape.deformation.rig import eigen_skeleton
 from eigenshape.deformation.rigidity import factor_equations, relax
-from eigenshape.deformation.rigidity_loops import fit_rotations, turned_edges
+from eigenshape.deformation.rigidity_loops import fit_rotations, turn_edges
 from eigenshape.operators.cotangent import cotangent_laplacian
 
 Points = Float[np.ndarray, "n 3"]
@@ -47,6 +47,11 @@ def as_rigid_as_possible(
     (n, 3) float
         The vertices.
 
+    Raises
+    ------
+    InvalidParameterError
+        If there is not one handle for each region.
+
     Examples
     --------
     >>> import eigenshape as es
@@ -58,7 +63,7 @@ def as_rigid_as_possible(
     1.5
     """
     require_type(binding, Binding, "binding")
-    require_each(handles, Handle, "handles")
+    require_handles(handles, len(binding.regions))
     rest = binding.rig.mesh.vertices
     start = move_by_shares(binding, handles)
     start[binding.part.free] = rest[binding.part.free]
@@ -84,9 +89,24 @@ def biharmonic_blend(binding: Binding, handles: Sequence[Handle]) -> Points:
     -------
     (n, 3) float
         The vertices.
+
+    Raises
+    ------
+    InvalidParameterError
+        If there is not one handle for each region.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> binding = es.deformation.bind(es.rig_shape(mesh), [mesh.vertices[:, 2] > 0.2])
+    >>> lift = es.Translation([0, 0, 0.5])
+    >>> vertices = es.deformation.biharmonic_blend(binding, [lift])
+    >>> float(vertices[:, 2].max().round(1))
+    1.5
     """
     require_type(binding, Binding, "binding")
-    require_each(handles, Handle, "handles")
+    require_handles(handles, len(binding.regions))
     rig, free = binding.rig, binding.part.free
     laplacian = cotangent_laplacian(rig.mesh)
     twice = (
@@ -127,9 +147,24 @@ def spectral_rigid(
     -------
     (n, 3) float
         The vertices.
+
+    Raises
+    ------
+    InvalidParameterError
+        If there is not one handle for each region.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> binding = es.deformation.bind(es.rig_shape(mesh), [mesh.vertices[:, 2] > 0.2])
+    >>> lift = es.Translation([0, 0, 0.5])
+    >>> vertices = es.deformation.spectral_rigid(binding, [lift])
+    >>> float(vertices[:, 2].max().round(1))
+    1.5
     """
     require_type(binding, Binding, "binding")
-    require_each(handles, Handle, "handles")
+    require_handles(handles, len(binding.regions))
     rig = binding.rig
     modes, rest = rig.eigenvectors[:, : min(n_modes, rig.n_modes)], rig.mesh.vertices
     skeleton = eigen_skeleton(rig, modes.shape[1])
@@ -143,7 +178,7 @@ def spectral_rigid(
     sums = np.empty_like(rest)
     moved = skeleton
     for _ in range(n_rounds):
-        turned_edges(everyone, *links, skeleton, turns, sums)
+        turn_edges(everyone, *links, skeleton, turns, sums)
         change = _turn(turns[fixed], details[fixed]) - details[fixed]
         right = modes.T @ sums + weight * modes[fixed].T @ (goal - change)
         moved = skeleton + modes @ lu_solve(factor, right)

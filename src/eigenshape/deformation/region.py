@@ -10,8 +10,9 @@ from scipy.spatial import cKDTree
 from typing_extensions import TypeAliasType
 
 from eigenshape._arguments import describe_value
-from eigenshape._arrays import as_array, frozen, positive_values, real_numbers, whole_numbers
+from eigenshape._arrays import as_array, freeze, positive_values, real_numbers, whole_numbers
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.deformation.handles import vector
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -51,6 +52,8 @@ class BoxRegion:
     low: Float[np.ndarray, " 3"]
     high: Float[np.ndarray, " 3"]
 
+    _repr_html_ = html_repr
+
     def __init__(self, low: ArrayLike, high: ArrayLike) -> None:
         corners = [
             real_numbers(corner, "A corner of a box").astype(np.float64) for corner in (low, high)
@@ -66,8 +69,8 @@ class BoxRegion:
             raise InvalidParameterError(
                 f"low must lie below high; along axis {axis[0]} they are {below} and {above}."
             )
-        object.__setattr__(self, "low", frozen(corners[0]))
-        object.__setattr__(self, "high", frozen(corners[1]))
+        object.__setattr__(self, "low", freeze(corners[0]))
+        object.__setattr__(self, "high", freeze(corners[1]))
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -90,13 +93,22 @@ class BrushRegion:
     --------
     BoxRegion : The vertices inside a box.
     region_mask : Select the vertices of a region.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> cap = es.deformation.BrushRegion(center=[0, 0, 1], radius=0.5)
+    >>> int(es.deformation.region_mask(es.icosphere(2), cap).sum())
+    7
     """
 
     center: Float[np.ndarray, " 3"]
     radius: float
 
+    _repr_html_ = html_repr
+
     def __init__(self, center: ArrayLike, radius: float) -> None:
-        object.__setattr__(self, "center", frozen(vector(center, "center")))
+        object.__setattr__(self, "center", freeze(vector(center, "center")))
         object.__setattr__(self, "radius", float(positive_values(radius, "radius")[0]))
 
 
@@ -107,7 +119,7 @@ def copy_region(region: Region) -> Region:
     """Return a region that can be used many times, and that the caller cannot change."""
     if isinstance(region, BoxRegion | BrushRegion):
         return region
-    return frozen(_entries(region))
+    return freeze(_entries(region))
 
 
 def _entries(region: np.ndarray | Iterable[int]) -> np.ndarray:

@@ -9,9 +9,10 @@ from jaxtyping import Float, Int
 from scipy.linalg import cho_solve
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import finite_rows, frozen, whole_number
+from eigenshape._arrays import finite_rows, freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.deformation.rigidity import EdgeWeights, edge_weights
@@ -60,6 +61,9 @@ class EigenRig:
     factor: Float[np.ndarray, "k k"]
     edges: EdgeWeights
 
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
     @property
     def n_modes(self) -> int:
         """Number of modes, k."""
@@ -68,7 +72,7 @@ class EigenRig:
     @cached_property
     def components(self) -> Int[np.ndarray, " n"]:
         """Component of each vertex, (n,) int."""
-        return frozen(vertex_components(self.mesh)[1])
+        return freeze(vertex_components(self.mesh)[1])
 
 
 def rig_shape(
@@ -131,9 +135,9 @@ def rig_shape(
     with one_blas_thread():
         # Φ = QR gives ΦᵀΦ = RᵀR, without the squared condition number of forming ΦᵀΦ.
         factor = np.asarray(np.linalg.qr(modes, mode="r")).T
-    edges = edge_weights(laplacian.stiffness)
-    areas = frozen(spectrum.mass @ np.ones(len(modes)))
-    return EigenRig(mesh, modes, spectrum.eigenvalues, areas, frozen(factor), edges)
+    edges = edge_weights(mesh, laplacian.stiffness)
+    areas = freeze(spectrum.mass @ np.ones(len(modes)))
+    return EigenRig(mesh, modes, spectrum.eigenvalues, areas, freeze(factor), edges)
 
 
 def pose_rig(rig: EigenRig, vertices: ArrayLike) -> EigenRig:

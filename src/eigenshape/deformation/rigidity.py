@@ -11,8 +11,10 @@ from scipy.sparse.csgraph import connected_components
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._threads import one_blas_thread
-from eigenshape.deformation.rigidity_loops import fit_rotations, turned_edges
-from eigenshape.sparse.elimination import SymmetricFactor, analyse, factorise
+from eigenshape.deformation.rigidity_loops import fit_rotations, turn_edges
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.topology import edge_table
+from eigenshape.sparse.elimination import SymmetricFactor, analyze_pattern, factorize_symmetric
 
 Points = Float[np.ndarray, "n 3"]
 Step = tuple[Points, Points]  # change of the free vertices in a round, and their new places
@@ -79,14 +81,21 @@ class FreePart:
     factor: SymmetricFactor | None
 
 
-def edge_weights(stiffness: sp.csr_array) -> EdgeWeights:
-    """Return the weights of a cotangent stiffness matrix, none below a thousandth of their mean.
+def edge_weights(mesh: TriangleMesh, stiffness: sp.csr_array) -> EdgeWeights:
+    """Return the weights of all edges of a mesh, none below a thousandth of their mean size.
 
-    With negative weights, the energy could become negative while a vertex turns over.
+    The weights are those of the cotangent stiffness matrix. With negative weights, the energy could
+    become negative while a vertex turns over.
     """
-    links = (-stiffness).tocsr()
-    links.setdiag(0)
-    links.eliminate_zeros()
+    # Where the cotangents of an edge sum to zero, rounding decides whether the matrix has an entry.
+    # So the edges of the faces are added with weight 0: sums of duplicates keep explicit zeros.
+    one, two = edge_table(mesh).edges.T
+    entries = stiffness.tocoo()
+    aside = entries.row != entries.col
+    rows = np.concatenate([entries.row[aside], one, two])
+    columns = np.concatenate([entries.col[aside], two, one])
+    values = np.concatenate([-entries.data[aside], np.zeros(2 * len(one))])
+    links = sp.csr_array((values, (rows, columns)), shape=stiffness.shape)
     links.sort_indices()
     links.data = np.maximum(links.data, LEAST_WEIGHT * np.abs(links.data).mean())
     matrix = (sp.diags_array(links.sum(axis=1)) - links).tocsr()
@@ -145,7 +154,7 @@ def factor_equations(square: sp.csr_array) -> SymmetricFactor:
     matrix = square.tocsc()
     matrix.sort_indices()
     with one_blas_thread():
-        factor = factorise(analyse(matrix), matrix.data)
+        factor = factorize_symmetric(analyze_pattern(matrix), matrix.data)
     if factor is None or not (factor.pivots > 0).all():
         raise InvalidShapeError(
             "Every triangle must have angles well above zero to be bent; the equations of the "
@@ -217,7 +226,7 @@ def relax(
             if least - energy <= ENERGY_TOLERANCE * energy and len(steps) > 1:
                 break
             least = energy
-            turned_edges(free, *links, rest, turns, sums)
+            turn_edges(free, *links, rest, turns, sums)
             # Solved for displacements, so that vertices without rotation or pull do not move.
             solved = rest[free] + part.factor.solve(sums + force, scratch)
             steps.append((solved - tried, solved))

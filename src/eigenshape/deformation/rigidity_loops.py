@@ -29,9 +29,12 @@ def fit_rotations(vertices, starts, others, weights, rest, posed, turns):
     """
     covariance = np.empty((3, 3))
     left = 0.0
-    for i in vertices:
-        covariance[:] = 0.0
+    for place in range(len(vertices)):
+        i = vertices[place]
         lengths = 0.0
+        for a in range(3):
+            for b in range(3):
+                covariance[a, b] = 0.0
         for k in range(starts[i], starts[i + 1]):
             j, w = others[k], weights[k]
             u, v, t = (
@@ -55,7 +58,7 @@ def fit_rotations(vertices, starts, others, weights, rest, posed, turns):
 @no_type_check
 def _settle(covariance, turns, i):
     """Climb by Newton's steps, and by steps that cannot overshoot where it is not concave; return the height."""
-    w, x, y, z = turns[i]
+    w, x, y, z = turns[i, 0], turns[i, 1], turns[i, 2], turns[i, 3]
     largest = 0.0
     for row in range(3):
         for column in range(3):
@@ -122,22 +125,24 @@ def _settle(covariance, turns, i):
 
 @njit
 @no_type_check
-def turned_edges(vertices, starts, others, weights, rest, turns, sums):
+def turn_edges(vertices, starts, others, weights, rest, turns, sums):
     """Write Σ_j w_ij ((R_i + R_j)/2 - 1) (x_i - x_j) for some vertices; nothing where nothing turns."""
-    n = len(starts) - 1
-    spin = np.empty((n, 9))
+    n = len(turns)
+    spins = np.empty((n, 3, 3))  # (R - 1)/2
     for i in range(n):
-        w, x, y, z = turns[i]
-        spin[i, 0], spin[i, 1], spin[i, 2] = -(y * y + z * z), x * y - w * z, x * z + w * y
-        spin[i, 3], spin[i, 4], spin[i, 5] = x * y + w * z, -(x * x + z * z), y * z - w * x
-        spin[i, 6], spin[i, 7], spin[i, 8] = x * z - w * y, y * z + w * x, -(x * x + y * y)
-    for place, i in enumerate(vertices):
-        a = b = c = 0.0
+        w, x, y, z = turns[i, 0], turns[i, 1], turns[i, 2], turns[i, 3]
+        s = spins[i]
+        s[0, 0], s[0, 1], s[0, 2] = -(y * y + z * z), x * y - w * z, x * z + w * y
+        s[1, 0], s[1, 1], s[1, 2] = x * y + w * z, -(x * x + z * z), y * z - w * x
+        s[2, 0], s[2, 1], s[2, 2] = x * z - w * y, y * z + w * x, -(x * x + y * y)
+    for place in range(len(vertices)):
+        i = vertices[place]
+        sums[place, 0] = sums[place, 1] = sums[place, 2] = 0.0
         for k in range(starts[i], starts[i + 1]):
             j, weight = others[k], weights[k]
             x, y, z = rest[i, 0] - rest[j, 0], rest[i, 1] - rest[j, 1], rest[i, 2] - rest[j, 2]
-            p, q = spin[i], spin[j]
-            a += weight * ((p[0] + q[0]) * x + (p[1] + q[1]) * y + (p[2] + q[2]) * z)
-            b += weight * ((p[3] + q[3]) * x + (p[4] + q[4]) * y + (p[5] + q[5]) * z)
-            c += weight * ((p[6] + q[6]) * x + (p[7] + q[7]) * y + (p[8] + q[8]) * z)
-        sums[place, 0], sums[place, 1], sums[place, 2] = a, b, c
+            p, q = spins[i], spins[j]
+            for row in range(3):
+                turned = (p[row, 0] + q[row, 0]) * x + (p[row, 1] + q[row, 1]) * y
+                turned += (p[row, 2] + q[row, 2]) * z
+                sums[place, row] += weight * turned

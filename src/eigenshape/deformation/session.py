@@ -10,11 +10,13 @@ from jaxtyping import Float
 from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr
 from eigenshape.deformation.binding import Binding, bind
-from eigenshape.deformation.deform import Mode, bend, require_mode
+from eigenshape.deformation.deform import bend
 from eigenshape.deformation.edits import Edit, Move, apply_edit, carry_edit
 from eigenshape.deformation.graded_bend import move_by_shares
 from eigenshape.deformation.handles import Handle
+from eigenshape.deformation.modes import Mode, require_mode
 from eigenshape.deformation.region import Region, region_mask
 from eigenshape.deformation.rig import EigenRig, pose_rig
 from eigenshape.deformation.skeleton import SkeletonResponse, move_skeleton, skeleton_response
@@ -67,6 +69,12 @@ class DeformationSession:
         # Number of edits in the present pose; later edits were undone and can be redone.
         self._place = 0
         self._pending: tuple[Edit, Binding, SkeletonResponse] | None = None
+
+    def __repr__(self) -> str:
+        mesh, n_edits = self.mesh, self._place
+        return f"DeformationSession({mesh!r}, {n_edits} edits, {self.n_redoable} to redo)"
+
+    _repr_html_ = html_repr
 
     @property
     def rig(self) -> EigenRig:

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arguments import require_each, require_type
+from eigenshape._arguments import require_type
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.binding import Binding
-from eigenshape.deformation.handles import Handle, affine_offset
+from eigenshape.deformation.handles import Handle, affine_offset, require_handles
 from eigenshape.deformation.rig import eigen_skeleton, project_on_modes
 
 
@@ -36,6 +37,9 @@ class SkeletonResponse:
 
     skeleton: Float[np.ndarray, "n 3"]
     weights: Float[np.ndarray, "r n 4"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 @one_blas_thread()
@@ -91,9 +95,30 @@ def move_skeleton(
     -------
     (n, 3) float
         K*, the vertices of the moved skeleton.
+
+    Raises
+    ------
+    InvalidParameterError
+        If there is not one handle for each region.
+
+    See Also
+    --------
+    skeleton_response : Compute the response.
+    bend : Move the shape itself.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> binding = es.deformation.bind(es.rig_shape(mesh), [mesh.vertices[:, 2] > 0.2])
+    >>> response = es.deformation.skeleton_response(binding)
+    >>> still = es.deformation.move_skeleton(response, [es.Translation([0, 0, 0])])
+    >>> moved = es.deformation.move_skeleton(response, [es.Translation([0, 0, 0.5])])
+    >>> bool((moved[:, 2] - still[:, 2]).max() > 0.4)
+    True
     """
     require_type(response, SkeletonResponse, "response")
-    require_each(handles, Handle, "handles")
+    require_handles(handles, len(response.weights))
     pairs = zip(response.weights, handles, strict=True)
     return response.skeleton + sum(
         (weights @ affine_offset(handle).T for weights, handle in pairs), np.zeros(3)

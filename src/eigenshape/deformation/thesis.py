@@ -7,7 +7,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arguments import require_each, require_type
+from eigenshape._arguments import require_type
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.binding import Binding
 from eigenshape.deformation.details import (
@@ -17,7 +18,7 @@ from eigenshape.deformation.details import (
     turn_by_frames,
     turn_by_handles,
 )
-from eigenshape.deformation.handles import Handle
+from eigenshape.deformation.handles import Handle, require_handles
 from eigenshape.deformation.rig import eigen_skeleton, project_on_modes
 from eigenshape.deformation.skeleton import SkeletonResponse, move_skeleton, skeleton_response
 
@@ -52,6 +53,9 @@ class DetailedSkeleton:
     fine: Points
     first: FramedDetails
     second: FramedDetails
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 @one_blas_thread()
@@ -102,6 +106,11 @@ def eigen_deformation(
     (n, 3) float
         The vertices.
 
+    Raises
+    ------
+    InvalidParameterError
+        If there is not one handle for each region.
+
     Examples
     --------
     >>> import eigenshape as es
@@ -112,7 +121,7 @@ def eigen_deformation(
     (162, 3)
     """
     require_type(skeleton, DetailedSkeleton, "skeleton")
-    require_each(handles, Handle, "handles")
+    require_handles(handles, len(skeleton.response.weights))
     rig, faces = skeleton.binding.rig, skeleton.binding.rig.mesh.faces
     moved = move_skeleton(skeleton.response, handles)
     by_frames = turn_by_frames(faces, skeleton.first, moved)

@@ -12,7 +12,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.distortion import require_poses
 from eigenshape.deformation.rigidity import edge_weights, fit_turns, free_part, nearest_rotations
-from eigenshape.deformation.rigidity_loops import turned_edges
+from eigenshape.deformation.rigidity_loops import turn_edges
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes, size_one
@@ -79,8 +79,9 @@ def transfer_deformation(
     >>> pairs = [[i, i] for i in range(162)]
     >>> mapping = es.functional_map(spectrum, spectrum, pairs, n_modes=16)
     >>> bent = es.deformation.transfer_deformation(mesh, longer, mesh, mapping)
-    >>> bent.n_vertices
-    162
+    >>> height = bent.vertices[:, 2].max() - bent.vertices[:, 2].min()
+    >>> float(height.round(1))
+    2.1
     """
     before = as_mesh(before, "before")
     after = as_mesh(after, "after")
@@ -99,7 +100,7 @@ def transfer_deformation(
     wanted = mapping.matrix.shape[1] if n_modes is None else n_modes
     k = whole_number(wanted, "n_modes", 1, mapping.matrix.shape[1])
     few = FunctionalMap(mapping.matrix[:, :k], mapping.source, mapping.target)
-    weights = edge_weights(cotangent_laplacian(before).stiffness)
+    weights = edge_weights(before, cotangent_laplacian(before).stiffness)
     turns = fit_turns(weights, before.vertices, after.vertices)
     # A mean of rotations is no rotation: take the nearest one.
     carried = nearest_rotations(transfer_function(few, turns.reshape(-1, 9)).reshape(-1, 3, 3))
@@ -127,13 +128,14 @@ def _center(
 
 def _turn_edges(target: TriangleMesh, turns: Turns) -> Float[np.ndarray, "n 3"]:
     """Return the vertices of the target with its edges turned, and its center unchanged."""
-    edges, areas = edge_weights(cotangent_laplacian(target).stiffness), dual_volumes(target)
+    edges = edge_weights(target, cotangent_laplacian(target).stiffness)
+    areas = dual_volumes(target)
     # The equations know edges alone: vertex 0 is fixed, and the center is restored below.
     fixed = np.arange(target.n_vertices) == 0
     part = free_part(edges, fixed)
     sums = np.empty((len(part.free), 3))
     spins = np.roll(Rotation.from_matrix(turns).as_quat(), 1, axis=1)
-    turned_edges(part.free, edges.starts, edges.others, edges.weights, target.vertices, spins, sums)
+    turn_edges(part.free, edges.starts, edges.others, edges.weights, target.vertices, spins, sums)
     found = target.vertices.copy()
     if part.factor is not None:
         found[part.free] += part.factor.solve(sums)

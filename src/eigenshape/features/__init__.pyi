@@ -1,11 +1,11 @@
 from .bottleneck import bottleneck_distance as bottleneck_distance
 from .boundaries import smooth_boundaries as smooth_boundaries
+from .contrast import PART_CONTRAST as PART_CONTRAST
 from .diagram import PersistenceDiagram as PersistenceDiagram
 from .diagram import PersistencePairs as PersistencePairs
 from .diagram import persistence_diagram as persistence_diagram
 from .merge_tree import merge_tree as merge_tree
 from .part_merging import part_tree as part_tree
-from .parts import PART_CONTRAST as PART_CONTRAST
 from .parts import PartDecomposition as PartDecomposition
 from .parts import find_parts as find_parts
 from .parts import part_spectrum as part_spectrum

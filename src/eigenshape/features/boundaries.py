@@ -8,10 +8,10 @@ from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import breadth_first_order, connected_components, dijkstra, maximum_flow
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import frozen, positive_values
+from eigenshape._arrays import freeze, positive_values
 from eigenshape.features.segmentation import Segmentation, adjacent_parts
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import face_areas, unit_scaled
+from eigenshape.geometry.measure import face_areas, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, face_pairs
 from eigenshape.operators.anisotropic import curvature_tensors
@@ -77,7 +77,7 @@ def smooth_boundaries(
     fixed = (mesh.faces == tips[:, None]).any(axis=1)
     for one, two in adjacent_parts(mesh, labels).tolist():
         _move_boundary(network, labels, (one, two), fixed, share)
-    return Segmentation(frozen(labels), segmentation.features)
+    return Segmentation(freeze(labels), segmentation.features)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,7 @@ class _Network:
 
 
 def _build_network(mesh: TriangleMesh) -> _Network:
-    points, _ = unit_scaled(mesh)
+    points, _ = scale_to_unit(mesh)
     unit = TriangleMesh(points, mesh.faces)
     table = edge_table(unit)
     pairs, edges = face_pairs(table)

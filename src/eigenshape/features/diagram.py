@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import frozen, vertex_values
+from eigenshape._arrays import freeze, vertex_values
+from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.features.loops import extended_loops
 from eigenshape.features.union_loops import join_points
@@ -36,6 +37,9 @@ class PersistencePairs:
     death_vertices: Int[np.ndarray, " p"]
     births: Float[np.ndarray, " p"]
     deaths: Float[np.ndarray, " p"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
     @property
     def persistence(self) -> Float[np.ndarray, " p"]:
@@ -74,6 +78,9 @@ class PersistenceDiagram:
     minima: PersistencePairs
     components: PersistencePairs
     loops: PersistencePairs | None
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def persistence_diagram(
@@ -160,4 +167,4 @@ def _sort_pairs(
     births, deaths = height[vertices].T
     order = np.lexsort((vertices[:, 1], vertices[:, 0], -np.abs(births - deaths)))
     sorted_columns = (*vertices[order].T, births[order], deaths[order])
-    return PersistencePairs(*(frozen(column) for column in sorted_columns))
+    return PersistencePairs(*(freeze(column) for column in sorted_columns))

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
 from eigenshape._errors import InvalidShapeError
-from eigenshape._memory import machine_memory
+from eigenshape._memory import available_memory, require_memory
 from eigenshape.features.matching_loops import match_rows
 
 Points = Float[np.ndarray, "_ d"]
@@ -27,6 +27,7 @@ SLACK = 1e-9
 GROWTH = 1.5
 # Peak bytes of memory per pair while pairs are listed.
 BYTES_OF_PAIR = 150
+SHARE_OF_PAIRS = 0.5  # of the memory; the matching needs the rest
 # Least distance at which the search begins, as a share of the largest distance of points at equal
 # places of their lists.
 COARSE = 1e-3
@@ -149,7 +150,7 @@ def near_pairs(some: Points, others: Points, distance: float, norm: float) -> Pa
     # the comparison below decides.
     reach = distance * (1 + SLACK)
     trees = cKDTree(some), cKDTree(others)
-    _require_memory(*trees, reach, norm)
+    _require_pairs_fit(*trees, reach, norm)
     found = trees[0].sparse_distance_matrix(trees[1], reach, p=norm, output_type="ndarray")
     i, j = found["i"].astype(np.int64), found["j"].astype(np.int64)
     distances = _lengths(some[i] - others[j], norm)
@@ -157,19 +158,19 @@ def near_pairs(some: Points, others: Points, distance: float, norm: float) -> Pa
     return Pairs(i[near], j[near], distances[near])
 
 
-def _require_memory(one: cKDTree, two: cKDTree, reach: float, norm: float) -> None:
-    available = machine_memory() / 2
-    if one.n * two.n * BYTES_OF_PAIR <= available:  # all pairs fit: no need to count
-        return
+def _require_pairs_fit(one: cKDTree, two: cKDTree, reach: float, norm: float) -> None:
+    """Count the pairs within reach, and raise an error if a list of them is too large."""
+    if one.n * two.n * BYTES_OF_PAIR <= available_memory(SHARE_OF_PAIRS):
+        return  # all pairs fit: no need to count
     n_pairs = int(one.count_neighbors(two, reach, p=norm))
-    needed = n_pairs * BYTES_OF_PAIR
-    if needed > available:
-        raise InvalidShapeError(
-            "Pairs of near points must fit into half of the memory, "
-            f"{available / 2**30:.1f} GiB; {n_pairs:.2g} pairs within {reach:.3g} take "
-            f"{needed / 2**30:.1f} GiB. "
-            "Bring the sets nearer to each other, or take fewer points."
-        )
+    require_memory(
+        "Pairs of near points",
+        f"{n_pairs:.2g} pairs within {reach:.3g}",
+        {"lists": n_pairs * BYTES_OF_PAIR},
+        "Bring the sets nearer to each other, or take fewer points.",
+        share=SHARE_OF_PAIRS,
+        error=InvalidShapeError,
+    )
 
 
 def _lower_bound(one: Points, two: Points, norm: float) -> float:

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import frozen, vertex_values
+from eigenshape._arrays import freeze, vertex_values
 from eigenshape._typing import ArrayLike
 from eigenshape.features.merge_loops import file_sides, find_corners, join_faces
 from eigenshape.features.region_tree import MergeTree, merge_regions, number_regions
@@ -47,7 +47,7 @@ def merge_tree(mesh: MeshLike, values: ArrayLike) -> MergeTree:
 
     Examples
     --------
-    -------- A strip of eight triangles, and a function with two ridges of heights 2 and 3 and a
+    A strip of eight triangles, and a function with two ridges of heights 2 and 3 and a
     valley of height 1 between:
 
     >>> import eigenshape as es
@@ -90,12 +90,12 @@ def merge_tree(mesh: MeshLike, values: ArrayLike) -> MergeTree:
     place[roots] = region
     parent, basins = number_regions(kept, parent, place[climbs_to])
     return MergeTree(
-        maxima=frozen(tops[kept]),
-        values=frozen(values_at_tops[kept]),
-        persistence=frozen(persistence[kept]),
-        parent=frozen(parent),
-        basins=frozen(basins),
-        saddles=frozen(saddles[kept]),
+        maxima=freeze(tops[kept]),
+        values=freeze(values_at_tops[kept]),
+        persistence=freeze(persistence[kept]),
+        parent=freeze(parent),
+        basins=freeze(basins),
+        saddles=freeze(saddles[kept]),
     )
 
 

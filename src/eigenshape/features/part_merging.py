@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import frozen, positive_values
+from eigenshape._arrays import freeze, positive_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.region_tree import PartTree, number_regions
@@ -104,11 +104,11 @@ def part_tree(mesh: MeshLike, spectrum: Spectrum, *, time: float = PART_TIME) ->
     order = np.concatenate([roots, ended[::-1]])
     parent, basins = number_regions(order, parent, seeds.labels)
     return PartTree(
-        maxima=frozen(seeds.features.vertices[order]),
-        values=frozen(seeds.features.values[order]),
-        persistence=frozen(persistence[order]),
-        parent=frozen(parent),
-        basins=frozen(basins),
+        maxima=freeze(seeds.features.vertices[order]),
+        values=freeze(seeds.features.values[order]),
+        persistence=freeze(persistence[order]),
+        parent=freeze(parent),
+        basins=freeze(basins),
     )
 
 

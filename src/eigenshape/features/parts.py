@@ -5,9 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import frozen, whole_number
+from eigenshape._arrays import freeze, whole_number
 from eigenshape._progress import Progress
+from eigenshape._text import html_repr, short_repr
 from eigenshape.features.boundaries import CONCAVITY, smooth_boundaries
+from eigenshape.features.contrast import PART_CONTRAST
 from eigenshape.features.part_merging import SEED_TIME, part_tree
 from eigenshape.features.region_tree import PartTree
 from eigenshape.features.segmentation import Segmentation, segment
@@ -25,10 +27,6 @@ from eigenshape.spectral.spectrum import Spectrum
 # Eigenpairs, beside one for each component. Of 15, 25 and 40, 25 was chosen on the tuning half of
 # experiments/ch5_parts, where 15 were as good.
 N_MODES = 25
-# Least persistence of a part: the share of a temperature difference to its parent that is left
-# after diffusion. A larger value finds fewer parts. The best of 0.1 to 0.4 on the tuning half of
-# experiments/ch5_parts.
-PART_CONTRAST = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +57,9 @@ class PartDecomposition:
     heat: Float[np.ndarray, " n"]
     tree: PartTree
     parts: Segmentation
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def find_parts(
@@ -129,7 +130,7 @@ def find_parts(
     tree = part_tree(outward, spectrum)
     heat = heat_kernel_signature(spectrum, [SEED_TIME * float(spectrum.mass.sum())])[:, 0]
     parts = smooth_boundaries(outward, segment(tree, persistence=PART_CONTRAST))
-    return PartDecomposition(outward, spectrum, frozen(heat), tree, parts)
+    return PartDecomposition(outward, spectrum, freeze(heat), tree, parts)
 
 
 def part_spectrum(

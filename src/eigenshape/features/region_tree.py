@@ -7,6 +7,8 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import connected_components
 
+from eigenshape._text import html_repr, short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class RegionTree:
@@ -55,6 +57,9 @@ class MergeTree(RegionTree):
 
     saddles: Int[np.ndarray, "m 2"]
 
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
 
 @dataclass(frozen=True, eq=False)
 class PartTree(RegionTree):
@@ -83,6 +88,9 @@ class PartTree(RegionTree):
     part_tree : Compute the tree.
     find_parts : Compute the tree of a mesh and cut it.
     """
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def number_regions(

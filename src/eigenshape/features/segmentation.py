@@ -6,8 +6,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import frozen, whole_number
+from eigenshape._arrays import freeze, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 from eigenshape.features.region_tree import MergeTree, PartTree, merge_regions
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.topology import edge_table, face_pairs
@@ -37,6 +38,9 @@ class FeaturePoints:
     values: Float[np.ndarray, " m"]
     persistence: Float[np.ndarray, " m"]
 
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
 
 @dataclass(frozen=True, eq=False)
 class Segmentation:
@@ -55,6 +59,9 @@ class Segmentation:
 
     labels: Int[np.ndarray, " f"]
     features: FeaturePoints
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def segment(
@@ -134,11 +141,11 @@ def segment(
     kept = np.flatnonzero(~ends)
     regions = merge_regions(np.maximum(tree.parent, 0), ends)[tree.basins]
     features = FeaturePoints(
-        vertices=frozen(tree.maxima[kept]),
-        values=frozen(tree.values[kept]),
-        persistence=frozen(tree.persistence[kept]),
+        vertices=freeze(tree.maxima[kept]),
+        values=freeze(tree.values[kept]),
+        persistence=freeze(tree.persistence[kept]),
     )
-    return Segmentation(frozen(np.searchsorted(kept, regions)), features)
+    return Segmentation(freeze(np.searchsorted(kept, regions)), features)
 
 
 def _above_largest_gap(tree: Tree) -> float:

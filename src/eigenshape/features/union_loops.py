@@ -9,8 +9,8 @@ from eigenshape._compile import njit
 
 @njit
 @no_type_check
-def join_points(starts, neighbours, order):
-    """Let points enter in order and join each to the neighbours before it.
+def join_points(starts, neighbors, order):
+    """Let points enter in order and join each to the neighbors before it.
 
     Returns for each point the first one of its component, and for each component that ends on the way its first point
     and the point that joined it to an earlier one.
@@ -23,9 +23,9 @@ def join_points(starts, neighbours, order):
     n_ended = 0
     for point in order:
         for entry in range(starts[point], starts[point + 1]):
-            if place[neighbours[entry]] >= place[point]:
+            if place[neighbors[entry]] >= place[point]:
                 continue
-            one, two = find_root(root, point), find_root(root, neighbours[entry])
+            one, two = find_root(root, point), find_root(root, neighbors[entry])
             if one == two:
                 continue
             if place[one] < place[two]:

@@ -6,8 +6,9 @@ from typing import SupportsIndex, TypeAlias
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import finite_rows, frozen, whole_number
+from eigenshape._arrays import finite_rows, freeze, whole_number
 from eigenshape._errors import InvalidShapeError
+from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.simplicial import Mesh
 
@@ -45,12 +46,14 @@ class PointCloud:
     points: Float[np.ndarray, "n d"]
     dim: int
 
+    _repr_html_ = html_repr
+
     def __init__(self, points: ArrayLike, dim: SupportsIndex = 2) -> None:
         coordinates = finite_rows(points, "points")
         if not coordinates.size:
             raise InvalidShapeError("A point cloud must have points; it has none.")
         object.__setattr__(self, "dim", whole_number(dim, "dim", 1, coordinates.shape[1]))
-        object.__setattr__(self, "points", frozen(coordinates))
+        object.__setattr__(self, "points", freeze(coordinates))
 
     @property
     def n_points(self) -> int:

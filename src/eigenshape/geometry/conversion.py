@@ -106,7 +106,7 @@ def as_mesh(value: object, name: str = "mesh") -> TriangleMesh:
     """
     if isinstance(value, TriangleMesh):
         return value
-    shape = _converted(value)
+    shape = _convert(value)
     if isinstance(shape, TriangleMesh):
         return shape
     if isinstance(shape, SimplicialMesh) and (shape.dim, shape.points.shape[1]) == (2, 3):
@@ -124,7 +124,7 @@ def as_simplicial(value: object, name: str = "mesh") -> Mesh:
     """
     if isinstance(value, TriangleMesh | SimplicialMesh):
         return value
-    shape = _converted(value)
+    shape = _convert(value)
     if isinstance(shape, TriangleMesh | SimplicialMesh):
         return shape
     raise _conversion_error(value, shape, f"{name} must be a mesh", "read_shape")
@@ -161,13 +161,13 @@ def as_shape(value: object, name: str = "shape") -> Shape:
     """
     if isinstance(value, TriangleMesh | SimplicialMesh | PointCloud):
         return value
-    shape = _converted(value)
+    shape = _convert(value)
     if shape is not None:
         return shape
     raise _conversion_error(value, None, f"{name} must be a mesh or a point cloud", "read_shape")
 
 
-def _converted(value: object) -> Shape | None:
+def _convert(value: object) -> Shape | None:
     """Return the shape that a value describes, or None if it describes none."""
     if isinstance(value, TriangleMesh | SimplicialMesh | PointCloud):
         return value

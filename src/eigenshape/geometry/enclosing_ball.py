@@ -6,8 +6,9 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import finite_rows, frozen
+from eigenshape._arrays import finite_rows, freeze
 from eigenshape._errors import InvalidShapeError
+from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.simplices import size_one
 
@@ -29,6 +30,9 @@ class EnclosingBall:
 
     center: Float[np.ndarray, " d"]
     radius: float
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def enclosing_ball(points: ArrayLike) -> EnclosingBall:
@@ -72,7 +76,7 @@ def enclosing_ball(points: ArrayLike) -> EnclosingBall:
     unit, inner = size_one(unit - middle)
     center = _center(unit)
     radius = np.sqrt(((unit - center) ** 2).sum(axis=1).max())
-    return EnclosingBall(frozen(scale * (middle + inner * center)), float(scale * inner * radius))
+    return EnclosingBall(freeze(scale * (middle + inner * center)), float(scale * inner * radius))
 
 
 def _center(points: Points) -> Float[np.ndarray, " d"]:

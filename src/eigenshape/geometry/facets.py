@@ -8,6 +8,7 @@ from jaxtyping import Int
 from scipy.sparse.csgraph import connected_components
 
 from eigenshape._errors import InvalidShapeError
+from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
@@ -39,6 +40,9 @@ class FacetTable:
     facets: Int[np.ndarray, "q m"]
     simplex_facets: Int[np.ndarray, "s corners"]
     n_simplices: Int[np.ndarray, " q"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
     @property
     def boundary(self) -> Int[np.ndarray, " b"]:

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from itertools import islice
+from itertools import chain, islice
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,13 +13,18 @@ from eigenshape._arrays import positive_values, whole_numbers
 from eigenshape._errors import InvalidShapeError
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
-from eigenshape.geometry.geodesic_loops import balls
+from eigenshape.geometry.geodesic_loops import spread_wave
 from eigenshape.geometry.simplices import in_length, scaled_corners
 from eigenshape.geometry.simplicial import Mesh
 
 # Sources of one task of the thread pool: enough that starting a task costs nothing beside it, few
 # enough that all cores have work.
 SOURCES_PER_TASK = 256
+
+# Where the triangles at each vertex start, their other two corners, and three lengths of each.
+Fans = tuple[
+    Int[np.ndarray, " n1"], Int[np.ndarray, " k"], Int[np.ndarray, " k"], Float[np.ndarray, "k 3"]
+]
 
 
 def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
@@ -68,21 +73,23 @@ def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
     _require_surface(mesh)
     positive_values(radius, "radius")
     corners, scale = scaled_corners(mesh)
-    starts, others, sides = _fans(mesh, corners)
-    firsts = range(0, mesh.n_points, SOURCES_PER_TASK)
+    fans, n = _fans(mesh, corners), mesh.n_points
+
+    def waves_from(first: int) -> list[tuple[Int[np.ndarray, " r"], Float[np.ndarray, " r"]]]:
+        scratch, reached, distances = _scratch(fans, 1), np.empty(n, dtype=np.int64), np.empty(n)
+        waves = []
+        for source in np.arange(first, min(first + SOURCES_PER_TASK, n)):
+            sources = np.array([source])
+            count = spread_wave(fans, radius / scale, sources, scratch, reached, distances)
+            waves.append((reached[:count].copy(), distances[:count].copy()))
+        return waves
+
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        sources = [
-            np.arange(first, min(first + SOURCES_PER_TASK, mesh.n_points)) for first in firsts
-        ]
-        waves = pool.map(
-            lambda some: balls(
-                starts, *others, sides, radius / scale, some, np.arange(len(some) + 1)
-            ),
-            sources,
-        )
-        counts, columns, values = (np.concatenate(parts) for parts in zip(*waves, strict=True))
-    rows = np.concatenate([[0], np.cumsum(counts)])
-    found = sp.csr_array((in_length(values, scale, 1), columns, rows), shape=(mesh.n_points,) * 2)
+        tasks = pool.map(waves_from, range(0, n, SOURCES_PER_TASK))
+        columns, values = zip(*chain.from_iterable(tasks), strict=True)
+    rows = np.concatenate([[0], np.cumsum([len(row) for row in columns])])
+    distances, columns = np.concatenate(values), np.concatenate(columns)
+    found = sp.csr_array((in_length(distances, scale, 1), columns, rows), shape=(n, n))
     found.sort_indices()
     # An entry that only one direction has is 0 in the other, and the minimum removes it.
     return found.minimum(found.T)
@@ -186,15 +193,15 @@ def waves_on(mesh: Mesh) -> Callable[..., Float[np.ndarray, " n"]]:
     """
     _require_surface(mesh)
     corners, scale = scaled_corners(mesh)
-    starts, others, sides = _fans(mesh, corners)
+    fans, n = _fans(mesh, corners), mesh.n_points
 
     def wave(source: ArrayLike, reach: float = np.inf) -> Float[np.ndarray, " n"]:
-        found = np.full(mesh.n_points, np.inf)
         sources = np.atleast_1d(np.asarray(source, dtype=np.int64))
-        _, reached, values = balls(
-            starts, *others, sides, reach / scale, sources, np.array([0, len(sources)])
-        )
-        found[reached] = in_length(values, scale, 1)
+        reached, distances = np.empty(n, dtype=np.int64), np.empty(n)
+        scratch = _scratch(fans, len(sources))
+        count = spread_wave(fans, reach / scale, sources, scratch, reached, distances)
+        found = np.full(n, np.inf)
+        found[reached[:count]] = in_length(distances[:count], scale, 1)
         return found
 
     return wave
@@ -281,13 +288,15 @@ def _require_surface(mesh: Mesh) -> None:
         )
 
 
-def _fans(
-    mesh: Mesh, corners: Float[np.ndarray, "f 3 d"]
-) -> tuple[
-    Int[np.ndarray, " n1"],
-    tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]],
-    Float[np.ndarray, "k 3"],
-]:
+def _scratch(fans: Fans, n_sources: int) -> tuple[np.ndarray, ...]:
+    """Return the memory that `spread_wave` needs while it runs."""
+    n, n_waves = len(fans[0]) - 1, len(fans[1]) + n_sources
+    vertices, settled = np.empty((2, n), dtype=np.int64), np.zeros(n, dtype=np.bool_)
+    heap = np.empty(n_waves), np.empty(n_waves, dtype=np.int64)
+    return np.full(n, np.inf), settled, *vertices, *heap
+
+
+def _fans(mesh: Mesh, corners: Float[np.ndarray, "f 3 d"]) -> Fans:
     """List the triangles at each vertex: where they start, their other two corners, three lengths.
 
     The lengths of a triangle are those from the vertex to each other corner and between these two.
@@ -302,4 +311,4 @@ def _fans(
     order = np.argsort(triples[:, 0], kind="stable")
     starts = np.searchsorted(triples[order, 0], np.arange(mesh.n_points + 1))
     one, two = (np.ascontiguousarray(triples[order, place]) for place in (1, 2))
-    return starts, (one, two), np.concatenate(lengths)[order]
+    return starts, one, two, np.concatenate(lengths)[order]

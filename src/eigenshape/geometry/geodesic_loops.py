@@ -1,4 +1,7 @@
-"""Compiled loops of `geodesic`: a wave that leaves some vertices and crosses triangles laid flat."""
+"""Compiled loops of `geodesic`: a wave that leaves some vertices and crosses triangles laid flat.
+
+The caller allocates all arrays: compiling an allocation takes longer than compiling a small loop.
+"""
 
 from typing import no_type_check
 
@@ -55,88 +58,71 @@ def across_edge(near, far, length, left, right):
 
 @njit
 @no_type_check
-def balls(starts, first_corner, second_corner, sides, radius, sources, begins):
-    """Return for each set of sources how many vertices lie within `radius`, which, and how far from the nearest.
+def spread_wave(fans, radius, sources, scratch, reached, distances):
+    """Fill which vertices lie within `radius` of some sources, and how far from the nearest; return how many.
 
-    Set i is sources[begins[i]:begins[i+1]].
-    Entry k of `starts[v]` to `starts[v + 1]` is a triangle at vertex v with its other two corners; `sides[k]` are the
-    lengths from v to each of them, and between them.
+    `fans` are `starts`, `first_corner`, `second_corner` and `sides`: entry k of starts[v] to starts[v + 1] is a
+    triangle at vertex v with its other two corners; sides[k] are the lengths from v to each of them, and between them.
+
+    `scratch` has for each vertex its distance, infinite on entry and again on return, whether it is settled, False on
+    entry and again on return, its sender, and a place in a list of those touched; and the keys and vertices of the
+    heap, as many as there are corners of triangles and sources: a triangle sends at most three waves.
     """
-    n = len(starts) - 1
-    distance = np.full(n, np.inf)
-    sender = np.empty(
-        n, dtype=np.int64
-    )  # the source that a vertex was reached from; FRONT where several sent the wave
-    settled = np.zeros(n, dtype=np.bool_)
-    counts = np.zeros(len(begins) - 1, dtype=np.int64)
-    columns, values = np.empty(1024, dtype=np.int64), np.empty(1024)
-    heap_keys, heap_ids = np.empty(1024), np.empty(1024, dtype=np.int64)
-    touched = np.empty(n, dtype=np.int64)
-    total = 0
-    for number in range(len(begins) - 1):
-        before = total
-        n_touched = 0
-        if begins[number + 1] - begins[number] > len(heap_keys):
-            heap_keys = np.empty(begins[number + 1] - begins[number])
-            heap_ids = np.empty(len(heap_keys), dtype=np.int64)
-        for source in sources[begins[number] : begins[number + 1]]:
-            distance[source] = 0.0
-            sender[source] = source
-            heap_keys[n_touched], heap_ids[n_touched] = 0.0, source
-            touched[n_touched] = source
-            n_touched += 1
-        height = n_touched
-        while height:
-            key, vertex = heap_keys[0], heap_ids[0]
-            height -= 1
-            _sink(heap_keys, heap_ids, height)
-            if settled[vertex]:
-                continue
-            if key > radius:
-                break
-            settled[vertex] = True
-            if total == len(columns):
-                columns, values = (
-                    np.append(columns, np.empty_like(columns)),
-                    np.append(values, np.empty_like(values)),
-                )
-            columns[total], values[total] = vertex, key
-            total += 1
-            for entry in range(starts[vertex], starts[vertex + 1]):
-                if height + 2 > len(heap_keys):
-                    heap_keys = np.append(heap_keys, np.empty_like(heap_keys))
-                    heap_ids = np.append(heap_ids, np.empty_like(heap_ids))
-                for turn in range(2):
-                    corner, other = first_corner[entry], second_corner[entry]
-                    to_corner, to_other = sides[entry, 0], sides[entry, 1]
-                    if turn:
-                        corner, other, to_corner, to_other = other, corner, to_other, to_corner
-                    if settled[corner]:
-                        continue
-                    reached, origin = key + to_corner, sender[vertex]
+    starts, first_corner, second_corner, sides = fans
+    # The sender is the source that a vertex was reached from; FRONT where several sent the wave.
+    distance, settled, sender, touched, heap_keys, heap_ids = scratch
+    n_touched = n_reached = 0
+    for i in range(len(sources)):
+        source = sources[i]
+        distance[source] = 0.0
+        sender[source] = source
+        touched[i] = source
+        heap_keys[i] = 0.0
+        heap_ids[i] = source
+        n_touched += 1
+    height = n_touched
+    while height:
+        key, vertex = heap_keys[0], heap_ids[0]
+        height -= 1
+        _sink(heap_keys, heap_ids, height)
+        if settled[vertex]:
+            continue
+        if key > radius:
+            break
+        settled[vertex] = True
+        reached[n_reached] = vertex
+        distances[n_reached] = key
+        n_reached += 1
+        for entry in range(starts[vertex], starts[vertex + 1]):
+            corner, other = first_corner[entry], second_corner[entry]
+            to_corner, to_other = sides[entry, 0], sides[entry, 1]
+            for _ in range(2):
+                if not settled[corner]:
+                    arrival, origin = key + to_corner, sender[vertex]
                     if settled[other]:
+                        far, across = distance[other], sides[entry, 2]
                         if origin == sender[other] and origin != FRONT:
-                            flat = through_edge(
-                                key, distance[other], to_other, to_corner, sides[entry, 2]
-                            )
+                            flat = through_edge(key, far, to_other, to_corner, across)
                         else:
-                            flat = across_edge(
-                                key, distance[other], to_other, to_corner, sides[entry, 2]
-                            )
-                            origin = FRONT if flat < reached else origin
-                        reached = min(reached, flat)
-                    if reached < distance[corner]:
+                            flat = across_edge(key, far, to_other, to_corner, across)
+                            if flat < arrival:
+                                origin = FRONT
+                        arrival = min(arrival, flat)
+                    if arrival < distance[corner]:
                         if distance[corner] == np.inf:
                             touched[n_touched] = corner
                             n_touched += 1
-                        distance[corner], sender[corner] = reached, origin
-                        _rise(heap_keys, heap_ids, height, reached, corner)
+                        distance[corner] = arrival
+                        sender[corner] = origin
+                        _rise(heap_keys, heap_ids, height, arrival, corner)
                         height += 1
-        counts[number] = total - before
-        for place in range(n_touched):
-            distance[touched[place]] = np.inf
-            settled[touched[place]] = False
-    return counts, columns[:total].copy(), values[:total].copy()
+                # The second turn is about the other corner.
+                corner, other = other, corner
+                to_corner, to_other = to_other, to_corner
+    for i in range(n_touched):
+        distance[touched[i]] = np.inf
+        settled[touched[i]] = False
+    return n_reached
 
 
 @njit

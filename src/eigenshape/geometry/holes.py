@@ -50,7 +50,7 @@ def triangulate_holes(mesh: TriangleMesh, most_edges: int) -> Fillings:
         else:
             points, _ = size_one(mesh.vertices[loop] - mesh.vertices[loop[0]])
             triangles = np.empty((len(loop) - 2, 3), dtype=np.int64)
-            good = triangulate(points, _taken(graph, loop, added), triangles)
+            good = triangulate(points, _mark_existing_edges(graph, loop, added), triangles)
             added += [loop[triangles]] if good else []
             n_open += not good
     return Fillings(tuple(added), n_long, n_open)
@@ -63,7 +63,7 @@ def _faces_on_boundary(mesh: TriangleMesh, table: EdgeTable) -> dict[tuple[int, 
     return dict(zip(sides, (places % mesh.n_faces).tolist(), strict=True))
 
 
-def _taken(
+def _mark_existing_edges(
     graph: sp.csr_array, loop: Int[np.ndarray, " k"], added: list[Int[np.ndarray, "_ 3"]]
 ) -> Bool[np.ndarray, "k k"]:
     """Mark the pairs of loop vertices that are edges already, of the mesh or of added faces."""

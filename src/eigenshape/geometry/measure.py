@@ -11,7 +11,7 @@ from eigenshape.geometry.simplices import in_length, scaled_corners, size_one
 from eigenshape.geometry.topology import edge_table
 
 
-def unit_scaled(mesh: TriangleMesh) -> tuple[Float[np.ndarray, "n 3"], float]:
+def scale_to_unit(mesh: TriangleMesh) -> tuple[Float[np.ndarray, "n 3"], float]:
     """Return the vertices relative to their mean, scaled to size 1, and the scale.
 
     The scale is a power of two, so dividing by it is exact. Squares and cubes of the scaled

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import finite_rows, frozen, index_rows
+from eigenshape._arrays import finite_rows, freeze, index_rows
 from eigenshape._errors import InvalidShapeError
+from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 
 
@@ -52,6 +53,8 @@ class TriangleMesh:
     vertices: Float[np.ndarray, "n 3"]
     faces: Int[np.ndarray, "f 3"]
 
+    _repr_html_ = html_repr
+
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
         points = finite_rows(vertices, "vertices", 3)
         if not len(points):
@@ -62,8 +65,8 @@ class TriangleMesh:
                 f"A mesh must have faces; it has {len(points)} vertices and no face. "
                 "Use PointCloud for points without faces."
             )
-        object.__setattr__(self, "vertices", frozen(points))
-        object.__setattr__(self, "faces", frozen(corners))
+        object.__setattr__(self, "vertices", freeze(points))
+        object.__setattr__(self, "faces", freeze(corners))
 
     @property
     def n_vertices(self) -> int:

@@ -9,7 +9,7 @@ from scipy.spatial.distance import cdist
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import area_vectors, unit_scaled
+from eigenshape.geometry.measure import area_vectors, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import degenerate_simplices
 
@@ -116,7 +116,7 @@ def normalize_diameter(mesh: MeshLike) -> TriangleMesh:
 
 
 def _resize(mesh: TriangleMesh, size_of: Callable[[Points], float]) -> TriangleMesh:
-    points, _ = unit_scaled(mesh)
+    points, _ = scale_to_unit(mesh)
     size = size_of(points)
     if not size > 0:
         raise InvalidShapeError(

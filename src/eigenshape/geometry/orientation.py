@@ -6,17 +6,12 @@ from scipy.spatial import ConvexHull, QhullError
 
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import area_vectors, enclosed_volume, mean_normals, unit_scaled
+from eigenshape.geometry.face_turns import face_turns, turn_faces
+from eigenshape.geometry.measure import area_vectors, enclosed_volume, mean_normals, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented
 from eigenshape.geometry.simplices import scaled_corners, size_one
-from eigenshape.geometry.topology import (
-    edge_table,
-    face_turns,
-    is_closed,
-    submesh,
-    with_turned_faces,
-)
+from eigenshape.geometry.topology import edge_table, is_closed, submesh
 
 # Signed volumes up to this share of area^1.5 are rounding, and do not tell which side is outside.
 # A ball has 0.094.
@@ -67,7 +62,7 @@ def orient_outward(mesh: MeshLike) -> TriangleMesh:
     """
     mesh = as_mesh(mesh)
     require_oriented(mesh)
-    points, _ = unit_scaled(mesh)
+    points, _ = scale_to_unit(mesh)
     try:
         hull = ConvexHull(points)
     except QhullError:
@@ -115,7 +110,7 @@ def faces_to_turn(
         The piece of each face.
     """
     turns = face_turns(mesh)
-    agreed = with_turned_faces(mesh, turns.turned)
+    agreed = turn_faces(mesh, turns.turned)
     _, piece = np.unique(turns.patches, return_inverse=True)
     table = edge_table(mesh)
     at_end = (table.n_faces != 2)[table.face_edges].any(axis=1)

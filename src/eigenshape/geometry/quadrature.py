@@ -6,8 +6,9 @@ from typing import SupportsIndex
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import finite_rows, frozen, positive_values, whole_number
+from eigenshape._arrays import finite_rows, freeze, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.requirements import require_sound
@@ -53,6 +54,8 @@ class Quadrature:
     weights: Float[np.ndarray, " n"]
     dim: int
 
+    _repr_html_ = html_repr
+
     def __init__(self, points: ArrayLike, weights: ArrayLike, dim: SupportsIndex) -> None:
         coordinates = finite_rows(points, "points")
         if not coordinates.size:
@@ -64,8 +67,8 @@ class Quadrature:
                 f"there are {len(measure)} for {len(coordinates)} points."
             )
         object.__setattr__(self, "dim", whole_number(dim, "dim", 1, coordinates.shape[1]))
-        object.__setattr__(self, "points", frozen(coordinates))
-        object.__setattr__(self, "weights", frozen(measure))
+        object.__setattr__(self, "points", freeze(coordinates))
+        object.__setattr__(self, "weights", freeze(measure))
 
     @property
     def n_points(self) -> int:

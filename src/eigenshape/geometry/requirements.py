@@ -6,12 +6,11 @@ Each check costs a few sorts. Its error names the first offender by index and va
 import numpy as np
 
 from eigenshape._errors import InvalidShapeError, try_auto
+from eigenshape.geometry.face_turns import face_turns, inconsistent_edges
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import require_volumes
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import (
-    face_turns,
-    inconsistent_edges,
     repeated_simplices,
     require_simplices_everywhere,
     seams,

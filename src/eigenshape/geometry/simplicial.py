@@ -6,8 +6,9 @@ from typing import TypeAlias
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import finite_rows, frozen, index_rows
+from eigenshape._arrays import finite_rows, freeze, index_rows
 from eigenshape._errors import InvalidShapeError
+from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.mesh import TriangleMesh
 
@@ -49,6 +50,8 @@ class SimplicialMesh:
     points: Float[np.ndarray, "n d"]
     simplices: Int[np.ndarray, "s corners"]
 
+    _repr_html_ = html_repr
+
     def __init__(self, points: ArrayLike, simplices: ArrayLike) -> None:
         coordinates = finite_rows(points, "points")
         if not coordinates.size:
@@ -65,8 +68,8 @@ class SimplicialMesh:
                 f"Simplices in R^{ambient} must have dimension 1..{ambient}; "
                 f"these have {dim + 1} corners, which is dimension {dim}."
             )
-        object.__setattr__(self, "points", frozen(coordinates))
-        object.__setattr__(self, "simplices", frozen(corners))
+        object.__setattr__(self, "points", freeze(coordinates))
+        object.__setattr__(self, "simplices", freeze(corners))
 
     @property
     def n_points(self) -> int:

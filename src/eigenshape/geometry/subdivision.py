@@ -7,7 +7,7 @@ from typing import overload
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._arrays import frozen
+from eigenshape._arrays import freeze
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
@@ -102,4 +102,4 @@ def pieces(dim: int) -> Int[np.ndarray, "pieces corners 2"]:
     )
     places = (starts[:, None, None] + walks).reshape(-1, dim + 1, dim)
     inside = (np.diff(places, axis=2) <= 0).all(axis=(1, 2))
-    return frozen(np.stack([(places[inside] >= least).sum(axis=2) for least in (1, 2)], axis=-1))
+    return freeze(np.stack([(places[inside] >= least).sum(axis=2) for least in (1, 2)], axis=-1))

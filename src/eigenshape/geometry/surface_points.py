@@ -7,7 +7,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import frozen, whole_number
+from eigenshape._arrays import freeze, whole_number
+from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.simplices import require_volumes, scaled_corners, volumes
 from eigenshape.geometry.simplicial import Mesh
@@ -34,6 +35,9 @@ class SurfacePoints:
     points: Float[np.ndarray, "p d"]
     simplices: Int[np.ndarray, " p"]
     weights: Float[np.ndarray, "p corners"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
     @property
     def n_points(self) -> int:
@@ -92,4 +96,4 @@ def place_points(
 ) -> SurfacePoints:
     """Return the points with given barycentric coordinates in given simplices."""
     points = np.einsum("pc,pcd->pd", weights, mesh.points[mesh.simplices[simplices]])
-    return SurfacePoints(frozen(points), frozen(simplices), frozen(weights))
+    return SurfacePoints(freeze(points), freeze(simplices), freeze(weights))

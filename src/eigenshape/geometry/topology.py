@@ -8,6 +8,7 @@ from jaxtyping import Bool, Int
 from scipy.sparse.csgraph import connected_components
 
 from eigenshape._errors import InvalidShapeError, try_auto
+from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.facets import boundary_facets, facet_table
 from eigenshape.geometry.mesh import TriangleMesh
@@ -37,6 +38,9 @@ class EdgeTable:
     edges: Int[np.ndarray, "e 2"]
     face_edges: Int[np.ndarray, "f 3"]
     n_faces: Int[np.ndarray, " e"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def edge_table(mesh: MeshLike) -> EdgeTable:
@@ -344,86 +348,6 @@ def _corner_fans(mesh: TriangleMesh) -> tuple[Int[np.ndarray, " c"], Int[np.ndar
     vertex = np.empty(count, dtype=np.int64)
     vertex[fan] = mesh.faces.ravel()
     return fan.astype(np.int64), vertex
-
-
-def inconsistent_edges(mesh: TriangleMesh) -> Int[np.ndarray, "k 2"]:
-    """Return the edges that two faces traverse in the same direction.
-
-    One of the two faces is turned over.
-    """
-    sides = half_edges(mesh)
-    directed = np.sort(sides[:, 0] * mesh.n_vertices + sides[:, 1])
-    # The usual case; this check takes a third of the time of an edge table.
-    if (directed[1:] != directed[:-1]).all():
-        return np.empty((0, 2), dtype=np.int64)
-    forward = (sides[:, 0] < sides[:, 1]).astype(np.int64)
-    table = edge_table(mesh)
-    n_forward = np.bincount(table.face_edges.T.ravel(), weights=forward, minlength=len(table.edges))
-    return table.edges[(table.n_faces == 2) & (n_forward != 1)]
-
-
-@dataclass(frozen=True, eq=False)
-class FaceTurns:
-    """Which faces to turn over so that neighbors agree.
-
-    Two faces are neighbors if they share an edge that has no third face. A patch is a set of faces
-    connected through neighbors.
-
-    Attributes
-    ----------
-    turned : (f,) bool
-        Whether to turn each face over. In each patch the smaller group is turned, or of equal
-        groups the one without the first face. Nothing is turned in a patch that cannot be oriented,
-        such as a Möbius strip.
-    patches : (f,) int
-        The patch of each face; the numbers have gaps.
-    orientable : (f,) bool
-        Whether the patch of each face can be oriented.
-    """
-
-    turned: Bool[np.ndarray, " f"]
-    patches: Int[np.ndarray, " f"]
-    orientable: Bool[np.ndarray, " f"]
-
-
-def face_turns(mesh: TriangleMesh) -> FaceTurns:
-    """Find which faces to turn over so that neighbors agree.
-
-    The method is the orientation double cover: each face has two sides, and sides of neighbors that
-    look the same way are linked. A patch can be oriented if and only if no chain of links leads
-    from one side of a face to its other side.
-    """
-    table, f = edge_table(mesh), mesh.n_faces
-    at_edge = table.face_edges.ravel()
-    order = np.argsort(at_edge, kind="stable")
-    one, two = order[table.n_faces[at_edge[order]] == 2].reshape(-1, 2).T
-    sides = half_edges(mesh).reshape(3, f, 2).transpose(1, 0, 2).reshape(-1, 2)
-    opposed = sides[one, 0] == sides[two, 1]
-    one, two = one // 3, two // 3
-    front, back = np.where(opposed, two, two + f), np.where(opposed, two + f, two)
-    ends = (np.concatenate([one, one + f]), np.concatenate([front, back]))
-    links = sp.coo_array((np.ones(len(ends[0]), dtype=np.int8), ends), shape=(2 * f, 2 * f))
-    count, labels = connected_components(links, directed=False)
-    as_is, over = labels[:f].astype(np.int64), labels[f:].astype(np.int64)
-    # Components are numbered in the order of their first side, so of the two halves of a patch the
-    # one with the lower number contains the first face unturned.
-    n_kept = np.bincount(as_is, minlength=count)
-    turned = np.where(n_kept[as_is] == n_kept[over], as_is > over, n_kept[as_is] < n_kept[over])
-    return FaceTurns(turned, np.minimum(as_is, over), as_is != over)
-
-
-def with_turned_faces(mesh: TriangleMesh, turned: Bool[np.ndarray, " f"]) -> TriangleMesh:
-    """Return the mesh with some faces turned over; the mesh itself if there are none."""
-    if not turned.any():
-        return mesh
-    return TriangleMesh(mesh.vertices, np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces))
-
-
-def consistently_oriented(mesh: TriangleMesh) -> TriangleMesh:
-    """Return the mesh with faces turned so that neighbors agree; the mesh itself if they do."""
-    if not len(inconsistent_edges(mesh)):
-        return mesh
-    return with_turned_faces(mesh, face_turns(mesh).turned)
 
 
 def euler_characteristic(mesh: MeshLike) -> int:

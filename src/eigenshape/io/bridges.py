@@ -62,6 +62,17 @@ def from_trimesh(mesh: Any, *, dim: SupportsIndex = 2) -> TriangleMesh | PointCl
         If the object is neither a Trimesh nor a PointCloud, or is not a valid mesh.
     MissingExtraError
         If trimesh is not installed.
+
+    See Also
+    --------
+    to_trimesh : The inverse conversion.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> import trimesh
+    >>> es.io.from_trimesh(trimesh.creation.box())
+    TriangleMesh(8 vertices, 12 faces)
     """
     trimesh = _extra("trimesh")
     if isinstance(mesh, trimesh.PointCloud):
@@ -91,6 +102,17 @@ def to_trimesh(shape: ShapeLike) -> Any:
         If the shape is neither a triangle mesh nor a point cloud in R³.
     MissingExtraError
         If trimesh is not installed.
+
+    See Also
+    --------
+    from_trimesh : The inverse conversion.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> surface = es.io.to_trimesh(es.icosphere(2))
+    >>> surface.vertices.shape, surface.is_watertight
+    ((162, 3), True)
     """
     shape = as_shape(shape)
     trimesh = _extra("trimesh")

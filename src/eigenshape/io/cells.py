@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError, InvalidParameterError
+from eigenshape.io.cell_kinds import CellKind
 from eigenshape.io.text import fans
 
-CellKind = Literal["triangles", "quads", "tetrahedra"]
 SEGMENTS = "segments"
 Blocks = Mapping[str, Int[np.ndarray, "_ _"]]  # by CellKind, or SEGMENTS
 SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))  # of a polygon of four corners
@@ -46,7 +46,7 @@ def require_splittable(others: Sequence[str]) -> None:
         )
 
 
-def chosen_cells(blocks: Blocks, cells: CellKind | None) -> Int[np.ndarray, "s corners"]:
+def select_cells(blocks: Blocks, cells: CellKind | None) -> Int[np.ndarray, "s corners"]:
     """Return the simplices that are to be read; quads become two triangles each, of shape (0, 3) where there is none.
 
     "quads" takes the triangles that lie between them, too.

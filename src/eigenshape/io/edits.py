@@ -33,6 +33,16 @@ def write_edits(edits: Sequence[Edit], mesh: MeshLike, path: str | Path) -> None
     --------
     read_edits : Read the edits.
     eigenshape.deformation.replay : Apply edits.
+
+    Examples
+    --------
+    >>> import json, pathlib, tempfile
+    >>> import eigenshape as es
+    >>> move = es.deformation.Move([0, 1], es.Translation([0, 0, 0.2]))
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "edits.json")
+    >>> es.io.write_edits([es.deformation.Edit((move,))], es.icosphere(2), path)
+    >>> json.loads(path.read_text())["mesh"]["n_vertices"]
+    162
     """
     require_each(edits, Edit, "edits")
     mesh = as_mesh(mesh)

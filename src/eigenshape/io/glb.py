@@ -8,9 +8,9 @@ import numpy as np
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.gltf import Gltf, decoded_buffers, placed_triangles
+from eigenshape.io.gltf import Gltf, decode_buffers, place_triangles
 from eigenshape.io.stl import single_precision
-from eigenshape.io.text import shown
+from eigenshape.io.text import quote_line
 
 JSON_CHUNK = b"JSON"
 BINARY_CHUNK = b"BIN\0"
@@ -21,19 +21,17 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     """Read vertices and faces of the scene; a buffer outside the file is refused, never opened."""
     chunks = _chunks(data)
     tree = _tree(chunks.get(JSON_CHUNK, b""))
-    return _scene(tree, decoded_buffers(tree, chunks.get(BINARY_CHUNK, b"")))
+    return _scene(tree, decode_buffers(tree, chunks.get(BINARY_CHUNK, b"")))
 
 
 def parse_text(data: bytes, folder: Path) -> tuple[np.ndarray, np.ndarray]:
     """Read vertices and faces of the scene of a .gltf file, whose buffers lie in this folder or in data URIs."""
     tree = _tree(data)
-    return _scene(tree, decoded_buffers(tree, b"", folder))
+    return _scene(tree, decode_buffers(tree, b"", folder))
 
 
 def _scene(tree: dict[str, Any], buffers: list[bytes]) -> tuple[np.ndarray, np.ndarray]:
-    vertices, faces = placed_triangles(
-        Gltf(tree, buffers, most=max(sum(map(len, buffers)), COPIES))
-    )
+    vertices, faces = place_triangles(Gltf(tree, buffers, most=max(sum(map(len, buffers)), COPIES)))
     if not len(faces):
         raise FileFormatError("A glTF file must hold triangles; it holds none.")
     return vertices, faces
@@ -43,7 +41,7 @@ def _chunks(data: bytes) -> dict[bytes, bytes]:
     version, length = (int.from_bytes(data[at : at + 4], "little") for at in (4, 8))
     if data[:4] != b"glTF" or version != 2 or length != len(data):
         raise FileFormatError(
-            f"A GLB file must begin with glTF, version 2 and its length; it begins with {shown((1, data[:4]))}, "
+            f"A GLB file must begin with glTF, version 2 and its length; it begins with {quote_line((1, data[:4]))}, "
             f"{version} and {length}, and has {len(data)} bytes."
         )
     chunks: dict[bytes, bytes] = {}

@@ -52,7 +52,7 @@ class Gltf:
         return entries[index]
 
 
-def decoded_buffers(tree: dict[str, Any], binary: bytes, folder: Path | None = None) -> list[bytes]:
+def decode_buffers(tree: dict[str, Any], binary: bytes, folder: Path | None = None) -> list[bytes]:
     """Return the buffers: the chunk beside the tree, those in data URIs, and, given a folder, the files in it.
 
     Raises
@@ -61,11 +61,12 @@ def decoded_buffers(tree: dict[str, Any], binary: bytes, folder: Path | None = N
         If a buffer lies outside of the file, or of the folder; it is never opened.
     """
     return [
-        _decoded(index, entry, binary, folder) for index, entry in enumerate(_list(tree, "buffers"))
+        _decode_buffer(index, entry, binary, folder)
+        for index, entry in enumerate(_list(tree, "buffers"))
     ]
 
 
-def _decoded(index: int, entry: Any, binary: bytes, folder: Path | None) -> bytes:
+def _decode_buffer(index: int, entry: Any, binary: bytes, folder: Path | None) -> bytes:
     uri = entry.get("uri") if isinstance(entry, dict) else None
     if uri is None:
         return binary if index == 0 else b""
@@ -104,7 +105,7 @@ def _beside(index: int, uri: str, folder: Path) -> Path:
     return path
 
 
-def placed_triangles(gltf: Gltf) -> Piece:
+def place_triangles(gltf: Gltf) -> Piece:
     """Gather the triangles of all nodes, in world coordinates."""
     _refuse_extensions(gltf)
     shapes: dict[int, Piece] = {}
@@ -117,7 +118,7 @@ def placed_triangles(gltf: Gltf) -> Piece:
         total += sum(map(len, shapes[index]))
         _require_few(total, gltf)  # before any copy is made
         places.append((index, matrix))
-    return _merged([_moved(shapes[index], matrix) for index, matrix in places])
+    return _merge_pieces([_transform(shapes[index], matrix) for index, matrix in places])
 
 
 def _require_few(total: int, gltf: Gltf) -> None:
@@ -127,7 +128,7 @@ def _require_few(total: int, gltf: Gltf) -> None:
         )
 
 
-def _merged(pieces: Sequence[Piece]) -> Piece:
+def _merge_pieces(pieces: Sequence[Piece]) -> Piece:
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])[:-1]
     vertices = [np.empty((0, 3)), *(vertices for vertices, _ in pieces)]
     faces = [corners + start for (_, corners), start in zip(pieces, starts, strict=True)]
@@ -186,7 +187,7 @@ def _local_matrix(node: dict[str, Any]) -> np.ndarray:
     return matrix
 
 
-def _moved(piece: Piece, matrix: np.ndarray) -> Piece:
+def _transform(piece: Piece, matrix: np.ndarray) -> Piece:
     vertices, faces = piece
     # A mirror turns triangles inside out; the format asks to turn them back.
     flipped = faces[:, ::-1] if np.linalg.slogdet(matrix[:3, :3])[0] < 0 else faces
@@ -210,7 +211,7 @@ def _mesh(gltf: Gltf, mesh: dict[str, Any]) -> Piece:
             total += 1 + len(faces[-1])
             _require_few(total, gltf)
         pieces.append((vertices, np.concatenate(faces)))
-    return _merged(pieces)
+    return _merge_pieces(pieces)
 
 
 def _faces(gltf: Gltf, part: dict[str, Any], n_vertices: int) -> np.ndarray:

@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.io.cells import SEGMENTS, require_splittable
-from eigenshape.io.text import numbers_of, shown, wholes
+from eigenshape.io.text import numbers_of, quote_line, wholes
 
 VERSIONS = {b"2": 2, b"2.1": 2, b"2.2": 2, b"4": 4, b"4.1": 4}
 POINT = 15  # elements of one node, which are passed over
@@ -79,7 +79,7 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], dict[str, Int[np.ndarr
     if version not in VERSIONS or form not in (b"0", b"1") or n_bytes not in (b"4", b"8"):
         raise FileFormatError(
             "A gmsh file must be of version 2.2 or 4.1; its format is "
-            f"{shown((0, words))}. Save it anew."
+            f"{quote_line((0, words))}. Save it anew."
         )
     is_text, size = form == b"0", f"<u{n_bytes.decode()}"
     if not is_text and order[:4] != b"\1\0\0\0":
@@ -117,13 +117,13 @@ def _plain_nodes(
         table = numbers.take("<f8", 4 * numbers.count("<i8")).reshape(-1, 4)
         numbers.require_end()
         return wholes(table[:, 0], "Node tags of a gmsh file"), table[:, 1:]
-    count, numbers = _counted(body)
+    count, numbers = _split_count(body)
     found = numbers.take("|u1", count * NODE.itemsize).view(NODE)
     numbers.require_end()
     return found["tag"].astype(np.int64), found["place"].astype(np.float64)
 
 
-def _counted(body: bytes) -> tuple[int, _Numbers]:
+def _split_count(body: bytes) -> tuple[int, _Numbers]:
     """Return the count before a binary section of version 2, which is text, and what follows it."""
     head, _, rest = body.partition(b"\n")
     return _Numbers(head, is_text=True).count("<i8"), _Numbers(rest, is_text=False)
@@ -157,7 +157,7 @@ def _plain_elements(body: bytes) -> Rows:
 
     Each element is its own tag, then its tags, then its nodes.
     """
-    count, numbers = _counted(body)
+    count, numbers = _split_count(body)
     rows: Rows = []
     while count > 0:
         kind, height, n_tags = (numbers.count("<i4") for _ in range(3))

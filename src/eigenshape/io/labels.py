@@ -10,7 +10,7 @@ from jaxtyping import Int
 from eigenshape._errors import FileFormatError
 from eigenshape._files import read_regular, replace_file
 from eigenshape.io.ply import parse_labels
-from eigenshape.io.text import INT64, Line, lines_of, shown, whole, whole_table
+from eigenshape.io.text import INT64, Line, lines_of, quote_line, whole, whole_table
 
 KEY = "face_labels"
 LABEL = ("A label", "the label of one face")
@@ -66,7 +66,7 @@ def _from_lines(lines: list[Line], words: tuple[str, str]) -> Int[np.ndarray, " 
     several = next((line for line in lines if len(line[1].split()) > 1), None)
     if several:
         raise FileFormatError(
-            f"A line must hold {words[1]}; line {several[0]} is {shown(several)}."
+            f"A line must hold {words[1]}; line {several[0]} is {quote_line(several)}."
         )
     return np.array([whole(line[1], line, words[0]) for line in lines], dtype=np.int64)
 

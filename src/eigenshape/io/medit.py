@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.io.cells import SEGMENTS, require_splittable
-from eigenshape.io.text import numbers_of, shown, wholes
+from eigenshape.io.text import numbers_of, quote_line, wholes
 
 CELLS = {
     "Edges": 2,
@@ -69,7 +69,7 @@ def parse_text(data: bytes) -> Found:
     before = text[: keywords[0].start()] if keywords else text
     if before.strip() or not keywords:
         raise FileFormatError(
-            f"A Medit file must begin with a keyword; it begins with {shown((0, before))}."
+            f"A Medit file must begin with a keyword; it begins with {quote_line((0, before))}."
         )
     ends = [match.start() for match in keywords[1:]] + [len(text)]
     single: dict[str, np.ndarray] = {}  # sections that may stand there once
@@ -88,7 +88,7 @@ def parse_text(data: bytes) -> Found:
             require_splittable([] if body[:1] == [b"0"] else [SOLIDS[name]])
         elif name not in PASSED_OVER:
             raise FileFormatError(
-                f"Keywords of a Medit file must be known; {shown((0, match[1]))} is not. "
+                f"Keywords of a Medit file must be known; {quote_line((0, match[1]))} is not. "
                 "Leave that section out if a shape does not need it."
             )
     if b"End" not in text and "Tetrahedra" not in tables:
@@ -153,7 +153,7 @@ def parse_binary(data: bytes) -> Found:
         If the file ends early, or a cell is no simplex or quadrilateral.
     """
     order = {1: "<", 2**24: ">"}.get(int.from_bytes(data[:4], "little"), "")
-    version = int(_taken(data, 4, order + "i4", 1)[0]) if order else 0
+    version = int(_read_items(data, 4, order + "i4", 1)[0]) if order else 0
     if not 1 <= version <= 4:
         raise FileFormatError(
             f"A binary Medit file must begin with 1 and a version of 1 to 4; it has {data[:8]!r}."
@@ -164,11 +164,11 @@ def parse_binary(data: bytes) -> Found:
     dimension, points = 0, np.empty((0, 0))
     tables: dict[str, list[np.ndarray]] = {}
     place = 8
-    while (code := int(_taken(data, place, order + "i4", 1)[0])) != END:
-        following = int(_taken(data, place + 4, position, 1)[0])
+    while (code := int(_read_items(data, place, order + "i4", 1)[0])) != END:
+        following = int(_read_items(data, place + 4, position, 1)[0])
         place += 4 + np.dtype(position).itemsize
         if code == DIMENSION:
-            dimension = int(_taken(data, place, order + "i4", 1)[0])
+            dimension = int(_read_items(data, place, order + "i4", 1)[0])
             place += 4
             if dimension not in (2, 3):
                 raise FileFormatError(
@@ -176,7 +176,7 @@ def parse_binary(data: bytes) -> Found:
                 )
         elif code == VERTICES or code in CODES:
             name = CODES.get(code, "Vertices")
-            count = int(_taken(data, place, whole, 1)[0])
+            count = int(_read_items(data, place, whole, 1)[0])
             place += np.dtype(whole).itemsize
             if name in SOLIDS:
                 require_splittable([SOLIDS[name]] if count else [])
@@ -186,7 +186,7 @@ def parse_binary(data: bytes) -> Found:
                 if code == VERTICES
                 else (whole, (width,))
             )
-            rows = _taken(data, place, row, count)
+            rows = _read_items(data, place, row, count)
             place += count * row.itemsize
             if code == VERTICES:
                 points = rows["point"].astype(np.float64)
@@ -205,7 +205,7 @@ def parse_binary(data: bytes) -> Found:
     return points, _blocks(tables)
 
 
-def _taken(data: bytes, place: int, kind: str | np.dtype, count: int) -> np.ndarray:
+def _read_items(data: bytes, place: int, kind: str | np.dtype, count: int) -> np.ndarray:
     size = count * np.dtype(kind).itemsize
     if not 0 <= size <= len(data) - place:
         raise FileFormatError(

@@ -12,7 +12,8 @@ from eigenshape._files import read_regular, replace_file
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io import glb, obj, off, ply, stl
-from eigenshape.io.cells import CellKind, require_kind
+from eigenshape.io.cell_kinds import CellKind
+from eigenshape.io.cells import require_kind
 from eigenshape.io.parsing import MESH_FORMATS, naming, parse_mesh, suffix_of
 
 TEXT = {

@@ -13,8 +13,8 @@ from eigenshape.io.text import (
     coordinates,
     fans,
     lines_of,
+    quote_line,
     rows_text,
-    shown,
     whole,
     whole_table,
 )
@@ -31,7 +31,7 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     polygons: list[Line] = []
     polylines: list[Line] = []
     n_so_far: dict[bytes, list[int]] = {b"f": [], b"l": []}
-    for number, text in lines_of(joined_lines(data)):
+    for number, text in lines_of(join_lines(data)):
         keyword = text.split(None, 1)[0]
         if keyword == b"v":
             positions.append((number, text[1:]))
@@ -47,12 +47,12 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def joined_lines(data: bytes) -> bytes:
+def join_lines(data: bytes) -> bytes:
     """Join lines of numbers that end in a backslash with the next; all others keep their places."""
-    return CONTINUED.sub(_joined, data) if JOINT.search(data) else data
+    return CONTINUED.sub(_join_match, data) if JOINT.search(data) else data
 
 
-def _joined(match: re.Match[bytes]) -> bytes:
+def _join_match(match: re.Match[bytes]) -> bytes:
     text, n_joints = JOINT.subn(b" ", match[0])
     return text + b"\n" * n_joints  # lines that follow keep their numbers
 
@@ -68,7 +68,7 @@ def _corners(line: Line, n_so_far: int) -> list[int]:
     words = line[1].split()
     if len(words) < 3:
         raise FileFormatError(
-            f"A face must have three corners or more; line {line[0]} is {shown(line)}."
+            f"A face must have three corners or more; line {line[0]} is {quote_line(line)}."
         )
     return [corner_index(word, line, n_so_far) for word in words]
 
@@ -79,7 +79,7 @@ def _segments(polylines: Sequence[Line], n_so_far: Sequence[int]) -> np.ndarray:
         places = [corner_index(word, line, count) for word in line[1].split()]
         if len(places) < 2:
             raise FileFormatError(
-                f"A polyline must have two points or more; line {line[0]} is {shown(line)}."
+                f"A polyline must have two points or more; line {line[0]} is {quote_line(line)}."
             )
         pairs += pairwise(places)
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
@@ -96,7 +96,7 @@ def corner_index(word: bytes, line: Line, n_so_far: int) -> int:
     index = whole(word, line, "A corner")
     if index == 0 or index < -n_so_far:
         raise FileFormatError(
-            f"A corner must count vertices from 1, or back from -1; line {line[0]} is {shown(line)} "
+            f"A corner must count vertices from 1, or back from -1; line {line[0]} is {quote_line(line)} "
             f"after {n_so_far} vertices."
         )
     return index - 1 if index > 0 else n_so_far + index

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.obj import corner_index, joined_lines
+from eigenshape.io.obj import corner_index, join_lines
 from eigenshape.io.text import Line, coordinates, rows_text, whole
 
 KEPT = (b"vt", b"o", b"g", b"s", b"usemtl", b"mtllib")
@@ -55,7 +55,7 @@ def read_sheet(data: bytes) -> ObjSheet:
     polygons: list[tuple[Corner, ...]] = []
     rows: list[str | int] = []
     n_textures = 0
-    for number, raw in enumerate(joined_lines(data.removeprefix(codecs.BOM_UTF8)).splitlines(), 1):
+    for number, raw in enumerate(join_lines(data.removeprefix(codecs.BOM_UTF8)).splitlines(), 1):
         text = raw.partition(b"#")[0].strip()
         keyword = text.split(None, 1)[0] if text else b""
         if keyword == b"v":
@@ -110,7 +110,7 @@ def format_sheet(
     vertices = rows_text("v ", mesh.vertices if moved is None else moved)
     lines = [f"{row} {tail}".rstrip() for row, tail in zip(vertices, tails, strict=True)]
 
-    triangles, added = _matched(sheet, mesh.faces, old_places, new_places)
+    triangles, added = _match_triangles(sheet, mesh.faces, old_places, new_places)
     for row in sheet.rows:
         lines += (
             [row] if isinstance(row, str) else _polygon_rows(sheet.polygons[row], triangles[row])
@@ -132,7 +132,7 @@ Triangles = list[
 ]  # of a polygon: new corners and whether it is turned, or none
 
 
-def _matched(
+def _match_triangles(
     sheet: ObjSheet,
     faces: Int[np.ndarray, "f 3"],
     old_places: Int[np.ndarray, " n"],
@@ -151,13 +151,13 @@ def _matched(
         for index in range(1, len(corners) - 1):
             wanted = old_places[[corners[0], corners[index], corners[index + 1]]].tolist()
             left = by_places[tuple(sorted(wanted))]
-            triangles.append(_fitted(left.popleft(), wanted, new_places) if left else None)
+            triangles.append(_fit_corners(left.popleft(), wanted, new_places) if left else None)
         found.append(triangles)
     added = [face for left in by_places.values() for face in left]
     return found, np.array(added, dtype=np.int64).reshape(-1, 3)
 
 
-def _fitted(
+def _fit_corners(
     face: list[int], wanted: list[int], places: Int[np.ndarray, " k"]
 ) -> tuple[Sequence[int], bool]:
     """Bring the corners of a face into the order of the places that are wanted."""

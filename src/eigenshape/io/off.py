@@ -13,8 +13,8 @@ from eigenshape.io.text import (
     fans,
     lines_of,
     number,
+    quote_line,
     rows_text,
-    shown,
     whole,
     whole_table,
 )
@@ -117,7 +117,7 @@ def _head(lines: list[Line]) -> tuple[Line, list[Line]]:
     match = KEYWORD.fullmatch(keyword)
     if match is None:
         raise FileFormatError(
-            f"An OFF file must begin with OFF, COFF, NOFF or the like; it begins with {shown(first)}."
+            f"An OFF file must begin with OFF, COFF, NOFF or the like; it begins with {quote_line(first)}."
         )
     counts = b" ".join([match["glued"], *words]).strip()
     if counts:
@@ -129,11 +129,13 @@ def _counts(line: Line) -> tuple[int, int]:
     words = line[1].split()
     if len(words) < 2:
         raise FileFormatError(
-            f"An OFF file must declare vertices and faces; line {line[0]} is {shown(line)}."
+            f"An OFF file must declare vertices and faces; line {line[0]} is {quote_line(line)}."
         )
     n_vertices, n_faces = (whole(word, line, "A count") for word in words[:2])
     if min(n_vertices, n_faces) < 0:
-        raise FileFormatError(f"A count must not be negative; line {line[0]} is {shown(line)}.")
+        raise FileFormatError(
+            f"A count must not be negative; line {line[0]} is {quote_line(line)}."
+        )
     return n_vertices, n_faces
 
 
@@ -143,7 +145,8 @@ def _require_equal_rows(rows: Sequence[Line]) -> None:
     odd = next((row for row, width in zip(rows, widths, strict=True) if width != widths[0]), None)
     if odd is not None:
         raise FileFormatError(
-            f"All vertices must have equally many columns; the first has {widths[0]} and line {odd[0]} is {shown(odd)}."
+            f"All vertices must have equally many columns; the first has {widths[0]} and "
+            f"line {odd[0]} is {quote_line(odd)}."
         )
 
 
@@ -163,7 +166,7 @@ def _corners(row: Line) -> list[int]:
     count = whole(words[0], row, "A number of corners")
     if not 3 <= count < len(words):
         raise FileFormatError(
-            f"A face must have three corners or more, as many as it says; line {row[0]} is {shown(row)}."
+            f"A face must have three corners or more, as many as it says; line {row[0]} is {quote_line(row)}."
         )
     return [whole(word, row, "A corner") for word in words[1 : 1 + count]]
 

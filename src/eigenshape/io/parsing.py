@@ -9,7 +9,8 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError, InvalidShapeError
 from eigenshape.io import glb, gmsh, medit, obj, off, ply, stl, vtk_legacy, vtu
-from eigenshape.io.cells import SEGMENTS, Blocks, CellKind, chosen_cells
+from eigenshape.io.cell_kinds import CellKind
+from eigenshape.io.cells import SEGMENTS, Blocks, select_cells
 
 # Formats whose bytes alone give vertices, and triangles or segments.
 PARSERS = {
@@ -68,7 +69,7 @@ def parse_mesh(
 ) -> tuple[Float[np.ndarray, "n d"], Int[np.ndarray, "s corners"]]:
     """Return points and the simplices that are chosen; of shape (0, 3) where there are points alone."""
     points, blocks = _blocks(path, suffix, data, cells)
-    return points, chosen_cells(blocks, cells)
+    return points, select_cells(blocks, cells)
 
 
 def _blocks(

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
 from eigenshape.io.lzf_loops import decompress
-from eigenshape.io.text import Line, coordinates, lines_of, number_table, shown, whole
+from eigenshape.io.text import Line, coordinates, lines_of, number_table, quote_line, whole
 from eigenshape.io.unpacking import require_reasonable
 
 AXES = (b"x", b"y", b"z")
@@ -41,9 +41,9 @@ def parse(data: bytes) -> Float[np.ndarray, "n 3"]:
     if kind == b"binary":
         return _records(header, body)
     if kind == b"binary_compressed":
-        return _columns(header, _unpacked(header, body))
+        return _columns(header, _unpack_body(header, body))
     raise FileFormatError(
-        f"DATA of a PCD file must be ascii, binary or binary_compressed; it is {shown((0, kind))}."
+        f"DATA of a PCD file must be ascii, binary or binary_compressed; it is {quote_line((0, kind))}."
     )
 
 
@@ -108,15 +108,18 @@ def _parse_text(header: Header, body: bytes, first: int) -> Float[np.ndarray, "n
     if table is not None and table.shape[1] == n_words:
         return table[:, places]
     return coordinates(
-        [(number, b" ".join(_chosen(number, text, places, n_words))) for number, text in lines]
+        [
+            (number, b" ".join(_select_fields(number, text, places, n_words)))
+            for number, text in lines
+        ]
     )
 
 
-def _chosen(number: int, text: bytes, places: list[int], n_words: int) -> list[bytes]:
+def _select_fields(number: int, text: bytes, places: list[int], n_words: int) -> list[bytes]:
     words = text.split()
     if len(words) != n_words:
         raise FileFormatError(
-            f"A point must have all fields and no more; line {number} is {shown((number, text))}."
+            f"A point must have all fields and no more; line {number} is {quote_line((number, text))}."
         )
     return [words[place] for place in places]
 
@@ -157,7 +160,7 @@ def _values(header: Header, raw: np.ndarray, place: int) -> np.ndarray:
     return raw.reshape(-1).view(np.dtype(header.kinds[place])).astype(np.float64)
 
 
-def _unpacked(header: Header, body: bytes) -> np.ndarray:
+def _unpack_body(header: Header, body: bytes) -> np.ndarray:
     if len(body) < 8:
         raise FileFormatError(
             f"Compressed points must begin with two sizes; the file ends after {len(body)} bytes."

@@ -17,8 +17,8 @@ from eigenshape.io.text import (
     lines_of,
     number,
     number_table,
+    quote_line,
     rows_text,
-    shown,
     strip_triangles,
     whole,
     whole_table,
@@ -148,7 +148,7 @@ def _row_by_row(rows: Sequence[Line], element: Element) -> Table:
         if place < len(words):
             raise FileFormatError(
                 f"A row of {element.name} must end with its columns; line {row[0]} goes on with "
-                f"{shown((0, b' '.join(words[place:])))}."
+                f"{quote_line((0, b' '.join(words[place:])))}."
             )
     return table
 
@@ -162,7 +162,7 @@ def _text_values(
         place += 1
     if not 0 <= count <= len(words) - place:
         raise FileFormatError(
-            f"A row must hold all its columns; line {row[0]} lacks {column.name}: {shown(row)}."
+            f"A row must hold all its columns; line {row[0]} lacks {column.name}: {quote_line(row)}."
         )
     return _understood(words[place : place + count], column, row), place + count
 

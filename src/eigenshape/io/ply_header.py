@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.text import shown
+from eigenshape.io.text import quote_line
 
 TYPES = {
     "char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d",
@@ -62,7 +62,7 @@ def parse_header(data: bytes) -> Header:
     """Read the header, refusing tables that are larger than the file before anybody makes room for them."""
     if not re.match(rb"ply\s", data):
         raise FileFormatError(
-            f"A PLY file must begin with ply; it begins with {shown((1, data[:10]))}."
+            f"A PLY file must begin with ply; it begins with {quote_line((1, data[:10]))}."
         )
     mark = END.search(data)
     if mark is None:
@@ -96,7 +96,8 @@ def _declarations(lines: list[bytes]) -> tuple[str, tuple[Element, ...]]:
                     REMARKS.index(other)
         except (IndexError, KeyError, ValueError) as err:
             raise FileFormatError(
-                f"A PLY header must declare format, elements and properties; line {number} is {shown((number, line))}."
+                f"A PLY header must declare format, elements and properties; "
+                f"line {number} is {quote_line((number, line))}."
             ) from err
     return order, tuple(
         Element(name, count, tuple(columns[name].values())) for name, count in counts.items()

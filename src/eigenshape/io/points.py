@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.text import coordinates, lines_of, rows_text, shown, whole
+from eigenshape.io.text import coordinates, lines_of, quote_line, rows_text, whole
 
 EXPE = b"[Expe/PointSet/Binary/"
 
@@ -41,7 +41,7 @@ def _parse_binary(data: bytes) -> Float[np.ndarray, "n 3"]:
             declared = whole(words[1], line, "A number of points")
         else:
             raise FileFormatError(
-                f"A binary point set must declare properties; line {line[0]} is {shown(line)}."
+                f"A binary point set must declare properties; line {line[0]} is {quote_line(line)}."
             )
     if sizes.get(b"position") != 12 or min(sizes.values()) < 1:
         raise FileFormatError(

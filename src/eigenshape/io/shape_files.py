@@ -13,7 +13,8 @@ from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.io import pcd, ply, points
-from eigenshape.io.cells import CellKind, require_kind
+from eigenshape.io.cell_kinds import CellKind
+from eigenshape.io.cells import require_kind
 from eigenshape.io.parsing import MESH_FORMATS, naming, parse_mesh, suffix_of
 
 POINTS = {".pts": points.parse, ".xyz": points.parse, ".pcd": pcd.parse}

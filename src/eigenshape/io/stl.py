@@ -4,8 +4,8 @@ import numpy as np
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import weld
-from eigenshape.io.text import coordinates, lines_of, shown
+from eigenshape.geometry.repair_steps import weld
+from eigenshape.io.text import coordinates, lines_of, quote_line
 
 HEADER = 84  # bytes before the triangles of a binary file: 80 of text, 4 of their number
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -22,12 +22,12 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _is_text(data: bytes) -> bool:
-    if len(data) >= HEADER and len(data) == HEADER + RECORD.itemsize * _declared(data):
+    if len(data) >= HEADER and len(data) == HEADER + RECORD.itemsize * _count_triangles(data):
         return False  # many a binary file begins with solid
     return data.lstrip()[:5].lower() == b"solid" and b"\0" not in data[:HEADER]
 
 
-def _declared(data: bytes) -> int:
+def _count_triangles(data: bytes) -> int:
     return int.from_bytes(data[80:HEADER], "little")
 
 
@@ -36,11 +36,11 @@ def _parse_binary(data: bytes) -> np.ndarray:
         raise FileFormatError(
             f"A binary STL file must have {HEADER} bytes of header; it has {len(data)} in all."
         )
-    expected = HEADER + RECORD.itemsize * _declared(data)
+    expected = HEADER + RECORD.itemsize * _count_triangles(data)
     if len(data) != expected:
         raise FileFormatError(
-            f"A binary STL file must hold the triangles it declares; {_declared(data)} take {expected} bytes and it "
-            f"has {len(data)}."
+            f"A binary STL file must hold the triangles it declares; "
+            f"{_count_triangles(data)} take {expected} bytes and it has {len(data)}."
         )
     return (
         np.frombuffer(data, dtype=RECORD, offset=HEADER)["corners"]
@@ -63,11 +63,11 @@ def _parse_text(data: bytes) -> np.ndarray:
     for place, (line, word) in enumerate(rows):
         if word != FACET[place % len(FACET)]:
             raise FileFormatError(
-                f"A facet must be lines of {b' '.join(FACET).decode()}; line {line[0]} is {shown(line)}."
+                f"A facet must be lines of {b' '.join(FACET).decode()}; line {line[0]} is {quote_line(line)}."
             )
     if len(rows) % len(FACET):
         raise FileFormatError(
-            f"A text STL file must end with a whole facet; its last line is {shown(rows[-1][0])}."
+            f"A text STL file must end with a whole facet; its last line is {quote_line(rows[-1][0])}."
         )
     return coordinates(
         [(line[0], line[1][len(word) :]) for line, word in rows if word == b"vertex"]

@@ -55,7 +55,9 @@ def coordinates(lines: Sequence[Line]) -> Float[np.ndarray, "n 3"]:
 def _three_numbers(line: Line) -> list[float]:
     words = line[1].split()[:3]
     if len(words) < 3:
-        raise FileFormatError(f"A vertex must have three numbers; line {line[0]} is {shown(line)}.")
+        raise FileFormatError(
+            f"A vertex must have three numbers; line {line[0]} is {quote_line(line)}."
+        )
     return [number(word, line) for word in words]
 
 
@@ -65,7 +67,7 @@ def number(word: bytes, line: Line) -> float:
         return float(word.replace(b"_", b"?"))  # Python would read 1_0 as ten
     except ValueError as err:
         raise FileFormatError(
-            f"A coordinate must be a number; line {line[0]} has {shown((0, word))} in {shown(line)}."
+            f"A coordinate must be a number; line {line[0]} has {quote_line((0, word))} in {quote_line(line)}."
         ) from err
 
 
@@ -75,11 +77,11 @@ def whole(word: bytes, line: Line, what: str) -> int:
         value = int(word.replace(b"_", b"?"))
     except ValueError as err:
         raise FileFormatError(
-            f"{what} must be a whole number; line {line[0]} has {shown((0, word))} in {shown(line)}."
+            f"{what} must be a whole number; line {line[0]} has {quote_line((0, word))} in {quote_line(line)}."
         ) from err
     if not -INT64 <= value < INT64:
         raise FileFormatError(
-            f"{what} must fit into 64 bits; line {line[0]} has {shown((0, word))}."
+            f"{what} must fit into 64 bits; line {line[0]} has {quote_line((0, word))}."
         )
     return value
 
@@ -108,7 +110,7 @@ def wholes(numbers: Shaped[np.ndarray, " k"], what: str) -> Int[np.ndarray, " k"
     return numbers.astype(np.int64)
 
 
-def shown(line: Line) -> str:
+def quote_line(line: Line) -> str:
     """Quote a line, cut short where it is long."""
     return repr(line[1].strip()[:60].decode("latin-1"))
 

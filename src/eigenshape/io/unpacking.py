@@ -29,7 +29,7 @@ def require_reasonable(size: int, n_bytes: int) -> None:
         )
 
 
-def unpacked_block(packed: bytes, size: int, compressor: str) -> bytes:
+def unpack_block(packed: bytes, size: int, compressor: str) -> bytes:
     """Unpack a block to the size that it declares; no byte more is unpacked.
 
     Raises

@@ -6,8 +6,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.cells import SEGMENTS, CellKind, four_cornered
-from eigenshape.io.text import fans, numbers_of, shown, strip_triangles, wholes
+from eigenshape.io.cell_kinds import CellKind
+from eigenshape.io.cells import SEGMENTS, four_cornered
+from eigenshape.io.text import fans, numbers_of, quote_line, strip_triangles, wholes
 from eigenshape.io.vtk_cells import CellLists, cells_of_types
 
 KINDS = {
@@ -105,7 +106,7 @@ def parse(
     if dataset[:1] != [b"DATASET"] or dataset[-1].upper() not in DATASETS:
         raise FileFormatError(
             f"A VTK file must hold the DATASET UNSTRUCTURED_GRID or POLYDATA; its line is "
-            f"{shown((0, b' '.join(dataset)))}."
+            f"{quote_line((0, b' '.join(dataset)))}."
         )
     points, types, lists = _sections(cursor)
     if dataset[-1].upper() == b"POLYDATA":

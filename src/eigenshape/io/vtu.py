@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.io.text import numbers_of, wholes
-from eigenshape.io.unpacking import COMPRESSORS, require_reasonable, unpacked_block
+from eigenshape.io.unpacking import COMPRESSORS, require_reasonable, unpack_block
 from eigenshape.io.vtk_cells import CellLists, cells_of_types
 
 HEADER_TYPES = {"UInt32": "u4", "UInt64": "u8"}
@@ -93,7 +93,7 @@ class _Packing:
         pieces = []
         start = 0
         for length, n_packed in zip(sizes, packed, strict=True):
-            pieces.append(unpacked_block(data[start : start + n_packed], length, self.compressor))
+            pieces.append(unpack_block(data[start : start + n_packed], length, self.compressor))
             start += n_packed
         return b"".join(pieces)
 
@@ -114,15 +114,15 @@ class _Source:
         """Return the bytes after the counts; in base64 these are coded with the counts, if joined, or on their own."""
         if self.is_raw:
             return self._first(self.text[self.n_counts :], length)
-        if joined and b"=" not in self.text[: _coded(self.n_counts)]:
+        if joined and b"=" not in self.text[: _count_characters(self.n_counts)]:
             return self._first(self.text, self.n_counts + length)[self.n_counts :]
-        return self._first(self.text[_coded(self.n_counts) :], length)
+        return self._first(self.text[_count_characters(self.n_counts) :], length)
 
     def _first(self, text: bytes, length: int) -> bytes:
         found = text[:length]
         if not self.is_raw:
             try:
-                found = base64.b64decode(text[: _coded(length)], validate=True)[:length]
+                found = base64.b64decode(text[: _count_characters(length)], validate=True)[:length]
             except binascii.Error as err:
                 raise FileFormatError(
                     f"Arrays of a VTU file must be in base64; {self.name!r} is not: {err}."
@@ -134,7 +134,7 @@ class _Source:
         return found
 
 
-def _coded(length: int) -> int:
+def _count_characters(length: int) -> int:
     """Return how many characters of base64 so many bytes take."""
     return -(-length // 3) * 4
 
@@ -163,7 +163,7 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], dict[str, Int[np.ndarr
     FileFormatError
         If the file is not what it declares, or declares far more than it can hold.
     """
-    root, packing = _opened(data)
+    root, packing = _parse_tags(data)
     pieces = root.findall("./UnstructuredGrid/Piece")
     counts = [(piece.get("NumberOfPoints", ""), piece.get("NumberOfCells", "")) for piece in pieces]
     if not counts or not all(
@@ -183,7 +183,7 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], dict[str, Int[np.ndarr
     return points, _cells(piece, packing, n_cells)
 
 
-def _opened(data: bytes) -> tuple[ElementTree.Element, _Packing]:
+def _parse_tags(data: bytes) -> tuple[ElementTree.Element, _Packing]:
     """Parse the tags; what is appended raw is no text and is cut out before."""
     raw = RAW.search(data)
     tags, appended = data, b""

@@ -10,7 +10,8 @@ from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import require_volumes, scaled_corners, triangular_sides
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators import elements
-from eigenshape.operators.cotangent import Mass, linear_mass, require_mass
+from eigenshape.operators.choices import Mass
+from eigenshape.operators.cotangent import linear_mass, require_mass
 from eigenshape.operators.laplacian import Laplacian
 
 # Asymmetry and negative eigenvalues up to this share of the largest entry count as rounding.

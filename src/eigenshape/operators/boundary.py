@@ -5,7 +5,6 @@ whole boundary gives the Dirichlet condition, fixing a part of it the mixed one.
 """
 
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Int
@@ -15,8 +14,6 @@ from eigenshape._arrays import as_array
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian
-
-Condition = Literal["neumann", "dirichlet"]
 
 
 def dirichlet_laplacian(

@@ -8,6 +8,7 @@ from typing import Any
 import scipy.sparse as sp
 
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
@@ -45,8 +46,12 @@ class Operator:
     options: tuple[str, ...]
     description: str
 
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
-OPERATORS = {
+
+# The operator of each name in `OPERATOR_NAMES`.
+OPERATORS: dict[str, Operator] = {
     "cotangent": Operator(cotangent_laplacian, MESHES, ("mass",), "linear finite elements"),
     "p2": Operator(
         partial(fem_laplacian, order=2), MESHES, (), "quadratic finite elements, nodes on edges too"

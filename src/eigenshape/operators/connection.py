@@ -9,7 +9,8 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
-from eigenshape.operators.cotangent import Mass, cotangent_laplacian
+from eigenshape.operators.choices import Mass
+from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.directions import corner_products, vertex_directions
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.tufted import edge_keys

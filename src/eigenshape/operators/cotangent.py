@@ -1,7 +1,5 @@
 """The cotangent Laplacian: linear finite elements on simplices of any dimension."""
 
-from typing import Literal
-
 import scipy.sparse as sp
 
 from eigenshape._errors import InvalidParameterError
@@ -10,9 +8,8 @@ from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators import elements
+from eigenshape.operators.choices import Mass
 from eigenshape.operators.laplacian import Laplacian
-
-Mass = Literal["lumped", "consistent", "averaged"]
 
 
 def cotangent_laplacian(mesh: MeshLike, mass: Mass = "lumped") -> Laplacian:

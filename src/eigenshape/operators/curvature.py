@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import unit_scaled, vertex_normals
+from eigenshape.geometry.measure import scale_to_unit, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import in_length
 from eigenshape.operators.cotangent import cotangent_laplacian
@@ -42,7 +42,7 @@ def mean_curvature(mesh: MeshLike) -> Float[np.ndarray, " n"]:
     0.5
     """
     mesh = as_mesh(mesh)
-    points, scale = unit_scaled(mesh)
+    points, scale = scale_to_unit(mesh)
     operator = cotangent_laplacian(TriangleMesh(points, mesh.faces))
     pull = (operator.stiffness @ points) / operator.mass.diagonal()[:, None]
     return in_length(np.einsum("ij,ij->i", pull, vertex_normals(mesh)) / 2, scale, -1)

@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import frozen
+from eigenshape._arrays import freeze
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.simplices import (
     in_length,
@@ -83,7 +83,7 @@ def _assemble(
 @lru_cache
 def local_nodes(dim: int, order: int) -> Int[np.ndarray, "nodes order"]:
     """Name the nodes of one simplex by its corners."""
-    return frozen(np.array(list(combinations_with_replacement(range(dim + 1), order))))
+    return freeze(np.array(list(combinations_with_replacement(range(dim + 1), order))))
 
 
 def number_nodes(
@@ -114,7 +114,7 @@ def _keys(
 def reference_mass(dim: int, order: int) -> Float[np.ndarray, "nodes nodes"]:
     """Return ∫ N_i N_j over a simplex of volume 1."""
     exponents, coefficients = _basis(dim, order)
-    return frozen(coefficients.T @ _integrals(exponents[:, None] + exponents) @ coefficients)
+    return freeze(coefficients.T @ _integrals(exponents[:, None] + exponents) @ coefficients)
 
 
 @lru_cache
@@ -128,7 +128,7 @@ def reference_stiffness(dim: int, order: int) -> Float[np.ndarray, "corners corn
             factors = np.outer(exponents[:, a], exponents[:, b])
             sums = np.maximum((exponents - units[a])[:, None] + (exponents - units[b]), 0)
             pairs[a, b] = coefficients.T @ (factors * _integrals(sums)) @ coefficients
-    return frozen(pairs)
+    return freeze(pairs)
 
 
 @lru_cache
@@ -139,7 +139,7 @@ def _basis(
     names = local_nodes(dim, order)
     exponents = (names[:, :, None] == np.arange(dim + 1)).sum(axis=1)
     places = exponents / order
-    return frozen(exponents), frozen(np.linalg.inv(np.prod(places[:, None] ** exponents, axis=2)))
+    return freeze(exponents), freeze(np.linalg.inv(np.prod(places[:, None] ** exponents, axis=2)))
 
 
 def _integrals(exponents: Int[np.ndarray, "i j corners"]) -> Float[np.ndarray, "i j"]:

@@ -122,7 +122,19 @@ def fem_boundary_nodes(mesh: MeshLike, order: SupportsIndex = 2) -> Int[np.ndarr
 
     See Also
     --------
-    es.operators.fem_laplacian : Build the operator, with an example.
+    fem_laplacian : Build the operator.
+
+    Examples
+    --------
+    The first eigenvalue of the unit square with a fixed boundary is 2π²:
+
+    >>> import eigenshape as es
+    >>> square = es.shapes.grid(8, 8)
+    >>> rim = es.operators.fem_boundary_nodes(square, order=3)
+    >>> laplacian = es.operators.fem_laplacian(square, order=3)
+    >>> drum = es.solve_spectrum(laplacian, 1, fixed=rim)
+    >>> (drum.eigenvalues / 3.14159265**2).round(4).tolist()
+    [2.0]
     """
     mesh = as_simplicial(mesh)
     names = _names(mesh, order)

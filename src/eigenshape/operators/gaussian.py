@@ -1,7 +1,7 @@
 """Laplacians from a Gaussian kernel: on meshes of any dimension, on samples, and on known surfaces."""
 
 from dataclasses import replace
-from typing import Literal, SupportsIndex, TypedDict, Unpack
+from typing import SupportsIndex, TypedDict, Unpack
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
@@ -18,9 +18,8 @@ from eigenshape.geometry.quadrature import Quadrature, mesh_quadrature, uniform_
 from eigenshape.geometry.simplices import mean_side_length, require_span, size_one
 from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.cells import cell_grid, gaussian_differences
+from eigenshape.operators.choices import Correction, Distance, Form
 from eigenshape.operators.kernel import (
-    Correction,
-    Form,
     KernelOptions,
     choose_kernel,
     geodesic_laplacian,
@@ -32,8 +31,6 @@ from eigenshape.operators.kernel import (
 )
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.neighbors import neighbor_graph
-
-Distance = Literal["euclidean", "geodesic"]
 
 
 class KernelChoice(TypedDict, total=False):

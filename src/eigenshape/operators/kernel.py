@@ -6,7 +6,6 @@ W_ij = -w_i w_j G(x_i, x_j) / t with G(x, y) = exp(-|x - y|²/4t) / (4πt)^{m/2}
 import warnings
 from dataclasses import dataclass
 from math import gamma, pi
-from typing import Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,17 +14,15 @@ from scipy.spatial import cKDTree
 
 from eigenshape._arrays import positive_values
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._memory import machine_memory
+from eigenshape._memory import require_memory
 from eigenshape.geometry.geodesic import geodesic_balls
 from eigenshape.geometry.quadrature import Quadrature
 from eigenshape.geometry.simplices import LARGEST_EXPONENT, size_one
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.cells import CellGrid, cell_grid, count_partners, gaussian_rows
+from eigenshape.operators.choices import Correction, Form
 from eigenshape.operators.csr_loops import component_labels
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
-
-Correction = Literal["log"]
-Form = Literal["literal", "random-walk"]
 
 # Width of a kernel by default, h / e; t = e².
 EDGE_FACTOR = 2.0
@@ -132,7 +129,7 @@ def kernel_laplacian(measure: Quadrature, kernel: GaussianKernel) -> Laplacian:
     weights, unit = size_one(measure.weights)
     t = kernel.t / scale / scale
     grid = cell_grid(points, kernel.cutoff * 2 * t**0.5)
-    _require_memory(grid)
+    _require_matrix_fits(grid)
     counts = count_partners(grid)
     _require_partners(measure, counts - 1, kernel)
     starts = np.concatenate([[0], np.cumsum(counts)])
@@ -152,7 +149,7 @@ def geodesic_laplacian(mesh: Mesh, measure: Quadrature, kernel: GaussianKernel) 
     points, scale = size_one(measure.points)
     weights, unit = size_one(measure.weights)
     radius = kernel.cutoff * kernel.width
-    _require_memory(
+    _require_matrix_fits(
         cell_grid(points, radius / scale)
     )  # no ball along the surface holds more than one through space
     matrix = geodesic_balls(mesh, radius)
@@ -244,16 +241,16 @@ def warn_of_few(measure: Quadrature, kernel: GaussianKernel) -> None:
         )
 
 
-def _require_memory(grid: CellGrid) -> None:
+def _require_matrix_fits(grid: CellGrid) -> None:
     """Estimate the size of the matrix from some of its rows, and raise an error if it is too large."""
     n = len(grid.order)
     sample = np.unique(np.linspace(0, n - 1, min(n, SAMPLED_ROWS)).astype(np.int64))
     entries = count_partners(grid, sample)[sample].mean() * n
-    available = machine_memory() / 2
-    if entries * PEAK > available:
-        raise InvalidShapeError(
-            f"A kernel matrix must fit into half of the memory, {available / 2**30:.1f} GiB; "
-            f"for {entries:.2g} entries, "
-            f"{entries / n:.0f} a row, it takes {entries * PEAK / 2**30:.1f} GiB. Choose a smaller t, or "
-            "functional_laplacian, which stores none."
-        )
+    require_memory(
+        "A kernel matrix",
+        f"{entries:.2g} entries, {entries / n:.0f} a row,",
+        {"values and columns": entries * PEAK},
+        "Choose a smaller t, or functional_laplacian, which stores none.",
+        share=0.5,
+        error=InvalidShapeError,
+    )

@@ -1,4 +1,4 @@
-"""The one form that every discretisation of the Laplace operator takes."""
+"""The one form that every discretization of the Laplace operator takes."""
 
 from dataclasses import dataclass
 
@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 from eigenshape.operators.csr_loops import worst_asymmetry
 
 # Largest difference of W_ij and W_ji, relative to the largest entry, that is accepted as rounding.
@@ -44,6 +45,8 @@ class GaussianKernel:
     form: str = "literal"
     cutoff: float = 4.0
     volume: float = 1.0
+
+    _repr_html_ = html_repr
 
     @property
     def width(self) -> float:
@@ -98,6 +101,9 @@ class Laplacian:
     stiffness: sp.csr_array
     mass: sp.csr_array
     kernel: GaussianKernel | None = None
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
         for name in ("stiffness", "mass"):

@@ -8,15 +8,16 @@ from eigenshape._arrays import positive_values
 from eigenshape._errors import InvalidShapeError
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.face_turns import orient_consistently
 from eigenshape.geometry.facets import boundary_facets
 from eigenshape.geometry.measure import edge_lengths, mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import mean_side_length, size_one
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.topology import boundary_vertices, consistently_oriented, edge_table
+from eigenshape.geometry.topology import boundary_vertices, edge_table
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.sparse.elimination import analyse, factorise
+from eigenshape.sparse.elimination import analyze_pattern, factorize_symmetric
 
 # Noise level at which `denoise` lets heat flow one mean edge length: that of Gaussian noise of a
 # quarter of an edge. A larger value smooths less.
@@ -59,7 +60,7 @@ def noise_level(mesh: MeshLike) -> float:
     if not inside.any():
         return 0.0
     away = links[inside] @ points / degrees[inside, None] - points[inside]
-    normals = mean_normals(consistently_oriented(unit))[inside]  # which side is out does not matter
+    normals = mean_normals(orient_consistently(unit))[inside]  # which side is out does not matter
     heights = np.abs(np.einsum("ni,ni->n", away, normals))
     return float(np.median(heights) / edge_lengths(unit).mean())
 
@@ -134,7 +135,7 @@ def _flow(
     matrix = pencil[:, free].tocsc()
     matrix.sort_indices()
     with one_blas_thread():
-        factor = factorise(analyse(matrix), matrix.data)
+        factor = factorize_symmetric(analyze_pattern(matrix), matrix.data)
     if factor is None:
         raise InvalidShapeError(
             "All triangles must have angles well above 0 for the surface to be smoothed; some have angles so close to "

@@ -7,9 +7,10 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
 
+from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import area_vectors, unit_scaled
+from eigenshape.geometry.measure import area_vectors, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, face_pairs
 
@@ -52,6 +53,8 @@ class Camera:
     rotation: Float[np.ndarray, "3 3"]
     size: int
 
+    _repr_html_ = html_repr
+
 
 @one_blas_thread()
 def three_quarter_view(mesh: MeshLike, *, up: Up = "auto", size: int = 600) -> Camera:
@@ -91,7 +94,7 @@ def three_quarter_view(mesh: MeshLike, *, up: Up = "auto", size: int = 600) -> C
     facing = _facing(mesh)
     if facing is not None and np.linalg.norm(np.cross(upward, facing)) > 0.1:
         towards = facing
-    elif _seen_bending(mesh, towards) < LESS * _seen_bending(mesh, behind):
+    elif _sum_visible_bending(mesh, towards) < LESS * _sum_visible_bending(mesh, behind):
         towards = behind
     towards = towards / np.linalg.norm(towards)
     right = np.cross(upward, towards)
@@ -100,7 +103,7 @@ def three_quarter_view(mesh: MeshLike, *, up: Up = "auto", size: int = 600) -> C
 
 
 def _upright_axis(mesh: TriangleMesh) -> Literal["y", "z"]:
-    points = unit_scaled(mesh)[0]
+    points = scale_to_unit(mesh)[0]
     areas = np.linalg.norm(area_vectors(points[mesh.faces]), axis=1)
     weights = areas / max(areas.sum(), np.finfo(np.float64).tiny)
     center = weights @ points[mesh.faces].mean(axis=1)
@@ -130,9 +133,9 @@ def _hull_area(points: Float[np.ndarray, "k 2"]) -> float:
         return 0.0
 
 
-def _seen_bending(mesh: TriangleMesh, towards: Float[np.ndarray, "3"]) -> float:
+def _sum_visible_bending(mesh: TriangleMesh, towards: Float[np.ndarray, "3"]) -> float:
     """Sum the bending of a surface, angle times length of each edge, weighted by how far the edge faces the viewer."""
-    points = unit_scaled(mesh)[0]
+    points = scale_to_unit(mesh)[0]
     vectors = area_vectors(points[mesh.faces])
     normals = (
         vectors / np.maximum(np.linalg.norm(vectors, axis=1), np.finfo(np.float64).tiny)[:, None]
@@ -150,7 +153,7 @@ def _seen_bending(mesh: TriangleMesh, towards: Float[np.ndarray, "3"]) -> float:
 
 def _facing(mesh: TriangleMesh) -> Float[np.ndarray, "3"] | None:
     """Return the mean normal of an open surface that mostly faces one way."""
-    vectors = area_vectors(unit_scaled(mesh)[0][mesh.faces])
+    vectors = area_vectors(scale_to_unit(mesh)[0][mesh.faces])
     mean = vectors.sum(axis=0) / max(
         np.linalg.norm(vectors, axis=1).sum(), np.finfo(np.float64).tiny
     )
@@ -159,7 +162,7 @@ def _facing(mesh: TriangleMesh) -> Float[np.ndarray, "3"] | None:
 
 def in_picture(mesh: TriangleMesh, camera: Camera) -> Float[np.ndarray, "n 3"]:
     """Return the vertices in pixels: right, down, and towards the viewer; the shape fills the picture."""
-    points = unit_scaled(mesh)[0] @ camera.rotation.T
+    points = scale_to_unit(mesh)[0] @ camera.rotation.T
     low, high = points.min(axis=0), points.max(axis=0)
     span = max(float((high - low)[:2].max()), np.finfo(np.float64).tiny)
     scale = camera.size * (1 - 2 * MARGIN) / span

@@ -1,7 +1,5 @@
 """Figures of functions and parts on a shape."""
 
-from collections.abc import Sequence
-
 import matplotlib as mpl
 import numpy as np
 import scipy.sparse as sp
@@ -11,6 +9,9 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, Normalize
 
 from eigenshape._arguments import require_type
+from eigenshape._arrays import face_labels, finite_values, vertex_values, whole_numbers
+from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
 from eigenshape.plot.camera import Camera, three_quarter_view
@@ -23,7 +24,7 @@ DOT = 46.0  # square points; area of the mark of a vertex
 
 
 def figure_eigenfunctions(
-    mesh: MeshLike, spectrum: Spectrum, indices: Sequence[int], *, camera: Camera | None = None
+    mesh: MeshLike, spectrum: Spectrum, indices: ArrayLike, *, camera: Camera | None = None
 ) -> Figure:
     """Draw eigenfunctions side by side, with their nodal lines.
 
@@ -35,14 +36,19 @@ def figure_eigenfunctions(
         With n vertices.
     spectrum : Spectrum
         Of an operator on the n vertices.
-    indices : sequence of int
-        Which columns of `spectrum.eigenvectors` to draw, four in a row.
+    indices : (c,) int
+        Which columns of `spectrum.eigenvectors` to draw, 0 to k - 1, four in a row.
     camera : Camera, optional
         By default `three_quarter_view(mesh)`.
 
     Returns
     -------
     matplotlib.figure.Figure
+
+    Raises
+    ------
+    InvalidParameterError
+        If the spectrum is of another number of points, or a column is out of range or none is given.
 
     See Also
     --------
@@ -61,13 +67,22 @@ def figure_eigenfunctions(
     mesh = as_mesh(mesh)
     require_type(spectrum, Spectrum, "spectrum")
     require_type(camera, Camera | None, "camera")
+    n_points, n_pairs = spectrum.eigenvectors.shape
+    if n_points != mesh.n_vertices:
+        raise InvalidParameterError(
+            f"spectrum must be of the mesh, which has {mesh.n_vertices} vertices; "
+            f"its eigenvectors have {n_points} entries."
+        )
+    chosen = whole_numbers(indices, "An index", 0, n_pairs - 1).tolist()
+    if not chosen:
+        raise InvalidParameterError("indices must name at least one eigenfunction; it is empty.")
     camera = camera or three_quarter_view(mesh, size=420)
-    n_columns = min(len(indices), 4)
-    n_rows = -(-len(indices) // n_columns)
+    n_columns = min(len(chosen), 4)
+    n_rows = -(-len(chosen) // n_columns)
     figure = Figure(figsize=(PANEL * n_columns + 0.8, (PANEL + 0.3) * n_rows), layout="constrained")
     grid = figure.subplots(n_rows, n_columns, squeeze=False)
     colors, scale = mpl.colormaps["RdBu_r"], Normalize(-1, 1)
-    for axes, index in zip(grid.flat, indices, strict=False):
+    for axes, index in zip(grid.flat, chosen, strict=False):
         function = spectrum.eigenvectors[:, index]
         shown = function / np.abs(function).max()
         show(
@@ -81,7 +96,7 @@ def figure_eigenfunctions(
         )
         number = spectrum.certificate.first + index
         axes.set_title(f"φ$_{{{number}}}$,  λ = {spectrum.eigenvalues[index]:.4g}")
-    for axes in grid.flat[len(indices) :]:
+    for axes in grid.flat[len(chosen) :]:
         axes.set_axis_off()
     bar = figure.colorbar(ScalarMappable(scale, colors), ax=grid, shrink=0.7)
     bar.set_label("eigenfunction / its largest value (dark line: 0)")
@@ -94,7 +109,7 @@ def _constant_as_one(function: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n
 
 def figure_field(
     mesh: MeshLike,
-    values: Float[np.ndarray, " n"],
+    values: ArrayLike,
     label: str = "",
     *,
     camera: Camera | None = None,
@@ -119,6 +134,11 @@ def figure_field(
     -------
     matplotlib.figure.Figure
 
+    Raises
+    ------
+    InvalidParameterError
+        If `values` does not hold one finite number per vertex.
+
     See Also
     --------
     figure_segments : Draw the parts of a mesh.
@@ -136,14 +156,15 @@ def figure_field(
     require_type(camera, Camera | None, "camera")
     figure = Figure(figsize=(2 * PANEL + 1.2, 2 * PANEL), layout="constrained")
     axes = figure.subplots()
-    scale, colors = Normalize(float(values.min()), float(values.max())), mpl.colormaps[color_map]
+    field = vertex_values(values, "values", mesh.n_vertices)
+    scale, colors = Normalize(float(field.min()), float(field.max())), mpl.colormaps[color_map]
     camera = camera or three_quarter_view(mesh)
-    show(axes, draw(mesh, camera, vertex_colors=mapped(values, scale, colors)))
+    show(axes, draw(mesh, camera, vertex_colors=map_colors(field, scale, colors)))
     figure.colorbar(ScalarMappable(scale, colors), ax=axes, shrink=0.8).set_label(label)
     return figure
 
 
-def mapped(
+def map_colors(
     values: Float[np.ndarray, " n"], scale: Normalize, colors: Colormap
 ) -> Float[np.ndarray, "n 3"]:
     """Return the color of each value."""
@@ -152,8 +173,8 @@ def mapped(
 
 def figure_segments(
     mesh: MeshLike,
-    labels: Int[np.ndarray, " f"],
-    vertices: Int[np.ndarray, " m"],
+    labels: ArrayLike,
+    vertices: ArrayLike | None = None,
     *,
     camera: Camera | None = None,
 ) -> Figure:
@@ -167,14 +188,19 @@ def figure_segments(
         With f faces.
     labels : (f,) int
         Number of the part of each face. Faces below 0 are gray.
-    vertices : (m,) int
-        Feature point of each part.
+    vertices : (m,) int, optional
+        Feature point of each part. By default none is drawn.
     camera : Camera, optional
         By default `three_quarter_view(mesh)`.
 
     Returns
     -------
     matplotlib.figure.Figure
+
+    Raises
+    ------
+    InvalidParameterError
+        If `labels` does not hold one whole number per face, or a feature point is not a vertex.
 
     See Also
     --------
@@ -193,18 +219,24 @@ def figure_segments(
     """
     mesh = as_mesh(mesh)
     require_type(camera, Camera | None, "camera")
+    labels = face_labels(labels, "labels", mesh.n_faces)
+    marked = np.empty(0, dtype=np.int64)
+    if vertices is not None:
+        marked = whole_numbers(vertices, "A feature point", 0, mesh.n_vertices - 1)
     figure = Figure(figsize=(2 * PANEL, 2 * PANEL + 0.4), layout="constrained")
     axes = figure.subplots()
     drawing = draw(mesh, camera or three_quarter_view(mesh), face_colors=palette(labels))
     show(axes, drawing)
-    mark(axes, drawing, vertices, numbers=True)
-    axes.set_title(
-        f"{len(vertices)} parts around their feature points (hollow: on the far side)", fontsize=10
-    )
+    mark(axes, drawing, marked, numbers=True)
+    if len(marked):
+        title = f"{len(marked)} parts around their feature points (hollow: on the far side)"
+    else:
+        title = f"{len(np.unique(labels[labels >= 0]))} parts"
+    axes.set_title(title, fontsize=10)
     return figure
 
 
-def part_colors(mesh: MeshLike, labels: Int[np.ndarray, " f"]) -> UInt8[np.ndarray, "n 3"]:
+def part_colors(mesh: MeshLike, labels: ArrayLike) -> UInt8[np.ndarray, "n 3"]:
     """Return a color for each vertex, by the part that has most of the area around it.
 
     Parts have the same colors as in `figure_segments`. Faces without a part, below 0, are gray.
@@ -221,6 +253,11 @@ def part_colors(mesh: MeshLike, labels: Int[np.ndarray, " f"]) -> UInt8[np.ndarr
     (n, 3) uint8
         Red, green and blue, for `write_mesh`.
 
+    Raises
+    ------
+    InvalidParameterError
+        If `labels` does not hold one whole number per face.
+
     See Also
     --------
     value_colors : Color vertices by a function.
@@ -235,6 +272,7 @@ def part_colors(mesh: MeshLike, labels: Int[np.ndarray, " f"]) -> UInt8[np.ndarr
     ((42, 3), 2)
     """
     mesh = as_mesh(mesh)
+    labels = face_labels(labels, "labels", mesh.n_faces).astype(np.int64)
     corners, areas = mesh.faces.ravel(), np.repeat(face_areas(mesh), 3)
     shape = (mesh.n_vertices, int(labels.max(initial=-1)) + 2)
     around = sp.coo_array(
@@ -243,9 +281,7 @@ def part_colors(mesh: MeshLike, labels: Int[np.ndarray, " f"]) -> UInt8[np.ndarr
     return _bytes(palette(np.asarray(around.argmax(axis=1)).ravel() - 1))
 
 
-def value_colors(
-    values: Float[np.ndarray, " n"], color_map: str = "viridis"
-) -> UInt8[np.ndarray, "n 3"]:
+def value_colors(values: ArrayLike, color_map: str = "viridis") -> UInt8[np.ndarray, "n 3"]:
     """Return a color for each vertex, by the value of a function.
 
     Parameters
@@ -260,21 +296,24 @@ def value_colors(
     (n, 3) uint8
         Red, green and blue, for `write_mesh`.
 
+    Raises
+    ------
+    InvalidParameterError
+        If `values` is not a list of finite numbers.
+
     See Also
     --------
     part_colors : Color vertices by parts.
 
     Examples
     --------
-    >>> import numpy as np, eigenshape as es
-    >>> es.plot.value_colors(np.array([0.0, 1.0, 2.0]), "gray").tolist()
+    >>> import eigenshape as es
+    >>> es.plot.value_colors([0.0, 1.0, 2.0], "gray").tolist()
     [[0, 0, 0], [128, 128, 128], [255, 255, 255]]
     """
-    return _bytes(
-        mapped(
-            values, Normalize(float(values.min()), float(values.max())), mpl.colormaps[color_map]
-        )
-    )
+    field = finite_values(values, "values")
+    scale = Normalize(float(field.min()), float(field.max()))
+    return _bytes(map_colors(field, scale, mpl.colormaps[color_map]))
 
 
 def _bytes(colors: Float[np.ndarray, "n 3"]) -> UInt8[np.ndarray, "n 3"]:

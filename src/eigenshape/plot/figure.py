@@ -28,14 +28,3 @@ class Figure(matplotlib_figure.Figure):
             if plain != text.get_text():
                 text.set_text(plain)
         super().draw(renderer)
-
-
-def literal(text: str) -> str:
-    r"""Return text that a figure shows letter by letter, such as a file's name: no ``$`` begins a formula.
-
-    Examples
-    --------
-    >>> print(literal("a$b$.ply"))
-    a\$b\$.ply
-    """
-    return printable(text).replace("$", r"\$")

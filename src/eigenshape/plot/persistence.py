@@ -132,7 +132,7 @@ def figure_merge_tree(
     )
     axes.set_xticks(place, [str(number) for number in range(shown)], fontsize=7)
     axes.set(ylim=(0, top), xlim=(-0.8, shown - 0.2))
-    axes.set_xlabel("number of the maximum, 0 the most persistent" + _left_out(tree, shown))
+    axes.set_xlabel("number of the maximum, 0 the most persistent" + _count_left_out(tree, shown))
     axes.set_ylabel(f"persistence: {label}")
     if persistence is not None:
         left = int(np.count_nonzero(tree.persistence >= persistence))
@@ -144,7 +144,7 @@ def figure_merge_tree(
     return figure
 
 
-def _left_out(tree: Tree, shown: int) -> str:
+def _count_left_out(tree: Tree, shown: int) -> str:
     more = len(tree.maxima) - shown
     return f" ({more:,} more merge by {tree.persistence[shown - 1]:.3g})" if more else ""
 

@@ -9,6 +9,9 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 
 from eigenshape._arguments import require_type
+from eigenshape._arrays import vertex_values
+from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.plot.camera import Camera, three_quarter_view
@@ -22,7 +25,7 @@ MOVED = ("#c9c9c9", "#f3c27b", "#d9541e")  # colors of shares 0, 1/2 and 1
 
 def figure_poses(
     poses: Mapping[str, MeshLike],
-    shares: Float[np.ndarray, " n"] | None = None,
+    shares: ArrayLike | None = None,
     *,
     camera: Camera | None = None,
 ) -> Figure:
@@ -31,15 +34,21 @@ def figure_poses(
     Parameters
     ----------
     poses : mapping of titles to MeshLike
-        With the same n vertices and faces.
+        Poses of one mesh, or of meshes of one shape.
     shares : (n,) float, optional
-        How much of a motion each vertex follows, from 0 to 1, such as `Binding.shares`. It sets the colors.
+        How much of a motion each vertex follows, from 0 to 1, such as `Binding.shares`. It sets the colors of all
+        poses, which must then have n vertices.
     camera : Camera, optional
         By default `three_quarter_view` of the first pose.
 
     Returns
     -------
     matplotlib.figure.Figure
+
+    Raises
+    ------
+    InvalidParameterError
+        If there is no pose, or `shares` does not hold one finite number per vertex of each.
 
     Examples
     --------
@@ -52,22 +61,25 @@ def figure_poses(
     """
     require_type(camera, Camera | None, "camera")
     require_type(poses, Mapping, "poses")
+    if not poses:
+        raise InvalidParameterError("poses must hold at least one mesh; it is empty.")
     meshes = {title: as_mesh(mesh, title) for title, mesh in poses.items()}
-    rest = next(iter(meshes.values()))
-    camera = camera or three_quarter_view(rest)
+    first = next(iter(meshes.values()))
+    camera = camera or three_quarter_view(first)
     columns = min(len(poses), N_COLUMNS)
     rows = -(-len(poses) // columns)
     size = 1.5 * PANEL
     figure = Figure(figsize=(size * columns + 0.8, (size + 0.3) * rows), layout="constrained")
     grid = figure.subplots(rows, columns, squeeze=False)
     corners = _frame(list(meshes.values()), camera)
-    values = np.zeros(rest.n_vertices) if shares is None else shares
     # a new map for each call, because a map fills its table at first use and threads may share it
     colormap = LinearSegmentedColormap.from_list("moved", MOVED)
-    colors = np.asarray(colormap(np.append(values, np.zeros(len(corners)))))[:, :3]
     for axes in grid.flat:
         axes.set_axis_off()
     for axes, (title, mesh) in zip(grid.flat, meshes.items(), strict=False):
+        n = mesh.n_vertices
+        values = np.zeros(n) if shares is None else vertex_values(shares, "shares", n)
+        colors = np.asarray(colormap(np.append(values, np.zeros(len(corners)))))[:, :3]
         framed = TriangleMesh(np.vstack([mesh.vertices, corners]), mesh.faces)
         show(axes, draw(framed, camera, vertex_colors=colors))
         axes.set_title(title, fontsize=10)

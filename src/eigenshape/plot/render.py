@@ -7,9 +7,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._threads import one_blas_thread
+from eigenshape.geometry.face_turns import orient_consistently
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import boundary_edges, consistently_oriented
+from eigenshape.geometry.topology import boundary_edges
 from eigenshape.plot.camera import Camera, in_picture
 from eigenshape.scans.raster import Raster, rasterize
 
@@ -19,7 +20,7 @@ AMBIENT = 0.42  # brightness, of 1, of what faces away from the light
 INK = 0.12  # brightness of lines
 LINE = 1.6  # their width, in shown pixels
 BEHIND = 0.02  # share of the picture's size that a point may lie behind what is seen and still count as seen
-GREY_PAIR = 7  # of matplotlib's tab20, left to what has no label
+GRAY_PAIR = 7  # of matplotlib's tab20, left to what has no label
 
 Image = Float[np.ndarray, "h w 4"]
 
@@ -81,7 +82,7 @@ def draw(
     if zero_set_of is not None:
         ink |= _changes(np.sign(_blend(zero_set_of[:, None], mesh, raster)[..., 0]), raster)
     seen = raster.face >= 0
-    shaded = np.where((_thickened(ink) & seen)[..., None], INK, shaded)
+    shaded = np.where((_thicken(ink) & seen)[..., None], INK, shaded)
     image = np.concatenate([np.clip(shaded, 0, 1), seen[..., None].astype(np.float64)], axis=2)
     return Drawing(_shrunk(image), points[:, :2] / FINER, _visible(points, raster))
 
@@ -110,7 +111,7 @@ def _blend(
 
 
 def _brightness(mesh: TriangleMesh, camera: Camera, raster: Raster) -> Float[np.ndarray, "h w"]:
-    normals = _blend(mean_normals(consistently_oriented(mesh)) @ camera.rotation.T, mesh, raster)
+    normals = _blend(mean_normals(orient_consistently(mesh)) @ camera.rotation.T, mesh, raster)
     normals = normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-12)
     normals = np.where(
         normals[..., 2:] < 0, -normals, normals
@@ -120,20 +121,20 @@ def _brightness(mesh: TriangleMesh, camera: Camera, raster: Raster) -> Float[np.
 
 
 def _changes(values: Float[np.ndarray, "h w"], raster: Raster) -> Bool[np.ndarray, "h w"]:
-    """Mark pixels whose value differs from that of the neighbour to the right or below on the same surface."""
+    """Mark pixels whose value differs from that of the neighbor to the right or below on the same surface."""
     ink = np.zeros(values.shape, dtype=bool)
     near = 0.01 * values.shape[0]
     for axis in (0, 1):
-        here, there = _neighbours(values, axis)
+        here, there = _neighbors(values, axis)
         with np.errstate(invalid="ignore"):
-            depth_here, depth_there = _neighbours(raster.depth, axis)
+            depth_here, depth_there = _neighbors(raster.depth, axis)
             joined = np.abs(depth_here - depth_there) < near
         window = (slice(None, -1), slice(None)) if axis == 0 else (slice(None), slice(None, -1))
         ink[window] |= (here != there) & joined
     return ink
 
 
-def _neighbours(values: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
+def _neighbors(values: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
     n = values.shape[axis]
     return values.take(np.arange(n - 1), axis), values.take(np.arange(1, n), axis)
 
@@ -162,7 +163,7 @@ def _pixels(
     return column, row
 
 
-def _thickened(ink: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:
+def _thicken(ink: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:
     radius = int(np.ceil(LINE * FINER / 2 - 0.5))
     thick = ink.copy()
     for down in range(-radius, radius + 1):
@@ -189,5 +190,5 @@ def _shrunk(image: Image) -> Float[np.ndarray, "rows columns 4"]:
 def palette(labels: Int[np.ndarray, " k"]) -> Float[np.ndarray, "k 3"]:
     """Return a color for each label, 18 different ones in turn; below 0 is gray."""
     pairs = mpl.colormaps["tab20"](np.arange(20))[:, :3].reshape(10, 2, 3)
-    colors = np.concatenate(pairs[np.arange(10) != GREY_PAIR].transpose(1, 0, 2))
+    colors = np.concatenate(pairs[np.arange(10) != GRAY_PAIR].transpose(1, 0, 2))
     return np.where(labels[:, None] < 0, 0.82, colors[labels % len(colors)])

@@ -8,6 +8,7 @@ from jaxtyping import Int
 from matplotlib.axes import Axes
 
 from eigenshape._arguments import require_each, require_type
+from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.plot.camera import three_quarter_view
@@ -44,6 +45,9 @@ class Panel:
     title: str
     colors: Int[np.ndarray, " f"]
     vertices: Int[np.ndarray, " m"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
         if self.mesh is not None:
@@ -140,9 +144,7 @@ def figure_label_transfer(source: MeshLike, target: MeshLike, transfer: LabelTra
     require_type(transfer, LabelTransfer, "transfer")
     figure = Figure(figsize=(4.4 * PANEL, 2.2 * PANEL + 0.4), layout="constrained")
     left, right = figure.subplots(1, 2)
-    _fill(
-        left, Panel(source, "labelled", transfer.source.labels, transfer.source.features.vertices)
-    )
+    _fill(left, Panel(source, "labeled", transfer.source.labels, transfer.source.features.vertices))
     colors = transfer.matches[transfer.target.labels]
     drawing = draw(target, three_quarter_view(target), face_colors=palette(colors))
     show(right, drawing)

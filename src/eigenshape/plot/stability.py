@@ -12,7 +12,7 @@ from eigenshape._arguments import require_type
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.plot.camera import three_quarter_view
-from eigenshape.plot.fields import PANEL, mapped, show
+from eigenshape.plot.fields import PANEL, map_colors, show
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import draw
 from eigenshape.plot.spectra import draw_comparison
@@ -79,7 +79,7 @@ def _draw_shapes(
     scale, colors = Normalize(0.0, report.distance or 1.0), mpl.colormaps["viridis"]
     camera = three_quarter_view(meshes[0])
     for axes, mesh, values, title in zip(panels, meshes, report.distances, titles, strict=True):
-        show(axes, draw(mesh, camera, vertex_colors=mapped(values, scale, colors)))
+        show(axes, draw(mesh, camera, vertex_colors=map_colors(values, scale, colors)))
         axes.set_title(title)
     bar = figure.colorbar(ScalarMappable(scale, colors), ax=panels.tolist(), shrink=0.8)
     bar.set_label("distance from the other shape, length")

@@ -1,12 +1,12 @@
 from . import baselines as baselines
 from .description import describe as describe
-from .heat.descriptor import SCALE_FREE as SCALE_FREE
-from .heat.descriptor import THESIS as THESIS
 from .heat.descriptor import HeatDescriptor as HeatDescriptor
-from .heat.descriptor import HeatRecipe as HeatRecipe
 from .heat.features import HeatFeatures as HeatFeatures
 from .heat.features import find_heat_features as find_heat_features
 from .heat.features import heat_descriptor as heat_descriptor
+from .heat.recipe import SCALE_FREE as SCALE_FREE
+from .heat.recipe import THESIS as THESIS
+from .heat.recipe import HeatRecipe as HeatRecipe
 from .heat.score import match_features as match_features
 from .heat.score import matching_score as matching_score
 from .label_transfer import LabelTransfer as LabelTransfer

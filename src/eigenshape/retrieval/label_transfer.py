@@ -8,9 +8,9 @@ from jaxtyping import Float, Int
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
-from eigenshape._arrays import as_array, frozen
-from eigenshape._errors import InvalidParameterError
+from eigenshape._arrays import face_labels, freeze
 from eigenshape._progress import Progress
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.features.boundaries import smooth_boundaries
@@ -20,9 +20,9 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.retrieval.heat.descriptor import SCALE_FREE
 from eigenshape.retrieval.heat.features import heat_descriptor
-from eigenshape.retrieval.heat.score import matching_scores, shifted
+from eigenshape.retrieval.heat.recipe import SCALE_FREE
+from eigenshape.retrieval.heat.score import matching_scores, shift_columns
 from eigenshape.spectral.bounds.nonconforming import partly
 from eigenshape.spectral.signatures.heat import positive_eigenvalues
 from eigenshape.spectral.solve import solve_spectrum
@@ -61,6 +61,9 @@ class LabelTransfer:
     matches: Int[np.ndarray, " m"]
     part_labels: Int[np.ndarray, " m"]
     confidence: Float[np.ndarray, " m"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 @one_blas_thread()
@@ -125,16 +128,11 @@ def transfer_labels(
     """
     source = as_mesh(source, "source")
     target = as_mesh(target, "target")
-    labels = as_array(labels, "labels")
-    if labels.shape != (source.n_faces,) or labels.dtype.kind not in "iu":
-        raise InvalidParameterError(
-            f"labels must hold one integer for each of the {source.n_faces} faces; they have shape "
-            f"{labels.shape} and type {labels.dtype}."
-        )
+    labels = face_labels(labels, "labels", source.n_faces)
     found = find_parts(source, progress=partly(progress, 0, 0.25))
-    source_parts = found.parts if n_parts is None else _cut(found, n_parts)
+    source_parts = found.parts if n_parts is None else _cut_into_parts(found, n_parts)
     found = find_parts(target, progress=partly(progress, 0.25, 0.5))
-    target_parts = _cut(found, len(source_parts.features.vertices))
+    target_parts = _cut_into_parts(found, len(source_parts.features.vertices))
 
     one = _describe_parts(target, target_parts.labels, partly(progress, 0.5, 0.75))
     two = _describe_parts(source, source_parts.labels, partly(progress, 0.75, 1))
@@ -146,16 +144,16 @@ def transfer_labels(
     displacements = cdist(one.distances, two.distances[:, matches], "cityblock") / len(matches)
     confidence = _confidence(differences + displacements, matches, source_labels)
     return LabelTransfer(
-        labels=frozen(source_labels[matches][target_parts.labels]),
+        labels=freeze(source_labels[matches][target_parts.labels]),
         source=source_parts,
         target=target_parts,
-        matches=frozen(matches),
-        part_labels=frozen(source_labels[matches]),
-        confidence=frozen(confidence),
+        matches=freeze(matches),
+        part_labels=freeze(source_labels[matches]),
+        confidence=freeze(confidence),
     )
 
 
-def _cut(found: PartDecomposition, count: int) -> Segmentation:
+def _cut_into_parts(found: PartDecomposition, count: int) -> Segmentation:
     return smooth_boundaries(found.mesh, segment(found.tree, n_regions=count))
 
 
@@ -213,7 +211,7 @@ def _majority_labels(
 def _descriptor_differences(one: _DescribedParts, two: _DescribedParts) -> Float[np.ndarray, "m r"]:
     """Return the mean difference of descriptors, at the relative size of the best score."""
     _, shifts = matching_scores(one.vectors, two.vectors, np.array([0]), SCALE_FREE)
-    ours, theirs = shifted(one.vectors, two.vectors, int(shifts[0]), SCALE_FREE)
+    ours, theirs = shift_columns(one.vectors, two.vectors, int(shifts[0]), SCALE_FREE)
     return cdist(ours, theirs, "cityblock") / ours.shape[1]
 
 

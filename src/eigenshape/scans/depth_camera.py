@@ -6,13 +6,14 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import frozen, whole_number
+from eigenshape._arrays import freeze, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import faces_of_largest
+from eigenshape.geometry.repair_steps import faces_of_largest
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.topology import submesh
 from eigenshape.scans.partial import rotation_towards, unit_direction
@@ -72,6 +73,8 @@ class DepthCamera:
     dropout: float = 0.01
     n_holes: int = 3
 
+    _repr_html_ = html_repr
+
 
 @dataclass(frozen=True, eq=False)
 class DepthScan:
@@ -90,6 +93,9 @@ class DepthScan:
     mesh: TriangleMesh
     source_faces: Int[np.ndarray, " n"]
     pixels: Int[np.ndarray, "n 2"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +184,7 @@ def simulate_scan(
     ahead = np.array([0, 0, camera.distance])
     placed = TriangleMesh((points - middle) @ turn.T / diagonal - ahead, mesh.faces)
     picture = _ideal_picture(placed, camera)
-    kept = _kept_pixels(picture, camera, rng)
+    kept = _draw_pixels_to_keep(picture, camera, rng)
     surface = _triangulate_pixels(picture, _noisy_depth(picture, camera, rng), kept)
     wanted = np.ones(surface.n_faces, dtype=bool) if all_pieces else faces_of_largest(surface)
     seen, source = submesh(surface, wanted)
@@ -186,7 +192,7 @@ def simulate_scan(
     columns = source % camera.resolution
     pixels = np.column_stack([columns, source // camera.resolution])
     return DepthScan(
-        TriangleMesh(back, seen.faces), frozen(picture.face.ravel()[source]), frozen(pixels)
+        TriangleMesh(back, seen.faces), freeze(picture.face.ravel()[source]), freeze(pixels)
     )
 
 
@@ -235,7 +241,7 @@ def _rays(size: int, focal: float) -> Float[np.ndarray, "h w 3"]:
     return np.stack([*np.meshgrid(across, across), np.full((size, size), -1.0)], axis=2)
 
 
-def _kept_pixels(
+def _draw_pixels_to_keep(
     picture: _Picture, camera: DepthCamera, rng: np.random.Generator
 ) -> Bool[np.ndarray, "h w"]:
     begins = np.deg2rad(camera.dropout_angle)

@@ -8,13 +8,15 @@ from jaxtyping import Bool, Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import mean_normals, unit_scaled
+from eigenshape.geometry.face_turns import orient_consistently
+from eigenshape.geometry.measure import mean_normals, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import faces_of_largest
-from eigenshape.geometry.topology import consistently_oriented, is_closed, submesh
+from eigenshape.geometry.repair_steps import faces_of_largest
+from eigenshape.geometry.topology import is_closed, submesh
 from eigenshape.scans.raster import rasterize
 
 # A vertex may be this many pixels away from the middle of the pixel in which the surface was seen,
@@ -42,6 +44,9 @@ class MeshPart:
     mesh: TriangleMesh
     source_vertices: Int[np.ndarray, " n"]
     source_faces: Int[np.ndarray, " f"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 @one_blas_thread()
@@ -163,7 +168,7 @@ def rotation_towards(view: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
 def _visible_vertices(
     mesh: TriangleMesh, view: Float[np.ndarray, "3"], resolution: int
 ) -> Bool[np.ndarray, " n"]:
-    points = unit_scaled(mesh)[0] @ rotation_towards(view).T
+    points = scale_to_unit(mesh)[0] @ rotation_towards(view).T
     low = points.min(axis=0)
     span = float((points.max(axis=0) - low)[:2].max())
     if not span > 0:
@@ -175,7 +180,7 @@ def _visible_vertices(
     raster = rasterize(pixels, mesh.faces, resolution, resolution)
     column, row = pixels[:, :2].astype(np.int64).T
     # The slope is the same on both sides of the surface, so it does not matter which is outside.
-    towards = np.abs(mean_normals(consistently_oriented(mesh)) @ view)
+    towards = np.abs(mean_normals(orient_consistently(mesh)) @ view)
     slope = np.minimum(
         np.sqrt(1 - np.minimum(towards, 1) ** 2) / np.maximum(towards, 1 / STEEPEST_SURFACE),
         STEEPEST_SURFACE,

@@ -60,7 +60,7 @@ def rasterize(
     weights = np.zeros((width * height, 3))
     corners = points[faces]
     for candidates in _chunks(corners, width, height):
-        index, pixel, inside = _covered(corners, candidates, width)
+        index, pixel, inside = _find_covered_pixels(corners, candidates, width)
         height_there = np.einsum("ij,ij->i", inside, corners[index, :, 2])
         before = depth[pixel]
         np.maximum.at(depth, pixel, height_there)
@@ -106,7 +106,7 @@ def _bands(boxes: Int[np.ndarray, "k 5"]) -> Int[np.ndarray, "b 5"]:
     return bands
 
 
-def _covered(
+def _find_covered_pixels(
     corners: Float[np.ndarray, "f 3 3"], boxes: Int[np.ndarray, "k 5"], width: int
 ) -> tuple[Int[np.ndarray, " c"], Int[np.ndarray, " c"], Float[np.ndarray, "c 3"]]:
     """Return face, pixel and barycentric coordinates wherever a pixel lies in the face of a box."""

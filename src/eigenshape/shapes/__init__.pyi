@@ -1,4 +1,4 @@
-from .creatures import CREATURES as CREATURES
+from .creature_plans import CREATURES as CREATURES
 from .creatures import make_creature as make_creature
 from .domains import ball as ball
 from .domains import box as box
@@ -15,11 +15,11 @@ from .exact import sphere_eigenvalues as sphere_eigenvalues
 from .exact import sphere_functional_eigenvalues as sphere_functional_eigenvalues
 from .harmonics import sphere_harmonics as sphere_harmonics
 from .spheres import fibonacci_sphere as fibonacci_sphere
-from .spheres import graded_sphere as graded_sphere
 from .spheres import projective_plane as projective_plane
 from .spheres import random_sphere as random_sphere
 from .spheres import sphere_hull as sphere_hull
 from .spheres import three_sphere as three_sphere
+from .spheres import uneven_sphere as uneven_sphere
 from .surfaces import grid as grid
 from .surfaces import icosphere as icosphere
 from .surfaces import torus as torus

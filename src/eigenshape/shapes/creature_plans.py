@@ -293,3 +293,5 @@ PLANS = {
     "quadruped": QUADRUPED,
     "snake": SNAKE,
 }
+
+CREATURES = tuple(sorted(PLANS))  # the kinds of creatures, by name

@@ -8,13 +8,11 @@ from jaxtyping import Float
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.shapes.creature_plans import PLANS
+from eigenshape.shapes.creature_plans import CREATURES, PLANS
 from eigenshape.shapes.isosurface import find_spacing, isosurface, relax
 from eigenshape.shapes.limbs import Body, distance_to_body, nearest_limbs, place_limbs
 from eigenshape.shapes.skinning import Joints, bend_at_joints, diffuse
 from eigenshape.shapes.thinning import decimate
-
-CREATURES = tuple(sorted(PLANS))  # the kinds of creatures, by name
 
 # The first mesh has this multiple of the requested number of vertices. The surplus lets `decimate`
 # remove the shortest edges; a larger surplus takes longer.

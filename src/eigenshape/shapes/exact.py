@@ -14,7 +14,7 @@ from eigenshape._arrays import positive_values, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.operators.boundary import Condition
+from eigenshape.operators.choices import Condition
 
 # Nodes of the Gauss rule of `sphere_functional_eigenvalues`: enough for harmonics of degree 300
 # over the whole sphere.
@@ -44,6 +44,11 @@ def sphere_eigenvalues(k: SupportsIndex, dim: SupportsIndex = 2) -> Float[np.nda
     -------
     (k,) float
         Eigenvalues in 1/length², ascending, repeated by multiplicity.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `k` is less than 1, or `dim` is not in 1..20.
 
     See Also
     --------
@@ -131,6 +136,11 @@ def projective_plane_eigenvalues(k: SupportsIndex) -> Float[np.ndarray, " k"]:
     -------
     (k,) float
         Eigenvalues in 1/length², ascending, repeated by multiplicity.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `k` is less than 1.
 
     See Also
     --------

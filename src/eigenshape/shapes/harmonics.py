@@ -6,7 +6,7 @@ from typing import SupportsIndex
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import finite_rows, frozen, whole_number
+from eigenshape._arrays import finite_rows, freeze, whole_number
 from eigenshape._errors import InvalidShapeError
 from eigenshape._typing import ArrayLike
 
@@ -71,7 +71,7 @@ def sphere_harmonics(points: ArrayLike, k: SupportsIndex) -> Float[np.ndarray, "
         degrees = np.arange(order, last + 1)
         harmonics[:, degrees * (degrees + 1) - order] = values * power.imag[:, None]
         harmonics[:, degrees * (degrees + 1) + order] = values * power.real[:, None]
-    return frozen(harmonics[:, :count])
+    return freeze(harmonics[:, :count])
 
 
 def _directions(points: ArrayLike) -> Float[np.ndarray, "n 3"]:

@@ -75,7 +75,9 @@ def place_limbs(plan: Sequence[Limb], individual: int = 0) -> Body:
     """
     growth = _growth(plan, individual)
     drawn = {
-        _sided(limb.name, side): _mirrored(limb, side) for limb in plan for side in _sides(limb)
+        _name_side(limb.name, side): _mirror_limb(limb, side)
+        for limb in plan
+        for side in _sides(limb)
     }
     numbers = {name: number for number, name in enumerate(drawn)}
     placed: list[PlacedLimb] = []
@@ -111,11 +113,11 @@ def _sides(limb: Limb) -> tuple[int, ...]:
     return (1, -1) if limb.name.endswith("*") else (1,)
 
 
-def _sided(name: str, side: int) -> str:
+def _name_side(name: str, side: int) -> str:
     return name.replace("*", "+" if side > 0 else "-")
 
 
-def _mirrored(limb: Limb, side: int) -> Limb:
+def _mirror_limb(limb: Limb, side: int) -> Limb:
     """Return one limb of a mirrored pair.
 
     In the mirror a rotation about y stays the same, and one about x or z changes its sense.
@@ -124,7 +126,7 @@ def _mirrored(limb: Limb, side: int) -> Limb:
     swings = tuple(
         (node, (side * x, y, side * z), low, high) for node, (x, y, z), low, high in limb.swings
     )
-    return limb._replace(parent=_sided(limb.parent, side), nodes=nodes, swings=swings)
+    return limb._replace(parent=_name_side(limb.parent, side), nodes=nodes, swings=swings)
 
 
 def _place(

@@ -39,7 +39,7 @@ def fibonacci_sphere(n: SupportsIndex = 1000) -> TriangleMesh:
     See Also
     --------
     sphere_eigenvalues : The exact eigenvalues of the sphere.
-    icosphere, random_sphere, graded_sphere
+    icosphere, random_sphere, uneven_sphere
 
     Examples
     --------
@@ -88,7 +88,7 @@ def random_sphere(n: SupportsIndex = 1000, *, rng: np.random.Generator) -> Trian
     return _outward_hull(directions / np.linalg.norm(directions, axis=1, keepdims=True))
 
 
-def graded_sphere(n: SupportsIndex = 1000, *, ratio: float = 4.0) -> TriangleMesh:
+def uneven_sphere(n: SupportsIndex = 1000, *, ratio: float = 4.0) -> TriangleMesh:
     """Make a triangle mesh of the unit sphere with more points near the top than near the bottom.
 
     The density of the points is a linear function of z.
@@ -117,7 +117,7 @@ def graded_sphere(n: SupportsIndex = 1000, *, ratio: float = 4.0) -> TriangleMes
     Examples
     --------
     >>> import eigenshape as es
-    >>> sphere = es.shapes.graded_sphere(100, ratio=4)
+    >>> sphere = es.shapes.uneven_sphere(100, ratio=4)
     >>> int((sphere.vertices[:, 2] > 0).sum())
     65
     """

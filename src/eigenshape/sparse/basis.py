@@ -12,7 +12,7 @@ Slots = Float[np.ndarray, "s n 8"]
 Block = Float[np.ndarray, "g n 8"]
 
 
-def packed(columns: Float[np.ndarray, "n k"]) -> Slots:
+def pack_columns(columns: Float[np.ndarray, "n k"]) -> Slots:
     """Return columns in slots, the last one filled up with zeros."""
     n, k = columns.shape
     slots = np.zeros((-(-k // LANES), n, LANES))
@@ -37,7 +37,7 @@ def subtract(space: Slots, weights: Float[np.ndarray, "m b"], columns: Block) ->
     subtract_combination(space, parts, columns)
 
 
-def combined(space: Slots, weights: Float[np.ndarray, "m k"]) -> Float[np.ndarray, "n k"]:
+def combine_columns(space: Slots, weights: Float[np.ndarray, "m k"]) -> Float[np.ndarray, "n k"]:
     """Return space weights, as columns of one matrix."""
     n = space.shape[1]
     result, flat = np.empty((n, weights.shape[1])), np.empty((ROWS, len(weights)))

@@ -39,9 +39,11 @@ def subtract_product(
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         address, size = arguments[:2]
-        rows, columns, terms = (_kept(builder, builder.extract_value(size, i)) for i in range(3))
+        rows, columns, terms = (
+            _store_whole(builder, builder.extract_value(size, i)) for i in range(3)
+        )
         left, right, taken = (_part(context, builder, signature, arguments, i) for i in (2, 4, 6))
-        minus, one = (_kept_real(builder, value) for value in (-1.0, 1.0))
+        minus, one = (_store_real(builder, value) for value in (-1.0, 1.0))
         # In Fortran's order every matrix is transposed: Cᵀ = Cᵀ - B Aᵀ.
         flags = [_letter(builder, letter) for letter in "TN"]
         given = [*flags, columns, rows, terms, minus, *right, *left, one, *taken]
@@ -61,21 +63,21 @@ def solve_triangle(
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         address, size = arguments[:2]
-        rows, columns = (_kept(builder, builder.extract_value(size, i)) for i in range(2))
+        rows, columns = (_store_whole(builder, builder.extract_value(size, i)) for i in range(2))
         triangle, right = (_part(context, builder, signature, arguments, i) for i in (2, 4))
         flags = [_letter(builder, letter) for letter in "LUTU"]
-        given = [*flags, columns, rows, _kept_real(builder, 1.0), *triangle, *right]
+        given = [*flags, columns, rows, _store_real(builder, 1.0), *triangle, *right]
         _call(builder, address, given)
         return context.get_dummy_value()
 
     return signature, generate
 
 
-def _kept(builder: Any, number: Any) -> Any:
+def _store_whole(builder: Any, number: Any) -> Any:
     return cgutils.alloca_once_value(builder, builder.trunc(number, WHOLE))
 
 
-def _kept_real(builder: Any, value: float) -> Any:
+def _store_real(builder: Any, value: float) -> Any:
     return cgutils.alloca_once_value(builder, ir.Constant(REAL, value))
 
 
@@ -86,7 +88,7 @@ def _letter(builder: Any, letter: str) -> Any:
 def _part(context: Any, builder: Any, signature: Any, arguments: Any, i: int) -> tuple[Any, Any]:
     """Return the first number of a part, and the numbers from one row to the next."""
     array = context.make_array(signature.args[i])(context, builder, arguments[i])
-    return builder.gep(array.data, [arguments[i + 1]]), _kept(
+    return builder.gep(array.data, [arguments[i + 1]]), _store_whole(
         builder, builder.extract_value(array.shape, 1)
     )
 

@@ -7,14 +7,16 @@ from eigenshape.sparse.dissection_loops import (
     LEAF,
     WORD,
     breadth_first,
-    cheapest_cut,
+    count_cuts,
     find_pieces,
     order_leaf,
+    smooth_keys,
     take_sides,
-    tell_apart,
 )
 
 Indices = Int[np.ndarray, " ..."]
+# Steps to an edge in which distances are told: smoothing needs some between whole edges.
+FINE = 64
 
 
 def dissect(indptr: Indices, indices: Indices) -> Indices:
@@ -37,7 +39,6 @@ def dissect(indptr: Indices, indices: Indices) -> Indices:
         n, dtype=np.int64
     )  # the name of the segment that a point lies in; -1 when its place is final
     one, two, queue, key = (np.empty(n, dtype=np.int64) for _ in range(4))
-    side = np.empty(n, dtype=np.int8)
     bits = np.empty(LEAF * -(-n // WORD), dtype=np.uint64)
     leaf = np.full(n, -1), np.empty(LEAF, dtype=np.int64), np.empty(LEAF, dtype=np.int64), bits
     waiting = [(0, n, False)]
@@ -62,17 +63,25 @@ def dissect(indptr: Indices, indices: Indices) -> Indices:
         reached = breadth_first(indptr, indices, segment[0], owner, name, one, queue)
         reached = breadth_first(indptr, indices, queue[reached - 1], owner, name, one, queue)
         breadth_first(indptr, indices, queue[reached - 1], owner, name, two, queue)
-        low, high = tell_apart(indptr, indices, segment, owner, name, one, two, key)
-        scratch = np.zeros((3, high - low + 2), dtype=np.int64)
-        level, above, full = cheapest_cut(indptr, indices, segment, owner, name, key, low, *scratch)
-        n_first, n_cut = take_sides(indptr, indices, segment, owner, name, key, level, above, side)
+        key[segment] = FINE * (one[segment] - two[segment])
+        smooth_keys(indptr, indices, segment, owner, name, key, one)
+        low, high = key[segment].min(), key[segment].max()
+        counts = np.zeros((3, high - low + 2), dtype=np.int64)
+        n_joined = count_cuts(indptr, indices, segment, owner, name, key, low, *counts)
+        cut_at, above = _cheapest_cut(counts.cumsum(axis=1))
+        # Half of all pairs are joined: no order saves much then, and one point a cut takes long.
+        full = 2 * n_joined >= size * size
+        side = np.empty(size, dtype=np.int8)
+        level = low + cut_at
+        take_sides(indptr, indices, segment, owner, name, key, level, above, side)
+        n_first, _, n_cut = np.bincount(side, minlength=3)
         parted = n_first > 0 and n_first + n_cut < size
         if n_cut in (0, size) or (
             full and not parted
         ):  # a clique or nearly, or nothing left to cut
             owner[segment] = -1
             continue
-        nodes[start:stop] = segment[np.argsort(side[segment], kind="stable")]
+        nodes[start:stop] = segment[np.argsort(side, kind="stable")]
         place[segment] = np.arange(start, stop)
         middle, cut = start + n_first, stop - n_cut
         owner[nodes[cut:stop]] = -1
@@ -80,3 +89,16 @@ def dissect(indptr: Indices, indices: Indices) -> Indices:
             (first, last, False) for first, last in ((start, middle), (middle, cut)) if first < last
         ]
     return nodes
+
+
+def _cheapest_cut(counts: Int[np.ndarray, "3 v"]) -> tuple[int, bool]:
+    """Return where to cut, and whether the cut is taken from above (key < value | key ≥ value).
+
+    For each value, `counts` has the points below it, and those on the cut from above and from below. The cut with the
+    fewest points for its smaller side is the cheapest.
+    """
+    smaller = np.minimum(counts[0], counts[0, -1] - counts[0])
+    costs = np.full((len(smaller), 2), np.inf)
+    np.divide(counts[1:].T + 1, smaller[:, None], out=costs, where=smaller[:, None] > 0)
+    value, from_below = divmod(int(costs.argmin()), 2)
+    return value, not from_below

@@ -12,7 +12,6 @@ from eigenshape._compile import njit
 
 LEAF = 160  # points that minimum degree orders
 WORD = 64  # bits of a number in which neighbors are marked
-FINE = 64  # steps to an edge in which distances are told: smoothing needs some between whole edges
 SMOOTHINGS = 4  # passes over the differences of distances; a ragged cut is a long one
 
 
@@ -61,13 +60,8 @@ def breadth_first(indptr, indices, root, owner, name, distance, queue):
 
 @njit
 @no_type_check
-def tell_apart(indptr, indices, segment, owner, name, one, two, key):
-    """Fill `key` with the difference of two distances, smoothed: a ragged cut is a long one. The first is used up.
-
-    Returns the least and the largest difference.
-    """
-    for i in range(len(segment)):
-        key[segment[i]] = FINE * (one[segment[i]] - two[segment[i]])
+def smooth_keys(indptr, indices, segment, owner, name, key, smoothed):
+    """Smooth the keys within a segment: a ragged cut is a long one. `smoothed` is scratch."""
     for _ in range(SMOOTHINGS):
         for i in range(len(segment)):
             node = segment[i]
@@ -76,30 +70,22 @@ def tell_apart(indptr, indices, segment, owner, name, one, two, key):
                 if owner[indices[at]] == name:
                     total += key[indices[at]]
                     degree += 1
-            one[node] = (key[node] + total // degree) // 2
+            smoothed[node] = (key[node] + total // degree) // 2
         for i in range(len(segment)):
-            key[segment[i]] = one[segment[i]]
-    low = high = key[segment[0]]
-    for i in range(len(segment)):
-        low = min(low, key[segment[i]])
-        high = max(high, key[segment[i]])
-    return low, high
+            key[segment[i]] = smoothed[segment[i]]
 
 
 @njit
 @no_type_check
-def cheapest_cut(indptr, indices, segment, owner, name, key, low, below, from_above, from_below):
-    """Return the value to cut at, whether the cut is taken from above it (key < value | key ≥ value), and a warning.
+def count_cuts(indptr, indices, segment, owner, name, key, low, below, from_above, from_below):
+    """Return how many ends of edges lie within a segment, and count what cuts at each key would hold.
 
-    `low` is the least key. The arrays are scratch, filled with 0, a place for each value from there to one above the
+    `low` is the least key. The other arrays, filled with 0, have a place for each value from there to one above the
     largest: how many keys are less by 1, and how many points the cut has more than that before it if it is taken from
     above or from below.
-
-    The warning says that half of all pairs are joined: no order saves much then, and one point a cut takes long.
     """
-    size = len(segment)
     joined = 0
-    for i in range(size):
+    for i in range(len(segment)):
         node = segment[i]
         least = most = key[node]
         for at in range(indptr[node], indptr[node + 1]):
@@ -114,40 +100,21 @@ def cheapest_cut(indptr, indices, segment, owner, name, key, low, below, from_ab
         from_above[key[node] - low + 1] -= 1
         from_below[key[node] - low + 1] += 1
         from_below[most - low + 1] -= 1
-    best, level, above = np.inf, low + 1, True
-    first = cut_above = cut_below = 0
-    for place in range(len(below)):
-        first += below[place]
-        cut_above += from_above[place]
-        cut_below += from_below[place]
-        smaller = min(first, size - first)
-        if smaller > 0:
-            if (cut_above + 1) / smaller < best:
-                best, level, above = (cut_above + 1) / smaller, low + place, True
-            if (cut_below + 1) / smaller < best:
-                best, level, above = (cut_below + 1) / smaller, low + place, False
-    return level, above, 2 * joined >= size * size
+    return joined
 
 
 @njit
 @no_type_check
 def take_sides(indptr, indices, segment, owner, name, key, level, above, side):
-    """Fill `side` with 0 below the level, 1 above, 2 on the cut; return how many are 0, and how many 2."""
-    n_first = n_cut = 0
+    """Fill `side` with 0 below the level, 1 above, 2 on the cut, point by point of the segment."""
     for i in range(len(segment)):
         node = segment[i]
-        side[node] = 0 if key[node] < level else 1
-        if (side[node] == 1) == above:
+        side[i] = key[node] >= level
+        if (side[i] == 1) == above:
             for at in range(indptr[node], indptr[node + 1]):
                 other = indices[at]
                 if owner[other] == name and (key[other] < level) == above:
-                    side[node] = 2
-                    break
-        if side[node] == 2:
-            n_cut += 1
-        elif side[node] == 0:
-            n_first += 1
-    return n_first, n_cut
+                    side[i] = 2
 
 
 @njit

@@ -38,9 +38,11 @@ class Elimination:
         Where the entries of each front begin among those of L.
     room : (int, int)
         Numbers that wait on the stack at most, and the rows of the largest front.
+    lengths : (s,) int
+        The most roundings that a product may see in each front and below.
     lower_ptr, lower_rows, source : int
         The lower triangle by columns, in the order of elimination, and the place of each entry in the data of the
-        matrix that was analysed.
+        matrix that was analyzed.
     """
 
     order: Indices
@@ -50,6 +52,7 @@ class Elimination:
     above: Indices
     places: Indices
     room: tuple[int, int]
+    lengths: Indices
     lower_ptr: Indices
     lower_rows: Indices
     source: Indices
@@ -99,33 +102,31 @@ class SymmetricFactor:
         """Solve A x = right for eight right-hand sides, arrays in C order, at once; `out` may be `right` itself."""
         e = self.elimination
         tree = e.order, e.first, e.begins, e.rows, e.places
-        fronts.solve_fronts(*tree, self.panels, self.pivots, right, out, scratch)
+        lanes, gathered, near = scratch
+        fronts.solve_lower(*tree, self.panels, right, lanes, gathered)
+        fronts.solve_upper(*tree, self.panels, self.pivots, lanes, out, gathered, near)
 
     def rounding(self) -> Float[np.ndarray, " n"]:
         """Bound what rounding has put between A and L D Lᵀ, row by row.
 
         Their difference E has |E_ij| ≤ m eps (|L||D||L|ᵀ)_ij where each of the products that make up an entry is
         rounded m times or fewer: once for every other term in whatever order they are added, or, since sums are made in
-        parts, as `sum_lengths` tells (Higham 2002, sections 4.2 and 10.1; four more for forming A and for what is
+        parts, as `measure_fronts` tells (Higham 2002, sections 4.2 and 10.1; four more for forming A and for what is
         formed here). A symmetric matrix lies, as a quadratic form, between plus and minus the diagonal one of the row
         sums of its sizes: |xᵀEx| ≤ Σ r_i x_i², and r is returned.
         """
         e = self.elimination
-        n, n_fronts = len(e.order), len(e.above)
-        weights, sizes, terms = np.empty(n), np.zeros(n), np.zeros(n, dtype=np.int64)
-        fronts.column_sizes(e.first, e.begins, e.places, self.panels, weights)
-        weights *= np.abs(self.pivots)
-        fronts.row_sizes(e.first, e.begins, e.rows, e.places, self.panels, weights, sizes, terms)
-        lengths = np.full(n_fronts, LONG)
-        fronts.sum_lengths(e.first, e.begins, e.above, np.zeros(n_fronts, dtype=np.int64), lengths)
+        n = len(e.order)
+        weights, sizes, terms = np.zeros(n), np.zeros(n), np.zeros(n, dtype=np.int64)
+        tree = e.first, e.begins, e.rows, e.places
+        fronts.add_sizes(*tree, self.panels, self.pivots, weights, sizes, terms)
+        lengths = np.repeat(e.lengths, np.diff(e.first))
         bounds = np.empty_like(sizes)
-        bounds[e.order] = (
-            EPS * (np.minimum(terms, np.repeat(lengths, np.diff(e.first))) + 4) * sizes
-        )
+        bounds[e.order] = EPS * (np.minimum(terms, lengths) + 4) * sizes
         return bounds
 
 
-def analyse(pattern: sp.csc_array) -> Elimination:
+def analyze_pattern(pattern: sp.csc_array) -> Elimination:
     """Order the elimination of a symmetric matrix, given by all its entries, and find the fronts of its factor."""
     n = pattern.shape[0]
     indptr, indices = pattern.indptr.astype(np.int64), pattern.indices.astype(np.int64)
@@ -140,16 +141,19 @@ def analyse(pattern: sp.csc_array) -> Elimination:
     first, heights = _supernodes(indptr, indices, order, place, parent)
     size = len(heights)
     begins = np.concatenate([[0], np.cumsum(heights)])
-    rows, above = np.empty(begins[-1], dtype=np.int64), _unknown(size)
-    scratch = np.empty(n, dtype=np.int64), _unknown(size), _unknown(size), _unknown(n)
-    symbolic.find_front_rows(
-        indptr, indices, order, place, parent, first, begins, rows, above, *scratch
-    )
+    front = np.arange(size)
+    above = np.repeat(front, np.diff(first))[parent[first[1:] - 1]]
+    above[parent[first[1:] - 1] < 0] = -1
+    rows = np.empty(begins[-1], dtype=np.int64)
+    scratch = _unknown(size), _unknown(size), _unknown(n)
+    symbolic.find_front_rows(indptr, indices, order, place, first, begins, above, rows, *scratch)
+    rows = np.sort(np.repeat(front * n, heights) + rows) % n  # ascending in each front
     lower_ptr, lower_rows, source = _lower(indptr, indices, place)
     places = _panel_places(np.diff(first), heights)
-    room = fronts.stack_size(first, begins, above, np.zeros(size, dtype=np.int64))
+    counters, lengths = np.zeros((2, size), dtype=np.int64), np.full(size, LONG)
+    room = fronts.measure_fronts(first, begins, above, *counters, lengths)
     return Elimination(
-        order, first, begins, rows, above, places, room, lower_ptr, lower_rows, source
+        order, first, begins, rows, above, places, room, lengths, lower_ptr, lower_rows, source
     )
 
 
@@ -178,10 +182,13 @@ def _supernodes(
     n = len(order)
     counts = np.ones(n, dtype=np.int64)
     symbolic.count_entries(indptr, indices, order, place, parent, _unknown(n), counts)
-    first, heights = np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int64)
-    scratch = np.empty(n, dtype=np.int64), np.zeros(n), np.ones(n, dtype=np.bool_)
-    size = symbolic.find_supernodes(parent, counts, first, heights, *scratch)
-    return first[: size + 1].copy(), heights[:size]
+    # Runs of columns with the same entries below their own: each is the parent of the one before.
+    continues = (parent[:-1] == np.arange(1, n)) & (counts[:-1] == counts[1:] + 1)
+    first = np.concatenate([[0], np.flatnonzero(~continues) + 1])
+    heights, widths = counts[first], np.diff(first, append=n)
+    keep = np.ones(len(first), dtype=np.bool_)
+    symbolic.join_runs(parent, first, heights, widths, np.zeros(len(first)), keep)
+    return np.append(first[keep], n), heights[keep]
 
 
 def _panel_places(widths: Indices, heights: Indices) -> Indices:
@@ -204,7 +211,7 @@ def _lower(indptr: Indices, indices: Indices, place: Indices) -> tuple[Indices, 
     return pointers, rows[kept], kept
 
 
-def factorise(
+def factorize_symmetric(
     elimination: Elimination, data: Float[np.ndarray, " e"], spent: SymmetricFactor | None = None
 ) -> SymmetricFactor | None:
     """Factor the matrix with these entries, in the room of a spent factor; None where a pivot is zero or not finite."""

@@ -16,43 +16,31 @@ NEAR = 32  # rows of a panel that stay in the nearest cache
 
 @njit
 @no_type_check
-def stack_size(first, begins, above, waiting):
+def measure_fronts(first, begins, above, waiting, children, lengths):
     """Return the most numbers that updates waiting for their parents take, and the rows of the largest front.
 
-    `waiting` is scratch, filled with 0.
+    `lengths`, filled with LONG, is raised to how many roundings a product may see in each front, on its way from below:
+    a front adds what each child left; then halves of its columns update others, LONG terms at a time. `waiting` and
+    `children` are scratch, filled with 0.
     """
     now = most = tallest = 0
     for s in range(len(above)):
-        rows = begins[s + 1] - begins[s]
-        tallest = max(tallest, rows)
-        now -= waiting[s]
-        rest = rows - (first[s + 1] - first[s])
-        now += rest * rest
-        most = max(most, now)
-        if above[s] >= 0:
-            waiting[above[s]] += rest * rest
-    return most, tallest
-
-
-@njit
-@no_type_check
-def sum_lengths(first, begins, above, children, lengths):
-    """Raise `lengths`, filled with LONG, to how many roundings a product may see in each front, on its way from below.
-
-    A front adds what each child left; then halves of its columns update others, LONG terms at a time. `children` is
-    scratch, filled with 0.
-    """
-    for s in range(len(lengths)):
         height, width = begins[s + 1] - begins[s], first[s + 1] - first[s]
+        rest = height - width
+        now += rest * rest - waiting[s]
+        most, tallest = max(most, now), max(tallest, height)
         own = width
         if height > SMALL:
             own, span = width // LONG + 2, NARROW
             while span < width:
                 own, span = own + 1, 2 * span
         lengths[s] += own + children[s]
-        if above[s] >= 0:
-            children[above[s]] += 1
-            lengths[above[s]] = max(lengths[above[s]], lengths[s])
+        parent = above[s]
+        if parent >= 0:
+            waiting[parent] += rest * rest
+            children[parent] += 1
+            lengths[parent] = max(lengths[parent], lengths[s])
+    return most, tallest
 
 
 @njit
@@ -133,128 +121,103 @@ def factor_fronts(
 
 @njit
 @no_type_check
-def solve_fronts(order, first, begins, rows, places, panels, pivots, right, solution, room):
-    """Solve for LANES right-hand sides (n, LANES); the solution may take the place of the right-hand sides."""
-    n, size = len(pivots), len(first) - 1
-    lanes, gathered, near = room
-    for i in range(n):
+def solve_lower(order, first, begins, rows, places, panels, right, lanes, gathered):
+    """Fill `lanes` with L⁻¹ times LANES right-hand sides (n, LANES), in the order of elimination."""
+    for i in range(len(order)):
         for lane in range(LANES):
             lanes[i, lane] = right[order[i], lane]
-    for s in range(size):
-        at, start, height = places[s], begins[s], begins[s + 1] - begins[s]
-        width = first[s + 1] - first[s]
-        for block in range(0, width, WIDE):
-            columns = min(WIDE, width - block)
-            _forward(panels, at, columns, rows[start + block : start + height], lanes, gathered)
-            at += (height - block) * columns
-    for i in range(n):
+    for s in range(len(first) - 1):
+        at = places[s]
+        for mine in range(first[s], first[s + 1], WIDE):
+            # A panel: a triangle in the rows of its own columns, and the rest of its rows.
+            columns = min(WIDE, first[s + 1] - mine)
+            below = begins[s] + mine - first[s] + columns
+            rest = begins[s + 1] - below
+            for i in range(1, columns):
+                subtract_sum(panels, at + i * columns, 1, 0, lanes, mine, i, lanes, mine + i)
+            at += columns * columns
+            for i in range(rest):
+                for lane in range(LANES):
+                    gathered[i, lane] = 0.0
+            four = rest // 4 * 4
+            for i in range(0, four, 4):
+                subtract_four_sums(
+                    panels, at + i * columns, 1, columns, lanes, mine, columns, gathered, i
+                )
+            for i in range(four, rest):
+                subtract_sum(panels, at + i * columns, 1, 0, lanes, mine, columns, gathered, i)
+            for i in range(rest):
+                row = rows[below + i]
+                for lane in range(LANES):
+                    lanes[row, lane] += gathered[i, lane]
+            at += rest * columns
+
+
+@njit
+@no_type_check
+def solve_upper(
+    order, first, begins, rows, places, panels, pivots, lanes, solution, gathered, near
+):
+    """Fill `solution` (n, LANES) with L⁻ᵀ D⁻¹ times what `solve_lower` left in `lanes`, as the matrix has its rows.
+
+    `gathered` and `near` are scratch.
+    """
+    for i in range(len(order)):
         for lane in range(LANES):
             lanes[i, lane] /= pivots[i]
-    for s in range(size - 1, -1, -1):
-        start, height = begins[s], begins[s + 1] - begins[s]
-        width = first[s + 1] - first[s]
-        at = places[s + 1]
+    for s in range(len(first) - 2, -1, -1):
+        height, width = begins[s + 1] - begins[s], first[s + 1] - first[s]
+        end = places[s + 1]
         for block in range((width - 1) // WIDE * WIDE, -1, -WIDE):
-            columns = min(WIDE, width - block)
-            at -= (height - block) * columns
-            _backward(
-                panels, at, columns, rows[start + block : start + height], lanes, gathered, near
-            )
-    for i in range(n):
+            columns, mine = min(WIDE, width - block), first[s] + block
+            rest = height - block - columns
+            below = end - rest * columns
+            at = below - columns * columns
+            for i in range(rest):
+                row = rows[begins[s + 1] - rest + i]
+                for lane in range(LANES):
+                    gathered[i, lane] = lanes[row, lane]
+            four = columns // 4 * 4
+            for low in range(0, rest, NEAR):
+                count, corner = min(NEAR, rest - low), below + low * columns
+                for i in range(count * columns):
+                    near[i] = panels[corner + i]
+                for j in range(0, four, 4):
+                    subtract_four_sums(near, j, columns, 1, gathered, low, count, lanes, mine + j)
+                for j in range(four, columns):
+                    subtract_sum(near, j, columns, 0, gathered, low, count, lanes, mine + j)
+            for j in range(columns - 2, -1, -1):
+                count, given = columns - 1 - j, mine + j + 1
+                place = at + (j + 1) * columns + j
+                subtract_sum(panels, place, columns, 0, lanes, given, count, lanes, mine + j)
+            end = at
+    for i in range(len(order)):
         for lane in range(LANES):
             solution[order[i], lane] = lanes[i, lane]
 
 
 @njit
 @no_type_check
-def _forward(panels, at, columns, rows, lanes, gathered):
-    mine, height = rows[0], len(rows)
-    for i in range(1, columns):
-        subtract_sum(panels, at + i * columns, 1, 0, lanes, mine, i, lanes, mine + i)
-    rest = height - columns
-    for i in range(rest):
-        for lane in range(LANES):
-            gathered[i, lane] = 0.0
-    four = rest // 4 * 4
-    for i in range(0, four, 4):
-        subtract_four_sums(
-            panels, at + (columns + i) * columns, 1, columns, lanes, mine, columns, gathered, i
-        )
-    for i in range(four, rest):
-        subtract_sum(panels, at + (columns + i) * columns, 1, 0, lanes, mine, columns, gathered, i)
-    for i in range(rest):
-        row = rows[columns + i]
-        for lane in range(LANES):
-            lanes[row, lane] += gathered[i, lane]
+def add_sizes(first, begins, rows, places, panels, pivots, weights, sizes, terms):
+    """Add |L||D||L|ᵀ 1 to `sizes`, and how many entries of L each row has to `terms`; `weights` is filled with 0.
 
-
-@njit
-@no_type_check
-def _backward(panels, at, columns, rows, lanes, gathered, near):
-    mine, height = rows[0], len(rows)
-    rest = height - columns
-    for i in range(rest):
-        row = rows[columns + i]
-        for lane in range(LANES):
-            gathered[i, lane] = lanes[row, lane]
-    below, four = at + columns * columns, columns // 4 * 4
-    for low in range(0, rest, NEAR):
-        count, corner = min(NEAR, rest - low), below + low * columns
-        for i in range(count * columns):
-            near[i] = panels[corner + i]
-        for j in range(0, four, 4):
-            subtract_four_sums(near, j, columns, 1, gathered, low, count, lanes, mine + j)
-        for j in range(four, columns):
-            subtract_sum(near, j, columns, 0, gathered, low, count, lanes, mine + j)
-    for j in range(columns - 2, -1, -1):
-        subtract_sum(
-            panels,
-            at + (j + 1) * columns + j,
-            columns,
-            0,
-            lanes,
-            mine + j + 1,
-            columns - 1 - j,
-            lanes,
-            mine + j,
-        )
-
-
-@njit
-@no_type_check
-def column_sizes(first, begins, places, panels, sizes):
-    """Fill the sums of the columns of |L|."""
+    All entries of some columns lie in one panel, so their sums |D||L|ᵀ 1 are known before its rows are weighed.
+    """
     for s in range(len(first) - 1):
-        at, height, width = places[s], begins[s + 1] - begins[s], first[s + 1] - first[s]
-        for block in range(0, width, WIDE):
-            columns = min(WIDE, width - block)
-            mine = first[s] + block
-            for j in range(columns):
-                sizes[mine + j] = 0.0
-            for _ in range(block, height):
+        at = places[s]
+        for mine in range(first[s], first[s + 1], WIDE):
+            columns = min(WIDE, first[s + 1] - mine)
+            top = begins[s] + mine - first[s]
+            height = begins[s + 1] - top
+            for i in range(height):
                 for j in range(columns):
-                    sizes[mine + j] += abs(panels[at + j])
-                at += columns
-
-
-@njit
-@no_type_check
-def row_sizes(first, begins, rows, places, panels, weights, sizes, terms):
-    """Add |L| weights to `sizes`, and how many entries of L each row has to `terms`."""
-    for s in range(len(first) - 1):
-        at, start, height, width = (
-            places[s],
-            begins[s],
-            begins[s + 1] - begins[s],
-            first[s + 1] - first[s],
-        )
-        for block in range(0, width, WIDE):
-            columns = min(WIDE, width - block)
-            mine = first[s] + block
-            for i in range(block, height):
+                    weights[mine + j] += abs(panels[at + i * columns + j])
+            for j in range(columns):
+                weights[mine + j] *= abs(pivots[mine + j])
+            for i in range(height):
                 total = 0.0
                 for j in range(columns):
-                    total += abs(panels[at + j]) * weights[mine + j]
-                sizes[rows[start + i]] += total
-                terms[rows[start + i]] += min(columns, i - block + 1)
-                at += columns
+                    total += abs(panels[at + i * columns + j]) * weights[mine + j]
+                sizes[rows[top + i]] += total
+                terms[rows[top + i]] += min(columns, i + 1)
+            at += height * columns

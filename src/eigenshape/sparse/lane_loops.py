@@ -51,8 +51,8 @@ def _summation(n_targets: int, *, added: bool) -> Any:
                 row = _load(builder, given, builder.mul(builder.add(start, loop.index), eight))
                 place = builder.add(at, builder.mul(loop.index, stride))
                 for total in sums:
-                    share = _repeated(builder, builder.load(builder.gep(shares, [place])))
-                    builder.store(_fused(builder, share, row, builder.load(total)), total)
+                    share = _repeat_scalar(builder, builder.load(builder.gep(shares, [place])))
+                    builder.store(_multiply_add(builder, share, row, builder.load(total)), total)
                     place = builder.add(place, apart)
             for q, total in enumerate(sums):
                 offset = builder.mul(builder.add(to, ir.Constant(to.type, q)), eight)
@@ -76,14 +76,14 @@ def _load(builder: Any, data: Any, offset: Any) -> Any:
     return builder.load(_pointer(builder, data, offset), align=8)
 
 
-def _repeated(builder: Any, scalar: Any) -> Any:
+def _repeat_scalar(builder: Any, scalar: Any) -> Any:
     zero = ir.Constant(ir.IntType(32), 0)
     one = builder.insert_element(ir.Constant(VECTOR, ir.Undefined), scalar, zero)
     mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), None)
     return builder.shuffle_vector(one, ir.Constant(VECTOR, ir.Undefined), mask)
 
 
-def _fused(builder: Any, a: Any, b: Any, c: Any) -> Any:
+def _multiply_add(builder: Any, a: Any, b: Any, c: Any) -> Any:
     return builder.fadd(builder.fmul(a, b, flags=["contract"]), c, flags=["contract"])
 
 

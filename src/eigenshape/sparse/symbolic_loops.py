@@ -1,13 +1,12 @@
 """Compiled loops of `elimination`: which entries a factor has, before any is computed.
 
-The caller allocates all arrays, also those that a loop needs only while it runs: compiling an allocation, or NumPy's
-sort, takes longer than compiling the loop that uses it.
+The caller allocates all arrays, also those that a loop needs only while it runs, and sorts: compiling an allocation, or
+NumPy's sort, takes longer than compiling the loop that uses it.
 """
 
 from typing import no_type_check
 
 from eigenshape._compile import njit
-from eigenshape.sparse.sort_loops import sort_part
 
 # A supernode joins the next one while few of the entries are zeros that the factor would not have. The numbers are
 # columns of both together, and the largest share of such zeros; they are the defaults of CHOLMOD (`nrelax`, `zrelax`).
@@ -87,23 +86,13 @@ def count_entries(indptr, indices, order, place, parent, mark, counts):
 
 @njit
 @no_type_check
-def find_supernodes(parent, counts, first, heights, widths, zeros, keep):
-    """Fill the first column of each run of columns with (nearly) the same entries, and n at the end; return how many.
+def join_runs(parent, first, heights, widths, zeros, keep):
+    """Join runs of columns with (nearly) the same entries, and say of each run whether it stays the first of its front.
 
-    `heights` is filled with the number of rows in the front of each run. `widths`, `zeros` and `keep` are scratch, the
-    last two filled with 0 and True.
+    A run begins at column `first`, and has so many rows (`heights`) and columns (`widths`), which grow where others
+    join it. `zeros` is scratch, filled with 0; `keep` comes filled with True.
     """
-    n = len(parent)
-    size = 0
-    for j in range(n):
-        if j == 0 or parent[j - 1] != j or counts[j - 1] != counts[j] + 1:
-            first[size] = j
-            size += 1
-    first[size] = n
-    for s in range(size):
-        widths[s] = first[s + 1] - first[s]
-        heights[s] = counts[first[s]]
-    for s in range(size - 2, -1, -1):  # s + 1 is by now the first of what it has joined
+    for s in range(len(first) - 2, -1, -1):  # s + 1 is by now the first of what it has joined
         up = parent[first[s + 1] - 1]
         if up < first[s + 1] or up >= first[s + 1] + widths[s + 1]:
             continue
@@ -122,56 +111,24 @@ def find_supernodes(parent, counts, first, heights, widths, zeros, keep):
             widths[s] = columns
             heights[s] = rows
             zeros[s] = lost
-    kept = 0
-    for s in range(size):
-        if keep[s]:
-            first[kept] = first[s]
-            heights[kept] = heights[s]
-            kept += 1
-    first[kept] = n
-    return kept
 
 
 @njit
 @no_type_check
 def find_front_rows(
-    indptr,
-    indices,
-    order,
-    place,
-    parent,
-    first,
-    begins,
-    rows,
-    above,
-    home,
-    first_child,
-    sibling,
-    mark,
+    indptr, indices, order, place, first, begins, above, rows, first_child, sibling, mark
 ):
-    """Fill for each supernode the rows of its front, ascending, from rows[begins[s]] on, and its parent supernode.
+    """Fill for each supernode the rows of its front, from rows[begins[s]] on: its own columns first.
 
-    The rows of a front are its own columns, what they are joined with, and what its children pass on. `above`,
-    `first_child`, `sibling` and `mark` come filled with -1; the last three and `home` are scratch.
+    The others are those that it is joined with, and what its children pass on, in any order. `first_child`, `sibling`
+    and `mark` come filled with -1 and are scratch.
     """
-    size = len(above)
-    for s in range(size):
-        for j in range(first[s], first[s + 1]):
-            home[j] = s
-    for s in range(size - 1, -1, -1):
-        up = parent[first[s + 1] - 1]
-        if up >= 0:
-            above[s] = home[up]
-            sibling[s] = first_child[above[s]]
-            first_child[above[s]] = s
-    for s in range(size):
-        low = first[s]
-        high = first[s + 1]
-        stop = begins[s]
-        for j in range(low, high):
+    for s in range(len(above)):
+        high, stop = first[s + 1], begins[s]
+        for j in range(first[s], high):
             rows[stop] = j
             stop += 1
-        for j in range(low, high):
+        for j in range(first[s], high):
             node = order[j]
             for at in range(indptr[node], indptr[node + 1]):
                 i = place[indices[at]]
@@ -188,4 +145,6 @@ def find_front_rows(
                     rows[stop] = i
                     stop += 1
             child = sibling[child]
-        sort_part(rows, begins[s] + high - low, stop)
+        if above[s] >= 0:
+            sibling[s] = first_child[above[s]]
+            first_child[above[s]] = s

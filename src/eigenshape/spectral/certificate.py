@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from eigenshape._text import html_repr, short_repr
+
 
 @dataclass(frozen=True)
 class Certificate:
@@ -75,6 +77,9 @@ class Certificate:
     first: int = 0
     floor: float = -np.inf
     estimate: float | None = None
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
     @property
     def complete(self) -> bool:

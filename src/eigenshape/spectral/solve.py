@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import frozen, positive_values, whole_number
+from eigenshape._arrays import freeze, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
@@ -247,4 +247,4 @@ def _on_all_points(
         return spectrum
     vectors = np.zeros((laplacian.n_points, spectrum.eigenvectors.shape[1]))
     vectors[free] = spectrum.eigenvectors
-    return replace(spectrum, eigenvectors=frozen(vectors), mass=laplacian.mass)
+    return replace(spectrum, eigenvectors=freeze(vectors), mass=laplacian.mass)

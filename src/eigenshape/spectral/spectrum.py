@@ -7,8 +7,9 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from eigenshape._arrays import frozen
+from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 from eigenshape.spectral.archive import read_archive, write_archive
 from eigenshape.spectral.certificate import Certificate
 
@@ -57,6 +58,9 @@ class Spectrum:
     residuals: Float[np.ndarray, " k"]
     certificate: Certificate
 
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
     def save(self, path: str | Path, *, key: str | None = None) -> None:
         """Write the spectrum to a .npz file; `load` reads it back bit for bit.
 
@@ -100,7 +104,7 @@ class Spectrum:
         """
         parts = read_archive(path, key)
         arrays = {
-            name: frozen(parts[name]) for name in ("eigenvalues", "eigenvectors", "residuals")
+            name: freeze(parts[name]) for name in ("eigenvalues", "eigenvectors", "residuals")
         }
         return cls(**arrays, mass=parts["mass"], certificate=parts["certificate"])
 

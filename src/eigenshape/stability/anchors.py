@@ -7,8 +7,9 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import frozen, positive_values, whole_number
+from eigenshape._arrays import freeze, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.geodesic import farthest_first, waves_on
 from eigenshape.geometry.simplex_distance import squared_distances
@@ -47,6 +48,9 @@ class AnchorNodes:
     points: Float[np.ndarray, "r d"]
     reached: float
     cover: float
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def anchor_nodes(mesh: MeshLike, delta: float, *, start: int = 0) -> AnchorNodes:
@@ -94,8 +98,8 @@ def anchor_nodes(mesh: MeshLike, delta: float, *, start: int = 0) -> AnchorNodes
         np.minimum(least, row, out=least)
     reached = float(least.max())
     return AnchorNodes(
-        vertices=frozen(np.array(chosen)),
-        points=frozen(mesh.points[chosen]),
+        vertices=freeze(np.array(chosen)),
+        points=freeze(mesh.points[chosen]),
         reached=reached,
         cover=reached + float(longest_edges(mesh).max()) / 3**0.5,
     )

@@ -9,6 +9,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_numbers
 from eigenshape._errors import ConvergenceError, InvalidParameterError
+from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.kernel import EDGE_FACTOR, LAST
@@ -43,6 +44,8 @@ class WeylBound:
 
     norm: float
     proven: float
+
+    _repr_html_ = html_repr
 
 
 @one_blas_thread()
@@ -167,6 +170,8 @@ class TimeRange:
     low: float
     high: float
     reach: float
+
+    _repr_html_ = html_repr
 
     @property
     def low_reason(self) -> str:

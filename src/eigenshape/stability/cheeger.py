@@ -7,8 +7,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import frozen, whole_number
+from eigenshape._arrays import freeze, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
@@ -56,6 +57,9 @@ class CheegerEstimate:
     lower: float
     mode: int
     part: Bool[np.ndarray, " n"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def cheeger_estimate(
@@ -112,7 +116,7 @@ def cheeger_estimate(
     )
     a = np.sqrt(max(-least_curvature, 0.0)) if least_curvature is not None else np.inf
     lower = (np.sqrt(a**2 + 10 * values[1]) - a) / 10 if np.isfinite(a) else 0.0
-    part = frozen(spectrum.eigenvectors[:, mode] > level)
+    part = freeze(spectrum.eigenvectors[:, mode] > level)
     return CheegerEstimate(upper, float(2 * np.sqrt(values[1])), float(lower), mode, part)
 
 

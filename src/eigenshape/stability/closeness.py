@@ -7,8 +7,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import finite_rows, frozen
+from eigenshape._arrays import finite_rows, freeze
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.enclosing_ball import enclosing_ball
@@ -57,6 +58,9 @@ class Closeness:
     size: float
     delta: float
     limited_by: Limit
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
     def explain(self) -> str:
         """Describe in plain words how close the shapes are, and what limits δ."""
@@ -222,10 +226,10 @@ def _closeness(
     largest = {name: _largest(part) for name, part in parts.items()}
     limit = max(largest, key=lambda name: largest[name])
     return Closeness(
-        displacement=frozen(displacement),
-        jacobians=frozen(jacobians),
-        radii=frozen(radii),
-        volume_ratios=frozen(volume_ratios),
+        displacement=freeze(displacement),
+        jacobians=freeze(jacobians),
+        radii=freeze(radii),
+        volume_ratios=freeze(volume_ratios),
         size=size,
         delta=largest[limit],
         limited_by=limit if largest[limit] else "nothing",

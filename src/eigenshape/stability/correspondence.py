@@ -8,8 +8,9 @@ from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import finite_rows, frozen, positive_values
+from eigenshape._arrays import finite_rows, freeze, positive_values
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.features.least_matching import least_perfect, near_pairs
 from eigenshape.features.matching_loops import match_rows
@@ -40,6 +41,9 @@ class MaximumMatching:
     partners: Int[np.ndarray, " n"]
     blocked: Int[np.ndarray, " b"]
 
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
     @property
     def n_matched(self) -> int:
         """Number of rows with a partner."""
@@ -69,6 +73,9 @@ class BottleneckMatching:
 
     partners: Int[np.ndarray, " n"]
     distance: float
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def matching_reach(mu: float) -> float:
@@ -201,7 +208,7 @@ def maximum_matching(graph: sp.sparray) -> MaximumMatching:
     n, n_columns = joined.shape
     partners, depth = match_rows(joined.indptr, joined.indices, n_columns, np.full(n, -1))
     blocked = np.flatnonzero(depth >= 0) if (partners < 0).any() else np.empty(0, dtype=np.int64)
-    return MaximumMatching(frozen(partners), frozen(blocked))
+    return MaximumMatching(freeze(partners), freeze(blocked))
 
 
 def bottleneck_matching(one: ArrayLike, two: ArrayLike) -> BottleneckMatching:
@@ -242,4 +249,4 @@ def bottleneck_matching(one: ArrayLike, two: ArrayLike) -> BottleneckMatching:
         )
     both, scale = size_one(np.stack([first, second]))
     distance, partners = least_perfect(both[0], both[1], 2.0)
-    return BottleneckMatching(frozen(partners), scale * distance)
+    return BottleneckMatching(freeze(partners), scale * distance)

@@ -6,8 +6,9 @@ import numpy as np
 from jaxtyping import Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import as_array, frozen
+from eigenshape._arrays import face_labels, freeze
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import facet_table
@@ -45,6 +46,9 @@ class Perturbation:
     two: Mesh
     regions_one: Labels
     regions_two: Labels
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
     @property
     def n_regions(self) -> int:
@@ -118,7 +122,7 @@ def measure_perturbation(
     labels_one = _check_labels(regions_one, one, "regions_one")
     labels_two = _check_labels(regions_two, two, "regions_two")
     _require_same_regions(labels_one, labels_two)
-    found = Perturbation(one, two, frozen(labels_one), frozen(labels_two))
+    found = Perturbation(one, two, freeze(labels_one), freeze(labels_two))
     _require_rims(found, vertex_pairs(found))
     return found
 
@@ -166,13 +170,7 @@ def _check_labels(regions: ArrayLike | None, mesh: Mesh, name: str) -> Labels:
     n = len(mesh.simplices)
     if regions is None:
         return np.full(n, OUTSIDE)
-    labels = as_array(regions, name)
-    if labels.shape != (n,) or labels.dtype.kind not in "iu":
-        raise InvalidParameterError(
-            f"{name} must hold one whole number per face, shape ({n},); "
-            f"it has shape {labels.shape} and type {labels.dtype}."
-        )
-    labels = labels.astype(np.int64)
+    labels = face_labels(regions, name, n).astype(np.int64)
     wrong = np.flatnonzero((labels < OUTSIDE) | (labels >= n))
     if wrong.size:
         raise InvalidParameterError(

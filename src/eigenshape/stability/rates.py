@@ -10,6 +10,7 @@ from jaxtyping import Float
 from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 
 THEOREMS = ("3.1.1", "3.1.3", "3.1.4", "3.1.5", "4.1.1", "4.3.1", "lipschitz", "dense")
@@ -43,6 +44,8 @@ class Rate:
     delta: float
     t: float
     constant: float = 1.0
+
+    _repr_html_ = html_repr
 
     def at(self, delta: ArrayLike, t: ArrayLike) -> Float[np.ndarray, "..."]:
         """Return the value of the law at each closeness and heat time."""

@@ -9,6 +9,7 @@ from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
+from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
@@ -21,6 +22,7 @@ from eigenshape.spectral.comparison.spectra import SpectrumComparison, compare_s
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.stability.bounds import TimeRange, admissible_times
 from eigenshape.stability.closeness import Closeness, map_closeness
+from eigenshape.stability.plan import USUAL_K, StabilityPlan
 from eigenshape.stability.sampled import (
     ChangeAtTime,
     changes_over_times,
@@ -33,43 +35,6 @@ from eigenshape.stability.sampled import (
 FEWEST_SAMPLES = 100
 # Most matched points: memory of the kernels and of the matching grows faster than their number.
 MOST_SAMPLES = 20_000
-# Eigenvalues to compare by default.
-USUAL_K = 20
-
-
-@dataclass(frozen=True)
-class StabilityPlan:
-    """Options of `compare_shapes`.
-
-    Parameters
-    ----------
-    k : int, optional
-        Number of eigenvalues to compare; by default 20, or fewer if the smaller shape has fewer.
-    n_samples : int
-        Number of random points of each shape, 100 to 20,000; of a cloud at most half of its points.
-    times : sequence of float, optional
-        Heat times in length²; by default four over the admissible range.
-    seed : int
-        Seed of the random points.
-    brackets : bool
-        Whether to compute guaranteed bounds of each eigenvalue of both meshes, which prove changes
-        for the shapes themselves.
-
-    See Also
-    --------
-    compare_shapes : Compare two shapes.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> plan = es.stability.StabilityPlan(k=8, n_samples=500)
-    """
-
-    k: int | None = None
-    n_samples: int = 2000
-    times: tuple[float, ...] = ()
-    seed: int = 0
-    brackets: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +83,9 @@ class StabilityReport:
     angles: EigenspaceAngles
     n_samples: int
     distances: tuple[Float[np.ndarray, " n1"], Float[np.ndarray, " n2"]]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
     def explain(self) -> str:
         """Describe the results in plain words, in one paragraph each."""

@@ -7,8 +7,9 @@ from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from eigenshape._arrays import frozen
+from eigenshape._arrays import freeze
 from eigenshape._progress import Progress
+from eigenshape._text import html_repr
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.quadrature import uniform_quadrature
 from eigenshape.geometry.surface_points import sample_surface
@@ -72,6 +73,8 @@ class ChangeAtTime:
     bound: float
     admissible: bool
 
+    _repr_html_ = html_repr
+
     @property
     def significant(self) -> bool:
         """Whether the change is more than twice the effect of sampling."""
@@ -123,7 +126,7 @@ def distances_between(
     """
     clouds = [_dense_points(shape, DENSER * n, rng) for shape in (one, two)]
     pairs = zip((one, two), clouds[::-1], strict=True)
-    first, second = (frozen(cKDTree(cloud).query(shape.points)[0]) for shape, cloud in pairs)
+    first, second = (freeze(cKDTree(cloud).query(shape.points)[0]) for shape, cloud in pairs)
     return first, second
 
 

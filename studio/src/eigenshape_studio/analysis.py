@@ -73,19 +73,10 @@ class Analysis:
     def view(self) -> dict[str, Any]:
         """How to look at the mesh: center and diagonal of its box, its upward axis and its front."""
         low, high = self.mesh.vertices.min(axis=0), self.mesh.vertices.max(axis=0)
-        right, down, towards = es.plot.three_quarter_view(self.mesh).rotation
-        # The camera stands upright: its row to the right is orthogonal to the upward axis.
-        level = np.abs(right) < LEVEL
-        up = np.eye(3)[np.argmax(np.where(level, -down, -np.inf))]
-        # It looks from the front, turned to the left about that axis.
-        along = towards - (towards @ up) * up
-        along /= np.linalg.norm(along)
-        front = np.cos(ASIDE) * along - np.sin(ASIDE) * np.cross(up, along)
         return {
             "center": ((low + high) / 2).tolist(),
             "extent": float(np.linalg.norm(high - low)),
-            "up": up.tolist(),
-            "front": front.tolist(),
+            **upright_view(self.mesh),
         }
 
     @cached_property
@@ -134,6 +125,19 @@ def _rig(mesh: es.TriangleMesh, solved: Job[es.Spectrum]) -> es.deformation.Eige
     if solved.result is None:
         raise es.EigenshapeError(solved.message or "The spectrum was cancelled.")
     return es.rig_shape(mesh, solved.result)
+
+
+def upright_view(mesh: es.TriangleMesh) -> dict[str, list[float]]:
+    """Return the upward axis of a shape, and its front, which is level."""
+    right, down, towards = es.plot.three_quarter_view(mesh).rotation
+    # The camera stands upright: its row to the right is orthogonal to the upward axis.
+    level = np.abs(right) < LEVEL
+    up = np.eye(3)[np.argmax(np.where(level, -down, -np.inf))] if level.any() else -down
+    # It looks from the front, turned to the left about that axis.
+    along = towards - (towards @ up) * up
+    along /= np.linalg.norm(along)
+    front = np.cos(ASIDE) * along - np.sin(ASIDE) * np.cross(up, along)
+    return {"up": up.tolist(), "front": front.tolist()}
 
 
 def assess_health(mesh: es.TriangleMesh) -> dict[str, Any]:

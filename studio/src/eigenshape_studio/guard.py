@@ -95,7 +95,8 @@ class Guard:
                 return
             self._check_token(scope)
             self._check_kind(scope)
-            await self.app(scope, self._capped(receive), answered)
+            body = await self._read_body(receive)
+            await self.app(scope, _replay(body, receive), answered)
         except RefusedError as error:
             await answered.refuse(error)
 
@@ -166,27 +167,38 @@ class Guard:
         if not length.isdecimal() or int(length[:20]) > self.rules.most_bytes:
             raise RefusedError(413, f"The body may have {self.rules.most_bytes:,} bytes.")
 
-    def _capped(self, receive: Receive) -> Receive:
-        """Return a `receive` that counts the bytes, and that does not wait for ever."""
+    async def _read_body(self, receive: Receive) -> bytes:
+        """Read the whole body, while counting its bytes and not waiting for ever."""
         end = monotonic() + self.rules.deadline
-        received, complete = 0, False
-
-        async def receive_capped() -> Message:
-            nonlocal received, complete
-            if complete:  # what comes now is only that the page has gone
-                return await receive()
+        parts, n_bytes = [], 0
+        while True:
             wait = min(self.rules.pause, end - monotonic())
             try:
                 message = await asyncio.wait_for(receive(), max(wait, 0.0))
             except TimeoutError as err:
                 raise RefusedError(408, "The body came too slowly.") from err
-            received += len(message.get("body", b""))
-            if received > self.rules.most_bytes:
+            if message["type"] != "http.request":
+                raise RefusedError(400, "The body must be complete.")
+            parts.append(message.get("body", b""))
+            n_bytes += len(parts[-1])
+            if n_bytes > self.rules.most_bytes:
                 raise RefusedError(413, f"The body may have {self.rules.most_bytes:,} bytes.")
-            complete = message["type"] != "http.request" or not message.get("more_body", False)
-            return message
+            if not message.get("more_body", False):
+                return b"".join(parts)
 
-        return receive_capped
+
+def _replay(body: bytes, receive: Receive) -> Receive:
+    """Return a `receive` that gives a body which has been read."""
+    given = False
+
+    async def receive_body() -> Message:
+        nonlocal given
+        if given:  # what comes now is only that the page has gone
+            return await receive()
+        given = True
+        return {"type": "http.request", "body": body, "more_body": False}
+
+    return receive_body
 
 
 class _Answer:

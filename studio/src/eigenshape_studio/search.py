@@ -10,6 +10,7 @@ from matplotlib.image import imsave
 
 import eigenshape as es
 from eigenshape.plot.render import draw
+from eigenshape_studio.analysis import upright_view
 
 THUMBNAIL = 144  # pixels
 N_KEPT = 256  # pictures that are kept in memory, about 10 kB each
@@ -53,31 +54,31 @@ class Shelf:
         matches, arrays = [], {}
         for number, match in enumerate(self.index.query(descriptor, n_matches=n_matches)):
             facts = {"name": match.name, "label": match.label, "score": match.score}
-            matches.append({**facts, "path": match.source})
+            picture, view = _picture(match.source)
+            matches.append({**facts, **view, "path": match.source})
             ours, theirs = match.correspondences.T
             pairs = np.column_stack([descriptor.vertices[ours], match.vertices[theirs]])
             arrays[f"pairs{number}"] = pairs.astype("<u4")
-            picture = _picture(match.source)
             if picture is not None:
                 arrays[f"thumbnail{number}"] = np.frombuffer(picture, np.uint8)
         return {"matches": matches}, arrays
 
 
-def _picture(source: str | None) -> bytes | None:
-    """Return the picture of a mesh file as PNG, or None if the file cannot be read."""
-    if source is None:
-        return None
+def _picture(source: str | None) -> tuple[bytes | None, dict[str, list[float]]]:
+    """Return the picture of a mesh file as PNG, and how it stands; nothing if it cannot be read."""
     try:
-        return _draw_file(source, Path(source).stat().st_mtime_ns)
-    except (es.EigenshapeError, OSError):
-        return None
+        if source is not None:
+            return _draw_file(source, Path(source).stat().st_mtime_ns)
+    except (es.EigenshapeError, OSError):  # the match is shown without a picture
+        pass
+    return None, {}
 
 
 @lru_cache(maxsize=N_KEPT)
-def _draw_file(source: str, _changed: int) -> bytes:
+def _draw_file(source: str, _changed: int) -> tuple[bytes, dict[str, list[float]]]:
     """Draw a mesh file; a file that changes is drawn again."""
     mesh = es.read_mesh(source)
     camera = es.plot.three_quarter_view(mesh, size=THUMBNAIL)
     file = BytesIO()
     imsave(file, draw(mesh, camera).image, format="png")
-    return file.getvalue()
+    return file.getvalue(), upright_view(mesh)

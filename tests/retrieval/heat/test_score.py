@@ -8,13 +8,8 @@ from hypothesis import strategies as st
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.retrieval.heat import score
-from eigenshape.retrieval.heat.descriptor import (
-    PRESETS,
-    SCALE_FREE,
-    THESIS,
-    HeatDescriptor,
-    HeatRecipe,
-)
+from eigenshape.retrieval.heat.descriptor import HeatDescriptor
+from eigenshape.retrieval.heat.recipe import PRESETS, SCALE_FREE, THESIS, HeatRecipe
 from eigenshape.retrieval.heat.score import match_features, matching_score, matching_scores
 
 
@@ -92,6 +87,8 @@ def test_recipes_must_agree():
         match="Shifts need logarithmic vectors at scales in geometric sequence",
     ):
         HeatRecipe(scales=(1.0, 2.0, 3.0))
+    with pytest.raises(InvalidParameterError, match="Shifts need logarithmic vectors"):
+        HeatRecipe(scales=(0.0, 1.0, 2.0))
     with pytest.raises(InvalidParameterError, match="Shifts need logarithmic vectors"):
         HeatRecipe(logarithmic=False)
 

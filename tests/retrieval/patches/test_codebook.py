@@ -40,7 +40,7 @@ def test_another_pose_is_the_nearest(creatures, book):
 def test_vectors_are_gradients_of_the_likelihood(creatures, book):
     shape = creatures["hand", 2]
     place, radius, step = 1, codes.BASES[1], 1e-5
-    points = codes._scaled(
+    points = codes._standardize(
         shape.numbers[:, radius].astype(float), book.means[place], book.spreads[place]
     )
     points = points @ book.axes[place]

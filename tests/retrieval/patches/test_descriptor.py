@@ -10,7 +10,7 @@ from eigenshape.retrieval.patches.codebook import encode_patches
 from eigenshape.retrieval.patches.descriptor import rounded_codes
 from eigenshape.retrieval.patches.patches import surface_patches
 from eigenshape.retrieval.store import batch
-from eigenshape.retrieval.store.index import describe_to_store
+from eigenshape.retrieval.store.writing import describe_to_store
 
 KINDS = ("quadruped", "hand", "octopus", "biped")
 

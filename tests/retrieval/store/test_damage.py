@@ -9,7 +9,7 @@ import pytest
 from describers import descriptor
 
 import eigenshape as es
-from eigenshape.retrieval.store.index import describe_to_store
+from eigenshape.retrieval.store.writing import describe_to_store
 
 HAND = es.make_creature("hand", 1, n_vertices=500)
 KINDS = ("hand", "octopus")

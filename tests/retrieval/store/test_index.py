@@ -20,7 +20,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eigenshape._errors import InvalidParameterError, StoreError
-from eigenshape.retrieval.heat.descriptor import HeatDescriptor, HeatRecipe
+from eigenshape.retrieval.heat.descriptor import HeatDescriptor
+from eigenshape.retrieval.heat.recipe import HeatRecipe
 from eigenshape.retrieval.heat.score import matching_score
 from eigenshape.retrieval.store import files as store
 from eigenshape.retrieval.store.index import ShapeIndex
@@ -215,14 +216,14 @@ def test_recipes_of_other_versions(index):
     fields = edit_recipe(index, lambda fields: fields.pop("n_modes"))
     assert "n_modes" not in fields
     assert index.query(descriptor(1))[0].score == 0
-    edit_recipe(index, lambda fields: fields.update(colour="red"))
+    edit_recipe(index, lambda fields: fields.update(color="red"))
     for ask in (
         index.records,
         lambda: index.query(descriptor(1)),
         lambda: index.add_descriptors("two", [descriptor(2)]),
     ):
         with pytest.raises(
-            StoreError, match=r"must be known to this version of eigenshape; .* argument 'colour'"
+            StoreError, match=r"must be known to this version of eigenshape; .* argument 'color'"
         ):
             ask()
 

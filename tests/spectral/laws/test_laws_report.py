@@ -79,7 +79,7 @@ def face_weighted(mesh: TriangleMesh, factors: np.ndarray) -> Laplacian:
     return replace(cotangent_laplacian(mesh), mass=sp.diags_array(masses).tocsr())
 
 
-def corners_from_centre(mesh: TriangleMesh) -> np.ndarray:
+def corners_from_center(mesh: TriangleMesh) -> np.ndarray:
     """Corners of the faces seen from the middle of their component."""
     count, labels = vertex_components(mesh)
     middles = np.array([mesh.vertices[labels == label].mean(axis=0) for label in range(count)])
@@ -284,14 +284,14 @@ def depends_on_the_axes(mesh):
 
 
 def depends_on_handedness(mesh):
-    corners = corners_from_centre(mesh)
+    corners = corners_from_center(mesh)
     sides = np.linalg.norm(np.roll(corners, -1, axis=1) - np.roll(corners, 1, axis=1), axis=2)
     by_size = np.take_along_axis(corners, sides.argsort(axis=1)[:, :, None], axis=1)
     return face_weighted(mesh, 1 + 1e-6 * np.sign(np.linalg.det(by_size)))
 
 
 def depends_on_orientation(mesh):
-    return face_weighted(mesh, 1 + 1e-6 * np.sign(np.linalg.det(corners_from_centre(mesh))))
+    return face_weighted(mesh, 1 + 1e-6 * np.sign(np.linalg.det(corners_from_center(mesh))))
 
 
 def depends_on_the_unit(mesh):
@@ -334,11 +334,11 @@ def test_an_operator_that_depends_on_what_it_should_not_breaks_that_law_alone(na
 
 
 def test_the_unit_is_found_also_where_only_eigenvalues_betray_it():
-    def metres(mesh):
+    def meters(mesh):
         laplacian = cotangent_laplacian(mesh)
         return replace(laplacian, mass=laplacian.mass / np.ptp(mesh.vertices))
 
-    report = check_operator(metres, SPHERE, promises=["scaling"])
+    report = check_operator(meters, SPHERE, promises=["scaling"])
     assert broken(report) == {"scaling"}
     assert "eigenvalues times length² by" in law(report, "scaling").explanation
 

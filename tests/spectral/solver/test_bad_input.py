@@ -289,7 +289,8 @@ def test_more_pairs_than_memory_are_refused_with_numbers(monkeypatch):
     monkeypatch.setattr("eigenshape._memory.machine_memory", lambda: 2.0**32)
     with pytest.raises(
         InvalidParameterError,
-        match=r"must fit into memory, 3\.6 GiB; 10050 pairs of 30000 points take about bases 7\.0 GiB",
+        match=r"must fit into 90 % of the memory, 3\.6 GiB; "
+        r"for 10050 pairs of 30000 points that is about 7\.0 GiB of bases",
     ):
         solve_spectrum(copies(TRIANGLE, 10_000), 10_050)
 

@@ -9,11 +9,11 @@ from jaxtyping import Bool, Complex, Float, Int
 from scipy.ndimage import label
 from scipy.spatial.transform import Rotation
 
-from eigenshape._arrays import frozen, whole_number
+from eigenshape._arrays import freeze, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import area_vectors, unit_scaled
+from eigenshape.geometry.measure import area_vectors, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.retrieval.baselines.light_field_loops import (
     least_difference,
@@ -144,7 +144,7 @@ def _in_unit_ball(mesh: TriangleMesh) -> Float[np.ndarray, "n 3"]:
 
     Unlike a bounding box, the ball does not depend on how the shape lies.
     """
-    points, _ = unit_scaled(mesh)
+    points, _ = scale_to_unit(mesh)
     corners = points[mesh.faces]
     areas = np.linalg.norm(area_vectors(corners), axis=1)
     if not areas.sum() > 0:
@@ -217,7 +217,7 @@ def _axes() -> Float[np.ndarray, "10 3"]:
     others = [
         np.roll([0, 1 / golden, sign * golden], turn) for turn in range(3) for sign in (1, -1)
     ]
-    return frozen(np.array([*cube, *others]) / np.sqrt(3))
+    return freeze(np.array([*cube, *others]) / np.sqrt(3))
 
 
 @lru_cache
@@ -229,7 +229,7 @@ def _pairings() -> Int[np.ndarray, "60 10"]:
     edges = np.argwhere(np.isclose(cosines, np.sqrt(5) / 3))
     frames = np.array([_frame(vertices[one], vertices[two]) for one, two in edges])
     images = np.einsum("eij,kj,ak->eai", frames, frames[0].T, _axes())
-    return frozen(np.abs(images @ _axes().T).argmax(axis=2))
+    return freeze(np.abs(images @ _axes().T).argmax(axis=2))
 
 
 def _frame(one: Float[np.ndarray, "3"], two: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
@@ -254,4 +254,4 @@ def _turns(count: int) -> Float[np.ndarray, "count 3 3"]:
         best = int(nearest.argmin())
         chosen.append(candidates[best])
         nearest = np.maximum(nearest, np.abs(axes @ axes[best].T).max(axis=(1, 2)))
-    return frozen(np.array(chosen))
+    return freeze(np.array(chosen))

@@ -7,8 +7,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import frozen, vertex_values
+from eigenshape._arrays import freeze, vertex_values
 from eigenshape._progress import Progress
+from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.region_tree import MergeTree
@@ -22,7 +23,8 @@ from eigenshape.geometry.topology import boundary_edges, vertex_components
 from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.retrieval.heat.descriptor import SCALE_FREE, HeatDescriptor, HeatRecipe
+from eigenshape.retrieval.heat.descriptor import HeatDescriptor
+from eigenshape.retrieval.heat.recipe import SCALE_FREE, HeatRecipe
 from eigenshape.scans.partial import MeshPart, partial_scan, viewpoint, views_of
 from eigenshape.spectral.signatures.approximate_heat import approximate_heat_signature
 from eigenshape.spectral.signatures.heat import heat_kernel_signature, reflection_free_signature
@@ -70,6 +72,9 @@ class HeatFeatures:
     parts: Segmentation
     descriptor: HeatDescriptor
     fragments: Int[np.ndarray, " c"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def heat_descriptor(
@@ -197,7 +202,7 @@ def find_heat_features(
     n_fragments = int(np.isin(tree.maxima, shape.fragments).sum())
     parts = segment(tree, n_regions=recipe.n_features + n_fragments)
     on_fragment = np.isin(parts.features.vertices, shape.fragments)
-    parts = _reordered(parts, np.argsort(on_fragment, kind="stable"))
+    parts = _reorder_parts(parts, np.argsort(on_fragment, kind="stable"))
 
     n_described = min(max(recipe.n_features, shape.n_components), int((~on_fragment).sum()))
     descriptor = _descriptor(heat.later, parts.features.vertices[:n_described], recipe, unit)
@@ -352,11 +357,11 @@ def _unit_and_times(area: float, recipe: HeatRecipe) -> tuple[float, Float[np.nd
     return unit, unit * recipe.time_unit * np.array([recipe.feature_scale, *recipe.scales])
 
 
-def _reordered(parts: Segmentation, order: Int[np.ndarray, " m"]) -> Segmentation:
+def _reorder_parts(parts: Segmentation, order: Int[np.ndarray, " m"]) -> Segmentation:
     features, number = parts.features, np.argsort(order)
     columns = (features.vertices, features.values, features.persistence)
     return Segmentation(
-        frozen(number[parts.labels]), FeaturePoints(*(frozen(column[order]) for column in columns))
+        freeze(number[parts.labels]), FeaturePoints(*(freeze(column[order]) for column in columns))
     )
 
 

@@ -6,7 +6,8 @@ from scipy.spatial.distance import cdist
 
 from eigenshape._arguments import require_type
 from eigenshape._errors import InvalidParameterError
-from eigenshape.retrieval.heat.descriptor import HeatDescriptor, HeatRecipe
+from eigenshape.retrieval.heat.descriptor import HeatDescriptor
+from eigenshape.retrieval.heat.recipe import HeatRecipe
 
 NUMBERS_AT_ONCE = 4_000_000  # distances held at a time: 32 MB
 # Added to a score for each step of relative size and each number compared. A part has less area
@@ -78,7 +79,7 @@ def matching_scores(
     shifts = np.zeros(len(starts), dtype=np.int64)
     n_rows = np.diff(np.append(starts, len(rows)))
     for shift in sorted(range(-recipe.n_shifts, recipe.n_shifts + 1), key=abs):
-        ours, theirs = shifted(query, rows, shift, recipe)
+        ours, theirs = shift_columns(query, rows, shift, recipe)
         stretch = query.shape[1] / ours.shape[1]  # so that sums over fewer columns compare
         price = SHIFT_PRICE * abs(shift) * query.shape[1] * (len(query) + n_rows) / 2
         scores = stretch * _sums_of_nearest(ours, theirs, starts) + price
@@ -87,7 +88,7 @@ def matching_scores(
     return best, shifts
 
 
-def shifted(
+def shift_columns(
     first: Float[np.ndarray, "m q"],
     second: Float[np.ndarray, "r q"],
     shift: int,
@@ -159,7 +160,7 @@ def match_features(first: HeatDescriptor, second: HeatDescriptor) -> Int[np.ndar
     require_type(second, HeatDescriptor, "second")
     _require_same_recipe(first, second)
     _, shifts = matching_scores(first.vectors, second.vectors, np.array([0]), first.recipe)
-    ours, theirs = shifted(first.vectors, second.vectors, int(shifts[0]), first.recipe)
+    ours, theirs = shift_columns(first.vectors, second.vectors, int(shifts[0]), first.recipe)
     distances = cdist(ours, theirs, "cityblock")
     forth, back = distances.argmin(axis=1), distances.argmin(axis=0)
     one = np.flatnonzero(back[forth] == np.arange(len(forth)))

@@ -14,8 +14,9 @@ from scipy.cluster.vq import kmeans2
 from scipy.special import logsumexp
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import frozen
+from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.patches import Patches
 
@@ -64,6 +65,8 @@ class PatchCodebook:
     shares: Float32[np.ndarray, "b w"]
     centers: Float32[np.ndarray, "b w d"]
     variances: Float32[np.ndarray, "b w d"]
+
+    _repr_html_ = html_repr
 
     @cached_property
     def digest(self) -> str:
@@ -135,7 +138,7 @@ def train_codebook(shapes: Sequence[Patches], *, seed: int = 0) -> PatchCodebook
             for base in BASES
         ]
     return PatchCodebook(
-        *(frozen(np.stack(parts).astype(np.float32)) for parts in zip(*books, strict=True))
+        *(freeze(np.stack(parts).astype(np.float32)) for parts in zip(*books, strict=True))
     )
 
 
@@ -215,7 +218,7 @@ def read_codebook(data: bytes) -> PatchCodebook:
     (3, 64)
     """
     with np.load(BytesIO(data)) as arrays:
-        return PatchCodebook(**{name: frozen(arrays[name]) for name in arrays.files})
+        return PatchCodebook(**{name: freeze(arrays[name]) for name in arrays.files})
 
 
 def _train_at_radius(rows: Float32[np.ndarray, "p c"], seed: int) -> tuple[np.ndarray, ...]:
@@ -223,14 +226,14 @@ def _train_at_radius(rows: Float32[np.ndarray, "p c"], seed: int) -> tuple[np.nd
     numbers = rows.astype(np.float64)
     mean = numbers.mean(axis=0)
     spread = np.maximum(numbers.std(axis=0), LEAST_SPREAD)
-    scaled = _scaled(numbers, mean, spread)
+    scaled = _standardize(numbers, mean, spread)
     values, vectors = sl.eigh(scaled.T @ scaled / len(scaled))
     lengths = np.sqrt(np.maximum(values[::-1][:N_AXES], LEAST_EIGENVALUE))
     axes = vectors[:, ::-1][:, :N_AXES] / lengths
     return mean, spread, axes, *_fit_mixture(scaled @ axes, seed)
 
 
-def _scaled(
+def _standardize(
     numbers: Float[np.ndarray, "p c"],
     mean: Float[np.ndarray, " c"],
     spread: Float[np.ndarray, " c"],
@@ -300,11 +303,11 @@ def encode_patches(shape: Patches, codebook: PatchCodebook) -> Float32[np.ndarra
     return np.asarray(rooted / np.linalg.norm(rooted, axis=2, keepdims=True), dtype=np.float32)
 
 
-def whitened(
+def whiten_numbers(
     shape: Patches, radius: int, codebook: PatchCodebook, place: int
 ) -> Float[np.ndarray, "m d"]:
     """Whiten the numbers at one radius as those of a base radius are."""
-    scaled = _scaled(
+    scaled = _standardize(
         shape.numbers[:, radius].astype(np.float64), codebook.means[place], codebook.spreads[place]
     )
     return scaled @ codebook.axes[place]
@@ -315,7 +318,7 @@ def _fisher(
 ) -> Float[np.ndarray, " v"]:
     shares, centers = codebook.shares[place], codebook.centers[place]
     variances = codebook.variances[place]
-    points = whitened(shape, radius, codebook, place)
+    points = whiten_numbers(shape, radius, codebook, place)
     joint = _log_joint(points, shares, centers, variances)
     belief = np.exp(joint - logsumexp(joint, axis=1, keepdims=True))
     weights = shape.weights[:, radius].astype(np.float64)

@@ -7,8 +7,9 @@ import numpy as np
 from jaxtyping import Float32, Int, Int8
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import frozen
+from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook, encode_patches
 from eigenshape.retrieval.patches.matching import PatchPoints, patch_points
@@ -41,6 +42,9 @@ class PatchRecipe:
 
     codebook: PatchCodebook = field(default_factory=default_codebook)
 
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
     @property
     def name(self) -> str:
         """Return a short name for messages and tables."""
@@ -68,6 +72,9 @@ class PatchDescriptor:
     codes: Int8[np.ndarray, "w b s v"]
     points: tuple[PatchPoints, ...]
     recipe: PatchRecipe
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
     @property
     def vertices(self) -> Int[np.ndarray, " m"]:
@@ -116,7 +123,7 @@ def patch_descriptor(patches: Sequence[Patches], recipe: PatchRecipe) -> PatchDe
     with one_blas_thread():
         codes = np.stack([rounded_codes(encode_patches(each, recipe.codebook)) for each in patches])
         points = tuple(patch_points(each, recipe.codebook) for each in patches)
-    return PatchDescriptor(frozen(codes), points, recipe)
+    return PatchDescriptor(freeze(codes), points, recipe)
 
 
 def rounded_codes(codes: Float32[np.ndarray, "*k v"]) -> Int8[np.ndarray, "*k v"]:

@@ -6,10 +6,11 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import frozen
+from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
-from eigenshape.retrieval.patches.codebook import BASES, N_SIZES, PatchCodebook, whitened
+from eigenshape.retrieval.patches.codebook import BASES, N_SIZES, PatchCodebook, whiten_numbers
 from eigenshape.retrieval.patches.matching_loops import leading, nearest_of_each_other
 from eigenshape.retrieval.patches.patches import RADII, Patches
 
@@ -54,6 +55,9 @@ class PatchPoints:
     distances: Float32[np.ndarray, "m m"]
     vertices: Int[np.ndarray, " m"]
 
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
 
 @dataclass(frozen=True, eq=False)
 class PatchMatch:
@@ -83,13 +87,16 @@ class PatchMatch:
     agreement: float
     step: int
 
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
 
 def patch_points(shape: Patches, codebook: PatchCodebook) -> PatchPoints:
     """Return what matching needs of patches: ten whitened numbers at each radius."""
     require_type(shape, Patches, "shape")
     require_type(codebook, PatchCodebook, "codebook")
     rows = [
-        whitened(shape, base + size, codebook, place)
+        whiten_numbers(shape, base + size, codebook, place)
         for place, base in enumerate(BASES)
         for size in range(N_SIZES)
     ]
@@ -98,9 +105,9 @@ def patch_points(shape: Patches, codebook: PatchCodebook) -> PatchPoints:
     weights = shape.weights.max(axis=1).astype(np.float16)  # as `pack_points` stores them
     distances = shape.distances.astype(np.float16)
     return PatchPoints(
-        frozen(NUMBER_STEP * clipped.astype(np.float32)),
-        frozen(weights.astype(np.float32)),
-        frozen(distances.astype(np.float32)),
+        freeze(NUMBER_STEP * clipped.astype(np.float32)),
+        freeze(weights.astype(np.float32)),
+        freeze(distances.astype(np.float32)),
         shape.vertices,
     )
 
@@ -150,9 +157,9 @@ def match_patches(first: PatchPoints, second: PatchPoints) -> PatchMatch:
     start = _best_start(first, second)
     costs = _squared_distances(first, second, start.step)
     costs = costs + STRAIN_WEIGHT * np.median(costs) * _strain(first, second, start)
-    points = _supported(_consistent(first, second, costs, start.step), LEAST_SUPPORT)
+    points = _select_supported(_consistent(first, second, costs, start.step), LEAST_SUPPORT)
     vertices = np.column_stack([first.vertices[points[:, 0]], second.vertices[points[:, 1]]])
-    return PatchMatch(frozen(points), frozen(vertices), start.agreement, start.step)
+    return PatchMatch(freeze(points), freeze(vertices), start.agreement, start.step)
 
 
 @one_blas_thread()
@@ -227,7 +234,7 @@ def _components(points: PatchPoints) -> Int[np.ndarray, " m"]:
     return np.isfinite(points.distances).argmax(axis=1)
 
 
-def _supported(matches: _Matches, share: float) -> Int[np.ndarray, "p 2"]:
+def _select_supported(matches: _Matches, share: float) -> Int[np.ndarray, "p 2"]:
     return matches.points[matches.support > share * matches.support.max(initial=0.0)]
 
 
@@ -235,7 +242,7 @@ def _strain(
     first: PatchPoints, second: PatchPoints, matches: _Matches
 ) -> Float32[np.ndarray, "m n"]:
     """Return the mean squared error of the distances of each pair to the surest matches, 0 to 1."""
-    anchors = _supported(matches, LEAST_ANCHOR_SUPPORT)[:N_ANCHORS]
+    anchors = _select_supported(matches, LEAST_ANCHOR_SUPPORT)[:N_ANCHORS]
     if not len(anchors):
         return np.zeros((len(first.numbers), len(second.numbers)), dtype=np.float32)
     ours = np.float32(SIZE_STEP**matches.step) * first.distances[:, None, anchors[:, 0]]

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from eigenshape._arrays import frozen
+from eigenshape._arrays import freeze
 from eigenshape.retrieval.patches.matching import NUMBER_STEP, PatchPoints
 
 # How numbers of points, vertices, and weights and distances are stored
@@ -45,7 +45,7 @@ def unpack_points(data: bytes) -> tuple[PatchPoints, ...]:
         distances[np.triu_indices(m, 1)] = take(HALF, m * (m - 1) // 2)
         found.append(
             PatchPoints(
-                frozen(numbers), frozen(weights), frozen(distances + distances.T), frozen(vertices)
+                freeze(numbers), freeze(weights), freeze(distances + distances.T), freeze(vertices)
             )
         )
     return tuple(found)

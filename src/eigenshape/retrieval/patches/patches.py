@@ -7,8 +7,9 @@ import numpy as np
 from jaxtyping import Float32, Int
 from scipy.sparse.csgraph import shortest_path
 
-from eigenshape._arrays import frozen, whole_number
+from eigenshape._arrays import freeze, whole_number
 from eigenshape._errors import InvalidShapeError
+from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.fragments import fragment_vertices
 from eigenshape.geometry.geodesic import farthest_points
@@ -55,6 +56,9 @@ class Patches:
     weights: Float32[np.ndarray, "m r"]
     vertices: Int[np.ndarray, " m"]
     distances: Float32[np.ndarray, "m m"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def extract_patches(
@@ -121,7 +125,7 @@ def extract_patches(
     found = [surface_patches(mesh, n_samples=count)]
     for part in views_of(mesh, n_viewpoints):
         patches = surface_patches(part.mesh, n_samples=count)
-        found.append(replace(patches, vertices=frozen(part.source_vertices[patches.vertices])))
+        found.append(replace(patches, vertices=freeze(part.source_vertices[patches.vertices])))
     return found
 
 
@@ -163,8 +167,8 @@ def surface_patches(mesh: TriangleMesh, *, n_samples: int = N_SAMPLES) -> Patche
     near = rows[:, chosen]
     distances = np.asarray(shortest_path(np.minimum(near, near.T), directed=False))
     return Patches(
-        frozen(numbers),
-        frozen(weights.astype(np.float32)),
-        frozen(source[chosen]),
-        frozen(distances.astype(np.float32)),
+        freeze(numbers),
+        freeze(weights.astype(np.float32)),
+        freeze(source[chosen]),
+        freeze(distances.astype(np.float32)),
     )

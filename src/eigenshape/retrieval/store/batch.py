@@ -11,12 +11,14 @@ from typing import SupportsIndex
 from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook, train_codebook
 from eigenshape.retrieval.patches.patches import Patches, extract_patches
-from eigenshape.retrieval.store.index import Record, ShapeIndex, describe_to_store
+from eigenshape.retrieval.store.index import Record, ShapeIndex
 from eigenshape.retrieval.store.workers import Item, Workers, run_in_workers
+from eigenshape.retrieval.store.writing import describe_to_store
 
 Read = Callable[[Path], MeshLike]
 Callback = Callable[[int, int, str, str | None], None]
@@ -45,6 +47,9 @@ class BatchReport:
     added: tuple[str, ...]
     skipped: tuple[str, ...]
     failed: tuple[tuple[str, str], ...]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 @dataclass(frozen=True)

@@ -4,22 +4,29 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import SupportsIndex
-from zlib import crc32
 
 import numpy as np
 from jaxtyping import Int
 
 from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import whole_number
-from eigenshape._errors import InvalidParameterError, StoreError
+from eigenshape._errors import StoreError
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.store import files as store
-from eigenshape.retrieval.store.catalog import Catalog, ShapeRow, keep_recipe
+from eigenshape.retrieval.store.catalog import ShapeRow, keep_recipe
 from eigenshape.retrieval.store.reading import StoredDescriptors, read_descriptors
+from eigenshape.retrieval.store.writing import (
+    add_shape,
+    describe_to_store,
+    require_columns,
+    require_text,
+    rows_of_each,
+    write_views,
+)
 
 
 @dataclass(frozen=True)
@@ -49,6 +56,9 @@ class Record:
     source: str | None
     digest: str | None
     recipes: tuple[AnyRecipe, ...]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +94,9 @@ class Match:
     vertices: Int[np.ndarray, " m"]
     view: int
 
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
 
 @dataclass(frozen=True)
 class ShapeIndex:
@@ -118,6 +131,8 @@ class ShapeIndex:
     """
 
     folder: Path
+
+    _repr_html_ = html_repr
 
     @classmethod
     def create(cls, folder: str | Path) -> "ShapeIndex":
@@ -293,7 +308,7 @@ class ShapeIndex:
         """
         mesh = as_mesh(mesh)
         require_type(recipe, AnyRecipe | None, "recipe")
-        _require_text(name, label, source)
+        require_text(name, label, source)
         if recipe is None:
             recipe = self.default_recipe()
         descriptors = describe_to_store(mesh, recipe, n_views)
@@ -341,39 +356,16 @@ class ShapeIndex:
         ShapeIndex.add, ShapeIndex.descriptors
         """
         require_each(descriptors, Descriptor, "descriptors")
-        _require_text(name, label, source, digest)
-        rows = _rows_of_each(name, descriptors)
+        require_text(name, label, source, digest)
+        rows = rows_of_each(name, descriptors)
         with store.writing(self.folder) as before:
             row = ShapeRow(0, name, label, source, digest)
-            catalog, shape = _with_shape(before, row, replace=replace)
+            catalog, shape = add_shape(before, row, replace=replace)
             for recipe in dict.fromkeys(descriptor.recipe for descriptor in descriptors):
                 views = [
                     pair for pair in zip(descriptors, rows, strict=True) if pair[0].recipe == recipe
                 ]
-                self._put(catalog, shape, keep_recipe(catalog, recipe), views)
-
-    def _put(
-        self,
-        catalog: Catalog,
-        shape: int,
-        recipe: int,
-        views: Sequence[tuple[Descriptor, np.ndarray]],
-    ) -> None:
-        """Write the views of a shape by one recipe, unless it has some already."""
-        others = [row for row in catalog.descriptors if row.recipe == recipe]
-        n_columns = others[0].n_columns if others else views[0][1].shape[1]
-        for descriptor, rows in views:
-            _require_columns(descriptor, rows, n_columns)
-        if any(row.shape == shape for row in others):
-            return
-        for view, (descriptor, rows) in enumerate(views):
-            details = kind_of(descriptor.recipe).details(descriptor)
-            offset = store.append_rows(self.folder, catalog.database, recipe, rows)
-            checksums = crc32(rows.tobytes()), crc32(details)
-            catalog.database.execute(
-                "INSERT INTO descriptor VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                (shape, recipe, view, offset, *rows.shape, *checksums, details),
-            )
+                write_views(self.folder, catalog, shape, keep_recipe(catalog, recipe), views)
 
     def remove(self, name: str) -> None:
         """Remove a shape.
@@ -432,11 +424,11 @@ class ShapeIndex:
             mesh, recipe = as_mesh(shape, "shape"), self.default_recipe()
             descriptor = kind_of(recipe).describe_query(mesh, recipe)
         kind = kind_of(descriptor.recipe)
-        (rows,) = _rows_of_each("the query", [descriptor])
+        (rows,) = rows_of_each("the query", [descriptor])
         query = kind.restore(rows, kind.details(descriptor), descriptor.recipe)
         with store.reading(self.folder) as catalog, one_blas_thread():
             stored = read_descriptors(self.folder, catalog, descriptor.recipe)
-            _require_columns(descriptor, rows, stored.entries[0].row.n_columns)
+            require_columns(descriptor, rows, stored.entries[0].row.n_columns)
             scores = kind.verify(query, stored.descriptor, kind.scores(query, stored.rows))
 
             # Of the views of each shape, keep the one with the lowest score. Entries are sorted by
@@ -481,61 +473,7 @@ class ShapeIndex:
         return found
 
 
-def describe_to_store(
-    mesh: TriangleMesh, recipe: AnyRecipe, n_views: SupportsIndex | None = None
-) -> list[Descriptor]:
-    """Describe a mesh as an index keeps it: the whole, and what viewpoints see if it is closed."""
-    kind = kind_of(recipe)
-    count = kind.n_views if n_views is None else whole_number(n_views, "n_views", 0)
-    descriptors: list[Descriptor] = kind.describe_to_store(mesh, recipe, count)
-    return descriptors
-
-
 def _match(query: Descriptor, stored: StoredDescriptors, place: int, score: float) -> Match:
     (shape, row), found = stored.entries[place], stored.descriptor(place)
     pairs = kind_of(stored.recipe).correspondences(query, found)
     return Match(shape.name, shape.label, shape.source, score, pairs, found.vertices, row.view)
-
-
-def _require_text(name: str, *others: str | None) -> None:
-    for text in (name, *others):
-        if text is not None and (
-            not isinstance(text, str) or text != text.encode(errors="replace").decode()
-        ):
-            raise InvalidParameterError(
-                "Names, labels, sources and digests in an index must be Unicode text; "
-                f"{text!r} is not."
-            )
-
-
-def _rows_of_each(name: str, descriptors: Sequence[Descriptor]) -> list[np.ndarray]:
-    """Return the rows of descriptors as they are stored; refuse numbers that cannot be."""
-    if not descriptors:
-        raise InvalidParameterError(
-            f"A shape must have a descriptor to be found; {name!r} has none."
-        )
-    return [kind_of(descriptor.recipe).rows(descriptor, name) for descriptor in descriptors]
-
-
-def _require_columns(descriptor: Descriptor, rows: np.ndarray, n_columns: int) -> None:
-    if rows.shape[1] != n_columns:
-        raise InvalidParameterError(
-            f"All features of one recipe must have as many numbers; those of recipe "
-            f"{descriptor.recipe.name!r} have {n_columns}, and these have {rows.shape[1]}."
-        )
-
-
-def _with_shape(catalog: Catalog, new: ShapeRow, *, replace: bool) -> tuple[Catalog, int]:
-    """Return a catalog that holds a shape, and the number of the shape."""
-    old = catalog.shape(new.name)
-    if old is not None and old.digest is not None and old.digest == new.digest:
-        return catalog, old.id
-    if old is not None and not replace:
-        raise StoreError(
-            f"A name stands for one shape; {new.name!r} is in the index with digest {old.digest}, "
-            f"not {new.digest}. Remove it first, or add it with replace=True."
-        )
-    if old is not None:
-        catalog = catalog.without(old)
-    row = catalog.database.execute("INSERT INTO shape VALUES (NULL, ?, ?, ?, ?)", new[1:])
-    return catalog, int(row.lastrowid or 0)

@@ -18,6 +18,7 @@ from threadpoolctl import threadpool_limits
 
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import EigenshapeError
+from eigenshape._text import html_repr
 
 T = TypeVar("T")
 NO_WORKERS = (
@@ -52,6 +53,8 @@ class Workers:
     count: int = 2
     timeout: float = 300.0
 
+    _repr_html_ = html_repr
+
     def __post_init__(self) -> None:
         whole_number(self.count, "count", 1)
         positive_values([self.timeout], "timeout")
@@ -83,6 +86,8 @@ class Item:
     name: str
     path: Path
     label: str | None = None
+
+    _repr_html_ = html_repr
 
 
 @dataclass(frozen=True)

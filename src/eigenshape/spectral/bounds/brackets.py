@@ -6,9 +6,10 @@ from typing import SupportsIndex
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import frozen, whole_number
+from eigenshape._arrays import freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import FacetTable, facet_components, facet_table, without_pinches
@@ -16,7 +17,7 @@ from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import in_length, size_one
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
-from eigenshape.operators.boundary import Condition
+from eigenshape.operators.choices import Condition
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import interpolation_constants, longest_edges
 from eigenshape.spectral.bounds.nonconforming import lower_bounds, partly
@@ -71,6 +72,9 @@ class Brackets:
     longest_edge: float
     constant: float
     rounding: float
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
     def explain(self) -> str:
         """Return a text that says what is bounded, and how tightly."""
@@ -180,8 +184,8 @@ def bracket_eigenvalues(
     if progress:
         progress(1.0, "bracketed")
     return Brackets(
-        lower=frozen(in_length(lower, scale, -2)),
-        upper=frozen(in_length(upper, scale, -2)),
+        lower=freeze(in_length(lower, scale, -2)),
+        upper=freeze(in_length(upper, scale, -2)),
         boundary=boundary,
         n_zero=n_zero,
         longest_edge=scale * float(longest_edges(unit).max()),

@@ -6,8 +6,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import frozen, whole_numbers
+from eigenshape._arrays import freeze, whole_numbers
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian
@@ -51,6 +52,9 @@ class EigenspaceAngles:
     angles: Float[np.ndarray, " g"]
     gaps: Float[np.ndarray, " g"]
     bounds: Float[np.ndarray, " g"] | None
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
     def explain(self) -> str:
         """Return a text that says how far the spaces rotate, and how many angles are bounded."""
@@ -153,11 +157,11 @@ def eigenspace_angles(
         for end in ("start", "stop")
     )
     return EigenspaceAngles(
-        starts=frozen(starts),
-        stops=frozen(stops),
-        angles=frozen(angles),
-        gaps=frozen(np.minimum(steps[starts], steps[stops])),
-        bounds=None if exact is None else frozen(bounds),
+        starts=freeze(starts),
+        stops=freeze(stops),
+        angles=freeze(angles),
+        gaps=freeze(np.minimum(steps[starts], steps[stops])),
+        bounds=None if exact is None else freeze(bounds),
     )
 
 

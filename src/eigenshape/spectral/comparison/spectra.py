@@ -6,8 +6,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import finite_values, frozen
+from eigenshape._arrays import finite_values, freeze
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.spectral.bounds.brackets import Brackets
 from eigenshape.spectral.signatures.heat import NULL
@@ -44,6 +45,9 @@ class SpectrumComparison:
     relative: Float[np.ndarray, " k"]
     zero: Bool[np.ndarray, " k"]
     bracketed: bool
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
     @property
     def proved_changes(self) -> Bool[np.ndarray, " k"]:
@@ -137,12 +141,12 @@ def compare_spectra(
             for each, name in zip(brackets, ("one", "two"), strict=True)
         ]
     return SpectrumComparison(
-        one=frozen(values[0]),
-        two=frozen(values[1]),
-        intervals_one=frozen(bars[0]),
-        intervals_two=frozen(bars[1]),
-        relative=frozen(relative_change(*values, zero=zeros)),
-        zero=frozen(zeros[0] & zeros[1]),
+        one=freeze(values[0]),
+        two=freeze(values[1]),
+        intervals_one=freeze(bars[0]),
+        intervals_two=freeze(bars[1]),
+        relative=freeze(relative_change(*values, zero=zeros)),
+        zero=freeze(zeros[0] & zeros[1]),
         bracketed=brackets is not None,
     )
 

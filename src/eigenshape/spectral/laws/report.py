@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias, get_args
 
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 
 Promise = Literal[
     "constants",  # W annihilates the constants of each component, and nothing else
@@ -45,13 +46,28 @@ class Law:
     allowed: float
     explanation: str
 
+    _repr_html_ = html_repr
+
 
 @dataclass(frozen=True)
 class SkippedLaw:
-    """A law that was not checked, and the reason."""
+    """A law that was not checked, and the reason.
+
+    Attributes
+    ----------
+    name : str
+    reason : str
+        One sentence.
+
+    See Also
+    --------
+    OperatorReport : Holds laws of both kinds.
+    """
 
     name: str
     reason: str
+
+    _repr_html_ = html_repr
 
 
 @dataclass(frozen=True)
@@ -67,6 +83,9 @@ class OperatorReport:
 
     laws: tuple[Law, ...]
     skipped: tuple[SkippedLaw, ...]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
     @property
     def passed(self) -> bool:

@@ -8,8 +8,9 @@ import scipy.linalg as sl
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import as_array, frozen, real_numbers, whole_number
+from eigenshape._arrays import as_array, freeze, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.spectral.signatures.heat import NULL
@@ -66,6 +67,9 @@ class FunctionalMap:
     source: Spectrum
     target: Spectrum
 
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
     def __post_init__(self) -> None:
         require_one_constant(self.source, "source")
         require_one_constant(self.target, "target")
@@ -82,7 +86,7 @@ class FunctionalMap:
             raise InvalidParameterError(
                 f"The matrix of a map must be finite; entry {bad[0].tolist()} is not."
             )
-        object.__setattr__(self, "matrix", frozen(self.matrix))
+        object.__setattr__(self, "matrix", freeze(self.matrix))
 
 
 def require_one_constant(spectrum: Spectrum, name: str) -> None:

@@ -8,7 +8,7 @@ import scipy.linalg as sl
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import as_array, frozen, whole_number
+from eigenshape._arrays import as_array, freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
@@ -61,7 +61,7 @@ def point_map(mapping: FunctionalMap) -> Int[np.ndarray, " n2"]:
     require_type(mapping, FunctionalMap, "mapping")
     k2, k1 = mapping.matrix.shape
     carried = unit_modes(mapping.source, k1) @ mapping.matrix.T
-    return frozen(_nearest(carried, unit_modes(mapping.target, k2)))
+    return freeze(_nearest(carried, unit_modes(mapping.target, k2)))
 
 
 def _nearest(
@@ -105,7 +105,18 @@ def map_from_points(
 
     See Also
     --------
-    es.spectral.point_map : The inverse conversion, with an example.
+    point_map : The inverse conversion.
+
+    Examples
+    --------
+    A sphere mapped to itself by the identity: C is the unit matrix.
+
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(es.icosphere(2)), 9)
+    >>> mapping = es.spectral.map_from_points(spectrum, spectrum, np.arange(162), n_modes=9)
+    >>> bool(np.allclose(mapping.matrix, np.eye(9), atol=1e-8))
+    True
     """
     require_type(source, Spectrum, "source")
     require_type(target, Spectrum, "target")
@@ -176,7 +187,20 @@ def refine_map(
 
     See Also
     --------
-    functional_map : Compute the map to start from, with an example.
+    functional_map : Compute the map to start from.
+
+    Examples
+    --------
+    From four modes and nine pairs of points to sixteen modes, with which every vertex is found:
+
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(es.icosphere(2)), 16)
+    >>> pairs = [[vertex, vertex] for vertex in range(0, 162, 20)]
+    >>> start = es.functional_map(spectrum, spectrum, pairs, n_modes=4)
+    >>> refined = es.spectral.refine_map(start, 16, step=4)
+    >>> bool((es.spectral.point_map(refined) == np.arange(162)).all())
+    True
     """
     require_type(start, FunctionalMap, "start")
     ends, first = (start.source, start.target), start.matrix.shape

@@ -42,12 +42,12 @@ def grow_aggregates(starts, columns, values, size):
             height += 1
         counts[n_aggregates] = height
         n_aggregates += 1
-    return _joined(starts, columns, values, labels, counts[:n_aggregates], FRAGMENT * size)
+    return _join_fragments(starts, columns, values, labels, counts[:n_aggregates], FRAGMENT * size)
 
 
 @njit
 @no_type_check
-def _joined(starts, columns, values, labels, counts, least):
+def _join_fragments(starts, columns, values, labels, counts, least):
     """Give each point of a fragment to the aggregate it is coupled with most, and number what is left."""
     for i in range(len(labels)):
         if counts[labels[i]] >= least:
@@ -86,7 +86,10 @@ def smooth_columns(matrix, factors, sparse, n_columns):
         if height + n_columns > len(new_values):
             room = _row_bound(starts, columns, old_starts, i)
             if height + room > len(new_values):
-                new_columns, new_values = _doubled(new_columns, room), _doubled(new_values, room)
+                new_columns, new_values = (
+                    _double_array(new_columns, room),
+                    _double_array(new_values, room),
+                )
         for entry in range(starts[i] - 1, starts[i + 1]):
             itself = entry < starts[i]
             j = i if itself else columns[entry]
@@ -113,7 +116,7 @@ def _row_bound(starts, columns, old_starts, i):
 
 @njit
 @no_type_check
-def _doubled(array, more):
+def _double_array(array, more):
     longer = np.empty(2 * len(array) + more, dtype=array.dtype)
     longer[: len(array)] = array
     return longer

@@ -83,7 +83,7 @@ def climb(
         return None
     bases = pencil.n * (2 * np.dtype(dtype).itemsize * m + 20 * WIDTH)
     parts = {"bases": bases + kept, "levels of their operator": 100 * pencil.stiffness.nnz}
-    require_memory(f"{k} pairs of {pencil.n} points", parts, "Ask for fewer pairs")
+    require_memory("A spectrum", f"{k} pairs of {pencil.n} points", parts, "Request fewer pairs.")
     report(0.01, "making coarser levels")
     order = reverse_cuthill_mckee(sp.csr_matrix(pencil.stiffness), symmetric_mode=True)
     coarsened = _coarsen(_reorder(pencil.stiffness, order), _reorder(pencil.mass, order), k, m)

@@ -49,14 +49,14 @@ def correct(
     multiply(level.rough_restrict, residual, restricted)
     below = correct(Tower(tower.levels[1:], tower.coarsest), restricted, shifts, INNER_STEPS)
     start = multiply(level.rough_prolong, below, np.empty(residual.shape, dtype=residual.dtype))
-    return _smoothed(level, (residual, shifts), start, steps)
+    return _smooth(level, (residual, shifts), start, steps)
 
 
 def smooth(
     tower: Tower, residual: np.ndarray, shifts: Float[np.ndarray, " b"], steps: int
 ) -> np.ndarray:
     """Return what `correct` does where coarser levels have nothing to add."""
-    return _smoothed(tower.levels[0], (residual, shifts), np.zeros_like(residual), steps)
+    return _smooth(tower.levels[0], (residual, shifts), np.zeros_like(residual), steps)
 
 
 def multiply(
@@ -68,7 +68,7 @@ def multiply(
     return product
 
 
-def _smoothed(
+def _smooth(
     level: Loaded, terms: tuple[np.ndarray, np.ndarray], block: np.ndarray, steps: int
 ) -> np.ndarray:
     """Chebyshev iteration for the eigenvalues from top / spread to top (Saad 2003, algorithm 12.1)."""

@@ -7,8 +7,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import frozen, positive_values, whole_number
+from eigenshape._arrays import freeze, positive_values, whole_number
 from eigenshape._progress import Progress, silent
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian
@@ -69,6 +70,9 @@ class ApproximateSignature:
     errors: Float[np.ndarray, " q"]
     eigenvalues: Float[np.ndarray, " k"]
     complete: bool
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 def approximate_heat_signature(
@@ -148,7 +152,7 @@ def _certified_signature(
     found = solve_spectrum(laplacian, k, progress=report)
     values, errors = heat_kernel_signature(found, times), np.full(len(times), SINGLE_ROUNDING)
     return ApproximateSignature(
-        frozen(values), frozen(times), frozen(errors), found.eigenvalues, complete=True
+        freeze(values), freeze(times), freeze(errors), found.eigenvalues, complete=True
     )
 
 
@@ -171,10 +175,10 @@ def _approximate_signature(
     values[start.order] = np.ldexp(heat, 2 * pencil.vector_exponent)
     report(1.0, "estimated")
     return ApproximateSignature(
-        frozen(values),
-        frozen(times),
-        frozen(errors / sizes + SINGLE_ROUNDING),
-        frozen(lowest),
+        freeze(values),
+        freeze(times),
+        freeze(errors / sizes + SINGLE_ROUNDING),
+        freeze(lowest),
         complete=False,
     )
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape.sparse.elimination import SymmetricFactor
-from eigenshape.sparse.elimination import factorise as factorise_symmetric
+from eigenshape.sparse.elimination import SymmetricFactor, factorize_symmetric
 from eigenshape.spectral.solver.pencil import Pencil
 
 
@@ -50,7 +49,7 @@ def factorize(
     shifted = pencil.shifted
     data = shifted.stiffness - shift * shifted.mass
     data[shifted.diagonal] -= slack
-    lower = factorise_symmetric(shifted.elimination, data, spent.lower if spent else None)
+    lower = factorize_symmetric(shifted.elimination, data, spent.lower if spent else None)
     return Factor(shift, int(np.count_nonzero(lower.pivots < 0)), slack, lower) if lower else None
 
 

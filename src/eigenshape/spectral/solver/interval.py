@@ -88,7 +88,7 @@ def _complete(
         gaps = _clear_gaps(pairs.values, interval)
         if gaps is None:
             return None
-        inner, certificate = _between(pencil, pairs, *gaps)
+        inner, certificate = _restrict_to_interval(pencil, pairs, *gaps)
         missing = certificate.n_missing
         if missing == 0:
             return inner, certificate
@@ -124,7 +124,7 @@ def _clear_gaps(
     return (lower, before[lower] / 2), (upper, ends[upper] - after[upper] / 2 - starts[upper])
 
 
-def _between(
+def _restrict_to_interval(
     pencil: Pencil, pairs: Pairs, before: tuple[int, float], after: tuple[int, float]
 ) -> tuple[Pairs, Certificate]:
     lower = count_beside(pencil, pairs, *before, most=False)

@@ -8,7 +8,7 @@ import scipy.linalg as sl
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._errors import ConvergenceError
-from eigenshape.sparse.basis import Block, Slots, combined, packed, products, subtract
+from eigenshape.sparse.basis import Block, Slots, combine_columns, pack_columns, products, subtract
 from eigenshape.sparse.elimination import Scratch
 from eigenshape.sparse.lane_loops import LANES
 from eigenshape.spectral.solver.factor import Factor
@@ -138,7 +138,7 @@ def block_lanczos(
     space = np.empty(
         (first + capacity // LANES + groups, pencil.n, LANES)
     )  # pages are touched only as it grows
-    space[:first] = packed(inner.enter(locked))
+    space[:first] = pack_columns(inner.enter(locked))
     projected = np.zeros((capacity, capacity))
     _orthonormalize(
         inner, space[: first + groups], rng.standard_normal((groups, pencil.n, LANES)), rng
@@ -269,7 +269,7 @@ def _one_by_one(
         else:
             columns[:, i] /= length
             upper[i, i] = length
-    fresh[:] = packed(columns)
+    fresh[:] = pack_columns(columns)
     return upper, short
 
 
@@ -322,4 +322,4 @@ def _vectors(krylov: Krylov, ritz: Ritz, chosen: Int[np.ndarray, " j"]) -> Float
     # One step of the operator takes the residual out of a Ritz vector y: A y / θ = y + fresh C s / θ, known already.
     weights = ritz.coefficients[:, chosen]
     step = krylov.coupling @ weights[-len(krylov.coupling) :] / ritz.thetas[chosen]
-    return combined(krylov.space, np.concatenate([weights, step]))
+    return combine_columns(krylov.space, np.concatenate([weights, step]))

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
-from eigenshape.sparse.elimination import Elimination, analyse, factorise
+from eigenshape.sparse.elimination import Elimination, analyze_pattern, factorize_symmetric
 from eigenshape.spectral.solver.residual_loops import add_sums
 
 # Columns of a Gram matrix that are computed together: enough for fast products, little memory.
@@ -83,7 +83,7 @@ class Pencil:
 
     @cached_property
     def shifted(self) -> Shifted:
-        """W and B in one pattern, analysed once for the factors at all shifts."""
+        """W and B in one pattern, analyzed once for the factors at all shifts."""
         return _shifted_pattern(self.stiffness, self.mass)
 
     def weigh(self, vectors: Float[np.ndarray, "n b"]) -> Float[np.ndarray, "n b"]:
@@ -97,7 +97,7 @@ class Pencil:
         return np.ldexp(values, self.value_exponent)
 
     def vectors_out(self, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
-        """Return B-normalised vectors in the user's units."""
+        """Return B-normalized vectors in the user's units."""
         return np.ldexp(vectors, self.vector_exponent)
 
 
@@ -219,7 +219,9 @@ def _shifted_pattern(stiffness: sp.csc_array, mass: sp.csc_array) -> Shifted:
     union.sort_indices()
     keys = _keys(union)
     diagonal = np.searchsorted(keys, np.arange(union.shape[1]) * (union.shape[1] + 1))
-    return Shifted(analyse(union), _scatter(stiffness, keys), _scatter(mass, keys), diagonal)
+    return Shifted(
+        analyze_pattern(union), _scatter(stiffness, keys), _scatter(mass, keys), diagonal
+    )
 
 
 def _scatter(matrix: sp.csc_array, keys: Int[np.ndarray, " e"]) -> Float[np.ndarray, " e"]:
@@ -247,7 +249,7 @@ def _mass_floor(mass: sp.csc_array, diagonal: Float[np.ndarray, " n"]) -> float:
     shifted = _shifted_pattern(mass, sp.csc_array(sp.diags_array(diagonal)))
     for halvings in range(12):
         floor = 0.49 * 0.5**halvings
-        lower = factorise(shifted.elimination, shifted.stiffness - floor * shifted.mass)
+        lower = factorize_symmetric(shifted.elimination, shifted.stiffness - floor * shifted.mass)
         if lower and (lower.pivots > 0).all():
             return floor
     place = int(np.argmax(lower.pivots <= 0)) if lower else 0

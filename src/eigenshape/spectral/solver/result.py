@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import frozen
+from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.certificate import Certificate
@@ -36,10 +36,10 @@ def spectrum_of(
     residuals = pencil.values_out(pairs.residuals)
     require_readable(laplacian.kernel, values, stacklevel=4)
     return Spectrum(
-        eigenvalues=frozen(from_pencil(laplacian.kernel, values)),
+        eigenvalues=freeze(from_pencil(laplacian.kernel, values)),
         eigenvectors=to_user_vectors(pencil, pairs.vectors),
         mass=laplacian.mass,
-        residuals=frozen(reported_residuals(laplacian.kernel, values, residuals)),
+        residuals=freeze(reported_residuals(laplacian.kernel, values, residuals)),
         certificate=reported_certificate(
             laplacian.kernel, in_user_units(pencil, certificate), float(values[-1])
         ),

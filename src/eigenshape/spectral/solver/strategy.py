@@ -229,10 +229,9 @@ def require_memory_for_pairs(pencil: Pencil, k: int, factors: int | None = None)
     bases = (
         8 * pencil.n * (3 * k + FEWEST_VECTORS + 2 * min(k, ONE_SHIFT_PAIRS))
     )  # a space of twice the pairs, results, a copy
-    advice = (
-        "Request fewer pairs, or pass method='approximate' to solve_spectrum, which needs no factor"
-    )
+    advice = "Request fewer pairs, or pass method='approximate' to solve_spectrum, which needs no factor."
     require_memory(
+        "A spectrum",
         f"{k} pairs of {pencil.n} points",
         {"bases": bases, "factors of their operator": factors},
         advice,

@@ -8,6 +8,8 @@ import numpy as np
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
+from eigenshape.cli.inputs import REGIONS
+from eigenshape.cli.steps.segments import smooth_parts
 from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.region import (
     BoxRegion,
@@ -16,18 +18,12 @@ from eigenshape.deformation.region import (
     region_boundary,
     region_mask,
 )
-from eigenshape.features.boundaries import smooth_boundaries
-from eigenshape.features.parts import PART_CONTRAST, find_parts
+from eigenshape.features.contrast import PART_CONTRAST
+from eigenshape.features.parts import find_parts
 from eigenshape.features.segmentation import segment
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.orientation import orient_closed_outward
 
-REGIONS = (
-    "'y>0.5' or 'y>0.5, x<0' (coordinates, or percent of the bounding box: 'y>60%'); 'vertex 17 within 0.2' "
-    "(distance along the surface, or percent of the square root of the area: 'within 10%'); 'part 3' (a number that "
-    "`eigenshape segment` prints); or a file with one vertex index a line."
-)
 CONDITION = re.compile(r"\s*([xyz])\s*([<>])\s*(-?[\d.]+(?:e-?\d+)?)\s*(%?)\s*")
 VERTEX = re.compile(r"\s*vertex\s+(\d+)\s+within\s+([\d.]+(?:e-?\d+)?)\s*(%?)\s*")
 PART = re.compile(r"\s*part\s+(\d+)\s*")
@@ -52,7 +48,7 @@ def parse_region(text: str, mesh: TriangleMesh, progress: Progress) -> Region:
     if all(conditions):
         return _box([found for found in conditions if found], mesh)
     if Path(text).is_file():
-        return _listed(Path(text))
+        return _read_list(Path(text))
     raise InvalidParameterError(f"A region is one of these: {REGIONS} It is {text!r}.")
 
 
@@ -68,12 +64,12 @@ def _box(conditions: list[re.Match[str]], mesh: TriangleMesh) -> BoxRegion:
 
 def _part(mesh: TriangleMesh, number: int, progress: Progress) -> Region:
     parts = segment(find_parts(mesh, progress=progress).tree, persistence=PART_CONTRAST)
-    labels = smooth_boundaries(orient_closed_outward(mesh), parts).labels
+    labels = smooth_parts(mesh, parts).labels
     whole_number(number, "A part", 0, int(labels.max()))
     return np.unique(mesh.faces[labels == number])
 
 
-def _listed(path: Path) -> Region:
+def _read_list(path: Path) -> Region:
     try:
         return np.array([int(line) for line in path.read_text().split()], dtype=np.int64)
     except ValueError as err:

@@ -10,16 +10,16 @@ from matplotlib.figure import Figure
 
 from eigenshape._errors import EigenshapeError, StoreError
 from eigenshape._progress import Progress
-from eigenshape.cli.console import err, progress_bar, shown
-from eigenshape.cli.inputs import read_repaired
+from eigenshape._text import literal
+from eigenshape.cli.console import err, escape_text, progress_bar
+from eigenshape.cli.steps.reading import read_repaired
 from eigenshape.geometry.geodesic import geodesic_distances
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.plot.figure import literal
 from eigenshape.plot.sheet import Panel, figure_contact_sheet
 from eigenshape.retrieval.description import describe
-from eigenshape.retrieval.heat.descriptor import HeatRecipe
 from eigenshape.retrieval.heat.features import find_heat_features, find_view_features
+from eigenshape.retrieval.heat.recipe import HeatRecipe
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
 from eigenshape.retrieval.store.index import Match
 
@@ -101,7 +101,7 @@ def _panel(query: ColoredQuery, match: Match, repairs: tuple[str, ...]) -> Panel
     try:
         mesh = _read_match(match, repairs)
     except (EigenshapeError, OSError) as error:
-        err.print(f"[yellow]not drawn:[/] {shown(match.name)}: {shown(error)}")
+        err.print(f"[yellow]not drawn:[/] {escape_text(match.name)}: {escape_text(error)}")
         nothing = np.zeros(0, dtype=np.int64)
         return Panel(None, title, nothing, nothing)
     ours, theirs = match.correspondences.T

@@ -1,15 +1,13 @@
-"""The methods of describing shapes that the command line knows by name."""
+"""The recipe of each method of describing shapes, for an index or a query."""
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Annotated
 
-import typer
-
-from eigenshape._errors import InvalidParameterError, StoreError
+from eigenshape._errors import StoreError
 from eigenshape.cli.console import batch_reporter, err, progress_bar
-from eigenshape.cli.inputs import read_repaired
-from eigenshape.retrieval.heat.descriptor import PRESETS, HeatRecipe
+from eigenshape.cli.inputs import PATCHES, require_method
+from eigenshape.cli.steps.reading import read_repaired
+from eigenshape.retrieval.heat.recipe import PRESETS, HeatRecipe
 from eigenshape.retrieval.kinds import AnyRecipe
 from eigenshape.retrieval.patches.codebook import default_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
@@ -17,41 +15,11 @@ from eigenshape.retrieval.store.batch import train_codebook_from_files
 from eigenshape.retrieval.store.index import ShapeIndex
 from eigenshape.retrieval.store.workers import Item, Workers
 
-PATCHES = "patches"
-EVERY = (PATCHES, *PRESETS)
-
-HeatMethodOption = Annotated[
-    str, typer.Option("--method", help=f"How shapes are described: {' or '.join(PRESETS)}.")
-]
-MethodOption = Annotated[
-    str,
-    typer.Option(
-        "--method",
-        help=f"How shapes are described: {', '.join(EVERY)}. patches is best for partial scans.",
-    ),
-]
-StoredMethodOption = Annotated[
-    str | None,
-    typer.Option(
-        "--method",
-        help=(
-            f"Which descriptions to compare: {', '.join(EVERY)}. By default the index's "
-            "own, or patches if it has several."
-        ),
-    ),
-]
-
 
 def heat_recipe(name: str) -> HeatRecipe:
     """Return the recipe of a heat method."""
     require_method(name, tuple(PRESETS))
     return PRESETS[name]
-
-
-def require_method(name: str, names: Sequence[str] = EVERY) -> None:
-    """Raise an error if the name is not one of the allowed names."""
-    if name not in names:
-        raise InvalidParameterError(f"--method takes {', '.join(names)}; it is {name!r}.")
 
 
 def index_recipe(
@@ -85,13 +53,14 @@ def query_recipe(shelf: ShapeIndex, name: str | None) -> AnyRecipe:
     """Return the recipe of a method by which an index can answer; without a name, its own."""
     if name is None:
         return shelf.default_recipe()
-    if name != PATCHES:
-        return PRESETS[name]
-    recipe = _patch_recipe(shelf)
+    if name == PATCHES:
+        recipe: AnyRecipe | None = _patch_recipe(shelf)
+    else:
+        recipe = PRESETS[name] if PRESETS[name] in shelf.recipes() else None
     if recipe is None:
         raise StoreError(
             f"An index answers by the methods that it was made with; {shelf.folder} has no "
-            "patches. Run `eigenshape index` with --method patches first."
+            f"descriptions by {name}. Run `eigenshape index` with --method {name} first."
         )
     return recipe
 

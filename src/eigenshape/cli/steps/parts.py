@@ -8,12 +8,13 @@ import numpy as np
 from jaxtyping import Int, UInt8
 
 from eigenshape.cli.console import print_table, print_written
-from eigenshape.cli.outputs import require_output
+from eigenshape.cli.steps.outputs import require_output
 from eigenshape.features.segmentation import Segmentation
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.labels import write_labels
 from eigenshape.io.mesh_files import write_mesh
+from eigenshape.plot.fields import part_colors
 
 LABEL_LISTS = (".seg", ".txt")  # files with one label a line
 SHOWN: dict[str, Callable[[Any], str]] = {
@@ -56,6 +57,13 @@ def save_labels(
     else:
         write_mesh(mesh, path, colors=colors, face_labels=labels)
     print_written(path)
+
+
+def label_colors(
+    mesh: TriangleMesh, labels: Int[np.ndarray, " f"], every: Int[np.ndarray, " _"]
+) -> UInt8[np.ndarray, "n 3"]:
+    """Return colors of the vertices by labels of faces; `every` lists all labels, for equal colors."""
+    return part_colors(mesh, np.searchsorted(np.unique(every), labels))
 
 
 def part_rows(mesh: TriangleMesh, parts: Segmentation) -> list[dict[str, Any]]:

@@ -1,0 +1,37 @@
+"""Reading the shapes that a verb is given, and repairing them."""
+
+from pathlib import Path
+
+from eigenshape.cli.console import print_repairs
+from eigenshape.cli.inputs import repair_names
+from eigenshape.geometry.cloud import Shape
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.repair import repair
+from eigenshape.geometry.repair_report import RepairedCloud
+from eigenshape.io.cell_kinds import CellKind
+from eigenshape.io.labels import read_labels as read_labels  # noqa: PLC0414  in the stub
+from eigenshape.io.labels import read_map as read_map  # noqa: PLC0414  in the stub
+from eigenshape.io.mesh_files import read_mesh
+from eigenshape.io.shape_files import read_shape
+
+
+def load_mesh(path: Path, repairs: str) -> TriangleMesh:
+    """Read a mesh, apply the requested repairs, and print on stderr what they did."""
+    done = repair(read_mesh(path), repair_names(repairs))
+    print_repairs(done.report)
+    return done.mesh
+
+
+def load_shape(
+    path: Path, repairs: str, dim: int, *, drop_missing: bool, cells: CellKind | None = None
+) -> Shape:
+    """Read a shape of any kind, apply the requested repairs, and print on stderr what they did."""
+    names = repair_names(repairs)
+    done = repair(read_shape(path, dim=dim, drop_missing=drop_missing, cells=cells), names)
+    print_repairs(done.report)
+    return done.cloud if isinstance(done, RepairedCloud) else done.mesh
+
+
+def read_repaired(path: Path, names: tuple[str, ...]) -> TriangleMesh:
+    """Read a mesh and apply repairs without printing, as for one of many."""
+    return repair(read_mesh(path), names).mesh

@@ -1,0 +1,21 @@
+"""The methods by which a region is bent, by name. The command line reads them, so this module is light."""
+
+from typing import Literal, cast, get_args
+
+from eigenshape._errors import InvalidParameterError
+
+Mode = Literal["graded", "uncrossed", "thesis"]
+
+
+def require_mode(mode: str) -> Mode:
+    """Return the mode; raise an error if it is unknown.
+
+    Raises
+    ------
+    InvalidParameterError
+    """
+    if mode not in get_args(Mode):
+        raise InvalidParameterError(
+            f"mode must be 'graded', 'uncrossed' or 'thesis'; it is {mode!r}."
+        )
+    return cast(Mode, mode)

@@ -1,0 +1,6 @@
+"""The default cut of part trees. The command line reads it for its help, so this module is light."""
+
+# Least persistence of a part: the share of a temperature difference to its parent that is left
+# after diffusion. A larger value finds fewer parts. The best of 0.1 to 0.4 on the tuning half of
+# experiments/ch5_parts.
+PART_CONTRAST = 0.3

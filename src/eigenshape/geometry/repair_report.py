@@ -1,0 +1,72 @@
+"""What a repair returns: the repaired shape, a report in sentences, and where its points come from."""
+
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+from jaxtyping import Int
+
+from eigenshape._text import html_repr, short_repr
+from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.simplices import MEASURES
+from eigenshape.geometry.simplicial import Mesh
+
+MeshT = TypeVar("MeshT", bound=Mesh)
+
+# Nouns of reports whose plural is not formed with an s.
+PLURALS = {"vertex": "vertices", "tetrahedron": "tetrahedra", "simplex": "simplices"}
+
+
+@dataclass(frozen=True, eq=False)
+class RepairedMesh(Generic[MeshT]):
+    """A mesh after one or more repairs, and a report of what they changed.
+
+    Attributes
+    ----------
+    mesh : TriangleMesh or SimplicialMesh
+        The mesh after the repairs.
+    report : tuple of str
+        One sentence for each repair, such as "drop_degenerate removed 2 faces without area".
+    source_vertices : (n,) int
+        For each vertex of `mesh`, its index in the original mesh.
+    """
+
+    mesh: MeshT
+    report: tuple[str, ...]
+    source_vertices: Int[np.ndarray, " n"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
+
+@dataclass(frozen=True, eq=False)
+class RepairedCloud:
+    """A point cloud after one or more repairs, and a report of what they changed.
+
+    Attributes
+    ----------
+    cloud : PointCloud
+        The cloud after the repairs.
+    report : tuple of str
+        One sentence for each repair, such as "drop_duplicate_points removed 2 points at the places
+        of others".
+    source_points : (n,) int
+        For each point of `cloud`, its index in the original cloud.
+    """
+
+    cloud: PointCloud
+    report: tuple[str, ...]
+    source_points: Int[np.ndarray, " n"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
+
+def count_nouns(number: int, noun: str) -> str:
+    """Return a number with its noun, which is in the plural if the number is not 1."""
+    return f"{number} {noun if number == 1 else PLURALS.get(noun, noun + 's')}"
+
+
+def simplex_noun(mesh: Mesh) -> str:
+    """Return what a simplex of a mesh is called, such as "face"."""
+    return MEASURES[mesh.dim][1] if mesh.dim in MEASURES else "simplex"
