@@ -42,18 +42,25 @@ def build_page() -> None:
     """Build the bundle, unless it is newer than all its sources."""
     if is_current():
         return
+    install_packages()
+    run_node("vite/bin/vite.js", "build", "--logLevel", "warn")
+    if BUNDLE.stat().st_size > MOST_BYTES:
+        raise SystemExit(f"The bundle may have {MOST_BYTES:,} bytes; {BUNDLE} has more.")
+
+
+def install_packages() -> None:
+    """Install what `package-lock.json` names, into front/node_modules."""
     node, npm = find_node()
     # npm finds the same Node for the scripts of packages.
     path = os.pathsep.join([str(Path(node).parent), os.environ.get("PATH", "")])
-    settings = {**os.environ, "PATH": path}
     install = [*npm, "ci", "--no-audit", "--no-fund", "--loglevel=error"]
-    subprocess.run(install, cwd=FRONT, env=settings, check=True)
-    # `npm run` would take a shell.
-    vite = FRONT / "node_modules" / "vite" / "bin" / "vite.js"
-    build = [node, str(vite), "build", "--logLevel", "warn"]
-    subprocess.run(build, cwd=FRONT, env=settings, check=True)
-    if BUNDLE.stat().st_size > MOST_BYTES:
-        raise SystemExit(f"The bundle may have {MOST_BYTES:,} bytes; {BUNDLE} has more.")
+    subprocess.run(install, cwd=FRONT, env={**os.environ, "PATH": path}, check=True)
+
+
+def run_node(script: str, *arguments: str) -> None:
+    """Run a script of an installed package; `npm run` would take a shell."""
+    command = [find_node()[0], str(FRONT / "node_modules" / script), *arguments]
+    subprocess.run(command, cwd=FRONT, check=True)
 
 
 def is_current() -> bool:

@@ -11,6 +11,13 @@ export type Handle =
   | { type: "translation"; vector: Vec3 }
   | null;
 
+/** Work of the server that the page waits for. */
+export interface Progress {
+  status: Status;
+  progress: number; // 0 to 1
+  message: string;
+}
+
 export interface State {
   name: string;
   n_vertices: number;
@@ -30,23 +37,9 @@ export interface State {
     findings: { name: string; why: string }[];
   };
   values: { name: string; title: string; unit: string; min: number; max: number }[];
-  spectrum: {
-    status: Status;
-    progress: number;
-    message: string;
-    k: number;
-    certificate: string;
-    complete: boolean;
-  };
-  parts: { status: Status; progress: number; message: string; n_regions: number; levels: number[] };
-  deformation: {
-    status: Status;
-    message: string;
-    mode: DeformMode;
-    n_edits: number;
-    n_redoable: number;
-    regions: unknown[];
-  };
+  spectrum: Progress & { k: number; certificate: string; complete: boolean };
+  parts: Progress & { n_regions: number; levels: number[] };
+  deformation: Progress & { mode: DeformMode; n_edits: number; n_redoable: number };
   index: { path: string; n_shapes: number } | null;
   pose: number;
   shape: number;

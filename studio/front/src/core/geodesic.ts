@@ -15,18 +15,16 @@ export function selectBox(points: ArrayLike<number>, low: Vec3, high: Vec3): Uin
   return Uint32Array.from(found);
 }
 
-const FRONT = -1; // sender of a vertex that several vertices reached as one straight front
-
 /**
  * Geodesic discs on one surface, by the waves of the library (`geometry/geodesic_loops.py`, Novotni
- * and Klein 2002): a wave crosses a triangle as if the surface behind it were flat.
+ * and Klein 2002): a wave crosses a triangle as if the surface behind it were flat. A disc has one
+ * source, so the straight fronts of several sources do not occur.
  */
 export class Surface {
   private readonly begins: Uint32Array; // triangles at each vertex, in the order of numpy
   private readonly others: Uint32Array; // their other two corners
   private readonly sides: Float64Array; // lengths from the vertex to each of them, and between them
   private readonly distance: Float64Array;
-  private readonly sender: Int32Array;
   private readonly settled: Uint8Array;
 
   constructor(points: ArrayLike<number>, faces: Uint32Array) {
@@ -51,18 +49,16 @@ export class Surface {
         this.sides.set([side(a, b), side(a, c), side(b, c)], 3 * entry);
       }
     this.distance = new Float64Array(count).fill(Infinity);
-    this.sender = new Int32Array(count);
     this.settled = new Uint8Array(count);
   }
 
   /** Return the vertices within a geodesic distance of a vertex, nearest first. */
   disc(source: number, radius: number): number[] {
-    const { begins, others, sides, distance, sender, settled } = this;
+    const { begins, others, sides, distance, settled } = this;
     const heap = new Heap();
     const touched = [source];
     const found: number[] = [];
     distance[source] = 0;
-    sender[source] = source;
     heap.push(0, source);
     while (heap.size) {
       const [key, vertex] = heap.pop();
@@ -75,18 +71,14 @@ export class Surface {
           const [corner, other] = [others[2 * entry + turn]!, others[2 * entry + 1 - turn]!];
           if (settled[corner]) continue;
           const [toCorner, toOther] = [sides[3 * entry + turn]!, sides[3 * entry + 1 - turn]!];
-          let [reached, origin] = [key + toCorner, sender[vertex]!];
+          let reached = key + toCorner;
           if (settled[other]) {
-            const together = origin === sender[other] && origin !== FRONT;
-            const cross = together ? throughEdge : acrossEdge;
-            const flat = cross(key, distance[other]!, toOther, toCorner, sides[3 * entry + 2]!);
-            if (!together && flat < reached) origin = FRONT;
-            reached = Math.min(reached, flat);
+            const across = sides[3 * entry + 2]!;
+            reached = Math.min(reached, throughEdge(key, distance[other]!, toOther, toCorner, across));
           }
           if (reached < distance[corner]!) {
             if (distance[corner] === Infinity) touched.push(corner);
             distance[corner] = reached;
-            sender[corner] = origin;
             heap.push(reached, corner);
           }
         }
@@ -110,18 +102,6 @@ function throughEdge(near: number, far: number, edge: number, left: number, righ
   if (depth === 0) return Infinity;
   const crossing = x + ((cornerX - x) * y) / depth;
   return crossing < 0 || crossing > edge ? Infinity : Math.hypot(cornerX - x, depth);
-}
-
-/** Return the same where several vertices send the wave: its front is straight. */
-function acrossEdge(near: number, far: number, edge: number, left: number, right: number): number {
-  if (edge === 0) return Infinity;
-  const climb = (far - near) / edge;
-  const cornerX = (left * left - right * right + edge * edge) / (2 * edge);
-  const cornerY = Math.sqrt(Math.max(left * left - cornerX * cornerX, 0));
-  const steep = Math.sqrt(Math.max(1 - climb * climb, 0));
-  if (steep === 0) return Infinity;
-  const crossing = cornerX - (cornerY * climb) / steep;
-  return crossing < 0 || crossing > edge ? Infinity : near + climb * cornerX + steep * cornerY;
 }
 
 /** A binary heap of numbers by their keys; equal keys leave it in the same order as in the library. */

@@ -2,7 +2,7 @@
 
 import * as three from "three";
 import type { Vec3 } from "./backend";
-import { cross, dot, length, subtract, vertexOf } from "./motion";
+import { length, subtract, vertexOf } from "./motion";
 import { PICK_FRAGMENT, PICK_VERTEX, POSITION_FRAGMENT, POSITION_VERTEX } from "./shaders";
 
 export interface Hit {
@@ -82,7 +82,7 @@ export class Picker {
       return values;
     }) as [Float32Array, Float32Array];
     if (!rest[3]) return null;
-    const face = this.findFace(Math.round(rest[3]) - 1, vertexOf(rest, 0));
+    const face = this.findFace(Math.round(rest[3]) - 1, new three.Vector3().fromArray(rest));
     const corners = vertexOf(this.geometry.index!.array, face);
     const points = this.geometry.getAttribute("position").array;
     const away = (vertex: number) => length(subtract(vertexOf(points, vertex), vertexOf(rest, 0)));
@@ -129,8 +129,8 @@ export class Picker {
     this.renderer.setClearColor(color, opacity);
   }
 
-  /** Return the face with this last corner whose plane and inside are nearest to a point. */
-  private findFace(last: number, point: Vec3): number {
+  /** Return the face with this last corner that is nearest to a point. */
+  private findFace(last: number, point: three.Vector3): number {
     const faces = this.facesOf.subarray(this.begins[last], this.begins[last + 1]);
     let [best, least] = [faces[0]!, Infinity];
     for (const face of faces) {
@@ -140,17 +140,11 @@ export class Picker {
     return best;
   }
 
-  private distanceToFace(face: number, point: Vec3): number {
-    const points = this.geometry.getAttribute("position").array;
-    const [a, b, c] = vertexOf(this.geometry.index!.array, face).map((v) => vertexOf(points, v)) as [Vec3, Vec3, Vec3];
-    const normal = cross(subtract(b, a), subtract(c, a));
-    const size = length(normal) || 1e-300;
-    let outside = Math.abs(dot(normal, subtract(point, a))) / size;
-    for (const [one, two] of [[a, b], [b, c], [c, a]] as [Vec3, Vec3][]) {
-      const inward = cross(normal, subtract(two, one));
-      const depth = dot(inward, subtract(point, one)) / (length(inward) || 1e-300);
-      outside += Math.max(-depth, 0);
-    }
-    return outside;
+  private distanceToFace(face: number, point: three.Vector3): number {
+    const points = this.geometry.getAttribute("position");
+    const triangle = new three.Triangle();
+    const [a, b, c] = vertexOf(this.geometry.index!.array, face);
+    triangle.setFromAttributeAndIndices(points, a, b, c);
+    return triangle.closestPointToPoint(point, new three.Vector3()).distanceTo(point);
   }
 }

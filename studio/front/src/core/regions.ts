@@ -3,7 +3,7 @@
 import { MAX_REGIONS } from "./shaders";
 
 export const FIXED = MAX_REGIONS; // number of the fixed vertices, after those of the regions
-const FREE = 255;
+const FREE = FIXED + 1;
 
 export class Regions {
   private owner: Uint8Array;
@@ -45,25 +45,13 @@ export class Regions {
     });
   }
 
-  /** Return the regions as text for the storage of the tab: owner and length of each run. */
+  /** Return the regions as text for the storage of the tab: one digit a vertex. */
   write(): string {
-    const runs: number[] = [];
-    let begin = 0;
-    for (let vertex = 1; vertex <= this.owner.length; vertex++)
-      if (this.owner[vertex] !== this.owner[begin]) {
-        runs.push(this.owner[begin]!, vertex - begin);
-        begin = vertex;
-      }
-    return runs.join(" ");
+    return this.owner.join("");
   }
 
   /** Take what `write` returned; text of another mesh is ignored. */
   read(text: string): void {
-    const runs = text.split(" ").map(Number);
-    const owner = new Uint8Array(this.owner.length);
-    let vertex = 0;
-    for (let place = 0; place < runs.length; place += 2)
-      owner.fill(runs[place]!, vertex, (vertex += runs[place + 1]!));
-    if (vertex === owner.length) this.owner = owner;
+    if (text.length === this.owner.length) this.owner = Uint8Array.from(text, Number);
   }
 }

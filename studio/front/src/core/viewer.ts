@@ -58,7 +58,6 @@ export class Viewer {
     blend: { value: 0 },
   };
   private readonly surface: three.Mesh<three.BufferGeometry, three.ShaderMaterial>;
-  private readonly crossing: three.Mesh<three.BufferGeometry, three.ShaderMaterial>;
   private readonly skeleton: three.Mesh<three.BufferGeometry, three.ShaderMaterial>;
   private readonly discs: three.Points<three.BufferGeometry, three.ShaderMaterial>;
   private readonly layers = new Map<string, { vertices: ArrayLike<number>; color: string }>();
@@ -75,18 +74,14 @@ export class Viewer {
     stage.append(this.canvas);
     this.canvas.setAttribute("aria-label", "The shape. Arrow keys turn it, + and - zoom.");
     this.surface = new three.Mesh(this.geometry, this.surfaceMaterial(PLAIN));
-    this.crossing = new three.Mesh(new three.BufferGeometry(), this.surfaceMaterial("#d8301f"));
-    this.crossing.material.polygonOffset = true;
-    this.crossing.material.polygonOffsetFactor = this.crossing.material.polygonOffsetUnits = -2;
     this.skeleton = new three.Mesh(new three.BufferGeometry(), this.surfaceMaterial("#3f7fae"));
     this.discs = new three.Points(new three.BufferGeometry(), this.pointMaterial());
-    this.crossing.visible = this.skeleton.visible = this.discs.visible = false;
+    this.skeleton.visible = this.discs.visible = false;
     this.surface.renderOrder = 1;
     this.skeleton.renderOrder = 2; // over the veil of the surface, also where it lies behind it
     this.skeleton.material.transparent = true;
-    this.crossing.renderOrder = 3;
-    this.discs.renderOrder = 4;
-    for (const object of [this.skeleton, this.surface, this.crossing, this.discs]) {
+    this.discs.renderOrder = 3;
+    for (const object of [this.skeleton, this.surface, this.discs]) {
       object.frustumCulled = false; // the shader moves vertices out of the box of the geometry
       this.space.add(object);
     }
@@ -116,7 +111,6 @@ export class Viewer {
     attribute("mark", new Uint8Array(4 * count), 4);
     this.picker?.setFaces(faces, count);
     this.layers.clear();
-    this.markFaces([]);
     this.setPoints([], PLAIN);
     this.setSkeleton(null);
     this.setScalars(null);
@@ -246,14 +240,10 @@ export class Viewer {
     this.invalidate();
   }
 
-  /** Show faces in red. */
+  /** Tint the corners of faces in red. */
   markFaces(faces: ArrayLike<number>): void {
-    this.crossing.visible = faces.length > 0;
-    const corners = new Uint32Array(3 * faces.length);
-    for (let place = 0; place < faces.length; place++)
-      corners.set(this.faces.subarray(3 * faces[place]!, 3 * faces[place]! + 3), 3 * place);
-    this.shareBuffers(this.crossing.geometry, corners);
-    this.invalidate();
+    const corners = Array.from(faces, (face) => [...this.faces.subarray(3 * face, 3 * face + 3)]);
+    this.setMarks(corners.flat(), "#d8301f", "crossing");
   }
 
   /** Show the eigen-skeleton in a veil of the surface. */

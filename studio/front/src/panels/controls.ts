@@ -2,7 +2,7 @@
 
 import uPlot from "uplot";
 import type { App, Panel } from "../app";
-import type { State } from "../core/backend";
+import type { Progress, State } from "../core/backend";
 import { h } from "../core/dom";
 import type { TypedArray } from "../core/wire";
 
@@ -118,7 +118,7 @@ export class ProgressBar {
     this.element = h("div", { class: "progress", "data-test": name }, this.bar, this.text);
   }
 
-  show({ status, progress, message }: Pick<State["spectrum"], "status" | "progress" | "message">): void {
+  show({ status, progress, message }: Progress): void {
     this.element.hidden = status !== "running" && status !== "failed";
     this.bar.hidden = status === "failed";
     this.bar.value = progress;

@@ -154,7 +154,7 @@ export class DeformPanel implements Panel {
   refresh(state: State): void {
     const { deformation } = state;
     const pose = `${state.shape} ${state.pose} ${deformation.status}`;
-    this.progress.show({ ...state.spectrum, ...deformation });
+    this.progress.show(deformation);
     this.undo.disabled = this.reset.disabled = !deformation.n_edits;
     this.redo.disabled = !deformation.n_redoable;
     if (pose === this.pose) {
