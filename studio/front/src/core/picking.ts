@@ -26,8 +26,6 @@ export class Picker {
   private readonly pixel: three.WebGLRenderTarget;
   private readonly scene = new three.Scene();
   private readonly space = new three.Group();
-  private facesOf: Uint32Array = new Uint32Array(0); // faces sorted by their last corner
-  private begins: Uint32Array = new Uint32Array(0);
 
   constructor(
     private readonly renderer: three.WebGLRenderer,
@@ -56,17 +54,6 @@ export class Picker {
     this.pixel = new three.WebGLRenderTarget(1, 1, { ...exact, count: 2 });
     this.scene.matrixWorldAutoUpdate = false;
     this.scene.add(this.space);
-  }
-
-  /** Take a new list of faces. */
-  setFaces(faces: Uint32Array, nVertices: number): void {
-    const count = faces.length / 3;
-    this.begins = new Uint32Array(nVertices + 1);
-    for (let face = 0; face < count; face++) this.begins[faces[3 * face + 2]! + 1]!++;
-    for (let vertex = 0; vertex < nVertices; vertex++) this.begins[vertex + 1]! += this.begins[vertex]!;
-    const next = this.begins.slice();
-    this.facesOf = new Uint32Array(count);
-    for (let face = 0; face < count; face++) this.facesOf[next[faces[3 * face + 2]!]!++] = face;
   }
 
   /** Return what lies under a place of the picture, in pixels of the page. */
@@ -131,9 +118,10 @@ export class Picker {
 
   /** Return the face with this last corner that is nearest to a point. */
   private findFace(last: number, point: three.Vector3): number {
-    const faces = this.facesOf.subarray(this.begins[last], this.begins[last + 1]);
-    let [best, least] = [faces[0]!, Infinity];
-    for (const face of faces) {
+    const corners = this.geometry.index!.array;
+    let [best, least] = [-1, Infinity];
+    for (let face = 0; 3 * face < corners.length; face++) {
+      if (corners[3 * face + 2] !== last) continue;
       const away = this.distanceToFace(face, point);
       if (away < least) [best, least] = [face, away];
     }

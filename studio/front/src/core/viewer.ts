@@ -46,7 +46,8 @@ export class Viewer {
   vertices: Float32Array = new Float32Array(0);
   faces: Uint32Array = new Uint32Array(0);
   labels: Int32Array | null = null;
-  extent = 1; // diagonal of the box around the mesh
+  readonly box = new three.Box3(); // around the mesh, as it was loaded
+  extent = 1; // its diagonal
   private readonly renderer: three.WebGLRenderer | null;
   private readonly picker: Picker | null;
   private readonly motion = {
@@ -109,16 +110,15 @@ export class Viewer {
     attribute("value", new Float32Array(count), 1);
     attribute("paint", new Uint8Array(3 * count), 3);
     attribute("mark", new Uint8Array(4 * count), 4);
-    this.picker?.setFaces(faces, count);
     this.layers.clear();
     this.setPoints([], PLAIN);
     this.setSkeleton(null);
     this.setScalars(null);
     this.setHandles([]);
-    const box = new three.Box3().setFromArray(vertices);
-    const size = (this.extent = box.getSize(new three.Vector3()).length() || 1);
+    const size = this.box.setFromArray(vertices).getSize(new three.Vector3()).length() || 1;
+    this.extent = size;
     this.space.scale.setScalar(1 / size);
-    this.space.position.copy(box.getCenter(new three.Vector3())).multiplyScalar(-1 / size);
+    this.space.position.copy(this.box.getCenter(new three.Vector3())).multiplyScalar(-1 / size);
     this.space.updateMatrixWorld(true);
     this.camera.up.set(...up);
     this.controls.dispose();

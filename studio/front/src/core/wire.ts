@@ -61,8 +61,7 @@ export function decode(message: ArrayBuffer | ArrayBufferView): Message {
   const header = JSON.parse(new TextDecoder().decode(bytes.subarray(4, begin)));
   const arrays: Arrays = {};
   for (const [name, entry] of Object.entries<any>(header.arrays ?? {})) {
-    const half = entry.dtype === "<f2";
-    const type = half ? Uint16Array : TYPES[entry.dtype as Dtype];
+    const type = TYPES[entry.dtype as Dtype];
     if (!type) throw new TypeError(`Array ${name} has the unknown type ${entry.dtype}.`);
     const length = entry.shape.reduce((product: number, side: number) => product * side, 1);
     const end = begin + entry.offset + length * type.BYTES_PER_ELEMENT;

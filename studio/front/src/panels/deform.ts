@@ -195,18 +195,14 @@ export class DeformPanel implements Panel {
       [this.tool, this.region] = [kept.tool, kept.region];
       this.regionChoice.press(String(this.region));
     }
-    const { vertices } = this.app.viewer;
-    const [low, high] = [0, 1].map(() => [0, 0, 0] as Vec3) as [Vec3, Vec3];
-    for (let axis = 0; axis < 3; axis++) {
-      const values = vertices.filter((_, place) => place % 3 === axis);
-      low[axis] = values.reduce((one, other) => Math.min(one, other));
-      high[axis] = values.reduce((one, other) => Math.max(one, other));
-    }
     // The first box holds what is above the middle, and nothing touches its other sides.
+    const { box, extent } = this.app.viewer;
+    const [low, high] = [box.min, box.max].map((corner) => corner.toArray()) as [Vec3, Vec3];
     const up = this.app.state.up.map(Math.abs).indexOf(1);
-    const room = 0.02 * this.app.viewer.extent;
-    for (let axis = 0; axis < 3; axis++) [low[axis], high[axis]] = [low[axis]! - room, high[axis]! + room];
-    if (up >= 0) low[up] = (low[up]! + high[up]!) / 2;
+    for (let axis = 0; axis < 3; axis++) {
+      low[axis] = axis === up ? (low[axis]! + high[axis]!) / 2 : low[axis]! - 0.02 * extent;
+      high[axis]! += 0.02 * extent;
+    }
     [this.box.low, this.box.high] = [low, high];
     this.writeBox();
   }

@@ -1,0 +1,274 @@
+"""Deformation in a real browser: the mouse moves what numpy moves."""
+
+import json
+
+import numpy as np
+import pytest
+from browser import find, open_page, serve_studio, start_browser, wait_until
+
+import eigenshape as es
+from eigenshape.deformation import BoxRegion, BrushRegion, bend, bind, region_mask
+
+pytestmark = pytest.mark.long
+
+PANEL = "eigenshape.panels.find((panel) => panel.id === 'deform')"
+SHADER = 1e-5  # single precision: the largest error that the shader may have, in lengths of about 1
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    path = tmp_path_factory.mktemp("deform") / "quadruped.ply"
+    es.write_mesh(es.make_creature("quadruped", n_vertices=2000), path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def mesh(path):
+    return es.read_mesh(path)
+
+
+@pytest.fixture(scope="module")
+def url(path):
+    with serve_studio(path) as url:
+        yield url
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with start_browser() as started:
+        yield started
+
+
+@pytest.fixture
+def page(browser, url):
+    """A tab of its own, whose shape can be deformed."""
+    with open_page(browser, url) as page:
+        wait_until(page, "eigenshape.state.deformation.status === 'ready'", 120)
+        yield page
+
+
+def positions(page):
+    """Return the vertices as the shader computes them."""
+    return np.array(page.evaluate("Array.from(eigenshape.viewer.readPositions())")).reshape(-1, 3)
+
+
+def region(page, number=0):
+    return np.array(page.evaluate(f"Array.from({PANEL}.regions.vertices({number}))"), dtype=int)
+
+
+def wait_until_bound(page):
+    wait_until(page, f"{PANEL}.root.dataset.ready === 'true'")
+
+
+def wait_for_edits(page, count):
+    wait_until(page, f"eigenshape.state.deformation.n_edits === {count}")
+
+
+def place_of(page, point):
+    """Return where a point is seen, in pixels of the page."""
+    code = """([point]) => {
+        const { camera, canvas, space } = eigenshape.viewer;
+        camera.updateMatrixWorld();
+        const seen = camera.position.clone().fromArray(point).applyMatrix4(space.matrixWorld);
+        seen.project(camera);
+        const box = canvas.getBoundingClientRect();
+        return [box.x + (seen.x + 1) / 2 * box.width, box.y + (1 - seen.y) / 2 * box.height];
+    }"""
+    return page.evaluate(code, [list(point)])
+
+
+def click_brush(page, mesh):
+    """Brush over the vertex on top, and return where, and the vertex that the brush took."""
+    find(page, "tool-brush").click()
+    x, y = place_of(page, mesh.vertices[mesh.vertices[:, 1].argmax()])
+    hits = [page.evaluate(f"eigenshape.viewer.pick({x}, {y + down})") for down in range(2, 30, 2)]
+    down = next(number for number, hit in enumerate(hits) if hit)
+    y += 2 + 2 * down + 6
+    vertex = page.evaluate(f"eigenshape.viewer.pick({x}, {y})")["vertex"]
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.up()
+    wait_until_bound(page)
+    return x, y, vertex
+
+
+def bend_by(mesh, chosen, handles, mode="graded"):
+    """Return the shape bent by the first handle of the page, and moved by its shares alone."""
+    entry = handles[0]
+    if entry["type"] == "rotation":
+        handle = es.Rotation(entry["pivot"], entry["axis"], entry["angle"])
+    else:
+        handle = es.Translation(entry["vector"])
+    binding = bind(es.rig_shape(mesh), [chosen])
+    moved = mesh.vertices + handle.carry(mesh.vertices, binding.shares[0])
+    return bend(binding, [handle], mode=mode).vertices, moved
+
+
+def test_box_and_brush_select_what_numpy_selects(page, mesh):
+    _, _, vertex = click_brush(page, mesh)
+    radius = 0.1 * page.evaluate("eigenshape.viewer.extent")
+    disc = region_mask(mesh, BrushRegion(mesh.vertices[vertex], radius))
+    np.testing.assert_array_equal(region(page), np.flatnonzero(disc))
+
+    find(page, "clear").click()
+    find(page, "tool-box").click()
+    wait_until_bound(page)
+    low, high = page.evaluate(f"[{PANEL}.box.low, {PANEL}.box.high]")
+    np.testing.assert_array_equal(
+        region(page), np.flatnonzero(region_mask(mesh, BoxRegion(low, high)))
+    )
+
+    # Drag the handle of the lower side upwards.
+    x, y = place_of(page, [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x, y - 60, steps=3)
+    page.mouse.up()
+    wait_until_bound(page)
+    moved = page.evaluate(f"{PANEL}.box.low")
+    assert moved[1] > low[1]
+    assert (moved[0], moved[2]) == (low[0], low[2])
+    np.testing.assert_array_equal(
+        region(page), np.flatnonzero(region_mask(mesh, BoxRegion(moved, high)))
+    )
+
+
+def test_a_mouse_drag_moves_the_shape_as_numpy_does(page, mesh):
+    x, y, _ = click_brush(page, mesh)
+    find(page, "tool-pull").click()
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 40, y - 50, steps=5)
+    handles = page.evaluate(f"{PANEL}.rowHandles()")
+    bent, moved = bend_by(mesh, region(page), handles)
+    assert np.linalg.norm(handles[0]["vector"]) > 0.02
+    wait_until(page, "eigenshape.viewer.motion.blend.value === 1")  # the pointer rests
+    np.testing.assert_allclose(positions(page), bent, atol=SHADER)
+    page.evaluate("eigenshape.viewer.motion.blend.value = 0")
+    np.testing.assert_allclose(positions(page), moved, atol=SHADER)
+    # The shape is picked where it is seen, not where it was.
+    hit = page.evaluate(f"eigenshape.viewer.pick({x + 40}, {y - 50})")
+    assert hit["vertex"] in region(page)
+
+    page.mouse.up()
+    wait_for_edits(page, 1)
+    np.testing.assert_array_equal(positions(page), bent.astype("f4"))
+
+
+def test_no_call_while_the_pointer_moves(page, mesh):
+    x, y, _ = click_brush(page, mesh)
+    find(page, "tool-pull").click()
+    page.mouse.move(x, y)
+    page.mouse.down()
+    calls = []
+    page.on("request", lambda request: calls.append(request.url))
+    # Motions each 20 ms for longer than a rest takes; a mouse of the test would wait for frames.
+    code = """async ([x, y]) => {
+        for (let step = 1; step <= 20; step++) {
+            const place = { clientX: x + step, clientY: y - step, bubbles: true };
+            eigenshape.viewer.canvas.dispatchEvent(new PointerEvent("pointermove", place));
+            await new Promise((done) => setTimeout(done, 20));
+        }
+    }"""
+    page.evaluate("void (eigenshape.viewer.draw = () => {})")
+    page.evaluate(code, [x, y])
+    assert calls == []
+    page.evaluate("delete eigenshape.viewer.draw")
+    page.mouse.up()
+    wait_for_edits(page, 1)
+
+
+def test_the_rings_turn_about_the_middle_of_the_rim(page, mesh):
+    click_brush(page, mesh)
+    find(page, "tool-rotate").click()
+    chosen = region(page)
+    mask = np.isin(np.arange(mesh.n_vertices), chosen)
+    pivot = mesh.vertices[es.deformation.region_boundary(mesh, mask)].mean(axis=0)
+    np.testing.assert_allclose(page.evaluate(f"{PANEL}.pivotOf(0)"), pivot, atol=1e-6)
+
+    x, y = place_of(page, pivot)
+    aside = np.array([0.6, -0.8])
+    for radius in range(40, 160, 3):  # the outer ring turns about the direction of the view
+        page.mouse.move(*(aside * radius + [x, y]))
+        if page.evaluate(f"{PANEL}.mover.gizmo.axis") == "E":
+            break
+    page.mouse.down()
+    for angle in np.linspace(0.1, 0.5, 4):
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        page.mouse.move(*(turn @ aside * radius + [x, y]))
+    handles = page.evaluate(f"{PANEL}.rowHandles()")
+    assert abs(handles[0]["angle"]) == pytest.approx(0.5, abs=0.02)
+    bent, moved = bend_by(mesh, chosen, handles)
+    page.evaluate("eigenshape.viewer.motion.blend.value = 0")
+    np.testing.assert_allclose(positions(page), moved, atol=SHADER)
+    page.mouse.up()
+    wait_for_edits(page, 1)
+    np.testing.assert_array_equal(positions(page), bent.astype("f4"))
+
+
+@pytest.mark.parametrize("mode", ["graded", "thesis"])
+def test_numbers_move_undo_redo_and_reload(page, mesh, mode):
+    click_brush(page, mesh)
+    rest = positions(page)
+    find(page, "mode").select_option(mode)
+    find(page, "exact-kind").select_option(index=2)
+    find(page, "exact-amount").fill("270")
+    find(page, "exact-amount").press("Enter")
+    wait_for_edits(page, 1)
+    pivot = mesh.vertices[
+        es.deformation.region_boundary(mesh, np.isin(np.arange(mesh.n_vertices), region(page)))
+    ].mean(axis=0)
+    handle = {"type": "rotation", "pivot": pivot, "axis": [0, 0, 1], "angle": np.deg2rad(270)}
+    bent, _ = bend_by(mesh, region(page), [handle], mode)
+    np.testing.assert_allclose(positions(page), bent, atol=SHADER)
+
+    posed = positions(page)
+    page.keyboard.press("Escape")
+    find(page, "canvas").focus()
+    page.keyboard.press("Control+z")
+    wait_for_edits(page, 0)
+    np.testing.assert_array_equal(positions(page), rest)
+    page.keyboard.press("Control+Shift+Z")
+    wait_for_edits(page, 1)
+    np.testing.assert_array_equal(positions(page), posed)
+
+    chosen = region(page)
+    page.reload()
+    wait_until(page, "window.eigenshape?.viewer.vertices.length > 0")
+    wait_until(page, f"{PANEL}?.active")
+    np.testing.assert_array_equal(positions(page), posed)
+    np.testing.assert_array_equal(region(page), chosen)
+
+
+def test_edits_are_saved_and_loaded(page, mesh, tmp_path):
+    click_brush(page, mesh)
+    find(page, "exact-kind").select_option(index=4)
+    find(page, "exact-amount").fill("0.1")
+    find(page, "exact-go").click()
+    wait_for_edits(page, 1)
+    posed = positions(page)
+    with page.expect_download() as saved:
+        find(page, "save-edits").click()
+    path = tmp_path / "edits.json"
+    saved.value.save_as(path)
+    assert json.loads(path.read_text())["kind"] == "eigenshape edits"
+    find(page, "reset").click()
+    wait_for_edits(page, 0)
+    with page.expect_file_chooser() as chooser:
+        find(page, "load-edits").click()
+    chooser.value.set_files(path)
+    wait_for_edits(page, 1)
+    np.testing.assert_array_equal(positions(page), posed)
+
+
+def test_the_picture_returns_after_a_loss_of_the_context(page):
+    page.evaluate(
+        "window.loss = eigenshape.viewer.canvas.getContext('webgl2')"
+        ".getExtension('WEBGL_lose_context'), loss.loseContext()"
+    )
+    find(page, "notice").wait_for()
+    before = page.evaluate("eigenshape.viewer.vertices.length")
+    page.evaluate("loss.restoreContext()")
+    find(page, "notice").wait_for(state="detached")
+    assert positions(page).size == before
+    assert np.ptp(positions(page)) > 0.1
