@@ -42,8 +42,8 @@ class Parts:
         return np.diff(self.starts)
 
     @cached_property
-    def ordered(self) -> tuple[sp.csc_array, sp.csc_array]:
-        """W and B with their points in order: each part is a block on the diagonal."""
+    def block_diagonal(self) -> tuple[sp.csc_array, sp.csc_array]:
+        """W and B with the points in the order of `order`: each part is one diagonal block."""
         stiffness, mass = (
             sp.csc_array(matrix[self.order][:, self.order])
             for matrix in (self.pencil.stiffness, self.pencil.mass)
@@ -57,7 +57,7 @@ class Parts:
     def only(self, part: int) -> Pencil:
         """Return the pencil of one part."""
         inside = slice(int(self.starts[part]), int(self.starts[part + 1]))
-        stiffness, mass = self.ordered
+        stiffness, mass = self.block_diagonal
         return part_pencil(self.pencil, stiffness[inside, inside], mass[inside, inside])
 
     def exponent(self, part: Pencil) -> int:
@@ -102,7 +102,7 @@ def _solve_blocks(
     """Return all eigenpairs of some parts of one size, which stand next to each other, and their residuals."""
     size = int(parts.sizes[first])
     inside = slice(int(parts.starts[first]), int(parts.starts[first]) + count * size)
-    stiffness, mass = (_blocks(matrix[inside, inside], size) for matrix in parts.ordered)
+    stiffness, mass = (_blocks(matrix[inside, inside], size) for matrix in parts.block_diagonal)
     diagonal = parts.pencil.mass_diagonal[parts.order[inside]].reshape(count, size, 1)
     if parts.pencil.mass_floor == 1.0:
         roots = np.sqrt(diagonal)

@@ -23,7 +23,7 @@ LARGEST_LEVEL_RATIO = 1e11
 
 
 @dataclass(frozen=True, eq=False)
-class Shifted:
+class ShiftPattern:
     """What W - σB has entries of, ready to be factored at any σ.
 
     Attributes
@@ -82,9 +82,9 @@ class Pencil:
         return len(self.mass_diagonal)
 
     @cached_property
-    def shifted(self) -> Shifted:
+    def shift_pattern(self) -> ShiftPattern:
         """W and B in one pattern, analyzed once for the factors at all shifts."""
-        return _shifted_pattern(self.stiffness, self.mass)
+        return _shift_pattern(self.stiffness, self.mass)
 
     def weigh(self, vectors: Float[np.ndarray, "n b"]) -> Float[np.ndarray, "n b"]:
         """Multiply by B."""
@@ -213,13 +213,13 @@ def _scale(matrix: sp.sparray, exponent: int) -> sp.csc_array:
     return scaled
 
 
-def _shifted_pattern(stiffness: sp.csc_array, mass: sp.csc_array) -> Shifted:
+def _shift_pattern(stiffness: sp.csc_array, mass: sp.csc_array) -> ShiftPattern:
     parts = [_ones(stiffness), _ones(mass), sp.eye_array(stiffness.shape[0], format="csc")]
     union = sp.csc_array(parts[0] + parts[1] + parts[2])
     union.sort_indices()
     keys = _keys(union)
     diagonal = np.searchsorted(keys, np.arange(union.shape[1]) * (union.shape[1] + 1))
-    return Shifted(
+    return ShiftPattern(
         analyze_pattern(union), _scatter(stiffness, keys), _scatter(mass, keys), diagonal
     )
 
@@ -246,15 +246,15 @@ def _mass_floor(mass: sp.csc_array, diagonal: Float[np.ndarray, " n"]) -> float:
     # B - cD is positive definite exactly when all its pivots are positive. Linear elements have c = 1/2.
     if (mass - sp.diags_array(diagonal)).count_nonzero() == 0:
         return 1.0
-    shifted = _shifted_pattern(mass, sp.csc_array(sp.diags_array(diagonal)))
+    pattern = _shift_pattern(mass, sp.csc_array(sp.diags_array(diagonal)))
     for halvings in range(12):
         floor = 0.49 * 0.5**halvings
-        lower = factorize_symmetric(shifted.elimination, shifted.stiffness - floor * shifted.mass)
+        lower = factorize_symmetric(pattern.elimination, pattern.stiffness - floor * pattern.mass)
         if lower and (lower.pivots > 0).all():
             return floor
     place = int(np.argmax(lower.pivots <= 0)) if lower else 0
     where = (
-        f", {lower.pivots[place]:.3g} at point {shifted.elimination.order[place]}" if lower else ""
+        f", {lower.pivots[place]:.3g} at point {pattern.elimination.order[place]}" if lower else ""
     )
     raise InvalidParameterError(
         f"mass must be positive definite; B - {floor:.1e} diag(B) has a pivot that is not positive{where}."
