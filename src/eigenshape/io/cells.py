@@ -80,8 +80,8 @@ def four_cornered(
     """Return whether cells of four corners are quads or tetrahedra; None if they could be either.
 
     They are quads if all are flat, or if they join like the faces of a surface: most share a side
-    with another cell, no side belongs to more than two, and few cells share three corners. They are tetrahedra if most share
-    three corners with another, and some side belongs to more than two.
+    with another cell, no side belongs to more than two, and few cells share three corners. They are
+    tetrahedra if most share three corners with another, and some side belongs to more than two.
     """
     if not len(cells) or cells.min() < 0 or cells.max() >= len(points):
         return "quads"  # the mesh that is built from them raises an error with the index
