@@ -13,9 +13,8 @@ from eigenshape.io.text import fans
 SEGMENTS = "segments"
 Blocks = Mapping[str, Int[np.ndarray, "_ _"]]  # by CellKind, or SEGMENTS
 SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))  # of a polygon of four corners
-FLAT = (
-    1e-6  # largest volume of a flat cell, as a share of its size cubed; single precision gives 1e-7
-)
+# Largest volume of a flat cell, as a share of its size cubed; single precision gives 1e-7.
+FLAT = 1e-6
 
 
 def require_kind(cells: str | None) -> CellKind | None:
