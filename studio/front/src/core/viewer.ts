@@ -185,7 +185,7 @@ export class Viewer {
     this.legend?.remove();
     this.legend = null;
     this.labels = null;
-    uniforms.coloring!.value = values && o ? 1 : 0;
+    this.setColoring(values && o ? 1 : 0);
     if (values && o) {
       this.replace("value", values);
       const colors = colorMap(o.map);
@@ -211,7 +211,14 @@ export class Viewer {
       if (label >= 0) paint.set(palette.subarray(3 * label, 3 * label + 3), 3 * vertex);
     });
     this.replace("paint", paint);
-    this.surface.material.uniforms.coloring!.value = 2;
+    this.setColoring(2);
+  }
+
+  private setColoring(kind: number): void {
+    const { material } = this.surface;
+    if (material.defines.COLORING === kind) return;
+    material.defines.COLORING = kind;
+    material.needsUpdate = true;
   }
 
   /** Tint vertices. Each layer has its own vertices and color. */
@@ -443,9 +450,9 @@ export class Viewer {
       side: three.DoubleSide,
       vertexShader: SURFACE_VERTEX,
       fragmentShader: SURFACE_FRAGMENT,
+      defines: { COLORING: 0 },
       uniforms: {
         ...this.motion,
-        coloring: { value: 0 },
         table: { value: null },
         range: { value: new three.Vector2(0, 1) },
         nodal: { value: false },
