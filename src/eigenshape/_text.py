@@ -82,6 +82,29 @@ def html_repr(value: Any) -> str:
     return "\n".join(["<table>", title, *rows, "</table>"])
 
 
+def repr_of_changes(value: Any) -> str:
+    """Return a dataclass in one line: its first field, and the fields that differ from their defaults.
+
+    The signature of a function that takes a recipe stays readable so.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @dataclass(repr=False)
+    ... class Plan:
+    ...     name: str
+    ...     steps: int = 5
+    ...     limit: float = 0.1
+    ...     __repr__ = repr_of_changes
+    >>> Plan("usual"), Plan("long", steps=50)
+    (Plan(name='usual'), Plan(name='long', steps=50))
+    """
+    first, *others = fields(value)
+    changed = [field for field in others if getattr(value, field.name) != field.default]
+    entries = [f"{field.name}={getattr(value, field.name)!r}" for field in (first, *changed)]
+    return f"{type(value).__name__}({', '.join(entries)})"
+
+
 def _shorten(entry: Any) -> str:
     """Return a field as text of at most `LONGEST` characters, or its type and size."""
     text = repr(entry)

@@ -50,9 +50,9 @@ def test_the_operations_of_a_factor_are_counted_by_columns():
     from eigenshape.spectral.solver.pencil import normalize
 
     pencil = normalize(es.cotangent_laplacian(es.icosphere(0)))
-    moved, operations = bench_parts._factor(pencil.shifted.elimination, None)
+    moved, operations = bench_parts._factor(pencil.shift_pattern.elimination, None)
     entries = np.zeros((12, 12))
-    e = pencil.shifted.elimination
+    e = pencil.shift_pattern.elimination
     for front in range(len(e.first) - 1):
         rows = e.rows[e.begins[front] : e.begins[front + 1]]
         for column in range(e.first[front], e.first[front + 1]):

@@ -99,7 +99,6 @@ def test_label_prints_a_table_and_takes_what_segment_prints(poses, tmp_path):
             "A mesh with labels must be written to a folder that exists",
         ),
         (("--labels", "{none}"), "No such file"),
-        (("--labels", "{seg}", "-n", 0), "n_regions must be at least 1; it is 0"),
     ],
 )
 def test_label_names_what_is_wrong(poses, tmp_path, options, message):

@@ -117,9 +117,12 @@ def test_segment_prints_a_table(biped):
         ),
         (
             ("segment", "{mesh}", "-n", 3, "--largest-gap"),
-            "exactly one of n_regions, persistence and largest_gap",
+            "at most one of --n-parts, --persistence, --largest-gap; it was given --n-parts and",
         ),
-        (("segment", "{mesh}", "-n", 0), "n_regions must be at least 1; it is 0"),
+        (
+            ("features", "{mesh}", "--persistence", 1, "--largest-gap"),
+            "it was given --persistence and --largest-gap",
+        ),
         (("segment", "{mesh}", "--persistence", -1), "persistence must be at least 0"),
     ],
 )
@@ -128,6 +131,13 @@ def test_segment_refuses_before_it_works(biped, tmp_path, arguments, message):
     done = run(*filled, code=1)
     assert message in " ".join(done.stderr.split())
     assert done.stdout == ""
+
+
+@pytest.mark.parametrize("verb", ["segment", "features"])
+def test_a_number_of_parts_below_one_is_refused_by_the_name_of_the_option(biped, verb):
+    shown = run(verb, biped, "-n", 0, code=2).output
+    assert "--n-parts" in shown
+    assert "n_regions" not in shown
 
 
 def test_features_write_their_heat_as_colors(biped, tmp_path):

@@ -92,6 +92,12 @@ def test_the_picture_gives_matched_parts_one_color_and_says_how_sure():
     assert right.texts
 
 
+def test_at_least_one_part_is_required():
+    ball = icosphere(1)
+    with pytest.raises(InvalidParameterError, match="n_parts must be at least 1; it is 0"):
+        transfer_labels(ball, np.zeros(80, dtype=np.int64), ball, n_parts=0)
+
+
 def test_one_label_a_face_is_asked_for():
     ball = icosphere(1)
     with pytest.raises(

@@ -8,7 +8,13 @@ import typer
 import eigenshape as es
 from eigenshape.cli import steps
 from eigenshape.cli.console import err, out, print_json, progress_bar
-from eigenshape.cli.inputs import HeatMethodOption, JsonOption, MeshArgument, RepairOption
+from eigenshape.cli.inputs import (
+    HeatMethodOption,
+    JsonOption,
+    MeshArgument,
+    RepairOption,
+    require_one_rule,
+)
 from eigenshape.retrieval.heat.recipe import SCALE_FREE
 
 COLUMNS = {
@@ -24,7 +30,9 @@ COLUMNS = {
 def features(
     mesh: MeshArgument,
     *,
-    n_parts: Annotated[int, typer.Option("-n", "--n-parts", help="Largest number of parts.")] = 15,
+    n_parts: Annotated[
+        int, typer.Option("-n", "--n-parts", min=1, help="Largest number of parts.")
+    ] = 15,
     persistence: Annotated[
         float | None,
         typer.Option(
@@ -63,6 +71,7 @@ def features(
     Above 100,000 vertices, or with --accuracy, heat is approximate, and its error is printed.
     """
     recipe = steps.heat_recipe(method)
+    require_one_rule(None, persistence, largest_gap=largest_gap)
     steps.require_picture(picture)
     steps.require_colored_path(output)
     surface = steps.load_mesh(mesh, repair)

@@ -100,6 +100,21 @@ def repair_names(text: str) -> tuple[str, ...]:
     return names
 
 
+def require_one_rule(n_parts: int | None, persistence: float | None, *, largest_gap: bool) -> None:
+    """Raise an error if more than one option decides how many parts a mesh gets."""
+    rules = {
+        "--n-parts": n_parts is not None,
+        "--persistence": persistence is not None,
+        "--largest-gap": largest_gap,
+    }
+    given = [name for name, is_given in rules.items() if is_given]
+    if len(given) > 1:
+        raise InvalidParameterError(
+            f"The number of parts takes at most one of {', '.join(rules)}; it was given "
+            f"{' and '.join(given)}."
+        )
+
+
 def require_method(name: str, names: Sequence[str] = METHODS) -> None:
     """Raise an error if the name is not one of the allowed names."""
     if name not in names:

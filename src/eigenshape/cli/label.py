@@ -41,6 +41,7 @@ def label(
         typer.Option(
             "-n",
             "--n-parts",
+            min=1,
             help="Largest number of parts to cut each mesh into. By default as many as are found.",
         ),
     ] = None,
@@ -65,8 +66,8 @@ def label(
     """
     steps.require_picture(picture)
     steps.require_label_path(output)
-    given = steps.read_labels(labels)
-    source, target = es.read_mesh(like), steps.load_mesh(mesh, repair)
+    source, given = steps.read_labeled_mesh(like, labels)
+    target = steps.load_mesh(mesh, repair)
     with progress_bar("label") as progress:
         found = es.transfer_labels(source, given, target, n_parts=n_parts, progress=progress)
     rows = _rows(target, found)

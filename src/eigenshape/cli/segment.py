@@ -9,7 +9,7 @@ import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_json, progress_bar
-from eigenshape.cli.inputs import PARTS, JsonOption, MeshArgument, RepairOption
+from eigenshape.cli.inputs import PARTS, JsonOption, MeshArgument, RepairOption, require_one_rule
 from eigenshape.features.contrast import PART_CONTRAST
 from eigenshape.retrieval.heat.recipe import PRESETS
 
@@ -37,7 +37,7 @@ def segment(
         ),
     ] = PARTS,
     n_parts: Annotated[
-        int | None, typer.Option("-n", "--n-parts", help="Largest number of parts.")
+        int | None, typer.Option("-n", "--n-parts", min=1, help="Largest number of parts.")
     ] = None,
     persistence: Annotated[
         float | None,
@@ -78,6 +78,7 @@ def segment(
     """Cut a mesh into its parts: limbs, head, torso."""
     if method not in METHODS:
         raise InvalidParameterError(f"--method takes {', '.join(METHODS)}; it is {method!r}.")
+    require_one_rule(n_parts, persistence, largest_gap=largest_gap)
     steps.require_picture(picture)
     steps.require_label_path(output)
     surface = steps.load_mesh(mesh, repair)

@@ -158,7 +158,7 @@ def spectrum(
     found = steps.load_shape(shape, repair, dim, drop_missing=drop_missing, cells=cells)
     steps.require_drawable(found, eigenfunctions)
     bounded = steps.require_bracketable(found) if brackets else None
-    name = operator or steps.default_operator(found)
+    name = steps.operator_name(found, operator)
     fixed = steps.boundary_points(found, ORDERS.get(name, 1)) if boundary == "dirichlet" else None
     with progress_bar("spectrum") as progress:
         progress(0.0, "building the operator")

@@ -81,7 +81,7 @@ def stability(
     For instance: eigenshape stability clean.ply noisy.ply --picture report.png
     """
     steps.require_picture(picture)
-    partners = steps.read_map(map_file) if map_file else None
+    partners = steps.read_partners(map_file)
     first, second = (
         steps.scale_shape(steps.load_shape(path, repair, dim, drop_missing=drop_missing), scale)
         for path in (one, two)

@@ -53,6 +53,14 @@ class Binding:
     --------
     bind : Compute a binding.
     bend : Move the bound regions.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> binding = es.deformation.bind(es.rig_shape(mesh), [mesh.vertices[:, 2] > 0.2])
+    >>> float(binding.shares.min()), float(binding.shares.max())
+    (0.0, 1.0)
     """
 
     rig: EigenRig

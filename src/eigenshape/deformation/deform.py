@@ -6,7 +6,7 @@ from typing import SupportsIndex
 from eigenshape._arguments import require_type
 from eigenshape.deformation.binding import Binding, bind
 from eigenshape.deformation.graded_bend import bend_graded, bend_uncrossed
-from eigenshape.deformation.handles import Handle, require_handles
+from eigenshape.deformation.handles import Handle, require_handle, require_handles
 from eigenshape.deformation.modes import Mode, require_mode
 from eigenshape.deformation.region import Region
 from eigenshape.deformation.rig import EigenRig
@@ -70,7 +70,7 @@ def deform(
     True
     """
     require_type(rig, EigenRig, "rig")
-    require_type(handle, Handle, "handle")
+    require_handle(handle)
     return bend(bind(rig, [region], fixed=fixed, n_modes=n_modes), [handle], mode=mode)
 
 

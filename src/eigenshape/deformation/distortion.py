@@ -35,6 +35,15 @@ class Distortion:
     See Also
     --------
     measure_distortion : Compute the distortion.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> larger = es.TriangleMesh(1.1 * mesh.vertices, mesh.faces)
+    >>> distortion = es.deformation.measure_distortion(mesh, larger)
+    >>> round(distortion.edge_error, 6), len(distortion.flipped)
+    (0.1, 0)
     """
 
     edge_error: float

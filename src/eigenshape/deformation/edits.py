@@ -14,7 +14,7 @@ from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import bend
-from eigenshape.deformation.handles import Handle, Rotation, Translation
+from eigenshape.deformation.handles import Handle, Rotation, Translation, require_handle
 from eigenshape.deformation.modes import Mode, require_mode
 from eigenshape.deformation.region import BoxRegion, BrushRegion, Region, copy_region, region_mask
 from eigenshape.deformation.rig import EigenRig, pose_rig
@@ -80,7 +80,7 @@ class Move:
     _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
-        require_type(self.handle, Handle, "handle")
+        require_handle(self.handle)
         object.__setattr__(self, "region", copy_region(self.region))
 
 

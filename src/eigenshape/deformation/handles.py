@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from typing_extensions import TypeAliasType
 
-from eigenshape._arguments import require_each
+from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import finite_values, freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr
@@ -133,12 +134,18 @@ class Translation:
         return share[:, None] * self.vector
 
 
-Handle = Rotation | Translation
+# `help` shows the name.
+Handle = TypeAliasType("Handle", Rotation | Translation)
+
+
+def require_handle(value: object) -> None:
+    """Raise an error if a value is neither a rotation nor a translation."""
+    require_type(value, Rotation | Translation, "handle")
 
 
 def require_handles(handles: Sequence[Handle], n_regions: int) -> None:
     """Raise an error if there is not one handle for each region."""
-    require_each(handles, Handle, "handles")
+    require_each(handles, Rotation | Translation, "handles")
     if len(handles) != n_regions:
         raise InvalidParameterError(
             "Each region must have one handle; "

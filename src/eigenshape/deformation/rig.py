@@ -52,6 +52,13 @@ class EigenRig:
     --------
     rig_shape : Compute a rig.
     deform : Move a region of a rigged shape.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> rig = es.rig_shape(es.icosphere(2))
+    >>> rig.eigenvectors.shape, round(float(rig.areas.sum()), 2)
+    ((162, 162), 12.33)
     """
 
     mesh: TriangleMesh

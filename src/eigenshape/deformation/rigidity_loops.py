@@ -1,4 +1,4 @@
-"""Compiled loops of `rigidity`: rotations that fit the edges at each vertex, and the edges turned by them."""
+"""Compiled loops of `rigidity`: the best rotation at each vertex, and the rotated edges."""
 
 from typing import no_type_check
 
@@ -22,10 +22,11 @@ HALFWAY = 3.0
 @njit
 @no_type_check
 def fit_rotations(vertices, starts, others, weights, rest, posed, turns):
-    """Turn the rotations (unit quaternions, real part first) of some vertices to where they fit the posed edges best.
+    """Update the rotations of some vertices so that they fit the posed edges best.
 
-    max over R of Σ_j w_ij e'_ij · R e_ij, from the rotation that stands in `turns` on. Where edges do not tell a
-    rotation, it keeps what it had. Returns what is left, Σ_ij w_ij |R_i e_ij - e'_ij|² / 2.
+    The rotation of vertex i maximizes Σ_j w_ij e'_ij · R e_ij. It is a unit quaternion, real part
+    first, in `turns`, which also holds the start of the iteration. If the edges do not determine a
+    rotation, it keeps its value. Returns the remaining energy, Σ_ij w_ij |R_i e_ij - e'_ij|² / 2.
     """
     covariance = np.empty((3, 3))
     left = 0.0
@@ -57,13 +58,13 @@ def fit_rotations(vertices, starts, others, weights, rest, posed, turns):
 @njit
 @no_type_check
 def _settle(covariance, turns, i):
-    """Climb by Newton's steps, and by steps that cannot overshoot where it is not concave; return the height."""
+    """Maximize by Newton steps, or by safe steps where it is not concave; return the maximum."""
     w, x, y, z = turns[i, 0], turns[i, 1], turns[i, 2], turns[i, 3]
     largest = 0.0
     for row in range(3):
         for column in range(3):
             largest = max(largest, abs(covariance[row, column]))
-    if largest > 0.0:  # cubes of it are taken below
+    if largest > 0.0:  # its cube is used below
         for row in range(3):
             for column in range(3):
                 covariance[row, column] /= largest
@@ -103,7 +104,7 @@ def _settle(covariance, turns, i):
             angle = np.arctan2(size, p00 + p11 + p22 - along)  # the best about this axis
             half = np.tan(min(angle, HALFWAY) / 2) / size
             u, v, t = u * half, v * half, t * half
-        # (1, tangent of half the turn) is its quaternion; small turns need no tangent.
+        # The quaternion of a turn is (1, tan(angle / 2) axis); small turns need no tangent.
         w, x, y, z = (
             w - u * x - v * y - t * z,
             x + u * w + v * z - t * y,
@@ -126,7 +127,7 @@ def _settle(covariance, turns, i):
 @njit
 @no_type_check
 def turn_edges(vertices, starts, others, weights, rest, turns, sums):
-    """Write Σ_j w_ij ((R_i + R_j)/2 - 1) (x_i - x_j) for some vertices; nothing where nothing turns."""
+    """Write Σ_j w_ij ((R_i + R_j)/2 - 1) (x_i - x_j) to `sums` for some vertices; 0 without rotation."""
     n = len(turns)
     spins = np.empty((n, 3, 3))  # (R - 1)/2
     for i in range(n):

@@ -15,7 +15,7 @@ from eigenshape.deformation.binding import Binding, bind
 from eigenshape.deformation.deform import bend
 from eigenshape.deformation.edits import Edit, Move, apply_edit, carry_edit
 from eigenshape.deformation.graded_bend import move_by_shares
-from eigenshape.deformation.handles import Handle
+from eigenshape.deformation.handles import Handle, require_handle
 from eigenshape.deformation.modes import Mode, require_mode
 from eigenshape.deformation.region import Region, region_mask
 from eigenshape.deformation.rig import EigenRig, pose_rig
@@ -150,7 +150,7 @@ class DeformationSession:
         InvalidParameterError
             As for `bind`.
         """
-        require_type(handle, Handle, "handle")
+        require_handle(handle)
         return self.drag_all([Move(region, handle)], fixed=fixed, n_modes=n_modes)
 
     def drag_all(

@@ -72,6 +72,20 @@ def detailed_skeleton(binding: Binding, *, second_pass: bool = True) -> Detailed
     Returns
     -------
     DetailedSkeleton
+
+    Examples
+    --------
+    One preparation serves many positions of a handle:
+
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> binding = es.deformation.bind(es.rig_shape(mesh), [mesh.vertices[:, 2] > 0.2])
+    >>> skeleton = es.deformation.detailed_skeleton(binding)
+    >>> for height in (0.1, 0.2):
+    ...     moved = es.deformation.eigen_deformation(skeleton, [es.Translation([0, 0, height])])
+    ...     print(f"the mean height is {moved[:, 2].mean():.2f}")
+    the mean height is 0.04
+    the mean height is 0.08
     """
     require_type(binding, Binding, "binding")
     rig, response = binding.rig, skeleton_response(binding)

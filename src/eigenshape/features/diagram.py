@@ -31,6 +31,14 @@ class PersistencePairs:
     birth_vertices, death_vertices : (p,) int
     births, deaths : (p,) float
         The function at these vertices.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.shapes.grid(4, 1)
+    >>> diagram = es.features.persistence_diagram(mesh, [0, 0, 2, 2, 1, 1, 3, 3, 0, 0])
+    >>> diagram.maxima.births, diagram.maxima.deaths
+    (array([2.]), array([1.]))
     """
 
     birth_vertices: Int[np.ndarray, " p"]
@@ -72,6 +80,16 @@ class PersistenceDiagram:
     --------
     persistence_diagram : Compute a diagram.
     bottleneck_distance : Compare two diagrams.
+
+    Examples
+    --------
+    The height on a torus that lies flat has two essential loops:
+
+    >>> import eigenshape as es
+    >>> torus = es.shapes.torus(20, 10)
+    >>> diagram = es.features.persistence_diagram(torus, torus.vertices[:, 2])
+    >>> len(diagram.loops.births)
+    2
     """
 
     maxima: PersistencePairs

@@ -10,11 +10,13 @@ from eigenshape._compile import njit
 @njit
 @no_type_check
 def match_rows(starts, columns, n_columns, first):
-    """Match as many rows as can be with a column each; entries `starts[i]` to `starts[i + 1]` are those of row i.
+    """Match as many rows as possible with a column each.
 
-    `first` is a matching to begin with, the column of each row, or -1. Returned are that of the largest matching, and
-    where a row is without column a depth ≥ 0 for the rows that alternating paths reach from such: these are more than
-    the columns that they may have (Hall 1935).
+    The columns of row i are columns[starts[i]:starts[i + 1]]. `first` is a matching to start from:
+    the column of each row, or -1. Returns the column of each row in a largest matching, and a depth
+    for each row. If a row has no column, depths ≥ 0 mark the rows that alternating paths reach from
+    such rows. These rows are more than the columns in their entries, which proves that no matching
+    is larger (Hall 1935).
     """
     n = len(starts) - 1
     row_of, column_of = np.full(n_columns, -1), first.copy()
@@ -38,7 +40,10 @@ def match_rows(starts, columns, n_columns, first):
 @njit
 @no_type_check
 def _layer(starts, columns, row_of, column_of, depth, queue):
-    """Count for each row the steps from a free one along alternating paths; whether a free column is reached."""
+    """Fill the distance of each row from a free row; return whether a free column is reached.
+
+    Distances are steps along alternating paths.
+    """
     height = 0
     for row in range(len(depth)):
         depth[row] = -1
@@ -66,7 +71,7 @@ def _layer(starts, columns, row_of, column_of, depth, queue):
 @njit
 @no_type_check
 def _augment(free, columns, starts, row_of, column_of, depth, following, path):
-    """Walk down the layers from a free row to a free column, and turn the path over."""
+    """Find a path through the layers from a free row to a free column, and flip its edges."""
     height = 1
     path[0] = free
     while height:

@@ -1,8 +1,9 @@
-"""Compiled loops of `merge_tree`: sides of faces in the order of their edges, and faces joined over them.
+"""Compiled loops of `merge_tree`: sort the sides of faces by edge, and join faces across them.
 
-Vertices are named by rank here, the lowest 0. A side is filed under the higher vertex of its edge, so that a walk over
-the ranks from the top meets all edges in falling order, and only the few sides at one vertex are ever sorted. The
-caller allocates all arrays: compiling an allocation takes longer than compiling a small loop.
+Here the number of a vertex is its rank; the lowest vertex is 0. Sides are grouped by the higher
+vertex of their edge, so a loop over falling ranks visits the edges in falling order, and only the
+few sides at one vertex must be sorted. The caller allocates all arrays: compiling an allocation
+takes longer than compiling a small loop.
 """
 
 from typing import no_type_check
@@ -29,9 +30,10 @@ def find_corners(faces, rank, corners):
 @njit
 @no_type_check
 def file_sides(corners, place, lower, owner):
-    """File the three sides of each face under the higher vertex: the lower vertex, and the face.
+    """Group the three sides of each face by their higher vertex.
 
-    Those of vertex v are filed from place[v] on, which is moved to their end.
+    Fills the lower vertex and the face of each side. The sides of vertex v begin at place[v], which
+    is moved to their end.
     """
     for face in range(len(corners)):
         for side in range(3):
@@ -46,13 +48,14 @@ def file_sides(corners, place, lower, owner):
 @njit
 @no_type_check
 def join_faces(corners, starts, lower, owner, climbs_to, highest, ended):
-    """Join faces over falling edges: fill for each the face it climbs to; return how many basins end.
+    """Join faces across edges in falling order; return the number of basins that end.
 
-    Of each that does, `ended` is filled with itself, the edge, and the neighbor. `climbs_to` and `highest` come filled
-    with the number of each face; the second is scratch.
+    `climbs_to` is filled with the face to which each face climbs. For each basin that ends, `ended`
+    is filled with the basin, the edge and the neighbor. On entry, `climbs_to` and `highest` hold
+    the number of each face; `highest` is scratch.
 
-    A face whose highest edge leads to a higher face joins its basin at once. Basins are joined as in Kruskal's
-    algorithm: the one with the lower maximum ends.
+    A face whose highest edge leads to a higher face joins its basin at once. Basins are joined as
+    in Kruskal's algorithm: the one with the lower maximum ends.
     """
     n_ended = 0
     for high in range(len(starts) - 2, -1, -1):
@@ -65,7 +68,7 @@ def join_faces(corners, starts, lower, owner, climbs_to, highest, ended):
                 last += 1
             for side in range(
                 last - 1, first - 1, -1
-            ):  # the higher face first, whose own way up it may be
+            ):  # the higher face first: this may be its own way up
                 face = owner[side]
                 if corners[face, 0] == high and corners[face, 1] == low and owner[side + 1] != face:
                     climbs_to[face] = climbs_to[owner[side + 1]]
@@ -86,7 +89,7 @@ def join_faces(corners, starts, lower, owner, climbs_to, highest, ended):
 @njit
 @no_type_check
 def _is_lower(corners, one, two):
-    """Say whether a face comes before another by highest, middle, lowest vertex, then number."""
+    """Return whether a face precedes another by highest, middle and lowest vertex, then number."""
     for corner in range(3):
         if corners[one, corner] != corners[two, corner]:
             return corners[one, corner] < corners[two, corner]
@@ -96,10 +99,10 @@ def _is_lower(corners, one, two):
 @njit
 @no_type_check
 def _sort_sides(corners, lower, owner, first, end):
-    """Sort the sides of a vertex by falling lower vertex, of equals the lower face first.
+    """Sort the sides of a vertex by falling lower vertex; equal ones by rising face.
 
-    By insertion at gaps that shrink to 1 (Shell 1959, gaps of Knuth 1973): most vertices have six sides, but the apex
-    of a fan may have a million.
+    This is Shell sort with Knuth's gaps (1973): most vertices have six sides, but the apex of a fan
+    may have a million.
     """
     gap = 1
     while 9 * gap < end - first:  # up to nine sides plain insertion is as fast

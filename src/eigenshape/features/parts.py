@@ -50,6 +50,13 @@ class PartDecomposition:
     See Also
     --------
     find_parts : Compute a decomposition.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> found = es.find_parts(es.make_creature("biped", n_vertices=1200))
+    >>> len(found.parts.features.vertices), found.heat.shape
+    (7, (1200,))
     """
 
     mesh: TriangleMesh
@@ -164,6 +171,21 @@ def part_spectrum(
     See Also
     --------
     part_tree : Merge parts by this spectrum.
+
+    Examples
+    --------
+    The first eigenfunction of a dumbbell that is not constant has one sign on each ball:
+
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(3)
+    >>> x, y, z = ball.vertices.T
+    >>> thickness = 0.1 + z**2
+    >>> dumbbell = es.TriangleMesh(np.column_stack([thickness * x, thickness * y, z]), ball.faces)
+    >>> spectrum = es.features.part_spectrum(dumbbell)
+    >>> upper = z > 0.2
+    >>> len(np.unique(np.sign(spectrum.eigenvectors[upper, 1])))
+    1
     """
     mesh = as_mesh(mesh)
     require_describable(mesh)

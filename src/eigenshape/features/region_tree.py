@@ -53,6 +53,16 @@ class MergeTree(RegionTree):
     --------
     merge_tree : Compute the tree.
     segment : Cut the tree into regions.
+
+    Examples
+    --------
+    The lower of two maxima merges into the higher one at a saddle of height 1:
+
+    >>> import eigenshape as es
+    >>> mesh = es.shapes.grid(4, 1)
+    >>> tree = es.merge_tree(mesh, [0, 0, 2, 2, 1, 1, 3, 3, 0, 0])
+    >>> tree.values, tree.persistence, tree.parent
+    (array([3., 2.]), array([inf,  1.]), array([-1,  0]))
     """
 
     saddles: Int[np.ndarray, "m 2"]

@@ -32,6 +32,15 @@ class FeaturePoints:
     See Also
     --------
     segment : Compute feature points and their regions.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.shapes.grid(4, 1)
+    >>> tree = es.merge_tree(mesh, [0, 0, 2, 2, 1, 1, 3, 3, 0, 0])
+    >>> features = es.segment(tree, n_regions=2).features
+    >>> features.vertices, features.persistence
+    (array([7, 3]), array([inf,  1.]))
     """
 
     vertices: Int[np.ndarray, " m"]
@@ -55,6 +64,16 @@ class Segmentation:
     See Also
     --------
     segment : Compute a segmentation.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> mesh = es.shapes.grid(4, 1)
+    >>> tree = es.merge_tree(mesh, [0, 0, 2, 2, 1, 1, 3, 3, 0, 0])
+    >>> parts = es.segment(tree, n_regions=2)
+    >>> parts.features.vertices, np.bincount(parts.labels)
+    (array([7, 3]), array([4, 4]))
     """
 
     labels: Int[np.ndarray, " f"]

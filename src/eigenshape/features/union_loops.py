@@ -1,4 +1,4 @@
-"""Compiled loops that join what is connected, in a given order."""
+"""Compiled loops of union-find: components that form as points or edges enter in a given order."""
 
 from typing import no_type_check
 
@@ -10,10 +10,10 @@ from eigenshape._compile import njit
 @njit
 @no_type_check
 def join_points(starts, neighbors, order):
-    """Let points enter in order and join each to the neighbors before it.
+    """Add points in the given order, and join each to its neighbors that are already there.
 
-    Returns for each point the first one of its component, and for each component that ends on the way its first point
-    and the point that joined it to an earlier one.
+    Returns the first point of each point's component and, for each component that was joined to an
+    earlier one, its first point and the point that joined them.
     """
     n = len(order)
     place = np.empty(n, dtype=np.int64)
@@ -42,7 +42,7 @@ def join_points(starts, neighbors, order):
 @njit
 @no_type_check
 def spanning_forest(ends, order, n):
-    """Say of each edge whether it joins two components where edges enter in order."""
+    """Return, for each edge, whether it joins two components when edges are added in order."""
     root = np.arange(n)
     joins = np.zeros(len(ends), dtype=np.bool_)
     for edge in order:
@@ -56,7 +56,7 @@ def spanning_forest(ends, order, n):
 @njit
 @no_type_check
 def find_root(root, point):
-    """Return the root of a tree that a point is in, halving the way there (Tarjan and van Leeuwen 1984)."""
+    """Return the root of a point's tree, with path halving (Tarjan and van Leeuwen 1984)."""
     while root[point] != point:
         root[point] = root[root[point]]
         point = root[point]

@@ -10,10 +10,10 @@ from eigenshape._compile import njit
 @njit
 @no_type_check
 def cell_areas(places):
-    """Return for each set of points (k, 2) the area of the Voronoi cell of the origin, inside their convex hull.
+    """Return the area of the origin's Voronoi cell within the convex hull, for each point set.
 
-    The points are sorted by x, then y, and the origin is one of them. Their hull (Andrew's monotone chain) is cut by
-    one bisector after the other.
+    Each set has k points, (k, 2), sorted by x, then y; the origin is one of them. The hull
+    (Andrew's monotone chain) is cut by one bisector after the other.
     """
     n, k, _ = places.shape
     areas = np.zeros(n)

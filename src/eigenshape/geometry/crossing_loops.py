@@ -1,6 +1,6 @@
 """Compiled loops of `crossings`: a tree of boxes, and whether two faces cross.
 
-Face i has the corners `points[3 i : 3 i + 3]`. The faces stand in the order of the tree's leaves.
+The corners of face i are `points[3 i : 3 i + 3]`. Faces are in the order of the tree's leaves.
 """
 
 from typing import no_type_check
@@ -28,7 +28,7 @@ def face_boxes(points):
 @njit
 @no_type_check
 def curve_places(boxes):
-    """Return for the middle of each box its place on Morton's curve through 2^20 cells a side."""
+    """Return the place of each box center on Morton's curve through 2^20 cells per side."""
     places = np.zeros(len(boxes), dtype=np.int64)
     lowest = np.array([boxes[:, axis].min() for axis in range(3)])
     extent = max([boxes[:, 3 + axis].max() - lowest[axis] for axis in range(3)])
@@ -45,7 +45,10 @@ def curve_places(boxes):
 @njit
 @no_type_check
 def box_tree(boxes):
-    """Return the boxes of a complete binary tree: below node k are nodes 2 k + 1 and 2 k + 2, and 2^levels leaves."""
+    """Return the boxes of a complete binary tree of 2^levels leaves.
+
+    The children of node k are 2 k + 1 and 2 k + 2.
+    """
     n, levels = len(boxes), 0
     while (LEAF << levels) < n:
         levels += 1
@@ -91,9 +94,9 @@ def _meet(one, other):
 @njit
 @no_type_check
 def crossing_pairs(points, boxes):
-    """Return the pairs of faces that cross, (p, 2), in no order.
+    """Return the pairs of faces that cross, (p, 2), in no particular order.
 
-    Nodes are compared with nodes of their own level, from the root with itself down to leaves with leaves.
+    Nodes are compared with nodes of the same level, from the root down to the leaves.
     """
     levels, nodes = box_tree(boxes)
     n, leaves, axes = len(boxes), 1 << levels, _axes(points)
@@ -128,7 +131,7 @@ def crossing_pairs(points, boxes):
 @njit
 @no_type_check
 def _axes(points):
-    """Return for each face an axis along which its shadow has area, -1 where the face has none."""
+    """Return, for each face, an axis along which its projection has area; -1 if the face has none."""
     axes = np.empty(len(points) // 3, dtype=np.int64)
     for face in range(len(axes)):
         axes[face], a = -1, 3 * face
@@ -142,11 +145,13 @@ def _axes(points):
 @njit
 @no_type_check
 def _cross(points, axes, i, j):
-    """Tell whether a point inside one of two faces belongs to the other; one of them has area.
+    """Return whether the interior of one of two faces meets the other; at least one has area.
 
-    The planes meet in a line, the faces meet it in two intervals. Each end is where a side meets it that starts at the
-    corner `alone` on its side of the other plane, so the sign of the volume of two such sides, one of each face, is the
-    order of their ends along the line, up to one common sign (Guigue and Devillers 2003, section 3).
+    The planes meet in a line, and each face cuts this line in an interval. An end of the interval
+    is the point where a side of the face meets the line. This side starts at `alone`, the corner
+    that is alone on its side of the other plane. The sign of the volume spanned by two such sides,
+    one of each face, gives the order of their ends on the line, up to one common sign (Guigue and
+    Devillers 2003, section 3).
     """
     a, b = 3 * i, 3 * j
     if axes[i] < 0:
@@ -165,7 +170,7 @@ def _cross(points, axes, i, j):
         )
     low_a, high_a, alone_a = _sides(points, b, a)
     if low_a == high_a or (low_a * high_a == 0 and low_b * high_b == 0):
-        return False  # one misses the line, or both have no more than their border on it
+        return False  # one misses the line, or only their borders touch it
     least, most = 1, -1
     for p in (a + (alone_a + 1) % 3, a + (alone_a + 2) % 3):
         for q in (b + (alone_b + 1) % 3, b + (alone_b + 2) % 3):
@@ -177,7 +182,7 @@ def _cross(points, axes, i, j):
 @njit
 @no_type_check
 def _beyond_shared_side(points, a, b):
-    """Return the corner of face b across a side that it has in common with face a, -1 where there is no such side."""
+    """Return the corner of face b opposite to a side that it shares with face a, or -1."""
     shared, apex = 0, -1
     for q in range(b, b + 3):
         if same_place(points, a, q) or same_place(points, a + 1, q) or same_place(points, a + 2, q):
@@ -190,7 +195,10 @@ def _beyond_shared_side(points, a, b):
 @njit
 @no_type_check
 def _sides(points, a, b):
-    """Return the least and the largest side of the plane of face a for corners of b, and the corner alone on one."""
+    """Return on which sides of face a's plane b has corners, and the corner alone on its side.
+
+    The sides are the smallest and the largest sign of the three corners.
+    """
     x = side_of_plane(points, a, a + 1, a + 2, b)
     y = side_of_plane(points, a, a + 1, a + 2, b + 1)
     z = side_of_plane(points, a, a + 1, a + 2, b + 2)
@@ -200,7 +208,7 @@ def _sides(points, a, b):
         alone = 1
     elif z != 0 and z * x <= 0 and z * y <= 0:
         alone = 2
-    else:  # no corner on one of the sides: the one in the plane, if any
+    else:  # one side has no corner: take the corner in the plane, if any
         alone = 0 if x == 0 else 1 if y == 0 else 2
     return min(x, y, z), max(x, y, z), alone
 
@@ -208,7 +216,10 @@ def _sides(points, a, b):
 @njit
 @no_type_check
 def _is_apart(points, u, v, a, p, q, r):
-    """Tell whether a side of face a has p, q, r beyond or on it, in the plane of axes u and v."""
+    """Return whether a side of face a separates it from p, q, r, projected to axes u and v.
+
+    Points on the side count as separated.
+    """
     turn = side_of_line(points, u, v, a, a + 1, a + 2)
     for k in range(3):
         s, t = a + k, a + (k + 1) % 3
@@ -224,7 +235,10 @@ def _is_apart(points, u, v, a, p, q, r):
 @njit
 @no_type_check
 def _enters(points, axis, a, b):
-    """Tell whether face a, a segment or a point, has a point inside face b, whose shadow along `axis` has area."""
+    """Return whether face a, a segment or a point, has a point inside face b.
+
+    The projection of b along `axis` has area.
+    """
     p, q = _ends(points, a)
     from_p, from_q = (
         side_of_plane(points, b, b + 1, b + 2, p),

@@ -26,6 +26,12 @@ class EnclosingBall:
         Center of the ball, in length.
     radius : float
         Radius of the ball, in length.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.geometry.enclosing_ball([[0.0, 0.0], [2.0, 0.0], [1.0, 0.5]])
+    EnclosingBall(center=array([1., 0.]), radius=1.0)
     """
 
     center: Float[np.ndarray, " d"]

@@ -35,6 +35,15 @@ class FacetTable:
     n_simplices : (q,) int
         Number of simplices at each facet: 1 on the boundary, 2 inside, more where the mesh is not
         a manifold.
+
+    Examples
+    --------
+    The facets of a curve are its points:
+
+    >>> import eigenshape as es
+    >>> curve = es.SimplicialMesh([[0.0], [1.0], [2.0]], [[0, 1], [1, 2]])
+    >>> es.geometry.facet_table(curve).n_simplices
+    array([1, 2, 1])
     """
 
     facets: Int[np.ndarray, "q m"]

@@ -1,4 +1,4 @@
-"""Compiled loops of `geodesic`: a wave that leaves some vertices and crosses triangles laid flat.
+"""Compiled loops of `geodesic`: a wave that starts at some vertices and crosses unfolded triangles.
 
 The caller allocates all arrays: compiling an allocation takes longer than compiling a small loop.
 """
@@ -9,16 +9,17 @@ import numpy as np
 
 from eigenshape._compile import njit
 
-FRONT = -1  # sender of a vertex that several sources reached as one straight front
+FRONT = -1  # stands for the source of a vertex that a straight front of several sources reached
 
 
 @njit
 @no_type_check
 def through_edge(near, far, length, left, right):
-    """Return the distance of a triangle's third corner from a source seen through the opposite edge, or infinity.
+    """Return the distance of a triangle's third corner from a source beyond the opposite edge.
 
-    `near` and `far` are the distances of the edge's ends; the source is laid flat beyond the edge. `left` and `right`
-    are the third corner's distances from the same ends. Infinity where the straight line misses the edge.
+    `near` and `far` are the distances of the edge's ends from the source, which is unfolded into
+    the plane of the triangle. `left` and `right` are the distances of the third corner from the
+    same ends. The distance is infinite if the straight line misses the edge.
     """
     if length == 0.0:  # both ends are one point, and the wave walks around it along the other edges
         return np.inf
@@ -38,9 +39,10 @@ def through_edge(near, far, length, left, right):
 @njit
 @no_type_check
 def across_edge(near, far, length, left, right):
-    """Return the same where no point sends the wave: its front is straight (Kimmel and Sethian 1998).
+    """Return the distance of the third corner from a straight front (Kimmel and Sethian 1998).
 
-    So it is before an edge whose ends are both sources, which is one all along.
+    The arguments are those of `through_edge`. A front is straight if both ends of the edge are
+    sources, because then the whole edge is one.
     """
     if length == 0.0:
         return np.inf
@@ -59,17 +61,19 @@ def across_edge(near, far, length, left, right):
 @njit
 @no_type_check
 def spread_wave(fans, radius, sources, scratch, reached, distances):
-    """Fill which vertices lie within `radius` of some sources, and how far from the nearest; return how many.
+    """Fill the vertices within `radius` of some sources and their distances; return their number.
 
-    `fans` are `starts`, `first_corner`, `second_corner` and `sides`: entry k of starts[v] to starts[v + 1] is a
-    triangle at vertex v with its other two corners; sides[k] are the lengths from v to each of them, and between them.
+    `fans` holds `starts`, `first_corner`, `second_corner` and `sides`. Entries starts[v] to
+    starts[v + 1] are the triangles at vertex v: their other two corners, and the lengths from v to
+    each of these and between them.
 
-    `scratch` has for each vertex its distance, infinite on entry and again on return, whether it is settled, False on
-    entry and again on return, its sender, and a place in a list of those touched; and the keys and vertices of the
-    heap, as many as there are corners of triangles and sources: a triangle sends at most three waves.
+    `scratch` holds, for each vertex: its distance (infinite on entry and on return), whether it is
+    settled (False on entry and on return), its source, and a list of the vertices that were
+    touched. It also holds the keys and vertices of the heap, which has one entry for each corner of
+    a triangle and each source, since a triangle sends at most three waves.
     """
     starts, first_corner, second_corner, sides = fans
-    # The sender is the source that a vertex was reached from; FRONT where several sent the wave.
+    # The sender is the source from which a vertex was reached, or FRONT if there were several.
     distance, settled, sender, touched, heap_keys, heap_ids = scratch
     n_touched = n_reached = 0
     for i in range(len(sources)):

@@ -1,4 +1,4 @@
-"""Compiled loop of `holes`: the least triangulation of a closed chain of points."""
+"""Compiled loop of `holes`: the cheapest triangulation of a closed chain of points."""
 
 from typing import no_type_check
 
@@ -17,9 +17,10 @@ FLAT = 1e-7
 @njit
 @no_type_check
 def triangulate(points, taken, triangles):
-    """Fill the triangles between points 0..n-1 in order, of the least sum of costs; tell whether there is one.
+    """Fill the cheapest triangulation of the polygon 0..n-1; return whether there is one.
 
-    Dynamic programming over the chains i..j (Barequet and Sharir 1995). Sides that are `taken` are not drawn.
+    This is dynamic programming over the chains i..j (Barequet and Sharir 1995). No side is drawn
+    that is marked in `taken`.
     """
     n = len(points)
     costs, middles = np.full((n, n), np.inf), np.zeros((n, n), dtype=np.int64)

@@ -1,9 +1,10 @@
-"""Compiled predicates with exact signs: on which side of a line or a plane does a point lie.
+"""Compiled predicates with exact signs: on which side of a line or a plane a point lies.
 
-A sum of rounded products is believed where it is larger than its rounding can be (bounds of Shewchuk 1997, "Adaptive
-precision floating-point arithmetic and fast robust geometric predicates", figures 21 and 22); elsewhere the sum is made
-without rounding, as an expansion: floats that do not overlap, ascending in size (his section 2). Coordinates must be at
-most 2 and whole multiples of 2^-300, so that no product of three underflows.
+A sum of rounded products is accepted if it exceeds the bound of its rounding error (Shewchuk 1997,
+"Adaptive precision floating-point arithmetic and fast robust geometric predicates", figures 21 and
+22). Otherwise it is computed exactly, as an expansion: floats that do not overlap, ascending in
+size (section 2 there). Coordinates must be at most 2 in size and whole multiples of 2^-300, so that
+no product of three underflows.
 """
 
 from typing import no_type_check
@@ -26,7 +27,7 @@ MOST_TERMS = 192
 @njit
 @no_type_check
 def _two_sum(a, b):
-    """Return a + b and what rounding left out (Knuth)."""
+    """Return the rounded sum a + b and its rounding error (Knuth)."""
     total = a + b
     of_b = total - a
     return total, (a - (total - of_b)) + (b - of_b)
@@ -35,7 +36,7 @@ def _two_sum(a, b):
 @njit
 @no_type_check
 def _two_product(a, b):
-    """Return a b and what rounding left out (Dekker, Veltkamp)."""
+    """Return the rounded product a b and its rounding error (Dekker, Veltkamp)."""
     product = a * b
     wide_a, wide_b = SPLITTER * a, SPLITTER * b
     high_a, high_b = wide_a - (wide_a - a), wide_b - (wide_b - b)
@@ -48,7 +49,10 @@ def _two_product(a, b):
 @njit
 @no_type_check
 def _add(expansion, length, value):
-    """Add a float to an expansion in place, leaving out zeros; return its length (Shewchuk's GROW-EXPANSION)."""
+    """Add a float to an expansion in place, without zeros; return its length.
+
+    This is GROW-EXPANSION of Shewchuk (1997).
+    """
     kept = 0
     for place in range(length):
         value, left = _two_sum(value, expansion[place])
@@ -70,7 +74,7 @@ def _sign(value):
 @njit
 @no_type_check
 def side_of_line(points, u, v, a, b, c):
-    """Return the sign of the area of points a, b, c in the plane of axes u and v: 1 where they turn left."""
+    """Return the sign of the area of a, b, c projected to axes u and v: 1 if they turn left."""
     left = (points[a, u] - points[c, u]) * (points[b, v] - points[c, v])
     right = (points[a, v] - points[c, v]) * (points[b, u] - points[c, u])
     difference, rounding = left - right, LINE_BOUND * (abs(left) + abs(right))
@@ -95,7 +99,10 @@ def _exact_side_of_line(points, u, v, a, b, c):
 @njit
 @no_type_check
 def side_of_plane(points, a, b, c, d):
-    """Return the sign of det[a - d, b - d, c - d]: 1 where a, b, c turn left when seen from the side away from d."""
+    """Return the sign of det[a - d, b - d, c - d].
+
+    It is 1 if a, b, c turn left as seen from the side of their plane away from d.
+    """
     ax, ay, az = (
         points[a, 0] - points[d, 0],
         points[a, 1] - points[d, 1],

@@ -29,6 +29,16 @@ class RepairedMesh(Generic[MeshT]):
         One sentence for each repair, such as "drop_degenerate removed 2 faces without area".
     source_vertices : (n,) int
         For each vertex of `mesh`, its index in the original mesh.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.TriangleMesh([[9, 9, 9], [0, 0, 0], [1, 0, 0], [0, 1, 0]], [[1, 2, 3]])
+    >>> done = es.repair(mesh, ["drop_unreferenced"])
+    >>> done.report
+    ('drop_unreferenced removed 1 vertex without a face',)
+    >>> done.source_vertices
+    array([1, 2, 3])
     """
 
     mesh: MeshT
@@ -52,6 +62,14 @@ class RepairedCloud:
         of others".
     source_points : (n,) int
         For each point of `cloud`, its index in the original cloud.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> cloud = es.PointCloud([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]], dim=1)
+    >>> done = es.repair(cloud, ["drop_duplicate_points"])
+    >>> done.source_points
+    array([0, 1])
     """
 
     cloud: PointCloud

@@ -30,6 +30,18 @@ class SurfacePoints:
         Simplex in which each point lies; for a surface, its face.
     weights : (p, m+1) float
         Barycentric coordinates of each point in its simplex, at least 0, with sum 1.
+
+    Examples
+    --------
+    The weights give the points back:
+
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(1)
+    >>> found = es.geometry.sample_surface(mesh, 10, rng=np.random.default_rng(0))
+    >>> corners = mesh.vertices[mesh.faces[found.simplices]]
+    >>> np.allclose(np.einsum("pc,pcd->pd", found.weights, corners), found.points)
+    True
     """
 
     points: Float[np.ndarray, "p d"]

@@ -33,6 +33,15 @@ class EdgeTable:
     n_faces : (e,) int
         Number of faces at each edge: 1 on the boundary, 2 inside, more where the mesh is not a
         manifold.
+
+    Examples
+    --------
+    A square of two triangles has one edge inside:
+
+    >>> import eigenshape as es
+    >>> table = es.geometry.edge_table(es.shapes.grid(1, 1))
+    >>> table.edges[table.n_faces == 2]
+    array([[0, 3]])
     """
 
     edges: Int[np.ndarray, "e 2"]

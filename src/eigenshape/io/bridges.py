@@ -146,6 +146,13 @@ def from_pyvista(dataset: Any, *, dim: SupportsIndex = 2) -> Shape:
         If the object is neither, or has cells that are not simplices.
     MissingExtraError
         If PyVista is not installed.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> import pyvista
+    >>> es.io.from_pyvista(pyvista.Plane(i_resolution=2, j_resolution=1).triangulate())
+    TriangleMesh(6 vertices, 4 faces)
     """
     pyvista = _extra("pyvista")
     if not isinstance(dataset, pyvista.PolyData | pyvista.UnstructuredGrid):
@@ -206,6 +213,13 @@ def to_pyvista(shape: ShapeLike) -> Any:
         If the shape has more than three coordinates.
     MissingExtraError
         If PyVista is not installed.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> surface = es.io.to_pyvista(es.icosphere(2))
+    >>> surface.n_points, surface.n_cells
+    (162, 320)
     """
     shape = as_shape(shape)
     pyvista = _extra("pyvista")

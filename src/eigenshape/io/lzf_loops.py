@@ -1,4 +1,4 @@
-"""Compiled loop that undoes LZF compression, as point cloud files use it."""
+"""Compiled loop that decompresses LZF data, which point cloud files use."""
 
 from typing import no_type_check
 
@@ -10,13 +10,13 @@ from eigenshape._compile import njit
 @njit
 @no_type_check
 def decompress(data, size):
-    """Return `size` bytes, or fewer where the data ends early or points outside of what is there."""
+    """Return `size` bytes, or fewer if the data ends early or refers to bytes before its start."""
     out = np.empty(size, dtype=np.uint8)
     place, end = 0, 0
     while place < len(data):
         control = int(data[place])
         place += 1
-        if control < 32:  # so many plain bytes, and one more
+        if control < 32:  # a run of control + 1 literal bytes
             count = control + 1
             if place + count > len(data) or end + count > size:
                 return out[:end]

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError, InvalidShapeError
+from eigenshape._files import require_regular
 from eigenshape.io import glb, gmsh, medit, obj, off, ply, stl, vtk_legacy, vtu
 from eigenshape.io.cell_kinds import CellKind
 from eigenshape.io.cells import SEGMENTS, Blocks, select_cells
@@ -32,20 +33,21 @@ MESH_FORMATS = (*PARSERS, ".gltf", ".vtk", *GRIDS)
 
 
 def suffix_of(path: Path, file_format: str | None, known: tuple[str, ...]) -> str:
-    """Return the suffix that says the format, in lower case.
+    """Return the suffix that names the format, in lower case.
 
     Raises
     ------
     FileFormatError
-        If it is not among those that are known.
+        If the suffix is not one of the known ones, or the path is a folder.
     """
     suffix = (
         path.suffix.lower() if file_format is None else f".{file_format.lower().removeprefix('.')}"
     )
     if suffix not in known:
-        raise FileFormatError(
-            f"{path} must be of a known format, {', '.join(known)}; it is {suffix!r}."
-        )
+        if path.is_dir():
+            require_regular(path)
+        found = f"is {suffix!r}" if suffix else "has no suffix"
+        raise FileFormatError(f"{path} must be of a known format, {', '.join(known)}; it {found}.")
     return suffix
 
 

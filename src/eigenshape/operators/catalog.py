@@ -39,6 +39,12 @@ class Operator:
         Names of its options.
     description : str
         One line that says what the operator is.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.operators.OPERATORS["cotangent"].description
+    'linear finite elements'
     """
 
     build: Callable[..., Laplacian]

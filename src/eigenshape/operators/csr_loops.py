@@ -1,4 +1,4 @@
-"""Compiled loops over the entries of a sparse matrix whose columns ascend in each row."""
+"""Compiled loops over sparse matrices by rows; the columns of each row ascend."""
 
 from typing import no_type_check
 
@@ -10,9 +10,10 @@ from eigenshape._compile import njit
 @njit
 @no_type_check
 def worst_asymmetry(starts, columns, values):
-    """Return the largest |M_ij - M_ji| with its i and j, in one pass that stores one number a row.
+    """Return the largest |M_ij - M_ji| with its i and j, in one pass.
 
-    Rows are visited in order, so the entries that row i mirrors in later rows are each the next unvisited one there.
+    Rows are visited in order. So the mirror image of an entry of row i in a later row is always the
+    next entry there that was not visited, and one number per row has to be stored.
     """
     n = len(starts) - 1
     following = starts[:-1].copy()
@@ -23,7 +24,7 @@ def worst_asymmetry(starts, columns, values):
             if j <= i:
                 if (
                     j < i and entry >= following[i] and abs(values[entry]) > worst
-                ):  # nothing above mirrors it
+                ):  # it has no mirror image
                     worst, row, column = abs(values[entry]), i, j
                 continue
             place = following[j]
@@ -44,7 +45,7 @@ def worst_asymmetry(starts, columns, values):
 @njit
 @no_type_check
 def component_labels(starts, columns):
-    """Return for each row the number of its connected component, counted in the order of their first rows."""
+    """Return the connected component of each row; components are numbered by their first rows."""
     n = len(starts) - 1
     labels = np.full(n, -1)
     stack = np.empty(n, dtype=np.int64)

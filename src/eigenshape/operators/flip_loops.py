@@ -1,8 +1,9 @@
 # mypy: allow-untyped-defs, allow-untyped-decorators, no-check-untyped-defs
 """Compiled loops over the sides of an intrinsic triangulation.
 
-Triangle f has the sides 3f, 3f + 1, 3f + 2, one after the other around it. Side h starts at the vertex `tails[h]`, is
-`lengths[h]` long, and lies on side `twins[h]` of another triangle, or of the same.
+The sides of triangle f are 3f, 3f + 1, 3f + 2, in order around it. Side h starts at the vertex
+`tails[h]`, has length `lengths[h]`, and is glued to side `twins[h]` of another triangle or the
+same.
 """
 
 from typing import no_type_check
@@ -21,7 +22,7 @@ def next_side(side):
 @njit(error_model="numpy")
 @no_type_check
 def area_of(a, b, c):
-    # Kahan's order of Heron's formula: every digit right, needles too.
+    # Heron's formula in Kahan's order, which is accurate for needles too.
     low, high = min(a, b), max(a, b)
     small, middle, large = min(low, c), max(low, min(high, c)), max(high, c)
     product = (large + (middle + small)) * (small - (large - middle))
@@ -41,7 +42,7 @@ def areas(lengths):
 @njit(error_model="numpy")
 @no_type_check
 def cotangent(lengths, side):
-    """Return the cotangent opposite to a side, and the size of the terms in it."""
+    """Return the cotangent of the angle opposite to a side, and the size of its terms."""
     a = lengths[side]
     b = lengths[next_side(side)]
     c = lengths[next_side(next_side(side))]
@@ -69,7 +70,7 @@ def needs_flip(twins, lengths, side, tolerance):
 @njit(error_model="numpy")
 @no_type_check
 def _apex(lengths, side):
-    """Return where the corner opposite to a side lies, along the side and beside it."""
+    """Return the coordinates of the opposite corner, along a side and perpendicular to it."""
     a = lengths[side]
     b = lengths[next_side(side)]
     c = lengths[next_side(next_side(side))]
@@ -79,7 +80,7 @@ def _apex(lengths, side):
 @njit(error_model="numpy")
 @no_type_check
 def _crossing(lengths, side, twin):
-    """Return the length of the other diagonal of the two triangles at a side, laid out in the plane."""
+    """Return the length of the other diagonal of the two triangles at a side, unfolded."""
     along, above = _apex(lengths, side)
     back, below = _apex(lengths, twin)
     return np.hypot(lengths[side] - along - back, above + below)
@@ -88,7 +89,7 @@ def _crossing(lengths, side, twin):
 @njit(error_model="numpy")
 @no_type_check
 def _flip(tails, twins, lengths, side):
-    # Triangles (u, v, w) and (v, u, x) become (x, w, u) and (w, x, v): each outer side moves one place on.
+    # Triangles (u, v, w) and (v, u, x) become (x, w, u) and (w, x, v): outer sides move one place.
     twin = twins[side]
     crossing = _crossing(lengths, side, twin)
     new = np.array(
@@ -113,7 +114,10 @@ def _flip(tails, twins, lengths, side):
 @njit(error_model="numpy")
 @no_type_check
 def flip_to_delaunay(tails, twins, lengths, tolerance, most):
-    """Flip until no edge needs it, in place, first come first served; return the number of flips, -1 beyond `most`."""
+    """Flip edges in place until all are Delaunay; return the number of flips.
+
+    Edges are flipped in the order in which they are found. Returns -1 after more than `most` flips.
+    """
     n = len(tails)
     queue, waiting = np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
     first, length, flips = 0, 0, 0

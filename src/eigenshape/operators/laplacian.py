@@ -37,6 +37,13 @@ class GaussianKernel:
     volume : float
         Factor by which eigenvalues are divided: 1 if weights are in length^m; if weights are 1/n,
         the volume of the manifold in length^m, as estimated by the kernel.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> kernel = es.mesh_laplacian(es.icosphere(2)).kernel
+    >>> kernel.edge_factor, kernel.corrected
+    (2.0, False)
     """
 
     t: float

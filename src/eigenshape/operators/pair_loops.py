@@ -1,7 +1,7 @@
 """Compiled loops over the pairs of points that `cells` finds.
 
-Each walks the cells from `first` to `last`, and for each point of a cell the runs of points that may lie within reach;
-`farthest` is the square of the reach. The points stand in the order of the cells.
+Each loop visits the cells from `first` to `last` and, for each point of a cell, the runs of points
+that may lie within reach. `farthest` is the square of the reach. Points are in the order of cells.
 """
 
 from typing import no_type_check
@@ -39,9 +39,10 @@ def count(points, order, cells, runs, farthest, wanted, counts, first, last):
 @njit
 @no_type_check
 def _find_candidates(points, order, place, runs, cell, numbers, near):
-    """Fill what may lie within reach of a cell, by its number before sorting, ascending, and its coordinates.
+    """Fill the numbers and coordinates of the points that may lie within reach of a cell.
 
-    Returns how many; `place` is the inverse of `order`.
+    Numbers are those before the points were sorted into cells, ascending. `place` is the inverse of
+    `order`. Returns the number of points.
     """
     total = 0
     for run in range(runs.shape[1]):
@@ -74,7 +75,10 @@ def fill(
     first,
     last,
 ):
-    """Fill columns and values of the rows of some cells; `numbers` and `near` have room for what one cell may reach."""
+    """Fill the columns and values of the rows of some cells.
+
+    `numbers` and `near` are scratch, with one entry for each point that a cell may reach.
+    """
     for cell in range(first, last):
         total = _find_candidates(points, order, place, runs, cell, numbers, near)
         for i in range(cells[cell], cells[cell + 1]):

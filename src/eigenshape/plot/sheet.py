@@ -138,6 +138,15 @@ def figure_label_transfer(source: MeshLike, target: MeshLike, transfer: LabelTra
     See Also
     --------
     transfer_labels : Copy labels to the matching parts of another shape.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> fish, other = (es.make_creature("fish", pose, n_vertices=500) for pose in (0, 1))
+    >>> found = es.transfer_labels(fish, es.find_parts(fish).parts.labels, other)
+    >>> figure = es.plot.figure_label_transfer(fish, other, found)
+    >>> figure.axes[0].get_title()
+    'labeled'
     """
     source = as_mesh(source, "source")
     target = as_mesh(target, "target")

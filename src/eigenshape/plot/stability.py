@@ -49,6 +49,16 @@ def figure_stability(
     See Also
     --------
     compare_shapes : Compute the report.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(3)
+    >>> longer = es.TriangleMesh(ball.vertices * [1, 1, 1.1], ball.faces)
+    >>> report = es.compare_shapes(ball, longer, es.stability.StabilityPlan(k=10, n_samples=100))
+    >>> figure = es.plot.figure_stability(report, ball, longer, titles=("ball", "longer"))
+    >>> figure.axes[0].get_title()
+    'ball'
     """
     require_type(report, StabilityReport, "report")
     one = as_shape(one, "one")

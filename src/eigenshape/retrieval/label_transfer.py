@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
-from eigenshape._arrays import face_labels, freeze
+from eigenshape._arrays import face_labels, freeze, whole_number
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
@@ -53,6 +53,14 @@ class LabelTransfer:
     See Also
     --------
     transfer_labels, figure_label_transfer
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> fish, other = (es.make_creature("fish", pose, n_vertices=500) for pose in (0, 1))
+    >>> found = es.transfer_labels(fish, es.find_parts(fish).parts.labels, other)
+    >>> found.part_labels, bool((found.confidence > 0.5).all())
+    (array([0, 1, 2, 3]), True)
     """
 
     labels: Int[np.ndarray, " f"]
@@ -129,6 +137,8 @@ def transfer_labels(
     source = as_mesh(source, "source")
     target = as_mesh(target, "target")
     labels = face_labels(labels, "labels", source.n_faces)
+    if n_parts is not None:
+        n_parts = whole_number(n_parts, "n_parts", 1)
     found = find_parts(source, progress=partly(progress, 0, 0.25))
     source_parts = found.parts if n_parts is None else _cut_into_parts(found, n_parts)
     found = find_parts(target, progress=partly(progress, 0.25, 0.5))

@@ -39,6 +39,14 @@ class MeshPart:
         For each vertex of `mesh`, its index in the whole mesh.
     source_faces : (f,) int
         For each face of `mesh`, its index in the whole mesh.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(3)
+    >>> part = es.scans.partial_scan(ball, [0, 0, 1])
+    >>> bool((part.mesh.vertices == ball.vertices[part.source_vertices]).all())
+    True
     """
 
     mesh: TriangleMesh

@@ -42,6 +42,13 @@ class AnchorNodes:
     See Also
     --------
     anchor_nodes : Choose nodes.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> nodes = es.stability.anchor_nodes(es.shapes.grid(4, 1), 0.9)
+    >>> nodes.vertices, nodes.reached < 0.9
+    (array([0, 9, 1, 8]), True)
     """
 
     vertices: Int[np.ndarray, " r"]
@@ -178,6 +185,21 @@ def witness_region(
     See Also
     --------
     correspondence_graph : Join points by witness regions.
+
+    Examples
+    --------
+    If nothing changed, these are the points within (ρ+1)δ of the nodes, here a cap of a sphere:
+
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(3)
+    >>> same = es.stability.measure_perturbation(mesh, mesh)
+    >>> points = es.geometry.sample_surface(mesh, 500, rng=np.random.default_rng(0))
+    >>> node = mesh.vertices[:1]
+    >>> inside = es.stability.witness_region(same, points, node, 0.3, rho=1.0)
+    >>> distances = np.linalg.norm(points.points - node, axis=1)
+    >>> bool((inside == (distances <= 0.6)).all())
+    True
     """
     require_type(perturbation, Perturbation, "perturbation")
     require_type(points, SurfacePoints, "points")

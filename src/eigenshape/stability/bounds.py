@@ -40,6 +40,16 @@ class WeylBound:
     See Also
     --------
     weyl_bound : Compute the bounds.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(2)
+    >>> longer = es.TriangleMesh(ball.vertices * [1, 1, 1.01], ball.faces)
+    >>> one, two = (es.cotangent_laplacian(mesh) for mesh in (ball, longer))
+    >>> bound = es.stability.weyl_bound(one, two)
+    >>> bound.norm <= bound.proven
+    True
     """
 
     norm: float

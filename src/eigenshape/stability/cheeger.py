@@ -50,6 +50,17 @@ class CheegerEstimate:
     See Also
     --------
     cheeger_estimate : Compute the bounds.
+
+    Examples
+    --------
+    The constant of the unit sphere is 1, by a cut along the equator:
+
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(3)
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(ball), 4)
+    >>> estimate = es.stability.cheeger_estimate(ball, spectrum)
+    >>> round(estimate.upper, 1), round(estimate.spectral, 1)
+    (1.0, 2.8)
     """
 
     upper: float

@@ -150,6 +150,22 @@ def correspondence_graph(
     See Also
     --------
     maximum_matching : Find a one-to-one correspondence in the graph.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(3)
+    >>> longer = es.TriangleMesh(mesh.vertices * [1, 1, 1.1], mesh.faces)
+    >>> perturbation = es.stability.measure_perturbation(mesh, longer)
+    >>> rng = np.random.default_rng(0)
+    >>> one, two = (es.geometry.sample_surface(shape, 50, rng=rng) for shape in (mesh, longer))
+    >>> nodes = es.stability.anchor_nodes(mesh, 0.3).points
+    >>> graph = es.stability.correspondence_graph(
+    ...     perturbation, one, two, nodes=nodes, delta=0.3, rho=2.0
+    ... )
+    >>> es.stability.maximum_matching(graph).n_matched
+    50
     """
     require_type(perturbation, Perturbation, "perturbation")
     require_type(points_one, SurfacePoints, "points_one")

@@ -40,6 +40,17 @@ class Perturbation:
     --------
     measure_perturbation : Check and label two shapes.
     measure_closeness : Compute how close the shapes are.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.shapes.grid(2, 1)
+    >>> labels = [-1, -1, 0, 0]
+    >>> perturbation = es.stability.measure_perturbation(
+    ...     mesh, mesh, regions_one=labels, regions_two=labels
+    ... )
+    >>> perturbation.n_regions, perturbation.outside_one
+    (1, array([0, 1]))
     """
 
     one: Mesh
@@ -143,6 +154,15 @@ def vertex_pairs(perturbation: Perturbation) -> Int[np.ndarray, "v 2"]:
     ------
     InvalidParameterError
         If Φ maps a vertex to two vertices, or two vertices to one.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> one = es.shapes.grid(2, 1)
+    >>> two = es.TriangleMesh(one.vertices[::-1], 5 - one.faces)
+    >>> perturbation = es.stability.measure_perturbation(one, two)
+    >>> es.stability.vertex_pairs(perturbation).tolist()
+    [[0, 5], [1, 4], [2, 3], [3, 2], [4, 1], [5, 0]]
     """
     require_type(perturbation, Perturbation, "perturbation")
     here, there = (

@@ -254,7 +254,10 @@ def test_a_query_in_a_recipe_that_is_not_there(index):
 
 
 def test_folders_that_are_no_index(tmp_path, index):
-    with pytest.raises(StoreError, match=r"must be an index; it has no index.sqlite"):
+    with pytest.raises(
+        StoreError,
+        match=r"must be an index; it has no index.sqlite. .*ShapeIndex.create, or with `eigenshape i",
+    ):
         ShapeIndex.open(tmp_path)
     with pytest.raises(StoreError, match="must be empty to become an index"):
         ShapeIndex.create(index.folder)

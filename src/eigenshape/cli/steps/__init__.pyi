@@ -24,8 +24,8 @@ from .parts import require_label_path as require_label_path
 from .parts import save_labels as save_labels
 from .reading import load_mesh as load_mesh
 from .reading import load_shape as load_shape
-from .reading import read_labels as read_labels
-from .reading import read_map as read_map
+from .reading import read_labeled_mesh as read_labeled_mesh
+from .reading import read_partners as read_partners
 from .recipes import heat_recipe as heat_recipe
 from .recipes import index_recipe as index_recipe
 from .recipes import query_recipe as query_recipe
@@ -40,9 +40,9 @@ from .sheets import ColoredQuery as ColoredQuery
 from .sheets import color_query as color_query
 from .sheets import contact_sheet as contact_sheet
 from .spectra import boundary_points as boundary_points
-from .spectra import default_operator as default_operator
 from .spectra import draw_eigenfunctions as draw_eigenfunctions
 from .spectra import draw_eigenvalues as draw_eigenvalues
+from .spectra import operator_name as operator_name
 from .spectra import print_spectrum as print_spectrum
 from .spectra import require_bracketable as require_bracketable
 from .spectra import require_drawable as require_drawable

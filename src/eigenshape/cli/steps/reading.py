@@ -2,6 +2,9 @@
 
 from pathlib import Path
 
+import numpy as np
+from jaxtyping import Int
+
 from eigenshape.cli.console import print_repairs
 from eigenshape.cli.inputs import repair_names
 from eigenshape.geometry.cloud import Shape
@@ -9,8 +12,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import repair
 from eigenshape.geometry.repair_report import RepairedCloud
 from eigenshape.io.cell_kinds import CellKind
-from eigenshape.io.labels import read_labels as read_labels  # noqa: PLC0414  in the stub
-from eigenshape.io.labels import read_map as read_map  # noqa: PLC0414  in the stub
+from eigenshape.io.labels import read_labels, read_map
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.io.shape_files import read_shape
 
@@ -30,6 +32,17 @@ def load_shape(
     done = repair(read_shape(path, dim=dim, drop_missing=drop_missing, cells=cells), names)
     print_repairs(done.report)
     return done.cloud if isinstance(done, RepairedCloud) else done.mesh
+
+
+def read_labeled_mesh(path: Path, labels: Path) -> tuple[TriangleMesh, Int[np.ndarray, " f"]]:
+    """Read a mesh and, from another file, the labels of its faces."""
+    face_labels = read_labels(labels)
+    return read_mesh(path), face_labels
+
+
+def read_partners(path: Path | None) -> Int[np.ndarray, " n"] | None:
+    """Read the partner of each vertex, or return None if no file is given."""
+    return None if path is None else read_map(path)
 
 
 def read_repaired(path: Path, names: tuple[str, ...]) -> TriangleMesh:

@@ -14,7 +14,7 @@ from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.operators.catalog import default_operator as default_operator  # noqa: PLC0414  in the stub
+from eigenshape.operators.catalog import default_operator
 from eigenshape.operators.fem import fem_boundary_nodes
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.plot.fields import figure_eigenfunctions
@@ -33,6 +33,11 @@ def usual_pairs(laplacian: Laplacian, fixed: Int[np.ndarray, " c"] | None, usual
             f"[yellow]note:[/] the default is {usual} pairs; this shape has {most}, and all are computed"
         )
     return max(1, min(usual, most))
+
+
+def operator_name(shape: Shape, requested: str | None) -> str:
+    """Return the requested operator, or by default the usual one for the shape."""
+    return requested or default_operator(shape)
 
 
 def require_drawable(shape: Shape, eigenfunctions: Path | None) -> None:

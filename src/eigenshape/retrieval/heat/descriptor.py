@@ -25,6 +25,13 @@ class HeatDescriptor:
     See Also
     --------
     matching_score, match_features
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.make_creature("fish", n_vertices=500)
+    >>> es.describe(mesh, es.retrieval.SCALE_FREE).vectors.shape
+    (15, 15)
     """
 
     vectors: Float[np.ndarray, "m q"]

@@ -6,7 +6,7 @@ from math import log
 from typing import Literal
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr
+from eigenshape._text import html_repr, repr_of_changes
 
 # Scales are a geometric sequence if the steps of their logarithms differ by less than this.
 EQUAL_STEPS = 1e-9
@@ -74,6 +74,7 @@ class HeatRecipe:
     reflections: bool = False
     n_shifts: int = 5
 
+    __repr__ = repr_of_changes
     _repr_html_ = html_repr
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Compiled loops of `patches`: what lies in the discs around a point, ring by ring."""
+"""Compiled loops of `patches`: descriptors of the geodesic discs around a point, by rings."""
 
 from typing import no_type_check
 
@@ -6,23 +6,23 @@ import numpy as np
 
 from eigenshape._compile import njit
 
-RINGS = 4  # of equal width, from the center of a disc to its radius
-TURN_BINS = 8  # of the cosine to the disc's normal, on 0..1
-HEIGHT_BINS = 6  # of the height over the point, in radii, on -1..1
+RINGS = 4  # rings of equal width in a disc
+TURN_BINS = 8  # bins of the cosine to the disc's normal, 0 to 1
+HEIGHT_BINS = 6  # bins of the height above the point, in radii, -1 to 1
 # The two histograms, the logarithm of the area, and the ratio of distances
 RING_NUMBERS = TURN_BINS + HEIGHT_BINS + 2
 NUMBERS = RINGS * RING_NUMBERS
-INNER = 0.35  # of the radius: where the disc's normal is taken
-LEAST_AREA = 1e-3  # of a flat disc's, added before the logarithm
+INNER = 0.35  # share of the radius in which the disc's normal is averaged
+LEAST_AREA = 1e-3  # share of a flat disc's area, added before the logarithm
 
 
 @njit
 @no_type_check
 def describe_disc(distances, center, order, surface, radius, kept, straight, found):
-    """Write NUMBERS for the disc of some radius around one point.
+    """Write the NUMBERS that describe the disc of a radius around one point.
 
-    `order` are vertices by distance, as far as the disc reaches or farther; `surface` are points, normals and areas of
-    all vertices. `kept` and `straight` have RINGS numbers and are scratch.
+    `order` holds the vertices by distance, at least as far as the disc reaches; `surface` holds the
+    points, normals and areas of all vertices. `kept` and `straight` are scratch of RINGS numbers.
     """
     points, normals, areas = surface
     x = y = z = 0.0
@@ -74,7 +74,7 @@ def describe_disc(distances, center, order, surface, radius, kept, straight, fou
 @njit
 @no_type_check
 def _add(bins, share, weight):
-    """Share a weight at 0..1 between the two bins whose centers it lies between."""
+    """Split a weight at `share`, 0 to 1, between the two bins with the nearest centers."""
     place = min(max(share * len(bins) - 0.5, 0.0), len(bins) - 1.0)
     low = min(int(place), len(bins) - 2)
     bins[low] += weight * (low + 1 - place)

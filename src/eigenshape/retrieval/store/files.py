@@ -121,7 +121,8 @@ def _sync(folder: Path) -> None:
 def _require_database(folder: Path) -> None:
     if not (folder / DATABASE).is_file():
         raise StoreError(
-            f"{folder} must be an index; it has no {DATABASE}. Make one with ShapeIndex.create."
+            f"{folder} must be an index; it has no {DATABASE}. Create one with "
+            "ShapeIndex.create, or with `eigenshape index` on the command line."
         )
 
 

@@ -84,6 +84,20 @@ class Match:
     See Also
     --------
     ShapeIndex.query
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import eigenshape as es
+    >>> recipe = es.retrieval.SCALE_FREE
+    >>> index = es.ShapeIndex.create(tempfile.mkdtemp())
+    >>> for name in ("fish", "biped"):
+    ...     mesh = es.make_creature(name, n_vertices=500)
+    ...     index.add_descriptors(name, [es.describe(mesh, recipe)], label="creature")
+    >>> scan = es.make_creature("fish", pose=1, n_vertices=500)
+    >>> match = index.query(es.describe(scan, recipe), n_matches=1)[0]
+    >>> match.name, match.label, len(match.vertices)
+    ('fish', 'creature', 15)
     """
 
     name: str

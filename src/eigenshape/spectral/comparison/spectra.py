@@ -36,6 +36,17 @@ class SpectrumComparison:
     See Also
     --------
     es.spectral.compare_spectra : Compare two spectra.
+
+    Examples
+    --------
+    At twice the size, positive eigenvalues are a quarter:
+
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(2)
+    >>> large = es.TriangleMesh(2 * ball.vertices, ball.faces)
+    >>> one, two = (es.solve_spectrum(es.cotangent_laplacian(mesh), 4) for mesh in (ball, large))
+    >>> es.spectral.compare_spectra(one, two).relative.round(6)
+    array([0.  , 0.75, 0.75, 0.75])
     """
 
     one: Float[np.ndarray, " k"]

@@ -80,8 +80,8 @@ class Trial:
     rounding: float
 
     @property
-    def allowed(self) -> float:
-        """What laws may change that leave the coordinates and corners as they are."""
+    def tolerance(self) -> float:
+        """Largest change that a law accepts if it leaves coordinates and corners as they are."""
         return min(self.rounding, MOST_ROUNDING)
 
 
@@ -201,7 +201,7 @@ def _attempt(name: str, law: Callable[[Trial], Outcome], trial: Trial) -> Outcom
             name,
             False,
             np.inf,
-            trial.allowed,
+            trial.tolerance,
             f"told otherwise, the shape or its spectrum is refused: {err}",
         )
 
@@ -291,7 +291,7 @@ def _scaling_by(trial: Trial, power: int) -> Law:
     other = trial.build(changes.rescale(trial.subject, 2.0**power))
     here, there = _unit_traces(trial.laplacian), _unit_traces(other)
     law = same_entries(
-        "scaling", Laplacian(there[0], there[1]), Laplacian(here[0], here[1]), trial.allowed
+        "scaling", Laplacian(there[0], there[1]), Laplacian(here[0], here[1]), trial.tolerance
     )
     unit = f"in a unit 2^{power} (1e{power * np.log10(2):+.0f}) times as large,"
     if not law.holds or isinstance(trial.subject, sp.csr_array):
@@ -346,10 +346,10 @@ def _same(name: str, trial: Trial, subject: Subject) -> Outcome:
 
 def _agree(name: str, trial: Trial, found: Laplacian, expected: Laplacian | None) -> Outcome:
     if trial.by_points and expected is not None:
-        return same_entries(name, found, expected, trial.allowed)
+        return same_entries(name, found, expected, trial.tolerance)
     if trial.spectrum is None:
         return _no_spectrum(name)
-    return same_eigenvalues(name, found, trial.spectrum, trial.allowed)
+    return same_eigenvalues(name, found, trial.spectrum, trial.tolerance)
 
 
 def _n_points(subject: Subject) -> int:

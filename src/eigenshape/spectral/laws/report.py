@@ -38,6 +38,14 @@ class Law:
         The law holds if `measured` is at most `allowed`; both are without unit.
     explanation : str
         One sentence with the numbers, and the worst entry if there is one.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> report = es.spectral.check_laplacian(es.cotangent_laplacian(es.icosphere(2)))
+    >>> law = report.laws[0]
+    >>> law.name, law.holds
+    ('symmetry of W', True)
     """
 
     name: str
@@ -62,6 +70,13 @@ class SkippedLaw:
     See Also
     --------
     OperatorReport : Holds laws of both kinds.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> report = es.spectral.check_laplacian(es.cotangent_laplacian(es.icosphere(2)))
+    >>> report.skipped[0]
+    SkippedLaw(name='components', reason='no mesh or graph says what belongs together')
     """
 
     name: str
@@ -79,6 +94,15 @@ class OperatorReport:
     laws : tuple of Law
         In the order in which they were checked.
     skipped : tuple of SkippedLaw
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> report = es.spectral.check_laplacian(es.cotangent_laplacian(es.icosphere(2)))
+    >>> all(law.holds for law in report.laws)
+    True
+    >>> [law.name for law in report.skipped]
+    ['components', 'definite', 'volume', 'nonnegative weights']
     """
 
     laws: tuple[Law, ...]

@@ -46,10 +46,10 @@ def factorize(
     A factor of the same pencil that is spent gives its room: what it solved before, it solves no more.
     """
     slack = np.zeros(pencil.n) if slack is None else slack
-    shifted = pencil.shifted
-    data = shifted.stiffness - shift * shifted.mass
-    data[shifted.diagonal] -= slack
-    lower = factorize_symmetric(shifted.elimination, data, spent.lower if spent else None)
+    pattern = pencil.shift_pattern
+    data = pattern.stiffness - shift * pattern.mass
+    data[pattern.diagonal] -= slack
+    lower = factorize_symmetric(pattern.elimination, data, spent.lower if spent else None)
     return Factor(shift, int(np.count_nonzero(lower.pivots < 0)), slack, lower) if lower else None
 
 

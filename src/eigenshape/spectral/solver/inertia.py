@@ -43,30 +43,31 @@ def count_beside(
     )
     found_error = error_bound(pairs)
 
-    def taken(slack: Float[np.ndarray, " n"]) -> float:
-        return found_error + float(slack @ shape)  # from this eigenvalue, to first order
+    def uncertainty(slack: Float[np.ndarray, " n"]) -> float:
+        # How far the slack moves this eigenvalue, to first order, and the error of the value.
+        return found_error + float(slack @ shape)
 
     def too_much(loss: float, shift: float) -> bool:
         return not 2 * loss < np.abs(pairs.values - shift).min()
 
     factor, none, sigma = beside, np.zeros(pencil.n), value + step
-    slack = none if beside is None or too_much(taken(beside.slack), sigma) else beside.slack
+    slack = none if beside is None or too_much(uncertainty(beside.slack), sigma) else beside.slack
     for _ in range(COUNT_TRIALS):
         factor = factorize(pencil, sigma, side * slack, factor)
         loss = rounding(factor) if factor else np.full(pencil.n, np.inf)
         # What is above the slack moves σ: W - σB - S + E ≤ W - (σ - ρ)B where no row has more than ρ c D of it.
         over = float(((loss - slack) / pencil.mass_diagonal).max(initial=0.0)) / pencil.mass_floor
         moved = sigma - side * over
-        if factor and not too_much(taken(slack) + over, moved):
+        if factor and not too_much(uncertainty(slack) + over, moved):
             return replace(factor, shift=moved)
         slack = wanted = np.maximum(slack, _pad(pencil, loss))
-        if too_much(taken(slack), sigma):
+        if too_much(uncertainty(slack), sigma):
             step, slack = WIDENING * step, none
             sigma = value + step
     raise ConvergenceError(
         f"To count eigenvalues, rounding must be smaller than their distance to σ; near "
         f"{np.ldexp(value, pencil.value_exponent):.6g} (1/length²) it is "
-        f"{np.ldexp(taken(wanted), pencil.value_exponent):.1e}. Repair nearly degenerate elements."
+        f"{np.ldexp(uncertainty(wanted), pencil.value_exponent):.1e}. Repair nearly degenerate elements."
     )
 
 

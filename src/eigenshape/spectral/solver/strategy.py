@@ -225,7 +225,7 @@ def require_memory_for_pairs(pencil: Pencil, k: int, factors: int | None = None)
         With the estimated sizes.
     """
     if factors is None:
-        factors = 24 * pencil.shifted.elimination.n_entries  # two at once, and their making
+        factors = 24 * pencil.shift_pattern.elimination.n_entries  # two at once, and their making
     bases = (
         8 * pencil.n * (3 * k + FEWEST_VECTORS + 2 * min(k, ONE_SHIFT_PAIRS))
     )  # a space of twice the pairs, results, a copy

@@ -150,34 +150,23 @@ export interface PlotOptions {
 
 /** Return a plot in the colors of the page, dark or light, that answers to clicks. */
 export function buildPlot(host: HTMLElement, data: uPlot.AlignedData, options: PlotOptions): uPlot {
-  const axes = options.labels.map((label, i) => ({
-    label,
-    labelSize: 18,
-    labelFont: "12px system-ui, sans-serif",
-    font: "11px system-ui, sans-serif",
-    size: [26, 42][i]!,
-    gap: 3,
-    stroke: () => pageColor(host, "--text"),
-    grid: { stroke: () => pageColor(host, "--line"), width: 1 },
-    ticks: { stroke: () => pageColor(host, "--line"), size: 4 },
-  }));
-  const draw = (plot: uPlot) =>
-    options.draw(plot, (x, y) => [plot.valToPos(x, "x", true), plot.valToPos(y, "y", true)]);
-  const plot = new uPlot(
-    {
-      width: host.clientWidth,
-      height: 200,
-      padding: [8, 10, 0, 0],
-      legend: { show: false },
-      scales: { x: { time: false, range: (_, low, high) => [low - MARGIN * (high - low), high + MARGIN * (high - low)] } },
-      cursor: { drag: { x: false, y: false }, points: { show: false } },
-      axes,
-      series: [{}, ...options.series],
-      hooks: { draw: [draw] },
-    },
-    data,
-    host,
-  );
+  const stroke = () => pageColor(host, "--text");
+  const grid = { stroke: () => pageColor(host, "--line"), width: 1 };
+  const font = "12px system-ui, sans-serif";
+  const [x, y] = options.labels.map((label) => ({ label, labelFont: font, labelSize: 18, font, gap: 3, stroke, grid, ticks: grid }));
+  const draw = (plot: uPlot) => options.draw(plot, (x, y) => [plot.valToPos(x, "x", true), plot.valToPos(y, "y", true)]);
+  const settings: uPlot.Options = {
+    width: host.clientWidth,
+    height: 200,
+    padding: [8, 10, 0, 0],
+    legend: { show: false },
+    scales: { x: { time: false, range: (_, low, high) => [low - MARGIN * (high - low), high + MARGIN * (high - low)] } },
+    cursor: { drag: { x: false, y: false }, points: { show: false } },
+    axes: [{ ...x, size: 28 }, { ...y, size: 44 }],
+    series: [{}, ...options.series],
+    hooks: { draw: [draw] },
+  };
+  const plot = new uPlot(settings, data, host);
   plot.over.addEventListener("click", () => options.choose(plot, plot.cursor.left!, plot.cursor.top!));
   const page = host.closest("[data-theme]");
   if (page) new MutationObserver(() => plot.redraw(false)).observe(page, { attributeFilter: ["data-theme"] });

@@ -38,18 +38,9 @@ export class PartsPanel extends ColoringPanel {
     super();
     const all = button("Show all parts", "all-parts", "End the choice of a part", () => this.selectPart(-1));
     const note = "A maximum of heat far from the diagonal is a limb or a tip; one near it is a bump.";
-    this.results = h(
-      "div",
-      {},
-      this.number.element,
-      this.level.element,
-      this.chosen,
-      all,
-      h("h3", {}, "Persistence diagram of heat"),
-      this.plotHost,
-      this.maximum.element,
-      h("p", { class: "note" }, note),
-    );
+    const cuts = [this.number.element, this.level.element, this.chosen, all];
+    const diagram = [h("h3", {}, "Persistence diagram of heat"), this.plotHost, this.maximum.element];
+    this.results = h("div", {}, ...cuts, ...diagram, h("p", { class: "note" }, note));
   }
 
   build(app: App): HTMLElement {
@@ -151,9 +142,9 @@ export class PartsPanel extends ColoringPanel {
   }
 
   private plotDiagram(): void {
-    const numbers = Array.from({ length: this.diagram.length / 4 }, (_, i) => i);
-    numbers.sort((a, b) => this.birth(a) - this.birth(b)); // uPlot wants rising numbers along x
-    const data: uPlot.AlignedData = [numbers.map((i) => this.birth(i)), numbers.map((i) => this.death(i))];
+    const places = Array.from({ length: this.diagram.length / 4 }, (_, i) => this.placeOf(i));
+    const sorted = [...places].sort((a, b) => a[0] - b[0]); // uPlot wants rising numbers along x
+    const data: uPlot.AlignedData = [sorted.map(([birth]) => birth), sorted.map(([, death]) => death)];
     if (this.plot) return this.plot.setData(data);
     this.plot = buildPlot(this.plotHost, data, {
       labels: ["birth: heat at the maximum, 1/length²", "death: at the saddle"],
@@ -162,25 +153,21 @@ export class PartsPanel extends ColoringPanel {
         const { x, y } = plot.scales;
         const [low, high] = [Math.max(x!.min!, y!.min!), Math.min(x!.max!, y!.max!)];
         drawLine(plot, pixel(low, low), pixel(high, high), pageColor(this.plotHost, "--faint"));
-        if (this.index >= 0) drawRing(plot, pixel(this.birth(this.index), this.death(this.index)), POINT);
+        if (this.index >= 0) drawRing(plot, pixel(...this.placeOf(this.index)), POINT);
       },
-      choose: (plot, left, top) => this.select(this.findNearest(plot, left, top)),
+      choose: (plot, left, top) => {
+        const away = (i: number) => {
+          const [birth, death] = this.placeOf(i);
+          return Math.hypot(plot.valToPos(birth, "x") - left, plot.valToPos(death, "y") - top);
+        };
+        const indices = Array.from({ length: this.diagram.length / 4 }, (_, i) => i);
+        this.select(indices.reduce((best, i) => (away(i) < away(best) ? i : best)));
+      },
     });
   }
 
-  private birth(index: number): number {
-    return this.diagram[4 * index]!;
-  }
-
-  private death(index: number): number {
-    return this.diagram[4 * index + 1]!;
-  }
-
-  private findNearest(plot: uPlot, left: number, top: number): number {
-    const away = (i: number) =>
-      Math.hypot(plot.valToPos(this.birth(i), "x") - left, plot.valToPos(this.death(i), "y") - top);
-    let best = 0;
-    for (let i = 1; 4 * i < this.diagram.length; i++) if (away(i) < away(best)) best = i;
-    return best;
+  /** Return birth and death of a maximum. */
+  private placeOf(index: number): [number, number] {
+    return [this.diagram[4 * index]!, this.diagram[4 * index + 1]!];
   }
 }

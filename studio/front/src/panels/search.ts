@@ -20,16 +20,13 @@ export class SearchPanel implements Panel {
   private second: Viewer | null = null;
   private found: Matches | null = null;
   private shape = -1; // which the matches belong to
-  private pictures: string[] = [];
 
   build(app: App): HTMLElement {
     this.app = app;
-    const search = button("Search with this shape", "search", "Compare with every shape of the index", () => this.search());
+    const search = button("Search with this shape", "search", "Compare with every shape of the index", () => this.search().catch(() => {}));
     search.classList.add("primary");
-    const file = button("With a file …", "search-file", "Open a mesh and search with it", async () => {
-      const { name, bytes } = await chooseFile(MESH_FILES);
-      this.searchFile(name, bytes);
-    });
+    const choose = () => chooseFile(MESH_FILES).then(({ name, bytes }) => this.searchFile(name, bytes));
+    const file = button("With a file …", "search-file", "Open a mesh and search with it", choose);
     const page = h("div", { class: "search" }, this.about, h("div", { class: "row" }, search, file), this.list);
     acceptDrops(page, (name, bytes) => this.searchFile(name, bytes));
     return page;
@@ -46,9 +43,9 @@ export class SearchPanel implements Panel {
   }
 
   /** The file becomes the shape, so that what is searched with is what is seen. */
-  private async searchFile(name: string, file: Uint8Array): Promise<void> {
-    await this.app.change({ kind: "open", name, file }, `Reading ${name}`);
-    await this.search();
+  private searchFile(name: string, file: Uint8Array): void {
+    const opened = this.app.change({ kind: "open", name, file }, `Reading ${name}`);
+    opened.then(() => this.search()).catch(() => {}); // the status line has said what failed
   }
 
   private async search(): Promise<void> {
@@ -61,21 +58,17 @@ export class SearchPanel implements Panel {
 
   private clear(): void {
     this.closeMatch();
-    this.pictures.forEach((url) => URL.revokeObjectURL(url));
-    this.pictures = [];
     this.list.replaceChildren();
   }
 
   private buildCard(match: Match, number: number): HTMLElement {
-    const bytes = this.found!.arrays[`thumbnail${number}`]?.data as Uint8Array<ArrayBuffer> | undefined;
-    let picture: HTMLElement = h("span", { class: "thumbnail" });
-    if (bytes?.length) {
-      const url = URL.createObjectURL(new Blob([bytes], { type: "image/png" }));
-      this.pictures.push(url);
-      picture = h("img", { class: "thumbnail", src: url, alt: "" });
-    }
-    const label = match.label ? h("span", { class: "label" }, match.label) : null;
-    const text = h("span", {}, h("b", {}, `${number + 1}. ${match.name}`), label, h("span", { class: "faint" }, `score ${match.score.toFixed(3)}`));
+    const bytes = (this.found!.arrays[`thumbnail${number}`]?.data ?? new Uint8Array()) as Uint8Array<ArrayBuffer>;
+    const src = URL.createObjectURL(new Blob([bytes], { type: "image/png" }));
+    const image = h("img", { src, alt: "", onload: () => URL.revokeObjectURL(src) });
+    const picture = h("span", { class: "thumbnail" }, bytes.length > 0 && image);
+    const label = match.label && h("span", { class: "label" }, match.label);
+    const score = h("span", { class: "faint" }, `score ${match.score.toFixed(3)}`);
+    const text = h("span", {}, h("b", {}, `${number + 1}. ${match.name}`), label, score);
     const open = () => this.openMatch(number).catch((error) => this.app.fail(error));
     const title = `Show ${match.name} beside this shape, with corresponding points`;
     return h("li", {}, h("button", { type: "button", title, "data-test": `match-${number}`, onclick: open }, picture, text));

@@ -22,29 +22,20 @@ export class ShapePanel extends ColoringPanel {
     const can = app.state.capabilities;
     const choose = async () => this.open(await chooseFile(MESH_FILES));
     const open = button("Open a file …", "open", "Read a mesh; it becomes the shape (O)", choose);
-    const save = [button("Picture", "save-png", "Save what is shown as PNG", () => this.savePicture())];
+    const save = [button("Picture", "save-png", "Save what is shown as PNG", () => this.savePicture().catch(() => {}))];
     if (can.includes("finish"))
       for (const format of FORMATS) {
         const name = format.toUpperCase();
-        save.push(button(name, `save-${format}`, `Save the shape as ${name}`, () => this.save(format)));
+        save.push(button(name, `save-${format}`, `Save the shape as ${name}`, () => this.save(format).catch(() => {})));
       }
     if (can.includes("open")) {
       app.shortcut("O", "Open a file", choose);
       acceptDrops(app.viewer.stage, (name, bytes) => this.open({ name, bytes }));
     }
-    const hint = h("span", { class: "faint" }, "or drop one on the shape");
-    return h(
-      "div",
-      {},
-      can.includes("open") && h("div", { class: "row" }, open, hint),
-      this.valuesPart,
-      h("h3", {}, "Size"),
-      this.facts,
-      h("h3", {}, "Health"),
-      this.health,
-      h("h3", {}, "Save"),
-      h("div", { class: "row" }, ...save),
-    );
+    const opening = h("div", { class: "row" }, open, h("span", { class: "faint" }, "or drop one on the shape"));
+    const size = [h("h3", {}, "Size"), this.facts, h("h3", {}, "Health"), this.health];
+    const saving = [h("h3", {}, "Save"), h("div", { class: "row" }, ...save)];
+    return h("div", {}, can.includes("open") && opening, this.valuesPart, ...size, ...saving);
   }
 
   protected versionOf(state: State): string {
@@ -61,14 +52,9 @@ export class ShapePanel extends ColoringPanel {
     }
     this.valuesPart.hidden = !values.length;
     const known = health.components !== null; // a large mesh is examined for some seconds
-    const rows = [
-      ["Vertices", state.n_vertices.toLocaleString("en")],
-      ["Faces", state.n_faces.toLocaleString("en")],
-    ];
-    if (known) {
-      const volume = health.volume === null ? "none: it is not closed" : `${formatNumber(health.volume)} length³`;
-      rows.push(["Area", `${formatNumber(health.area)} length²`], ["Volume", volume]);
-    }
+    const rows = [["Vertices", state.n_vertices.toLocaleString("en")], ["Faces", state.n_faces.toLocaleString("en")]];
+    const volume = health.volume === null ? "none: it is not closed" : `${formatNumber(health.volume)} length³`;
+    if (known) rows.push(["Area", `${formatNumber(health.area)} length²`], ["Volume", volume]);
     this.facts.replaceChildren(...rows.map(([name, text]) => h("tr", {}, h("th", {}, name), h("td", {}, text))));
     this.health.replaceChildren(...(known ? this.describe(state) : [h("li", {}, "It is being examined …")]));
     super.refresh(state);

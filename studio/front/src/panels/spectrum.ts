@@ -22,7 +22,7 @@ export class SpectrumPanel extends ColoringPanel {
   private readonly slider = new Slider("Number i", "eigenfunction", (i) => this.select(i));
   private readonly nodal = h("input", { type: "checkbox", checked: true, "data-test": "nodal", onchange: () => this.start() });
   private readonly proof = h("p", { class: "note", "data-test": "certificate" });
-  private readonly bracket = button("Bracket the lowest 20", "bracket", "Compute bounds of the shape's own eigenvalues", () => this.loadBrackets());
+  private readonly bracket = button("Bracket the lowest 20", "bracket", "Compute bounds of the shape's own eigenvalues", () => this.loadBrackets().catch(() => {}));
   private readonly bounds = h("p", { class: "note", "data-test": "bounds" });
   private readonly results: HTMLElement;
   private plot: uPlot | null = null;
@@ -42,19 +42,10 @@ export class SpectrumPanel extends ColoringPanel {
       this.start();
     });
     choice.press(this.view);
-    this.results = h(
-      "div",
-      {},
-      this.plotHost,
-      h("p", { class: "keys-of-plot" }, ...keys),
-      this.slider.element,
-      this.bounds,
-      choice.element,
-      h("div", { class: "row" }, h("label", {}, this.nodal, "Nodal lines")),
-      h("h3", {}, "Proof"),
-      this.proof,
-      this.bracket,
-    );
+    const plot = [this.plotHost, h("p", { class: "keys-of-plot" }, ...keys)];
+    const nodal = h("div", { class: "row" }, h("label", {}, this.nodal, "Nodal lines"));
+    const mode = [this.slider.element, this.bounds, choice.element, nodal];
+    this.results = h("div", {}, ...plot, ...mode, h("h3", {}, "Proof"), this.proof, this.bracket);
   }
 
   build(app: App): HTMLElement {
@@ -102,10 +93,9 @@ export class SpectrumPanel extends ColoringPanel {
   /** Return the shape that the first modes express; Σ φ_i ⟨φ_i, x⟩. */
   private async smoothShape(count: number): Promise<Float32Array> {
     this.bent = true;
-    const [vertices, areas, modes] = await Promise.all([
-      this.get<Float32Array>("vertices"), this.get<Float32Array>("areas"), this.get<Float32Array>("modes"),
-    ]);
-    return lowpass(vertices, modes, areas, count);
+    const names = ["vertices", "modes", "areas"];
+    const [vertices, modes, areas] = await Promise.all(names.map((name) => this.get<Float32Array>(name)));
+    return lowpass(vertices!, modes!, areas!, count);
   }
 
   private async unbend(): Promise<Float32Array | null> {
