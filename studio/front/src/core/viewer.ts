@@ -400,7 +400,6 @@ export class Viewer {
   private startControls(): OrbitControls {
     const controls = new OrbitControls(this.camera, this.canvas);
     controls.zoomToCursor = true;
-    controls.keyPanSpeed = 12;
     controls.addEventListener("change", () => this.invalidate());
     controls.addEventListener("end", () => {
       const [position, target] = [this.camera.position.toArray(), controls.target.toArray()];
@@ -440,8 +439,25 @@ export class Viewer {
       from = null;
       taken = false;
     };
+    this.canvas.addEventListener("keydown", (event) => this.turnByKey(event));
     this.canvas.addEventListener("pointerup", finish);
     this.canvas.addEventListener("pointercancel", finish);
+  }
+
+  private turnByKey(event: KeyboardEvent): void {
+    const { controls } = this;
+    const actions: Record<string, () => void> = {
+      ArrowLeft: () => controls.rotateLeft(0.1),
+      ArrowRight: () => controls.rotateLeft(-0.1),
+      ArrowUp: () => controls.rotateUp(0.1),
+      ArrowDown: () => controls.rotateUp(-0.1),
+      "+": () => controls.dollyIn(1.1),
+      "-": () => controls.dollyOut(1.1),
+    };
+    if (!actions[event.key]) return;
+    event.preventDefault();
+    actions[event.key]!();
+    controls.dispatchEvent({ type: "end" });
   }
 
   private surfaceMaterial(plain: string): three.ShaderMaterial {
