@@ -238,8 +238,8 @@ export class Studio implements App {
     const [vertices, faces] = [state.n_vertices, state.n_faces].map((n) => n.toLocaleString("en"));
     this.counts.textContent = `${vertices} vertices · ${faces} faces`;
     clearTimeout(this.timer);
-    const { spectrum, parts, deformation } = state;
-    if ([spectrum, parts, deformation].some((part) => part.status === "running"))
+    const { health, spectrum, parts, deformation } = state;
+    if ([health, spectrum, parts, deformation].some((part) => part.status === "running"))
       this.timer = window.setTimeout(() => this.refresh().catch((error) => this.fail(error)), POLL);
   }
 

@@ -28,6 +28,7 @@ export interface State {
   front: Vec3;
   capabilities: Capability[];
   health: {
+    status: Status; // all else is null until it is ready
     components: number;
     boundary_loops: number;
     closed: boolean;

@@ -100,8 +100,10 @@ void main() {
   float share = (v_value - range.x) / max(range.y - range.x, 1e-30);
   vec3 base = texelFetch(table, ivec2(clamp(int(256.0 * share), 0, 255), 0), 0).rgb;
   // A line of constant width on the screen where the function changes its sign.
-  float distance_to_zero = abs(v_value) / max(fwidth(v_value), 1e-30);
-  if (nodal) base = mix(vec3(0.12), base, smoothstep(0.7, 1.5, distance_to_zero));
+  // Where it is zero all over, as on a component of its own, there is none: slope is rounding.
+  float slope = fwidth(v_value);
+  float distance_to_zero = abs(v_value) / max(slope, 1e-30);
+  if (nodal && slope > 1e-9 * range.y) base = mix(vec3(0.12), base, smoothstep(0.7, 1.5, distance_to_zero));
 #elif COLORING == 2
   vec3 base = v_paint;
 #else

@@ -51,7 +51,7 @@ export class ShapePanel extends ColoringPanel {
       this.values.dataset.names = names;
     }
     this.valuesPart.hidden = !values.length;
-    const known = health.components !== null; // a large mesh is examined for some seconds
+    const known = health.status === "ready"; // a large mesh is examined for some seconds
     const rows = [["Vertices", state.n_vertices.toLocaleString("en")], ["Faces", state.n_faces.toLocaleString("en")]];
     const volume = health.volume === null ? "none: it is not closed" : `${formatNumber(health.volume)} length³`;
     if (known) rows.push(["Area", `${formatNumber(health.area)} length²`], ["Volume", volume]);
@@ -72,10 +72,11 @@ export class ShapePanel extends ColoringPanel {
       line(manifold, manifold ? "It is a clean surface (manifold)." : "Some edges or vertices join more than one sheet."),
     ];
     for (const { name, why } of health.findings) {
-      const label = `Repair: ${name.replaceAll("_", " ")}`;
+      const words = name.replaceAll("_", " ");
+      const label = `Repair: ${words}`;
       const repair = () => this.app.change({ kind: "repair", names: [name] }, label).catch(() => {});
       const act = capabilities.includes("repair") && button(label, `repair-${name}`, why, repair);
-      lines.push(h("li", { class: "bad" }, `It would help: ${why}.`, act));
+      lines.push(h("li", { class: "bad" }, `A trial of ${why.replace(name, words)}.`, act));
     }
     return health.findings.length ? lines : [...lines, line(true, "No repair is needed.")];
   }
