@@ -13,7 +13,10 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 
 VTK_CELLS = {1: 3, 2: 5, 3: 10}  # VTK's numbers for segment, triangle and tetrahedron
-POINTS, LINES = (1, 2), (3, 4)  # those of a point and of several, of a segment and of a polyline
+POINTS, LINES = (
+    (1, 2),
+    (3, 4),
+)  # VTK's numbers of cells for one or several points, and for a segment or polyline
 
 
 def to_arrays(shape: ShapeLike) -> tuple[np.ndarray, np.ndarray | None]:
@@ -30,7 +33,7 @@ def to_arrays(shape: ShapeLike) -> tuple[np.ndarray, np.ndarray | None]:
 
     See Also
     --------
-    from_arrays : Make a shape of arrays.
+    from_arrays : Make a shape from arrays.
 
     Examples
     --------
@@ -128,7 +131,8 @@ def to_trimesh(shape: ShapeLike) -> Any:
 def from_pyvista(dataset: Any, *, dim: SupportsIndex = 2) -> Shape:
     """Convert a PolyData or UnstructuredGrid of PyVista.
 
-    The simplices of the highest dimension are taken, or the points if there are none. Polylines become segments.
+    The simplices of the highest dimension are taken, or the points if there are none. Polylines
+    become segments.
 
     Parameters
     ----------
@@ -143,7 +147,7 @@ def from_pyvista(dataset: Any, *, dim: SupportsIndex = 2) -> Shape:
     Raises
     ------
     InvalidShapeError
-        If the object is neither, or has cells that are not simplices.
+        If the object is neither of these, or has cells that are not simplices.
     MissingExtraError
         If PyVista is not installed.
 
@@ -177,7 +181,7 @@ def from_pyvista(dataset: Any, *, dim: SupportsIndex = 2) -> Shape:
 
 
 def _segments(kinds: np.ndarray, sizes: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Return the pairs of points that follow each other in segments and polylines."""
+    """Return the pairs of successive points of segments and polylines."""
     cell = np.repeat(np.arange(len(sizes)), sizes)
     chained = (cell[1:] == cell[:-1]) & np.isin(kinds, LINES)[cell[1:]]
     return np.column_stack([corners[:-1][chained], corners[1:][chained]])

@@ -1,4 +1,7 @@
-"""The kinds of cells that a file can be asked for. The command line reads them, so this module is light."""
+"""The kinds of cells that can be requested from a file.
+
+The command line imports this module for its help, so it imports little.
+"""
 
 from typing import Literal
 

@@ -1,4 +1,4 @@
-"""Which cells of a file are read: those of the highest dimension, or those that the caller names."""
+"""Selection of the cells of a file: those of the highest dimension, or of a requested kind."""
 
 from collections.abc import Mapping, Sequence
 from typing import Literal, cast, get_args
@@ -13,16 +13,17 @@ from eigenshape.io.text import fans
 SEGMENTS = "segments"
 Blocks = Mapping[str, Int[np.ndarray, "_ _"]]  # by CellKind, or SEGMENTS
 SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))  # of a polygon of four corners
-FLAT = 1e-6  # share of the third power of a cell's size; files of single precision are flat to 1e-7
+# Largest volume of a flat cell, as a share of its size cubed; single precision gives 1e-7.
+FLAT = 1e-6
 
 
 def require_kind(cells: str | None) -> CellKind | None:
-    """Return the kind of cells, or refuse another.
+    """Return the kind of cells; raise an error if there is no such kind.
 
     Raises
     ------
     InvalidParameterError
-        If it is another.
+        If the kind is unknown.
     """
     if cells is not None and cells not in get_args(CellKind):
         raise InvalidParameterError(
@@ -32,12 +33,12 @@ def require_kind(cells: str | None) -> CellKind | None:
 
 
 def require_splittable(others: Sequence[str]) -> None:
-    """Refuse cells that are neither simplices nor quads, by their names.
+    """Raise an error that names the cells that are neither simplices nor quads.
 
     Raises
     ------
     FileFormatError
-        If there are any.
+        If there are such cells.
     """
     if others:
         raise FileFormatError(
@@ -47,14 +48,14 @@ def require_splittable(others: Sequence[str]) -> None:
 
 
 def select_cells(blocks: Blocks, cells: CellKind | None) -> Int[np.ndarray, "s corners"]:
-    """Return the simplices that are to be read; quads become two triangles each, of shape (0, 3) where there is none.
+    """Return the simplices of the requested kind, where each quad becomes two triangles.
 
-    "quads" takes the triangles that lie between them, too.
+    The kind "quads" includes the triangles between them. Without cells the shape is (0, 3).
 
     Raises
     ------
     FileFormatError
-        If the file has no cells of the kind that is asked for.
+        If the file has no cells of the requested kind.
     """
     quads = fans(blocks["quads"]) if "quads" in blocks else np.empty((0, 3), dtype=np.int64)
     triangles = blocks.get("triangles", quads[:0])
@@ -75,14 +76,14 @@ def select_cells(blocks: Blocks, cells: CellKind | None) -> Int[np.ndarray, "s c
 def four_cornered(
     points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "c 4"]
 ) -> Literal["quads", "tetrahedra"] | None:
-    """Tell whether cells of four corners are quads or tetrahedra; None where they could be either.
+    """Return whether cells of four corners are quads or tetrahedra; None if they could be either.
 
-    They are quads where all are flat, or where they join as the faces of a surface do: most share a side with one
-    other, none with two, and few share three corners with another. They are tetrahedra where most share three corners
-    with another, and some side belongs to more than two.
+    They are quads if all are flat, or if they join like the faces of a surface: most share a side
+    with another cell, no side belongs to more than two, and few cells share three corners. They are
+    tetrahedra if most share three corners with another, and some side belongs to more than two.
     """
     if not len(cells) or cells.min() < 0 or cells.max() >= len(points):
-        return "quads"  # whatever is made of them refuses them by index
+        return "quads"  # the mesh that is built from them raises an error with the index
     if _are_flat(points, cells):
         return "quads"
     distinct = np.unique(np.sort(cells, axis=1), axis=0, return_index=True)[1]
@@ -107,7 +108,7 @@ def _are_flat(points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "c 4"]) -
 
 
 def _multiplicities(rows: Int[np.ndarray, "c p corners"]) -> Int[np.ndarray, "c p"]:
-    """Return how often each row of corners occurs among all."""
+    """Return, for each row of corners, how often it occurs."""
     flat = rows.reshape(-1, rows.shape[2])
     _, inverse, counts = np.unique(flat, axis=0, return_inverse=True, return_counts=True)
     return counts[inverse.ravel()].reshape(rows.shape[:2])

@@ -14,12 +14,12 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 def write_edits(edits: Sequence[Edit], mesh: MeshLike, path: str | Path) -> None:
     """Write edits of a mesh to a JSON file.
 
-    The file appears complete or not at all, and holds numbers to the last digit.
+    The file appears complete or not at all. Numbers are written without loss of digits.
 
     Parameters
     ----------
     edits : sequence of Edit
-        Such as `DeformationSession.edits`.
+        For example `DeformationSession.edits`.
     mesh : MeshLike
         The mesh that the edits were made on.
     path : str or Path
@@ -58,8 +58,8 @@ def read_edits(path: str | Path, mesh: MeshLike) -> list[Edit]:
     ----------
     path : str or Path
     mesh : MeshLike
-        The mesh that the edits were made on, equal to the last digit. To apply the edits to another mesh of the same
-        shape, pass this mesh to `replay` as `source`.
+        The mesh that the edits were made on, equal to the last digit. To apply the edits to another
+        mesh of the same shape, pass this mesh to `replay` as `source`.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""glTF, binary or with its files beside it: all triangles of all nodes, each moved to its place."""
+"""glTF, as one binary file or with separate buffers: the triangles of all nodes, transformed."""
 
 import json
 from pathlib import Path
@@ -14,11 +14,11 @@ from eigenshape.io.text import quote_line
 
 JSON_CHUNK = b"JSON"
 BINARY_CHUNK = b"BIN\0"
-COPIES = 2**22  # so many vertices and faces may be made of copies in a small file; they take 200 MB
+COPIES = 2**22  # most vertices and faces from copies in a small file; they take 200 MB
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Read vertices and faces of the scene; a buffer outside the file is refused, never opened."""
+    """Read vertices and faces of the scene; a buffer outside the file raises an error."""
     chunks = _chunks(data)
     tree = _tree(chunks.get(JSON_CHUNK, b""))
     return _scene(tree, decode_buffers(tree, chunks.get(BINARY_CHUNK, b"")))

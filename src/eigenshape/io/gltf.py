@@ -1,4 +1,4 @@
-"""The scene of a glTF file: nodes that place meshes, and accessors that find numbers in buffers."""
+"""The scene of a glTF file: nodes that place meshes, and accessors to numbers in buffers."""
 
 import base64
 import sys
@@ -19,7 +19,7 @@ WIDTHS = {"SCALAR": 1, "VEC3": 3}
 TRIANGLES, STRIP, FAN = 4, 5, 6
 LARGEST = sys.float_info.max
 NO_FACES = np.empty((0, 3), dtype=np.int64)
-# Extensions that change what a surface looks like, not where it is, or that ask nothing of the reader.
+# Extensions that change the look of a surface but not its place, or that a reader may ignore.
 HARMLESS = (
     "KHR_materials_",
     "KHR_texture_",
@@ -32,9 +32,9 @@ Piece = tuple[np.ndarray, np.ndarray]  # vertices and faces
 
 @dataclass(frozen=True)
 class Gltf:
-    """The JSON tree of a file and its buffers, and how many vertices and faces may come out of it.
+    """The JSON tree and buffers of a file, and a limit for its vertices and faces.
 
-    The bound is there because a small file can place one mesh any number of times.
+    There is a limit because a small file can place one mesh any number of times.
     """
 
     tree: dict[str, Any]
@@ -42,7 +42,7 @@ class Gltf:
     most: int
 
     def entry(self, kind: str, index: Any) -> dict[str, Any]:
-        """Return one entry of a list of the tree."""
+        """Return one entry of a list in the tree."""
         entries = _list(self.tree, kind)
         known = type(index) is int and 0 <= index < len(entries)
         if not known or not isinstance(entries[index], dict):
@@ -53,12 +53,12 @@ class Gltf:
 
 
 def decode_buffers(tree: dict[str, Any], binary: bytes, folder: Path | None = None) -> list[bytes]:
-    """Return the buffers: the chunk beside the tree, those in data URIs, and, given a folder, the files in it.
+    """Return the buffers: the binary chunk, data URIs and, if a folder is given, files in it.
 
     Raises
     ------
     FileFormatError
-        If a buffer lies outside of the file, or of the folder; it is never opened.
+        If a buffer is outside the file or the folder. Such a file is not opened.
     """
     return [
         _decode_buffer(index, entry, binary, folder)
@@ -92,11 +92,11 @@ def _decode_buffer(index: int, entry: Any, binary: bytes, folder: Path | None) -
 
 
 def _beside(index: int, uri: str, folder: Path) -> Path:
-    """Return the file that a relative URI names, which must lie in the folder or below, links followed."""
+    """Return the file of a relative URI; links resolved, it must be in or below the folder."""
     try:
         root = folder.resolve()
         path = (root / unquote(uri, errors="strict")).resolve()
-    except (ValueError, OSError, RuntimeError):  # no text, a zero byte, a loop of links
+    except (ValueError, OSError, RuntimeError):  # undecodable text, a zero byte, a loop of links
         path = root.parent
     if ":" in uri or not path.is_relative_to(root):
         raise FileFormatError(
@@ -189,13 +189,13 @@ def _local_matrix(node: dict[str, Any]) -> np.ndarray:
 
 def _transform(piece: Piece, matrix: np.ndarray) -> Piece:
     vertices, faces = piece
-    # A mirror turns triangles inside out; the format asks to turn them back.
+    # A reflection turns triangles inside out; by the format they must be turned back.
     flipped = faces[:, ::-1] if np.linalg.slogdet(matrix[:3, :3])[0] < 0 else faces
     return vertices @ matrix[:3, :3].T + matrix[:3, 3], flipped
 
 
 def _mesh(gltf: Gltf, mesh: dict[str, Any]) -> Piece:
-    """Read one mesh; parts that differ in material only share their vertices, as the file does."""
+    """Read one mesh; parts that differ only in material share their vertices, as in the file."""
     parts: dict[int, list[dict[str, Any]]] = {}
     for part in _list(mesh, "primitives"):
         if _whole(part, "mode", TRIANGLES) in (TRIANGLES, STRIP, FAN):
@@ -256,7 +256,7 @@ def _accessor(gltf: Gltf, index: Any, width: int) -> np.ndarray:
     data, step = _view(gltf, accessor.get("bufferView"))
     row = kind.itemsize * width
     count, start = _whole(accessor, "count"), _whole(accessor, "byteOffset", 0)
-    step = step if step and count > 1 else row  # no step is taken between fewer than two rows
+    step = step if step and count > 1 else row  # fewer than two rows have no step
     if step < row or start + (count - 1) * step + row > len(data):
         raise FileFormatError(
             f"accessors[{index}] must lie in its buffer; {count} rows do not fit {len(data)} bytes."

@@ -14,7 +14,7 @@ from eigenshape.io.cells import SEGMENTS, require_splittable
 from eigenshape.io.text import numbers_of, quote_line, wholes
 
 VERSIONS = {b"2": 2, b"2.1": 2, b"2.2": 2, b"4": 4, b"4.1": 4}
-POINT = 15  # elements of one node, which are passed over
+POINT = 15  # elements of one node, which are ignored
 KINDS = {1: SEGMENTS, 2: "triangles", 3: "quads", 4: "tetrahedra"}
 CORNERS = {1: 2, 2: 3, 3: 4, 4: 4, POINT: 1}
 SOLIDS = {5: "hexahedron", 6: "wedge", 7: "pyramid"}
@@ -25,7 +25,7 @@ Rows = list[tuple[int, Int[np.ndarray, "_ _"]]]  # gmsh's number of a type, and 
 
 
 class _Numbers:
-    """The numbers of a section, one after the other."""
+    """Reads the numbers of a section in order."""
 
     def __init__(self, body: bytes, is_text: bool) -> None:
         self.is_text, self.place = is_text, 0
@@ -37,7 +37,7 @@ class _Numbers:
         Raises
         ------
         FileFormatError
-            If fewer are left, or a word of a text file is no number.
+            If there are fewer, or a word of a text file is not a number.
         """
         size = 1 if self.is_text else np.dtype(kind).itemsize
         end = self.place + count * size
@@ -59,7 +59,7 @@ class _Numbers:
         return int(self.take(kind, 1)[0])
 
     def require_end(self) -> None:
-        """Refuse what is left."""
+        """Raise an error if numbers remain."""
         rest = self.source[self.place :]
         if len(rest.strip() if isinstance(rest, bytes) else rest):
             raise FileFormatError(f"{RULE}; more follows after the last that is declared.")
@@ -71,7 +71,7 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], dict[str, Int[np.ndarr
     Raises
     ------
     FileFormatError
-        If a section is missing or there twice, nodes and elements are not as declared, or an
+        If a section is missing or occurs twice, nodes and elements are not as declared, or an
         element is neither a simplex nor a quadrilateral.
     """
     words, _, order = _section(data, b"MeshFormat").partition(b"\n")
@@ -111,7 +111,7 @@ def _section(data: bytes, name: bytes) -> bytes:
 def _plain_nodes(
     body: bytes, is_text: bool
 ) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n 3"]]:
-    """Read nodes of version 2: a count, then a tag and three coordinates a node."""
+    """Read nodes of version 2: a count, then a tag and three coordinates for each node."""
     if is_text:
         numbers = _Numbers(body, is_text)
         table = numbers.take("<f8", 4 * numbers.count("<i8")).reshape(-1, 4)
@@ -124,7 +124,7 @@ def _plain_nodes(
 
 
 def _split_count(body: bytes) -> tuple[int, _Numbers]:
-    """Return the count before a binary section of version 2, which is text, and what follows it."""
+    """Return the count before a binary section of version 2, which is text, and the section."""
     head, _, rest = body.partition(b"\n")
     return _Numbers(head, is_text=True).count("<i8"), _Numbers(rest, is_text=False)
 
@@ -235,12 +235,12 @@ def _require_total(found: int, declared: int, what: str) -> None:
 
 
 def _cells(tags: Int[np.ndarray, " n"], rows: Rows) -> dict[str, Int[np.ndarray, "_ _"]]:
-    """Return cells by kind, with places of nodes in the file instead of their tags.
+    """Return cells by kind, with the order of nodes in the file instead of their tags.
 
     Raises
     ------
     FileFormatError
-        If tags are not positive and distinct, or an element has a tag that no node has.
+        If tags are not positive and distinct, or an element refers to a tag without node.
     """
     if tags.size and tags.min() < 1:
         raise FileFormatError(

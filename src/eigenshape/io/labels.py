@@ -1,4 +1,4 @@
-"""Whole numbers: labels of faces, in .seg, .json or .ply files, or vertices of two shapes that correspond."""
+"""Files of whole numbers: labels of faces (.seg, .json or .ply), or corresponding vertices."""
 
 import json
 from pathlib import Path
@@ -18,12 +18,14 @@ VERTEX = ("A vertex", "the number of one vertex")
 
 
 def read_labels(path: Path) -> Int[np.ndarray, " f"]:
-    """Read one label a face: a line each, those under "face_labels" of a .json file, or the property of a .ply file.
+    """Read one label per face.
+
+    A file has one label a line, the list "face_labels" in .json, or the property `label` in .ply.
 
     Raises
     ------
     FileFormatError
-        With the line or the entry that is no whole number, or if there is no such list.
+        If a line or an entry is not a whole number, or if there is no such list.
     OSError
         If the system cannot open the file.
     """
@@ -38,12 +40,12 @@ def read_labels(path: Path) -> Int[np.ndarray, " f"]:
 
 
 def read_map(path: Path) -> Int[np.ndarray, " n"]:
-    """Read for each vertex of a shape the number of one of another, a line each, from 0.
+    """Read the corresponding vertex of another shape for each vertex, one a line, from 0.
 
     Raises
     ------
     FileFormatError
-        With the line that is no whole number.
+        If a line is not a whole number.
     OSError
         If the system cannot open the file.
     """
@@ -55,7 +57,7 @@ def read_map(path: Path) -> Int[np.ndarray, " n"]:
 
 
 def write_labels(labels: Int[np.ndarray, " f"], path: Path) -> None:
-    """Write one label a line; the file appears whole or not at all."""
+    """Write one label a line; the file appears complete or not at all."""
     replace_file(path, "".join(f"{label}\n" for label in labels.tolist()).encode())
 
 

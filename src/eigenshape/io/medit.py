@@ -31,7 +31,7 @@ SOLIDS = {
     "Hexahedra": "hexahedron",
     "Hexaedra": "hexahedron",
 }
-# What a shape does not need. Another keyword is refused: it could be a misspelt section of cells.
+# Sections that are ignored. An unknown keyword is an error: it could be misspelt cells.
 PASSED_OVER = {
     "End", "Corners", "Ridges", "Normals", "Tangents", "AngleOfCornerBound", "BoundingBox",
     "RequiredVertices", "RequiredEdges", "RequiredTriangles", "RequiredQuadrilaterals",
@@ -56,7 +56,7 @@ Found = tuple[Float[np.ndarray, "n d"], dict[str, Int[np.ndarray, "_ _"]]]
 
 
 def parse_text(data: bytes) -> Found:
-    """Return points and cells by kind of a text file.
+    """Return the points, and the cells by kind, of a text file.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def parse_text(data: bytes) -> Found:
             f"A Medit file must begin with a keyword; it begins with {quote_line((0, before))}."
         )
     ends = [match.start() for match in keywords[1:]] + [len(text)]
-    single: dict[str, np.ndarray] = {}  # sections that may stand there once
+    single: dict[str, np.ndarray] = {}  # sections that may occur only once
     tables: dict[str, list[np.ndarray]] = {}
     for match, end in zip(keywords, ends, strict=True):
         name = match[1].decode()
@@ -101,7 +101,7 @@ def parse_text(data: bytes) -> Found:
     if "Vertices" not in single:
         raise FileFormatError("A Medit file must have Vertices; it has none.")
     points = _rows(single["Vertices"], dimension + 1, "Vertices")[:, :dimension]
-    # Version 1 stands for single precision, whatever digits are written.
+    # Version 1 means single precision, however many digits are written.
     return (points.astype(np.float32) if version < 2 else points).astype(np.float64), _blocks(
         tables
     )
@@ -145,12 +145,14 @@ def _blocks(tables: dict[str, list[np.ndarray]]) -> dict[str, Int[np.ndarray, "_
 
 
 def parse_binary(data: bytes) -> Found:
-    """Return points and cells by kind of a binary file of version 1 to 4, in either order of bytes.
+    """Return the points, and the cells by kind, of a binary file of version 1 to 4.
+
+    Both byte orders are read.
 
     Raises
     ------
     FileFormatError
-        If the file ends early, or a cell is no simplex or quadrilateral.
+        If the file ends early, or a cell is neither a simplex nor a quadrilateral.
     """
     order = {1: "<", 2**24: ">"}.get(int.from_bytes(data[:4], "little"), "")
     version = int(_read_items(data, 4, order + "i4", 1)[0]) if order else 0

@@ -31,9 +31,10 @@ def read_mesh(
 ) -> TriangleMesh:
     r"""Read a triangle mesh from a file.
 
-    Vertices keep their order and are neither merged nor split. The exception is STL, which does not store shared
-    vertices: there, corners with equal coordinates become one vertex. Polygons become fans of triangles around their
-    first corner. Colors, normals, textures and materials are ignored. The whole file is read into memory.
+    Vertices keep their order and are neither merged nor split. The exception is STL, which does not
+    store shared vertices: there, corners with equal coordinates become one vertex. Polygons become
+    fans of triangles around their first corner. Colors, normals, textures and materials are
+    ignored. The whole file is read into memory.
 
     Parameters
     ----------
@@ -42,7 +43,8 @@ def read_mesh(
     file_format : str, optional
         Suffix of the format, such as "ply" or ".ply". By default the suffix of the path.
     cells : {"triangles", "quads", "tetrahedra"}, optional
-        Kind of cells to read, if the file holds several kinds or does not name the kind; see `read_shape`.
+        Kind of cells to read, if the file holds several kinds or does not name the kind; see
+        `read_shape`.
 
     Returns
     -------
@@ -52,8 +54,8 @@ def read_mesh(
     Raises
     ------
     FileFormatError
-        If the format is unknown, the path is not a regular file, the content differs from what its header declares,
-        or it holds no triangles in R³.
+        If the format is unknown, the path is not a regular file, the content differs from what its
+        header declares, or it holds no triangles in R³.
     InvalidShapeError
         If a coordinate is not finite, or a face has an index that is not that of a vertex.
     InvalidParameterError
@@ -116,8 +118,8 @@ def write_mesh(
 ) -> None:
     """Write a mesh to a file, in the format of its suffix.
 
-    The file appears complete or not at all. `read_mesh` reads OFF, OBJ and PLY back exactly. STL stores triangles
-    without shared vertices; GLB and binary STL store single precision.
+    The file appears complete or not at all. `read_mesh` reads OFF, OBJ and PLY back exactly. STL
+    stores triangles without shared vertices; GLB and binary STL store single precision.
 
     Parameters
     ----------
@@ -126,19 +128,22 @@ def write_mesh(
     path : str or Path
         Must end in .off, .obj, .ply, .stl or .glb.
     binary : bool, optional
-        Whether to write binary data. By default True for PLY and STL. OFF and OBJ are always text, GLB always binary.
+        Whether to write binary data. By default True for PLY and STL. OFF and OBJ are always text,
+        GLB always binary.
     colors : (n, 3) uint8, optional
         Red, green and blue of each vertex; only for PLY.
     face_labels : (f,) int, optional
-        A whole number of 32 bits for each face, such as the number of its part. Only for PLY, where it is the property
-        `label` of faces.
+        A whole number of 32 bits for each face, such as the number of its part. Only for PLY, where
+        it is the property `label` of faces.
 
     Raises
     ------
     FileFormatError
-        If the suffix is unknown, or the format has only single precision and coordinates do not fit into it.
+        If the suffix is unknown, or the format has only single precision and coordinates do not fit
+        into it.
     InvalidParameterError
-        If the format has no such binary or text form, if it takes no colors or labels, or if their shapes are wrong.
+        If the format has no such binary or text form, if it takes no colors or labels, or if their
+        shapes are wrong.
     OSError
         If the system cannot write the file.
 

@@ -1,4 +1,4 @@
-"""Wavefront OBJ: positions and faces; texture seams, normals, groups and materials are passed over."""
+"""Wavefront OBJ: positions and faces; textures, normals, groups and materials are ignored."""
 
 import re
 from collections.abc import Sequence
@@ -19,14 +19,14 @@ from eigenshape.io.text import (
     whole_table,
 )
 
-# A backslash joins lines only in numbers: a comment may end in one, as may a folder's name.
+# A backslash joins only lines of numbers: comments and names of folders may end in one.
 CONTINUED = re.compile(rb"^[ \t]*[vfl](?:[^\n\\#]|\\\r?\n|\\(?!\r?\n))*", re.MULTILINE)
 JOINT = re.compile(rb"\\\r?\n")
 AFTER_POSITION = re.compile(rb"(?<=\d)/\S*")  # a corner is position/texture/normal
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Read vertices, and the faces, or else the segments of lines, or else none."""
+    """Read vertices and faces; without faces, the segments of lines; without both, none."""
     positions: list[Line] = []
     polygons: list[Line] = []
     polylines: list[Line] = []
@@ -48,7 +48,7 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
 
 
 def join_lines(data: bytes) -> bytes:
-    """Join lines of numbers that end in a backslash with the next; all others keep their places."""
+    """Join lines of numbers that end in a backslash with the next line; keep all line numbers."""
     return CONTINUED.sub(_join_match, data) if JOINT.search(data) else data
 
 
@@ -86,12 +86,12 @@ def _segments(polylines: Sequence[Line], n_so_far: Sequence[int]) -> np.ndarray:
 
 
 def corner_index(word: bytes, line: Line, n_so_far: int) -> int:
-    """Return the vertex that a corner names, from 0, after so many vertices.
+    """Return the vertex of a corner, from 0, if `n_so_far` vertices precede it.
 
     Raises
     ------
     FileFormatError
-        If it names none, or counts back beyond the first.
+        If there is no such vertex, or a negative index goes back beyond the first.
     """
     index = whole(word, line, "A corner")
     if index == 0 or index < -n_so_far:

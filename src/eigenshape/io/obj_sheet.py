@@ -1,4 +1,4 @@
-"""OBJ files on their way through a change of the mesh: polygons, texture coordinates and groups are kept."""
+"""Rewriting of OBJ files for a changed mesh, with their polygons, textures and groups."""
 
 import codecs
 from collections import defaultdict, deque
@@ -15,25 +15,25 @@ from eigenshape.io.text import Line, coordinates, rows_text, whole
 
 KEPT = (b"vt", b"o", b"g", b"s", b"usemtl", b"mtllib")
 ORDERS = tuple(permutations(range(3)))
-TURNED = ((0, 2, 1), (1, 0, 2), (2, 1, 0))  # those of ORDERS that turn a face over
+TURNED = ((0, 2, 1), (1, 0, 2), (2, 1, 0))  # the permutations in ORDERS that reverse a face
 Corner = tuple[int, str]  # a vertex, and "/7" where it has the texture coordinate 7
 
 
 @dataclass(frozen=True, eq=False)
 class ObjSheet:
-    """What an OBJ file holds that a triangle mesh leaves out.
+    """The content of an OBJ file that a triangle mesh does not store.
 
-    Normals, points, polylines and comments are not kept: normals no longer hold once a surface changes.
+    Normals, points, polylines and comments are dropped; normals are wrong after a change.
 
     Attributes
     ----------
     vertices : (n, 3) float
     tails : tuple of str
-        For each vertex what follows its coordinates: a weight or a color.
+        For each vertex, the text after its coordinates: a weight or a color.
     polygons : tuple
-        For each face its corners.
+        The corners of each face.
     rows : tuple
-        Lines to be written as they were, and numbers of polygons, in the order of the file.
+        Lines to copy, and numbers of polygons, in the order of the file.
     """
 
     vertices: Float[np.ndarray, "n 3"]
@@ -43,7 +43,7 @@ class ObjSheet:
 
 
 def read_sheet(data: bytes) -> ObjSheet:
-    """Read what `obj.parse` reads, and what goes with it.
+    """Read an OBJ file with its polygons, textures and groups.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def read_sheet(data: bytes) -> ObjSheet:
             polygons.append(tuple(corners))
         elif keyword in KEPT:
             n_textures += keyword == b"vt"
-            rows.append(raw.strip().decode("latin-1"))  # names may hold a #
+            rows.append(raw.strip().decode("latin-1"))  # names may contain #
     return ObjSheet(coordinates(positions), tuple(tails), tuple(polygons), tuple(rows))
 
 
@@ -85,19 +85,20 @@ def _corner(word: bytes, line: Line, n_vertices: int, n_textures: int) -> Corner
 def format_sheet(
     sheet: ObjSheet, mesh: TriangleMesh, moved: Float[np.ndarray, "k 3"] | None = None
 ) -> bytes:
-    """Write a repaired or deformed mesh with what is left of the file's polygons, textures and groups.
+    """Write a repaired or deformed mesh with the remaining polygons, textures and groups.
 
-    A polygon stays one where all its triangles are still there; else those that are there are written as triangles. A
-    triangle that the file does not have, as of a sealed hole, comes last and has no texture.
+    A polygon is kept if all its triangles still exist. Otherwise its remaining triangles are
+    written. Triangles that the file does not have, such as those of a filled hole, come last and
+    have no texture.
 
     Parameters
     ----------
     sheet : ObjSheet
-        Of the file that the mesh was read from.
+        The content of the file that the mesh was read from.
     mesh : TriangleMesh
-        After repairs, which leave vertices in place.
+        The mesh after repairs, which do not move vertices.
     moved : (k, 3) float, optional
-        Where its vertices are to be written.
+        Coordinates to write instead of those of the mesh.
     """
     places, old_places, new_places = _places(sheet.vertices, mesh.vertices)
     first = np.full(places, -1)
@@ -138,7 +139,7 @@ def _match_triangles(
     old_places: Int[np.ndarray, " n"],
     new_places: Int[np.ndarray, " k"],
 ) -> tuple[list[Triangles], Int[np.ndarray, "a 3"]]:
-    """Find each triangle of each polygon among the faces of the mesh, by place; and faces that no polygon has."""
+    """Find the face of each triangle of each polygon, by place, and the faces of no polygon."""
     by_places: defaultdict[tuple[int, ...], deque[list[int]]] = defaultdict(deque)
     for face, places in zip(
         faces.tolist(), np.sort(new_places[faces], axis=1).tolist(), strict=True
@@ -160,16 +161,16 @@ def _match_triangles(
 def _fit_corners(
     face: list[int], wanted: list[int], places: Int[np.ndarray, " k"]
 ) -> tuple[Sequence[int], bool]:
-    """Bring the corners of a face into the order of the places that are wanted."""
+    """Permute the corners of a face into the order of the given places."""
     orders = (
         order for order in ORDERS if places[[face[place] for place in order]].tolist() == wanted
     )
-    order = next(orders)  # the sorted places agree, so one does
+    order = next(orders)  # the sorted places agree, so there is one
     return [face[place] for place in order], order in TURNED
 
 
 def _polygon_rows(polygon: Sequence[Corner], triangles: Triangles) -> list[str]:
-    """Write what is left of a polygon: itself, turned over perhaps, or some of its triangles."""
+    """Write the remaining part of a polygon: the whole, perhaps reversed, or some triangles."""
     textures = [texture for _, texture in polygon]
     whole_polygon = _whole(triangles)
     if whole_polygon is not None:
@@ -189,7 +190,10 @@ def _polygon_rows(polygon: Sequence[Corner], triangles: Triangles) -> list[str]:
 
 
 def _whole(triangles: Triangles) -> tuple[list[int], bool] | None:
-    """Return the corners of the polygon that all these triangles make; None where one is gone, or they disagree."""
+    """Return the corners of a polygon with all its triangles; None if one is missing or reversed.
+
+    Triangles that are all reversed make a reversed polygon.
+    """
     if not triangles or triangles[0] is None:
         return None
     vertices, is_turned = [*triangles[0][0][:2]], triangles[0][1]

@@ -1,4 +1,4 @@
-"""Object File Format: counts, then vertices, then faces; as text mostly one a line, or binary."""
+"""Object File Format: counts, vertices and faces, as text or binary."""
 
 import re
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ BINARY = re.compile(rb"OFF[ \t]+BINARY[ \t]*\r?\n", re.IGNORECASE)
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Read vertices and faces; polygons become fans, colors and normals are passed over."""
+    """Read vertices and faces; polygons become fans; colors and normals are ignored."""
     binary = BINARY.match(data)
     if binary:
         return _parse_binary(data[binary.end() :])
@@ -47,7 +47,7 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
 def _parse_stream(
     rows: Sequence[Line], n_vertices: int, n_faces: int
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Read numbers wherever lines break; None where vertices and faces without colors do not fill the file."""
+    """Read numbers without regard to lines; None if vertices and faces do not fill the file."""
     words = [(at, word) for at, text in rows for word in text.split()]
     if 3 * n_vertices + 4 * n_faces > len(words):
         return None
@@ -70,10 +70,10 @@ def _parse_stream(
 
 
 def _parse_binary(body: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Read 32-bit numbers in the order and with the counts of colors that fill the file.
+    """Read 32-bit numbers, in the byte order and with the counts of colors that fit the file.
 
-    Geomview writes big-endian numbers and after each face how many colors follow; the Polygon Mesh Processing library
-    and OpenMesh write those of the machine, and faces without such a count.
+    Geomview writes big-endian numbers and, after each face, the number of its colors. The Polygon
+    Mesh Processing library and OpenMesh use the byte order of the machine and write no such number.
     """
     for order in ">", "<":
         for has_colors in True, False:
@@ -140,7 +140,7 @@ def _counts(line: Line) -> tuple[int, int]:
 
 
 def _require_equal_rows(rows: Sequence[Line]) -> None:
-    """Refuse rows of several widths: where counts are wrong a face could be taken for a vertex."""
+    """Raise an error if rows have different widths: a face could be read as a vertex."""
     widths = [len(row[1].split()) for row in rows]
     odd = next((row for row, width in zip(rows, widths, strict=True) if width != widths[0]), None)
     if odd is not None:

@@ -1,4 +1,4 @@
-"""From the bytes of a file to points and simplices, whatever the format; errors name the file."""
+"""Parse the bytes of a file of any format to points and simplices; errors name the file."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,7 +13,7 @@ from eigenshape.io import glb, gmsh, medit, obj, off, ply, stl, vtk_legacy, vtu
 from eigenshape.io.cell_kinds import CellKind
 from eigenshape.io.cells import SEGMENTS, Blocks, select_cells
 
-# Formats whose bytes alone give vertices, and triangles or segments.
+# Formats that are parsed to vertices, and triangles or segments.
 PARSERS = {
     ".off": off.parse,
     ".obj": obj.parse,
@@ -22,7 +22,7 @@ PARSERS = {
     ".glb": glb.parse,
 }
 NAMES = {2: SEGMENTS, 3: "triangles"}
-# Formats whose bytes alone give points, and cells by kind.
+# Formats that are parsed to points, and cells by kind.
 GRIDS = {
     ".mesh": medit.parse_text,
     ".meshb": medit.parse_binary,
@@ -53,7 +53,7 @@ def suffix_of(path: Path, file_format: str | None, known: tuple[str, ...]) -> st
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """Put the path before the message of an error; what overflows is left to the check of the shape."""
+    """Put the path before the message of an error. Overflow is found when the shape is checked."""
     try:
         with np.errstate(all="ignore"):
             yield
@@ -69,7 +69,7 @@ def naming(path: Path) -> Iterator[None]:
 def parse_mesh(
     path: Path, suffix: str, data: bytes, cells: CellKind | None
 ) -> tuple[Float[np.ndarray, "n d"], Int[np.ndarray, "s corners"]]:
-    """Return points and the simplices that are chosen; of shape (0, 3) where there are points alone."""
+    """Return points and the selected simplices, of shape (0, 3) if there are only points."""
     points, blocks = _blocks(path, suffix, data, cells)
     return points, select_cells(blocks, cells)
 

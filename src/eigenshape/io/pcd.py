@@ -13,12 +13,12 @@ from eigenshape.io.unpacking import require_reasonable
 
 AXES = (b"x", b"y", b"z")
 KINDS = {(b"F", 4): "<f4", (b"F", 8): "<f8"}
-MOST_TIMES = 88  # three bytes stand for 264 at most
+MOST_TIMES = 88  # largest compression ratio: three bytes stand for at most 264
 
 
 @dataclass(frozen=True)
 class Header:
-    """What a file declares: fields with the bytes of each, and how many points there are."""
+    """The header of a file: the fields with their sizes, and the number of points."""
 
     names: tuple[bytes, ...]
     sizes: tuple[int, ...]  # bytes of all values of the field
@@ -33,7 +33,7 @@ class Header:
 
 
 def parse(data: bytes) -> Float[np.ndarray, "n 3"]:
-    """Read x, y and z; other fields are passed over. Missing returns are NaN, as the file has them."""
+    """Read x, y and z; other fields are ignored. Missing returns remain NaN, as in the file."""
     lines, kind, body = _split(data)
     header = _header(lines)
     if kind == b"ascii":
@@ -145,7 +145,7 @@ def _records(header: Header, body: bytes) -> Float[np.ndarray, "n 3"]:
 
 
 def _columns(header: Header, body: np.ndarray) -> Float[np.ndarray, "n 3"]:
-    """Read what stands field by field instead of point by point."""
+    """Read data that are stored by field instead of by point."""
     starts = np.cumsum([0, *header.sizes]) * header.n_points
     return np.column_stack(
         [_values(header, body[starts[i] : starts[i + 1]], i) for i in _axes(header)]

@@ -26,12 +26,12 @@ from eigenshape.io.text import (
 
 AXES = ("x", "y", "z")
 CORNERS = ("vertex_indices", "vertex_index")
-LABEL = "label"  # the property of faces that says of which part each is
+LABEL = "label"  # the property of faces that holds the number of their part
 Table = dict[str, Any]  # the values of each column, by name
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Read vertices and faces, if any; polygons become fans, strips triangles, the rest is passed over."""
+    """Read vertices and faces; polygons and strips become triangles, the rest is ignored."""
     tables = _tables(data)
     vertices = np.column_stack(
         [np.asarray(tables["vertex"][axis], dtype=np.float64) for axis in AXES]
@@ -59,7 +59,7 @@ def _lists(tables: dict[str, Table], name: str) -> Any:
 
 
 def _pieces(strips: Sequence[Sequence[int]] | np.ndarray) -> list[np.ndarray]:
-    """Cut strips where a -1 ends one and begins the next."""
+    """Split strips at -1, which separates them."""
     pieces = []
     for strip in strips:
         corners = np.asarray(strip, dtype=np.int64)
@@ -115,7 +115,7 @@ def _text_tables(lines: Sequence[Line], elements: Sequence[Element]) -> dict[str
 
 
 def _plain_table(rows: Sequence[Line], element: Element) -> Table | None:
-    """Read rows of plain numbers whose lists all have the length of the first; None where they are anything else."""
+    """Read rows of plain numbers with lists of equal lengths at once; None if there are others."""
     is_whole = all(column.is_whole for column in element.columns)
     if not is_whole and any(column.length_kind for column in element.columns):
         return None
@@ -172,7 +172,7 @@ def _understood(words: Sequence[bytes], column: Column, row: Line) -> Sequence[A
         return [number(word, row) for word in words]
     if column.name in CORNERS:
         return [whole(word, row, "A corner") for word in words]
-    return words  # nobody asks for it
+    return words  # the column is not used
 
 
 def _binary_tables(body: bytes, elements: Sequence[Element], order: str) -> dict[str, Table]:
@@ -187,7 +187,7 @@ def _binary_tables(body: bytes, elements: Sequence[Element], order: str) -> dict
 
 
 def _binary_table(body: bytes, element: Element, order: str, start: int) -> tuple[Table, int]:
-    """Read all rows at once if their lists have the length of the first row's, as most do."""
+    """Read all rows at once if their lists have equal lengths, as in most files."""
     first, end = _ragged_table(body, replace(element, count=min(element.count, 1)), order, start)
     if not element.count:
         return first, end
@@ -237,7 +237,7 @@ def parse_labels(data: bytes) -> Int[np.ndarray, " f"]:
     Raises
     ------
     FileFormatError
-        If faces have no such property, or it is no whole number.
+        If faces have no such property, or it is not a whole number.
     """
     tables = _tables(data)
     labels = tables.get("face", {}).get(LABEL)
@@ -260,7 +260,7 @@ def format_text(
     colors: np.ndarray | None = None,
     face_labels: Int[np.ndarray, " f"] | None = None,
 ) -> bytes:
-    """Write a mesh as text that reads back exactly; colors, (n, 3) uint8, stand with the vertices."""
+    """Write a mesh as text that reads back exactly, with colors of vertices, (n, 3) uint8."""
     vertices = rows_text("", mesh.vertices)
     if colors is not None:
         vertices = [
@@ -278,7 +278,7 @@ def format_binary(
     colors: np.ndarray | None = None,
     face_labels: Int[np.ndarray, " f"] | None = None,
 ) -> bytes:
-    """Write a mesh in binary that reads back exactly; colors, (n, 3) uint8, stand with the vertices."""
+    """Write a mesh in binary that reads back exactly, with colors of vertices, (n, 3) uint8."""
     vertices = np.zeros(
         mesh.n_vertices,
         dtype=[("xyz", "<f8", 3)] + ([("rgb", "u1", 3)] if colors is not None else []),
@@ -299,7 +299,7 @@ def format_binary(
 
 
 def format_points(points: np.ndarray) -> bytes:
-    """Write points alone, in binary."""
+    """Write points without faces, in binary."""
     lines = [
         "ply", "format binary_little_endian 1.0",
         f"element vertex {len(points)}", *(f"property double {axis}" for axis in AXES), "end_header",

@@ -1,4 +1,4 @@
-"""The header of a PLY file: which tables follow, and of which columns."""
+"""The header of a PLY file: its tables and their columns."""
 
 import re
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ END = re.compile(rb"(?:^|(?<=[\r\n]))end_header[ \t]*(\r\n|\n|\r|$)")
 
 @dataclass(frozen=True)
 class Column:
-    """A property: its name, the letter of its type, and that of its length where it is a list."""
+    """A property: its name, the letter of its type, and for a list that of its length."""
 
     name: str
     kind: str
@@ -44,13 +44,13 @@ class Element:
 
     @property
     def least_bytes(self) -> int:
-        """Bytes that a row of the table takes at least, in binary."""
+        """Least number of bytes of a row of the table, in binary."""
         return sum(np.dtype(column.length_kind or column.kind).itemsize for column in self.columns)
 
 
 @dataclass(frozen=True)
 class Header:
-    """Byte order (TEXT where there is none), tables, and where their rows begin."""
+    """The byte order (or TEXT), the tables, and the place where their rows begin."""
 
     order: str
     elements: tuple[Element, ...]

@@ -32,14 +32,16 @@ def read_shape(
 ) -> Shape:
     r"""Read a shape of any kind from a file.
 
-    The content decides the type. Triangles in R³ become a TriangleMesh; tetrahedra, segments and triangles in the plane
-    a SimplicialMesh; points without cells a PointCloud. If a file holds simplices of several dimensions, those of the
-    highest dimension are read, and the others, such as the boundary triangles of a tetrahedral mesh, are ignored.
-    Points keep their order, and points that no simplex uses are kept. Polylines in OBJ and VTK files become segments.
+    The content decides the type. Triangles in R³ become a TriangleMesh; tetrahedra, segments and
+    triangles in the plane a SimplicialMesh; points without cells a PointCloud. If a file holds
+    simplices of several dimensions, those of the highest dimension are read, and the others, such
+    as the boundary triangles of a tetrahedral mesh, are ignored. Points keep their order, and
+    points that no simplex uses are kept. Polylines in OBJ and VTK files become segments.
 
-    Legacy VTK files with POLYDATA store tetrahedra and quads in the same way, as polygons of four corners. They are
-    read as quads if all are flat or if they join like the faces of a surface, and as tetrahedra if most share three
-    corners with another and some side belongs to more than two. In other cases `cells` must be given.
+    Legacy VTK files with POLYDATA store tetrahedra and quads in the same way, as polygons of four
+    corners. They are read as quads if all are flat or if they join like the faces of a surface, and
+    as tetrahedra if most share three corners with another and some side belongs to more than two.
+    In other cases `cells` must be given.
 
     Parameters
     ----------
@@ -50,11 +52,12 @@ def read_shape(
     dim : int
         Dimension of the manifold that a point cloud samples.
     drop_missing : bool
-        Whether to leave out points of a cloud that are not finite. Scanners write such points if they measured nothing.
-        By default they raise an error.
+        Whether to leave out points of a cloud that are not finite. Scanners write such points if
+        they measured nothing. By default they raise an error.
     cells : {"triangles", "quads", "tetrahedra"}, optional
-        Kind of cells to read, such as the boundary triangles of a tetrahedral mesh. Quads become two triangles each,
-        and triangles between them are read too. By default the cells of the highest dimension.
+        Kind of cells to read, such as the boundary triangles of a tetrahedral mesh. Quads become
+        two triangles each, and triangles between them are read too. By default the cells of the
+        highest dimension.
 
     Returns
     -------
@@ -63,10 +66,11 @@ def read_shape(
     Raises
     ------
     FileFormatError
-        If the format is unknown, the path is not a regular file, the content differs from what its header declares,
-        or cells are not simplices.
+        If the format is unknown, the path is not a regular file, the content differs from what its
+        header declares, or cells are not simplices.
     InvalidShapeError
-        If a coordinate is not finite, a simplex has an index that is not that of a point, or there are no points.
+        If a coordinate is not finite, a simplex has an index that is not that of a point, or there
+        are no points.
     InvalidParameterError
         If `dim` is larger than the number of coordinates, or `cells` is unknown.
     OSError

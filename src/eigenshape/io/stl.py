@@ -1,4 +1,4 @@
-"""Stereolithography: triangles without shared corners, as text, or in binary and then in single precision."""
+"""Stereolithography: triangles without shared corners, as text or in binary single precision."""
 
 import numpy as np
 
@@ -23,7 +23,7 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
 
 def _is_text(data: bytes) -> bool:
     if len(data) >= HEADER and len(data) == HEADER + RECORD.itemsize * _count_triangles(data):
-        return False  # many a binary file begins with solid
+        return False  # many binary files also begin with "solid"
     return data.lstrip()[:5].lower() == b"solid" and b"\0" not in data[:HEADER]
 
 
@@ -109,7 +109,7 @@ def _normals(mesh: TriangleMesh) -> np.ndarray:
 
 
 def single_precision(mesh: TriangleMesh, name: str) -> np.ndarray:
-    """Return vertices as float32, refusing what does not fit."""
+    """Return vertices as float32; raise an error if one does not fit."""
     single = np.finfo(np.float32)
     largest = np.abs(mesh.vertices).max(axis=1)
     bad = int(np.argmax(largest))

@@ -1,4 +1,4 @@
-"""Lines of numbers in text files: read all at once where they are plain, one by one where a line is to be named."""
+"""Lines of numbers in text files, read all at once if they are plain, otherwise one by one."""
 
 import codecs
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ from jaxtyping import Float, Int, Shaped
 
 from eigenshape._errors import FileFormatError
 
-Line = tuple[int, bytes]  # where it stands in the file, and what it says
+Line = tuple[int, bytes]  # its number in the file, and its text
 PLAIN = b"+-.0123456789eE \t\n"
 PLAIN_WHOLE = b"+-0123456789 \t\n"
 EXACT = 2**53  # whole numbers below it are exact in double precision
@@ -23,12 +23,12 @@ def lines_of(data: bytes, first: int = 1) -> list[Line]:
 
 
 def number_table(lines: Sequence[Line]) -> Float[np.ndarray, "n c"] | None:
-    """Read lines of equally many plain numbers at once; None where they are anything else."""
+    """Read a table of plain numbers at once; return None if the lines are no such table."""
     return _table(lines, PLAIN)
 
 
 def whole_table(lines: Sequence[Line]) -> Int[np.ndarray, "n c"] | None:
-    """Read lines of equally many plain whole numbers at once; None where they are anything else."""
+    """Read a table of plain whole numbers at once; return None if the lines are no such table."""
     values = _table(lines, PLAIN_WHOLE)
     return values.astype(np.int64) if values is not None and np.abs(values).max() < EXACT else None
 
@@ -41,7 +41,7 @@ def _table(lines: Sequence[Line], allowed: bytes) -> np.ndarray | None:
         values = np.loadtxt(text.decode().split("\n"), comments=None, ndmin=2)
     except ValueError:
         return None
-    return values if len(values) == len(lines) else None  # it passes over lines without a word
+    return values if len(values) == len(lines) else None  # loadtxt ignores empty lines
 
 
 def coordinates(lines: Sequence[Line]) -> Float[np.ndarray, "n 3"]:
@@ -62,7 +62,7 @@ def _three_numbers(line: Line) -> list[float]:
 
 
 def number(word: bytes, line: Line) -> float:
-    """Read a number, naming the line where there is none."""
+    """Read a number; an error names the line."""
     try:
         return float(word.replace(b"_", b"?"))  # Python would read 1_0 as ten
     except ValueError as err:
@@ -72,7 +72,7 @@ def number(word: bytes, line: Line) -> float:
 
 
 def whole(word: bytes, line: Line, what: str) -> int:
-    """Read a whole number, naming the line where there is none."""
+    """Read a whole number; an error names the line."""
     try:
         value = int(word.replace(b"_", b"?"))
     except ValueError as err:
@@ -92,7 +92,7 @@ def numbers_of(words: Sequence[bytes]) -> Float[np.ndarray, " k"]:
     Raises
     ------
     ValueError
-        If one is no number.
+        If one is not a number.
     """
     if b"_" in b" ".join(words):  # Python would read 1_0 as ten
         raise ValueError("numbers have no underscores")
@@ -100,7 +100,7 @@ def numbers_of(words: Sequence[bytes]) -> Float[np.ndarray, " k"]:
 
 
 def wholes(numbers: Shaped[np.ndarray, " k"], what: str) -> Int[np.ndarray, " k"]:
-    """Return numbers as whole numbers, refusing others."""
+    """Convert numbers to whole numbers; raise an error for others."""
     odd = (numbers != np.floor(numbers)) | ~(np.abs(numbers.astype(np.float64)) < EXACT)
     bad = np.flatnonzero(odd)
     if bad.size:
@@ -111,7 +111,7 @@ def wholes(numbers: Shaped[np.ndarray, " k"], what: str) -> Int[np.ndarray, " k"
 
 
 def quote_line(line: Line) -> str:
-    """Quote a line, cut short where it is long."""
+    """Quote a line, shortened if it is long."""
     return repr(line[1].strip()[:60].decode("latin-1"))
 
 
@@ -129,9 +129,10 @@ def fans(polygons: Sequence[Sequence[int]] | Int[np.ndarray, "p c"]) -> Int[np.n
 
 
 def strip_triangles(strips: Sequence[Int[np.ndarray, " _"]]) -> Int[np.ndarray, "f 3"]:
-    """Split strips into triangles, every second one turned so that all agree.
+    """Split strips into triangles, every second one reversed so that all agree.
 
-    A strip turns a corner by naming a point twice; the triangles without area that this makes are no part of the shape.
+    A strip changes its direction by a repeated point. The triangles without area that result from
+    this are left out.
     """
     pieces = [np.empty((0, 3), dtype=np.int64)]
     for corners in strips:

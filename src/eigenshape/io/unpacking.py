@@ -5,7 +5,7 @@ import zlib
 
 from eigenshape._errors import FileFormatError
 
-# A lattice of tetrahedra, as regular as meshes come, shrinks by 9 with zlib and by 36 with LZMA; zeros by 1,000.
+# Compression ratios: a regular lattice of tetrahedra has 9 with zlib and 36 with LZMA, zeros 1,000.
 MOST_TIMES = 40
 ALWAYS = 2**25  # bytes that a file of any size may unpack to
 LZMA_MEMORY = 2**27  # bytes; level 9, the most that compressors use, needs 65 MiB
@@ -14,7 +14,7 @@ COMPRESSORS = (ZLIB, LZMA)
 
 
 def require_reasonable(size: int, n_bytes: int) -> None:
-    """Refuse a declared size that no file of real data has, before memory is taken for it.
+    """Raise an error for a declared size that no real file has, before memory is allocated.
 
     Raises
     ------
@@ -30,7 +30,7 @@ def require_reasonable(size: int, n_bytes: int) -> None:
 
 
 def unpack_block(packed: bytes, size: int, compressor: str) -> bytes:
-    """Unpack a block to the size that it declares; no byte more is unpacked.
+    """Unpack a block to its declared size, and not more.
 
     Raises
     ------
@@ -39,7 +39,9 @@ def unpack_block(packed: bytes, size: int, compressor: str) -> bytes:
     """
     try:
         if compressor == ZLIB:
-            found = zlib.decompressobj().decompress(packed, size + 1)  # a limit of 0 would be none
+            found = zlib.decompressobj().decompress(
+                packed, size + 1
+            )  # a limit of 0 would mean no limit
         else:
             unpacker = lzma.LZMADecompressor(memlimit=LZMA_MEMORY)
             found = unpacker.decompress(packed, max_length=size + 1)

@@ -1,4 +1,4 @@
-"""Cells of VTK files, legacy and XML: lists of points, and a number that tells what each is."""
+"""Cells of VTK files, legacy and XML: lists of points, and the number of their type."""
 
 from dataclasses import dataclass
 
@@ -30,7 +30,7 @@ class CellLists:
 
     @property
     def lengths(self) -> Int[np.ndarray, " c"]:
-        """Points of each list."""
+        """Number of points of each list."""
         return np.diff(self.starts)
 
     def rows(self, chosen: Int[np.ndarray, " s"], length: int) -> Int[np.ndarray, "s length"]:
@@ -38,7 +38,7 @@ class CellLists:
         return self.corners[self.starts[chosen][:, None] + np.arange(length)]
 
     def pairs(self, chosen: Int[np.ndarray, " s"]) -> Int[np.ndarray, "p 2"]:
-        """Return the pairs of points that follow each other in lists."""
+        """Return the pairs of successive points in lists."""
         owner = np.repeat(np.arange(len(self.lengths)), self.lengths)
         follows = (owner[1:] == owner[:-1]) & np.isin(owner[1:], chosen)
         return np.column_stack([self.corners[:-1][follows], self.corners[1:][follows]])
@@ -47,12 +47,12 @@ class CellLists:
 def cells_of_types(
     lists: CellLists, types: Int[np.ndarray, " c"]
 ) -> dict[str, Int[np.ndarray, "_ _"]]:
-    """Sort cells into segments, triangles, quads and tetrahedra; cells that are points are passed over.
+    """Sort cells into segments, triangles, quads and tetrahedra; ignore cells that are points.
 
     Raises
     ------
     FileFormatError
-        If a cell is none of these, or has another number of corners than its type.
+        If a cell has another type, or its number of corners does not match its type.
     """
     others = np.setdiff1d(types, [VERTEX, POLY_VERTEX, POLYLINE, *KINDS])
     if others.size:

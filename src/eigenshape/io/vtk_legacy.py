@@ -1,4 +1,4 @@
-"""Legacy VTK files, text or binary: POLYDATA and UNSTRUCTURED_GRID; data on points and cells is never read."""
+"""Legacy VTK files, text or binary: POLYDATA and UNSTRUCTURED_GRID, without attribute data."""
 
 from collections.abc import Sequence
 
@@ -21,7 +21,7 @@ DATASETS = (b"POLYDATA", b"UNSTRUCTURED_GRID")
 
 
 class _Cursor:
-    """A place in the file, and how numbers are written there."""
+    """A position in the file, and the encoding of its numbers."""
 
     def __init__(self, data: bytes) -> None:
         self.data, self.place = data, 0
@@ -36,7 +36,7 @@ class _Cursor:
         return text
 
     def line(self) -> bytes:
-        """Return the next line that is not blank, or nothing at the end."""
+        """Return the next line that is not blank, or an empty one at the end."""
         while self.place < len(self.data):
             text = self._raw_line()
             if text:
@@ -44,7 +44,7 @@ class _Cursor:
         return b""
 
     def numbers(self, count: int, kind: bytes) -> np.ndarray:
-        """Return the next numbers; so many must be there."""
+        """Return the next `count` numbers; raise an error if there are fewer."""
         if kind not in KINDS:
             raise FileFormatError(
                 f"Numbers of a VTK file must be {b', '.join(KINDS).decode()}; they are {kind!r}."
@@ -94,12 +94,14 @@ class _Cursor:
 def parse(
     data: bytes, cells: CellKind | None = None
 ) -> tuple[Float[np.ndarray, "n 3"], dict[str, Int[np.ndarray, "_ _"]]]:
-    """Return points and cells by kind; `cells` says what polygons of four corners are, where the file does not.
+    """Return points and cells by kind.
+
+    `cells` is the kind of polygons of four corners if the file does not determine it.
 
     Raises
     ------
     FileFormatError
-        If the file is not what it declares, or could mean quads or tetrahedra.
+        If the content differs from the header, or polygons could be quads or tetrahedra.
     """
     cursor = _Cursor(data)
     dataset = cursor.line().split()
@@ -184,7 +186,7 @@ def _polydata_cells(
 def _four_cornered_kind(
     points: np.ndarray, four: Int[np.ndarray, "c 4"], cells: CellKind | None
 ) -> CellKind:
-    """Return what polygons of four corners are: programs such as LaPy write tetrahedra as such."""
+    """Return the kind of polygons of four corners: LaPy, for example, writes tetrahedra as such."""
     if cells is not None:
         return "tetrahedra" if cells == "tetrahedra" else "quads"
     kind = four_cornered(points, four)
@@ -207,7 +209,7 @@ def _count(word: bytes) -> int:
 
 
 def _cells(cursor: _Cursor, name: bytes, count: int, size: int) -> CellLists:
-    """Read lists of points; version 5 has offsets and connectivity instead of counts before each cell."""
+    """Read lists of points; version 5 has offsets and connectivity instead of counts per cell."""
     start = cursor.place
     words = cursor.line().split()
     if words and words[0].upper() == b"OFFSETS":
@@ -245,7 +247,7 @@ def _cells_by_counts(flat: Int[np.ndarray, " k"], count: int) -> CellLists:
         return CellLists(
             np.arange(0, count * length + 1, length), flat.reshape(count, -1)[:, 1:].ravel()
         )
-    places = []  # of the counts
+    places = []  # where the counts are
     place = 0
     for index in range(count):
         if place >= size or not 0 <= flat[place] < size - place:

@@ -1,4 +1,4 @@
-"""XML files of unstructured grids: points and cells alone are unpacked, after their sizes are checked."""
+"""XML files of unstructured grids; only points and cells are unpacked, after a check of sizes."""
 
 import base64
 import binascii
@@ -25,7 +25,7 @@ RAW = re.compile(rb"<AppendedData[^>]*\bencoding\s*=\s*[\"']raw[\"'][^>]*>\s*_")
 
 @dataclass(frozen=True)
 class _Packing:
-    """How the arrays of a file are written, and the bytes after its tags."""
+    """The encoding of the arrays of a file, and the bytes after its tags."""
 
     size: np.dtype  # of the counts before each array
     order: str
@@ -35,7 +35,7 @@ class _Packing:
     n_bytes: int  # of the file
 
     def numbers(self, array: ElementTree.Element, count: int | None = None) -> np.ndarray:
-        """Read an array, of `count` numbers if that is known, which is checked before any is unpacked."""
+        """Read an array; a known `count` is checked before anything is unpacked."""
         name = array.get("Name", "an array")
         kind = NUMBERS.get(array.get("type", ""))
         if kind is None:
@@ -85,7 +85,7 @@ class _Packing:
             )
         _, usual, last, *packed = source.counts(self.size, 3 + n_blocks)
         sizes = [usual] * n_blocks
-        if n_blocks and last:  # 0 stands for a last block as large as the others
+        if n_blocks and last:  # 0 means that the last block is as large as the others
             sizes[-1] = last
         _require_size(sum(sizes), size, name)
         require_reasonable(sum(sizes), self.n_bytes)
@@ -111,7 +111,10 @@ class _Source:
         return np.frombuffer(self._first(self.text, self.n_counts), kind).tolist()
 
     def after_counts(self, length: int, *, joined: bool) -> bytes:
-        """Return the bytes after the counts; in base64 these are coded with the counts, if joined, or on their own."""
+        """Return the bytes after the counts.
+
+        In base64 they are encoded together with the counts if `joined`, otherwise separately.
+        """
         if self.is_raw:
             return self._first(self.text[self.n_counts :], length)
         if joined and b"=" not in self.text[: _count_characters(self.n_counts)]:
@@ -135,7 +138,7 @@ class _Source:
 
 
 def _count_characters(length: int) -> int:
-    """Return how many characters of base64 so many bytes take."""
+    """Return the number of base64 characters for a number of bytes."""
     return -(-length // 3) * 4
 
 
@@ -156,12 +159,12 @@ def _text_numbers(text: str, name: str) -> np.ndarray:
 
 
 def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], dict[str, Int[np.ndarray, "_ _"]]]:
-    """Return points and cells by kind; data on points and cells is never unpacked.
+    """Return points and cells by kind; attribute data are not unpacked.
 
     Raises
     ------
     FileFormatError
-        If the file is not what it declares, or declares far more than it can hold.
+        If the content differs from the tags, or they declare more than the file can hold.
     """
     root, packing = _parse_tags(data)
     pieces = root.findall("./UnstructuredGrid/Piece")
@@ -184,7 +187,7 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], dict[str, Int[np.ndarr
 
 
 def _parse_tags(data: bytes) -> tuple[ElementTree.Element, _Packing]:
-    """Parse the tags; what is appended raw is no text and is cut out before."""
+    """Parse the tags; raw appended data are not text and are cut out first."""
     raw = RAW.search(data)
     tags, appended = data, b""
     if raw:
