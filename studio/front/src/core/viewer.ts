@@ -451,8 +451,8 @@ export class Viewer {
       ArrowRight: () => controls.rotateLeft(-0.1),
       ArrowUp: () => controls.rotateUp(0.1),
       ArrowDown: () => controls.rotateUp(-0.1),
-      "+": () => controls.dollyIn(1.1),
-      "-": () => controls.dollyOut(1.1),
+      "+": () => controls.dollyIn(0.9),
+      "-": () => controls.dollyOut(0.9),
     };
     if (!actions[event.key]) return;
     event.preventDefault();
