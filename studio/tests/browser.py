@@ -13,11 +13,12 @@ from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from time import monotonic
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser, Locator, Page, sync_playwright
+from playwright.sync_api import Browser, Locator, Page, Request, sync_playwright
 
 STUDIO = Path(__file__).parents[1]
 # WebGL2 in software, the same on every machine, and no request of the browser's own.
@@ -38,6 +39,8 @@ from eigenshape_studio.server import serve
 mesh, index = sys.argv[1:]
 serve(mesh, index=index or None, announce=lambda url: print(url, flush=True), browse=False)
 """
+# Requests of each page that have no answer yet.
+UNDER_WAY: WeakKeyDictionary[Page, set[Request]] = WeakKeyDictionary()
 
 
 @contextmanager
@@ -87,7 +90,19 @@ def open_page(browser: Browser, url: str, *, dark: bool = False) -> Iterator[Pag
         "console",
         lambda line: line.type in ("error", "warning") and seen.append(f"{line.type}: {line.text}"),
     )
-    page.on("request", lambda request: is_local(request.url) or seen.append(request.url))
+    UNDER_WAY[page] = set()
+
+    def begin(request: Request) -> None:
+        UNDER_WAY[page].add(request)
+        if not is_local(request.url):
+            seen.append(f"request to {request.url}")
+
+    def end(request: Request) -> None:
+        UNDER_WAY[page].discard(request)
+
+    page.on("request", begin)
+    page.on("requestfinished", end)
+    page.on("requestfailed", end)
     page.goto(url)
     wait_until(page, "window.eigenshape?.viewer.vertices.length > 0")
     yield page
@@ -122,9 +137,14 @@ def wait_until(page: Page, condition: str, seconds: float = 60.0) -> None:
 
 
 def wait_until_still(page: Page) -> None:
-    """Wait until nothing is loaded any more, and two frames have been drawn."""
-    page.wait_for_load_state("networkidle")
-    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    """Wait until no request is under way, and two frames have been drawn."""
+    two_frames = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+    page.evaluate(two_frames)  # what was clicked may send a request only now
+    end = monotonic() + 60
+    while UNDER_WAY[page]:
+        assert monotonic() < end, f"requests without an answer: {UNDER_WAY[page]}"
+        page.wait_for_timeout(20)
+    page.evaluate(two_frames)
 
 
 def vertex_values(page: Page, name: str = "value") -> np.ndarray:

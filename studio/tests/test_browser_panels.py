@@ -17,6 +17,7 @@ from browser import (
     wait_until,
     wait_until_still,
 )
+from scipy.ndimage import binary_erosion
 
 import eigenshape as es
 from eigenshape.plot.render import palette
@@ -167,14 +168,17 @@ def test_nodal_lines_are_drawn_where_the_function_is_zero(page, mesh, spectrum):
     lines = picture(page).astype(int)
     find(page, "nodal").uncheck()
     wait_until_still(page)
-    inside = lines[..., 3] == 255  # pixels at the rim of the shape are mixed with the ground
+    # At the rim the surface is steep, and the next pixel lies far away on it.
+    inside = binary_erosion(lines[..., 3] == 255, iterations=4)
     rows, columns = np.nonzero(inside & (np.abs(lines - picture(page)).max(axis=2) > 60))
     assert len(rows) > 300
     for place in np.linspace(0, len(rows) - 1, 12).astype(int):
-        at = [float(columns[place]) + 0.5, float(rows[place]) + 0.5]
-        hit = page.evaluate("([x, y]) => eigenshape.viewer.pick(x, y)", at)
-        corners = spectrum.eigenvectors[mesh.faces[hit["face"]], 4]
-        assert np.abs(corners).min() < 2 * np.ptp(corners)
+        # A pixel where a leg covers the body is a mixture of both, so its neighbors count, too.
+        steps = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
+        places = [[columns[place] + 0.5 + right, rows[place] + 0.5 + down] for right, down in steps]
+        code = "(places) => places.map(([x, y]) => eigenshape.viewer.pick(x, y).face)"
+        corners = spectrum.eigenvectors[mesh.faces[page.evaluate(code, places)], 4]
+        assert (np.abs(corners).min(axis=1) < np.ptp(corners, axis=1)).any()
 
 
 def test_click_on_an_eigenvalue_selects_it(page):

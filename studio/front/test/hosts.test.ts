@@ -1,0 +1,65 @@
+import { expect, test } from "vitest";
+import { decode, encode } from "../src/core/wire";
+import { inlineBackend } from "../src/hosts/inline";
+import { widgetBackend } from "../src/hosts/widget";
+
+async function report(meta: unknown, arrays: Parameters<typeof encode>[1]) {
+  const stream = new Blob([encode(meta, arrays)]).stream().pipeThrough(new CompressionStream("gzip"));
+  const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
+  const text = btoa(String.fromCharCode(...bytes));
+  return inlineBackend({ textContent: `\n${text}\n` } as HTMLElement);
+}
+
+test("a report answers meta and arrays, whole and by rows", async () => {
+  const modes = { data: Float32Array.of(0, 1, 2, 3, 4, 5), shape: [3, 2] };
+  const backend = await report({ name: "ball" }, { modes, eigenvalues: Float64Array.of(0, 2, 6) });
+  expect((await backend.meta()).name).toBe("ball");
+  expect(await backend.array("modes")).toEqual(modes);
+  expect(await backend.array("modes", 1, 2)).toEqual({ data: Float32Array.of(2, 3), shape: [1, 2] });
+  expect(await backend.array("modes", 1, 9)).toEqual({ data: Float32Array.of(2, 3, 4, 5), shape: [2, 2] });
+  expect((await backend.array("eigenvalues")).shape).toEqual([3]);
+});
+
+test("a report refuses what it cannot do", async () => {
+  const backend = await report({}, {});
+  await expect(backend.array("brackets")).rejects.toThrow("no array brackets");
+  await expect(backend.finish({ kind: "undo" })).rejects.toThrow("cannot change");
+  await expect(backend.query({ n_matches: 1 })).rejects.toThrow("cannot change");
+});
+
+/** A model as in a notebook: every view hears every answer. */
+function notebook() {
+  const listeners: ((content: { id?: string }, buffers: DataView[]) => void)[] = [];
+  const sent: { content: any; message: Uint8Array }[] = [];
+  const model = {
+    get: () => undefined,
+    send: (content: unknown, _: unknown, buffers: ArrayBufferView[] = []) =>
+      void sent.push({ content, message: buffers[0] as Uint8Array }),
+    on: (_: "msg:custom", listener: (typeof listeners)[0]) => void listeners.push(listener),
+  };
+  const answer = (id: string, meta: unknown) => {
+    const bytes = encode(meta);
+    for (const listener of listeners) listener({ id }, [new DataView(bytes.buffer)]);
+  };
+  return { model, sent, answer };
+}
+
+test("answers of a notebook reach their calls, in any order and in two views", async () => {
+  const { model, sent, answer } = notebook();
+  const [one, two] = [widgetBackend(model), widgetBackend(model)];
+  const answers = [one.meta(), two.meta(), one.meta()];
+  await Promise.resolve();
+  expect(sent.map(({ content }) => content.call)).toEqual(["meta", "meta", "meta"]);
+  expect(decode(sent[0]!.message).meta).toEqual({});
+  for (const i of [2, 0, 1]) answer(sent[i]!.content.id, { name: `answer ${i}` });
+  expect((await Promise.all(answers)).map(({ name }) => name)).toEqual(["answer 0", "answer 1", "answer 2"]);
+});
+
+test("errors of a notebook are told, and foreign messages ignored", async () => {
+  const { model, sent, answer } = notebook();
+  const wrong = widgetBackend(model).array("nothing");
+  await Promise.resolve();
+  answer("another view", {});
+  answer(sent[0]!.content.id, { error: { kind: "RequestError", message: "there is none" } });
+  await expect(wrong).rejects.toThrow("there is none");
+});
