@@ -40,8 +40,8 @@ def anisotropic_laplacian(
     Raises
     ------
     InvalidParameterError
-        If a tensor is not finite, not symmetric or has a negative eigenvalue, or their number is not
-        that of the simplices.
+        If a tensor is not finite, not symmetric or has a negative eigenvalue, or their number is
+        not that of the simplices.
     InvalidShapeError
         As in `cotangent_laplacian`.
 
@@ -94,8 +94,8 @@ def curvature_tensors(
     """Compute tensors that reduce diffusion across bends (Andreux, Rodolà, Aubry, Cremers 2014).
 
     Along each principal direction of a face the conductivity is 1 / (1 + α |κ| √area), with κ the
-    principal curvature from the vertex normals and the area of the whole surface. It is without unit,
-    and 1 at α = 0.
+    principal curvature from the vertex normals and the area of the whole surface. It is without
+    unit, and 1 at α = 0.
 
     Parameters
     ----------

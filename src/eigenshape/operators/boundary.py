@@ -25,8 +25,8 @@ def dirichlet_laplacian(
     ----------
     laplacian : Laplacian
     fixed : (c,) int
-        Points where functions are zero; duplicates are allowed. `es.geometry.boundary_vertices(mesh)`
-        is the whole boundary of a mesh.
+        Points where functions are zero; duplicates are allowed.
+        `es.geometry.boundary_vertices(mesh)` is the whole boundary of a mesh.
 
     Returns
     -------

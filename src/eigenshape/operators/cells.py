@@ -1,8 +1,9 @@
 """Sums over all pairs of points that a Gaussian reaches: a grid of cells, walked by compiled loops.
 
-Points are sorted by cell. A point's partners lie in runs of that order, one run for each neighboring column of cells,
-so that no list of pairs is ever stored. Each row is computed by itself, in an order of its own: the entries (i, j) and
-(j, i) come out equal to the last digit, and nothing depends on the number of threads.
+Points are sorted by cell. A point's partners lie in runs of that order, one run for each
+neighboring column of cells, so that no list of pairs is ever stored. Each row is computed by
+itself, in an order of its own: the entries (i, j) and (j, i) come out equal to the last digit, and
+nothing depends on the number of threads.
 """
 
 import os
@@ -36,7 +37,8 @@ class CellGrid:
     cells : (c + 1,) int
         First point of each cell that has any; n at the end.
     runs : (c, 9, 2) int
-        For each cell the ranges of points, in ascending order, that hold all partners of its points.
+        For each cell the ranges of points, in ascending order, that hold all partners of its
+        points.
     reach : float
         Farthest distance at which two points are partners.
     """
@@ -114,7 +116,8 @@ def gaussian_rows(
 ) -> tuple[Int[np.ndarray, " z"], Float[np.ndarray, " z"]]:
     """Return the columns, ascending in each row, and the values w_i w_j exp(-|x_i - x_j|²/4t) of the kernel matrix.
 
-    `weights` are in the order before sorting, and so are the rows; row i fills starts[i] to starts[i + 1].
+    `weights` are in the order before sorting, and so are the rows; row i fills starts[i] to
+    starts[i + 1].
     """
     kind = np.int32 if max(len(weights), starts[-1]) < 2**31 else np.int64
     columns, values = np.empty(starts[-1], dtype=kind), np.empty(starts[-1])

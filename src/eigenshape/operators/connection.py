@@ -24,17 +24,17 @@ COCIRCULAR = 1e-14
 def connection_laplacian(mesh: MeshLike, mass: Mass = "lumped") -> Laplacian:
     """Build the Laplacian of tangent vector fields, with the Levi-Civita connection of the mesh.
 
-    The energy of W is Σ_ij w_ij |v_j - r_ij v_i|², with cotangent weights w_ij and r_ij the rotation
-    that transports a vector along the edge from vertex i to vertex j (Knöppel, Crane, Pinkall,
-    Schröder 2013; Sharp, Soliman, Crane 2019). The angles around an inner vertex are scaled to 2π;
-    those at a boundary vertex are not scaled, and the boundary is free.
+    The energy of W is Σ_ij w_ij |v_j - r_ij v_i|², with cotangent weights w_ij and r_ij the
+    rotation that transports a vector along the edge from vertex i to vertex j (Knöppel, Crane,
+    Pinkall, Schröder 2013; Sharp, Soliman, Crane 2019). The angles around an inner vertex are
+    scaled to 2π; those at a boundary vertex are not scaled, and the boundary is free.
 
-    W is positive semidefinite on any mesh. If all w_ij ≥ 0, as on a Delaunay mesh, each term is, and W
-    is the published operator. Otherwise the published sum may be negative for some fields. The
-    energy of a face with negative weights is a sum of squares if the face is flat. So in such faces,
-    few on a good mesh, each r_ij is rotated by a third of the curvature of the face, such that the
-    transport around the face is the identity. The rotation is of the order of curvature times
-    squared edge length, as is the discretization error.
+    W is positive semidefinite on any mesh. If all w_ij ≥ 0, as on a Delaunay mesh, each term is,
+    and W is the published operator. Otherwise the published sum may be negative for some fields.
+    The energy of a face with negative weights is a sum of squares if the face is flat. So in such
+    faces, few on a good mesh, each r_ij is rotated by a third of the curvature of the face, such
+    that the transport around the face is the identity. The rotation is of the order of curvature
+    times squared edge length, as is the discretization error.
 
     Unlike in a scalar Laplacian the rows of W do not sum to 0: only parallel fields have no energy,
     and on a curved surface there are none.
@@ -113,8 +113,8 @@ def tangent_frames(mesh: MeshLike) -> Float[np.ndarray, "n 2 3"]:
     Raises
     ------
     InvalidShapeError
-        As in `connection_laplacian`; or if the normals of the faces at a vertex cancel, or its first
-        edge is parallel to the normal.
+        As in `connection_laplacian`; or if the normals of the faces at a vertex cancel, or its
+        first edge is parallel to the normal.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """Crouzeix-Raviart elements: linear on each simplex, and equal in the mean over each facet between two.
 
-Such functions jump across facets, so their eigenvalues are no upper bounds; with the constants here they become lower
-bounds (`spectral.bounds.brackets`).
+Such functions jump across facets, so their eigenvalues are no upper bounds; with the constants here
+they become lower bounds (`spectral.bounds.brackets`).
 """
 
 from math import pi
@@ -30,12 +30,12 @@ REGULAR_TETRAHEDRON = 0.147  # that of a regular tetrahedron over its edge
 def crouzeix_raviart_laplacian(mesh: MeshLike) -> Laplacian:
     """Build the Laplacian of Crouzeix-Raviart elements, whose unknowns are means over facets.
 
-    On a simplex, the function of the facet opposite to corner a is ψ_a = 1 - m λ_a: its mean is 1 on
-    that facet and 0 on the others. So W sums up m² V ∇λ_a·∇λ_b, and B sums up
-    V (m² - m + 2) / ((m+1)(m+2)) on the diagonal and V (2 - m) / ((m+1)(m+2)) off it: V/3 and 0 on
-    triangles, 2V/5 and -V/20 on tetrahedra (Crouzeix and Raviart 1973). Any number of simplices may
-    share a facet; simplices that share less than a facet are not connected. On segments, whose
-    facets are points, these are the linear elements.
+    On a simplex, the function of the facet opposite to corner a is ψ_a = 1 - m λ_a: its mean is 1
+    on that facet and 0 on the others. So W sums up m² V ∇λ_a·∇λ_b, and B sums up V (m² - m + 2) /
+    ((m+1)(m+2)) on the diagonal and V (2 - m) / ((m+1)(m+2)) off it: V/3 and 0 on triangles, 2V/5
+    and -V/20 on tetrahedra (Crouzeix and Raviart 1973). Any number of simplices may share a facet;
+    simplices that share less than a facet are not connected. On segments, whose facets are points,
+    these are the linear elements.
 
     Parameters
     ----------
@@ -44,8 +44,8 @@ def crouzeix_raviart_laplacian(mesh: MeshLike) -> Laplacian:
     Returns
     -------
     Laplacian
-        On the facets, in the order of `es.geometry.facet_table(mesh).facets`, whose `boundary` is to
-        be fixed for the Dirichlet condition. W in length^(m-2), B, the exact mass, in length^m.
+        On the facets, in the order of `es.geometry.facet_table(mesh).facets`, whose `boundary` is
+        to be fixed for the Dirichlet condition. W in length^(m-2), B, the exact mass, in length^m.
 
     Raises
     ------
@@ -84,12 +84,13 @@ def mass_floor(dim: int) -> float:
 def interpolation_constants(mesh: Mesh) -> Float[np.ndarray, " s"]:
     """Bound C with ‖u - Πu‖ ≤ C ‖∇(u - Πu)‖ on each simplex, in length.
 
-    Πu is the linear function with the same mean as u on every facet. On a segment of length h, C = h/π. On a triangle
-    with longest edge h, C = 0.1893 h (Liu 2015; equilateral ones need 0.1891). In any dimension
-    C² = h²/π² + Σ |e|² / (m²(m+1)²(m+2)) over the edges e: w = u - Πu has the mean -(1/mV) ∫ (x - c)·∇w about
-    the centroid c, and differs from it by h/π at most (Payne and Weinberger 1960; Bebendorf 2003), which is 0.3311 h
-    where all edges are h (Carstensen and Puttkammer 2024, κ). A tetrahedron is also the image of a regular one under a
-    linear map A, and C ≤ |A| times the constant of that one, 0.147 of its edge: linear maps keep facet means, and
+    Πu is the linear function with the same mean as u on every facet. On a segment of length h, C =
+    h/π. On a triangle with longest edge h, C = 0.1893 h (Liu 2015; equilateral ones need 0.1891).
+    In any dimension C² = h²/π² + Σ |e|² / (m²(m+1)²(m+2)) over the edges e: w = u - Πu has the mean
+    -(1/mV) ∫ (x - c)·∇w about the centroid c, and differs from it by h/π at most (Payne and
+    Weinberger 1960; Bebendorf 2003), which is 0.3311 h where all edges are h (Carstensen and
+    Puttkammer 2024, κ). A tetrahedron is also the image of a regular one under a linear map A, and
+    C ≤ |A| times the constant of that one, 0.147 of its edge: linear maps keep facet means, and
     ∇(w∘A) is at most |A| times as long as ∇w. The smaller of both is taken.
     """
     corners, scale = scaled_corners(mesh)

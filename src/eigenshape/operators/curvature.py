@@ -13,11 +13,11 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 def mean_curvature(mesh: MeshLike) -> Float[np.ndarray, " n"]:
     """Compute the mean curvature at each vertex, half the sum of the principal curvatures.
 
-    L x = 2 H N for positions x and the outer normal N (L is positive; Meyer, Desbrun, Schröder and Barr
-    2003, with lumped mass): H = (L x)·N / 2, with N of `vertex_normals`. H is positive where the
-    surface is convex seen from the side on which its faces are counter-clockwise: 1/R on a sphere
-    that faces outward. On a boundary, L x includes the missing half of the neighborhood, which lies
-    in the surface and so vanishes with N if the boundary is straight.
+    L x = 2 H N for positions x and the outer normal N (L is positive; Meyer, Desbrun, Schröder and
+    Barr 2003, with lumped mass): H = (L x)·N / 2, with N of `vertex_normals`. H is positive where
+    the surface is convex seen from the side on which its faces are counter-clockwise: 1/R on a
+    sphere that faces outward. On a boundary, L x includes the missing half of the neighborhood,
+    which lies in the surface and so vanishes with N if the boundary is straight.
 
     Parameters
     ----------
@@ -31,8 +31,8 @@ def mean_curvature(mesh: MeshLike) -> Float[np.ndarray, " n"]:
     Raises
     ------
     InvalidShapeError
-        If a face has no area or occurs twice, a vertex belongs to no face, or neighboring faces have
-        opposite orientations.
+        If a face has no area or occurs twice, a vertex belongs to no face, or neighboring faces
+        have opposite orientations.
 
     Examples
     --------

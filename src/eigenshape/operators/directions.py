@@ -23,13 +23,13 @@ class Directions:
     Attributes
     ----------
     at_tail : (3f,) float
-        Angle of the side in the tangent plane of its start, counter-clockwise from the first side there; those around
-        an inner vertex are scaled to 2π.
+        Angle of the side in the tangent plane of its start, counter-clockwise from the first side
+        there; those around an inner vertex are scaled to 2π.
     at_head : (3f,) float
         Angle at which its start is seen from its end, likewise.
     first : (n,) int
-        The first side that leaves each vertex: on a boundary that with nothing on its right, else that of the lowest
-        number.
+        The first side that leaves each vertex: on a boundary that with nothing on its right, else
+        that of the lowest number.
     """
 
     at_tail: Float[np.ndarray, " h"]
@@ -43,8 +43,8 @@ def vertex_directions(mesh: TriangleMesh) -> Directions:
     Raises
     ------
     InvalidShapeError
-        If the mesh is no manifold, two neighboring faces are turned against each other, a face has no area or a
-        vertex no face; the message names the first.
+        If the mesh is no manifold, two neighboring faces are turned against each other, a face has
+        no area or a vertex no face; the message names the first.
     """
     require_sound(mesh)
     _require_oriented_manifold(mesh)

@@ -33,8 +33,8 @@ def fem_laplacian(mesh: MeshLike, order: SupportsIndex = 2) -> Laplacian:
     Returns
     -------
     Laplacian
-        On the nodes of `fem_nodes`, of which the first are the points of the mesh. W in length^(m-2),
-        B, the full mass matrix, in length^m.
+        On the nodes of `fem_nodes`, of which the first are the points of the mesh. W in
+        length^(m-2), B, the full mass matrix, in length^m.
 
     Raises
     ------

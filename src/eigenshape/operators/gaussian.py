@@ -56,15 +56,16 @@ def mesh_laplacian(  # noqa: PLR0913 - one keyword for each choice that the meth
 
     L f(x_i) = 1/(t (4πt)^{m/2}) Σ_j A_j exp(-|x_i - x_j|²/4t) (f_i - f_j)
 
-    (thesis 2.1; Belkin, Sun, Wang 2008), with A_j the volume around point j, as the symmetric pencil
-    W_ij = -A_i A_j G_ij / t, B = diag(A). The operator is robust to noise. Its kernel uses Euclidean
-    distance, so heat leaks between limbs that are close to each other. On flat space the operator is
-    (1 - e^{-tΔ})/t, whose eigenvalues are below those of Δ.
+    (thesis 2.1; Belkin, Sun, Wang 2008), with A_j the volume around point j, as the symmetric
+    pencil W_ij = -A_i A_j G_ij / t, B = diag(A). The operator is robust to noise. Its kernel uses
+    Euclidean distance, so heat leaks between limbs that are close to each other. On flat space the
+    operator is (1 - e^{-tΔ})/t, whose eigenvalues are below those of Δ.
 
     Whether the operator converges depends on how t decreases as the mesh gets finer. Let ε be the
-    fineness of a mesh with its vertices on a smooth manifold. L f converges to Δf at every point for
-    t = ε^{1/(2.5 + α)}, α > 0 (Belkin, Sun, Wang 2008; thesis 2.1.1), and each eigenvalue converges
-    if t and ε / t^{m/2 + 3} go to 0 (thesis 3.1.3). In both cases t decreases far more slowly than e².
+    fineness of a mesh with its vertices on a smooth manifold. L f converges to Δf at every point
+    for t = ε^{1/(2.5 + α)}, α > 0 (Belkin, Sun, Wang 2008; thesis 2.1.1), and each eigenvalue
+    converges if t and ε / t^{m/2 + 3} go to 0 (thesis 3.1.3). In both cases t decreases far more
+    slowly than e².
 
     With the default, t = e², no such theorem holds, and L f does not converge: the kernel always
     sees the same number of points, and the error of their weights A_j is divided by t. On 1,000 to
@@ -180,11 +181,11 @@ def gaussian_laplacian(
     Raises
     ------
     InvalidParameterError
-        If t is not positive or less than a quarter of the squared distance of neighbors, or dim is not
-        in 1..d.
+        If t is not positive or less than a quarter of the squared distance of neighbors, or dim is
+        not in 1..d.
     InvalidShapeError
-        If a point is not finite or isolated, two points are equal, all points lie in a flat of fewer
-        than m dimensions, or the matrix needs more than half of the memory.
+        If a point is not finite or isolated, two points are equal, all points lie in a flat of
+        fewer than m dimensions, or the matrix needs more than half of the memory.
 
     Examples
     --------
@@ -272,7 +273,8 @@ def point_cloud_laplacian(
     """Build the Laplacian of points that sample a manifold, evenly or not.
 
     This is the operator of `mesh_laplacian`, with the volume around each point taken from its
-    Voronoi cell in the tangent plane (`es.geometry.cloud_quadrature`; after Belkin, Sun, Wang 2009).
+    Voronoi cell in the tangent plane (`es.geometry.cloud_quadrature`; after Belkin, Sun, Wang
+    2009).
 
     Parameters
     ----------
@@ -336,19 +338,21 @@ def functional_laplacian(measure: Quadrature, t: float, *, cutoff: float = 6.0) 
     Parameters
     ----------
     measure : Quadrature
-        Of a known surface (`sphere_quadrature`, `torus_quadrature`) or of a mesh (`mesh_quadrature`).
-        On a mesh this is the mesh Laplacian without its matrix, for kernels that are too dense to
-        store.
+        Of a known surface (`sphere_quadrature`, `torus_quadrature`) or of a mesh
+        (`mesh_quadrature`). On a mesh this is the mesh Laplacian without its matrix, for kernels
+        that are too dense to store.
     t : float
         Heat time, in length².
     cutoff : float
-        Distance, in widths h, beyond which the kernel is set to zero. Beyond 6 it is below rounding.
+        Distance, in widths h, beyond which the kernel is set to zero. Beyond 6 it is below
+        rounding.
 
     Returns
     -------
     LinearOperator
-        (n, n), maps values at the points to values of 𝓛_t f there, in 1/length². Self-adjoint in the
-        inner product of the weights; multiplied by the weights it is W of `quadrature_laplacian`.
+        (n, n), maps values at the points to values of 𝓛_t f there, in 1/length². Self-adjoint in
+        the inner product of the weights; multiplied by the weights it is W of
+        `quadrature_laplacian`.
 
     Raises
     ------

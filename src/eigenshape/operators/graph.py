@@ -27,8 +27,8 @@ def graph_laplacian(
     Parameters
     ----------
     graph : (n, n) sparse, or MeshLike
-        Symmetric adjacency matrix whose entry (i, j) is the weight of the edge, > 0. Or a mesh of any
-        dimension, whose graph consists of the sides of all its simplices.
+        Symmetric adjacency matrix whose entry (i, j) is the weight of the edge, > 0. Or a mesh of
+        any dimension, whose graph consists of the sides of all its simplices.
     kind : {"combinatorial", "weighted", "normalized"}
         "combinatorial": every edge has weight 1, B = I (the Kirchhoff operator). "weighted": the
         weights of the matrix, or 1 / length on a mesh, and B = I. "normalized": the weights of the
@@ -43,11 +43,12 @@ def graph_laplacian(
     Raises
     ------
     InvalidParameterError
-        If the matrix is not sparse, square and symmetric; a weight is negative or not finite; a point
-        is its own neighbor; `kind` is not one of the three; or a point has no edge and `kind` is
-        "normalized".
+        If the matrix is not sparse, square and symmetric; a weight is negative or not finite; a
+        point is its own neighbor; `kind` is not one of the three; or a point has no edge and `kind`
+        is "normalized".
     InvalidShapeError
-        If a simplex has a corner twice, or an edge of a mesh has no length and `kind` is "weighted".
+        If a simplex has a corner twice, or an edge of a mesh has no length and `kind` is
+        "weighted".
 
     Examples
     --------

@@ -1,6 +1,7 @@
 """The matrix of a Gaussian kernel on weighted points, its scale, and the Laplacian that it makes.
 
-W_ij = -w_i w_j G(x_i, x_j) / t with G(x, y) = exp(-|x - y|²/4t) / (4πt)^{m/2}: one formula, whatever the weights are.
+W_ij = -w_i w_j G(x_i, x_j) / t with G(x, y) = exp(-|x - y|²/4t) / (4πt)^{m/2}: one formula,
+whatever the weights are.
 """
 
 import warnings
@@ -26,7 +27,8 @@ from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 
 # Width of a kernel by default, h / e; t = e².
 EDGE_FACTOR = 2.0
-# Narrowest kernel, h / e: at half of it eigenvalues are half as large even on the most regular points.
+# Narrowest kernel, h / e: at half of it eigenvalues are half as large even on the most regular
+# points.
 NARROWEST = 1.0
 # h / e below which eigenvalues of irregular points are 5 % too low or worse.
 NARROW = 1.5
@@ -58,8 +60,8 @@ def choose_kernel(options: KernelOptions, edge: float) -> GaussianKernel:
     Raises
     ------
     InvalidParameterError
-        If more than one is given, one is not positive, another option is unknown, or the kernel is narrower than the
-        points lie.
+        If more than one is given, one is not positive, another option is unknown, or the kernel is
+        narrower than the points lie.
     """
     _require_options(options)
     width = options.h or (options.edge_factor or EDGE_FACTOR) * edge
@@ -123,7 +125,8 @@ def kernel_laplacian(measure: Quadrature, kernel: GaussianKernel) -> Laplacian:
     Raises
     ------
     InvalidShapeError
-        If the matrix would not fit into memory or its entries into floats, or a point has no partner.
+        If the matrix would not fit into memory or its entries into floats, or a point has no
+        partner.
     """
     points, scale = size_one(measure.points)
     weights, unit = size_one(measure.weights)

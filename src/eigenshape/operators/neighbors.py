@@ -22,9 +22,9 @@ def neighbor_graph(
     """Build the graph of nearest neighbors of points.
 
     Two points are joined if one of them is among the nearest neighbors of the other. Weights are
-    exp(-|x - y|²/4t) (Belkin and Niyogi 2003; thesis reference 5), or 1 if t is not given. Of points at
-    the same distance the one with the lower index counts as nearer; duplicates of a point are
-    neighbors at distance 0.
+    exp(-|x - y|²/4t) (Belkin and Niyogi 2003; thesis reference 5), or 1 if t is not given. Of
+    points at the same distance the one with the lower index counts as nearer; duplicates of a point
+    are neighbors at distance 0.
 
     Parameters
     ----------

@@ -60,8 +60,8 @@ def robust_laplacian(mesh: MeshLike, *, mollify: float = 1e-5) -> Laplacian:
     ------
     InvalidShapeError
         If a face has a corner twice or the same corners as another, a vertex belongs to no face,
-        all vertices lie on a line, no face has area, `mollify` is too small to give area to one that
-        has none, or coordinates are beyond 1e±150.
+        all vertices lie on a line, no face has area, `mollify` is too small to give area to one
+        that has none, or coordinates are beyond 1e±150.
     InvalidParameterError
         If `mollify` is negative or not finite.
 
@@ -116,7 +116,8 @@ def _cover(mesh: TriangleMesh, mollify: float) -> tuple[Triangulation, float]:
 
 def _stiffness(cover: Triangulation, n: int) -> sp.csr_array:
     cotangents = flip_loops.cotangents(cover.lengths)
-    # What rounding leaves below zero is zero. The cover counts the surface twice: a quarter of each sum, not half.
+    # What rounding leaves below zero is zero. The cover counts the surface twice: a quarter of each
+    # sum, not half.
     once = np.flatnonzero(np.arange(len(cover.twins)) < cover.twins)
     twins = cover.twins[once]
     weights = np.maximum(cotangents[once] + cotangents[twins], 0.0) / 4

@@ -28,10 +28,10 @@ ONE_EDGE = 0.165
 def noise_level(mesh: MeshLike) -> float:
     """Measure the noise of the vertices normal to the surface, in mean edge lengths.
 
-    This is the median, over vertices that are not on the boundary, of |N · (mean of neighbors - vertex)|.
-    It is almost zero on finely meshed smooth surfaces. Gaussian noise of 0.1, 0.25 and 0.5 mean edge
-    lengths in each coordinate gives about 0.09, 0.17 and 0.25 on real meshes of 5,000 vertices; without
-    noise these meshes have up to 0.11 (coarse ones with sharp features).
+    This is the median, over vertices that are not on the boundary, of |N · (mean of neighbors -
+    vertex)|. It is almost zero on finely meshed smooth surfaces. Gaussian noise of 0.1, 0.25 and
+    0.5 mean edge lengths in each coordinate gives about 0.09, 0.17 and 0.25 on real meshes of 5,000
+    vertices; without noise these meshes have up to 0.11 (coarse ones with sharp features).
 
     Parameters
     ----------
@@ -70,16 +70,16 @@ def denoise(mesh: MeshLike, *, reach: float | None = None) -> TriangleMesh:
 
     H solves (B + h² W) y = B x: implicit fairing (Desbrun, Meyer, Schröder and Barr 1999). Twicing,
     H x + H (x - H x), restores most of the shape that one step removes (Tukey 1977). The boundary
-    flows only along itself, and the rest of the surface flows with the boundary fixed there, so that
-    the surface does not shrink away from its boundary.
+    flows only along itself, and the rest of the surface flows with the boundary fixed there, so
+    that the surface does not shrink away from its boundary.
 
     Parameters
     ----------
     mesh : MeshLike
         Without faces of zero area.
     reach : float, optional
-        h in mean edge lengths. The default is (`noise_level` / 0.165)², so that surfaces with little
-        noise hardly move.
+        h in mean edge lengths. The default is (`noise_level` / 0.165)², so that surfaces with
+        little noise hardly move.
 
     Returns
     -------

@@ -16,8 +16,8 @@ MOST_FLIPS = 1000  # a side: far more than any shape takes, which is about one
 class Triangulation:
     """Triangles that know lengths only, glued along whole sides into a surface without boundary.
 
-    Triangle f has the sides 3f, 3f + 1, 3f + 2 in turn. Two corners of a triangle may be one vertex, and two of its
-    sides one edge.
+    Triangle f has the sides 3f, 3f + 1, 3f + 2 in turn. Two corners of a triangle may be one
+    vertex, and two of its sides one edge.
 
     Attributes
     ----------
@@ -39,8 +39,8 @@ def mollify_lengths(
 ) -> Float[np.ndarray, " h"]:
     """Lengthen all sides by one amount, the least that leaves every triangle inequality a margin.
 
-    The margin is `factor` times the mean edge length (Sharp and Crane 2020); sides are left as they are
-    where every triangle has it. `edges` numbers the edge of each side.
+    The margin is `factor` times the mean edge length (Sharp and Crane 2020); sides are left as they
+    are where every triangle has it. `edges` numbers the edge of each side.
     """
     _, firsts = np.unique(edges, return_index=True)
     margin = factor * lengths[firsts].mean()
@@ -56,8 +56,9 @@ def tufted_cover(
 ) -> Triangulation:
     """Give each face a front and a back and glue these around each edge (Sharp and Crane 2020).
 
-    Around an edge the front of one face meets what it faces: the back or front of the next face by angle. So any
-    number of faces at an edge, turned any way, make a surface that is a manifold but for its vertices.
+    Around an edge the front of one face meets what it faces: the back or front of the next face by
+    angle. So any number of faces at an edge, turned any way, make a surface that is a manifold but
+    for its vertices.
     """
     n_sides = 3 * len(faces)
     heads = np.roll(faces, -1, axis=1).ravel()
@@ -115,13 +116,15 @@ def _angles(
     along = np.divide(along, lengths, out=np.zeros_like(along), where=lengths > 0)
     out = points[apex] - points[low]
     out -= np.einsum("ij,ij->i", out, along)[:, None] * along
-    # Angles start from the face whose apex is farthest from the edge, which rounding has blurred least.
+    # Angles start from the face whose apex is farthest from the edge, which rounding has blurred
+    # least.
     best = np.lexsort((sides, -np.linalg.norm(out, axis=1), edges))
     groups, inverse = np.unique(edges, return_inverse=True)
     zero = out[best[np.searchsorted(edges[best], groups)]][inverse]
     quarter = np.cross(along, zero)
     angles = np.arctan2(np.einsum("ij,ij->i", out, quarter), np.einsum("ij,ij->i", out, zero))
-    # Faces with the same corners lie in one order seen from any of their sides: seen against it, from the last.
+    # Faces with the same corners lie in one order seen from any of their sides: seen against it,
+    # from the last.
     between = (low < apex) & (apex < high)
     return angles, np.where(between, -face, face)
 

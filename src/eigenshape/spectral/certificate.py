@@ -15,16 +15,16 @@ class Certificate:
     of eigenvalues below σ. If as many B-orthonormal eigenvectors were found, and their error
     intervals end below σ, none is missing and none is extra. If the k-th eigenvalue is multiple (to
     `resolution`) and more copies follow, σ is below all copies, and the pairs found at the level of
-    the k-th eigenvalue are the rest of the k. For an interval far up in the spectrum a second factor
-    counts below its lower end, and the difference of the counts must have been found.
+    the k-th eigenvalue are the rest of the k. For an interval far up in the spectrum a second
+    factor counts below its lower end, and the difference of the counts must have been found.
 
     Attributes
     ----------
     n_pairs : int
         Number of certified eigenpairs k.
     first : int
-        Index of the first of them among all eigenvalues, 0 for the lowest: the number of eigenvalues
-        below it.
+        Index of the first of them among all eigenvalues, 0 for the lowest: the number of
+        eigenvalues below it.
     floor : float
         Lower end of the count, in 1/length²; -inf if all eigenvalues below σ are counted.
     shift : float
@@ -38,8 +38,8 @@ class Certificate:
         An interval around σ, in 1/length², without eigenvalues: its upper part by the count, its
         lower part by the error intervals of the eigenvalues.
     resolution : float
-        Eigenvalues closer than this, in 1/length², count as equal: the rounding of the factor and of
-        the eigenvectors, and at least 1e-6 of the largest eigenvalue.
+        Eigenvalues closer than this, in 1/length², count as equal: the rounding of the factor and
+        of the eigenvectors, and at least 1e-6 of the largest eigenvalue.
     orthonormality : float
         Largest entry of |ΦᵀBΦ - I|.
     max_residual : float

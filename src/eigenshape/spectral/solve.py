@@ -47,71 +47,77 @@ def solve_spectrum(  # noqa: PLR0913 - one keyword for each choice: which pairs,
 ) -> Spectrum:
     """Compute the lowest eigenpairs of a Laplacian, W φ = λ B φ, or all eigenpairs in an interval.
 
-    The certified method proves that no eigenvalue is missing. It runs block Lanczos on (W - σB)⁻¹B with σ among the
-    wanted eigenvalues, counts the eigenvalues below a gap by Sylvester's law of inertia (Parlett 1998, section 3.3),
-    and searches for what is missing until both counts agree. Small operators are solved densely.
+    The certified method proves that no eigenvalue is missing. It runs block Lanczos on (W - σB)⁻¹B
+    with σ among the wanted eigenvalues, counts the eigenvalues below a gap by Sylvester's law of
+    inertia (Parlett 1998, section 3.3), and searches for what is missing until both counts agree.
+    Small operators are solved densely.
 
-    The approximate method factors nothing of full size and proves nothing. It aggregates points (Vaněk, Mandel and
-    Brezina 1996), solves the coarsest level exactly, and refines the eigenvectors level by level by block Davidson
-    iteration, in the spirit of Nasikun and Hildebrandt (2022). It needs less memory, and less time for a few dozen
-    pairs of many points.
+    The approximate method factors nothing of full size and proves nothing. It aggregates points
+    (Vaněk, Mandel and Brezina 1996), solves the coarsest level exactly, and refines the
+    eigenvectors level by level by block Davidson iteration, in the spirit of Nasikun and
+    Hildebrandt (2022). It needs less memory, and less time for a few dozen pairs of many points.
 
     Results do not depend on units: coordinates scaled by s give the eigenvalues divided by s².
 
     Parameters
     ----------
     laplacian : Laplacian
-        Any operator with W positive semidefinite and B positive definite; B diagonal for the approximate method.
+        Any operator with W positive semidefinite and B positive definite; B diagonal for the
+        approximate method.
     k : int, optional
         Number of eigenpairs, 1 to the number of free points. Either `k` or `below` must be given.
     fixed : (c,) int, optional
-        Points where functions are zero; duplicates are allowed. With the boundary of a mesh fixed this is the
-        Dirichlet condition. Points that are not fixed are free (Neumann condition).
+        Points where functions are zero; duplicates are allowed. With the boundary of a mesh fixed
+        this is the Dirichlet condition. Points that are not fixed are free (Neumann condition).
     below : float, optional
         Compute all pairs with λ < below, in 1/length². Certified method only.
     above : float, optional
-        With `below`: compute all pairs with above ≤ λ < below. `certificate.first` is the number of eigenvalues
-        below `above`.
+        With `below`: compute all pairs with above ≤ λ < below. `certificate.first` is the number of
+        eigenvalues below `above`.
     method : {"certified", "approximate"}
     accuracy : float, optional
-        Approximate method only: estimated error of the eigenvalues at which the solver stops, relative to the k-th
-        eigenvalue, 1e-10 to 0.1. The default is 1e-3. `certificate.estimate` holds the estimate that was reached.
+        Approximate method only: estimated error of the eigenvalues at which the solver stops,
+        relative to the k-th eigenvalue, 1e-10 to 0.1. The default is 1e-3. `certificate.estimate`
+        holds the estimate that was reached.
     max_residual : float, optional
-        Approximate method only: continue until every residual, relative to the k-th eigenvalue, is at most this
-        value too. The residual bounds the error rigorously, and is much larger than the error, which is
-        proportional to its square.
+        Approximate method only: continue until every residual, relative to the k-th eigenvalue, is
+        at most this value too. The residual bounds the error rigorously, and is much larger than
+        the error, which is proportional to its square.
     progress : callable, optional
         Called as progress(fraction_done, message) while the solver works.
     cache : path, optional
-        Folder in which spectra are kept, each under a hash of W, B and the request. A spectrum found there is
-        loaded instead of computed. The folder is created if it does not exist, and nothing in it is deleted.
+        Folder in which spectra are kept, each under a hash of W, B and the request. A spectrum
+        found there is loaded instead of computed. The folder is created if it does not exist, and
+        nothing in it is deleted.
 
     Returns
     -------
     Spectrum
-        Eigenvalues in 1/length², ascending and ≥ 0, and eigenvectors on all n points, zero at the fixed ones. An
-        eigenvalue that is negative by less than its residual is reported as 0. If k cuts a multiple eigenvalue,
-        `certificate.n_split` is the number of copies left out. If the operator's kernel is corrected, eigenvalues,
-        residuals and certificate hold λ = -log(1 - t μ)/t for the eigenvalue μ of the pencil. Approximate results
-        have `certificate.complete` False and `certificate.count` None, except for operators so small that the
-        certified method is faster: these are certified.
+        Eigenvalues in 1/length², ascending and ≥ 0, and eigenvectors on all n points, zero at the
+        fixed ones. An eigenvalue that is negative by less than its residual is reported as 0. If k
+        cuts a multiple eigenvalue, `certificate.n_split` is the number of copies left out. If the
+        operator's kernel is corrected, eigenvalues, residuals and certificate hold λ = -log(1 - t
+        μ)/t for the eigenvalue μ of the pencil. Approximate results have `certificate.complete`
+        False and `certificate.count` None, except for operators so small that the certified method
+        is faster: these are certified.
 
     Raises
     ------
     InvalidParameterError
-        If not exactly one of `k` and `below` is given; `k` is not in 1..n; no eigenvalue is in the interval; a fixed
-        point is out of range or no point is free; the options do not fit the method; B is not positive definite or W
-        has a negative eigenvalue; an eigenvalue to be corrected is 1/t or more; the entries of the operator span too
-        many orders of magnitude; the memory is too small; or the folder `cache` cannot be written to.
+        If not exactly one of `k` and `below` is given; `k` is not in 1..n; no eigenvalue is in the
+        interval; a fixed point is out of range or no point is free; the options do not fit the
+        method; B is not positive definite or W has a negative eigenvalue; an eigenvalue to be
+        corrected is 1/t or more; the entries of the operator span too many orders of magnitude; the
+        memory is too small; or the folder `cache` cannot be written to.
     ConvergenceError
-        If the proof cannot be completed, or the accuracy is not reached. Incomplete spectra are never returned as
-        complete.
+        If the proof cannot be completed, or the accuracy is not reached. Incomplete spectra are
+        never returned as complete.
 
     Warns
     -----
     UserWarning
-        If eigenvalues of a kernel operator are too close to 1/t to represent the shape, or a file in `cache` is
-        damaged and the spectrum is computed again.
+        If eigenvalues of a kernel operator are too close to 1/t to represent the shape, or a file
+        in `cache` is damaged and the spectrum is computed again.
 
     See Also
     --------

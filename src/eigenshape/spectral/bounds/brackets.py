@@ -113,8 +113,9 @@ def bracket_eigenvalues(
 ) -> Brackets:
     """Compute guaranteed lower and upper bounds for the k lowest eigenvalues of a mesh.
 
-    The mesh is taken as the shape made of its flat simplices. Upper bounds come from linear elements
-    with consistent mass (Rayleigh-Ritz), lower bounds from Crouzeix-Raviart elements, as follows.
+    The mesh is taken as the shape made of its flat simplices. Upper bounds come from linear
+    elements with consistent mass (Rayleigh-Ritz), lower bounds from Crouzeix-Raviart elements, as
+    follows.
 
     Let Πu have the facet means of u, and w = u - Πu. Green's formula on each simplex gives
     |u|₁² = |Πu|₁² + |w|₁², and `interpolation_constants` gives ‖w‖_T ≤ C_T |w|_{1,T}. Both need only
@@ -129,7 +130,8 @@ def bracket_eigenvalues(
     Carstensen and Puttkammer (2024). On curves both bounds use linear elements.
 
     The bounds include residuals and the rounding of matrix entries (`spectral.bounds.rounding`).
-    They do not include the last few roundings in their own computation, or errors in the coordinates.
+    They do not include the last few roundings in their own computation, or errors in the
+    coordinates.
 
     Parameters
     ----------

@@ -37,9 +37,9 @@ def lower_bounds(
 ) -> Values:
     """Return lower bounds for the k lowest eigenvalues with some facets fixed at zero, in 1/length².
 
-    The proof is in `bracket_eigenvalues`. If the interpolation constants are even, the weight μ = 0 is
-    enough. Otherwise weights near the last eigenvalue and in steps below it improve the bounds of the
-    eigenvalues up to each of them, so that later solves are cheaper.
+    The proof is in `bracket_eigenvalues`. If the interpolation constants are even, the weight μ = 0
+    is enough. Otherwise weights near the last eigenvalue and in steps below it improve the bounds
+    of the eigenvalues up to each of them, so that later solves are cheaper.
     """
     squares, measure = interpolation_constants(mesh) ** 2, simplex_volumes(mesh)
     mean, largest = float((squares * measure).sum() / measure.sum()), float(squares.max())

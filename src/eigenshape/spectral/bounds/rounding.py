@@ -15,9 +15,10 @@ def enclose(
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return lower and upper bounds for the eigenvalues of the pencil in exact arithmetic, in 1/length².
 
-    The errors of all eigenvalues, matched one to one, are at most √2 times the norm of the residuals (Kahan 1967;
-    Parlett 1998, theorem 11.5.1), plus the lack of orthonormality of the vectors. The absolute rounding errors, in sums
-    over rows and in the residuals, are at most (row length + 4) eps times the largest row of |W| over B.
+    The errors of all eigenvalues, matched one to one, are at most √2 times the norm of the
+    residuals (Kahan 1967; Parlett 1998, theorem 11.5.1), plus the lack of orthonormality of the
+    vectors. The absolute rounding errors, in sums over rows and in the residuals, are at most (row
+    length + 4) eps times the largest row of |W| over B.
 
     Parameters
     ----------
@@ -43,11 +44,12 @@ def enclose(
 def relative_rounding(mesh: Mesh) -> float:
     """Bound the relative error that the rounded entries of linear elements cause in every eigenvalue.
 
-    An error ε |∇λ_a| |∇λ_b| V in each product V ∇λ_a·∇λ_b changes Σ w_ab (u_a - u_b)², which is V |∇u|², by at most ε q
-    of itself, q = Σ |e_ab|² |∇λ_a| |∇λ_b| over the edges: 4 on an equilateral triangle, the square of the aspect ratio
-    on a flat one. Sides, their triangle and its inverse err like linear maps that are within eps q of the identity.
-    Counted together that is below 4 (m+1)² (d + t) eps q, with t simplices at most around an edge. The coordinates as
-    stored are taken for exact.
+    An error ε |∇λ_a| |∇λ_b| V in each product V ∇λ_a·∇λ_b changes Σ w_ab (u_a - u_b)², which is V
+    |∇u|², by at most ε q of itself, q = Σ |e_ab|² |∇λ_a| |∇λ_b| over the edges: 4 on an equilateral
+    triangle, the square of the aspect ratio on a flat one. Sides, their triangle and its inverse
+    err like linear maps that are within eps q of the identity. Counted together that is below 4
+    (m+1)² (d + t) eps q, with t simplices at most around an edge. The coordinates as stored are
+    taken for exact.
     """
     corners, _ = scaled_corners(mesh)
     edges = mesh.simplices[:, np.column_stack(np.triu_indices(mesh.dim + 1, 1))].reshape(-1, 2)

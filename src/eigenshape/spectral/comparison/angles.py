@@ -88,13 +88,13 @@ def eigenspace_angles(
     with the same numbers are pulled back to the points of `one` (thesis, lemma 3.2.1) and
     orthonormalized in its mass.
 
-    With the operator (W, B) of `one` the angle has a bound. Let V be that basis, H = VᵀWV,
-    R = WV - BVH, and δ the distance between the interval spanned by the eigenvalues of H and all
-    eigenvalues of `one` outside the group. Then sin θ ≤ ‖R‖/δ, with the largest singular value in
-    B⁻¹ (Davis and Kahan 1970, the sin θ theorem; Parlett 1998, section 11.7), since X = U⊥ᵀBV, U⊥ the
-    other eigenvectors, solves Λ⊥X - XH = U⊥ᵀR. The eigenvectors of `one` have the same kind of bound
-    by their own residuals, which is added. Eigenvalues have errors of at most √2 times the norm of
-    all residuals, by which the gap is reduced. The bound depends on `two` only through V: it is a
+    With the operator (W, B) of `one` the angle has a bound. Let V be that basis, H = VᵀWV, R = WV -
+    BVH, and δ the distance between the interval spanned by the eigenvalues of H and all eigenvalues
+    of `one` outside the group. Then sin θ ≤ ‖R‖/δ, with the largest singular value in B⁻¹ (Davis
+    and Kahan 1970, the sin θ theorem; Parlett 1998, section 11.7), since X = U⊥ᵀBV, U⊥ the other
+    eigenvectors, solves Λ⊥X - XH = U⊥ᵀR. The eigenvectors of `one` have the same kind of bound by
+    their own residuals, which is added. Eigenvalues have errors of at most √2 times the norm of all
+    residuals, by which the gap is reduced. The bound depends on `two` only through V: it is a
     posteriori, and gives no information if eigenvalues change places.
 
     Parameters
@@ -117,8 +117,8 @@ def eigenspace_angles(
     ------
     InvalidParameterError
         If a spectrum does not begin with the lowest eigenvalue, the points do not fit, the
-        pulled-back eigenvectors are dependent, or `laplacian` is given and `one` is not certified or
-        has other points.
+        pulled-back eigenvectors are dependent, or `laplacian` is given and `one` is not certified
+        or has other points.
     ConvergenceError
         If `laplacian` is not the operator of `one`.
 

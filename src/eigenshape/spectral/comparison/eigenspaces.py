@@ -14,13 +14,13 @@ from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.spectral.spectrum import Spectrum, require_lowest
 
-# Exact eigenvalues that differ by less than this share of the larger one are copies of one eigenvalue:
-# formulas evaluate them to about 1e-15.
+# Exact eigenvalues that differ by less than this share of the larger one are copies of one
+# eigenvalue: formulas evaluate them to about 1e-15.
 EQUAL_EIGENVALUES = 1e-9
 # Least ratio of the gap around a group to its spread. A larger ratio gives smaller groups.
 SEPARATED = 4.0
-# Least eigenvalue of the Gram matrix of unit columns that count as independent. Cholesky loses about
-# 1e-16 / DEPENDENT_FUNCTIONS of orthonormality at once, so two steps still reach rounding.
+# Least eigenvalue of the Gram matrix of unit columns that count as independent. Cholesky loses
+# about 1e-16 / DEPENDENT_FUNCTIONS of orthonormality at once, so two steps still reach rounding.
 DEPENDENT_FUNCTIONS = 1e-12
 
 
@@ -31,8 +31,9 @@ def eigenspace_errors(
     """Measure the distance of each eigenvector from the exact eigenspace (thesis 3.4, Figure 3.2b).
 
     The distance is ‖φ_i - P φ_i‖, with P the projection on the span of all exact eigenfunctions of
-    eigenvalue number i, sampled at the points. The thesis uses the plain inner product; this function
-    uses that of the mass B, in which eigenvectors are orthonormal and which approximates the integral.
+    eigenvalue number i, sampled at the points. The thesis uses the plain inner product; this
+    function uses that of the mass B, in which eigenvectors are orthonormal and which approximates
+    the integral.
 
     Parameters
     ----------
@@ -133,9 +134,9 @@ def separated_groups(eigenvalues: ArrayLike, *, ratio: float = SEPARATED) -> lis
     Only the space of a whole group is stable under perturbations. A group is a run of eigenvalues
     whose distance from the rest is at least `ratio` times its own spread, last minus first. The
     largest such runs are returned, the run of all eigenvalues excluded. Each single eigenvalue is
-    such a run, and of two runs that overlap one contains the other: otherwise a gap at an end of each
-    would be part of the spread of the other. So every eigenvalue is in exactly one group. The result
-    does not depend on units.
+    such a run, and of two runs that overlap one contains the other: otherwise a gap at an end of
+    each would be part of the spread of the other. So every eigenvalue is in exactly one group. The
+    result does not depend on units.
 
     Parameters
     ----------
@@ -187,8 +188,8 @@ def orthonormal(
 ) -> Float[np.ndarray, "n p"]:
     """Return a basis of the span of these columns that is orthonormal in B.
 
-    Twice by Cholesky, of columns made of one length first: as orthonormal as rounding lets it be for all that pass
-    (Yamamoto and others 2015).
+    Twice by Cholesky, of columns made of one length first: as orthonormal as rounding lets it be
+    for all that pass (Yamamoto and others 2015).
 
     Raises
     ------

@@ -24,8 +24,8 @@ class SpectrumComparison:
     one, two : (k,) float
         Eigenvalues, ascending, in 1/length².
     intervals_one, intervals_two : (k, 2) float
-        Intervals that contain the exact eigenvalues: those of the operator, by the residuals, or those
-        of the shape, by brackets.
+        Intervals that contain the exact eigenvalues: those of the operator, by the residuals, or
+        those of the shape, by brackets.
     relative : (k,) float
         |two - one| / one; 0 if both are 0 to rounding, infinite if one of them is.
     zero : (k,) bool
@@ -112,7 +112,8 @@ def compare_spectra(
     one, two : Spectrum
         From the lowest eigenvalue on. To ignore size, scale both shapes to the same area.
     brackets : (Brackets, Brackets), optional
-        Brackets of the two shapes. Changes are then proved for the shapes, not only for the operators.
+        Brackets of the two shapes. Changes are then proved for the shapes, not only for the
+        operators.
 
     Returns
     -------
@@ -206,9 +207,9 @@ def spectral_hausdorff_distance(one: ArrayLike, two: ArrayLike) -> float:
     """Compute the Hausdorff distance of two sets of eigenvalues (thesis, theorem 3.1.4).
 
     max(max_λ dist(λ, Ω), max_ω dist(ω, Λ)), restricted to what two truncated spectra determine. An
-    eigenvalue above the last known one of the other set is left out, because its nearest neighbor may
-    be unknown. For all others the distance is exact: unknown eigenvalues of the other set are at or
-    above its last known one, and so no nearer than that.
+    eigenvalue above the last known one of the other set is left out, because its nearest neighbor
+    may be unknown. For all others the distance is exact: unknown eigenvalues of the other set are
+    at or above its last known one, and so no nearer than that.
 
     Parameters
     ----------

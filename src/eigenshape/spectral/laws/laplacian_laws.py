@@ -204,8 +204,9 @@ def _row_sums(laplacian: Laplacian) -> Law:
 def _kernel(laplacian: Laplacian, pencil: Pencil) -> Law:
     """Count the eigenvalues on either side of zero: a zero for each component, and no other.
 
-    The energy of each component's indicator bounds that many eigenvalues from above (Courant-Fischer). So this law
-    finds zeros that are too many; those too few are found by the row sums.
+    The energy of each component's indicator bounds that many eigenvalues from above
+    (Courant-Fischer). So this law finds zeros that are too many; those too few are found by the row
+    sums.
     """
     n_parts, labels = _graph_parts(laplacian.stiffness)
     energies = np.abs(np.bincount(labels, weights=pencil.stiffness.sum(axis=1)))

@@ -41,7 +41,8 @@ from eigenshape.spectral.spectrum import Spectrum
 
 Build: TypeAlias = Callable[[Any], Laplacian]
 
-# Powers of two near 1e±100, 1e±50 and 1e±20, which round no coordinate; the first for which W and B stay floats serves.
+# Powers of two near 1e±100, 1e±50 and 1e±20, which round no coordinate; the first for which W and B
+# stay floats serves.
 DOUBLINGS = (332, 166, 66)
 # Powers of two that W and B may grow by: floats end at 2^1023.
 LARGEST_EXPONENT = 900
@@ -95,14 +96,14 @@ def check_operator(
 ) -> OperatorReport:
     """Check the laws that a Laplace operator must obey, by building it on transformed copies of a shape.
 
-    The matrices are checked as in `es.spectral.check_laplacian`. Then the operator is built again on
-    transformed copies of the shape (moved, scaled, renumbered, ...) and compared entry by entry,
+    The matrices are checked as in `es.spectral.check_laplacian`. Then the operator is built again
+    on transformed copies of the shape (moved, scaled, renumbered, ...) and compared entry by entry,
     relative to √(W_ii W_jj) and √(B_ii B_jj). If rows are not points (elements of higher order, a
     boundary condition, vectors), the 20 lowest eigenvalues are compared instead.
 
-    Rounding changes entries more if simplices are thin. The tolerance is 32 times the largest change
-    under three random perturbations of the coordinates by their rounding, and at least 1e-12. If it
-    is above 1e-4, laws that round coordinates anew are skipped.
+    Rounding changes entries more if simplices are thin. The tolerance is 32 times the largest
+    change under three random perturbations of the coordinates by their rounding, and at least
+    1e-12. If it is above 1e-4, laws that round coordinates anew are skipped.
 
     Parameters
     ----------
@@ -112,13 +113,13 @@ def check_operator(
     shape : ShapeLike or (n, n) sparse
         A mesh, a point cloud, or the adjacency matrix of a graph.
     promises : iterable of str
-        Laws to check, those of `es.spectral.check_laplacian` and these. "rigid_motion": a rotated and
-        translated shape has the same operator. "reflection": so has its mirror image. "orientation":
-        so has the mesh with some simplices reversed. "scaling": at 1e±100 times the size W and B
-        change by one factor each, and eigenvalues by 1/length² (on a graph, whose weights are
-        scaled, by any factor). "union": a shape with a distant copy has the operator twice, as
-        blocks. Two laws are always checked: building twice gives the same bits, and the order of
-        points and simplices does not matter.
+        Laws to check, those of `es.spectral.check_laplacian` and these. "rigid_motion": a rotated
+        and translated shape has the same operator. "reflection": so has its mirror image.
+        "orientation": so has the mesh with some simplices reversed. "scaling": at 1e±100 times the
+        size W and B change by one factor each, and eigenvalues by 1/length² (on a graph, whose
+        weights are scaled, by any factor). "union": a shape with a distant copy has the operator
+        twice, as blocks. Two laws are always checked: building twice gives the same bits, and the
+        order of points and simplices does not matter.
     by_points : bool, optional
         Whether row i of the operator is point i of the shape. The default is True if the operator
         has as many rows as the shape has points.

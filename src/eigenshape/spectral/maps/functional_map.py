@@ -36,8 +36,8 @@ class FunctionalMap:
     Attributes
     ----------
     matrix : (k2, k1) float
-        Maps coefficients in the k1 lowest modes of the source to coefficients in the k2 lowest modes
-        of the target.
+        Maps coefficients in the k1 lowest modes of the source to coefficients in the k2 lowest
+        modes of the target.
     source, target : Spectrum
         Of connected shapes without fixed boundary, from the lowest eigenvalue on.
 
@@ -95,7 +95,8 @@ def require_one_constant(spectrum: Spectrum, name: str) -> None:
     Raises
     ------
     InvalidParameterError
-        For intervals of a spectrum, fixed boundaries, disconnected shapes, and fewer than two modes.
+        For intervals of a spectrum, fixed boundaries, disconnected shapes, and fewer than two
+        modes.
     """
     if len(spectrum.eigenvalues) < 2:
         raise InvalidParameterError(
@@ -148,12 +149,12 @@ def functional_map(
 ) -> FunctionalMap:
     """Compute a functional map between two shapes from a few pairs of corresponding points.
 
-    Minimizes Σ_p w_p |C a_p - b_p|² + μ Σ_ij (λ'_i - λ_j)² C_ij² over maps C that keep constants, with
-    a_p and b_p the coefficients of unit masses at the points of pair p, w_p = 1/(|a_p| |b_p|), and
-    λ × area for λ (Ovsjanikov and others 2012, section 4). A few pairs are enough: the commutativity
-    penalty determines the rest. In a comparison on nine pairs of poses of a horse, a cat and a lion
-    (5,000 to 8,400 vertices, six pairs chosen by hand), wave functions at the points instead of unit
-    masses were no better, and heat was worse.
+    Minimizes Σ_p w_p |C a_p - b_p|² + μ Σ_ij (λ'_i - λ_j)² C_ij² over maps C that keep constants,
+    with a_p and b_p the coefficients of unit masses at the points of pair p, w_p = 1/(|a_p| |b_p|),
+    and λ × area for λ (Ovsjanikov and others 2012, section 4). A few pairs are enough: the
+    commutativity penalty determines the rest. In a comparison on nine pairs of poses of a horse, a
+    cat and a lion (5,000 to 8,400 vertices, six pairs chosen by hand), wave functions at the points
+    instead of unit masses were no better, and heat was worse.
 
     The shapes should be nearly isometric; maps of parts of shapes are not supported. If all pairs
     are mirrored, as those of `es.retrieval.match_patches` may be, the map is mirrored too.
@@ -258,7 +259,8 @@ def _as_pairs(pairs: ArrayLike, n_source: int, n_target: int) -> Int[np.ndarray,
 def transfer_function(mapping: FunctionalMap, values: ArrayLike) -> Float[np.ndarray, "n2 ..."]:
     """Transfer functions from the source of a functional map to its target.
 
-    The function is projected on the modes of the source, mapped, and expanded in those of the target.
+    The function is projected on the modes of the source, mapped, and expanded in those of the
+    target.
 
     Parameters
     ----------

@@ -34,8 +34,8 @@ DISTANCES_AT_ONCE = 2**22  # distances computed at a time: 32 MiB of float64
 def point_map(mapping: FunctionalMap) -> Int[np.ndarray, " n2"]:
     """Convert a functional map to corresponding vertices: one vertex of the source for each of the target.
 
-    argmin_x |C Φ1(x)ᵀ - Φ2(y)ᵀ| (Ovsjanikov and others 2012, section 6.1). All distances are computed,
-    because that is faster than a k-d tree in 50 modes and more.
+    argmin_x |C Φ1(x)ᵀ - Φ2(y)ᵀ| (Ovsjanikov and others 2012, section 6.1). All distances are
+    computed, because that is faster than a k-d tree in 50 modes and more.
 
     Parameters
     ----------
@@ -44,8 +44,8 @@ def point_map(mapping: FunctionalMap) -> Int[np.ndarray, " n2"]:
     Returns
     -------
     (n2,) int
-        Vertices of the source; the first one if several are equally near. The map need not be one to
-        one.
+        Vertices of the source; the first one if several are equally near. The map need not be one
+        to one.
 
     Examples
     --------
@@ -81,8 +81,9 @@ def map_from_points(
 ) -> FunctionalMap:
     """Convert corresponding vertices to a functional map.
 
-    The map assigns to each vertex of the target the value of a function at its vertex of the source:
-    C = Φ2ᵀ B2 Φ1[points], in modes of shapes scaled to area 1 (Ovsjanikov and others 2012, section 4).
+    The map assigns to each vertex of the target the value of a function at its vertex of the
+    source: C = Φ2ᵀ B2 Φ1[points], in modes of shapes scaled to area 1 (Ovsjanikov and others 2012,
+    section 4).
 
     Parameters
     ----------
@@ -100,8 +101,8 @@ def map_from_points(
     Raises
     ------
     InvalidParameterError
-        If `points` does not hold one vertex of the source for each vertex of the target, or a spectrum
-        has too few modes or does not begin with one constant function.
+        If `points` does not hold one vertex of the source for each vertex of the target, or a
+        spectrum has too few modes or does not begin with one constant function.
 
     See Also
     --------
@@ -157,11 +158,12 @@ def refine_map(
     """Refine a functional map from few modes to many (ZoomOut, Melzi and others 2019).
 
     Each round converts the map to points and back to a functional map with a few more modes. The
-    conversion back uses samples of the target that are far from each other in √(1/λ) φ, each weighted
-    by the area nearest to it. Over nine pairs of poses of a horse, a cat and a lion, with six
-    landmarks each and 100 modes, ten samples per mode have a mean error of 0.016 √area, the same as
-    all vertices; five have 0.017. 25,000 vertices take 4 s to 100 modes on one core. Between species
-    some forty modes are better than 100: at 100 the map of a horse onto a camel has discontinuities.
+    conversion back uses samples of the target that are far from each other in √(1/λ) φ, each
+    weighted by the area nearest to it. Over nine pairs of poses of a horse, a cat and a lion, with
+    six landmarks each and 100 modes, ten samples per mode have a mean error of 0.016 √area, the
+    same as all vertices; five have 0.017. 25,000 vertices take 4 s to 100 modes on one core.
+    Between species some forty modes are better than 100: at 100 the map of a horse onto a camel has
+    discontinuities.
 
     Parameters
     ----------
@@ -171,8 +173,8 @@ def refine_map(
     step : int
         Number of modes added in each round.
     n_samples : int, optional
-        Number of samples of the target, at least 2 n_modes. The default is 10 n_modes, or all vertices
-        if there are fewer.
+        Number of samples of the target, at least 2 n_modes. The default is 10 n_modes, or all
+        vertices if there are fewer.
     progress : callable, optional
         Called as progress(fraction_done, message).
 
@@ -183,7 +185,8 @@ def refine_map(
     Raises
     ------
     InvalidParameterError
-        If a spectrum has fewer than `n_modes` modes, `start` has more, or `n_samples` is out of range.
+        If a spectrum has fewer than `n_modes` modes, `start` has more, or `n_samples` is out of
+        range.
 
     See Also
     --------

@@ -57,8 +57,8 @@ class ApproximateSignature:
     times : (q,) float
         In length².
     errors : (q,) float
-        Estimated error of each column: root mean square weighted by the mass, relative to that of the
-        column.
+        Estimated error of each column: root mean square weighted by the mass, relative to that of
+        the column.
     eigenvalues : (k,) float
         Ritz values, in 1/length².
     complete : bool
@@ -90,10 +90,10 @@ def approximate_heat_signature(
     HKS-simp, without its definition (5.4); this one is ours. The eigenvectors are those of the
     approximate method of `solve_spectrum`, in single precision, and are summed in blocks of points.
 
-    The error is estimated, not bounded: some of the pairs are corrected once more, and the resulting
-    changes of their squares, weighted by exp(-tλ), add up to `errors`. On scans, synthetic surfaces
-    and poor triangles the estimate was 0.8 to 4.5 times the true error. It does not include missing
-    pairs.
+    The error is estimated, not bounded: some of the pairs are corrected once more, and the
+    resulting changes of their squares, weighted by exp(-tλ), add up to `errors`. On scans,
+    synthetic surfaces and poor triangles the estimate was 0.8 to 4.5 times the true error. It does
+    not include missing pairs.
 
     Parameters
     ----------
@@ -104,9 +104,9 @@ def approximate_heat_signature(
     times : (q,) float
         Diffusion times, in length², all > 0.
     accuracy : float
-        Error of the eigenvalues, relative to the k-th, at which refinement stops, 1e-4 to 0.1. At 1e-2
-        the relative error of the heat was 0.0007 to 0.0016; at 1e-3 nearly all maxima were at the
-        same vertices as those of the certified heat.
+        Error of the eigenvalues, relative to the k-th, at which refinement stops, 1e-4 to 0.1. At
+        1e-2 the relative error of the heat was 0.0007 to 0.0016; at 1e-3 nearly all maxima were at
+        the same vertices as those of the certified heat.
     progress : callable, optional
         Called as progress(fraction_done, message).
 
@@ -117,8 +117,8 @@ def approximate_heat_signature(
     Raises
     ------
     InvalidParameterError
-        If k is not in 1..n, a time is not positive and finite, the accuracy is out of range, the mass
-        is not diagonal, the memory is too small, or `solve_spectrum` refuses the operator.
+        If k is not in 1..n, a time is not positive and finite, the accuracy is out of range, the
+        mass is not diagonal, the memory is too small, or `solve_spectrum` refuses the operator.
     ConvergenceError
         If the accuracy is not reached.
 
@@ -192,7 +192,8 @@ def _errors(
 ) -> Float[np.ndarray, " q"]:
     """Add up what further corrections change, as if all of it had one sign: |Σ e^{-tλ} (φ'² - φ²)|, t e^{-tλ} (θ' - θ).
 
-    The mean of φ² over the shape is 1 / its measure, so of the constant of that height is a change of eigenvalues.
+    The mean of φ² over the shape is 1 / its measure, so of the constant of that height is a change
+    of eigenvalues.
     """
     k = len(decay)
     sample = np.unique(np.linspace(0, k - 1, min(k, SAMPLED_PAIRS)).round().astype(np.int64))
@@ -209,7 +210,8 @@ def _changes(
 ) -> tuple[Float[np.ndarray, " s"], Float[np.ndarray, " s"]]:
     """Return what some Ritz vectors become with their corrections: the norms of φ'² - φ² in M, and their values' fall.
 
-    Only what lies outside the span of all columns counts: within it Ritz vectors are what they can be.
+    Only what lies outside the span of all columns counts: within it Ritz vectors are what they can
+    be.
     """
     vectors, values, mass = (
         pick_columns(tower, columns, sample),

@@ -42,8 +42,8 @@ def default_times(spectrum: Spectrum, n_times: SupportsIndex = N_TIMES) -> Float
     """Return diffusion times in geometric sequence that suit a spectrum.
 
     The times range from 4 ln 10 / λ_k to 4 ln 10 / λ_1, with λ_1 the first eigenvalue above 0 (Sun,
-    Ovsjanikov, Guibas 2009, section 5): exp(-tλ_k) is 1e-4 at the first time, and exp(-tλ_1) is 1e-4
-    at the last. They scale with the shape.
+    Ovsjanikov, Guibas 2009, section 5): exp(-tλ_k) is 1e-4 at the first time, and exp(-tλ_1) is
+    1e-4 at the last. They scale with the shape.
 
     Parameters
     ----------
@@ -127,8 +127,8 @@ def reflection_free_signature(
 ) -> Float[np.ndarray, "n q"]:
     """Compute the heat kernel signature of a surface without the effect of its boundary.
 
-    The Neumann condition reflects heat at a boundary, and the Dirichlet condition absorbs it. Near a
-    straight boundary the two kernels are that of the whole plane plus and minus the same mirror
+    The Neumann condition reflects heat at a boundary, and the Dirichlet condition absorbs it. Near
+    a straight boundary the two kernels are that of the whole plane plus and minus the same mirror
     image (the method of images), so their mean contains no mirror image.
 
     Parameters
@@ -187,8 +187,8 @@ def scale_invariant_signature(
         In geometric sequence, in length². The default is `default_times(spectrum)`, with which the
         invariance is exact. Fixed times make parts comparable with whole shapes.
     n_frequencies : int
-        Number of lowest frequencies ω = 0, 1, ... to return, at most q/2. The first one is the total
-        decrease of log h.
+        Number of lowest frequencies ω = 0, 1, ... to return, at most q/2. The first one is the
+        total decrease of log h.
 
     Returns
     -------

@@ -37,7 +37,8 @@ def default_energies(
     Returns
     -------
     energies : (q,) float
-        Logarithms of eigenvalues in 1/length². On a shape β times as large they are lower by 2 log β.
+        Logarithms of eigenvalues in 1/length². On a shape β times as large they are lower by 2 log
+        β.
     sigma : float
         Standard deviation of the bands, without unit.
 
@@ -118,6 +119,7 @@ def wave_kernel_signature(
     levels = finite_values(energies, "energies")
     width = positive_values(sigma, "sigma")[0]
     exponents = -((np.log(values)[:, None] - levels) ** 2) / (2 * width**2)
-    # Far from all eigenvalues every exponential is 0; relative to the largest, the nearest one is 1.
+    # Far from all eigenvalues every exponential is 0; relative to the largest, the nearest one is
+    # 1.
     bands = np.exp(exponents - exponents.max(axis=0))
     return np.asarray(spectrum.eigenvectors[:, -len(values) :] ** 2 @ (bands / bands.sum(axis=0)))

@@ -30,7 +30,8 @@ def certified_pairs(
     Raises
     ------
     InvalidParameterError
-        If no eigenvalue lies in the interval, the memory is too small, or the operator cannot be solved.
+        If no eigenvalue lies in the interval, the memory is too small, or the operator cannot be
+        solved.
     ConvergenceError
         If the proof cannot be completed.
     """

@@ -19,8 +19,8 @@ from eigenshape.spectral.solver.pencil import Pencil, column_chunks, normalize, 
 
 # Eigenvalues closer than this, relative to the largest one, form a cluster.
 RESOLUTION = 1e-6
-# Extent, relative to the largest eigenvalue, beyond which a chain of close eigenvalues is no cluster
-# and proves nothing.
+# Extent, relative to the largest eigenvalue, beyond which a chain of close eigenvalues is no
+# cluster and proves nothing.
 WIDEST_CLUSTER = 1e-3
 # Largest entry of |ΦᵀBΦ - I| with which eigenvectors count as orthonormal. Solvers
 # correct what is above 1e-12; a large tolerance would let one eigenvector count twice.
@@ -38,9 +38,9 @@ def certify(
 ) -> Certificate:
     """Prove that given eigenpairs are the k lowest ones of an operator, or raise an error.
 
-    By Sylvester's law of inertia (Parlett 1998, section 3.3), D in W - σB = L D Lᵀ has as many negative
-    entries as there are eigenvalues below σ. σ is placed just above the k-th eigenvalue, farther away
-    than the rounding of the factor can change the count.
+    By Sylvester's law of inertia (Parlett 1998, section 3.3), D in W - σB = L D Lᵀ has as many
+    negative entries as there are eigenvalues below σ. σ is placed just above the k-th eigenvalue,
+    farther away than the rounding of the factor can change the count.
 
     Parameters
     ----------

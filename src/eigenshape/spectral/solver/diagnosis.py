@@ -10,9 +10,11 @@ from eigenshape.spectral.solver.inertia import count_beside
 from eigenshape.spectral.solver.pairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil
 
-# Ratio of W_ii/B_ii between two points beyond which rounding at the one hides the eigenvalues of the other.
+# Ratio of W_ii/B_ii between two points beyond which rounding at the one hides the eigenvalues of
+# the other.
 DIGITS = 1e10
-# First negative value at which eigenvalues are counted, in the pencil's level: rounding of a zero stays above.
+# First negative value at which eigenvalues are counted, in the pencil's level: rounding of a zero
+# stays above.
 BELOW_ZERO = 1e-12
 # Factor between the negative values at which eigenvalues are counted,
 STEP_DOWN = 8.0
@@ -68,7 +70,8 @@ def _require_semidefinite(pencil: Pencil, error: ConvergenceError) -> None:
 def _count_below(pencil: Pencil, shift: float) -> Factor | None:
     """Count eigenvalues below a negative value or a lower one, safely against rounding; None if none is proved.
 
-    No eigenpair is known. 0 and the constant should be one, and `count_beside` keeps rounding away from it.
+    No eigenpair is known. 0 and the constant should be one, and `count_beside` keeps rounding away
+    from it.
     """
     constant = np.full((pencil.n, 1), pencil.mass_diagonal.sum() ** -0.5)
     with suppress(ConvergenceError):

@@ -43,7 +43,8 @@ def factorize(
 ) -> Factor | None:
     """Factor W - σB - S, S = diag(slack), pivots on the diagonal; None where one is zero or not finite.
 
-    A factor of the same pencil that is spent gives its room: what it solved before, it solves no more.
+    A factor of the same pencil that is spent gives its room: what it solved before, it solves no
+    more.
     """
     slack = np.zeros(pencil.n) if slack is None else slack
     pattern = pencil.shift_pattern
@@ -56,8 +57,9 @@ def factorize(
 def rounding(factor: Factor) -> Float[np.ndarray, " n"]:
     """Bound the rounding of a factor, row by row.
 
-    By Sylvester's law of inertia D has as many negative entries as L D Lᵀ has negative eigenvalues. That matrix is
-    W - σB - S + E with |xᵀEx| ≤ Σ r_i x_i², and r is returned. So where S ≥ r, L D Lᵀ is nowhere above W - σB, and
-    `factor.count` is at least the number of eigenvalues below σ, whatever the rounding.
+    By Sylvester's law of inertia D has as many negative entries as L D Lᵀ has negative eigenvalues.
+    That matrix is W - σB - S + E with |xᵀEx| ≤ Σ r_i x_i², and r is returned. So where S ≥ r, L D
+    Lᵀ is nowhere above W - σB, and `factor.count` is at least the number of eigenvalues below σ,
+    whatever the rounding.
     """
     return factor.lower.rounding()

@@ -27,9 +27,9 @@ def count_beside(
 ) -> Factor:
     """Count at `step` from a value, or farther off where rounding would move a value found across σ.
 
-    The count is not less than the number of eigenvalues below `shift` of what is returned; with `most=False` it is not
-    more. A factor tells how much slack the next one needs for its count to stand above rounding (`rounding`). One that
-    has counted right beside had enough; it is spent.
+    The count is not less than the number of eigenvalues below `shift` of what is returned; with
+    `most=False` it is not more. A factor tells how much slack the next one needs for its count to
+    stand above rounding (`rounding`). One that has counted right beside had enough; it is spent.
 
     Raises
     ------
@@ -55,7 +55,8 @@ def count_beside(
     for _ in range(COUNT_TRIALS):
         factor = factorize(pencil, sigma, side * slack, factor)
         loss = rounding(factor) if factor else np.full(pencil.n, np.inf)
-        # What is above the slack moves σ: W - σB - S + E ≤ W - (σ - ρ)B where no row has more than ρ c D of it.
+        # What is above the slack moves σ: W - σB - S + E ≤ W - (σ - ρ)B where no row has more than
+        # ρ c D of it.
         over = float(((loss - slack) / pencil.mass_diagonal).max(initial=0.0)) / pencil.mass_floor
         moved = sigma - side * over
         if factor and not too_much(uncertainty(slack) + over, moved):

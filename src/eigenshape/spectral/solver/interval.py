@@ -48,8 +48,9 @@ def count_interval(pencil: Pencil, low: float, high: float) -> Interval:
 def solve_interval(pencil: Pencil, interval: Interval, report: Report) -> tuple[Pairs, Certificate]:
     """Find all eigenpairs of an interval far up in the spectrum, and those past its ends up to a clear gap.
 
-    Block Lanczos as in `solve_spectrum`, a slice at a time. With N(σ) the number of eigenvalues below σ, as many are to
-    be found between σ and τ as N(τ) - N(σ) says; the certificate holds both shifts.
+    Block Lanczos as in `solve_spectrum`, a slice at a time. With N(σ) the number of eigenvalues
+    below σ, as many are to be found between σ and τ as N(τ) - N(σ) says; the certificate holds both
+    shifts.
 
     Raises
     ------

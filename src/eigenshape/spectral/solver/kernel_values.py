@@ -1,7 +1,7 @@
 """Conversion between the eigenvalues of a kernel's pencil and the eigenvalues of Δ that they approximate.
 
-On flat space an operator with a Gaussian kernel is (1 - e^{-tΔ})/t: its eigenvalue is μ = (1 - e^{-tλ})/t, and
-λ = -log(1 - tμ)/t. Near 1/t all λ are close together and cannot be distinguished.
+On flat space an operator with a Gaussian kernel is (1 - e^{-tΔ})/t: its eigenvalue is μ = (1 -
+e^{-tλ})/t, and λ = -log(1 - tμ)/t. Near 1/t all λ are close together and cannot be distinguished.
 """
 
 import warnings
@@ -14,8 +14,8 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.operators.laplacian import GaussianKernel
 from eigenshape.spectral.certificate import Certificate
 
-# t μ at t λ = 2.9, beyond which corrected eigenvalues cannot be distinguished: on a surface that is the
-# k-th eigenvalue of n = 5 k t/e² points.
+# t μ at t λ = 2.9, beyond which corrected eigenvalues cannot be distinguished: on a surface that is
+# the k-th eigenvalue of n = 5 k t/e² points.
 LAST_CORRECTED = 0.945
 # t μ from which eigenvalues of the literal form do not depend on λ: n = 21 k t/e².
 ESSENTIAL = 0.5
@@ -104,8 +104,8 @@ def reported_certificate(
 ) -> Certificate:
     """Return a certificate whose shift, gap and resolution are in the values that are reported.
 
-    `last` is the largest eigenvalue of the pencil that was found. A shift at 1/t or beyond is moved down in its gap,
-    where it counts the same eigenvalues.
+    `last` is the largest eigenvalue of the pencil that was found. A shift at 1/t or beyond is moved
+    down in its gap, where it counts the same eigenvalues.
     """
     if kernel is None or not kernel.corrected:
         return certificate

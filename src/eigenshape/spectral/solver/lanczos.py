@@ -34,7 +34,8 @@ INDEPENDENT_PIVOT = 0.1
 class Operator:
     """(W - σB)⁻¹B in an inner product in which it is symmetric.
 
-    Where B is diagonal that is B^½ (W - σB)⁻¹ B^½ in the plain one, on u = B^½ φ, and nothing is weighed.
+    Where B is diagonal that is B^½ (W - σB)⁻¹ B^½ in the plain one, on u = B^½ φ, and nothing is
+    weighed.
     """
 
     pencil: Pencil
@@ -122,10 +123,10 @@ def block_lanczos(
 ) -> tuple[Float[np.ndarray, " j"], Float[np.ndarray, "n j"]]:
     """Return eigenvalues around the shift, and B-orthonormal eigenvectors, orthogonal to the B-orthonormal `locked`.
 
-    Unrestarted block Lanczos on (W - σB)⁻¹B in the inner product of B (Grimes, Lewis and Simon 1994), in blocks of
-    `groups` times eight columns, every block orthogonalized against all before it. It stops when what the space has
-    seen of `wanted` has converged; copies of an eigenvalue beyond the width of the block may be missing, which an
-    inertia count tells afterwards.
+    Unrestarted block Lanczos on (W - σB)⁻¹B in the inner product of B (Grimes, Lewis and Simon
+    1994), in blocks of `groups` times eight columns, every block orthogonalized against all before
+    it. It stops when what the space has seen of `wanted` has converged; copies of an eigenvalue
+    beyond the width of the block may be missing, which an inertia count tells afterwards.
 
     Raises
     ------
@@ -175,8 +176,8 @@ def _orthonormalize(
 ) -> tuple[Float[np.ndarray, "m b"], Float[np.ndarray, "b b"]]:
     """Split columns = known along + fresh upper, with [known, fresh] = space orthonormal; return along and upper.
 
-    The last slots of `space` are filled with what is fresh; the columns are used up. The recent blocks, which take most
-    of a Lanczos image away, are projected out first, then all of them.
+    The last slots of `space` are filled with what is fresh; the columns are used up. The recent
+    blocks, which take most of a Lanczos image away, are projected out first, then all of them.
     """
     groups, block = len(columns), len(columns) * LANES
     known, fresh = space[:-groups], space[-groups:]
@@ -212,8 +213,8 @@ def _gram_schmidt(
 ) -> tuple[Float[np.ndarray, "b b"], bool]:
     """Orthonormalize a block into `fresh`; return the triangle, and whether a column became short against what it was.
 
-    By the Cholesky factor of the Gram matrix, twice where the first leaves digits to be gained (Yamamoto and others
-    2015), and column by column where it fails. The columns are used up.
+    By the Cholesky factor of the Gram matrix, twice where the first leaves digits to be gained
+    (Yamamoto and others 2015), and column by column where it fails. The columns are used up.
     """
     upper = _by_cholesky(inner, columns, fresh)
     if upper is None:
@@ -299,7 +300,8 @@ def _ritz(krylov: Krylov, shift: float) -> Ritz:
 def _choose(ritz: Ritz, wanted: Wanted) -> tuple[Int[np.ndarray, " j"], int]:
     """Return the converged pairs of the window, and how many are still to converge.
 
-    On either side only those count that no unconverged one is nearer than: nothing seen lies between.
+    On either side only those count that no unconverged one is nearer than: nothing seen lies
+    between.
     """
     above, below = np.flatnonzero(ritz.thetas > 0)[::-1], np.flatnonzero(ritz.thetas < 0)
     n_above, n_below = (
@@ -308,7 +310,8 @@ def _choose(ritz: Ritz, wanted: Wanted) -> tuple[Int[np.ndarray, " j"], int]:
     past_ceiling = n_above > 0 and ritz.values[above[n_above - 1]] > wanted.ceiling
     past_floor = n_below > 0 and ritz.values[below[n_below - 1]] < wanted.floor
     late_above = 0 if past_ceiling else max(wanted.above - n_above, 0)
-    # Copies that the space cannot see are left to a later run; one converged value above proves it has looked.
+    # Copies that the space cannot see are left to a later run; one converged value above proves it
+    # has looked.
     goal = min(len(below), wanted.below) if n_above else wanted.below
     late_below = 0 if past_floor else max(goal - n_below, 0)
     above, below = above[: min(n_above, wanted.above)], below[: min(n_below, wanted.below)]
@@ -319,7 +322,8 @@ def _choose(ritz: Ritz, wanted: Wanted) -> tuple[Int[np.ndarray, " j"], int]:
 
 
 def _vectors(krylov: Krylov, ritz: Ritz, chosen: Int[np.ndarray, " j"]) -> Float[np.ndarray, "n j"]:
-    # One step of the operator takes the residual out of a Ritz vector y: A y / θ = y + fresh C s / θ, known already.
+    # One step of the operator takes the residual out of a Ritz vector y: A y / θ = y + fresh C s /
+    # θ, known already.
     weights = ritz.coefficients[:, chosen]
     step = krylov.coupling @ weights[-len(krylov.coupling) :] / ritz.thetas[chosen]
     return combine_columns(krylov.space, np.concatenate([weights, step]))

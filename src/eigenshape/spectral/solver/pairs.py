@@ -11,8 +11,8 @@ from eigenshape.spectral.solver.pencil import Pencil, rayleigh_residuals
 
 # Largest entry of |ΦᵀBΦ - I| that needs no correction.
 LOOSE = 1e-12
-# Largest entry that one Newton step corrects to rounding, since its error is the square; beyond it the
-# vectors of different runs are wrong.
+# Largest entry that one Newton step corrects to rounding, since its error is the square; beyond it
+# the vectors of different runs are wrong.
 SKEW = 1e-5
 # Residual, relative to the largest eigenvalue, above which a pair takes one more solve.
 POLISHED = 2e-9
@@ -35,7 +35,8 @@ def error_bound(pairs: Pairs) -> float:
 def polish(pencil: Pencil, factor: Factor, pairs: Pairs) -> Pairs:
     """Refine the pairs whose residuals are large because of the rounding of the factor.
 
-    One step of (W - σB)⁻¹ on a residual gives the error of the vector outside the space of all vectors.
+    One step of (W - σB)⁻¹ on a residual gives the error of the vector outside the space of all
+    vectors.
     """
     late = np.flatnonzero(pairs.residuals > POLISHED * np.abs(pairs.values).max(initial=0.0))
     if not late.size:

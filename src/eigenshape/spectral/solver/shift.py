@@ -7,8 +7,9 @@ from eigenshape._errors import ConvergenceError
 from eigenshape.spectral.solver.factor import Factor, factorize
 from eigenshape.spectral.solver.pencil import Pencil
 
-# Of the k wanted eigenvalues this share lies below the shift. On a surface counts grow like eigenvalues (Weyl), and
-# below the shift the spectrum ends at 0, so that side converges sooner. Measured best, and flat around it.
+# Of the k wanted eigenvalues this share lies below the shift. On a surface counts grow like
+# eigenvalues (Weyl), and below the shift the spectrum ends at 0, so that side converges sooner.
+# Measured best, and flat around it.
 SHARE_BELOW = 0.62
 # Shares of the k eigenvalues below the shift that are accepted. A narrower range would cost more
 # trial factors.
@@ -28,9 +29,10 @@ CLEAR = 1e-5  # relative distance of the shift to an eigenvalue, below which rou
 def shift_inside(pencil: Pencil, k: int) -> Factor:
     """Factor at a shift with about 0.62 k eigenvalues below it.
 
-    Each factor counts the eigenvalues below its shift, so trial shifts follow a secant through the logarithms of the
-    counts, whatever the dimension of the shape. Where a cluster leaves no such shift (k smaller than the number of
-    components, say), the highest shift with fewer than k eigenvalues below it serves, or one below zero.
+    Each factor counts the eigenvalues below its shift, so trial shifts follow a secant through the
+    logarithms of the counts, whatever the dimension of the shape. Where a cluster leaves no such
+    shift (k smaller than the number of components, say), the highest shift with fewer than k
+    eigenvalues below it serves, or one below zero.
     """
     guess = float(expected_values(pencil, np.array([SHARE_BELOW * k]))[0])
     low: Factor | None = None
@@ -93,7 +95,8 @@ def _serves(pencil: Pencil, factor: Factor) -> bool:
         + abs(factor.shift) * pencil.weigh(np.abs(once))
         + np.abs(start)
     )
-    # Two steps of inverse iteration: an eigenvalue very close to σ would outshine all others in any vector.
+    # Two steps of inverse iteration: an eigenvalue very close to σ would outshine all others in any
+    # vector.
     twice = factor.solve(pencil.weigh(once))
     clear = CLEAR * abs(factor.shift) * np.linalg.norm(twice) < np.linalg.norm(once)
     return bool(clear and (np.abs(rest) <= BACKWARD_ERROR * terms).all())

@@ -13,7 +13,8 @@ from eigenshape.spectral.solver.shift import factorize_near, shift_inside
 
 Report = Callable[[float], None]
 
-# Eigenvalues in a slice: with more the orthogonalization is slow, with fewer there are more factors.
+# Eigenvalues in a slice: with more the orthogonalization is slow, with fewer there are more
+# factors.
 SLICE = 250
 # Eigenvalues found past the end of a slice, in whose widest gap it ends.
 OVERLAP = 12
@@ -41,9 +42,10 @@ def walk_on(
 ) -> tuple[Float[np.ndarray, "n j"], Factor]:
     """Return the eigenvectors from number `known` to k as far as they were seen, and the factor at the last shift.
 
-    The first factor stands in the first slice. A slice ends in a clear gap. The next shift is placed by the spacing of
-    the last eigenvalues found, and the count of its factor tells how many lie between. What a slice does not see,
-    copies of a multiple eigenvalue beyond the width of its block, is left out.
+    The first factor stands in the first slice. A slice ends in a clear gap. The next shift is
+    placed by the spacing of the last eigenvalues found, and the count of its factor tells how many
+    lie between. What a slice does not see, copies of a multiple eigenvalue beyond the width of its
+    block, is left out.
 
     Raises
     ------

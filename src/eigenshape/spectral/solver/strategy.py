@@ -42,7 +42,8 @@ DENSE_LIMIT = 6000
 ONE_SHIFT_PAIRS = 400
 # Vectors of a Lanczos space at least, for the estimate of memory.
 FEWEST_VECTORS = 150
-# Groups of eight columns in a block at most; wider blocks find more copies of an eigenvalue at once.
+# Groups of eight columns in a block at most; wider blocks find more copies of an eigenvalue at
+# once.
 MOST_GROUPS = 8
 # Runs of block Lanczos before giving up. Each run finds at least one missing pair or is the last.
 MOST_RUNS = 40
@@ -102,9 +103,10 @@ def _solve_dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certi
 def _solve_parts(parts: Parts, k: int, report: Progress) -> tuple[Pairs, Certificate]:
     """Solve each connected part separately, and certify the merged pairs as a whole.
 
-    A Krylov space of all parts finds few copies of an eigenvalue at a time, and 0 has as many copies as there are
-    parts. From a large part as many pairs are requested as Weyl's law expects, and more until its last eigenvalue is
-    not below the k-th of all parts: then none of its other eigenvalues is among the k lowest.
+    A Krylov space of all parts finds few copies of an eigenvalue at a time, and 0 has as many
+    copies as there are parts. From a large part as many pairs are requested as Weyl's law expects,
+    and more until its last eigenvalue is not below the k-th of all parts: then none of its other
+    eigenvalues is among the k lowest.
     """
     require_memory_for_pairs(parts.pencil, k)
     report(0.02, f"solving {len(parts.sizes)} parts")
