@@ -12,8 +12,8 @@ from eigenshape._compile import njit
 def cell_areas(places):
     """Return the area of the origin's Voronoi cell within the convex hull, for each point set.
 
-    Each set has k points, (k, 2), sorted by x, then y; the origin is one of them. The hull (Andrew's
-    monotone chain) is cut by one bisector after the other.
+    Each set has k points, (k, 2), sorted by x, then y; the origin is one of them. The hull
+    (Andrew's monotone chain) is cut by one bisector after the other.
     """
     n, k, _ = places.shape
     areas = np.zeros(n)

@@ -147,11 +147,11 @@ def _axes(points):
 def _cross(points, axes, i, j):
     """Return whether the interior of one of two faces meets the other; at least one has area.
 
-    The planes meet in a line, and each face cuts this line in an interval. An end of the interval is
-    the point where a side of the face meets the line. This side starts at `alone`, the corner that
-    is alone on its side of the other plane. The sign of the volume spanned by two such sides, one of
-    each face, gives the order of their ends on the line, up to one common sign (Guigue and Devillers
-    2003, section 3).
+    The planes meet in a line, and each face cuts this line in an interval. An end of the interval
+    is the point where a side of the face meets the line. This side starts at `alone`, the corner
+    that is alone on its side of the other plane. The sign of the volume spanned by two such sides,
+    one of each face, gives the order of their ends on the line, up to one common sign (Guigue and
+    Devillers 2003, section 3).
     """
     a, b = 3 * i, 3 * j
     if axes[i] < 0:

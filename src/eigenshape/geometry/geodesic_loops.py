@@ -17,9 +17,9 @@ FRONT = -1  # stands for the source of a vertex that a straight front of several
 def through_edge(near, far, length, left, right):
     """Return the distance of a triangle's third corner from a source beyond the opposite edge.
 
-    `near` and `far` are the distances of the edge's ends from the source, which is unfolded into the
-    plane of the triangle. `left` and `right` are the distances of the third corner from the same
-    ends. The distance is infinite if the straight line misses the edge.
+    `near` and `far` are the distances of the edge's ends from the source, which is unfolded into
+    the plane of the triangle. `left` and `right` are the distances of the third corner from the
+    same ends. The distance is infinite if the straight line misses the edge.
     """
     if length == 0.0:  # both ends are one point, and the wave walks around it along the other edges
         return np.inf

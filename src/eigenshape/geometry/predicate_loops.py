@@ -2,9 +2,9 @@
 
 A sum of rounded products is accepted if it exceeds the bound of its rounding error (Shewchuk 1997,
 "Adaptive precision floating-point arithmetic and fast robust geometric predicates", figures 21 and
-22). Otherwise it is computed exactly, as an expansion: floats that do not overlap, ascending in size
-(section 2 there). Coordinates must be at most 2 in size and whole multiples of 2^-300, so that no
-product of three underflows.
+22). Otherwise it is computed exactly, as an expansion: floats that do not overlap, ascending in
+size (section 2 there). Coordinates must be at most 2 in size and whole multiples of 2^-300, so that
+no product of three underflows.
 """
 
 from typing import no_type_check

@@ -1,7 +1,8 @@
 """Lagrange elements of any order on simplices of any dimension.
 
-A node of order p is the mean of p corners, each any number of times: (a, a, a) is the corner a itself, (a, a, b)
-a third of the way from a to b. So a node is named by its corners in ascending order, also across elements.
+A node of order p is the mean of p corners, which may repeat: (a, a, a) is the corner a itself, and
+(a, a, b) is a third of the way from a to b. The ascending corners identify a node, also if several
+elements share it.
 """
 
 from functools import lru_cache
@@ -27,10 +28,10 @@ from eigenshape.geometry.simplicial import Mesh
 def gradient_products(
     mesh: Mesh, tensors: Float[np.ndarray, "s d d"] | None = None
 ) -> Float[np.ndarray, "s corners corners"]:
-    """Return V ∇λ_a·D∇λ_b of the barycentric coordinates of each simplex, in length^(m-2).
+    """Return V ∇λ_a·D∇λ_b for the barycentric coordinates of each simplex, in length^(m-2).
 
-    D is the identity, or a tensor a simplex. The gradients come from the triangular factor of the sides, not from their
-    Gram matrix, whose condition is the square.
+    D is the identity, or one tensor per simplex. The gradients are computed from the triangular
+    factor of the side vectors. Their Gram matrix would have the squared condition number.
     """
     corners, scale = scaled_corners(mesh)
     basis, triangles = triangular_sides(corners)
@@ -46,9 +47,9 @@ def gradient_products(
 def stiffness(
     nodes: Int[np.ndarray, "s nodes"], products: Float[np.ndarray, "s corners corners"], order: int
 ) -> sp.csr_array:
-    """Assemble ∫ ∇N_i·D∇N_j; the diagonal is what makes the rows sum to zero."""
+    """Assemble ∫ ∇N_i·D∇N_j; the diagonal is set so that all row sums are zero."""
     dim = products.shape[1] - 1
-    with one_blas_thread():  # threads would cut the product where they like, and change last digits
+    with one_blas_thread():  # how threads split the product would change the last digits
         local = np.einsum("sab,abij->sij", products, reference_stiffness(dim, order), optimize=True)
     weights = _assemble(nodes, local)
     return (weights - sp.diags_array(weights.sum(axis=1))).tocsr()
@@ -64,7 +65,7 @@ def weighted_mass(
     nodes: Int[np.ndarray, "s nodes"],
     reference: Float[np.ndarray, "nodes nodes"],
 ) -> sp.csr_array:
-    """Assemble a measure of each simplex times one matrix for all."""
+    """Assemble one local matrix, multiplied by the measure of each simplex."""
     diagonal = np.bincount(nodes.ravel(), weights=np.outer(measure, np.diag(reference)).ravel())
     return (sp.diags_array(diagonal) + _assemble(nodes, measure[:, None, None] * reference)).tocsr()
 
@@ -72,7 +73,7 @@ def weighted_mass(
 def _assemble(
     nodes: Int[np.ndarray, "s nodes"], local: Float[np.ndarray, "s nodes nodes"]
 ) -> sp.csr_array:
-    """Sum up what lies off the diagonal, each pair once and then mirrored."""
+    """Sum up the entries off the diagonal: each pair is summed once, then mirrored."""
     i, j = np.triu_indices(nodes.shape[1], 1)
     ends = (nodes[:, i].ravel(), nodes[:, j].ravel())
     n = int(nodes.max()) + 1
@@ -82,16 +83,17 @@ def _assemble(
 
 @lru_cache
 def local_nodes(dim: int, order: int) -> Int[np.ndarray, "nodes order"]:
-    """Name the nodes of one simplex by its corners."""
+    """Return the nodes of one simplex, each as its corners."""
     return freeze(np.array(list(combinations_with_replacement(range(dim + 1), order))))
 
 
 def number_nodes(
     simplices: Int[np.ndarray, "s corners"], order: int
 ) -> tuple[np.ndarray, Int[np.ndarray, "s nodes"]]:
-    """Return the nodes of a mesh by their corners, (n_nodes, order), and those of each simplex by number.
+    """Return the nodes of a mesh, each as its corners, (n_nodes, order), and those of each simplex.
 
-    The points of the mesh come first, in their own order; then the nodes between two of them, between three, and so on.
+    The points of the mesh come first, in their own order. Nodes between two points follow, then
+    those between three, and so on.
     """
     named = np.sort(simplices[:, local_nodes(simplices.shape[1] - 1, order)], axis=2)
     n_corners = 1 + np.count_nonzero(np.diff(named, axis=2), axis=2)
@@ -102,7 +104,7 @@ def number_nodes(
 def _keys(
     n_corners: Int[np.ndarray, "s nodes"], named: Int[np.ndarray, "s nodes order"]
 ) -> np.ndarray:
-    """Return a key for each node, in whose order nodes are numbered: one whole number where it fits."""
+    """Return a sort key for each node: one integer if it fits into 64 bits, otherwise several."""
     base, order = int(named.max()) + 1, named.shape[2]
     if (order + 1) * base**order < 2**63:
         return (n_corners * base**order + named @ base ** np.arange(order)[::-1]).ravel()
@@ -119,7 +121,7 @@ def reference_mass(dim: int, order: int) -> Float[np.ndarray, "nodes nodes"]:
 
 @lru_cache
 def reference_stiffness(dim: int, order: int) -> Float[np.ndarray, "corners corners nodes nodes"]:
-    """Return ∫ ∂_a N_i ∂_b N_j over a simplex of volume 1, the derivatives with respect to barycentric coordinates."""
+    """Return ∫ ∂_a N_i ∂_b N_j over a simplex of volume 1; ∂_a is with respect to λ_a."""
     exponents, coefficients = _basis(dim, order)
     units = np.eye(dim + 1, dtype=np.int64)
     pairs = np.zeros((dim + 1, dim + 1, len(exponents), len(exponents)))
@@ -135,7 +137,7 @@ def reference_stiffness(dim: int, order: int) -> Float[np.ndarray, "corners corn
 def _basis(
     dim: int, order: int
 ) -> tuple[Int[np.ndarray, "nodes corners"], Float[np.ndarray, "nodes nodes"]]:
-    """Return monomials λ^α with |α| = order, and each basis function's coefficients as a column."""
+    """Return the monomials λ^α with |α| = order, and the basis functions in them as columns."""
     names = local_nodes(dim, order)
     exponents = (names[:, :, None] == np.arange(dim + 1)).sum(axis=1)
     places = exponents / order

@@ -2,7 +2,8 @@
 """Compiled loops over the sides of an intrinsic triangulation.
 
 The sides of triangle f are 3f, 3f + 1, 3f + 2, in order around it. Side h starts at the vertex
-`tails[h]`, has length `lengths[h]`, and is glued to side `twins[h]` of another triangle or the same.
+`tails[h]`, has length `lengths[h]`, and is glued to side `twins[h]` of another triangle or the
+same.
 """
 
 from typing import no_type_check

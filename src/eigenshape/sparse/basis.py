@@ -1,4 +1,4 @@
-"""Tall columns in slots of eight, (s, n, 8): what a core reads of them at once lies together."""
+"""Tall columns in slots of eight, (s, n, 8): eight numbers of a row are adjacent in memory."""
 
 import numpy as np
 from jaxtyping import Float
@@ -6,14 +6,14 @@ from jaxtyping import Float
 from eigenshape.sparse.basis_loops import add_products, gather_rows, subtract_combination
 from eigenshape.sparse.lane_loops import LANES
 
-ROWS = 512  # of a combination at once
+ROWS = 512  # rows of a combination that are computed at once
 
 Slots = Float[np.ndarray, "s n 8"]
 Block = Float[np.ndarray, "g n 8"]
 
 
 def pack_columns(columns: Float[np.ndarray, "n k"]) -> Slots:
-    """Return columns in slots, the last one filled up with zeros."""
+    """Return columns in slots, the last slot padded with zeros."""
     n, k = columns.shape
     slots = np.zeros((-(-k // LANES), n, LANES))
     for slot, start in zip(slots, range(0, k, LANES), strict=True):
@@ -23,14 +23,14 @@ def pack_columns(columns: Float[np.ndarray, "n k"]) -> Slots:
 
 
 def products(space: Slots, columns: Block) -> Float[np.ndarray, "m b"]:
-    """Return spaceᵀ columns."""
+    """Return the product spaceᵀ columns."""
     parts = np.zeros((len(columns), len(space) * LANES, LANES))
     add_products(space, columns, parts)
     return np.concatenate(list(parts), axis=1)
 
 
 def subtract(space: Slots, weights: Float[np.ndarray, "m b"], columns: Block) -> None:
-    """Take space weights from the columns, in place."""
+    """Subtract the product of `space` and `weights` from the columns, in place."""
     parts = np.ascontiguousarray(
         weights.reshape(len(weights), len(columns), LANES).transpose(1, 0, 2)
     )
@@ -38,7 +38,7 @@ def subtract(space: Slots, weights: Float[np.ndarray, "m b"], columns: Block) ->
 
 
 def combine_columns(space: Slots, weights: Float[np.ndarray, "m k"]) -> Float[np.ndarray, "n k"]:
-    """Return space weights, as columns of one matrix."""
+    """Return the product of `space` and `weights` as an ordinary matrix."""
     n = space.shape[1]
     result, flat = np.empty((n, weights.shape[1])), np.empty((ROWS, len(weights)))
     for start in range(0, n, ROWS):

@@ -1,17 +1,20 @@
-"""Compiled loops of `basis`: columns in slots of eight, against one another."""
+"""Compiled loops of `basis`: products of tall blocks whose columns are packed by eight."""
 
 from typing import no_type_check
 
 from eigenshape._compile import njit
 from eigenshape.sparse.lane_loops import LANES, add_eight_sums, subtract_four_sums, subtract_sum
 
-CHUNK = 1024  # rows that stay in the second cache
+CHUNK = 1024  # rows that fit into the second-level cache
 
 
 @njit
 @no_type_check
 def add_products(space, columns, parts):
-    """Add spaceᵀ columns: slots (s, n, LANES) and (g, n, LANES) to parts (g, s LANES, LANES)."""
+    """Add the product spaceᵀ columns to `parts`.
+
+    The shapes are (s, n, LANES), (g, n, LANES) and (g, s LANES, LANES).
+    """
     slots, n, _ = space.shape
     groups = len(columns)
     for start in range(0, n, CHUNK):
@@ -34,7 +37,7 @@ def add_products(space, columns, parts):
 @njit
 @no_type_check
 def subtract_combination(space, parts, columns):
-    """Take space parts from the columns, shapes as in `add_products`."""
+    """Subtract the product of `space` and `parts` from the columns; shapes as in `add_products`."""
     slots, n, _ = space.shape
     groups = len(columns)
     for start in range(0, n, CHUNK):
@@ -65,7 +68,7 @@ def subtract_combination(space, parts, columns):
 @njit
 @no_type_check
 def gather_rows(space, start, stop, flat):
-    """Write rows of all slots as rows of one matrix (rows, slots LANES)."""
+    """Write some rows of all slots as rows of one matrix, (rows, slots LANES)."""
     for slot in range(len(space)):
         for row in range(start, stop):
             for lane in range(LANES):

@@ -1,6 +1,7 @@
-"""Two routines of SciPy's BLAS, callable from compiled loops on parts of arrays, in place.
+"""Two routines of SciPy's BLAS for compiled loops, which work on parts of arrays in place.
 
-np.dot in a compiled loop copies what is not contiguous, and its product has to be subtracted in another pass.
+In a compiled loop np.dot copies arrays that are not contiguous, and subtracting its product takes
+another pass.
 """
 
 from typing import Any
@@ -15,7 +16,10 @@ MODULE = "scipy.linalg.cython_blas"
 
 
 def addresses() -> tuple[int, int]:
-    """Return where dgemm and dtrsm are in this process; compiled code that is kept on disk takes them as numbers."""
+    """Return the addresses of dgemm and dtrsm in this process.
+
+    They are arguments of compiled loops, because compiled code on disk cannot hold addresses.
+    """
     return get_cython_function_address(MODULE, "dgemm"), get_cython_function_address(
         MODULE, "dtrsm"
     )
@@ -33,7 +37,10 @@ def subtract_product(
     taken: Any,
     taken_at: Any,
 ) -> Any:
-    """Take A Bᵀ from C: parts of matrices in C order that begin at flat places, size = (rows, columns, terms)."""
+    """Subtract A Bᵀ from C, where all three are parts of matrices in C order.
+
+    A part is given by the flat index of its first entry; size = (rows, columns, terms).
+    """
     whole, place = types.int64, types.int64
     signature = types.void(whole, size, left, place, right, place, taken, place)
 
@@ -57,7 +64,10 @@ def subtract_product(
 def solve_triangle(
     context: Any, address: Any, size: Any, triangle: Any, triangle_at: Any, right: Any, at: Any
 ) -> Any:
-    """Replace X by X L⁻ᵀ, L unit lower triangular, parts of matrices in C order; size = (rows of X, columns)."""
+    """Replace X by X L⁻ᵀ, where L is unit lower triangular and both are parts of matrices.
+
+    Matrices are in C order; size = (rows of X, columns).
+    """
     whole, place = types.int64, types.int64
     signature = types.void(whole, size, triangle, place, right, place)
 
@@ -86,7 +96,7 @@ def _letter(builder: Any, letter: str) -> Any:
 
 
 def _part(context: Any, builder: Any, signature: Any, arguments: Any, i: int) -> tuple[Any, Any]:
-    """Return the first number of a part, and the numbers from one row to the next."""
+    """Return the address of a part, and the number of entries from one row to the next."""
     array = context.make_array(signature.args[i])(context, builder, arguments[i])
     return builder.gep(array.data, [arguments[i + 1]]), _store_whole(
         builder, builder.extract_value(array.shape, 1)

@@ -1,4 +1,7 @@
-"""Compiled loops of `front_loops`: the first columns of one dense front, eliminated; on and below the diagonal."""
+"""Compiled loops of `front_loops`: eliminate the first columns of one dense front.
+
+Only entries on and below the diagonal are used.
+"""
 
 from typing import no_type_check
 
@@ -8,14 +11,14 @@ from eigenshape._compile import njit
 from eigenshape.sparse.blas_loops import solve_triangle, subtract_product
 
 NARROW = 16  # columns that are eliminated one by one
-TALL = 96  # rows of an update at once
-LONG = 256  # terms of a sum in one product: shorter sums round less
+TALL = 96  # rows that are updated at once
+LONG = 256  # terms of a sum in one product: shorter sums have less rounding error
 
 
 @njit
 @no_type_check
 def eliminate_plain(front, width, pivots):
-    """Eliminate the first columns one by one; say whether all pivots served."""
+    """Eliminate the first columns one by one; return whether all pivots are finite and not zero."""
     height = len(front)
     for j in range(width):
         pivot = front[j, j]
@@ -36,16 +39,18 @@ def eliminate_plain(front, width, pivots):
 @njit
 @no_type_check
 def eliminate_blocked(front, width, pivots, times, blas):
-    """Eliminate by halves: products of matrices take the left half of some columns out of the right half.
+    """Eliminate the first columns by recursive halving, so that most work is in matrix products.
 
-    After every NARROW columns those of the largest power of two that has just been filled update as many that follow,
-    which is the order of the recursion; in the end all columns update the rest of the front. L D goes into `times`.
+    The left half of a block of columns is eliminated, then updates the right half by a product.
+    This loop does so in the order of the recursion: after every NARROW columns, the largest block
+    of 2^k NARROW columns that is complete updates as many columns after it. At the end all columns
+    update the rest of the front. L D is written to `times`.
     """
     height, wide = len(front), times.shape[1]
     gemm, trsm = blas
     for start in range(0, width, NARROW):
         end = min(start + NARROW, width)
-        # The triangle on the diagonal, column by column.
+        # The triangular block on the diagonal, column by column.
         for j in range(start, end):
             pivot = front[j, j]
             if pivot == 0 or not np.isfinite(pivot):
@@ -66,7 +71,7 @@ def eliminate_blocked(front, width, pivots, times, blas):
         for i in range(end, height):
             for j in range(start, end):
                 front[i, j] = times[i, j] / pivots[j]
-        # The columns to the right that these update, on and below the diagonal.
+        # Update the columns to the right, on and below the diagonal.
         first, stop = 0, height
         if end < width:
             done = (end + NARROW - 1) // NARROW

@@ -15,18 +15,20 @@ from eigenshape.sparse.dissection_loops import (
 )
 
 Indices = Int[np.ndarray, " ..."]
-# Steps to an edge in which distances are told: smoothing needs some between whole edges.
+# Units of distance per edge: smoothing needs values between whole edges.
 FINE = 64
 
 
 def dissect(indptr: Indices, indices: Indices) -> Indices:
-    """Return the points of a graph, separators after what they separate (George 1973).
+    """Return an order of the points of a graph in which separators come last (George 1973).
 
-    Two points far from each other are found, and every point is told by how much nearer it is to one than to the
-    other, in edges; of all cuts at a value of that difference the shortest for its smaller side is taken. What is small
-    is ordered by minimum degree.
+    Each segment of the graph is cut in two. The key of a point is the difference of its distances,
+    in edges, from two points that are far apart. Of all cuts at a value of the key, the one with
+    the fewest points relative to its smaller side is taken. Small segments are ordered by minimum
+    degree.
 
-    This runs once for each segment of some hundred points, so it need not be compiled; what it calls is.
+    This loop runs once per segment of some hundred points, so only the functions that it calls are
+    compiled.
 
     Parameters
     ----------
@@ -69,7 +71,8 @@ def dissect(indptr: Indices, indices: Indices) -> Indices:
         counts = np.zeros((3, high - low + 2), dtype=np.int64)
         n_joined = count_cuts(indptr, indices, segment, owner, name, key, low, *counts)
         cut_at, above = _cheapest_cut(counts.cumsum(axis=1))
-        # Half of all pairs are joined: no order saves much then, and one point a cut takes long.
+        # If half of all pairs are joined, no order saves much, and cuts of one point each take
+        # long.
         full = 2 * n_joined >= size * size
         side = np.empty(size, dtype=np.int8)
         level = low + cut_at
@@ -78,7 +81,7 @@ def dissect(indptr: Indices, indices: Indices) -> Indices:
         parted = n_first > 0 and n_first + n_cut < size
         if n_cut in (0, size) or (
             full and not parted
-        ):  # a clique or nearly, or nothing left to cut
+        ):  # nearly a clique, or nothing is left to cut
             owner[segment] = -1
             continue
         nodes[start:stop] = segment[np.argsort(side, kind="stable")]
@@ -92,10 +95,11 @@ def dissect(indptr: Indices, indices: Indices) -> Indices:
 
 
 def _cheapest_cut(counts: Int[np.ndarray, "3 v"]) -> tuple[int, bool]:
-    """Return where to cut, and whether the cut is taken from above (key < value | key ≥ value).
+    """Return the value of the cheapest cut, and whether the cut is taken from above.
 
-    For each value, `counts` has the points below it, and those on the cut from above and from below. The cut with the
-    fewest points for its smaller side is the cheapest.
+    A cut separates key < value from key ≥ value. For each value, `counts` has the number of points
+    below it, on the cut from above, and on the cut from below. The cheapest cut has the fewest
+    points relative to its smaller side.
     """
     smaller = np.minimum(counts[0], counts[0, -1] - counts[0])
     costs = np.full((len(smaller), 2), np.inf)

@@ -1,7 +1,7 @@
-"""Compiled loops of `dissection`: what is done with one segment of a graph.
+"""Compiled loops of `dissection`: operations on one segment of a graph.
 
-The points of a segment are those whose `owner` is its name. The caller allocates all arrays, also those that a loop
-needs only while it runs: compiling an allocation takes longer than compiling a small loop.
+The points of a segment are those whose `owner` is its name. The caller allocates all arrays, also
+scratch: compiling an allocation takes longer than compiling a small loop.
 """
 
 from typing import no_type_check
@@ -10,17 +10,18 @@ import numpy as np
 
 from eigenshape._compile import njit
 
-LEAF = 160  # points that minimum degree orders
-WORD = 64  # bits of a number in which neighbors are marked
-SMOOTHINGS = 4  # passes over the differences of distances; a ragged cut is a long one
+LEAF = 160  # most points of a segment that is ordered by minimum degree
+WORD = 64  # bits of an integer in a set of neighbors
+SMOOTHINGS = 4  # smoothing passes over the keys: smooth keys have short cuts
 
 
 @njit
 @no_type_check
 def find_pieces(indptr, indices, segment, owner, name, distance, queue, ends):
-    """Fill `queue` with the connected pieces of a segment one after the other, `ends` with their ends; return how many.
+    """Find the connected pieces of a segment; return their number.
 
-    Their names are name + 1 on. `distance` is scratch.
+    Fills `queue` with the points of one piece after the other, and `ends` with the ends of the
+    pieces in it. Their names are name + 1, name + 2, ... `distance` is scratch.
     """
     n_pieces = 0
     total = 0
@@ -38,7 +39,10 @@ def find_pieces(indptr, indices, segment, owner, name, distance, queue, ends):
 @njit
 @no_type_check
 def breadth_first(indptr, indices, root, owner, name, distance, queue):
-    """Fill `distance` from the root within a segment, `queue` with its points by distance; return how many."""
+    """Fill the distances from a root within a segment; return the number of points reached.
+
+    `queue` is filled with these points by distance.
+    """
     owner[root] = -name  # visited
     distance[root] = 0
     queue[0] = root
@@ -61,7 +65,7 @@ def breadth_first(indptr, indices, root, owner, name, distance, queue):
 @njit
 @no_type_check
 def smooth_keys(indptr, indices, segment, owner, name, key, smoothed):
-    """Smooth the keys within a segment: a ragged cut is a long one. `smoothed` is scratch."""
+    """Smooth the keys within a segment, which shortens cuts. `smoothed` is scratch."""
     for _ in range(SMOOTHINGS):
         for i in range(len(segment)):
             node = segment[i]
@@ -78,11 +82,13 @@ def smooth_keys(indptr, indices, segment, owner, name, key, smoothed):
 @njit
 @no_type_check
 def count_cuts(indptr, indices, segment, owner, name, key, low, below, from_above, from_below):
-    """Return how many ends of edges lie within a segment, and count what cuts at each key would hold.
+    """Count the points below and on the cut at each value of the keys.
 
-    `low` is the least key. The other arrays, filled with 0, have a place for each value from there to one above the
-    largest: how many keys are less by 1, and how many points the cut has more than that before it if it is taken from
-    above or from below.
+    `low` is the smallest key. The last three arrays come filled with 0 and have one entry for each
+    value from `low` to the largest key plus 1. Their cumulative sums are the number of points below
+    the value, and the number of points on the cut if it is taken from above or from below.
+
+    Returns the number of entries of the adjacency matrix within the segment.
     """
     joined = 0
     for i in range(len(segment)):
@@ -95,7 +101,7 @@ def count_cuts(indptr, indices, segment, owner, name, key, low, below, from_abov
                 least = min(least, key[other])
                 most = max(most, key[other])
         below[key[node] - low + 1] += 1
-        # On the cut from above at values in (least, key], from below at values in (key, most].
+        # The point is on the cut from above at values in (least, key], from below in (key, most].
         from_above[least - low + 1] += 1
         from_above[key[node] - low + 1] -= 1
         from_below[key[node] - low + 1] += 1
@@ -106,7 +112,7 @@ def count_cuts(indptr, indices, segment, owner, name, key, low, below, from_abov
 @njit
 @no_type_check
 def take_sides(indptr, indices, segment, owner, name, key, level, above, side):
-    """Fill `side` with 0 below the level, 1 above, 2 on the cut, point by point of the segment."""
+    """Fill the side of each point of a segment: 0 below the level, 1 above, 2 on the cut."""
     for i in range(len(segment)):
         node = segment[i]
         side[i] = key[node] >= level
@@ -120,10 +126,12 @@ def take_sides(indptr, indices, segment, owner, name, key, level, above, side):
 @njit
 @no_type_check
 def order_leaf(indptr, indices, nodes, start, stop, owner, place, local, order, degree, bits):
-    """Order a leaf by minimum degree, its neighbors outside counted, its elimination graph in bits.
+    """Order a leaf by minimum degree, with its outer neighbors counted in the degrees.
 
-    The segment is nodes[start:stop]. The rest is scratch: `local` has a number for each point of the graph, -1 on entry
-    and again on return; `order` and `degree` have LEAF; `bits` has a bit for each of LEAF and each point of the graph.
+    The segment is nodes[start:stop]. The elimination graph is a matrix of bits. The other arrays
+    are scratch: `local` has an entry for each point of the graph, -1 on entry and on return;
+    `order` and `degree` have LEAF entries; `bits` has a bit for each of LEAF rows and each point of
+    the graph.
     """
     count = stop - start
     for i in range(count):

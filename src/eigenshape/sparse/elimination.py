@@ -1,4 +1,4 @@
-"""Symmetric matrices of one pattern: an order of elimination, and factors L D Lᵀ with pivots on the diagonal."""
+"""Factors L D Lᵀ of symmetric matrices that share a pattern, with pivots on the diagonal."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ Scratch = tuple[Float[np.ndarray, "n 8"], Float[np.ndarray, "t 8"], Float[np.nda
 
 @dataclass(frozen=True, eq=False)
 class Elimination:
-    """An order of elimination of a symmetric pattern, and the fronts of its factors (Liu 1992).
+    """The symbolic analysis of a symmetric pattern: an order of elimination, and fronts (Liu 1992).
 
     Attributes
     ----------
@@ -35,14 +35,14 @@ class Elimination:
     above : (s,) int
         The parent of each front; -1 at a root.
     places : (s+1,) int
-        Where the entries of each front begin among those of L.
+        Where the entries of each front begin in the array of all entries of L.
     room : (int, int)
-        Numbers that wait on the stack at most, and the rows of the largest front.
+        Largest size of the stack of updates, in numbers, and the rows of the largest front.
     lengths : (s,) int
-        The most roundings that a product may see in each front and below.
+        Bound for the number of roundings of a product up to each front.
     lower_ptr, lower_rows, source : int
-        The lower triangle by columns, in the order of elimination, and the place of each entry in the data of the
-        matrix that was analyzed.
+        The lower triangle by columns, in the order of elimination, and the place of each entry in
+        the data of the matrix that was analyzed.
     """
 
     order: Indices
@@ -59,7 +59,7 @@ class Elimination:
 
     @property
     def n_entries(self) -> int:
-        """Entries of L that are stored."""
+        """Number of stored entries of L."""
         return int(self.places[-1])
 
 
@@ -74,7 +74,7 @@ class SymmetricFactor:
     def solve(
         self, right: Float[np.ndarray, "n b"], scratch: Scratch | None = None
     ) -> Float[np.ndarray, "n b"]:
-        """Solve A x = right, in memory of the caller or in fresh memory."""
+        """Solve A x = right, in the given scratch memory or in new memory."""
         width, scratch = right.shape[1], scratch or self.scratch()
         solution, lanes = np.empty((len(right), width)), np.zeros((len(right), LANES))
         for start in range(0, width, LANES):
@@ -85,9 +85,11 @@ class SymmetricFactor:
         return solution
 
     def scratch(self) -> Scratch:
-        """Return fresh memory for solves: right-hand sides in the order of elimination, those of one front, a panel.
+        """Return new scratch memory for solves.
 
-        Whoever solves often keeps it, and shares it with no other thread: a factor is a value and holds none.
+        It has room for right-hand sides in the order of elimination, for those of one front, and
+        for a panel. Callers that solve often keep it, but share it with no other thread: a factor
+        is a value and holds no scratch memory.
         """
         e = self.elimination
         return (
@@ -99,7 +101,10 @@ class SymmetricFactor:
     def solve_lanes(
         self, right: Float[np.ndarray, "n 8"], out: Float[np.ndarray, "n 8"], scratch: Scratch
     ) -> None:
-        """Solve A x = right for eight right-hand sides, arrays in C order, at once; `out` may be `right` itself."""
+        """Solve A x = right for eight right-hand sides at once; `out` may be `right` itself.
+
+        Arrays are in C order.
+        """
         e = self.elimination
         tree = e.order, e.first, e.begins, e.rows, e.places
         lanes, gathered, near = scratch
@@ -107,13 +112,13 @@ class SymmetricFactor:
         fronts.solve_upper(*tree, self.panels, self.pivots, lanes, out, gathered, near)
 
     def rounding(self) -> Float[np.ndarray, " n"]:
-        """Bound what rounding has put between A and L D Lᵀ, row by row.
+        """Bound the rounding error E = A - L D Lᵀ by a diagonal: |xᵀEx| ≤ Σ r_i x_i². Return r.
 
-        Their difference E has |E_ij| ≤ m eps (|L||D||L|ᵀ)_ij where each of the products that make up an entry is
-        rounded m times or fewer: once for every other term in whatever order they are added, or, since sums are made in
-        parts, as `measure_fronts` tells (Higham 2002, sections 4.2 and 10.1; four more for forming A and for what is
-        formed here). A symmetric matrix lies, as a quadratic form, between plus and minus the diagonal one of the row
-        sums of its sizes: |xᵀEx| ≤ Σ r_i x_i², and r is returned.
+        |E_ij| ≤ m eps (|L||D||L|ᵀ)_ij if each of the products that are summed up in an entry is
+        rounded at most m times: once for every other term, in whatever order they are added, or
+        fewer times since sums are split, as `measure_fronts` counts (Higham 2002, sections 4.2
+        and 10.1). Four more roundings are for forming A and for the sums formed here. For a symmetric
+        E, |xᵀEx| is at most Σ r_i x_i² with the row sums r_i of |E|.
         """
         e = self.elimination
         n = len(e.order)
@@ -127,12 +132,15 @@ class SymmetricFactor:
 
 
 def analyze_pattern(pattern: sp.csc_array) -> Elimination:
-    """Order the elimination of a symmetric matrix, given by all its entries, and find the fronts of its factor."""
+    """Order the elimination of a symmetric matrix and find the fronts of its factor.
+
+    The pattern has all entries of the matrix, above and below the diagonal.
+    """
     n = pattern.shape[0]
     indptr, indices = pattern.indptr.astype(np.int64), pattern.indices.astype(np.int64)
     order = dissect(indptr, indices)
     parent = _parents(indptr, indices, order)
-    # Number the columns again so that every subtree is in one piece: supernodes are runs of columns.
+    # Renumber the columns by a postorder, so that supernodes are runs of columns.
     post = np.empty(n, dtype=np.int64)
     symbolic.postorder(parent, _unknown(n), _unknown(n), np.empty_like(post), post)
     order = order[post]
@@ -158,7 +166,7 @@ def analyze_pattern(pattern: sp.csc_array) -> Elimination:
 
 
 def _unknown(n: int) -> Indices:
-    """Return -1 for each of n rows or fronts."""
+    """Return an array of n times -1."""
     return np.full(n, -1, dtype=np.int64)
 
 
@@ -178,11 +186,11 @@ def _parents(indptr: Indices, indices: Indices, order: Indices) -> Indices:
 def _supernodes(
     indptr: Indices, indices: Indices, order: Indices, place: Indices, parent: Indices
 ) -> tuple[Indices, Indices]:
-    """Return the first column of each supernode, n at the end; and the number of rows of its front."""
+    """Return the first column of each supernode, with n at the end, and the rows of its front."""
     n = len(order)
     counts = np.ones(n, dtype=np.int64)
     symbolic.count_entries(indptr, indices, order, place, parent, _unknown(n), counts)
-    # Runs of columns with the same entries below their own: each is the parent of the one before.
+    # In a supernode each column is the parent of the one before, with the same entries below.
     continues = (parent[:-1] == np.arange(1, n)) & (counts[:-1] == counts[1:] + 1)
     first = np.concatenate([[0], np.flatnonzero(~continues) + 1])
     heights, widths = counts[first], np.diff(first, append=n)
@@ -192,11 +200,12 @@ def _supernodes(
 
 
 def _panel_places(widths: Indices, heights: Indices) -> Indices:
-    """Return where the panels of each front begin among all entries: at most WIDE columns to a panel.
+    """Return where the panels of each front begin in the array of all entries.
 
-    The panel that begins at column b of its front has the rows from b on.
+    A panel has at most WIDE columns. The panel that begins at column b of its front has the rows
+    from b on.
     """
-    full = widths // fronts.WIDE  # panels of WIDE columns; one of what remains comes last
+    full = widths // fronts.WIDE  # full panels; the last one has the remaining columns
     above = fronts.WIDE * full
     entries = above * heights - fronts.WIDE**2 * full * (full - 1) // 2
     entries += (heights - above) * (widths - above)
@@ -214,11 +223,14 @@ def _lower(indptr: Indices, indices: Indices, place: Indices) -> tuple[Indices, 
 def factorize_symmetric(
     elimination: Elimination, data: Float[np.ndarray, " e"], spent: SymmetricFactor | None = None
 ) -> SymmetricFactor | None:
-    """Factor the matrix with these entries, in the room of a spent factor; None where a pivot is zero or not finite."""
+    """Factor the matrix with these entries; return None if a pivot is zero or not finite.
+
+    The memory of a spent factor, if one is given, is used again.
+    """
     e = elimination
     panels = (
         np.empty(e.n_entries) if spent is None else spent.panels
-    )  # fresh pages cost half as much as a factor
+    )  # new memory pages cost half as much as a factorization
     pivots = np.empty(len(e.order))
     lower = e.lower_ptr, e.lower_rows, data[e.source]
     tree = e.first, e.begins, e.rows, e.above, e.places

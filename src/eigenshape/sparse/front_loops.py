@@ -9,19 +9,20 @@ from eigenshape._compile import njit
 from eigenshape.sparse.dense_loops import LONG, NARROW, eliminate_blocked, eliminate_plain
 from eigenshape.sparse.lane_loops import LANES, subtract_four_sums, subtract_sum
 
-WIDE = 64  # columns to a panel of L: 32 rows of them are 16 KiB, half of the nearest cache
-SMALL = 40  # rows of a front up to which plain loops are the faster ones (measured)
-NEAR = 32  # rows of a panel that stay in the nearest cache
+WIDE = 64  # columns in a panel of L: 32 of its rows are 16 KiB, half of the first-level cache
+SMALL = 40  # rows of a front up to which plain loops are faster (measured)
+NEAR = 32  # rows of a panel that fit into the first-level cache
 
 
 @njit
 @no_type_check
 def measure_fronts(first, begins, above, waiting, children, lengths):
-    """Return the most numbers that updates waiting for their parents take, and the rows of the largest front.
+    """Return the largest size of the stack of updates, and the rows of the largest front.
 
-    `lengths`, filled with LONG, is raised to how many roundings a product may see in each front, on its way from below:
-    a front adds what each child left; then halves of its columns update others, LONG terms at a time. `waiting` and
-    `children` are scratch, filled with 0.
+    An update waits on the stack until its parent is processed; sizes are in numbers. `lengths`
+    comes filled with LONG, and is raised to a bound for the number of roundings of a product up to
+    each front: a front adds the updates of its children, then blocks of its columns update others,
+    LONG terms at a time. `waiting` and `children` are scratch, filled with 0.
     """
     now = most = tallest = 0
     for s in range(len(above)):
@@ -60,13 +61,14 @@ def factor_fronts(
     children,
     blas,
 ):
-    """Fill panels and pivots with L and D of a matrix whose lower triangle is given by columns; tell if it could be.
+    """Fill panels and pivots with L and D of a matrix; return whether all pivots are usable.
 
-    Multifrontal (Duff and Reid 1983), pivots in their order: a front gathers the entries of its columns and what its
-    children left, eliminates its columns, and leaves the rest to its parent.
+    The matrix is given by the columns of its lower triangle. This is the multifrontal method (Duff
+    and Reid 1983) without pivoting: a front gathers the entries of its columns and the updates of
+    its children, eliminates its columns, and passes the rest to its parent as an update.
 
-    `room` is memory for the updates that wait, for two fronts, for a place of each row (n) and for the fronts that wait
-    (s); `children` counts those of each front.
+    `room` is memory for the stack of updates, for two fronts, for one number per row (n) and one
+    per front (s). `children` is the number of children of each front.
     """
     size = len(first) - 1
     stack, space, times, local, waiting = room
@@ -122,14 +124,14 @@ def factor_fronts(
 @njit
 @no_type_check
 def solve_lower(order, first, begins, rows, places, panels, right, lanes, gathered):
-    """Fill `lanes` with L⁻¹ times LANES right-hand sides (n, LANES), in the order of elimination."""
+    """Fill `lanes` (n, LANES) with L⁻¹ times the right-hand sides, in the order of elimination."""
     for i in range(len(order)):
         for lane in range(LANES):
             lanes[i, lane] = right[order[i], lane]
     for s in range(len(first) - 1):
         at = places[s]
         for mine in range(first[s], first[s + 1], WIDE):
-            # A panel: a triangle in the rows of its own columns, and the rest of its rows.
+            # A panel is a triangle in the rows of its own columns, and a rectangle below.
             columns = min(WIDE, first[s + 1] - mine)
             below = begins[s] + mine - first[s] + columns
             rest = begins[s + 1] - below
@@ -158,9 +160,9 @@ def solve_lower(order, first, begins, rows, places, panels, right, lanes, gather
 def solve_upper(
     order, first, begins, rows, places, panels, pivots, lanes, solution, gathered, near
 ):
-    """Fill `solution` (n, LANES) with L⁻ᵀ D⁻¹ times what `solve_lower` left in `lanes`, as the matrix has its rows.
+    """Fill `solution` (n, LANES) with L⁻ᵀ D⁻¹ times the result of `solve_lower` in `lanes`.
 
-    `gathered` and `near` are scratch.
+    Rows are in the order of the matrix. `gathered` and `near` are scratch.
     """
     for i in range(len(order)):
         for lane in range(LANES):
@@ -199,9 +201,10 @@ def solve_upper(
 @njit
 @no_type_check
 def add_sizes(first, begins, rows, places, panels, pivots, weights, sizes, terms):
-    """Add |L||D||L|ᵀ 1 to `sizes`, and how many entries of L each row has to `terms`; `weights` is filled with 0.
+    """Add the row sums of |L||D||L|ᵀ to `sizes`, and the number of entries per row of L to `terms`.
 
-    All entries of some columns lie in one panel, so their sums |D||L|ᵀ 1 are known before its rows are weighed.
+    All entries of a column are in one panel, so its sum |D||L|ᵀ 1 is complete before the rows of
+    the panel are weighted by it. `weights` is scratch, filled with 0.
     """
     for s in range(len(first) - 1):
         at = places[s]

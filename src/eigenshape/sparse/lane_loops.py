@@ -1,7 +1,7 @@
-"""Sums of rows of eight numbers, the innermost loop of solves and projections, in vector instructions.
+"""Sums of rows of eight numbers, the innermost loop of solves and projections, as vector code.
 
-Compilers leave eight scalars where one vector would do; so the sum is spelt out. LLVM cuts the vectors to what the
-machine has.
+The compiler would use eight scalars, so the vector instructions are written out here. LLVM splits
+the vectors into the sizes of the machine.
 """
 
 from typing import Any
@@ -11,12 +11,16 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-LANES = 8  # doubles in one vector instruction of 512 bits; two or four instructions where there are none
+# Doubles in a vector of 512 bits; machines without such vectors use two or four instructions.
+LANES = 8
 VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 
 
 def _summation(n_targets: int, *, added: bool) -> Any:
-    """Return the intrinsic for so many target rows at once: enough to keep two multipliers busy, few enough to fit."""
+    """Return the intrinsic that sums into `n_targets` rows at once.
+
+    More rows use the multipliers better, as long as all fit into registers.
+    """
 
     @intrinsic
     def summation(
@@ -31,7 +35,10 @@ def _summation(n_targets: int, *, added: bool) -> Any:
         taken: Any,
         to: Any,
     ) -> Any:
-        """Add Σ_t shares[at + t stride + q apart] given[start + t] to taken[to + q], or subtract it, for each q."""
+        """Add or subtract a weighted sum of rows, for each target row q.
+
+        To taken[to + q] goes Σ_t shares[at + t stride + q apart] given[start + t].
+        """
         whole = types.int64
         signature = types.void(shares, whole, whole, whole, given, whole, whole, taken, whole)
 

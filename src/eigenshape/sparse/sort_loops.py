@@ -1,4 +1,4 @@
-"""A compiled sort: NumPy's takes a second to compile inside a loop, this one a tenth."""
+"""A compiled sort. NumPy's sort takes 1 s to compile inside a loop, this one 0.1 s."""
 
 from typing import no_type_check
 
@@ -8,7 +8,7 @@ from eigenshape._compile import njit
 @njit
 @no_type_check
 def sort_part(values, start, stop):
-    """Sort a part of an array in place, by insertion at gaps that shrink to 1 (Shell 1959, gaps of Knuth 1973)."""
+    """Sort a part of an array in place, by Shell sort with Knuth's gaps (1973)."""
     gap = 1
     while 3 * gap < stop - start:
         gap = 3 * gap + 1

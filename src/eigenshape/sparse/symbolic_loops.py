@@ -1,15 +1,16 @@
-"""Compiled loops of `elimination`: which entries a factor has, before any is computed.
+"""Compiled loops of `elimination`: symbolic analysis, which finds the entries of a factor.
 
-The caller allocates all arrays, also those that a loop needs only while it runs, and sorts: compiling an allocation, or
-NumPy's sort, takes longer than compiling the loop that uses it.
+The caller allocates all arrays, also scratch, and sorts them: compiling an allocation or NumPy's
+sort takes longer than compiling the loop that uses it.
 """
 
 from typing import no_type_check
 
 from eigenshape._compile import njit
 
-# A supernode joins the next one while few of the entries are zeros that the factor would not have. The numbers are
-# columns of both together, and the largest share of such zeros; they are the defaults of CHOLMOD (`nrelax`, `zrelax`).
+# Supernodes are merged if the merged one stores few zeros that the factor does not need. The
+# numbers are the columns of the merged supernode and the largest share of such zeros, the defaults
+# of CHOLMOD (`nrelax`, `zrelax`).
 ALWAYS = 4
 OFTEN, OFTEN_ZEROS = 16, 0.8
 RARELY, RARELY_ZEROS = 48, 0.1
@@ -19,9 +20,10 @@ BEYOND_ZEROS = 0.05
 @njit
 @no_type_check
 def find_parents(indptr, indices, order, place, parent, ancestor):
-    """Fill the parent of each column of the factor, columns in the order given; -1 at a root (Liu 1990).
+    """Fill the elimination tree: the parent of each column, -1 at a root (Liu 1990).
 
-    `place` is the inverse of `order`; `parent` and `ancestor` come filled with -1, and the second is scratch.
+    Columns are numbered in the given order; `place` is its inverse. `parent` and `ancestor` come
+    filled with -1; `ancestor` is scratch.
     """
     for i in range(len(order)):
         node = order[i]
@@ -38,7 +40,7 @@ def find_parents(indptr, indices, order, place, parent, ancestor):
 @njit
 @no_type_check
 def postorder(parent, first_child, sibling, stack, order):
-    """Fill `order` with the columns, every subtree in one piece, children before parents.
+    """Fill `order` with a postorder of the columns: children first, each subtree contiguous.
 
     `first_child` and `sibling` come filled with -1; both and `stack` are scratch.
     """
@@ -69,7 +71,7 @@ def postorder(parent, first_child, sibling, stack, order):
 @njit
 @no_type_check
 def count_entries(indptr, indices, order, place, parent, mark, counts):
-    """Count the entries of each column of the factor, its diagonal among them.
+    """Count the entries of each column of the factor, with the diagonal.
 
     `mark` comes filled with -1 and is scratch; `counts` comes filled with 1.
     """
@@ -87,17 +89,18 @@ def count_entries(indptr, indices, order, place, parent, mark, counts):
 @njit
 @no_type_check
 def join_runs(parent, first, heights, widths, zeros, keep):
-    """Join runs of columns with (nearly) the same entries, and say of each run whether it stays the first of its front.
+    """Merge supernodes with nearly the same entries; `keep` tells which ones remain.
 
-    A run begins at column `first`, and has so many rows (`heights`) and columns (`widths`), which grow where others
-    join it. `zeros` is scratch, filled with 0; `keep` comes filled with True.
+    Each supernode is a run of columns. It begins at column `first` and has `heights` rows and
+    `widths` columns, which grow when it absorbs the next one. `keep` becomes False for a supernode
+    that is absorbed. `zeros` is scratch, filled with 0; `keep` comes filled with True.
     """
-    for s in range(len(first) - 2, -1, -1):  # s + 1 is by now the first of what it has joined
+    for s in range(len(first) - 2, -1, -1):  # s + 1 has already absorbed those after it
         up = parent[first[s + 1] - 1]
         if up < first[s + 1] or up >= first[s + 1] + widths[s + 1]:
             continue
         columns = widths[s] + widths[s + 1]
-        rows = widths[s] + heights[s + 1]  # exactly: all other rows of s are rows of its parent too
+        rows = widths[s] + heights[s + 1]  # exact: all other rows of s are also rows of its parent
         lost = zeros[s + 1] + widths[s] * (rows - heights[s])
         share = lost / (columns * (columns + 1) / 2 + columns * (rows - columns))
         if (
@@ -118,10 +121,11 @@ def join_runs(parent, first, heights, widths, zeros, keep):
 def find_front_rows(
     indptr, indices, order, place, first, begins, above, rows, first_child, sibling, mark
 ):
-    """Fill for each supernode the rows of its front, from rows[begins[s]] on: its own columns first.
+    """Fill the rows of the front of each supernode s, from rows[begins[s]] on.
 
-    The others are those that it is joined with, and what its children pass on, in any order. `first_child`, `sibling`
-    and `mark` come filled with -1 and are scratch.
+    Its own columns come first. Then follow, in any order, the rows of its columns' entries and
+    those that its children pass on. `first_child`, `sibling` and `mark` are scratch, filled with
+    -1.
     """
     for s in range(len(above)):
         high, stop = first[s + 1], begins[s]

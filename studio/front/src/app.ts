@@ -267,7 +267,9 @@ export class Studio implements App {
     const rows = [...this.shortcuts].map(([key, { text }]) =>
       h("div", {}, h("kbd", {}, key.replaceAll("+", " + ")), text),
     );
-    const mouse = "Drag turns the shape, the right button moves it, the wheel zooms.";
+    const mouse =
+      "Drag turns the shape, the right button moves it, the wheel zooms; so do the arrow keys, " +
+      "+ and - while the picture has the focus.";
     const close = button("Close", "help-close", "Close (Esc)", () => this.help.close());
     this.help.replaceChildren(h("h2", {}, "Keys"), h("div", { class: "keys" }, ...rows), mouse, close);
     this.help.showModal();

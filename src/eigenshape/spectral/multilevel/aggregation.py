@@ -1,4 +1,4 @@
-"""Fewer and fewer points for the same operator: smoothed aggregation (Vaněk, Mandel, Brezina 1996)."""
+"""A hierarchy of coarser operators by smoothed aggregation (Vaněk, Mandel, Brezina 1996)."""
 
 from dataclasses import dataclass
 
@@ -9,35 +9,36 @@ from jaxtyping import Float
 
 from eigenshape.spectral.multilevel.multilevel_loops import grow_aggregates, smooth_columns
 
-LARGEST = 64  # points to an aggregate
-TOO_LITTLE = 1.5  # times fewer points, under which another level is not worth its cost
-DEGREE = 1.0  # steps of smoothing per edge that an aggregate is across
-MESH_ROW = 7.0  # entries in a row of a triangle mesh, whose steps reach one edge far
-PASSED = 4.0  # points of an aggregate to the wavelength from which functions are kept
-LEAST_RATIO = 2.5  # of the top to the least of these zeros' interval
-# Steps of Lanczos that bound the largest eigenvalue of diag(A)⁻¹ A.
+LARGEST = 64  # most points in an aggregate, on average
+TOO_LITTLE = 1.5  # ratio of points between levels below which another level is not worth its cost
+DEGREE = 1.0  # smoothing steps per edge of an aggregate's diameter
+MESH_ROW = 7.0  # entries per row of a triangle mesh, where a smoothing step reaches one edge far
+# Smoothing keeps functions with at least size / PASSED points per wavelength (an area on surfaces),
+# where `size` is the number of points in an aggregate.
+PASSED = 4.0
+LEAST_RATIO = 2.5  # smallest ratio of the ends of the interval that smoothing damps
+# Lanczos steps for the bound of the largest eigenvalue of diag(A)⁻¹ A.
 LANCZOS_STEPS = 12
-ENERGY_ROUNDING = (
-    1e-12  # of the energy that functions of a component would have without their neighbors
-)
-SMOOTHED = 0.6  # of an aggregate's points: how far below the top of the spectrum smoothing reaches
-LEAST_SPREADS = (6.0, 20.0)  # of operators whose rows are full, and of those of a triangle mesh
+ENERGY_ROUNDING = 1e-12  # share of the summed energies below which an energy counts as rounding
+# Smoothing damps the eigenvalues above top / (SMOOTHED × points of an aggregate).
+SMOOTHED = 0.6
+LEAST_SPREADS = (6.0, 20.0)  # smallest spread of operators with long rows, and of a triangle mesh
 
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """An operator with fewer points than the one before, and the way down to the next.
+    """An operator of the hierarchy, and the prolongation from the next coarser one.
 
     Attributes
     ----------
     stiffness, mass : (n, n) sparse
         A and M.
     top : float
-        A bound of the eigenvalues of diag(A)⁻¹ A.
+        Upper bound of the eigenvalues of diag(A)⁻¹ A.
     spread : float
-        Smoothing is for the eigenvalues from top / spread on.
+        Smoothing damps the eigenvalues above top / spread.
     down : (n, m) sparse or None
-        P: columns are functions that the next level has as points.
+        Prolongation P: its columns are the basis functions of the next coarser level.
     up : (m, n) sparse or None
         Pᵀ.
     """
@@ -77,9 +78,10 @@ class Loaded:
 def build_levels(
     stiffness: sp.csr_array, mass: sp.csr_array, n_coarsest: int, *, smooth: bool = True
 ) -> list[Level]:
-    """Coarsen a pencil to about so many points; the last level has no way down.
+    """Coarsen a pencil to about `n_coarsest` points; the last level has no prolongation.
 
-    Without smoothing the columns of P are indicators of aggregates: rough, but never nearly dependent.
+    Without smoothing, the columns of P are indicators of aggregates: inaccurate, but never nearly
+    dependent.
     """
     levels: list[Level] = []
     while True:
@@ -104,9 +106,10 @@ def _least_spread(stiffness: sp.csr_array) -> float:
 
 
 def load(level: Level, dtype: type, *, lumped: bool) -> Loaded:
-    """Return a level that has a way down with its matrices in the precisions that the solver uses.
+    """Convert the matrices of a level to the precisions that the solver uses.
 
-    `lumped` says that M is diagonal, and `dtype` is the precision of the vectors.
+    `lumped` means that M is diagonal; `dtype` is the precision of the vectors. The level must have
+    a prolongation.
     """
     rough_prolong = _in_precision(level.down, np.float32)
     diagonal = level.mass.diagonal()[:, None]
@@ -126,7 +129,7 @@ def load(level: Level, dtype: type, *, lumped: bool) -> Loaded:
 
 
 def _in_precision(matrix: sp.sparray, dtype: type) -> sp.csr_array:
-    """Return a matrix sorted by rows, with values of this precision and indices of 32 bits."""
+    """Return a matrix by sorted rows, with values of type `dtype` and indices of 32 bits."""
     rows = _by_rows(matrix)
     return sp.csr_array(
         (rows.data.astype(dtype, copy=False), rows.indices, rows.indptr), shape=rows.shape
@@ -143,10 +146,10 @@ def _aggregates(stiffness: sp.csr_array, n_coarsest: int) -> sp.csr_array:
 
 
 def _smooth(stiffness: sp.csr_array, top: float, columns: sp.csr_array) -> sp.csr_array:
-    """Smooth columns by a polynomial in diag(A)⁻¹A that is 1 at 0, so that constants stay.
+    """Smooth columns by a polynomial in diag(A)⁻¹A that is 1 at 0, so that constants do not change.
 
-    Its zeros are those of a Chebyshev polynomial on the part of the spectrum that steps from aggregate to aggregate
-    lie in: what is left of the steps falls with the degree as fast as it can.
+    Its zeros are those of a Chebyshev polynomial on the part of the spectrum that contains the
+    jumps between aggregates. So the jumps decrease with the degree as fast as possible.
     """
     size = columns.shape[0] / columns.shape[1]
     row = stiffness.nnz / stiffness.shape[0]
@@ -169,9 +172,10 @@ def _project(up: sp.csr_array, matrix: sp.csr_array, down: sp.csr_array) -> sp.c
 
 
 def _clear_rounding(stiffness: sp.csr_array, energies: Float[np.ndarray, " m"]) -> None:
-    """Set to 0 what rounding left of components that have become one point: constants there, which have no energy.
+    """Set the energy of components that consist of one point to 0 if it is only rounding error.
 
-    Else their rounding, 1e-16 of the energy of what was summed up, stands for an eigenvalue of its own.
+    A constant on a component has no energy. The rounding error, 1e-16 of the energies that were
+    summed, would otherwise appear as an eigenvalue.
     """
     alone = np.flatnonzero(np.diff(stiffness.indptr) == 1)
     places = stiffness.indptr[alone]
@@ -191,9 +195,10 @@ def _positive(diagonal: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
 
 
 def _top(matrix: sp.csr_array) -> float:
-    """Bound the eigenvalues of diag(A)⁻¹A: by Gershgorin, or by Lanczos with its last residual (Zhou and others 2006).
+    """Bound the eigenvalues of diag(A)⁻¹A, by Gershgorin or by Lanczos (Zhou and others 2006).
 
-    Only the speed of corrections hangs on it.
+    The bound by Lanczos is the largest Ritz value plus the last residual. It is not certain, but
+    only the speed of corrections depends on it.
     """
     inverse = 1 / _positive(matrix.diagonal())
     gershgorin = float((inverse * abs(matrix).sum(axis=1)).max())

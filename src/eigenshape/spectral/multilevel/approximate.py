@@ -1,4 +1,4 @@
-"""The lowest eigenpairs of a pencil, approximately: no factor of the whole operator, and no proof."""
+"""Approximate lowest eigenpairs of a pencil, without a factor of the operator or a proof."""
 
 from dataclasses import replace
 
@@ -19,19 +19,20 @@ def approximate_pairs(
 ) -> tuple[Pairs, Certificate]:
     """Compute approximations of the k lowest pairs of a pencil with diagonal mass.
 
-    Points are joined into aggregates, whose indicators are smoothed (Vaněk, Mandel and Brezina 1996), until an
-    operator of some thousand points is left. That one is solved exactly. On the way back its eigenvectors are smoothed
-    level by level, and where that is not enough refined by Rayleigh-Ritz among them and their corrections through all
-    coarser levels (block Davidson), in the spirit of Nasikun and Hildebrandt (2022). Some more pairs than requested
-    are refined along, so that copies of a multiple eigenvalue find their place; but no count tells whether one is
-    missing. Pencils of few points, or of few for k, are solved and certified.
+    Smoothed aggregation (Vaněk, Mandel and Brezina 1996) coarsens the operator to some thousand
+    points, where it is solved exactly. The eigenvectors are then interpolated and smoothed level by
+    level. If that is not accurate enough, they are refined by block Davidson: Rayleigh-Ritz on the
+    eigenvectors and their multilevel corrections, similar to Nasikun and Hildebrandt (2022). Some
+    more pairs than requested are refined too, so that all copies of a multiple eigenvalue are
+    found. No count proves that none is missing. Pencils with few points, or with few points for k,
+    are solved and certified instead.
 
     Raises
     ------
     InvalidParameterError
         If the memory is too small.
     ConvergenceError
-        If the residuals do not come down to the accuracy.
+        If the residuals do not reach the accuracy.
     """
     goal = Goal(k, accuracy, max_residual, pencil.level / pencil.n, ROUNDS, strict=True)
     dtype = np.float32 if accuracy >= SINGLE and np.isinf(max_residual) else np.float64

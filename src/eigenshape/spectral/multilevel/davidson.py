@@ -1,4 +1,4 @@
-"""Block Davidson: Rayleigh-Ritz among approximate eigenvectors and their corrections, until what is left is small."""
+"""Block Davidson: repeated Rayleigh-Ritz on approximate eigenvectors and their corrections."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,31 +17,33 @@ from eigenshape.spectral.multilevel.residuals import (
 )
 from eigenshape.spectral.multilevel.vcycle import Tower, correct, multiply, smooth
 
-WIDTH = 32  # columns that are corrected at once
-SMOOTHING_STEPS = (8, 30)  # of smoothing, fewest and most
-FIRST_STEPS = 2.0  # of smoothing alone, times the root of what is to be smoothed
+WIDTH = 32  # columns that are corrected together
+SMOOTHING_STEPS = (8, 30)  # fewest and most smoothing steps
+FIRST_STEPS = 2.0  # first smoothing steps, as a multiple of the root of the spread
 DEPENDENT_COLUMNS = {
     4: 1e-6,
     8: 1e-13,
-}  # of the largest eigenvalue of a Gram matrix of unit columns, by their bytes
+}  # share of the largest eigenvalue of a Gram matrix of unit columns, by bytes per number
 # A k-th eigenvalue below this share of `Goal.least` counts as 0.
 ZERO_SHARE = 1e-6
-FIRST_SHARE = 0.3  # of the work, told while the columns are smoothed the first time
-PROBES = 8  # random columns of a last look
+FIRST_SHARE = 0.3  # share of the work that is reported for the first smoothing
+PROBES = 8  # random columns in the search for eigenvectors that were missed
 # Steps of inverse iteration on these random columns.
 PROBE_STEPS = 4
-MOST_LEFT = 10.0  # times what a round has lowered
-EARLY = 0.5  # of the bound, or:
-EXACT = 0.01  # of the accuracy, under which a residual is left as it is
+MOST_LEFT = 10.0  # largest estimate of the remaining error, as a multiple of the last decrease
+# A column is not corrected if its residual is below this share of the bound.
+EARLY = 0.5
+# The same share of the accuracy, if there is no bound.
+EXACT = 0.01
 TOO_FAR = (
     "The weights of the operator spread too far for its diagonal: solve with method='certified'."
 )
-UNSEEN = 3.0  # times what is estimated, where only smoothing has been at work
+UNSEEN = 3.0  # factor of the estimated error as long as columns were only smoothed
 
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Columns S of approximate eigenvectors, and room for as many that are added to them."""
+    """Approximate eigenvectors as columns S, and memory for as many columns to add."""
 
     columns: np.ndarray
     added: np.ndarray
@@ -49,10 +51,11 @@ class Space:
 
 @dataclass(frozen=True)
 class Goal:
-    """What the first k pairs are to reach, in shares of the k-th eigenvalue, after so many rounds at most.
+    """The required accuracy of the first k pairs, and the largest number of rounds.
 
-    What is left of the values' errors is estimated at no more than `accuracy`, and no residual is above `bound`.
-    `least` stands for the eigenvalue where that is next to nothing beside it: all may be 0.
+    The estimated error of the values must be at most `accuracy`, and all residuals at most `bound`,
+    both as shares of the k-th eigenvalue. If this eigenvalue is negligible beside `least`, it is
+    replaced by `least`, since all k may be 0.
     """
 
     k: int
@@ -65,7 +68,11 @@ class Goal:
 
 @dataclass(frozen=True)
 class Standing:
-    """How near the vectors are: the k-th value, the largest residual, and an estimate of the error, in its shares."""
+    """The state of the refinement.
+
+    `scale` is the k-th value. `worst` is the largest residual and `left` the estimated error of the
+    values, both as shares of it.
+    """
 
     scale: float
     worst: float
@@ -75,16 +82,19 @@ class Standing:
 def refine(
     tower: Tower, below: tuple[np.ndarray, np.ndarray], goal: Goal, report: Callable[[float], None]
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return M-orthonormal Ritz vectors, their values and an estimate of these' error, refined until the goal.
+    """Refine vectors until the goal is reached; return M-orthonormal Ritz vectors and values.
 
-    The vectors come from the next coarser level, which has no more to say about them, so they are smoothed first, and
-    the Ritz vectors of what that leaves taken. Each round then adds to the columns their corrections through all
-    levels (`correct`), and keeps the best of both together (Davidson 1975; block form with one block of memory).
+    Also returns the estimated error of the values. The vectors come from the next coarser level,
+    which cannot improve them further. So they are smoothed first, and replaced by the Ritz vectors
+    of their span. Each round then computes multilevel corrections (`correct`) and takes the lowest
+    Ritz vectors in the span of columns and corrections (Davidson 1975; in blocks, without older
+    columns).
 
     Raises
     ------
     ConvergenceError
-        If a strict goal is not reached in its rounds, or columns overflow or become dependent.
+        If a strict goal is not reached in the given rounds, or columns overflow or become
+        dependent.
     """
     values, m = below[1], len(below[1])
     space = _prolong(tower, below[0])
@@ -131,10 +141,11 @@ def finish_vectors(
 def _standing(
     goal: Goal, values: np.ndarray, residuals: np.ndarray, before: float, lowered: float
 ) -> Standing:
-    """Judge a round by what it did to the values and to the largest residual.
+    """Estimate the error after a round, from the decrease of the values and of the residuals.
 
-    Errors go with the squares of residuals. If they fell only as much as those did, by a factor q, then of what the
-    round lowered q / (1 - q) is left; no more than ten times is taken to be left, lest rounding in residuals decides.
+    Errors of values behave like squares of residuals. If they decrease only as fast as the
+    residuals, by a factor q per round, the remaining error is q / (1 - q) times the last decrease.
+    The factor is limited to 10, so that rounding in the residuals does not dominate.
     """
     last = float(values[goal.k - 1])
     scale = last if last > ZERO_SHARE * goal.least else goal.least
@@ -153,7 +164,7 @@ def _prolong(tower: Tower, vectors: np.ndarray) -> Space:
 def _smooth_all(
     tower: Tower, space: Space, values: np.ndarray, report: Callable[[float], None]
 ) -> Float[np.ndarray, " m"]:
-    """Smooth the columns, and return the norms of the residuals that they had."""
+    """Smooth the columns; return the norms of their residuals before."""
     steps, norms = (
         int(np.ceil(FIRST_STEPS * np.sqrt(tower.levels[0].spread))),
         np.empty(len(values)),
@@ -178,12 +189,12 @@ def _add_corrections(
     late: np.ndarray,
     excess: float,
 ) -> None:
-    """Add the corrections of late columns, which have these values and residuals.
+    """Add the corrections of the columns that have not converged, `late`.
 
     Raises
     ------
     ConvergenceError
-        If they overflow.
+        If corrections overflow.
     """
     steps = int(
         np.clip(
@@ -203,7 +214,7 @@ def _add_corrections(
 
 
 def _require_finite(corrections: np.ndarray, some: np.ndarray) -> None:
-    # Far below zero, where single rows are next to nothing beside θM, smoothing makes columns grow.
+    # If rows are negligible beside θM, with θ far below zero, smoothing makes columns grow.
     if not np.isfinite(corrections.sum()):
         raise ConvergenceError(
             f"Corrections must be finite; those of eigenvector {some[0]} overflow. {TOO_FAR}"
@@ -213,11 +224,11 @@ def _require_finite(corrections: np.ndarray, some: np.ndarray) -> None:
 def _look_again(
     tower: Tower, space: Space, values: np.ndarray, k: int, bound: float, seed: int
 ) -> Float[np.ndarray, " m"]:
-    """Look for eigenvectors that the coarser levels cannot see, with columns that know nothing of them.
+    """Search for eigenvectors that the coarser levels cannot represent.
 
-    Some steps of inverse iteration on random columns, outside the span of those that are known. Where they lower one
-    of the first k values by half the bound or more, they are taken in, and the new values returned; else everything
-    stays as it is.
+    Inverse iteration is run on random columns, orthogonal to the known ones. If Rayleigh-Ritz with
+    these columns lowers one of the first k values by half the bound or more, they are included and
+    the new values are returned. Otherwise nothing changes.
     """
     level, m = tower.levels[0], len(values)
     shifts = np.zeros(PROBES, dtype=np.float32)
@@ -235,9 +246,10 @@ def _look_again(
 
 
 def _ritz(tower: Tower, space: Space, values: np.ndarray, fresh: slice) -> np.ndarray:
-    """Put the lowest Ritz vectors of all columns, those added up to the last fresh one, in place; return their values.
+    """Replace the columns by the lowest Ritz vectors of their span; return the Ritz values.
 
-    Columns before the fresh ones are Ritz vectors already, with the values given.
+    The span includes the added columns up to the last fresh one. The columns before the fresh ones
+    are already Ritz vectors, with the given values.
     """
     values, weights = _combination(tower, space, values, fresh)
     _combine(tower, space, weights)
@@ -257,7 +269,7 @@ def _combine(tower: Tower, space: Space, weights: np.ndarray) -> None:
 def _combination(
     tower: Tower, space: Space, values: np.ndarray, fresh: slice
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lowest Ritz values of the columns up to the last fresh ones, and their vectors' coefficients."""
+    """Return the lowest Ritz values of the columns, and the coefficients of the Ritz vectors."""
     known = fresh.start
     gram, projected = _grams(tower, space, fresh)
     gram[:known, :known] = np.eye(known)
@@ -276,7 +288,7 @@ def _combination(
 
 
 def _grams(tower: Tower, space: Space, fresh: slice) -> tuple[np.ndarray, np.ndarray]:
-    """Return SᵀMS and SᵀAS, without the block of the columns before the fresh ones."""
+    """Return SᵀMS and SᵀAS, except the block of the columns before the fresh ones."""
     size, m = fresh.stop, space.columns.shape[1]
     gram, projected = np.zeros((size, size)), np.zeros((size, size))
     of = space.columns if fresh.start == 0 else space.added[:, : size - m]

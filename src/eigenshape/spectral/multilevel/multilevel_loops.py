@@ -1,4 +1,4 @@
-"""Compiled loops of `aggregation` and `vcycle`: aggregates of points, their smoothed indicators, and products."""
+"""Compiled loops of `aggregation` and `vcycle`: aggregates, smoothing, and sparse products."""
 
 from typing import no_type_check
 
@@ -6,14 +6,17 @@ import numpy as np
 
 from eigenshape._compile import njit
 
-STRONG = 0.25  # of a row's strongest coupling, below which points are not neighbors
-FRAGMENT = 0.25  # of the size aimed at, below which an aggregate is given away
+STRONG = 0.25  # share of a row's strongest coupling below which points do not count as neighbors
+FRAGMENT = 0.25  # share of the target size below which an aggregate is split among its neighbors
 
 
 @njit
 @no_type_check
 def grow_aggregates(starts, columns, values, size):
-    """Label points by aggregates of about `size`, grown along strong negative couplings; count them."""
+    """Label points by aggregates of about `size` points; return the labels and their number.
+
+    Aggregates grow along strong negative couplings.
+    """
     n = len(starts) - 1
     labels, strongest = np.full(n, -1, dtype=np.int32), np.zeros(n)
     for i in range(n):
@@ -48,7 +51,7 @@ def grow_aggregates(starts, columns, values, size):
 @njit
 @no_type_check
 def _join_fragments(starts, columns, values, labels, counts, least):
-    """Give each point of a fragment to the aggregate it is coupled with most, and number what is left."""
+    """Move each point of a fragment to its most strongly coupled aggregate; renumber the others."""
     for i in range(len(labels)):
         if counts[labels[i]] >= least:
             continue
@@ -72,7 +75,7 @@ def _join_fragments(starts, columns, values, labels, counts, least):
 @njit
 @no_type_check
 def smooth_columns(matrix, factors, sparse, n_columns):
-    """Return P - diag(factors) A P, both sparse by rows; rows of the result are not sorted."""
+    """Return P - diag(factors) A P for matrices by rows; rows of the result are not sorted."""
     (starts, columns, values), (old_starts, old_columns, old_values) = matrix, sparse
     n = len(starts) - 1
     new_starts = np.zeros(n + 1, dtype=np.int32)
@@ -125,7 +128,7 @@ def _double_array(array, more):
 @njit
 @no_type_check
 def multiply_rows(starts, columns, values, block, product):
-    """Write a sparse matrix times a block of columns; `starts` may be that of some rows only."""
+    """Write a sparse matrix times a block of columns; `starts` may cover some rows only."""
     for i in range(len(starts) - 1):
         _row_product(starts, columns, values, block, i, product)
 
@@ -145,9 +148,10 @@ def _row_product(starts, columns, values, block, i, product):
 @njit
 @no_type_check
 def smoothing_step(matrix, scales, terms, block, step, moved, old, new):
-    """Write the next Chebyshev step, in place of the last, and where it leads from `block`.
+    """Compute one Chebyshev step in place, and the block after it.
 
-    step = old step + new D⁻¹ (r - (A - θ M) block) and moved = block + step, with the diagonals M and D⁻¹ in `scales`.
+    step = old step + new D⁻¹ (r - (A - θ M) block), and moved = block + step. The diagonals M and
+    D⁻¹ are in `scales`.
     """
     starts, columns, values = matrix
     weights, inverse = scales

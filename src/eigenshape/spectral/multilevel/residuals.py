@@ -1,4 +1,4 @@
-"""Tall blocks of columns, some rows at a time: their images and residuals."""
+"""Images and residuals of tall blocks of columns, computed in chunks of rows."""
 
 from collections.abc import Iterator
 
@@ -7,18 +7,18 @@ from jaxtyping import Float
 
 from eigenshape.spectral.multilevel.vcycle import Tower, multiply
 
-# Rows of tall blocks at once: two products of 32 columns then take 2 MiB, which a cache holds.
+# Rows in a chunk: two products of 32 columns then take 2 MiB, which fit into the cache.
 ROWS = 4096
 
 
 def row_chunks(tower: Tower) -> list[slice]:
-    """Return the rows of the first level, as many at a time as a cache holds."""
+    """Return the rows of the finest level in chunks that fit into the cache."""
     n = tower.levels[0].n
     return [slice(start, min(start + ROWS, n)) for start in range(0, n, ROWS)]
 
 
 def images(tower: Tower, columns: np.ndarray) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
-    """Give A and M times columns some rows at a time, in double precision."""
+    """Yield A S and M S for columns S in chunks of rows, in double precision."""
     level = tower.levels[0]
     room = [np.empty((min(ROWS, level.n), columns.shape[1])) for _ in range(2)]
     for rows in row_chunks(tower):
@@ -34,7 +34,7 @@ def images(tower: Tower, columns: np.ndarray) -> Iterator[tuple[slice, np.ndarra
 def _residual_rows(
     tower: Tower, columns: np.ndarray, values: np.ndarray
 ) -> Iterator[tuple[slice, np.ndarray]]:
-    """Give A S - M S θ some rows at a time."""
+    """Yield the residuals A S - M S θ in chunks of rows."""
     for rows, image, weighed in images(tower, columns):
         np.multiply(weighed, values, out=weighed)
         yield rows, np.subtract(image, weighed, out=image)
@@ -43,7 +43,7 @@ def _residual_rows(
 def norms_of_residuals(
     tower: Tower, columns: np.ndarray, values: np.ndarray
 ) -> Float[np.ndarray, " m"]:
-    """Return the norms of the columns' residuals, in the inverse of M or of its diagonal."""
+    """Return the norms of the columns' residuals for the inverse of M or of its diagonal."""
     squares = np.zeros(len(values))
     for rows, rest in _residual_rows(tower, columns, values):
         squares += _squares(tower, rows, rest)
@@ -57,7 +57,7 @@ def _squares(tower: Tower, rows: slice, rest: np.ndarray) -> np.ndarray:
 
 
 def pick_columns(tower: Tower, columns: np.ndarray, some: np.ndarray) -> np.ndarray:
-    """Return some of the columns, beside each other."""
+    """Return some of the columns as a contiguous block."""
     picked = np.empty((len(columns), len(some)), dtype=columns.dtype)
     for rows in row_chunks(tower):
         picked[rows] = np.take(columns[rows], some, axis=1)
@@ -67,7 +67,7 @@ def pick_columns(tower: Tower, columns: np.ndarray, some: np.ndarray) -> np.ndar
 def residual_block(
     tower: Tower, columns: np.ndarray, values: np.ndarray, scales: np.ndarray
 ) -> tuple[np.ndarray, Float[np.ndarray, " b"]]:
-    """Return scaled residuals in single precision, and their norms."""
+    """Return residuals, scaled and in single precision, and their norms."""
     squares = np.zeros(len(values))
     block = np.empty(columns.shape, dtype=np.float32)
     for rows, rest in _residual_rows(tower, columns, values):
@@ -77,7 +77,10 @@ def residual_block(
 
 
 def keep_outside(tower: Tower, columns: np.ndarray, block: np.ndarray) -> None:
-    """Take from a block in place what lies in the span of columns that are orthonormal in M, or in its diagonal."""
+    """Project the span of orthonormal columns out of a block, in place.
+
+    Orthonormal is meant for M or its diagonal.
+    """
     weights = tower.levels[0].weights
     inside = np.zeros((columns.shape[1], block.shape[1]))
     for rows in row_chunks(tower):

@@ -1,4 +1,4 @@
-"""From an operator down to one of few points, and back up to the last level but one with its eigenvectors."""
+"""Coarsen an operator, solve the coarsest level, and refine the vectors up to the second level."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -34,7 +34,7 @@ COARSEST_PER_PAIR = 30
 COARSENED = 8
 # Shifts of the factors of the coarsest level, as shares of the k-th eigenvalue.
 SHIFTS = (0.2, 0.5, 0.75, 0.93)
-# Rounds of refinement before an error is raised.
+# Rounds of refinement after which an error is raised.
 ROUNDS = 100
 # Accuracy from which vectors are refined in single precision.
 SINGLE = 1e-4
@@ -53,11 +53,11 @@ class Start:
     Attributes
     ----------
     order : (n,) int
-        The points' order on the levels.
+        The order of the points on the finest level.
     tower : Tower
         All levels.
     below : (m, g) float, (g,) float
-        Eigenvectors and values of the second level.
+        Eigenvectors and eigenvalues on the second level.
     """
 
     order: Int[np.ndarray, " n"]
@@ -68,10 +68,11 @@ class Start:
 def climb(
     pencil: Pencil, k: int, report: Progress, *, dtype: type = np.float32, kept: int = 0
 ) -> Start | None:
-    """Make the levels of a pencil with diagonal mass, solve the coarsest, and refine its vectors up to the second.
+    """Coarsen a pencil with diagonal mass, solve the coarsest level, and refine up to the second.
 
-    Some more pairs than k are carried along, in the precision given. `kept` are bytes that the caller needs at the end
-    beside these bases. None where the pencil has too few points to be worth it, or none that can be joined.
+    Some more pairs than k are computed, with vectors of type `dtype`. `kept` is the number of bytes
+    that the caller needs besides these bases. Returns None if the pencil has too few points to gain
+    from coarsening, or if no points can be aggregated.
 
     Raises
     ------
@@ -102,7 +103,7 @@ def climb(
 
 
 def require_lumped(laplacian: Laplacian) -> None:
-    """Refuse a mass with entries beside its diagonal, with the first."""
+    """Raise an error that names the first entry of a mass off the diagonal, if there is one."""
     rows = laplacian.mass.tocoo()
     beside = np.flatnonzero((rows.row != rows.col) & (rows.data != 0))
     if beside.size:
@@ -115,13 +116,13 @@ def require_lumped(laplacian: Laplacian) -> None:
 
 
 def require_accuracy(name: str, value: float, least: float) -> None:
-    """Refuse an accuracy out of range."""
+    """Raise an error if an accuracy is out of range."""
     if not least <= value <= LEAST_ACCURATE:
         raise InvalidParameterError(f"{name} must lie in {least}..{LEAST_ACCURATE}; it is {value}.")
 
 
 def on_finest(report: Progress, start: Start) -> Callable[[float], None]:
-    """Return how a refinement of the first level, from 0 to 1, is told."""
+    """Return a function that reports how much of the refinement on the finest level is done."""
     n_levels = len(start.tower.levels)
     return lambda done: report(0.35 + 0.6 * done, f"refining on level {n_levels} of {n_levels}")
 
@@ -133,21 +134,25 @@ def _reorder(matrix: sp.sparray, order: Int[np.ndarray, " n"]) -> sp.csr_array:
 def _coarsen(
     stiffness: sp.csr_array, mass: sp.csr_array, k: int, m: int
 ) -> tuple[list[Level], Coarsest, Float[np.ndarray, " m"]] | None:
-    """Return the levels with the solved coarsest one, and its values; None where nothing can be joined."""
+    """Return the levels, the coarsest one solved, and its values; None without aggregates."""
     n_coarsest = min(max(COARSEST_PER_PAIR * k, COARSEST), stiffness.shape[0] // COARSENED)
     levels = build_levels(stiffness, mass, n_coarsest)
     if len(levels) == 1:
         return None
     with suppress(ConvergenceError, InvalidParameterError):
         return levels, *_solve_coarsest(levels[-1], k, m)
-    levels = build_levels(stiffness, mass, n_coarsest, smooth=False)  # weights over many decades
+    levels = build_levels(
+        stiffness, mass, n_coarsest, smooth=False
+    )  # only indicators stay independent if weights differ by many orders of magnitude
     return levels, *_solve_coarsest(levels[-1], k, m)
 
 
 def _solve_coarsest(level: Level, k: int, m: int) -> tuple[Coarsest, Float[np.ndarray, " m"]]:
     pencil = as_pencil(level.stiffness, level.mass)
     pairs, _ = solve_lowest(pencil, m, silent)
-    last = max(float(pairs.values[k - 1]), pencil.level / pencil.n)  # where all that is wanted is 0
+    last = max(
+        float(pairs.values[k - 1]), pencil.level / pencil.n
+    )  # the mean eigenvalue if all wanted ones are 0
     factors = tuple(factorize_near(pencil, share * last) for share in SHIFTS)
     return Coarsest(pencil, pairs.vectors, factors), pairs.values
 

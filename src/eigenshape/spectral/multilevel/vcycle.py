@@ -1,4 +1,4 @@
-"""Corrections of approximate eigenvectors through all levels of a hierarchy."""
+"""Corrections of approximate eigenvectors by a V-cycle through all levels."""
 
 from dataclasses import dataclass
 
@@ -11,14 +11,15 @@ from eigenshape.spectral.multilevel.multilevel_loops import multiply_rows, smoot
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.pencil import Pencil
 
-INNER_STEPS = 8  # of smoothing, on the levels between
+INNER_STEPS = 8  # smoothing steps on the levels between the finest and the coarsest
 
 
 @dataclass(frozen=True, eq=False)
 class Coarsest:
-    """The lowest eigenvectors of the coarsest pencil, which need no correction, and factors for all others.
+    """The coarsest level: its lowest eigenvectors, and factors at several shifts.
 
-    Corrections of a column with value θ take the factor with the highest shift under θ.
+    The eigenvectors are exact there and need no correction. The correction of a column with value θ
+    uses the factor with the largest shift below θ.
     """
 
     pencil: Pencil
@@ -28,7 +29,7 @@ class Coarsest:
 
 @dataclass(frozen=True, eq=False)
 class Tower:
-    """The levels from a finest one down to the coarsest."""
+    """The levels from the finest to the coarsest."""
 
     levels: tuple[Loaded, ...]
     coarsest: Coarsest
@@ -37,10 +38,11 @@ class Tower:
 def correct(
     tower: Tower, residual: np.ndarray, shifts: Float[np.ndarray, " b"], steps: int
 ) -> np.ndarray:
-    """Return columns e with (A - θ M) e ≈ residual where eigenvalues lie above those looked for; single precision.
+    """Return approximate solutions e of (A - θ M) e = residual, in single precision.
 
-    The coarser levels first, the coarsest by its factor; then Chebyshev iteration in diag(A)⁻¹ (A - θM), which takes
-    away what only this level sees.
+    Only components above the wanted eigenvalues are solved for. Coarser levels are corrected first,
+    the coarsest by its factor. Then Chebyshev iteration with diag(A)⁻¹ (A - θM) reduces the error
+    that coarser levels cannot represent.
     """
     if not tower.levels:
         return _coarsest(tower, residual, shifts)
@@ -55,14 +57,14 @@ def correct(
 def smooth(
     tower: Tower, residual: np.ndarray, shifts: Float[np.ndarray, " b"], steps: int
 ) -> np.ndarray:
-    """Return what `correct` does where coarser levels have nothing to add."""
+    """Return corrections by smoothing on this level alone."""
     return _smooth(tower.levels[0], (residual, shifts), np.zeros_like(residual), steps)
 
 
 def multiply(
     matrix: sp.csr_array, block: np.ndarray, product: np.ndarray, rows: slice | None = None
 ) -> np.ndarray:
-    """Write matrix times block, or these rows of it, to `product`, and return it."""
+    """Write the matrix times a block, or some rows of it, to `product`, and return it."""
     starts = matrix.indptr if rows is None else matrix.indptr[rows.start : rows.stop + 1]
     multiply_rows(starts, matrix.indices, matrix.data, block, product)
     return product
@@ -71,7 +73,7 @@ def multiply(
 def _smooth(
     level: Loaded, terms: tuple[np.ndarray, np.ndarray], block: np.ndarray, steps: int
 ) -> np.ndarray:
-    """Chebyshev iteration for the eigenvalues from top / spread to top (Saad 2003, algorithm 12.1)."""
+    """Run Chebyshev iteration on [top / spread, top] (Saad 2003, algorithm 12.1)."""
     middle = (level.top + level.top / level.spread) / 2
     half = (level.top - level.top / level.spread) / 2
     sharpness = middle / half

@@ -1,4 +1,4 @@
-"""Operators that fall into parts: each is solved by itself, small ones of one size together."""
+"""Disconnected operators: each part is solved separately, small parts of equal size together."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,11 +25,11 @@ class Parts:
     Attributes
     ----------
     pencil : Pencil
-        All of it.
+        The whole pencil.
     order : (n,) int
-        Its points, part by part, ascending within each.
+        The points, part by part, ascending within each part.
     starts : (c + 1,) int
-        Where the points of each part begin in `order`, and n.
+        Where the points of each part begin in `order`, with n at the end.
     """
 
     pencil: Pencil
@@ -38,7 +38,7 @@ class Parts:
 
     @property
     def sizes(self) -> Int[np.ndarray, " c"]:
-        """Points of each part, ascending."""
+        """Number of points of each part, ascending."""
         return np.diff(self.starts)
 
     @cached_property
@@ -61,21 +61,22 @@ class Parts:
         return part_pencil(self.pencil, stiffness[inside, inside], mass[inside, inside])
 
     def exponent(self, part: Pencil) -> int:
-        """Return the power of two by which a part's eigenvalues are larger in the units of the whole pencil."""
+        """Return the power of two that converts eigenvalues of a part to units of the whole."""
         return part.value_exponent - self.pencil.value_exponent
 
 
 def connected_parts(pencil: Pencil) -> Parts:
-    """Find what W and B hold together."""
+    """Find the connected parts of W and B together."""
     sizes = np.bincount(pencil.labels)
     order = np.lexsort((pencil.labels, sizes[pencil.labels]))
     return Parts(pencil, order, np.concatenate([[0], np.cumsum(np.sort(sizes))]))
 
 
 def solve_small(parts: Parts, largest: int, k: int) -> list[Pairs]:
-    """Solve the parts of few points densely, all of one size at once.
+    """Solve the small parts densely, all of one size at once.
 
-    Of each those pairs are returned that may be among the k lowest of all, on its own points.
+    Returns the pairs of each part that may be among the k lowest of all. Vectors are on the points
+    of the part.
     """
     found: list[Pairs] = []
     known = np.empty(0)
@@ -99,7 +100,7 @@ def solve_small(parts: Parts, largest: int, k: int) -> list[Pairs]:
 def _solve_blocks(
     parts: Parts, first: int, count: int
 ) -> tuple[Float[np.ndarray, "c s"], Float[np.ndarray, "c s s"], Float[np.ndarray, "c s"]]:
-    """Return all eigenpairs of some parts of one size, which stand next to each other, and their residuals."""
+    """Return all eigenpairs of consecutive parts of one size, and their residuals."""
     size = int(parts.sizes[first])
     inside = slice(int(parts.starts[first]), int(parts.starts[first]) + count * size)
     stiffness, mass = (_blocks(matrix[inside, inside], size) for matrix in parts.block_diagonal)
@@ -127,16 +128,16 @@ def _blocks(matrix: sp.csc_array, size: int) -> Float[np.ndarray, "c s s"]:
 def widths(
     values: Float[np.ndarray, "*k"], residuals: Float[np.ndarray, "*k"]
 ) -> Float[np.ndarray, "*k"]:
-    """Return how far from each value another may lie that is equal to it but for rounding."""
+    """Return, for each value, the largest distance of another that counts as equal to it."""
     return ZERO_RESIDUALS * residuals + CONGRUENT * np.abs(values)
 
 
 def merge_pairs(parts: Parts, found: list[Pairs], k: int) -> Pairs:
     """Return the k lowest of all eigenpairs of all parts; each vector is zero outside its part.
 
-    Values that differ by no more than rounding are equal: they stand in the order of the first points of their parts,
-    whatever their last digits are, and are raised to the largest of those before them, so that all ascend. What may be
-    0 is 0.
+    Values that differ only by rounding count as equal. They are in the order of the first points of
+    their parts, whatever their last digits, and are raised to the largest value before them, so
+    that all ascend. Values that cannot be distinguished from 0 are set to 0.
     """
     counts = np.array([len(pairs.values) for pairs in found])
     part = np.repeat(np.arange(len(found)), counts)

@@ -1,4 +1,4 @@
-"""The operator in units of its own, so that a solve never sees the user's."""
+"""The operator scaled to its own units, so that solvers are independent of the user's."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,27 +13,27 @@ from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 from eigenshape.sparse.elimination import Elimination, analyze_pattern, factorize_symmetric
 from eigenshape.spectral.solver.residual_loops import add_sums
 
-# Columns of a Gram matrix that are computed together: enough for fast products, little memory.
+# Columns that are processed together: enough for fast products, with little memory.
 COLUMNS_AT_ONCE = 64
-# Largest ratio of two diagonal entries: squares of vectors must be floats.
+# Largest ratio of two diagonal entries: squares of vectors must not overflow.
 WIDEST_RANGE = 1e140
-# If trace W / trace B exceeds the median of W_ii/B_ii by this factor, the median is the pencil's level:
-# a few points must not set the unit of all tolerances.
+# If trace W / trace B exceeds the median of W_ii/B_ii by this factor, the median is the pencil's
+# level: a few points must not set the unit of all tolerances.
 LARGEST_LEVEL_RATIO = 1e11
 
 
 @dataclass(frozen=True, eq=False)
 class ShiftPattern:
-    """What W - σB has entries of, ready to be factored at any σ.
+    """W and B in the union of their patterns, ready to factor W - σB for any σ.
 
     Attributes
     ----------
     elimination : Elimination
-        Of the union of both patterns.
+        Symbolic analysis of the union of both patterns.
     stiffness, mass : (e,) float
-        The entries of W and B in it, zeros among them.
+        The entries of W and B in this pattern, with zeros.
     diagonal : (n,) int
-        Where those of the diagonal are.
+        The places of the diagonal entries.
     """
 
     elimination: Elimination
@@ -44,7 +44,7 @@ class ShiftPattern:
 
 @dataclass(frozen=True, eq=False)
 class Pencil:
-    """W φ = λ B φ scaled by powers of two, which change no digit.
+    """The problem W φ = λ B φ, scaled by powers of two, which change no digit.
 
     Attributes
     ----------
@@ -57,13 +57,14 @@ class Pencil:
     labels : (n,) int
         The connected part of W and B that each point belongs to, numbered by their first points.
     level : float
-        trace W / trace B: the mean of the eigenvalues up to the shape of B, and the unit for every tolerance. Of
-        several parts the harmonic mean, since few of the low eigenvalues are of small parts. Where a few points make it
-        far larger than W_ii/B_ii is in the median, that median.
+        trace W / trace B: about the mean of the eigenvalues, and the unit of every tolerance. For
+        several parts it is the harmonic mean, since small parts have few of the low eigenvalues. If
+        a few points make it far larger than the median of W_ii/B_ii, it is that median.
     value_exponent, vector_exponent : int
-        An eigenvalue is 2**value_exponent times larger in the user's units, a vector 2**vector_exponent times.
+        Eigenvalues are 2**value_exponent times larger in the user's units, and vectors
+        2**vector_exponent times.
     kernel : GaussianKernel or None
-        What W was built with, in the user's units.
+        The kernel that W was built with, in the user's units.
     """
 
     stiffness: sp.csc_array
@@ -115,13 +116,13 @@ def normalize(laplacian: Laplacian) -> Pencil:
 
 
 def part_pencil(whole: Pencil, stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
-    """Scale some rows and columns of W and B of a pencil, apart from all others, to units of their own."""
+    """Return the pencil of one part, given by its W and B, scaled to its own units."""
     exponents = whole.value_exponent, whole.vector_exponent
     return _normalize_matrices(stiffness, mass, exponents, whole.kernel)
 
 
 def as_pencil(stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
-    """Take a pencil as it is, whose entries are of moderate size already.
+    """Make a pencil without scaling, for entries that are already of moderate size.
 
     Raises
     ------
@@ -137,7 +138,7 @@ def _normalize_matrices(
     exponents: tuple[int, int],
     kernel: GaussianKernel | None,
 ) -> Pencil:
-    """Scale a pencil whose eigenvalues and vectors are powers of two times those in the user's units."""
+    """Scale W and B; the exponents add to those of a pencil that was scaled before."""
     up_w, up_b = _exponent(stiffness), _exponent(mass)
     up_b -= up_b % 2  # an even power, so that its square root is a power of two as well
     exponents = exponents[0] + up_w - up_b, exponents[1] - up_b // 2
@@ -195,7 +196,7 @@ def _level(
 def _harmonic_mean(
     stiffness: Float[np.ndarray, " n"], mass: Float[np.ndarray, " n"], labels: Int[np.ndarray, " n"]
 ) -> float:
-    """Return the level with which parts have as many low eigenvalues as each with its own (Weyl's law)."""
+    """Return the level that predicts the number of low eigenvalues of all parts (Weyl's law)."""
     levels = np.bincount(labels, stiffness) / np.bincount(labels, mass)
     counts, stiff = np.bincount(labels), levels > 0
     return float(counts[stiff].sum() / (counts[stiff] / levels[stiff]).sum())
@@ -237,13 +238,14 @@ def _ones(matrix: sp.csc_array) -> sp.csc_array:
 
 
 def _keys(matrix: sp.csc_array) -> Int[np.ndarray, " e"]:
-    """Return the place of each entry in a full matrix; they ascend where indices are sorted."""
+    """Return the place of each entry in a full matrix, ascending if indices are sorted."""
     n = matrix.shape[1]
     return np.repeat(np.arange(n) * n, np.diff(matrix.indptr)) + matrix.indices
 
 
 def _mass_floor(mass: sp.csc_array, diagonal: Float[np.ndarray, " n"]) -> float:
-    # B - cD is positive definite exactly when all its pivots are positive. Linear elements have c = 1/2.
+    # B - cD is positive definite exactly when all its pivots are positive. Linear elements have c =
+    # 1/2.
     if (mass - sp.diags_array(diagonal)).count_nonzero() == 0:
         return 1.0
     pattern = _shift_pattern(mass, sp.csc_array(sp.diags_array(diagonal)))
@@ -264,7 +266,7 @@ def _mass_floor(mass: sp.csc_array, diagonal: Float[np.ndarray, " n"]) -> float:
 def rayleigh_residuals(
     pencil: Pencil, vectors: Float[np.ndarray, "n k"]
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
-    """Return Rayleigh quotients of the columns, and the bounds that `residual_norms` has for them."""
+    """Return Rayleigh quotients of the columns and their error bounds (`residual_norms`)."""
     return _residuals(pencil, vectors, None)
 
 
@@ -282,7 +284,7 @@ def _residuals(
     pencil: Pencil, vectors: Float[np.ndarray, "n k"], given: Float[np.ndarray, " k"] | None
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     values, norms = np.empty(vectors.shape[1]), np.empty(vectors.shape[1])
-    # One type of indices, whatever SciPy chose: the loop is compiled once.
+    # One type of indices, whatever SciPy chose, so that the loop is compiled once.
     matrices = tuple(
         (part.indptr.astype(np.int64), part.indices.astype(np.int64), part.data)
         for part in (pencil.stiffness, pencil.mass)
@@ -304,12 +306,15 @@ def _residuals(
 
 
 def column_chunks(k: int) -> list[slice]:
-    """Cut k columns into slices of few enough that what is computed of them stays small."""
+    """Split k columns into slices, so that intermediate results stay small."""
     return [slice(start, min(start + COLUMNS_AT_ONCE, k)) for start in range(0, k, COLUMNS_AT_ONCE)]
 
 
 def to_user_vectors(pencil: Pencil, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
-    """Return the vectors in the user's units, with the sign that `Spectrum` promises, read-only and in their place."""
+    """Convert vectors in place to the user's units and the signs of `Spectrum`.
+
+    The result is read-only.
+    """
     vectors = np.ascontiguousarray(vectors)
     signs = np.ones(vectors.shape[1])
     for columns in column_chunks(vectors.shape[1]):

@@ -1,10 +1,10 @@
-"""Compiled loop of `pencil`: what Rayleigh quotients and residuals sum over points, in one pass over the vectors."""
+"""Compiled loop of `pencil`: the sums in Rayleigh quotients and residuals, in one pass."""
 
 from typing import no_type_check
 
 from eigenshape._compile import njit
 
-ROWS = 256  # whose sums are added up before they are added to those of others, for accuracy
+ROWS = 256  # rows whose sums are added up separately first, for accuracy
 
 
 @njit
@@ -12,9 +12,9 @@ ROWS = 256  # whose sums are added up before they are added to those of others, 
 def add_sums(stiffness, mass, vectors, values, weights, with_residuals, images, part, sums):
     """Add φᵀWφ, φᵀBφ and Σ (Wφ - λBφ)² / weights of each column to the rows of `sums`; W and B are symmetric.
 
-    W and B are given by int64 pointers and indices and by their entries, `values` are the λ. Without residuals these
-    do not matter, and the last row stays as it is. `images` (2, k) and `part`
-    (3, k), filled with 0, are scratch: one loop for both uses compiles in half the time of two.
+    W and B are given by int64 pointers, indices and entries; `values` are the λ. Without residuals
+    the values are not used and the last row of `sums` does not change. `images` (2, k) and `part`
+    (3, k), filled with 0, are scratch. One loop for both uses compiles in half the time of two.
     """
     n, k = vectors.shape
     for i in range(n):

@@ -185,7 +185,7 @@ export class Viewer {
     this.legend?.remove();
     this.legend = null;
     this.labels = null;
-    uniforms.coloring!.value = values && o ? 1 : 0;
+    this.setColoring(values && o ? 1 : 0);
     if (values && o) {
       this.replace("value", values);
       const colors = colorMap(o.map);
@@ -211,7 +211,14 @@ export class Viewer {
       if (label >= 0) paint.set(palette.subarray(3 * label, 3 * label + 3), 3 * vertex);
     });
     this.replace("paint", paint);
-    this.surface.material.uniforms.coloring!.value = 2;
+    this.setColoring(2);
+  }
+
+  private setColoring(kind: number): void {
+    const { material } = this.surface;
+    if (material.defines.COLORING === kind) return;
+    material.defines.COLORING = kind;
+    material.needsUpdate = true;
   }
 
   /** Tint vertices. Each layer has its own vertices and color. */
@@ -393,7 +400,6 @@ export class Viewer {
   private startControls(): OrbitControls {
     const controls = new OrbitControls(this.camera, this.canvas);
     controls.zoomToCursor = true;
-    controls.keyPanSpeed = 12;
     controls.addEventListener("change", () => this.invalidate());
     controls.addEventListener("end", () => {
       const [position, target] = [this.camera.position.toArray(), controls.target.toArray()];
@@ -433,8 +439,25 @@ export class Viewer {
       from = null;
       taken = false;
     };
+    this.canvas.addEventListener("keydown", (event) => this.turnByKey(event));
     this.canvas.addEventListener("pointerup", finish);
     this.canvas.addEventListener("pointercancel", finish);
+  }
+
+  private turnByKey(event: KeyboardEvent): void {
+    const { controls } = this;
+    const actions: Record<string, () => void> = {
+      ArrowLeft: () => controls.rotateLeft(0.1),
+      ArrowRight: () => controls.rotateLeft(-0.1),
+      ArrowUp: () => controls.rotateUp(0.1),
+      ArrowDown: () => controls.rotateUp(-0.1),
+      "+": () => controls.dollyIn(1.1),
+      "-": () => controls.dollyOut(1.1),
+    };
+    if (!actions[event.key]) return;
+    event.preventDefault();
+    actions[event.key]!();
+    controls.dispatchEvent({ type: "end" });
   }
 
   private surfaceMaterial(plain: string): three.ShaderMaterial {
@@ -443,9 +466,9 @@ export class Viewer {
       side: three.DoubleSide,
       vertexShader: SURFACE_VERTEX,
       fragmentShader: SURFACE_FRAGMENT,
+      defines: { COLORING: 0 },
       uniforms: {
         ...this.motion,
-        coloring: { value: 0 },
         table: { value: null },
         range: { value: new three.Vector2(0, 1) },
         nodal: { value: false },
