@@ -1,5 +1,6 @@
 """A real server against hostile requests: none is accepted, and none stops it."""
 
+import asyncio
 import json
 import os
 import re
@@ -7,8 +8,8 @@ import socket
 import struct
 import subprocess
 import sys
+import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
 from urllib.parse import urlsplit
 
 import httpx
@@ -17,8 +18,10 @@ import pytest
 from conftest import stretched_ball
 
 import eigenshape as es
-from eigenshape_studio.server import serve
+from eigenshape_studio.guard import Rules, local_hosts
+from eigenshape_studio.server import MOST_CALLS, make_app, serve
 from eigenshape_studio.wire import decode, encode
+from eigenshape_studio.workspace import Answer
 
 # The studio with limits that tests can reach within a second or two.
 SCRIPT = """
@@ -43,7 +46,7 @@ class Server:
         self.port, self.token = parts.port, parts.query.removeprefix("token=")
         self.base = f"http://127.0.0.1:{self.port}"
         self.cookie = f"eigenshape-studio-{self.port}={self.token}"
-        self.client = httpx.Client(base_url=self.base, timeout=60)
+        self.client = httpx.Client(base_url=self.base, timeout=300)
 
     def call(self, name, meta=None, arrays=None, tab=TAB):
         kind = {"content-type": "application/octet-stream", "x-eigenshape-tab": tab}
@@ -111,7 +114,7 @@ def server(tmp_path_factory):
 
 
 def test_the_printed_address_becomes_a_cookie(server):
-    answer = httpx.get(server.url)
+    answer = httpx.get(server.url, timeout=60)
     assert (answer.status_code, answer.headers["location"]) == (303, "/")
     cookie = answer.headers["set-cookie"]
     assert {"HttpOnly", "SameSite=Strict"} <= set(cookie.split("; "))
@@ -137,24 +140,49 @@ def test_tabs_are_apart_and_the_oldest_is_dropped(server):
     assert server.state(tabs[0])["n_vertices"] == 162
 
 
-def test_the_work_of_one_tab_does_not_stop_another(server):
-    wait_for_rig(server)
-    with ThreadPoolExecutor() as threads:
-        work = threads.submit(
-            server.call, "array", {"name": "brackets", "stop": 100}, None, "busy-tab"
-        )
-        began = time.perf_counter()
-        server.state("quiet-tab")
-        seconds = time.perf_counter() - began
-        assert work.result().status_code == 200
-    assert seconds < 5
+class SlowWorkspace:
+    """A workspace whose searches last until they are let go."""
+
+    def __init__(self):
+        self.begun, self.let_go = threading.Semaphore(0), threading.Event()
+
+    def fork(self):
+        return self
+
+    def answer(self, call, _message):
+        if call == "query":
+            self.begun.release()
+            assert self.let_go.wait(60)
+        return Answer(encode({"call": call}), 200)
 
 
-def wait_for_rig(server):
-    end = time.monotonic() + 120
-    while server.state()["deformation"]["status"] == "running":
-        assert time.monotonic() < end
-        time.sleep(0.2)
+def test_the_work_of_one_tab_does_not_stop_another():
+    slow = SlowWorkspace()
+    rules = Rules("secret", local_hosts(5000), 5000)
+    cookie = {"cookie": "eigenshape-studio-5000=secret", "content-type": "application/octet-stream"}
+
+    async def run():
+        transport = httpx.ASGITransport(make_app(slow, rules))
+        async with httpx.AsyncClient(
+            transport=transport, base_url="http://127.0.0.1:5000", headers=cookie
+        ) as client:
+
+            async def call(name, tab):
+                headers = {"x-eigenshape-tab": tab}
+                answer = await client.post(f"/api/{name}", headers=headers, content=encode({}))
+                return answer.status_code
+
+            searches = [asyncio.create_task(call("query", "busy-tab")) for _ in range(MOST_CALLS)]
+            for _ in searches:
+                while not slow.begun.acquire(blocking=False):
+                    await asyncio.sleep(0.01)
+            assert await call("meta", "quiet-tab") == 200
+            assert await call("meta", "busy-tab") == 429
+            slow.let_go.set()
+            assert await asyncio.gather(*searches) == [200] * MOST_CALLS
+            assert await call("meta", "busy-tab") == 200
+
+    asyncio.run(run())
 
 
 def ply_of(vertices, face="3 0 1 2", n_vertices=3, n_faces=1):
@@ -376,7 +404,7 @@ def test_the_command_prints_the_address(tmp_path):
         url = re.fullmatch(r"The studio is open at (http://127\.0\.0\.1:\d+/\?token=\S+)\n", line)[
             1
         ]
-        assert httpx.get(url).status_code == 303
+        assert httpx.get(url, timeout=60).status_code == 303
     finally:
         process.terminate()
         process.communicate(timeout=20)

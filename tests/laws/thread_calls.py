@@ -545,4 +545,5 @@ CALLS: dict[str, Callable[[Shared], object]] = {
 LEFT_OUT = {
     "build_index": "It starts processes, which take seconds to import; it writes to an index, which admits one writer.",
     "train_codebook_from_files": "It starts processes, which take seconds to import.",
+    "view": "It shows a widget of the studio, which is a package of its own.",
 }

@@ -1,7 +1,7 @@
 """A mesh, and what is computed of it in the background."""
 
 import copy
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -40,6 +40,8 @@ class Analysis:
         self.mesh = mesh
         self.name = name
         self._n_modes = n_modes
+        # The first that a page asks for; it has begun when the browser opens.
+        self._upright: Job[dict[str, Any]] = Job(lambda _: frame_shape(mesh), shared=True)
         self.health: Job[dict[str, Any]] = Job(lambda _: assess_health(mesh), shared=shared)
         self.spectrum: Job[es.Spectrum] = Job(self._solve_default, shared=shared)
         solved = self.spectrum
@@ -69,15 +71,12 @@ class Analysis:
         """Return an analysis of the same mesh that shares the jobs which have been started."""
         return copy.copy(self)
 
-    @cached_property
     def view(self) -> dict[str, Any]:
-        """How to look at the mesh: center and diagonal of its box, its upward axis and its front."""
-        low, high = self.mesh.vertices.min(axis=0), self.mesh.vertices.max(axis=0)
-        return {
-            "center": ((low + high) / 2).tolist(),
-            "extent": float(np.linalg.norm(high - low)),
-            **upright_view(self.mesh),
-        }
+        """Return how to look at the mesh: center and diagonal of its box, up and front."""
+        self._upright.wait()
+        if self._upright.result is None:
+            raise self._upright.error or es.EigenshapeError("The view was cancelled.")
+        return self._upright.result
 
     @cached_property
     def areas(self) -> np.ndarray:
@@ -127,6 +126,16 @@ def _rig(mesh: es.TriangleMesh, solved: Job[es.Spectrum]) -> es.deformation.Eige
     return es.rig_shape(mesh, solved.result)
 
 
+def frame_shape(mesh: es.TriangleMesh) -> dict[str, Any]:
+    """Return center and diagonal of the box of a mesh, and how it stands upright."""
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    return {
+        "center": ((low + high) / 2).tolist(),
+        "extent": float(np.linalg.norm(high - low)),
+        **upright_view(mesh),
+    }
+
+
 def upright_view(mesh: es.TriangleMesh) -> dict[str, list[float]]:
     """Return the upward axis of a shape, and its front, which is level."""
     right, down, towards = es.plot.three_quarter_view(mesh).rotation
@@ -138,6 +147,22 @@ def upright_view(mesh: es.TriangleMesh) -> dict[str, list[float]]:
     along /= np.linalg.norm(along)
     front = np.cos(ASIDE) * along - np.sin(ASIDE) * np.cross(up, along)
     return {"up": up.tolist(), "front": front.tolist()}
+
+
+@cache
+def warm_up() -> Job[None]:
+    """Load or compile the loops that the first drag takes, on a small shape, once a process.
+
+    Without this the first drag took 11 s where nothing was compiled before, and then 1 s.
+    """
+    return Job(lambda _: _drag_a_ball(), shared=True)
+
+
+def _drag_a_ball() -> None:
+    ball = es.icosphere(1)
+    session = es.DeformationSession(es.rig_shape(ball))
+    session.drag(ball.vertices[:, 2] > 0, es.Translation([0.0, 0.0, 0.1]))
+    es.geometry.self_intersections(session.commit())
 
 
 def assess_health(mesh: es.TriangleMesh) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from starlette.routing import Route
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 import eigenshape as es
+from eigenshape_studio.analysis import warm_up
 from eigenshape_studio.bundle import NotBuiltError, read_static
 from eigenshape_studio.guard import App, Guard, Rules, local_hosts
 from eigenshape_studio.workspace import Answer, Workspace, error_message
@@ -190,6 +191,7 @@ def serve(  # noqa: PLR0913  one for each option of the command
             "Pass allow_remote=True (--allow-remote) if others may use it."
         )
     first = _first_workspace(mesh, index)
+    warm_up()
     listening = _listen(host, port)
     port = listening.getsockname()[1]
     token = secrets.token_urlsafe(32)

@@ -164,7 +164,7 @@ class Workspace:
             "name": analysis.name,
             "n_vertices": analysis.mesh.n_vertices,
             "n_faces": analysis.mesh.n_faces,
-            **analysis.view,
+            **analysis.view(),
             "capabilities": capabilities,
             "health": analysis.health_facts(),
             "values": [_field_facts(name, field) for name, field in self.fields.items()],
