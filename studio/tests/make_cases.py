@@ -29,7 +29,7 @@ def _pack(colors: np.ndarray) -> str:
 
 
 def cases() -> dict:
-    """Return parts, heat and colors of small shapes, as the library computes them."""
+    """Return parts and heat of small shapes, as the library computes them."""
     mesh = _bumpy_sphere()
     found = es.find_parts(mesh)
     pair = es.geometry.disjoint_union(mesh, es.icosphere(1))
@@ -43,7 +43,6 @@ def cases() -> dict:
         np.exp(-times[0] * spectrum.eigenvalues) * spectrum.eigenvectors[source]
     )
     weights = spectrum.eigenvectors[:, :5].T @ (spectrum.mass @ mesh.vertices)
-    values = np.linspace(-2.0, 3.0, 37)
     return {
         "trees": [_tree_case(found.tree), _tree_case(waves)],
         "heat": {
@@ -58,10 +57,6 @@ def cases() -> dict:
             "lowpass5": _plain((spectrum.eigenvectors[:, :5] @ weights).ravel()),
         },
         "deformation": _deformation_case(mesh),
-        "colors": {
-            "values": _plain(values),
-            "viridis": es.plot.value_colors(values).ravel().tolist(),
-        },
     }
 
 

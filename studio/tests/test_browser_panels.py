@@ -244,6 +244,7 @@ def test_parts_equal_those_of_segment(page, mesh):
     move_slider(page, "n-parts", 5)
     colors = np.round(255 * palette(vertex_labels(page)))
     assert np.array_equal(vertex_values(page, "paint").reshape(-1, 3), colors)
+    check_picture_of_parts(page, mesh)
     check_clicks_on_parts(page, found)
 
 
@@ -252,6 +253,24 @@ def assert_parts(page, cut, tree, finest):
     part_of_region = np.full(len(tree.maxima), -1)
     part_of_region[tree.basins] = cut.labels
     assert np.array_equal(vertex_labels(page), part_of_region[finest])
+
+
+def check_picture_of_parts(page, mesh):
+    """Inside a part, light changes the color of its pixels only by a factor."""
+    image = picture(page).astype(float)
+    rows, columns = np.nonzero(binary_erosion(image[..., 3] == 255, iterations=4))
+    labels, n_compared = vertex_labels(page), 0
+    for place in np.linspace(0, len(rows) - 1, 40).astype(int):
+        at = [columns[place] + 0.5, rows[place] + 0.5]
+        face = page.evaluate("([x, y]) => eigenshape.viewer.pick(x, y).face", at)
+        parts = labels[mesh.faces[face]]
+        color = 255 * palette(parts)[0]
+        pixel = image[rows[place], columns[place], :3]
+        if len(set(parts)) == 1 and pixel.max() < 255:
+            light = (pixel @ color) / (color @ color)
+            assert np.abs(pixel - light * color).max() < 3
+            n_compared += 1
+    assert n_compared > 20
 
 
 def check_clicks_on_parts(page, found):

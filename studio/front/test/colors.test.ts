@@ -1,28 +1,21 @@
 import { expect, test } from "vitest";
-import { colorIndex, colorMap, cssColor, findRange, formatNumber, partColors } from "../src/core/colors";
-import cases from "./cases.json";
+import { colorMap, findRange, formatNumber, partColors } from "../src/core/colors";
 
-test("values have the library's colors", () => {
-  const { values, viridis } = cases.colors;
-  const table = colorMap("viridis");
-  const range = findRange(values);
-  const found = values.flatMap((value) => {
-    const index = colorIndex(value, range);
-    return [...table.slice(3 * index, 3 * index + 3)];
-  });
-  expect(found).toEqual(viridis);
-});
+test("a map has 256 colors", () => expect(colorMap("viridis").length).toBe(768));
 
 test("an unknown map is refused", () => expect(() => colorMap("jet")).toThrow("no color map jet"));
 
-test("part colors repeat after 18, and gray is not among them", () => {
-  const colors = partColors(19);
-  expect(cssColor(colors, 0)).toBe("rgb(31 119 180)");
-  expect(cssColor(colors, 18)).toBe(cssColor(colors, 0));
-  expect(new Set(Array.from({ length: 18 }, (_, i) => cssColor(colors, i))).size).toBe(18);
+test("part colors repeat after 18, all different", () => {
+  const colors = Array.from({ length: 19 }, (_, i) => partColors(19).slice(3 * i, 3 * i + 3).join());
+  expect(colors[0]).toBe("31,119,180");
+  expect(colors[18]).toBe(colors[0]);
+  expect(new Set(colors).size).toBe(18);
 });
 
-test("a constant has one color", () => expect(colorIndex(3, findRange([3, 3]))).toBe(0));
+test("the range of values", () => {
+  expect(findRange([2, -1, 3])).toEqual([-1, 3]);
+  expect(findRange([])).toEqual([0, 0]);
+});
 
 test("numbers are short and plain", () => {
   const pairs: [number, string][] = [

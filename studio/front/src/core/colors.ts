@@ -21,16 +21,6 @@ export function partColors(count: number): Uint8Array {
   return Uint8Array.from({ length: 3 * count }, (_, i) => PARTS[i % PARTS.length]!);
 }
 
-/** The place in a color map of 256 colors, as matplotlib finds it. */
-export function colorIndex(value: number, [low, high]: [number, number]): number {
-  const share = high > low ? (value - low) / (high - low) : 0;
-  return Math.min(255, Math.max(0, Math.floor(share * 256)));
-}
-
-export function cssColor(table: Uint8Array, index: number): string {
-  return `rgb(${table.slice(3 * index, 3 * index + 3).join(" ")})`;
-}
-
 /** A number with four digits, short enough for a legend; 0 for what is only rounding beside `scale`. */
 export function formatNumber(value: number, scale = Math.abs(value)): string {
   if (!Number.isFinite(value)) return value > 0 ? "∞" : value < 0 ? "−∞" : "–";

@@ -31,12 +31,12 @@ export class HeatPanel extends ColoringPanel {
     });
     choice.press(this.view);
     this.time.setRange(0, STEPS);
-    this.time.show(STEPS / 2, "");
     this.results = h("div", {}, choice.element, this.time.element, this.explained);
   }
 
   build(app: App): HTMLElement {
     this.app = app;
+    this.time.show(app.settings.get("heat-time", STEPS / 2), "");
     app.viewer.onPick(({ vertex }) => {
       if (!this.active || this.view !== "source") return;
       this.source = vertex;
@@ -70,6 +70,7 @@ export class HeatPanel extends ColoringPanel {
     if (!this.modes.length || !times) return;
     const { viewer } = this.app;
     const { modes, eigenvalues, source } = this;
+    this.app.settings.set("heat-time", this.time.value);
     const share = this.time.value / STEPS;
     const time = times[0] ** (1 - share) * times[1] ** share;
     this.time.show(this.time.value, `${formatNumber(time)} length²`);

@@ -84,7 +84,7 @@ export class PartsPanel extends ColoringPanel {
       this.level.setRange(0, STEPS);
       this.maximum.setRange(0, this.diagram.length / 4 - 1);
       this.plotDiagram();
-      this.cut({ count: state.parts.n_regions });
+      this.cut({ count: this.app.settings.get(`parts of ${state.name}`, state.parts.n_regions) });
     }
     this.paint();
   }
@@ -99,6 +99,7 @@ export class PartsPanel extends ColoringPanel {
     const { parts, kept } = cutTree(this.merges, rule);
     this.labels = relabel(this.finest, parts);
     this.nParts = kept.length;
+    this.app.settings.set(`parts of ${this.app.state.name}`, kept.length);
     // The level of a number: the persistence of the last part that has not merged.
     const merged = this.merges.count - kept.length;
     const last = this.levels[this.levels.length - merged - 1] ?? this.levelAt(STEPS);
@@ -119,11 +120,8 @@ export class PartsPanel extends ColoringPanel {
   }
 
   private describePart(): string {
-    let [inside, all] = [0, 0];
-    this.labels.forEach((label, vertex) => {
-      all += this.areas[vertex]!;
-      if (label === this.part) inside += this.areas[vertex]!;
-    });
+    const all = this.areas.reduce((sum, area) => sum + area, 0);
+    const inside = this.areas.reduce((sum, area, i) => sum + (this.labels[i] === this.part ? area : 0), 0);
     return `Part ${this.part}: ${((100 * inside) / all).toFixed(1)} % of the area.`;
   }
 

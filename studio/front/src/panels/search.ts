@@ -38,9 +38,7 @@ export class SearchPanel implements Panel {
     if (state.shape !== this.shape) this.clear();
   }
 
-  hidden(): void {
-    this.closeMatch();
-  }
+  hidden = (): void => this.closeMatch();
 
   /** The file becomes the shape, so that what is searched with is what is seen. */
   private searchFile(name: string, file: Uint8Array): void {

@@ -85,9 +85,8 @@ export class ShapePanel extends ColoringPanel {
     const { viewer, state } = this.app;
     const chosen = state.values.find(({ name }) => name === this.values.value);
     if (!chosen) return viewer.setScalars(null);
-    const { name, title, unit, min, max } = chosen;
-    const values = await this.latest(this.get<Float32Array>(`values/${name}`));
-    viewer.setScalars(values, { map: "viridis", range: [min, max], title, unit });
+    const values = await this.latest(this.get<Float32Array>(`values/${chosen.name}`));
+    viewer.setScalars(values, { ...chosen, map: "viridis", range: [chosen.min, chosen.max] });
   }
 
   private open({ name, bytes }: { name: string; bytes: Uint8Array }): void {

@@ -50,6 +50,7 @@ export class SpectrumPanel extends ColoringPanel {
 
   build(app: App): HTMLElement {
     this.app = app;
+    this.index = app.settings.get("eigenfunction", 1);
     const solve = () => app.change({ kind: "solve", k: this.k.valueAsNumber }, "Starting to solve").catch(() => {});
     this.solver.append(button("Solve", "solve", "Compute the lowest eigenpairs", solve));
     this.solver.hidden = this.bracket.hidden = !app.state.capabilities.includes("solve");
@@ -67,12 +68,14 @@ export class SpectrumPanel extends ColoringPanel {
     this.proof.textContent = spectrum.certificate;
     this.proof.classList.toggle("complete", spectrum.complete);
     this.k.max = String(state.n_vertices);
+    this.k.valueAsNumber = Math.min(this.k.valueAsNumber, state.n_vertices);
     super.refresh(state);
   }
 
   override hidden(): void {
     super.hidden();
-    this.unbend().catch((error) => this.app.fail(error));
+    const restored = this.unbend().then((points) => points && this.app.viewer.setVertices(points));
+    restored.catch((error) => this.app.fail(error));
   }
 
   protected async show(): Promise<void> {
@@ -93,17 +96,16 @@ export class SpectrumPanel extends ColoringPanel {
   /** Return the shape that the first modes express; Σ φ_i ⟨φ_i, x⟩. */
   private async smoothShape(count: number): Promise<Float32Array> {
     this.bent = true;
-    const names = ["vertices", "modes", "areas"];
-    const [vertices, modes, areas] = await Promise.all(names.map((name) => this.get<Float32Array>(name)));
-    return lowpass(vertices!, modes!, areas!, count);
+    const kept = ["modes", "areas"].map((name) => this.get<Float32Array>(name));
+    const [modes, areas] = await Promise.all(kept);
+    const { data } = await this.app.backend.array("vertices"); // of the present pose
+    return lowpass(data as Float32Array, modes!, areas!, count);
   }
 
   private async unbend(): Promise<Float32Array | null> {
     if (!this.bent) return null;
     this.bent = false;
-    const { data } = await this.app.backend.array("vertices");
-    this.app.viewer.setVertices(data as Float32Array);
-    return null;
+    return (await this.app.backend.array("vertices")).data as Float32Array;
   }
 
   private plotValues(eigenvalues: Float64Array): void {
@@ -145,6 +147,7 @@ export class SpectrumPanel extends ColoringPanel {
   }
 
   private select(index: number): void {
+    this.app.settings.set("eigenfunction", index);
     this.showIndex(index);
     this.start();
   }
