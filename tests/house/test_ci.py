@@ -10,8 +10,9 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def test_ci_sets_nothing_that_the_readme_does_not():
     readme_part = (ROOT / ".ci" / "run").read_text().split("kernel=$(")[0]
-    # real shapes must be there, and the environment is a new one
+    # real shapes and a browser must be there, and the environment is a new one
     assert set(re.findall(r"^\s*export (\w+)=", readme_part, re.MULTILINE)) == {
+        "EIGENSHAPE_REQUIRE_BROWSER",
         "EIGENSHAPE_REQUIRE_DATA",
         "PATH",
     }
