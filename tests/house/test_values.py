@@ -9,7 +9,7 @@ import pytest
 from public_names import public_things
 
 import eigenshape as es
-from eigenshape._text import LONGEST, html_repr, short_repr
+from eigenshape._text import LONGEST, html_repr, repr_of_changes, short_repr
 
 CLASSES = [
     thing
@@ -52,7 +52,8 @@ def test_short_entries_stand_in_full_and_long_ones_with_their_shape():
 def test_every_value_has_a_table_for_notebooks_and_a_short_text(kind):
     assert kind._repr_html_.__qualname__ == html_repr.__qualname__
     made = kind.__repr__
-    assert made.__qualname__ in (short_repr.__qualname__, f"{kind.__name__}.__repr__")
+    short = (short_repr.__qualname__, repr_of_changes.__qualname__)
+    assert made.__qualname__ in (*short, f"{kind.__name__}.__repr__")
     # What dataclasses generate prints arrays in full, so it is for a few numbers and texts alone.
     if inspect.unwrap(made).__code__.co_filename == "<string>":
         assert len(dataclasses.fields(kind)) <= 10
