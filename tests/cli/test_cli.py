@@ -168,7 +168,7 @@ def test_features(zoo, tmp_path):
     widest = int(np.argmax(np.subtract(lengths, [*lengths[1:], 0])))
     assert len(run_json("features", path, "--largest-gap")["features"]) == widest + 2
     refused = run("features", path, "--largest-gap", "--persistence", 1, code=1)
-    assert "exactly one of n_regions, persistence and largest_gap" in " ".join(
+    assert "at most one of --n-parts, --persistence, --largest-gap" in " ".join(
         refused.stderr.split()
     )
 
