@@ -13,13 +13,15 @@ from eigenshape._arrays import positive_values, whole_numbers
 from eigenshape._errors import InvalidShapeError
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
-from eigenshape.geometry.geodesic_loops import spread_wave
+from eigenshape.geometry.geodesic_loops import spread_wave, spread_waves
 from eigenshape.geometry.simplices import in_length, scaled_corners
 from eigenshape.geometry.simplicial import Mesh
 
 # Sources of one task of the thread pool: enough that starting a task costs nothing beside it, few
 # enough that all cores have work.
 SOURCES_PER_TASK = 256
+# Waves over all vertices for which a task has room at a time.
+WAVES_OF_ROOM = 2
 
 # Where the triangles at each vertex start, their other two corners, and three lengths of each.
 Fans = tuple[
@@ -75,20 +77,27 @@ def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
     corners, scale = scaled_corners(mesh)
     fans, n = _fans(mesh, corners), mesh.n_points
 
-    def waves_from(first: int) -> list[tuple[Int[np.ndarray, " r"], Float[np.ndarray, " r"]]]:
-        scratch, reached, distances = _scratch(fans, 1), np.empty(n, dtype=np.int64), np.empty(n)
+    def waves_from(first: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        sources = np.arange(first, min(first + SOURCES_PER_TASK, n))
+        scratch, counts = _scratch(fans, 1), np.empty(len(sources), dtype=np.int64)
+        # Room for the longest wave, and for many short ones in each compiled call.
+        reached, distances = (
+            np.empty(WAVES_OF_ROOM * n, dtype=np.int64),
+            np.empty(WAVES_OF_ROOM * n),
+        )
         waves = []
-        for source in np.arange(first, min(first + SOURCES_PER_TASK, n)):
-            sources = np.array([source])
-            count = spread_wave(fans, radius / scale, sources, scratch, reached, distances)
-            waves.append((reached[:count].copy(), distances[:count].copy()))
+        while len(sources):
+            done = spread_waves(fans, radius / scale, sources, scratch, counts, reached, distances)
+            total = counts[:done].sum()
+            waves.append((counts[:done].copy(), reached[:total].copy(), distances[:total].copy()))
+            sources = sources[done:]
         return waves
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         tasks = pool.map(waves_from, range(0, n, SOURCES_PER_TASK))
-        columns, values = zip(*chain.from_iterable(tasks), strict=True)
-    rows = np.concatenate([[0], np.cumsum([len(row) for row in columns])])
-    distances, columns = np.concatenate(values), np.concatenate(columns)
+        parts = zip(*chain.from_iterable(tasks), strict=True)
+        counts, columns, distances = (np.concatenate(part) for part in parts)
+    rows = np.concatenate([[0], np.cumsum(counts)])
     found = sp.csr_array((in_length(distances, scale, 1), columns, rows), shape=(n, n))
     found.sort_indices()
     # An entry that only one direction has is 0 in the other, and the minimum removes it.

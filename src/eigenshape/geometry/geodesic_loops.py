@@ -131,6 +131,25 @@ def spread_wave(fans, radius, sources, scratch, reached, distances):
 
 @njit
 @no_type_check
+def spread_waves(fans, radius, sources, scratch, counts, reached, distances):
+    """Spread one wave from each source, and return for how many sources there was room.
+
+    Wave i fills the next counts[i] entries of `reached` and `distances`. It begins only if a wave
+    over all vertices would fit there. The other arguments are those of `spread_wave`.
+    """
+    total, n = 0, len(fans[0]) - 1
+    for i in range(len(sources)):
+        if total + n > len(reached):
+            return i
+        counts[i] = spread_wave(
+            fans, radius, sources[i : i + 1], scratch, reached[total:], distances[total:]
+        )
+        total += counts[i]
+    return len(sources)
+
+
+@njit
+@no_type_check
 def _rise(keys, ids, height, key, vertex):
     place = height
     while place:
