@@ -46,7 +46,9 @@ class Server:
         self.port, self.token = parts.port, parts.query.removeprefix("token=")
         self.base = f"http://127.0.0.1:{self.port}"
         self.cookie = f"eigenshape-studio-{self.port}={self.token}"
-        self.client = httpx.Client(base_url=self.base, timeout=300)
+        # The server closes a connection that waits for a second, perhaps as a call is sent.
+        a_connection_each = httpx.Limits(max_keepalive_connections=0)
+        self.client = httpx.Client(base_url=self.base, timeout=300, limits=a_connection_each)
 
     def call(self, name, meta=None, arrays=None, tab=TAB):
         kind = {"content-type": "application/octet-stream", "x-eigenshape-tab": tab}
