@@ -1,3 +1,4 @@
+from . import calculus as calculus
 from . import deformation as deformation
 from . import features as features
 from . import geometry as geometry

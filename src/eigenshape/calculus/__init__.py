@@ -1,0 +1,5 @@
+"""Calculus on meshes: derivatives, equations, distances along the surface, and flows."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

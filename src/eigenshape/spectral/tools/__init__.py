@@ -1,0 +1,1 @@
+"""What spectra are used for: projection, embeddings, clustering, compression, watermarks."""
