@@ -42,8 +42,8 @@ p 1
 
 
 def turned(faces):
-    """Return the faces in an order of their own, each begun with its lowest corner."""
-    return sorted(np.roll(face, -int(np.argmin(face))).tolist() for face in faces)
+    """Return the faces in an order of their own, each begun so that its corners read lowest."""
+    return sorted(min(np.roll(face, shift).tolist() for shift in range(3)) for face in faces)
 
 
 def lines(data, keyword):
