@@ -136,6 +136,8 @@ def test_jupyterlab_shows_the_widget(lab):
         page.on("pageerror", lambda error: seen.append(str(error)))
         page.goto(lab)
         page.locator(".jp-Notebook .jp-Cell").first.click(timeout=60_000)
+        # A cell that is run before the kernel has answered is sometimes never sent.
+        page.locator(".jp-Notebook-ExecutionIndicator[data-status=idle]").wait_for(timeout=120_000)
         page.keyboard.press("Shift+Enter")
         canvas = page.locator(".jp-OutputArea canvas").first
         canvas.wait_for(timeout=120_000)

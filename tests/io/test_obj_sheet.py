@@ -42,8 +42,8 @@ p 1
 
 
 def turned(faces):
-    """Return the faces in an order of their own, each begun with its lowest corner."""
-    return sorted(np.roll(face, -int(np.argmin(face))).tolist() for face in faces)
+    """Return the faces in an order of their own, each begun so that its corners read lowest."""
+    return sorted(min(np.roll(face, shift).tolist() for shift in range(3)) for face in faces)
 
 
 def lines(data, keyword):
@@ -100,7 +100,7 @@ def test_polygons_turn_over_shrink_to_triangles_and_holes_are_sealed():
 
 
 @pytest.mark.long
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(data=st.data())
 def test_what_is_written_reads_back_as_the_mesh_whatever_was_repaired(data):
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))

@@ -38,7 +38,7 @@ from eigenshape.spectral.laws.transformations import random_rotation
 
 seeds = st.integers(0, 2**32 - 1)
 few = settings(deadline=None, max_examples=8)
-many = settings(deadline=None, max_examples=20)
+many = settings(deadline=None, max_examples=10)
 
 
 def turned(points, rng, noise):
