@@ -1,6 +1,7 @@
 """Symmetric systems of equations on points: factored once, solved for many right-hand sides."""
 
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -32,6 +33,8 @@ SINGULAR = (
 )
 # Constraints count as met up to this share of their terms.
 MET = 1e-8
+
+SparseMatrix: TypeAlias = sp.sparray | sp.spmatrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,11 +184,12 @@ class LinearSolver:
 
     def floating_sums(self, load: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "u k"]:
         """Return the sums of loads over each component that is determined up to a constant."""
-        inside = self.floating >= 0
+        points = np.flatnonzero(self.floating >= 0)
         count = int(self.floating.max(initial=-1)) + 1
-        numbers = self.floating[inside]
-        sums = [np.bincount(numbers, weights=each, minlength=count) for each in load[inside].T]
-        return np.stack(sums, axis=1)
+        members = sp.csr_array(
+            (np.ones(len(points)), (self.floating[points], points)), shape=(count, self.n_points)
+        )
+        return np.asarray(members @ load)
 
     def _without_means(self, found: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
         """Subtract the weighted mean over each floating component."""
@@ -277,9 +281,9 @@ class Constraints:
 
 
 def factor_equations(
-    matrix: sp.sparray,
+    matrix: SparseMatrix,
     fixed: ArrayLike | None = None,
-    constraints: sp.sparray | ArrayLike | None = None,
+    constraints: SparseMatrix | ArrayLike | None = None,
     *,
     weights: ArrayLike | None = None,
     indefinite: bool = False,
@@ -348,7 +352,7 @@ def factor_equations(
     return replace(solver, _constraints=_eliminate(solver, constraints))
 
 
-def _require_symmetric(matrix: sp.sparray) -> sp.csr_array:
+def _require_symmetric(matrix: SparseMatrix) -> sp.csr_array:
     if not sp.issparse(matrix) or matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
         raise InvalidParameterError(
             "The matrix of a system must be sparse and square; it is "
@@ -414,7 +418,7 @@ def _factor(
     return factor
 
 
-def _eliminate(solver: LinearSolver, constraints: sp.sparray | ArrayLike) -> Constraints:
+def _eliminate(solver: LinearSolver, constraints: SparseMatrix | ArrayLike) -> Constraints:
     """Prepare the small system of the multipliers and of the constants on floating components."""
     given = constraints if sp.issparse(constraints) else real_numbers(constraints, "constraints")
     matrix = (
