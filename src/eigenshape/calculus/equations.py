@@ -297,12 +297,12 @@ def solve_helmholtz(
     return solver.solve(_right_hand_side(laplacian, source, load), values=values)
 
 
-def solve_heat(
+def solve_heat(  # noqa: PLR0913 - one keyword for each part of the equation
     laplacian: Laplacian,
     start: ArrayLike,
     t: float,
-    *,
     n_steps: SupportsIndex = 1,
+    *,
     source: ArrayLike = 0.0,
     fixed: ArrayLike | None = None,
     values: ArrayLike = 0.0,
