@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 import eigenshape as es
 from eigenshape import calculus
@@ -96,8 +97,8 @@ def test_the_gradient_on_the_sphere_is_of_first_order():
 def test_heat_steps_are_of_first_order_in_time():
     mesh = es.icosphere(2)
     laplacian = es.cotangent_laplacian(mesh)
-    spectrum = es.solve_spectrum(laplacian, 2)
-    mode, value = spectrum.eigenvectors[:, 1], spectrum.eigenvalues[1]
+    values, modes = eigh(laplacian.stiffness.toarray(), laplacian.mass.toarray())
+    mode, value = modes[:, 1], values[1]
     counts = np.array([4, 8, 16])
     errors = [
         np.abs(

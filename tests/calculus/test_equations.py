@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from scipy.linalg import eigh
 
 import eigenshape as es
 from eigenshape.calculus import (
@@ -89,8 +90,9 @@ def test_a_source_adds_heat_and_fixed_ends_let_it_out():
 
 
 def test_helmholtz_of_an_eigenfunction():
-    spectrum = es.solve_spectrum(es.cotangent_laplacian(BALL), 5)
-    value, mode = spectrum.eigenvalues[4], spectrum.eigenvectors[:, 4]
+    laplacian = es.cotangent_laplacian(BALL)
+    values, modes = eigh(laplacian.stiffness.toarray(), laplacian.mass.toarray())
+    value, mode = values[4], modes[:, 4]
     found = solve_helmholtz(es.cotangent_laplacian(BALL), 1.0, mode)
     np.testing.assert_allclose(found, mode / (value - 1.0), atol=1e-8)
 

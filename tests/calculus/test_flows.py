@@ -6,15 +6,15 @@ import pytest
 import eigenshape as es
 from eigenshape.calculus import mean_curvature_flow, taubin_smooth
 
-BALL = es.icosphere(3)
+BALL = es.icosphere(2)
 
 
 @pytest.mark.parametrize("conformal", [False, True])
 def test_a_sphere_shrinks_by_four_t(conformal):
-    found = mean_curvature_flow(BALL, 0.1, n_steps=40, conformal=conformal)
+    found = mean_curvature_flow(BALL, 0.1, n_steps=20, conformal=conformal)
     radii = np.linalg.norm(found.vertices, axis=1)
     # ∂r/∂t = -2/r; the conformal flow follows the same path on a sphere.
-    np.testing.assert_allclose(radii, np.sqrt(0.6), rtol=0.01)
+    np.testing.assert_allclose(radii, np.sqrt(0.6), rtol=0.02)
 
 
 def test_a_surface_with_boundary_goes_to_a_minimal_one():
@@ -25,7 +25,7 @@ def test_a_surface_with_boundary_goes_to_a_minimal_one():
     rim = es.geometry.boundary_vertices(square)
     np.testing.assert_array_equal(found.vertices[rim], hill.vertices[rim])
     assert abs(found.vertices[:, 2]).max() < 1e-6
-    free = mean_curvature_flow(hill, 0.1, fixed=[])
+    free = mean_curvature_flow(hill, 0.005, fixed=[])
     assert np.abs(free.vertices[rim] - hill.vertices[rim]).max() > 0.01
 
 
@@ -38,13 +38,13 @@ def test_flow_scales_exactly_with_the_unit():
 
 
 def test_taubin_smooths_noise_and_keeps_the_volume():
-    noise = 0.02 * np.random.default_rng(0).standard_normal(BALL.vertices.shape)
-    noisy = es.TriangleMesh(BALL.vertices + noise, BALL.faces)
-    smooth = taubin_smooth(noisy, 20)
-    kept = es.geometry.enclosed_volume(smooth) / es.geometry.enclosed_volume(BALL)
-    assert kept == pytest.approx(1.0, abs=0.01)
-    shrunk = taubin_smooth(noisy, 20, inflate=-0.5001)
-    assert es.geometry.enclosed_volume(shrunk) < es.geometry.enclosed_volume(smooth)
+    ball = es.icosphere(3)
+    noise = 0.02 * np.random.default_rng(0).standard_normal(ball.vertices.shape)
+    noisy = es.TriangleMesh(ball.vertices + noise, ball.faces)
+    smooth, shrunk = taubin_smooth(noisy), taubin_smooth(noisy, inflate=-1e-9 - 0.5)
+    whole, kept, more = (es.geometry.enclosed_volume(each) for each in (ball, smooth, shrunk))
+    assert abs(kept / whole - 1) < abs(more / whole - 1)
+    assert es.operators.noise_level(smooth) < 0.8 * es.operators.noise_level(noisy)
 
 
 def test_the_inside_of_a_solid_is_smoothed_and_its_boundary_stays():
@@ -61,8 +61,12 @@ def test_the_inside_of_a_solid_is_smoothed_and_its_boundary_stays():
 def test_wrong_arguments_are_named():
     with pytest.raises(es.InvalidParameterError, match="t must be positive"):
         mean_curvature_flow(BALL, 0.0)
-    with pytest.raises(es.InvalidShapeError, match="The flow must stop before the surface collaps"):
-        mean_curvature_flow(es.shapes.torus(24, 8), 1e9, n_steps=60)
+    with pytest.raises(es.InvalidShapeError, match="must stop before the surface collapses; after"):
+        mean_curvature_flow(BALL, 1e4, n_steps=5)
+    with pytest.raises(
+        es.InvalidShapeError, match="The flow must stop before faces collapse; after"
+    ):
+        mean_curvature_flow(es.shapes.torus(24, 8, inner=0.1), 0.01, n_steps=20)
     for steps in ({"shrink": 0.0}, {"shrink": 0.5, "inflate": -0.4}, {"inflate": 0.3}):
         with pytest.raises(es.InvalidParameterError, match="inflate below -shrink"):
             taubin_smooth(BALL, **steps)

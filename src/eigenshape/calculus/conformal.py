@@ -9,7 +9,7 @@ from jaxtyping import Complex, Float
 from eigenshape._arrays import real_numbers, whole_number
 from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
 from eigenshape._typing import ArrayLike
-from eigenshape.calculus.linear_solver import factor_equations
+from eigenshape.calculus.linear_solver import factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, face_areas, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
@@ -102,7 +102,7 @@ def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
     energy = _as_real(laplacian.stiffness - 2 * _area_form(mesh.n_vertices, rim))
     mass = sp.kron(laplacian.mass, sp.eye_array(2))
     shift = SHIFT * energy.diagonal().max() / mass.diagonal().max()
-    solver = factor_equations(energy + shift * mass)
+    solver = factor_definite(energy + shift * mass)
     on_rim = np.zeros(mesh.n_vertices)
     on_rim[rim] = 1.0
 
@@ -203,7 +203,7 @@ def map_to_sphere(mesh: MeshLike, *, n_steps: SupportsIndex = 500) -> Float[np.n
         if n_idle == PATIENCE:
             break
         mass = sp.diags_array(weights * factor)
-        points = factor_equations(mass + FLOW_STEP * stiffness).solve(mass @ points)
+        points = factor_definite(mass + FLOW_STEP * stiffness).solve(mass @ points)
     if least > ROUND:
         raise ConvergenceError(
             f"The flow must make the surface round within {most} steps; the radii of its vertices "

@@ -18,7 +18,12 @@ from eigenshape._arrays import (
 )
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._typing import ArrayLike
-from eigenshape.calculus.linear_solver import LinearSolver, SparseMatrix, factor_equations
+from eigenshape.calculus.linear_solver import (
+    LinearSolver,
+    SparseMatrix,
+    factor_definite,
+    factor_equations,
+)
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import boundary_facets
 from eigenshape.geometry.simplicial import SimplicialMesh
@@ -113,7 +118,9 @@ def helmholtz_solver(
     (kappa,) = finite_values(squared_wavenumber, "squared_wavenumber")
     weights = laplacian.mass.sum(axis=1)
     matrix = laplacian.stiffness - kappa * laplacian.mass
-    return factor_equations(matrix, fixed, weights=weights, indefinite=bool(kappa > 0))
+    if kappa == 0:
+        return factor_equations(matrix, fixed, weights=weights)
+    return factor_definite(matrix, fixed, indefinite=bool(kappa > 0))
 
 
 def heat_solver(laplacian: Laplacian, t: float, fixed: ArrayLike | None = None) -> LinearSolver:
@@ -155,7 +162,7 @@ def heat_solver(laplacian: Laplacian, t: float, fixed: ArrayLike | None = None) 
     """
     require_type(laplacian, Laplacian, "laplacian")
     (step,) = positive_values(t, "t")
-    return factor_equations(laplacian.mass + step * laplacian.stiffness, fixed)
+    return factor_definite(laplacian.mass + step * laplacian.stiffness, fixed)
 
 
 def remove_means(laplacian: Laplacian, values: ArrayLike) -> Float[np.ndarray, "n ..."]:
@@ -186,13 +193,14 @@ def remove_means(laplacian: Laplacian, values: ArrayLike) -> Float[np.ndarray, "
     [2.0, -1.0, -1.0, -1.0]
     """
     require_type(laplacian, Laplacian, "laplacian")
-    functions = point_functions(values, "values", laplacian.n_points)
+    left = point_functions(values, "values", laplacian.n_points)
     count, labels = connected_components(laplacian.stiffness, directed=False)
     weights = laplacian.mass.sum(axis=1)
     members = sp.csr_array((weights, (labels, np.arange(len(labels)))), shape=(count, len(labels)))
-    sums = members.sum(axis=1).reshape(-1, *[1] * (functions.ndim - 1))
-    means = (members @ functions) / sums
-    return functions - means[labels]
+    sums = members.sum(axis=1).reshape(-1, *[1] * (left.ndim - 1))
+    for _ in range(2):  # once more for the rounding of the first, where little is left
+        left = left - ((members @ left) / sums)[labels]
+    return left
 
 
 def solve_poisson(

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from eigenshape._arrays import finite_values, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._typing import ArrayLike
-from eigenshape.calculus.linear_solver import factor_equations
+from eigenshape.calculus.linear_solver import factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
@@ -21,6 +21,9 @@ from eigenshape.operators.graph import edge_graph
 # Steps of Taubin's filter, without unit: λ and μ of his paper's examples (0.33, -0.34) are weaker;
 # these give the pass band 1/λ + 1/μ = 0.1 that he recommends, with λ = 0.5.
 SHRINK, INFLATE = 0.5, -1 / 1.9
+# A surface of less than this share of its first size counts as a point: with implicit steps it
+# shrinks on and on without ever becoming one.
+COLLAPSED = 1e-6
 
 
 def mean_curvature_flow(
@@ -87,18 +90,23 @@ def mean_curvature_flow(
     step = time / count / scale / scale
     held = require_points(boundary_vertices(mesh) if fixed is None else fixed, mesh.n_vertices)
     held = np.unique(held)
-    first = operator = cotangent_laplacian(TriangleMesh(points, mesh.faces))
+    first = cotangent_laplacian(TriangleMesh(points, mesh.faces))
+    size = np.ptp(points, axis=0).max()
     for number in range(count):
-        if number:
-            try:
-                operator = cotangent_laplacian(TriangleMesh(points, mesh.faces))
-            except InvalidShapeError as err:
-                raise InvalidShapeError(
-                    "The flow must stop before the surface collapses; after step "
-                    f"{number} of {count} a face has no area. Pass a smaller t, or conformal=True."
-                ) from err
-        stiffness = first.stiffness if conformal else operator.stiffness
-        solver = factor_equations(operator.mass + step * stiffness, held)
+        if np.ptp(points, axis=0).max() < COLLAPSED * size:
+            raise InvalidShapeError(
+                "The flow must stop before the surface collapses; after step "
+                f"{number} of {count} it is a point. Pass a smaller t."
+            )
+        try:
+            operator = cotangent_laplacian(TriangleMesh(points, mesh.faces)) if number else first
+            stiffness = first.stiffness if conformal else operator.stiffness
+            solver = factor_definite(operator.mass + step * stiffness, held)
+        except (InvalidShapeError, InvalidParameterError) as err:
+            raise InvalidShapeError(
+                f"The flow must stop before faces collapse; after step {number} of {count} one "
+                "has no area, up to rounding. Pass a smaller t, or conformal=True."
+            ) from err
         points = solver.solve(operator.mass @ points, values=points[held] if len(held) else 0.0)
     return TriangleMesh(points * scale, mesh.faces)
 
