@@ -11,7 +11,7 @@ import eigenshape as es
 from eigenshape import calculus
 
 TORUS = es.shapes.torus(20, 12)
-BIPED = es.make_creature("biped", n_vertices=400)
+BIPED = es.make_creature("biped", n_vertices=800)
 SQUARE = es.shapes.grid(9, 7)
 BOX = es.shapes.box(3, 4, 3)
 
