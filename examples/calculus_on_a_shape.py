@@ -17,13 +17,14 @@ def main(folder: Path, *, n_vertices: int = 5000) -> dict[str, np.ndarray]:
     laplacian = es.cotangent_laplacian(giraffe)
     height = giraffe.vertices[:, 1]
 
-    # The smoothest function that is 0 where the feet stand and 1 at the highest vertex.
+    # The smoothest function that is 0 where the feet stand and 1 on the top of the head.
     feet = np.flatnonzero(height < np.quantile(height, 0.01))
-    fixed = np.append(feet, height.argmax())
-    values = np.append(np.zeros(len(feet)), 1.0)
+    top = np.flatnonzero(height > np.quantile(height, 0.95))
+    fixed = np.concatenate([feet, top])
+    values = np.concatenate([np.zeros(len(feet)), np.ones(len(top))])
     up = es.calculus.solve_harmonic(laplacian, fixed, values)
-    bands = np.floor(25 * up) / 25
-    picture = es.figure_field(giraffe, bands, "harmonic function, in bands")
+    bands = np.round(15 * up) / 15
+    picture = es.figure_field(giraffe, bands, "harmonic function, in bands", color_map="turbo")
     es.save_figure(picture, folder / "harmonic.png")
     levels = np.linspace(0.05, 0.95, 19)
     girths = np.array([es.calculus.level_set(giraffe, up, level).size for level in levels])
@@ -31,7 +32,7 @@ def main(folder: Path, *, n_vertices: int = 5000) -> dict[str, np.ndarray]:
     # Mean curvature times the size of the shape: positive where the surface bulges outward.
     curvature = es.geometry.principal_curvatures(giraffe).mean
     size = es.geometry.surface_area(giraffe) ** 0.5
-    shown = np.clip(curvature * size, -20, 20)
+    shown = np.clip(curvature * size, -15, 15)
     picture = es.figure_field(giraffe, shown, "mean curvature × √area", color_map="coolwarm")
     es.save_figure(picture, folder / "curvature.png")
 

@@ -31,6 +31,9 @@ from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators import elements
 from eigenshape.operators.laplacian import Laplacian
 
+# Differences from a mean up to this share of the value are the rounding of sums.
+ROUNDING = 8 * float(np.finfo(np.float64).eps)
+
 
 def poisson_solver(
     laplacian: Laplacian,
@@ -193,14 +196,16 @@ def remove_means(laplacian: Laplacian, values: ArrayLike) -> Float[np.ndarray, "
     [2.0, -1.0, -1.0, -1.0]
     """
     require_type(laplacian, Laplacian, "laplacian")
-    left = point_functions(values, "values", laplacian.n_points)
+    functions = point_functions(values, "values", laplacian.n_points)
     count, labels = connected_components(laplacian.stiffness, directed=False)
     weights = laplacian.mass.sum(axis=1)
     members = sp.csr_array((weights, (labels, np.arange(len(labels)))), shape=(count, len(labels)))
-    sums = members.sum(axis=1).reshape(-1, *[1] * (left.ndim - 1))
-    for _ in range(2):  # once more for the rounding of the first, where little is left
-        left = left - ((members @ left) / sums)[labels]
-    return left
+    sums = members.sum(axis=1).reshape(-1, *[1] * (functions.ndim - 1))
+    left = functions - ((members @ functions) / sums)[labels]
+    # What is rounding of a constant is removed, and where little is left, so is its own mean:
+    # a solver measures the balance of loads by their size.
+    left[np.abs(left) <= ROUNDING * np.abs(functions)] = 0.0
+    return left - ((members @ left) / sums)[labels]
 
 
 def solve_poisson(

@@ -380,8 +380,18 @@ def factor_system(
     rows = system[free]
     block, coupling = rows[:, free], rows[:, held]
     factor = _factor(block, free, indefinite=indefinite)
-    arrays = (freeze(each) for each in (free, held, floating, points, means))
-    return LinearSolver(n, *arrays, block, coupling, factor, indefinite)
+    return LinearSolver(
+        n_points=n,
+        free=freeze(free),
+        fixed=freeze(held),
+        floating=freeze(floating),
+        _given=freeze(points),
+        _weights=freeze(means),
+        _block=block,
+        _coupling=coupling,
+        _factor=factor,
+        _refined=indefinite,
+    )
 
 
 def _require_symmetric(matrix: SparseMatrix) -> sp.csr_array:
