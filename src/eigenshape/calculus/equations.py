@@ -31,8 +31,9 @@ from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators import elements
 from eigenshape.operators.laplacian import Laplacian
 
-# Differences from a mean up to this share of the value are the rounding of sums.
-ROUNDING = 8 * float(np.finfo(np.float64).eps)
+# Differences from a mean up to this share of the value are the rounding of sums of up to a million
+# numbers.
+ROUNDING = 1e-12
 
 
 def poisson_solver(
