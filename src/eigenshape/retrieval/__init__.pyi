@@ -31,5 +31,5 @@ from .store.batch import train_codebook_from_files as train_codebook_from_files
 from .store.index import Match as Match
 from .store.index import Record as Record
 from .store.index import ShapeIndex as ShapeIndex
-from .store.workers import Item as Item
-from .store.workers import Workers as Workers
+from .store.batch import Item as Item
+from .store.batch import Workers as Workers

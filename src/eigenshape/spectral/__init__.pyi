@@ -32,3 +32,10 @@ from .signatures.wave import wave_kernel_signature as wave_kernel_signature
 from .solve import solve_spectrum as solve_spectrum
 from .solver.certify import certify as certify
 from .spectrum import Spectrum as Spectrum
+from .tools.nodal import NodalDomains as NodalDomains
+from .tools.nodal import courant_bounds as courant_bounds
+from .tools.nodal import nodal_domains as nodal_domains
+from .tools.bundle import OperatorBundle as OperatorBundle
+from .tools.bundle import cache_operator_bundles as cache_operator_bundles
+from .tools.bundle import export_bundle as export_bundle
+from .tools.bundle import operator_bundle as operator_bundle

@@ -17,7 +17,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.retrieval.description import describe
 from eigenshape.retrieval.store.batch import build_index, content_digest
 from eigenshape.retrieval.store.index import ShapeIndex
-from eigenshape.retrieval.store.workers import Item, Workers
+from eigenshape._workers import Item, Workers
 
 
 @pytest.fixture

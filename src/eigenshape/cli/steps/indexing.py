@@ -12,7 +12,7 @@ from eigenshape.io.parsing import MESH_FORMATS
 from eigenshape.retrieval.kinds import AnyRecipe
 from eigenshape.retrieval.store.batch import BatchReport, build_index
 from eigenshape.retrieval.store.index import ShapeIndex
-from eigenshape.retrieval.store.workers import Item, Workers
+from eigenshape._workers import Item, Workers
 
 
 def find_items(sources: Sequence[Path]) -> list[Item]:

@@ -13,7 +13,7 @@ from eigenshape.retrieval.patches.codebook import default_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.store.batch import train_codebook_from_files
 from eigenshape.retrieval.store.index import ShapeIndex
-from eigenshape.retrieval.store.workers import Item, Workers
+from eigenshape._workers import Item, Workers
 
 
 def heat_recipe(name: str) -> HeatRecipe:

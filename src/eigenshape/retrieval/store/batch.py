@@ -17,7 +17,9 @@ from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook, train_codebook
 from eigenshape.retrieval.patches.patches import Patches, extract_patches
 from eigenshape.retrieval.store.index import Record, ShapeIndex
-from eigenshape.retrieval.store.workers import Item, Workers, run_in_workers
+from eigenshape._workers import Item as Item
+from eigenshape._workers import Workers as Workers
+from eigenshape._workers import run_in_workers
 from eigenshape.retrieval.store.writing import describe_to_store
 
 Read = Callable[[Path], MeshLike]
