@@ -39,3 +39,10 @@ from .tools.bundle import OperatorBundle as OperatorBundle
 from .tools.bundle import cache_operator_bundles as cache_operator_bundles
 from .tools.bundle import export_bundle as export_bundle
 from .tools.bundle import operator_bundle as operator_bundle
+from .tools.compression import CompressedMesh as CompressedMesh
+from .tools.compression import compress_mesh as compress_mesh
+from .tools.compression import decompress_mesh as decompress_mesh
+from .tools.watermark import WatermarkTest as WatermarkTest
+from .tools.watermark import detect_watermark as detect_watermark
+from .tools.watermark import detect_watermarks as detect_watermarks
+from .tools.watermark import embed_watermark as embed_watermark

@@ -144,10 +144,8 @@ def write_faces(
 
 def _third_corner(row: list[int], tail: int, head: int) -> int:
     """Return the corner of a face that is not on its side from `tail` to `head`."""
-    for corner in range(3):
-        if row[corner] == tail and row[(corner + 1) % 3] == head:
-            return row[(corner + 2) % 3]
-    raise AssertionError  # pragma: no cover - the side was taken from this very face
+    sides = zip(row, row[1:] + row[:1], strict=True)
+    return row[(list(sides).index((tail, head)) + 2) % 3]
 
 
 def read_faces(
