@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 import eigenshape as es
+from eigenshape._files import replace_file
 from eigenshape.cli import steps
 from eigenshape.cli.console import out, print_json, print_written, progress_bar
 from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption
@@ -37,7 +38,7 @@ def compress(
     surface = steps.load_mesh(mesh, repair)
     with progress_bar("compress") as progress:
         packed = es.spectral.compress_mesh(surface, bits, progress=progress)
-    steps.replace_file(output, packed.data)
+    replace_file(output, packed.data)
     print_written(output)
     n = surface.n_vertices
     facts = {

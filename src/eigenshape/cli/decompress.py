@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 import eigenshape as es
+from eigenshape._files import read_regular
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_written, progress_bar
 
@@ -24,7 +25,7 @@ def decompress(
     steps.require_mesh_path(output)
     with progress_bar("decompress") as progress:
         mesh = es.spectral.decompress_mesh(
-            steps.read_regular(packed, "a compressed mesh"), progress=progress
+            read_regular(packed, "a compressed mesh"), progress=progress
         )
     es.write_mesh(mesh, output)
     print_written(output)

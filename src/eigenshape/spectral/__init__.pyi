@@ -32,9 +32,6 @@ from .signatures.wave import wave_kernel_signature as wave_kernel_signature
 from .solve import solve_spectrum as solve_spectrum
 from .solver.certify import certify as certify
 from .spectrum import Spectrum as Spectrum
-from .tools.nodal import NodalDomains as NodalDomains
-from .tools.nodal import courant_bounds as courant_bounds
-from .tools.nodal import nodal_domains as nodal_domains
 from .tools.bundle import OperatorBundle as OperatorBundle
 from .tools.bundle import cache_operator_bundles as cache_operator_bundles
 from .tools.bundle import export_bundle as export_bundle
@@ -42,6 +39,10 @@ from .tools.bundle import operator_bundle as operator_bundle
 from .tools.compression import CompressedMesh as CompressedMesh
 from .tools.compression import compress_mesh as compress_mesh
 from .tools.compression import decompress_mesh as decompress_mesh
+from .tools.nodal import NodalDomains as NodalDomains
+from .tools.nodal import courant_bounds as courant_bounds
+from .tools.nodal import nodal_domains as nodal_domains
+from .tools.nodal import nodal_set as nodal_set
 from .tools.watermark import WatermarkTest as WatermarkTest
 from .tools.watermark import detect_watermark as detect_watermark
 from .tools.watermark import detect_watermarks as detect_watermarks

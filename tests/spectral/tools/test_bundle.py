@@ -135,7 +135,12 @@ def test_files_are_described_in_processes_and_failures_are_named(tmp_path):
     ]
     seen = []
     failed = es.spectral.cache_operator_bundles(
-        items, es.read_mesh, tmp_path / "kept", 6, workers=Workers(1), callback=lambda *a: seen.append(a)
+        items,
+        es.read_mesh,
+        tmp_path / "kept",
+        6,
+        workers=Workers(1),
+        callback=lambda *a: seen.append(a),
     )
     assert [name for name, _ in failed] == ["missing"]
     assert "no.off" in failed[0][1]
@@ -194,8 +199,6 @@ def test_bad_shapes_are_named():
     with pytest.raises(es.InvalidShapeError, match="A cloud must have dim=2 and at least 3 points"):
         es.spectral.operator_bundle(es.PointCloud(np.eye(3), 1), 1)
     # two equal triangles back to back: their normals cancel at every corner
-    folded = es.TriangleMesh(
-        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 1, 0]], [[0, 1, 2], [1, 0, 3]]
-    )
+    folded = es.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 1, 0]], [[0, 1, 2], [1, 0, 3]])
     with pytest.raises(es.InvalidShapeError, match="A vertex must have a tangent plane"):
         es.spectral.operator_bundle(folded, 1)

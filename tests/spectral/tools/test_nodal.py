@@ -77,6 +77,27 @@ def test_a_cluster_that_is_cut_counts_whole():
     assert es.spectral.courant_bounds(spectrum).tolist() == [1, 4, 4, 4, 9, 9]
 
 
+def test_nodal_lines_of_a_square_are_measured_by_hand():
+    square = es.shapes.grid(8, 8)
+    x, y, _ = square.vertices.T
+    cross = es.spectral.nodal_set(square, (x - 0.45) * (y - 0.3))
+    assert cross.size == pytest.approx(2, rel=0.02)
+    line = es.spectral.nodal_set(square, x - 0.3)
+    (points,) = line.polylines()
+    np.testing.assert_allclose(points[:, 0], 0.3, atol=1e-15)
+    assert sorted(points[[0, -1], 1].tolist()) == [0, 1]
+    assert line.size == pytest.approx(1, rel=1e-12)
+
+
+def test_noise_around_a_nodal_line_does_not_move_it():
+    ball = es.icosphere(3)
+    height = ball.vertices[:, 2]
+    noise = 1e-13 * np.random.default_rng(0).normal(size=len(height))
+    plain, noisy = (es.spectral.nodal_set(ball, values) for values in (height, height + noise))
+    np.testing.assert_array_equal(plain.edges, noisy.edges)
+    assert len(noisy.polylines()) == 1
+
+
 def test_bad_arguments_are_named():
     with pytest.raises(es.InvalidParameterError, match="values must hold one number per vertex"):
         es.spectral.nodal_domains(PATH, np.ones(5))

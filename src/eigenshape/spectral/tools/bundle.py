@@ -232,9 +232,7 @@ def export_bundle(
     if form not in get_args(Form):
         raise InvalidParameterError(f"form must be 'scipy', 'numpy' or 'torch'; it is {form!r}.")
     if precision not in get_args(Precision):
-        raise InvalidParameterError(
-            f"precision must be 'single' or 'double'; it is {precision!r}."
-        )
+        raise InvalidParameterError(f"precision must be 'single' or 'double'; it is {precision!r}.")
     convert = {"scipy": _for_scipy, "numpy": _for_numpy, "torch": _for_torch}[form]
     dtype = np.float32 if precision == "single" else np.float64
     parts = (

@@ -45,11 +45,7 @@ def read_bundle(path: Path) -> dict[str, Any]:
         with path.open("rb") as file:
             require_uncompressed(path, file, "a bundle")
             with np.load(file, allow_pickle=False) as archive:
-                found = json.loads(str(archive["head"]))["eigenshape_bundle"]
-                if found != FORMAT:
-                    raise FileFormatError(
-                        f"{path} must hold a bundle in format {FORMAT}; it is in format {found}."
-                    )
+                _require_format(path, json.loads(str(archive["head"]))["eigenshape_bundle"])
                 fields: dict[str, Any] = {name: archive[name] for name in DENSE}
                 n = len(fields["mass"])
                 for name in SPARSE:
@@ -64,6 +60,13 @@ def read_bundle(path: Path) -> dict[str, Any]:
         ) from error
     _require_sound(path, fields)
     return {name: freeze(part) if name in DENSE else part for name, part in fields.items()}
+
+
+def _require_format(path: Path, found: object) -> None:
+    if found != FORMAT:
+        raise FileFormatError(
+            f"{path} must hold a bundle in format {FORMAT}; it is in format {found!r}."
+        )
 
 
 def _require_sound(path: Path, fields: Mapping[str, Any]) -> None:

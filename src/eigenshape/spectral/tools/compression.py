@@ -29,8 +29,6 @@ from eigenshape.spectral.tools.packing import (
     unpack,
 )
 from eigenshape.spectral.tools.patch_basis import (
-    N_SEEDS,
-    PATCH_SIZE,
     find_patches,
     find_seed,
     patch_basis,
@@ -258,9 +256,8 @@ def decompress_mesh(data: bytes, *, progress: Progress | None = None) -> Triangl
     ):
         report(0.1 + 0.9 * number / len(patches), "coordinates")
         _, basis, _ = patch_basis(laplacian, seeds[number])
-        points[patch] = low + step * (means[number] + basis @ coefficients[number])
-    with np.errstate(over="ignore"):
-        points *= scale
+        with np.errstate(over="ignore", invalid="ignore"):  # the result is checked below
+            points[patch] = scale * (low + step * (means[number] + basis @ coefficients[number]))
     if not np.isfinite(points).all():
         raise FileFormatError(
             f"A compressed mesh must have finite coordinates; with scale {scale} and step {step} "

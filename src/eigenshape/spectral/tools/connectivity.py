@@ -3,7 +3,7 @@
 from collections import deque
 
 import numpy as np
-from jaxtyping import Int, UInt8
+from jaxtyping import Int
 
 from eigenshape._errors import FileFormatError
 

@@ -12,6 +12,7 @@ from eigenshape._arrays import freeze, vertex_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
+from eigenshape.calculus.level_sets import LevelSet, level_set
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.operators.graph import edge_graph
 from eigenshape.spectral.spectrum import Spectrum
@@ -53,9 +54,7 @@ class NodalDomains:
         return len(self.signs)
 
 
-def nodal_domains(
-    mesh: MeshLike, values: ArrayLike, *, zero: float = ZERO_SHARE
-) -> NodalDomains:
+def nodal_domains(mesh: MeshLike, values: ArrayLike, *, zero: float = ZERO_SHARE) -> NodalDomains:
     """Find the nodal domains of a function: the connected regions in which it has one sign.
 
     Two neighboring vertices belong to one domain if the function is positive at both, or negative
@@ -86,7 +85,7 @@ def nodal_domains(
     See Also
     --------
     courant_bounds : The largest number of domains that an eigenvector can have.
-    nodal_lines : The curves between the domains.
+    nodal_set : The lines between the domains, and their length.
 
     Examples
     --------
@@ -100,9 +99,7 @@ def nodal_domains(
     """
     mesh = as_simplicial(mesh)
     heights = vertex_values(values, "values", mesh.n_points)
-    if not 0 <= zero < 1:
-        raise InvalidParameterError(f"zero must be at least 0 and less than 1; it is {zero}.")
-    signs = clear_signs(heights, zero)
+    signs = np.sign(_without_noise(heights, zero)).astype(np.int64)
     edges = edge_graph(mesh).tocoo()
     joined = (signs[edges.row] == signs[edges.col]) & (signs[edges.row] != 0)
     graph = sp.coo_array(
@@ -160,7 +157,53 @@ def courant_bounds(spectrum: Spectrum) -> Int[np.ndarray, " k"]:
     return np.repeat(lasts, sizes)
 
 
-def clear_signs(values: Float[np.ndarray, " n"], zero: float) -> Int[np.ndarray, " n"]:
-    """Return 1, -1, or 0 where a value is at most the share `zero` of the largest."""
-    largest = np.abs(values).max(initial=0.0)
-    return np.where(np.abs(values) > zero * largest, np.sign(values), 0).astype(np.int64)
+def nodal_set(mesh: MeshLike, values: ArrayLike, *, zero: float = ZERO_SHARE) -> LevelSet:
+    """Find the nodal set of a function: the lines on a surface where it is zero.
+
+    The function is linear on each face. Where it is zero at a vertex, the line passes through the
+    vertex, or just beside it if the function is zero in a region.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Triangles, or tetrahedra: there the nodal set is a surface.
+    values : (n,) float
+    zero : float
+        As for `nodal_domains`.
+
+    Returns
+    -------
+    LevelSet
+        Its `polylines()` are the nodal lines, `size` is their length.
+
+    Raises
+    ------
+    InvalidParameterError
+        If there is not one finite value for each vertex, or `zero` is not in 0..1.
+    InvalidShapeError
+        If the mesh consists neither of triangles nor of tetrahedra.
+
+    See Also
+    --------
+    nodal_domains : The regions between the lines.
+
+    Examples
+    --------
+    The height on a unit sphere is zero along the equator, of length 2π = 6.283:
+
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(4)
+    >>> equator = es.spectral.nodal_set(ball, ball.vertices[:, 2])
+    >>> len(equator.polylines()), round(equator.size, 2)
+    (1, 6.28)
+    """
+    mesh = as_simplicial(mesh)
+    heights = vertex_values(values, "values", mesh.n_points)
+    return level_set(mesh, _without_noise(heights, zero), 0.0)
+
+
+def _without_noise(values: Float[np.ndarray, " n"], zero: float) -> Float[np.ndarray, " n"]:
+    """Return values with 0 in place of those of at most the share `zero` of the largest."""
+    if not 0 <= zero < 1:
+        raise InvalidParameterError(f"zero must be at least 0 and less than 1; it is {zero}.")
+    return np.where(np.abs(values) > zero * np.abs(values).max(), values, 0.0)

@@ -10,9 +10,7 @@ from eigenshape._errors import FileFormatError
 # LZMA2 without a container: our file has its own lengths and its own checksum. Bytes are coded
 # whatever their place (pb) and the byte before (lc), which say nothing of a coefficient: what comes
 # out is within 1 % of the entropy of each band. The dictionary bounds the memory.
-FILTERS = [
-    {"id": lzma.FILTER_LZMA2, "preset": 9, "lc": 0, "lp": 0, "pb": 0, "dict_size": 1 << 22}
-]
+FILTERS = [{"id": lzma.FILTER_LZMA2, "preset": 9, "lc": 0, "lp": 0, "pb": 0, "dict_size": 1 << 22}]
 # A number of this size or more is this byte, and the rest follows in a second stream.
 ESCAPE = 255
 # Most bytes of a number in the second stream, seven bits each.
@@ -72,10 +70,11 @@ def to_varints(numbers: list[int]) -> bytes:
     """Return numbers as bytes of seven bits each, the lowest first (LEB128)."""
     written = bytearray()
     for number in numbers:
-        while number > 127:
-            written.append(number & 127 | 128)
-            number >>= 7
-        written.append(number)
+        left = number
+        while left > 127:
+            written.append(left & 127 | 128)
+            left >>= 7
+        written.append(left)
     return bytes(written)
 
 

@@ -61,9 +61,7 @@ def point_frames(shape: Shape3, edges: Int[np.ndarray, "2 e"]) -> Float[np.ndarr
     return np.stack([first, np.cross(normals, first), normals], axis=1)
 
 
-def _fitted_normals(
-    cloud: PointCloud, edges: Int[np.ndarray, "2 e"]
-) -> Float[np.ndarray, "n 3"]:
+def _fitted_normals(cloud: PointCloud, edges: Int[np.ndarray, "2 e"]) -> Float[np.ndarray, "n 3"]:
     """Return the direction in which the neighbors of each point spread least; its sign is free."""
     points, _ = size_one(cloud.points)
     near = points[edges[1].reshape(cloud.n_points, -1)] - points[:, None]

@@ -278,7 +278,7 @@ def _align(
     middle, goal = (shares * points).sum(axis=0), (shares * target).sum(axis=0)
     centered, wanted = points - middle, target - goal
     spread = float((shares * centered**2).sum())
-    if spread == 0:
+    if not np.ptp(points, axis=0).any():
         raise InvalidShapeError(
             f"The suspect must have an extent; all of its vertices are at {middle.tolist()}."
         )
