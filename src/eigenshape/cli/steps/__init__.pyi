@@ -11,8 +11,6 @@ from .heat import find_features as find_features
 from .heat import save_heat as save_heat
 from .indexing import describe_all as describe_all
 from .indexing import find_items as find_items
-from .outputs import read_regular as read_regular
-from .outputs import replace_file as replace_file
 from .outputs import require_mesh_path as require_mesh_path
 from .outputs import require_output as require_output
 from .outputs import require_picture as require_picture

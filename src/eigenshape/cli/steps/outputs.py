@@ -8,8 +8,7 @@ from matplotlib.figure import Figure
 from numpy import ndarray
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape._files import read_regular as read_regular
-from eigenshape._files import replace_file as replace_file
+from eigenshape._files import read_regular, replace_file
 from eigenshape.cli.console import print_written
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.mesh_files import WRITTEN, write_mesh
