@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import shake_256
+from pathlib import Path
 from typing import SupportsIndex
 
 import numpy as np
@@ -61,6 +62,7 @@ def embed_watermark(
     *,
     strength: float = DEFAULT_STRENGTH,
     k: SupportsIndex = DEFAULT_MODES,
+    cache: str | Path | None = None,
 ) -> TriangleMesh:
     """Move the vertices of a mesh imperceptibly by a pattern that only a key reveals.
 
@@ -80,6 +82,9 @@ def embed_watermark(
         more than 0, at most 0.1.
     k : int
         Number of modes that carry the mark, beside one constant mode for each component.
+    cache : path, optional
+        Folder in which the spectrum of the mesh is kept, as of `solve_spectrum`. Detection takes it
+        from there.
 
     Returns
     -------
@@ -116,7 +121,7 @@ def embed_watermark(
             f"strength must be at most {MOST_STRENGTH} of the diagonal; it is {share}."
         )
     points, scale = size_one(mesh.vertices)
-    basis, mass = _low_modes((points, mesh.faces), k)
+    basis, mass = _low_modes((points, mesh.faces), k, cache)
     pattern = _pattern(secret, basis, mass)
     diagonal = np.linalg.norm(np.ptp(points, axis=0))
     size = share * diagonal * np.sqrt(mass.sum()) / np.linalg.norm(pattern)
@@ -124,7 +129,12 @@ def embed_watermark(
 
 
 def detect_watermark(
-    original: MeshLike, suspect: MeshLike, key: Key, *, k: SupportsIndex = DEFAULT_MODES
+    original: MeshLike,
+    suspect: MeshLike,
+    key: Key,
+    *,
+    k: SupportsIndex = DEFAULT_MODES,
+    cache: str | Path | None = None,
 ) -> WatermarkTest:
     """Test whether a mesh carries the watermark of a key, with the unmarked original at hand.
 
@@ -146,7 +156,7 @@ def detect_watermark(
     suspect : MeshLike
         A mesh with the same vertices in the same order; its faces do not matter.
     key : str or bytes
-    k : int
+    k, cache
         As given to `embed_watermark`.
 
     Returns
@@ -167,11 +177,16 @@ def detect_watermark(
     --------
     detect_watermarks : Test many keys at once.
     """
-    return detect_watermarks(original, suspect, [key], k=k)[0]
+    return detect_watermarks(original, suspect, [key], k=k, cache=cache)[0]
 
 
 def detect_watermarks(
-    original: MeshLike, suspect: MeshLike, keys: Sequence[Key], *, k: SupportsIndex = DEFAULT_MODES
+    original: MeshLike,
+    suspect: MeshLike,
+    keys: Sequence[Key],
+    *,
+    k: SupportsIndex = DEFAULT_MODES,
+    cache: str | Path | None = None,
 ) -> tuple[WatermarkTest, ...]:
     """Test which of many keys a mesh carries, as to find who passed a copy on.
 
@@ -182,7 +197,8 @@ def detect_watermarks(
     original, suspect : MeshLike
         As for `detect_watermark`.
     keys : sequence of str or bytes
-    k : int
+    k, cache
+        As given to `embed_watermark`.
 
     Returns
     -------
@@ -212,7 +228,7 @@ def detect_watermarks(
             f"{other.n_vertices} vertices and the original has {mesh.n_vertices}."
         )
     points, _ = size_one(mesh.vertices)
-    basis, mass = _low_modes((points, mesh.faces), k)
+    basis, mass = _low_modes((points, mesh.faces), k, cache)
     aligned = _align(size_one(other.vertices)[0], points, mass)
     found = basis.T @ (mass[:, None] * (aligned - points))
     length = np.linalg.norm(found)
@@ -237,7 +253,9 @@ def _require_key(key: object) -> bytes:
 
 
 def _low_modes(
-    mesh: tuple[Float[np.ndarray, "n 3"], np.ndarray], k: SupportsIndex
+    mesh: tuple[Float[np.ndarray, "n 3"], np.ndarray],
+    k: SupportsIndex,
+    cache: str | Path | None,
 ) -> tuple[Float[np.ndarray, "n k"], Float[np.ndarray, " n"]]:
     """Return the lowest eigenfunctions that are not constant on components, and the mass.
 
@@ -245,7 +263,7 @@ def _low_modes(
     """
     n_constant, _ = vertex_components(mesh)
     wanted = whole_number(k, "k", 1, len(mesh[0]) - n_constant)
-    spectrum = solve_spectrum(robust_laplacian(mesh), wanted + n_constant)
+    spectrum = solve_spectrum(robust_laplacian(mesh), wanted + n_constant, cache=cache)
     proof = spectrum.certificate
     end = wanted + n_constant
     if proof.n_split and end - proof.clusters[-1] > n_constant:
