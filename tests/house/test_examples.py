@@ -49,6 +49,12 @@ def test_any_shape_has_its_spectrum(capsys):
     assert "All 11 laws hold." in capsys.readouterr().out
 
 
+def test_a_mark_survives_a_small_file(tmp_path, capsys):
+    test = runpy.run_path(str(ROOT / "examples" / "small_and_marked.py"))["main"](tmp_path)
+    assert test.false_alarm < 1e-30
+    assert "bits a vertex, faces included" in capsys.readouterr().out
+
+
 def test_readme_begins_with_exactly_two_commands():
     blocks = (ROOT / "README.md").read_text().split("```")
     commands = blocks[1].splitlines()[1:]
