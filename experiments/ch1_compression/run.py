@@ -26,7 +26,7 @@ try:
 except ImportError:  # the curves of Draco are left out
     DracoPy = None
 
-CLASSICS = ("horse.ply", "bunny.off", "camel.off")
+CLASSICS = ("bunny.off", "camel.off", "elk.off")
 BITS = (8, 10, 12, 14)
 QUICK_BITS = (8, 10, 12)
 SHOWN_BITS = (6, 7, 8, 10)

@@ -28,7 +28,7 @@ def write_bundle(path: Path, fields: Mapping[str, Any]) -> None:
         arrays |= {f"{name}_{part}": getattr(fields[name], part) for part in PARTS}
     head = np.array(json.dumps({"eigenshape_bundle": FORMAT}))
     with replacing(path) as file:
-        np.savez(file, **{**arrays, "head": head})  # type: ignore[arg-type]
+        np.savez(file, **{**arrays, "head": head})
 
 
 def read_bundle(path: Path) -> dict[str, Any]:

@@ -113,7 +113,8 @@ def write_faces(
         if side is None:
             while is_done[start]:
                 start += 1
-            face, index = tuple(write_vertex(corner) for corner in rows[start]), start
+            a, b, c = (write_vertex(corner) for corner in rows[start])
+            face, index = (a, b, c), start
         else:
             tail, head = side
             candidates = beyond.get((order[head], order[tail]), [])
@@ -177,7 +178,8 @@ def read_faces(
         while len(walked) < n_faces:
             side = front.take()
             if side is None:
-                face = tuple(read_vertex(next(coming), -1, -1) for _ in range(3))
+                a, b, c = (read_vertex(next(coming), -1, -1) for _ in range(3))
+                face = (a, b, c)
             else:
                 tail, head = side
                 symbol = next(coming)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import SupportsIndex
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.special import betainc, ndtri
 
 from eigenshape._arguments import describe_value
@@ -28,6 +28,10 @@ DEFAULT_STRENGTH = 5e-4
 MOST_STRENGTH = 0.1
 DEFAULT_MODES = 100  # modes that carry the mark, beside the constant ones
 
+# Coefficients of at most this share of the largest are rounding errors without a direction, as
+# nearly all those of a sphere are.
+LEAST_COEFFICIENT = 1e-9
+
 Key = str | bytes
 
 
@@ -42,7 +46,7 @@ class WatermarkTest:
     false_alarm : float
         Probability of this score or a higher one if the mesh does not carry the mark.
     n_numbers : int
-        Number of coefficients that are compared.
+        Number of independent numbers that are compared.
 
     See Also
     --------
@@ -67,10 +71,10 @@ def embed_watermark(
     """Move the vertices of a mesh imperceptibly by a pattern that only a key reveals.
 
     The pattern is white noise made from the key, projected on the lowest eigenfunctions: each
-    coefficient of the coordinates in these modes moves by an independent Gaussian number. In the
-    manner of Ohbuchi, Mukaiyama and Takahashi (2002) the mark lies in low frequencies, where
-    smoothing and noise do least (thesis 1.2.3). A projection does not depend on the choice of
-    eigenvectors, so the mark of a symmetric shape is the same on any machine.
+    coefficient of the coordinates in these modes, a vector in R³, moves by an independent Gaussian
+    vector. In the manner of Ohbuchi, Mukaiyama and Takahashi (2002) the mark lies in low
+    frequencies, where noise does least (thesis 1.2.3). Each coefficient moves at a right angle to
+    itself, since smoothing makes it longer or shorter and so leaves the mark alone.
 
     Parameters
     ----------
@@ -122,7 +126,7 @@ def embed_watermark(
         )
     points, scale = size_one(mesh.vertices)
     basis, mass = _low_modes((points, mesh.faces), k, cache)
-    pattern = _pattern(secret, basis, mass)
+    pattern = _across(_pattern(secret, basis, mass), basis.T @ (mass[:, None] * points))
     diagonal = np.linalg.norm(np.ptp(points, axis=0))
     size = share * diagonal * np.sqrt(mass.sum()) / np.linalg.norm(pattern)
     return TriangleMesh((points + size * (basis @ pattern)) * scale, mesh.faces)
@@ -139,9 +143,10 @@ def detect_watermark(
     """Test whether a mesh carries the watermark of a key, with the unmarked original at hand.
 
     The suspect is moved, turned and scaled onto the original (Umeyama 1991). The score is the
-    correlation of the pattern of the key with the difference of both, in the lowest modes. If the
-    key has nothing to do with the suspect, its pattern is a Gaussian vector that is independent of
-    this difference, so it points in a uniformly random direction among m = 3k dimensions, and the
+    correlation of the pattern of the key with the difference of both, in the lowest modes and at
+    right angles to the coefficients of the original. If the key has nothing to do with the suspect,
+    its pattern is a Gaussian vector that is independent of this difference, so it points in a
+    uniformly random direction among m dimensions, two a mode (three if a coefficient is 0), and the
     score s is exceeded with probability I(1 - s²; (m - 1)/2, 1/2) / 2, with the regularized
     incomplete beta function I. This is exact, whatever was done to the suspect.
 
@@ -230,16 +235,18 @@ def detect_watermarks(
     points, _ = size_one(mesh.vertices)
     basis, mass = _low_modes((points, mesh.faces), k, cache)
     aligned = _align(size_one(other.vertices)[0], points, mass)
-    found = basis.T @ (mass[:, None] * (aligned - points))
+    own = basis.T @ (mass[:, None] * points)
+    found = _across(basis.T @ (mass[:, None] * (aligned - points)), own)
     length = np.linalg.norm(found)
+    dimension = own.size - int(_is_clear(own).sum())
     tests = []
     for secret in secrets:
-        pattern = _pattern(secret, basis, mass)
+        pattern = _across(_pattern(secret, basis, mass), own)
         score = 0.0
         if length > 0:
             score = float((pattern * found).sum() / (np.linalg.norm(pattern) * length))
-        chance = _exceedance(score, pattern.size) if length > 0 else 1.0
-        tests.append(WatermarkTest(score, chance, pattern.size))
+        chance = _exceedance(score, dimension) if length > 0 else 1.0
+        tests.append(WatermarkTest(score, chance, dimension))
     return tuple(tests)
 
 
@@ -284,6 +291,22 @@ def _pattern(
     uniform = ((words >> np.uint64(11)) + 0.5) / 2.0**53  # strictly between 0 and 1
     noise = ndtri(uniform).reshape(n, 3)
     return basis.T @ (np.sqrt(mass)[:, None] * noise)
+
+
+def _across(
+    vectors: Float[np.ndarray, "k 3"], own: Float[np.ndarray, "k 3"]
+) -> Float[np.ndarray, "k 3"]:
+    """Take from each vector its component along the coefficient of the original in that mode."""
+    is_clear = _is_clear(own)
+    lengths = np.linalg.norm(own, axis=1, keepdims=True)
+    along = np.divide(own, lengths, out=np.zeros_like(own), where=is_clear[:, None])
+    return vectors - (vectors * along).sum(axis=1, keepdims=True) * along
+
+
+def _is_clear(own: Float[np.ndarray, "k 3"]) -> Bool[np.ndarray, " k"]:
+    """Say which coefficients have a direction, and are not rounding errors alone."""
+    lengths = np.linalg.norm(own, axis=1)
+    return lengths > LEAST_COEFFICIENT * lengths.max()
 
 
 def _align(
