@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import SupportsIndex
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float, Int
 from scipy.special import betainc, ndtri
 
 from eigenshape._arguments import describe_value
@@ -28,8 +28,8 @@ DEFAULT_STRENGTH = 5e-4
 MOST_STRENGTH = 0.1
 DEFAULT_MODES = 100  # modes that carry the mark, beside the constant ones
 
-# Coefficients of at most this share of the largest are rounding errors without a direction, as
-# nearly all those of a sphere are.
+# Coefficients of at most this share of the largest are rounding errors without a direction: all
+# those of a sphere but three are.
 LEAST_COEFFICIENT = 1e-9
 
 Key = str | bytes
@@ -74,7 +74,8 @@ def embed_watermark(
     coefficient of the coordinates in these modes, a vector in R³, moves by an independent Gaussian
     vector. In the manner of Ohbuchi, Mukaiyama and Takahashi (2002) the mark lies in low
     frequencies, where noise does least (thesis 1.2.3). Each coefficient moves at a right angle to
-    itself, since smoothing makes it longer or shorter and so leaves the mark alone.
+    itself, since smoothing makes it longer or shorter and so leaves the mark alone. Coefficients of
+    one eigenspace count as one vector, so it does not matter which eigenvectors a machine finds.
 
     Parameters
     ----------
@@ -125,8 +126,9 @@ def embed_watermark(
             f"strength must be at most {MOST_STRENGTH} of the diagonal; it is {share}."
         )
     points, scale = size_one(mesh.vertices)
-    basis, mass = _low_modes((points, mesh.faces), k, cache)
-    pattern = _across(_pattern(secret, basis, mass), basis.T @ (mass[:, None] * points))
+    basis, mass, groups = _low_modes((points, mesh.faces), k, cache)
+    own = basis.T @ (mass[:, None] * points)
+    pattern, _ = _across(_pattern(secret, basis, mass), own, groups)
     diagonal = np.linalg.norm(np.ptp(points, axis=0))
     size = share * diagonal * np.sqrt(mass.sum()) / np.linalg.norm(pattern)
     return TriangleMesh((points + size * (basis @ pattern)) * scale, mesh.faces)
@@ -146,7 +148,7 @@ def detect_watermark(
     correlation of the pattern of the key with the difference of both, in the lowest modes and at
     right angles to the coefficients of the original. If the key has nothing to do with the suspect,
     its pattern is a Gaussian vector that is independent of this difference, so it points in a
-    uniformly random direction among m dimensions, two a mode (three if a coefficient is 0), and the
+    uniformly random direction among m dimensions, two for each simple eigenvalue, and the
     score s is exceeded with probability I(1 - s²; (m - 1)/2, 1/2) / 2, with the regularized
     incomplete beta function I. This is exact, whatever was done to the suspect.
 
@@ -233,15 +235,15 @@ def detect_watermarks(
             f"{other.n_vertices} vertices and the original has {mesh.n_vertices}."
         )
     points, _ = size_one(mesh.vertices)
-    basis, mass = _low_modes((points, mesh.faces), k, cache)
+    basis, mass, groups = _low_modes((points, mesh.faces), k, cache)
     aligned = _align(size_one(other.vertices)[0], points, mass)
     own = basis.T @ (mass[:, None] * points)
-    found = _across(basis.T @ (mass[:, None] * (aligned - points)), own)
+    difference = basis.T @ (mass[:, None] * (aligned - points))
+    found, dimension = _across(difference, own, groups)
     length = np.linalg.norm(found)
-    dimension = own.size - int(_is_clear(own).sum())
     tests = []
     for secret in secrets:
-        pattern = _across(_pattern(secret, basis, mass), own)
+        pattern, _ = _across(_pattern(secret, basis, mass), own, groups)
         score = 0.0
         if length > 0:
             score = float((pattern * found).sum() / (np.linalg.norm(pattern) * length))
@@ -263,8 +265,8 @@ def _low_modes(
     mesh: tuple[Float[np.ndarray, "n 3"], np.ndarray],
     k: SupportsIndex,
     cache: str | Path | None,
-) -> tuple[Float[np.ndarray, "n k"], Float[np.ndarray, " n"]]:
-    """Return the lowest eigenfunctions that are not constant on components, and the mass.
+) -> tuple[Float[np.ndarray, "n k"], Float[np.ndarray, " n"], Int[np.ndarray, " k"]]:
+    """Return the lowest eigenfunctions that are not constant on components, B, and the eigenspaces.
 
     An eigenspace that k would cut is left out, since its part would depend on the machine.
     """
@@ -275,7 +277,9 @@ def _low_modes(
     end = wanted + n_constant
     if proof.n_split and end - proof.clusters[-1] > n_constant:
         end -= proof.clusters[-1]
-    return spectrum.eigenvectors[:, n_constant:end], spectrum.mass.diagonal()
+    groups = np.repeat(np.arange(len(proof.clusters)), proof.clusters)[n_constant:end]
+    basis = spectrum.eigenvectors[:, n_constant:end]
+    return basis, spectrum.mass.diagonal(), groups - groups[0]
 
 
 def _pattern(
@@ -294,19 +298,18 @@ def _pattern(
 
 
 def _across(
-    vectors: Float[np.ndarray, "k 3"], own: Float[np.ndarray, "k 3"]
-) -> Float[np.ndarray, "k 3"]:
-    """Take from each vector its component along the coefficient of the original in that mode."""
-    is_clear = _is_clear(own)
-    lengths = np.linalg.norm(own, axis=1, keepdims=True)
-    along = np.divide(own, lengths, out=np.zeros_like(own), where=is_clear[:, None])
-    return vectors - (vectors * along).sum(axis=1, keepdims=True) * along
+    vectors: Float[np.ndarray, "k 3"], own: Float[np.ndarray, "k 3"], groups: Int[np.ndarray, " k"]
+) -> tuple[Float[np.ndarray, "k 3"], int]:
+    """Take from vectors, eigenspace by eigenspace, their component along those of the original.
 
-
-def _is_clear(own: Float[np.ndarray, "k 3"]) -> Bool[np.ndarray, " k"]:
-    """Say which coefficients have a direction, and are not rounding errors alone."""
-    lengths = np.linalg.norm(own, axis=1)
-    return lengths > LEAST_COEFFICIENT * lengths.max()
+    All coefficients of one eigenspace count as one vector, so the choice of eigenvectors does not
+    matter. The second result is the number of dimensions that are left.
+    """
+    squares = np.bincount(groups, weights=(own**2).sum(axis=1))
+    is_clear = squares > LEAST_COEFFICIENT**2 * squares.max()
+    products = np.bincount(groups, weights=(vectors * own).sum(axis=1))
+    shares = np.divide(products, squares, out=np.zeros_like(squares), where=is_clear)
+    return vectors - shares[groups, None] * own, own.size - int(is_clear.sum())
 
 
 def _align(
