@@ -1,5 +1,6 @@
 """Compressed meshes: what comes back, how exactly, and files that are no such meshes."""
 
+import inspect
 import os
 import struct
 import subprocess
@@ -133,9 +134,9 @@ def test_hashed_numbers_never_change():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kernel", ["Haswell", "Nehalem"])
+@pytest.mark.parametrize("kernel", ["Nehalem", "Prescott"])
 def test_another_blas_kernel_reads_the_same_mesh(tmp_path, kernel):
-    for name in ("square", "torus", "two pieces"):
+    for name in ("sphere", "square"):
         (tmp_path / "mesh.esz").write_bytes(es.spectral.compress_mesh(CASES[name], 16).data)
         code = (
             "import numpy as np, eigenshape as es, pathlib\n"
@@ -188,7 +189,7 @@ HOSTILE = {
     "The seeds of a compressed mesh must unpack": with_streams(seeds=packing.pack(b"\0" * 9)),
     "must have a seed for each of 2": with_streams(seeds=packing.pack(b"\0")),
     "large numbers; 0 could be read": with_streams(**{"large means": packing.pack(b"\x80" * 4)}),
-    "The symbols of a compressed mesh are damaged": with_streams(symbols=b"\xff\xff\xff"),
+    "The symbols of a compressed mesh are damaged": with_streams(symbols=b"\x05\x05\x05"),
 }
 
 
@@ -244,4 +245,4 @@ def test_bad_arguments_are_named():
     with pytest.raises(es.InvalidParameterError, match=r"bits must lie in 4\.\.24; it is 3"):
         es.spectral.compress_mesh(BALL, 3)
     with pytest.raises(es.FileFormatError, match="A compressed mesh must be bytes; the value is"):
-        es.spectral.decompress_mesh.__wrapped__("ball.esz")
+        inspect.unwrap(es.spectral.decompress_mesh)("ball.esz")

@@ -88,8 +88,8 @@ def write_faces(
     rows = faces.tolist()
     for index in range(len(rows) - 1, -1, -1):  # so that pop() gives the lowest number
         a, b, c = rows[index]
-        for side in {(a, b), (b, c), (c, a)}:
-            beyond.setdefault(side, []).append(index)
+        for edge in {(a, b), (b, c), (c, a)}:
+            beyond.setdefault(edge, []).append(index)
 
     front, symbols, references = Front(), bytearray(), []
     number = [-1] * n_vertices
@@ -178,7 +178,8 @@ def read_faces(
         while len(walked) < n_faces:
             side = front.take()
             if side is None:
-                a, b, c = (read_vertex(next(coming), -1, -1) for _ in range(3))
+                # a list, because a generator would turn the end of the symbols into another error
+                a, b, c = [read_vertex(next(coming), -1, -1) for _ in range(3)]
                 face = (a, b, c)
             else:
                 tail, head = side
