@@ -42,7 +42,7 @@ def average_onto_simplices(mesh: MeshLike, values: ArrayLike) -> Float[np.ndarra
     --------
     >>> import eigenshape as es
     >>> es.calculus.average_onto_simplices(es.shapes.grid(1, 1), [0, 3, 6, 9]).tolist()
-    [4.0, 5.0]
+    [5.0, 4.0]
     """
     mesh = as_simplicial(mesh)
     rows = _rows(values, mesh.n_points, "point")
@@ -81,7 +81,7 @@ def average_onto_points(mesh: MeshLike, values: ArrayLike) -> Float[np.ndarray, 
     --------
     >>> import eigenshape as es
     >>> es.calculus.average_onto_points(es.shapes.grid(1, 1), [2.0, 4.0]).round(12).tolist()
-    [3.0, 2.0, 4.0, 3.0]
+    [3.0, 4.0, 2.0, 3.0]
     """
     mesh = as_simplicial(mesh)
     rows = _rows(values, len(mesh.simplices), "simplex")

@@ -9,7 +9,7 @@ from jaxtyping import Complex, Float
 from eigenshape._arrays import real_numbers, whole_number
 from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
 from eigenshape._typing import ArrayLike
-from eigenshape.calculus.linear_solver import factor_equations
+from eigenshape.calculus.linear_solver import factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, face_areas, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
@@ -29,12 +29,15 @@ SHIFT = 1e-10
 # Inverse iteration stops where the map changes by this share of its size. The next energy is
 # several times the lowest on discs, so 10 to 30 iterations are enough.
 SETTLED, MOST_ITERATIONS = 1e-9, 300
-# Step of the conformal flow to the sphere, for a surface of area 4π: half the time in which the
-# lowest deviation from the sphere falls by a factor of e.
-FLOW_STEP = 0.1
-# The flow has reached a sphere where the radii differ by this share, and is given up where the
-# deviation no longer falls.
-ROUND = 1e-4
+# Step of the conformal flow to the sphere, for a surface of area 4π. With 0.5 a biped is round after
+# 30 steps, with 0.02 after 150, and its angles are the same to 1 %.
+FLOW_STEP = 0.5
+# The flow has come to its end where the radii have not come nearer to each other for so many steps,
+# by this share. On meshes they stay apart by the discretization error: 6 % of the radius with 162
+# vertices, 1.5 % with 642.
+PATIENCE, IMPROVEMENT = 10, 0.01
+# Radii within this of each other count as a sphere, whose radius is 1.
+ROUND = 0.3
 
 
 def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
@@ -71,17 +74,16 @@ def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
 
     Examples
     --------
-    A half sphere becomes a disc:
+    A piece of a cylinder is unrolled without distortion:
 
     >>> import eigenshape as es
     >>> import numpy as np
-    >>> ball = es.icosphere(3)
-    >>> upper = ball.faces[(ball.vertices[ball.faces, 2] > -1e-9).all(axis=1)]
-    >>> dome = es.geometry.drop_unreferenced(es.TriangleMesh(ball.vertices, upper)).mesh
-    >>> plane = es.calculus.flatten_conformally(dome)
-    >>> radii = np.linalg.norm(plane[es.geometry.boundary_vertices(dome)], axis=1)
-    >>> bool(radii.max() / radii.min() < 1.01)
-    True
+    >>> sheet = es.shapes.grid(8, 4)
+    >>> x, y, _ = sheet.vertices.T
+    >>> roof = es.TriangleMesh(np.column_stack([np.cos(x), y, np.sin(x)]), sheet.faces)
+    >>> plane = es.calculus.flatten_conformally(roof)
+    >>> es.calculus.angle_distortion(roof, plane).max().round(2).item()
+    1.0
     """
     mesh = as_mesh(mesh)
     require_sound(mesh)
@@ -100,7 +102,7 @@ def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
     energy = _as_real(laplacian.stiffness - 2 * _area_form(mesh.n_vertices, rim))
     mass = sp.kron(laplacian.mass, sp.eye_array(2))
     shift = SHIFT * energy.diagonal().max() / mass.diagonal().max()
-    solver = factor_equations(energy + shift * mass)
+    solver = factor_definite(energy + shift * mass)
     on_rim = np.zeros(mesh.n_vertices)
     on_rim[rim] = 1.0
 
@@ -184,28 +186,29 @@ def map_to_sphere(mesh: MeshLike, *, n_steps: SupportsIndex = 500) -> Float[np.n
         )
     points, _ = scale_to_unit(mesh)
     stiffness = cotangent_laplacian(TriangleMesh(points, mesh.faces)).stiffness
-    least = np.inf
+    sphere, least, n_idle = points, np.inf, 0
     for _ in range(most):
         areas = np.linalg.norm(area_vectors(points[mesh.faces]), axis=1)
-        # Scaled to area 4π and moved to the center, so that the limit is the unit sphere.
         weights = np.bincount(
             mesh.faces.ravel(), weights=np.repeat(areas / 3, 3), minlength=mesh.n_vertices
         )
+        # Moved to the center and scaled to area 4π, so that the limit is the unit sphere.
         factor = 4 * np.pi / areas.sum()
         points = (points - weights @ points / weights.sum()) * np.sqrt(factor)
         radii = np.linalg.norm(points, axis=1)
         spread = float(np.ptp(radii))
-        if spread < ROUND:
+        n_idle = 0 if spread < (1 - IMPROVEMENT) * least else n_idle + 1
+        if spread < least:
+            sphere, least = points / radii[:, None], spread
+        if n_idle == PATIENCE:
             break
         mass = sp.diags_array(weights * factor)
-        points = factor_equations(mass + FLOW_STEP * stiffness).solve(mass @ points)
-        least = min(least, spread)
-    else:
+        points = factor_definite(mass + FLOW_STEP * stiffness).solve(mass @ points)
+    if least > ROUND:
         raise ConvergenceError(
-            f"The flow must make the surface round within {most} steps; its radii still lie within "
-            f"{spread:.1e} of each other, not {ROUND:.0e}. Pass a larger n_steps."
+            f"The flow must make the surface round within {most} steps; the radii of its vertices "
+            f"still differ by {least:.2g} of the radius. Pass a larger n_steps, or use a finer mesh."
         )
-    sphere = points / radii[:, None]
     a, b, c = sphere[mesh.faces].transpose(1, 0, 2)
     inward = np.flatnonzero(np.einsum("fi,fi->f", a, np.cross(b, c)) <= 0)
     if len(inward) == mesh.n_faces:  # a surface that faces inward

@@ -18,13 +18,21 @@ from eigenshape._arrays import (
 )
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._typing import ArrayLike
-from eigenshape.calculus.linear_solver import LinearSolver, SparseMatrix, factor_equations
+from eigenshape.calculus.linear_solver import (
+    LinearSolver,
+    SparseMatrix,
+    factor_definite,
+    factor_equations,
+)
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import boundary_facets
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators import elements
 from eigenshape.operators.laplacian import Laplacian
+
+# Differences from a mean up to this share of the value are the rounding of sums.
+ROUNDING = 8 * float(np.finfo(np.float64).eps)
 
 
 def poisson_solver(
@@ -113,7 +121,9 @@ def helmholtz_solver(
     (kappa,) = finite_values(squared_wavenumber, "squared_wavenumber")
     weights = laplacian.mass.sum(axis=1)
     matrix = laplacian.stiffness - kappa * laplacian.mass
-    return factor_equations(matrix, fixed, weights=weights, indefinite=bool(kappa > 0))
+    if kappa == 0:
+        return factor_equations(matrix, fixed, weights=weights)
+    return factor_definite(matrix, fixed, indefinite=bool(kappa > 0))
 
 
 def heat_solver(laplacian: Laplacian, t: float, fixed: ArrayLike | None = None) -> LinearSolver:
@@ -155,7 +165,7 @@ def heat_solver(laplacian: Laplacian, t: float, fixed: ArrayLike | None = None) 
     """
     require_type(laplacian, Laplacian, "laplacian")
     (step,) = positive_values(t, "t")
-    return factor_equations(laplacian.mass + step * laplacian.stiffness, fixed)
+    return factor_definite(laplacian.mass + step * laplacian.stiffness, fixed)
 
 
 def remove_means(laplacian: Laplacian, values: ArrayLike) -> Float[np.ndarray, "n ..."]:
@@ -191,8 +201,11 @@ def remove_means(laplacian: Laplacian, values: ArrayLike) -> Float[np.ndarray, "
     weights = laplacian.mass.sum(axis=1)
     members = sp.csr_array((weights, (labels, np.arange(len(labels)))), shape=(count, len(labels)))
     sums = members.sum(axis=1).reshape(-1, *[1] * (functions.ndim - 1))
-    means = (members @ functions) / sums
-    return functions - means[labels]
+    left = functions - ((members @ functions) / sums)[labels]
+    # What is rounding of a constant is removed, and where little is left, so is its own mean:
+    # a solver measures the balance of loads by their size.
+    left[np.abs(left) <= ROUNDING * np.abs(functions)] = 0.0
+    return left - ((members @ left) / sums)[labels]
 
 
 def solve_poisson(
@@ -297,12 +310,12 @@ def solve_helmholtz(
     return solver.solve(_right_hand_side(laplacian, source, load), values=values)
 
 
-def solve_heat(
+def solve_heat(  # noqa: PLR0913 - one keyword for each part of the equation
     laplacian: Laplacian,
     start: ArrayLike,
     t: float,
-    *,
     n_steps: SupportsIndex = 1,
+    *,
     source: ArrayLike = 0.0,
     fixed: ArrayLike | None = None,
     values: ArrayLike = 0.0,

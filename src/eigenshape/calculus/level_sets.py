@@ -161,7 +161,7 @@ def level_set(mesh: MeshLike, values: ArrayLike, level: float) -> LevelSet:
     >>> ball = es.icosphere(4)
     >>> circle = es.calculus.level_set(ball, ball.vertices[:, 2], 0.5)
     >>> round(circle.size, 2)
-    5.43
+    5.44
     >>> len(circle.polylines())
     1
     """

@@ -29,7 +29,7 @@ DEPENDENT = 1e-12
 # Of a system that no pins or fixed points make regular.
 SINGULAR = (
     "The equations of the free points must have one solution; {}. "
-    "Fix a point of each component, or move the shift away from an eigenvalue."
+    "Fix a point of each component, or change t or the squared wavenumber."
 )
 # Constraints count as met up to this share of their terms.
 MET = 1e-8
@@ -334,22 +334,64 @@ def factor_equations(
     [0.0, 0.4, 0.7, 0.9, 1.0]
     """
     system = _require_symmetric(matrix)
-    n = system.shape[0]
-    points = require_points([] if fixed is None else fixed, n)
-    held = np.unique(points)
+    points = require_points([] if fixed is None else fixed, system.shape[0])
+    floating = _floating_components(system, np.unique(points))
+    solver = factor_system(system, points, floating, weights, indefinite=indefinite)
+    if constraints is None:
+        return solver
+    return replace(solver, _constraints=_eliminate(solver, constraints))
+
+
+def factor_definite(
+    matrix: SparseMatrix, fixed: ArrayLike | None = None, *, indefinite: bool = False
+) -> LinearSolver:
+    """Factor a symmetric system in which constants have an energy, however small.
+
+    Raises
+    ------
+    InvalidParameterError
+        As in `factor_equations`.
+    """
+    system = sp.csr_array(matrix)
+    points = require_points([] if fixed is None else fixed, system.shape[0])
+    return factor_system(system, points, np.full(system.shape[0], -1), indefinite=indefinite)
+
+
+def factor_system(
+    system: sp.csr_array,
+    points: Int[np.ndarray, " g"],
+    floating: Int[np.ndarray, " n"],
+    weights: ArrayLike | None = None,
+    *,
+    indefinite: bool = False,
+) -> LinearSolver:
+    """Factor a symmetric system whose components that float are known, -1 elsewhere.
+
+    Raises
+    ------
+    InvalidParameterError
+        As in `factor_equations`.
+    """
+    n, held = system.shape[0], np.unique(points)
     means = np.ones(n) if weights is None else point_functions(weights, "weights", n)
-    floating = _floating_components(system, held)
     _, pins = np.unique(floating, return_index=True)
     pins = pins[floating[pins] >= 0]
     free = np.setdiff1d(np.arange(n), np.concatenate([held, pins]))
     rows = system[free]
     block, coupling = rows[:, free], rows[:, held]
     factor = _factor(block, free, indefinite=indefinite)
-    arrays = (freeze(each) for each in (free, held, floating, points, means))
-    solver = LinearSolver(n, *arrays, block, coupling, factor, indefinite)
-    if constraints is None:
-        return solver
-    return replace(solver, _constraints=_eliminate(solver, constraints))
+    return LinearSolver(
+        n_points=n,
+        free=freeze(free),
+        fixed=freeze(held),
+        floating=freeze(floating),
+        _given=freeze(points),
+        _weights=freeze(means),
+        _block=block,
+        _coupling=coupling,
+        _factor=factor,
+        _refined=indefinite,
+    )
 
 
 def _require_symmetric(matrix: SparseMatrix) -> sp.csr_array:
