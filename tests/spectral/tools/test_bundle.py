@@ -73,6 +73,12 @@ def test_eigenpairs_mass_and_stiffness_are_those_of_the_operator():
     np.testing.assert_allclose(robust.eigenvalues, spectrum.eigenvalues, atol=1e-9)
 
 
+def test_a_simplicial_mesh_of_triangles_is_a_surface_too():
+    simplicial = es.geometry.SimplicialMesh(BALL.vertices, BALL.faces)
+    bundle = es.spectral.operator_bundle(simplicial, 2)
+    assert bundle.frames.shape == (162, 3, 3)
+
+
 def test_edges_on_a_line_have_no_derivative_across():
     strip = es.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     bundle = es.spectral.operator_bundle(strip, 1)

@@ -27,8 +27,9 @@ from eigenshape._progress import Progress
 from eigenshape._text import html_repr, short_repr
 from eigenshape._workers import Item, Workers, run_in_workers
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.conversion import ShapeLike, as_shape
+from eigenshape.geometry.conversion import ShapeLike, as_mesh, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.operators.catalog import build_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.solve import solve_spectrum
@@ -318,6 +319,8 @@ def _keep_bundle_of(read: Read, cache: Path, k: int, operator: str | None, path:
 
 def _require_surface(shape: Any) -> Shape3:
     """Return the shape if it is a triangle mesh or a cloud of a surface in R³."""
+    if isinstance(shape, SimplicialMesh) and (shape.dim, shape.points.shape[1]) == (2, 3):
+        return as_mesh(shape)
     is_cloud = isinstance(shape, PointCloud)
     if not isinstance(shape, TriangleMesh) and not (is_cloud and shape.points.shape[1] == 3):
         raise InvalidShapeError(
