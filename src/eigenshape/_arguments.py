@@ -30,6 +30,7 @@ MAKERS = {
     "MergeTree": "es.merge_tree(mesh, values)",
     "Move": "es.deformation.Move(region, handle)",
     "Panel": "es.plot.Panel(mesh, title, labels, vertices)",
+    "OperatorBundle": "es.spectral.operator_bundle(mesh, k)",
     "PartTree": "es.find_parts(mesh).tree",
     "PatchCodebook": "es.retrieval.default_codebook()",
     "PatchDescriptor": "es.describe(mesh)",

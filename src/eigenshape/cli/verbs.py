@@ -36,6 +36,8 @@ VERBS = {
     "are still added.",
     "query": "Find the shapes of an index that are most like a scan, and which features "
     "correspond.",
+    "compress": "Write a mesh as a small file, by the spectral coefficients of its coordinates.",
+    "decompress": "Write the mesh of a file that `eigenshape compress` wrote.",
     "studio": "Open a window in the browser: bend a shape by hand, see its spectrum, heat and parts, "
     "and search.",
     "report": "Write a shape with its spectrum, heat and parts to one HTML file that any browser "

@@ -57,7 +57,7 @@ def neighbor_graph(
     rows = finite_rows(points, "points")
     wanted = whole_number(n_neighbors, "n_neighbors", 1, len(rows) - 1)
     scaled, scale = size_one(rows)
-    near = _nearest(scaled, wanted)
+    near = nearest_others(scaled, wanted)
     ends = np.stack([np.repeat(np.arange(len(rows)), wanted), near.ravel()])
     keys = np.unique(ends.min(axis=0) * len(rows) + ends.max(axis=0))
     edges = np.column_stack(np.divmod(keys, len(rows)))
@@ -65,7 +65,7 @@ def neighbor_graph(
     return adjacency_matrix(edges, weights, len(rows))
 
 
-def _nearest(points: Float[np.ndarray, "n d"], wanted: int) -> Int[np.ndarray, "n k"]:
+def nearest_others(points: Float[np.ndarray, "n d"], wanted: int) -> Int[np.ndarray, "n k"]:
     """Return the nearest others of each point, of equals the lower index first."""
     tree, n = cKDTree(points), len(points)
     nearest = np.empty((n, wanted), dtype=np.int64)

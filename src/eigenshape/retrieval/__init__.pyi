@@ -26,10 +26,10 @@ from .patches.patches import Patches as Patches
 from .patches.patches import extract_patches as extract_patches
 from .patches.verification import patch_scores as patch_scores
 from .store.batch import BatchReport as BatchReport
+from .store.batch import Item as Item
+from .store.batch import Workers as Workers
 from .store.batch import build_index as build_index
 from .store.batch import train_codebook_from_files as train_codebook_from_files
 from .store.index import Match as Match
 from .store.index import Record as Record
 from .store.index import ShapeIndex as ShapeIndex
-from .store.workers import Item as Item
-from .store.workers import Workers as Workers

@@ -51,7 +51,7 @@ def read_archive(path: str | Path, key: str | None) -> dict[str, Any]:
     require_regular(Path(path))
     try:
         with Path(path).open("rb") as file:
-            _require_uncompressed(path, file)
+            require_uncompressed(path, file, "a spectrum")
             with np.load(file, allow_pickle=False) as archive:
                 certificate = _certificate(path, json.loads(str(archive["head"])), key)
                 arrays = {name: archive[name] for name in ARRAYS}
@@ -69,12 +69,12 @@ def read_archive(path: str | Path, key: str | None) -> dict[str, Any]:
     return {**arrays, "mass": mass, "certificate": certificate}
 
 
-def _require_uncompressed(path: str | Path, file: typing.BinaryIO) -> None:
-    """Refuse compressed parts: a spectrum has none, and a few bytes of them could fill the memory."""
+def require_uncompressed(path: str | Path, file: typing.BinaryIO, what: str) -> None:
+    """Refuse compressed parts: what we write has none, and a few bytes of them could fill the memory."""
     for part in zipfile.ZipFile(file).infolist():
         if part.compress_type != zipfile.ZIP_STORED:
             raise FileFormatError(
-                f"{path} must hold a spectrum that eigenshape saved; its part {part.filename} is compressed."
+                f"{path} must hold {what} that eigenshape saved; its part {part.filename} is compressed."
             )
     file.seek(0)
 

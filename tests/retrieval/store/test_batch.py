@@ -14,10 +14,10 @@ from filelock import FileLock
 
 import eigenshape
 from eigenshape._errors import InvalidParameterError
+from eigenshape._workers import Item, Workers
 from eigenshape.retrieval.description import describe
 from eigenshape.retrieval.store.batch import build_index, content_digest
 from eigenshape.retrieval.store.index import ShapeIndex
-from eigenshape.retrieval.store.workers import Item, Workers
 
 
 @pytest.fixture

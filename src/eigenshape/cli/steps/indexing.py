@@ -6,13 +6,13 @@ from functools import partial
 from pathlib import Path
 
 from eigenshape._errors import InvalidParameterError
+from eigenshape._workers import Item, Workers
 from eigenshape.cli.console import batch_reporter, progress_bar
 from eigenshape.cli.steps.reading import read_repaired
 from eigenshape.io.parsing import MESH_FORMATS
 from eigenshape.retrieval.kinds import AnyRecipe
 from eigenshape.retrieval.store.batch import BatchReport, build_index
 from eigenshape.retrieval.store.index import ShapeIndex
-from eigenshape.retrieval.store.workers import Item, Workers
 
 
 def find_items(sources: Sequence[Path]) -> list[Item]:

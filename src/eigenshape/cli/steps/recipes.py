@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from eigenshape._errors import StoreError
+from eigenshape._workers import Item, Workers
 from eigenshape.cli.console import batch_reporter, err, progress_bar
 from eigenshape.cli.inputs import PATCHES, require_method
 from eigenshape.cli.steps.reading import read_repaired
@@ -13,7 +14,6 @@ from eigenshape.retrieval.patches.codebook import default_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.store.batch import train_codebook_from_files
 from eigenshape.retrieval.store.index import ShapeIndex
-from eigenshape.retrieval.store.workers import Item, Workers
 
 
 def heat_recipe(name: str) -> HeatRecipe:

@@ -12,12 +12,14 @@ from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
+from eigenshape._workers import Item as Item  # noqa: PLC0414 - the room lists it from here
+from eigenshape._workers import Workers as Workers  # noqa: PLC0414 - and this
+from eigenshape._workers import run_in_workers
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook, train_codebook
 from eigenshape.retrieval.patches.patches import Patches, extract_patches
 from eigenshape.retrieval.store.index import Record, ShapeIndex
-from eigenshape.retrieval.store.workers import Item, Workers, run_in_workers
 from eigenshape.retrieval.store.writing import describe_to_store
 
 Read = Callable[[Path], MeshLike]

@@ -1,0 +1,60 @@
+"""eigenshape compress: a mesh as a small file."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import eigenshape as es
+from eigenshape._files import replace_file
+from eigenshape.cli import steps
+from eigenshape.cli.console import out, print_json, print_written, progress_bar
+from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption
+
+SUFFIX = ".esz"
+
+
+def compress(
+    mesh: MeshArgument,
+    *,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Compressed mesh to write; it ends in .esz.")
+    ],
+    bits: Annotated[
+        int,
+        typer.Option(
+            help="Precision of coordinates, 4 to 24: vertices move by about 1 / 2^bits of the longest "
+            "side of the bounding box."
+        ),
+    ] = 12,
+    repair: RepairOption = "",
+    as_json: JsonOption = False,
+) -> None:
+    """Write a mesh as a small file, by the spectral coefficients of its coordinates.
+
+    For instance: eigenshape compress scan.ply -o scan.esz --bits 12
+    """
+    steps.require_output(output, (SUFFIX,), "A compressed mesh")
+    surface = steps.load_mesh(mesh, repair)
+    with progress_bar("compress") as progress:
+        packed = es.spectral.compress_mesh(surface, bits, progress=progress)
+    replace_file(output, packed.data)
+    print_written(output)
+    n = surface.n_vertices
+    facts = {
+        "bytes": len(packed.data),
+        "connectivity_bytes": packed.n_connectivity_bytes,
+        "geometry_bytes": packed.n_geometry_bytes,
+        "bits_per_vertex": 8 * len(packed.data) / n,
+        "rms_error": packed.rms_error,
+        "max_error": packed.max_error,
+    }
+    if as_json:
+        print_json({"path": str(mesh), "output": str(output), **facts})
+        return
+    out.print(
+        f"{facts['bytes']:,} bytes, {facts['bits_per_vertex']:.1f} bits a vertex "
+        f"(faces {8 * packed.n_connectivity_bytes / n:.1f}, coordinates "
+        f"{8 * packed.n_geometry_bytes / n:.1f}); vertices move by {packed.rms_error:.3g} (root mean "
+        f"square), at most {packed.max_error:.3g}"
+    )

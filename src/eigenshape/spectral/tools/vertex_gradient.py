@@ -1,0 +1,106 @@
+"""Gradients at points, in tangent planes: a linear fit to the differences to all neighbors."""
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+
+from eigenshape._errors import InvalidShapeError, try_auto
+from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.measure import mean_normals
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import size_one
+from eigenshape.operators.graph import edge_graph
+from eigenshape.operators.neighbors import nearest_others
+
+# Neighbors of a point of a cloud, for its normal and its gradient, as in DiffusionNet.
+CLOUD_NEIGHBORS = 30
+# The first tangent is the x axis, projected, or the y axis where the cosine of x and the normal
+# exceeds this; as in DiffusionNet.
+STEEP = 0.9
+# Edges of a point lie on one line if the determinant of their normal equations is at most this
+# share of the squared trace: they are within 1e-6 rad of the line. Then there is no derivative
+# across.
+COLLINEAR = 1e-12
+
+Shape3 = TriangleMesh | PointCloud
+
+
+def neighbor_edges(shape: Shape3) -> Int[np.ndarray, "2 e"]:
+    """Return the directed edges from each point to its neighbors.
+
+    Those of a mesh are its edges in both directions; those of a cloud lead to the nearest points.
+    """
+    if isinstance(shape, TriangleMesh):
+        return np.stack(edge_graph(shape).nonzero()).astype(np.int64)
+    n = shape.n_points
+    near = nearest_others(size_one(shape.points)[0], min(CLOUD_NEIGHBORS, n - 1))
+    return np.stack([np.repeat(np.arange(n), near.shape[1]), near.ravel()])
+
+
+def point_frames(shape: Shape3, edges: Int[np.ndarray, "2 e"]) -> Float[np.ndarray, "n 3 3"]:
+    """Return two tangents and the normal of each point, an orthonormal right-handed frame.
+
+    Raises
+    ------
+    InvalidShapeError
+        If the normals of the faces at a vertex cancel.
+    """
+    normals = (
+        mean_normals(shape) if isinstance(shape, TriangleMesh) else _fitted_normals(shape, edges)
+    )
+    flat = np.flatnonzero(~normals.any(axis=1))
+    if flat.size:
+        raise InvalidShapeError(
+            f"A vertex must have a tangent plane; the normals of the faces at vertex {flat[0]} at "
+            f"{shape.points[flat[0]].tolist()} cancel ({flat.size} such). {try_auto()}"
+        )
+    steep = np.abs(normals[:, :1]) >= STEEP
+    axis = np.where(steep, [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
+    first = axis - (axis * normals).sum(axis=1, keepdims=True) * normals
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(normals, first), normals], axis=1)
+
+
+def _fitted_normals(cloud: PointCloud, edges: Int[np.ndarray, "2 e"]) -> Float[np.ndarray, "n 3"]:
+    """Return the direction in which the neighbors of each point spread least; its sign is free."""
+    points, _ = size_one(cloud.points)
+    near = points[edges[1].reshape(cloud.n_points, -1)] - points[:, None]
+    covariances = np.einsum("nki,nkj->nij", near, near)
+    return np.linalg.eigh(covariances)[1][:, :, 0]
+
+
+def fit_gradient(
+    points: Float[np.ndarray, "n 3"],
+    frames: Float[np.ndarray, "n 3 3"],
+    edges: Int[np.ndarray, "2 e"],
+) -> tuple[sp.csr_array, sp.csr_array]:
+    """Return the matrices of the two components of the gradient, in 1/length.
+
+    The gradient g at point i minimizes Σ_j (g · e_ij - (f_j - f_i))² over its neighbors j, with e_ij
+    the edge in the frame of i. Of several minimizers, where all edges lie on one line, it is the
+    shortest.
+    """
+    scaled, scale = size_one(points)
+    tails, heads = edges
+    vectors = scaled[heads] - scaled[tails]
+    x, y = (np.einsum("ei,ei->e", vectors, frames[tails, axis]) for axis in (0, 1))
+
+    # The inverse of each 2 x 2 matrix of normal equations, or its pseudoinverse if its rank is 1.
+    n = len(points)
+    xx, xy, yy = (np.bincount(tails, weights=w, minlength=n) for w in (x * x, x * y, y * y))
+    determinant, trace = xx * yy - xy * xy, xx + yy
+    regular = determinant > COLLINEAR * trace**2
+    divisor = np.where(regular, determinant, np.maximum(trace, np.finfo(float).tiny) ** 2)
+    divisor = np.maximum(divisor, np.finfo(float).tiny)
+    a = np.where(regular, yy, xx) / divisor
+    b = np.where(regular, -xy, xy) / divisor
+    c = np.where(regular, xx, yy) / divisor
+
+    gradients = []
+    for weights in (a[tails] * x + b[tails] * y, b[tails] * x + c[tails] * y):
+        own = -np.bincount(tails, weights=weights, minlength=n)
+        rows = np.concatenate([tails, np.arange(n)])
+        columns = np.concatenate([heads, np.arange(n)])
+        entries = np.concatenate([weights, own]) / scale
+        gradients.append(sp.csr_array((entries, (rows, columns)), shape=(n, n)))
+    return gradients[0], gradients[1]

@@ -1,0 +1,45 @@
+"""Watermarks after attacks, and false alarms: what the README shows and claims."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch1_watermark"
+FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
+README = (FOLDER / "README.md").read_text()
+SURVIVED = (
+    "none",
+    "turned, scaled, moved",
+    "low-pass to 70 % of the modes",
+    "noise of 0.1 %",
+    "low-pass, then noise",
+)
+
+
+def test_every_mark_is_found_after_smoothing_and_noise():
+    assert FULL["shapes"] == 20
+    for attack in SURVIVED:
+        assert FULL["attacks"][attack]["found"] == 20, attack
+
+
+def test_wrong_keys_are_not_found():
+    wrong = FULL["wrong keys"]
+    assert wrong["tries"] == 10_000
+    assert wrong["found"] == 0
+
+
+def test_the_readme_shows_the_attacks():
+    for attack, row in FULL["attacks"].items():
+        found, lowest, mean, exponent = row.values()
+        assert f"| {attack} | {found} | {lowest:.2f} | {mean:.2f} | {exponent:.0f} |" in README
+    wrong = FULL["wrong keys"]
+    assert f"{wrong['below 1e-3']} have a probability below 0.001" in README
+    assert f"highest score is {wrong['highest score']:.2f}" in README
+
+
+@pytest.mark.long
+def test_a_few_marks_are_found_and_no_wrong_key_is(quick_form):
+    found = quick_form("ch1_watermark/run.py")
+    assert all(found["attacks"][attack]["found"] == found["shapes"] for attack in SURVIVED)
+    assert found["wrong keys"]["found"] == 0
