@@ -27,8 +27,11 @@ from eigenshape.operators.tufted import (
     tufted_cover,
 )
 
+# Smallest margin of the triangle inequalities, in mean edge lengths (Sharp and Crane 2020).
+MOLLIFY = 1e-5
 
-def robust_laplacian(mesh: MeshLike, *, mollify: float = 1e-5) -> Laplacian:
+
+def robust_laplacian(mesh: MeshLike, *, mollify: float = MOLLIFY) -> Laplacian:
     """Build the Laplacian of a triangle mesh of any quality, manifold or not.
 
     This is the operator of Sharp and Crane, "A Laplacian for Nonmanifold Triangle Meshes" (2020).
@@ -82,6 +85,20 @@ def robust_laplacian(mesh: MeshLike, *, mollify: float = 1e-5) -> Laplacian:
     False
     """
     mesh = as_mesh(mesh)
+    delaunay, scale = delaunay_cover(mesh, mollify)
+    areas = in_length(_areas(delaunay, mesh.n_points), scale, 2)
+    return Laplacian(_stiffness(delaunay, mesh.n_points), sp.diags_array(areas).tocsr())
+
+
+def delaunay_cover(mesh: MeshLike, mollify: float = MOLLIFY) -> tuple[Triangulation, float]:
+    """Return the Delaunay triangles of the tufted cover, and the unit of their lengths.
+
+    Raises
+    ------
+    InvalidShapeError, InvalidParameterError
+        As in `robust_laplacian`.
+    """
+    mesh = as_mesh(mesh)
     if not 0 <= mollify < np.inf:
         raise InvalidParameterError(f"mollify must be finite and not negative; it is {mollify}.")
     require_distinct_corners(mesh)
@@ -92,10 +109,7 @@ def robust_laplacian(mesh: MeshLike, *, mollify: float = 1e-5) -> Laplacian:
         not mollify or len(degenerate_simplices(mesh)) == mesh.n_faces
     ):  # no face: all area would be that of mollifying
         require_volumes(mesh)
-    cover, scale = _cover(mesh, mollify)
-    delaunay = flip_to_delaunay(cover)
-    areas = in_length(_areas(delaunay, mesh.n_points), scale, 2)
-    return Laplacian(_stiffness(delaunay, mesh.n_points), sp.diags_array(areas).tocsr())
+    return _cover(mesh, mollify)
 
 
 def _cover(mesh: TriangleMesh, mollify: float) -> tuple[Triangulation, float]:
@@ -111,7 +125,11 @@ def _cover(mesh: TriangleMesh, mollify: float) -> tuple[Triangulation, float]:
             f"Mollified faces must have area; face {flat[0]} has sides {sides.tolist()} ({flat.size} such). Choose "
             f"a larger mollify than {mollify}."
         )
-    return tufted_cover(points, mesh.faces, lengths), scale
+    return flip_to_delaunay(tufted_cover(points, mesh.faces, lengths)), scale
+
+
+def cloud_cover(cloud, mollify=MOLLIFY):
+    raise NotImplementedError
 
 
 def _stiffness(cover: Triangulation, n: int) -> sp.csr_array:
