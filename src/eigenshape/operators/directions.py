@@ -47,7 +47,7 @@ def vertex_directions(mesh: TriangleMesh) -> Directions:
         no area or a vertex no face; the message names the first.
     """
     require_sound(mesh)
-    _require_oriented_manifold(mesh)
+    require_oriented_manifold(mesh)
     twins = _twins(mesh)
     first, inner = _first_sides(mesh, twins)
     cosines, sines = corner_products(mesh)
@@ -109,7 +109,15 @@ def _walk_around(
     return at_tail, at_head, around
 
 
-def _require_oriented_manifold(mesh: TriangleMesh) -> None:
+def require_oriented_manifold(mesh: TriangleMesh) -> None:
+    """Raise an error if vertices have no tangent planes with a side to look at them from.
+
+    Raises
+    ------
+    InvalidShapeError
+        If an edge has more than two faces, a vertex more than one fan of faces, or two neighboring
+        faces are turned against each other.
+    """
     edges, vertices = non_manifold_edges(mesh), non_manifold_vertices(mesh)
     if len(edges):
         raise InvalidShapeError(
