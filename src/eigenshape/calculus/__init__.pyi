@@ -1,0 +1,12 @@
+from .derivatives import curl as curl
+from .derivatives import curl_matrix as curl_matrix
+from .derivatives import divergence as divergence
+from .derivatives import divergence_matrix as divergence_matrix
+from .derivatives import gradient as gradient
+from .derivatives import gradient_matrix as gradient_matrix
+from .equations import heat_solver as heat_solver
+from .equations import helmholtz_solver as helmholtz_solver
+from .equations import poisson_solver as poisson_solver
+from .equations import remove_means as remove_means
+from .linear_solver import LinearSolver as LinearSolver
+from .linear_solver import factor_equations as factor_equations

@@ -14,7 +14,7 @@ from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.rigidity_loops import fit_rotations, turn_edges
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
-from eigenshape.sparse.elimination import SymmetricFactor, analyze_pattern, factorize_symmetric
+from eigenshape.sparse.elimination import SymmetricFactor, factor_matrix
 
 Points = Float[np.ndarray, "n 3"]
 Step = tuple[Points, Points]  # change of the free vertices in a round, and their new places
@@ -151,10 +151,7 @@ def factor_equations(square: sp.csr_array) -> SymmetricFactor:
     InvalidShapeError
         If they are not positive definite.
     """
-    matrix = square.tocsc()
-    matrix.sort_indices()
-    with one_blas_thread():
-        factor = factorize_symmetric(analyze_pattern(matrix), matrix.data)
+    factor = factor_matrix(square)
     if factor is None or not (factor.pivots > 0).all():
         raise InvalidShapeError(
             "Every triangle must have angles well above zero to be bent; the equations of the "

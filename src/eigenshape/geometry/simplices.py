@@ -65,7 +65,7 @@ def in_length(
     """
     exponent = power * (int(np.frexp(scale)[1]) - 1)
     if abs(exponent) > LARGEST_EXPONENT:
-        noun = {-2: "eigenvalues", 1: "lengths", 2: "areas", 3: "volumes"}.get(
+        noun = {-2: "eigenvalues", -1: "gradients", 1: "lengths", 2: "areas", 3: "volumes"}.get(
             power, f"{power}-volumes"
         )
         most = 301 // abs(power)
@@ -96,6 +96,23 @@ def triangular_sides(
             np.einsum("as,as->s", sides[i], sides[j], out=triangles[i, j])
             sides[j] -= triangles[i, j] * sides[i]
     return sides.transpose(2, 1, 0), triangles.transpose(2, 0, 1)
+
+
+def barycentric_gradients(
+    corners: Float[np.ndarray, "s corners d"],
+) -> tuple[
+    Float[np.ndarray, "s d m"], Float[np.ndarray, "s m m"], Float[np.ndarray, "s corners m"]
+]:
+    """Return the two factors of `triangular_sides`, and the gradients of barycentric coordinates.
+
+    Row a holds the gradient of the coordinate of corner a, in the orthonormal basis of the simplex.
+    The gradients are computed from the triangular factor, because the Gram matrix of the sides
+    would have the squared condition number.
+    """
+    basis, triangles = triangular_sides(corners)
+    inner = np.linalg.inv(triangles)
+    gradients = np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
+    return basis, triangles, gradients
 
 
 def volumes(corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndarray, " s"]:

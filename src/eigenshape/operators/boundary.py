@@ -55,17 +55,7 @@ def dirichlet_laplacian(
     (4, [5, 6, 9, 10])
     """
     require_type(laplacian, Laplacian, "laplacian")
-    points = np.atleast_1d(as_array(fixed, "fixed"))
-    if points.size and points.dtype.kind not in "iu":
-        raise InvalidParameterError(
-            f"fixed must be a list of point numbers; the type of its entries is {points.dtype}. "
-            f"Pass np.flatnonzero(mask) for a mask."
-        )
-    bad = np.flatnonzero((points < 0) | (points >= laplacian.n_points))
-    if bad.size:
-        raise InvalidParameterError(
-            f"fixed must hold points 0..{laplacian.n_points - 1}; entry {bad[0]} is {points[bad[0]]}."
-        )
+    points = require_points(fixed, laplacian.n_points)
     free = np.setdiff1d(np.arange(laplacian.n_points), points)
     if not free.size:
         raise InvalidParameterError(
@@ -73,3 +63,25 @@ def dirichlet_laplacian(
         )
     cut = {name: getattr(laplacian, name)[free][:, free] for name in ("stiffness", "mass")}
     return replace(laplacian, **cut), free
+
+
+def require_points(fixed: ArrayLike, n_points: int) -> Int[np.ndarray, " c"]:
+    """Return `fixed` as an array of points, in its order and with its duplicates.
+
+    Raises
+    ------
+    InvalidParameterError
+        If an entry is no point number, or out of range.
+    """
+    points = np.atleast_1d(as_array(fixed, "fixed"))
+    if points.size and points.dtype.kind not in "iu":
+        raise InvalidParameterError(
+            f"fixed must be a list of point numbers; the type of its entries is {points.dtype}. "
+            f"Pass np.flatnonzero(mask) for a mask."
+        )
+    bad = np.flatnonzero((points < 0) | (points >= n_points))
+    if bad.size:
+        raise InvalidParameterError(
+            f"fixed must hold points 0..{n_points - 1}; entry {bad[0]} is {points[bad[0]]}."
+        )
+    return points.astype(np.int64)

@@ -16,10 +16,10 @@ from jaxtyping import Float, Int
 from eigenshape._arrays import freeze
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.simplices import (
+    barycentric_gradients,
     in_length,
     scaled_corners,
     simplex_volumes,
-    triangular_sides,
     volumes_of,
 )
 from eigenshape.geometry.simplicial import Mesh
@@ -30,13 +30,10 @@ def gradient_products(
 ) -> Float[np.ndarray, "s corners corners"]:
     """Return V ∇λ_a·D∇λ_b for the barycentric coordinates of each simplex, in length^(m-2).
 
-    D is the identity, or one tensor per simplex. The gradients are computed from the triangular
-    factor of the side vectors. Their Gram matrix would have the squared condition number.
+    D is the identity, or one tensor per simplex.
     """
     corners, scale = scaled_corners(mesh)
-    basis, triangles = triangular_sides(corners)
-    inner = np.linalg.inv(triangles)
-    gradients = np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
+    basis, triangles, gradients = barycentric_gradients(corners)
     conducted = (
         gradients if tensors is None else gradients @ (basis.transpose(0, 2, 1) @ tensors @ basis)
     )

@@ -17,7 +17,7 @@ from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices, edge_table
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.sparse.elimination import analyze_pattern, factorize_symmetric
+from eigenshape.sparse.elimination import factor_matrix
 
 # Noise level at which `denoise` lets heat flow one mean edge length: that of Gaussian noise of a
 # quarter of an edge. A larger value smooths less.
@@ -132,10 +132,7 @@ def _flow(
     pencil = (laplacian.mass + time * laplacian.stiffness).tocsr()[free]
     mass = laplacian.mass.diagonal()[free, None]
     fixed = np.setdiff1d(np.arange(len(points)), free)
-    matrix = pencil[:, free].tocsc()
-    matrix.sort_indices()
-    with one_blas_thread():
-        factor = factorize_symmetric(analyze_pattern(matrix), matrix.data)
+    factor = factor_matrix(pencil[:, free])
     if factor is None:
         raise InvalidShapeError(
             "All triangles must have angles well above 0 for the surface to be smoothed; some have angles so close to "

@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
+from eigenshape._threads import one_blas_thread
 from eigenshape.sparse import front_loops as fronts
 from eigenshape.sparse import symbolic_loops as symbolic
 from eigenshape.sparse.blas_loops import addresses
@@ -240,3 +241,11 @@ def factorize_symmetric(
     children = np.bincount(e.above[e.above >= 0], minlength=len(e.above))
     sound = fronts.factor_fronts(*lower, *tree, panels, pivots, workspace, children, addresses())
     return SymmetricFactor(e, panels, pivots) if sound else None
+
+
+def factor_matrix(matrix: sp.sparray) -> SymmetricFactor | None:
+    """Factor one symmetric matrix; return None if a pivot is zero or not finite."""
+    columns = sp.csc_array(matrix)
+    columns.sort_indices()
+    with one_blas_thread():
+        return factorize_symmetric(analyze_pattern(columns), columns.data)

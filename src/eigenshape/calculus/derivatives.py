@@ -1,0 +1,354 @@
+"""Gradient, divergence and curl of piecewise linear functions on meshes of any dimension."""
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float
+
+from eigenshape._arrays import point_functions, simplex_vectors
+from eigenshape._errors import InvalidShapeError
+from eigenshape._typing import ArrayLike
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
+from eigenshape.geometry.measure import face_normals
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.requirements import require_oriented, require_sound
+from eigenshape.geometry.simplices import (
+    barycentric_gradients,
+    in_length,
+    scaled_corners,
+    volumes_of,
+)
+from eigenshape.geometry.simplicial import Mesh
+
+
+def gradient_matrix(mesh: MeshLike) -> sp.csr_array:
+    """Build the matrix that takes values at vertices to one gradient per simplex.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Triangles, tetrahedra, segments, or m-simplices in R^d.
+
+    Returns
+    -------
+    (s·d, n) sparse
+        G, in 1/length. Row d·j + i is component i of the gradient on simplex j, so
+        (G @ values).reshape(s, d) is `gradient(mesh, values)`.
+
+    Raises
+    ------
+    InvalidShapeError
+        If a simplex has no volume or the same corners as another, or a point belongs to no simplex.
+
+    See Also
+    --------
+    es.calculus.gradient : The gradients themselves.
+    es.calculus.divergence_matrix : Its adjoint, up to the sign.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> square = es.shapes.grid(1, 1)
+    >>> G = es.calculus.gradient_matrix(square)
+    >>> G.shape
+    (6, 4)
+    >>> abs((G @ square.vertices[:, 0]).reshape(-1, 3).round(12)).tolist()
+    [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
+    """
+    mesh = as_simplicial(mesh)
+    require_sound(mesh)
+    gradients, _ = _gradients(mesh)
+    return _gradient_rows(mesh, gradients)
+
+
+def gradient(mesh: MeshLike, values: ArrayLike) -> Float[np.ndarray, "s d ..."]:
+    """Compute the gradient of piecewise linear functions, one vector per simplex.
+
+    ∇u = Σ_a u_a ∇λ_a over the corners a of a simplex, with λ_a its barycentric coordinates. The
+    vector lies in the simplex.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Triangles, tetrahedra, segments, or m-simplices in R^d.
+    values : (n,) or (n, k) float
+        Values at the points; each column is one function.
+
+    Returns
+    -------
+    (s, d) or (s, d, k) float
+        In units of the values per length.
+
+    Raises
+    ------
+    InvalidShapeError
+        If a simplex has no volume or the same corners as another, or a point belongs to no simplex.
+    InvalidParameterError
+        If `values` does not have one row per point, or a value is not finite.
+
+    See Also
+    --------
+    es.calculus.gradient_matrix : The same as a sparse matrix.
+    es.calculus.divergence : Its adjoint, up to the sign.
+
+    Examples
+    --------
+    On a cube of tetrahedra, the gradient of x - 2z:
+
+    >>> import eigenshape as es
+    >>> cube = es.shapes.box(1, 1, 1)
+    >>> es.calculus.gradient(cube, cube.points @ [1, 0, -2])[0].round(12).tolist()
+    [1.0, 0.0, -2.0]
+    """
+    mesh = as_simplicial(mesh)
+    require_sound(mesh)
+    functions = point_functions(values, "values", mesh.n_points)
+    gradients, _ = _gradients(mesh)
+    return np.einsum("sad,sa...->sd...", gradients, functions[mesh.simplices])
+
+
+def divergence_matrix(mesh: MeshLike) -> sp.csr_array:
+    """Build the matrix of the integrated divergence: D = -Gᵀ diag(volumes).
+
+    D G = -W, with W the stiffness of `cotangent_laplacian`.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Triangles, tetrahedra, segments, or m-simplices in R^d.
+
+    Returns
+    -------
+    (n, s·d) sparse
+        In length^(m-1). Column d·j + i takes component i of the vector on simplex j.
+
+    Raises
+    ------
+    InvalidShapeError
+        If a simplex has no volume or the same corners as another, or a point belongs to no simplex.
+
+    See Also
+    --------
+    es.calculus.divergence : The divergence itself.
+    es.calculus.gradient_matrix : Its adjoint, up to the sign.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(1)
+    >>> G, D = es.calculus.gradient_matrix(ball), es.calculus.divergence_matrix(ball)
+    >>> bool(abs(D @ G + es.cotangent_laplacian(ball).stiffness).max() < 1e-14)
+    True
+    """
+    mesh = as_simplicial(mesh)
+    require_sound(mesh)
+    gradients, volumes = _gradients(mesh)
+    return (-_gradient_rows(mesh, gradients * volumes[:, None, None])).T.tocsr()
+
+
+def divergence(mesh: MeshLike, vectors: ArrayLike) -> Float[np.ndarray, "n ..."]:
+    """Compute the integrated divergence of vectors on simplices, one number per point.
+
+    (div X)_i = -Σ V X·∇λ_i over the simplices at point i: the weak form -∫ X·∇λ_i (Polthier and
+    Preuß 2003; libigl, LaPy and geometry-central integrate likewise). It is the adjoint of
+    `gradient`: div X·u = -Σ V X·∇u for all u, and -div ∇u = W u with W the stiffness of
+    `cotangent_laplacian`. On a boundary this includes the flux through it, so that the sum over
+    each component is 0. Divide by `dual_volumes(mesh)` for the divergence at an inner point.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Triangles, tetrahedra, segments, or m-simplices in R^d.
+    vectors : (s, d) or (s, d, k) float
+        One vector per simplex, or k of them. Parts normal to the simplex do not count.
+
+    Returns
+    -------
+    (n,) or (n, k) float
+        In units of the vectors times length^(m-1).
+
+    Raises
+    ------
+    InvalidShapeError
+        If a simplex has no volume or the same corners as another, or a point belongs to no simplex.
+    InvalidParameterError
+        If `vectors` does not have one vector per simplex, or a number is not finite.
+
+    See Also
+    --------
+    es.calculus.divergence_matrix : The same as a sparse matrix.
+
+    Examples
+    --------
+    The field (x, y), sampled at the middle of triangles, has divergence 2.
+
+    >>> import eigenshape as es
+    >>> square = es.shapes.grid(8, 8)
+    >>> field = square.vertices[square.faces].mean(axis=1)
+    >>> at_points = es.calculus.divergence(square, field) / es.geometry.dual_volumes(square)
+    >>> at_points[40].round(12).item()  # the center
+    2.0
+    """
+    mesh = as_simplicial(mesh)
+    require_sound(mesh)
+    field = simplex_vectors(vectors, "vectors", len(mesh.simplices), mesh.points.shape[1])
+    gradients, volumes = _gradients(mesh)
+    weighted = gradients * volumes[:, None, None]
+    return _sum_at_points(mesh, -np.einsum("sad,sd...->sa...", weighted, field))
+
+
+def curl_matrix(mesh: MeshLike) -> sp.csr_array:
+    """Build the matrix of the integrated curl of vectors on simplices.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        As in `curl`.
+
+    Returns
+    -------
+    (n, s·d) or (3n, s·d) sparse
+        In length^(m-1). Column d·j + i takes component i of the vector on simplex j. On
+        tetrahedra, row 3·p + i is component i at point p.
+
+    Raises
+    ------
+    InvalidShapeError
+        As in `curl`.
+
+    See Also
+    --------
+    es.calculus.curl : The curl itself.
+
+    Examples
+    --------
+    The curl of a gradient is zero inside; a sphere has no boundary.
+
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(1)
+    >>> C, G = es.calculus.curl_matrix(ball), es.calculus.gradient_matrix(ball)
+    >>> bool(abs(C @ G).max() < 1e-14)
+    True
+    """
+    mesh = as_simplicial(mesh)
+    require_sound(mesh)
+    weights = _curl_weights(mesh)
+    n, s = mesh.n_points, len(mesh.simplices)
+    ambient, corners = weights.shape[-1], weights.shape[1]
+    width = 1 if weights.ndim == 3 else 3
+    entries = weights.reshape(s, corners, width, ambient)
+    points = np.broadcast_to(mesh.simplices[:, :, None, None], entries.shape)
+    rows = width * points + np.arange(width)[:, None]
+    columns = ambient * np.arange(s)[:, None, None, None] + np.arange(ambient)
+    places = (rows.ravel(), np.broadcast_to(columns, entries.shape).ravel())
+    return sp.coo_array((entries.ravel(), places), shape=(width * n, ambient * s)).tocsr()
+
+
+def curl(mesh: MeshLike, vectors: ArrayLike) -> Float[np.ndarray, "n ..."]:
+    """Compute the integrated curl of vectors on triangles or tetrahedra, at each point.
+
+    On tetrahedra it is ∫ curl X λ_i = Σ V X × ∇λ_i over the simplices at point i, a vector. On a
+    surface it is its part along the normal N, the number Σ V N·(X × ∇λ_i) (Polthier and Preuß
+    2003). Half the circulation around the point is the same. On a boundary this includes the
+    circulation along it, so that the sum over each component is 0. Divide by `dual_volumes(mesh)`
+    for the curl at an inner point.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Triangles in R³, consistently oriented; triangles in the plane, where counter-clockwise is
+        positive; or tetrahedra in R³.
+    vectors : (s, d) or (s, d, k) float
+        One vector per simplex, or k of them.
+
+    Returns
+    -------
+    (n,), (n, k), (n, 3) or (n, 3, k) float
+        One number per point on a surface, one vector on tetrahedra, in units of the vectors times
+        length^(m-1).
+
+    Raises
+    ------
+    InvalidShapeError
+        If the mesh is neither a surface in R² or R³ nor made of tetrahedra in R³, two neighboring
+        faces are turned against each other, a simplex has no volume or the same corners as another,
+        or a point belongs to no simplex.
+    InvalidParameterError
+        If `vectors` does not have one vector per simplex, or a number is not finite.
+
+    See Also
+    --------
+    es.calculus.curl_matrix : The same as a sparse matrix.
+    es.calculus.divergence : The other derivative of a field.
+
+    Examples
+    --------
+    The field (-y, x) turns at rate 1, so its curl is 2.
+
+    >>> import eigenshape as es
+    >>> square = es.shapes.grid(8, 8)
+    >>> middles = square.vertices[square.faces].mean(axis=1)
+    >>> field = middles[:, [1, 0, 2]] * [-1, 1, 0]
+    >>> at_points = es.calculus.curl(square, field) / es.geometry.dual_volumes(square)
+    >>> at_points[40].round(12).item()  # the center
+    2.0
+    """
+    mesh = as_simplicial(mesh)
+    require_sound(mesh)
+    weights = _curl_weights(mesh)
+    field = simplex_vectors(vectors, "vectors", len(mesh.simplices), mesh.points.shape[1])
+    rule = "sad,sd...->sa..." if weights.ndim == 3 else "said,sd...->sai..."
+    return _sum_at_points(mesh, np.einsum(rule, weights, field))
+
+
+def _gradients(
+    mesh: Mesh,
+) -> tuple[Float[np.ndarray, "s corners d"], Float[np.ndarray, " s"]]:
+    """Return the gradients of the barycentric coordinates of each simplex, and its volume."""
+    corners, scale = scaled_corners(mesh)
+    basis, triangles, inner = barycentric_gradients(corners)
+    gradients = inner @ basis.transpose(0, 2, 1)
+    volumes = in_length(volumes_of(triangles), scale, mesh.dim)
+    return in_length(gradients, scale, -1), volumes
+
+
+def _gradient_rows(mesh: Mesh, gradients: Float[np.ndarray, "s corners d"]) -> sp.csr_array:
+    """Return the matrix with one row for each component of the gradient on each simplex."""
+    s, corners, ambient = gradients.shape
+    columns = np.broadcast_to(mesh.simplices[:, None, :], (s, ambient, corners))
+    starts = np.arange(0, s * ambient * corners + 1, corners)
+    data = gradients.transpose(0, 2, 1)
+    rows = sp.csr_array((data.ravel(), columns.ravel(), starts), shape=(s * ambient, mesh.n_points))
+    rows.sort_indices()
+    return rows
+
+
+def _curl_weights(mesh: Mesh) -> Float[np.ndarray, "s corners ..."]:
+    """Return, for each corner of each simplex, what the curl there takes from the vector."""
+    ambient = mesh.points.shape[1]
+    if (mesh.dim, ambient) not in ((2, 2), (2, 3), (3, 3)):
+        raise InvalidShapeError(
+            f"The curl needs triangles in R^2 or R^3, or tetrahedra in R^3; the mesh is a {mesh!r}."
+        )
+    gradients, volumes = _gradients(mesh)
+    weighted = gradients * volumes[:, None, None]
+    if mesh.dim == 3:
+        # Row i of the matrix of X -> X × g is e_i · (X × g) = (g × e_i) · X.
+        return np.cross(weighted[:, :, None, :], np.eye(3))
+    if ambient == 2:
+        return weighted[:, :, ::-1] * [1.0, -1.0]
+    surface = TriangleMesh(mesh.points, mesh.simplices)
+    require_oriented(surface)
+    # N · (X × g) = (g × N) · X.
+    return np.cross(weighted, face_normals(surface)[:, None, :])
+
+
+def _sum_at_points(
+    mesh: Mesh, shares: Float[np.ndarray, "s corners ..."]
+) -> Float[np.ndarray, "n ..."]:
+    """Add the shares of all corners at their points."""
+    columns = shares.reshape(mesh.simplices.size, -1)
+    sums = [
+        np.bincount(mesh.simplices.ravel(), weights=column, minlength=mesh.n_points)
+        for column in columns.T
+    ]
+    return np.stack(sums, axis=1).reshape(mesh.n_points, *shares.shape[2:])

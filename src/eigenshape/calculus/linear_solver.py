@@ -1,0 +1,460 @@
+"""Symmetric systems of equations on points: factored once, solved for many right-hand sides."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+from scipy.sparse.csgraph import connected_components
+
+from eigenshape._arrays import freeze, point_functions, real_numbers
+from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
+from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
+from eigenshape.operators.boundary import require_points
+from eigenshape.operators.laplacian import ASYMMETRY
+from eigenshape.sparse.elimination import SymmetricFactor, factor_matrix
+
+# Row sums up to this share of the absolute row sums count as zero: those of stiffness matrices are
+# zero up to the rounding of their entries.
+ZERO_ROW_SUM = 1e-12
+# Loads on a component where nothing is fixed may sum to this share of their absolute sum. Sums of a
+# million numbers round to 1e-10 of it at most; a source that is not balanced is far above.
+BALANCED = 1e-9
+# Singular values of the constraints' equations up to this share of the largest count as zero:
+# redundant constraints give some near 1e-16, and the conditions of meshes stay above.
+DEPENDENT = 1e-12
+# Of a system that no pins or fixed points make regular.
+SINGULAR = (
+    "The equations of the free points must have one solution; {}. "
+    "Fix a point of each component, or move the shift away from an eigenvalue."
+)
+# Constraints count as met up to this share of their terms.
+MET = 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class LinearSolver:
+    """A symmetric system A x = b on points, factored once for many right-hand sides.
+
+    Some points may be fixed at values, and linear constraints C x = d may hold; then x is the
+    stationary point of ½ xᵀAx - xᵀb among those, the minimum if A is positive semidefinite.
+    Where a component has no fixed point and constants on it have no energy, such as with pure
+    Neumann conditions, x is determined up to a constant: constraints choose it, else the weighted
+    mean over the component is 0.
+
+    A solver is a value without scratch memory; several threads may use it at once.
+
+    Attributes
+    ----------
+    n_points : int
+    free : (f,) int
+        The points that the factor solves for, ascending.
+    fixed : (c,) int
+        The points with given values, ascending, without duplicates.
+    floating : (n,) int
+        Number of the component of each point among those determined up to a constant, else -1.
+
+    See Also
+    --------
+    es.calculus.poisson_solver, es.calculus.helmholtz_solver, es.calculus.heat_solver : Make solvers
+        for the equations of a Laplacian.
+    es.calculus.factor_equations : Make a solver for any symmetric matrix.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> laplacian = es.cotangent_laplacian(es.shapes.interval(2))
+    >>> solver = es.calculus.poisson_solver(laplacian, fixed=[0, 2])
+    >>> solver.solve(values=[1.0, 3.0]).round(12).tolist()
+    [1.0, 2.0, 3.0]
+    """
+
+    n_points: int
+    free: Int[np.ndarray, " f"]
+    fixed: Int[np.ndarray, " c"]
+    floating: Int[np.ndarray, " n"]
+    _given: Int[np.ndarray, " g"]  # `fixed` as it was given, in its order
+    _weights: Float[np.ndarray, " n"]  # of the means
+    _block: sp.csr_array  # A on the free points
+    _coupling: sp.csr_array  # A from the fixed to the free points
+    _factor: SymmetricFactor | None  # None if no point is free
+    _refined: bool  # whether solutions take a step of refinement
+    _constraints: "Constraints | None" = None
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
+    def solve(
+        self, right: ArrayLike = 0.0, *, values: ArrayLike = 0.0, targets: ArrayLike = 0.0
+    ) -> Float[np.ndarray, "n ..."]:
+        """Solve for one or many right-hand sides.
+
+        Parameters
+        ----------
+        right : (n,) or (n, k) float, or 0
+            b, integrated: one number per point for each right-hand side, such as B f for a source f
+            or -`divergence`. Its rows at fixed points do not count.
+        values : (c,) or (c, k) float, or a number
+            At the fixed points, in the order in which they were given.
+        targets : (p,) or (p, k) float, or a number
+            d, of the constraints.
+
+        Returns
+        -------
+        (n,) or (n, k) float
+            Two-dimensional if any argument is.
+
+        Raises
+        ------
+        InvalidParameterError
+            If an array has another length or a number is not finite, a point that is fixed twice
+            has two values, the right-hand side does not sum to 0 on a component where nothing is
+            fixed, or no x meets all constraints.
+        """
+        load = _columns(right, "right", self.n_points, "point")
+        given = _columns(values, "values", len(self._given), "fixed point")
+        n_constraints = 0 if self._constraints is None else len(self._constraints.response.T)
+        wanted = _columns(targets, "targets", n_constraints, "constraint")
+        widths = {each.shape[1] for each in (load, given, wanted)} - {1}
+        if len(widths) > 1:
+            raise InvalidParameterError(
+                "right, values and targets must have one column, or equally many; "
+                f"they have {load.shape[1]}, {given.shape[1]} and {wanted.shape[1]}."
+            )
+        width = max(widths, default=1)
+        at_fixed = self._values_at_fixed(given)
+        with one_blas_thread():
+            found = self._solve_pinned(load, at_fixed, width)
+            if self._constraints is None:
+                self._require_balanced(load)
+                found = self._without_means(found)
+            else:
+                found = self._constraints.correct(self, found, load, wanted)
+        flat = max(np.ndim(each) for each in (right, values, targets)) < 2
+        return found[:, 0] if flat else found
+
+    def _values_at_fixed(self, given: Float[np.ndarray, "g k"]) -> Float[np.ndarray, "c k"]:
+        """Return the values at `fixed`; raise an error if a point has two."""
+        _, first, inverse = np.unique(self._given, return_index=True, return_inverse=True)
+        at_fixed = given[first]
+        clash = np.argwhere(at_fixed[inverse] != given)
+        if len(clash):
+            entry, column = clash[0]
+            raise InvalidParameterError(
+                f"A point can be fixed at one value only; point {self._given[entry]} is fixed at "
+                f"{at_fixed[inverse[entry], column]} and at {given[entry, column]}."
+            )
+        return at_fixed
+
+    def _solve_pinned(
+        self, load: Float[np.ndarray, "n w"], at_fixed: Float[np.ndarray, "c v"], width: int
+    ) -> Float[np.ndarray, "n k"]:
+        """Solve with the first point of each floating component at 0."""
+        found = np.zeros((self.n_points, width))
+        found[self.fixed] = at_fixed
+        if self._factor is None:
+            return found
+        right = np.broadcast_to(
+            load[self.free] - self._coupling @ at_fixed, (len(self.free), width)
+        )
+        inner = self._factor.solve(right)
+        if self._refined:
+            inner += self._factor.solve(right - self._block @ inner)
+        found[self.free] = inner
+        return found
+
+    def _require_balanced(self, load: Float[np.ndarray, "n k"]) -> None:
+        """Raise an error if loads do not sum to zero on a floating component."""
+        sums, sizes = self.floating_sums(load), self.floating_sums(np.abs(load))
+        bad = np.argwhere(np.abs(sums) > BALANCED * sizes)
+        if len(bad):
+            component, column = bad[0]
+            point = int(np.argmax(self.floating == component))
+            raise InvalidParameterError(
+                "Where no point of a component is fixed, the right-hand side must sum to 0 on it "
+                f"(what flows in must flow out); on the component of point {point} it sums to "
+                f"{sums[component, column]:.6g} ({len(np.unique(bad[:, 0]))} such components). "
+                "Pass es.calculus.remove_means(laplacian, source) as the source, or fix a point."
+            )
+
+    def floating_sums(self, load: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "u k"]:
+        """Return the sums of loads over each component that is determined up to a constant."""
+        inside = self.floating >= 0
+        count = int(self.floating.max(initial=-1)) + 1
+        numbers = self.floating[inside]
+        sums = [np.bincount(numbers, weights=each, minlength=count) for each in load[inside].T]
+        return np.stack(sums, axis=1)
+
+    def _without_means(self, found: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+        """Subtract the weighted mean over each floating component."""
+        inside = self.floating >= 0
+        if not inside.any():
+            return found
+        weights = self._weights[:, None]
+        means = self.floating_sums(weights * found) / self.floating_sums(weights)
+        found[inside] -= means[self.floating[inside]]
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Constraints:
+    """Linear constraints C x = d of a solver, eliminated by a small dense system.
+
+    x = x₀ - R μ + Z α, with x₀ the solution without constraints, R = A⁻¹Cᵀ, and Z the constants on
+    floating components. The multipliers μ and constants α solve C x = d and Zᵀ(b - Cᵀμ) = 0.
+
+    Attributes
+    ----------
+    matrix : (p, n) sparse
+        C, as given.
+    response : (n, p) float
+        R.
+    constants : (p, u) float
+        C Z.
+    scale : float
+        Unit of the constants α that balances the system.
+    system : (p+u, p+u) float
+    inverse : (p+u, p+u) float
+        Its pseudo-inverse: redundant constraints do no harm.
+    """
+
+    matrix: sp.csr_array
+    response: Float[np.ndarray, "n p"]
+    constants: Float[np.ndarray, "p u"]
+    scale: float
+    system: Float[np.ndarray, "q q"]
+    inverse: Float[np.ndarray, "q q"]
+
+    def correct(
+        self,
+        solver: LinearSolver,
+        start: Float[np.ndarray, "n k"],
+        load: Float[np.ndarray, "n w"],
+        targets: Float[np.ndarray, "p v"],
+    ) -> Float[np.ndarray, "n k"]:
+        """Return the solution that meets the constraints, given that without them.
+
+        Raises
+        ------
+        InvalidParameterError
+            If the constraints conflict, or leave a component where loads do not sum to 0.
+        """
+        n_rows, width = self.constants.shape[0], start.shape[1]
+        reached = self.matrix @ start
+        sums = np.broadcast_to(solver.floating_sums(load), (self.constants.shape[1], width))
+        right = np.concatenate([reached - targets, -self.scale * sums])
+        shares = self.inverse @ right
+        left = self.system @ shares - right
+        terms = np.abs(self.system) @ np.abs(shares)
+        sizes = np.concatenate([np.abs(reached) + np.abs(targets), np.zeros_like(sums)])
+        # A load that sums to rounding has no share in what is left.
+        sizes[n_rows:] = self.scale * solver.floating_sums(np.abs(load))
+        bad = np.argwhere(np.abs(left) > MET * (terms + sizes))
+        if len(bad):
+            row, column = bad[0]
+            if row >= n_rows:
+                solver._require_balanced(load)
+            raise InvalidParameterError(
+                "The constraints must not contradict each other or the fixed values; "
+                f"constraint {row} would hold with target "
+                f"{targets[row, min(column, targets.shape[1] - 1)] - left[row, column]:.6g} only, "
+                f"not {targets[row, min(column, targets.shape[1] - 1)]:.6g} ({len(bad)} such)."
+            )
+        multipliers, constants = shares[:n_rows], self.scale * shares[n_rows:]
+        found = start - self.response @ multipliers
+        # Components that no constraint concerns have mean 0, as without constraints.
+        inside = solver.floating >= 0
+        untouched = np.flatnonzero(~self.constants.any(axis=0))
+        free_mean = inside & np.isin(solver.floating, untouched)
+        kept = found[inside & ~free_mean]
+        if len(kept):
+            found[inside & ~free_mean] = kept + constants[solver.floating[inside & ~free_mean]]
+        if free_mean.any():
+            found[free_mean] = solver._without_means(found.copy())[free_mean]
+        return found
+
+
+def factor_equations(
+    matrix: sp.sparray,
+    fixed: ArrayLike | None = None,
+    constraints: sp.sparray | ArrayLike | None = None,
+    *,
+    weights: ArrayLike | None = None,
+    indefinite: bool = False,
+) -> LinearSolver:
+    """Factor a symmetric system, for many right-hand sides.
+
+    Fixed points are eliminated and the rest is factored as L D Lᵀ; constraints follow by the Schur
+    complement, a dense system of their number. That takes one solve and n numbers of memory for
+    each constraint, which is meant for hundreds of them.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse
+        A, symmetric; positive semidefinite unless `indefinite`.
+    fixed : (c,) int, optional
+        Points at which values are given.
+    constraints : (p, n) sparse or float, optional
+        C, one row per linear constraint C x = d.
+    weights : (n,) float, optional
+        Weights of the means that are 0 where x is determined up to a constant; ones by default.
+    indefinite : bool
+        Whether A may have negative eigenvalues. Then x is a stationary point, and each solve takes
+        a step of refinement.
+
+    Returns
+    -------
+    LinearSolver
+
+    Raises
+    ------
+    InvalidParameterError
+        If the matrix is not square, finite and symmetric; is singular, or not positive semidefinite
+        though not called indefinite; a fixed point is out of range; or constraints or weights have
+        another size or are not finite.
+
+    See Also
+    --------
+    es.calculus.minimize_quadratic : Factor and solve at once.
+
+    Examples
+    --------
+    The stiffest string through 0 and 1 whose values sum to 3:
+
+    >>> import eigenshape as es
+    >>> W = es.cotangent_laplacian(es.shapes.interval(4)).stiffness
+    >>> solver = es.calculus.factor_equations(W, fixed=[0, 4], constraints=[[1, 1, 1, 1, 1]])
+    >>> solver.solve(values=[0, 1], targets=[3]).round(4).tolist()
+    [0.0, 0.4, 0.7, 0.9, 1.0]
+    """
+    system = _require_symmetric(matrix)
+    n = system.shape[0]
+    points = require_points([] if fixed is None else fixed, n)
+    held = np.unique(points)
+    means = np.ones(n) if weights is None else point_functions(weights, "weights", n)
+    floating = _floating_components(system, held)
+    _, pins = np.unique(floating, return_index=True)
+    pins = pins[floating[pins] >= 0]
+    free = np.setdiff1d(np.arange(n), np.concatenate([held, pins]))
+    rows = system[free]
+    block, coupling = rows[:, free], rows[:, held]
+    factor = _factor(block, free, indefinite=indefinite)
+    arrays = (freeze(each) for each in (free, held, floating, points, means))
+    solver = LinearSolver(n, *arrays, block, coupling, factor, indefinite)
+    if constraints is None:
+        return solver
+    return replace(solver, _constraints=_eliminate(solver, constraints))
+
+
+def _require_symmetric(matrix: sp.sparray) -> sp.csr_array:
+    if not sp.issparse(matrix) or matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
+        raise InvalidParameterError(
+            "The matrix of a system must be sparse and square; it is "
+            f"a {type(matrix).__name__} of shape {np.shape(matrix)}."
+        )
+    system = sp.csr_array(matrix, dtype=np.float64, copy=True)
+    system.sum_duplicates()
+    largest = abs(system).max() if system.nnz else 0.0
+    if not np.isfinite(largest):
+        raise InvalidParameterError("The matrix of a system must be finite; it is not.")
+    asymmetry = abs(system - system.T)
+    if asymmetry.nnz and asymmetry.max() > ASYMMETRY * largest:
+        worst = asymmetry.tocoo()
+        at = int(worst.data.argmax())
+        i, j = worst.coords[0][at], worst.coords[1][at]
+        raise InvalidParameterError(
+            f"The matrix of a system must be symmetric; entry ({i}, {j}) is {system[i, j]} and "
+            f"entry ({j}, {i}) is {system[j, i]}."
+        )
+    return system
+
+
+def _floating_components(
+    system: sp.csr_array, fixed: Int[np.ndarray, " c"]
+) -> Int[np.ndarray, " n"]:
+    """Return numbers of components without fixed point where constants have no energy, else -1."""
+    count, labels = connected_components(system, directed=False)
+    sums, sizes = np.abs(system.sum(axis=1)), abs(system).sum(axis=1)
+    rigid = np.bincount(labels, weights=sums > ZERO_ROW_SUM * sizes, minlength=count) > 0
+    rigid[labels[fixed]] = True
+    numbers = np.where(rigid, -1, np.cumsum(~rigid) - 1)
+    return numbers[labels].astype(np.int64)
+
+
+def _factor(
+    block: sp.csr_array, free: Int[np.ndarray, " f"], *, indefinite: bool
+) -> SymmetricFactor | None:
+    """Factor the equations of the free points; None if there are none.
+
+    Raises
+    ------
+    InvalidParameterError
+        If they are singular up to rounding, or have negative pivots that are not expected.
+    """
+    if not len(free):
+        return None
+    factor = factor_matrix(block)
+    if factor is None:
+        raise InvalidParameterError(SINGULAR.format("a pivot is 0"))
+    pivots, bounds = factor.pivots, factor.rounding()[factor.elimination.order]
+    small = np.flatnonzero(np.abs(pivots) <= bounds)
+    if small.size:
+        point = free[factor.elimination.order[small[0]]]
+        raise InvalidParameterError(
+            SINGULAR.format(f"the pivot of point {point} is zero up to rounding")
+        )
+    negative = np.flatnonzero(pivots < 0)
+    if negative.size and not indefinite:
+        raise InvalidParameterError(
+            "A minimum exists only if the matrix is positive semidefinite; it has "
+            f"{negative.size} negative eigenvalues. Pass indefinite=True for a stationary point."
+        )
+    return factor
+
+
+def _eliminate(solver: LinearSolver, constraints: sp.sparray | ArrayLike) -> Constraints:
+    """Prepare the small system of the multipliers and of the constants on floating components."""
+    given = constraints if sp.issparse(constraints) else real_numbers(constraints, "constraints")
+    matrix = (
+        sp.csr_array(given, dtype=np.float64) if np.ndim(given) == 2 or sp.issparse(given) else None
+    )
+    if matrix is None or matrix.shape[1] != solver.n_points:
+        raise InvalidParameterError(
+            f"constraints must have one column per point, shape (p, {solver.n_points}); "
+            f"the shape is {np.shape(given)}."
+        )
+    if not np.isfinite(matrix.data).all():
+        raise InvalidParameterError("constraints must be finite; they are not.")
+    rows = matrix.T.toarray()
+    with one_blas_thread():
+        zero = np.zeros((len(solver.fixed), 1))
+        response = solver._solve_pinned(rows, zero, rows.shape[1])
+        constants = solver.floating_sums(rows).T
+        schur = matrix @ response
+        unit = np.abs(constants).max(initial=0.0)
+        scale = float(np.abs(schur).max() / unit) if unit > 0 and schur.any() else 1.0
+        corner = np.zeros((constants.shape[1],) * 2)
+        system = np.block([[schur, -scale * constants], [-scale * constants.T, corner]])
+        inverse = np.linalg.pinv(system, rcond=DEPENDENT, hermitian=True)
+    return Constraints(matrix, response, constants, scale, system, inverse)
+
+
+def _columns(value: ArrayLike, name: str, n_rows: int, noun: str) -> Float[np.ndarray, "r k"]:
+    """Return `value` as a table with one row per point, fixed point or constraint."""
+    numbers = real_numbers(value, name).astype(np.float64)
+    if numbers.ndim == 0:
+        numbers = np.full((n_rows, 1), numbers)
+    if numbers.ndim not in (1, 2) or len(numbers) != n_rows:
+        raise InvalidParameterError(
+            f"{name} must hold one number per {noun}, shape ({n_rows},) or ({n_rows}, k); "
+            f"the shape is {numbers.shape}."
+        )
+    bad = np.argwhere(~np.isfinite(numbers))
+    if len(bad):
+        row, *column = bad[0].tolist()
+        raise InvalidParameterError(
+            f"{name} must be finite; that of {noun} {row} is {numbers[(row, *column)]}."
+        )
+    return numbers if numbers.ndim == 2 else numbers[:, None]
