@@ -9,7 +9,6 @@ from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arrays import positive_values, whole_numbers
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike, as_shape
@@ -18,9 +17,10 @@ from eigenshape.geometry.simplices import in_length, size_one
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 from eigenshape.operators import elements, flip_loops
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.operators.robust import cloud_cover, delaunay_cover
+from eigenshape.operators.cloud_triangles import cloud_cover
+from eigenshape.operators.robust import delaunay_cover
 from eigenshape.operators.tufted import Triangulation
-from eigenshape.sparse.elimination import SymmetricFactor, analyze_pattern, factorize_symmetric
+from eigenshape.sparse.elimination import SymmetricFactor, factor_matrix
 
 # Sources that are solved for together: the lanes of a factor, and few enough that the gradients of
 # all simplices fit in the cache.
@@ -265,10 +265,7 @@ def factorize_definite(matrix: sp.sparray) -> SymmetricFactor:
     InvalidShapeError
         If rounding makes a pivot vanish, as it may where simplices are extremely thin.
     """
-    columns = sp.csc_array(matrix)
-    columns.sort_indices()
-    with one_blas_thread():
-        factor = factorize_symmetric(analyze_pattern(columns), columns.data)
+    factor = factor_matrix(matrix)
     if factor is None:
         raise InvalidShapeError(
             "Simplices must have angles well above 0 for the equations to be factored; some are "

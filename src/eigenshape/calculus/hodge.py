@@ -487,13 +487,14 @@ def _closed_part(
     matrix, differential = mass[inner][:, inner], d1[:, inner].tocsr()
     # The penalty has the size of the mass, so that ε is a share in any unit.
     penalty = float(matrix.diagonal().mean()) / PENALTY
-    weights = (penalty * (differential.T @ differential)).tocsr()
-    factor = factorize_definite(matrix + weights)
+    factor = factorize_definite(matrix + penalty * (differential.T @ differential))
     loads = (mass @ form)[inner]
     closed, stream = np.zeros(len(inner)), np.zeros(d1.shape[0])
     size = float(np.abs(form).max(initial=0.0))
     for _ in range(ROUNDS):
-        rest = loads - matrix @ closed - differential.T @ stream - weights @ closed
+        # Rounding of the penalty must stay in the range of dᵀ, or it would enter the closed part.
+        turning = stream + penalty * (differential @ closed)
+        rest = loads - matrix @ closed - differential.T @ turning
         step = factor.solve(rest[:, None])[:, 0]
         closed = closed + step
         stream = stream + penalty * (differential @ closed)
