@@ -48,7 +48,7 @@ def vertex_directions(mesh: TriangleMesh) -> Directions:
     """
     require_sound(mesh)
     require_oriented_manifold(mesh)
-    twins = _twins(mesh)
+    twins = side_twins(mesh)
     first, inner = _first_sides(mesh, twins)
     cosines, sines = corner_products(mesh)
     at_tail, at_head, around = _walk_around(mesh, first, twins, np.arctan2(sines, cosines))
@@ -66,7 +66,7 @@ def corner_products(mesh: TriangleMesh) -> tuple[Float[np.ndarray, " h"], Float[
     return np.einsum("fij,fij->fi", to_next, to_last).ravel(), sines.ravel()
 
 
-def _twins(mesh: TriangleMesh) -> Int[np.ndarray, " h"]:
+def side_twins(mesh: TriangleMesh) -> Int[np.ndarray, " h"]:
     """Return the side that lies on each, -1 on a boundary."""
     keys = edge_keys(mesh.faces, mesh.n_vertices)
     order = np.argsort(keys, kind="stable")
