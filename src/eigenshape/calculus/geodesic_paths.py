@@ -28,6 +28,8 @@ from eigenshape.operators.directions import (
 
 # An angle counts as less than π if it is by more than this: rounding of unfolded strips is 1e-13.
 STRAIGHT = 1e-10
+# Points of a path nearer than this share of its coordinates to the next are one point.
+SAME = 1e-14
 # Rounds in which pivots are passed on their other side; a path of k edges takes about √k.
 ROUNDS = 10_000
 
@@ -218,7 +220,9 @@ def _walkable(mesh: TriangleMesh) -> _Sides:
     lengths = np.linalg.norm(mesh.vertices[heads] - mesh.vertices[tails], axis=1)
     angles = face_angles(mesh).ravel()
     around = np.bincount(tails, angles, minlength=mesh.n_vertices)
-    of_edge = dict(zip(zip(tails.tolist(), heads.tolist(), strict=True), range(len(tails)), strict=True))
+    of_edge = dict(
+        zip(zip(tails.tolist(), heads.tolist(), strict=True), range(len(tails)), strict=True)
+    )
     return _Sides(mesh.vertices, tails, heads, side_twins(mesh), lengths, angles, around, of_edge)
 
 
@@ -257,7 +261,11 @@ def _strip_along(sides: _Sides, path: list[int]) -> list[int]:
     strip: list[int] = []
     is_left: bool | None = None
     for before, vertex, after in zip(path[:-2], path[1:-1], path[2:], strict=True):
-        fans = [fan for fan in (_fan(sides, before, vertex, after, left) for left in (True, False)) if fan]
+        fans = [
+            fan
+            for fan in (_fan(sides, before, vertex, after, left) for left in (True, False))
+            if fan
+        ]
         angle, now_left, fan = min(fans, key=lambda found: found[0])
         if is_left is not None and is_left != now_left:
             # From the left of the edge to its right, or back.
@@ -355,6 +363,8 @@ def _pull_taut(portals: Portals) -> list[tuple[int, int]]:
                 tips[end], at[end] = portals[number][end], number
                 continue
             # Past the other side: the path bends there, and the funnel begins anew.
+            if other == 0 and len(corners) > 1:
+                corners.pop()  # several portals have that vertex; the last one counts
             corners.append((at[1 - end], 1 - end))
             apex, number = tips[1 - end], at[1 - end]
             tips, at = [apex, apex], [number, number]
@@ -452,11 +462,11 @@ def _on_side(mesh: TriangleMesh, sides: _Sides, side: int, share: float) -> Floa
 
 def _as_path(points: Float[np.ndarray, "p 3"]) -> GeodesicPath:
     """Keep each point of a path once, and measure it."""
-    kept = np.ones(len(points), dtype=bool)
-    kept[1:] = (points[1:] != points[:-1]).any(axis=1)
-    unit, scale = size_one(points[kept])
-    length = np.linalg.norm(np.diff(unit, axis=0), axis=1).sum(keepdims=True)
-    return GeodesicPath(freeze(points[kept]), float(in_length(length, scale, 1)[0]))
+    unit, scale = size_one(points)
+    steps = np.linalg.norm(np.diff(unit, axis=0), axis=1)
+    kept = np.append(True, steps > SAME)
+    length = in_length(steps.sum(keepdims=True), scale, 1)
+    return GeodesicPath(freeze(points[kept]), float(length[0]))
 
 
 def _wedge(
@@ -464,7 +474,9 @@ def _wedge(
 ) -> tuple[int, float]:
     """Return the side after which a direction leaves a vertex, and the angle from it in the face."""
     out = np.flatnonzero(sides.tails == vertex)
-    is_inner = (sides.twins[out] >= 0).all() and (sides.twins[[_previous(h) for h in out]] >= 0).all()
+    is_inner = (sides.twins[out] >= 0).all() and (
+        sides.twins[[_previous(h) for h in out]] >= 0
+    ).all()
     scale = 2 * np.pi / sides.around[vertex] if is_inner else 1.0
     angle %= 2 * np.pi
     offsets = (angle - at_tail[out]) / scale

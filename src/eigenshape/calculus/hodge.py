@@ -144,9 +144,7 @@ def decompose_field(
     return HodgeDecomposition(exact, coexact, harmonic, potential[:, 0], stream[:, 0])
 
 
-def harmonic_fields(
-    mesh: MeshLike, *, boundary: Rim = "tangential"
-) -> Float[np.ndarray, "b f 3"]:
+def harmonic_fields(mesh: MeshLike, *, boundary: Rim = "tangential") -> Float[np.ndarray, "b f 3"]:
     """Compute an orthonormal basis of the harmonic vector fields of a surface.
 
     Harmonic parts of random fields span the space; its dimension β_1 is known from topology.
@@ -385,7 +383,10 @@ def _split_field(
     ):
         local = np.einsum("f,fad,fdk->fak", areas, gradients, fields)
         loads = np.stack(
-            [np.bincount(nodes.ravel(), load.ravel(), minlength=len(fixed)) for load in local.T.swapaxes(1, 2)],
+            [
+                np.bincount(nodes.ravel(), load.ravel(), minlength=len(fixed))
+                for load in local.T.swapaxes(1, 2)
+            ],
             axis=1,
         )
         found = _solve_grounded(stiffness, loads, fixed)
@@ -448,9 +449,7 @@ def _whitney_mass(mesh: Mesh, edges: Int[np.ndarray, "e 2"]) -> sp.csr_array:
     return ((full + full.T) / 2).tocsr()
 
 
-def _differentials(
-    mesh: Mesh, edges: Int[np.ndarray, "e 2"]
-) -> tuple[sp.csr_array, sp.csr_array]:
+def _differentials(mesh: Mesh, edges: Int[np.ndarray, "e 2"]) -> tuple[sp.csr_array, sp.csr_array]:
     """Return the matrices of d on functions and on one-forms; triangles run from low to high."""
     n, number = mesh.n_points, np.arange(len(edges))
     ones = np.ones(len(edges))

@@ -224,8 +224,10 @@ def transport_vectors(
     impulses = np.zeros(solver.n_points, dtype=complex)
     np.add.at(impulses, wanted, given / np.where(lengths > 0, lengths, 1.0))
     found = _normalize(_diffuse(solver, impulses))
-    lengths = np.full(solver.n_points, lengths[0]) if len(wanted) == 1 else _extend(
-        solver, wanted, lengths
+    lengths = (
+        np.full(solver.n_points, lengths[0])
+        if len(wanted) == 1
+        else _extend(solver, wanted, lengths)
     )
     return _as_rows(found * lengths)
 

@@ -32,6 +32,7 @@ from eigenshape.operators.tufted import (
     tufted_cover,
 )
 
+
 def robust_laplacian(
     mesh: ShapeLike, *, mollify: float = MOLLIFY, n_neighbors: SupportsIndex | None = None
 ) -> Laplacian:
