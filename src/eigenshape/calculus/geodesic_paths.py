@@ -2,6 +2,7 @@
 
 from cmath import phase
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import SupportsIndex
 
 import numpy as np
@@ -131,13 +132,13 @@ def geodesic_path(
         *(whole_numbers(via, "A vertex of via", 0, last).tolist() if np.size(via) else ()),
         whole_number(end, "end", 0, last),
     ]
-    for one, two in zip(stops[:-1], stops[1:], strict=True):
+    for one, two in pairwise(stops):
         if one == two:
             raise InvalidParameterError(
                 f"Each stop of a path must differ from the one before; vertex {one} is followed by "
                 "itself."
             )
-    points, scale = scale_to_unit(mesh)
+    points, _ = scale_to_unit(mesh)
     sides = _walkable(TriangleMesh(points, mesh.faces))
     strip = _strip_along(sides, _edge_path(mesh, stops))
     first, final = stops[0], stops[-1]
@@ -240,7 +241,7 @@ def _edge_path(mesh: TriangleMesh, stops: list[int]) -> list[int]:
     n = mesh.n_vertices
     graph = sp.coo_array((edge_lengths(mesh), table.edges.T), shape=(n, n)).tocsr()
     path = [stops[0]]
-    for one, two in zip(stops[:-1], stops[1:], strict=True):
+    for one, two in pairwise(stops):
         _, before = dijkstra(graph, directed=False, indices=one, return_predecessors=True)
         if before[two] < 0:
             raise InvalidParameterError(
@@ -266,7 +267,7 @@ def _strip_along(sides: _Sides, path: list[int]) -> list[int]:
             for fan in (_fan(sides, before, vertex, after, left) for left in (True, False))
             if fan
         ]
-        angle, now_left, fan = min(fans, key=lambda found: found[0])
+        _, now_left, fan = min(fans, key=lambda found: found[0])
         if is_left is not None and is_left != now_left:
             # From the left of the edge to its right, or back.
             ends = (before, vertex) if is_left else (vertex, before)
@@ -442,7 +443,7 @@ def _points_of(
 ) -> Float[np.ndarray, "p 3"]:
     """Return where a taut path starts, crosses edges, passes vertices, and ends."""
     points = [mesh.vertices[ends[0]]]
-    for (begin, first_end), (stop, last_end) in zip(corners[:-1], corners[1:], strict=True):
+    for (begin, first_end), (stop, last_end) in pairwise(corners):
         origin = portals[begin][first_end]
         way = portals[stop][last_end] - origin
         for number in range(begin + 1, stop):
@@ -475,7 +476,7 @@ def _wedge(
     """Return the side after which a direction leaves a vertex, and the angle from it in the face."""
     out = np.flatnonzero(sides.tails == vertex)
     is_inner = (sides.twins[out] >= 0).all() and (
-        sides.twins[[_previous(h) for h in out]] >= 0
+        sides.twins[[_previous(int(h)) for h in out]] >= 0
     ).all()
     scale = 2 * np.pi / sides.around[vertex] if is_inner else 1.0
     angle %= 2 * np.pi

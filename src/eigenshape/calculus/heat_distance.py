@@ -16,8 +16,8 @@ from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import in_length, size_one
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 from eigenshape.operators import elements, flip_loops
-from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.cloud_triangles import cloud_cover
+from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.robust import delaunay_cover
 from eigenshape.operators.tufted import Triangulation
 from eigenshape.sparse.elimination import SymmetricFactor, factor_matrix
@@ -222,7 +222,7 @@ def heat_distance_to_set(
     >>> square = es.shapes.grid(20, 20)
     >>> left = (square.vertices[:, 0] == 0).nonzero()[0]
     >>> distance = es.calculus.heat_distance_to_set(square, left)
-    >>> bool(abs(distance - square.vertices[:, 0]).max() < 0.01)
+    >>> bool(abs(distance - square.vertices[:, 0]).max() < 0.02)
     True
     """
     solver = as_heat_geodesics(shape)

@@ -432,12 +432,12 @@ def _whitney_mass(mesh: Mesh, edges: Int[np.ndarray, "e 2"]) -> sp.csr_array:
     # ∫ λ_i λ_k over a simplex of volume 1.
     means = (1 + np.eye(m + 1)) / ((m + 1) * (m + 2))
     i, j = np.triu_indices(m + 1, 1)
-    k, l = i, j
+    k, last = i, j
     local = (
-        means[np.ix_(i, k)] * products[:, j[:, None], l]
-        - means[np.ix_(i, l)] * products[:, j[:, None], k]
-        - means[np.ix_(j, k)] * products[:, i[:, None], l]
-        + means[np.ix_(j, l)] * products[:, i[:, None], k]
+        means[np.ix_(i, k)] * products[:, j[:, None], last]
+        - means[np.ix_(i, last)] * products[:, j[:, None], k]
+        - means[np.ix_(j, k)] * products[:, i[:, None], last]
+        + means[np.ix_(j, last)] * products[:, i[:, None], k]
     )
     keys = _edge_keys(edges, mesh.n_points)
     numbers = np.searchsorted(keys, corners[:, i] * mesh.n_points + corners[:, j])
@@ -502,8 +502,8 @@ def _closed_part(
     else:
         raise ConvergenceError(
             f"The closed part of a one-form must have no circulation; after {ROUNDS} rounds it "
-            f"still changes by {np.abs(step).max() / size:.2g} of the largest value. Simplices may be too thin; try repair(mesh, "
-            '["collapse_needles"]).'
+            f"still changes by {np.abs(step).max() / size:.2g} of the largest value. Simplices may "
+            'be too thin; try repair(mesh, ["collapse_needles"]).'
         )
     whole = np.zeros(len(form))
     whole[inner] = closed

@@ -286,10 +286,7 @@ def logarithmic_map(
     >>> bool(np.allclose(found, exact))
     True
     """
-    if method not in get_args(LogMethod):
-        raise InvalidParameterError(
-            f"method must be 'affine', 'adaptive' or 'radial'; it is {method!r}."
-        )
+    require_log_method(method)
     solver = as_vector_heat(mesh)
     start = whole_number(source, "source", 0, solver.n_points - 1)
     _require_source_everywhere(solver, np.array([start]))
@@ -299,6 +296,19 @@ def logarithmic_map(
     parallel[parallel == 0] = 1.0  # opposite to the source any direction will do
     compute = {"affine": _affine, "adaptive": _adaptive, "radial": _radial}[method]
     return in_length(_as_rows(compute(solver, start, parallel)), solver.scale, 1)
+
+
+def require_log_method(method: str) -> None:
+    """Raise an error if a method of the logarithmic map is unknown.
+
+    Raises
+    ------
+    InvalidParameterError
+    """
+    if method not in get_args(LogMethod):
+        raise InvalidParameterError(
+            f"method must be 'affine', 'adaptive' or 'radial'; it is {method!r}."
+        )
 
 
 def as_vector_heat(mesh: MeshLike | VectorHeat) -> VectorHeat:
