@@ -6,9 +6,11 @@ import robust_laplacian as authors
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import repair
 from eigenshape.io.mesh_files import read_mesh
+from eigenshape.operators.cloud_triangles import local_triangles
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 
@@ -117,3 +119,28 @@ def test_soups(seed):
     of_stiffness, of_mass = differences(TriangleMesh(points[used], renumbered.reshape(-1, 3)))
     assert of_stiffness < 1e-9
     assert of_mass < 1e-9
+
+
+def rows_that_differ(one, two) -> int:
+    apart = abs(one - two).tocoo()
+    return len(np.unique(apart.row[apart.data > 1e-4]))
+
+
+def test_point_clouds():
+    """Triangles are the same; three copies of each are glued in an order that theirs leaves open."""
+    points = np.random.default_rng(1).standard_normal((1000, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    cloud = PointCloud(points, dim=2)
+    ours = robust_laplacian(cloud)
+    stiffness, mass = authors.point_cloud_laplacian(points)
+    triangles = local_triangles(cloud)
+    order = np.random.default_rng(2).permutation(len(triangles))
+    one, two = (
+        authors.mesh_laplacian(points, faces)[0] / 3 for faces in (triangles, triangles[order])
+    )
+    # As many rows change where the same triangles are given to theirs in another order.
+    assert rows_that_differ(ours.stiffness, stiffness) < 1.5 * rows_that_differ(one, two)
+    assert ours.mass.sum() == pytest.approx(mass.sum(), rel=0.01)
+    once = np.unique(np.sort(triangles, axis=1), axis=0)
+    of_stiffness, _ = differences(TriangleMesh(points, once))
+    assert of_stiffness < FLIPPED_FROM

@@ -4,6 +4,7 @@ from .boundary import dirichlet_laplacian as dirichlet_laplacian
 from .catalog import OPERATORS as OPERATORS
 from .catalog import Operator as Operator
 from .catalog import build_laplacian as build_laplacian
+from .cloud_triangles import local_triangles as local_triangles
 from .connection import connection_laplacian as connection_laplacian
 from .connection import tangent_frames as tangent_frames
 from .cotangent import cotangent_laplacian as cotangent_laplacian

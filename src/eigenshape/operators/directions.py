@@ -47,8 +47,8 @@ def vertex_directions(mesh: TriangleMesh) -> Directions:
         no area or a vertex no face; the message names the first.
     """
     require_sound(mesh)
-    _require_oriented_manifold(mesh)
-    twins = _twins(mesh)
+    require_oriented_manifold(mesh)
+    twins = side_twins(mesh)
     first, inner = _first_sides(mesh, twins)
     cosines, sines = corner_products(mesh)
     at_tail, at_head, around = _walk_around(mesh, first, twins, np.arctan2(sines, cosines))
@@ -66,7 +66,7 @@ def corner_products(mesh: TriangleMesh) -> tuple[Float[np.ndarray, " h"], Float[
     return np.einsum("fij,fij->fi", to_next, to_last).ravel(), sines.ravel()
 
 
-def _twins(mesh: TriangleMesh) -> Int[np.ndarray, " h"]:
+def side_twins(mesh: TriangleMesh) -> Int[np.ndarray, " h"]:
     """Return the side that lies on each, -1 on a boundary."""
     keys = edge_keys(mesh.faces, mesh.n_vertices)
     order = np.argsort(keys, kind="stable")
@@ -109,7 +109,15 @@ def _walk_around(
     return at_tail, at_head, around
 
 
-def _require_oriented_manifold(mesh: TriangleMesh) -> None:
+def require_oriented_manifold(mesh: TriangleMesh) -> None:
+    """Raise an error if vertices have no tangent planes with a side to look at them from.
+
+    Raises
+    ------
+    InvalidShapeError
+        If an edge has more than two faces, a vertex more than one fan of faces, or two neighboring
+        faces are turned against each other.
+    """
     edges, vertices = non_manifold_edges(mesh), non_manifold_vertices(mesh)
     if len(edges):
         raise InvalidShapeError(

@@ -1,11 +1,14 @@
 """The robust Laplacian: weights ≥ 0 on any triangles, manifold or not."""
 
+from typing import SupportsIndex
+
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_different_simplices
 from eigenshape.geometry.simplices import (
@@ -17,9 +20,11 @@ from eigenshape.geometry.simplices import (
 )
 from eigenshape.geometry.topology import require_simplices_everywhere
 from eigenshape.operators import flip_loops
+from eigenshape.operators.cloud_triangles import cloud_cover
 from eigenshape.operators.graph import require_distinct_corners
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.tufted import (
+    MOLLIFY,
     Triangulation,
     edge_keys,
     flip_to_delaunay,
@@ -28,8 +33,10 @@ from eigenshape.operators.tufted import (
 )
 
 
-def robust_laplacian(mesh: MeshLike, *, mollify: float = 1e-5) -> Laplacian:
-    """Build the Laplacian of a triangle mesh of any quality, manifold or not.
+def robust_laplacian(
+    mesh: ShapeLike, *, mollify: float = MOLLIFY, n_neighbors: SupportsIndex | None = None
+) -> Laplacian:
+    """Build the Laplacian of a triangle mesh of any quality, manifold or not, or of points.
 
     This is the operator of Sharp and Crane, "A Laplacian for Nonmanifold Triangle Meshes" (2020).
     Edge lengths are mollified; each face gets a front and a back, which are glued into the tufted
@@ -44,12 +51,20 @@ def robust_laplacian(mesh: MeshLike, *, mollify: float = 1e-5) -> Laplacian:
     among them is given by its index. If both diagonals of a quadrilateral are Delaunay, as in a
     square, the diagonal of the mesh is kept; this choice affects B and not W.
 
+    On a point cloud the triangles are those of `local_triangles`, Delaunay around each point.
+    Nearly every triangle is there three times, once for each corner, so W and B are divided by
+    three. `point_cloud_laplacian` is the kernel instead: for any dimension, and under noise.
+
     Parameters
     ----------
-    mesh : MeshLike
+    mesh : ShapeLike
+        A triangle mesh, or a point cloud of dimension 2 in R³.
     mollify : float
         ε ≥ 0, as a multiple of the mean edge length. All edges grow by the smallest length such
         that a + b ≥ c + ε in every triangle. With 0, faces without area are refused.
+    n_neighbors : int, optional
+        For a point cloud: neighbors of each point among which its triangles are sought, 30 by
+        default, or all others of fewer points.
 
     Returns
     -------
@@ -61,9 +76,10 @@ def robust_laplacian(mesh: MeshLike, *, mollify: float = 1e-5) -> Laplacian:
     InvalidShapeError
         If a face has a corner twice or the same corners as another, a vertex belongs to no face,
         all vertices lie on a line, no face has area, `mollify` is too small to give area to one
-        that has none, or coordinates are beyond 1e±150.
+        that has none, or coordinates are beyond 1e±150; or for a cloud as in `local_triangles`.
     InvalidParameterError
-        If `mollify` is negative or not finite.
+        If `mollify` is negative or not finite, or 0 for a point cloud; or if `n_neighbors` is out
+        of range, or given for a mesh.
 
     See Also
     --------
@@ -81,6 +97,31 @@ def robust_laplacian(mesh: MeshLike, *, mollify: float = 1e-5) -> Laplacian:
     >>> es.robust_laplacian(mesh).stiffness[0, 1].item() > 0
     False
     """
+    if isinstance(mesh, PointCloud):
+        delaunay, scale = cloud_cover(mesh, mollify, n_neighbors)
+        copies = 3
+    else:
+        mesh = as_mesh(mesh)
+        if n_neighbors is not None:
+            raise InvalidParameterError(
+                f"n_neighbors must not be given for a mesh, which has its faces; it is "
+                f"{n_neighbors}. Pass PointCloud(mesh.points) for its points alone."
+            )
+        delaunay, scale = delaunay_cover(mesh, mollify)
+        copies = 1
+    areas = in_length(_areas(delaunay, mesh.n_points) / copies, scale, 2)
+    stiffness = (_stiffness(delaunay, mesh.n_points) / copies).tocsr()
+    return Laplacian(stiffness, sp.diags_array(areas).tocsr())
+
+
+def delaunay_cover(mesh: MeshLike, mollify: float = MOLLIFY) -> tuple[Triangulation, float]:
+    """Return the Delaunay triangles of the tufted cover, and the unit of their lengths.
+
+    Raises
+    ------
+    InvalidShapeError, InvalidParameterError
+        As in `robust_laplacian`.
+    """
     mesh = as_mesh(mesh)
     if not 0 <= mollify < np.inf:
         raise InvalidParameterError(f"mollify must be finite and not negative; it is {mollify}.")
@@ -92,10 +133,7 @@ def robust_laplacian(mesh: MeshLike, *, mollify: float = 1e-5) -> Laplacian:
         not mollify or len(degenerate_simplices(mesh)) == mesh.n_faces
     ):  # no face: all area would be that of mollifying
         require_volumes(mesh)
-    cover, scale = _cover(mesh, mollify)
-    delaunay = flip_to_delaunay(cover)
-    areas = in_length(_areas(delaunay, mesh.n_points), scale, 2)
-    return Laplacian(_stiffness(delaunay, mesh.n_points), sp.diags_array(areas).tocsr())
+    return _cover(mesh, mollify)
 
 
 def _cover(mesh: TriangleMesh, mollify: float) -> tuple[Triangulation, float]:
@@ -111,7 +149,7 @@ def _cover(mesh: TriangleMesh, mollify: float) -> tuple[Triangulation, float]:
             f"Mollified faces must have area; face {flat[0]} has sides {sides.tolist()} ({flat.size} such). Choose "
             f"a larger mollify than {mollify}."
         )
-    return tufted_cover(points, mesh.faces, lengths), scale
+    return flip_to_delaunay(tufted_cover(points, mesh.faces, lengths)), scale
 
 
 def _stiffness(cover: Triangulation, n: int) -> sp.csr_array:

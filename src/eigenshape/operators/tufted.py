@@ -9,6 +9,8 @@ from eigenshape._errors import ConvergenceError
 from eigenshape.operators import flip_loops
 
 TOLERANCE = 1e-12  # a pair of cotangents that sums to less below zero is cocircular, relative to the terms in it
+# Smallest margin of the triangle inequalities, in mean edge lengths (Sharp and Crane 2020).
+MOLLIFY = 1e-5
 MOST_FLIPS = 1000  # a side: far more than any shape takes, which is about one
 
 

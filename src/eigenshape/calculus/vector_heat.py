@@ -1,0 +1,492 @@
+"""Parallel transport, scalar extension and logarithmic maps by short heat flow."""
+
+from dataclasses import dataclass
+from typing import Literal, SupportsIndex, get_args
+
+import numpy as np
+from jaxtyping import Complex, Float, Int
+
+from eigenshape._arrays import finite_values, positive_values, real_numbers, whole_number
+from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
+from eigenshape.calculus.heat_distance import factorize_definite, ground, require_sources
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.measure import edge_lengths, scale_to_unit
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import in_length
+from eigenshape.operators.connection import connection_laplacian
+from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.directions import Directions, corner_products, vertex_directions
+from eigenshape.sparse.elimination import SymmetricFactor
+
+LogMethod = Literal["affine", "adaptive", "radial"]
+
+
+@dataclass(frozen=True, eq=False)
+class VectorHeat:
+    """A surface that is ready for transport by heat: three factors, used for all sources.
+
+    `prepare_vector_heat` makes it. All lengths inside are divided by `scale`.
+
+    Attributes
+    ----------
+    time : float
+        Time t of the heat, in length².
+    scale : float
+        A power of two, the size of the coordinates, in length.
+    mesh : TriangleMesh
+        The surface, scaled.
+    directions : Directions
+        Angles of all sides in the tangent planes of their ends.
+    components : (n,) int
+        Connected component of each vertex.
+    scalar_heat, vector_heat, poisson : SymmetricFactor
+        Factors of B + tW for functions and for tangent vectors, and of W with one vertex of each
+        component fixed.
+    """
+
+    time: float
+    scale: float
+    mesh: TriangleMesh
+    directions: Directions
+    components: Int[np.ndarray, " n"]
+    scalar_heat: SymmetricFactor
+    vector_heat: SymmetricFactor
+    poisson: SymmetricFactor
+
+    @property
+    def n_points(self) -> int:
+        """Number of vertices n."""
+        return self.mesh.n_vertices
+
+    def __repr__(self) -> str:
+        return f"VectorHeat({self.n_points} points, time={self.time:.4g})"
+
+
+def prepare_vector_heat(mesh: MeshLike, *, time_factor: float = 1.0) -> VectorHeat:
+    """Factor the equations of transport by heat, to be used for any number of sources.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        A manifold, with or without boundary, with consistently oriented faces.
+    time_factor : float
+        The heat flows for the time t = time_factor × h², with the mean edge length h.
+
+    Returns
+    -------
+    VectorHeat
+
+    Raises
+    ------
+    InvalidShapeError
+        As in `connection_laplacian`, or if triangles are so thin that the equations cannot be
+        factored.
+    InvalidParameterError
+        If `time_factor` is not positive and finite.
+
+    See Also
+    --------
+    extend_scalar, transport_vectors, logarithmic_map : What it is for.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> solver = es.calculus.prepare_vector_heat(es.icosphere(2))
+    >>> es.calculus.logarithmic_map(solver, 0).shape
+    (162, 2)
+    """
+    mesh = as_mesh(mesh)
+    factor = float(positive_values(time_factor, "time_factor")[0])
+    points, scale = scale_to_unit(mesh)
+    unit = TriangleMesh(points, mesh.faces)
+    connection = connection_laplacian(unit)
+    scalar = cotangent_laplacian(unit)
+    time = factor * float(edge_lengths(unit).mean()) ** 2
+    grounded, components = ground(scalar.stiffness)
+    return VectorHeat(
+        float(in_length(np.array([time]), scale, 2)[0]),
+        scale,
+        unit,
+        vertex_directions(unit),
+        components,
+        factorize_definite(scalar.mass + time * scalar.stiffness),
+        factorize_definite(connection.mass + time * connection.stiffness),
+        factorize_definite(grounded),
+    )
+
+
+def extend_scalar(
+    mesh: MeshLike | VectorHeat, sources: ArrayLike, values: ArrayLike
+) -> Float[np.ndarray, " n"]:
+    """Extend values at some vertices to all vertices, each taking that of the nearest source.
+
+    The quotient of two heat flows: that of the values, and that of ones at the sources (Sharp,
+    Soliman, Crane 2019, section 4). Between sources the result changes smoothly over about an edge
+    length, and lies between the least and the largest value on a Delaunay mesh.
+
+    Parameters
+    ----------
+    mesh : MeshLike or VectorHeat
+        `prepare_vector_heat(mesh)` keeps the factors for further calls.
+    sources : (k,) int
+        Vertices.
+    values : (k,) float
+        In any unit.
+
+    Returns
+    -------
+    (n,) float
+        In the unit of the values.
+
+    Raises
+    ------
+    InvalidParameterError
+        If there is no source, a source is not a vertex, `values` has another length or is not
+        finite, or a component has no source.
+    InvalidShapeError
+        As in `prepare_vector_heat`.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(2)
+    >>> extended = es.calculus.extend_scalar(ball, [0, 3], [1.0, 5.0])
+    >>> bool(extended.min() > 0.99 and extended.max() < 5.01)
+    True
+    """
+    solver = as_vector_heat(mesh)
+    wanted = require_sources(sources, solver.n_points)
+    given = finite_values(values, "values")
+    if len(given) != len(wanted):
+        raise InvalidParameterError(
+            f"values must hold one number per source; there are {len(given)} values and "
+            f"{len(wanted)} sources."
+        )
+    _require_source_everywhere(solver, wanted)
+    return _extend(solver, wanted, given)
+
+
+def transport_vectors(
+    mesh: MeshLike | VectorHeat, sources: ArrayLike, vectors: ArrayLike
+) -> Float[np.ndarray, "n 2"]:
+    """Transport tangent vectors from some vertices to all, along shortest paths.
+
+    The vector heat method (Sharp, Soliman, Crane 2019): directions flow by the connection
+    Laplacian, lengths by `extend_scalar`. From several sources each vertex takes the vector of the
+    nearest one, blended over about an edge length.
+
+    Vectors are given by two coordinates in the frame of their vertex, `operators.tangent_frames`:
+    x along the first edge of the vertex, y a quarter turn further, counter-clockwise seen from
+    outside. The frame depends on the order of faces. In space the vectors are
+    ``np.einsum("nk,nkd->nd", vectors, frames)``.
+
+    Parameters
+    ----------
+    mesh : MeshLike or VectorHeat
+        `prepare_vector_heat(mesh)` keeps the factors for further calls.
+    sources : (k,) int
+        Vertices.
+    vectors : (k, 2) float
+        Tangent vectors at the sources, in any unit.
+
+    Returns
+    -------
+    (n, 2) float
+        Tangent vector at each vertex, in the unit of `vectors`. Zero where vectors from all sides
+        cancel exactly.
+
+    Raises
+    ------
+    InvalidParameterError
+        If there is no source, a source is not a vertex, `vectors` has another shape or is not
+        finite, or a component has no source.
+    InvalidShapeError
+        As in `prepare_vector_heat`.
+
+    Examples
+    --------
+    On a plane, transported vectors are parallel:
+
+    >>> import eigenshape as es
+    >>> import numpy as np
+    >>> square = es.shapes.grid(5, 5)
+    >>> field = es.calculus.transport_vectors(square, [14], [[1.0, 0.0]])
+    >>> in_space = np.einsum("nk,nkd->nd", field, es.operators.tangent_frames(square))
+    >>> bool(np.allclose(in_space, in_space[14]))
+    True
+    """
+    solver = as_vector_heat(mesh)
+    wanted = require_sources(sources, solver.n_points)
+    given = _as_vectors(vectors, len(wanted))
+    _require_source_everywhere(solver, wanted)
+    lengths = np.abs(given)
+    impulses = np.zeros(solver.n_points, dtype=complex)
+    np.add.at(impulses, wanted, given / np.where(lengths > 0, lengths, 1.0))
+    found = _normalize(_diffuse(solver, impulses))
+    lengths = (
+        np.full(solver.n_points, lengths[0])
+        if len(wanted) == 1
+        else _extend(solver, wanted, lengths)
+    )
+    return _as_rows(found * lengths)
+
+
+def logarithmic_map(
+    mesh: MeshLike | VectorHeat, source: SupportsIndex, *, method: LogMethod = "affine"
+) -> Float[np.ndarray, "n 2"]:
+    """Compute the logarithmic map at a vertex: polar coordinates of all vertices around it.
+
+    The length of each result is the geodesic distance from the source, its angle the direction in
+    which the shortest path leaves the source.
+
+    Parameters
+    ----------
+    mesh : MeshLike or VectorHeat
+        `prepare_vector_heat(mesh)` keeps the factors for further calls.
+    source : int
+        Vertex.
+    method : {"affine", "adaptive", "radial"}
+        "affine": heat of affine coordinates in the frames of all vertices, the most accurate on
+        the nearer half of a sphere. "adaptive": the same in one frame that is transported from the
+        source, the most accurate where curvature changes much (both Soliman and Sharp, The affine
+        heat method, 2025). "radial": the angle between a transported vector and a field that
+        points away from the source, which is also integrated to distances (Sharp, Soliman, Crane
+        2019, section 8). Beyond the cut locus only "radial" still gives the distance.
+
+    Returns
+    -------
+    (n, 2) float
+        Coordinates in the frame of the source, the row of `operators.tangent_frames`, in length.
+        The source is at 0 for "radial", and within rounding of it on flat regions for the others.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the source is not a vertex, a component does not contain it, or `method` is not one of
+        the three.
+    InvalidShapeError
+        As in `prepare_vector_heat`.
+
+    See Also
+    --------
+    transport_vectors : Conventions of frames.
+    trace_geodesic : The inverse, the exponential map, of one vector.
+
+    Examples
+    --------
+    On a plane these are the differences of coordinates, turned into the frame of the source:
+
+    >>> import eigenshape as es
+    >>> import numpy as np
+    >>> square = es.shapes.grid(10, 10)
+    >>> found = es.calculus.logarithmic_map(square, 60)
+    >>> offsets = square.vertices - square.vertices[60]
+    >>> exact = offsets @ es.operators.tangent_frames(square)[60].T
+    >>> bool(np.allclose(found, exact))
+    True
+    """
+    require_log_method(method)
+    solver = as_vector_heat(mesh)
+    start = whole_number(source, "source", 0, solver.n_points - 1)
+    _require_source_everywhere(solver, np.array([start]))
+    impulse = np.zeros(solver.n_points, dtype=complex)
+    impulse[start] = 1.0
+    parallel = _normalize(_diffuse(solver, impulse))
+    parallel[parallel == 0] = 1.0  # opposite to the source any direction will do
+    compute = {"affine": _affine, "adaptive": _adaptive, "radial": _radial}[method]
+    return in_length(_as_rows(compute(solver, start, parallel)), solver.scale, 1)
+
+
+def require_log_method(method: str) -> None:
+    """Raise an error if a method of the logarithmic map is unknown.
+
+    Raises
+    ------
+    InvalidParameterError
+    """
+    if method not in get_args(LogMethod):
+        raise InvalidParameterError(
+            f"method must be 'affine', 'adaptive' or 'radial'; it is {method!r}."
+        )
+
+
+def as_vector_heat(mesh: MeshLike | VectorHeat) -> VectorHeat:
+    """Prepare a mesh with the usual options, unless it is prepared."""
+    return mesh if isinstance(mesh, VectorHeat) else prepare_vector_heat(mesh)
+
+
+def _as_vectors(vectors: ArrayLike, count: int) -> Complex[np.ndarray, " k"]:
+    """Return vectors of two coordinates as complex numbers."""
+    rows = real_numbers(vectors, "vectors").astype(np.float64)
+    if rows.shape != (count, 2):
+        raise InvalidParameterError(
+            f"vectors must hold two coordinates per source, shape ({count}, 2); the shape is "
+            f"{rows.shape}. Vectors in space have the coordinates tangent_frames(mesh)[i] @ vector."
+        )
+    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    if bad.size:
+        raise InvalidParameterError(
+            f"vectors must be finite; vector {bad[0]} is {rows[bad[0]].tolist()}."
+        )
+    return rows[:, 0] + 1j * rows[:, 1]
+
+
+def _as_rows(field: Complex[np.ndarray, " n"]) -> Float[np.ndarray, "n 2"]:
+    return np.column_stack([field.real, field.imag])
+
+
+def _require_source_everywhere(solver: VectorHeat, sources: Int[np.ndarray, " k"]) -> None:
+    """Raise an error if a component has no source: nothing flows there."""
+    reached = np.isin(solver.components, solver.components[sources])
+    if not reached.all():
+        vertex = int(np.argmin(reached))
+        raise InvalidParameterError(
+            f"Every component must have a source; that of vertex {vertex} has none "
+            f"({np.count_nonzero(~reached)} such vertices). Add one there, or pass the component "
+            "by itself."
+        )
+
+
+def _diffuse(solver: VectorHeat, field: Complex[np.ndarray, " n"]) -> Complex[np.ndarray, " n"]:
+    """Solve (B + tW) x = field for tangent vectors."""
+    solution = solver.vector_heat.solve(_as_rows(field).reshape(-1, 1))[:, 0]
+    return solution[::2] + 1j * solution[1::2]
+
+
+def _normalize(field: Complex[np.ndarray, " n"]) -> Complex[np.ndarray, " n"]:
+    """Return vectors of length 1, and 0 for 0."""
+    # Far away vectors are as short as 1e-300, whose squares underflow.
+    largest = np.maximum(np.abs(field.real), np.abs(field.imag))
+    field = field / np.where(largest > 0, largest, 1.0)
+    lengths = np.abs(field)
+    return field / np.where(lengths > 0, lengths, 1.0)
+
+
+def _extend(
+    solver: VectorHeat, sources: Int[np.ndarray, " k"], values: Float[np.ndarray, " k"]
+) -> Float[np.ndarray, " n"]:
+    impulses = np.zeros((solver.n_points, 2))
+    np.add.at(impulses, sources, np.column_stack([values, np.ones(len(values))]))
+    flowed = solver.scalar_heat.solve(impulses)
+    return flowed[:, 0] / _require_heat(flowed[:, 1])
+
+
+def _require_heat(heat: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """Raise an error where heat is too small for a float."""
+    cold = np.flatnonzero(heat == 0)
+    if cold.size:
+        raise InvalidParameterError(
+            f"Heat from the sources must reach every vertex; at vertex {cold[0]} it is too small "
+            f"for a float ({cold.size} such). Choose a larger time_factor."
+        )
+    return heat
+
+
+def _tail_and_head(mesh: TriangleMesh) -> tuple[Int[np.ndarray, " h"], Int[np.ndarray, " h"]]:
+    return mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+
+
+def _sides(solver: VectorHeat) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return of each side: itself as a vector at its tail and at its head; its turn; its weight.
+
+    The turn takes a vector from the tail to the head. Weights are half of one cotangent.
+    """
+    tails, heads = _tail_and_head(solver.mesh)
+    points = solver.mesh.vertices
+    lengths = np.linalg.norm(points[heads] - points[tails], axis=1)
+    at_tail = lengths * np.exp(1j * solver.directions.at_tail)
+    at_head = -lengths * np.exp(1j * solver.directions.at_head)
+    turns = np.exp(1j * (solver.directions.at_head + np.pi - solver.directions.at_tail))
+    cosines, sines = corner_products(solver.mesh)
+    weights = np.roll((cosines / sines).reshape(-1, 3), 1, axis=1).ravel() / 2
+    return at_tail, at_head, turns, weights
+
+
+def _adaptive(
+    solver: VectorHeat, start: int, parallel: Complex[np.ndarray, " n"]
+) -> Complex[np.ndarray, " n"]:
+    """Diffuse affine coordinates (z, w) in the transported frame, where an edge is a translation.
+
+    Heat takes (z, w) at j to (z - w e, w) at i, with the edge e from i to j in the frame at i. So
+    w is the heat of functions, and z that with a source of translations: two solves by one factor.
+    """
+    tails, heads = _tail_and_head(solver.mesh)
+    at_tail, at_head, _, weights = _sides(solver)
+    weight = _scalar_impulse(solver, start)
+    # Each side counts from both of its ends.
+    sources = np.zeros(solver.n_points, dtype=complex)
+    np.add.at(sources, tails, -weights * weight[heads] * at_tail / parallel[tails])
+    np.add.at(sources, heads, weights * weight[tails] * at_head / parallel[heads])
+    time = solver.time / solver.scale**2
+    moved = solver.scalar_heat.solve(time * _as_rows(sources))
+    return (moved[:, 0] + 1j * moved[:, 1]) / weight
+
+
+def _affine(
+    solver: VectorHeat, start: int, parallel: Complex[np.ndarray, " n"]
+) -> Complex[np.ndarray, " n"]:
+    """Diffuse affine coordinates in the frames of all vertices, and turn them to the source's."""
+    tails, heads = _tail_and_head(solver.mesh)
+    at_tail, at_head, _, weights = _sides(solver)
+    weight = _scalar_impulse(solver, start)
+    sources = np.zeros(solver.n_points, dtype=complex)
+    np.add.at(sources, tails, -weights * weight[heads] * at_tail)
+    np.add.at(sources, heads, weights * weight[tails] * at_head)
+    moved = _diffuse(solver, solver.time / solver.scale**2 * sources)
+    return moved / weight / parallel
+
+
+def _scalar_impulse(solver: VectorHeat, start: int) -> Float[np.ndarray, " n"]:
+    impulse = np.zeros((solver.n_points, 1))
+    impulse[start] = 1.0
+    return _require_heat(solver.scalar_heat.solve(impulse)[:, 0])
+
+
+def _radial(
+    solver: VectorHeat, start: int, parallel: Complex[np.ndarray, " n"]
+) -> Complex[np.ndarray, " n"]:
+    """Diffuse the field that points away from the source, and integrate it to distances."""
+    radial = _normalize(_diffuse(solver, _outward_field(solver, start)))
+    radial[start] = 0.0
+    tails, heads = _tail_and_head(solver.mesh)
+    at_tail, _, turns, weights = _sides(solver)
+    mean = (radial[tails] + radial[heads] * np.conj(turns)) / 2
+    flux = weights * (np.conj(mean) * at_tail).real
+    divergence = np.bincount(heads, flux, minlength=solver.n_points)
+    divergence -= np.bincount(tails, flux, minlength=solver.n_points)
+    distance = solver.poisson.solve(divergence[:, None])[:, 0]
+    return radial / parallel * (distance - distance[start])
+
+
+def _outward_field(solver: VectorHeat, start: int) -> Complex[np.ndarray, " n"]:
+    """Integrate the unit field that points away from a vertex against the hat functions around it.
+
+    The integrals over each face are exact (Sharp, Soliman, Crane 2019, appendix A).
+    """
+    mesh, directions = solver.mesh, solver.directions
+    faces, corners = np.nonzero(mesh.faces == start)
+    side = 3 * faces + corners
+    following, last = 3 * faces + (corners + 1) % 3, 3 * faces + (corners + 2) % 3
+    cosines, sines = corner_products(mesh)
+    angles = np.arctan2(sines, cosines)
+    theta = angles[side]
+    # Twice the area over the sides of the face is its height over each.
+    points = mesh.vertices[mesh.faces]
+    lengths = np.linalg.norm(np.roll(points, -1, axis=1) - points, axis=2).ravel()
+    double_area = lengths[side] * lengths[last] * np.sin(theta)
+    field = np.zeros(mesh.n_vertices, dtype=complex)
+
+    along, across = -theta * np.sin(theta), theta * np.cos(theta) - np.sin(theta)
+    heads, tails = mesh.faces.ravel()[following], mesh.faces.ravel()[last]
+    to_start = np.exp(1j * directions.at_head[side])
+    np.add.at(field, heads, (along + 1j * across) * lengths[last] / (2 * double_area) * to_start)
+    to_start = np.exp(1j * directions.at_tail[last])
+    np.add.at(field, tails, (along - 1j * across) * lengths[side] / (2 * double_area) * to_start)
+
+    alpha = np.pi / 2 - angles[following]
+    along = -(theta * np.cos(alpha) + np.cos(alpha - theta) * np.sin(theta)) / 2
+    across = -(np.cos(alpha) - np.cos(alpha - 2 * theta) + 2 * theta * np.sin(alpha)) / 4
+    outward = (along + 1j * across) * np.exp(1j * directions.at_tail[side])
+    field[start] = (outward * lengths[following] / double_area).sum()
+    return field
