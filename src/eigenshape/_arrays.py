@@ -170,6 +170,20 @@ def vertex_values(value: ArrayLike, name: str, n_vertices: int) -> NDArray[np.fl
     return values
 
 
+def point_functions(value: ArrayLike, name: str, n_points: int) -> NDArray[np.float64]:
+    """Return `value` as finite float64 numbers: one per point, or a column for each function."""
+    values = real_numbers(value, name)
+    if values.ndim not in (1, 2) or len(values) != n_points:
+        hint = " Transpose it." if values.ndim == 2 and values.shape[1] == n_points else ""
+        raise InvalidParameterError(
+            f"{name} must hold one number per point, shape ({n_points},) or ({n_points}, k) for k "
+            f"functions; the shape is {values.shape}.{hint}"
+        )
+    values = values.astype(np.float64)
+    _require_finite(values, name)
+    return values
+
+
 def face_labels(value: ArrayLike, name: str, n_faces: int) -> NDArray[Any]:
     """Return `value` as an array with one whole number per face, of any integer type."""
     labels = as_array(value, name)
@@ -182,9 +196,11 @@ def face_labels(value: ArrayLike, name: str, n_faces: int) -> NDArray[Any]:
 
 
 def _require_finite(values: NDArray[np.float64], name: str) -> None:
-    bad = np.flatnonzero(~np.isfinite(values))
-    if bad.size:
-        raise InvalidParameterError(f"{name} must be finite; entry {bad[0]} is {values[bad[0]]}.")
+    bad = np.argwhere(~np.isfinite(values))
+    if len(bad):
+        place = tuple(bad[0].tolist())
+        entry = place[0] if len(place) == 1 else place
+        raise InvalidParameterError(f"{name} must be finite; entry {entry} is {values[place]}.")
 
 
 def _list_of_numbers(value: ArrayLike, name: str) -> NDArray[np.float64]:
