@@ -29,21 +29,16 @@ def load_shape(*, quick: bool) -> es.TriangleMesh:
     return es.read_mesh(DATA / "classics" / "decimated-max.obj")
 
 
-def measure(
-    mesh: es.TriangleMesh, graph: es.Spectrum, surface: es.Spectrum
-) -> list[dict[str, float]]:
-    """Return the eigenvalue of each function, its sign changes, and its share in the surface's."""
-    edges = es.geometry.edge_table(mesh).edges
+def measure(graph: es.Spectrum, surface: es.Spectrum) -> list[dict[str, float]]:
+    """Return the eigenvalue of each function, and its share in those of the surface."""
     rows = []
     for index in range(1, COUNT + 1):
         function = graph.eigenvectors[:, index]
         coefficients = es.spectral.project(function, surface)
         norm = function @ (surface.mass @ function)
-        crossed = np.prod(np.sign(function[edges]), axis=1) < 0
         rows.append(
             {
                 "eigenvalue": graph.eigenvalues[index],
-                "edges crossed by the nodal set, share": crossed.mean(),
                 "share in the surface's functions": np.sum(coefficients**2) / norm,
             }
         )
@@ -59,7 +54,7 @@ def main() -> None:
     results = {
         "vertices": mesh.n_vertices,
         "longest / shortest edge": np.divide(*np.sort(es.geometry.edge_lengths(mesh))[[-1, 0]]),
-        "functions": measure(mesh, graph, surface),
+        "functions": measure(graph, surface),
     }
     pictures = {}
     if not arguments.quick:

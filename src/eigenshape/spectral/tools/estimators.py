@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
+from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError, MissingExtraError
@@ -20,7 +21,6 @@ from eigenshape.spectral.tools.clustering import (
     spectral_clusters,
 )
 from eigenshape.spectral.tools.embedding import (
-    count_constant_modes,
     diffusion_map,
     spectral_embedding,
 )
@@ -234,8 +234,8 @@ def _graph_spectrum(
     used = min(whole_number(n_neighbors, "n_neighbors", 2), most)
     while True:
         joined = sp.csr_array(kneighbors_graph(points, used - 1))
-        laplacian = graph_laplacian(((joined + joined.T) / 2).tocsr(), "normalized")
-        spectrum = solve_spectrum(laplacian, n_pairs)
-        if used == most or count_constant_modes(spectrum) <= most_components:
-            return spectrum, used
+        graph = ((joined + joined.T) / 2).tocsr()
+        n_components, _ = connected_components(graph, directed=False)
+        if used == most or n_components <= most_components:
+            return solve_spectrum(graph_laplacian(graph, "normalized"), n_pairs), used
         used = min(2 * used, most)
