@@ -416,7 +416,7 @@ def _chosen(points: ArrayLike | None, n: int) -> Int[np.ndarray, " q"]:
     return whole_numbers(points, "A point", 0, n - 1)
 
 
-def _one_time(t: float) -> float:
+def _one_time(t: ArrayLike) -> float:
     times = positive_values(t, "t")
     if len(times) != 1:
         raise InvalidParameterError(f"t must be one diffusion time; there are {len(times)}.")

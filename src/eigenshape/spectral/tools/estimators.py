@@ -11,7 +11,6 @@ from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError, MissingExtraError
-from eigenshape._typing import ArrayLike
 from eigenshape.operators.graph import graph_laplacian
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
@@ -107,7 +106,7 @@ class SpectralEmbedder(BaseEstimator):  # type: ignore[misc]
         self.t = t
         self.n_neighbors = n_neighbors
 
-    def fit(self, X: ArrayLike, y: object = None) -> SpectralEmbedder:
+    def fit(self, X: Any, y: object = None) -> SpectralEmbedder:
         """Compute the embedding of (n, d) points; `y` is ignored."""
         del y
         points = validate_data(self, X, dtype=np.float64, ensure_min_samples=2)
@@ -129,7 +128,7 @@ class SpectralEmbedder(BaseEstimator):  # type: ignore[misc]
             self.embedding_ = spectral_embedding(self.spectrum_, self.n_components, power=power)
         return self
 
-    def fit_transform(self, X: ArrayLike, y: object = None) -> Float[np.ndarray, "n d"]:
+    def fit_transform(self, X: Any, y: object = None) -> Float[np.ndarray, "n d"]:
         """Compute the embedding of (n, d) points and return it."""
         return self.fit(X, y).embedding_
 
@@ -197,7 +196,7 @@ class SpectralClusterer(ClusterMixin, BaseEstimator):  # type: ignore[misc]
         self.method = method
         self.n_neighbors = n_neighbors
 
-    def fit(self, X: ArrayLike, y: object = None) -> SpectralClusterer:
+    def fit(self, X: Any, y: object = None) -> SpectralClusterer:
         """Compute the clusters of (n, d) points; `y` is ignored."""
         del y
         points = validate_data(self, X, dtype=np.float64, ensure_min_samples=2)
@@ -215,7 +214,7 @@ class SpectralClusterer(ClusterMixin, BaseEstimator):  # type: ignore[misc]
         self.labels_ = spectral_clusters(self.spectrum_, self.n_clusters_, method=self.method)
         return self
 
-    def fit_predict(self, X: ArrayLike, y: object = None, **kwargs: Any) -> Int[np.ndarray, " n"]:
+    def fit_predict(self, X: Any, y: object = None, **kwargs: Any) -> Int[np.ndarray, " n"]:
         """Compute the clusters of (n, d) points and return the cluster of each."""
         del kwargs
         return self.fit(X, y).labels_
