@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import eigenshape as es
+from eigenshape import _memory
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.spectral.tools.embedding import component_labels
 
@@ -151,6 +152,12 @@ def test_distances_scale_with_the_unit():
     )
     one, other = (es.spectral.biharmonic_distances(each, [0]) for each in (SPECTRUM, large))
     np.testing.assert_allclose(other, one * 2.0**40, rtol=1e-9)
+
+
+def test_pairs_that_do_not_fit_into_memory_are_refused(monkeypatch):
+    monkeypatch.setattr(_memory, "machine_memory", lambda: 1e5)
+    with pytest.raises(es.InvalidParameterError, match="162 × 162 pairs of points"):
+        es.spectral.commute_time_distances(SPECTRUM)
 
 
 def test_bad_input_is_named():

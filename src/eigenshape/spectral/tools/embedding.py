@@ -5,7 +5,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial.distance import cdist
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import positive_values, real_numbers, whole_numbers
+from eigenshape._arrays import SHARE_OF_ARRAYS, positive_values, real_numbers, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._memory import require_memory
 from eigenshape._threads import one_blas_thread
@@ -16,6 +16,7 @@ from eigenshape.spectral.spectrum import Spectrum, require_lowest
 # Cosine of the angle between rows of the constant modes above which two points are of one
 # component. It is 1 inside a component and 0 between components; the solvers err by 1e-3 at most.
 ONE_COMPONENT = 0.5
+BYTES_OF_PAIR = 9.0  # memory for each distance: a float, and whether the pair is apart
 
 
 @one_blas_thread()
@@ -404,8 +405,9 @@ def _distances(
     require_memory(
         "Distances",
         f"{n} × {len(chosen)} pairs of points",
-        {"distances": 8.0 * n * len(chosen)},
+        {"distances": BYTES_OF_PAIR * n * len(chosen)},
         "Pass fewer points.",
+        share=SHARE_OF_ARRAYS,
     )
     return np.asarray(cdist(embedded, embedded[chosen]))
 
