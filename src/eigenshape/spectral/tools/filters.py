@@ -167,8 +167,8 @@ def filter_values(
     Raises
     ------
     InvalidParameterError
-        If `values` does not hold one finite number per point, or the response is not one finite
-        factor per eigenvalue.
+        If `values` does not hold one finite number per point, or the response cannot be called or
+        is not one finite factor per eigenvalue.
 
     See Also
     --------
@@ -194,6 +194,11 @@ def filter_values(
     """
     require_type(spectrum, Spectrum, "spectrum")
     functions = point_functions(values, "values", len(spectrum.eigenvectors))
+    if not callable(response):
+        raise InvalidParameterError(
+            "response must be a function of the eigenvalues, such as es.spectral.LowPass(cutoff); "
+            f"it is {describe_value(response)}."
+        )
     factors = _factors(response, spectrum.eigenvalues)
     change = factors - 1 if keep_rest else factors
     coefficients = project(functions, spectrum)
@@ -208,13 +213,8 @@ def _factors(response: Response, eigenvalues: Float[np.ndarray, " k"]) -> Float[
     Raises
     ------
     InvalidParameterError
-        If the response cannot be called, or does not return one finite number per eigenvalue.
+        If the response does not return one finite number per eigenvalue.
     """
-    if not callable(response):
-        raise InvalidParameterError(
-            "response must be a function of the eigenvalues, such as es.spectral.LowPass(cutoff); "
-            f"it is {describe_value(response)}."
-        )
     factors = real_numbers(response(eigenvalues), "The factors of a filter").astype(np.float64)
     if factors.shape != eigenvalues.shape:
         raise InvalidParameterError(
