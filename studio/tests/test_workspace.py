@@ -343,3 +343,22 @@ def test_a_message_that_is_none_is_answered():
         answer = workspace.answer("meta", message)
         assert answer.status == 400
         assert "error" in decode(answer.message)[0]
+
+
+@pytest.mark.parametrize("up", ["y", "-z", "x"])
+@pytest.mark.parametrize("view", ["auto", "front", "right", "top"])
+def test_the_page_looks_from_the_requested_side(view, up):
+    """It looks from the front left and above, so up and front say where."""
+    ball = es.icosphere(2)
+    workspace = Workspace(ball)
+    workspace.analysis.look_from(view, up)
+    found = workspace.analysis.view()
+    axis = "xyz".index(up[-1])
+    assert found["up"] == pytest.approx((-1 if up == "-z" else 1) * np.eye(3)[axis], abs=1e-9)
+    upward, front = np.array(found["up"]), np.array(found["front"])
+    shown = 0.78 * front + 0.48 * np.cross(upward, front)
+    camera = es.plot.aim_camera(ball, view="front" if view == "top" else view, up=up)
+    towards = camera.rotation[2] - (camera.rotation[2] @ upward) * upward
+    assert np.cross(shown, towards) == pytest.approx(np.zeros(3), abs=1e-9)
+    assert shown @ towards > 0
+    workspace.close()

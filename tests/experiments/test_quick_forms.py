@@ -14,6 +14,8 @@ FIGURES["ch5_retrieval/robustness.py"] = "ch5_retrieval/expected_robustness.json
 MADE_UP = (  # what needs no real shapes
     "ch1_compression/run.py",
     "ch1_watermark/run.py",
+    "ch1_eigenfunctions/run.py",
+    "ch1_projection/run.py",
     "ch3_accuracy/run.py",
     "ch3_invariance/run.py",
     "ch3_sphere/run.py",

@@ -39,6 +39,13 @@ def test_a_bent_shape_is_bent_again_on_a_finer_mesh(tmp_path):
     assert (tmp_path / "giraffe.png").stat().st_size > 10_000
 
 
+def test_a_shape_is_filtered_measured_and_clustered():
+    found = runpy.run_path(str(ROOT / "examples" / "filter_and_cluster.py"))["main"]()
+    assert found["mean error of 25 modes, shares of the diagonal"] < 0.03
+    assert found["volume kept"] == pytest.approx(1, rel=1e-9)
+    assert 0.2 < found["points in the largest cluster"] < 0.8
+
+
 def test_any_shape_has_its_spectrum(capsys):
     spectra = runpy.run_path(str(ROOT / "examples" / "any_shape.py"))["main"]()
     np.testing.assert_allclose(spectra["sphere"], [0, 2, 2, 2], atol=0.02)

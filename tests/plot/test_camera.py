@@ -3,11 +3,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.plot import fields, poses, sheet, stability
-from eigenshape.plot.camera import in_picture, three_quarter_view
+from eigenshape.plot.camera import aim_camera, in_picture, three_quarter_view
 from eigenshape.plot.fields import figure_field, figure_segments
 from eigenshape.plot.poses import figure_poses
 from eigenshape.plot.render import draw
@@ -140,3 +141,80 @@ def test_real_animals_are_shown_on_their_feet(data, name, up):
     assert np.array_equal(
         three_quarter_view(mesh).rotation, three_quarter_view(mesh, up=up).rotation
     )
+
+
+@pytest.mark.parametrize(
+    ("view", "towards"),
+    [
+        ("front", [0, 0, 1]),
+        ("back", [0, 0, -1]),
+        ("left", [1, 0, 0]),
+        ("right", [-1, 0, 0]),
+        ("top", [0, 1, 0]),
+        ("bottom", [0, -1, 0]),
+        ([3, 0, 4], [0.6, 0, 0.8]),
+        ([1e-300, 0, 0], [1, 0, 0]),
+    ],
+)
+def test_named_views_look_at_their_side(view, towards):
+    rotation = aim_camera(BALL, view=view, up="y").rotation
+    assert rotation[2] == pytest.approx(towards, abs=1e-12)
+    assert rotation @ rotation.T == pytest.approx(np.eye(3), abs=1e-12)
+    assert np.cross(rotation[0], rotation[2]) == pytest.approx(rotation[1], abs=1e-12)
+
+
+def test_views_along_the_upward_direction_keep_the_front_at_the_viewers_side():
+    assert aim_camera(BALL, view="top", up="y").rotation[1] == pytest.approx([0, 0, 1])
+    assert aim_camera(BALL, view="bottom", up="y").rotation[1] == pytest.approx([0, 0, -1])
+
+
+@pytest.mark.parametrize(
+    ("up", "down"), [("-z", [0, 0, 1]), ("x", [-1, 0, 0]), ([0, 2, 0], [0, -1, 0])]
+)
+def test_the_upward_direction_points_up(up, down):
+    assert aim_camera(BALL, view="front", up=up).rotation[1] == pytest.approx(down, abs=1e-12)
+    assert three_quarter_view(BALL, up=up).rotation[1] @ down > 0.8
+
+
+def test_the_usual_view_is_from_the_front_left():
+    for up in ("auto", "x", "-y"):
+        named = aim_camera(BALL, view="front-left", up=up).rotation
+        assert three_quarter_view(BALL, up=up).rotation == pytest.approx(named, abs=1e-12)
+
+
+@pytest.mark.parametrize("bad", ["behind", "y", [0, 0, 0], [1, 2], [1, 0, np.nan]])
+def test_a_view_that_is_none_is_refused(bad):
+    match = "view must be one of" if isinstance(bad, str) else "view must be a direction"
+    with pytest.raises(InvalidParameterError, match=match):
+        aim_camera(BALL, view=bad)
+
+
+def test_an_upward_direction_that_is_none_is_refused():
+    with pytest.raises(InvalidParameterError, match="up must be one of auto, x, y, z, -x, -y, -z"):
+        three_quarter_view(BALL, up="front")
+
+
+def test_figures_take_a_view_or_a_camera_but_not_both():
+    camera = aim_camera(BALL, view="left", up="z", size=50)
+    with pytest.raises(InvalidParameterError, match="view and up must not be passed with it"):
+        figure_field(BALL, BALL.vertices[:, 0], camera=camera, up="z")
+
+
+def test_every_figure_of_shapes_passes_its_view_on(monkeypatch):
+    views = []
+    for module in (fields, poses, sheet):
+        monkeypatch.setattr(
+            module,
+            "draw",
+            lambda shape, camera, **_: views.append(camera.rotation) or draw(BALL, camera),
+        )
+    side = {"view": "right", "up": "z"}
+    labels = np.zeros(BALL.n_faces, dtype=int)
+    figure_segments(BALL, labels, **side)
+    figure_field(BALL, BALL.vertices[:, 0], **side)
+    figure_poses({"one": BALL}, **side)
+    panel = Panel(BALL, "a", labels, np.array([0]))
+    figure_contact_sheet(panel, [panel], **side)
+    assert len(views) == 5
+    for rotation in views:
+        assert rotation == pytest.approx(aim_camera(BALL, **side).rotation)

@@ -41,3 +41,19 @@ def test_without_the_studio_view_says_what_to_install(monkeypatch, missing):
     monkeypatch.setitem(sys.modules, missing, None)
     with pytest.raises(es.MissingExtraError, match=r"pip install 'eigenshape-studio\[notebook\]'"):
         es.view(es.icosphere(1))
+
+
+def test_view_passes_the_side_on_to_the_widget(widgets, monkeypatch):
+    sides = []
+
+    class Widget:
+        def __init__(self, *_, **__):
+            pass
+
+        def look_from(self, view, up):
+            sides.append((view, up))
+
+    monkeypatch.setattr(sys.modules["eigenshape_studio.widget"], "ShapeWidget", Widget)
+    es.view(es.icosphere(1))
+    es.view(es.icosphere(1), view="left", up="-z")
+    assert sides == [("left", "-z")]

@@ -9,7 +9,14 @@ import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_written, progress_bar
-from eigenshape.cli.inputs import REGIONS, JsonOption, MeshArgument, RepairOption
+from eigenshape.cli.inputs import (
+    REGIONS,
+    JsonOption,
+    MeshArgument,
+    RepairOption,
+    UpOption,
+    ViewOption,
+)
 from eigenshape.deformation.modes import require_mode
 
 
@@ -79,6 +86,8 @@ def deform(
     picture: Annotated[
         Path | None, typer.Option(help="Draw the mesh before and after (PNG, SVG or PDF).")
     ] = None,
+    view: ViewOption = "auto",
+    up: UpOption = "auto",
     as_json: JsonOption = False,
 ) -> None:
     """Bend, twist or stretch a mesh: a region is turned or moved, and the rest follows smoothly.
@@ -86,6 +95,7 @@ def deform(
     For instance: eigenshape deform scan.ply --region 'y>60%' --rotate 'x by 30' -o bent.ply --picture bent.png
     """
     steps.require_picture(picture)
+    side = steps.parse_side(view, up)
     steps.require_mesh_path(output)
     steps.require_output(save_edits, (".json",), "A list of edits")
     handles = [name for name in (rotate, move) if name]
@@ -123,4 +133,4 @@ def deform(
     if picture:
         shares = steps.displacement_shares(session.mesh, surface, session.edits, rig)
         poses = {"before": surface, "after": session.mesh}
-        steps.save_picture(es.plot.figure_poses(poses, shares), picture)
+        steps.save_picture(es.plot.figure_poses(poses, shares, **side), picture)

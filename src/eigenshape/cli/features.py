@@ -13,6 +13,8 @@ from eigenshape.cli.inputs import (
     JsonOption,
     MeshArgument,
     RepairOption,
+    UpOption,
+    ViewOption,
     require_one_rule,
 )
 from eigenshape.retrieval.heat.recipe import SCALE_FREE
@@ -64,6 +66,8 @@ def features(
     picture: Annotated[
         Path | None, typer.Option(help="Draw parts and feature points (PNG, SVG or PDF).")
     ] = None,
+    view: ViewOption = "auto",
+    up: UpOption = "auto",
     as_json: JsonOption = False,
 ) -> None:
     """Find the feature points of a mesh and the parts around them, most persistent first.
@@ -73,6 +77,7 @@ def features(
     recipe = steps.heat_recipe(method)
     require_one_rule(None, persistence, largest_gap=largest_gap)
     steps.require_picture(picture)
+    side = steps.parse_side(view, up)
     steps.require_colored_path(output)
     surface = steps.load_mesh(mesh, repair)
     with progress_bar("features") as progress:
@@ -113,8 +118,7 @@ def features(
         unit = "the area" if recipe.unit == "area" else "the square of the longest side of the box"
         out.print(f"heat at time t = {time:g} of {unit}, in 1/length²")
     if picture:
-        steps.save_picture(
-            es.plot.figure_segments(surface, parts.labels, parts.features.vertices), picture
-        )
+        figure = es.plot.figure_segments(surface, parts.labels, parts.features.vertices, **side)
+        steps.save_picture(figure, picture)
     if output:
         steps.save_heat(surface, shape.heat, output)

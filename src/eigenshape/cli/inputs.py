@@ -57,6 +57,29 @@ DimOption = Annotated[
         help="Dimension of the shape that a point cloud samples: 1 curve, 2 surface, 3 volume."
     ),
 ]
+ViewOption = Annotated[
+    str,
+    typer.Option(
+        "--view",
+        metavar="SIDE",
+        help=(
+            "Side from which the picture shows the shape: front, back, left, right, top, bottom, "
+            "front-left, front-right, back-left, back-right, or a direction to the viewer such as "
+            "1,0,2. By default the front left, as far as the front can be guessed."
+        ),
+    ),
+]
+UpOption = Annotated[
+    str,
+    typer.Option(
+        "--up",
+        metavar="AXIS",
+        help=(
+            "Upward direction of the picture: x, y, z, -x, -y, -z, or a direction such as 0,1,1. "
+            "By default it is guessed."
+        ),
+    ),
+]
 Scale = Literal["none", "area", "diameter"]
 PATCHES = "patches"  # a method of `index` and `query`
 PARTS = "parts"  # a method of `segment`

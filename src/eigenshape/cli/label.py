@@ -10,7 +10,7 @@ import typer
 import eigenshape as es
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_json, progress_bar
-from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption
+from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, UpOption, ViewOption
 
 COLUMNS = {
     "part": "part",
@@ -58,6 +58,8 @@ def label(
     picture: Annotated[
         Path | None, typer.Option(help="Draw both meshes side by side (PNG, SVG or PDF).")
     ] = None,
+    view: ViewOption = "auto",
+    up: UpOption = "auto",
     as_json: JsonOption = False,
 ) -> None:
     """Copy the labels of one mesh to the matching parts of another: label a horse, and get a labeled camel.
@@ -65,6 +67,7 @@ def label(
     Left and right may be exchanged. Repairs are applied to the mesh that gets the labels.
     """
     steps.require_picture(picture)
+    side = steps.parse_side(view, up)
     steps.require_label_path(output)
     source, given = steps.read_labeled_mesh(like, labels)
     target = steps.load_mesh(mesh, repair)
@@ -81,7 +84,8 @@ def label(
         colors = steps.label_colors(target, found.labels, given)
         steps.save_labels(target, found.labels, colors, output)
     if picture:
-        steps.save_picture(es.plot.figure_label_transfer(source, target, found), picture)
+        figure = es.plot.figure_label_transfer(source, target, found, **side)
+        steps.save_picture(figure, picture)
 
 
 def _rows(target: es.TriangleMesh, found: es.retrieval.LabelTransfer) -> list[dict[str, Any]]:

@@ -9,7 +9,15 @@ import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_json, progress_bar
-from eigenshape.cli.inputs import PARTS, JsonOption, MeshArgument, RepairOption, require_one_rule
+from eigenshape.cli.inputs import (
+    PARTS,
+    JsonOption,
+    MeshArgument,
+    RepairOption,
+    UpOption,
+    ViewOption,
+    require_one_rule,
+)
 from eigenshape.features.contrast import PART_CONTRAST
 from eigenshape.retrieval.heat.recipe import PRESETS
 
@@ -73,6 +81,8 @@ def segment(
         ),
     ] = None,
     picture: Annotated[Path | None, typer.Option(help="Draw the parts (PNG, SVG or PDF).")] = None,
+    view: ViewOption = "auto",
+    up: UpOption = "auto",
     as_json: JsonOption = False,
 ) -> None:
     """Cut a mesh into its parts: limbs, head, torso."""
@@ -80,6 +90,7 @@ def segment(
         raise InvalidParameterError(f"--method takes {', '.join(METHODS)}; it is {method!r}.")
     require_one_rule(n_parts, persistence, largest_gap=largest_gap)
     steps.require_picture(picture)
+    side = steps.parse_side(view, up)
     steps.require_label_path(output)
     surface = steps.load_mesh(mesh, repair)
     with progress_bar("parts") as progress:
@@ -99,6 +110,5 @@ def segment(
     if output:
         steps.save_labels(surface, parts.labels, es.plot.part_colors(surface, parts.labels), output)
     if picture:
-        steps.save_picture(
-            es.plot.figure_segments(surface, parts.labels, parts.features.vertices), picture
-        )
+        figure = es.plot.figure_segments(surface, parts.labels, parts.features.vertices, **side)
+        steps.save_picture(figure, picture)

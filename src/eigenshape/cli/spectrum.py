@@ -16,6 +16,8 @@ from eigenshape.cli.inputs import (
     JsonOption,
     RepairOption,
     ShapeArgument,
+    UpOption,
+    ViewOption,
 )
 from eigenshape.operators.choices import OPERATOR_NAMES, Condition, Correction, Distance, Form, Mass
 
@@ -128,6 +130,8 @@ def spectrum(
             "SVG or PDF)."
         ),
     ] = None,
+    view: ViewOption = "auto",
+    up: UpOption = "auto",
     cache: Annotated[
         Path | None,
         typer.Option(
@@ -139,6 +143,7 @@ def spectrum(
     """Compute the lowest eigenvalues of a shape and prove that none is missing."""
     steps.require_picture(picture)
     steps.require_picture(eigenfunctions)
+    side = steps.parse_side(view, up)
     steps.require_output(output, (".npz",), "A spectrum")
     if accuracy is not None and below is not None:
         raise InvalidParameterError(
@@ -196,7 +201,7 @@ def spectrum(
     if picture:
         steps.draw_eigenvalues(found, solved, bounds, picture)
     if eigenfunctions and isinstance(found, es.TriangleMesh):
-        steps.draw_eigenfunctions(found, solved, eigenfunctions)
+        steps.draw_eigenfunctions(found, solved, eigenfunctions, side)
     if output:
         solved.save(output)
         print_written(output)

@@ -16,6 +16,8 @@ from eigenshape.cli.inputs import (
     RepairOption,
     Scale,
     ShapeArgument,
+    UpOption,
+    ViewOption,
 )
 from eigenshape.stability.plan import USUAL_K, StabilityPlan
 
@@ -71,6 +73,8 @@ def stability(
     drop_missing: DropMissingOption = False,
     repair: RepairOption = "",
     picture: Annotated[Path | None, typer.Option(help="Draw the report (PNG, SVG or PDF).")] = None,
+    view: ViewOption = "auto",
+    up: UpOption = "auto",
     as_json: JsonOption = False,
 ) -> None:
     """Compare two shapes: how close they lie, what changes in their spectra, and which heat times to trust.
@@ -81,6 +85,7 @@ def stability(
     For instance: eigenshape stability clean.ply noisy.ply --picture report.png
     """
     steps.require_picture(picture)
+    side = steps.parse_side(view, up)
     partners = steps.read_partners(map_file)
     first, second = (
         steps.scale_shape(steps.load_shape(path, repair, dim, drop_missing=drop_missing), scale)
@@ -100,7 +105,7 @@ def stability(
     if picture:
         steps.save_picture(
             es.plot.figure_stability(
-                report, first, second, titles=(literal(one.stem), literal(two.stem))
+                report, first, second, titles=(literal(one.stem), literal(two.stem)), **side
             ),
             picture,
         )

@@ -93,6 +93,10 @@ def denoise(mesh: MeshLike, *, reach: float | None = None) -> TriangleMesh:
     InvalidShapeError
         If a face has no area or angles too close to 0, or a vertex belongs to no face.
 
+    See Also
+    --------
+    es.spectral.smooth_mesh : Filter the coordinates by any function of the eigenvalues.
+
     Examples
     --------
     >>> import eigenshape as es

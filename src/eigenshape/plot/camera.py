@@ -7,14 +7,52 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
 
+from eigenshape._arguments import require_type
+from eigenshape._arrays import real_numbers
+from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, face_pairs
 
-Up = Literal["auto", "x", "y", "z"]
+Up = Literal["auto", "x", "y", "z", "-x", "-y", "-z"] | ArrayLike
+View = (
+    Literal[
+        "auto",
+        "front",
+        "back",
+        "left",
+        "right",
+        "top",
+        "bottom",
+        "front-left",
+        "front-right",
+        "back-left",
+        "back-right",
+    ]
+    | ArrayLike
+)
+UP_NAMES = ("auto", "x", "y", "z", "-x", "-y", "-z")
+# The parts of front, left and up in the direction to the viewer, for each name of a view. Views of
+# two words are a little from above.
+VIEWS = {
+    "front": (1.0, 0.0, 0.0),
+    "back": (-1.0, 0.0, 0.0),
+    "left": (0.0, 1.0, 0.0),
+    "right": (0.0, -1.0, 0.0),
+    "top": (0.0, 0.0, 1.0),
+    "bottom": (0.0, 0.0, -1.0),
+    "front-left": (0.78, 0.48, 0.4),
+    "front-right": (0.78, -0.48, 0.4),
+    "back-left": (-0.78, 0.48, 0.4),
+    "back-right": (-0.78, -0.48, 0.4),
+}
+# Sine of the angle between the view and the upward direction below which the view counts as along
+# it, so that another direction must point up in the picture.
+ALONG_UP = 1e-6
 # Length of the mean normal above which a surface counts as a scan. A closed surface has 0, a flat piece 1.
 ONE_WAY = 0.3
 MARGIN = 0.04  # share of the picture that is left free on each side
@@ -56,7 +94,6 @@ class Camera:
     _repr_html_ = html_repr
 
 
-@one_blas_thread()
 def three_quarter_view(mesh: MeshLike, *, up: Up = "auto", size: int = 600) -> Camera:
     """Return a camera that shows a shape upright, from its front left and a little from above.
 
@@ -67,9 +104,9 @@ def three_quarter_view(mesh: MeshLike, *, up: Up = "auto", size: int = 600) -> C
     Parameters
     ----------
     mesh : MeshLike
-    up : {"auto", "x", "y", "z"}
-        The upward axis. "auto" takes y, or z if the shape would fall over along y and would stand along z on a base
-        more than four times as large. It is a guess: of 243 real shapes whose upright pose is known, it shows 183
+    up : {"auto", "x", "y", "z", "-x", "-y", "-z"} or (3,) float
+        The upward direction. "auto" takes y, or z if the shape would fall over along y and would stand along z on a
+        base more than four times as large. It is a guess: of 243 real shapes whose upright pose is known, it shows 183
         upright, and y alone shows 143.
     size : int
         Width and height of the picture in pixels.
@@ -78,6 +115,15 @@ def three_quarter_view(mesh: MeshLike, *, up: Up = "auto", size: int = 600) -> C
     -------
     Camera
 
+    Raises
+    ------
+    InvalidParameterError
+        If `up` is neither a name nor a direction.
+
+    See Also
+    --------
+    es.plot.aim_camera : Choose the side from which the shape is shown.
+
     Examples
     --------
     >>> import eigenshape as es
@@ -85,21 +131,133 @@ def three_quarter_view(mesh: MeshLike, *, up: Up = "auto", size: int = 600) -> C
     >>> camera.size, bool(camera.rotation[1, 2] < 0)  # the second row points down
     (300, True)
     """
+    return aim_camera(mesh, up=up, size=size)
+
+
+@one_blas_thread()
+def aim_camera(mesh: MeshLike, *, view: View = "auto", up: Up = "auto", size: int = 600) -> Camera:
+    """Return a camera that shows a shape upright from a side.
+
+    Front, left and so on are sides of the shape itself: the left hand of a person is on the left
+    side, and on the right in a picture from the front. The front is the side that
+    `three_quarter_view` shows; a direction involves no guess.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+    view : str or (3,) float
+        "auto" is `three_quarter_view`. "front", "back", "left", "right", "top" and "bottom" look
+        straight at a side; "front-left", "front-right", "back-left" and "back-right" look from
+        between two sides, a little from above. A vector points from the shape to the viewer.
+    up : {"auto", "x", "y", "z", "-x", "-y", "-z"} or (3,) float
+        The upward direction, or "auto" for the guess of `three_quarter_view`. In a view along it
+        the front is at the bottom of the picture ("top") or at its top.
+    size : int
+        Width and height of the picture in pixels.
+
+    Returns
+    -------
+    Camera
+
+    Raises
+    ------
+    InvalidParameterError
+        If `view` or `up` is neither a name nor a direction.
+
+    See Also
+    --------
+    three_quarter_view : The guess alone.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> camera = es.plot.aim_camera(es.icosphere(1), view=[1, 0, 0], up="z")
+    >>> abs(camera.rotation.round(9)).tolist()  # y to the right, z upward, x to the viewer
+    [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]
+    """
     mesh = as_mesh(mesh)
-    axis = "xyz".index(_upright_axis(mesh) if up == "auto" else up)
-    upward, front = np.eye(3)[axis], np.eye(3)[(axis + 1) % 3]
-    side = np.cross(upward, front)
-    towards = 0.78 * front + 0.48 * side + 0.4 * upward
-    behind = -0.78 * front - 0.48 * side + 0.4 * upward
-    facing = _facing(mesh)
-    if facing is not None and np.linalg.norm(np.cross(upward, facing)) > 0.1:
-        towards = facing
-    elif _sum_visible_bending(mesh, towards) < LESS * _sum_visible_bending(mesh, behind):
-        towards = behind
+    if isinstance(up, str) and up == "auto":
+        up = _upright_axis(mesh)
+    upward = _direction(up, "up", UP_NAMES)
+    front, towards_auto = _guess_front(mesh, upward)
+    if isinstance(view, str) and view == "auto":
+        towards = towards_auto
+    elif isinstance(view, str) and view in VIEWS:
+        towards = np.array(VIEWS[view]) @ [front, np.cross(upward, front), upward]
+    else:
+        towards = _direction(view, "view", ("auto", *VIEWS))
     towards = towards / np.linalg.norm(towards)
     right = np.cross(upward, towards)
+    if np.linalg.norm(right) < ALONG_UP:
+        # Along the upward direction: the back is at the top of the picture, seen from above.
+        right = np.cross(-np.sign(towards @ upward) * front, towards)
     right = right / np.linalg.norm(right)
     return Camera(np.stack([right, -np.cross(towards, right), towards]), size)
+
+
+def choose_camera(
+    mesh: TriangleMesh, camera: Camera | None, view: View, up: Up, *, size: int = 600
+) -> Camera:
+    """Return the camera of a figure: the one that was passed, or one for the view.
+
+    Raises
+    ------
+    InvalidParameterError
+        If both a camera and a view or an upward direction were passed.
+    """
+    require_type(camera, Camera | None, "camera")
+    if camera is None:
+        return aim_camera(mesh, view=view, up=up, size=size)
+    if not (isinstance(view, str) and view == "auto" and isinstance(up, str) and up == "auto"):
+        raise InvalidParameterError(
+            "A camera determines the view, so view and up must not be passed with it. "
+            "Pass camera, or view and up."
+        )
+    return camera
+
+
+def _direction(value: View, name: str, names: tuple[str, ...]) -> Float[np.ndarray, "3"]:
+    """Return a unit vector for the name of an axis or for three numbers.
+
+    Raises
+    ------
+    InvalidParameterError
+        If it is not one of the names, not three finite numbers, or zero.
+    """
+    if isinstance(value, str):
+        if value not in UP_NAMES or value == "auto" or name != "up":
+            raise InvalidParameterError(
+                f"{name} must be one of {', '.join(names)}, or three numbers; it is {value!r}."
+            )
+        return (-1.0 if value.startswith("-") else 1.0) * np.eye(3)["xyz".index(value[-1])]
+    vector = real_numbers(value, name).astype(np.float64)
+    if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
+        raise InvalidParameterError(
+            f"{name} must be a direction, three finite numbers that are not all 0, or one of "
+            f"{', '.join(names)}; it is {vector.tolist()}."
+        )
+    vector = vector / np.abs(vector).max()
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+def _guess_front(
+    mesh: TriangleMesh, upward: Float[np.ndarray, "3"]
+) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+    """Return the level direction of the front, and the direction to the viewer of the usual view."""
+    # The axis after the upward one, made level where the upward direction is oblique.
+    front = np.eye(3)[(int(np.abs(upward).argmax()) + 1) % 3]
+    front = front - (front @ upward) * upward
+    front = front / np.linalg.norm(front)
+    facing = _facing(mesh)
+    if facing is not None and np.linalg.norm(np.cross(upward, facing)) > 0.1:
+        level = facing - (facing @ upward) * upward
+        return level / np.linalg.norm(level), facing
+    parts = np.array(VIEWS["front-left"])
+    towards = parts @ [front, np.cross(upward, front), upward]
+    behind = parts @ [-front, -np.cross(upward, front), upward]
+    if _sum_visible_bending(mesh, towards) < LESS * _sum_visible_bending(mesh, behind):
+        return -front, behind
+    return front, towards
 
 
 def _upright_axis(mesh: TriangleMesh) -> Literal["y", "z"]:

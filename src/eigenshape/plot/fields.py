@@ -14,7 +14,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
-from eigenshape.plot.camera import Camera, three_quarter_view
+from eigenshape.plot.camera import Camera, Up, View, choose_camera
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import Drawing, draw, palette
 from eigenshape.spectral.spectrum import Spectrum
@@ -24,7 +24,13 @@ DOT = 46.0  # square points; area of the mark of a vertex
 
 
 def figure_eigenfunctions(
-    mesh: MeshLike, spectrum: Spectrum, indices: ArrayLike, *, camera: Camera | None = None
+    mesh: MeshLike,
+    spectrum: Spectrum,
+    indices: ArrayLike,
+    *,
+    camera: Camera | None = None,
+    view: View = "auto",
+    up: Up = "auto",
 ) -> Figure:
     """Draw eigenfunctions side by side, with their nodal lines.
 
@@ -39,7 +45,11 @@ def figure_eigenfunctions(
     indices : (c,) int
         Which columns of `spectrum.eigenvectors` to draw, 0 to k - 1, four in a row.
     camera : Camera, optional
-        By default `three_quarter_view(mesh)`.
+        Instead of `view` and `up`.
+    view : str or (3,) float
+        The side from which the shape is drawn, as in `aim_camera`.
+    up : str or (3,) float
+        The upward direction, as in `aim_camera`.
 
     Returns
     -------
@@ -66,7 +76,6 @@ def figure_eigenfunctions(
     """
     mesh = as_mesh(mesh)
     require_type(spectrum, Spectrum, "spectrum")
-    require_type(camera, Camera | None, "camera")
     n_points, n_pairs = spectrum.eigenvectors.shape
     if n_points != mesh.n_vertices:
         raise InvalidParameterError(
@@ -76,7 +85,7 @@ def figure_eigenfunctions(
     chosen = whole_numbers(indices, "An index", 0, n_pairs - 1).tolist()
     if not chosen:
         raise InvalidParameterError("indices must name at least one eigenfunction; it is empty.")
-    camera = camera or three_quarter_view(mesh, size=420)
+    camera = choose_camera(mesh, camera, view, up, size=420)
     n_columns = min(len(chosen), 4)
     n_rows = -(-len(chosen) // n_columns)
     figure = Figure(figsize=(PANEL * n_columns + 0.8, (PANEL + 0.3) * n_rows), layout="constrained")
@@ -107,12 +116,14 @@ def _constant_as_one(function: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n
     return function if np.ptp(function) > 1e-6 else np.ones_like(function)
 
 
-def figure_field(
+def figure_field(  # noqa: PLR0913 - what is drawn, and one keyword for each choice of how
     mesh: MeshLike,
     values: ArrayLike,
     label: str = "",
     *,
     camera: Camera | None = None,
+    view: View = "auto",
+    up: Up = "auto",
     color_map: str = "viridis",
 ) -> Figure:
     """Draw one function on a mesh, with a color bar.
@@ -126,7 +137,11 @@ def figure_field(
     label : str
         Text beside the color bar, such as the name of the function and its unit.
     camera : Camera, optional
-        By default `three_quarter_view(mesh)`.
+        Instead of `view` and `up`.
+    view : str or (3,) float
+        The side from which the shape is drawn, as in `aim_camera`.
+    up : str or (3,) float
+        The upward direction, as in `aim_camera`.
     color_map : str
         Name of a color map of matplotlib.
 
@@ -137,7 +152,7 @@ def figure_field(
     Raises
     ------
     InvalidParameterError
-        If `values` does not hold one finite number per vertex.
+        If `values` does not hold one finite number per vertex, or the view is not valid.
 
     See Also
     --------
@@ -153,12 +168,11 @@ def figure_field(
     'height, length'
     """
     mesh = as_mesh(mesh)
-    require_type(camera, Camera | None, "camera")
     figure = Figure(figsize=(2 * PANEL + 1.2, 2 * PANEL), layout="constrained")
     axes = figure.subplots()
     field = vertex_values(values, "values", mesh.n_vertices)
     scale, colors = Normalize(float(field.min()), float(field.max())), mpl.colormaps[color_map]
-    camera = camera or three_quarter_view(mesh)
+    camera = choose_camera(mesh, camera, view, up)
     show(axes, draw(mesh, camera, vertex_colors=map_colors(field, scale, colors)))
     figure.colorbar(ScalarMappable(scale, colors), ax=axes, shrink=0.8).set_label(label)
     return figure
@@ -177,6 +191,8 @@ def figure_segments(
     vertices: ArrayLike | None = None,
     *,
     camera: Camera | None = None,
+    view: View = "auto",
+    up: Up = "auto",
 ) -> Figure:
     """Draw the parts of a mesh in colors, with their numbered feature points.
 
@@ -191,7 +207,11 @@ def figure_segments(
     vertices : (m,) int, optional
         Feature point of each part. By default none is drawn.
     camera : Camera, optional
-        By default `three_quarter_view(mesh)`.
+        Instead of `view` and `up`.
+    view : str or (3,) float
+        The side from which the shape is drawn, as in `aim_camera`.
+    up : str or (3,) float
+        The upward direction, as in `aim_camera`.
 
     Returns
     -------
@@ -218,14 +238,13 @@ def figure_segments(
     '2 parts around their feature points (hollow: on the far side)'
     """
     mesh = as_mesh(mesh)
-    require_type(camera, Camera | None, "camera")
     labels = face_labels(labels, "labels", mesh.n_faces)
     marked = np.empty(0, dtype=np.int64)
     if vertices is not None:
         marked = whole_numbers(vertices, "A feature point", 0, mesh.n_vertices - 1)
     figure = Figure(figsize=(2 * PANEL, 2 * PANEL + 0.4), layout="constrained")
     axes = figure.subplots()
-    drawing = draw(mesh, camera or three_quarter_view(mesh), face_colors=palette(labels))
+    drawing = draw(mesh, choose_camera(mesh, camera, view, up), face_colors=palette(labels))
     show(axes, drawing)
     mark(axes, drawing, marked, numbers=True)
     if len(marked):

@@ -14,7 +14,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.plot.camera import Camera, three_quarter_view
+from eigenshape.plot.camera import Camera, Up, View, choose_camera
 from eigenshape.plot.fields import PANEL, show
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import draw
@@ -28,6 +28,8 @@ def figure_poses(
     shares: ArrayLike | None = None,
     *,
     camera: Camera | None = None,
+    view: View = "auto",
+    up: Up = "auto",
 ) -> Figure:
     """Draw poses of one shape side by side, in the same view and at the same scale.
 
@@ -39,7 +41,11 @@ def figure_poses(
         How much of a motion each vertex follows, from 0 to 1, such as `Binding.shares`. It sets the colors of all
         poses, which must then have n vertices.
     camera : Camera, optional
-        By default `three_quarter_view` of the first pose.
+        Instead of `view` and `up`.
+    view : str or (3,) float
+        The side from which the first pose is drawn, as in `aim_camera`; the others are drawn alike.
+    up : str or (3,) float
+        The upward direction, as in `aim_camera`.
 
     Returns
     -------
@@ -59,13 +65,12 @@ def figure_poses(
     >>> [axes.get_title() for axes in figure.axes]
     ['ball', 'egg']
     """
-    require_type(camera, Camera | None, "camera")
     require_type(poses, Mapping, "poses")
     if not poses:
         raise InvalidParameterError("poses must hold at least one mesh; it is empty.")
     meshes = {title: as_mesh(mesh, title) for title, mesh in poses.items()}
     first = next(iter(meshes.values()))
-    camera = camera or three_quarter_view(first)
+    camera = choose_camera(first, camera, view, up)
     columns = min(len(poses), N_COLUMNS)
     rows = -(-len(poses) // columns)
     size = 1.5 * PANEL

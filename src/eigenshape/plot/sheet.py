@@ -11,7 +11,7 @@ from eigenshape._arguments import require_each, require_type
 from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.plot.camera import three_quarter_view
+from eigenshape.plot.camera import Up, View, aim_camera
 from eigenshape.plot.fields import PANEL, mark, show
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import draw, palette
@@ -54,7 +54,14 @@ class Panel:
             require_type(self.mesh, TriangleMesh, "mesh")
 
 
-def figure_contact_sheet(query: Panel, matches: Sequence[Panel], *, caption: str = "") -> Figure:
+def figure_contact_sheet(
+    query: Panel,
+    matches: Sequence[Panel],
+    *,
+    caption: str = "",
+    view: View = "auto",
+    up: Up = "auto",
+) -> Figure:
     """Draw a query beside its matches, as figure 5.1 of the thesis.
 
     Parameters
@@ -65,6 +72,10 @@ def figure_contact_sheet(query: Panel, matches: Sequence[Panel], *, caption: str
         In reading order, three in a row.
     caption : str
         Title of the whole figure.
+    view : str or (3,) float
+        The side from which each shape is drawn, as in `aim_camera`.
+    up : str or (3,) float
+        The upward direction of each shape, as in `aim_camera`.
 
     Returns
     -------
@@ -87,18 +98,18 @@ def figure_contact_sheet(query: Panel, matches: Sequence[Panel], *, caption: str
     figure = Figure(figsize=(size * (N_COLUMNS + 1.5), size * n_rows + 0.8), layout="constrained")
     left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=[1.5, N_COLUMNS])[0]
     left.set_facecolor("#f3f3f3")
-    _fill(left.subplots(), query)
+    _fill(left.subplots(), query, view, up)
     grid = right.subplots(n_rows, N_COLUMNS, squeeze=False)
     for axes in grid.flat:
         axes.set_axis_off()
     for axes, panel in zip(grid.flat, matches, strict=False):
-        _fill(axes, panel)
+        _fill(axes, panel, view, up)
     if caption:
         figure.suptitle(caption, fontsize=11)
     return figure
 
 
-def _fill(axes: Axes, panel: Panel) -> None:
+def _fill(axes: Axes, panel: Panel, view: View, up: Up) -> None:
     axes.set_title(panel.title, fontsize=10)
     if panel.mesh is None:
         axes.text(
@@ -112,14 +123,20 @@ def _fill(axes: Axes, panel: Panel) -> None:
         )
         axes.set_axis_off()
         return
-    drawing = draw(
-        panel.mesh, three_quarter_view(panel.mesh, size=440), face_colors=palette(panel.colors)
-    )
+    camera = aim_camera(panel.mesh, view=view, up=up, size=440)
+    drawing = draw(panel.mesh, camera, face_colors=palette(panel.colors))
     show(axes, drawing)
     mark(axes, drawing, panel.vertices[drawing.visible[panel.vertices]])
 
 
-def figure_label_transfer(source: MeshLike, target: MeshLike, transfer: LabelTransfer) -> Figure:
+def figure_label_transfer(
+    source: MeshLike,
+    target: MeshLike,
+    transfer: LabelTransfer,
+    *,
+    view: View = "auto",
+    up: Up = "auto",
+) -> Figure:
     """Draw two shapes side by side, matched parts in one color, with the labels and their confidence.
 
     Parameters
@@ -130,6 +147,10 @@ def figure_label_transfer(source: MeshLike, target: MeshLike, transfer: LabelTra
         The mesh that got them.
     transfer : LabelTransfer
         Of `transfer_labels(source, labels, target)`.
+    view : str or (3,) float
+        The side from which each shape is drawn, as in `aim_camera`.
+    up : str or (3,) float
+        The upward direction of both shapes, as in `aim_camera`.
 
     Returns
     -------
@@ -153,9 +174,10 @@ def figure_label_transfer(source: MeshLike, target: MeshLike, transfer: LabelTra
     require_type(transfer, LabelTransfer, "transfer")
     figure = Figure(figsize=(4.4 * PANEL, 2.2 * PANEL + 0.4), layout="constrained")
     left, right = figure.subplots(1, 2)
-    _fill(left, Panel(source, "labeled", transfer.source.labels, transfer.source.features.vertices))
+    labeled = transfer.source
+    _fill(left, Panel(source, "labeled", labeled.labels, labeled.features.vertices), view, up)
     colors = transfer.matches[transfer.target.labels]
-    drawing = draw(target, three_quarter_view(target), face_colors=palette(colors))
+    drawing = draw(target, aim_camera(target, view=view, up=up), face_colors=palette(colors))
     show(right, drawing)
     vertices = transfer.target.features.vertices
     mark(right, drawing, vertices)

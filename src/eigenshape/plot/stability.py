@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from eigenshape._arguments import require_type
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.plot.camera import three_quarter_view
+from eigenshape.plot.camera import Camera, Up, View, aim_camera
 from eigenshape.plot.fields import PANEL, map_colors, show
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import draw
@@ -27,6 +27,8 @@ def figure_stability(
     two: ShapeLike,
     *,
     titles: tuple[str, str] = ("one", "two"),
+    view: View = "auto",
+    up: Up = "auto",
 ) -> Figure:
     """Draw a report on two shapes.
 
@@ -41,6 +43,10 @@ def figure_stability(
         The shapes that were compared. They are drawn if both are triangle meshes.
     titles : (str, str)
         Titles of the two shapes.
+    view : str or (3,) float
+        The side from which the first shape is drawn, as in `aim_camera`; the other is drawn alike.
+    up : str or (3,) float
+        The upward direction, as in `aim_camera`.
 
     Returns
     -------
@@ -69,7 +75,8 @@ def figure_stability(
         2 if drawn else 1, 1, squeeze=False, height_ratios=[PANEL, 8] if drawn else None
     )[:, 0]
     if isinstance(one, TriangleMesh) and isinstance(two, TriangleMesh):
-        _draw_shapes(rows[0], report, (one, two), titles)
+        camera = aim_camera(one, view=view, up=up)
+        _draw_shapes(rows[0], report, (one, two), titles, camera)
     grid = rows[-1].subplots(2, 2)
     draw_comparison(grid[:, 0], report.spectra, titles)
     _draw_times(grid[0, 1], report)
@@ -84,10 +91,10 @@ def _draw_shapes(
     report: StabilityReport,
     meshes: tuple[TriangleMesh, TriangleMesh],
     titles: tuple[str, str],
+    camera: Camera,
 ) -> None:
     panels = figure.subplots(1, 2)
     scale, colors = Normalize(0.0, report.distance or 1.0), mpl.colormaps["viridis"]
-    camera = three_quarter_view(meshes[0])
     for axes, mesh, values, title in zip(panels, meshes, report.distances, titles, strict=True):
         show(axes, draw(mesh, camera, vertex_colors=map_colors(values, scale, colors)))
         axes.set_title(title)

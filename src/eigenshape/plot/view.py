@@ -8,6 +8,7 @@ from typing import Any
 from eigenshape._errors import MissingExtraError
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.plot.camera import Up, View
 
 
 def view(
@@ -15,6 +16,8 @@ def view(
     values: Mapping[str, ArrayLike] | ArrayLike | None = None,
     *,
     height: int = 640,
+    view: View = "auto",
+    up: Up = "auto",
 ) -> Any:
     """Show a shape in a notebook, where it can be turned, bent and examined.
 
@@ -30,6 +33,11 @@ def view(
         Functions on the vertices to choose from. A title can end with a unit in parentheses.
     height : int
         Height of the widget in pixels.
+    view : str or (3,) float
+        The side from which the shape is shown at first, as in `aim_camera`, but always a little
+        from above.
+    up : str or (3,) float
+        The upward direction, as in `aim_camera`.
 
     Returns
     -------
@@ -39,7 +47,7 @@ def view(
     Raises
     ------
     InvalidParameterError
-        If a function does not have one finite value per vertex.
+        If a function does not have one finite value per vertex, or the view is not valid.
     MissingExtraError
         If the package eigenshape-studio or anywidget is not installed.
 
@@ -58,7 +66,10 @@ def view(
     if values is None:
         values = {}
     fields = values if isinstance(values, Mapping) else {"values": values}
-    return studio_module("widget").ShapeWidget(surface, fields, height=height)
+    widget = studio_module("widget").ShapeWidget(surface, fields, height=height)
+    if not (isinstance(view, str) and view == "auto" and isinstance(up, str) and up == "auto"):
+        widget.look_from(view, up)
+    return widget
 
 
 def studio_module(name: str) -> ModuleType:

@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 import eigenshape as es
+from eigenshape.plot.camera import Up, View
 from eigenshape_studio.jobs import NO_JOB, Job, Progress
 
 # Modes that are solved for when a shape is opened, beside one for each further component: as many
@@ -78,6 +79,17 @@ class Analysis:
             raise self._upright.error or es.EigenshapeError("The view was cancelled.")
         return self._upright.result
 
+    def look_from(self, view: View, up: Up) -> None:
+        """Show the mesh from another side, from the next time on that a page asks for its view.
+
+        Raises
+        ------
+        InvalidParameterError
+            If `view` or `up` is neither a name nor a direction, as in `es.plot.aim_camera`.
+        """
+        found = frame_shape(self.mesh, view, up)
+        self._upright = Job(lambda _: found, shared=True)
+
     @cached_property
     def areas(self) -> np.ndarray:
         """The area around each vertex."""
@@ -126,27 +138,39 @@ def _rig(mesh: es.TriangleMesh, solved: Job[es.Spectrum]) -> es.deformation.Eige
     return es.rig_shape(mesh, solved.result)
 
 
-def frame_shape(mesh: es.TriangleMesh) -> dict[str, Any]:
+def frame_shape(mesh: es.TriangleMesh, view: View = "auto", up: Up = "auto") -> dict[str, Any]:
     """Return center and diagonal of the box of a mesh, and how it stands upright."""
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     return {
         "center": ((low + high) / 2).tolist(),
         "extent": float(np.linalg.norm(high - low)),
-        **upright_view(mesh),
+        **upright_view(mesh, view, up),
     }
 
 
-def upright_view(mesh: es.TriangleMesh) -> dict[str, list[float]]:
-    """Return the upward axis of a shape, and its front, which is level."""
-    right, down, towards = es.plot.three_quarter_view(mesh).rotation
-    # The camera stands upright: its row to the right is orthogonal to the upward axis.
-    level = np.abs(right) < LEVEL
-    up = np.eye(3)[np.argmax(np.where(level, -down, -np.inf))] if level.any() else -down
+def upright_view(
+    mesh: es.TriangleMesh, view: View = "auto", up: Up = "auto"
+) -> dict[str, list[float]]:
+    """Return the upward axis of a shape, and its front, which is level.
+
+    The page looks from the front left and a little from above, so a view changes the side alone.
+    """
+    if isinstance(up, str):
+        # The usual camera stands upright: its row to the right is orthogonal to the upward axis.
+        right, down, _ = es.plot.three_quarter_view(mesh, up=up).rotation
+        level = np.abs(right) < LEVEL
+        axis = np.argmax(np.where(level, np.abs(down), -np.inf))
+        upward = -np.sign(down[axis]) * np.eye(3)[axis] if level.any() else -down
+    else:
+        upward = np.asarray(up, dtype=np.float64) / np.linalg.norm(up)
+    _, down, towards = es.plot.aim_camera(mesh, view=view, up=up).rotation
     # It looks from the front, turned to the left about that axis.
-    along = towards - (towards @ up) * up
+    along = towards - (towards @ upward) * upward
+    if np.linalg.norm(along) < LEVEL:  # from above or below: the front is beside the viewer
+        along = np.sign(towards @ upward) * down
     along /= np.linalg.norm(along)
-    front = np.cos(ASIDE) * along - np.sin(ASIDE) * np.cross(up, along)
-    return {"up": up.tolist(), "front": front.tolist()}
+    front = np.cos(ASIDE) * along - np.sin(ASIDE) * np.cross(upward, along)
+    return {"up": upward.tolist(), "front": front.tolist()}
 
 
 @cache

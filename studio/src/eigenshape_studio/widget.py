@@ -9,6 +9,7 @@ import anywidget
 import traitlets
 
 import eigenshape as es
+from eigenshape.plot.camera import Up, View
 from eigenshape_studio.analysis import warm_up
 from eigenshape_studio.bundle import bundle_text
 from eigenshape_studio.workspace import Workspace
@@ -46,6 +47,16 @@ class ShapeWidget(anywidget.AnyWidget):
         self._threads = ThreadPoolExecutor(max_workers=4, thread_name_prefix="studio")
         super().__init__(_esm=bundle_text(), height=height)
         self.on_msg(self._receive)
+
+    def look_from(self, view: View = "auto", up: Up = "auto") -> None:
+        """Show the shape from another side and another way up; `es.view` calls it.
+
+        Raises
+        ------
+        InvalidParameterError
+            If `view` or `up` is neither a name nor a direction, as in `es.plot.aim_camera`.
+        """
+        self.workspace.analysis.look_from(view, up)
 
     @property
     def mesh(self) -> es.TriangleMesh:

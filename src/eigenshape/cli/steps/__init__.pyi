@@ -49,3 +49,5 @@ from .spectra import require_drawable as require_drawable
 from .spectra import spectrum_facts as spectrum_facts
 from .spectra import usual_pairs as usual_pairs
 from .studio import studio_module as studio_module
+from .views import Side as Side
+from .views import parse_side as parse_side

@@ -10,6 +10,7 @@ from jaxtyping import Int
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import err, out, print_table
 from eigenshape.cli.steps.outputs import save_picture
+from eigenshape.cli.steps.views import Side
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
@@ -105,8 +106,9 @@ def draw_eigenvalues(shape: Shape, found: Spectrum, bounds: Brackets | None, pat
     save_picture(figure_spectrum(found, area=area, brackets=bounds), path)
 
 
-def draw_eigenfunctions(mesh: TriangleMesh, found: Spectrum, path: Path) -> None:
+def draw_eigenfunctions(mesh: TriangleMesh, found: Spectrum, path: Path, side: Side) -> None:
     """Draw the first eigenfunctions that are not constant."""
     first, k = found.certificate.first, len(found.eigenvalues)
     start = min(1, k - 1) if first == 0 else 0  # the lowest is constant
-    save_picture(figure_eigenfunctions(mesh, found, range(start, min(k, start + N_PICTURED))), path)
+    chosen = range(start, min(k, start + N_PICTURED))
+    save_picture(figure_eigenfunctions(mesh, found, chosen, **side), path)

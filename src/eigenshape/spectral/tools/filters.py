@@ -1,0 +1,312 @@
+"""Filters: functions whose frequencies are weakened or strengthened (thesis 1.2.3)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from eigenshape._arguments import describe_value, require_type
+from eigenshape._arrays import point_functions, positive_values, real_numbers
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.measure import enclosed_volume
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import size_one
+from eigenshape.geometry.topology import is_closed
+from eigenshape.spectral.spectrum import Spectrum
+from eigenshape.spectral.tools.projection import project, reconstruct
+
+# A filter: the factor of each frequency, as a function of the eigenvalues.
+Response = Callable[[Float[np.ndarray, " k"]], Float[np.ndarray, " k"]]
+# Share of the volume of a shape that must be left for the rest to be restored by scaling. Below it
+# the result would be a speck blown up, of which rounding is the largest part.
+LEAST_VOLUME = 1e-6
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """A filter that keeps the frequencies up to a cutoff and removes the others.
+
+    Parameters
+    ----------
+    cutoff : float
+        Largest eigenvalue to keep, in 1/length², > 0. On a surface of area A about A·cutoff/4π
+        eigenvalues are kept (Weyl's law).
+
+    Raises
+    ------
+    InvalidParameterError
+        If the cutoff is not positive and finite.
+
+    See Also
+    --------
+    filter_values, smooth_mesh : Apply a filter.
+
+    Examples
+    --------
+    >>> import numpy as np, eigenshape as es
+    >>> es.spectral.LowPass(5.0)(np.array([0.0, 2.0, 6.0])).tolist()
+    [1.0, 1.0, 0.0]
+    """
+
+    cutoff: float
+
+    def __post_init__(self) -> None:
+        positive_values(self.cutoff, "cutoff")
+
+    def __call__(self, eigenvalues: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+        """Return 1 for each eigenvalue up to the cutoff, and 0 beyond."""
+        return np.asarray(eigenvalues <= self.cutoff, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class BandPass:
+    """A filter that keeps the frequencies of a band and removes the others.
+
+    Parameters
+    ----------
+    low, high : float
+        Smallest and largest eigenvalue to keep, in 1/length², 0 ≤ low ≤ high.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the ends are not finite, negative, or in the wrong order.
+
+    See Also
+    --------
+    filter_values, smooth_mesh : Apply a filter.
+
+    Examples
+    --------
+    >>> import numpy as np, eigenshape as es
+    >>> es.spectral.BandPass(1.0, 5.0)(np.array([0.0, 2.0, 6.0])).tolist()
+    [0.0, 1.0, 0.0]
+    """
+
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.low <= self.high < np.inf:
+            raise InvalidParameterError(
+                f"A band must be 0 ≤ low ≤ high, finite; it is {self.low} to {self.high}."
+            )
+
+    def __call__(self, eigenvalues: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+        """Return 1 for each eigenvalue in the band, and 0 outside."""
+        inside = (eigenvalues >= self.low) & (eigenvalues <= self.high)
+        return np.asarray(inside, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class HeatFilter:
+    """A filter that lets heat flow for some time: the factor of eigenvalue λ is exp(-tλ).
+
+    Parameters
+    ----------
+    t : float
+        Diffusion time, in length², > 0.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the time is not positive and finite.
+
+    See Also
+    --------
+    filter_values, smooth_mesh : Apply a filter.
+
+    Examples
+    --------
+    >>> import numpy as np, eigenshape as es
+    >>> es.spectral.HeatFilter(0.5)(np.array([0.0, 2.0])).round(3).tolist()
+    [1.0, 0.368]
+    """
+
+    t: float
+
+    def __post_init__(self) -> None:
+        positive_values(self.t, "t")
+
+    def __call__(self, eigenvalues: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+        """Return exp(-tλ) for each eigenvalue λ."""
+        return np.exp(-self.t * eigenvalues)
+
+
+@one_blas_thread()
+def filter_values(
+    values: ArrayLike, spectrum: Spectrum, response: Response, *, keep_rest: bool = False
+) -> Float[np.ndarray, "n ..."]:
+    """Multiply each frequency of a function by a factor.
+
+    The result is Σ_i r(λ_i) c_i φ_i with c = ΦᵀB x the coefficients of the function (Taubin 1995;
+    Vallet and Lévy 2008).
+
+    Parameters
+    ----------
+    values : (n,) or (n, q) float
+        One or q functions.
+    spectrum : Spectrum
+        k eigenpairs on n points.
+    response : callable
+        r: takes the (k,) eigenvalues, in 1/length², and returns (k,) factors. `LowPass`, `BandPass`
+        and `HeatFilter` are such callables, and any function of yours may be one.
+    keep_rest : bool
+        What lies outside the k eigenvectors is removed by default. If True it is kept as it is, so
+        that a filter can change low frequencies without loss of detail.
+
+    Returns
+    -------
+    (n,) or (n, q) float
+        In the unit of the values.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `values` does not hold one finite number per point, or the response cannot be called or
+        is not one finite factor per eigenvalue.
+
+    See Also
+    --------
+    smooth_mesh : Filter the coordinates of a mesh.
+
+    Examples
+    --------
+    Remove all but the slow part of noise on a sphere:
+
+    >>> import numpy as np, eigenshape as es
+    >>> mesh = es.icosphere(3)
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(mesh), 100)
+    >>> noise = np.random.default_rng(0).standard_normal(mesh.n_vertices)
+    >>> slow = es.spectral.filter_values(noise, spectrum, es.spectral.LowPass(12.5))
+    >>> bool(np.ptp(slow) < np.ptp(noise) / 3)
+    True
+
+    Weaken all frequencies alike, by a filter of one's own:
+
+    >>> half = es.spectral.filter_values(
+    ...     noise, spectrum, lambda eigenvalues: 0.5 + 0 * eigenvalues, keep_rest=True
+    ... )
+    """
+    require_type(spectrum, Spectrum, "spectrum")
+    functions = point_functions(values, "values", len(spectrum.eigenvectors))
+    if not callable(response):
+        raise InvalidParameterError(
+            "response must be a function of the eigenvalues, such as es.spectral.LowPass(cutoff); "
+            f"it is {describe_value(response)}."
+        )
+    factors = _factors(response, spectrum.eigenvalues)
+    change = factors - 1 if keep_rest else factors
+    coefficients = project(functions, spectrum)
+    # A column for each function, or none: the transposes let one line serve both.
+    filtered = reconstruct((change * coefficients.T).T, spectrum)
+    return functions + filtered if keep_rest else filtered
+
+
+def _factors(response: Response, eigenvalues: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+    """Return the factor of each eigenvalue.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the response does not return one finite number per eigenvalue.
+    """
+    factors = real_numbers(response(eigenvalues), "The factors of a filter").astype(np.float64)
+    if factors.shape != eigenvalues.shape:
+        raise InvalidParameterError(
+            f"A filter must return one factor per eigenvalue, shape {eigenvalues.shape}; the shape "
+            f"is {factors.shape}."
+        )
+    bad = np.flatnonzero(~np.isfinite(factors))
+    if bad.size:
+        raise InvalidParameterError(
+            f"The factors of a filter must be finite; that of eigenvalue {bad[0]}, "
+            f"{eigenvalues[bad[0]]:.6g}, is {factors[bad[0]]}."
+        )
+    return factors
+
+
+def smooth_mesh(
+    mesh: MeshLike,
+    spectrum: Spectrum,
+    response: Response,
+    *,
+    keep_volume: bool = False,
+    keep_rest: bool = False,
+) -> TriangleMesh:
+    """Filter the coordinates of a mesh, as functions on it.
+
+    Low-pass and heat filters remove detail first, and then shrink the shape: limbs most. With
+    `keep_volume` the result is scaled about its centroid until it encloses the volume of the mesh
+    again (Desbrun, Meyer, Schröder and Barr 1999, section 2.4).
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        With n vertices.
+    spectrum : Spectrum
+        k eigenpairs on the n vertices, from the lowest on.
+    response : callable
+        Factors as a function of the eigenvalues, as in `filter_values`.
+    keep_volume : bool
+        Whether to scale the result to the volume of the mesh, which must be closed.
+    keep_rest : bool
+        Whether to keep what lies outside the k eigenvectors, as in `filter_values`.
+
+    Returns
+    -------
+    TriangleMesh
+        With the same faces.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the spectrum is of another number of points, or the response is not one finite factor per
+        eigenvalue.
+    InvalidShapeError
+        If the volume is to be kept and the mesh is open, its faces are not turned alike, or the
+        filter leaves no volume to scale.
+
+    See Also
+    --------
+    es.operators.denoise : Remove noise by one step of heat flow, without a spectrum.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.make_creature("quadruped", n_vertices=500)
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(mesh), 100)
+    >>> heat = es.spectral.HeatFilter(0.002 * es.geometry.surface_area(mesh))
+    >>> smooth = es.spectral.smooth_mesh(mesh, spectrum, heat, keep_volume=True)
+    >>> volumes = [es.geometry.enclosed_volume(each) for each in (mesh, smooth)]
+    >>> bool(abs(volumes[1] / volumes[0] - 1) < 1e-12)
+    True
+    """
+    mesh = as_mesh(mesh)
+    require_type(spectrum, Spectrum, "spectrum")
+    if keep_volume and not is_closed(mesh):
+        raise InvalidShapeError(
+            "A mesh must be closed for its volume to be kept; this one has a boundary. Pass "
+            "keep_volume=False, or close it by repair(mesh, ['fill_holes'])."
+        )
+    # Coordinates of size 1, so that volumes neither overflow nor vanish.
+    points, scale = size_one(mesh.vertices)
+    filtered = filter_values(points, spectrum, response, keep_rest=keep_rest)
+    if keep_volume:
+        before, after = (
+            enclosed_volume(TriangleMesh(each, mesh.faces)) for each in (points, filtered)
+        )
+        if before == 0 or after / before < LEAST_VOLUME:
+            raise InvalidShapeError(
+                "A filter must leave some of the volume for the rest to be restored; the volume "
+                f"was {before * scale**3:.3g} and is {after * scale**3:.3g} length³. "
+                "Use a shorter time or a higher cutoff, or pass keep_volume=False."
+            )
+        areas = np.asarray(spectrum.mass.sum(axis=1)).ravel()
+        center = areas @ filtered / areas.sum()
+        filtered = center + (before / after) ** (1 / 3) * (filtered - center)
+    return TriangleMesh(filtered * scale, mesh.faces)
