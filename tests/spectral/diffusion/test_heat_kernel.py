@@ -46,7 +46,9 @@ def test_single_numbers_have_no_axis():
 
 
 def test_points_and_times_that_are_not_there_are_named(monkeypatch):
-    with pytest.raises(InvalidParameterError, match=r"a point of x must lie in 0\.\.107; it is 108"):
+    with pytest.raises(
+        InvalidParameterError, match=r"a point of x must lie in 0\.\.107; it is 108"
+    ):
         heat_kernel(SPECTRUM, 108, None, 0.1)
     with pytest.raises(InvalidParameterError, match=r"a point of y must lie in 0\.\.107; it is -1"):
         heat_kernel(SPECTRUM, 1, [-1], 0.1)

@@ -264,7 +264,9 @@ def _fit(
     further = (times / times.mean())[:, None] ** (power * np.arange(1, n_terms + 1))
     table = np.column_stack([*columns, further])
     # Equal weights of the relative errors of A would be t; √t leaves more of them to short times.
-    fitted = np.linalg.lstsq(table * np.sqrt(times)[:, None], traces * np.sqrt(times), rcond=None)[0]
+    fitted = np.linalg.lstsq(table * np.sqrt(times)[:, None], traces * np.sqrt(times), rcond=None)[
+        0
+    ]
     if boundary is None:
         return np.array([fitted[0], 0.0, fitted[1]])
     return fitted[:3].copy()
