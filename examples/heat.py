@@ -20,7 +20,7 @@ def warm_hand(path: Path, n_vertices: int = 4000) -> np.ndarray:
     laplacian = es.cotangent_laplacian(hand)
     area = es.geometry.surface_area(hand)
     tip = np.zeros(hand.n_vertices)
-    tip[hand.vertices[:, 2].argmax()] = 1
+    tip[hand.vertices[:, 1].argmax()] = 1
     heat = es.spectral.apply_heat(laplacian, tip, TIMES * area)
     even = laplacian.mass.diagonal() @ tip / area  # what is left everywhere in the end
 
@@ -33,7 +33,7 @@ def warm_hand(path: Path, n_vertices: int = 4000) -> np.ndarray:
     levels = np.log10(np.maximum(heat / even, 0.01)).T.ravel()
     label = "heat over its mean, log10, after t = 0.002, 0.02, 0.2 area"
     row = es.geometry.disjoint_union(*copies)
-    es.save_figure(es.figure_field(row, levels, label, camera=camera, color_map="inferno"), path)
+    es.save_figure(es.figure_field(row, levels, label, camera=camera), path)
     return heat
 
 
