@@ -1,6 +1,6 @@
 """Let heat flow from a fingertip, and read area and handles of a torus off its eigenvalues.
 
-    python examples/heat.py docs/pictures/heat.png
+python examples/heat.py docs/pictures/heat.png
 """
 
 import sys

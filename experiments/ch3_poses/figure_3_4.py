@@ -78,7 +78,9 @@ def figure_spectra(
         mesh = read(name)
         show_shape(axes, mesh, es.plot.three_quarter_view(mesh, up="z"), color=color)
         axes.set_title(name, fontsize=9)
-    for axes, (operator, found) in zip(below.subplots(1, 3, sharey=True), rows.items(), strict=True):
+    for axes, (operator, found) in zip(
+        below.subplots(1, 3, sharey=True), rows.items(), strict=True
+    ):
         for (name, values), color in zip(found.items(), COLORS, strict=False):
             style = "-" if name.startswith("michael") else "--"
             scaled = values * size[name]["area 1"]

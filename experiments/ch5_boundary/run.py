@@ -108,7 +108,11 @@ def measure(classes: tuple[str, ...], each: int, k: int) -> dict[str, dict[str, 
     rows = [row for row in manifest() if row["cls"] in classes]
     chosen = [row for name in classes for row in [r for r in rows if r["cls"] == name][:each]]
     labels = [row["cls"] for row in chosen]
-    database, queries, points = [], {name: [] for name in CONDITIONS}, {name: [] for name in CONDITIONS}
+    database, queries, points = (
+        [],
+        {name: [] for name in CONDITIONS},
+        {name: [] for name in CONDITIONS},
+    )
     for number, row in enumerate(track(chosen, description="shapes")):
         whole = es.geometry.normalize_box(es.read_mesh(DATA / row["path"]))
         piece, source = cut(whole, number)
@@ -153,8 +157,10 @@ def figure_conditions(table: dict[str, dict[str, float]]) -> Figure:
             at = np.arange(len(keys)) + 0.27 * (place - 1)
             axes.bar(at, [row[key] for key in keys], 0.25, color=color, label=name)
             axes.set_xticks(range(len(keys)), keys)
-    label(left, "points near the boundary, and elsewhere", "mean |log h' - log h|", "heat of a piece beside that of the whole")
-    label(right, "", "%", "points found, and classes among the first 1, 3, 5", legend=False)
+    left.set_xticks((0, 1), ("within 0.1 √area of the boundary", "elsewhere"))
+    label(left, "", "median of mean |log h' - log h|", "heat of a piece beside that of the whole")
+    right.set_xticks(range(4), ("points found", "class first", "among 3", "among 5"))
+    label(right, "", "%", "what a piece finds in whole shapes", legend=False)
     return figure
 
 
@@ -163,7 +169,9 @@ def main() -> None:
     arguments = parse_arguments(__doc__, HERE)
     require_data()
     warnings.simplefilter("ignore")
-    sizes = (QUICK_CLASSES, QUICK_EACH, QUICK_MODES) if arguments.quick else (CLASSES, EACH, N_MODES)
+    sizes = (
+        (QUICK_CLASSES, QUICK_EACH, QUICK_MODES) if arguments.quick else (CLASSES, EACH, N_MODES)
+    )
     table = measure(*sizes)
     pictures = {} if arguments.quick else {"conditions": figure_conditions(table)}
     finish(rounded(table), pictures, arguments)

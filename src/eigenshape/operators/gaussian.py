@@ -34,10 +34,9 @@ from eigenshape.operators.kernel import (
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.neighbors import neighbor_graph
 
-
-# t of the pointwise rule over e R on a surface. Of 0.1, 0.2, 0.3 and 0.5, the errors of L f on
-# 1,000 to 16,000 even, random and noisy points of the sphere are all within 3 times the best one at
-# 0.3 alone (experiments/ch2_pointwise).
+# t of the pointwise rule over e R on a surface: of 0.1, 0.2, 0.3, 0.5 and 0.8 the best for L f on
+# random points of the sphere. On even and noisy ones 0.2 is better by up to 1.5 times
+# (experiments/ch2_pointwise).
 POINTWISE = 0.3
 
 

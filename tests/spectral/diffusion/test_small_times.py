@@ -86,15 +86,18 @@ def test_a_number_is_rounded_only_where_the_error_leaves_no_choice():
     assert lost.whole_characteristic(even=True) is None
     assert "too uncertain to be rounded" in lost.explain()
     assert found.explain().startswith("300 eigenvalues give area 12.566")
-    assert "boundary 6.28" in recover_geometry(
-        disc_eigenvalues(300, "dirichlet"), boundary="dirichlet"
-    ).explain()
+    assert (
+        "boundary 6.28"
+        in recover_geometry(disc_eigenvalues(300, "dirichlet"), boundary="dirichlet").explain()
+    )
 
 
 def annulus(n_rings, n_around, inner=0.4):
     """Return the ring between radius `inner` and 1, in triangles that are nearly equilateral."""
     radii = np.linspace(inner, 1, n_rings + 1)
-    turns = 2 * np.pi * (np.arange(n_around) + 0.5 * (np.arange(n_rings + 1)[:, None] % 2)) / n_around
+    turns = (
+        2 * np.pi * (np.arange(n_around) + 0.5 * (np.arange(n_rings + 1)[:, None] % 2)) / n_around
+    )
     x, y = radii[:, None] * np.cos(turns), radii[:, None] * np.sin(turns)
     points = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
     ring, step = np.meshgrid(np.arange(n_rings), np.arange(n_around), indexing="ij")
@@ -157,7 +160,11 @@ GOOD = sphere_eigenvalues(60)
         (np.where(GOOD == 2, np.nan, GOOD), {}, "eigenvalues must be finite; entry 1"),
         (GOOD[1:], {}, "The first eigenvalue must be 0, that of constants; it is 2"),
         (GOOD, {"boundary": "dirichlet"}, "With the Dirichlet condition no eigenvalue is 0; 1 are"),
-        (GOOD, {"errors": np.ones(3)}, "errors must hold one number per eigenvalue, 60; there are 3"),
+        (
+            GOOD,
+            {"errors": np.ones(3)},
+            "errors must hold one number per eigenvalue, 60; there are 3",
+        ),
     ],
 )
 def test_eigenvalues_that_do_not_fit_are_named(values, options, message):
