@@ -1,7 +1,8 @@
 """How far do eigenspaces turn, and do gaps say how far? (thesis 3.5).
 
-A lion that is stretched a little, with noise of four strengths, and in four poses, all with the same faces. The largest principal angle of each group
-of eigenvectors is compared with the gap around its eigenvalues and with the bound of Davis and Kahan.
+A lion that is stretched, with noise of four strengths, and in four poses, all with the same faces. The largest
+principal angle of each group of eigenvectors is compared with the gap around its eigenvalues and with the bound of
+Davis and Kahan.
 """
 
 import sys

@@ -1,7 +1,7 @@
 """Figure 3.4 drawn by the operator of the thesis: five poses of a man beside a cat and a horse (thesis 3.4).
 
-The mesh Laplacian as printed at t = e², with Euclidean and with geodesic distances, and linear elements. Shapes have area
-1; the mean of |λ/λ' - 1| to the first pose is printed, also for diameter 1, as the thesis normalizes.
+The mesh Laplacian as printed at t = e², with Euclidean and with geodesic distances, and linear elements. Shapes have
+area 1; the mean of |λ/λ' - 1| to the first pose is printed, also for diameter 1, as the thesis normalizes.
 """
 
 import sys

@@ -172,6 +172,14 @@ def test_eigenvalues_that_do_not_fit_are_named(values, options, message):
         recover_geometry(values, **options)
 
 
+def test_a_boundary_has_one_of_two_conditions():
+    plain = getattr(recover_geometry, "__wrapped__", recover_geometry)
+    with pytest.raises(
+        InvalidParameterError, match="boundary must be None, 'neumann' or 'dirichlet'"
+    ):
+        plain(GOOD, boundary="robin")
+
+
 def test_a_spectrum_is_taken_from_its_beginning():
     laplacian = cotangent_laplacian(icosphere(2), "averaged")
     spectrum = solve_spectrum(laplacian, 100)
