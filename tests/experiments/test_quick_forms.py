@@ -9,6 +9,7 @@ from quick_forms import require_expected
 EXPERIMENTS = Path(__file__).resolve().parents[2] / "experiments"
 SCRIPTS = sorted(path.parent.name + "/run.py" for path in EXPERIMENTS.glob("ch*/run.py"))
 FIGURES = {script: script.replace("run.py", "expected.json") for script in SCRIPTS}
+FIGURES["ch3_poses/figure_3_4.py"] = "ch3_poses/expected_figure_3_4.json"
 FIGURES["ch5_retrieval/robustness.py"] = "ch5_retrieval/expected_robustness.json"
 
 MADE_UP = (  # what needs no real shapes
@@ -16,6 +17,7 @@ MADE_UP = (  # what needs no real shapes
     "ch1_watermark/run.py",
     "ch1_eigenfunctions/run.py",
     "ch1_projection/run.py",
+    "ch2_pointwise/run.py",
     "ch3_accuracy/run.py",
     "ch3_invariance/run.py",
     "ch3_sphere/run.py",

@@ -23,8 +23,11 @@ from eigenshape.operators.gaussian import (
     functional_laplacian,
     gaussian_laplacian,
     mesh_laplacian,
+    pointwise_time,
     quadrature_laplacian,
 )
+from eigenshape.shapes.domains import box, circle
+from eigenshape.shapes.spheres import random_sphere
 from eigenshape.shapes.surfaces import grid, icosphere
 
 
@@ -163,6 +166,39 @@ def test_the_functional_on_a_torus_does_not_depend_on_the_nodes():
     coarse = functional_laplacian(one, 0.01) @ field(one.points)
     fine = functional_laplacian(two, 0.01) @ field(two.points)
     np.testing.assert_allclose(fine.reshape(160, 80)[::2, ::2].ravel(), coarse, atol=1e-8)
+
+
+def test_the_pointwise_time_has_no_unit_of_its_own():
+    # 0.3 R² (e/R)^p with p = 10/11, 1 and 14/13 in dimensions 1, 2 and 3; R of a circle is its radius.
+    ring, sphere, solid = circle(500), icosphere(4), box(4, 4, 4)
+    e = mean_side_length(ring)
+    assert pointwise_time(ring) == pytest.approx(0.3 * e ** (10 / 11), rel=1e-3)
+    assert pointwise_time(sphere) == pytest.approx(0.3 * mean_side_length(sphere), rel=1e-3)
+    radius = (1 / (2 * np.pi**2)) ** (1 / 3)
+    power = (mean_side_length(solid) / radius) ** (14 / 13)
+    assert pointwise_time(solid) == pytest.approx(0.3 * radius**2 * power, rel=1e-12)
+    for scale in (1e-100, 3.0, 1e100):
+        scaled = TriangleMesh(sphere.vertices * scale, sphere.faces)
+        assert pointwise_time(scaled) == pytest.approx(pointwise_time(sphere) * scale**2, rel=1e-12)
+
+
+def test_at_the_pointwise_time_functions_converge_on_random_points():
+    errors = []
+    for n in (250, 1000):
+        mesh = random_sphere(n, rng=np.random.default_rng(0))
+        laplacian = mesh_laplacian(mesh, t="pointwise")
+        assert laplacian.kernel.t == pointwise_time(mesh)
+        z = mesh.vertices[:, 2]
+        applied = laplacian.stiffness @ z / laplacian.mass.diagonal()
+        errors.append(np.abs(applied - 2 * z).max())
+    assert errors[1] < 0.85 * errors[0] < 0.3
+
+
+def test_another_text_is_no_time():
+    with pytest.raises(InvalidParameterError, match="t must be a heat time or 'pointwise'; it is"):
+        _plain(mesh_laplacian)(icosphere(1), t="best")
+    with pytest.raises(InvalidParameterError, match="At most one of t, h and edge_factor must be"):
+        mesh_laplacian(icosphere(1), t="pointwise", h=0.5)
 
 
 def test_without_a_matrix_it_is_the_same():

@@ -17,6 +17,7 @@ from .gaussian import functional_laplacian as functional_laplacian
 from .gaussian import gaussian_laplacian as gaussian_laplacian
 from .gaussian import mesh_laplacian as mesh_laplacian
 from .gaussian import point_cloud_laplacian as point_cloud_laplacian
+from .gaussian import pointwise_time as pointwise_time
 from .gaussian import quadrature_laplacian as quadrature_laplacian
 from .graph import edge_graph as edge_graph
 from .graph import graph_laplacian as graph_laplacian

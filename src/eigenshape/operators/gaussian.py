@@ -1,7 +1,8 @@
 """Laplacians from a Gaussian kernel: on meshes of any dimension, on samples, and on known surfaces."""
 
 from dataclasses import replace
-from typing import SupportsIndex, TypedDict, Unpack
+from math import gamma
+from typing import Literal, SupportsIndex, TypedDict, Unpack
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
@@ -16,6 +17,7 @@ from eigenshape.geometry.cloud_measure import cloud_quadrature
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.quadrature import Quadrature, mesh_quadrature, uniform_quadrature
 from eigenshape.geometry.simplices import mean_side_length, require_span, size_one
+from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.cells import cell_grid, gaussian_differences
 from eigenshape.operators.choices import Correction, Distance, Form
@@ -32,6 +34,11 @@ from eigenshape.operators.kernel import (
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.neighbors import neighbor_graph
 
+# t of the pointwise rule over e R on a surface: of 0.1, 0.2, 0.3, 0.5 and 0.8 the best for L f on
+# random points of the sphere. On even and noisy ones 0.2 is better by up to 1.5 times
+# (experiments/ch2_pointwise).
+POINTWISE = 0.3
+
 
 class KernelChoice(TypedDict, total=False):
     """Further options of a kernel, as in `mesh_laplacian`."""
@@ -44,7 +51,7 @@ class KernelChoice(TypedDict, total=False):
 def mesh_laplacian(  # noqa: PLR0913 - one keyword for each choice that the method leaves open
     shape: MeshLike,
     *,
-    t: float | None = None,
+    t: float | Literal["pointwise"] | None = None,
     h: float | None = None,
     edge_factor: float | None = None,
     correct: Correction | None = None,
@@ -70,7 +77,8 @@ def mesh_laplacian(  # noqa: PLR0913 - one keyword for each choice that the meth
     With the default, t = e², no such theorem holds, and L f does not converge: the kernel always
     sees the same number of points, and the error of their weights A_j is divided by t. On 1,000 to
     64,000 random points of the unit sphere the largest error of L z, which should be 2z, grows from
-    1.3 to 14; with t = 0.1 e, in units of the radius, it decreases from 1.9 to 0.3. Eigenvalues are
+    1.3 to 14; with t = 0.1 e, in units of the radius, it decreases from 1.9 to 0.3.
+    `t="pointwise"` takes the t of `pointwise_time`, which is best for L f. Eigenvalues are
     more accurate, because the errors of weights average out: on 1,000 to 16,000 even points of the
     sphere the median error of 300 eigenvalues decreases from 0.6 to 0.07, and with `correct="log"`
     from 0.012 to 0.0007. That is measured, not proved (docs/operators.md; experiments/ch3_sphere).
@@ -101,7 +109,8 @@ def mesh_laplacian(  # noqa: PLR0913 - one keyword for each choice that the meth
     Raises
     ------
     InvalidParameterError
-        If more than one scale is given, one is not positive, or h < e.
+        If more than one scale is given, one is not positive, another text than "pointwise" is
+        given, or h < e.
     InvalidShapeError
         If a simplex has no volume or the same corners as another, a point belongs to no simplex,
         the kernel graph of a component is not connected, or the matrix needs more than half of the
@@ -110,7 +119,8 @@ def mesh_laplacian(  # noqa: PLR0913 - one keyword for each choice that the meth
     Warns
     -----
     UserWarning
-        If h < 1.5 e, or t is so large that fewer than ten eigenvalues can be distinguished.
+        If h < 1.5 e, or t is so large that fewer than ten eigenvalues can be distinguished (not for
+        "pointwise").
 
     See Also
     --------
@@ -131,12 +141,16 @@ def mesh_laplacian(  # noqa: PLR0913 - one keyword for each choice that the meth
         raise InvalidParameterError(
             f"distance must be 'euclidean' or 'geodesic'; it is {distance!r}."
         )
+    if isinstance(t, str) and t != "pointwise":
+        raise InvalidParameterError(f"t must be a heat time or 'pointwise'; it is {t!r}.")
     measure = mesh_quadrature(shape)
+    time = pointwise_time(shape) if t == "pointwise" else t
     kernel = choose_kernel(
-        KernelOptions(t, h, edge_factor, correct, form, cutoff), mean_side_length(shape)
+        KernelOptions(time, h, edge_factor, correct, form, cutoff), mean_side_length(shape)
     )
     warn_of_narrow(kernel)
-    warn_of_few(measure, kernel)
+    if t != "pointwise":
+        warn_of_few(measure, kernel)
     laplacian = (
         geodesic_laplacian(shape, measure, kernel)
         if distance == "geodesic"
@@ -144,6 +158,62 @@ def mesh_laplacian(  # noqa: PLR0913 - one keyword for each choice that the meth
     )
     require_whole(laplacian, vertex_components(shape)[1], kernel)
     return laplacian
+
+
+def pointwise_time(shape: MeshLike) -> float:
+    """Return the heat time at which the mesh Laplacian of a shape is best applied to functions.
+
+    t = 0.3 R² (e/R)^p,   p = (2m + 8)/(m + 10)
+
+    with e the mean length of sides and R the radius of the m-sphere of the same volume. On a
+    surface p = 1 and t = 0.3 e R, R = √(area / 4π).
+
+    The rule balances two errors of L f at a point. The bias of the kernel is proportional to t. The
+    sum over points is the integral of an interpolant, which on a simplex errs by e^{m+2} g'' for
+    the integrand g = G (f(x) - f(y))/t, g'' ~ t^{-m/2 - 3/2}. On irregular meshes these errors have
+    random signs, and the (√t/e)^m of them under the kernel add up to e^{m/2 + 2} t^{-m/4 - 3/2}. On
+    a surface that is e³/t². Both are equal at the stated power of e, and then the error of L f is
+    proportional to t: to e on a surface, or n^{-1/2}. Theorem 2.1.1 of the thesis allows any mesh,
+    also one whose errors all have the same sign, and so asks for t = ε^{1/(2.5 + α)}. The factor
+    0.3 is measured on spheres (experiments/ch2_pointwise).
+
+    Parameters
+    ----------
+    shape : MeshLike
+        Of any dimension m.
+
+    Returns
+    -------
+    float
+        In length².
+
+    Raises
+    ------
+    InvalidShapeError
+        If the shape is no mesh, or has no volume.
+
+    See Also
+    --------
+    mesh_laplacian : `t="pointwise"` takes this time.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(4)
+    >>> e = es.geometry.mean_side_length(mesh)
+    >>> round(es.operators.pointwise_time(mesh) / e, 3)  # 0.3 R, and R is nearly 1
+    0.3
+    """
+    shape = as_simplicial(shape, "shape")
+    points, scale = size_one(shape.points)
+    unit = SimplicialMesh(points, shape.simplices)
+    m = unit.dim
+    volume = float(mesh_quadrature(unit).weights.sum())
+    sphere = 2 * np.pi ** ((m + 1) / 2) / gamma((m + 1) / 2)  # volume of the unit m-sphere
+    radius = (volume / sphere) ** (1 / m)
+    edge = mean_side_length(unit)
+    time = POINTWISE * radius**2 * (edge / radius) ** ((2 * m + 8) / (m + 10))
+    return time * scale * scale
 
 
 def gaussian_laplacian(

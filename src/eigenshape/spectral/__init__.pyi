@@ -8,6 +8,12 @@ from .comparison.eigenspaces import separated_groups as separated_groups
 from .comparison.spectra import SpectrumComparison as SpectrumComparison
 from .comparison.spectra import compare_spectra as compare_spectra
 from .comparison.spectra import spectral_hausdorff_distance as spectral_hausdorff_distance
+from .diffusion.heat_flow import apply_heat as apply_heat
+from .diffusion.heat_kernel import HeatTrace as HeatTrace
+from .diffusion.heat_kernel import heat_kernel as heat_kernel
+from .diffusion.heat_kernel import heat_trace as heat_trace
+from .diffusion.small_times import RecoveredGeometry as RecoveredGeometry
+from .diffusion.small_times import recover_geometry as recover_geometry
 from .laws.laplacian_laws import check_laplacian as check_laplacian
 from .laws.operator_laws import check_operator as check_operator
 from .laws.report import DEFAULT_PROMISES as DEFAULT_PROMISES

@@ -10,7 +10,8 @@ from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.spectral.spectrum import Spectrum, require_lowest
+from eigenshape.spectral.diffusion.decay import decay_factors
+from eigenshape.spectral.spectrum import Spectrum
 
 # Relative difference between steps of log t up to which times count as a geometric sequence; the
 # rounding of numpy.geomspace stays far below it.
@@ -101,6 +102,7 @@ def heat_kernel_signature(spectrum: Spectrum, times: ArrayLike) -> Float[np.ndar
     See Also
     --------
     wave_kernel_signature : Signature of one frequency band at a time.
+    es.spectral.heat_kernel : Heat between different points; this is the diagonal.
     merge_tree, segment : Segment a shape by its heat.
 
     Examples
@@ -115,10 +117,7 @@ def heat_kernel_signature(spectrum: Spectrum, times: ArrayLike) -> Float[np.ndar
     >>> (heat[:3, 1] * 12.566).round(2).tolist()
     [1.0, 1.0, 1.0]
     """
-    require_type(spectrum, Spectrum, "spectrum")
-    require_lowest(spectrum, "spectrum")
-    decay = np.exp(-np.outer(spectrum.eigenvalues, positive_values(times, "times")))
-    return np.asarray(spectrum.eigenvectors**2 @ decay)
+    return np.asarray(spectrum.eigenvectors**2 @ decay_factors(spectrum, times))
 
 
 @one_blas_thread()

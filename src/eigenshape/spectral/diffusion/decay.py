@@ -1,0 +1,27 @@
+"""How fast each eigenfunction loses its heat: the one formula of operator, kernel, trace and signature."""
+
+import numpy as np
+from jaxtyping import Float
+
+from eigenshape._arguments import require_type
+from eigenshape._arrays import positive_values
+from eigenshape._typing import ArrayLike
+from eigenshape.spectral.spectrum import Spectrum, require_lowest
+
+
+def decay_factors(
+    spectrum: Spectrum, times: ArrayLike, name: str = "times"
+) -> Float[np.ndarray, "k q"]:
+    """Return exp(-t λ_i), the share of eigenfunction i that is left after each time t.
+
+    `name` is what messages call the times.
+
+    Raises
+    ------
+    InvalidParameterError
+        If a time is not positive and finite, or the spectrum does not begin with the lowest
+        eigenvalue.
+    """
+    require_type(spectrum, Spectrum, "spectrum")
+    require_lowest(spectrum, "spectrum")
+    return np.exp(-np.outer(spectrum.eigenvalues, positive_values(times, name)))

@@ -1,0 +1,290 @@
+"""The heat operator e^{-tL}: where the heat of a function is after a time (thesis 2.3)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float
+
+from eigenshape._arguments import require_type
+from eigenshape._arrays import positive_values, real_numbers
+from eigenshape._errors import InvalidParameterError
+from eigenshape._progress import Progress, silent
+from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.sparse.elimination import SymmetricFactor, factorize_symmetric
+from eigenshape.spectral.diffusion.decay import decay_factors
+from eigenshape.spectral.diffusion.implicit_steps import group_times, step_coefficients, step_time
+from eigenshape.spectral.solver.pencil import Pencil, normalize
+from eigenshape.spectral.spectrum import Spectrum
+
+# Largest error by default, relative to the norm of the values: 24 to 29 solves for each factor.
+DEFAULT_ACCURACY = 1e-10
+# Smallest and largest accuracy that can be requested. Below the first, rounding dominates; above
+# the second, nothing is computed.
+ACCURACIES = (1e-12, 0.1)
+# Largest t times trace W / trace B. Then 1 + τλ of the highest eigenvalue is about 1e9, and 7
+# digits of the solves are left. On a surface of n points it is about 1e9/n times the area.
+LONGEST = 1e10
+# Row sums of W, relative to the sums of absolute values, up to which constants are in its kernel.
+NULL_ROWS = 1e-10
+
+Columns = Float[np.ndarray, "n c"]
+
+
+@one_blas_thread()
+def apply_heat(
+    operator: Laplacian | Spectrum,
+    values: ArrayLike,
+    t: ArrayLike,
+    *,
+    accuracy: float | None = None,
+    progress: Progress | None = None,
+) -> Float[np.ndarray, "..."]:
+    """Apply the heat operator: let the heat of a function flow for a time.
+
+    H_t f = e^{-tL} f, L = B⁻¹W           (thesis 2.3)
+
+    solves ∂u/∂t = -Lu from u = f, with no flow through the boundary.
+
+    - **With a Laplacian** no eigenvector is needed. A polynomial in S = (B + τW)⁻¹B, the implicit
+      Euler step of a time τ, approximates e^{-tL}. One factor of B + τW serves all columns of
+      `values` and all times within a factor of 8 of each other. The polynomial is within `accuracy`
+      of e^{-tλ} at every λ ≥ 0, so ‖result - e^{-tL} f‖ ≤ accuracy ‖f‖ in the norm of B, plus
+      rounding.
+    - **With a spectrum** of k pairs the result is Σ_i e^{-tλ_i} φ_i φ_iᵀBf. What is missing is at
+      most e^{-tλ_k} ‖f - ΦΦᵀBf‖, λ_k the last eigenvalue.
+
+    Both are linear in f, self-adjoint in B, and keep the integral 1ᵀBf of each component (of a
+    spectrum: if it has the constants of all components). Heat never becomes negative if B is
+    diagonal and W_ij ≤ 0 between different points; then an entry of the result is at worst
+    -accuracy ‖f‖/√B_ii.
+
+    Parameters
+    ----------
+    operator : Laplacian or Spectrum
+        To fix the boundary at 0, pass the operator of `es.operators.dirichlet_laplacian`, or a
+        spectrum that was computed with `fixed`.
+    values : (n,) or (n, c) float
+        One function, or one in each column.
+    t : float or (q,) float
+        Diffusion times, in length², > 0.
+    accuracy : float, optional
+        Largest error in the norm of B, relative to that of f, 1e-12 to 0.1. With a Laplacian the
+        default is 1e-10. With a spectrum it is a demand on k: e^{-tλ_k} must not be larger.
+    progress : callable, optional
+        Called as progress(fraction_done, message).
+
+    Returns
+    -------
+    (n,) or (n, c) float; (n, q) or (n, c, q) for several times
+        In the unit of the values.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the values do not fit or are not finite; a time is not positive and finite, or too long
+        for factors; the accuracy is out of range, or more than the spectrum can give; the kernel of
+        the operator is corrected; or the operator has a negative eigenvalue.
+
+    See Also
+    --------
+    heat_kernel : Entries of the heat operator.
+    es.heat_kernel_signature : The diagonal of the heat kernel.
+
+    Examples
+    --------
+    On the unit sphere Δz = 2z, so z becomes e^{-2t} z:
+
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(4)
+    >>> z = mesh.vertices[:, 2]
+    >>> warm = es.spectral.apply_heat(es.cotangent_laplacian(mesh), z, 0.5)
+    >>> (warm @ z / (z @ z)).round(3).item()  # e^{-1} = 0.368
+    0.368
+    """
+    require_type(operator, Laplacian | Spectrum, "operator")
+    n = operator.mass.shape[0]
+    columns = _columns(values, n)
+    times = positive_values(t, "t")
+    if accuracy is not None:
+        _require_accuracy(accuracy)
+    if isinstance(operator, Spectrum):
+        warm = _flow_by_modes(operator, columns, times, accuracy)
+    else:
+        warm = _flow_by_steps(
+            operator, columns, times, accuracy or DEFAULT_ACCURACY, progress or silent
+        )
+    warm = warm.reshape(*np.shape(values), len(times))
+    return warm if np.ndim(t) else warm[..., 0]
+
+
+def _columns(values: ArrayLike, n: int) -> Columns:
+    numbers = real_numbers(values, "values")
+    if numbers.ndim not in (1, 2) or len(numbers) != n:
+        raise InvalidParameterError(
+            f"values must hold one number per point, or one row, shape ({n},) or ({n}, c); "
+            f"the shape is {numbers.shape}."
+        )
+    columns = numbers.reshape(n, -1).astype(np.float64)
+    bad = np.argwhere(~np.isfinite(columns))
+    if len(bad):
+        raise InvalidParameterError(
+            f"values must be finite; the value of point {bad[0][0]} is {columns[tuple(bad[0])]} "
+            f"({len(bad)} such)."
+        )
+    return columns
+
+
+def _require_accuracy(accuracy: float) -> None:
+    low, high = ACCURACIES
+    if not low <= accuracy <= high:
+        raise InvalidParameterError(f"accuracy must lie in {low}..{high}; it is {accuracy!r}.")
+
+
+def _flow_by_modes(
+    spectrum: Spectrum,
+    columns: Columns,
+    times: Float[np.ndarray, " q"],
+    accuracy: float | None,
+) -> Float[np.ndarray, "n c q"]:
+    decay = decay_factors(spectrum, times, "t")
+    n, k = spectrum.eigenvectors.shape
+    left = float(decay[-1].max())
+    if accuracy is not None and k < n and left > accuracy:
+        needed = -np.log(accuracy) / times.min()
+        raise InvalidParameterError(
+            f"A spectrum must reach the accuracy: {k} pairs leave up to {left:.2g} of a function at "
+            f"t = {times.min():.4g}, and accuracy is {accuracy:.2g}. Compute all pairs below "
+            f"{needed:.4g}, or pass the Laplacian itself."
+        )
+    coefficients = spectrum.eigenvectors.T @ (spectrum.mass @ columns)
+    damped = coefficients[:, :, None] * decay[:, None, :]
+    return np.tensordot(spectrum.eigenvectors, damped, axes=1)
+
+
+def _flow_by_steps(
+    laplacian: Laplacian,
+    columns: Columns,
+    times: Float[np.ndarray, " q"],
+    accuracy: float,
+    progress: Progress,
+) -> Float[np.ndarray, "n c q"]:
+    if laplacian.kernel is not None and laplacian.kernel.corrected:
+        raise InvalidParameterError(
+            "Heat needs a matrix, and the correction of a kernel changes eigenvalues only; this "
+            "operator has correct='log'. Pass its spectrum, es.solve_spectrum(laplacian, k)."
+        )
+    pencil = normalize(laplacian)
+    own_times = np.ldexp(times, pencil.value_exponent)  # tλ has no unit
+    _require_short(pencil, times, own_times)
+    constants = _constants(pencil)
+    # Constants stay. Held apart, they are exact however long the time, and solves need not carry a
+    # part that is 1 + τλ times as large as the rest.
+    still = constants.mean_columns(columns)
+    moving = columns - still
+    warm = np.empty((*columns.shape, len(times)))
+    groups = group_times(own_times)
+    for number, places in enumerate(groups):
+        tau = step_time(own_times[places])
+        polynomials = [step_coefficients(time / tau, accuracy) for time in own_times[places]]
+        factor = _factorize_step(pencil, tau)
+
+        def report(share: float, number: int = number) -> None:
+            progress((number + share) / len(groups), "heat")
+
+        warm[:, :, places] = _apply_polynomials(
+            _Step(pencil, factor, constants), moving, polynomials, report
+        )
+    return warm + still[:, :, None]
+
+
+def _require_short(
+    pencil: Pencil, times: Float[np.ndarray, " q"], own_times: Float[np.ndarray, " q"]
+) -> None:
+    longest = int(np.argmax(own_times))
+    if own_times[longest] * pencil.level > LONGEST:
+        limit = times[longest] * (LONGEST / pencil.level / own_times[longest])
+        raise InvalidParameterError(
+            f"Without a spectrum t must be at most {limit:.4g}, {LONGEST:.0e} times trace B / trace W; "
+            f"it is {times[longest]:.4g}. Pass a spectrum: after such a time few pairs are enough."
+        )
+
+
+def _factorize_step(pencil: Pencil, tau: float) -> SymmetricFactor:
+    pattern = pencil.shift_pattern
+    factor = factorize_symmetric(pattern.elimination, pattern.mass + tau * pattern.stiffness)
+    if factor is None or (factor.pivots <= 0).any():
+        raise InvalidParameterError(
+            "The operator must have no negative eigenvalue, or heat grows without limit; B + τW is "
+            f"not positive definite at τ = {tau * 2.0**-pencil.value_exponent:.4g}. "
+            "es.spectral.check_laplacian(laplacian) says more."
+        )
+    return factor
+
+
+@dataclass(frozen=True, eq=False)
+class _Constants:
+    """The functions that are constant on one component and 0 elsewhere, where W makes them 0.
+
+    Attributes
+    ----------
+    averages : (p, n) sparse
+        Rows that take the mean of a function over each of these components, in the mass.
+    members : (n, p) sparse
+        The indicators of the components.
+    """
+
+    averages: sp.csr_array
+    members: sp.csr_array
+
+    def mean_columns(self, columns: Columns) -> Columns:
+        """Return the mean of each column over the component of each point; 0 where heat is lost."""
+        return np.asarray(self.members @ (self.averages @ columns))
+
+
+def _constants(pencil: Pencil) -> _Constants:
+    rows = pencil.stiffness.sum(axis=1)
+    sizes = abs(pencil.stiffness).sum(axis=1)
+    losing = np.unique(pencil.labels[np.abs(rows) > NULL_ROWS * sizes.max()])
+    n_parts = int(pencil.labels.max()) + 1
+    keeping = np.setdiff1d(np.arange(n_parts), losing)
+    where = np.arange(pencil.n), pencil.labels
+    members = sp.csr_array((np.ones(pencil.n), where), shape=(pencil.n, n_parts))[:, keeping]
+    weighed = sp.csr_array(pencil.mass @ members)
+    averages = weighed.T / weighed.sum(axis=0)[:, None]
+    return _Constants(sp.csr_array(averages), sp.csr_array(members))
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """S = (B + τW)⁻¹B, on functions of mean 0 on each component that keeps its heat."""
+
+    pencil: Pencil
+    factor: SymmetricFactor
+    constants: _Constants
+
+    def apply(self, columns: Columns) -> Columns:
+        """Return S times the columns, their means set to 0 again, which rounding moves."""
+        stepped = self.factor.solve(self.pencil.weigh(columns))
+        return stepped - self.constants.mean_columns(stepped)
+
+
+def _apply_polynomials(
+    step: _Step,
+    columns: Columns,
+    polynomials: list[np.ndarray],
+    progress: Callable[[float], None],
+) -> Float[np.ndarray, "n c q"]:
+    """Return Σ_d c_d T_d(2S - 1) times the columns, for the coefficients c of each polynomial."""
+    degree = max(map(len, polynomials))
+    coefficients = np.array([np.pad(each, (0, degree - len(each))) for each in polynomials])
+    before, now = columns, 2 * step.apply(columns) - columns
+    found = before[:, :, None] * coefficients[:, 0] + now[:, :, None] * coefficients[:, 1]
+    for order in range(2, degree):
+        before, now = now, 4 * step.apply(now) - 2 * now - before
+        found += now[:, :, None] * coefficients[:, order]
+        progress((order + 1) / degree)
+    return found

@@ -1,0 +1,43 @@
+"""Pointwise convergence: what the README shows and claims."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch2_pointwise"
+FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
+README = (FOLDER / "README.md").read_text()
+
+
+def test_the_readme_shows_the_expected_figures():
+    for kind, rows in FULL["errors"].items():
+        for n, row in rows.items():
+            cells = " | ".join(f"{value:.4f}" for value in row.values())
+            assert f"| {kind} | {n} | {cells} |" in README
+    for kind, row in FULL["rates"].items():
+        assert f"| {kind} | " + " | ".join(f"{value:.3f}" for value in row.values()) in README
+    for kind, rows in FULL["factors"].items():
+        for n, row in rows.items():
+            shown = next(
+                line
+                for line in README.splitlines()
+                if f"| {kind} | {n} | " in line and line.count("|") == 8
+            )
+            cells = [float(cell) for cell in shown.split("|")[3:-1]]
+            assert cells == pytest.approx(list(row.values()), abs=6e-4)
+
+
+def test_only_the_pointwise_rule_and_the_theorem_converge():
+    for kind, row in FULL["rates"].items():
+        default, pointwise, theorem, cotangent = row.values()
+        assert default < -0.5, kind
+        assert 0.8 < pointwise < 1.2
+        assert 0.2 < theorem < 0.4
+        assert cotangent < 0
+
+
+@pytest.mark.long
+def test_coarse_meshes_converge_as_well(quick_form):
+    for row in quick_form("ch2_pointwise/run.py")["rates"].values():
+        assert 0.8 < row["t = pointwise"] < 1.4
