@@ -68,6 +68,8 @@ def test_calculus_on_a_shape_draws_its_pictures(tmp_path):
     page = (ROOT / "docs" / "calculus.md").read_text()
     shown = re.findall(r"\(pictures/(\S+?)\)", page)
     assert sorted(shown) == sorted(path.name for path in tmp_path.glob("*.png"))
+
+
 def test_a_mark_survives_a_small_file(tmp_path, capsys):
     test = runpy.run_path(str(ROOT / "examples" / "small_and_marked.py"))["main"](tmp_path)
     assert test.false_alarm < 1e-30

@@ -22,8 +22,6 @@ from .equations import solve_helmholtz as solve_helmholtz
 from .equations import solve_poisson as solve_poisson
 from .flows import mean_curvature_flow as mean_curvature_flow
 from .flows import taubin_smooth as taubin_smooth
-from .level_sets import LevelSet as LevelSet
-from .level_sets import level_set as level_set
 from .geodesic_paths import GeodesicPath as GeodesicPath
 from .geodesic_paths import geodesic_path as geodesic_path
 from .geodesic_paths import trace_geodesic as trace_geodesic
@@ -36,6 +34,8 @@ from .hodge import decompose_field as decompose_field
 from .hodge import decompose_one_form as decompose_one_form
 from .hodge import harmonic_fields as harmonic_fields
 from .hodge import one_form_edges as one_form_edges
+from .level_sets import LevelSet as LevelSet
+from .level_sets import level_set as level_set
 from .linear_solver import LinearSolver as LinearSolver
 from .linear_solver import factor_equations as factor_equations
 from .vector_heat import VectorHeat as VectorHeat
