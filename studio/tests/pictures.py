@@ -11,16 +11,19 @@ from io import BytesIO
 from pathlib import Path
 
 from browser import (
+    PANEL,
     find,
     move_slider,
     open_page,
+    place_of,
     serve_studio,
     start_browser,
+    wait_for_edits,
     wait_until,
+    wait_until_bound,
     wait_until_still,
 )
 from PIL import Image
-from test_browser_deform import PANEL, place_of, wait_for_edits, wait_until_bound
 
 import eigenshape as es
 
