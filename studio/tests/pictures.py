@@ -50,18 +50,19 @@ def main(folder: Path, *, n_vertices: int = 8000) -> list[Path]:
     bar = es.geometry.boundary_surface(es.shapes.box(cells, 6 * cells, cells, sides=(1, 6, 1)))
     with tempfile.TemporaryDirectory() as work, start_browser() as browser:
         draw = partial(draw_shape, browser, folder, Path(work))
+        looks = {"deform": show_deform, "spectrum": show_spectrum, "parts": show_parts}
         return [
-            *draw(giraffe, {"deform": show_deform, "spectrum": show_spectrum, "parts": show_parts}),
-            *draw(biped, {name: partial(edit_biped, name) for name in BIPED}),
-            *draw(bar, {"bar": twist_bar}),
+            *draw("giraffe", giraffe, looks),
+            *draw("biped", biped, {"biped": bend_biped}),
+            *draw("bar", bar, {"bar": twist_bar}),
         ]
 
 
-def draw_shape(browser, folder, work, mesh, steps):
+def draw_shape(browser, folder, work, title, mesh, steps):
     """Open a shape, and draw a picture after each step."""
     paths = []
-    es.write_mesh(mesh, work / "shape.ply")
-    with serve_studio(work / "shape.ply") as url, open_page(browser, url) as page:
+    es.write_mesh(mesh, work / f"{title}.ply")
+    with serve_studio(work / f"{title}.ply") as url, open_page(browser, url) as page:
         wait_until(page, "eigenshape.state.deformation.status === 'ready'", 120)
         for name, act in steps.items():
             act(page)
@@ -105,11 +106,11 @@ def show_parts(page):
     find(page, "diagram").locator("canvas").wait_for(timeout=120_000)
 
 
-def edit_biped(name, page):
-    """Choose a part of the biped by the box, and turn or move it by a ring or an arrow."""
-    sides, handle, axis, amount = BIPED[name]
-    drag_sides(page, sides)
-    drag_handle(page, handle, axis, amount)
+def bend_biped(page):
+    """Choose parts of the biped by the box, and turn or move each by a ring or an arrow."""
+    for sides, handle, axis, amount in BIPED.values():
+        drag_sides(page, sides)
+        drag_handle(page, handle, axis, amount)
 
 
 def twist_bar(page):

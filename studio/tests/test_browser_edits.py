@@ -285,17 +285,6 @@ def test_the_region_turns_about_the_pivot_that_was_moved(page, mesh, rig):
     np.testing.assert_array_equal(positions(page), bent.astype("f4"))
 
 
-def test_a_drag_that_ends_over_the_panel_selects_no_text(page):
-    choose_above(page, HEAD)
-    find(page, "tool-move").click()
-    drag_arrow(page, axis=1, pixels=40)
-    box = find(page, "region-count").bounding_box()
-    page.mouse.move(box["x"] + box["width"], box["y"], steps=3)
-    page.mouse.up()
-    wait_for_edits(page, 1)
-    assert page.evaluate("getSelection().type") != "Range"
-
-
 def walk_to(page, name):
     """Press Tab until an element has the focus."""
     focus = "eigenshape.main.getRootNode().activeElement?.dataset.test"
