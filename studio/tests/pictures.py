@@ -119,7 +119,7 @@ def twist_bar(page):
     drag_sides(page, {(1, 0): -0.1, (1, 1): 0.6})
     find(page, "region-0").click()
     drag_sides(page, {(1, 1): 6.1, (1, 0): 5.4})
-    drag_handle(page, "rotate", 1, 180.0)
+    drag_handle(page, "rotate", 1, 120.0)
 
 
 def drag_sides(page, sides):
