@@ -1,6 +1,6 @@
 """The studio in a real browser: how soon it answers, what a frame costs, and whether it grows.
 
-    python benchmarks/bench_studio.py                  25,000 and 100,000 vertices; three minutes
+    python benchmarks/bench_studio.py                  25,000 and 100,000 vertices; some minutes
     python benchmarks/bench_studio.py --quick          2,500 vertices, half a minute
     python benchmarks/bench_studio.py --minutes 10     then ten minutes of work by a script
 
@@ -103,8 +103,8 @@ def row(n_vertices: int, figure: str, value: float, unit: str = "s", most: Any =
 
 def cells(row: Row) -> list[str]:
     """Return a row as text."""
-    most = "" if row["most"] is None else f"at most {row['most']:g} {row['unit']}"
-    return [row["shape"], row["figure"], f"{row['value']:.3g} {row['unit']}", most]
+    most = "" if row["most"] is None else f"at most {row['most']:g} {row['unit']}".rstrip()
+    return [row["shape"], row["figure"], f"{row['value']:.3g} {row['unit']}".rstrip(), most]
 
 
 def wait_until_ready(page: Page) -> None:
