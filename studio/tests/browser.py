@@ -8,7 +8,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
@@ -39,6 +39,8 @@ from eigenshape_studio.server import serve
 mesh, index = sys.argv[1:]
 serve(mesh, index=index or None, announce=lambda url: print(url, flush=True), browse=False)
 """
+# The panel in which shapes are bent, in the code of the page.
+PANEL = "eigenshape.panels.find((panel) => panel.id === 'deform')"
 # Requests of each page that have no answer yet.
 UNDER_WAY: WeakKeyDictionary[Page, set[Request]] = WeakKeyDictionary()
 
@@ -64,15 +66,22 @@ def build_page() -> None:
 
 
 @contextmanager
-def serve_studio(mesh: Path, index: Path | None = None) -> Iterator[str]:
-    """Serve the studio in a process of its own, and yield its address."""
+def start_server(mesh: Path, index: Path | None = None) -> Iterator[tuple[str, int]]:
+    """Serve the studio in a process of its own; yield its address and the number of the process."""
     build_page()
     command = [sys.executable, "-c", SERVE, str(mesh), str(index or "")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
-            yield str(process.stdout.readline().strip())  # type: ignore[union-attr]
+            yield str(process.stdout.readline().strip()), process.pid  # type: ignore[union-attr]
         finally:
             process.terminate()
+
+
+@contextmanager
+def serve_studio(mesh: Path, index: Path | None = None) -> Iterator[str]:
+    """Serve the studio in a process of its own, and yield its address."""
+    with start_server(mesh, index) as (url, _):
+        yield url
 
 
 @contextmanager
@@ -176,3 +185,36 @@ def drop_file(page: Page, name: str, path: Path) -> None:
     }"""
     files = page.evaluate_handle(make, [path.name, path.read_text(encoding="utf-8")])
     find(page, name).dispatch_event("drop", {"dataTransfer": files})
+
+
+def positions(page: Page) -> np.ndarray:
+    """Return the vertices as the shader computes them."""
+    return np.array(page.evaluate("Array.from(eigenshape.viewer.readPositions())")).reshape(-1, 3)
+
+
+def region(page: Page, number: int = 0) -> np.ndarray:
+    """Return the vertices of a region, ascending."""
+    return np.array(page.evaluate(f"Array.from({PANEL}.regions.vertices({number}))"), dtype=int)
+
+
+def wait_until_bound(page: Page) -> None:
+    """Wait until the regions can be moved."""
+    wait_until(page, f"{PANEL}.root.dataset.ready === 'true'")
+
+
+def wait_for_edits(page: Page, count: int) -> None:
+    """Wait until this many edits are committed."""
+    wait_until(page, f"eigenshape.state.deformation.n_edits === {count}")
+
+
+def place_of(page: Page, point: Sequence[float]) -> list[float]:
+    """Return where a point is seen, in pixels of the page."""
+    code = """([point]) => {
+        const { camera, canvas, space } = eigenshape.viewer;
+        camera.updateMatrixWorld();
+        const seen = camera.position.clone().fromArray(point).applyMatrix4(space.matrixWorld);
+        seen.project(camera);
+        const box = canvas.getBoundingClientRect();
+        return [box.x + (seen.x + 1) / 2 * box.width, box.y + (1 - seen.y) / 2 * box.height];
+    }"""
+    return list(page.evaluate(code, [list(point)]))

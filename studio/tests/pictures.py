@@ -2,46 +2,75 @@
 
     python studio/tests/pictures.py docs/pictures
 
-A giraffe whose head and neck are turned, its eigenfunctions, and its parts.
+A giraffe whose head and neck are turned, its eigenfunctions, and its parts. Then figures 6.3, 6.4 and 6.13
+of the thesis, by the mouse: knee, arm and waist of a biped, and a bar that is twisted.
 """
 
+import math
 import sys
 import tempfile
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 
 from browser import (
+    PANEL,
     find,
     move_slider,
     open_page,
+    place_of,
     serve_studio,
     start_browser,
+    wait_for_edits,
     wait_until,
+    wait_until_bound,
     wait_until_still,
 )
 from PIL import Image
-from test_browser_deform import PANEL, place_of, wait_for_edits, wait_until_bound
 
 import eigenshape as es
 
 NECK = 0.62  # height, of the whole, above which the giraffe is turned
+FIXED = 4  # number of the fixed part, after those of the four regions
+# Edits of a biped that stands from -0.98 to 1.08 with its arms spread to x = -0.91 and 0.91: the sides
+# of the box that are moved, axis, upper or lower and place; then the handle, its axis, and how far it is
+# dragged, in degrees or lengths.
+BIPED = {
+    "knee": ({(0, 0): 0.02, (1, 0): -1.1, (1, 1): -0.45}, "rotate", 0, 70.0),
+    "arm": ({(0, 0): 0.6, (1, 1): 1.0, (1, 0): 0.2}, "move", 0, 0.45),
+    "waist": ({(0, 1): 1.5, (0, 0): -1.0, (1, 1): 1.2, (1, 0): 0.1}, "rotate", 2, 30.0),
+}
 
 
 def main(folder: Path, *, n_vertices: int = 8000) -> list[Path]:
     """Draw all pictures into a folder."""
     giraffe = es.make_creature("giraffe", n_vertices=n_vertices)
-    paths = [folder / f"studio_{name}.png" for name in ("deform", "spectrum", "parts")]
+    biped = es.make_creature("biped", n_vertices=n_vertices)
+    cells = max(4, n_vertices // 650)  # along the short sides of the bar
+    bar = es.geometry.boundary_surface(es.shapes.box(cells, 6 * cells, cells, sides=(1, 6, 1)))
     with tempfile.TemporaryDirectory() as work, start_browser() as browser:
-        mesh = Path(work, "giraffe.ply")
-        es.write_mesh(giraffe, mesh)
-        with serve_studio(mesh) as url, open_page(browser, url) as page:
-            wait_until(page, "eigenshape.state.deformation.status === 'ready'", 120)
-            for draw, path in zip((show_deform, show_spectrum, show_parts), paths, strict=True):
-                draw(page)
-                page.mouse.move(5, 5)
-                wait_until_still(page)
-                seen = Image.open(BytesIO(page.screenshot()))
-                seen.convert("RGB").quantize(256).save(path, optimize=True)  # a third of the bytes
+        draw = partial(draw_shape, browser, folder, Path(work))
+        looks = {"deform": show_deform, "spectrum": show_spectrum, "parts": show_parts}
+        return [
+            *draw("giraffe", giraffe, looks),
+            *draw("biped", biped, {"biped": bend_biped}),
+            *draw("bar", bar, {"bar": twist_bar}),
+        ]
+
+
+def draw_shape(browser, folder, work, title, mesh, steps):
+    """Open a shape, and draw a picture after each step."""
+    paths = []
+    es.write_mesh(mesh, work / f"{title}.ply")
+    with serve_studio(work / f"{title}.ply") as url, open_page(browser, url) as page:
+        wait_until(page, "eigenshape.state.deformation.status === 'ready'", 120)
+        for name, act in steps.items():
+            act(page)
+            page.mouse.move(5, 5)
+            wait_until_still(page)
+            seen = Image.open(BytesIO(page.screenshot()))
+            paths.append(folder / f"studio_{name}.png")
+            seen.convert("RGB").quantize(256).save(paths[-1], optimize=True)  # a third of the bytes
     return paths
 
 
@@ -75,6 +104,85 @@ def show_parts(page):
     find(page, "tab-parts").click()
     find(page, "find-parts").click()
     find(page, "diagram").locator("canvas").wait_for(timeout=120_000)
+
+
+def bend_biped(page):
+    """Choose parts of the biped by the box, and turn or move each by a ring or an arrow."""
+    for sides, handle, axis, amount in BIPED.values():
+        drag_sides(page, sides)
+        drag_handle(page, handle, axis, amount)
+
+
+def twist_bar(page):
+    """Hold the lower end of a bar, and turn the upper one."""
+    find(page, f"region-{FIXED}").click()
+    drag_sides(page, {(1, 0): -0.1, (1, 1): 0.6})
+    find(page, "region-0").click()
+    drag_sides(page, {(1, 1): 6.1, (1, 0): 5.4})
+    drag_handle(page, "rotate", 1, 120.0)
+
+
+def drag_sides(page, sides):
+    """Drag sides of the box by the mouse, each to a place on its axis."""
+    find(page, "tool-box").click()
+    for (axis, upper), place in sides.items():
+        low, high = page.evaluate(f"[{PANEL}.box.low, {PANEL}.box.high]")
+        middle = [(one + other) / 2 for one, other in zip(low, high, strict=True)]
+        start, end = (
+            [*middle[:axis], at, *middle[axis + 1 :]] for at in ((low, high)[upper][axis], place)
+        )
+        page.mouse.move(*place_of(page, start))
+        page.mouse.down()
+        page.mouse.move(*place_of(page, end), steps=3)
+        page.mouse.up()
+
+
+def drag_handle(page, handle, axis, amount):
+    """Drag a ring or an arrow of the gizmo until the region has turned or moved by an amount."""
+    find(page, f"tool-{handle}").click()
+    wait_until_bound(page)
+    n_edits = page.evaluate("eigenshape.state.deformation.n_edits")
+    x, y, along = find_handle(page, axis)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 4 * along[0], y + 4 * along[1])
+    forth = math.copysign(1.0, motion_of(page, axis) * amount)
+    step = 0
+    while motion_of(page, axis) * math.copysign(1.0, amount) < abs(amount) and step < 400:
+        step += 8
+        page.mouse.move(x + forth * step * along[0], y + forth * step * along[1])
+    page.mouse.up()
+    wait_for_edits(page, n_edits + 1)
+
+
+def find_handle(page, axis):
+    """Return where the handle of an axis is, and in which direction of the screen to drag it."""
+    pivot = page.evaluate(f"{PANEL}.mover.anchor.position.toArray()")
+    x, y = place_of(page, pivot)
+    ahead_x, ahead_y = place_of(page, [one + 0.1 * (i == axis) for i, one in enumerate(pivot)])
+    size = math.hypot(ahead_x - x, ahead_y - y)
+    along = ((ahead_x - x) / size, (ahead_y - y) / size)
+    across = (-along[1], along[0])
+    for angle in range(0, 360, 15):
+        right, down = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+        for away in range(25, 110, 3):
+            place = (x + away * right, y + away * down)
+            page.mouse.move(*place)
+            if page.evaluate(f"{PANEL}.mover.gizmo.axis") == "XYZ"[axis]:
+                # An arrow is dragged along its axis, a ring across it.
+                turns = page.evaluate(f"{PANEL}.mover.gizmo.mode") == "rotate"
+                return *place, across if turns else along
+    raise AssertionError("A handle of the gizmo must be in sight.")
+
+
+def motion_of(page, axis):
+    """Return by how many degrees the region is turned, or how far it is moved along an axis."""
+    (handle,) = page.evaluate(f"{PANEL}.rowHandles()")
+    if handle is None:
+        return 0.0
+    if handle["type"] == "translation":
+        return handle["vector"][axis]
+    return math.degrees(handle["angle"]) * handle["axis"][axis]
 
 
 if __name__ == "__main__":

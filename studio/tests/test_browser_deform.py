@@ -4,14 +4,25 @@ import json
 
 import numpy as np
 import pytest
-from browser import find, open_page, serve_studio, start_browser, wait_until
+from browser import (
+    PANEL,
+    find,
+    open_page,
+    place_of,
+    positions,
+    region,
+    serve_studio,
+    start_browser,
+    wait_for_edits,
+    wait_until,
+    wait_until_bound,
+)
 
 import eigenshape as es
 from eigenshape.deformation import BoxRegion, BrushRegion, bend, bind, region_mask
 
 pytestmark = pytest.mark.long
 
-PANEL = "eigenshape.panels.find((panel) => panel.id === 'deform')"
 SHADER = 1e-5  # single precision: the largest error that the shader may have, in lengths of about 1
 
 
@@ -45,36 +56,6 @@ def page(browser, url):
     with open_page(browser, url) as page:
         wait_until(page, "eigenshape.state.deformation.status === 'ready'", 120)
         yield page
-
-
-def positions(page):
-    """Return the vertices as the shader computes them."""
-    return np.array(page.evaluate("Array.from(eigenshape.viewer.readPositions())")).reshape(-1, 3)
-
-
-def region(page, number=0):
-    return np.array(page.evaluate(f"Array.from({PANEL}.regions.vertices({number}))"), dtype=int)
-
-
-def wait_until_bound(page):
-    wait_until(page, f"{PANEL}.root.dataset.ready === 'true'")
-
-
-def wait_for_edits(page, count):
-    wait_until(page, f"eigenshape.state.deformation.n_edits === {count}")
-
-
-def place_of(page, point):
-    """Return where a point is seen, in pixels of the page."""
-    code = """([point]) => {
-        const { camera, canvas, space } = eigenshape.viewer;
-        camera.updateMatrixWorld();
-        const seen = camera.position.clone().fromArray(point).applyMatrix4(space.matrixWorld);
-        seen.project(camera);
-        const box = canvas.getBoundingClientRect();
-        return [box.x + (seen.x + 1) / 2 * box.width, box.y + (1 - seen.y) / 2 * box.height];
-    }"""
-    return page.evaluate(code, [list(point)])
 
 
 def click_brush(page, mesh):

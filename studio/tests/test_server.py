@@ -1,6 +1,7 @@
 """A real server against hostile requests: none is accepted, and none stops it."""
 
 import asyncio
+import http.client
 import json
 import os
 import re
@@ -46,9 +47,7 @@ class Server:
         self.port, self.token = parts.port, parts.query.removeprefix("token=")
         self.base = f"http://127.0.0.1:{self.port}"
         self.cookie = f"eigenshape-studio-{self.port}={self.token}"
-        # The server closes a connection that waits for a second, perhaps as a call is sent.
-        a_connection_each = httpx.Limits(max_keepalive_connections=0)
-        self.client = httpx.Client(base_url=self.base, timeout=300, limits=a_connection_each)
+        self.client = httpx.Client(base_url=self.base, timeout=300)
 
     def call(self, name, meta=None, arrays=None, tab=TAB):
         kind = {"content-type": "application/octet-stream", "x-eigenshape-tab": tab}
@@ -349,6 +348,24 @@ def test_a_slow_header_ends_the_connection(server):
     assert server.raw(head, [b"x"] * 8, pause=0.3) in (None, 400)
     assert time.monotonic() - began < 6
     server.state()
+
+
+def test_a_connection_without_a_request_is_kept(server):
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=8)
+    kind = {"content-type": "application/octet-stream", "x-eigenshape-tab": TAB}
+    headers = {**kind, "cookie": server.cookie}
+    for pause in (0.0, 1.5):  # longer than HEADER_SECONDS: the second call must not meet a reset
+        time.sleep(pause)
+        connection.request("POST", "/api/meta", encode({}), headers)
+        answer = connection.getresponse()
+        assert answer.status == 200
+        answer.read()
+    # Once a byte of the next header has come, the rest is due.
+    began = time.monotonic()
+    connection.sock.sendall(server.request()[:60])
+    assert connection.sock.recv(1) == b""
+    assert 0.5 < time.monotonic() - began < 6
+    connection.close()
 
 
 def test_a_slow_body_is_given_up(server):

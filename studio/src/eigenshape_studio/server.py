@@ -33,7 +33,10 @@ MOST_TABS = 8  # of 25,000 vertices, a tab with a spectrum of its own takes abou
 MOST_CALLS = 8  # of one tab at the same time; the panels together send fewer
 N_THREADS = 32  # for calls; MOST_CALLS of them for one tab leave enough for the others
 MOST_CONNECTIONS = 128
-HEADER_SECONDS = 10.0  # within which a connection must have sent the header of a request
+HEADER_SECONDS = 10.0  # within which a header must have come, once it or its connection has begun
+# A connection without a request is kept longer than browsers keep it (Chromium for 300 s). Otherwise
+# the server may close it while a call is on its way, and Firefox does not send a POST a second time.
+KEEP_SECONDS = 330
 
 
 class Tabs:
@@ -77,26 +80,30 @@ class Tabs:
 
 
 class StudioProtocol(H11Protocol):
-    """HTTP that closes connections which do not send the header of a request in time."""
+    """HTTP that closes connections which do not send the header of a request in time.
+
+    The first request is due when the connection begins, each later one when its first byte comes.
+    """
 
     def connection_made(self, transport: Any) -> None:
-        """Start to wait for a header."""
+        """Expect the first header."""
         super().connection_made(transport)
-        self._wait_for_header()
+        self._expect_header()
 
-    def on_response_complete(self) -> None:
-        """Start to wait for the header of the next request."""
-        super().on_response_complete()
-        self._wait_for_header()
+    def data_received(self, data: bytes) -> None:
+        """Expect the rest of a header that begins."""
+        if self.timeout_keep_alive_task is not None:  # no request was under way
+            self._expect_header()
+        super().data_received(data)
 
-    def _wait_for_header(self) -> None:
-        before = self.cycle
+    def _expect_header(self) -> None:
+        before = self.cycle  # a complete header begins another one
 
-        def close_if_idle() -> None:
+        def close_if_late() -> None:
             if self.cycle is before and not self.transport.is_closing():
                 self.transport.close()
 
-        self.loop.call_later(HEADER_SECONDS, close_if_idle)
+        self.loop.call_later(HEADER_SECONDS, close_if_late)
 
 
 def make_app(first: Workspace, rules: Rules) -> App:
@@ -212,6 +219,7 @@ def serve(  # noqa: PLR0913  one for each option of the command
         date_header=False,
         proxy_headers=False,
         limit_concurrency=MOST_CONNECTIONS,
+        timeout_keep_alive=KEEP_SECONDS,
         h11_max_incomplete_event_size=32 << 10,
         timeout_graceful_shutdown=2,
     )
