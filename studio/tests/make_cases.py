@@ -56,48 +56,20 @@ def cases() -> dict:
             "kernel": _plain(kernel),
             "lowpass5": _plain((spectrum.eigenvectors[:, :5] @ weights).ravel()),
         },
-        "deformation": _deformation_case(mesh),
+        "deformation": _deformation_case(),
     }
 
 
-def _deformation_case(mesh: es.TriangleMesh) -> dict:
-    """Return regions and motions as `region_mask` and the handles compute them."""
-    box = es.deformation.BoxRegion([-0.7, -2.0, -0.1], [2.0, 0.6, 0.75])
-    brushes = [(0, 0.4), (0, 0.9), (77, 0.55), (140, 2.5)]
-    discs = [es.deformation.BrushRegion(mesh.vertices[at], radius) for at, radius in brushes]
-    shares = np.random.default_rng(1).random(mesh.n_vertices)
-    turn = es.Rotation([0.1, -0.2, 0.3], [1.0, 2.0, -2.0], 5.0)
-    shift = es.Translation([0.3, -0.1, 0.7])
+def _deformation_case() -> dict:
+    """Return drags and how the library turns by them."""
     drags = np.random.default_rng(2).standard_normal((4, 3, 3))
     turns = [es.deformation.rotation_from_drag(*drag) for drag in drags]
-    mask = es.deformation.region_mask(mesh, box)
     return {
-        "vertices": mesh.vertices.ravel().tolist(),
-        "faces": mesh.faces.ravel().tolist(),
-        "box": {"low": box.low.tolist(), "high": box.high.tolist(), "vertices": _where(mask)},
-        "rim": es.deformation.region_boundary(mesh, mask).tolist(),
-        "brushes": [
-            {
-                "vertex": at,
-                "radius": radius,
-                "vertices": _where(es.deformation.region_mask(mesh, disc)),
-            }
-            for (at, radius), disc in zip(brushes, discs, strict=True)
-        ],
-        "shares": _plain(shares),
-        "rotation": {"pivot": turn.pivot.tolist(), "axis": turn.axis.tolist(), "angle": turn.angle},
-        "rotated": _plain((mesh.vertices + turn.carry(mesh.vertices, shares)).ravel()),
-        "translation": {"vector": shift.vector.tolist()},
-        "translated": _plain((mesh.vertices + shift.carry(mesh.vertices, shares)).ravel()),
         "drags": [
             {"points": drag.tolist(), "axis": _plain(turn.axis), "angle": _plain([turn.angle])[0]}
             for drag, turn in zip(drags, turns, strict=True)
         ],
     }
-
-
-def _where(mask: np.ndarray) -> list[int]:
-    return np.flatnonzero(mask).tolist()
 
 
 def _bumpy_sphere() -> es.TriangleMesh:

@@ -86,8 +86,10 @@ class Analysis:
     def health_facts(self) -> dict[str, Any]:
         """Return what is known of the faults of the mesh so far."""
         nothing = ("components", "boundary_loops", "closed", "manifold", "area", "volume")
-        found = self.health.result or {**dict.fromkeys(nothing), "findings": []}
-        return {"status": self.health.status, **found}
+        unknown = {**dict.fromkeys(nothing), "findings": []}
+        found = self.health.result or unknown
+        status = self.health.status
+        return {"status": status, **found, **describe_health(self.mesh, found, status)}
 
     def spectrum_facts(self) -> dict[str, Any]:
         """Return how far the spectrum is, and what is proved of it."""
@@ -162,7 +164,9 @@ def _drag_a_ball() -> None:
     ball = es.icosphere(1)
     session = es.DeformationSession(es.rig_shape(ball))
     session.drag(ball.vertices[:, 2] > 0, es.Translation([0.0, 0.0, 0.1]))
-    es.geometry.self_intersections(session.commit())
+    bent = session.commit()
+    es.geometry.self_intersections(bent)
+    es.geometry.geodesic_waves(bent)(0, 1.0)
 
 
 def assess_health(mesh: es.TriangleMesh) -> dict[str, Any]:
@@ -177,8 +181,46 @@ def assess_health(mesh: es.TriangleMesh) -> dict[str, Any]:
         "manifold": es.geometry.is_manifold(mesh),
         "area": es.geometry.surface_area(mesh),
         "volume": _volume(mesh) if closed else None,
-        "findings": [{"name": name, "why": why} for name, why in zip(names, report, strict=True)],
+        "findings": [_finding(name, why) for name, why in zip(names, report, strict=True)],
     }
+
+
+def describe_health(
+    mesh: es.TriangleMesh, health: dict[str, Any], status: str
+) -> dict[str, list[tuple[str, str]]]:
+    """Return sizes by their names, and a line of text for each fact of health: good or fair."""
+    facts = [("Vertices", f"{mesh.n_vertices:,}"), ("Faces", f"{mesh.n_faces:,}")]
+    if status != "ready":
+        text = "It cannot be examined." if status == "failed" else "It is being examined …"
+        return {"facts": facts, "lines": [("fair", text)]}
+    volume = health["volume"]
+    enclosed = "none: it is not closed" if volume is None else f"{volume:.4g} length³"
+    facts += [("Area", f"{health['area']:.4g} length²"), ("Volume", enclosed)]
+    n_pieces, n_rims = health["components"], health["boundary_loops"]
+    rims = "1 boundary" if n_rims == 1 else f"{n_rims:,} boundaries"
+    sheets = "Some edges or vertices join more than one sheet."
+    lines = [
+        _line(n_pieces == 1, "It is one piece.", f"It consists of {n_pieces:,} separate pieces."),
+        _line(
+            health["closed"],
+            "It is closed: it has an inside and an outside.",
+            f"It is open, with {rims}.",
+        ),
+        _line(health["manifold"], "It is a clean surface (manifold).", sheets),
+    ]
+    if not health["findings"]:
+        lines.append(("good", "No repair is needed."))
+    return {"facts": facts, "lines": lines}
+
+
+def _line(good: bool, if_good: str, otherwise: str) -> tuple[str, str]:
+    return ("good", if_good) if good else ("fair", otherwise)
+
+
+def _finding(name: str, why: str) -> dict[str, str]:
+    """Return a repair that would help: its name, and what it would do, as the page shows it."""
+    text = f"A trial of {why.replace(name, name.replace('_', ' '))}."
+    return {"name": name, "why": why, "text": text}
 
 
 def _volume(mesh: es.TriangleMesh) -> float | None:

@@ -113,6 +113,9 @@ class Workspace:
         # How often the vertices, and how often the mesh, has changed.
         self.pose, self.shape = 0, 0
         self._changing = threading.RLock()
+        self._painting = threading.Lock()
+        # The pose that the brush last painted on, and the function that computes distances on it.
+        self._waves: tuple[Any, Any] = (None, None)
 
     def fork(self) -> "Workspace":
         """Return a workspace of the same shape for another tab, without its edits."""
@@ -120,7 +123,7 @@ class Workspace:
         twin.__dict__.update(self.__dict__)
         twin.analysis, twin.fields = self.analysis.fork(), dict(self.fields)
         twin.session, twin.bound, twin.mode = None, None, "graded"
-        twin._changing = threading.RLock()
+        twin._changing, twin._painting = threading.RLock(), threading.Lock()
         return twin
 
     def close(self) -> None:
@@ -166,6 +169,7 @@ class Workspace:
             "n_faces": analysis.mesh.n_faces,
             **analysis.view(),
             "capabilities": capabilities,
+            "suffixes": ",".join(es.io.MESH_FORMATS),
             "health": analysis.health_facts(),
             "values": [_field_facts(name, field) for name, field in self.fields.items()],
             "spectrum": analysis.spectrum_facts(),
@@ -218,6 +222,7 @@ class Workspace:
             "parts": self._parts_array,
             "values": self._values_array,
             "skeleton": self._skeleton,
+            "disc": self._disc,
             "file": self._file,
             "match": self._match_array,
         }
@@ -286,6 +291,31 @@ class Workspace:
             )
         return es.deformation.eigen_skeleton(rig, int(tail)).astype("<f4")
 
+    def _disc(self, tail: str) -> np.ndarray:
+        """Return the vertices within a geodesic radius of a vertex; `tail` is "vertex/radius".
+
+        A stroke of the brush asks for many discs, so what they have in common is kept.
+        """
+        vertex, _, radius = tail.partition("/")
+        try:
+            source, reach = int(vertex), float(radius)
+        except ValueError as err:
+            raise RequestError(
+                f"A disc must be named by its vertex and its radius, as 'disc/7/0.5'; not {tail[:80]!r}."
+            ) from err
+        if not (0 <= source < self.mesh.n_vertices and 0 < reach < np.inf):
+            raise RequestError(
+                f"A disc must have one of the {self.mesh.n_vertices} vertices and a positive, finite "
+                f"radius; it has vertex {source} and radius {reach:g}."
+            )
+        with self._painting:
+            mesh, wave = self._waves
+            if mesh is not self.mesh:
+                mesh = self.mesh
+                wave = es.geometry.geodesic_waves(mesh)
+                self._waves = mesh, wave
+        return np.flatnonzero(wave(source, reach) <= reach).astype("<u4")
+
     def _file(self, tail: str) -> np.ndarray:
         if tail not in ("ply", "obj", "glb", "edits"):
             raise RequestError(
@@ -337,8 +367,15 @@ class Workspace:
             self._require_session()
             self.bound = None
             binding = self._drag(Bound(regions, fixed, n_modes), [None] * n_regions)
-        facts = {"n_modes": binding.n_modes.tolist(), "seconds": perf_counter() - began}
-        return facts, {"shares": binding.shares.astype("<f4")}
+        facts = {
+            "n_modes": binding.n_modes.tolist(),
+            "pivots": [_rim_center(self.mesh, region) for region in regions],
+            "seconds": perf_counter() - began,
+        }
+        # As the vertex shader takes them.
+        shares = np.zeros((self.mesh.n_vertices, MOST_REGIONS), dtype="<f4")
+        shares[:, :n_regions] = binding.shares.T
+        return facts, {"shares": shares}
 
     def _drag(self, bound: Bound, handles: list[Any]) -> es.deformation.Binding:
         """Drag the bound regions by handles, and return by how much each vertex follows."""
@@ -548,6 +585,13 @@ def handle_from(entry: Any) -> es.types.Handle:
     except (KeyError, TypeError) as err:
         raise RequestError(f"A handle must have all its entries; {err} is missing.") from err
     raise RequestError("The type of a handle must be rotation or translation.")
+
+
+def _rim_center(mesh: es.TriangleMesh, region: np.ndarray) -> list[float]:
+    """Return the mean of the vertices at the rim of a region, about which it turns."""
+    rim = es.deformation.region_boundary(mesh, es.deformation.region_mask(mesh, region))
+    center: list[float] = mesh.vertices[rim if len(rim) else region].mean(axis=0).tolist()
+    return center
 
 
 def _bytes(arrays: Arrays, name: str) -> bytes:
