@@ -94,8 +94,10 @@ def three_quarter_view(mesh: MeshLike, *, up: Up = "auto", size: int = 600) -> C
     facing = _facing(mesh)
     if facing is not None and np.linalg.norm(np.cross(upward, facing)) > 0.1:
         towards = facing
-    elif _sum_visible_bending(mesh, towards) < LESS * _sum_visible_bending(mesh, behind):
-        towards = behind
+    else:
+        before, after = _sum_visible_bending(mesh, np.stack([towards, behind]))
+        if before < LESS * after:
+            towards = behind
     towards = towards / np.linalg.norm(towards)
     right = np.cross(upward, towards)
     right = right / np.linalg.norm(right)
@@ -133,8 +135,13 @@ def _hull_area(points: Float[np.ndarray, "k 2"]) -> float:
         return 0.0
 
 
-def _sum_visible_bending(mesh: TriangleMesh, towards: Float[np.ndarray, "3"]) -> float:
-    """Sum the bending of a surface, angle times length of each edge, weighted by how far the edge faces the viewer."""
+def _sum_visible_bending(
+    mesh: TriangleMesh, directions: Float[np.ndarray, "d 3"]
+) -> Float[np.ndarray, " d"]:
+    """Sum the bending that a viewer sees, for each direction towards a viewer.
+
+    The bending of an edge is its angle times its length, weighted by how far it faces the viewer.
+    """
     points = scale_to_unit(mesh)[0]
     vectors = area_vectors(points[mesh.faces])
     normals = (
@@ -148,7 +155,7 @@ def _sum_visible_bending(mesh: TriangleMesh, towards: Float[np.ndarray, "3"]) ->
     angles = np.arccos(np.clip(np.einsum("ij,ij->i", one, two), -1, 1))
     begin, end = points[table.edges[edges]].transpose(1, 0, 2)
     lengths = np.linalg.norm(end - begin, axis=1)
-    return float((angles * lengths) @ np.maximum((one + two) @ towards, 0))
+    return (angles * lengths) @ np.maximum((one + two) @ directions.T, 0)
 
 
 def _facing(mesh: TriangleMesh) -> Float[np.ndarray, "3"] | None:

@@ -91,8 +91,8 @@ export class Studio {
     for (const panel of this.panels) this.addPanel(panel);
     const usable = [...this.pages.keys()];
     const last = this.settings.get("panel", "");
-    this.open(usable.includes(last) ? last : usable[0]!);
     this.refreshPanels();
+    this.open(usable.includes(last) ? last : usable[0]!);
   }
 
   /** Ask for the state, load what changed, and refresh all panels; again while something runs. */

@@ -42,7 +42,7 @@ class Analysis:
         self._n_modes = n_modes
         # The first that a page asks for; it has begun when the browser opens.
         self._upright: Job[dict[str, Any]] = Job(lambda _: frame_shape(mesh), shared=True)
-        self.health: Job[dict[str, Any]] = Job(lambda _: assess_health(mesh), shared=shared)
+        self.health: Job[dict[str, Any]] = Job(self._assess_health, shared=shared)
         self.spectrum: Job[es.Spectrum] = Job(self._solve_default, shared=shared)
         solved = self.spectrum
         self.rig: Job[es.deformation.EigenRig] = Job(lambda _: _rig(mesh, solved), shared=shared)
@@ -111,7 +111,12 @@ class Analysis:
             "levels": [] if found is None else found.tree.persistence.tolist(),
         }
 
+    def _assess_health(self, _progress: Progress) -> dict[str, Any]:
+        self._upright.wait()  # nothing may delay the first picture
+        return assess_health(self.mesh)
+
     def _solve_default(self, progress: Progress) -> es.Spectrum:
+        self._upright.wait()
         n_components, _ = es.geometry.vertex_components(self.mesh)
         wanted = min(self._n_modes + n_components - 1, self.mesh.n_vertices)
         return _solve(self.mesh, wanted, progress)
@@ -238,11 +243,18 @@ def vertex_labels(mesh: es.TriangleMesh, labels: np.ndarray) -> np.ndarray:
     return np.asarray(around.tocsr().argmax(axis=1)).ravel().astype(np.int32)
 
 
-def merge_rows(tree: es.features.PartTree) -> np.ndarray:
-    """Return the merges of a tree: for each region with a parent its number, parent and level."""
-    merged = np.flatnonzero(tree.parent >= 0)
-    rows = [merged, tree.parent[merged], tree.persistence[merged]]
-    return np.column_stack(rows).astype(np.float64)
+def cut_rows(tree: es.features.PartTree) -> np.ndarray:
+    """Return the part of each finest region for every number of parts, one row each, fewest first.
+
+    A row equals `es.segment` with that number of regions. Regions are sorted by falling
+    persistence, so the last region that is left is always the next to merge with its parent.
+    """
+    part = np.arange(len(tree.parent), dtype=np.int32)
+    rows = [part.copy()]
+    for last in range(len(part) - 1, np.count_nonzero(tree.parent < 0) - 1, -1):
+        part[part == last] = part[tree.parent[last]]
+        rows.append(part.copy())
+    return np.stack(rows[::-1])
 
 
 def diagram_rows(mesh: es.TriangleMesh, heat: np.ndarray) -> np.ndarray:

@@ -66,9 +66,7 @@ def parse_mesh(name: str, data: bytes, limits: Limits | None = None) -> es.Trian
     suffix = Path(name).suffix.lower()
     if suffix not in es.io.MESH_FORMATS:
         known = ", ".join(es.io.MESH_FORMATS)
-        raise es.FileFormatError(
-            f"A mesh file must end in {known}; {display_name(name)} does not."
-        )
+        raise es.FileFormatError(f"A mesh file must end in {known}; {display_name(name)} does not.")
     command = [sys.executable, "-m", "eigenshape_studio.parse", suffix]
     numbers = [limits.seconds, limits.memory, limits.n_faces]
     try:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import eigenshape as es
-from eigenshape_studio.analysis import N_MODES, Analysis, diagram_rows, merge_rows, vertex_labels
+from eigenshape_studio.analysis import N_MODES, Analysis, cut_rows, diagram_rows, vertex_labels
 from eigenshape_studio.jobs import NO_JOB
 from eigenshape_studio.parse import display_name, parse_mesh
 from eigenshape_studio.poses import carry_pose
@@ -214,6 +214,7 @@ class Workspace:
             "areas": lambda: self.analysis.areas.astype("<f4"),
             "modes": lambda: self._modes(meta),
             "eigenvalues": lambda: self._spectrum().eigenvalues.astype("<f8"),
+            "coefficients": self._coefficients,
             "brackets": lambda: self._brackets(meta),
             "diagram": self._diagram,
             "crossings": self._crossings,
@@ -249,6 +250,12 @@ class Workspace:
         stop = whole(meta, "stop", start, modes.shape[1], modes.shape[1])
         return np.ascontiguousarray(modes[:, start:stop].T, dtype="<f4")
 
+    def _coefficients(self) -> np.ndarray:
+        """Return the coordinates of the present pose in terms of the modes, (k, 3)."""
+        spectrum = self._spectrum()
+        weighted = spectrum.mass @ self.mesh.vertices
+        return np.asarray(spectrum.eigenvectors.T @ weighted).astype("<f4")
+
     def _brackets(self, meta: dict[str, Any]) -> np.ndarray:
         k = whole(meta, "stop", 1, min(300, self.analysis.mesh.n_vertices), N_BRACKETS)
         found = self.analysis.brackets
@@ -271,9 +278,9 @@ class Workspace:
         found = self._require_parts()
         if tail == "labels":
             return vertex_labels(found.mesh, found.tree.basins)
-        if tail == "merges":
-            return merge_rows(found.tree)
-        raise RequestError(f"Of parts there are labels and merges; {tail[:80]!r} was requested.")
+        if tail == "cuts":
+            return cut_rows(found.tree)
+        raise RequestError(f"Of parts there are labels and cuts; {tail[:80]!r} was requested.")
 
     def _values_array(self, tail: str) -> np.ndarray:
         if tail not in self.fields:

@@ -32,7 +32,7 @@ export interface State {
   };
   values: { name: string; title: string; unit: string; min: number; max: number }[];
   spectrum: Progress & { k: number; certificate: string; complete: boolean };
-  parts: Progress & { n_regions: number; levels: number[] }; // a level for each finest region
+  parts: Progress & { n_regions: number; levels: (number | null)[] }; // null: without end
   deformation: Progress & { n_edits: number; n_redoable: number };
   index: { path: string; n_shapes: number } | null;
   pose: number; // counts the poses of the shape, and the shapes

@@ -33,19 +33,16 @@ export function heatFromSource(
   return sumModes(modes, weights, n);
 }
 
-/** The shape that the first modes express: Σ φ_i ⟨φ_i, x⟩ for each coordinate, weighted by areas. */
+/** The shape that the first modes express: Σ φ_i c_i, with three coefficients c_i for each mode. */
 export function lowpass(
-  points: Float32Array,
   modes: Float32Array,
-  areas: Float32Array,
+  coefficients: Float32Array,
   count: number,
 ): Float32Array<ArrayBuffer> {
-  const n = areas.length;
-  const smooth = new Float32Array(points.length);
+  const n = modes.length / (coefficients.length / 3);
+  const smooth = new Float32Array(3 * n);
   for (let axis = 0; axis < 3; axis++) {
-    const weights = new Float64Array(count).map((_, i) =>
-      areas.reduce((sum, area, x) => sum + area * modes[i * n + x]! * points[3 * x + axis]!, 0),
-    );
+    const weights = new Float64Array(count).map((_, i) => coefficients[3 * i + axis]!);
     sumModes(modes, weights, n).forEach((value, x) => (smooth[3 * x + axis] = value));
   }
   return smooth;

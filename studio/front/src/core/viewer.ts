@@ -352,8 +352,10 @@ export class Viewer {
   }
 
   private startRenderer(): three.WebGLRenderer | null {
-    const antialias = !rendersInSoftware();
-    const context = this.canvas.getContext("webgl2", { antialias, alpha: true });
+    // Without a graphics card, smoothing edges would double the time of a frame.
+    const context =
+      this.canvas.getContext("webgl2", { failIfMajorPerformanceCaveat: true }) ??
+      this.canvas.getContext("webgl2", { antialias: false });
     if (!context?.getExtension("EXT_color_buffer_float")) {
       this.showNotice(
         "This browser has no WebGL2 with float buffers, which the picture needs. Enable hardware " +
@@ -494,15 +496,4 @@ function vertexNormals(points: Float32Array, faces: Uint32Array): Float32Array {
   surface.setAttribute("position", new three.BufferAttribute(points, 3));
   surface.setIndex(new three.BufferAttribute(faces, 1)).computeVertexNormals();
   return surface.getAttribute("normal").array as Float32Array;
-}
-
-/** Say whether there is no graphics card: smoothing edges would then double the time of a frame. */
-function rendersInSoftware(): boolean {
-  const context = document.createElement("canvas").getContext("webgl2");
-  if (!context) return false;
-  let name = String(context.getParameter(context.RENDERER));
-  const info = name === "WebKit WebGL" && context.getExtension("WEBGL_debug_renderer_info");
-  if (info) name = String(context.getParameter(info.UNMASKED_RENDERER_WEBGL));
-  context.getExtension("WEBGL_lose_context")?.loseContext();
-  return /swiftshader|llvmpipe|software|basic render/i.test(name);
 }

@@ -4,7 +4,7 @@ import type { Panel, Studio } from "../app";
 import type { Change, Handle, State, Vec3 } from "../core/backend";
 import { partColors, rgbOf } from "../core/colors";
 import { chooseFiles, Form, h } from "../core/dom";
-import { cutTree, relabel } from "../core/parts";
+import { cutParts } from "../core/parts";
 import { FIXED, Regions } from "../core/regions";
 import { BoxTool, MotionTool, type MotionKind } from "../core/tools";
 import type { Hit, PointerTool } from "../core/viewer";
@@ -325,11 +325,9 @@ export class DeformPanel implements Panel {
   private async showParts(count: number): Promise<void> {
     const { backend, state, viewer } = this.app;
     const { levels } = state.parts;
-    const [finest, rows] = await Promise.all([
-      backend.array<Int32Array>("parts/labels"),
-      backend.array<Float64Array>("parts/merges"),
-    ]);
-    this.labels = relabel(finest, cutTree({ count: levels.length, rows }, { count }).parts);
+    const names = ["parts/labels", "parts/cuts"];
+    const arrays = await Promise.all(names.map((name) => backend.array<Int32Array>(name)));
+    this.labels = cutParts(arrays[0]!, arrays[1]!, levels.length, count);
     this.form.slide("region-parts", count, String(count));
     if (!this.active || this.tool !== "part") return;
     this.form.get("parts-slider").hidden = false;

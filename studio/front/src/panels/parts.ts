@@ -5,7 +5,7 @@ import type { Studio } from "../app";
 import type { State } from "../core/backend";
 import { formatNumber, partColors } from "../core/colors";
 import { Form } from "../core/dom";
-import { cutTree, findLevels, relabel, type Merges, type Rule } from "../core/parts";
+import { cutParts } from "../core/parts";
 import { ColoringPanel } from "./coloring";
 import markup from "./parts.html?raw";
 import { buildPlot, dots, pageColor } from "./plot";
@@ -21,8 +21,8 @@ export class PartsPanel extends ColoringPanel {
   private plot: uPlot | null = null;
   private finest = new Int32Array(); // region of each vertex
   private labels = new Int32Array(); // part of each vertex, by the present cut
-  private merges: Merges = { count: 0, rows: new Float64Array() };
-  private levels = new Float64Array();
+  private cuts = new Int32Array();
+  private levels: number[] = []; // persistence of each finest region, falling
   private diagram = new Float64Array(); // birth, death, persistence, vertex in turn
   private areas = new Float32Array();
   private nParts = 0;
@@ -34,8 +34,8 @@ export class PartsPanel extends ColoringPanel {
     this.app = app;
     form.on({
       "find-parts": () => app.change({ kind: "parts" }, "Starting to find parts").catch(() => {}),
-      "n-parts": () => this.cut({ count: form.number("n-parts") }),
-      persistence: () => this.cut({ persistence: this.levelAt(form.number("persistence")) }),
+      "n-parts": () => this.cut(form.number("n-parts")),
+      persistence: () => this.cutAt(this.levelAt(form.number("persistence"))),
       "all-parts": () => this.selectPart(-1),
       maximum: () => this.select(form.number("maximum")),
     });
@@ -64,38 +64,39 @@ export class PartsPanel extends ColoringPanel {
     });
     const finest = await this.get<Int32Array>("parts/labels");
     const fresh = finest !== this.finest;
-    const names = ["parts/merges", "diagram", "areas"];
+    const names = ["parts/cuts", "diagram", "areas"];
     const wanted = Promise.all(names.map((name) => this.get(name)));
-    const [rows, diagram, areas] = await this.latest(wanted);
+    const [cuts, diagram, areas] = await this.latest(wanted);
     if (!fresh) return this.paint();
-    Object.assign(this, { finest, diagram, areas });
-    this.merges = { count: state.parts.levels.length, rows: rows as Float64Array };
-    this.levels = findLevels(this.merges);
-    const { count } = this.merges;
-    this.form.setRange("n-parts", count - this.levels.length, count);
+    Object.assign(this, { finest, cuts, diagram, areas });
+    this.levels = state.parts.levels.map((level) => level ?? Infinity);
+    const fewest = this.levels.filter((level) => level === Infinity).length;
+    this.form.setRange("n-parts", fewest, this.levels.length);
     this.form.setRange("maximum", 0, this.diagram.length / 4 - 1);
     this.plotDiagram();
-    this.cut({ count: settings.get(`parts of ${state.name}`, state.parts.n_regions) });
+    this.cut(settings.get(`parts of ${state.name}`, state.parts.n_regions));
   }
 
   /** Return the persistence of a step; steps are finer below, where most levels are. */
   private levelAt(step: number): number {
-    return 1.02 * (this.levels[0] ?? 1) * (step / STEPS) ** 2;
+    return 1.02 * (this.levels.find(Number.isFinite) ?? 1) * (step / STEPS) ** 2;
   }
 
-  /** Unite the finest regions by a rule, and show the parts; both sliders say the same. */
-  private cut(rule: Rule): void {
-    const { form, levels, merges } = this;
-    const { parts, kept } = cutTree(merges, rule);
-    this.labels = relabel(this.finest, parts);
-    this.nParts = kept.length;
-    this.app.settings.set(`parts of ${this.app.state.name}`, kept.length);
-    // The level of a number: the persistence of the last part that has not merged.
-    const last = levels[levels.length - (merges.count - kept.length) - 1] ?? this.levelAt(STEPS);
-    const persistence = "count" in rule ? last : rule.persistence;
-    const step = STEPS * Math.sqrt(persistence / this.levelAt(STEPS));
-    form.slide("n-parts", kept.length, String(kept.length));
-    form.slide("persistence", step, formatNumber(persistence));
+  /** Keep the parts of at least some persistence. */
+  private cutAt(persistence: number): void {
+    this.cut(this.levels.filter((level) => level >= persistence).length, persistence);
+  }
+
+  /** Unite the finest regions to a number of parts, and show them; both sliders say the same. */
+  private cut(count: number, persistence = this.levels[count - 1]!): void {
+    const { form, levels } = this;
+    this.nParts = count;
+    this.labels = cutParts(this.finest, this.cuts, levels.length, count);
+    this.app.settings.set(`parts of ${this.app.state.name}`, count);
+    const highest = this.levelAt(STEPS);
+    const level = Math.min(persistence, highest);
+    form.slide("n-parts", count, String(count));
+    form.slide("persistence", STEPS * Math.sqrt(level / highest), formatNumber(level));
     this.selectPart(-1);
   }
 

@@ -90,12 +90,9 @@ export class SpectrumPanel extends ColoringPanel {
   /** Return the shape that the first modes express, in its present pose. */
   private async smoothShape(count: number): Promise<Float32Array<ArrayBuffer>> {
     this.bent = true;
-    const [modes, areas, points] = await Promise.all([
-      this.get<Float32Array>("modes"),
-      this.get<Float32Array>("areas"),
-      this.app.backend.array<Float32Array>("vertices"),
-    ]);
-    return lowpass(points, modes, areas, count);
+    const modes = this.get<Float32Array>("modes");
+    const coefficients = this.app.backend.array<Float32Array>("coefficients");
+    return lowpass(await modes, await coefficients, count);
   }
 
   private async unbend(): Promise<Float32Array<ArrayBuffer> | null> {
