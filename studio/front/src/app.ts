@@ -226,7 +226,9 @@ export class Studio {
     this.shown = { shape, pose };
     this.page.text("name", state.name);
     this.page.get("name").title = state.name;
-    const [nVertices, nFaces] = [state.n_vertices, state.n_faces].map((n) => n.toLocaleString("en"));
+    const [nVertices, nFaces] = [state.n_vertices, state.n_faces].map((n) =>
+      n.toLocaleString("en"),
+    );
     this.page.text("counts", `${nVertices} vertices · ${nFaces} faces`);
     clearTimeout(this.timer);
     const { health, spectrum, parts, deformation } = state;
@@ -266,7 +268,7 @@ export class Studio {
     const target = event.composedPath()[0] as HTMLElement;
     const typing = target.matches?.("select, input:not([type=range], [type=checkbox])");
     if (typing || this.help.open) return;
-    if (target instanceof HTMLButtonElement && event.key === "Enter") return; // it presses the button
+    if (target.tagName === "BUTTON" && event.key === "Enter") return; // it presses the button
     const letter = event.key.length === 1 ? event.key.toUpperCase() : event.key;
     const control = event.ctrlKey || event.metaKey;
     // Shift is part of "?" itself, but tells "Ctrl+Shift+Z" from "Ctrl+Z".

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.image import imsave
 
 import eigenshape as es
-from eigenshape.plot.render import draw
 from eigenshape_studio.analysis import upright_view
 
 THUMBNAIL = 144  # pixels
@@ -89,5 +88,5 @@ def _draw_file(source: str, _changed: int) -> tuple[bytes, dict[str, list[float]
     mesh = es.read_mesh(source)
     camera = es.plot.three_quarter_view(mesh, size=THUMBNAIL)
     file = BytesIO()
-    imsave(file, draw(mesh, camera).image, format="png")
+    imsave(file, es.plot.draw(mesh, camera).image, format="png")
     return file.getvalue(), upright_view(mesh)

@@ -49,7 +49,12 @@ export class Picker {
     const height = Math.ceil(count / GRID);
     const bare = this.geometry.clone().setIndex(null); // without faces: one point a vertex
     this.material.uniforms.grid!.value.set(GRID, height);
-    const [, places] = this.draw(new three.Points(bare, this.material), new three.Camera(), GRID, height);
+    const [, places] = this.draw(
+      new three.Points(bare, this.material),
+      new three.Camera(),
+      GRID,
+      height,
+    );
     this.material.uniforms.grid!.value.set(0, 0);
     bare.dispose();
     return places!.filter((_, i) => i % 4 < 3 && i < 4 * count);

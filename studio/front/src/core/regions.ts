@@ -19,7 +19,9 @@ export class Regions {
 
   /** Return the vertices of a region, ascending. */
   vertices(region: number): Uint32Array {
-    return Uint32Array.from(this.owner.keys()).filter((vertex) => this.owner[vertex] === region);
+    const found: number[] = [];
+    this.owner.forEach((owner, vertex) => owner === region && found.push(vertex));
+    return Uint32Array.from(found);
   }
 
   /** Add vertices to a region; they leave the region that had them. */

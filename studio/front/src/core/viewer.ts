@@ -30,7 +30,7 @@ export interface PointerTool {
 export type { Hit };
 export type Click = (hit: Hit, event: PointerEvent) => void;
 
-const MOST_PIXELS = 1.5; // device pixels for each pixel of the page: more costs much and shows little
+const MOST_PIXELS = 1.5; // device pixels for each of the page: more costs much and shows little
 const FIELD_OF_VIEW = 26; // degrees: almost parallel, as in the library's pictures
 const MARGIN = 0.84; // share of the window that the shape fills
 const CLICK = 4; // pixels that a click may move

@@ -50,7 +50,11 @@ export class DeformPanel implements Panel {
     const { form } = this;
     const { viewer } = app;
     this.app = app;
-    this.box = new BoxTool(viewer, () => this.boxMoved(), () => this.bind());
+    this.box = new BoxTool(
+      viewer,
+      () => this.boxMoved(),
+      () => this.bind(),
+    );
     this.mover = new MotionTool(viewer, {
       canDrag: (vertex) => this.canDrag(vertex),
       moved: (handle) => this.moved(handle),
@@ -141,7 +145,12 @@ export class DeformPanel implements Panel {
   private startShape({ shape, n_vertices, up }: State): void {
     this.regions = new Regions(n_vertices);
     [this.pivots, this.labels] = [[], null];
-    const kept = this.app.settings.get("regions", { shape: -1, text: "", tool: this.tool, region: 0 });
+    const kept = this.app.settings.get("regions", {
+      shape: -1,
+      text: "",
+      tool: this.tool,
+      region: 0,
+    });
     if (kept.shape === shape) {
       this.regions.read(kept.text);
       [this.tool, this.region] = [kept.tool, kept.region];
@@ -205,7 +214,8 @@ export class DeformPanel implements Panel {
     if (!active) viewer.setPointer();
     else if (tool === "box") viewer.setPointer("grab", null, this.box);
     else if (tool === "brush") viewer.setPointer("crosshair", null, this.brush);
-    else if (tool === "part") viewer.setPointer("crosshair", (hit, event) => this.pickPart(hit, event));
+    else if (tool === "part")
+      viewer.setPointer("crosshair", (hit, event) => this.pickPart(hit, event));
     else viewer.setPointer("grab", null, this.mover);
     if (active && tool === "part") this.loadParts();
     else if (labels && viewer.labels === labels) viewer.setLabels(null);
@@ -265,7 +275,8 @@ export class DeformPanel implements Panel {
   }
 
   private readBox(): void {
-    const read = (name: string) => AXES.map((axis) => this.form.number(`box-${name}-${axis}`)) as Vec3;
+    const read = (name: string) =>
+      AXES.map((axis) => this.form.number(`box-${name}-${axis}`)) as Vec3;
     const [low, high] = [read("low"), read("high")];
     if (!low.every((value, axis) => value <= high[axis]!)) return;
     this.box.set(low, high);
@@ -398,7 +409,11 @@ export class DeformPanel implements Panel {
     await nextFrame();
     await new Promise((done) => setTimeout(done, REST));
     if (turn !== this.motions) return;
-    const change = { kind: "preview", handles: this.rowHandles(), mode: this.form.get("mode").value };
+    const change = {
+      kind: "preview",
+      handles: this.rowHandles(),
+      mode: this.form.get("mode").value,
+    };
     const done = await app.backend.finish(change).catch((error) => app.fail(error));
     if (done && turn === this.motions) app.viewer.setExact(done.vertices!);
   }
@@ -464,7 +479,9 @@ export class DeformPanel implements Panel {
     const crossing = [...new Set<number>(pairs ?? [])];
     this.crossing = crossing.flatMap((face) => [...faces.subarray(3 * face, 3 * face + 3)]);
     this.paint();
-    const found = crossing.length ? `${pairs!.length / 2} pairs of faces cross.` : "No faces cross.";
+    const found = crossing.length
+      ? `${pairs!.length / 2} pairs of faces cross.`
+      : "No faces cross.";
     if (pairs) this.app.say(found);
   }
 

@@ -144,7 +144,10 @@ export class PartsPanel extends ColoringPanel {
       this.diagram[4 * index + 1]!, // death
     ];
     const places = indices.map(placeOf).sort((a, b) => a[0] - b[0]); // as uPlot wants them
-    const data: uPlot.AlignedData = [places.map(([birth]) => birth), places.map(([, death]) => death)];
+    const data: uPlot.AlignedData = [
+      places.map(([birth]) => birth),
+      places.map(([, death]) => death),
+    ];
     this.plot?.destroy();
     this.plot = buildPlot(host, data, {
       labels: ["birth: heat at the maximum, 1/length²", "death: at the saddle"],

@@ -99,8 +99,14 @@ export class SearchPanel implements Panel {
     viewer.fit();
     const pairs = found.arrays[`pairs${number}`] as Uint32Array;
     const colors = found.arrays[`colors${number}`] as Uint8Array;
-    viewer.setPoints(pairs.filter((_, i) => i % 2 === 0), colors);
-    this.second.setPoints(pairs.filter((_, i) => i % 2 === 1), colors);
+    viewer.setPoints(
+      pairs.filter((_, i) => i % 2 === 0),
+      colors,
+    );
+    this.second.setPoints(
+      pairs.filter((_, i) => i % 2 === 1),
+      colors,
+    );
     [...this.list.children].forEach((card, i) => card.classList.toggle("chosen", i === number));
   }
 

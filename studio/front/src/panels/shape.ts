@@ -44,7 +44,9 @@ export class ShapePanel extends ColoringPanel {
       select.dataset.names = names;
     }
     this.form.get("values-part").hidden = !values.length;
-    const rows = health.facts.map(([name, text]) => h("tr", {}, h("th", {}, name), h("td", {}, text)));
+    const rows = health.facts.map(([name, text]) =>
+      h("tr", {}, h("th", {}, name), h("td", {}, text)),
+    );
     this.form.get("facts").replaceChildren(...rows);
     const lines = health.lines.map(([kind, text]) => h("li", { class: kind }, text));
     this.form.get("health").replaceChildren(...lines, ...this.buildRepairs(state));

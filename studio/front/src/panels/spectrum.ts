@@ -84,7 +84,13 @@ export class SpectrumPanel extends ColoringPanel {
     const size = Math.max(-low, high);
     const nodal = this.form.get("nodal").checked && high - low > FLAT * size;
     const title = `eigenfunction ${i}`;
-    viewer.setScalars(values, { map: "RdBu_r", range: [-size, size], nodal, title, unit: "1/length" });
+    viewer.setScalars(values, {
+      map: "RdBu_r",
+      range: [-size, size],
+      nodal,
+      title,
+      unit: "1/length",
+    });
   }
 
   /** Return the shape that the first modes express, in its present pose. */
