@@ -53,6 +53,8 @@ export class Studio {
   private busy = 0;
   private timer = 0;
   private shown = { shape: -1, pose: -1 }; // what the viewer shows
+  private mesh: Promise<[Float32Array, Uint32Array]>; // requested, of a shape not shown yet
+  private readonly first: Promise<State>;
 
   constructor(
     readonly backend: Backend,
@@ -61,6 +63,9 @@ export class Studio {
     readonly settings: Settings,
     keys: EventTarget = host,
   ) {
+    // WebGL takes a second to start without a graphics card; meanwhile the shape is on its way.
+    this.first = backend.meta();
+    this.mesh = this.requestMesh();
     // A shadow root keeps the styles of a notebook out, and ours in.
     const root = host.attachShadow({ mode: "open" });
     const sheet = new CSSStyleSheet();
@@ -85,7 +90,7 @@ export class Studio {
   }
 
   async start(): Promise<void> {
-    await this.run("Loading the shape", this.load());
+    await this.run("Loading the shape", this.first.then((state) => this.show(state)));
     const view = this.settings.get<View | null>("view", null);
     if (view && view.shape === this.state.shape) this.viewer.setView(view);
     for (const panel of this.panels) this.addPanel(panel);
@@ -206,6 +211,13 @@ export class Studio {
     this.shortcut(String(number), `Panel: ${panel.title}`, click);
   }
 
+  private requestMesh(): Promise<[Float32Array, Uint32Array]> {
+    return Promise.all([
+      this.backend.array<Float32Array>("vertices"),
+      this.backend.array<Uint32Array>("faces"),
+    ]);
+  }
+
   private async load(): Promise<void> {
     await this.show(await this.backend.meta());
   }
@@ -215,10 +227,8 @@ export class Studio {
     this.state = state;
     const { shape, pose } = state;
     if (shape !== this.shown.shape) {
-      const [points, faces] = await Promise.all([
-        this.backend.array<Float32Array>("vertices"),
-        this.backend.array<Uint32Array>("faces"),
-      ]);
+      if (this.shown.shape >= 0) this.mesh = this.requestMesh();
+      const [points, faces] = await this.mesh;
       this.viewer.setMesh(points, faces, state.up, state.front);
       this.viewer.shape = shape;
     } else if (pose !== this.shown.pose)

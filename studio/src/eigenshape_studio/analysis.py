@@ -86,7 +86,7 @@ class Analysis:
     def health_facts(self) -> dict[str, Any]:
         """Return what is known of the faults of the mesh so far."""
         nothing = ("components", "boundary_loops", "closed", "manifold", "area", "volume")
-        unknown = {**dict.fromkeys(nothing), "findings": []}
+        unknown: dict[str, Any] = {**dict.fromkeys(nothing), "findings": []}
         found = self.health.result or unknown
         status = self.health.status
         return {"status": status, **found, **describe_health(self.mesh, found, status)}
