@@ -316,10 +316,12 @@ export class DeformPanel implements Panel {
     const hit = app.viewer.pick(event.offsetX, event.offsetY);
     if (!hit) return false;
     this.ready = false;
-    const disc = app.backend.array<Uint32Array>(`disc/${hit.vertex}/${this.radius}`);
+    const name = `disc/${hit.vertex}/${this.radius}`;
+    // One request at a time: a quick stroke sends more than the server takes at once.
     const add = async () => {
-      if (event.shiftKey) regions.remove(region, await disc);
-      else regions.add(region, await disc);
+      const disc = await app.backend.array<Uint32Array>(name);
+      if (event.shiftKey) regions.remove(region, disc);
+      else regions.add(region, disc);
       this.paint();
     };
     this.painting = this.painting.then(add).catch((error) => app.fail(error));
