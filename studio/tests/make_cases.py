@@ -29,12 +29,8 @@ def _pack(colors: np.ndarray) -> str:
 
 
 def cases() -> dict:
-    """Return parts and heat of small shapes, as the library computes them."""
+    """Return heat and drags of small shapes, as the library computes them."""
     mesh = _bumpy_sphere()
-    found = es.find_parts(mesh)
-    pair = es.geometry.disjoint_union(mesh, es.icosphere(1))
-    x, y, z = pair.vertices.T
-    waves = es.merge_tree(pair, np.sin(9 * x) * np.cos(7 * y) + 0.3 * np.sin(11 * z))
     spectrum = es.solve_spectrum(es.cotangent_laplacian(mesh), 12)
     times = es.spectral.default_times(spectrum, 2)
     heat = es.heat_kernel_signature(spectrum, times)
@@ -44,7 +40,6 @@ def cases() -> dict:
     )
     weights = spectrum.eigenvectors[:, :5].T @ (spectrum.mass @ mesh.vertices)
     return {
-        "trees": [_tree_case(found.tree), _tree_case(waves)],
         "heat": {
             "modes": _plain(spectrum.eigenvectors.T.ravel()),
             "eigenvalues": _plain(spectrum.eigenvalues),
@@ -56,39 +51,15 @@ def cases() -> dict:
             "kernel": _plain(kernel),
             "lowpass5": _plain((spectrum.eigenvectors[:, :5] @ weights).ravel()),
         },
-        "deformation": _deformation_case(mesh),
+        "deformation": _deformation_case(),
     }
 
 
-def _deformation_case(mesh: es.TriangleMesh) -> dict:
-    """Return regions and motions as `region_mask` and the handles compute them."""
-    box = es.deformation.BoxRegion([-0.7, -2.0, -0.1], [2.0, 0.6, 0.75])
-    brushes = [(0, 0.4), (0, 0.9), (77, 0.55), (140, 2.5)]
-    discs = [es.deformation.BrushRegion(mesh.vertices[at], radius) for at, radius in brushes]
-    shares = np.random.default_rng(1).random(mesh.n_vertices)
-    turn = es.Rotation([0.1, -0.2, 0.3], [1.0, 2.0, -2.0], 5.0)
-    shift = es.Translation([0.3, -0.1, 0.7])
+def _deformation_case() -> dict:
+    """Return drags and how the library turns by them."""
     drags = np.random.default_rng(2).standard_normal((4, 3, 3))
     turns = [es.deformation.rotation_from_drag(*drag) for drag in drags]
-    mask = es.deformation.region_mask(mesh, box)
     return {
-        "vertices": mesh.vertices.ravel().tolist(),
-        "faces": mesh.faces.ravel().tolist(),
-        "box": {"low": box.low.tolist(), "high": box.high.tolist(), "vertices": _where(mask)},
-        "rim": es.deformation.region_boundary(mesh, mask).tolist(),
-        "brushes": [
-            {
-                "vertex": at,
-                "radius": radius,
-                "vertices": _where(es.deformation.region_mask(mesh, disc)),
-            }
-            for (at, radius), disc in zip(brushes, discs, strict=True)
-        ],
-        "shares": _plain(shares),
-        "rotation": {"pivot": turn.pivot.tolist(), "axis": turn.axis.tolist(), "angle": turn.angle},
-        "rotated": _plain((mesh.vertices + turn.carry(mesh.vertices, shares)).ravel()),
-        "translation": {"vector": shift.vector.tolist()},
-        "translated": _plain((mesh.vertices + shift.carry(mesh.vertices, shares)).ravel()),
         "drags": [
             {"points": drag.tolist(), "axis": _plain(turn.axis), "angle": _plain([turn.angle])[0]}
             for drag, turn in zip(drags, turns, strict=True)
@@ -96,39 +67,11 @@ def _deformation_case(mesh: es.TriangleMesh) -> dict:
     }
 
 
-def _where(mask: np.ndarray) -> list[int]:
-    return np.flatnonzero(mask).tolist()
-
-
 def _bumpy_sphere() -> es.TriangleMesh:
     ball = es.icosphere(2)
     x, y, z = ball.vertices.T
     bumps = 1 + 0.35 * np.cos(4 * np.arctan2(y, x)) * (x**2 + y**2) + 0.3 * x * z
     return es.TriangleMesh(ball.vertices * bumps[:, None], ball.faces)
-
-
-def _tree_case(tree: es.features.MergeTree | es.features.PartTree) -> dict:
-    """Return a tree as the wire carries it, and its cuts by number and by persistence."""
-    ends = np.flatnonzero(tree.parent >= 0)
-    rows = np.column_stack([ends, tree.parent[ends], tree.persistence[ends]])
-    levels = np.unique(tree.persistence[ends])
-    steps = max(1, len(tree.maxima) // 6)  # a few cuts of a large tree are enough
-    counts = [*range(1, len(tree.maxima) + 2)][::steps]
-    thresholds = [0.0, *[*levels, *(levels[1:] + levels[:-1]) / 2][::steps], 2 * levels[-1]]
-    by_count = [(count, es.segment(tree, n_regions=count)) for count in counts]
-    by_level = [(level, es.segment(tree, persistence=level)) for level in thresholds]
-    return {
-        "count": len(tree.maxima),
-        "rows": rows.ravel().tolist(),
-        "maxima": tree.maxima.tolist(),
-        "labels": tree.basins.tolist(),
-        "by_count": [{"count": count, **_cut(cut)} for count, cut in by_count],
-        "by_persistence": [{"persistence": float(level), **_cut(cut)} for level, cut in by_level],
-    }
-
-
-def _cut(cut: es.features.Segmentation) -> dict:
-    return {"labels": cut.labels.tolist(), "vertices": cut.features.vertices.tolist()}
 
 
 def _plain(numbers: np.ndarray) -> list[float]:

@@ -43,7 +43,7 @@ def test_a_report_holds_the_state_and_all_arrays(tmp_path):
     assert np.abs(arrays["modes"] - spectrum.eigenvectors.T).max() < 5e-4 * largest
     np.testing.assert_array_equal(arrays["vertices"], mesh.vertices.astype("<f4"))
     np.testing.assert_array_equal(arrays["faces"], mesh.faces)
-    assert {"areas", "diagram", "parts/labels", "parts/merges"} <= arrays.keys()
+    assert {"areas", "diagram", "parts/labels", "parts/cuts"} <= arrays.keys()
     assert f"values/{state['values'][0]['name']}" in arrays
     assert list(tmp_path.iterdir()) == [path]
 

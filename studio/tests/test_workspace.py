@@ -66,11 +66,39 @@ def test_arrays_are_those_of_the_library(page):
     np.testing.assert_array_equal(page.array("skeleton/12"), skeleton.astype("<f4"))
 
 
+def test_a_disc_is_that_of_the_brush(page, top):
+    mesh = page.workspace.mesh
+    for vertex, radius in ((7, 0.4), (200, 0.9)):
+        brush = es.deformation.BrushRegion(mesh.vertices[vertex], radius)
+        wanted = np.flatnonzero(es.deformation.region_mask(mesh, brush))
+        np.testing.assert_array_equal(page.array(f"disc/{vertex}/{radius}"), wanted)
+    assert "vertex and its radius" in page.error("array", name="disc/7")["message"]
+    for name in ("disc/642/0.5", "disc/-1/0.5", "disc/7/nan", "disc/7/0"):
+        assert "positive, finite radius" in page.error("array", name=name)["message"]
+    # The brush paints on the present pose.
+    bend(page, top, TURN, "graded")
+    bent = page.workspace.mesh
+    brush = es.deformation.BrushRegion(bent.vertices[7], 0.4)
+    wanted = np.flatnonzero(es.deformation.region_mask(bent, brush))
+    np.testing.assert_array_equal(page.array("disc/7/0.4"), wanted)
+
+
+def test_coefficients_express_the_present_pose(page):
+    modes, coefficients = page.array("modes"), page.array("coefficients")
+    mesh, spectrum = page.workspace.mesh, page.workspace.analysis.spectrum.result
+    smooth = modes[:12].T @ coefficients[:12]
+    kept = spectrum.eigenvectors[:, :12]
+    np.testing.assert_allclose(smooth, kept @ (kept.T @ (spectrum.mass @ mesh.vertices)), atol=1e-5)
+
+
 def test_shares_are_those_of_bind(page, top):
     facts, arrays = page.call("rig", n_modes=20, n_regions=1, fixed=False, _arrays={"region0": top})
     binding = es.deformation.bind(es.rig_shape(stretched_ball()), [top.astype(int)], n_modes=20)
     assert facts["n_modes"] == [20]
-    np.testing.assert_array_equal(arrays["shares"], binding.shares.astype("<f4"))
+    np.testing.assert_array_equal(arrays["shares"][:, :1], binding.shares.T.astype("<f4"))
+    assert not arrays["shares"][:, 1:].any()
+    rim = es.deformation.region_boundary(page.workspace.mesh, np.isin(np.arange(642), top))
+    np.testing.assert_allclose(facts["pivots"][0], page.workspace.mesh.vertices[rim].mean(axis=0))
     assert page.call("meta")[0]["deformation"]["regions"] == [len(top)]
 
 
@@ -198,16 +226,15 @@ def test_parts_cut_in_the_browser_are_those_of_segment():
     state = page.call("meta")[0]["parts"]
     found = page.workspace.analysis.parts.result
     assert state["n_regions"] == len(found.parts.features.vertices)
-    labels, merges = page.array("parts/labels"), page.array("parts/merges")
+    labels, cuts = page.array("parts/labels"), page.array("parts/cuts")
     assert labels.shape == (800,)
-    # What the page does: unite each region that ends with its parent.
-    n_regions = 5
-    became = np.arange(len(found.tree.maxima))
-    for merged, parent, _ in merges[merges[:, 0] >= n_regions].astype(int).tolist():
-        one, two = sorted([became[merged], became[parent]])
-        became[became == two] = one
-    cut = es.segment(found.tree, n_regions=n_regions)
-    np.testing.assert_array_equal(became[found.tree.basins], cut.labels)
+    # A row for each number of parts; the last one keeps all the finest regions.
+    n_finest = len(found.tree.maxima)
+    np.testing.assert_array_equal(cuts[-1], np.arange(n_finest))
+    for row, n_regions in zip(cuts[::-1], range(n_finest, 0, -1), strict=False):
+        cut = es.segment(found.tree, n_regions=n_regions)
+        np.testing.assert_array_equal(row[found.tree.basins], cut.labels)
+    assert "labels and cuts" in page.error("array", name="parts/merges")["message"]
     births, deaths, persistence, vertices = page.array("diagram").T
     assert (births >= deaths).all()
     np.testing.assert_allclose(births, found.heat[vertices.astype(int)])
@@ -291,7 +318,7 @@ WRONG = [
     ("finish", {"kind": "repair", "names": ["explode"]}, {}, "must be among"),
     ("finish", {"kind": "repair"}, {}, "must be a list"),
     ("finish", {"kind": "open", "name": "a.ply"}, {}, "with the bytes of a file"),
-    ("finish", {"kind": "open", "name": "a.exe"}, {"file": b"MZ"}, "must end in .ply"),
+    ("finish", {"kind": "open", "name": "a.exe"}, {"file": b"MZ"}, "must end in .off"),
     ("finish", {"kind": "open", "name": "a.ply"}, {"file": b"ply"}, "The file"),
     ("finish", {"kind": "replay", "edits": {"kind": "x"}}, {}, "of kind"),
     ("finish", {"kind": "open", "match": 0}, {}, "match must be a whole number"),

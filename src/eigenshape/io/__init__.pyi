@@ -7,6 +7,7 @@ from .edits import read_edits as read_edits
 from .edits import write_edits as write_edits
 from .mesh_files import read_mesh as read_mesh
 from .mesh_files import write_mesh as write_mesh
+from .parsing import MESH_FORMATS as MESH_FORMATS
 from .shape_files import read_points as read_points
 from .shape_files import read_shape as read_shape
 from .shape_files import write_points as write_points

@@ -29,6 +29,7 @@ GRIDS = {
     ".msh": gmsh.parse,
     ".vtu": vtu.parse,
 }
+# Suffixes of the files that `read_mesh` reads.
 MESH_FORMATS = (*PARSERS, ".gltf", ".vtk", *GRIDS)
 
 

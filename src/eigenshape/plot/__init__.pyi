@@ -9,6 +9,8 @@ from .fields import value_colors as value_colors
 from .persistence import figure_diagram as figure_diagram
 from .persistence import figure_merge_tree as figure_merge_tree
 from .poses import figure_poses as figure_poses
+from .render import Drawing as Drawing
+from .render import draw as draw
 from .save import save_figure as save_figure
 from .sheet import Panel as Panel
 from .sheet import figure_contact_sheet as figure_contact_sheet

@@ -255,7 +255,8 @@ def _guess_front(
     parts = np.array(VIEWS["front-left"])
     towards = parts @ [front, np.cross(upward, front), upward]
     behind = parts @ [-front, -np.cross(upward, front), upward]
-    if _sum_visible_bending(mesh, towards) < LESS * _sum_visible_bending(mesh, behind):
+    before, after = _sum_visible_bending(mesh, np.stack([towards, behind]))
+    if before < LESS * after:
         return -front, behind
     return front, towards
 
@@ -291,8 +292,13 @@ def _hull_area(points: Float[np.ndarray, "k 2"]) -> float:
         return 0.0
 
 
-def _sum_visible_bending(mesh: TriangleMesh, towards: Float[np.ndarray, "3"]) -> float:
-    """Sum the bending of a surface, angle times length of each edge, weighted by how far the edge faces the viewer."""
+def _sum_visible_bending(
+    mesh: TriangleMesh, directions: Float[np.ndarray, "d 3"]
+) -> Float[np.ndarray, " d"]:
+    """Sum the bending that a viewer sees, for each direction towards a viewer.
+
+    The bending of an edge is its angle times its length, weighted by how far it faces the viewer.
+    """
     points = scale_to_unit(mesh)[0]
     vectors = area_vectors(points[mesh.faces])
     normals = (
@@ -306,7 +312,7 @@ def _sum_visible_bending(mesh: TriangleMesh, towards: Float[np.ndarray, "3"]) ->
     angles = np.arccos(np.clip(np.einsum("ij,ij->i", one, two), -1, 1))
     begin, end = points[table.edges[edges]].transpose(1, 0, 2)
     lengths = np.linalg.norm(end - begin, axis=1)
-    return float((angles * lengths) @ np.maximum((one + two) @ towards, 0))
+    return (angles * lengths) @ np.maximum((one + two) @ directions.T, 0)
 
 
 def _facing(mesh: TriangleMesh) -> Float[np.ndarray, "3"] | None:

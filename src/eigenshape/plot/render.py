@@ -6,6 +6,7 @@ import matplotlib as mpl
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.face_turns import orient_consistently
 from eigenshape.geometry.measure import mean_normals
@@ -37,11 +38,26 @@ class Drawing:
         Pixels right and down of each vertex.
     visible : (n,) bool
         Whether nothing lies before it.
+
+    See Also
+    --------
+    draw : Draw a mesh.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(2)
+    >>> drawing = es.plot.draw(ball, es.plot.three_quarter_view(ball, size=64))
+    >>> drawing.places.shape
+    (162, 2)
     """
 
     image: Image
     places: Float[np.ndarray, "n 2"]
     visible: Bool[np.ndarray, " n"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
 
 
 @one_blas_thread()
@@ -53,7 +69,7 @@ def draw(
     face_colors: Float[np.ndarray, "f 3"] | None = None,
     zero_set_of: Float[np.ndarray, " n"] | None = None,
 ) -> Drawing:
-    """Draw a mesh with soft light.
+    """Draw a mesh with soft light, pixel by pixel.
 
     Parameters
     ----------
@@ -70,6 +86,17 @@ def draw(
     -------
     Drawing
         Boundary edges are drawn dark as well.
+
+    See Also
+    --------
+    figure_field : Draw a function on a mesh, with its legend.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(2)
+    >>> es.plot.draw(ball, es.plot.three_quarter_view(ball, size=64)).image.shape
+    (64, 64, 4)
     """
     fine = Camera(camera.rotation, camera.size * FINER)
     points = in_picture(mesh, fine)

@@ -11,7 +11,7 @@ from eigenshape._arrays import freeze, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
-from eigenshape.geometry.geodesic import farthest_first, waves_on
+from eigenshape.geometry.geodesic import farthest_first, geodesic_waves
 from eigenshape.geometry.simplex_distance import squared_distances
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.surface_points import SurfacePoints, place_points
@@ -98,7 +98,7 @@ def anchor_nodes(mesh: MeshLike, delta: float, *, start: int = 0) -> AnchorNodes
     positive_values(delta, "delta")
     least, chosen = np.full(mesh.n_points, np.inf), []
     first = whole_number(start, "start", 0, mesh.n_points - 1)
-    for vertex, row in farthest_first(waves_on(mesh), mesh.n_points, first):
+    for vertex, row in farthest_first(geodesic_waves(mesh), mesh.n_points, first):
         if least[vertex] < delta:
             break
         chosen.append(vertex)

@@ -1,8 +1,10 @@
 /** The window: viewer on the left, panels on the right, one line of status below. */
 
 import type { Backend, Change, Finished, State } from "./core/backend";
-import { button, h } from "./core/dom";
+import markup from "./app.html?raw";
+import { download, Form, h, type NamedFile } from "./core/dom";
 import { Viewer, type View } from "./core/viewer";
+import type { Arrays } from "./core/wire";
 import style from "./style.css?inline";
 
 /** What survives a reload of the page, in the storage of the tab. */
@@ -26,30 +28,11 @@ export class Settings {
   }
 }
 
-export interface App {
-  readonly backend: Backend;
-  readonly viewer: Viewer;
-  readonly settings: Settings;
-  readonly state: State;
-  /** Ask for the state, load what changed, and refresh all panels; again while something runs. */
-  refresh(): Promise<void>;
-  /** Make a change on the server, and show its result and its warnings. */
-  change(change: Change, text: string): Promise<Finished>;
-  /** Show `text` as the status while `work` runs, and its error if it fails. */
-  run<T>(text: string, work: Promise<T>): Promise<T>;
-  fail(error: unknown): void;
-  say(text: string): void;
-  /** Bind a key such as "g", "Shift+D" or "Ctrl+Z"; the overview lists it with its text. */
-  shortcut(key: string, text: string, action: () => void): void;
-  /** Show a panel. */
-  open(id: string): void;
-}
-
 export interface Panel {
   id: string;
   title: string;
   needs: string[]; // capabilities without which the panel is hidden
-  build(app: App): HTMLElement;
+  build(app: Studio): HTMLElement;
   refresh(state: State): void;
   shown?(): void;
   hidden?(): void;
@@ -57,22 +40,21 @@ export interface Panel {
 
 const POLL = 300; // ms between two questions while the server computes
 
-export class Studio implements App {
+export class Studio {
   readonly viewer: Viewer;
   state!: State;
-  private readonly main: HTMLElement;
-  private readonly tabs = h("div", { class: "tabs", role: "tablist", "aria-label": "Panels" });
-  private readonly body = h("div", { class: "panels" });
-  private readonly status = h("span", { class: "message", role: "status", "data-test": "status" });
-  private readonly counts = h("span", { class: "counts", "data-test": "counts" });
-  private readonly title = h("h1", { "data-test": "name" });
-  private readonly help = h("dialog", { class: "help", "data-test": "help", "aria-label": "Keys" });
+  private readonly page = new Form(markup);
+  private readonly main = this.page.root;
+  private readonly status = this.page.get("status");
+  private readonly help = this.page.get<HTMLDialogElement>("help");
   private readonly shortcuts = new Map<string, { text: string; action: () => void }>();
   private readonly pages = new Map<string, { panel: Panel; tab: HTMLElement; page: HTMLElement }>();
   private active: Panel | null = null;
   private busy = 0;
   private timer = 0;
   private shown = { shape: -1, pose: -1 }; // what the viewer shows
+  private mesh: Promise<[Float32Array, Uint32Array]>; // requested, of a shape not shown yet
+  private readonly first: Promise<State>;
 
   constructor(
     readonly backend: Backend,
@@ -81,28 +63,25 @@ export class Studio implements App {
     readonly settings: Settings,
     keys: EventTarget = host,
   ) {
+    // WebGL takes a second to start without a graphics card; meanwhile the shape is on its way.
+    this.first = backend.meta();
+    this.mesh = this.requestMesh();
     // A shadow root keeps the styles of a notebook out, and ours in.
     const root = host.attachShadow({ mode: "open" });
     const sheet = new CSSStyleSheet();
     sheet.replaceSync(style);
     root.adoptedStyleSheets = [sheet];
-    const stage = h("div", { class: "stage", "data-test": "stage" });
-    const bar = h(
-      "header",
-      {},
-      this.title,
-      button("◐", "theme", "Dark or light (T)", () => this.switchTheme()),
-      button("?", "help-button", "Keys (?)", () => this.showHelp()),
-    );
-    const side = h("aside", {}, bar, this.tabs, this.body);
-    const footer = h("footer", {}, this.status, this.counts);
-    this.main = h("div", { class: "studio" }, stage, side, footer, this.help);
     root.append(this.main);
     this.setTheme(settings.get("theme", matchMedia("(prefers-color-scheme: dark)").matches));
-    this.viewer = new Viewer(stage);
+    this.viewer = new Viewer(this.page.get("stage"));
     this.viewer.onView = (view) => settings.set("view", view);
+    this.page.on({
+      theme: () => this.switchTheme(),
+      "help-button": () => this.showHelp(),
+      "help-close": () => this.help.close(),
+    });
     keys.addEventListener("keydown", (event) => this.press(event as KeyboardEvent));
-    this.tabs.addEventListener("keydown", (event) => this.walkTabs(event));
+    this.page.get("tabs").addEventListener("keydown", (event) => this.walkTabs(event));
     this.shortcut("?", "Show this overview", () => this.showHelp());
     this.shortcut("Home", "Show the whole shape", () => this.viewer.fit());
     this.shortcut("T", "Dark or light", () => this.switchTheme());
@@ -111,34 +90,42 @@ export class Studio implements App {
   }
 
   async start(): Promise<void> {
-    await this.run("Loading the shape", this.load());
+    await this.run("Loading the shape", this.first.then((state) => this.show(state)));
     const view = this.settings.get<View | null>("view", null);
     if (view && view.shape === this.state.shape) this.viewer.setView(view);
     for (const panel of this.panels) this.addPanel(panel);
     const usable = [...this.pages.keys()];
-    const last = this.settings.get("panel", usable[0]);
-    if (usable.length) this.open(last && usable.includes(last) ? last : usable[0]!);
+    const last = this.settings.get("panel", "");
     this.refreshPanels();
+    this.open(usable.includes(last) ? last : usable[0]!);
   }
 
+  /** Ask for the state, load what changed, and refresh all panels; again while something runs. */
   async refresh(): Promise<void> {
     await this.load();
     this.refreshPanels();
   }
 
-  async change(change: Change, text: string): Promise<Finished> {
-    const done = await this.run(text, this.backend.finish(change));
-    const vertices = done.arrays.vertices?.data as Float32Array | undefined;
-    if (vertices && done.state.shape === this.shown.shape) {
-      this.viewer.setVertices(vertices);
-      this.shown.pose = done.state.pose;
-    }
-    await this.show(done.state);
+  /** Make a change on the server, and show its result and its warnings. */
+  async change(change: Change, text: string, files?: Arrays): Promise<Finished> {
+    const done = await this.run(text, this.backend.finish(change, files));
+    await this.show(done.state, done.vertices);
     this.refreshPanels();
     if (done.warnings.length) this.say(done.warnings.join(" "));
     return done;
   }
 
+  /** Let a file become the shape; return whether it did. */
+  async openFile(file: NamedFile): Promise<boolean> {
+    const change = { kind: "open", name: file.name };
+    const opening = this.change(change, `Reading ${file.name}`, { file: file.bytes });
+    return opening.then(
+      () => true,
+      () => false, // the status line has said what failed
+    );
+  }
+
+  /** Show `text` as the status while `work` runs, and its error if it fails. */
   async run<T>(text: string, work: Promise<T>): Promise<T> {
     this.busy += 1;
     this.say(`${text} …`);
@@ -163,14 +150,35 @@ export class Studio implements App {
 
   say(text: string): void {
     this.status.classList.remove("failed");
-    this.status.textContent = text;
-    this.status.title = text;
+    this.status.textContent = this.status.title = text;
   }
 
+  /** Save a file that the library writes: a mesh format, or the edits. */
+  async save(kind: string, ending: string): Promise<void> {
+    const wanted = this.backend.array<Uint8Array<ArrayBuffer>>(`file/${kind}`);
+    const file = await this.run("Writing the file", wanted).catch(() => null);
+    if (file) download(file, this.fileName(ending));
+  }
+
+  /** Let the buttons of a form that name a format save the shape. */
+  addExports(form: Form, usable = true): void {
+    for (const button of form.root.querySelectorAll<HTMLElement>("[data-format]")) {
+      const format = button.dataset.format!;
+      button.hidden = !usable;
+      button.addEventListener("click", () => this.save(format, format));
+    }
+  }
+
+  fileName(ending: string): string {
+    return `${this.state.name.replace(/\.\w{2,4}$/, "") || "shape"}.${ending}`;
+  }
+
+  /** Bind a key such as "g", "Shift+D" or "Ctrl+Z"; the overview lists it with its text. */
   shortcut(key: string, text: string, action: () => void): void {
     this.shortcuts.set(key, { text, action });
   }
 
+  /** Show a panel. */
   open(id: string): void {
     const next = this.pages.get(id);
     if (!next || next.panel === this.active) return;
@@ -187,34 +195,27 @@ export class Studio implements App {
   }
 
   private addPanel(panel: Panel): void {
-    const capabilities = this.state.capabilities as string[];
+    const { capabilities } = this.state;
     if (!panel.needs.every((need) => capabilities.includes(need))) return;
     const number = this.pages.size + 1;
-    const tab = h(
-      "button",
-      {
-        type: "button",
-        role: "tab",
-        id: `tab-${panel.id}`,
-        "aria-controls": `panel-${panel.id}`,
-        "data-test": `tab-${panel.id}`,
-        title: `${panel.title} (${number})`,
-        onclick: () => this.open(panel.id),
-      },
-      panel.title,
-    );
-    const page = h("section", {
-      role: "tabpanel",
-      id: `panel-${panel.id}`,
-      "aria-labelledby": tab.id,
-      "data-test": `panel-${panel.id}`,
-      hidden: true,
-    });
-    page.append(panel.build(this));
-    this.tabs.append(tab);
-    this.body.append(page);
+    const [tabId, pageId] = [`tab-${panel.id}`, `panel-${panel.id}`];
+    const click = () => this.open(panel.id);
+    const title = `${panel.title} (${number})`;
+    const control = { id: tabId, "data-test": tabId, role: "tab", "aria-controls": pageId };
+    const tab = h("button", { ...control, type: "button", title, click }, panel.title);
+    const region = { id: pageId, "data-test": pageId, role: "tabpanel", "aria-labelledby": tabId };
+    const page = h("section", { ...region, hidden: true }, panel.build(this));
+    this.page.get("tabs").append(tab);
+    this.page.get("panels").append(page);
     this.pages.set(panel.id, { panel, tab, page });
-    this.shortcut(String(number), `Panel: ${panel.title}`, () => this.open(panel.id));
+    this.shortcut(String(number), `Panel: ${panel.title}`, click);
+  }
+
+  private requestMesh(): Promise<[Float32Array, Uint32Array]> {
+    return Promise.all([
+      this.backend.array<Float32Array>("vertices"),
+      this.backend.array<Uint32Array>("faces"),
+    ]);
   }
 
   private async load(): Promise<void> {
@@ -222,24 +223,26 @@ export class Studio implements App {
   }
 
   /** Take a state, and load the mesh or the vertices if they are others than the viewer has. */
-  private async show(state: State): Promise<void> {
+  private async show(state: State, vertices?: Float32Array<ArrayBuffer>): Promise<void> {
     this.state = state;
-    if (state.shape !== this.shown.shape) {
-      const names = ["vertices", "faces"];
-      const [vertices, faces] = await Promise.all(names.map((name) => this.backend.array(name)));
-      const [points, corners] = [vertices!.data as Float32Array, faces!.data as Uint32Array];
-      this.viewer.setMesh(points, corners, state.up, state.front);
-      this.viewer.shape = state.shape;
-    } else if (state.pose !== this.shown.pose) {
-      this.viewer.setVertices((await this.backend.array("vertices")).data as Float32Array);
-    }
-    this.shown = { shape: state.shape, pose: state.pose };
-    this.title.textContent = this.title.title = state.name;
-    const [vertices, faces] = [state.n_vertices, state.n_faces].map((n) => n.toLocaleString("en"));
-    this.counts.textContent = `${vertices} vertices · ${faces} faces`;
+    const { shape, pose } = state;
+    if (shape !== this.shown.shape) {
+      if (this.shown.shape >= 0) this.mesh = this.requestMesh();
+      const [points, faces] = await this.mesh;
+      this.viewer.setMesh(points, faces, state.up, state.front);
+      this.viewer.shape = shape;
+    } else if (pose !== this.shown.pose)
+      this.viewer.setVertices(vertices ?? (await this.backend.array("vertices")));
+    this.shown = { shape, pose };
+    this.page.text("name", state.name);
+    this.page.get("name").title = state.name;
+    const [nVertices, nFaces] = [state.n_vertices, state.n_faces].map((n) =>
+      n.toLocaleString("en"),
+    );
+    this.page.text("counts", `${nVertices} vertices · ${nFaces} faces`);
     clearTimeout(this.timer);
     const { health, spectrum, parts, deformation } = state;
-    if ([health, spectrum, parts, deformation].some((part) => part.status === "running"))
+    if ([health, spectrum, parts, deformation].some(({ status }) => status === "running"))
       this.timer = window.setTimeout(() => this.refresh().catch((error) => this.fail(error)), POLL);
   }
 
@@ -267,19 +270,15 @@ export class Studio implements App {
     const rows = [...this.shortcuts].map(([key, { text }]) =>
       h("div", {}, h("kbd", {}, key.replaceAll("+", " + ")), text),
     );
-    const mouse =
-      "Drag turns the shape, the right button moves it, the wheel zooms; so do the arrow keys, " +
-      "+ and - while the picture has the focus.";
-    const close = button("Close", "help-close", "Close (Esc)", () => this.help.close());
-    this.help.replaceChildren(h("h2", {}, "Keys"), h("div", { class: "keys" }, ...rows), mouse, close);
+    this.page.get("keys").replaceChildren(...rows);
     this.help.showModal();
   }
 
   private press(event: KeyboardEvent): void {
-    const target = event.composedPath()[0];
-    const typing = target instanceof HTMLInputElement && !["range", "checkbox", "radio"].includes(target.type);
-    if (typing || target instanceof HTMLSelectElement || this.help.open) return;
-    if (target instanceof HTMLButtonElement && event.key === "Enter") return; // it presses the button
+    const target = event.composedPath()[0] as HTMLElement;
+    const typing = target.matches?.("select, input:not([type=range], [type=checkbox])");
+    if (typing || this.help.open) return;
+    if (target.tagName === "BUTTON" && event.key === "Enter") return; // it presses the button
     const letter = event.key.length === 1 ? event.key.toUpperCase() : event.key;
     const control = event.ctrlKey || event.metaKey;
     // Shift is part of "?" itself, but tells "Ctrl+Shift+Z" from "Ctrl+Z".

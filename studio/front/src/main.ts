@@ -1,7 +1,8 @@
 /** Start the studio in the page that loads this bundle; a notebook calls `render` instead. */
 
-import { Settings, Studio, type Panel } from "./app";
+import { Settings, Studio } from "./app";
 import type { Backend } from "./core/backend";
+import { h } from "./core/dom";
 import { httpBackend } from "./hosts/http";
 import { inlineBackend } from "./hosts/inline";
 import { widgetBackend, type WidgetModel } from "./hosts/widget";
@@ -12,52 +13,46 @@ import { SearchPanel } from "./panels/search";
 import { ShapePanel } from "./panels/shape";
 import { SpectrumPanel } from "./panels/spectrum";
 
-function makePanels(): Panel[] {
-  return [new DeformPanel(), new ShapePanel(), new SpectrumPanel(), new HeatPanel(), new PartsPanel(), new SearchPanel()];
-}
-
-/** Return the number of this tab, which the server knows its session by; it survives a reload. */
-function tabNumber(settings: Settings): string {
-  const number = settings.get("tab", "") || crypto.randomUUID();
-  settings.set("tab", number);
-  return number;
-}
-
-/** Let the studio fill the window. */
-function fillWindow(host: HTMLElement): HTMLElement {
-  document.body.style.margin = "0";
-  host.style.height = "100vh";
-  return host;
-}
-
 function start(backend: Backend, host: HTMLElement, settings: Settings, keys: EventTarget): Studio {
-  const studio = new Studio(backend, host, makePanels(), settings, keys);
+  const panels = [
+    new DeformPanel(),
+    new ShapePanel(),
+    new SpectrumPanel(),
+    new HeatPanel(),
+    new PartsPanel(),
+    new SearchPanel(),
+  ];
+  const studio = new Studio(backend, host, panels, settings, keys);
   studio.start().catch((error) => studio.fail(error));
   return studio;
 }
 
-const page = document.getElementById("eigenshape-studio");
-const data = document.getElementById("eigenshape-data");
-// The page around the studio; a notebook has its own.
-if (page || data) {
+/** Let the studio fill the window of a page of ours; a notebook has its own page. */
+function fillWindow(backend: Backend, settings: Settings): void {
   const sheet = new CSSStyleSheet();
   sheet.replaceSync("html, body, body > div { height: 100%; margin: 0; }");
   document.adoptedStyleSheets = [sheet];
+  const page = document.getElementById("eigenshape-studio");
+  const host = page ?? document.body.appendChild(h("div"));
+  (window as any).eigenshape = start(backend, host, settings, window); // for tests
 }
-if (page) {
-  const settings = new Settings(sessionStorage);
-  // For tests.
-  (window as any).eigenshape = start(httpBackend(tabNumber(settings)), fillWindow(page), settings, window);
-} else if (data) {
-  const host = fillWindow(document.body.appendChild(document.createElement("div")));
+
+const data = document.getElementById("eigenshape-data");
+if (data) {
   // All files share one storage, so each report has a key of its own.
   const settings = new Settings(sessionStorage, `eigenshape ${location.pathname}`);
-  inlineBackend(data).then((backend) => ((window as any).eigenshape = start(backend, host, settings, window)));
+  inlineBackend(data).then((backend) => fillWindow(backend, settings));
+} else if (document.getElementById("eigenshape-studio")) {
+  const settings = new Settings(sessionStorage);
+  // The server knows the session of a tab by a number, which survives a reload.
+  const tab = settings.get("tab", "") || crypto.randomUUID();
+  settings.set("tab", tab);
+  fillWindow(httpBackend(tab), settings);
 }
 
 /** Show the studio in the output of a notebook's cell (anywidget). */
 function render({ model, el }: { model: WidgetModel; el: HTMLElement }): () => void {
-  const host = el.appendChild(document.createElement("div"));
+  const host = el.appendChild(h("div"));
   host.style.height = `${model.get("height") ?? 640}px`;
   const { viewer } = start(widgetBackend(model), host, new Settings(null), host);
   return () => viewer.dispose();

@@ -1,28 +1,13 @@
 import { expect, test } from "vitest";
-import { cutTree, findLevels, relabel } from "../src/core/parts";
-import cases from "./cases.json";
+import { cutParts } from "../src/core/parts";
 
-for (const [number, tree] of cases.trees.entries()) {
-  const merges = { count: tree.count, rows: Float64Array.from(tree.rows) };
-  const finest = Int32Array.from(tree.labels);
-  for (const [name, cuts] of Object.entries({ number: tree.by_count, persistence: tree.by_persistence }))
-    test(`tree ${number} cut by ${name} equals segment`, () => {
-      expect(cuts.length).toBeGreaterThan(2);
-      for (const cut of cuts) {
-        const { parts, kept } = cutTree(merges, cut);
-        expect(kept.map((region) => tree.maxima[region])).toEqual(cut.vertices);
-        expect(Array.from(relabel(finest, parts))).toEqual(cut.labels);
-      }
-    });
+// Three regions, of which at least two stay apart.
+const cuts = Int32Array.of(0, 1, 0, 0, 1, 2);
+const finest = Int32Array.of(2, 0, 1, 2);
 
-  test(`tree ${number}: each level adds a part`, () => {
-    const levels = findLevels(merges);
-    const roots = tree.count - levels.length;
-    expect([...levels]).toEqual([...levels].sort((a, b) => b - a));
-    levels.forEach((persistence, i) => expect(cutTree(merges, { persistence }).kept.length).toBeGreaterThan(roots + i));
-  });
-}
-
-test("what has no region stays without", () => {
-  expect([...relabel(Int32Array.of(-1, 1, 0), Int32Array.of(0, 0))]).toEqual([-1, 0, 0]);
+test("a cut unites the finest regions, and there are not fewer or more parts than possible", () => {
+  expect([...cutParts(finest, cuts, 3, 2)]).toEqual([0, 0, 1, 0]);
+  expect([...cutParts(finest, cuts, 3, 3)]).toEqual([2, 0, 1, 2]);
+  expect(cutParts(finest, cuts, 3, 1)).toEqual(cutParts(finest, cuts, 3, 2));
+  expect(cutParts(finest, cuts, 3, 9)).toEqual(cutParts(finest, cuts, 3, 3));
 });

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { backendOver, StudioError, type Send } from "../src/core/backend";
+import { backendOver, type Send } from "../src/core/backend";
 import { decode, encode, type TypedArray } from "../src/core/wire";
 
 const arrays: Record<string, TypedArray> = {
@@ -13,21 +13,20 @@ const arrays: Record<string, TypedArray> = {
 
 test("messages come back as they were, and arrays begin at multiples of 8", () => {
   const meta = { name: "größe ∞", list: [1, null, true] };
-  const message = encode(meta, { ...arrays, f: { data: Float32Array.of(1, 2, 3, 4, 5, 6), shape: [2, 3] } });
+  const message = encode(meta, arrays);
   const found = decode(message);
   expect(found.meta).toEqual(meta);
   for (const [name, array] of Object.entries(arrays)) {
-    expect(found.arrays[name]).toEqual({ data: array, shape: [array.length] });
-    expect(found.arrays[name]!.data.byteOffset % 8).toBe(0);
+    expect(found.arrays[name]).toEqual(array);
+    expect(found.arrays[name]!.byteOffset % 8).toBe(0);
   }
-  expect(found.arrays.f!.shape).toEqual([2, 3]);
 });
 
 test("a message may begin anywhere in a larger buffer", () => {
   const message = encode({}, arrays);
   const larger = new Uint8Array(message.length + 3);
   larger.set(message, 3);
-  expect(decode(larger.subarray(3)).arrays.b!.data[0]).toBe(Math.PI);
+  expect(decode(larger.subarray(3)).arrays.b![0]).toBe(Math.PI);
 });
 
 test("the bytes are those of the specification", () => {
@@ -41,9 +40,9 @@ test("the bytes are those of the specification", () => {
 
 test("damaged messages are refused", () => {
   const message = encode({}, arrays);
-  expect(() => decode(message.subarray(0, 2))).toThrow("4 bytes");
+  expect(() => decode(message.subarray(0, 2))).toThrow(RangeError);
   expect(() => decode(message.subarray(0, 20))).toThrow("header");
-  expect(() => decode(message.slice(0, message.length - 16))).toThrow("Array");
+  expect(() => decode(message.slice(0, message.length - 16))).toThrow(RangeError);
 });
 
 test("half precision comes as single precision, times its scale", () => {
@@ -55,8 +54,8 @@ test("half precision comes as single precision, times its scale", () => {
   message.set(new Uint8Array(halves.buffer), 96);
   message[0] = 92;
   const found = decode(message).arrays.h!;
-  expect(found.data).toBeInstanceOf(Float32Array);
-  [3, -6, 1, 3 * 2 ** -24, 3 * 65504].forEach((value, i) => expect(found.data[i]! / value).toBeCloseTo(1, 3));
+  expect(found).toBeInstanceOf(Float32Array);
+  [3, -6, 1, 3 * 2 ** -24, 3 * 65504].forEach((value, i) => expect(found[i]! / value).toBeCloseTo(1, 3));
 });
 
 test("calls become messages, and errors of the library are thrown", async () => {
@@ -71,6 +70,5 @@ test("calls become messages, and errors of the library are thrown", async () => 
   const answer = await backend.rig({ n_modes: null, regions, fixed: Uint32Array.of(0) });
   expect([...answer.shares]).toEqual([0, 1]);
   expect(seen[0]).toEqual(["rig", { n_modes: null, n_regions: 2, fixed: true }, ["region0", "region1", "fixed"]]);
-  await expect(backend.finish({ kind: "undo" })).rejects.toThrow(StudioError);
   await expect(backend.finish({ kind: "undo" })).rejects.toThrow("A region is empty.");
 });

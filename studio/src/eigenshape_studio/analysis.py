@@ -43,7 +43,7 @@ class Analysis:
         self._n_modes = n_modes
         # The first that a page asks for; it has begun when the browser opens.
         self._upright: Job[dict[str, Any]] = Job(lambda _: frame_shape(mesh), shared=True)
-        self.health: Job[dict[str, Any]] = Job(lambda _: assess_health(mesh), shared=shared)
+        self.health: Job[dict[str, Any]] = Job(self._assess_health, shared=shared)
         self.spectrum: Job[es.Spectrum] = Job(self._solve_default, shared=shared)
         solved = self.spectrum
         self.rig: Job[es.deformation.EigenRig] = Job(lambda _: _rig(mesh, solved), shared=shared)
@@ -98,8 +98,10 @@ class Analysis:
     def health_facts(self) -> dict[str, Any]:
         """Return what is known of the faults of the mesh so far."""
         nothing = ("components", "boundary_loops", "closed", "manifold", "area", "volume")
-        found = self.health.result or {**dict.fromkeys(nothing), "findings": []}
-        return {"status": self.health.status, **found}
+        unknown: dict[str, Any] = {**dict.fromkeys(nothing), "findings": []}
+        found = self.health.result or unknown
+        status = self.health.status
+        return {"status": status, **found, **describe_health(self.mesh, found, status)}
 
     def spectrum_facts(self) -> dict[str, Any]:
         """Return how far the spectrum is, and what is proved of it."""
@@ -121,7 +123,12 @@ class Analysis:
             "levels": [] if found is None else found.tree.persistence.tolist(),
         }
 
+    def _assess_health(self, _progress: Progress) -> dict[str, Any]:
+        self._upright.wait()  # nothing may delay the first picture
+        return assess_health(self.mesh)
+
     def _solve_default(self, progress: Progress) -> es.Spectrum:
+        self._upright.wait()
         n_components, _ = es.geometry.vertex_components(self.mesh)
         wanted = min(self._n_modes + n_components - 1, self.mesh.n_vertices)
         return _solve(self.mesh, wanted, progress)
@@ -186,7 +193,9 @@ def _drag_a_ball() -> None:
     ball = es.icosphere(1)
     session = es.DeformationSession(es.rig_shape(ball))
     session.drag(ball.vertices[:, 2] > 0, es.Translation([0.0, 0.0, 0.1]))
-    es.geometry.self_intersections(session.commit())
+    bent = session.commit()
+    es.geometry.self_intersections(bent)
+    es.geometry.geodesic_waves(bent)(0, 1.0)
 
 
 def assess_health(mesh: es.TriangleMesh) -> dict[str, Any]:
@@ -201,8 +210,46 @@ def assess_health(mesh: es.TriangleMesh) -> dict[str, Any]:
         "manifold": es.geometry.is_manifold(mesh),
         "area": es.geometry.surface_area(mesh),
         "volume": _volume(mesh) if closed else None,
-        "findings": [{"name": name, "why": why} for name, why in zip(names, report, strict=True)],
+        "findings": [_finding(name, why) for name, why in zip(names, report, strict=True)],
     }
+
+
+def describe_health(
+    mesh: es.TriangleMesh, health: dict[str, Any], status: str
+) -> dict[str, list[tuple[str, str]]]:
+    """Return sizes by their names, and a line of text for each fact of health: good or fair."""
+    facts = [("Vertices", f"{mesh.n_vertices:,}"), ("Faces", f"{mesh.n_faces:,}")]
+    if status != "ready":
+        text = "It cannot be examined." if status == "failed" else "It is being examined …"
+        return {"facts": facts, "lines": [("fair", text)]}
+    volume = health["volume"]
+    enclosed = "none: it is not closed" if volume is None else f"{volume:.4g} length³"
+    facts += [("Area", f"{health['area']:.4g} length²"), ("Volume", enclosed)]
+    n_pieces, n_rims = health["components"], health["boundary_loops"]
+    rims = "1 boundary" if n_rims == 1 else f"{n_rims:,} boundaries"
+    sheets = "Some edges or vertices join more than one sheet."
+    lines = [
+        _line(n_pieces == 1, "It is one piece.", f"It consists of {n_pieces:,} separate pieces."),
+        _line(
+            health["closed"],
+            "It is closed: it has an inside and an outside.",
+            f"It is open, with {rims}.",
+        ),
+        _line(health["manifold"], "It is a clean surface (manifold).", sheets),
+    ]
+    if not health["findings"]:
+        lines.append(("good", "No repair is needed."))
+    return {"facts": facts, "lines": lines}
+
+
+def _line(good: bool, if_good: str, otherwise: str) -> tuple[str, str]:
+    return ("good", if_good) if good else ("fair", otherwise)
+
+
+def _finding(name: str, why: str) -> dict[str, str]:
+    """Return a repair that would help: its name, and what it would do, as the page shows it."""
+    text = f"A trial of {why.replace(name, name.replace('_', ' '))}."
+    return {"name": name, "why": why, "text": text}
 
 
 def _volume(mesh: es.TriangleMesh) -> float | None:
@@ -220,11 +267,18 @@ def vertex_labels(mesh: es.TriangleMesh, labels: np.ndarray) -> np.ndarray:
     return np.asarray(around.tocsr().argmax(axis=1)).ravel().astype(np.int32)
 
 
-def merge_rows(tree: es.features.PartTree) -> np.ndarray:
-    """Return the merges of a tree: for each region with a parent its number, parent and level."""
-    merged = np.flatnonzero(tree.parent >= 0)
-    rows = [merged, tree.parent[merged], tree.persistence[merged]]
-    return np.column_stack(rows).astype(np.float64)
+def cut_rows(tree: es.features.PartTree) -> np.ndarray:
+    """Return the part of each finest region for every number of parts, one row each, fewest first.
+
+    A row equals `es.segment` with that number of regions. Regions are sorted by falling
+    persistence, so the last region that is left is always the next to merge with its parent.
+    """
+    part = np.arange(len(tree.parent), dtype=np.int32)
+    rows = [part.copy()]
+    for last in range(len(part) - 1, np.count_nonzero(tree.parent < 0) - 1, -1):
+        part[part == last] = part[tree.parent[last]]
+        rows.append(part.copy())
+    return np.stack(rows[::-1])
 
 
 def diagram_rows(mesh: es.TriangleMesh, heat: np.ndarray) -> np.ndarray:

@@ -15,7 +15,6 @@ import numpy as np
 import eigenshape as es
 from eigenshape_studio.wire import WireError, decode, encode
 
-SUFFIXES = (".ply", ".obj", ".off", ".stl", ".glb", ".gltf", ".mesh", ".msh", ".vtk", ".vtu")
 LONGEST_NAME = 120  # characters that are kept of a file's name
 
 
@@ -65,10 +64,9 @@ def parse_mesh(name: str, data: bytes, limits: Limits | None = None) -> es.Trian
     """
     limits = limits or Limits()
     suffix = Path(name).suffix.lower()
-    if suffix not in SUFFIXES:
-        raise es.FileFormatError(
-            f"A mesh file must end in {', '.join(SUFFIXES)}; {display_name(name)} does not."
-        )
+    if suffix not in es.io.MESH_FORMATS:
+        known = ", ".join(es.io.MESH_FORMATS)
+        raise es.FileFormatError(f"A mesh file must end in {known}; {display_name(name)} does not.")
     command = [sys.executable, "-m", "eigenshape_studio.parse", suffix]
     numbers = [limits.seconds, limits.memory, limits.n_faces]
     try:

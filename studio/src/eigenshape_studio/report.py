@@ -102,10 +102,10 @@ def _message(
         raise analysis.spectrum.error
     state = workspace.state() | {"capabilities": []}
     state["deformation"] |= {"status": "none", "message": ""}
-    names = ["vertices", "faces", "eigenvalues", "areas"]
+    names = ["vertices", "faces", "eigenvalues", "coefficients", "areas"]
     names += [f"values/{name}" for name in workspace.fields]
     if state["parts"]["status"] == "ready":
-        names += ["parts/labels", "parts/merges", "diagram"]
+        names += ["parts/labels", "parts/cuts", "diagram"]
     arrays = {name: workspace.array(name) for name in names}
     modes = {"modes": np.asarray(workspace.array("modes"), dtype=np.float64)}
     return encode_halves(state, arrays, modes)

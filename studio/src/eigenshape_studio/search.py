@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.image import imsave
 
 import eigenshape as es
-from eigenshape.plot.render import draw
 from eigenshape_studio.analysis import upright_view
 
 THUMBNAIL = 144  # pixels
@@ -59,9 +58,18 @@ class Shelf:
             ours, theirs = match.correspondences.T
             pairs = np.column_stack([descriptor.vertices[ours], match.vertices[theirs]])
             arrays[f"pairs{number}"] = pairs.astype("<u4")
+            arrays[f"colors{number}"] = color_places(mesh.vertices[pairs[:, 0]])
             if picture is not None:
                 arrays[f"thumbnail{number}"] = np.frombuffer(picture, np.uint8)
         return {"matches": matches}, arrays
+
+
+def color_places(points: np.ndarray) -> np.ndarray:
+    """Return a color for each point, red, green, blue of 255: neighbors have similar colors."""
+    low = points.min(axis=0, initial=np.inf)
+    span = np.ptp(points, axis=0) if len(points) else np.ones(3)
+    shares = (points - low) / np.where(span > 0, span, 1.0)
+    return np.round(40 + 215 * shares).astype(np.uint8)
 
 
 def _picture(source: str | None) -> tuple[bytes | None, dict[str, list[float]]]:
@@ -80,5 +88,5 @@ def _draw_file(source: str, _changed: int) -> tuple[bytes, dict[str, list[float]
     mesh = es.read_mesh(source)
     camera = es.plot.three_quarter_view(mesh, size=THUMBNAIL)
     file = BytesIO()
-    imsave(file, draw(mesh, camera).image, format="png")
+    imsave(file, es.plot.draw(mesh, camera).image, format="png")
     return file.getvalue(), upright_view(mesh)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import eigenshape as es
-from eigenshape_studio.analysis import N_MODES, Analysis, diagram_rows, merge_rows, vertex_labels
+from eigenshape_studio.analysis import N_MODES, Analysis, cut_rows, diagram_rows, vertex_labels
 from eigenshape_studio.jobs import NO_JOB
 from eigenshape_studio.parse import display_name, parse_mesh
 from eigenshape_studio.poses import carry_pose
@@ -113,6 +113,9 @@ class Workspace:
         # How often the vertices, and how often the mesh, has changed.
         self.pose, self.shape = 0, 0
         self._changing = threading.RLock()
+        self._painting = threading.Lock()
+        # The pose that the brush last painted on, and the function that computes distances on it.
+        self._waves: tuple[Any, Any] = (None, None)
 
     def fork(self) -> "Workspace":
         """Return a workspace of the same shape for another tab, without its edits."""
@@ -120,7 +123,7 @@ class Workspace:
         twin.__dict__.update(self.__dict__)
         twin.analysis, twin.fields = self.analysis.fork(), dict(self.fields)
         twin.session, twin.bound, twin.mode = None, None, "graded"
-        twin._changing = threading.RLock()
+        twin._changing, twin._painting = threading.RLock(), threading.Lock()
         return twin
 
     def close(self) -> None:
@@ -166,6 +169,7 @@ class Workspace:
             "n_faces": analysis.mesh.n_faces,
             **analysis.view(),
             "capabilities": capabilities,
+            "suffixes": ",".join(es.io.MESH_FORMATS),
             "health": analysis.health_facts(),
             "values": [_field_facts(name, field) for name, field in self.fields.items()],
             "spectrum": analysis.spectrum_facts(),
@@ -210,6 +214,7 @@ class Workspace:
             "areas": lambda: self.analysis.areas.astype("<f4"),
             "modes": lambda: self._modes(meta),
             "eigenvalues": lambda: self._spectrum().eigenvalues.astype("<f8"),
+            "coefficients": self._coefficients,
             "brackets": lambda: self._brackets(meta),
             "diagram": self._diagram,
             "crossings": self._crossings,
@@ -218,6 +223,7 @@ class Workspace:
             "parts": self._parts_array,
             "values": self._values_array,
             "skeleton": self._skeleton,
+            "disc": self._disc,
             "file": self._file,
             "match": self._match_array,
         }
@@ -244,6 +250,12 @@ class Workspace:
         stop = whole(meta, "stop", start, modes.shape[1], modes.shape[1])
         return np.ascontiguousarray(modes[:, start:stop].T, dtype="<f4")
 
+    def _coefficients(self) -> np.ndarray:
+        """Return the coordinates of the present pose in terms of the modes, (k, 3)."""
+        spectrum = self._spectrum()
+        weighted = spectrum.mass @ self.mesh.vertices
+        return np.asarray(spectrum.eigenvectors.T @ weighted).astype("<f4")
+
     def _brackets(self, meta: dict[str, Any]) -> np.ndarray:
         k = whole(meta, "stop", 1, min(300, self.analysis.mesh.n_vertices), N_BRACKETS)
         found = self.analysis.brackets
@@ -266,9 +278,9 @@ class Workspace:
         found = self._require_parts()
         if tail == "labels":
             return vertex_labels(found.mesh, found.tree.basins)
-        if tail == "merges":
-            return merge_rows(found.tree)
-        raise RequestError(f"Of parts there are labels and merges; {tail[:80]!r} was requested.")
+        if tail == "cuts":
+            return cut_rows(found.tree)
+        raise RequestError(f"Of parts there are labels and cuts; {tail[:80]!r} was requested.")
 
     def _values_array(self, tail: str) -> np.ndarray:
         if tail not in self.fields:
@@ -285,6 +297,31 @@ class Workspace:
                 f"A skeleton must be of 1 to {rig.n_modes} modes; not {tail[:80]!r}."
             )
         return es.deformation.eigen_skeleton(rig, int(tail)).astype("<f4")
+
+    def _disc(self, tail: str) -> np.ndarray:
+        """Return the vertices within a geodesic radius of a vertex; `tail` is "vertex/radius".
+
+        A stroke of the brush asks for many discs, so what they have in common is kept.
+        """
+        vertex, _, radius = tail.partition("/")
+        try:
+            source, reach = int(vertex), float(radius)
+        except ValueError as err:
+            raise RequestError(
+                f"A disc must be named by its vertex and its radius, as 'disc/7/0.5'; not {tail[:80]!r}."
+            ) from err
+        if not (0 <= source < self.mesh.n_vertices and 0 < reach < np.inf):
+            raise RequestError(
+                f"A disc must have one of the {self.mesh.n_vertices} vertices and a positive, finite "
+                f"radius; it has vertex {source} and radius {reach:g}."
+            )
+        with self._painting:
+            mesh, wave = self._waves
+            if mesh is not self.mesh:
+                mesh = self.mesh
+                wave = es.geometry.geodesic_waves(mesh)
+                self._waves = mesh, wave
+        return np.flatnonzero(wave(source, reach) <= reach).astype("<u4")
 
     def _file(self, tail: str) -> np.ndarray:
         if tail not in ("ply", "obj", "glb", "edits"):
@@ -337,8 +374,15 @@ class Workspace:
             self._require_session()
             self.bound = None
             binding = self._drag(Bound(regions, fixed, n_modes), [None] * n_regions)
-        facts = {"n_modes": binding.n_modes.tolist(), "seconds": perf_counter() - began}
-        return facts, {"shares": binding.shares.astype("<f4")}
+        facts = {
+            "n_modes": binding.n_modes.tolist(),
+            "pivots": [_rim_center(self.mesh, region) for region in regions],
+            "seconds": perf_counter() - began,
+        }
+        # As the vertex shader takes them.
+        shares = np.zeros((self.mesh.n_vertices, MOST_REGIONS), dtype="<f4")
+        shares[:, :n_regions] = binding.shares.T
+        return facts, {"shares": shares}
 
     def _drag(self, bound: Bound, handles: list[Any]) -> es.deformation.Binding:
         """Drag the bound regions by handles, and return by how much each vertex follows."""
@@ -548,6 +592,13 @@ def handle_from(entry: Any) -> es.types.Handle:
     except (KeyError, TypeError) as err:
         raise RequestError(f"A handle must have all its entries; {err} is missing.") from err
     raise RequestError("The type of a handle must be rotation or translation.")
+
+
+def _rim_center(mesh: es.TriangleMesh, region: np.ndarray) -> list[float]:
+    """Return the mean of the vertices at the rim of a region, about which it turns."""
+    rim = es.deformation.region_boundary(mesh, es.deformation.region_mask(mesh, region))
+    center: list[float] = mesh.vertices[rim if len(rim) else region].mean(axis=0).tolist()
+    return center
 
 
 def _bytes(arrays: Arrays, name: str) -> bytes:

@@ -3,53 +3,64 @@
 import tables from "./color_tables.json";
 import { h } from "./dom";
 
-function bytes(base64: string): Uint8Array {
-  return Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
+/** How the values of a function are colored, and what its legend says. */
+export interface Scale {
+  map: string;
+  range: [number, number];
+  title: string;
+  unit?: string;
+  nodal?: boolean; // whether a line marks where the function is zero
 }
 
-/** 256 colors of a color map of matplotlib, red, green, blue: "viridis", "inferno" or "RdBu_r". */
-export function colorMap(name: string): Uint8Array {
-  const table = (tables.maps as Record<string, string>)[name];
-  if (!table) throw new Error(`There is no color map ${name}.`);
-  return bytes(table);
+const bytesOf = (base64: string) =>
+  Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
+
+/** Return the 256 colors of "viridis", "inferno" or "RdBu_r": red, green, blue, opacity. */
+export function colorMap(name: string): Uint8Array<ArrayBuffer> {
+  const colors = bytesOf((tables.maps as Record<string, string>)[name]!);
+  return new Uint8Array(1024).map((_, i) => (i % 4 === 3 ? 255 : colors[3 * (i >> 2) + (i % 4)]!));
 }
 
-const PARTS = bytes(tables.parts); // 18 colors; then they repeat, as in eigenshape.plot
+const PARTS = bytesOf(tables.parts); // 18 colors; then they repeat, as in eigenshape.plot
 
-/** Colors of the parts 0 .. count - 1, red, green, blue. */
+/** Return the colors of the parts 0 .. count - 1: red, green, blue. */
 export function partColors(count: number): Uint8Array {
-  return Uint8Array.from({ length: 3 * count }, (_, i) => PARTS[i % PARTS.length]!);
+  return new Uint8Array(3 * count).map((_, i) => PARTS[i % PARTS.length]!);
 }
 
-/** A number with four digits, short enough for a legend; 0 for what is only rounding beside `scale`. */
+/** Return the three bytes of a color such as "#cdc8c0". */
+export function rgbOf(color: string): [number, number, number] {
+  const number = parseInt(color.slice(1), 16);
+  return [number >> 16, (number >> 8) & 255, number & 255];
+}
+
+/** Write a number with four digits; 0 for what is only rounding beside `scale`. */
 export function formatNumber(value: number, scale = Math.abs(value)): string {
-  if (!Number.isFinite(value)) return value > 0 ? "∞" : value < 0 ? "−∞" : "–";
-  if (Math.abs(value) <= 1e-9 * scale) return "0";
   const size = Math.abs(value);
-  const text = size >= 1e-3 && size < 1e6 ? `${Number(value.toPrecision(4))}` : value.toExponential(2);
+  if (size === Infinity) return value > 0 ? "∞" : "−∞";
+  if (size <= 1e-9 * scale) return "0";
+  const plain = size >= 1e-3 && size < 1e6;
+  const text = plain ? String(Number(value.toPrecision(4))) : value.toExponential(2);
   return text.replaceAll("-", "−");
 }
 
-export function findRange(values: ArrayLike<number>): [number, number] {
-  let [low, high] = [Infinity, -Infinity];
-  for (let i = 0; i < values.length; i++) {
-    const value = values[i]!;
-    if (value < low) low = value;
-    if (value > high) high = value;
-  }
-  return low <= high ? [low, high] : [0, 0];
+export function findRange(values: Float32Array): [number, number] {
+  return values.reduce(
+    ([low, high], value) => [Math.min(low, value), Math.max(high, value)],
+    [Infinity, -Infinity],
+  );
 }
 
-/** The bar of a color map with its title and unit, and the numbers at its ends and in the middle. */
-export function buildLegend(title: string, unit: string, map: string, range: [number, number]): HTMLElement {
+/** Return the bar of a color map with its title and unit, and the numbers below it. */
+export function buildLegend({ title, unit, map, range: [low, high] }: Scale): HTMLElement {
   const bar = h("canvas", { class: "bar", width: 256, height: 1 });
-  const colors = colorMap(map);
-  const image = new ImageData(256, 1);
-  for (let i = 0; i < 256; i++) image.data.set([...colors.subarray(3 * i, 3 * i + 3), 255], 4 * i);
-  bar.getContext("2d")?.putImageData(image, 0, 0);
-  const scale = Math.max(...range.map(Math.abs));
-  const numbers = [range[0], (range[0] + range[1]) / 2, range[1]];
-  const texts = numbers.map((number) => h("span", {}, formatNumber(number, scale)));
+  const image = new ImageData(new Uint8ClampedArray(colorMap(map)), 256, 1);
+  bar.getContext("2d")!.putImageData(image, 0, 0);
+  const largest = Math.max(Math.abs(low), Math.abs(high));
+  const numbers = [low, (low + high) / 2, high].map((number) =>
+    h("span", {}, formatNumber(number, largest)),
+  );
   const heading = h("div", {}, unit ? `${title}, ${unit}` : title);
-  return h("div", { class: "legend", "data-test": "legend" }, heading, bar, h("div", { class: "numbers" }, ...texts));
+  const scale = h("div", { class: "numbers" }, ...numbers);
+  return h("div", { class: "legend", "data-test": "legend" }, heading, bar, scale);
 }

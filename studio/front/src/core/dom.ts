@@ -1,49 +1,137 @@
-/** Small helpers to build the page. */
+/** Elements of the page: made one by one, or as a form out of a text of HTML. */
+
+import type { Progress } from "./backend";
 
 type Child = Node | string | null | undefined | false;
-type Attributes = Record<string, unknown>;
 
-/** Return an element: `on...` entries are listeners, booleans are flags, the rest are attributes. */
+/** Return an element: functions are listeners, booleans are flags, the rest are attributes. */
 export function h<K extends keyof HTMLElementTagNameMap>(
   tag: K,
-  attributes: Attributes = {},
+  attributes: Record<string, unknown> = {},
   ...children: Child[]
 ): HTMLElementTagNameMap[K] {
   const element = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
-    if (typeof value === "function") element.addEventListener(name.slice(2), value as EventListener);
+    if (typeof value === "function") element.addEventListener(name, value as EventListener);
     else if (typeof value === "boolean") element.toggleAttribute(name, value);
-    else if (value !== null && value !== undefined) element.setAttribute(name, String(value));
+    else element.setAttribute(name, String(value));
   }
   element.append(...children.filter((child): child is Node | string => !!child));
   return element;
 }
 
-/** Return a button; `name` is its data-test, and `title` its tooltip and description. */
-export function button(label: string, name: string, title: string, action: () => void) {
-  return h("button", { type: "button", "data-test": name, title, onclick: action }, label);
+/** Controls, made out of HTML, by the names in their `data-test`. */
+export class Form {
+  readonly root: HTMLElement;
+
+  constructor(html: string) {
+    const holder = h("div");
+    holder.innerHTML = html;
+    this.root = holder.firstElementChild as HTMLElement;
+  }
+
+  /** Return an element by its name; most are inputs. */
+  get<T extends HTMLElement = HTMLInputElement>(name: string): T {
+    return this.root.querySelector<T>(`[data-test="${name}"]`)!;
+  }
+
+  /** Let buttons and inputs do something when they are clicked or changed. */
+  on(actions: Record<string, () => unknown>): void {
+    for (const [name, action] of Object.entries(actions)) {
+      const element = this.get(name);
+      const change = element.type === "range" ? "input" : "change";
+      element.addEventListener(element.tagName === "BUTTON" ? "click" : change, action);
+    }
+  }
+
+  /** Let the buttons of a choice, whose names begin alike, do something with the rest of theirs. */
+  onChoice(name: string, action: (id: string) => void): void {
+    for (const [id, element] of this.choice(name))
+      element.addEventListener("click", () => {
+        this.press(name, id);
+        action(id);
+      });
+  }
+
+  /** Show one button of a choice as pressed. */
+  press(name: string, pressed: string): void {
+    for (const [id, element] of this.choice(name))
+      element.setAttribute("aria-pressed", String(id === pressed));
+  }
+
+  /** Return the buttons of a choice by the rest of their names. */
+  choice(name: string): [string, HTMLElement][] {
+    const begin = `${name}-`;
+    const buttons = this.root.querySelectorAll<HTMLElement>(`button[data-test^="${begin}"]`);
+    return [...buttons].map((element) => [element.dataset.test!.slice(begin.length), element]);
+  }
+
+  text(name: string, text: string): void {
+    this.get(name).textContent = text;
+  }
+
+  number(name: string): number {
+    return this.get(name).valueAsNumber;
+  }
+
+  setRange(name: string, min: number, max: number): void {
+    Object.assign(this.get(name), { min, max });
+  }
+
+  /** Move a slider, and say in words where it stands. */
+  slide(name: string, value: number, text: string): void {
+    this.get(name).valueAsNumber = value;
+    this.get(name).setAttribute("aria-valuetext", text);
+    this.text(`${name}-value`, text);
+  }
+
+  /** Show the progress of work on the server, while it runs or if it has failed. */
+  progress(name: string, { status, progress, message }: Progress): void {
+    const element = this.get(name);
+    const [bar, text] = element.children as unknown as [HTMLProgressElement, HTMLElement];
+    const failed = status === "failed";
+    element.hidden = status !== "running" && !failed;
+    bar.hidden = failed;
+    bar.value = progress;
+    text.textContent = failed ? message : `${Math.round(100 * progress)} % ${message}`;
+  }
 }
 
 /** Offer bytes as a file. */
-export function download(data: BlobPart, name: string, type = "application/octet-stream") {
+export function download(data: BlobPart, name: string, type = "application/octet-stream"): void {
   const link = h("a", { download: name, href: URL.createObjectURL(new Blob([data], { type })) });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
-export interface ChosenFile {
+export interface NamedFile {
   name: string;
   bytes: Uint8Array<ArrayBuffer>;
 }
 
+const readFiles = (files: FileList | null | undefined) =>
+  Promise.all(
+    [...(files ?? [])].map(async (file) => ({
+      name: file.name,
+      bytes: new Uint8Array(await file.arrayBuffer()),
+    })),
+  );
+
 /** Let the person choose files, and return their names and bytes. */
-export function chooseFiles(accept: string, multiple = true): Promise<ChosenFile[]> {
-  const read = async (file: File) => ({ name: file.name, bytes: new Uint8Array(await file.arrayBuffer()) });
+export function chooseFiles(accept: string, multiple = false): Promise<NamedFile[]> {
+  const input = h("input", { type: "file", accept, multiple });
   return new Promise((resolve) => {
-    const input = h("input", { type: "file", accept, multiple });
-    input.addEventListener("change", () => resolve(Promise.all([...(input.files ?? [])].map(read))));
+    input.addEventListener("change", () => resolve(readFiles(input.files)));
     input.click();
   });
 }
 
-export const chooseFile = async (accept: string) => (await chooseFiles(accept, false))[0]!;
+/** Let files be dropped on an element. */
+export function acceptDrops(element: HTMLElement, onFile: (file: NamedFile) => void): void {
+  for (const type of ["dragover", "dragleave", "drop"] as const)
+    element.addEventListener(type, async (event) => {
+      event.preventDefault(); // otherwise the browser leaves the page for the file
+      element.classList.toggle("dropping", type === "dragover");
+      if (type === "drop") (await readFiles(event.dataTransfer?.files)).slice(0, 1).forEach(onFile);
+    });
+}

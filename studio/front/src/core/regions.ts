@@ -1,7 +1,6 @@
 /** The regions of an edit: each vertex is free, fixed, or in one of at most four regions. */
 
-import { MAX_REGIONS } from "./shaders";
-
+export const MAX_REGIONS = 4; // as in moved.glsl: one component each of the attribute `shares`
 export const FIXED = MAX_REGIONS; // number of the fixed vertices, after those of the regions
 const FREE = FIXED + 1;
 
@@ -25,11 +24,6 @@ export class Regions {
     return Uint32Array.from(found);
   }
 
-  /** Return for each vertex whether it is in a region. */
-  mask(region: number): Uint8Array {
-    return this.owner.map((owner) => (owner === region ? 1 : 0));
-  }
-
   /** Add vertices to a region; they leave the region that had them. */
   add(region: number, vertices: Iterable<number>): void {
     for (const vertex of vertices) this.owner[vertex] = region;
@@ -40,9 +34,7 @@ export class Regions {
   }
 
   clear(region: number): void {
-    this.owner.forEach((owner, vertex) => {
-      if (owner === region) this.owner[vertex] = FREE;
-    });
+    this.remove(region, this.owner.keys());
   }
 
   /** Return the regions as text for the storage of the tab: one digit a vertex. */

@@ -3,48 +3,54 @@
 import * as three from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Handle, Vec3 } from "./backend";
-import { buildLegend, colorMap } from "./colors";
+import { buildLegend, colorMap, rgbOf, type Scale } from "./colors";
 import { h } from "./dom";
-import { vertexNormals } from "./motion";
 import { Picker, type Hit } from "./picking";
-import { MAX_REGIONS, POINT_FRAGMENT, POINT_VERTEX, SURFACE_FRAGMENT, SURFACE_VERTEX } from "./shaders";
+import { MAX_REGIONS } from "./regions";
+import movedSource from "../shaders/moved.glsl?raw";
+import pickFragment from "../shaders/pick.frag.glsl?raw";
+import pickVertex from "../shaders/pick.vert.glsl?raw";
+import pointFragment from "../shaders/point.frag.glsl?raw";
+import pointVertex from "../shaders/point.vert.glsl?raw";
+import surfaceFragment from "../shaders/surface.frag.glsl?raw";
+import surfaceVertex from "../shaders/surface.vert.glsl?raw";
 
-export type { Hit };
-export type PointerMode = "orbit" | "box" | "brush" | "part" | "drag" | "source";
 /** A camera that survives a reload; `shape` says which mesh it looked at. */
 export interface View {
   shape: number;
   position: Vec3;
   target: Vec3;
 }
-/** Takes over the pointer: returns false to leave it to the camera. */
+/** Takes over the pointer: `down` returns false to leave it to the camera. */
 export interface PointerTool {
   down(event: PointerEvent): boolean;
   move(event: PointerEvent): void;
-  up(event: PointerEvent): void;
+  up(): void;
 }
+export type { Hit };
+export type Click = (hit: Hit, event: PointerEvent) => void;
 
-const MOST_PIXELS = 1.5; // device pixels for each pixel of the page: more costs much and shows little
+const MOST_PIXELS = 1.5; // device pixels for each of the page: more costs much and shows little
 const FIELD_OF_VIEW = 26; // degrees: almost parallel, as in the library's pictures
 const MARGIN = 0.84; // share of the window that the shape fills
 const CLICK = 4; // pixels that a click may move
 const FADE = 160; // ms in which the exact result blends in
 const PLAIN = "#cdc8c0";
+const [UNCOLORED, BY_VALUE, BY_PAINT] = [0, 1, 2]; // COLORING of the shader
 
 export class Viewer {
   /** Number of the mesh that is shown; views of another mesh are not restored. */
   shape = -1;
   onView: (view: View) => void = () => {};
-  tool: PointerTool | null = null;
   /** Everything in the coordinates of the mesh; the scene around it has size 1 at any unit. */
   readonly space = new three.Group();
   readonly scene = new three.Scene();
   readonly camera = new three.PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, 100);
-  readonly canvas: HTMLCanvasElement = h("canvas", { tabindex: "0", "data-test": "canvas" });
+  readonly canvas = h("canvas", { tabindex: "0", "data-test": "canvas" });
   readonly geometry = new three.BufferGeometry();
   controls: OrbitControls;
-  vertices: Float32Array = new Float32Array(0);
-  faces: Uint32Array = new Uint32Array(0);
+  vertices = new Float32Array(0);
+  faces = new Uint32Array(0);
   labels: Int32Array | null = null;
   readonly box = new three.Box3(); // around the mesh, as it was loaded
   extent = 1; // its diagonal
@@ -58,14 +64,21 @@ export class Viewer {
     angle: { value: new Float32Array(MAX_REGIONS) },
     blend: { value: 0 },
   };
-  private readonly surface: three.Mesh<three.BufferGeometry, three.ShaderMaterial>;
-  private readonly skeleton: three.Mesh<three.BufferGeometry, three.ShaderMaterial>;
-  private readonly discs: three.Points<three.BufferGeometry, three.ShaderMaterial>;
-  private readonly layers = new Map<string, { vertices: ArrayLike<number>; color: string }>();
+  private readonly surface = new three.Mesh(this.geometry, this.surfaceMaterial(PLAIN));
+  private readonly skeleton = new three.Mesh(
+    new three.BufferGeometry(),
+    this.surfaceMaterial("#3f7fae"),
+  );
+  private readonly discs = new three.Points(
+    new three.BufferGeometry(),
+    this.material(pointVertex, pointFragment, {
+      size: { value: 14 * Math.min(devicePixelRatio, MOST_PIXELS) },
+    }),
+  );
   private readonly watch = new ResizeObserver(() => this.resize());
-  private readonly listeners = new Set<(hit: Hit, event: PointerEvent) => void>();
   private legend: HTMLElement | null = null;
-  private mode: PointerMode = "orbit";
+  private tool: PointerTool | null = null;
+  private click: Click | null = null;
   private frame = 0;
   private fading = 0;
   private up: Vec3 = [0, 1, 0];
@@ -74,43 +87,45 @@ export class Viewer {
   constructor(readonly stage: HTMLElement) {
     stage.append(this.canvas);
     this.canvas.setAttribute("aria-label", "The shape. Arrow keys turn it, + and - zoom.");
-    this.surface = new three.Mesh(this.geometry, this.surfaceMaterial(PLAIN));
-    this.skeleton = new three.Mesh(new three.BufferGeometry(), this.surfaceMaterial("#3f7fae"));
-    this.discs = new three.Points(new three.BufferGeometry(), this.pointMaterial());
     this.skeleton.visible = this.discs.visible = false;
-    this.surface.renderOrder = 1;
-    this.skeleton.renderOrder = 2; // over the veil of the surface, also where it lies behind it
-    this.skeleton.material.transparent = true;
-    this.discs.renderOrder = 3;
-    for (const object of [this.skeleton, this.surface, this.discs]) {
+    this.skeleton.material.transparent = this.discs.material.transparent = true;
+    // The skeleton is drawn over the veil of the surface, also where it lies behind it.
+    [this.surface, this.skeleton, this.discs].forEach((object, order) => {
+      object.renderOrder = order;
       object.frustumCulled = false; // the shader moves vertices out of the box of the geometry
       this.space.add(object);
-    }
+    });
     this.scene.add(this.space);
     this.renderer = this.startRenderer();
-    this.picker = this.renderer && new Picker(this.renderer, this.geometry, this.motion);
+    const grid = { value: new three.Vector2() };
+    const material = this.material(pickVertex, pickFragment, { grid });
+    this.picker = this.renderer && new Picker(this.renderer, this.geometry, material);
     this.controls = this.startControls();
     this.listenToPointer();
+    this.canvas.addEventListener("keydown", (event) => this.turnByKey(event));
     this.watch.observe(stage);
     this.resize();
   }
 
   setMesh(vertices: Float32Array, faces: Uint32Array, up: Vec3, front: Vec3): void {
     const count = vertices.length / 3;
-    [this.vertices, this.faces, this.up, this.front] = [vertices, faces, up, front];
+    Object.assign(this, { vertices, faces, up, front });
     this.geometry.dispose();
-    const attribute = (name: string, array: Float32Array | Uint8Array, size: number) =>
-      this.geometry.setAttribute(name, new three.BufferAttribute(array, size, array instanceof Uint8Array));
+    const attributes = {
+      position: [vertices, 3],
+      normal: [vertexNormals(vertices, faces), 3],
+      exact: [vertices.slice(), 3],
+      exact_normal: [new Float32Array(3 * count), 3],
+      shares: [new Float32Array(MAX_REGIONS * count), MAX_REGIONS],
+      value: [new Float32Array(count), 1],
+      paint: [new Uint8Array(3 * count), 3],
+      mark: [new Uint8Array(4 * count), 4],
+    } as const;
     this.geometry.setIndex(new three.BufferAttribute(faces, 1));
-    attribute("position", vertices, 3);
-    attribute("normal", vertexNormals(vertices, faces), 3);
-    attribute("exact", vertices.slice(), 3);
-    attribute("exact_normal", new Float32Array(3 * count), 3);
-    attribute("shares", new Float32Array(MAX_REGIONS * count), MAX_REGIONS);
-    attribute("value", new Float32Array(count), 1);
-    attribute("paint", new Uint8Array(3 * count), 3);
-    attribute("mark", new Uint8Array(4 * count), 4);
-    this.layers.clear();
+    for (const [name, [array, size]] of Object.entries(attributes)) {
+      const normalized = array instanceof Uint8Array;
+      this.geometry.setAttribute(name, new three.BufferAttribute(array, size, normalized));
+    }
     this.setPoints([], PLAIN);
     this.setSkeleton(null);
     this.setScalars(null);
@@ -127,36 +142,30 @@ export class Viewer {
   }
 
   /** Take a new pose. The motion ends: the new vertices are at rest. */
-  setVertices(vertices: Float32Array): void {
+  setVertices(vertices: Float32Array<ArrayBuffer>): void {
     this.vertices = vertices;
     this.replace("position", vertices);
     this.replace("normal", vertexNormals(vertices, this.faces));
     this.setHandles([]);
   }
 
-  /** Set by how much each vertex follows each region: row r of `shares` is region r. */
-  setShares(shares: Float32Array, nRegions: number): void {
-    const count = this.vertices.length / 3;
-    const packed = new Float32Array(MAX_REGIONS * count);
-    for (let region = 0; region < nRegions; region++)
-      for (let vertex = 0; vertex < count; vertex++)
-        packed[MAX_REGIONS * vertex + region] = shares[region * count + vertex]!;
-    this.replace("shares", packed);
+  /** Set by how much each vertex follows each region: one number for each of `MAX_REGIONS`. */
+  setShares(shares: Float32Array): void {
+    this.replace("shares", shares);
   }
 
   /** Show the motion of the regions by shares, computed in the shader. */
   setHandles(handles: Handle[]): void {
     const { kind, pivot, direction, angle } = this.motion;
     this.motion.n_moving.value = handles.some((handle) => handle) ? handles.length : 0;
-    for (let region = 0; region < MAX_REGIONS; region++) {
-      const handle = handles[region] ?? null;
+    handles.forEach((handle, region) => {
       kind.value[region] = handle ? (handle.type === "rotation" ? 1 : 2) : 0;
       if (handle?.type === "rotation") {
         pivot.value[region]!.set(...handle.pivot);
         direction.value[region]!.set(...handle.axis);
         angle.value[region] = handle.angle;
       } else if (handle) direction.value[region]!.set(...handle.vector);
-    }
+    });
     this.motion.blend.value = 0;
     cancelAnimationFrame(this.fading);
     this.invalidate();
@@ -177,28 +186,20 @@ export class Viewer {
   }
 
   /** Color by a function; nodal lines mark where it is zero. */
-  setScalars(
-    values: Float32Array | null,
-    o: { map: string; range: [number, number]; nodal?: boolean; title: string; unit?: string } | null = null,
-  ): void {
-    const uniforms = this.surface.material.uniforms;
+  setScalars(values: Float32Array | null, scale?: Scale): void {
+    const { table, range, nodal } = this.surface.material.uniforms;
     this.legend?.remove();
-    this.legend = null;
     this.labels = null;
-    this.setColoring(values && o ? 1 : 0);
-    if (values && o) {
-      this.replace("value", values);
-      const colors = colorMap(o.map);
-      const bytes = new Uint8Array(1024).map((_, i) => (i % 4 === 3 ? 255 : colors[3 * (i >> 2) + (i % 4)]!));
-      uniforms.table!.value?.dispose();
-      uniforms.table!.value = new three.DataTexture(bytes, 256, 1);
-      uniforms.table!.value.needsUpdate = true;
-      uniforms.range!.value.set(...o.range);
-      uniforms.nodal!.value = o.nodal ?? false;
-      this.legend = buildLegend(o.title, o.unit ?? "", o.map, o.range);
-      this.stage.append(this.legend);
-    }
-    this.invalidate();
+    this.setColoring(values ? BY_VALUE : UNCOLORED);
+    if (!values || !scale) return;
+    this.replace("value", values);
+    table!.value?.dispose();
+    table!.value = new three.DataTexture(colorMap(scale.map), 256, 1);
+    table!.value.needsUpdate = true;
+    range!.value.set(...scale.range);
+    nodal!.value = scale.nodal ?? false;
+    this.legend = buildLegend(scale);
+    this.stage.append(this.legend);
   }
 
   /** Color by parts; `palette` has three bytes a label. Labels below 0 stay plain. */
@@ -211,69 +212,56 @@ export class Viewer {
       if (label >= 0) paint.set(palette.subarray(3 * label, 3 * label + 3), 3 * vertex);
     });
     this.replace("paint", paint);
-    this.setColoring(2);
+    this.setColoring(BY_PAINT);
   }
 
   private setColoring(kind: number): void {
     const { material } = this.surface;
-    if (material.defines.COLORING === kind) return;
+    if (material.defines.COLORING !== kind) material.needsUpdate = true;
     material.defines.COLORING = kind;
-    material.needsUpdate = true;
+    this.invalidate();
   }
 
-  /** Tint vertices. Each layer has its own vertices and color. */
-  setMarks(vertices: ArrayLike<number>, color: string, layer = "marks"): void {
-    if (vertices.length) this.layers.set(layer, { vertices, color });
-    else if (!this.layers.delete(layer)) return;
-    const marks = new Uint8Array((4 * this.vertices.length) / 3);
-    for (const one of this.layers.values()) {
-      const hex = new three.Color(one.color).getHex(three.SRGBColorSpace);
-      const tint = [hex >> 16, (hex >> 8) & 255, hex & 255, 190];
-      for (let place = 0; place < one.vertices.length; place++) marks.set(tint, 4 * one.vertices[place]!);
-    }
+  /** Tint vertices: red, green, blue and strength of each, in bytes. */
+  setMarks(marks: Uint8Array): void {
     this.replace("mark", marks);
   }
 
   /** Mark vertices by discs of constant size on the screen, of one color or one each. */
-  setPoints(vertices: ArrayLike<number>, colors: string | string[]): void {
+  setPoints(vertices: ArrayLike<number>, colors: string | Uint8Array): void {
     this.discs.visible = vertices.length > 0;
     this.shareBuffers(this.discs.geometry, Uint32Array.from(vertices));
-    const tints = new Float32Array(this.vertices.length);
-    for (let place = 0; place < vertices.length; place++) {
-      const color = this.colorOf(typeof colors === "string" ? colors : colors[place]!);
-      tints.set(color.toArray(), 3 * vertices[place]!);
-    }
-    this.discs.geometry.setAttribute("tint", new three.BufferAttribute(tints, 3));
+    const tints = new Uint8Array(this.vertices.length);
+    Array.from(vertices).forEach((vertex, i) => {
+      const tint = typeof colors === "string" ? rgbOf(colors) : colors.subarray(3 * i, 3 * i + 3);
+      tints.set(tint, 3 * vertex);
+    });
+    this.discs.geometry.setAttribute("tint", new three.BufferAttribute(tints, 3, true));
     this.invalidate();
-  }
-
-  /** Tint the corners of faces in red. */
-  markFaces(faces: ArrayLike<number>): void {
-    const corners = Array.from(faces, (face) => [...this.faces.subarray(3 * face, 3 * face + 3)]);
-    this.setMarks(corners.flat(), "#d8301f", "crossing");
   }
 
   /** Show the eigen-skeleton in a veil of the surface. */
   setSkeleton(points: Float32Array | null): void {
     this.skeleton.visible = points !== null;
     if (points) {
-      this.shareBuffers(this.skeleton.geometry, this.faces);
-      this.skeleton.geometry.setAttribute("position", new three.BufferAttribute(points, 3));
+      const { geometry } = this.skeleton;
+      this.shareBuffers(geometry, this.faces);
+      geometry.setAttribute("position", new three.BufferAttribute(points, 3));
       const normals = vertexNormals(points, this.faces);
-      this.skeleton.geometry.setAttribute("normal", new three.BufferAttribute(normals, 3));
+      geometry.setAttribute("normal", new three.BufferAttribute(normals, 3));
     }
-    const material = this.surface.material;
+    const { material } = this.surface;
     material.transparent = points !== null;
     material.depthWrite = points === null;
     material.uniforms.opacity!.value = points ? 0.28 : 1;
     this.invalidate();
   }
 
+  /** Return what lies under a place of the canvas, as it is shown. */
   pick(x: number, y: number): Hit | null {
-    const { clientWidth: width, clientHeight: height } = this.canvas;
-    if (!this.picker || !this.faces.length || !width) return null;
+    if (!this.faces.length || !this.canvas.clientWidth) return null;
     this.camera.updateMatrixWorld();
-    return this.picker.pick(x, y, width, height, this.camera, this.space.matrixWorld);
+    return this.picker?.pick(x, y, this.camera, this.space.matrixWorld) ?? null;
   }
 
   readPositions(): Float32Array {
@@ -283,7 +271,9 @@ export class Viewer {
   screenshot(): Promise<Blob> {
     this.draw(); // a drawing buffer is readable only in the turn in which it was drawn
     return new Promise((resolve, reject) =>
-      this.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("There is no picture.")))),
+      this.canvas.toBlob((blob) =>
+        blob ? resolve(blob) : reject(new Error("There is no picture.")),
+      ),
     );
   }
 
@@ -302,55 +292,46 @@ export class Viewer {
     this.frame ||= requestAnimationFrame(() => this.draw());
   }
 
-  /** Call back with what was clicked, in every mode but "orbit"; returns how to stop. */
-  onPick(callback: (hit: Hit, event: PointerEvent) => void): () => void {
-    this.listeners.add(callback);
-    return () => this.listeners.delete(callback);
-  }
-
-  setMode(mode: PointerMode): void {
-    this.mode = mode;
-    this.canvas.style.cursor = mode === "orbit" ? "grab" : mode === "drag" ? "pointer" : "crosshair";
+  /** Give the pointer to a tool that drags, or to what a click does; else it turns the camera. */
+  setPointer(cursor = "grab", click: Click | null = null, tool: PointerTool | null = null): void {
+    this.canvas.style.cursor = cursor;
+    [this.click, this.tool] = [click, tool];
   }
 
   /** Show the whole shape upright, from its front left and a little from above. */
   fit(): void {
     const up = new three.Vector3(...this.up);
-    const front = new three.Vector3(...this.front);
-    const side = up.clone().cross(front);
-    const towards = front.multiplyScalar(0.78).addScaledVector(side, 0.48).addScaledVector(up, 0.4).normalize();
+    const towards = new three.Vector3(...this.front);
+    const side = up.clone().cross(towards);
+    towards.multiplyScalar(0.78).addScaledVector(side, 0.48).addScaledVector(up, 0.4).normalize();
     const right = up.clone().cross(towards).normalize();
     const above = towards.clone().cross(right);
-    const tangent = Math.tan((FIELD_OF_VIEW * Math.PI) / 360);
-    const halves = [tangent * this.camera.aspect * MARGIN, tangent * MARGIN] as const;
+    const turn = new three.Matrix4().makeBasis(right, above, towards).transpose();
+    turn.multiply(this.space.matrixWorld);
+    const tangent = MARGIN * Math.tan((FIELD_OF_VIEW * Math.PI) / 360);
+    const halves = new three.Vector3(tangent * this.camera.aspect, tangent, 0);
     // A vertex (x, y, z), z towards the camera, is in the picture if the camera stands at least
     // x / tan away from it in z, and so on each of the four sides. Opposite sides are balanced.
-    const low = [Infinity, Infinity];
-    const high = [-Infinity, -Infinity];
-    const point = new three.Vector3();
+    const sides = new three.Box3();
+    const [point, reach] = [new three.Vector3(), new three.Vector3()];
     for (let place = 0; place < this.vertices.length; place += 3) {
-      point.fromArray(this.vertices, place).applyMatrix4(this.space.matrixWorld);
-      const depth = point.dot(towards);
-      [right, above].forEach((axis, i) => {
-        const reach = point.dot(axis);
-        high[i] = Math.max(high[i]!, reach + depth * halves[i]!);
-        low[i] = Math.min(low[i]!, reach - depth * halves[i]!);
-      });
+      point.fromArray(this.vertices, place).applyMatrix4(turn);
+      sides.expandByPoint(reach.copy(point).addScaledVector(halves, point.z));
+      sides.expandByPoint(reach.copy(point).addScaledVector(halves, -point.z));
     }
-    const middle = [0, 1].map((i) => (low[i]! + high[i]!) / 2);
-    const distance = Math.max(...[0, 1].map((i) => (high[i]! - low[i]!) / 2 / halves[i]!));
-    const target = right.multiplyScalar(middle[0]!).addScaledVector(above, middle[1]!);
+    const middle = sides.getCenter(new three.Vector3());
+    const size = sides.getSize(new three.Vector3()).divideScalar(2);
+    const distance = Math.max(size.x / halves.x, size.y / halves.y);
+    const target = right.multiplyScalar(middle.x).addScaledVector(above, middle.y);
     this.controls.target.copy(target);
     this.camera.position.copy(target).addScaledVector(towards, distance);
     this.controls.update();
-    this.invalidate();
   }
 
   setView(view: View): void {
     this.camera.position.set(...view.position);
     this.controls.target.set(...view.target);
     this.controls.update();
-    this.invalidate();
   }
 
   /** Return how many pixels of the page a length has at the point that the camera turns about. */
@@ -371,10 +352,15 @@ export class Viewer {
   }
 
   private startRenderer(): three.WebGLRenderer | null {
-    const antialias = !rendersInSoftware();
-    const context = this.canvas.getContext("webgl2", { antialias, alpha: true });
+    // Without a graphics card, smoothing edges would double the time of a frame.
+    const context =
+      this.canvas.getContext("webgl2", { failIfMajorPerformanceCaveat: true }) ??
+      this.canvas.getContext("webgl2", { antialias: false });
     if (!context?.getExtension("EXT_color_buffer_float")) {
-      this.showNotice("This browser has no WebGL2 with float buffers, which the picture needs. Enable hardware acceleration, or use a recent Chrome, Edge, Firefox or Safari.");
+      this.showNotice(
+        "This browser has no WebGL2 with float buffers, which the picture needs. Enable hardware " +
+          "acceleration, or use a recent Chrome, Edge, Firefox or Safari.",
+      );
       return null;
     }
     const renderer = new three.WebGLRenderer({ canvas: this.canvas, context });
@@ -408,40 +394,32 @@ export class Viewer {
     return controls;
   }
 
-  /** Tell clicks from drags, and let the tool of the mode take the pointer before the camera. */
+  /** Tell clicks from drags, and let the tool take the pointer before the camera. */
   private listenToPointer(): void {
     let from: [number, number] | null = null;
-    let taken = false;
-    const before = { capture: true };
-    this.canvas.addEventListener(
-      "pointerdown",
-      (event) => {
-        if (event.button !== 0 || !event.isPrimary) return;
-        from = [event.offsetX, event.offsetY];
-        taken = this.tool?.down(event) ?? false;
-        if (!taken) return;
-        this.canvas.setPointerCapture(event.pointerId);
-        event.stopImmediatePropagation();
-      },
-      before,
-    );
-    this.canvas.addEventListener("pointermove", (event) => {
-      if (taken) this.tool?.move(event);
-    });
-    const finish = (event: PointerEvent) => {
-      if (taken) this.tool?.up(event);
-      else if (from && this.mode !== "orbit" && event.type === "pointerup") {
-        const [x, y] = [event.offsetX, event.offsetY];
-        const still = Math.hypot(x - from[0], y - from[1]) < CLICK;
-        const hit = still ? this.pick(x, y) : null;
-        if (hit) for (const listener of this.listeners) listener(hit, event);
-      }
-      from = null;
-      taken = false;
+    let holder: PointerTool | null = null; // the tool that has the pointer
+    const take = (event: PointerEvent) => {
+      if (event.button !== 0 || !event.isPrimary) return;
+      from = [event.offsetX, event.offsetY];
+      holder = this.tool?.down(event) ? this.tool : null;
+      if (!holder) return;
+      this.canvas.setPointerCapture(event.pointerId);
+      event.stopImmediatePropagation();
     };
-    this.canvas.addEventListener("keydown", (event) => this.turnByKey(event));
-    this.canvas.addEventListener("pointerup", finish);
-    this.canvas.addEventListener("pointercancel", finish);
+    const release = (event: PointerEvent) => {
+      const [x, y] = [event.offsetX, event.offsetY];
+      const still = from && Math.hypot(x - from[0], y - from[1]) < CLICK;
+      if (holder) holder.up();
+      else if (this.click && still && event.type === "pointerup") {
+        const hit = this.pick(x, y);
+        if (hit) this.click(hit, event);
+      }
+      from = holder = null;
+    };
+    this.canvas.addEventListener("pointerdown", take, { capture: true });
+    this.canvas.addEventListener("pointermove", (event) => holder?.move(event));
+    this.canvas.addEventListener("pointerup", release);
+    this.canvas.addEventListener("pointercancel", release);
   }
 
   private turnByKey(event: KeyboardEvent): void {
@@ -454,47 +432,32 @@ export class Viewer {
       "+": () => controls.dollyIn(0.9),
       "-": () => controls.dollyOut(0.9),
     };
-    if (!actions[event.key]) return;
+    const action = actions[event.key];
+    if (!action) return;
     event.preventDefault();
-    actions[event.key]!();
+    action();
     controls.dispatchEvent({ type: "end" });
   }
 
-  private surfaceMaterial(plain: string): three.ShaderMaterial {
-    return new three.ShaderMaterial({
-      glslVersion: three.GLSL3,
-      side: three.DoubleSide,
-      vertexShader: SURFACE_VERTEX,
-      fragmentShader: SURFACE_FRAGMENT,
-      defines: { COLORING: 0 },
-      uniforms: {
-        ...this.motion,
-        table: { value: null },
-        range: { value: new three.Vector2(0, 1) },
-        nodal: { value: false },
-        plain: { value: this.colorOf(plain) },
-        opacity: { value: 1 },
-      },
+  private surfaceMaterial(plain: string) {
+    const material = this.material(surfaceVertex, surfaceFragment, {
+      table: { value: null },
+      range: { value: new three.Vector2(0, 1) },
+      nodal: { value: false },
+      plain: { value: new three.Vector3(...rgbOf(plain)).divideScalar(255) },
+      opacity: { value: 1 },
     });
+    material.side = three.DoubleSide;
+    material.defines = { COLORING: UNCOLORED };
+    return material;
   }
 
-  private pointMaterial(): three.ShaderMaterial {
-    return new three.ShaderMaterial({
-      glslVersion: three.GLSL3,
-      vertexShader: POINT_VERTEX,
-      fragmentShader: POINT_FRAGMENT,
-      transparent: true,
-      uniforms: {
-        ...this.motion,
-        size: { value: 14 * Math.min(devicePixelRatio, MOST_PIXELS) },
-      },
-    });
-  }
-
-  /** Return a color without conversion: the shaders compute with the numbers of the page. */
-  private colorOf(color: string): three.Color {
-    const converted = new three.Color(color);
-    return new three.Color().setHex(converted.getHex(three.SRGBColorSpace), three.LinearSRGBColorSpace);
+  /** Return a material whose vertices move as `moved.glsl` says. */
+  private material(vertex: string, fragmentShader: string, own: Record<string, three.IUniform>) {
+    const uniforms = { ...this.motion, ...own };
+    const vertexShader = movedSource + vertex;
+    const glslVersion = three.GLSL3;
+    return new three.ShaderMaterial({ glslVersion, vertexShader, fragmentShader, uniforms });
   }
 
   private replace(name: string, values: Float32Array | Uint8Array): void {
@@ -527,13 +490,10 @@ export class Viewer {
   }
 }
 
-/** Say whether there is no graphics card: smoothing edges would then double the time of a frame. */
-function rendersInSoftware(): boolean {
-  const context = document.createElement("canvas").getContext("webgl2");
-  if (!context) return false;
-  let name = String(context.getParameter(context.RENDERER));
-  const info = name === "WebKit WebGL" && context.getExtension("WEBGL_debug_renderer_info");
-  if (info) name = String(context.getParameter(info.UNMASKED_RENDERER_WEBGL));
-  context.getExtension("WEBGL_lose_context")?.loseContext();
-  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+/** Return unit normals at the vertices, weighted by the areas of the faces. */
+function vertexNormals(points: Float32Array, faces: Uint32Array): Float32Array {
+  const surface = new three.BufferGeometry();
+  surface.setAttribute("position", new three.BufferAttribute(points, 3));
+  surface.setIndex(new three.BufferAttribute(faces, 1)).computeVertexNormals();
+  return surface.getAttribute("normal").array as Float32Array;
 }

@@ -1,11 +1,7 @@
 /** One message format for every call and every host: header length, JSON header, arrays. */
 
 export type TypedArray = Float32Array | Float64Array | Uint32Array | Int32Array | Uint8Array;
-export interface WireArray<T extends TypedArray = TypedArray> {
-  data: T;
-  shape: number[];
-}
-export type Arrays = Record<string, WireArray>;
+export type Arrays = Record<string, TypedArray>;
 export interface Message {
   meta: any;
   arrays: Arrays;
@@ -18,58 +14,52 @@ const TYPES = {
   "<u4": Uint32Array,
   "<i4": Int32Array,
   "|u1": Uint8Array,
-} as const;
+};
 type Dtype = keyof typeof TYPES;
+interface Entry {
+  dtype: Dtype;
+  shape: number[];
+  offset: number;
+  scale?: number;
+}
 
 // Typed arrays need aligned offsets; 8 bytes serve all types.
 const ALIGNMENT = 8;
 const align = (bytes: number) => Math.ceil(bytes / ALIGNMENT) * ALIGNMENT;
 
-function dtypeOf(array: TypedArray): Dtype {
-  for (const [name, type] of Object.entries(TYPES)) if (array instanceof type) return name as Dtype;
-  throw new TypeError(`An array of a message cannot be a ${array.constructor.name}.`);
-}
-
-export function encode(meta: unknown, arrays: Record<string, WireArray | TypedArray> = {}) {
-  const entries: Record<string, { dtype: Dtype; shape: number[]; offset: number }> = {};
-  const parts: { offset: number; data: TypedArray }[] = [];
+export function encode(meta: unknown, arrays: Arrays = {}): Uint8Array<ArrayBuffer> {
+  const entries: Record<string, Entry> = {};
   let size = 0;
-  for (const [name, value] of Object.entries(arrays)) {
-    const array = "data" in value ? value : { data: value, shape: [value.length] };
-    entries[name] = { dtype: dtypeOf(array.data), shape: array.shape, offset: size };
-    parts.push({ offset: size, data: array.data });
-    size = align(size + array.data.byteLength);
+  for (const [name, data] of Object.entries(arrays)) {
+    const dtype = (Object.keys(TYPES) as Dtype[]).find((key) => data instanceof TYPES[key])!;
+    entries[name] = { dtype, shape: [data.length], offset: size };
+    size = align(size + data.byteLength);
   }
   const header = new TextEncoder().encode(JSON.stringify({ meta, arrays: entries }));
   const begin = align(4 + header.length);
   const bytes = new Uint8Array(begin + size);
-  bytes.fill(0x20, 4, begin);
+  bytes.fill(0x20, 4, begin); // spaces after the header
   new DataView(bytes.buffer).setUint32(0, begin - 4, true);
   bytes.set(header, 4);
-  for (const { offset, data } of parts)
-    bytes.set(new Uint8Array(data.buffer, data.byteOffset, data.byteLength), begin + offset);
+  for (const [name, { buffer, byteOffset, byteLength }] of Object.entries(arrays))
+    bytes.set(new Uint8Array(buffer, byteOffset, byteLength), begin + entries[name]!.offset);
   return bytes;
 }
 
+/** Return the meta and the arrays of a message; a damaged message raises a RangeError. */
 export function decode(message: ArrayBuffer | ArrayBufferView): Message {
   const bytes = alignedBytes(message);
-  if (bytes.length < 4) throw new RangeError(`A message has 4 bytes or more; it has ${bytes.length}.`);
-  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-  const begin = 4 + view.getUint32(0, true);
-  if (begin > bytes.length || begin % ALIGNMENT)
+  const buffer = bytes.buffer as ArrayBuffer;
+  const begin = 4 + new DataView(buffer, bytes.byteOffset, bytes.length).getUint32(0, true);
+  if (begin > bytes.length)
     throw new RangeError(`The header of a message ends at byte ${begin} of ${bytes.length}.`);
   const header = JSON.parse(new TextDecoder().decode(bytes.subarray(4, begin)));
   const arrays: Arrays = {};
-  for (const [name, entry] of Object.entries<any>(header.arrays ?? {})) {
-    const type = TYPES[entry.dtype as Dtype];
-    if (!type) throw new TypeError(`Array ${name} has the unknown type ${entry.dtype}.`);
-    const length = entry.shape.reduce((product: number, side: number) => product * side, 1);
-    const end = begin + entry.offset + length * type.BYTES_PER_ELEMENT;
-    if (entry.offset % ALIGNMENT || end > bytes.length)
-      throw new RangeError(`Array ${name} ends at byte ${end} of ${bytes.length}.`);
-    const data = new type(bytes.buffer as ArrayBuffer, bytes.byteOffset + begin + entry.offset, length);
-    const numbers = data instanceof Uint16Array ? fromHalves(data, entry.scale ?? 1) : data;
-    arrays[name] = { data: numbers, shape: entry.shape };
+  for (const [name, entry] of Object.entries<Entry>(header.arrays)) {
+    const length = entry.shape.reduce((product, side) => product * side, 1);
+    const start = bytes.byteOffset + begin + entry.offset;
+    const data = new TYPES[entry.dtype](buffer, start, length);
+    arrays[name] = data instanceof Uint16Array ? fromHalves(data, entry.scale ?? 1) : data;
   }
   return { meta: header.meta, arrays };
 }

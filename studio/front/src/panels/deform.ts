@@ -1,215 +1,186 @@
 /** Deform: choose regions, move them, and let the shape follow (chapter 6 of the thesis). */
 
-import type { App, Panel } from "../app";
-import type { Change, DeformMode, Handle, State, Vec3 } from "../core/backend";
-import { BoxTool } from "../core/box";
-import { partColors } from "../core/colors";
-import { button, chooseFile, chooseFiles, download, h } from "../core/dom";
-import { selectBox, Surface } from "../core/geodesic";
-import { MotionTool, type MotionKind } from "../core/gizmo";
-import { add, middleOf, regionBoundary } from "../core/motion";
-import { cutTree, relabel } from "../core/parts";
+import type { Panel, Studio } from "../app";
+import type { Change, Handle, State, Vec3 } from "../core/backend";
+import { partColors, rgbOf } from "../core/colors";
+import { chooseFiles, Form, h } from "../core/dom";
+import { cutParts } from "../core/parts";
 import { FIXED, Regions } from "../core/regions";
-import type { PointerTool } from "../core/viewer";
-import { buildChoice, ProgressBar, Slider } from "./controls";
+import { BoxTool, MotionTool, type MotionKind } from "../core/tools";
+import type { Hit, PointerTool } from "../core/viewer";
+import type { TypedArray } from "../core/wire";
+import markup from "./deform.html?raw";
 
-const REST = 150; // ms without motion after which the exact result is requested
+const REST = 80; // ms without motion, beside two frames, after which the exact result is requested
 const COLORS = ["#e08a2e", "#3b8fd4", "#46a564", "#b468c8", "#4f6072"]; // of the regions, and fixed
-const NAMES = { 0: "1", 1: "2", 2: "3", 3: "4", [FIXED]: "Fixed" };
-const SELECTORS = { box: "Box", brush: "Brush", part: "Part" };
-const MOTIONS = { rotate: "Rotate", move: "Move", pull: "Pull", swing: "Swing", pivot: "Pivot" };
-const HINTS: Record<Tool, string> = {
-  box: "Drag the handles of the box.",
-  brush: "Paint on the surface. Shift erases.",
-  part: "Click on parts. Shift removes them.",
-  rotate: "Drag a ring: the region turns about the pivot.",
-  move: "Drag an arrow: the region moves.",
-  pull: "Drag a point of the region: it moves in the plane of the screen.",
-  swing: "Drag a point of the region: it turns about the pivot.",
-  pivot: "Drag the pivot, about which the region turns.",
-};
-const SHORTCUTS: Record<Tool, string> = {
-  box: "B", brush: "P", part: "A", rotate: "R", move: "G", pull: "D", swing: "W", pivot: "V",
-};
-const AXES = ["x", "y", "z"];
-const LOADABLE = ".ply,.obj,.off,.stl,.glb";
+const CROSSING = "#d8301f";
+const TINT = 190; // of 255: how strongly a region covers the colors below
+const AXES = [0, 1, 2];
+const SELECTORS = ["box", "brush", "part"]; // the other tools move
 
-type Selector = keyof typeof SELECTORS;
-type Tool = Selector | MotionKind;
+type Tool = "box" | "brush" | "part" | MotionKind;
+const nextFrame = () => new Promise(requestAnimationFrame);
 
 export class DeformPanel implements Panel {
   readonly id = "deform";
   readonly title = "Deform";
   readonly needs = ["rig", "finish"];
-  private app!: App;
+  private readonly form = new Form(markup);
+  private readonly root = this.form.root;
+  private readonly ring = h("div", { class: "ring", hidden: true });
+  private app!: Studio;
+  private box!: BoxTool;
+  private mover!: MotionTool;
   private regions = new Regions(0);
   private region = 0; // that the tools change
   private tool: Tool = "brush";
-  private box!: BoxTool;
-  private mover!: MotionTool;
-  private surface: Surface | null = null;
   private labels: Int32Array | null = null; // part of each vertex
+  private crossing: number[] = []; // vertices of faces that cross
   private rows: number[] = []; // the region of each row of the shares
   private handles: Handle[] = []; // of each region
-  private pivots: (Vec3 | null)[] = []; // that the person chose; otherwise the middle of the rim
+  private rims: Vec3[] = []; // middle of the rim of each region
+  private pivots: (Vec3 | undefined)[] = []; // that the person chose instead
   private bindings = 0; // counts requests, so that only the last answer is used
   private motions = 0;
-  private resting = 0;
+  private painting: Promise<void> = Promise.resolve(); // discs of the brush, one after the other
   private pose = "";
   private active = false;
-  private stopPicking = () => {};
 
-  private readonly root = h("div");
-  private readonly progress = new ProgressBar("rig-progress");
-  private readonly regionChoice = buildChoice("region", NAMES, (id) => this.chooseRegion(Number(id)));
-  private readonly selectors = buildChoice("tool", SELECTORS, (id) => this.chooseTool(id as Tool));
-  private readonly motionChoice = buildChoice("tool", MOTIONS, (id) => this.chooseTool(id as Tool));
-  private readonly hint = h("p", { class: "note", "data-test": "hint" });
-  private readonly count = h("span", { class: "faint", "data-test": "region-count" });
-  private readonly bound = h("p", { class: "note", "data-test": "bound" });
-  private readonly corners = ["low", "high"].map((name) =>
-    AXES.map((axis, i) => numberInput(`box-${name}-${i}`, `${name} ${axis}`, () => this.readBox())),
-  );
-  private readonly boxOptions = h(
-    "div", { class: "corners" }, "low", ...this.corners[0]!, "high", ...this.corners[1]!,
-  );
-  private readonly radius = new Slider("Radius, of the extent", "brush-radius", (value) => this.setRadius(value));
-  private readonly nParts = new Slider("Number of parts", "region-parts", (value) => this.showParts(value));
-  private readonly mode = choice("mode", "Method", ["graded", "uncrossed", "thesis"]);
-  private readonly nModes = numberInput("n-modes", "Number of modes that spread the motion; automatic if empty", () => this.bind());
-  private readonly several = checkbox("several", "Several motions at once", () => this.showTools());
-  private readonly apply = button("Apply", "apply", "Apply the motions (Enter)", () => this.commit());
-  private readonly exactKind = choice("exact-kind", "Motion in numbers", [
-    ...AXES.map((axis) => `Rotate about ${axis}, °`), ...AXES.map((axis) => `Move along ${axis}`),
-  ]);
-  private readonly amount = numberInput("exact-amount", "Amount", () => {});
-  private readonly undo = button("Undo", "undo", "Undo (Ctrl+Z)", () => this.change({ kind: "undo" }, "Undoing"));
-  private readonly redo = button("Redo", "redo", "Redo (Ctrl+Shift+Z)", () => this.change({ kind: "redo" }, "Redoing"));
-  private readonly reset = button("Reset", "reset", "Undo all edits", () => this.change({ kind: "reset" }, "Undoing all"));
-  private readonly skeleton = checkbox("skeleton", "Skeleton of", () => this.showSkeleton());
-  private readonly skeletonModes = numberInput("skeleton-modes", "Modes of the skeleton", () => this.showSkeleton());
-  private readonly crossings = checkbox("crossings", "Crossing faces in red", () => this.showCrossings());
-  private readonly ring = h("div", { class: "ring", hidden: true });
-
-  build(app: App): HTMLElement {
+  build(app: Studio): HTMLElement {
+    const { form } = this;
+    const { viewer } = app;
     this.app = app;
-    this.box = new BoxTool(app.viewer, () => this.boxMoved(), () => this.bind());
-    this.mover = new MotionTool(app.viewer, {
+    this.box = new BoxTool(
+      viewer,
+      () => this.boxMoved(),
+      () => this.bind(),
+    );
+    this.mover = new MotionTool(viewer, {
       canDrag: (vertex) => this.canDrag(vertex),
       moved: (handle) => this.moved(handle),
-      released: () => this.several.input.checked || this.commit(),
+      released: () => this.several || this.commit(),
       pivoted: (pivot) => (this.pivots[this.region] = pivot),
     });
-    app.viewer.stage.append(this.ring);
-    app.viewer.canvas.addEventListener("pointermove", (event) => this.moveRing(event));
-    this.regionChoice.element.querySelectorAll("button").forEach((each, number) => {
-      each.style.setProperty("--swatch", COLORS[number]!);
-      each.classList.add("swatch");
+    viewer.stage.append(this.ring);
+    viewer.canvas.addEventListener("pointermove", (event) => this.moveRing(event));
+    COLORS.forEach((color, region) => {
+      form.get(`region-${region}`).style.setProperty("--swatch", color);
     });
-    this.radius.setRange(0.01, 0.5, 0.005);
-    this.radius.show(app.settings.get("radius", 0.1), "");
-    this.nParts.setRange(2, 30, 1);
-    this.skeletonModes.valueAsNumber = 50;
-    this.nModes.placeholder = "auto";
-    this.amount.placeholder = "amount";
-    this.amount.addEventListener("keydown", ({ key }) => key === "Enter" && this.moveExactly());
-    this.exactKind.className = "wide";
-    for (const [tool, key] of Object.entries(SHORTCUTS)) {
-      const label = { ...SELECTORS, ...MOTIONS }[tool as Tool];
-      app.shortcut(key, `Deform: ${label.toLowerCase()}`, () => (app.open(this.id), this.chooseTool(tool as Tool)));
-    }
-    app.shortcut("Enter", "Apply the motions", () => this.commit());
-    app.shortcut("Escape", "Drop the motion", () => this.drop());
-    const exact = button("Go", "exact-go", "Move the region by this amount", () => this.moveExactly());
-    const clear = button("Clear", "clear", "Empty this region", () => this.clear());
-    this.root.append(
-      this.progress.element,
-      h("h3", {}, "Region"), this.regionChoice.element, this.selectors.element,
-      this.boxOptions, this.radius.element, this.nParts.element,
-      h("div", { class: "row" }, clear, this.count),
-      h("h3", {}, "Motion"), this.motionChoice.element, this.hint,
-      h("div", { class: "row tight" }, this.exactKind, this.amount, exact), this.bound,
-      h("div", { class: "row tight" }, "Method", this.mode, "Modes", this.nModes),
-      h("div", { class: "row" }, this.several.element, this.apply),
-      h("h3", {}, "Edits"),
-      h("div", { class: "row tight" }, this.undo, this.redo, this.reset,
-        button("Save", "save-edits", "Save the edits as JSON", () => this.save("edits", "json")),
-        button("Load", "load-edits", "Apply saved edits. If they were made on another mesh of this shape, choose its file, too", () => this.replay()),
-      ),
-      h("h3", {}, "Show"),
-      h("div", { class: "row" }, this.skeleton.element, this.skeletonModes, "modes"),
-      h("div", { class: "row" }, this.crossings.element),
-      h("h3", {}, "Export"),
-      h("div", { class: "row" },
-        ...["ply", "obj", "glb"].map((type) =>
-          button(type.toUpperCase(), `export-${type}`, `Save as ${type.toUpperCase()}`, () => this.save(type, type)),
-        ),
-        button("Pose to a file …", "transfer", "Carry this pose to another shape", () => this.transfer()),
-      ),
-    );
-    this.regionChoice.press("0");
+    form.get("brush-radius").valueAsNumber = app.settings.get("radius", 0.1);
+    this.listen();
     return this.root;
   }
 
+  /** Let controls and keys do what they say. */
+  private listen(): void {
+    const { app, form } = this;
+    form.onChoice("region", (id) => this.chooseRegion(Number(id)));
+    form.onChoice("tool", (id) => this.chooseTool(id as Tool));
+    for (const name of ["low", "high"])
+      for (const axis of AXES) form.on({ [`box-${name}-${axis}`]: () => this.readBox() });
+    form.on({
+      "brush-radius": () => this.showRadius(),
+      "region-parts": () => this.showParts(form.number("region-parts")),
+      clear: () => this.clear(),
+      "exact-go": () => this.moveExactly(),
+      "n-modes": () => this.bind(),
+      several: () => this.showTools(),
+      apply: () => this.commit(),
+      undo: () => this.change({ kind: "undo" }, "Undoing"),
+      redo: () => this.change({ kind: "redo" }, "Redoing"),
+      reset: () => this.change({ kind: "reset" }, "Undoing all"),
+      "save-edits": () => app.save("edits", "json"),
+      "load-edits": () => this.replay(),
+      skeleton: () => this.showSkeleton(),
+      "skeleton-modes": () => this.showSkeleton(),
+      crossings: () => this.showCrossings(),
+      transfer: () => this.transfer(),
+    });
+    app.addExports(form);
+    form.get("exact-amount").addEventListener("keydown", ({ key }) => {
+      if (key === "Enter") this.moveExactly();
+    });
+    for (const [tool, { dataset, textContent }] of form.choice("tool"))
+      app.shortcut(dataset.key!, `Deform: ${textContent!.toLowerCase()}`, () => {
+        app.open(this.id);
+        this.chooseTool(tool as Tool);
+      });
+    app.shortcut("Enter", "Apply the motions", () => this.commit());
+    app.shortcut("Escape", "Drop the motion", () => this.drop());
+  }
+
   refresh(state: State): void {
-    const { deformation } = state;
+    const { form } = this;
+    const { deformation, parts } = state;
+    form.progress("rig-progress", deformation);
+    form.get("undo").disabled = form.get("reset").disabled = !deformation.n_edits;
+    form.get("redo").disabled = !deformation.n_redoable;
     const pose = `${state.shape} ${state.pose} ${deformation.status}`;
-    this.progress.show(deformation);
-    this.undo.disabled = this.reset.disabled = !deformation.n_edits;
-    this.redo.disabled = !deformation.n_redoable;
     if (pose === this.pose) {
-      if (this.tool === "part" && !this.labels && state.parts.status === "ready") this.loadParts();
+      if (this.tool === "part" && !this.labels && parts.status === "ready") this.loadParts();
       return;
     }
-    if (state.shape !== Number(this.pose.split(" ")[0] || NaN)) this.startShape(state);
+    if (!this.pose.startsWith(`${state.shape} `)) this.startShape(state);
     this.pose = pose;
-    [this.surface, this.handles] = [null, []];
+    [this.handles, this.crossing] = [[], []];
     this.paint();
     this.bind();
-    if (this.skeleton.input.checked) this.showSkeleton();
-    if (this.crossings.input.checked) this.showCrossings();
+    if (form.get("skeleton").checked) this.showSkeleton();
+    if (form.get("crossings").checked) this.showCrossings();
   }
 
   shown(): void {
     this.active = true;
-    this.stopPicking = this.app.viewer.onPick((hit, event) => this.pickPart(hit.vertex, event.shiftKey));
     this.paint();
     this.showTools();
   }
 
   hidden(): void {
     this.active = false;
-    this.stopPicking();
     this.drop();
-    this.showTools();
     this.paint();
   }
 
   /** Begin with a new shape: without regions, or with those of before a reload. */
-  private startShape({ shape, n_vertices }: State): void {
+  private startShape({ shape, n_vertices, up }: State): void {
     this.regions = new Regions(n_vertices);
     [this.pivots, this.labels] = [[], null];
-    const kept = this.app.settings.get("regions", { shape: -1, text: "", tool: this.tool, region: 0 });
+    const kept = this.app.settings.get("regions", {
+      shape: -1,
+      text: "",
+      tool: this.tool,
+      region: 0,
+    });
     if (kept.shape === shape) {
       this.regions.read(kept.text);
       [this.tool, this.region] = [kept.tool, kept.region];
-      this.regionChoice.press(String(this.region));
     }
+    this.form.press("region", String(this.region));
     // The first box holds what is above the middle, and nothing touches its other sides.
     const { box, extent } = this.app.viewer;
-    const [low, high] = [box.min, box.max].map((corner) => corner.toArray()) as [Vec3, Vec3];
-    const up = this.app.state.up.map(Math.abs).indexOf(1);
-    for (let axis = 0; axis < 3; axis++) {
-      low[axis] = axis === up ? (low[axis]! + high[axis]!) / 2 : low[axis]! - 0.02 * extent;
-      high[axis]! += 0.02 * extent;
-    }
-    [this.box.low, this.box.high] = [low, high];
+    const around = box.clone().expandByScalar(0.02 * extent);
+    const [low, high] = [around.min.toArray(), around.max.toArray()];
+    const upward = up.map(Math.abs).indexOf(1);
+    if (upward >= 0) low[upward] = (low[upward]! + high[upward]! - 0.02 * extent) / 2;
+    this.box.set(low, high);
     this.writeBox();
+  }
+
+  private get several(): boolean {
+    return this.form.get("several").checked;
+  }
+
+  private get ready(): boolean {
+    return this.root.dataset.ready === "true";
+  }
+
+  private set ready(ready: boolean) {
+    this.root.dataset.ready = String(ready);
   }
 
   private chooseRegion(region: number): void {
     this.region = region;
-    this.regionChoice.press(String(region));
+    this.form.press("region", String(region));
     this.remember();
     this.showTools();
   }
@@ -218,56 +189,64 @@ export class DeformPanel implements Panel {
     this.tool = tool;
     this.remember();
     this.showTools();
-    if (tool === "box" && !this.regions.vertices(this.region).length) this.boxMoved();
-    if (tool === "box") this.bind();
+    if (tool !== "box") return;
+    if (!this.regions.vertices(this.region).length) this.boxMoved();
+    this.bind();
   }
 
   /** Show what belongs to the tool: its options, its handles, the cursor. */
   private showTools(): void {
-    const { tool, app } = this;
-    const { viewer } = app;
-    const selects = tool in SELECTORS;
-    this.selectors.press(tool);
-    this.motionChoice.press(tool);
-    this.hint.textContent = HINTS[tool];
-    this.boxOptions.hidden = tool !== "box";
-    this.radius.element.hidden = tool !== "brush";
-    this.nParts.element.hidden = tool !== "part" || !this.labels;
-    this.apply.hidden = !this.several.input.checked;
-    this.setRadius(this.radius.value);
-    const on = this.active && this.app.state;
-    viewer.setMode(on && (tool === "part" || tool === "brush") ? tool : "orbit");
-    viewer.tool = !on ? null : tool === "brush" ? this.brush : tool === "box" ? this.box : this.mover;
-    if (on && tool === "box") this.box.show(this.box.low, this.box.high);
-    else this.box.hide();
-    const row = this.rows.indexOf(this.region);
-    const ready = this.root.dataset.ready === "true";
-    if (on && !selects && ready && row >= 0) this.mover.show(this.pivotOf(this.region), tool as MotionKind);
-    else this.mover.hide();
-    if (on && tool === "part") this.loadParts();
-    else if (viewer.labels === this.labels && this.labels) viewer.setLabels(null);
+    const { tool, active, form, labels } = this;
+    const { viewer } = this.app;
+    form.press("tool", tool);
+    form.text("hint", form.get(`tool-${tool}`).dataset.hint!);
+    form.get("corners").hidden = tool !== "box";
+    form.get("radius").hidden = tool !== "brush";
+    form.get("parts-slider").hidden = tool !== "part" || !labels;
+    form.get("apply").hidden = !this.several;
+    this.showRadius();
     this.ring.hidden = true;
+    this.box.show(active && tool === "box");
+    const moves = active && !SELECTORS.includes(tool) && this.ready;
+    if (moves && this.rows.includes(this.region))
+      this.mover.show(this.pivotOf(this.region), tool as MotionKind);
+    else this.mover.hide();
+    if (!active) viewer.setPointer();
+    else if (tool === "box") viewer.setPointer("grab", null, this.box);
+    else if (tool === "brush") viewer.setPointer("crosshair", null, this.brush);
+    else if (tool === "part")
+      viewer.setPointer("crosshair", (hit, event) => this.pickPart(hit, event));
+    else viewer.setPointer("grab", null, this.mover);
+    if (active && tool === "part") this.loadParts();
+    else if (labels && viewer.labels === labels) viewer.setLabels(null);
   }
 
-  /** Tint the regions, and say how many vertices the chosen one has. */
+  /** Tint the regions and the faces that cross, and say how many vertices the region has. */
   private paint(): void {
-    const { viewer } = this.app;
-    COLORS.forEach((color, region) =>
-      viewer.setMarks(this.active ? this.regions.vertices(region) : [], color, `region ${region}`),
-    );
-    const count = this.regions.vertices(this.region).length;
-    this.count.textContent = `${count.toLocaleString("en")} vertices in ${this.region === FIXED ? "the fixed part" : `region ${this.region + 1}`}`;
+    const { regions, region, app } = this;
+    const tints = COLORS.map((color) => [...rgbOf(color), TINT]);
+    const marks = new Uint8Array(4 * app.state.n_vertices);
+    for (let vertex = 0; this.active && vertex < app.state.n_vertices; vertex++) {
+      const owner = regions.of(vertex);
+      if (owner !== null) marks.set(tints[owner]!, 4 * vertex);
+    }
+    for (const vertex of this.crossing) marks.set([...rgbOf(CROSSING), TINT], 4 * vertex);
+    app.viewer.setMarks(marks);
+    const count = regions.vertices(region).length.toLocaleString("en");
+    const place = region === FIXED ? "the fixed part" : `region ${region + 1}`;
+    this.form.text("region-count", `${count} vertices in ${place}`);
   }
 
   private remember(): void {
     const { region, tool } = this;
-    this.app.settings.set("regions", { shape: this.app.state.shape, text: this.regions.write(), tool, region });
+    const kept = { shape: this.app.state.shape, text: this.regions.write(), tool, region };
+    this.app.settings.set("regions", kept);
     this.paint();
   }
 
   private clear(): void {
     this.regions.clear(this.region);
-    this.pivots[this.region] = null;
+    this.pivots[this.region] = undefined;
     this.selected();
   }
 
@@ -278,38 +257,48 @@ export class DeformPanel implements Panel {
   }
 
   private boxMoved(): void {
-    this.regions.clear(this.region);
+    const { app, box, regions, region } = this;
+    regions.clear(region);
     // A box that passes over another region leaves that region as it is.
-    const inside = selectBox(this.app.viewer.vertices, this.box.low, this.box.high);
-    this.regions.add(this.region, inside.filter((vertex) => this.regions.of(vertex) === null));
+    const free = (vertex: number) => regions.of(vertex) === null;
+    regions.add(region, box.select(app.viewer.vertices).filter(free));
     this.writeBox();
-    this.remember();
-    this.root.dataset.ready = "false";
+    this.paint();
+    this.ready = false;
   }
 
   private writeBox(): void {
-    [this.box.low, this.box.high].forEach((corner, i) =>
-      corner.forEach((value, axis) => (this.corners[i]![axis]!.value = String(Number(value.toPrecision(5))))),
-    );
+    for (const name of ["low", "high"] as const)
+      this.box[name].forEach((value, i) => {
+        this.form.get(`box-${name}-${i}`).value = String(Number(value.toPrecision(5)));
+      });
   }
 
   private readBox(): void {
-    const [low, high] = this.corners.map((row) => row.map((input) => input.valueAsNumber)) as [Vec3, Vec3];
+    const read = (name: string) =>
+      AXES.map((axis) => this.form.number(`box-${name}-${axis}`)) as Vec3;
+    const [low, high] = [read("low"), read("high")];
     if (!low.every((value, axis) => value <= high[axis]!)) return;
-    this.box.show(low, high);
+    this.box.set(low, high);
     this.boxMoved();
-    this.bind();
+    this.selected();
   }
 
-  private setRadius(share: number): void {
-    this.radius.show(share, `${(100 * share).toFixed(1)} %`);
+  private showRadius(): void {
+    const share = this.form.number("brush-radius");
+    this.form.slide("brush-radius", share, `${(100 * share).toFixed(1)} %`);
     this.app.settings.set("radius", share);
   }
 
+  /** Return the radius of the brush, in length. */
+  private get radius(): number {
+    return this.form.number("brush-radius") * this.app.viewer.extent;
+  }
+
   private moveRing(event: PointerEvent): void {
-    const reach = this.app.viewer.pixelsOf(this.radius.value * this.app.viewer.extent);
-    this.ring.hidden = !this.active || this.tool !== "brush";
+    const reach = this.app.viewer.pixelsOf(this.radius);
     const { style } = this.ring;
+    this.ring.hidden = !this.active || this.tool !== "brush";
     style.width = style.height = `${2 * reach}px`;
     style.left = `${event.offsetX - reach}px`;
     style.top = `${event.offsetY - reach}px`;
@@ -319,89 +308,90 @@ export class DeformPanel implements Panel {
   private readonly brush: PointerTool = {
     down: (event) => this.stroke(event),
     move: (event) => void this.stroke(event),
-    up: () => this.selected(),
+    up: () => this.painting.then(() => this.selected()),
   };
 
   private stroke(event: PointerEvent): boolean {
-    const { viewer } = this.app;
-    const hit = viewer.pick(event.offsetX, event.offsetY);
+    const { app, region, regions } = this;
+    const hit = app.viewer.pick(event.offsetX, event.offsetY);
     if (!hit) return false;
-    this.surface ??= new Surface(viewer.vertices, viewer.faces);
-    const disc = this.surface.disc(hit.vertex, this.radius.value * viewer.extent);
-    if (event.shiftKey) this.regions.remove(this.region, disc);
-    else this.regions.add(this.region, disc);
-    this.root.dataset.ready = "false";
-    this.paint();
+    this.ready = false;
+    const name = `disc/${hit.vertex}/${this.radius}`;
+    // One request at a time: a quick stroke sends more than the server takes at once.
+    const add = async () => {
+      const disc = await app.backend.array<Uint32Array>(name);
+      if (event.shiftKey) regions.remove(region, disc);
+      else regions.add(region, disc);
+      this.paint();
+    };
+    this.painting = this.painting.then(add).catch((error) => app.fail(error));
     return true;
   }
 
   private async loadParts(): Promise<void> {
-    const { app } = this;
-    const { status, n_regions } = app.state.parts;
+    const { status, n_regions } = this.app.state.parts;
     if (status === "none") return this.change({ kind: "parts" }, "Finding the parts");
     if (status !== "ready") return;
-    if (!this.labels) this.nParts.show(n_regions, String(n_regions));
-    this.labels ??= new Int32Array();
-    this.nParts.element.hidden = false;
-    await this.showParts(this.nParts.value);
+    await this.showParts(this.labels ? this.form.number("region-parts") : n_regions);
   }
 
   private async showParts(count: number): Promise<void> {
-    const { backend, viewer } = this.app;
-    this.nParts.show(count, String(count));
-    const [finest, rows] = await Promise.all([backend.array("parts/labels"), backend.array("parts/merges")]);
-    const labels = finest.data as Int32Array;
-    const merges = { count: labels.reduce((one, other) => Math.max(one, other), 0) + 1, rows: rows.data as Float64Array };
-    this.labels = relabel(labels, cutTree(merges, { count }).parts);
-    if (this.active && this.tool === "part") viewer.setLabels(this.labels, partColors(merges.count));
+    const { backend, state, viewer } = this.app;
+    const { levels } = state.parts;
+    const names = ["parts/labels", "parts/cuts"];
+    const arrays = await Promise.all(names.map((name) => backend.array<Int32Array>(name)));
+    this.labels = cutParts(arrays[0]!, arrays[1]!, levels.length, count);
+    this.form.slide("region-parts", count, String(count));
+    if (!this.active || this.tool !== "part") return;
+    this.form.get("parts-slider").hidden = false;
+    viewer.setLabels(this.labels, partColors(levels.length));
   }
 
-  private pickPart(vertex: number, remove: boolean): void {
-    const part = this.labels?.[vertex];
-    if (this.tool !== "part" || part === undefined) return;
-    const vertices: number[] = [];
-    this.labels!.forEach((label, each) => label === part && vertices.push(each));
-    if (remove) this.regions.remove(this.region, vertices);
+  private pickPart({ vertex }: Hit, { shiftKey }: PointerEvent): void {
+    if (!this.labels) return;
+    const part = this.labels[vertex];
+    const vertices = [...this.labels.keys()].filter((each) => this.labels![each] === part);
+    if (shiftKey) this.regions.remove(this.region, vertices);
     else this.regions.add(this.region, vertices);
     this.selected();
   }
 
   /** Ask by how much each vertex follows each region; then the regions can be moved. */
   private async bind(): Promise<void> {
-    const { app, regions } = this;
+    const { app, form, regions } = this;
     const turn = ++this.bindings;
     const chosen = [0, 1, 2, 3].map((region) => regions.vertices(region));
     const fixed = regions.vertices(FIXED);
-    this.root.dataset.ready = "false";
-    this.bound.textContent = "";
+    this.ready = false;
+    form.text("bound", "");
     this.rows = [0, 1, 2, 3].filter((region) => chosen[region]!.length);
     if (this.rows.length && app.state.deformation.status === "ready") {
       const request = {
-        n_modes: this.nModes.valueAsNumber || null,
+        n_modes: form.number("n-modes") || null,
         regions: this.rows.map((region) => chosen[region]!),
         fixed: fixed.length ? fixed : null,
       };
-      const answer = await app.run("Binding the regions", app.backend.rig(request)).catch(() => null);
+      const binding = app.run("Binding the regions", app.backend.rig(request));
+      const answer = await binding.catch(() => null);
       if (turn !== this.bindings) return;
       if (answer) {
-        app.viewer.setShares(answer.shares, this.rows.length);
-        this.bound.textContent = `Ready: the motion is spread by ${answer.n_modes.join(", ")} modes.`;
-        this.root.dataset.ready = "true";
+        app.viewer.setShares(answer.shares);
+        this.rows.forEach((region, row) => (this.rims[region] = answer.pivots[row]!));
+        form.text("bound", `Ready: the motion is spread by ${answer.n_modes.join(", ")} modes.`);
+        this.ready = true;
       }
     }
     this.showTools();
   }
 
   private pivotOf(region: number): Vec3 {
-    const { vertices, faces } = this.app.viewer;
-    const rim = regionBoundary(faces, this.regions.mask(region));
-    return this.pivots[region] ?? middleOf(vertices, rim.length ? rim : this.regions.vertices(region));
+    return this.pivots[region] ?? this.rims[region]!;
   }
 
   /** A drag may begin on any region that is bound; it becomes the chosen one. */
   private canDrag(vertex: number): boolean {
     const region = this.regions.of(vertex);
-    if (region === null || region === FIXED || this.root.dataset.ready !== "true") return false;
+    if (region === null || region === FIXED || !this.ready) return false;
     if (region !== this.region) this.chooseRegion(region);
     return true;
   }
@@ -411,39 +401,41 @@ export class DeformPanel implements Panel {
   }
 
   /** Show a motion by shares at once, and the exact result when the pointer rests. */
-  private moved(handle: Handle): void {
+  private async moved(handle: Handle): Promise<void> {
+    const { app } = this;
     this.handles[this.region] = handle;
-    this.app.viewer.setHandles(this.rowHandles());
+    app.viewer.setHandles(this.rowHandles());
     const turn = ++this.motions;
-    clearTimeout(this.resting);
-    this.resting = window.setTimeout(async () => {
-      const change: Change = { kind: "preview", handles: this.rowHandles(), mode: this.deformMode };
-      const done = await this.app.backend.finish(change).catch((error) => this.app.fail(error));
-      if (done && turn === this.motions) this.app.viewer.setExact(done.arrays.vertices!.data as Float32Array);
-    }, REST);
-  }
-
-  private get deformMode(): DeformMode {
-    return this.mode.value as DeformMode;
+    // A slow frame is no rest: a pointer that moves is heard of at the latest before the next one.
+    await nextFrame();
+    await nextFrame();
+    await new Promise((done) => setTimeout(done, REST));
+    if (turn !== this.motions) return;
+    const change = {
+      kind: "preview",
+      handles: this.rowHandles(),
+      mode: this.form.get("mode").value,
+    };
+    const done = await app.backend.finish(change).catch((error) => app.fail(error));
+    if (done && turn === this.motions) app.viewer.setExact(done.vertices!);
   }
 
   private async commit(): Promise<void> {
     const handles = this.rowHandles();
-    if (this.root.dataset.ready !== "true" || !handles.some((handle) => handle)) return;
+    if (!this.ready || !handles.some((handle) => handle)) return;
     this.endMotion();
-    this.root.dataset.ready = "false";
+    this.ready = false;
     this.rows.forEach((region, row) => {
       const [pivot, handle] = [this.pivots[region], handles[row]];
-      if (pivot && handle?.type === "translation") this.pivots[region] = add(pivot, handle.vector);
+      if (pivot && handle?.type === "translation")
+        this.pivots[region] = pivot.map((value, axis) => value + handle.vector[axis]!) as Vec3;
     });
-    const change: Change = { kind: "commit", handles, mode: this.deformMode };
-    const done = await this.app.change(change, "Bending the shape").catch(() => null);
-    if (!done) this.drop();
+    const change = { kind: "commit", handles, mode: this.form.get("mode").value };
+    await this.app.change(change, "Bending the shape").catch(() => this.drop());
   }
 
   private endMotion(): void {
     this.motions++;
-    clearTimeout(this.resting);
     this.mover.hide();
   }
 
@@ -456,70 +448,57 @@ export class DeformPanel implements Panel {
   }
 
   private async moveExactly(): Promise<void> {
-    const [kind, amount] = [this.exactKind.selectedIndex, this.amount.valueAsNumber];
-    if (!amount || !this.rows.includes(this.region)) return;
-    const axis = AXES.map((_, i) => Number(i === kind % 3)) as Vec3;
+    const kind = this.form.get<HTMLSelectElement>("exact-kind").selectedIndex;
+    const amount = this.form.number("exact-amount");
+    if (!amount || !this.ready || !this.rows.includes(this.region)) return;
+    const axis = AXES.map((each) => Number(each === kind % 3)) as Vec3;
     const pivot = this.pivotOf(this.region);
     if (kind < 3) this.moved({ type: "rotation", pivot, axis, angle: (amount * Math.PI) / 180 });
     else this.moved({ type: "translation", vector: axis.map((one) => one * amount) as Vec3 });
-    if (!this.several.input.checked) await this.commit();
+    if (!this.several) await this.commit();
   }
 
-  private async change(change: Change, text: string): Promise<void> {
-    await this.app.change(change, text).catch(() => {}); // the status line has told the error
+  private async change(change: Change, text: string, files?: Record<string, Uint8Array>) {
+    await this.app.change(change, text, files).catch(() => {}); // the status line has the error
+  }
+
+  /** Return an array that the library computes, or null if it cannot; the status says why. */
+  private ask<T extends TypedArray>(name: string, text: string): Promise<T | null> {
+    return this.app.run(text, this.app.backend.array<T>(name)).catch(() => null);
   }
 
   private async showSkeleton(): Promise<void> {
-    const { backend, viewer } = this.app;
-    const name = `skeleton/${this.skeletonModes.valueAsNumber}`;
-    if (!this.skeleton.input.checked) return viewer.setSkeleton(null);
-    const points = await this.app.run("Computing the skeleton", backend.array(name)).catch(() => null);
-    if (points) viewer.setSkeleton(points.data as Float32Array);
+    const name = `skeleton/${this.form.number("skeleton-modes")}`;
+    const checked = this.form.get("skeleton").checked;
+    const points = checked ? await this.ask<Float32Array>(name, "Computing the skeleton") : null;
+    this.app.viewer.setSkeleton(points);
   }
 
   private async showCrossings(): Promise<void> {
-    const { backend, viewer } = this.app;
-    if (!this.crossings.input.checked) return viewer.markFaces([]);
-    const pairs = await this.app.run("Looking for crossing faces", backend.array("crossings")).catch(() => null);
-    if (!pairs) return;
-    const faces = [...new Set(pairs.data)];
-    viewer.markFaces(faces);
-    this.app.say(faces.length ? `${pairs.shape[0]} pairs of faces cross.` : "No faces cross.");
-  }
-
-  private async save(array: string, ending: string): Promise<void> {
-    const name = this.app.state.name.replace(/\.\w+$/, "");
-    const file = await this.app.run("Writing the file", this.app.backend.array(`file/${array}`)).catch(() => null);
-    if (file) download(file.data as Uint8Array<ArrayBuffer>, `${name}.${ending}`);
+    const checked = this.form.get("crossings").checked;
+    const pairs = checked ? await this.ask("crossings", "Looking for crossing faces") : null;
+    const { faces } = this.app.viewer;
+    const crossing = [...new Set<number>(pairs ?? [])];
+    this.crossing = crossing.flatMap((face) => [...faces.subarray(3 * face, 3 * face + 3)]);
+    this.paint();
+    const found = crossing.length
+      ? `${pairs!.length / 2} pairs of faces cross.`
+      : "No faces cross.";
+    if (pairs) this.app.say(found);
   }
 
   private async replay(): Promise<void> {
-    const files = await chooseFiles(`.json,${LOADABLE}`);
+    const files = await chooseFiles(`.json,${this.app.state.suffixes}`, true);
     const written = files.find(({ name }) => name.endsWith(".json"));
     const source = files.find((file) => file !== written);
     if (!written) return this.app.say("Choose a JSON file of edits.");
     const edits = JSON.parse(new TextDecoder().decode(written.bytes));
-    const change: Change = { kind: "replay", edits, source: source?.name, sourceFile: source?.bytes };
-    await this.change(change, "Applying the edits");
+    const change = { kind: "replay", edits, source: source?.name };
+    await this.change(change, "Applying the edits", source && { source: source.bytes });
   }
 
   private async transfer(): Promise<void> {
-    const { name, bytes } = await chooseFile(LOADABLE);
-    await this.change({ kind: "transfer", name, file: bytes }, "Carrying the pose over");
+    const { name, bytes } = (await chooseFiles(this.app.state.suffixes))[0]!;
+    await this.change({ kind: "transfer", name }, "Carrying the pose over", { file: bytes });
   }
-}
-
-function numberInput(name: string, label: string, onChange: () => void): HTMLInputElement {
-  const attributes = { type: "number", step: "any", title: label, "aria-label": label, "data-test": name };
-  return h("input", { ...attributes, onchange: onChange });
-}
-
-function checkbox(name: string, label: string, onChange: () => void) {
-  const input = h("input", { type: "checkbox", "data-test": name, onchange: onChange });
-  return { input, element: h("label", {}, input, label) };
-}
-
-function choice(name: string, label: string, options: string[]): HTMLSelectElement {
-  const entries = options.map((option) => h("option", {}, option));
-  return h("select", { title: label, "aria-label": label, "data-test": name }, ...entries);
 }

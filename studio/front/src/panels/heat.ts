@@ -1,48 +1,35 @@
 /** Heat on the shape: how much stays at each point, or how it spreads from a picked source. */
 
-import type { App } from "../app";
+import type { Studio } from "../app";
 import type { State } from "../core/backend";
 import { findRange, formatNumber } from "../core/colors";
-import { h } from "../core/dom";
+import { Form } from "../core/dom";
 import { findTimeRange, heatFromSource, heatKernelSignature } from "../core/heat";
-import { buildChoice, ColoringPanel, ProgressBar, Slider } from "./controls";
+import { ColoringPanel } from "./coloring";
+import markup from "./heat.html?raw";
 
-const STEPS = 400; // of the slider, equal in the logarithm of time
+const STEPS = 400; // of the slider in heat.html, equal in the logarithm of time
 const SOURCE = "#35c9e0"; // in no color of heat
 
 export class HeatPanel extends ColoringPanel {
   readonly id = "heat";
   readonly title = "Heat";
-  private readonly progress = new ProgressBar("heat-progress");
-  private readonly time = new Slider("Time t", "time", () => this.paint());
-  private readonly explained = h("p", { class: "note", "data-test": "heat-explained" });
-  private readonly results: HTMLElement;
-  private modes: Float32Array = new Float32Array();
-  private eigenvalues: Float64Array = new Float64Array();
+  private readonly form = new Form(markup);
+  private modes = new Float32Array();
+  private eigenvalues = new Float64Array();
   private view = "signature";
   private source = -1;
 
-  constructor() {
-    super();
-    const views = { signature: "Heat that stays", source: "From a source" };
-    const choice = buildChoice("heat", views, (view) => {
+  build(app: Studio): HTMLElement {
+    const { form } = this;
+    this.app = app;
+    form.onChoice("heat", (view) => {
       this.view = view;
       this.paint();
     });
-    choice.press(this.view);
-    this.time.setRange(0, STEPS);
-    this.results = h("div", {}, choice.element, this.time.element, this.explained);
-  }
-
-  build(app: App): HTMLElement {
-    this.app = app;
-    this.time.show(app.settings.get("heat-time", STEPS / 2), "");
-    app.viewer.onPick(({ vertex }) => {
-      if (!this.active || this.view !== "source") return;
-      this.source = vertex;
-      this.paint();
-    });
-    return h("div", {}, this.progress.element, this.results);
+    form.on({ time: () => this.paint() });
+    form.slide("time", app.settings.get("heat-time", STEPS / 2), "");
+    return form.root;
   }
 
   protected versionOf(state: State): string {
@@ -50,16 +37,20 @@ export class HeatPanel extends ColoringPanel {
   }
 
   override refresh(state: State): void {
-    this.progress.show(state.spectrum);
-    this.results.hidden = !state.spectrum.k;
+    this.form.progress("heat-progress", state.spectrum);
+    this.form.get("heat-results").hidden = !state.spectrum.k;
     super.refresh(state);
   }
 
   protected async show(): Promise<void> {
     this.modes = new Float32Array();
     if (!this.app.state.spectrum.k) return this.app.viewer.setScalars(null);
-    const arrays = Promise.all([this.get<Float64Array>("eigenvalues"), this.get<Float32Array>("modes")]);
-    [this.eigenvalues, this.modes] = await this.latest(this.app.run("Loading the eigenfunctions", arrays));
+    const arrays = [
+      this.get<Float64Array>("eigenvalues"),
+      this.get<Float32Array>("modes"),
+    ] as const;
+    const loaded = this.app.run("Loading the eigenfunctions", Promise.all(arrays));
+    [this.eigenvalues, this.modes] = (await this.latest(loaded)) as any;
     if (this.source >= this.app.state.n_vertices) this.source = -1;
     this.paint();
   }
@@ -68,28 +59,45 @@ export class HeatPanel extends ColoringPanel {
   private paint(): void {
     const times = findTimeRange(this.eigenvalues);
     if (!this.modes.length || !times) return;
-    const { viewer } = this.app;
-    const { modes, eigenvalues, source } = this;
-    this.app.settings.set("heat-time", this.time.value);
-    const share = this.time.value / STEPS;
-    const time = times[0] ** (1 - share) * times[1] ** share;
-    this.time.show(this.time.value, `${formatNumber(time)} length²`);
-    const picking = this.view === "source";
-    viewer.setMode(picking ? "source" : "orbit");
-    viewer.setPoints(picking && source >= 0 ? [source] : [], SOURCE);
+    const { form, modes, eigenvalues, source } = this;
+    const { settings, viewer } = this.app;
+    const step = form.number("time");
+    const time = times[0] ** (1 - step / STEPS) * times[1] ** (step / STEPS);
+    settings.set("heat-time", step);
+    form.slide("time", step, `${formatNumber(time)} length²`);
     const reach = `Heat spreads about 2√t = ${formatNumber(2 * Math.sqrt(time))} in this time.`;
-    if (!picking) {
+    const unit = "1/length²";
+    if (this.view === "signature") {
+      form.text(
+        "heat-explained",
+        "The heat kernel signature: how much of a unit of heat is still at the same point after " +
+          `time t. It is high at tips. ${reach}`,
+      );
       const heat = heatKernelSignature(modes, eigenvalues, time);
-      this.explained.textContent = `The heat kernel signature: how much of a unit of heat is still at the same point after time t. It is high at tips. ${reach}`;
-      viewer.setScalars(heat, { map: "viridis", range: findRange(heat), title: "heat that stays", unit: "1/length²" });
-    } else if (source >= 0) {
-      const heat = heatFromSource(modes, eigenvalues, time, source);
-      const [low, high] = findRange(heat);
-      this.explained.textContent = `A unit of heat starts at vertex ${source}. ${reach} Click another source.`;
-      viewer.setScalars(heat, { map: "inferno", range: [Math.min(low, 0), high], title: "heat", unit: "1/length²" });
-    } else {
-      this.explained.textContent = "Click a point of the shape, and a unit of heat starts there.";
-      viewer.setScalars(null);
+      const range = findRange(heat);
+      viewer.setPointer();
+      viewer.setPoints([], SOURCE);
+      viewer.setScalars(heat, { map: "viridis", range, title: "heat that stays", unit });
+      return;
     }
+    viewer.setPointer("crosshair", ({ vertex }) => {
+      this.source = vertex;
+      this.paint();
+    });
+    viewer.setPoints(source < 0 ? [] : [source], SOURCE);
+    if (source < 0) {
+      form.text("heat-explained", "Click a point of the shape, and a unit of heat starts there.");
+      return viewer.setScalars(null);
+    }
+    const started = `A unit of heat starts at vertex ${source}.`;
+    form.text("heat-explained", `${started} ${reach} Click another source.`);
+    const heat = heatFromSource(modes, eigenvalues, time, source);
+    const [low, high] = findRange(heat);
+    viewer.setScalars(heat, {
+      map: "inferno",
+      range: [Math.min(low, 0), high],
+      title: "heat",
+      unit,
+    });
   }
 }

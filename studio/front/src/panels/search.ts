@@ -1,11 +1,10 @@
 /** Search: the shapes of an index that are most like this one, and which points correspond. */
 
-import type { App, Panel } from "../app";
+import type { Panel, Studio } from "../app";
 import type { Match, Matches, State } from "../core/backend";
-import { button, chooseFile, h } from "../core/dom";
+import { acceptDrops, chooseFiles, Form, h, type NamedFile } from "../core/dom";
 import { Viewer } from "../core/viewer";
-import { acceptDrops } from "./controls";
-import { MESH_FILES } from "./shape";
+import markup from "./search.html?raw";
 
 const N_MATCHES = 10;
 
@@ -13,42 +12,43 @@ export class SearchPanel implements Panel {
   readonly id = "search";
   readonly title = "Search";
   readonly needs = ["query"];
-  private app!: App;
-  private readonly about = h("p", { class: "note", "data-test": "index" });
-  private readonly list = h("ol", { class: "matches", "data-test": "matches" });
+  private app!: Studio;
+  private readonly form = new Form(markup);
+  private readonly list = this.form.get("matches");
   private readonly beside = h("div", { class: "stage", "data-test": "beside" });
   private second: Viewer | null = null;
   private found: Matches | null = null;
   private shape = -1; // which the matches belong to
 
-  build(app: App): HTMLElement {
+  build(app: Studio): HTMLElement {
     this.app = app;
-    const search = button("Search with this shape", "search", "Compare with every shape of the index", () => this.search().catch(() => {}));
-    search.classList.add("primary");
-    const choose = () => chooseFile(MESH_FILES).then(({ name, bytes }) => this.searchFile(name, bytes));
-    const file = button("With a file …", "search-file", "Open a mesh and search with it", choose);
-    const page = h("div", { class: "search" }, this.about, h("div", { class: "row" }, search, file), this.list);
-    acceptDrops(page, (name, bytes) => this.searchFile(name, bytes));
-    return page;
+    this.form.on({
+      search: () => this.search().catch(() => {}),
+      "search-file": async () => this.searchFile((await chooseFiles(app.state.suffixes))[0]!),
+    });
+    acceptDrops(this.form.root, (file) => this.searchFile(file));
+    return this.form.root;
   }
 
-  refresh(state: State): void {
-    const { index } = state;
-    if (index) this.about.textContent = `${index.n_shapes.toLocaleString("en")} shapes in ${index.path}. A smaller score is more alike. Drop a file here to search with it.`;
-    if (state.shape !== this.shape) this.clear();
+  refresh({ index, shape }: State): void {
+    const about = `${index!.n_shapes.toLocaleString("en")} shapes in ${index!.path}.`;
+    const help = "A smaller score is more alike. Drop a file here to search with it.";
+    this.form.text("index", `${about} ${help}`);
+    if (shape !== this.shape) this.clear();
   }
 
-  hidden = (): void => this.closeMatch();
+  hidden(): void {
+    this.closeMatch();
+  }
 
   /** The file becomes the shape, so that what is searched with is what is seen. */
-  private searchFile(name: string, file: Uint8Array): void {
-    const opened = this.app.change({ kind: "open", name, file }, `Reading ${name}`);
-    opened.then(() => this.search()).catch(() => {}); // the status line has said what failed
+  private async searchFile(file: NamedFile): Promise<void> {
+    if (await this.app.openFile(file)) await this.search().catch(() => {});
   }
 
   private async search(): Promise<void> {
     this.clear();
-    this.found = await this.app.run("Searching", this.app.backend.query({ n_matches: N_MATCHES }));
+    this.found = await this.app.run("Searching", this.app.backend.query(N_MATCHES));
     this.shape = this.app.state.shape;
     this.list.replaceChildren(...this.found.matches.map((match, i) => this.buildCard(match, i)));
     if (!this.found.matches.length) this.list.append("The index has no shape like this one.");
@@ -59,42 +59,54 @@ export class SearchPanel implements Panel {
     this.list.replaceChildren();
   }
 
-  private buildCard(match: Match, number: number): HTMLElement {
-    const bytes = (this.found!.arrays[`thumbnail${number}`]?.data ?? new Uint8Array()) as Uint8Array<ArrayBuffer>;
-    const src = URL.createObjectURL(new Blob([bytes], { type: "image/png" }));
-    const image = h("img", { src, alt: "", onload: () => URL.revokeObjectURL(src) });
-    const picture = h("span", { class: "thumbnail" }, bytes.length > 0 && image);
-    const label = match.label && h("span", { class: "label" }, match.label);
-    const score = h("span", { class: "faint" }, `score ${match.score.toFixed(3)}`);
-    const text = h("span", {}, h("b", {}, `${number + 1}. ${match.name}`), label, score);
-    const open = () => this.openMatch(number).catch((error) => this.app.fail(error));
-    const title = `Show ${match.name} beside this shape, with corresponding points`;
-    return h("li", {}, h("button", { type: "button", title, "data-test": `match-${number}`, onclick: open }, picture, text));
+  private buildCard({ name, label, score }: Match, number: number): HTMLElement {
+    const png = this.found!.arrays[`thumbnail${number}`] as Uint8Array<ArrayBuffer> | undefined;
+    const src = URL.createObjectURL(new Blob(png ? [png] : [], { type: "image/png" }));
+    const load = () => URL.revokeObjectURL(src);
+    const picture = h("span", { class: "thumbnail" }, png && h("img", { src, alt: "", load }));
+    const text = h(
+      "span",
+      {},
+      h("b", {}, `${number + 1}. ${name}`),
+      label && h("span", { class: "label" }, label),
+      h("span", { class: "faint" }, `score ${score.toFixed(3)}`),
+    );
+    const title = `Show ${name} beside this shape, with corresponding points`;
+    const click = () => this.openMatch(number).catch((error) => this.app.fail(error));
+    const attributes = { type: "button", title, "data-test": `match-${number}`, click };
+    return h("li", {}, h("button", attributes, picture, text));
   }
 
   /** Show a match in a second view, and corresponding points of both in the same colors. */
   private async openMatch(number: number): Promise<void> {
-    const { app, found } = this;
+    const { found } = this;
+    const { app } = this;
     const { backend, state, viewer } = app;
-    const names = [`match/${number}/vertices`, `match/${number}/faces`, "vertices"];
-    const arrays = await app.run("Loading the match", Promise.all(names.map((name) => backend.array(name))));
-    const [vertices, faces, own] = arrays.map(({ data }) => data);
-    if (found !== this.found) return;
-    const { name, up = state.up, front = state.front } = found!.matches[number]!;
+    const names = [`match/${number}/vertices`, `match/${number}/faces`];
+    const loading = Promise.all(names.map((name) => backend.array(name)));
+    const [vertices, faces] = await app.run("Loading the match", loading);
+    if (!found || found !== this.found) return;
+    const { name, up = state.up, front = state.front } = found.matches[number]!;
     this.closeMatch();
-    const stage = viewer.stage;
-    stage.after(this.beside);
-    stage.parentElement!.classList.add("compare");
+    viewer.stage.after(this.beside);
+    viewer.stage.parentElement!.classList.add("compare");
     this.second = new Viewer(this.beside);
-    const close = button("Close", "close-match", "Close the match", () => this.closeMatch());
-    this.beside.append(h("div", { class: "caption" }, name, close));
+    const click = () => this.closeMatch();
+    const close = { type: "button", "data-test": "close-match", title: "Close the match", click };
+    const caption = h("div", { class: "caption" }, name, h("button", close, "Close"));
+    this.beside.append(caption);
     this.second.setMesh(vertices as Float32Array, faces as Uint32Array, up, front);
     viewer.fit();
-    const pairs = found!.arrays[`pairs${number}`]?.data ?? new Uint32Array();
-    const [here, there] = [0, 1].map((side) => pairs.filter((_, i) => i % 2 === side) as Uint32Array);
-    const colors = colorByPlace(own as Float32Array, here!);
-    viewer.setPoints(here!, colors);
-    this.second.setPoints(there!, colors);
+    const pairs = found.arrays[`pairs${number}`] as Uint32Array;
+    const colors = found.arrays[`colors${number}`] as Uint8Array;
+    viewer.setPoints(
+      pairs.filter((_, i) => i % 2 === 0),
+      colors,
+    );
+    this.second.setPoints(
+      pairs.filter((_, i) => i % 2 === 1),
+      colors,
+    );
     [...this.list.children].forEach((card, i) => card.classList.toggle("chosen", i === number));
   }
 
@@ -105,17 +117,7 @@ export class SearchPanel implements Panel {
     this.beside.remove();
     this.beside.replaceChildren();
     this.app.viewer.stage.parentElement!.classList.remove("compare");
-    this.app.viewer.setPoints([], "red");
+    this.app.viewer.setPoints([], "#000000");
     for (const card of this.list.children) card.classList.remove("chosen");
   }
-}
-
-/** Neighboring points have similar colors, so that a swapped limb is seen at a glance. */
-function colorByPlace(points: Float32Array, vertices: Uint32Array): string[] {
-  const channels = [0, 1, 2].map((axis) => {
-    const places = Array.from(vertices, (vertex) => points[3 * vertex + axis]!);
-    const [low, high] = [Math.min(...places), Math.max(...places)];
-    return places.map((place) => Math.round(40 + (215 * (place - low)) / (high - low || 1)));
-  });
-  return Array.from(vertices, (_, i) => `rgb(${channels.map((channel) => channel[i]).join(", ")})`);
 }

@@ -1,0 +1,39 @@
+precision highp float;
+in vec3 v_normal;
+in vec3 v_view;
+in float v_value;
+in vec3 v_paint;
+in vec4 v_mark;
+uniform sampler2D table; // 256 colors
+uniform vec2 range;
+uniform bool nodal;
+uniform vec3 plain;
+uniform float opacity;
+out vec4 color;
+void main() {
+  // COLORING is 0: plain, 1: values through the table, 2: paint. Without a graphics card a branch
+  // that is not taken costs a sixth of a frame, so the shader is compiled for each of them.
+#if COLORING == 1
+  float share = (v_value - range.x) / max(range.y - range.x, 1e-30);
+  vec3 base = texelFetch(table, ivec2(clamp(int(256.0 * share), 0, 255), 0), 0).rgb;
+  // A line of constant width on the screen where the function changes its sign.
+  // Where it is zero all over, as on a component of its own, there is none: slope is rounding.
+  float slope = fwidth(v_value);
+  float distance_to_zero = abs(v_value) / max(slope, 1e-30);
+  if (nodal && slope > 1e-9 * range.y) base = mix(vec3(0.12), base, smoothstep(0.7, 1.5, distance_to_zero));
+#elif COLORING == 2
+  vec3 base = v_paint;
+#else
+  vec3 base = plain;
+#endif
+  base = mix(base, v_mark.rgb, v_mark.a);
+  vec3 eye = normalize(v_view);
+  vec3 n = normalize(v_normal);
+  if (dot(n, eye) < 0.0) n = -n; // both sides of an open surface are lit
+  // A large soft lamp at the upper left of the camera, a faint one at the lower right, and air.
+  float key = 0.5 + 0.5 * dot(n, vec3(-0.448, 0.647, 0.617));
+  float fill = max(dot(n, vec3(0.781, -0.279, 0.558)), 0.0);
+  float rim = 1.0 - max(dot(n, eye), 0.0);
+  float light = 0.36 + 0.68 * key * key + 0.1 * fill - 0.12 * rim * rim * rim;
+  color = vec4(min(base * light, 1.0), opacity);
+}
