@@ -11,7 +11,7 @@ from eigenshape.operators.cells import (
     gaussian_differences,
     gaussian_rows,
 )
-from eigenshape.operators.csr_loops import component_labels, worst_asymmetry
+from eigenshape.operators.csr_loops import component_labels
 
 
 def dense_kernel(points, weights, t, reach):
@@ -68,21 +68,6 @@ def test_the_number_of_threads_changes_nothing(monkeypatch):
 def test_points_not_chosen_are_not_counted():
     points = np.zeros((5, 1))
     assert count_partners(cell_grid(points, 1.0), np.array([1, 3])).tolist() == [0, 5, 0, 5, 0]
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.integers(1, 7), st.integers(0, 2**31), st.sampled_from(["any", "symmetric", "one"]))
-def test_the_worst_asymmetry_is_found(n, seed, kind):
-    rng = np.random.default_rng(seed)
-    matrix = rng.normal(size=(n, n)) * (rng.random((n, n)) < 0.5)
-    if kind != "any":
-        matrix = matrix + matrix.T
-    if kind == "one":
-        matrix[rng.integers(n), rng.integers(n)] += 1
-    sparse = sp.csr_array(matrix)
-    worst, row, column = worst_asymmetry(sparse.indptr, sparse.indices, sparse.data)
-    expected = np.abs(matrix - matrix.T)
-    assert worst == expected.max() == expected[row, column]
 
 
 def test_components_are_numbered_by_their_first_rows():

@@ -47,6 +47,14 @@ def test_asymmetry_is_refused_with_both_entries():
         Laplacian(matrix([1, -1], [-2, 1]), EYE)
 
 
+def test_the_largest_asymmetry_is_named():
+    rows = [[2, -1, -1, 0], [-1, 2, 0, -1], [-1.5, 0, 3, -1], [0, -1, 0, 2]]
+    with pytest.raises(
+        InvalidParameterError, match=r"entry \(2, 3\) is -1\.0 and entry \(3, 2\) is 0\.0"
+    ):
+        Laplacian(matrix(*rows), sp.csr_array(sp.eye_array(4)))
+
+
 def test_asymmetry_of_rounding_passes():
     assert Laplacian(matrix([1, -1], [-1 - 1e-15, 1]), EYE).n_points == 2
 

@@ -7,7 +7,6 @@ import scipy.sparse as sp
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
-from eigenshape.operators.csr_loops import worst_asymmetry
 
 # Largest difference of W_ij and W_ji, relative to the largest entry, that is accepted as rounding.
 ASYMMETRY = 1e-12
@@ -167,11 +166,12 @@ def _require_finite(name: str, matrix: sp.csr_array) -> None:
 
 
 def _require_symmetric(name: str, matrix: sp.csr_array) -> None:
-    # One type of indices where they fit, whatever SciPy chose: the loop is compiled once.
-    kind = np.int32 if max(matrix.shape[0], matrix.nnz) < 2**31 else np.int64
-    starts, columns = (each.astype(kind, copy=False) for each in (matrix.indptr, matrix.indices))
-    worst, row, column = worst_asymmetry(starts, columns, matrix.data)
-    if worst > ASYMMETRY * max(matrix.data.max(initial=0.0), -matrix.data.min(initial=0.0)):
+    differences = abs(matrix - matrix.T).tocoo()
+    if not differences.nnz:
+        return
+    worst = differences.data.argmax()
+    if differences.data[worst] > ASYMMETRY * abs(matrix.data).max():
+        row, column = differences.row[worst], differences.col[worst]
         raise InvalidParameterError(
             f"{name} must be symmetric; entry ({row}, {column}) is {matrix[row, column]} "
             f"and entry ({column}, {row}) is {matrix[column, row]}."

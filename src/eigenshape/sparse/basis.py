@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape.sparse.basis_loops import add_products, gather_rows, subtract_combination
+from eigenshape.sparse.basis_loops import add_products, subtract_combination
 from eigenshape.sparse.lane_loops import LANES
 
 ROWS = 512  # rows of a combination that are computed at once
@@ -39,10 +39,11 @@ def subtract(space: Slots, weights: Float[np.ndarray, "m b"], columns: Block) ->
 
 def combine_columns(space: Slots, weights: Float[np.ndarray, "m k"]) -> Float[np.ndarray, "n k"]:
     """Return the product of `space` and `weights` as an ordinary matrix."""
-    n = space.shape[1]
-    result, flat = np.empty((n, weights.shape[1])), np.empty((ROWS, len(weights)))
+    slots, n, _ = space.shape
+    result, flat = np.empty((n, weights.shape[1])), np.empty((ROWS, slots, LANES))
     for start in range(0, n, ROWS):
-        stop = min(start + ROWS, n)
-        gather_rows(space, start, stop, flat)
-        np.matmul(flat[: stop - start], weights, out=result[start:stop])
+        count = min(ROWS, n - start)
+        flat[:count] = space[:, start : start + count].transpose(1, 0, 2)
+        rows = flat[:count].reshape(count, slots * LANES)
+        np.matmul(rows, weights, out=result[start : start + count])
     return result

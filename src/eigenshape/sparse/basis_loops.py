@@ -63,13 +63,3 @@ def subtract_combination(space, parts, columns):
                         columns,
                         to + row,
                     )
-
-
-@njit
-@no_type_check
-def gather_rows(space, start, stop, flat):
-    """Write some rows of all slots as rows of one matrix, (rows, slots LANES)."""
-    for slot in range(len(space)):
-        for row in range(start, stop):
-            for lane in range(LANES):
-                flat[row - start, slot * LANES + lane] = space[slot, row, lane]

@@ -32,24 +32,29 @@ def subtract_product(
     size: Any,
     left: Any,
     left_at: Any,
+    left_wide: Any,
     right: Any,
     right_at: Any,
+    right_wide: Any,
     taken: Any,
     taken_at: Any,
+    taken_wide: Any,
 ) -> Any:
     """Subtract A Bᵀ from C, where all three are parts of matrices in C order.
 
-    A part is given by the flat index of its first entry; size = (rows, columns, terms).
+    A part is given by the flat index of its first entry, and by the number of entries from one row
+    to the next; size = (rows, columns, terms).
     """
-    whole, place = types.int64, types.int64
-    signature = types.void(whole, size, left, place, right, place, taken, place)
+    whole = types.int64
+    parts = left, whole, whole, right, whole, whole, taken, whole, whole
+    signature = types.void(whole, size, *parts)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         address, size = arguments[:2]
         rows, columns, terms = (
             _store_whole(builder, builder.extract_value(size, i)) for i in range(3)
         )
-        left, right, taken = (_part(context, builder, signature, arguments, i) for i in (2, 4, 6))
+        left, right, taken = (_part(context, builder, signature, arguments, i) for i in (2, 5, 8))
         minus, one = (_store_real(builder, value) for value in (-1.0, 1.0))
         # In Fortran's order every matrix is transposed: Cᵀ = Cᵀ - B Aᵀ.
         flags = [_letter(builder, letter) for letter in "TN"]
@@ -62,19 +67,27 @@ def subtract_product(
 
 @intrinsic
 def solve_triangle(
-    context: Any, address: Any, size: Any, triangle: Any, triangle_at: Any, right: Any, at: Any
+    context: Any,
+    address: Any,
+    size: Any,
+    triangle: Any,
+    triangle_at: Any,
+    triangle_wide: Any,
+    right: Any,
+    right_at: Any,
+    right_wide: Any,
 ) -> Any:
     """Replace X by X L⁻ᵀ, where L is unit lower triangular and both are parts of matrices.
 
-    Matrices are in C order; size = (rows of X, columns).
+    Parts are given as in `subtract_product`; size = (rows of X, columns).
     """
-    whole, place = types.int64, types.int64
-    signature = types.void(whole, size, triangle, place, right, place)
+    whole = types.int64
+    signature = types.void(whole, size, triangle, whole, whole, right, whole, whole)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         address, size = arguments[:2]
         rows, columns = (_store_whole(builder, builder.extract_value(size, i)) for i in range(2))
-        triangle, right = (_part(context, builder, signature, arguments, i) for i in (2, 4))
+        triangle, right = (_part(context, builder, signature, arguments, i) for i in (2, 5))
         flags = [_letter(builder, letter) for letter in "LUTU"]
         given = [*flags, columns, rows, _store_real(builder, 1.0), *triangle, *right]
         _call(builder, address, given)
@@ -98,9 +111,7 @@ def _letter(builder: Any, letter: str) -> Any:
 def _part(context: Any, builder: Any, signature: Any, arguments: Any, i: int) -> tuple[Any, Any]:
     """Return the address of a part, and the number of entries from one row to the next."""
     array = context.make_array(signature.args[i])(context, builder, arguments[i])
-    return builder.gep(array.data, [arguments[i + 1]]), _store_whole(
-        builder, builder.extract_value(array.shape, 1)
-    )
+    return builder.gep(array.data, [arguments[i + 1]]), _store_whole(builder, arguments[i + 2])
 
 
 def _call(builder: Any, address: Any, given: list[Any]) -> None:

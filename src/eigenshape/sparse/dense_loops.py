@@ -17,70 +17,79 @@ LONG = 256  # terms of a sum in one product: shorter sums have less rounding err
 
 @njit
 @no_type_check
-def eliminate_plain(front, width, pivots):
-    """Eliminate the first columns one by one; return whether all pivots are finite and not zero."""
-    height = len(front)
+def eliminate_plain(front, height, width, pivots, low):
+    """Eliminate the first columns one by one; return whether all pivots are finite and not zero.
+
+    The front is flat, row by row. Its pivots go to pivots[low:low + width].
+    """
     for j in range(width):
-        pivot = front[j, j]
-        if pivot == 0 or not np.isfinite(pivot):
+        corner = j * height + j
+        pivot = front[corner]
+        if not 0.0 < abs(pivot) < np.inf:
             return False
-        pivots[j] = pivot
-        front[j, j] = 1.0
+        pivots[low + j] = pivot
+        front[corner] = 1.0
         for i in range(j + 1, height):
-            share = front[i, j] / pivot
+            row = i * height
+            share = front[row + j] / pivot
             if share != 0:
                 for k in range(j + 1, i + 1):
-                    front[i, k] -= share * front[k, j]
+                    front[row + k] -= share * front[k * height + j]
         for i in range(j + 1, height):
-            front[i, j] /= pivot
+            front[i * height + j] /= pivot
     return True
 
 
 @njit
 @no_type_check
-def eliminate_blocked(front, width, pivots, times, blas):
+def eliminate_blocked(front, height, width, pivots, low, times, blas):
     """Eliminate the first columns by recursive halving, so that most work is in matrix products.
 
     The left half of a block of columns is eliminated, then updates the right half by a product.
     This loop does so in the order of the recursion: after every NARROW columns, the largest block
     of 2^k NARROW columns that is complete updates as many columns after it. At the end all columns
-    update the rest of the front. L D is written to `times`.
+    update the rest of the front. L D is written to `times`, row by row. The other arguments are
+    those of `eliminate_plain`.
     """
-    height, wide = len(front), times.shape[1]
     gemm, trsm = blas
     for start in range(0, width, NARROW):
         end = min(start + NARROW, width)
         # The triangular block on the diagonal, column by column.
         for j in range(start, end):
-            pivot = front[j, j]
-            if pivot == 0 or not np.isfinite(pivot):
+            corner = j * height + j
+            pivot = front[corner]
+            if not 0.0 < abs(pivot) < np.inf:
                 return False
-            pivots[j] = pivot
-            front[j, j] = 1.0
+            pivots[low + j] = pivot
+            front[corner] = 1.0
             for i in range(j + 1, end):
-                times[i, j] = front[i, j]
-                front[i, j] /= pivot
+                row = i * height
+                share = front[row + j]
+                times[i * width + j] = share
+                front[row + j] = share / pivot
                 for k in range(j + 1, i + 1):
-                    front[i, k] -= times[i, j] * front[k, j]
+                    front[row + k] -= share * front[k * height + j]
         # The rows below the triangle.
         for i in range(end, height):
             for j in range(start, end):
-                times[i, j] = front[i, j]
+                times[i * width + j] = front[i * height + j]
         size, corner = (height - end, end - start), start * height + start
-        solve_triangle(trsm, size, front, corner, times, end * wide + start)
+        solve_triangle(trsm, size, front, corner, height, times, end * width + start, width)
         for i in range(end, height):
             for j in range(start, end):
-                front[i, j] = times[i, j] / pivots[j]
+                front[i * height + j] = times[i * width + j] / pivots[low + j]
         # Update the columns to the right, on and below the diagonal.
         first, stop = 0, height
         if end < width:
             done = (end + NARROW - 1) // NARROW
             span = (done & -done) * NARROW
             first, stop = max(end - span, 0), min(end + span, width)
-        for low in range(end, height, TALL):
-            high = min(low + TALL, height)
+        for top in range(end, height, TALL):
+            bottom = min(top + TALL, height)
             for term in range(first, end, LONG):
-                size = (high - low, min(high, stop) - end, min(term + LONG, end) - term)
-                left, right = low * wide + term, end * height + term
-                subtract_product(gemm, size, times, left, front, right, front, low * height + end)
+                size = (bottom - top, min(bottom, stop) - end, min(term + LONG, end) - term)
+                left, right, taken = top * width + term, end * height + term, top * height + end
+                subtract_product(
+                    gemm, size, times, left, width, front, right, height, front, taken, height
+                )
     return True

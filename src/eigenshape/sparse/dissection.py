@@ -1,5 +1,9 @@
 """Nested dissection of a graph: an order of elimination with few entries in the factor."""
 
+from collections.abc import Callable
+from functools import partial
+from itertools import pairwise
+
 import numpy as np
 from jaxtyping import Int
 
@@ -8,7 +12,6 @@ from eigenshape.sparse.dissection_loops import (
     WORD,
     breadth_first,
     count_cuts,
-    find_pieces,
     order_leaf,
     smooth_keys,
     take_sides,
@@ -41,8 +44,9 @@ def dissect(indptr: Indices, indices: Indices) -> Indices:
         n, dtype=np.int64
     )  # the name of the segment that a point lies in; -1 when its place is final
     one, two, queue, key = (np.empty(n, dtype=np.int64) for _ in range(4))
-    bits = np.empty(LEAF * -(-n // WORD), dtype=np.uint64)
+    bits = np.empty(LEAF * -(-n // WORD), dtype=np.int64)
     leaf = np.full(n, -1), np.empty(LEAF, dtype=np.int64), np.empty(LEAF, dtype=np.int64), bits
+    measure_distances = partial(breadth_first, indptr, indices)
     waiting = [(0, n, False)]
     name = 0
     while waiting:
@@ -55,16 +59,14 @@ def dissect(indptr: Indices, indices: Indices) -> Indices:
         name += 1
         owner[segment] = name
         if not connected:
-            n_pieces = find_pieces(indptr, indices, segment, owner, name, one, queue, two)
+            ends = _find_pieces(measure_distances, segment, owner, name, one, queue)
             nodes[start:stop] = queue[:size]
             place[segment] = np.arange(start, stop)
-            ends = [start, *(start + two[:n_pieces])]
-            waiting += [(ends[i], ends[i + 1], True) for i in range(n_pieces)]
-            name += n_pieces
+            waiting += [(start + low, start + high, True) for low, high in pairwise([0, *ends])]
             continue
-        reached = breadth_first(indptr, indices, segment[0], owner, name, one, queue)
-        reached = breadth_first(indptr, indices, queue[reached - 1], owner, name, one, queue)
-        breadth_first(indptr, indices, queue[reached - 1], owner, name, two, queue)
+        reached = measure_distances(segment[0], owner, name, one, queue)
+        reached = measure_distances(queue[reached - 1], owner, name, one, queue)
+        measure_distances(queue[reached - 1], owner, name, two, queue)
         key[segment] = FINE * (one[segment] - two[segment])
         smooth_keys(indptr, indices, segment, owner, name, key, one)
         low, high = key[segment].min(), key[segment].max()
@@ -92,6 +94,33 @@ def dissect(indptr: Indices, indices: Indices) -> Indices:
             (first, last, False) for first, last in ((start, middle), (middle, cut)) if first < last
         ]
     return nodes
+
+
+def _find_pieces(
+    measure_distances: Callable[..., int],
+    segment: Indices,
+    owner: Indices,
+    name: int,
+    distance: Indices,
+    queue: Indices,
+) -> list[int]:
+    """Fill `queue` with the points of one connected piece of a segment after the other.
+
+    Returns the ends of the pieces in it. `measure_distances` is `breadth_first` on the graph;
+    `distance` is scratch.
+    """
+    ends = []
+    total = 0
+    for root in segment:
+        if total == len(segment):
+            break
+        if owner[root] == name:
+            rest = queue[total:]
+            found = measure_distances(root, owner, name, distance, rest)
+            owner[rest[:found]] = 0  # no segment's name
+            total += found
+            ends.append(total)
+    return ends
 
 
 def _cheapest_cut(counts: Int[np.ndarray, "3 v"]) -> tuple[int, bool]:

@@ -6,34 +6,11 @@ scratch: compiling an allocation takes longer than compiling a small loop.
 
 from typing import no_type_check
 
-import numpy as np
-
 from eigenshape._compile import njit
 
 LEAF = 160  # most points of a segment that is ordered by minimum degree
-WORD = 64  # bits of an integer in a set of neighbors
+WORD = 63  # bits of an int64 in a set of neighbors, without its sign
 SMOOTHINGS = 4  # smoothing passes over the keys: smooth keys have short cuts
-
-
-@njit
-@no_type_check
-def find_pieces(indptr, indices, segment, owner, name, distance, queue, ends):
-    """Find the connected pieces of a segment; return their number.
-
-    Fills `queue` with the points of one piece after the other, and `ends` with the ends of the
-    pieces in it. Their names are name + 1, name + 2, ... `distance` is scratch.
-    """
-    n_pieces = 0
-    total = 0
-    for i in range(len(segment)):
-        if owner[segment[i]] == name:
-            found = breadth_first(indptr, indices, segment[i], owner, name, distance, queue[total:])
-            for j in range(total, total + found):
-                owner[queue[j]] = name + n_pieces + 1
-            total += found
-            ends[n_pieces] = total
-            n_pieces += 1
-    return n_pieces
 
 
 @njit
@@ -131,7 +108,7 @@ def order_leaf(indptr, indices, nodes, start, stop, owner, place, local, order, 
     The segment is nodes[start:stop]. The elimination graph is a matrix of bits. The other arrays
     are scratch: `local` has an entry for each point of the graph, -1 on entry and on return;
     `order` and `degree` have LEAF entries; `bits` has a bit for each of LEAF rows and each point of
-    the graph.
+    the graph. No neighbor is listed twice.
     """
     count = stop - start
     for i in range(count):
@@ -146,14 +123,14 @@ def order_leaf(indptr, indices, nodes, start, stop, owner, place, local, order, 
     words = (total + WORD - 1) // WORD
     for i in range(count * words):
         bits[i] = 0
-    one = np.uint64(1)
     for i in range(count):
         node = nodes[start + i]
+        degree[i] = 0
         for at in range(indptr[node], indptr[node + 1]):
             j = local[indices[at]]
             if j != i:
-                bits[i * words + j // WORD] |= one << np.uint64(j % WORD)
-        degree[i] = _count_ones(bits, i * words, words)
+                bits[i * words + j // WORD] |= 1 << (j % WORD)
+                degree[i] += 1
     for i in range(start, stop):
         node = nodes[i]
         local[node] = -1
@@ -166,30 +143,26 @@ def order_leaf(indptr, indices, nodes, start, stop, owner, place, local, order, 
                 pivot = i
         order[step] = nodes[start + pivot]
         degree[pivot] = -1
-        clear = ~(one << np.uint64(pivot % WORD))
+        given = pivot * words
         for i in range(count):
-            if degree[i] >= 0 and (bits[pivot * words + i // WORD] >> np.uint64(i % WORD)) & one:
-                for word in range(words):
-                    bits[i * words + word] |= bits[pivot * words + word]
-                bits[i * words + pivot // WORD] &= clear
-                bits[i * words + i // WORD] &= ~(one << np.uint64(i % WORD))
-                degree[i] = _count_ones(bits, i * words, words)
+            if degree[i] < 0 or not bits[given + i // WORD] >> (i % WORD) & 1:
+                continue
+            # Row i takes over the neighbors of the pivot, but neither the pivot nor itself.
+            taken = i * words
+            for word in range(words):
+                bits[taken + word] |= bits[given + word]
+            bits[taken + pivot // WORD] &= ~(1 << (pivot % WORD))
+            bits[taken + i // WORD] &= ~(1 << (i % WORD))
+            total = 0
+            for word in range(words):
+                # The bits of a word are added up in parallel: by 2, by 4, by 8, then all.
+                x = bits[taken + word]
+                x -= (x >> 1) & 0x5555555555555555
+                x = (x & 0x3333333333333333) + ((x >> 2) & 0x3333333333333333)
+                x = (x + (x >> 4)) & 0x0F0F0F0F0F0F0F0F
+                total += (x * 0x0101010101010101) >> 56
+            degree[i] = total
     for i in range(count):
         nodes[start + i] = order[i]
         place[order[i]] = start + i
         owner[order[i]] = -1
-
-
-@njit
-@no_type_check
-def _count_ones(bits, start, words):
-    total = 0
-    for word in range(start, start + words):
-        x = bits[word]
-        x = x - ((x >> np.uint64(1)) & np.uint64(0x5555555555555555))
-        x = (x & np.uint64(0x3333333333333333)) + (
-            (x >> np.uint64(2)) & np.uint64(0x3333333333333333)
-        )
-        x = (x + (x >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
-        total += np.int64((x * np.uint64(0x0101010101010101)) >> np.uint64(56))
-    return total

@@ -10,7 +10,7 @@ from eigenshape._threads import one_blas_thread
 from eigenshape.sparse import front_loops as fronts
 from eigenshape.sparse import symbolic_loops as symbolic
 from eigenshape.sparse.blas_loops import addresses
-from eigenshape.sparse.dense_loops import LONG
+from eigenshape.sparse.dense_loops import LONG, NARROW
 from eigenshape.sparse.dissection import dissect
 from eigenshape.sparse.lane_loops import LANES
 
@@ -117,7 +117,7 @@ class SymmetricFactor:
 
         |E_ij| ≤ m eps (|L||D||L|ᵀ)_ij if each of the products that are summed up in an entry is
         rounded at most m times: once for every other term, in whatever order they are added, or
-        fewer times since sums are split, as `measure_fronts` counts (Higham 2002, sections 4.2
+        fewer times since sums are split, as `_measure_fronts` counts (Higham 2002, sections 4.2
         and 10.1). Four more roundings are for forming A and for the sums formed here. For a symmetric
         E, |xᵀEx| is at most Σ r_i x_i² with the row sums r_i of |E|.
         """
@@ -159,8 +159,7 @@ def analyze_pattern(pattern: sp.csc_array) -> Elimination:
     rows = np.sort(np.repeat(front * n, heights) + rows) % n  # ascending in each front
     lower_ptr, lower_rows, source = _lower(indptr, indices, place)
     places = _panel_places(np.diff(first), heights)
-    counters, lengths = np.zeros((2, size), dtype=np.int64), np.full(size, LONG)
-    room = fronts.measure_fronts(first, begins, above, *counters, lengths)
+    room, lengths = _measure_fronts(np.diff(first), heights, above)
     return Elimination(
         order, first, begins, rows, above, places, room, lengths, lower_ptr, lower_rows, source
     )
@@ -211,6 +210,33 @@ def _panel_places(widths: Indices, heights: Indices) -> Indices:
     entries = above * heights - fronts.WIDE**2 * full * (full - 1) // 2
     entries += (heights - above) * (widths - above)
     return np.concatenate([[0], np.cumsum(entries)])
+
+
+def _measure_fronts(
+    widths: Indices, heights: Indices, above: Indices
+) -> tuple[tuple[int, int], Indices]:
+    """Return `room` and `lengths` of an `Elimination`.
+
+    A front adds the updates of its children. Then blocks of its columns update others, LONG terms
+    at a time.
+    """
+    size = len(above)
+    has_parent = above >= 0
+    children = np.bincount(above[has_parent], minlength=size)
+    # An update waits on the stack until its parent is processed.
+    updates = (heights - widths) ** 2
+    waiting = np.zeros(size, dtype=np.int64)
+    np.add.at(waiting, above[has_parent], updates[has_parent])
+    stack = np.cumsum(updates - waiting)
+    # Blocks of NARROW columns are doubled until they are as wide as the front.
+    doublings = np.ceil(np.log2(np.maximum(widths / NARROW, 1))).astype(np.int64)
+    own = np.where(heights > fronts.SMALL, widths // LONG + 2 + doublings, widths) + children
+    longest = [LONG] * size
+    for s, (parent, roundings) in enumerate(zip(above.tolist(), own.tolist(), strict=True)):
+        longest[s] += roundings
+        if parent >= 0:
+            longest[parent] = max(longest[parent], longest[s])
+    return (int(stack.max()), int(heights.max())), np.array(longest)
 
 
 def _lower(indptr: Indices, indices: Indices, place: Indices) -> tuple[Indices, Indices, Indices]:

@@ -6,42 +6,20 @@ The caller allocates all arrays: compiling an allocation takes longer than compi
 from typing import no_type_check
 
 from eigenshape._compile import njit
-from eigenshape.sparse.dense_loops import LONG, NARROW, eliminate_blocked, eliminate_plain
-from eigenshape.sparse.lane_loops import LANES, subtract_four_sums, subtract_sum
+from eigenshape.sparse.dense_loops import eliminate_blocked, eliminate_plain
+from eigenshape.sparse.lane_loops import (
+    add_row,
+    copy_row,
+    divide_row,
+    subtract_four_sums,
+    subtract_sum,
+    write_four_negative_sums,
+    write_negative_sum,
+)
 
 WIDE = 64  # columns in a panel of L: 32 of its rows are 16 KiB, half of the first-level cache
 SMALL = 40  # rows of a front up to which plain loops are faster (measured)
 NEAR = 32  # rows of a panel that fit into the first-level cache
-
-
-@njit
-@no_type_check
-def measure_fronts(first, begins, above, waiting, children, lengths):
-    """Return the largest size of the stack of updates, and the rows of the largest front.
-
-    An update waits on the stack until its parent is processed; sizes are in numbers. `lengths`
-    comes filled with LONG, and is raised to a bound for the number of roundings of a product up to
-    each front: a front adds the updates of its children, then blocks of its columns update others,
-    LONG terms at a time. `waiting` and `children` are scratch, filled with 0.
-    """
-    now = most = tallest = 0
-    for s in range(len(above)):
-        height, width = begins[s + 1] - begins[s], first[s + 1] - first[s]
-        rest = height - width
-        now += rest * rest - waiting[s]
-        most, tallest = max(most, now), max(tallest, height)
-        own = width
-        if height > SMALL:
-            own, span = width // LONG + 2, NARROW
-            while span < width:
-                own, span = own + 1, 2 * span
-        lengths[s] += own + children[s]
-        parent = above[s]
-        if parent >= 0:
-            waiting[parent] += rest * rest
-            children[parent] += 1
-            lengths[parent] = max(lengths[parent], lengths[s])
-    return most, tallest
 
 
 @njit
@@ -71,20 +49,18 @@ def factor_fronts(
     per front (s). `children` is the number of children of each front.
     """
     size = len(first) - 1
-    stack, space, times, local, waiting = room
+    stack, front, times, local, waiting = room
     n_waiting = top = 0
     for s in range(size):
         low, high, start = first[s], first[s + 1], begins[s]
         height, width = begins[s + 1] - start, high - low
-        front = space[: height * height].reshape(height, height)
-        for i in range(height):
-            for j in range(height):
-                front[i, j] = 0.0
+        for i in range(height * height):
+            front[i] = 0.0
         for i in range(height):
             local[rows[start + i]] = i
         for j in range(low, high):
             for at in range(lower_ptr[j], lower_ptr[j + 1]):
-                front[local[lower_rows[at]], j - low] += values[at]
+                front[local[lower_rows[at]] * height + j - low] += values[at]
         for _ in range(children[s]):
             n_waiting -= 1
             child = waiting[n_waiting]
@@ -92,15 +68,13 @@ def factor_fronts(
             count = begins[child + 1] - skip
             top -= count * count
             for i in range(count):
-                target, given = local[rows[skip + i]], top + i * count
+                target, given = local[rows[skip + i]] * height, top + i * count
                 for j in range(i + 1):
-                    front[target, local[rows[skip + j]]] += stack[given + j]
+                    front[target + local[rows[skip + j]]] += stack[given + j]
         if height <= SMALL:
-            sound = eliminate_plain(front, width, pivots[low:high])
+            sound = eliminate_plain(front, height, width, pivots, low)
         else:
-            sound = eliminate_blocked(
-                front, width, pivots[low:high], times[: height * width].reshape(height, width), blas
-            )
+            sound = eliminate_blocked(front, height, width, pivots, low, times, blas)
         if not sound:
             return False
         at = places[s]
@@ -108,12 +82,13 @@ def factor_fronts(
             end = min(block + WIDE, width)
             for i in range(block, height):
                 for j in range(block, end):
-                    panels[at] = front[i, j]
+                    panels[at] = front[i * height + j]
                     at += 1
         count = height - width
         for i in range(count):
+            given = (width + i) * height + width
             for j in range(i + 1):
-                stack[top + i * count + j] = front[width + i, width + j]
+                stack[top + i * count + j] = front[given + j]
         top += count * count
         if above[s] >= 0:
             waiting[n_waiting] = s
@@ -126,8 +101,7 @@ def factor_fronts(
 def solve_lower(order, first, begins, rows, places, panels, right, lanes, gathered):
     """Fill `lanes` (n, LANES) with L⁻¹ times the right-hand sides, in the order of elimination."""
     for i in range(len(order)):
-        for lane in range(LANES):
-            lanes[i, lane] = right[order[i], lane]
+        copy_row(right, order[i], lanes, i)
     for s in range(len(first) - 1):
         at = places[s]
         for mine in range(first[s], first[s + 1], WIDE):
@@ -138,20 +112,17 @@ def solve_lower(order, first, begins, rows, places, panels, right, lanes, gather
             for i in range(1, columns):
                 subtract_sum(panels, at + i * columns, 1, 0, lanes, mine, i, lanes, mine + i)
             at += columns * columns
-            for i in range(rest):
-                for lane in range(LANES):
-                    gathered[i, lane] = 0.0
             four = rest // 4 * 4
             for i in range(0, four, 4):
-                subtract_four_sums(
+                write_four_negative_sums(
                     panels, at + i * columns, 1, columns, lanes, mine, columns, gathered, i
                 )
             for i in range(four, rest):
-                subtract_sum(panels, at + i * columns, 1, 0, lanes, mine, columns, gathered, i)
+                write_negative_sum(
+                    panels, at + i * columns, 1, 0, lanes, mine, columns, gathered, i
+                )
             for i in range(rest):
-                row = rows[below + i]
-                for lane in range(LANES):
-                    lanes[row, lane] += gathered[i, lane]
+                add_row(gathered, i, lanes, rows[below + i])
             at += rest * columns
 
 
@@ -165,8 +136,7 @@ def solve_upper(
     Rows are in the order of the matrix. `gathered` and `near` are scratch.
     """
     for i in range(len(order)):
-        for lane in range(LANES):
-            lanes[i, lane] /= pivots[i]
+        divide_row(lanes, i, pivots[i])
     for s in range(len(first) - 2, -1, -1):
         height, width = begins[s + 1] - begins[s], first[s + 1] - first[s]
         end = places[s + 1]
@@ -176,9 +146,7 @@ def solve_upper(
             below = end - rest * columns
             at = below - columns * columns
             for i in range(rest):
-                row = rows[begins[s + 1] - rest + i]
-                for lane in range(LANES):
-                    gathered[i, lane] = lanes[row, lane]
+                copy_row(lanes, rows[begins[s + 1] - rest + i], gathered, i)
             four = columns // 4 * 4
             for low in range(0, rest, NEAR):
                 count, corner = min(NEAR, rest - low), below + low * columns
@@ -194,8 +162,7 @@ def solve_upper(
                 subtract_sum(panels, place, columns, 0, lanes, given, count, lanes, mine + j)
             end = at
     for i in range(len(order)):
-        for lane in range(LANES):
-            solution[order[i], lane] = lanes[i, lane]
+        copy_row(lanes, i, solution, order[i])
 
 
 @njit

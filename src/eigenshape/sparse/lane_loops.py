@@ -16,10 +16,11 @@ LANES = 8
 VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 
 
-def _summation(n_targets: int, *, added: bool) -> Any:
-    """Return the intrinsic that sums into `n_targets` rows at once.
+def _summation(n_targets: int, change: str, *, kept: bool = True) -> Any:
+    """Return the intrinsic that changes `n_targets` rows at once by sums: "fadd" or "fsub".
 
-    More rows use the multipliers better, as long as all fit into registers.
+    Rows that are not kept count as 0. More rows use the multipliers better, as long as all fit into
+    registers.
     """
 
     @intrinsic
@@ -35,7 +36,7 @@ def _summation(n_targets: int, *, added: bool) -> Any:
         taken: Any,
         to: Any,
     ) -> Any:
-        """Add or subtract a weighted sum of rows, for each target row q.
+        """Change each target row q by a weighted sum of rows.
 
         To taken[to + q] goes Σ_t shares[at + t stride + q apart] given[start + t].
         """
@@ -64,10 +65,9 @@ def _summation(n_targets: int, *, added: bool) -> Any:
             for q, total in enumerate(sums):
                 offset = builder.mul(builder.add(to, ir.Constant(to.type, q)), eight)
                 pointer = _pointer(builder, taken, offset)
-                change = builder.fadd if added else builder.fsub
-                builder.store(
-                    change(builder.load(pointer, align=8), builder.load(total)), pointer, align=8
-                )
+                row = builder.load(pointer, align=8) if kept else ir.Constant(VECTOR, None)
+                row = getattr(builder, change)(row, builder.load(total))
+                builder.store(row, pointer, align=8)
             return context.get_dummy_value()
 
         return signature, generate
@@ -94,6 +94,57 @@ def _multiply_add(builder: Any, a: Any, b: Any, c: Any) -> Any:
     return builder.fadd(builder.fmul(a, b, flags=["contract"]), c, flags=["contract"])
 
 
-subtract_sum = _summation(1, added=False)
-subtract_four_sums = _summation(4, added=False)
-add_eight_sums = _summation(8, added=True)
+subtract_sum = _summation(1, "fsub")
+subtract_four_sums = _summation(4, "fsub")
+write_negative_sum = _summation(1, "fsub", kept=False)
+write_four_negative_sums = _summation(4, "fsub", kept=False)
+add_eight_sums = _summation(8, "fadd")
+
+
+@intrinsic
+def copy_row(context: Any, given: Any, start: Any, taken: Any, to: Any) -> Any:
+    """Copy row `start` of `given` to row `to` of `taken`."""
+    return _row_change(given, taken, lambda builder, row, old: row)
+
+
+@intrinsic
+def add_row(context: Any, given: Any, start: Any, taken: Any, to: Any) -> Any:
+    """Add row `start` of `given` to row `to` of `taken`."""
+    return _row_change(given, taken, lambda builder, row, old: builder.fadd(old, row))
+
+
+def _row_change(given: Any, taken: Any, change: Any) -> Any:
+    whole = types.int64
+    signature = types.void(given, whole, taken, whole)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        eight = ir.Constant(arguments[1].type, LANES)
+        given, taken = (
+            _pointer(
+                builder,
+                context.make_array(signature.args[place])(context, builder, arguments[place]).data,
+                builder.mul(arguments[place + 1], eight),
+            )
+            for place in (0, 2)
+        )
+        row, old = (builder.load(pointer, align=8) for pointer in (given, taken))
+        builder.store(change(builder, row, old), taken, align=8)
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+@intrinsic
+def divide_row(context: Any, rows: Any, at: Any, divisor: Any) -> Any:
+    """Divide row `at` of `rows` by a number that is not 0."""
+    signature = types.void(rows, types.int64, types.float64)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        rows, at, divisor = arguments
+        data = context.make_array(signature.args[0])(context, builder, rows).data
+        pointer = _pointer(builder, data, builder.mul(at, ir.Constant(at.type, LANES)))
+        quotients = builder.fdiv(builder.load(pointer, align=8), _repeat_scalar(builder, divisor))
+        builder.store(quotients, pointer, align=8)
+        return context.get_dummy_value()
+
+    return signature, generate

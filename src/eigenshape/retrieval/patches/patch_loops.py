@@ -26,7 +26,8 @@ def describe_disc(distances, center, order, surface, radius, kept, straight, fou
     """
     points, normals, areas = surface
     x = y = z = 0.0
-    for i in order:
+    for at in range(len(order)):
+        i = order[at]
         if distances[i] > INNER * radius:
             break
         x += areas[i] * normals[i, 0]
@@ -39,7 +40,8 @@ def describe_disc(distances, center, order, surface, radius, kept, straight, fou
         found[place] = 0.0
     for ring in range(RINGS):
         kept[ring] = straight[ring] = 0.0
-    for i in order:
+    for at in range(len(order)):
+        i = order[at]
         if distances[i] > radius:
             break
         u, v, w = points[i, 0] - center[0], points[i, 1] - center[1], points[i, 2] - center[2]
@@ -52,12 +54,8 @@ def describe_disc(distances, center, order, surface, radius, kept, straight, fou
         first = ring * RING_NUMBERS
         kept[ring] += areas[i]
         straight[ring] += areas[i] * (beeline / distances[i] if distances[i] > 0 else 1.0)
-        _add(found[first : first + TURN_BINS], turn, areas[i])
-        _add(
-            found[first + TURN_BINS : first + TURN_BINS + HEIGHT_BINS],
-            (height / radius + 1) / 2,
-            areas[i],
-        )
+        _add(found, first, TURN_BINS, turn, areas[i])
+        _add(found, first + TURN_BINS, HEIGHT_BINS, (height / radius + 1) / 2, areas[i])
     covered = 0.0
     for ring in range(RINGS):
         first = ring * RING_NUMBERS
@@ -73,9 +71,12 @@ def describe_disc(distances, center, order, surface, radius, kept, straight, fou
 
 @njit
 @no_type_check
-def _add(bins, share, weight):
-    """Split a weight at `share`, 0 to 1, between the two bins with the nearest centers."""
-    place = min(max(share * len(bins) - 0.5, 0.0), len(bins) - 1.0)
-    low = min(int(place), len(bins) - 2)
-    bins[low] += weight * (low + 1 - place)
-    bins[low + 1] += weight * (place - low)
+def _add(found, first, n_bins, share, weight):
+    """Split a weight at `share`, 0 to 1, between the two bins with the nearest centers.
+
+    The bins are the entries of `found` from `first` on.
+    """
+    place = min(max(share * n_bins - 0.5, 0.0), n_bins - 1.0)
+    low = min(int(place), n_bins - 2)
+    found[first + low] += weight * (low + 1 - place)
+    found[first + low + 1] += weight * (place - low)
