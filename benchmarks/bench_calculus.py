@@ -8,7 +8,7 @@ Each call begins with vertices and faces and has a process of its own on one cor
 compiles. Libraries take turns. "Poisson" fixes one vertex at 0. "Heat" is one implicit step of the squared mean edge
 length from points. potpourri3d has neither as a call of its own, but distances by heat, which take one heat solve, a
 gradient, a divergence and one Poisson solve for each source; ours for that comparison are the same steps, written
-with our functions. libigl factors anew for each call, since its `min_quad_with_fixed` keeps no factor from Python here.
+with our functions. libigl is called by `min_quad_with_fixed`, which factors and solves at once.
 """
 
 import statistics

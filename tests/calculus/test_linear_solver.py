@@ -122,6 +122,10 @@ def test_threads_share_a_solver():
     np.testing.assert_array_equal(alone, together)
 
 
+def test_a_solver_says_what_it_solves():
+    assert repr(poisson_solver(PLATE, [0, 7])) == "LinearSolver(36 points, 2 fixed, 0 constraints)"
+
+
 def test_everything_may_be_fixed():
     solver = poisson_solver(PLATE, np.arange(PLATE.n_points))
     assert (solver.solve(values=4.0) == 4.0).all()

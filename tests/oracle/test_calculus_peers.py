@@ -21,8 +21,10 @@ def lapy_mesh(mesh):
     if mesh.dim == 2:
         return lapy.TriaMesh(mesh.points.copy(), mesh.simplices.copy())
     solid = lapy.TetMesh(mesh.points.copy(), mesh.simplices.copy())
-    solid.orient_()  # its divergence depends on the order of corners; ours does not
-    return solid
+    solid.orient_()
+    # Its gradients depend on the order of corners: after its own `orient_` they point down the
+    # slope, with two corners swapped they point up. Ours do not depend on it.
+    return lapy.TetMesh(solid.v, solid.t[:, [0, 1, 3, 2]])
 
 
 def lapy_solver(mesh):

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arrays import freeze, point_functions, real_numbers
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.boundary import require_points
@@ -86,8 +86,11 @@ class LinearSolver:
     _refined: bool  # whether solutions take a step of refinement
     _constraints: "Constraints | None" = None
 
-    __repr__ = short_repr
     _repr_html_ = html_repr
+
+    def __repr__(self) -> str:
+        count = 0 if self._constraints is None else self._constraints.matrix.shape[0]
+        return f"LinearSolver({self.n_points} points, {len(self.fixed)} fixed, {count} constraints)"
 
     def solve(
         self, right: ArrayLike = 0.0, *, values: ArrayLike = 0.0, targets: ArrayLike = 0.0
