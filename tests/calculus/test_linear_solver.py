@@ -19,7 +19,7 @@ BALL = es.cotangent_laplacian(es.icosphere(2))
 SQUARE = es.shapes.grid(5, 5)
 PLATE = es.cotangent_laplacian(SQUARE)
 RIM = es.geometry.boundary_vertices(SQUARE)
-TWO = es.cotangent_laplacian(es.geometry.disjoint_union([es.icosphere(1), es.icosphere(2)]))
+TWO = es.cotangent_laplacian(es.geometry.disjoint_union(es.icosphere(1), es.icosphere(2)))
 
 
 def test_poisson_on_a_closed_shape_has_mean_zero():
@@ -132,7 +132,9 @@ def test_a_load_that_does_not_balance_is_named_and_the_remedy_works():
         poisson_solver(TWO).solve(TWO.mass @ np.ones(TWO.n_points))
     assert "on the component of point 0 it sums to" in str(info.value)
     assert "(2 such components)" in str(info.value)
-    assert (poisson_solver(TWO).solve(TWO.mass @ remove_means(TWO, np.ones(204))) == 0).all()
+    for source in (np.ones(204), 1 + 1e-9 * np.sin(np.arange(204))):
+        left = remove_means(TWO, source)
+        np.testing.assert_allclose(poisson_solver(TWO).solve(TWO.mass @ left), 0.0, atol=1e-8)
 
 
 def test_wrong_arguments_are_named():
@@ -168,7 +170,7 @@ def test_wrong_arguments_are_named():
 
 def test_matrices_without_a_solution_are_named():
     with pytest.raises(es.InvalidParameterError, match="must be sparse and square"):
-        factor_equations(np.eye(3))
+        factor_equations(sp.csr_array(np.ones((2, 3))))
     with pytest.raises(es.InvalidParameterError, match="matrix of a system must be finite"):
         factor_equations(sp.csr_array([[np.inf]]))
     with pytest.raises(es.InvalidParameterError, match="matrix of a system must be symmetric"):
@@ -177,5 +179,6 @@ def test_matrices_without_a_solution_are_named():
         factor_equations(sp.csr_array([[1.0, 2.0], [2.0, 1.0]]))
     with pytest.raises(es.InvalidParameterError, match="must have one solution; a pivot is 0"):
         factor_equations(sp.csr_array([[0.0, 1.0], [1.0, 0.0]]), indefinite=True)
+    rows = np.random.default_rng(7).standard_normal((2, 3))
     with pytest.raises(es.InvalidParameterError, match="is zero up to rounding"):
-        factor_equations(sp.csr_array([[1.0, -1.0, 0.0], [-1.0, 2.0, 1.0], [0.0, 1.0, 1.0]]))
+        factor_equations(sp.csr_array(rows.T @ rows))

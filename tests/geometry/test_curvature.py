@@ -97,3 +97,50 @@ def test_bad_meshes_are_named():
         es.geometry.gaussian_curvature(es.TriangleMesh(np.eye(3), [[0, 1, 2], [0, 0, 1]]))
     with pytest.raises(InvalidShapeError, match="vertex 3 at"):
         es.geometry.gaussian_curvature(es.TriangleMesh(np.eye(4, 3), [[0, 1, 2]]))
+
+
+def test_principal_curvatures_of_a_cylinder_at_its_boundary_too():
+    sheet = es.shapes.grid(24, 12, width=3.0, height=1.0)
+    x, y, _ = sheet.vertices.T
+    pipe = es.TriangleMesh(np.column_stack([2 * np.sin(x / 2), y, 2 * np.cos(x / 2)]), sheet.faces)
+    found = es.geometry.principal_curvatures(pipe)
+    np.testing.assert_allclose(found.values[:, 0], 0.5, atol=0.01)
+    np.testing.assert_allclose(found.values[:, 1], 0.0, atol=0.01)
+    np.testing.assert_allclose(np.abs(found.directions[:, 1, 1]), 1.0, atol=1e-3)
+    np.testing.assert_allclose(found.mean, 0.25, atol=0.01)
+    np.testing.assert_allclose(found.gaussian, found.values[:, 0] * found.values[:, 1])
+
+
+def test_principal_directions_are_orthonormal_and_tangent():
+    mesh = es.make_creature("biped", n_vertices=600)
+    one, two = es.geometry.principal_curvatures(mesh).directions.transpose(1, 0, 2)
+    np.testing.assert_allclose(np.linalg.norm(one, axis=1), 1.0)
+    np.testing.assert_allclose(np.linalg.norm(two, axis=1), 1.0)
+    np.testing.assert_allclose(np.einsum("ni,ni->n", one, two), 0.0, atol=1e-9)
+
+
+def test_principal_curvatures_scale_exactly_and_change_sign_with_the_side():
+    ball = es.icosphere(1)
+    found = es.geometry.principal_curvatures(ball).values
+    large = es.TriangleMesh(ball.vertices * 2.0**40, ball.faces)
+    np.testing.assert_array_equal(es.geometry.principal_curvatures(large).values * 2.0**40, found)
+    inside = es.TriangleMesh(ball.vertices, ball.faces[:, ::-1])
+    np.testing.assert_allclose(
+        es.geometry.principal_curvatures(inside).values, -found[:, ::-1], atol=1e-12
+    )
+
+
+def test_few_neighbors_are_enough_for_principal_curvatures():
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    tetrahedron = es.TriangleMesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    assert np.isfinite(es.geometry.principal_curvatures(tetrahedron).values).all()
+    plane = es.geometry.principal_curvatures(es.shapes.grid(1, 1)).values
+    np.testing.assert_allclose(plane, 0.0, atol=1e-12)
+
+
+def test_a_vertex_without_normal_is_named():
+    # Two triangles that lie on each other, turned over, so that their normals cancel.
+    points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 1, 0], [1, 0, 0]]
+    folded = es.TriangleMesh(points, [[0, 1, 2], [0, 3, 4]])
+    with pytest.raises(es.InvalidShapeError, match="A vertex must have a normal"):
+        es.geometry.principal_curvatures(folded)

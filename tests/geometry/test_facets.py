@@ -3,13 +3,14 @@ import pytest
 
 from eigenshape.geometry.facets import (
     boundary_facets,
+    boundary_surface,
     facet_components,
     facet_table,
     without_pinches,
 )
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.topology import edge_table
+from eigenshape.geometry.topology import boundary_vertices, edge_table
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.shapes.domains import ball, box, interval
 from eigenshape.shapes.surfaces import grid, icosphere
@@ -94,3 +95,9 @@ def test_two_parts_are_numbered():
     count, labels = facet_components(facet_table(disjoint_union(grid(1, 1), grid(1, 1))))
     assert count == 2
     assert labels.tolist() == [0, 0, 1, 1]
+
+
+def test_vertices_of_the_boundary_are_its_points_in_order():
+    solid = ball(3)
+    surface, points = boundary_surface(solid), boundary_vertices(solid)
+    np.testing.assert_array_equal(surface.vertices, solid.points[points])

@@ -49,6 +49,20 @@ def test_any_shape_has_its_spectrum(capsys):
     assert "All 11 laws hold." in capsys.readouterr().out
 
 
+@pytest.mark.long
+def test_calculus_on_a_shape_draws_its_pictures(tmp_path):
+    found = runpy.run_path(str(ROOT / "examples" / "calculus_on_a_shape.py"))["main"](
+        tmp_path, n_vertices=800
+    )
+    assert found["up"].min() == 0.0
+    assert found["up"].max() == 1.0
+    assert (found["girths"] > 0).all()
+    assert found["distortion"].mean() < 1.1
+    page = (ROOT / "docs" / "calculus.md").read_text()
+    shown = re.findall(r"\(pictures/(\S+?)\)", page)
+    assert sorted(shown) == sorted(path.name for path in tmp_path.glob("*.png"))
+
+
 def test_readme_begins_with_exactly_two_commands():
     blocks = (ROOT / "README.md").read_text().split("```")
     commands = blocks[1].splitlines()[1:]

@@ -1,21 +1,45 @@
 """Poisson, Helmholtz and heat equations on any operator, with fixed values and loads."""
 
+from typing import SupportsIndex
+
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import finite_values, point_functions, positive_values
+from eigenshape._arrays import (
+    finite_values,
+    point_functions,
+    positive_values,
+    real_numbers,
+    vertex_values,
+    whole_number,
+)
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._typing import ArrayLike
-from eigenshape.calculus.linear_solver import LinearSolver, factor_equations
+from eigenshape.calculus.linear_solver import (
+    LinearSolver,
+    SparseMatrix,
+    factor_definite,
+    factor_equations,
+)
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
+from eigenshape.geometry.facets import boundary_facets
+from eigenshape.geometry.simplicial import SimplicialMesh
+from eigenshape.geometry.topology import boundary_vertices
+from eigenshape.operators import elements
 from eigenshape.operators.laplacian import Laplacian
+
+# Differences from a mean up to this share of the value are the rounding of sums of up to a million
+# numbers.
+ROUNDING = 1e-12
 
 
 def poisson_solver(
     laplacian: Laplacian,
     fixed: ArrayLike | None = None,
-    constraints: sp.sparray | ArrayLike | None = None,
+    constraints: SparseMatrix | ArrayLike | None = None,
 ) -> LinearSolver:
     """Factor the Poisson equation W u = b, for many right-hand sides.
 
@@ -98,7 +122,9 @@ def helmholtz_solver(
     (kappa,) = finite_values(squared_wavenumber, "squared_wavenumber")
     weights = laplacian.mass.sum(axis=1)
     matrix = laplacian.stiffness - kappa * laplacian.mass
-    return factor_equations(matrix, fixed, weights=weights, indefinite=bool(kappa > 0))
+    if kappa == 0:
+        return factor_equations(matrix, fixed, weights=weights)
+    return factor_definite(matrix, fixed, indefinite=bool(kappa > 0))
 
 
 def heat_solver(laplacian: Laplacian, t: float, fixed: ArrayLike | None = None) -> LinearSolver:
@@ -140,7 +166,7 @@ def heat_solver(laplacian: Laplacian, t: float, fixed: ArrayLike | None = None) 
     """
     require_type(laplacian, Laplacian, "laplacian")
     (step,) = positive_values(t, "t")
-    return factor_equations(laplacian.mass + step * laplacian.stiffness, fixed)
+    return factor_definite(laplacian.mass + step * laplacian.stiffness, fixed)
 
 
 def remove_means(laplacian: Laplacian, values: ArrayLike) -> Float[np.ndarray, "n ..."]:
@@ -176,5 +202,400 @@ def remove_means(laplacian: Laplacian, values: ArrayLike) -> Float[np.ndarray, "
     weights = laplacian.mass.sum(axis=1)
     members = sp.csr_array((weights, (labels, np.arange(len(labels)))), shape=(count, len(labels)))
     sums = members.sum(axis=1).reshape(-1, *[1] * (functions.ndim - 1))
-    means = (members @ functions) / sums
-    return functions - means[labels]
+    left = functions - ((members @ functions) / sums)[labels]
+    # What is rounding of a constant is removed, and where little is left, so is its own mean:
+    # a solver measures the balance of loads by their size.
+    left[np.abs(left) <= ROUNDING * np.abs(functions)] = 0.0
+    return left - ((members @ left) / sums)[labels]
+
+
+def solve_poisson(
+    laplacian: Laplacian,
+    source: ArrayLike = 0.0,
+    *,
+    load: ArrayLike = 0.0,
+    fixed: ArrayLike | None = None,
+    values: ArrayLike = 0.0,
+) -> Float[np.ndarray, "n ..."]:
+    """Solve the Poisson equation -Δu = f with fixed values, flux through the boundary or neither.
+
+    W u = B f + load, in the sign of the library: L is -div grad. Where nothing is fixed, the flux
+    through the boundary is the load, zero by default (Neumann).
+
+    Parameters
+    ----------
+    laplacian : Laplacian
+    source : (n,) or (n, k) float, or a number
+        f at the points, in units of u per length².
+    load : (n,) or (n, k) float, or a number
+        Integrated loads, added to B f: `boundary_load` of a flux, or -`divergence` of a field.
+    fixed : (c,) int, optional
+        Points where values are given (Dirichlet).
+    values : (c,) or (c, k) float, or a number
+        The values there.
+
+    Returns
+    -------
+    (n,) or (n, k) float
+        u. On a component without fixed point its mean, weighted by the mass, is 0.
+
+    Raises
+    ------
+    InvalidParameterError
+        If an array has another length or a number is not finite, a point is fixed at two values, or
+        on a component without fixed point B f + load does not sum to 0.
+
+    See Also
+    --------
+    es.calculus.poisson_solver : The factor, kept for many right-hand sides.
+
+    Examples
+    --------
+    On a sphere of radius 1, -Δz = 2z:
+
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(3)
+    >>> z = ball.vertices[:, 2]
+    >>> u = es.calculus.solve_poisson(es.cotangent_laplacian(ball), 2 * z)
+    >>> bool(abs(u - z).max() < 0.01)
+    True
+    """
+    solver = poisson_solver(laplacian, fixed)
+    return solver.solve(_right_hand_side(laplacian, source, load), values=values)
+
+
+def solve_helmholtz(
+    laplacian: Laplacian,
+    squared_wavenumber: float,
+    source: ArrayLike = 0.0,
+    *,
+    load: ArrayLike = 0.0,
+    fixed: ArrayLike | None = None,
+    values: ArrayLike = 0.0,
+) -> Float[np.ndarray, "n ..."]:
+    """Solve the Helmholtz equation -Δu - κu = f, or the screened Poisson equation where κ < 0.
+
+    (W - κB) u = B f + load.
+
+    Parameters
+    ----------
+    laplacian : Laplacian
+    squared_wavenumber : float
+        κ, in 1/length².
+    source, load, fixed, values
+        As in `solve_poisson`.
+
+    Returns
+    -------
+    (n,) or (n, k) float
+        u.
+
+    Raises
+    ------
+    InvalidParameterError
+        If κ is not finite, or an eigenvalue of the operator up to rounding, or an argument is wrong
+        as in `solve_poisson`.
+
+    See Also
+    --------
+    es.calculus.helmholtz_solver : The factor, kept for many right-hand sides.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> laplacian = es.cotangent_laplacian(es.icosphere(2))
+    >>> es.calculus.solve_helmholtz(laplacian, -4.0, 1.0)[0].round(12).item()
+    0.25
+    """
+    solver = helmholtz_solver(laplacian, squared_wavenumber, fixed)
+    return solver.solve(_right_hand_side(laplacian, source, load), values=values)
+
+
+def solve_heat(  # noqa: PLR0913 - one keyword for each part of the equation
+    laplacian: Laplacian,
+    start: ArrayLike,
+    t: float,
+    n_steps: SupportsIndex = 1,
+    *,
+    source: ArrayLike = 0.0,
+    fixed: ArrayLike | None = None,
+    values: ArrayLike = 0.0,
+) -> Float[np.ndarray, "n ..."]:
+    """Let heat flow for a time t by implicit steps, with one factor for all of them.
+
+    Each step of length τ = t / n_steps solves (B + τW) u' = B (u + τf): backward Euler, of first
+    order in τ and without a bound on it. Heat is conserved, but for the source and what fixed
+    points let out.
+
+    Parameters
+    ----------
+    laplacian : Laplacian
+    start : (n,) or (n, k) float
+        Values at time 0.
+    t : float
+        Time, in length².
+    n_steps : int
+    source : (n,) or (n, k) float, or a number
+        f, in units of u per length².
+    fixed : (c,) int, optional
+        Points where values are given (Dirichlet).
+    values : (c,) or (c, k) float, or a number
+        The values there, constant in time.
+
+    Returns
+    -------
+    (n,) or (n, k) float
+        Values at time t.
+
+    Raises
+    ------
+    InvalidParameterError
+        If t is not positive, n_steps is below 1, an array has another length or a number is not
+        finite, or a point is fixed at two values.
+
+    See Also
+    --------
+    es.calculus.heat_solver : The factor of one step.
+
+    Examples
+    --------
+    The temperature of a bar whose ends are kept at 0 and 1 becomes linear.
+
+    >>> import eigenshape as es
+    >>> import numpy as np
+    >>> bar = es.cotangent_laplacian(es.shapes.interval(4))
+    >>> ends = {"fixed": [0, 4], "values": [0.0, 1.0]}
+    >>> es.calculus.solve_heat(bar, np.zeros(5), 10.0, n_steps=20, **ends).round(6).tolist()
+    [0.0, 0.25, 0.5, 0.75, 1.0]
+    """
+    require_type(laplacian, Laplacian, "laplacian")
+    count = whole_number(n_steps, "n_steps", 1)
+    (time,) = positive_values(t, "t")
+    current = point_functions(start, "start", laplacian.n_points)
+    solver = heat_solver(laplacian, time / count, fixed)
+    added = (time / count) * _right_hand_side(laplacian, source, 0.0)
+    for _ in range(count):
+        current = solver.solve(_add(laplacian.mass @ current, added), values=values)
+    return current
+
+
+def boundary_load(mesh: MeshLike, flux: ArrayLike) -> Float[np.ndarray, " n"]:
+    """Integrate a flux through the boundary of a mesh: ∫ g λ_i over its boundary, at each point.
+
+    The load of the Neumann condition ∂u/∂ν = g, with ν the direction out of the mesh.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Of any dimension m, with a boundary.
+    flux : (n,) float, or a number
+        g at the points, linear between them; values inside do not count.
+
+    Returns
+    -------
+    (n,) float
+        In units of the flux times length^(m-1); zero inside.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `flux` does not have one number per point, or a number is not finite.
+    InvalidShapeError
+        If the mesh has no boundary.
+
+    Examples
+    --------
+    A flux of 1 out of a unit square:
+
+    >>> import eigenshape as es
+    >>> load = es.calculus.boundary_load(es.shapes.grid(4, 4), 1.0)
+    >>> load.sum().round(12).item()
+    4.0
+    """
+    mesh = as_simplicial(mesh)
+    given = real_numbers(flux, "flux")
+    if given.ndim == 0:
+        given = np.full(mesh.n_points, given)
+    strength = vertex_values(given, "flux", mesh.n_points)
+    rim = boundary_vertices(mesh)
+    if not rim.size:
+        raise InvalidShapeError("A flux needs a boundary to flow through; the mesh is closed.")
+    load = np.zeros(mesh.n_points)
+    if mesh.dim == 1:
+        load[rim] = strength[rim]  # the boundary of a curve is points, of measure 1
+        return load
+    edge = SimplicialMesh(mesh.points[rim], np.searchsorted(rim, boundary_facets(mesh)))
+    load[rim] = elements.mass(edge, edge.simplices, 1) @ strength[rim]
+    return load
+
+
+def minimize_quadratic(
+    matrix: SparseMatrix,
+    linear: ArrayLike = 0.0,
+    *,
+    fixed: ArrayLike | None = None,
+    values: ArrayLike = 0.0,
+    constraints: SparseMatrix | ArrayLike | None = None,
+    targets: ArrayLike = 0.0,
+) -> Float[np.ndarray, "n ..."]:
+    """Minimize ½ xᵀQx - xᵀb with fixed values and linear constraints C x = d.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse
+        Q, symmetric and positive semidefinite, such as a stiffness or `polyharmonic_matrix`.
+    linear : (n,) or (n, k) float, or a number
+        b.
+    fixed : (c,) int, optional
+        Points where values are given.
+    values : (c,) or (c, k) float, or a number
+        The values there.
+    constraints : (p, n) sparse or float, optional
+        C.
+    targets : (p,) or (p, k) float, or a number
+        d.
+
+    Returns
+    -------
+    (n,) or (n, k) float
+        x. Where it is determined up to a constant on a component, its mean there is 0.
+
+    Raises
+    ------
+    InvalidParameterError
+        As in `factor_equations`, which keeps the factor, and `LinearSolver.solve`.
+
+    See Also
+    --------
+    es.calculus.solve_harmonic : The smoothest functions through given values.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> from scipy.sparse import eye_array
+    >>> Q = eye_array(3)
+    >>> es.calculus.minimize_quadratic(Q, constraints=[[1, 1, 1]], targets=[6]).round(12).tolist()
+    [2.0, 2.0, 2.0]
+    """
+    solver = factor_equations(matrix, fixed, constraints)
+    return solver.solve(linear, values=values, targets=targets)
+
+
+def polyharmonic_matrix(laplacian: Laplacian, order: SupportsIndex = 2) -> sp.csr_array:
+    """Build the energy matrix of k-harmonic functions, W (B⁻¹W)^(k-1).
+
+    ½ uᵀQu is half the integral of |∇u|² for k = 1 and of (Δu)² for k = 2, with natural conditions
+    at the boundary (Botsch and Kobbelt 2004; Jacobson, Tosun, Sorkine and Zorin 2010).
+
+    Parameters
+    ----------
+    laplacian : Laplacian
+        With diagonal (lumped) mass.
+    order : int
+        k, at least 1.
+
+    Returns
+    -------
+    (n, n) sparse
+        Q, in length^(m-2k).
+
+    Raises
+    ------
+    InvalidParameterError
+        If k is below 1, or the mass is not diagonal and k is above 1.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> Q = es.calculus.polyharmonic_matrix(es.cotangent_laplacian(es.icosphere(1)))
+    >>> bool(abs(Q.sum(axis=1)).max() < 1e-12)
+    True
+    """
+    require_type(laplacian, Laplacian, "laplacian")
+    count = whole_number(order, "order", 1)
+    stiffness, mass = laplacian.stiffness, laplacian.mass
+    diagonal = mass.diagonal()
+    if count > 1 and mass.count_nonzero() > np.count_nonzero(diagonal):
+        raise InvalidParameterError(
+            "A k-harmonic energy needs a diagonal mass, because its inverse must be sparse; the "
+            'mass is not diagonal. Use es.cotangent_laplacian(mesh, "lumped").'
+        )
+    inverse = sp.diags_array(1 / diagonal)
+    energy = stiffness
+    for _ in range(count - 1):
+        energy = energy @ (inverse @ stiffness)
+    # The factors commute but for rounding.
+    return ((energy + energy.T) / 2).tocsr()
+
+
+def solve_harmonic(
+    laplacian: Laplacian,
+    fixed: ArrayLike,
+    values: ArrayLike,
+    *,
+    order: SupportsIndex = 1,
+) -> Float[np.ndarray, "n ..."]:
+    """Interpolate values at some points by the smoothest function: harmonic, biharmonic and so on.
+
+    Parameters
+    ----------
+    laplacian : Laplacian
+        With diagonal (lumped) mass if `order` is above 1.
+    fixed : (c,) int
+        Points where values are given, at least one per component.
+    values : (c,) or (c, k) float, or a number
+        The values there.
+    order : int
+        1 for harmonic, Δu = 0; 2 for biharmonic, Δ²u = 0; and so on.
+
+    Returns
+    -------
+    (n,) or (n, k) float
+
+    Raises
+    ------
+    InvalidParameterError
+        If a component has no fixed point, or as in `polyharmonic_matrix` and `LinearSolver.solve`.
+
+    See Also
+    --------
+    es.calculus.polyharmonic_matrix : The energy that is minimized.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> bar = es.cotangent_laplacian(es.shapes.interval(4))
+    >>> es.calculus.solve_harmonic(bar, [0, 4], [0.0, 1.0]).round(12).tolist()
+    [0.0, 0.25, 0.5, 0.75, 1.0]
+    """
+    solver = factor_equations(polyharmonic_matrix(laplacian, order), fixed)
+    loose = np.flatnonzero(solver.floating >= 0)
+    if loose.size:
+        raise InvalidParameterError(
+            "Each component must have a fixed point; the component of point "
+            f"{loose[0]} has none ({int(solver.floating.max()) + 1} such)."
+        )
+    return solver.solve(values=values)
+
+
+def _right_hand_side(
+    laplacian: Laplacian, source: ArrayLike, load: ArrayLike
+) -> Float[np.ndarray, "n ..."]:
+    """Return B f + load."""
+    require_type(laplacian, Laplacian, "laplacian")
+    terms = []
+    for name, given in (("source", source), ("load", load)):
+        numbers = real_numbers(given, name)
+        if numbers.ndim == 0:
+            numbers = np.full(laplacian.n_points, numbers)
+        terms.append(point_functions(numbers, name, laplacian.n_points))
+    return _add(laplacian.mass @ terms[0], terms[1])
+
+
+def _add(one: Float[np.ndarray, "n ..."], two: Float[np.ndarray, "n ..."]) -> np.ndarray:
+    """Add functions; one function is added to each of several."""
+    if one.ndim < two.ndim:
+        one = one[:, None]
+    if two.ndim < one.ndim:
+        two = two[:, None]
+    return np.asarray(one + two)

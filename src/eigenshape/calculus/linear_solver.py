@@ -1,6 +1,7 @@
 """Symmetric systems of equations on points: factored once, solved for many right-hand sides."""
 
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -28,10 +29,12 @@ DEPENDENT = 1e-12
 # Of a system that no pins or fixed points make regular.
 SINGULAR = (
     "The equations of the free points must have one solution; {}. "
-    "Fix a point of each component, or move the shift away from an eigenvalue."
+    "Fix a point of each component, or change t or the squared wavenumber."
 )
 # Constraints count as met up to this share of their terms.
 MET = 1e-8
+
+SparseMatrix: TypeAlias = sp.sparray | sp.spmatrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,11 +184,12 @@ class LinearSolver:
 
     def floating_sums(self, load: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "u k"]:
         """Return the sums of loads over each component that is determined up to a constant."""
-        inside = self.floating >= 0
+        points = np.flatnonzero(self.floating >= 0)
         count = int(self.floating.max(initial=-1)) + 1
-        numbers = self.floating[inside]
-        sums = [np.bincount(numbers, weights=each, minlength=count) for each in load[inside].T]
-        return np.stack(sums, axis=1)
+        members = sp.csr_array(
+            (np.ones(len(points)), (self.floating[points], points)), shape=(count, self.n_points)
+        )
+        return np.asarray(members @ load)
 
     def _without_means(self, found: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
         """Subtract the weighted mean over each floating component."""
@@ -277,9 +281,9 @@ class Constraints:
 
 
 def factor_equations(
-    matrix: sp.sparray,
+    matrix: SparseMatrix,
     fixed: ArrayLike | None = None,
-    constraints: sp.sparray | ArrayLike | None = None,
+    constraints: SparseMatrix | ArrayLike | None = None,
     *,
     weights: ArrayLike | None = None,
     indefinite: bool = False,
@@ -330,25 +334,67 @@ def factor_equations(
     [0.0, 0.4, 0.7, 0.9, 1.0]
     """
     system = _require_symmetric(matrix)
-    n = system.shape[0]
-    points = require_points([] if fixed is None else fixed, n)
-    held = np.unique(points)
+    points = require_points([] if fixed is None else fixed, system.shape[0])
+    floating = _floating_components(system, np.unique(points))
+    solver = factor_system(system, points, floating, weights, indefinite=indefinite)
+    if constraints is None:
+        return solver
+    return replace(solver, _constraints=_eliminate(solver, constraints))
+
+
+def factor_definite(
+    matrix: SparseMatrix, fixed: ArrayLike | None = None, *, indefinite: bool = False
+) -> LinearSolver:
+    """Factor a symmetric system in which constants have an energy, however small.
+
+    Raises
+    ------
+    InvalidParameterError
+        As in `factor_equations`.
+    """
+    system = sp.csr_array(matrix)
+    points = require_points([] if fixed is None else fixed, system.shape[0])
+    return factor_system(system, points, np.full(system.shape[0], -1), indefinite=indefinite)
+
+
+def factor_system(
+    system: sp.csr_array,
+    points: Int[np.ndarray, " g"],
+    floating: Int[np.ndarray, " n"],
+    weights: ArrayLike | None = None,
+    *,
+    indefinite: bool = False,
+) -> LinearSolver:
+    """Factor a symmetric system whose components that float are known, -1 elsewhere.
+
+    Raises
+    ------
+    InvalidParameterError
+        As in `factor_equations`.
+    """
+    n, held = system.shape[0], np.unique(points)
     means = np.ones(n) if weights is None else point_functions(weights, "weights", n)
-    floating = _floating_components(system, held)
     _, pins = np.unique(floating, return_index=True)
     pins = pins[floating[pins] >= 0]
     free = np.setdiff1d(np.arange(n), np.concatenate([held, pins]))
     rows = system[free]
     block, coupling = rows[:, free], rows[:, held]
     factor = _factor(block, free, indefinite=indefinite)
-    arrays = (freeze(each) for each in (free, held, floating, points, means))
-    solver = LinearSolver(n, *arrays, block, coupling, factor, indefinite)
-    if constraints is None:
-        return solver
-    return replace(solver, _constraints=_eliminate(solver, constraints))
+    return LinearSolver(
+        n_points=n,
+        free=freeze(free),
+        fixed=freeze(held),
+        floating=freeze(floating),
+        _given=freeze(points),
+        _weights=freeze(means),
+        _block=block,
+        _coupling=coupling,
+        _factor=factor,
+        _refined=indefinite,
+    )
 
 
-def _require_symmetric(matrix: sp.sparray) -> sp.csr_array:
+def _require_symmetric(matrix: SparseMatrix) -> sp.csr_array:
     if not sp.issparse(matrix) or matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
         raise InvalidParameterError(
             "The matrix of a system must be sparse and square; it is "
@@ -414,7 +460,7 @@ def _factor(
     return factor
 
 
-def _eliminate(solver: LinearSolver, constraints: sp.sparray | ArrayLike) -> Constraints:
+def _eliminate(solver: LinearSolver, constraints: SparseMatrix | ArrayLike) -> Constraints:
     """Prepare the small system of the multipliers and of the constants on floating components."""
     given = constraints if sp.issparse(constraints) else real_numbers(constraints, "constraints")
     matrix = (

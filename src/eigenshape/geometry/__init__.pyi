@@ -5,7 +5,9 @@ from .conversion import as_mesh as as_mesh
 from .conversion import as_shape as as_shape
 from .conversion import from_arrays as from_arrays
 from .crossings import self_intersections as self_intersections
+from .curvature import PrincipalCurvatures as PrincipalCurvatures
 from .curvature import gaussian_curvature as gaussian_curvature
+from .curvature import principal_curvatures as principal_curvatures
 from .enclosing_ball import EnclosingBall as EnclosingBall
 from .enclosing_ball import enclosing_ball as enclosing_ball
 from .facets import FacetTable as FacetTable

@@ -121,7 +121,7 @@ def boundary_surface(mesh: MeshLike) -> TriangleMesh:
     -------
     TriangleMesh
         The triangles that belong to one tetrahedron only. Points inside the mesh are left out; the
-        others keep their order.
+        others keep their order, so vertex i is point `boundary_vertices(mesh)[i]` of the solid.
 
     Raises
     ------

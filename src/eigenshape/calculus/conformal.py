@@ -1,0 +1,297 @@
+"""Maps that keep angles: of surfaces with boundary to the plane, and of genus 0 to the sphere."""
+
+from typing import SupportsIndex
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Complex, Float
+
+from eigenshape._arrays import real_numbers, whole_number
+from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
+from eigenshape._typing import ArrayLike
+from eigenshape.calculus.linear_solver import factor_definite
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.measure import area_vectors, face_areas, scale_to_unit
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.requirements import require_oriented, require_sound
+from eigenshape.geometry.simplices import scaled_corners, triangular_sides
+from eigenshape.geometry.topology import (
+    boundary_edges,
+    euler_characteristic,
+    is_closed,
+    vertex_components,
+)
+from eigenshape.operators.cotangent import cotangent_laplacian
+
+# Multiple of the mass that makes the conformal energy of a flat mesh definite, relative to the
+# largest entries of both. It changes the map by as much.
+SHIFT = 1e-10
+# Inverse iteration stops where the map changes by this share of its size. The next energy is
+# several times the lowest on discs, so 10 to 30 iterations are enough.
+SETTLED, MOST_ITERATIONS = 1e-9, 300
+# Step of the conformal flow to the sphere, for a surface of area 4π. With 0.5 a biped is round after
+# 30 steps, with 0.02 after 150, and its angles are the same to 1 %.
+FLOW_STEP = 0.5
+# The flow has come to its end where the radii have not come nearer to each other for so many steps,
+# by this share. On meshes they stay apart by the discretization error: 6 % of the radius with 162
+# vertices, 1.5 % with 642.
+PATIENCE, IMPROVEMENT = 10, 0.01
+# Radii within this of each other count as a sphere, whose radius is 1.
+ROUND = 0.3
+
+
+def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
+    """Map a surface with boundary to the plane with as little change of angles as possible.
+
+    Spectral conformal parameterization (Mullen, Tong, Alliez and Desbrun 2008): the complex
+    coordinates z minimize the conformal energy ½ Σ w_ij |z_i - z_j|² - area(z), which is 0 for a
+    conformal map, at a given Σ |z|² over the boundary, by inverse iteration on one factor. No
+    points are pinned. Least-squares conformal maps (Lévy and others 2002) minimize the same energy
+    with two pinned points, on which the result depends.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Connected and consistently oriented, with a boundary. A disc gives a map without folds on
+        most meshes; that of a surface with handles covers parts of the plane several times.
+
+    Returns
+    -------
+    (n, 2) float
+        In length: the area is that of the surface, and the mean over the boundary is 0.
+
+    Raises
+    ------
+    InvalidShapeError
+        If the mesh is not connected, has no boundary, has faces without area or repeated, or
+        neighboring faces have opposite orientations.
+    ConvergenceError
+        If the iteration does not settle.
+
+    See Also
+    --------
+    es.calculus.angle_distortion : How far a map is from conformal.
+
+    Examples
+    --------
+    A piece of a cylinder is unrolled without distortion:
+
+    >>> import eigenshape as es
+    >>> import numpy as np
+    >>> sheet = es.shapes.grid(8, 4)
+    >>> x, y, _ = sheet.vertices.T
+    >>> roof = es.TriangleMesh(np.column_stack([np.cos(x), y, np.sin(x)]), sheet.faces)
+    >>> plane = es.calculus.flatten_conformally(roof)
+    >>> es.calculus.angle_distortion(roof, plane).max().round(2).item()
+    1.0
+    """
+    mesh = as_mesh(mesh)
+    require_sound(mesh)
+    require_oriented(mesh)
+    rim = boundary_edges(mesh)
+    n_components, _ = vertex_components(mesh)
+    if not len(rim) or n_components > 1:
+        raise InvalidShapeError(
+            "A surface must be connected and have a boundary to be flattened; this one has "
+            f"{n_components} components and {len(rim)} boundary edges. Cut a closed surface open, "
+            "or use map_to_sphere."
+        )
+    points, scale = scale_to_unit(mesh)
+    unit = TriangleMesh(points, mesh.faces)
+    laplacian = cotangent_laplacian(unit)
+    energy = _as_real(laplacian.stiffness - 2 * _area_form(mesh.n_vertices, rim))
+    mass = sp.kron(laplacian.mass, sp.eye_array(2))
+    shift = SHIFT * energy.diagonal().max() / mass.diagonal().max()
+    solver = factor_definite(energy + shift * mass)
+    on_rim = np.zeros(mesh.n_vertices)
+    on_rim[rim] = 1.0
+
+    # The lowest energy is double, since a rotation of the plane does not change it: any vector of
+    # its eigenspace is a solution, and a single one converges to one.
+    found = _to_complex(np.random.default_rng(0).standard_normal(2 * mesh.n_vertices))
+    for _ in range(MOST_ITERATIONS):
+        before = found
+        right = np.stack([on_rim * found.real, on_rim * found.imag], axis=1)
+        found = _to_complex(solver.solve(right.ravel()))
+        found = found - (on_rim @ found) / on_rim.sum()
+        found /= np.sqrt(on_rim @ np.abs(found) ** 2)
+        # Rotated back onto the last one, where the solution may have turned.
+        turn = np.vdot(found * on_rim, before)
+        found *= turn / abs(turn)
+        if np.sqrt(on_rim @ np.abs(found - before) ** 2) < SETTLED:
+            break
+    else:
+        raise ConvergenceError(
+            f"The conformal map must settle within {MOST_ITERATIONS} iterations; it still changes "
+            f"by {np.sqrt(on_rim @ np.abs(found - before) ** 2):.1e}. "
+            'Try repair(mesh, ["collapse_needles"]).'
+        )
+    plane = np.stack([found.real, found.imag], axis=1)
+    signed = _signed_areas(plane[mesh.faces]).sum()
+    return plane * (np.sqrt(face_areas(unit).sum() / abs(signed)) * scale)
+
+
+def map_to_sphere(mesh: MeshLike, *, n_steps: SupportsIndex = 500) -> Float[np.ndarray, "n 3"]:
+    """Map a closed surface of genus 0 to the unit sphere with little change of angles.
+
+    Conformalized mean curvature flow until the surface is round (Kazhdan, Solomon and Ben-Chen
+    2012), then division by the radius. Parts that stick out, such as limbs, become very small; the
+    map is nearly conformal where the sphere's triangles stay well shaped.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Closed, connected, consistently oriented, of genus 0.
+    n_steps : int
+        Largest number of steps of the flow.
+
+    Returns
+    -------
+    (n, 3) float
+        Unit vectors, with the orientation of the surface; no triangle is turned over.
+
+    Raises
+    ------
+    InvalidShapeError
+        If the mesh is not closed, connected and of genus 0, faces have no area or are repeated, or
+        neighboring faces have opposite orientations.
+    ConvergenceError
+        If the surface does not become round, or triangles are turned over on the sphere.
+
+    See Also
+    --------
+    es.calculus.angle_distortion : How far a map is from conformal.
+    es.calculus.mean_curvature_flow : The flow.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> import numpy as np
+    >>> ball = es.icosphere(2)
+    >>> egg = es.TriangleMesh(ball.vertices * [1.0, 1.0, 1.5], ball.faces)
+    >>> sphere = es.calculus.map_to_sphere(egg)
+    >>> np.linalg.norm(sphere, axis=1).round(12).max().item()
+    1.0
+    """
+    mesh = as_mesh(mesh)
+    most = whole_number(n_steps, "n_steps", 1)
+    require_sound(mesh)
+    require_oriented(mesh)
+    euler, (n_components, _) = euler_characteristic(mesh), vertex_components(mesh)
+    if not is_closed(mesh) or n_components > 1 or euler != 2:
+        raise InvalidShapeError(
+            "Only a closed connected surface of genus 0 maps to the sphere; this one "
+            f"{'is closed' if is_closed(mesh) else 'has a boundary'}, has {n_components} "
+            f"components and Euler characteristic {euler} (a sphere has 2)."
+        )
+    points, _ = scale_to_unit(mesh)
+    stiffness = cotangent_laplacian(TriangleMesh(points, mesh.faces)).stiffness
+    sphere, least, n_idle = points, np.inf, 0
+    for _ in range(most):
+        areas = np.linalg.norm(area_vectors(points[mesh.faces]), axis=1)
+        weights = np.bincount(
+            mesh.faces.ravel(), weights=np.repeat(areas / 3, 3), minlength=mesh.n_vertices
+        )
+        # Moved to the center and scaled to area 4π, so that the limit is the unit sphere.
+        factor = 4 * np.pi / areas.sum()
+        points = (points - weights @ points / weights.sum()) * np.sqrt(factor)
+        radii = np.linalg.norm(points, axis=1)
+        spread = float(np.ptp(radii))
+        n_idle = 0 if spread < (1 - IMPROVEMENT) * least else n_idle + 1
+        if spread < least:
+            sphere, least = points / radii[:, None], spread
+        if n_idle == PATIENCE:
+            break
+        mass = sp.diags_array(weights * factor)
+        points = factor_definite(mass + FLOW_STEP * stiffness).solve(mass @ points)
+    if least > ROUND:
+        raise ConvergenceError(
+            f"The flow must make the surface round within {most} steps; the radii of its vertices "
+            f"still differ by {least:.2g} of the radius. Pass a larger n_steps, or use a finer mesh."
+        )
+    a, b, c = sphere[mesh.faces].transpose(1, 0, 2)
+    inward = np.flatnonzero(np.einsum("fi,fi->f", a, np.cross(b, c)) <= 0)
+    if len(inward) == mesh.n_faces:  # a surface that faces inward
+        return sphere
+    if inward.size:
+        raise ConvergenceError(
+            "A map to the sphere must not turn triangles over; it turns "
+            f"{inward.size} of {mesh.n_faces}, the first is face {inward[0]}. Use a finer mesh "
+            'where limbs are thin, or try repair(mesh, ["collapse_needles"]).'
+        )
+    return sphere
+
+
+def angle_distortion(mesh: MeshLike, positions: ArrayLike) -> Float[np.ndarray, " f"]:
+    """Compute how far a map is from conformal on each face: the ratio of its two stretches.
+
+    The larger singular value of the linear map of a face over the smaller one, the
+    quasi-conformal dilatation; 1 where angles stay.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+    positions : (n, 2) or (n, 3) float
+        Where the vertices are mapped.
+
+    Returns
+    -------
+    (f,) float
+        At least 1; infinite where a face collapses.
+
+    Raises
+    ------
+    InvalidShapeError
+        If a face of the mesh has no area.
+    InvalidParameterError
+        If `positions` has another shape or a number is not finite.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> square = es.shapes.grid(1, 1)
+    >>> es.calculus.angle_distortion(square, square.vertices * [3, 1, 1]).round(12).tolist()
+    [3.0, 3.0]
+    """
+    mesh = as_mesh(mesh)
+    require_sound(mesh)
+    places = real_numbers(positions, "positions").astype(np.float64)
+    if places.ndim != 2 or len(places) != mesh.n_vertices or places.shape[1] not in (2, 3):
+        raise InvalidParameterError(
+            f"positions must hold one place per vertex, shape ({mesh.n_vertices}, 2) or "
+            f"({mesh.n_vertices}, 3); the shape is {places.shape}."
+        )
+    bad = np.argwhere(~np.isfinite(places))
+    if len(bad):
+        raise InvalidParameterError(
+            f"positions must be finite; that of vertex {bad[0][0]} is {places[bad[0][0]].tolist()}."
+        )
+    _, before = triangular_sides(scaled_corners(mesh)[0])
+    _, after = triangular_sides(places[mesh.faces])
+    stretches = np.linalg.svd(after @ np.linalg.inv(before), compute_uv=False)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = stretches[:, 0] / stretches[:, 1]
+    return np.where(stretches[:, 1] > 0, ratios, np.inf)
+
+
+def _area_form(n: int, rim: np.ndarray) -> sp.csr_array:
+    """Return the Hermitian M with zᴴMz the signed area of z, from the boundary edges."""
+    tails, heads = rim.T
+    quarter = np.full(len(rim), -0.25j)  # Im(conj(z_tail) z_head) / 2
+    half = sp.coo_array((quarter, (tails, heads)), shape=(n, n)).tocsr()
+    return (half + half.conj().T).tocsr()
+
+
+def _as_real(matrix: sp.csr_array) -> sp.csr_array:
+    """Write a Hermitian matrix of n complex numbers as a symmetric one of 2n real numbers."""
+    turned = sp.csr_array(np.array([[0.0, -1.0], [1.0, 0.0]]))
+    return (sp.kron(matrix.real, sp.eye_array(2)) + sp.kron(matrix.imag, turned)).tocsr()
+
+
+def _to_complex(pairs: Float[np.ndarray, " n2"]) -> Complex[np.ndarray, " n"]:
+    return pairs[0::2] + 1j * pairs[1::2]
+
+
+def _signed_areas(corners: Float[np.ndarray, "f 3 2"]) -> Float[np.ndarray, " f"]:
+    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2

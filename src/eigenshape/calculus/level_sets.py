@@ -1,0 +1,275 @@
+"""Level sets of piecewise linear functions: polylines on surfaces, triangles in solids."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from eigenshape._arrays import finite_values, freeze, point_functions, vertex_values
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._text import html_repr, short_repr
+from eigenshape._typing import ArrayLike
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import in_length, size_one, volumes
+from eigenshape.geometry.simplicial import Mesh
+
+
+@dataclass(frozen=True, eq=False)
+class LevelSet:
+    """The points where a piecewise linear function has a value, as segments or triangles.
+
+    Attributes
+    ----------
+    level : float
+    points : (p, d) float
+        Where the level set crosses the edges of the mesh, one point per crossed edge.
+    pieces : (q, m) int
+        Points of each piece: segments on a surface, triangles in a solid. On a consistently
+        oriented surface larger values are on the left of segments; in a solid they are on the outer
+        side of triangles, from which their corners are seen counter-clockwise.
+    edges : (p, 2) int
+        The two mesh vertices of the edge of each point.
+    shares : (p,) float
+        How far the point is along its edge, in 0..1.
+
+    See Also
+    --------
+    es.calculus.level_set : Makes it.
+    """
+
+    level: float
+    points: Float[np.ndarray, "p d"]
+    pieces: Int[np.ndarray, "q m"]
+    edges: Int[np.ndarray, "p 2"]
+    shares: Float[np.ndarray, " p"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
+    @property
+    def size(self) -> float:
+        """Length on a surface, area in a solid; in length^(m-1)."""
+        if not len(self.pieces):
+            return 0.0
+        corners, scale = size_one(self.points[self.pieces])
+        return float(in_length(volumes(corners), scale, self.pieces.shape[1] - 1).sum())
+
+    def interpolate(self, values: ArrayLike) -> Float[np.ndarray, "p ..."]:
+        """Interpolate a function on the mesh at the points of the level set.
+
+        Parameters
+        ----------
+        values : (n,) or (n, k) float
+            At the vertices of the mesh.
+
+        Returns
+        -------
+        (p,) or (p, k) float
+
+        Raises
+        ------
+        InvalidParameterError
+            If a crossed edge has a vertex that `values` does not have, or a value is not finite.
+        """
+        functions = point_functions(values, "values", len(np.atleast_1d(np.asarray(values))))
+        largest = int(self.edges.max(initial=-1))
+        if len(functions) <= largest:
+            raise InvalidParameterError(
+                "values must have one row per vertex of the mesh; the level set crosses an edge of "
+                f"vertex {largest}, and there are {len(functions)} rows."
+            )
+        one, two = functions[self.edges[:, 0]], functions[self.edges[:, 1]]
+        shares = self.shares.reshape(-1, *[1] * (functions.ndim - 1))
+        return (1 - shares) * one + shares * two
+
+    def polylines(self) -> list[Float[np.ndarray, "k d"]]:
+        """Chain the segments of a level set on a surface.
+
+        Returns
+        -------
+        list of (k, d) float
+            Points along each line, longest list first. A closed line ends with its first point.
+            Lines end at the boundary, and where more than two faces meet.
+
+        Raises
+        ------
+        InvalidShapeError
+            If the level set is one in a solid.
+        """
+        if self.pieces.shape[1] != 2:
+            raise InvalidShapeError(
+                "Only level sets on surfaces are lines; this one has "
+                f"{len(self.pieces)} triangles. Use surface()."
+            )
+        return [self.points[line] for line in _chain(self.pieces)]
+
+    def surface(self) -> TriangleMesh:
+        """Return a level set in a solid in R³ as a triangle mesh.
+
+        Returns
+        -------
+        TriangleMesh
+            With faces of zero area where the level set passes through a vertex of the solid;
+            `drop_degenerate` removes them.
+
+        Raises
+        ------
+        InvalidShapeError
+            If the level set is one on a surface, or empty.
+        """
+        if self.pieces.shape[1] != 3:
+            raise InvalidShapeError(
+                "Only level sets in solids are surfaces; this one has "
+                f"{len(self.pieces)} segments. Use polylines()."
+            )
+        return TriangleMesh(self.points, self.pieces)
+
+
+def level_set(mesh: MeshLike, values: ArrayLike, level: float) -> LevelSet:
+    """Find where a piecewise linear function has a given value, on triangles or tetrahedra.
+
+    A vertex exactly at the level counts as above it. So every triangle is crossed at two edges or
+    at none, lines on a manifold never branch, and the length is right: where the level set runs
+    along mesh edges it is found once.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Triangles or tetrahedra, in R^d.
+    values : (n,) float
+        At the vertices.
+    level : float
+
+    Returns
+    -------
+    LevelSet
+        Empty if no edge crosses the level.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `values` does not have one number per vertex, or a number is not finite.
+    InvalidShapeError
+        If the mesh consists neither of triangles nor of tetrahedra.
+
+    Examples
+    --------
+    The circle of height 0.5 on a sphere has length 2π √0.75 = 5.441.
+
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(4)
+    >>> circle = es.calculus.level_set(ball, ball.vertices[:, 2], 0.5)
+    >>> round(circle.size, 2)
+    5.44
+    >>> len(circle.polylines())
+    1
+    """
+    mesh = as_simplicial(mesh)
+    if mesh.dim not in (2, 3):
+        raise InvalidShapeError(
+            f"Level sets are found on triangles and tetrahedra; the mesh is a {mesh!r}."
+        )
+    heights = vertex_values(values, "values", mesh.n_points)
+    (wanted,) = finite_values(level, "level")
+    above = heights >= wanted
+    crossed = np.flatnonzero(above[mesh.simplices].any(axis=1) & ~above[mesh.simplices].all(axis=1))
+    corners = mesh.simplices[crossed]
+    cut = _cut_triangles if mesh.dim == 2 else _cut_tetrahedra
+    ends = cut(corners, above[corners])  # (q, m, 2): the edge of each corner of each piece
+
+    # Points are numbered by their edges, the lower vertex first, so that neighbors share them.
+    ends = np.sort(ends, axis=2)
+    keys, pieces = np.unique(ends[..., 0] * mesh.n_points + ends[..., 1], return_inverse=True)
+    edges = np.stack([keys // mesh.n_points, keys % mesh.n_points], axis=1)
+    pieces = pieces.reshape(ends.shape[:2])
+    # Halves first: the difference of two large values may overflow.
+    low, high = heights[edges[:, 0]] / 2, heights[edges[:, 1]] / 2
+    shares = np.clip((wanted / 2 - low) / (high - low), 0.0, 1.0)
+    one, two = mesh.points[edges[:, 0]], mesh.points[edges[:, 1]]
+    points = (1 - shares)[:, None] * one + shares[:, None] * two
+    if mesh.dim == 3 and mesh.points.shape[1] == 3:
+        pieces = _facing_up(mesh, heights, points, pieces, edges)
+    return LevelSet(float(wanted), freeze(points), freeze(pieces), freeze(edges), freeze(shares))
+
+
+def _cut_triangles(
+    corners: Int[np.ndarray, "q 3"], above: Bool[np.ndarray, "q 3"]
+) -> Int[np.ndarray, "q 2 2"]:
+    """Return the two crossed edges of each triangle, with larger values left of the segment."""
+    n_above = above.sum(axis=1)
+    lone = np.argmax(above == (n_above == 1)[:, None], axis=1)
+    rows = np.arange(len(corners))
+    tip, following, before = (corners[rows, (lone + turn) % 3] for turn in range(3))
+    first, second = np.stack([tip, following], axis=1), np.stack([tip, before], axis=1)
+    ends = np.stack([first, second], axis=1)
+    return np.where((n_above == 1)[:, None, None], ends, ends[:, ::-1])
+
+
+def _cut_tetrahedra(
+    corners: Int[np.ndarray, "q 4"], above: Bool[np.ndarray, "q 4"]
+) -> Int[np.ndarray, "r 3 2"]:
+    """Return three crossed edges for each triangle: one in a tetrahedron with a lone corner, or two."""
+    n_above = above.sum(axis=1)
+    # Corners above come first, in each tetrahedron.
+    ordered = np.take_along_axis(corners, np.argsort(~above, axis=1, kind="stable"), axis=1)
+    one, three, two = (ordered[n_above == count] for count in (1, 3, 2))
+    found = [
+        np.stack([one[:, [0, other]] for other in (1, 2, 3)], axis=1),
+        np.stack([three[:, [other, 3]] for other in (0, 1, 2)], axis=1),
+    ]
+    # Two above, two below: a quadrilateral, cut along a diagonal.
+    quad = [two[:, [0, 2]], two[:, [0, 3]], two[:, [1, 3]], two[:, [1, 2]]]
+    found += [np.stack([quad[0], quad[1], quad[2]], axis=1)]
+    found += [np.stack([quad[0], quad[2], quad[3]], axis=1)]
+    return np.concatenate(found)
+
+
+def _facing_up(
+    mesh: Mesh,
+    heights: Float[np.ndarray, " n"],
+    points: Float[np.ndarray, "p 3"],
+    pieces: Int[np.ndarray, "q 3"],
+    edges: Int[np.ndarray, "p 2"],
+) -> Int[np.ndarray, "q 3"]:
+    """Turn triangles over so that values grow along their normals."""
+    scaled, _ = size_one(points)
+    a, b, c = scaled[pieces].transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    # The upper end of the first corner's edge lies on the side of larger values.
+    ends = edges[pieces[:, 0]]
+    upper = np.where(heights[ends[:, 0]] > heights[ends[:, 1]], ends[:, 0], ends[:, 1])
+    lower = np.where(upper == ends[:, 0], ends[:, 1], ends[:, 0])
+    place, _ = size_one(mesh.points)
+    wrong = np.einsum("qi,qi->q", normals, place[upper] - place[lower]) < 0
+    turned = pieces.copy()
+    turned[wrong] = pieces[wrong][:, ::-1]
+    return turned
+
+
+def _chain(segments: Int[np.ndarray, "q 2"]) -> list[Int[np.ndarray, " k"]]:
+    """Follow segments from point to point; lines from their ends first, then closed ones."""
+    links: dict[int, list[int]] = {}
+    for number, (start, stop) in enumerate(segments.tolist()):
+        links.setdefault(start, []).append(number)
+        links.setdefault(stop, []).append(number)
+    ends = {point for point, numbers in links.items() if len(numbers) != 2}
+    unused = np.ones(len(segments), dtype=bool)
+    # Segments that leave an end come first, then those that arrive at one, then all others.
+    leaving = [row for row, (start, _) in enumerate(segments.tolist()) if start in ends]
+    arriving = [row for row, (_, stop) in enumerate(segments.tolist()) if stop in ends]
+    lines = []
+    for number in [*leaving, *arriving, *range(len(segments))]:
+        if not unused[number]:
+            continue
+        line = segments[number].tolist()
+        if line[1] in ends and line[0] not in ends:
+            line.reverse()
+        unused[number] = False
+        while line[-1] not in ends and line[-1] != line[0]:
+            following = next(each for each in links[line[-1]] if unused[each])
+            unused[following] = False
+            start, stop = segments[following].tolist()
+            line.append(stop if start == line[-1] else start)
+        lines.append(np.array(line, dtype=np.int64))
+    return sorted(lines, key=lambda line: (-len(line), int(line[0])))
