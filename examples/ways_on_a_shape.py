@@ -9,7 +9,7 @@ import eigenshape as es
 
 def main(folder: Path) -> dict[str, float]:
     """Measure a giraffe from the top of its head, walk to where it is farthest, and decompose a field on it."""
-    mesh = es.make_creature("giraffe", n_vertices=3000)
+    mesh = es.make_creature("giraffe", n_vertices=2000)
     source = int(mesh.vertices[:, 1].argmax())
     solver = es.calculus.prepare_heat_geodesics(mesh)
     distances = es.calculus.heat_distances(solver, [source])[0]
