@@ -110,3 +110,15 @@ def test_the_pictures_of_the_front_page_can_be_drawn(tmp_path):
     shown = re.findall(r"\(docs/pictures/(?!studio_)(\S+?)\)", readme)
     assert shown == [path.name for path in drawn]
     assert all(path.stat().st_size > 10_000 for path in drawn)
+
+
+@pytest.mark.long
+def test_ways_on_a_shape_agree(tmp_path):
+    found = runpy.run_path(str(ROOT / "examples" / "ways_on_a_shape.py"))["main"](tmp_path)
+    assert found["by heat"] == pytest.approx(found["by waves"], rel=0.05)
+    assert found["along the path"] >= 0.98 * found["by waves"]
+    assert found["length of a vector"] == pytest.approx(1.0)
+    shares = [found[f"{part} share"] for part in ("exact", "coexact", "harmonic")]
+    assert sum(shares) == pytest.approx(1.0)
+    assert shares[2] < 1e-20  # a giraffe is a sphere
+    assert (tmp_path / "distances.png").stat().st_size > 10_000

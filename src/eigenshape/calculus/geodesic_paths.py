@@ -420,7 +420,8 @@ def _other_fan(sides: _Sides, enter: int, leave: int, vertex: int) -> list[int] 
     is_tail = sides.tails[enter] == vertex
     step = _previous if is_tail else _next
     target = int(sides.twins[leave]) // 3
-    side, crossed = enter, []
+    side = enter
+    crossed: list[int] = []
     for _ in range(len(sides.tails)):
         if side // 3 == target:
             return crossed
@@ -458,7 +459,7 @@ def _points_of(
 def _on_side(mesh: TriangleMesh, sides: _Sides, side: int, share: float) -> Float[np.ndarray, "3"]:
     """Return the point at a share of the way from the tail of a side to its head."""
     tail, head = mesh.vertices[sides.tails[side]], mesh.vertices[sides.heads[side]]
-    return (1 - share) * tail + share * head
+    return np.asarray((1 - share) * tail + share * head)
 
 
 def _as_path(points: Float[np.ndarray, "p 3"]) -> GeodesicPath:

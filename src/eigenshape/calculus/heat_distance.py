@@ -222,7 +222,7 @@ def heat_distance_to_set(
     >>> square = es.shapes.grid(20, 20)
     >>> left = (square.vertices[:, 0] == 0).nonzero()[0]
     >>> distance = es.calculus.heat_distance_to_set(square, left)
-    >>> bool(abs(distance - square.vertices[:, 0]).max() < 0.02)
+    >>> bool(abs(distance - square.vertices[:, 0]).max() < 0.025)  # half an edge
     True
     """
     solver = as_heat_geodesics(shape)

@@ -98,7 +98,7 @@ def local_triangles(
     coordinates = np.einsum("nkd,nad->nka", offsets, frames)
     rings = np.empty((cloud.n_points, count + 1), dtype=np.int64)
     cloud_loops.local_rings(np.ascontiguousarray(coordinates), rings)
-    triangles = _fans(neighbors, rings)
+    triangles = _fans(neighbors, rings, coordinates)
     bare = np.setdiff1d(np.arange(cloud.n_points), triangles)
     if bare.size:
         raise InvalidShapeError(
@@ -147,7 +147,9 @@ def _require_different(
 
 
 def _fans(
-    neighbors: Int[np.ndarray, "n k"], rings: Int[np.ndarray, "n k1"]
+    neighbors: Int[np.ndarray, "n k"],
+    rings: Int[np.ndarray, "n k1"],
+    coordinates: Float[np.ndarray, "n k 2"],
 ) -> Int[np.ndarray, "f 3"]:
     """Join each two that follow each other in a ring with the middle, but across its opening."""
     n, k = neighbors.shape
@@ -156,6 +158,9 @@ def _fans(
     following[np.arange(n), lengths - 1] = rings[:, 0]
     is_side = (rings >= 0) & (rings < k) & (following < k)
     point, place = np.nonzero(is_side)
-    second = neighbors[point, rings[point, place]]
-    third = neighbors[point, following[point, place]]
-    return np.column_stack([point, second, third])
+    second, third = rings[point, place], following[point, place]
+    one, two = coordinates[point, second], coordinates[point, third]
+    # Where all neighbors lie on a line through the point, the ring has no inside.
+    spans = one[:, 0] * two[:, 1] > one[:, 1] * two[:, 0]
+    triangles = np.column_stack([point, neighbors[point, second], neighbors[point, third]])
+    return triangles[spans]
