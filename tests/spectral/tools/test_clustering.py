@@ -1,5 +1,7 @@
 """Clusters: known divisions, the bound of the relaxation, and data sets of scikit-learn."""
 
+import sys
+from importlib import import_module
 from inspect import unwrap  # past the check of types, which only tests have
 
 import numpy as np
@@ -152,3 +154,10 @@ def test_bad_parameters_of_estimators_are_named():
         es.spectral.SpectralEmbedder(2).set_params(method="tsne").fit(points)
     with pytest.raises(es.InvalidParameterError, match="n_neighbors must be at least 2"):
         es.spectral.SpectralEmbedder(2, n_neighbors=1).fit(points)
+
+
+def test_without_scikit_learn_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "sklearn.base", None)
+    monkeypatch.delitem(sys.modules, "eigenshape.spectral.tools.estimators")
+    with pytest.raises(es.MissingExtraError, match=r"pip install 'eigenshape\[sklearn\]'"):
+        import_module("eigenshape.spectral.tools.estimators")
