@@ -49,6 +49,16 @@ def test_any_shape_has_its_spectrum(capsys):
     assert "All 11 laws hold." in capsys.readouterr().out
 
 
+@pytest.mark.long
+def test_heat_is_drawn_and_a_torus_recovered(tmp_path):
+    example = runpy.run_path(str(ROOT / "examples" / "heat.py"))
+    found = example["main"](tmp_path)
+    area = 4 * np.pi**2 * 0.4  # with radii 1 and 0.4; flat triangles have a little less
+    assert abs(found.area / area - 1) < 0.01
+    assert found.whole_characteristic(even=True) == 0
+    assert (tmp_path / "heat.png").stat().st_size > 10_000
+
+
 def test_readme_begins_with_exactly_two_commands():
     blocks = (ROOT / "README.md").read_text().split("```")
     commands = blocks[1].splitlines()[1:]
