@@ -166,6 +166,10 @@ def recover_geometry(
     >>> print(found.explain()[-32:])
     which leaves the whole number 2.
     """
+    if boundary not in (None, *get_args(Condition)):
+        raise InvalidParameterError(
+            f"boundary must be None, 'neumann' or 'dirichlet'; it is {boundary!r}."
+        )
     values = _require_eigenvalues(eigenvalues, boundary)
     top = values[-1]
     base = _fit(values / top, boundary)
@@ -206,10 +210,6 @@ def _units(top: float) -> Float[np.ndarray, "3"]:
 def _require_eigenvalues(
     eigenvalues: Spectrum | ArrayLike, boundary: Condition | None
 ) -> Float[np.ndarray, " k"]:
-    if boundary not in (None, *get_args(Condition)):
-        raise InvalidParameterError(
-            f"boundary must be None, 'neumann' or 'dirichlet'; it is {boundary!r}."
-        )
     if isinstance(eigenvalues, Spectrum):
         require_lowest(eigenvalues, "eigenvalues")
         eigenvalues = eigenvalues.eigenvalues
