@@ -125,7 +125,7 @@ def recover_geometry(
     A/4π ± L/(8π√λ) of eigenvalues that belongs to the first two terms. Then A, L, χ and the next
     term are fitted to Σ weight exp(-t λ) at times from 4/λ_k to 20/λ_k. The smooth weight averages
     over the fluctuations of the counting function: on the exact spectrum of a sphere a sharp end of
-    the list gives χ with an error of 0.2, and the weight with one of 0.0005.
+    the list gives χ with an error of 0.2, and the weight with one of 0.001.
 
     The stated errors are twice the largest change if a further term is fitted, the times begin at
     2/λ_k, or the weight begins to fall at 0.3 or 0.5 √λ_k. They are estimates, not bounds. They
