@@ -40,8 +40,8 @@ def warm_hand(path: Path, n_vertices: int = 4000) -> np.ndarray:
 def main(folder: Path) -> es.spectral.RecoveredGeometry:
     """Draw the hand, and recover the geometry of a torus from 200 eigenvalues."""
     warm_hand(folder / "heat.png", 1500)
-    torus = es.shapes.torus(40, 20)
-    spectrum = es.solve_spectrum(es.operators.fem_laplacian(torus, 2), 200)
+    torus = es.shapes.torus(36, 18)
+    spectrum = es.solve_spectrum(es.operators.fem_laplacian(torus, 3), 200)
     trace = es.spectral.heat_trace(spectrum, [0.5, 1.0])
     print(f"heat trace {trace.values.round(4)}, at most {trace.remainders.max():.1e} missing")
     return es.spectral.recover_geometry(spectrum)

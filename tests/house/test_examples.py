@@ -5,6 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import eigenshape as es
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -74,6 +76,13 @@ def test_a_mark_survives_a_small_file(tmp_path, capsys):
     test = runpy.run_path(str(ROOT / "examples" / "small_and_marked.py"))["main"](tmp_path)
     assert test.false_alarm < 1e-30
     assert "bits a vertex, faces included" in capsys.readouterr().out
+def test_heat_is_drawn_and_a_torus_recovered(tmp_path):
+    example = runpy.run_path(str(ROOT / "examples" / "heat.py"))
+    found = example["main"](tmp_path)
+    area = es.geometry.surface_area(es.shapes.torus(36, 18))
+    assert abs(found.area - area) < max(found.area_error, 0.005 * area)
+    assert found.whole_characteristic(even=True) == 0
+    assert (tmp_path / "heat.png").stat().st_size > 10_000
 
 
 def test_readme_begins_with_exactly_two_commands():

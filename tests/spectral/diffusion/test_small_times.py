@@ -9,7 +9,6 @@ import pytest
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
@@ -113,23 +112,25 @@ def annulus(n_rings, n_around, inner=0.4):
 @pytest.mark.parametrize(
     ("mesh", "boundary", "characteristic"),
     [
-        pytest.param(icosphere(4), None, 2, id="sphere"),
-        pytest.param(torus(72, 36), None, 0, id="torus"),
-        pytest.param(disc(24), "neumann", 1, id="free disc"),
-        pytest.param(disc(24), "dirichlet", 1, id="fixed disc"),
-        pytest.param(annulus(14, 100), "neumann", 0, id="free annulus"),
-        pytest.param(annulus(14, 100), "dirichlet", 0, id="fixed annulus"),
+        pytest.param(icosphere(3), None, 2, id="sphere"),
+        pytest.param(torus(60, 30), None, 0, id="torus"),
+        pytest.param(disc(20), "neumann", 1, id="free disc"),
+        pytest.param(disc(20), "dirichlet", 1, id="fixed disc"),
+        pytest.param(annulus(12, 88), "neumann", 0, id="free annulus"),
+        pytest.param(annulus(12, 88), "dirichlet", 0, id="fixed annulus"),
     ],
 )
 def test_meshes_give_their_geometry_within_the_stated_errors(mesh, boundary, characteristic):
-    linear, quadratic = (
-        solve_spectrum(operator, 300, fixed=rim if boundary == "dirichlet" else None).eigenvalues
-        for operator, rim in (
-            (cotangent_laplacian(mesh, "averaged"), boundary_vertices(mesh)),
-            (fem_laplacian(mesh, 2), fem_boundary_nodes(mesh, 2)),
-        )
+    quadratic, cubic = (
+        solve_spectrum(
+            fem_laplacian(mesh, order),
+            300,
+            fixed=fem_boundary_nodes(mesh, order) if boundary == "dirichlet" else None,
+        ).eigenvalues
+        for order in (2, 3)
     )
-    found = recover_geometry(quadratic, boundary=boundary, errors=linear - quadratic)
+    # Here cubic elements err by an eighth of what quadratic ones do, at the 300th eigenvalue.
+    found = recover_geometry(cubic, boundary=boundary, errors=(quadratic - cubic) / 4)
     edges = mesh.vertices[np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)]
     sides, counts = np.unique(edges.reshape(-1, 6), axis=0, return_counts=True)
     length = np.linalg.norm(sides[counts == 1, :3] - sides[counts == 1, 3:], axis=1).sum()

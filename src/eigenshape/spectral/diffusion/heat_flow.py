@@ -20,7 +20,7 @@ from eigenshape.spectral.diffusion.implicit_steps import group_times, step_coeff
 from eigenshape.spectral.solver.pencil import Pencil, normalize
 from eigenshape.spectral.spectrum import Spectrum
 
-# Largest error by default, relative to the norm of the values: 24 to 29 solves for each factor.
+# Largest error by default, relative to the norm of the values: 25 to 30 solves for each factor.
 DEFAULT_ACCURACY = 1e-10
 # Smallest and largest accuracy that can be requested. Below the first, rounding dominates; above
 # the second, nothing is computed.

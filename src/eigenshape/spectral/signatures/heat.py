@@ -117,7 +117,8 @@ def heat_kernel_signature(spectrum: Spectrum, times: ArrayLike) -> Float[np.ndar
     >>> (heat[:3, 1] * 12.566).round(2).tolist()
     [1.0, 1.0, 1.0]
     """
-    return np.asarray(spectrum.eigenvectors**2 @ decay_factors(spectrum, times))
+    decay = decay_factors(spectrum, times)
+    return np.asarray(spectrum.eigenvectors**2 @ decay)
 
 
 @one_blas_thread()
