@@ -76,6 +76,8 @@ def test_a_mark_survives_a_small_file(tmp_path, capsys):
     test = runpy.run_path(str(ROOT / "examples" / "small_and_marked.py"))["main"](tmp_path)
     assert test.false_alarm < 1e-30
     assert "bits a vertex, faces included" in capsys.readouterr().out
+
+
 def test_heat_is_drawn_and_a_torus_recovered(tmp_path):
     example = runpy.run_path(str(ROOT / "examples" / "heat.py"))
     found = example["main"](tmp_path)

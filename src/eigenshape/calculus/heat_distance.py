@@ -13,7 +13,7 @@ from eigenshape._typing import ArrayLike
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.requirements import require_sound
-from eigenshape.geometry.simplices import in_length, size_one
+from eigenshape.geometry.simplices import in_length, simplex_volumes, size_one
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 from eigenshape.operators import elements, flip_loops
 from eigenshape.operators.cloud_triangles import cloud_cover
@@ -300,7 +300,7 @@ def _of_mesh(mesh: Mesh, factor: float) -> HeatGeodesics:
     tails, heads = np.divmod(keys, mesh.n_points)
     length = float(np.linalg.norm(points[tails] - points[heads], axis=1).mean())
     products = elements.gradient_products(unit)
-    volumes = elements.simplex_volumes(unit)
+    volumes = simplex_volumes(unit)
     return _solver(
         (mesh.simplices, products, volumes),
         laplacian.stiffness,

@@ -17,8 +17,8 @@ from .geodesic import farthest_points as farthest_points
 from .geodesic import geodesic_balls as geodesic_balls
 from .geodesic import geodesic_distance_to_set as geodesic_distance_to_set
 from .geodesic import geodesic_distances as geodesic_distances
-from .homology import betti_numbers as betti_numbers
 from .geodesic import geodesic_waves as geodesic_waves
+from .homology import betti_numbers as betti_numbers
 from .measure import edge_lengths as edge_lengths
 from .measure import enclosed_volume as enclosed_volume
 from .measure import face_areas as face_areas
