@@ -95,7 +95,7 @@ def nodal_domains(mesh: MeshLike, values: ArrayLike, *, zero: float = ZERO_SHARE
     >>> ball = es.icosphere(2)
     >>> domains = es.spectral.nodal_domains(ball, ball.vertices[:, 2])
     >>> domains.n_domains, domains.signs.tolist()
-    (2, [1, -1])
+    (2, [-1, 1])
     """
     mesh = as_simplicial(mesh)
     heights = vertex_values(values, "values", mesh.n_points)
