@@ -101,7 +101,7 @@ class RecoveredGeometry:
                 f"closed orientable surface is"
             )
         else:
-            conclusion = "too uncertain to be rounded"
+            conclusion = "which does not determine a whole number"
         return (
             f"{self.n_eigenvalues} eigenvalues give {', '.join(parts)}, and Euler characteristic "
             f"{characteristic}, {conclusion}."
@@ -143,8 +143,8 @@ def recover_geometry(
         The condition at the boundary; None if the surface has no boundary.
     errors : (k,) float, optional
         Estimated errors of the eigenvalues, in 1/length², such as a quarter of the differences
-        between elements of order 2 and 3, for the eigenvalues of order 3. The change that they make, all at once with their signs, is added to the
-        stated errors.
+        between elements of order 2 and 3, for the eigenvalues of order 3. The change that they
+        make, all at once with their signs, is added to the stated errors.
 
     Returns
     -------
