@@ -83,7 +83,7 @@ def test_a_number_is_rounded_only_where_the_error_leaves_no_choice():
     assert "of which only 2 is even" in unsure.explain()
     lost = type(found)(**{**vars(found), **change, "euler_characteristic_error": 1.4})
     assert lost.whole_characteristic(even=True) is None
-    assert "too uncertain to be rounded" in lost.explain()
+    assert "which does not determine a whole number" in lost.explain()
     assert found.explain().startswith("300 eigenvalues give area 12.566")
     assert (
         "boundary 6.28"

@@ -71,8 +71,8 @@ class RecoveredGeometry:
     def whole_characteristic(self, *, even: bool = False) -> int | None:
         """Return the Euler characteristic as a whole number, or None if the error leaves a choice.
 
-        A number is returned if it is the only one within the stated error of the fitted value, and
-        the error is less than half of the distance to the next one.
+        A number is returned if it is within the stated error of the fitted value, and that
+        error is less than half of the distance to the next number.
 
         Parameters
         ----------
@@ -84,7 +84,7 @@ class RecoveredGeometry:
         nearest = step * round(self.euler_characteristic / step)
         away = abs(self.euler_characteristic - nearest)
         error = self.euler_characteristic_error
-        return nearest if away <= error < step / 2 or away + error < step / 2 else None
+        return nearest if away <= error < step / 2 else None
 
     def explain(self) -> str:
         """Return a text that says what was recovered, and how surely."""
@@ -101,7 +101,7 @@ class RecoveredGeometry:
                 f"closed orientable surface is"
             )
         else:
-            conclusion = "too uncertain to be rounded"
+            conclusion = "which does not determine a whole number"
         return (
             f"{self.n_eigenvalues} eigenvalues give {', '.join(parts)}, and Euler characteristic "
             f"{characteristic}, {conclusion}."
@@ -142,9 +142,9 @@ def recover_geometry(
     boundary : {None, "neumann", "dirichlet"}
         The condition at the boundary; None if the surface has no boundary.
     errors : (k,) float, optional
-        Estimated errors of the eigenvalues, in 1/length², such as the differences between elements
-        of order 1 and 2. The change that they make, all at once with their signs, is added to the
-        stated errors.
+        Estimated errors of the eigenvalues, in 1/length², such as a quarter of the differences
+        between elements of order 2 and 3, for the eigenvalues of order 3. The change that they
+        make, all at once with their signs, is added to the stated errors.
 
     Returns
     -------
