@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from public_names import public_things
+from sklearn.base import BaseEstimator  # prints and draws estimators itself
 
 import eigenshape as es
 from eigenshape._text import LONGEST, html_repr, repr_of_changes, short_repr
@@ -14,7 +15,7 @@ from eigenshape._text import LONGEST, html_repr, repr_of_changes, short_repr
 CLASSES = [
     thing
     for thing in public_things().values()
-    if inspect.isclass(thing) and not issubclass(thing, Exception)
+    if inspect.isclass(thing) and not issubclass(thing, (Exception, BaseEstimator))
 ]
 BALL = es.icosphere(2)
 SPECTRUM = es.solve_spectrum(es.cotangent_laplacian(BALL), 9)

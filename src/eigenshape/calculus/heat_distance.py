@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arrays import positive_values, whole_numbers
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike, as_shape
@@ -59,6 +60,8 @@ class HeatGeodesics:
     components: Int[np.ndarray, " n"]
     heat: SymmetricFactor
     poisson: SymmetricFactor
+
+    _repr_html_ = html_repr
 
     @property
     def n_points(self) -> int:

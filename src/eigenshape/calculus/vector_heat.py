@@ -8,6 +8,7 @@ from jaxtyping import Complex, Float, Int
 
 from eigenshape._arrays import finite_values, positive_values, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.heat_distance import factorize_definite, ground, require_sources
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -53,6 +54,8 @@ class VectorHeat:
     scalar_heat: SymmetricFactor
     vector_heat: SymmetricFactor
     poisson: SymmetricFactor
+
+    _repr_html_ = html_repr
 
     @property
     def n_points(self) -> int:

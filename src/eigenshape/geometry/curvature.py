@@ -165,7 +165,7 @@ def principal_curvatures(mesh: MeshLike) -> PrincipalCurvatures:
     Examples
     --------
     >>> import eigenshape as es
-    >>> torus = es.shapes.torus(48, 24, outer=2.0, inner=1.0)
+    >>> torus = es.shapes.torus(96, 48, outer=2.0, inner=1.0)
     >>> es.geometry.principal_curvatures(torus).values[:, 0].mean().round(1).item()
     1.0
     """

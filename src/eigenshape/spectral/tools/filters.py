@@ -9,6 +9,7 @@ from jaxtyping import Float
 from eigenshape._arguments import describe_value, require_type
 from eigenshape._arrays import point_functions, positive_values, real_numbers
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -54,6 +55,8 @@ class LowPass:
 
     cutoff: float
 
+    _repr_html_ = html_repr
+
     def __post_init__(self) -> None:
         positive_values(self.cutoff, "cutoff")
 
@@ -89,6 +92,8 @@ class BandPass:
 
     low: float
     high: float
+
+    _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
         if not 0 <= self.low <= self.high < np.inf:
@@ -128,6 +133,8 @@ class HeatFilter:
     """
 
     t: float
+
+    _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
         positive_values(self.t, "t")
