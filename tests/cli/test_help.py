@@ -121,6 +121,8 @@ def test_the_main_output_of_every_verb_is_called_output():
         "segment",
         "label",
         "deform",
+        "compress",
+        "decompress",
         "report",
         "demo",
     ]
