@@ -118,7 +118,7 @@ def test_a_small_hole_is_closed():
 
 def test_faces_that_look_inward_are_refused_and_the_remedies_work():
     one = disjoint_union(moved(BALL, 1.0, 5.0), inverted(BALL))
-    with pytest.raises(InvalidShapeError, match=r'face 320 looks inward \(320 such\)') as caught:
+    with pytest.raises(InvalidShapeError, match=r"face 320 looks inward \(320 such\)") as caught:
         signed_distance(one, [[0, 0, 0]])
     assert 'repair(mesh, ["orient"])' in str(caught.value)
     assert signed_distance(repair(one, ["orient"]).mesh, [[0, 0, 0]])[0] < -0.9

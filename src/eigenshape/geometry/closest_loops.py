@@ -127,9 +127,7 @@ def windings(points, corners):
             a = np.sqrt(ax * ax + ay * ay + az * az)
             b = np.sqrt(bx * bx + by * by + bz * bz)
             c = np.sqrt(cx * cx + cy * cy + cz * cz)
-            volume = (
-                ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
-            )
+            volume = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
             below = (
                 a * b * c
                 + (ax * bx + ay * by + az * bz) * c
