@@ -52,7 +52,7 @@ def test_distances_to_a_cube_are_exact():
     beyond = np.abs(points - 0.5) - 0.5
     outside = np.linalg.norm(np.maximum(beyond, 0), axis=1)
     exact = outside + np.minimum(beyond.max(axis=1), 0)
-    np.testing.assert_allclose(signed_distance(CUBE, points), exact, atol=1e-15)
+    np.testing.assert_allclose(signed_distance(CUBE, points), exact, atol=1e-14)
 
 
 def test_distances_to_a_ball_fall_to_those_of_the_sphere_with_the_second_order():
@@ -138,7 +138,7 @@ def test_bad_points_are_named(compute):
         compute(BALL, [[0, 0, 0], [0, np.nan, 0]])
     with pytest.raises(InvalidShapeError, match=r"points must have shape \(n, 3\)"):
         compute(BALL, [[0, 0]])
-    with pytest.raises(InvalidParameterError, match=r"within 1e\+100 sizes .* point 1"):
+    with pytest.raises(InvalidParameterError, match=r"within 1e\+50 sizes .* point 1"):
         compute(BALL, [[0, 0, 0], [1e150, 0, 0]])
     with pytest.raises(InvalidShapeError, match="at least one face; it has none"):
         compute(TriangleMesh(BALL.vertices, np.empty((0, 3), dtype=int)), [[0, 0, 0]])

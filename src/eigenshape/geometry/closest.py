@@ -16,9 +16,9 @@ from eigenshape.geometry.simplices import in_length, size_one
 from eigenshape.geometry.surface_points import SurfacePoints, place_points
 from eigenshape.geometry.topology import is_closed
 
-# Points may be this many sizes of the mesh away: squares of distances stay below 1e200, and floats
-# end at 1e308.
-FARTHEST = 1e100
+# Points may be this many sizes of the mesh away: products of three distances stay below 1e200, and
+# floats end at 1e308.
+FARTHEST = 1e50
 # Winding numbers above this are inside: those of a closed surface are 1 there and 0 outside, and a
 # small hole changes them by little.
 INSIDE = 0.5
@@ -47,7 +47,7 @@ def closest_points(mesh: MeshLike, points: ArrayLike) -> SurfacePoints:
     InvalidShapeError
         If `points` is not a table of three finite coordinates a row, or the mesh has no face.
     InvalidParameterError
-        If a point is more than 1e100 sizes of the mesh away.
+        If a point is more than 1e50 sizes of the mesh away.
 
     See Also
     --------
@@ -129,7 +129,7 @@ def signed_distance(mesh: MeshLike, points: ArrayLike) -> Float[np.ndarray, " p"
         If two neighboring faces are turned against each other, or faces look inward, or as in
         `closest_points`.
     InvalidParameterError
-        If a point is more than 1e100 sizes of the mesh away.
+        If a point is more than 1e50 sizes of the mesh away.
 
     See Also
     --------

@@ -10,8 +10,8 @@ import numpy as np
 from eigenshape._compile import njit
 
 # A product of many complex numbers is brought back to size 1 beyond these sizes, far from where
-# floats end (1e±308), because one factor changes its size by 1e±100 at most.
-SMALL, LARGE = 1e-150, 1e150
+X
+SMALL, LARGE = 1e-100, 1e100
 
 
 @njit
@@ -82,7 +82,7 @@ def _to_face(corners, face, x, y, z):
         # Weights of the foot: n · (w × v) / n² of corner 1, n · (u × w) / n² of corner 2.
         b = nx * (wy * vz - wz * vy) + ny * (wz * vx - wx * vz) + nz * (wx * vy - wy * vx)
         c = nx * (uy * wz - uz * wy) + ny * (uz * wx - ux * wz) + nz * (ux * wy - uy * wx)
-        if b >= 0.0 and c >= 0.0 and b + c <= square:
+        if b > 0.0 and c > 0.0 and b + c < square:
             height = nx * wx + ny * wy + nz * wz
             return height * height / square, b / square, c / square
     least, first = _to_segment(ux, uy, uz, wx, wy, wz)
