@@ -9,8 +9,8 @@ import numpy as np
 
 from eigenshape._compile import njit
 
-# A product of many complex numbers is brought back to size 1 beyond these sizes, far from where
-X
+# A product of many complex numbers is brought back to size 1 beyond these sizes. One factor changes
+# it by up to 1e±160, and floats end at 1e±308.
 SMALL, LARGE = 1e-100, 1e100
 
 
