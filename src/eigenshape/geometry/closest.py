@@ -45,7 +45,7 @@ def closest_points(mesh: MeshLike, points: ArrayLike) -> SurfacePoints:
     Raises
     ------
     InvalidShapeError
-        If `points` is not a table of three finite coordinates a row, or the mesh has no face.
+        If `points` is not a table of three finite coordinates a row.
     InvalidParameterError
         If a point is more than 1e50 sizes of the mesh away.
 
@@ -159,8 +159,6 @@ def _scale_both(
 ) -> tuple[Float[np.ndarray, "f 3 3"], Float[np.ndarray, "p 3"], float]:
     """Return corners and points relative to the middle of the mesh, in units of its size, and it."""
     places = finite_rows(points, "points", 3)
-    if not mesh.n_faces:
-        raise InvalidShapeError("A distance needs a surface with at least one face; it has none.")
     corners = mesh.vertices[mesh.faces]
     middle = corners.min(axis=(0, 1)) / 2 + corners.max(axis=(0, 1)) / 2
     corners, scale = size_one(corners - middle)
