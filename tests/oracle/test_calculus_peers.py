@@ -164,3 +164,21 @@ def test_curvatures_of_a_torus_have_a_quarter_of_the_error_of_libigl():
     rho = np.hypot(*mesh.vertices[:, :2].T)
     exact = np.stack([np.ones_like(rho), (rho - 2) / rho], axis=1)
     assert np.abs(ours - exact).max() < np.abs(theirs - exact).max() / 4
+
+
+def test_signed_distances_and_winding_numbers_are_those_of_libigl():
+    points = np.random.default_rng(4).uniform(-1, 1, (300, 3))
+    low, high = BIPED.vertices.min(axis=0), BIPED.vertices.max(axis=0)
+    points = (low + high) / 2 + points * (high - low) * 0.6
+    arrays = np.array(BIPED.vertices), np.array(BIPED.faces)
+    kind = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
+    distances, _, nearest, _ = igl.signed_distance(points, *arrays, kind)
+    ours = es.geometry.signed_distance(BIPED, points)
+    assert 0 < np.count_nonzero(ours < 0) < 300
+    np.testing.assert_allclose(ours, distances, atol=1e-12)
+    np.testing.assert_allclose(
+        es.geometry.closest_points(BIPED, points).points, nearest, atol=1e-12
+    )
+    np.testing.assert_allclose(
+        es.geometry.winding_numbers(BIPED, points), igl.winding_number(*arrays, points), atol=1e-12
+    )

@@ -6,6 +6,7 @@ import pytest
 
 from eigenshape.calculus.geodesic_paths import geodesic_path, trace_geodesic
 from eigenshape.calculus.heat_distance import heat_distances, prepare_heat_geodesics
+from eigenshape.calculus.signed_heat import signed_heat_distance
 from eigenshape.calculus.vector_heat import (
     VectorHeat,
     extend_scalar,
@@ -15,6 +16,7 @@ from eigenshape.calculus.vector_heat import (
 )
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.topology import boundary_loops
 from eigenshape.operators.cloud_triangles import local_triangles
 from eigenshape.operators.connection import tangent_frames
 from eigenshape.operators.cotangent import cotangent_laplacian
@@ -139,3 +141,19 @@ def test_triangles_around_points():
         return {(row[0], *sorted(row[1:])) for row in triangles.tolist()}
 
     assert keys(ours) == keys(theirs)
+
+
+def test_signed_distances_have_the_opposite_sign():
+    # Theirs keeps vectors at edges and is positive on the left of a curve.
+    ball = CLOSED["sphere"]
+    path = cap_loop(ball)
+    ours = signed_heat_distance(ball, [path])
+    theirs = pp3d.MeshSignedHeatSolver(*arrays(ball)).compute_distance([[(i, []) for i in path]])
+    assert np.abs(ours + theirs).max() < 0.1 * np.abs(theirs).max()
+
+
+def cap_loop(ball: TriangleMesh) -> list[int]:
+    """Return the vertices around a cap of faces, counter-clockwise, the first again at the end."""
+    cap = TriangleMesh(ball.vertices, ball.faces[(ball.vertices[ball.faces, 2] > 0.4).all(axis=1)])
+    loop = boundary_loops(cap)[0].tolist()
+    return [*loop, loop[0]]

@@ -38,6 +38,7 @@ from .level_sets import LevelSet as LevelSet
 from .level_sets import level_set as level_set
 from .linear_solver import LinearSolver as LinearSolver
 from .linear_solver import factor_equations as factor_equations
+from .signed_heat import signed_heat_distance as signed_heat_distance
 from .vector_heat import VectorHeat as VectorHeat
 from .vector_heat import extend_scalar as extend_scalar
 from .vector_heat import logarithmic_map as logarithmic_map

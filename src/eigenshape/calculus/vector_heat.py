@@ -226,7 +226,7 @@ def transport_vectors(
     lengths = np.abs(given)
     impulses = np.zeros(solver.n_points, dtype=complex)
     np.add.at(impulses, wanted, given / np.where(lengths > 0, lengths, 1.0))
-    found = _normalize(_diffuse(solver, impulses))
+    found = normalize(diffuse(solver, impulses))
     lengths = (
         np.full(solver.n_points, lengths[0])
         if len(wanted) == 1
@@ -295,7 +295,7 @@ def logarithmic_map(
     _require_source_everywhere(solver, np.array([start]))
     impulse = np.zeros(solver.n_points, dtype=complex)
     impulse[start] = 1.0
-    parallel = _normalize(_diffuse(solver, impulse))
+    parallel = normalize(diffuse(solver, impulse))
     parallel[parallel == 0] = 1.0  # opposite to the source any direction will do
     compute = {"affine": _affine, "adaptive": _adaptive, "radial": _radial}[method]
     return in_length(_as_rows(compute(solver, start, parallel)), solver.scale, 1)
@@ -351,13 +351,13 @@ def _require_source_everywhere(solver: VectorHeat, sources: Int[np.ndarray, " k"
         )
 
 
-def _diffuse(solver: VectorHeat, field: Complex[np.ndarray, " n"]) -> Complex[np.ndarray, " n"]:
+def diffuse(solver: VectorHeat, field: Complex[np.ndarray, " n"]) -> Complex[np.ndarray, " n"]:
     """Solve (B + tW) x = field for tangent vectors."""
     solution = solver.vector_heat.solve(_as_rows(field).reshape(-1, 1))[:, 0]
     return solution[::2] + 1j * solution[1::2]
 
 
-def _normalize(field: Complex[np.ndarray, " n"]) -> Complex[np.ndarray, " n"]:
+def normalize(field: Complex[np.ndarray, " n"]) -> Complex[np.ndarray, " n"]:
     """Return vectors of length 1, and 0 for 0."""
     # Far away vectors are as short as 1e-300, whose squares underflow.
     largest = np.maximum(np.abs(field.real), np.abs(field.imag))
@@ -436,7 +436,7 @@ def _affine(
     sources = np.zeros(solver.n_points, dtype=complex)
     np.add.at(sources, tails, -weights * weight[heads] * at_tail)
     np.add.at(sources, heads, weights * weight[tails] * at_head)
-    moved = _diffuse(solver, solver.time / solver.scale**2 * sources)
+    moved = diffuse(solver, solver.time / solver.scale**2 * sources)
     return moved / weight / parallel
 
 
@@ -450,16 +450,33 @@ def _radial(
     solver: VectorHeat, start: int, parallel: Complex[np.ndarray, " n"]
 ) -> Complex[np.ndarray, " n"]:
     """Diffuse the field that points away from the source, and integrate it to distances."""
-    radial = _normalize(_diffuse(solver, _outward_field(solver, start)))
+    radial = normalize(diffuse(solver, _outward_field(solver, start)))
     radial[start] = 0.0
+    distance = integrate_along_edges(solver, edge_sums(solver, radial) / 2)
+    return radial / parallel * (distance - distance[start])
+
+
+def edge_sums(solver: VectorHeat, field: Complex[np.ndarray, " n"]) -> Complex[np.ndarray, " h"]:
+    """Add the vectors at both ends of each side, in the frame of its tail."""
     tails, heads = _tail_and_head(solver.mesh)
-    at_tail, _, turns, weights = _sides(solver)
-    mean = (radial[tails] + radial[heads] * np.conj(turns)) / 2
-    flux = weights * (np.conj(mean) * at_tail).real
+    _, _, turns, _ = _sides(solver)
+    return field[tails] + field[heads] * np.conj(turns)
+
+
+def integrate_along_edges(
+    solver: VectorHeat, vectors: Complex[np.ndarray, " h"]
+) -> Float[np.ndarray, " n"]:
+    """Return the function, up to a constant on each component, whose gradient is nearest to a field.
+
+    The field is given on each side, in the frame of its tail. Its divergence at a vertex is the
+    flux through the dual edges around it.
+    """
+    tails, heads = _tail_and_head(solver.mesh)
+    at_tail, _, _, weights = _sides(solver)
+    flux = weights * (np.conj(vectors) * at_tail).real
     divergence = np.bincount(heads, flux, minlength=solver.n_points)
     divergence -= np.bincount(tails, flux, minlength=solver.n_points)
-    distance = solver.poisson.solve(divergence[:, None])[:, 0]
-    return radial / parallel * (distance - distance[start])
+    return solver.poisson.solve(divergence[:, None])[:, 0]
 
 
 def _outward_field(solver: VectorHeat, start: int) -> Complex[np.ndarray, " n"]:

@@ -1,4 +1,7 @@
 from .average_distance import average_geodesic_distance as average_geodesic_distance
+from .closest import closest_points as closest_points
+from .closest import signed_distance as signed_distance
+from .closest import winding_numbers as winding_numbers
 from .cloud import PointCloud as PointCloud
 from .cloud_measure import cloud_quadrature as cloud_quadrature
 from .conversion import as_mesh as as_mesh
