@@ -356,6 +356,7 @@ def solve_heat(  # noqa: PLR0913 - one keyword for each part of the equation
     See Also
     --------
     es.calculus.heat_solver : The factor of one step.
+    es.spectral.apply_heat : e^{-tL} with a stated error, without sources.
 
     Examples
     --------
