@@ -116,8 +116,8 @@ def test_one_stiff_pair_does_not_hide_a_fixed_boundary(stiff):
     rows = np.append(weights, 0) + np.append(1.0, weights)  # left of point 0 the boundary is fixed
     stiffness = sp.csr_array(sp.diags_array([-weights, rows, -weights], offsets=[-1, 0, 1]))
     laplacian = Laplacian(stiffness, sp.csr_array(sp.eye_array(9)))
-    found = apply_heat(laplacian, np.ones(9), [0.5, 30.0])
-    exact = np.stack([sl.expm(-t * glued(stiff)) @ np.ones(8) for t in (0.5, 30.0)], axis=1)
+    found = apply_heat(laplacian, np.ones(9), [0.1, 0.4])
+    exact = np.stack([sl.expm(-t * glued(stiff)) @ np.ones(8) for t in (0.1, 0.4)], axis=1)
     np.testing.assert_allclose(np.delete(found, stiff, axis=0), exact, atol=1e-4)
 
 

@@ -195,7 +195,7 @@ def count_clusters(spectrum: Spectrum, most: int | None = None) -> int:
     ------
     InvalidParameterError
         If there are fewer than 3 eigenvalues or all are 0, the spectrum does not begin with the
-        lowest one, or `most` is not in 2..k-1.
+        lowest one, or `most` is not in 2..k-1, or is less than the number of components.
 
     Examples
     --------
@@ -217,6 +217,11 @@ def count_clusters(spectrum: Spectrum, most: int | None = None) -> int:
         )
     limit = k - 1 if most is None else whole_number(most, "most", 2, k - 1)
     n_components = count_constant_modes(spectrum)
+    if n_components > limit:
+        raise InvalidParameterError(
+            f"most must be at least the number of components, {n_components}; it is {limit}. Pass "
+            f"most={n_components}, or keep fewer components."
+        )
     if n_components > 1:
         return n_components
     ratios = spectrum.eigenvalues[2 : limit + 1] / spectrum.eigenvalues[1:limit]

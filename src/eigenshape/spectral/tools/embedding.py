@@ -5,7 +5,13 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial.distance import cdist
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import SHARE_OF_ARRAYS, positive_values, real_numbers, whole_numbers
+from eigenshape._arrays import (
+    SHARE_OF_ARRAYS,
+    positive_values,
+    real_numbers,
+    whole_number,
+    whole_numbers,
+)
 from eigenshape._errors import InvalidParameterError
 from eigenshape._memory import require_memory
 from eigenshape._threads import one_blas_thread
@@ -57,7 +63,7 @@ def spectral_embedding(
     ------
     InvalidParameterError
         If the spectrum does not begin with the lowest eigenvalue, has fewer modes that are not
-        constant, or the power is not finite.
+        constant, `n_dims` is not a whole number, or the power is not finite.
 
     See Also
     --------
@@ -81,12 +87,13 @@ def spectral_embedding(
         raise InvalidParameterError(f"power must be one finite number; it is {power!r}.")
     first = count_constant_modes(spectrum)
     most = len(spectrum.eigenvalues) - first
-    if n_dims is not None and not 1 <= n_dims <= most:
+    n_wanted = most if n_dims is None else whole_number(n_dims, "n_dims", 1)
+    if n_wanted > most:
         raise InvalidParameterError(
             f"n_dims must lie in 1..{most}, the number of modes that are not constant "
-            f"({first} of {len(spectrum.eigenvalues)} are); it is {n_dims}. Compute more eigenpairs."
+            f"({first} of {len(spectrum.eigenvalues)} are); it is {n_wanted}. Compute more eigenpairs."
         )
-    chosen = slice(first, first + (n_dims or most))
+    chosen = slice(first, first + n_wanted)
     return spectrum.eigenvectors[:, chosen] * spectrum.eigenvalues[chosen] ** float(exponent)
 
 
