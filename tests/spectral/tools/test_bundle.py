@@ -71,6 +71,8 @@ def test_eigenpairs_mass_and_stiffness_are_those_of_the_operator():
     assert (bundle.stiffness != laplacian.stiffness).nnz == 0
     robust = es.spectral.operator_bundle(BALL, 7, operator="robust")
     np.testing.assert_allclose(robust.eigenvalues, spectrum.eigenvalues, atol=1e-9)
+    cloud = es.spectral.operator_bundle(CLOUD, 3)
+    assert (cloud.stiffness != es.robust_laplacian(CLOUD).stiffness).nnz == 0
 
 
 def test_a_simplicial_mesh_of_triangles_is_a_surface_too():

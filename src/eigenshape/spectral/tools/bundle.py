@@ -110,8 +110,8 @@ def operator_bundle(
     k : int
         Number of eigenpairs, 1 to n.
     operator : str, optional
-        A name in `es.operators.OPERATORS` whose mass is diagonal, such as "robust". By default
-        "cotangent" for meshes and "point-cloud" for clouds.
+        A name in `es.operators.OPERATORS` whose mass is diagonal. By default "cotangent" for meshes
+        and "robust" for clouds, as DiffusionNet takes them.
     cache : path, optional
         Folder in which bundles are kept, each under a hash of the shape and the request. A bundle
         found there is loaded instead of computed.
@@ -155,8 +155,9 @@ def operator_bundle(
     """
     surface = _require_surface(as_shape(shape))
     count = whole_number(k, "k", 1, surface.n_points)
+    name = operator or ("robust" if isinstance(surface, PointCloud) else "cotangent")
     if cache is not None:
-        path = Path(cache) / f"{_content_key(surface, count, operator)}.npz"
+        path = Path(cache) / f"{_content_key(surface, count, name)}.npz"
         if path.exists():
             try:
                 return OperatorBundle(**read_bundle(path))
@@ -167,7 +168,7 @@ def operator_bundle(
                 )
         require_writable(cache)  # before the work, not after it
 
-    laplacian = build_laplacian(surface, operator)
+    laplacian = build_laplacian(surface, name)
     mass = _diagonal_mass(laplacian, surface)
     edges = neighbor_edges(surface)
     frames = point_frames(surface, edges)
@@ -347,7 +348,7 @@ def _diagonal_mass(laplacian: Laplacian, shape: Shape3) -> Float[np.ndarray, " n
     return mass
 
 
-def _content_key(shape: Shape3, k: int, operator: str | None) -> str:
+def _content_key(shape: Shape3, k: int, operator: str) -> str:
     """Return the SHA-256 of the coordinates, the faces, the request and our version."""
     request = (FORMAT, version("eigenshape"), type(shape).__name__, k, operator)
     digest = hashlib.sha256(repr(request).encode())
