@@ -146,6 +146,24 @@ def find_zero_row_sums(matrix: sp.sparray) -> Bool[np.ndarray, " n"]:
     return np.asarray(sums <= ZERO_ROW_SUM * sizes)
 
 
+def require_matrix(laplacian: Laplacian, name: str = "laplacian") -> None:
+    """Raise an error if the matrices of an operator are not all of it.
+
+    The correction of a kernel changes eigenvalues after they are computed, so an equation with the
+    matrices would silently be that of the uncorrected operator.
+
+    Raises
+    ------
+    InvalidParameterError
+    """
+    if laplacian.kernel is not None and laplacian.kernel.corrected:
+        raise InvalidParameterError(
+            f"{name} must be given by its matrices alone; it has correct='log', which changes "
+            "eigenvalues after they are computed. Build it with correct=None, or use its spectrum, "
+            "es.solve_spectrum(laplacian, k)."
+        )
+
+
 def _as_symmetric(name: str, value: sp.sparray) -> sp.csr_array:
     _require_square(name, value)
     matrix = sp.csr_array(value, dtype=np.float64)
