@@ -178,3 +178,10 @@ def test_fewer_clusters_than_components_cannot_be_requested():
         es.InvalidParameterError, match="most must be at least the number of components, 5; it is 3"
     ):
         es.spectral.count_clusters(spectrum, most=3)
+
+
+def test_the_cut_of_an_operator_with_corrected_eigenvalues_is_refused():
+    ball = es.icosphere(2)
+    laplacian = es.mesh_laplacian(ball, correct="log")
+    with pytest.raises(es.InvalidParameterError, match="must be given by its matrices alone"):
+        es.spectral.normalized_cut(laplacian, np.zeros(ball.n_vertices, dtype=int))

@@ -13,7 +13,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.operators.laplacian import Laplacian, find_zero_row_sums
+from eigenshape.operators.laplacian import Laplacian, find_zero_row_sums, require_matrix
 from eigenshape.sparse.elimination import SymmetricFactor, factorize_symmetric
 from eigenshape.spectral.diffusion.decay import decay_factors
 from eigenshape.spectral.diffusion.implicit_steps import group_times, step_coefficients, step_time
@@ -165,11 +165,7 @@ def _flow_by_steps(
     accuracy: float,
     progress: Progress,
 ) -> Float[np.ndarray, "n c q"]:
-    if laplacian.kernel is not None and laplacian.kernel.corrected:
-        raise InvalidParameterError(
-            "Heat needs a matrix, and the correction of a kernel changes eigenvalues only; this "
-            "operator has correct='log'. Pass its spectrum, es.solve_spectrum(laplacian, k)."
-        )
+    require_matrix(laplacian, "operator")
     pencil = normalize(laplacian)
     own_times = np.ldexp(times, pencil.value_exponent)  # tλ has no unit
     _require_short(pencil, times, own_times)

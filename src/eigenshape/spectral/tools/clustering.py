@@ -12,7 +12,7 @@ from eigenshape._arrays import as_array, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.laplacian import Laplacian, require_matrix
 from eigenshape.spectral.spectrum import Spectrum, require_lowest
 from eigenshape.spectral.tools.embedding import count_constant_modes
 
@@ -251,7 +251,7 @@ def normalized_cut(laplacian: Laplacian, labels: ArrayLike) -> float:
     Raises
     ------
     InvalidParameterError
-        If there is not one whole number per point.
+        If there is not one whole number per point, or the operator has `correct="log"`.
 
     See Also
     --------
@@ -269,6 +269,7 @@ def normalized_cut(laplacian: Laplacian, labels: ArrayLike) -> float:
     0.666666667
     """
     require_type(laplacian, Laplacian, "laplacian")
+    require_matrix(laplacian)
     names = as_array(labels, "labels")
     if names.shape != (laplacian.n_points,) or names.dtype.kind not in "biu":
         raise InvalidParameterError(

@@ -16,8 +16,8 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._memory import require_memory
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.spectral.signatures.heat import NULL
-from eigenshape.spectral.spectrum import Spectrum, require_lowest
+from eigenshape.spectral.diffusion.decay import exponential_decay
+from eigenshape.spectral.spectrum import Spectrum, count_zero_modes, require_lowest
 
 # Cosine of the angle between rows of the constant modes above which two points are of one
 # component. It is 1 inside a component and 0 between components; the solvers err by 1e-3 at most.
@@ -182,7 +182,7 @@ def diffusion_map(
     embedded = spectral_embedding(spectrum, n_dims)
     first = count_constant_modes(spectrum)
     values = spectrum.eigenvalues[first : first + embedded.shape[1]]
-    return embedded * np.exp(-time * values)
+    return embedded * exponential_decay(values, time)[:, 0]
 
 
 @one_blas_thread()
@@ -343,8 +343,8 @@ def diffusion_distances(
     """
     require_type(spectrum, Spectrum, "spectrum")
     require_lowest(spectrum, "spectrum")
-    weights = np.exp(-_one_time(t) * spectrum.eigenvalues)
-    return _distances(spectrum.eigenvectors * weights, points)
+    decay = exponential_decay(spectrum.eigenvalues, _one_time(t))[:, 0]
+    return _distances(spectrum.eigenvectors * decay, points)
 
 
 def count_constant_modes(spectrum: Spectrum) -> int:
@@ -357,7 +357,7 @@ def count_constant_modes(spectrum: Spectrum) -> int:
     """
     require_lowest(spectrum, "spectrum")
     values = spectrum.eigenvalues
-    n_zero = int(np.count_nonzero(values <= NULL * values[-1]))
+    n_zero = count_zero_modes(spectrum)
     # A lone eigenvalue of rounding size is not below its own multiple.
     if n_zero == len(values) or len(values) == 1:
         raise InvalidParameterError(
