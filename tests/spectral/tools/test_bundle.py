@@ -156,6 +156,16 @@ def test_files_are_described_in_processes_and_failures_are_named(tmp_path):
     assert len(list((tmp_path / "kept").glob("*.npz"))) == 1
 
 
+def test_bundles_are_read_only_computed_or_read(tmp_path):
+    for _ in range(2):  # the second comes from the cache
+        bundle = es.spectral.operator_bundle(BALL, 3, cache=tmp_path)
+        for matrix in (bundle.stiffness, bundle.gradient_x, bundle.gradient_y):
+            with pytest.raises(ValueError, match="read-only"):
+                matrix.data[0] = 1
+        assert not bundle.eigenvectors.flags.writeable
+        assert np.abs(bundle.gradient_x @ np.ones(len(bundle.mass))).max() < 1e-12
+
+
 def test_scipy_and_numpy_forms_hold_the_same_numbers():
     bundle = es.spectral.operator_bundle(BALL, 3)
     *_, gradient = es.spectral.export_bundle(bundle, "scipy")

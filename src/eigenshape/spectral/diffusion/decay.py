@@ -10,7 +10,7 @@ from eigenshape.spectral.spectrum import Spectrum, require_lowest
 
 
 def exponential_decay(
-    eigenvalues: Float[np.ndarray, " k"], times: float | Float[np.ndarray, " q"]
+    eigenvalues: Float[np.ndarray, " k"], times: ArrayLike
 ) -> Float[np.ndarray, "k q"]:
     """Return exp(-t λ_i) for each eigenvalue and each time, without any check."""
     return np.exp(-np.outer(eigenvalues, times))

@@ -32,6 +32,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.operators.catalog import build_laplacian
 from eigenshape.operators.laplacian import Laplacian
+from eigenshape.sparse.frozen import freeze_sparse
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver.cache import require_writable
 from eigenshape.spectral.tools.bundle_archive import FORMAT, read_bundle, write_bundle
@@ -177,11 +178,11 @@ def operator_bundle(
     bundle = OperatorBundle(
         frames=freeze(frames),
         mass=freeze(mass),
-        stiffness=laplacian.stiffness,
+        stiffness=freeze_sparse(laplacian.stiffness),
         eigenvalues=spectrum.eigenvalues,
         eigenvectors=spectrum.eigenvectors,
-        gradient_x=gradient_x,
-        gradient_y=gradient_y,
+        gradient_x=freeze_sparse(gradient_x),
+        gradient_y=freeze_sparse(gradient_y),
     )
     if cache is not None:
         try:
