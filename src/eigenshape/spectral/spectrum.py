@@ -17,6 +17,9 @@ from eigenshape.spectral.certificate import Certificate
 # residual. The second says so where all known eigenvalues are small beside the rounding of W.
 NULL = 1e-9
 ZERO_RESIDUALS = 4
+# Approximate pairs have residuals near the root of the error of their values, above eigenvalues that
+# are not 0. There the residual counts only up to this share of the largest eigenvalue.
+APPROXIMATE_NULL = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +120,10 @@ class Spectrum:
 def count_zero_modes(spectrum: Spectrum) -> int:
     """Return how many of the first eigenvalues count as 0: one for each component of a shape."""
     values = spectrum.eigenvalues
-    zero = values <= np.maximum(NULL * values[-1], ZERO_RESIDUALS * spectrum.residuals)
+    rounding = ZERO_RESIDUALS * spectrum.residuals
+    if spectrum.certificate.count is None:
+        rounding = np.minimum(rounding, APPROXIMATE_NULL * values[-1])
+    zero = values <= np.maximum(NULL * values[-1], rounding)
     return len(values) if zero.all() else int(np.argmin(zero))
 
 
