@@ -71,7 +71,7 @@ def test_random_faces_come_back():
 def test_more_bits_halve_the_error_and_take_more_space():
     sizes, errors = [], []
     for bits in (8, 10, 12):
-        packed = es.spectral.compress_mesh(SMALL, bits)
+        packed = es.spectral.compress_mesh(BALL, bits)
         sizes.append(len(packed.data))
         errors.append(packed.rms_error)
     assert sizes == sorted(sizes)
