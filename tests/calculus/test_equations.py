@@ -11,7 +11,9 @@ from eigenshape.calculus import (
     divergence,
     gradient,
     heat_solver,
+    helmholtz_solver,
     minimize_quadratic,
+    poisson_solver,
     polyharmonic_matrix,
     remove_means,
     solve_harmonic,
@@ -135,6 +137,19 @@ def test_solutions_scale_exactly_with_the_unit():
     source = remove_means(small, np.random.default_rng(4).standard_normal(BALL.n_vertices))
     found = solve_poisson(large, source / unit / unit)
     np.testing.assert_array_equal(found, solve_poisson(small, source))
+
+
+def test_an_operator_with_corrected_eigenvalues_has_no_equation():
+    corrected = es.mesh_laplacian(BALL, correct="log")
+    for build in (
+        poisson_solver,
+        lambda operator: helmholtz_solver(operator, 1.0),
+        lambda operator: heat_solver(operator, 1.0),
+        polyharmonic_matrix,
+    ):
+        with pytest.raises(es.InvalidParameterError, match="must be given by its matrices alone"):
+            build(corrected)
+        build(es.mesh_laplacian(BALL))  # the remedy
 
 
 def test_wrong_arguments_are_named():

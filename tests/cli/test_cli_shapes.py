@@ -94,6 +94,10 @@ def test_spectra_by_other_operators(folder):
     np.testing.assert_allclose(points["eigenvalues"], [0, 2, 2, 2], rtol=0.03, atol=1e-9)
     assert points["operator"] == "point-cloud"
     assert points["edge_factor"] == 1.8
+    tufted = run_json(
+        "spectrum", folder / "sphere.xyz", "-k", 4, "--operator", "robust", "--n-neighbors", 20
+    )
+    np.testing.assert_allclose(tufted["eigenvalues"], [0, 2, 2, 2], rtol=0.05, atol=1e-9)
 
 
 def test_brackets(folder):
@@ -155,7 +159,7 @@ def test_operators_are_listed():
     assert run_json("operators").keys() == OPERATORS.keys()
     text = run("operators").stdout
     assert "Gaussian kernel, weighed by volumes" in text
-    assert "of triangles; --mollify" in text
+    assert "of triangles, points; --mollify --n-neighbors" in text
 
 
 @pytest.mark.parametrize(

@@ -126,13 +126,16 @@ def curve(rng):
 def cloud(rng):
     """Points on a shaken sphere, or on a shaken circle in four dimensions."""
     if rng.random() < 0.5:
-        points = rng.standard_normal((150, 3))
-        return PointCloud(
-            turned(points / np.linalg.norm(points, axis=1, keepdims=True), rng, 0.01), 2
-        )
+        return surface_cloud(rng)
     angles = 2 * np.pi * (np.arange(60) + rng.uniform(-0.3, 0.3, 60)) / 60
     points = np.column_stack([np.cos(angles), np.sin(angles), np.zeros((60, 2))])
     return PointCloud(turned(points, rng, 0.005), 1)
+
+
+def surface_cloud(rng):
+    """Points on a shaken sphere."""
+    points = rng.standard_normal((150, 3))
+    return PointCloud(turned(points / np.linalg.norm(points, axis=1, keepdims=True), rng, 0.01), 2)
 
 
 def graph(rng):
@@ -215,6 +218,12 @@ TABLE = [
     ),
     Row("robust", robust_laplacian, SURFACES, MONOTONE - {"volume"}, boundary_vertices),
     Row("robust, not mollified", partial(robust_laplacian, mollify=0.0), (surface, soup), MONOTONE),
+    Row(
+        "robust on points",
+        robust_laplacian,
+        (surface_cloud,),
+        DEFAULT_PROMISES | {"nonnegative_weights"},
+    ),
     Row("mesh", mesh_laplacian, (surface, solid, curve), MONOTONE, boundary_vertices),
     Row(
         "mesh, random walk",

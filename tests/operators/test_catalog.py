@@ -7,6 +7,7 @@ from eigenshape.geometry.cloud import PointCloud
 from eigenshape.operators.catalog import OPERATORS, build_laplacian
 from eigenshape.operators.choices import OPERATOR_NAMES
 from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.robust import robust_laplacian
 from eigenshape.shapes.domains import box, interval
 from eigenshape.shapes.surfaces import icosphere
 
@@ -45,6 +46,12 @@ def test_without_a_name_the_shape_decides():
     assert (one.stiffness != two.stiffness).nnz == 0
     assert build_laplacian(SHAPES["points"]).kernel is not None
     assert build_laplacian(SHAPES["graph"]).n_points == 5
+
+
+def test_clouds_have_the_robust_operator_by_name():
+    named = build_laplacian(SHAPES["points"], "robust", n_neighbors=12)
+    direct = robust_laplacian(SHAPES["points"], n_neighbors=12)
+    assert (named.stiffness != direct.stiffness).nnz == 0
 
 
 def test_unknown_names_and_options_are_refused():

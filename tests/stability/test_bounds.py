@@ -133,7 +133,7 @@ def test_bad_input_is_named(monkeypatch):
     with pytest.raises(es.InvalidParameterError, match="name each point once; point 8 has 2"):
         es.stability.weyl_bound(one, two, twice)
     corrected = es.operators.gaussian_laplacian(moved, 0.1, 2, correct="log", form="random-walk")
-    with pytest.raises(es.InvalidParameterError, match="those of two are corrected"):
+    with pytest.raises(es.InvalidParameterError, match="two must be given by its matrices alone"):
         es.stability.weyl_bound(one, corrected)
     mesh = es.shapes.torus(16, 8)
     full = es.cotangent_laplacian(mesh, mass="consistent")

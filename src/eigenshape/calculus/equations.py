@@ -29,7 +29,7 @@ from eigenshape.geometry.facets import boundary_facets
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators import elements
-from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.laplacian import Laplacian, require_matrix
 
 # Differences from a mean up to this share of the value are the rounding of sums of up to a million
 # numbers.
@@ -61,7 +61,7 @@ def poisson_solver(
     Raises
     ------
     InvalidParameterError
-        As in `factor_equations`.
+        If the operator has `correct="log"`; or as in `factor_equations`.
 
     See Also
     --------
@@ -79,6 +79,7 @@ def poisson_solver(
     (162, 100)
     """
     require_type(laplacian, Laplacian, "laplacian")
+    require_matrix(laplacian)
     weights = laplacian.mass.sum(axis=1)
     return factor_equations(laplacian.stiffness, fixed, constraints, weights=weights)
 
@@ -103,8 +104,8 @@ def helmholtz_solver(
     Raises
     ------
     InvalidParameterError
-        If κ is not finite, or an eigenvalue of the operator up to rounding; or as in
-        `factor_equations`.
+        If κ is not finite, or an eigenvalue of the operator up to rounding; if the operator has
+        `correct="log"`; or as in `factor_equations`.
 
     See Also
     --------
@@ -119,6 +120,7 @@ def helmholtz_solver(
     [0.5, 0.5, 0.5]
     """
     require_type(laplacian, Laplacian, "laplacian")
+    require_matrix(laplacian)
     (kappa,) = finite_values(squared_wavenumber, "squared_wavenumber")
     weights = laplacian.mass.sum(axis=1)
     matrix = laplacian.stiffness - kappa * laplacian.mass
@@ -146,7 +148,7 @@ def heat_solver(laplacian: Laplacian, t: float, fixed: ArrayLike | None = None) 
     Raises
     ------
     InvalidParameterError
-        If t is not positive; or as in `factor_equations`.
+        If t is not positive, or the operator has `correct="log"`; or as in `factor_equations`.
 
     See Also
     --------
@@ -165,6 +167,7 @@ def heat_solver(laplacian: Laplacian, t: float, fixed: ArrayLike | None = None) 
     True
     """
     require_type(laplacian, Laplacian, "laplacian")
+    require_matrix(laplacian)
     (step,) = positive_values(t, "t")
     return factor_definite(laplacian.mass + step * laplacian.stiffness, fixed)
 
@@ -243,7 +246,7 @@ def solve_poisson(
     ------
     InvalidParameterError
         If an array has another length or a number is not finite, a point is fixed at two values, or
-        on a component without fixed point B f + load does not sum to 0.
+        on a component without fixed point B f + load does not sum to 0; or as in `poisson_solver`.
 
     See Also
     --------
@@ -351,11 +354,12 @@ def solve_heat(  # noqa: PLR0913 - one keyword for each part of the equation
     ------
     InvalidParameterError
         If t is not positive, n_steps is below 1, an array has another length or a number is not
-        finite, or a point is fixed at two values.
+        finite, or a point is fixed at two values; or as in `heat_solver`.
 
     See Also
     --------
     es.calculus.heat_solver : The factor of one step.
+    es.spectral.apply_heat : e^{-tL} with a stated error, without sources.
 
     Examples
     --------
@@ -502,7 +506,8 @@ def polyharmonic_matrix(laplacian: Laplacian, order: SupportsIndex = 2) -> sp.cs
     Raises
     ------
     InvalidParameterError
-        If k is below 1, or the mass is not diagonal and k is above 1.
+        If k is below 1, the mass is not diagonal and k is above 1, or the operator has
+        `correct="log"`.
 
     Examples
     --------
@@ -512,6 +517,7 @@ def polyharmonic_matrix(laplacian: Laplacian, order: SupportsIndex = 2) -> sp.cs
     True
     """
     require_type(laplacian, Laplacian, "laplacian")
+    require_matrix(laplacian)
     count = whole_number(order, "order", 1)
     stiffness, mass = laplacian.stiffness, laplacian.mass
     diagonal = mass.diagonal()

@@ -14,12 +14,9 @@ from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.boundary import require_points
-from eigenshape.operators.laplacian import ASYMMETRY
+from eigenshape.operators.laplacian import ASYMMETRY, find_zero_row_sums
 from eigenshape.sparse.elimination import SymmetricFactor, factor_matrix
 
-# Row sums up to this share of the absolute row sums count as zero: those of stiffness matrices are
-# zero up to the rounding of their entries.
-ZERO_ROW_SUM = 1e-12
 # Loads on a component where nothing is fixed may sum to this share of their absolute sum. Sums of a
 # million numbers round to 1e-10 of it at most; a source that is not balanced is far above.
 BALANCED = 1e-9
@@ -425,8 +422,7 @@ def _floating_components(
 ) -> Int[np.ndarray, " n"]:
     """Return numbers of components without fixed point where constants have no energy, else -1."""
     count, labels = connected_components(system, directed=False)
-    sums, sizes = np.abs(system.sum(axis=1)), abs(system).sum(axis=1)
-    rigid = np.bincount(labels, weights=sums > ZERO_ROW_SUM * sizes, minlength=count) > 0
+    rigid = np.bincount(labels, weights=~find_zero_row_sums(system), minlength=count) > 0
     rigid[labels[fixed]] = True
     numbers = np.where(rigid, -1, np.cumsum(~rigid) - 1)
     return numbers[labels].astype(np.int64)

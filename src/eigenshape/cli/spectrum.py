@@ -108,6 +108,13 @@ def spectrum(
             "By default 1e-5."
         ),
     ] = None,
+    n_neighbors: Annotated[
+        int | None,
+        typer.Option(
+            help="Neighbors of each point of a cloud among which the robust operator seeks triangles. "
+            "By default 30."
+        ),
+    ] = None,
     dim: DimOption = 2,
     drop_missing: DropMissingOption = False,
     cells: CellsOption = None,
@@ -154,6 +161,7 @@ def spectrum(
     given = {
         "mass": mass,
         "mollify": mollify,
+        "n_neighbors": n_neighbors,
         **scale,
         "correct": correct,
         "form": form,

@@ -69,7 +69,10 @@ OPERATORS: dict[str, Operator] = {
         "cubic finite elements, nodes inside triangles too",
     ),
     "robust": Operator(
-        robust_laplacian, (TriangleMesh,), ("mollify",), "linear elements on intrinsic triangles"
+        robust_laplacian,
+        (TriangleMesh, PointCloud),
+        ("mollify", "n_neighbors"),
+        "linear elements on intrinsic triangles",
     ),
     "mesh": Operator(
         mesh_laplacian, MESHES, (*KERNEL, "distance"), "Gaussian kernel, weighed by volumes"

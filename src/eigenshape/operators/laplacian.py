@@ -4,12 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
+from jaxtyping import Bool
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 
 # Largest difference of W_ij and W_ji, relative to the largest entry, that is accepted as rounding.
 ASYMMETRY = 1e-12
+# Row sums up to this share of the absolute row sums count as zero: those of stiffness matrices are
+# zero up to the rounding of their entries.
+ZERO_ROW_SUM = 1e-12
 
 
 @dataclass(frozen=True)
@@ -130,6 +134,34 @@ class Laplacian:
     def n_points(self) -> int:
         """Number of points n on which the operator acts."""
         return int(self.stiffness.shape[0])
+
+
+def find_zero_row_sums(matrix: sp.sparray) -> Bool[np.ndarray, " n"]:
+    """Return for each row whether it sums to zero, up to rounding.
+
+    Constants on a component have no energy if all its rows do. Each row is compared with its own
+    entries: beside one stiff edge, the rows at a fixed boundary are small and not zero.
+    """
+    sums, sizes = np.abs(matrix.sum(axis=1)), abs(matrix).sum(axis=1)
+    return np.asarray(sums <= ZERO_ROW_SUM * sizes)
+
+
+def require_matrix(laplacian: Laplacian, name: str = "laplacian") -> None:
+    """Raise an error if the matrices of an operator are not all of it.
+
+    The correction of a kernel changes eigenvalues after they are computed, so an equation with the
+    matrices would silently be that of the uncorrected operator.
+
+    Raises
+    ------
+    InvalidParameterError
+    """
+    if laplacian.kernel is not None and laplacian.kernel.corrected:
+        raise InvalidParameterError(
+            f"{name} must be given by its matrices alone; it has correct='log', which changes "
+            "eigenvalues after they are computed. Build it with correct=None, or use its spectrum, "
+            "es.solve_spectrum(laplacian, k)."
+        )
 
 
 def _as_symmetric(name: str, value: sp.sparray) -> sp.csr_array:

@@ -13,6 +13,14 @@ from eigenshape._text import html_repr, short_repr
 from eigenshape.spectral.archive import read_archive, write_archive
 from eigenshape.spectral.certificate import Certificate
 
+# An eigenvalue counts as 0 up to this share of the largest one, or up to this many times its own
+# residual. The second says so where all known eigenvalues are small beside the rounding of W.
+NULL = 1e-9
+ZERO_RESIDUALS = 4
+# Approximate pairs have residuals near the root of the error of their values, above eigenvalues that
+# are not 0. There the residual counts only up to this share of the largest eigenvalue.
+APPROXIMATE_NULL = 1e-6
+
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
@@ -107,6 +115,16 @@ class Spectrum:
             name: freeze(parts[name]) for name in ("eigenvalues", "eigenvectors", "residuals")
         }
         return cls(**arrays, mass=parts["mass"], certificate=parts["certificate"])
+
+
+def count_zero_modes(spectrum: Spectrum) -> int:
+    """Return how many of the first eigenvalues count as 0: one for each component of a shape."""
+    values = spectrum.eigenvalues
+    rounding = ZERO_RESIDUALS * spectrum.residuals
+    if spectrum.certificate.count is None:
+        rounding = np.minimum(rounding, APPROXIMATE_NULL * values[-1])
+    zero = values <= np.maximum(NULL * values[-1], rounding)
+    return len(values) if zero.all() else int(np.argmin(zero))
 
 
 def require_lowest(spectrum: Spectrum, name: str) -> None:

@@ -13,7 +13,7 @@ from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.kernel import EDGE_FACTOR, LAST
-from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.laplacian import Laplacian, require_matrix
 
 # Points up to which the norm comes from a dense eigensolver: Lanczos' method needs more points than
 # vectors.
@@ -123,11 +123,7 @@ def _permutation(partners: ArrayLike | None, n: int) -> np.ndarray:
 
 def _symmetric(laplacian: Laplacian, name: str) -> sp.csr_array:
     """Return B^(-1/2) W B^(-1/2)."""
-    if laplacian.kernel is not None and laplacian.kernel.corrected:
-        raise InvalidParameterError(
-            "Weyl's bound is for the eigenvalues of a pencil; "
-            f"those of {name} are corrected. Build it with correct=None."
-        )
+    require_matrix(laplacian, name)
     if laplacian.mass.nnz > laplacian.n_points:
         raise InvalidParameterError(
             f"Weyl's bound needs a diagonal mass; that of {name} is not. Build it with lumped mass."

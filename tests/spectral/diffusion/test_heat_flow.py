@@ -109,6 +109,26 @@ def test_through_a_fixed_boundary_heat_is_lost():
     assert totals[-1] < 1e-7
 
 
+@pytest.mark.parametrize("stiff", [4, 0])
+def test_one_stiff_pair_does_not_hide_a_fixed_boundary(stiff):
+    weights = np.ones(8)
+    weights[stiff] = 1e11
+    rows = np.append(weights, 0) + np.append(1.0, weights)  # left of point 0 the boundary is fixed
+    stiffness = sp.csr_array(sp.diags_array([-weights, rows, -weights], offsets=[-1, 0, 1]))
+    laplacian = Laplacian(stiffness, sp.csr_array(sp.eye_array(9)))
+    found = apply_heat(laplacian, np.ones(9), [0.1, 0.4])
+    exact = np.stack([sl.expm(-t * glued(stiff)) @ np.ones(8) for t in (0.1, 0.4)], axis=1)
+    np.testing.assert_allclose(np.delete(found, stiff, axis=0), exact, atol=1e-4)
+
+
+def glued(stiff):
+    """Return B⁻¹W of the path of unit weights whose points `stiff` and `stiff + 1` are one."""
+    stiffness = np.diag(np.append(np.full(7, 2.0), 1.0)) - np.eye(8, k=1) - np.eye(8, k=-1)
+    mass = np.ones(8)
+    mass[stiff] = 2
+    return stiffness / mass[:, None]
+
+
 def test_heat_of_one_sign_keeps_it_where_no_weight_is_negative():
     laplacian = cotangent_laplacian(icosphere(2))  # all angles are acute
     point = np.zeros(laplacian.n_points)
@@ -188,11 +208,11 @@ def test_progress_ends_at_one():
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        (np.ones(5), r"shape \(198,\) or \(198, c\); the shape is \(5,\)"),
-        (np.ones((1, 198)), r"values must hold one number per point, or one row"),
+        (np.ones(5), r"shape \(198,\) or \(198, k\) for k functions; the shape is \(5,\)"),
+        (np.ones((1, 198)), "values must hold one number per point, .* Transpose it"),
         (
             np.where(np.arange(198) == 6, np.nan, 1.0),
-            r"values must be finite; the value of point 6",
+            "values must be finite; entry 6 is nan",
         ),
     ],
 )
@@ -237,7 +257,7 @@ def test_a_spectrum_that_is_too_short_for_the_accuracy_is_refused():
 
 def test_a_corrected_kernel_needs_a_spectrum():
     laplacian = mesh_laplacian(TORUS, correct="log")
-    with pytest.raises(InvalidParameterError, match="correction of a kernel changes eigenvalues"):
+    with pytest.raises(InvalidParameterError, match="operator must be given by its matrices"):
         apply_heat(laplacian, np.ones(198), 0.3)
     np.testing.assert_allclose(
         apply_heat(solve_spectrum(laplacian, 5), np.ones(198), 0.3), 1, atol=1e-9

@@ -71,6 +71,8 @@ def test_eigenpairs_mass_and_stiffness_are_those_of_the_operator():
     assert (bundle.stiffness != laplacian.stiffness).nnz == 0
     robust = es.spectral.operator_bundle(BALL, 7, operator="robust")
     np.testing.assert_allclose(robust.eigenvalues, spectrum.eigenvalues, atol=1e-9)
+    cloud = es.spectral.operator_bundle(CLOUD, 3)
+    assert (cloud.stiffness != es.robust_laplacian(CLOUD).stiffness).nnz == 0
 
 
 def test_a_simplicial_mesh_of_triangles_is_a_surface_too():
@@ -152,6 +154,16 @@ def test_files_are_described_in_processes_and_failures_are_named(tmp_path):
     assert "no.off" in failed[0][1]
     assert [done for done, *_ in seen] == [1, 2]
     assert len(list((tmp_path / "kept").glob("*.npz"))) == 1
+
+
+def test_bundles_are_read_only_computed_or_read(tmp_path):
+    for _ in range(2):  # the second comes from the cache
+        bundle = es.spectral.operator_bundle(BALL, 3, cache=tmp_path)
+        for matrix in (bundle.stiffness, bundle.gradient_x, bundle.gradient_y):
+            with pytest.raises(ValueError, match="read-only"):
+                matrix.data[0] = 1
+        assert not bundle.eigenvectors.flags.writeable
+        assert np.abs(bundle.gradient_x @ np.ones(len(bundle.mass))).max() < 1e-12
 
 
 def test_scipy_and_numpy_forms_hold_the_same_numbers():

@@ -167,3 +167,21 @@ def test_without_scikit_learn_the_extra_is_named(monkeypatch):
     monkeypatch.delitem(sys.modules, "eigenshape.spectral.tools.estimators")
     with pytest.raises(es.MissingExtraError, match=r"pip install 'eigenshape\[sklearn\]'"):
         import_module("eigenshape.spectral.tools.estimators")
+
+
+def test_fewer_clusters_than_components_cannot_be_requested():
+    edges = sp.block_diag(5 * [[[0.0, 1.0], [1.0, 0.0]]], format="csr")
+    graph = sp.csr_array(edges)
+    spectrum = es.solve_spectrum(es.operators.graph_laplacian(graph, "normalized"), 8)
+    assert es.spectral.count_clusters(spectrum, most=5) == 5
+    with pytest.raises(
+        es.InvalidParameterError, match="most must be at least the number of components, 5; it is 3"
+    ):
+        es.spectral.count_clusters(spectrum, most=3)
+
+
+def test_the_cut_of_an_operator_with_corrected_eigenvalues_is_refused():
+    ball = es.icosphere(2)
+    laplacian = es.mesh_laplacian(ball, correct="log")
+    with pytest.raises(es.InvalidParameterError, match="must be given by its matrices alone"):
+        es.spectral.normalized_cut(laplacian, np.zeros(ball.n_vertices, dtype=int))

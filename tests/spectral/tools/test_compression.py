@@ -14,8 +14,10 @@ import eigenshape as es
 from eigenshape.spectral.tools import compression, connectivity, packing, patch_basis
 
 BALL = es.icosphere(3)
-SQUARE = es.shapes.grid(23, 23)  # many symmetries, so many multiple eigenvalues
+SMALL = es.icosphere(2)
+SQUARE = es.shapes.grid(20, 20)  # many symmetries, so many multiple eigenvalues
 PACKED = es.spectral.compress_mesh(BALL)
+SMALL_PACKED = es.spectral.compress_mesh(SMALL)
 TETRAHEDRON = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
 CASES = {
     "sphere": BALL,
@@ -56,7 +58,7 @@ def test_any_mesh_comes_back(name):
 
 def test_random_faces_come_back():
     rng = np.random.default_rng(3)
-    for _ in range(20):
+    for _ in range(8):
         n = int(rng.integers(4, 40))
         mesh = es.TriangleMesh(
             rng.random((n, 3)), rng.integers(0, n, (int(rng.integers(1, 60)), 3))
@@ -78,11 +80,11 @@ def test_more_bits_halve_the_error_and_take_more_space():
 
 @pytest.mark.parametrize("scale", [1e-100, 2.0**40, 1e100])
 def test_units_do_not_matter(scale):
-    packed = es.spectral.compress_mesh((BALL.vertices * scale, BALL.faces))
-    assert packed.rms_error == pytest.approx(PACKED.rms_error * scale, rel=1e-2)
+    packed = es.spectral.compress_mesh((SMALL.vertices * scale, SMALL.faces))
+    assert packed.rms_error == pytest.approx(SMALL_PACKED.rms_error * scale, rel=1e-2)
     again = es.spectral.decompress_mesh(packed.data).vertices / scale
-    wanted = es.spectral.decompress_mesh(PACKED.data).vertices
-    np.testing.assert_allclose(again, wanted, atol=3 * PACKED.max_error)
+    wanted = es.spectral.decompress_mesh(SMALL_PACKED.data).vertices
+    np.testing.assert_allclose(again, wanted, atol=3 * SMALL_PACKED.max_error)
     if np.log2(scale).is_integer():
         np.testing.assert_array_equal(again, wanted)
 
@@ -226,8 +228,8 @@ def test_sealed_nonsense_is_refused_or_read_and_never_crashes():
 
 
 def test_a_bomb_is_not_unpacked():
-    bomb = packing.pack(b"\1" * 10_000_000)
-    assert len(bomb) < 10_000
+    bomb = packing.pack(b"\1" * 1_000_000)
+    assert len(bomb) < 1_000
     with pytest.raises(es.FileFormatError, match="must unpack to at most 100 bytes"):
         packing.unpack(bomb, 100, "symbols")
     with pytest.raises(es.FileFormatError, match="must unpack to at most 100 bytes"):

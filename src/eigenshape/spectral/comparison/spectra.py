@@ -11,8 +11,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.spectral.bounds.brackets import Brackets
-from eigenshape.spectral.signatures.heat import NULL
-from eigenshape.spectral.spectrum import Spectrum, require_lowest
+from eigenshape.spectral.spectrum import NULL, Spectrum, require_lowest
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,13 @@ from eigenshape._typing import ArrayLike
 from eigenshape.spectral.spectrum import Spectrum, require_lowest
 
 
+def exponential_decay(
+    eigenvalues: Float[np.ndarray, " k"], times: ArrayLike
+) -> Float[np.ndarray, "k q"]:
+    """Return exp(-t λ_i) for each eigenvalue and each time, without any check."""
+    return np.exp(-np.outer(eigenvalues, times))
+
+
 def decay_factors(
     spectrum: Spectrum, times: ArrayLike, name: str = "times"
 ) -> Float[np.ndarray, "k q"]:
@@ -24,4 +31,4 @@ def decay_factors(
     """
     require_type(spectrum, Spectrum, "spectrum")
     require_lowest(spectrum, "spectrum")
-    return np.exp(-np.outer(spectrum.eigenvalues, positive_values(times, name)))
+    return exponential_decay(spectrum.eigenvalues, positive_values(times, name))

@@ -8,12 +8,12 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import positive_values, real_numbers
+from eigenshape._arrays import point_functions, positive_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.laplacian import Laplacian, find_zero_row_sums, require_matrix
 from eigenshape.sparse.elimination import SymmetricFactor, factorize_symmetric
 from eigenshape.spectral.diffusion.decay import decay_factors
 from eigenshape.spectral.diffusion.implicit_steps import group_times, step_coefficients, step_time
@@ -28,8 +28,6 @@ ACCURACIES = (1e-12, 0.1)
 # Largest t times trace W / trace B. Then 1 + τλ of the highest eigenvalue is about 1e9, and 7
 # digits of the solves are left. On a surface of n points it is about 1e9/n times the area.
 LONGEST = 1e10
-# Row sums of W, relative to the sums of absolute values, up to which constants are in its kernel.
-NULL_ROWS = 1e-10
 
 Columns = Float[np.ndarray, "n c"]
 
@@ -65,8 +63,8 @@ def apply_heat(
     Parameters
     ----------
     operator : Laplacian or Spectrum
-        To fix the boundary at 0, pass the operator of `es.operators.dirichlet_laplacian`, or a
-        spectrum that was computed with `fixed`.
+        To fix points at 0, pass a spectrum that was computed with `fixed`, or the operator that
+        `es.operators.dirichlet_laplacian` makes on the free points, with the values there.
     values : (n,) or (n, c) float
         One function, or one in each column.
     t : float or (q,) float
@@ -93,6 +91,7 @@ def apply_heat(
     --------
     heat_kernel : Entries of the heat operator.
     es.heat_kernel_signature : The diagonal of the heat kernel.
+    es.calculus.solve_heat : Heat with sources and given values at points, by implicit Euler steps.
 
     Examples
     --------
@@ -104,10 +103,21 @@ def apply_heat(
     >>> warm = es.spectral.apply_heat(es.cotangent_laplacian(mesh), z, 0.5)
     >>> (warm @ z / (z @ z)).round(3).item()  # e^{-1} = 0.368
     0.368
+
+    With the boundary of a square fixed at 0, heat is lost there:
+
+    >>> import numpy as np
+    >>> square = es.shapes.grid(8, 8)
+    >>> laplacian, rim = es.cotangent_laplacian(square), es.geometry.boundary_vertices(square)
+    >>> inner, free = es.operators.dirichlet_laplacian(laplacian, rim)
+    >>> values, warm = np.ones(square.n_vertices), np.zeros(square.n_vertices)
+    >>> warm[free] = es.spectral.apply_heat(inner, values[free], 0.1)
+    >>> bool(laplacian.mass.diagonal() @ warm < 0.1)  # it was the area, 1
+    True
     """
     require_type(operator, Laplacian | Spectrum, "operator")
     n = operator.mass.shape[0]
-    columns = _columns(values, n)
+    columns = point_functions(values, "values", n).reshape(n, -1)
     times = positive_values(t, "t")
     if accuracy is not None:
         _require_accuracy(accuracy)
@@ -119,23 +129,6 @@ def apply_heat(
         )
     warm = warm.reshape(*np.shape(values), len(times))
     return warm if np.ndim(t) else warm[..., 0]
-
-
-def _columns(values: ArrayLike, n: int) -> Columns:
-    numbers = real_numbers(values, "values")
-    if numbers.ndim not in (1, 2) or len(numbers) != n:
-        raise InvalidParameterError(
-            f"values must hold one number per point, or one row, shape ({n},) or ({n}, c); "
-            f"the shape is {numbers.shape}."
-        )
-    columns = numbers.reshape(n, -1).astype(np.float64)
-    bad = np.argwhere(~np.isfinite(columns))
-    if len(bad):
-        raise InvalidParameterError(
-            f"values must be finite; the value of point {bad[0][0]} is {columns[tuple(bad[0])]} "
-            f"({len(bad)} such)."
-        )
-    return columns
 
 
 def _require_accuracy(accuracy: float) -> None:
@@ -172,11 +165,7 @@ def _flow_by_steps(
     accuracy: float,
     progress: Progress,
 ) -> Float[np.ndarray, "n c q"]:
-    if laplacian.kernel is not None and laplacian.kernel.corrected:
-        raise InvalidParameterError(
-            "Heat needs a matrix, and the correction of a kernel changes eigenvalues only; this "
-            "operator has correct='log'. Pass its spectrum, es.solve_spectrum(laplacian, k)."
-        )
+    require_matrix(laplacian, "operator")
     pencil = normalize(laplacian)
     own_times = np.ldexp(times, pencil.value_exponent)  # tλ has no unit
     _require_short(pencil, times, own_times)
@@ -246,9 +235,7 @@ class _Constants:
 
 
 def _constants(pencil: Pencil) -> _Constants:
-    rows = pencil.stiffness.sum(axis=1)
-    sizes = abs(pencil.stiffness).sum(axis=1)
-    losing = np.unique(pencil.labels[np.abs(rows) > NULL_ROWS * sizes.max()])
+    losing = np.unique(pencil.labels[~find_zero_row_sums(pencil.stiffness)])
     n_parts = int(pencil.labels.max()) + 1
     keeping = np.setdiff1d(np.arange(n_parts), losing)
     where = np.arange(pencil.n), pencil.labels

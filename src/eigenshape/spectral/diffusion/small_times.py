@@ -11,11 +11,13 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.choices import Condition
-from eigenshape.spectral.spectrum import Spectrum, require_lowest
+from eigenshape.spectral.diffusion.decay import exponential_decay
+from eigenshape.spectral.spectrum import Spectrum, count_zero_modes, require_lowest
 
 # Eigenvalues that are needed at least. With fewer, the shortest times are as long as the shape.
 FEWEST = 50
-# An eigenvalue up to this share of the largest is 0.
+# In a list without residuals, an eigenvalue up to this share of the largest is 0: other solvers than
+# ours stop at about 1e-8.
 ZERO = 1e-7
 # The first and last time of the fit, times the largest eigenvalue. Shorter times see the end of the
 # list, longer ones see the shape as a whole, which the expansion at t = 0 does not describe. Chosen
@@ -210,10 +212,10 @@ def _units(top: float) -> Float[np.ndarray, "3"]:
 def _require_eigenvalues(
     eigenvalues: Spectrum | ArrayLike, boundary: Condition | None
 ) -> Float[np.ndarray, " k"]:
-    if isinstance(eigenvalues, Spectrum):
-        require_lowest(eigenvalues, "eigenvalues")
-        eigenvalues = eigenvalues.eigenvalues
-    values = finite_values(eigenvalues, "eigenvalues")
+    spectrum = eigenvalues if isinstance(eigenvalues, Spectrum) else None
+    if spectrum is not None:
+        require_lowest(spectrum, "eigenvalues")
+    values = finite_values(spectrum.eigenvalues if spectrum else eigenvalues, "eigenvalues")
     if len(values) < FEWEST:
         raise InvalidParameterError(
             f"At least {FEWEST} eigenvalues are needed to see short times; there are {len(values)}. "
@@ -224,7 +226,8 @@ def _require_eigenvalues(
         raise InvalidParameterError(
             f"eigenvalues must be ascending and at least 0; entry {bad[0]} is {values[bad[0]]:.6g}."
         )
-    n_zero = int(np.count_nonzero(values <= ZERO * values[-1]))
+    n_small = int(np.count_nonzero(values <= ZERO * values[-1]))
+    n_zero = n_small if spectrum is None else count_zero_modes(spectrum)
     if boundary == "dirichlet" and n_zero:
         raise InvalidParameterError(
             f"With the Dirichlet condition no eigenvalue is 0; {n_zero} are. Pass fixed= to "
@@ -248,14 +251,14 @@ def _fit(
 ) -> Float[np.ndarray, "3"]:
     """Fit A, L and χ to eigenvalues whose largest is 1, with n further terms; L is 0 without boundary."""
     times = np.geomspace(*window, N_TIMES)
-    traces = np.exp(-np.outer(times, values)) @ _weights(np.sqrt(values), ramp)
+    traces = _weights(np.sqrt(values), ramp) @ exponential_decay(values, times)
     # ∫ weight exp(-tλ) of the densities of eigenvalues 1 and 1/√λ, in √λ = v: dλ = 2v dv.
     ends = np.array([0, ramp, 1])
     nodes, shares = np.polynomial.legendre.leggauss(N_NODES)
     middles, halves = (ends[1:] + ends[:-1]) / 2, np.diff(ends) / 2
     v = (middles[:, None] + halves[:, None] * nodes).ravel()
     density = 2 * (halves[:, None] * shares).ravel() * _weights(v, ramp)
-    decay = np.exp(-np.outer(times, v**2))
+    decay = exponential_decay(v**2, times).T
     columns = [decay @ (density * v) / (4 * np.pi), np.full(N_TIMES, 1 / 6)]
     if boundary is not None:
         sign = 1 if boundary == "neumann" else -1

@@ -13,8 +13,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.spectral.signatures.heat import NULL
-from eigenshape.spectral.spectrum import Spectrum
+from eigenshape.spectral.spectrum import Spectrum, count_zero_modes
 
 N_MODES = 20  # of each shape by default, for exact pairs; inexact ones need fewer
 # Weight of the commutativity penalty relative to the pairs. A larger weight draws the map towards
@@ -102,7 +101,7 @@ def require_one_constant(spectrum: Spectrum, name: str) -> None:
         raise InvalidParameterError(
             f"A map needs at least 2 modes of each shape; the {name} has 1. Solve for more."
         )
-    if spectrum.eigenvalues[1] <= NULL * spectrum.eigenvalues[-1]:
+    if count_zero_modes(spectrum) > 1:
         raise InvalidParameterError(
             f"Shapes to be mapped must be connected; the {name} has the eigenvalues {spectrum.eigenvalues[0]:.3g} and "
             f"{spectrum.eigenvalues[1]:.3g}, which count as 0, so it has several components. "

@@ -13,6 +13,7 @@ from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian
+from eigenshape.spectral.diffusion.decay import exponential_decay
 from eigenshape.spectral.multilevel.davidson import Goal, refine
 from eigenshape.spectral.multilevel.residuals import (
     images,
@@ -164,7 +165,7 @@ def _approximate_signature(
     lowest = pencil.values_out(ritz[: goal.k])
     require_readable(pencil.kernel, lowest)
     lowest = from_pencil(pencil.kernel, lowest)
-    decay = np.exp(-np.outer(lowest, times))
+    decay = exponential_decay(lowest, times)
     heat = np.empty((pencil.n, len(times)))
     for rows in row_chunks(start.tower):
         part = columns[rows, : goal.k].astype(np.float64)

@@ -11,13 +11,11 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.spectral.diffusion.decay import decay_factors
-from eigenshape.spectral.spectrum import Spectrum
+from eigenshape.spectral.spectrum import Spectrum, count_zero_modes
 
 # Relative difference between steps of log t up to which times count as a geometric sequence; the
 # rounding of numpy.geomspace stays far below it.
 EQUAL_STEPS = 1e-9
-# Eigenvalues below this multiple of the largest one count as 0.
-NULL = 1e-9
 N_TIMES = 100  # times by default, as in Sun, Ovsjanikov and Guibas 2009
 
 
@@ -30,7 +28,7 @@ def positive_eigenvalues(spectrum: Spectrum) -> Float[np.ndarray, " k"]:
         If no eigenvalue is above 0.
     """
     values = spectrum.eigenvalues
-    positive = values[values > np.maximum(NULL * values[-1], 4 * spectrum.residuals)]
+    positive = values[count_zero_modes(spectrum) :]
     if not positive.size:
         raise InvalidParameterError(
             f"The spectrum must have an eigenvalue above 0; its {len(values)} are all 0, one for each "

@@ -9,11 +9,10 @@ from jaxtyping import Float, Int
 
 from eigenshape.spectral.solver.pairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil, part_pencil, residual_norms
+from eigenshape.spectral.spectrum import ZERO_RESIDUALS
 
 # Numbers in the blocks of small parts that are solved together: 32 MiB.
 BLOCK_NUMBERS = 2**22
-# An eigenvalue below this many residuals counts as 0, as in `positive_eigenvalues`.
-ZERO_RESIDUALS = 4
 # Relative difference of eigenvalues of congruent parts whose coordinates are rounded.
 CONGRUENT = 1e-12
 

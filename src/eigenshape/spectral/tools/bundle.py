@@ -32,6 +32,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.operators.catalog import build_laplacian
 from eigenshape.operators.laplacian import Laplacian
+from eigenshape.sparse.frozen import freeze_sparse
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver.cache import require_writable
 from eigenshape.spectral.tools.bundle_archive import FORMAT, read_bundle, write_bundle
@@ -110,8 +111,8 @@ def operator_bundle(
     k : int
         Number of eigenpairs, 1 to n.
     operator : str, optional
-        A name in `es.operators.OPERATORS` whose mass is diagonal, such as "robust". By default
-        "cotangent" for meshes and "point-cloud" for clouds.
+        A name in `es.operators.OPERATORS` whose mass is diagonal. By default "cotangent" for meshes
+        and "robust" for clouds, as DiffusionNet takes them.
     cache : path, optional
         Folder in which bundles are kept, each under a hash of the shape and the request. A bundle
         found there is loaded instead of computed.
@@ -155,8 +156,9 @@ def operator_bundle(
     """
     surface = _require_surface(as_shape(shape))
     count = whole_number(k, "k", 1, surface.n_points)
+    name = operator or ("robust" if isinstance(surface, PointCloud) else "cotangent")
     if cache is not None:
-        path = Path(cache) / f"{_content_key(surface, count, operator)}.npz"
+        path = Path(cache) / f"{_content_key(surface, count, name)}.npz"
         if path.exists():
             try:
                 return OperatorBundle(**read_bundle(path))
@@ -167,7 +169,7 @@ def operator_bundle(
                 )
         require_writable(cache)  # before the work, not after it
 
-    laplacian = build_laplacian(surface, operator)
+    laplacian = build_laplacian(surface, name)
     mass = _diagonal_mass(laplacian, surface)
     edges = neighbor_edges(surface)
     frames = point_frames(surface, edges)
@@ -176,11 +178,11 @@ def operator_bundle(
     bundle = OperatorBundle(
         frames=freeze(frames),
         mass=freeze(mass),
-        stiffness=laplacian.stiffness,
+        stiffness=freeze_sparse(laplacian.stiffness),
         eigenvalues=spectrum.eigenvalues,
         eigenvectors=spectrum.eigenvectors,
-        gradient_x=gradient_x,
-        gradient_y=gradient_y,
+        gradient_x=freeze_sparse(gradient_x),
+        gradient_y=freeze_sparse(gradient_y),
     )
     if cache is not None:
         try:
@@ -347,7 +349,7 @@ def _diagonal_mass(laplacian: Laplacian, shape: Shape3) -> Float[np.ndarray, " n
     return mass
 
 
-def _content_key(shape: Shape3, k: int, operator: str | None) -> str:
+def _content_key(shape: Shape3, k: int, operator: str) -> str:
     """Return the SHA-256 of the coordinates, the faces, the request and our version."""
     request = (FORMAT, version("eigenshape"), type(shape).__name__, k, operator)
     digest = hashlib.sha256(repr(request).encode())

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from eigenshape._arrays import freeze
 from eigenshape._errors import FileFormatError
 from eigenshape._files import replacing, require_regular
+from eigenshape.sparse.frozen import freeze_sparse
 from eigenshape.spectral.archive import require_uncompressed
 
 # Version of the file format; a file of another version is refused.
@@ -59,7 +60,10 @@ def read_bundle(path: Path) -> dict[str, Any]:
             f"{path} must hold a bundle that eigenshape saved; {error}."
         ) from error
     _require_sound(path, fields)
-    return {name: freeze(part) if name in DENSE else part for name, part in fields.items()}
+    return {
+        name: freeze(part) if name in DENSE else freeze_sparse(part)
+        for name, part in fields.items()
+    }
 
 
 def _require_format(path: Path, found: object) -> None:

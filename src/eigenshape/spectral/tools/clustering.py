@@ -12,7 +12,7 @@ from eigenshape._arrays import as_array, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.laplacian import Laplacian, require_matrix
 from eigenshape.spectral.spectrum import Spectrum, require_lowest
 from eigenshape.spectral.tools.embedding import count_constant_modes
 
@@ -195,7 +195,7 @@ def count_clusters(spectrum: Spectrum, most: int | None = None) -> int:
     ------
     InvalidParameterError
         If there are fewer than 3 eigenvalues or all are 0, the spectrum does not begin with the
-        lowest one, or `most` is not in 2..k-1.
+        lowest one, or `most` is not in 2..k-1, or is less than the number of components.
 
     Examples
     --------
@@ -217,6 +217,11 @@ def count_clusters(spectrum: Spectrum, most: int | None = None) -> int:
         )
     limit = k - 1 if most is None else whole_number(most, "most", 2, k - 1)
     n_components = count_constant_modes(spectrum)
+    if n_components > limit:
+        raise InvalidParameterError(
+            f"most must be at least the number of components, {n_components}; it is {limit}. Pass "
+            f"most={n_components}, or keep fewer components."
+        )
     if n_components > 1:
         return n_components
     ratios = spectrum.eigenvalues[2 : limit + 1] / spectrum.eigenvalues[1:limit]
@@ -246,7 +251,7 @@ def normalized_cut(laplacian: Laplacian, labels: ArrayLike) -> float:
     Raises
     ------
     InvalidParameterError
-        If there is not one whole number per point.
+        If there is not one whole number per point, or the operator has `correct="log"`.
 
     See Also
     --------
@@ -264,6 +269,7 @@ def normalized_cut(laplacian: Laplacian, labels: ArrayLike) -> float:
     0.666666667
     """
     require_type(laplacian, Laplacian, "laplacian")
+    require_matrix(laplacian)
     names = as_array(labels, "labels")
     if names.shape != (laplacian.n_points,) or names.dtype.kind not in "biu":
         raise InvalidParameterError(

@@ -19,7 +19,7 @@ from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
-from eigenshape.spectral.tools.connectivity import read_faces, write_faces
+from eigenshape.spectral.tools.connectivity import OTHER, read_faces, write_faces
 from eigenshape.spectral.tools.packing import (
     from_bytes,
     from_varints,
@@ -236,7 +236,7 @@ def decompress_mesh(data: bytes, *, progress: Progress | None = None) -> Triangl
     report(0.0, "faces")
     n, n_faces, scale, step, low, packed = _read_container(data)
     symbols = unpack(packed["symbols"], SYMBOLS_PER_FACE * n_faces, "symbols")
-    n_references = symbols.count(4)
+    n_references = symbols.count(OTHER)
     references = unpack(packed["references"], 5 * n_references, "references")
     faces = read_faces(symbols, from_varints(references, n_references), n_faces, n)
 

@@ -5,13 +5,19 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial.distance import cdist
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import SHARE_OF_ARRAYS, positive_values, real_numbers, whole_numbers
+from eigenshape._arrays import (
+    SHARE_OF_ARRAYS,
+    positive_values,
+    real_numbers,
+    whole_number,
+    whole_numbers,
+)
 from eigenshape._errors import InvalidParameterError
 from eigenshape._memory import require_memory
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.spectral.signatures.heat import NULL
-from eigenshape.spectral.spectrum import Spectrum, require_lowest
+from eigenshape.spectral.diffusion.decay import exponential_decay
+from eigenshape.spectral.spectrum import Spectrum, count_zero_modes, require_lowest
 
 # Cosine of the angle between rows of the constant modes above which two points are of one
 # component. It is 1 inside a component and 0 between components; the solvers err by 1e-3 at most.
@@ -57,7 +63,7 @@ def spectral_embedding(
     ------
     InvalidParameterError
         If the spectrum does not begin with the lowest eigenvalue, has fewer modes that are not
-        constant, or the power is not finite.
+        constant, `n_dims` is not a whole number, or the power is not finite.
 
     See Also
     --------
@@ -81,12 +87,13 @@ def spectral_embedding(
         raise InvalidParameterError(f"power must be one finite number; it is {power!r}.")
     first = count_constant_modes(spectrum)
     most = len(spectrum.eigenvalues) - first
-    if n_dims is not None and not 1 <= n_dims <= most:
+    n_wanted = most if n_dims is None else whole_number(n_dims, "n_dims", 1)
+    if n_wanted > most:
         raise InvalidParameterError(
             f"n_dims must lie in 1..{most}, the number of modes that are not constant "
-            f"({first} of {len(spectrum.eigenvalues)} are); it is {n_dims}. Compute more eigenpairs."
+            f"({first} of {len(spectrum.eigenvalues)} are); it is {n_wanted}. Compute more eigenpairs."
         )
-    chosen = slice(first, first + (n_dims or most))
+    chosen = slice(first, first + n_wanted)
     return spectrum.eigenvectors[:, chosen] * spectrum.eigenvalues[chosen] ** float(exponent)
 
 
@@ -175,7 +182,7 @@ def diffusion_map(
     embedded = spectral_embedding(spectrum, n_dims)
     first = count_constant_modes(spectrum)
     values = spectrum.eigenvalues[first : first + embedded.shape[1]]
-    return embedded * np.exp(-time * values)
+    return embedded * exponential_decay(values, time)[:, 0]
 
 
 @one_blas_thread()
@@ -336,8 +343,8 @@ def diffusion_distances(
     """
     require_type(spectrum, Spectrum, "spectrum")
     require_lowest(spectrum, "spectrum")
-    weights = np.exp(-_one_time(t) * spectrum.eigenvalues)
-    return _distances(spectrum.eigenvectors * weights, points)
+    decay = exponential_decay(spectrum.eigenvalues, _one_time(t))[:, 0]
+    return _distances(spectrum.eigenvectors * decay, points)
 
 
 def count_constant_modes(spectrum: Spectrum) -> int:
@@ -350,7 +357,7 @@ def count_constant_modes(spectrum: Spectrum) -> int:
     """
     require_lowest(spectrum, "spectrum")
     values = spectrum.eigenvalues
-    n_zero = int(np.count_nonzero(values <= NULL * values[-1]))
+    n_zero = count_zero_modes(spectrum)
     # A lone eigenvalue of rounding size is not below its own multiple.
     if n_zero == len(values) or len(values) == 1:
         raise InvalidParameterError(

@@ -17,6 +17,7 @@ from eigenshape.geometry.measure import enclosed_volume
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.topology import is_closed
+from eigenshape.spectral.diffusion.decay import exponential_decay
 from eigenshape.spectral.spectrum import Spectrum
 from eigenshape.spectral.tools.projection import project, reconstruct
 
@@ -141,7 +142,7 @@ class HeatFilter:
 
     def __call__(self, eigenvalues: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
         """Return exp(-tλ) for each eigenvalue λ."""
-        return np.exp(-self.t * eigenvalues)
+        return exponential_decay(eigenvalues, self.t)[:, 0]
 
 
 @one_blas_thread()
