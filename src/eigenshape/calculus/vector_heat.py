@@ -298,12 +298,17 @@ def logarithmic_map(
     solver = as_vector_heat(mesh)
     start = whole_number(source, "source", 0, solver.n_points - 1)
     _require_source_everywhere(solver, np.array([start]))
+    weight = _scalar_impulse(solver, start)
     impulse = np.zeros(solver.n_points, dtype=complex)
     impulse[start] = 1.0
     parallel = _normalize(_diffuse(solver, impulse))
     parallel[parallel == 0] = 1.0  # opposite to the source any direction will do
-    compute = {"affine": _affine, "adaptive": _adaptive, "radial": _radial}[method]
-    return in_length(_as_rows(compute(solver, start, parallel)), solver.scale, 1)
+    if method == "radial":
+        found = _radial(solver, start, parallel)
+    else:
+        compute = _affine if method == "affine" else _adaptive
+        found = compute(solver, weight, parallel)
+    return in_length(_as_rows(found), solver.scale, 1)
 
 
 def require_log_method(method: str) -> None:
@@ -366,7 +371,9 @@ def _normalize(field: Complex[np.ndarray, " n"]) -> Complex[np.ndarray, " n"]:
     """Return vectors of length 1, and 0 for 0."""
     # Far away vectors are as short as 1e-300, whose squares underflow.
     largest = np.maximum(np.abs(field.real), np.abs(field.imag))
-    field = field / np.where(largest > 0, largest, 1.0)
+    # The parts are divided by themselves, because complex division forms 1 / largest.
+    size = np.where(largest > 0, largest, 1.0)
+    field = field.real / size + 1j * (field.imag / size)
     lengths = np.abs(field)
     return field / np.where(lengths > 0, lengths, 1.0)
 
@@ -402,7 +409,7 @@ def _sides(solver: VectorHeat) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.n
 
 
 def _adaptive(
-    solver: VectorHeat, start: int, parallel: Complex[np.ndarray, " n"]
+    solver: VectorHeat, weight: Float[np.ndarray, " n"], parallel: Complex[np.ndarray, " n"]
 ) -> Complex[np.ndarray, " n"]:
     """Diffuse affine coordinates (z, w) in the transported frame, where an edge is a translation.
 
@@ -411,7 +418,6 @@ def _adaptive(
     """
     tails, heads = _tail_and_head(solver.mesh)
     at_tail, at_head, _, weights = _sides(solver)
-    weight = _scalar_impulse(solver, start)
     # Each side counts from both of its ends.
     sources = np.zeros(solver.n_points, dtype=complex)
     np.add.at(sources, tails, -weights * weight[heads] * at_tail / parallel[tails])
@@ -422,12 +428,11 @@ def _adaptive(
 
 
 def _affine(
-    solver: VectorHeat, start: int, parallel: Complex[np.ndarray, " n"]
+    solver: VectorHeat, weight: Float[np.ndarray, " n"], parallel: Complex[np.ndarray, " n"]
 ) -> Complex[np.ndarray, " n"]:
     """Diffuse affine coordinates in the frames of all vertices, and turn them to the source's."""
     tails, heads = _tail_and_head(solver.mesh)
     at_tail, at_head, _, weights = _sides(solver)
-    weight = _scalar_impulse(solver, start)
     sources = np.zeros(solver.n_points, dtype=complex)
     np.add.at(sources, tails, -weights * weight[heads] * at_tail)
     np.add.at(sources, heads, weights * weight[tails] * at_head)
@@ -448,7 +453,6 @@ def _radial(
     solver: VectorHeat, start: int, parallel: Complex[np.ndarray, " n"]
 ) -> Complex[np.ndarray, " n"]:
     """Diffuse the field that points away from the source, and integrate it to distances."""
-    _scalar_impulse(solver, start)  # raises an error where no heat arrives
     radial = _normalize(_diffuse(solver, _outward_field(solver, start)))
     radial[start] = 0.0
     tails, heads = _tail_and_head(solver.mesh)
