@@ -2,9 +2,15 @@
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 import eigenshape as es
-from eigenshape.calculus import angle_distortion, flatten_conformally, map_to_sphere
+from eigenshape.calculus import (
+    angle_distortion,
+    conformal,
+    flatten_conformally,
+    map_to_sphere,
+)
 
 SHEET = es.shapes.grid(10, 5)
 
@@ -70,6 +76,8 @@ def test_wrong_arguments_are_named():
     stick = es.TriangleMesh(ball.vertices * [1, 1, 20], ball.faces)
     with pytest.raises(es.ConvergenceError, match="must make the surface round within 2 steps"):
         map_to_sphere(stick, n_steps=2)
+    with pytest.raises(es.ConvergenceError, match="equations of a conformal map must be definite"):
+        conformal._factor(sp.csr_array([[0.0]]))
     with pytest.raises(es.InvalidParameterError, match="positions must hold one place per vertex"):
         angle_distortion(SHEET, np.zeros((3, 2)))
     with pytest.raises(

@@ -91,6 +91,15 @@ def test_a_source_adds_heat_and_fixed_ends_let_it_out():
     np.testing.assert_allclose(columns, 3.0)
 
 
+def test_heat_that_flows_in_through_one_end():
+    # u = x²/2 + t solves u_t = u_xx with flux 0 in on the left and 1 on the right; implicit steps
+    # and linear elements are exact for it.
+    line = es.shapes.interval(20)
+    x, laplacian = line.points[:, 0], es.cotangent_laplacian(line)
+    found = solve_heat(laplacian, x**2 / 2, 0.7, 3, load=boundary_load(line, x))
+    np.testing.assert_allclose(found, x**2 / 2 + 0.7, atol=1e-12)
+
+
 def test_helmholtz_of_an_eigenfunction():
     laplacian = es.cotangent_laplacian(BALL)
     values, modes = eigh(laplacian.stiffness.toarray(), laplacian.mass.toarray())
@@ -104,6 +113,20 @@ def test_biharmonic_functions_through_linear_values_are_linear_in_one_dimension(
     x = np.linspace(0, 1, 11)
     found = solve_harmonic(bar, [0, 1, 9, 10], x[[0, 1, 9, 10]], order=2)
     np.testing.assert_allclose(found, x, atol=1e-9)
+
+
+def test_biharmonic_functions_have_no_slope_where_the_boundary_is_free():
+    # Linear functions have energy there, in proportion to the number of points at the boundary.
+    energies = []
+    for n in (8, 16):
+        sheet = es.shapes.grid(n, n)
+        laplacian, x = es.cotangent_laplacian(sheet), sheet.vertices[:, 0]
+        energies.append(x @ polyharmonic_matrix(laplacian) @ x)
+    assert energies[1] == pytest.approx(2 * energies[0], rel=0.05)
+    # With values on two sides alone, the solution has slope 0 there: 3x² - 2x³, not x.
+    ends = np.flatnonzero((x == 0) | (x == 1))
+    found = solve_harmonic(laplacian, ends, x[ends], order=2)
+    np.testing.assert_allclose(found, 3 * x**2 - 2 * x**3, atol=0.02)
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])

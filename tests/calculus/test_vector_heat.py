@@ -117,8 +117,21 @@ def test_bad_input_is_named():
         transport_vectors(TriangleMesh(ball.vertices, faces), [1], [[1.0, 0.0]])
 
 
-def test_heat_that_underflows_is_named():
+def test_heat_that_underflows_is_named_and_the_remedy_works():
     strip = grid(1200, 1, width=1200, height=1)
-    solver = prepare_vector_heat(strip, time_factor=0.2)
-    with pytest.raises(InvalidParameterError, match="Heat from the sources must reach"):
-        extend_scalar(solver, [0], [1.0])
+    cold = prepare_vector_heat(strip, time_factor=0.2)
+    for compute in (
+        lambda solver: extend_scalar(solver, [0], [1.0])[:, None],
+        lambda solver: transport_vectors(solver, [0], [[1.0, 0.0]]),
+        lambda solver: logarithmic_map(solver, 0, method="radial"),
+        lambda solver: logarithmic_map(solver, 0, method="affine"),
+    ):
+        with pytest.raises(InvalidParameterError, match="Heat from the sources must reach"):
+            compute(cold)
+    warm = prepare_vector_heat(strip, time_factor=5.0)
+    assert extend_scalar(warm, [0], [1.0]) == pytest.approx(1.0)
+    field = transport_vectors(warm, [0], [[1.0, 0.0]])
+    assert np.linalg.norm(field, axis=1) == pytest.approx(1.0)
+    assert np.isfinite(logarithmic_map(warm, 0, method="radial")).all()
+    lengths = np.linalg.norm(logarithmic_map(warm, 0, method="affine"), axis=1)
+    assert lengths == pytest.approx(np.linalg.norm(strip.vertices, axis=1), abs=1e-6)

@@ -9,7 +9,7 @@ from jaxtyping import Complex, Float
 from eigenshape._arrays import real_numbers, whole_number
 from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
 from eigenshape._typing import ArrayLike
-from eigenshape.calculus.linear_solver import factor_definite
+from eigenshape.calculus.linear_solver import LinearSolver, factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, face_areas, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
@@ -66,7 +66,7 @@ def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
         If the mesh is not connected, has no boundary, has faces without area or repeated, or
         neighboring faces have opposite orientations.
     ConvergenceError
-        If the iteration does not settle.
+        If the iteration does not settle, or faces are too thin for its equations to be solved.
 
     See Also
     --------
@@ -102,7 +102,7 @@ def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
     energy = _as_real(laplacian.stiffness - 2 * _area_form(mesh.n_vertices, rim))
     mass = sp.kron(laplacian.mass, sp.eye_array(2))
     shift = SHIFT * energy.diagonal().max() / mass.diagonal().max()
-    solver = factor_definite(energy + shift * mass)
+    solver = _factor(energy + shift * mass)
     on_rim = np.zeros(mesh.n_vertices)
     on_rim[rim] = 1.0
 
@@ -156,7 +156,8 @@ def map_to_sphere(mesh: MeshLike, *, n_steps: SupportsIndex = 500) -> Float[np.n
         If the mesh is not closed, connected and of genus 0, faces have no area or are repeated, or
         neighboring faces have opposite orientations.
     ConvergenceError
-        If the surface does not become round, or triangles are turned over on the sphere.
+        If the surface does not become round, triangles are turned over on the sphere, or faces are
+        too thin for the equations of the flow to be solved.
 
     See Also
     --------
@@ -203,7 +204,7 @@ def map_to_sphere(mesh: MeshLike, *, n_steps: SupportsIndex = 500) -> Float[np.n
         if n_idle == PATIENCE:
             break
         mass = sp.diags_array(weights * factor)
-        points = factor_definite(mass + FLOW_STEP * stiffness).solve(mass @ points)
+        points = _factor(mass + FLOW_STEP * stiffness).solve(mass @ points)
     if least > ROUND:
         raise ConvergenceError(
             f"The flow must make the surface round within {most} steps; the radii of its vertices "
@@ -272,6 +273,22 @@ def angle_distortion(mesh: MeshLike, positions: ArrayLike) -> Float[np.ndarray, 
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = stretches[:, 0] / stretches[:, 1]
     return np.where(stretches[:, 1] > 0, ratios, np.inf)
+
+
+def _factor(matrix: sp.csr_array) -> LinearSolver:
+    """Factor the equations of a map, which are definite but for rounding.
+
+    Raises
+    ------
+    ConvergenceError
+    """
+    try:
+        return factor_definite(matrix)
+    except InvalidParameterError as err:
+        raise ConvergenceError(
+            "The equations of a conformal map must be definite up to rounding; faces are too thin "
+            'for that. Try repair(mesh, ["collapse_needles"]).'
+        ) from err
 
 
 def _area_form(n: int, rim: np.ndarray) -> sp.csr_array:

@@ -321,14 +321,15 @@ def solve_heat(  # noqa: PLR0913 - one keyword for each part of the equation
     n_steps: SupportsIndex = 1,
     *,
     source: ArrayLike = 0.0,
+    load: ArrayLike = 0.0,
     fixed: ArrayLike | None = None,
     values: ArrayLike = 0.0,
 ) -> Float[np.ndarray, "n ..."]:
     """Let heat flow for a time t by implicit steps, with one factor for all of them.
 
-    Each step of length τ = t / n_steps solves (B + τW) u' = B (u + τf): backward Euler, of first
-    order in τ and without a bound on it. Heat is conserved, but for the source and what fixed
-    points let out.
+    Each step of length τ = t / n_steps solves (B + τW) u' = B u + τ (B f + load): backward Euler,
+    of first order in τ and without a bound on it. Heat is conserved, but for the source, the load
+    and what fixed points let out.
 
     Parameters
     ----------
@@ -339,7 +340,9 @@ def solve_heat(  # noqa: PLR0913 - one keyword for each part of the equation
         Time, in length².
     n_steps : int
     source : (n,) or (n, k) float, or a number
-        f, in units of u per length².
+        f, in units of u per length², constant in time.
+    load : (n,) or (n, k) float, or a number
+        Integrated loads, constant in time: `boundary_load` of a flux, or -`divergence` of a field.
     fixed : (c,) int, optional
         Points where values are given (Dirichlet).
     values : (c,) or (c, k) float, or a number
@@ -359,7 +362,8 @@ def solve_heat(  # noqa: PLR0913 - one keyword for each part of the equation
     See Also
     --------
     es.calculus.heat_solver : The factor of one step.
-    es.spectral.apply_heat : e^{-tL} with a stated error, without sources.
+    es.spectral.apply_heat : Heat of a function, exact to a given accuracy; without sources, loads
+        and fixed values.
 
     Examples
     --------
@@ -377,7 +381,7 @@ def solve_heat(  # noqa: PLR0913 - one keyword for each part of the equation
     (time,) = positive_values(t, "t")
     current = point_functions(start, "start", laplacian.n_points)
     solver = heat_solver(laplacian, time / count, fixed)
-    added = (time / count) * _right_hand_side(laplacian, source, 0.0)
+    added = (time / count) * _right_hand_side(laplacian, source, load)
     for _ in range(count):
         current = solver.solve(_add(laplacian.mass @ current, added), values=values)
     return current
@@ -488,8 +492,10 @@ def minimize_quadratic(
 def polyharmonic_matrix(laplacian: Laplacian, order: SupportsIndex = 2) -> sp.csr_array:
     """Build the energy matrix of k-harmonic functions, W (B⁻¹W)^(k-1).
 
-    ½ uᵀQu is half the integral of |∇u|² for k = 1 and of (Δu)² for k = 2, with natural conditions
-    at the boundary (Botsch and Kobbelt 2004; Jacobson, Tosun, Sorkine and Zorin 2010).
+    ½ uᵀQu is half the integral of |∇u|² for k = 1 and of (Δu)² for k = 2 (Botsch and Kobbelt 2004;
+    Jacobson, Tosun, Sorkine and Zorin 2010). For k above 1 it also asks for ∂u/∂ν = 0 where the
+    boundary is free, because W does; so a linear function on a flat sheet has energy (Stein,
+    Grinspun, Wardetzky and Jacobson 2018).
 
     Parameters
     ----------
@@ -542,6 +548,10 @@ def solve_harmonic(
     order: SupportsIndex = 1,
 ) -> Float[np.ndarray, "n ..."]:
     """Interpolate values at some points by the smoothest function: harmonic, biharmonic and so on.
+
+    The minimum of the energy of `polyharmonic_matrix`, with ∂u/∂ν = 0 where the boundary is free.
+    So for `order` above 1 a linear function on a flat sheet has energy, and is found only if it is
+    given at the boundary and at the neighbors of the boundary.
 
     Parameters
     ----------

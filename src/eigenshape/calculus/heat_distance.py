@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arrays import positive_values, whole_numbers
@@ -158,7 +158,8 @@ def heat_distances(
     Raises
     ------
     InvalidParameterError
-        If there is no source, or a source is not a point.
+        If there is no source, a source is not a point, or heat is too small for a float somewhere:
+        the shape is too long for the time.
     InvalidShapeError
         As in `prepare_heat_geodesics`.
 
@@ -213,7 +214,8 @@ def heat_distance_to_set(
     Raises
     ------
     InvalidParameterError
-        If there is no source, or a source is not a point.
+        If there is no source, a source is not a point, or heat is too small for a float somewhere:
+        the shape is too long for the time.
     InvalidShapeError
         As in `prepare_heat_geodesics`.
 
@@ -275,6 +277,27 @@ def factorize_definite(matrix: sp.sparray) -> SymmetricFactor:
             'too thin. Try repair(mesh, ["collapse_needles"]), or robust=True for triangles.'
         )
     return factor
+
+
+def require_heat(
+    heat: Float[np.ndarray, "n b"], reached: Bool[np.ndarray, "n b"] | bool = True
+) -> None:
+    """Raise an error if heat of a source is too small for a float at a point of its component.
+
+    Each edge takes a factor from it, of about 0.4 with the usual time; so 750 edges are too many.
+
+    Raises
+    ------
+    InvalidParameterError
+    """
+    # Below the normal floats digits are lost, and with them directions.
+    cold = np.argwhere(reached & (np.abs(heat) < np.finfo(np.float64).tiny))
+    if len(cold):
+        raise InvalidParameterError(
+            f"Heat from the sources must reach every point; at point {cold[0, 0]} it is too small "
+            f"for a float ({len(np.unique(cold[:, 0]))} such). Choose a larger time_factor; four "
+            "times as much reaches about twice as far."
+        )
 
 
 def ground(stiffness: sp.csr_array) -> tuple[sp.csr_array, Int[np.ndarray, " n"]]:
@@ -358,7 +381,12 @@ def _distances_of(
     solver: HeatGeodesics, impulses: Float[np.ndarray, "n b"]
 ) -> Float[np.ndarray, "n b"]:
     """Return distances up to a constant on each component, in units of the scale."""
-    heat = solver.heat.solve(impulses)[solver.nodes]
+    at_points = solver.heat.solve(impulses)
+    has_source = np.zeros((int(solver.components.max()) + 1, impulses.shape[1]), dtype=bool)
+    sources, columns = np.nonzero(impulses)
+    has_source[solver.components[sources], columns] = True
+    require_heat(at_points, has_source[solver.components])
+    heat = at_points[solver.nodes]
     # Far away heat is as small as 1e-300, so each simplex gets a unit of its own.
     heat = heat - heat[:, :1]
     largest = np.abs(heat).max(axis=1, keepdims=True)

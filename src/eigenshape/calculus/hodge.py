@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arrays import real_numbers
-from eigenshape._errors import ConvergenceError, InvalidParameterError
+from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.heat_distance import factorize_definite
@@ -55,8 +55,8 @@ class HodgeDecomposition:
         Quarter turn of the gradient of `stream` on a surface; in general what is orthogonal to all
         closed fields. Without divergence.
     harmonic : (f, 3) or (e,) float
-        The rest, without curl and divergence. It has as many dimensions as there are independent
-        loops, and is 0 on a sphere or a disc.
+        The rest, without curl and divergence. Its dimension depends on the topology alone; it is 0
+        on a sphere or a disc.
     potential : (n,) float
         Values at the vertices.
     stream : (e,) or (q,) float
@@ -232,8 +232,12 @@ def decompose_one_form(
 
     A one-form has one number per edge: the integral of a vector field along it. ω = df + δβ + h,
     orthogonal in the inner product of Whitney forms ∫ W_i·W_j (Whitney 1957; Arnold, Falk, Winther
-    2006), which is definite on any mesh. The harmonic part has the dimension β_1 of the topology.
-    Orientation plays no part. Works on triangles and tetrahedra.
+    2006), which is definite on any mesh. Orientation plays no part. Works on triangles and
+    tetrahedra.
+
+    The harmonic part has the dimension β_1 of the topology with "tangential", and that of the
+    cohomology relative to the boundary with "normal": β_1 on orientable surfaces, 0 on a Möbius
+    band, β_2 in solids (Lefschetz duality).
 
     Parameters
     ----------
@@ -275,9 +279,7 @@ def decompose_one_form(
     mesh = as_simplicial(mesh)
     _require_rim(boundary)
     if mesh.dim not in (2, 3):
-        raise InvalidParameterError(
-            f"One-forms need triangles or tetrahedra; the mesh is a {mesh!r}."
-        )
+        raise InvalidShapeError(f"One-forms need triangles or tetrahedra; the mesh is a {mesh!r}.")
     require_sound(mesh)
     edges = edges_of(mesh)
     form = real_numbers(values, "values").astype(np.float64)

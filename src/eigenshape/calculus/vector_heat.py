@@ -10,7 +10,12 @@ from eigenshape._arrays import finite_values, positive_values, real_numbers, who
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
-from eigenshape.calculus.heat_distance import factorize_definite, ground, require_sources
+from eigenshape.calculus.heat_distance import (
+    factorize_definite,
+    ground,
+    require_heat,
+    require_sources,
+)
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import edge_lengths, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
@@ -146,7 +151,7 @@ def extend_scalar(
     ------
     InvalidParameterError
         If there is no source, a source is not a vertex, `values` has another length or is not
-        finite, or a component has no source.
+        finite, a component has no source, or heat is too small for a float somewhere.
     InvalidShapeError
         As in `prepare_vector_heat`.
 
@@ -203,7 +208,7 @@ def transport_vectors(
     ------
     InvalidParameterError
         If there is no source, a source is not a vertex, `vectors` has another shape or is not
-        finite, or a component has no source.
+        finite, a component has no source, or heat is too small for a float somewhere.
     InvalidShapeError
         As in `prepare_vector_heat`.
 
@@ -226,12 +231,12 @@ def transport_vectors(
     lengths = np.abs(given)
     impulses = np.zeros(solver.n_points, dtype=complex)
     np.add.at(impulses, wanted, given / np.where(lengths > 0, lengths, 1.0))
+    if len(wanted) == 1:
+        _scalar_impulse(solver, int(wanted[0]))  # raises an error where no heat arrives
+        lengths = np.full(solver.n_points, lengths[0])
+    else:
+        lengths = _extend(solver, wanted, lengths)
     found = normalize(diffuse(solver, impulses))
-    lengths = (
-        np.full(solver.n_points, lengths[0])
-        if len(wanted) == 1
-        else _extend(solver, wanted, lengths)
-    )
     return _as_rows(found * lengths)
 
 
@@ -266,8 +271,8 @@ def logarithmic_map(
     Raises
     ------
     InvalidParameterError
-        If the source is not a vertex, a component does not contain it, or `method` is not one of
-        the three.
+        If the source is not a vertex, a component does not contain it, heat is too small for a
+        float somewhere, or `method` is not one of the three.
     InvalidShapeError
         As in `prepare_vector_heat`.
 
@@ -293,12 +298,17 @@ def logarithmic_map(
     solver = as_vector_heat(mesh)
     start = whole_number(source, "source", 0, solver.n_points - 1)
     _require_source_everywhere(solver, np.array([start]))
+    weight = _scalar_impulse(solver, start)
     impulse = np.zeros(solver.n_points, dtype=complex)
     impulse[start] = 1.0
     parallel = normalize(diffuse(solver, impulse))
     parallel[parallel == 0] = 1.0  # opposite to the source any direction will do
-    compute = {"affine": _affine, "adaptive": _adaptive, "radial": _radial}[method]
-    return in_length(_as_rows(compute(solver, start, parallel)), solver.scale, 1)
+    if method == "radial":
+        found = _radial(solver, start, parallel)
+    else:
+        compute = _affine if method == "affine" else _adaptive
+        found = compute(solver, weight, parallel)
+    return in_length(_as_rows(found), solver.scale, 1)
 
 
 def require_log_method(method: str) -> None:
@@ -361,7 +371,9 @@ def normalize(field: Complex[np.ndarray, " n"]) -> Complex[np.ndarray, " n"]:
     """Return vectors of length 1, and 0 for 0."""
     # Far away vectors are as short as 1e-300, whose squares underflow.
     largest = np.maximum(np.abs(field.real), np.abs(field.imag))
-    field = field / np.where(largest > 0, largest, 1.0)
+    # The parts are divided by themselves, because complex division forms 1 / largest.
+    size = np.where(largest > 0, largest, 1.0)
+    field = field.real / size + 1j * (field.imag / size)
     lengths = np.abs(field)
     return field / np.where(lengths > 0, lengths, 1.0)
 
@@ -372,18 +384,8 @@ def _extend(
     impulses = np.zeros((solver.n_points, 2))
     np.add.at(impulses, sources, np.column_stack([values, np.ones(len(values))]))
     flowed = solver.scalar_heat.solve(impulses)
-    return flowed[:, 0] / _require_heat(flowed[:, 1])
-
-
-def _require_heat(heat: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    """Raise an error where heat is too small for a float."""
-    cold = np.flatnonzero(heat == 0)
-    if cold.size:
-        raise InvalidParameterError(
-            f"Heat from the sources must reach every vertex; at vertex {cold[0]} it is too small "
-            f"for a float ({cold.size} such). Choose a larger time_factor."
-        )
-    return heat
+    require_heat(flowed[:, 1:])
+    return flowed[:, 0] / flowed[:, 1]
 
 
 def _tail_and_head(mesh: TriangleMesh) -> tuple[Int[np.ndarray, " h"], Int[np.ndarray, " h"]]:
@@ -407,7 +409,7 @@ def _sides(solver: VectorHeat) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.n
 
 
 def _adaptive(
-    solver: VectorHeat, start: int, parallel: Complex[np.ndarray, " n"]
+    solver: VectorHeat, weight: Float[np.ndarray, " n"], parallel: Complex[np.ndarray, " n"]
 ) -> Complex[np.ndarray, " n"]:
     """Diffuse affine coordinates (z, w) in the transported frame, where an edge is a translation.
 
@@ -416,7 +418,6 @@ def _adaptive(
     """
     tails, heads = _tail_and_head(solver.mesh)
     at_tail, at_head, _, weights = _sides(solver)
-    weight = _scalar_impulse(solver, start)
     # Each side counts from both of its ends.
     sources = np.zeros(solver.n_points, dtype=complex)
     np.add.at(sources, tails, -weights * weight[heads] * at_tail / parallel[tails])
@@ -427,12 +428,11 @@ def _adaptive(
 
 
 def _affine(
-    solver: VectorHeat, start: int, parallel: Complex[np.ndarray, " n"]
+    solver: VectorHeat, weight: Float[np.ndarray, " n"], parallel: Complex[np.ndarray, " n"]
 ) -> Complex[np.ndarray, " n"]:
     """Diffuse affine coordinates in the frames of all vertices, and turn them to the source's."""
     tails, heads = _tail_and_head(solver.mesh)
     at_tail, at_head, _, weights = _sides(solver)
-    weight = _scalar_impulse(solver, start)
     sources = np.zeros(solver.n_points, dtype=complex)
     np.add.at(sources, tails, -weights * weight[heads] * at_tail)
     np.add.at(sources, heads, weights * weight[tails] * at_head)
@@ -441,9 +441,12 @@ def _affine(
 
 
 def _scalar_impulse(solver: VectorHeat, start: int) -> Float[np.ndarray, " n"]:
+    """Return the heat of one source, which must reach every vertex."""
     impulse = np.zeros((solver.n_points, 1))
     impulse[start] = 1.0
-    return _require_heat(solver.scalar_heat.solve(impulse)[:, 0])
+    heat = solver.scalar_heat.solve(impulse)
+    require_heat(heat)
+    return heat[:, 0]
 
 
 def _radial(
