@@ -13,7 +13,7 @@ def exponential_decay(
     eigenvalues: Float[np.ndarray, " k"], times: ArrayLike
 ) -> Float[np.ndarray, "k q"]:
     """Return exp(-t λ_i) for each eigenvalue and each time, without any check."""
-    return np.exp(-np.outer(eigenvalues, times))
+    return np.exp(-np.outer(eigenvalues, np.asarray(times)))
 
 
 def decay_factors(

@@ -212,10 +212,12 @@ def _units(top: float) -> Float[np.ndarray, "3"]:
 def _require_eigenvalues(
     eigenvalues: Spectrum | ArrayLike, boundary: Condition | None
 ) -> Float[np.ndarray, " k"]:
-    spectrum = eigenvalues if isinstance(eigenvalues, Spectrum) else None
-    if spectrum is not None:
+    spectrum = None
+    if isinstance(eigenvalues, Spectrum):
+        spectrum = eigenvalues
         require_lowest(spectrum, "eigenvalues")
-    values = finite_values(spectrum.eigenvalues if spectrum else eigenvalues, "eigenvalues")
+        eigenvalues = spectrum.eigenvalues
+    values = finite_values(eigenvalues, "eigenvalues")
     if len(values) < FEWEST:
         raise InvalidParameterError(
             f"At least {FEWEST} eigenvalues are needed to see short times; there are {len(values)}. "
