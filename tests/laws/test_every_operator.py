@@ -37,8 +37,8 @@ from eigenshape.spectral.laws.report import DEFAULT_PROMISES
 from eigenshape.spectral.laws.transformations import random_rotation
 
 seeds = st.integers(0, 2**32 - 1)
-few = settings(deadline=None, max_examples=8)
-many = settings(deadline=None, max_examples=10)
+few = settings(deadline=None, max_examples=5)
+many = settings(deadline=None, max_examples=6)
 
 
 def turned(points, rng, noise):

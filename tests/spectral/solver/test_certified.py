@@ -70,9 +70,10 @@ def test_no_eigenvalue_is_missing_or_extra(always_lanczos, mesh, mass):
 
 
 @pytest.mark.long
-def test_two_hundred_solves_miss_nothing(always_lanczos):
+def test_a_hundred_solves_miss_nothing(always_lanczos):
     done = 0
-    for mass in ("lumped", "consistent", "averaged"):
+    for turn, mass in enumerate(("lumped", "consistent", "averaged")):
+        # Every other number of pairs, and the others with the next mass: copies end everywhere.
         for level in (1, 2, 3):
             laplacian = cotangent_laplacian(icosphere(level), mass)
             ks = [
@@ -80,7 +81,7 @@ def test_two_hundred_solves_miss_nothing(always_lanczos):
                 for k in (1, 4, 5, 9, 16, 17, 25, 36, 49, 64, 81, 100, 150, 200)
                 if k < laplacian.n_points
             ]
-            done += require_lowest(laplacian, ks)
+            done += require_lowest(laplacian, ks[turn % 2 :: 2])
         for mesh in (
             tetrahedra(12),
             tetrahedra(60),
@@ -88,9 +89,9 @@ def test_two_hundred_solves_miss_nothing(always_lanczos):
             disjoint_union(*[icosphere(2)] * 6),
         ):
             laplacian = cotangent_laplacian(mesh, mass)
-            ks = (1, 3, 11, 12, 13, 24, 30, 47, 59, 60, 61, 100, 180)
+            ks = (1, 3, 11, 12, 13, 24, 30, 47, 59, 60, 61, 100, 180)[turn % 2 :: 2]
             done += require_lowest(laplacian, [k for k in ks if k < laplacian.n_points])
-    assert done >= 200
+    assert done >= 100
 
 
 @pytest.mark.parametrize(
