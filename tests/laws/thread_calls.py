@@ -59,6 +59,8 @@ class Shared:
             self.many_spectrum, self.many_spectrum, [[0, 0], [99, 99]], n_modes=4
         )
         self.transfer = es.transfer_labels(self.animal, self.labels, self.pose)
+        self._make_solvers()
+        self._make_graph()
         self._make_files()
 
     def _make_bends(self) -> None:
@@ -118,6 +120,30 @@ class Shared:
             es.stability.StabilityPlan(k=5, n_samples=200, times=(0.05,)),
             partners=None,
         )
+
+    def _make_solvers(self) -> None:
+        self.height = self.many.vertices[:, 2]
+        self.field = self.many.vertices[self.many.faces].mean(axis=1)
+        self.poisson = es.calculus.poisson_solver(self.many_laplacian)
+        self.bound = es.calculus.factor_equations(
+            self.laplacian.stiffness,
+            fixed=[0, 9],
+            constraints=self.laplacian.mass.sum(axis=0)[None],
+        )
+        self.by_heat_flow = es.calculus.prepare_heat_geodesics(self.many)
+        self.by_vector_heat = es.calculus.prepare_vector_heat(self.animal)
+        self.form = np.sin(np.arange(len(es.calculus.one_form_edges(self.torus))))
+        self.circle = es.calculus.level_set(self.many, self.height, 0.1)
+        self.cut = es.calculus.level_set(self.solid, self.solid.points[:, 0], 0.4)
+
+    def _make_graph(self) -> None:
+        self.normalized = es.operators.graph_laplacian(self.animal, "normalized")
+        self.graph_spectrum = es.solve_spectrum(self.normalized, 8)
+        self.many_coefficients = es.spectral.project(self.many.vertices, self.many_spectrum)
+        self.packed = es.spectral.compress_mesh(self.torus)
+        self.marked = es.spectral.embed_watermark(self.animal, "a key", k=30)
+        self.bundle = es.spectral.operator_bundle(self.ball, 6)
+        self.recovered = es.spectral.recover_geometry(es.shapes.sphere_eigenvalues(300))
 
     def _make_files(self) -> None:
         es.write_mesh(self.ball, self.folder / "ball.ply")
@@ -198,7 +224,18 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "DepthCamera": lambda v: es.scans.simulate_scan(
         v.ball, rng(), camera=es.scans.DepthCamera(resolution=40)
     ),
+    "LevelSet.interpolate": lambda v: v.circle.interpolate(v.many.vertices),
+    "LevelSet.polylines": lambda v: v.circle.polylines(),
+    "LevelSet.surface": lambda v: v.cut.surface(),
+    "LinearSolver": lambda v: [
+        v.poisson.floating_sums(v.many.vertices),
+        v.poisson.solve(v.many_laplacian.mass @ v.height),
+        v.bound.solve(v.animal.vertices, values=[[1.0], [2.0]], targets=[[3.0]]),
+    ],
     "Rate.at": lambda v: es.stability.theorem_rate("lipschitz", 2).at([0.1, 0.2], 0.01),
+    "RecoveredGeometry.whole_characteristic": lambda v: [
+        v.recovered.whole_characteristic(even=even) for even in (False, True)
+    ],
     "Rotation.carry": lambda v: v.handle.carry(
         v.ball.vertices, np.linspace(0, 1, v.ball.n_vertices)
     ),
@@ -207,18 +244,28 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ),
     "ShapeIndex": answers,
     "ShapeIndex.add": index_of,
+    "SpectralClusterer": lambda v: es.spectral.SpectralClusterer(3).fit_predict(v.torus.vertices),
+    "SpectralEmbedder": lambda v: es.spectral.SpectralEmbedder(3).fit_transform(v.torus.vertices),
     "Spectrum.save": lambda v: written(v.folder, ".npz", v.spectrum.save),
     "Spectrum.load": lambda v: es.Spectrum.load(v.folder / "spectrum.npz"),
     "affinity_distance": lambda v: es.retrieval.baselines.affinity_distance(
         v.spectrum.eigenvalues, v.spectrum2.eigenvalues
     ),
     "affinity_eigenvalues": lambda v: es.retrieval.baselines.affinity_eigenvalues(v.animal),
+    "aim_camera": lambda v: es.plot.aim_camera(v.many),
     "anchor_nodes": lambda v: es.stability.anchor_nodes(v.ball, 0.5),
     "anchor_region": lambda v: es.stability.anchor_region(v.on_one.points, v.nodes.points, 0.5),
+    "angle_distortion": lambda v: es.calculus.angle_distortion(
+        v.many, v.many.vertices * [1.0, 2.0, 3.0]
+    ),
     "anisotropic_laplacian": lambda v: es.operators.anisotropic_laplacian(
         v.ball, es.operators.curvature_tensors(v.ball, 2.0)
     ),
     "apply_edit": lambda v: es.deformation.apply_edit(v.rig, v.edit).mesh,
+    "apply_heat": lambda v: [
+        es.spectral.apply_heat(v.laplacian, v.animal.vertices, 0.01),
+        es.spectral.apply_heat(v.many_spectrum, v.height, [0.1, 0.2]),
+    ],
     "approximate_heat_signature": lambda v: es.spectral.approximate_heat_signature(
         v.many_laplacian, 8, [0.5, 1.0]
     ),
@@ -230,19 +277,24 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "average_geodesic_distance": lambda v: es.geometry.average_geodesic_distance(
         v.animal, n_bases=40
     ),
+    "average_onto_points": lambda v: es.calculus.average_onto_points(v.many, v.field),
+    "average_onto_simplices": lambda v: es.calculus.average_onto_simplices(v.many, v.many.vertices),
     "ball": lambda v: es.shapes.ball(3),
     "ball_eigenvalues": lambda v: es.shapes.ball_eigenvalues(9),
     "bend": lambda v: [
         es.deformation.bend(v.binding, [v.handle], mode=mode)
         for mode in ("graded", "uncrossed", "thesis")
     ],
+    "betti_numbers": lambda v: [es.geometry.betti_numbers(mesh) for mesh in (v.torus, v.solid)],
     "biharmonic_blend": lambda v: es.deformation.biharmonic_blend(v.binding, [v.handle]),
+    "biharmonic_distances": lambda v: es.spectral.biharmonic_distances(v.many_spectrum, [0, 9]),
     "bind": lambda v: es.deformation.bind(v.rig, [v.region], fixed=v.fixed).shares,
     "bottleneck_distance": lambda v: es.features.bottleneck_distance(v.diagram, v.diagram2),
     "bottleneck_matching": lambda v: es.stability.bottleneck_matching(
         v.on_one.points, v.on_two.points
     ),
     "boundary_edges": lambda v: es.geometry.boundary_edges(v.grid),
+    "boundary_load": lambda v: es.calculus.boundary_load(v.grid, 1.0),
     "boundary_loops": lambda v: es.geometry.boundary_loops(v.grid),
     "boundary_vertices": lambda v: es.geometry.boundary_vertices(v.grid),
     "boundary_surface": lambda v: es.geometry.boundary_surface(v.solid),
@@ -261,7 +313,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "check_operator": lambda v: es.check_operator(es.cotangent_laplacian, v.ball),
     "cheeger_estimate": lambda v: es.stability.cheeger_estimate(v.animal, v.spectrum),
     "circle": lambda v: es.shapes.circle(9),
+    "closest_points": lambda v: es.geometry.closest_points(v.animal, v.ball.vertices),
     "cloud_quadrature": lambda v: es.geometry.cloud_quadrature(v.cloud),
+    "commute_time_distances": lambda v: es.spectral.commute_time_distances(v.many_spectrum, [0, 9]),
     "compare_shapes": lambda v: es.compare_shapes(
         v.ball, v.torus, es.stability.StabilityPlan(k=3, n_samples=150, times=(0.05,))
     ),
@@ -269,6 +323,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "compose_maps": lambda v: es.spectral.compose_maps(
         v.map, es.spectral.map_from_points(v.spectrum2, v.spectrum, np.arange(700))
     ),
+    "compress_mesh": lambda v: es.spectral.compress_mesh(v.torus),
     "connection_laplacian": lambda v: es.operators.connection_laplacian(v.ball),
     "correspondence_graph": lambda v: es.stability.correspondence_graph(
         v.change, v.on_one, v.on_two, nodes=v.nodes.points, delta=0.5, rho=3.0
@@ -277,9 +332,18 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "bounding_rate": lambda v: es.stability.bounding_rate(
         es.stability.theorem_rate("lipschitz", 2), [0.1, 0.2], [0.01, 0.01], [1.0, 2.0]
     ),
+    "count_clusters": lambda v: es.spectral.count_clusters(v.graph_spectrum),
+    "courant_bounds": lambda v: es.spectral.courant_bounds(v.spectrum),
     "crouzeix_raviart_laplacian": lambda v: es.operators.crouzeix_raviart_laplacian(v.ball),
+    "curl": lambda v: es.calculus.curl(v.many, v.field),
+    "curl_matrix": lambda v: es.calculus.curl_matrix(v.many),
     "curvature_tensors": lambda v: es.operators.curvature_tensors(v.animal, 2.0),
     "cut_by_planes": lambda v: es.scans.cut_by_planes(v.animal, [[0, 1, 0, 0.3]]),
+    "decompose_field": lambda v: es.calculus.decompose_field(
+        v.torus, es.calculus.gradient(v.torus, v.torus.vertices[:, 0])
+    ),
+    "decompose_one_form": lambda v: es.calculus.decompose_one_form(v.torus, v.form),
+    "decompress_mesh": lambda v: es.spectral.decompress_mesh(v.packed.data),
     "default_codebook": lambda v: es.retrieval.default_codebook(),
     "default_energies": lambda v: es.spectral.default_energies(v.spectrum),
     "default_times": lambda v: es.spectral.default_times(v.spectrum),
@@ -287,6 +351,12 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "denoise": lambda v: es.operators.denoise(v.animal, reach=0.02),
     "describe": lambda v: [es.describe(v.animal), es.describe(v.animal, es.retrieval.SCALE_FREE)],
     "detailed_skeleton": lambda v: es.deformation.detailed_skeleton(v.binding).fine,
+    "detect_watermark": lambda v: es.spectral.detect_watermark(v.animal, v.marked, "a key", k=30),
+    "detect_watermarks": lambda v: es.spectral.detect_watermarks(
+        v.animal, v.marked, ["a key", "another"], k=30
+    ),
+    "diffusion_distances": lambda v: es.spectral.diffusion_distances(v.many_spectrum, 0.2, [0, 9]),
+    "diffusion_map": lambda v: es.spectral.diffusion_map(v.many_spectrum, 0.2),
     "dirichlet_laplacian": lambda v: es.operators.dirichlet_laplacian(
         v.laplacian, np.array([0, 5])
     ),
@@ -295,6 +365,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "disjoint_union": lambda v: es.geometry.disjoint_union(v.ball, v.torus),
     "drop_duplicate_points": lambda v: es.geometry.drop_duplicate_points(v.cloud),
     "collapse_needles": lambda v: es.geometry.collapse_needles(v.animal),
+    "divergence": lambda v: es.calculus.divergence(v.many, v.field),
+    "divergence_matrix": lambda v: es.calculus.divergence_matrix(v.many),
+    "draw": lambda v: es.plot.draw(v.ball, v.camera),
     "drop_degenerate": lambda v: es.geometry.drop_degenerate(v.animal),
     "drop_duplicate_faces": lambda v: es.geometry.drop_duplicate_faces(v.animal),
     "drop_unreferenced": lambda v: es.geometry.drop_unreferenced(v.animal),
@@ -310,13 +383,21 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         es.shapes.sphere_eigenvalues(9),
         es.shapes.sphere_harmonics(v.many.vertices, 4),
     ),
+    "embed_watermark": lambda v: es.spectral.embed_watermark(v.animal, "a key", k=30),
     "enclosed_volume": lambda v: es.geometry.enclosed_volume(v.many),
     "enclosing_ball": lambda v: es.geometry.enclosing_ball(v.animal.vertices),
     "euler_characteristic": lambda v: es.geometry.euler_characteristic(v.animal),
+    "export_bundle": lambda v: [
+        es.spectral.export_bundle(v.bundle, form) for form in ("scipy", "numpy")
+    ],
+    "extend_scalar": lambda v: es.calculus.extend_scalar(v.by_vector_heat, [0, 9], [1.0, 5.0]),
     "extract_patches": lambda v: es.retrieval.extract_patches(v.torus, n_views=1),
     "face_areas": lambda v: es.geometry.face_areas(v.many),
     "face_normals": lambda v: es.geometry.face_normals(v.many),
     "facet_table": lambda v: es.geometry.facet_table(v.solid),
+    "factor_equations": lambda v: es.calculus.factor_equations(
+        v.laplacian.stiffness, fixed=[0], constraints=v.animal.vertices.T
+    ),
     "farthest_points": lambda v: es.geometry.farthest_points(v.animal, 20),
     "fem_boundary_nodes": lambda v: es.operators.fem_boundary_nodes(v.grid),
     "fem_laplacian": lambda v: es.operators.fem_laplacian(v.solid, 3),
@@ -351,6 +432,14 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ),
     "figure_spectrum": lambda v: drawn(es.plot.figure_spectrum(v.spectrum)),
     "figure_stability": lambda v: drawn(es.plot.figure_stability(v.report, v.cloud, v.cloud)),
+    "filter_values": lambda v: [
+        es.spectral.filter_values(v.many.vertices, v.many_spectrum, response, keep_rest=True)
+        for response in (
+            es.spectral.LowPass(3.0),
+            es.spectral.BandPass(1.0, 3.0),
+            es.spectral.HeatFilter(0.1),
+        )
+    ],
     "find_heat_features": lambda v: [
         es.retrieval.find_heat_features(v.animal),
         es.retrieval.find_heat_features(v.animal, accuracy=0.01),
@@ -360,6 +449,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         [0.1, 0.2, 0.4], [0.01, 0.02, 0.03], [1.0, 2.0, 5.0]
     ),
     "flat_torus_eigenvalues": lambda v: es.shapes.flat_torus_eigenvalues(9, np.eye(2)),
+    "flatten_conformally": lambda v: es.calculus.flatten_conformally(v.grid),
     "from_arrays": lambda v: es.from_arrays(v.ball.vertices, v.ball.faces),
     "from_pyvista": lambda v: es.io.from_pyvista(es.io.to_pyvista(v.ball)),
     "from_trimesh": lambda v: es.io.from_trimesh(es.io.to_trimesh(v.ball)),
@@ -376,24 +466,45 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "geodesic_distance_to_set": lambda v: es.geometry.geodesic_distance_to_set(v.animal, [0, 9]),
     "geodesic_distances": lambda v: es.geometry.geodesic_distances(v.animal, [0, 9]),
     "uneven_sphere": lambda v: es.shapes.uneven_sphere(200),
+    "geodesic_path": lambda v: es.calculus.geodesic_path(v.ball, 0, 99),
+    "geodesic_waves": lambda v: es.geometry.geodesic_waves(v.ball)(0, 1.0),
+    "global_point_signature": lambda v: es.spectral.global_point_signature(v.many_spectrum),
+    "gradient": lambda v: es.calculus.gradient(v.many, v.many.vertices),
+    "gradient_matrix": lambda v: es.calculus.gradient_matrix(v.many),
     "graph_laplacian": lambda v: es.operators.graph_laplacian(v.animal, "normalized"),
     "grid": lambda v: es.shapes.grid(3, 4),
+    "harmonic_fields": lambda v: es.calculus.harmonic_fields(v.torus),
     "heat_descriptor": lambda v: es.retrieval.heat_descriptor(v.spectrum, v.parts.features),
     "skeleton_response": lambda v: es.deformation.skeleton_response(v.binding),
+    "heat_distance_to_set": lambda v: es.calculus.heat_distance_to_set(v.by_heat_flow, [0, 9]),
+    "heat_distances": lambda v: [
+        es.calculus.heat_distances(shape, [0, 9]) for shape in (v.ball, v.by_heat_flow)
+    ],
+    "heat_kernel": lambda v: es.spectral.heat_kernel(v.many_spectrum, [0, 9], None, 0.2),
     "heat_kernel_signature": lambda v: es.heat_kernel_signature(v.many_spectrum, [0.3]),
+    "heat_solver": lambda v: es.calculus.heat_solver(v.laplacian, 0.01),
+    "heat_trace": lambda v: es.spectral.heat_trace(v.many_spectrum, [0.5, 1.0]),
+    "helmholtz_solver": lambda v: es.calculus.helmholtz_solver(v.laplacian, 1.0),
     "icosphere": lambda v: es.icosphere(2),
     "interval": lambda v: es.shapes.interval(9),
     "irregular_grid": lambda v: es.shapes.irregular_grid(4, 5, rng=rng()),
     "is_closed": lambda v: es.geometry.is_closed(v.animal),
     "is_manifold": lambda v: es.geometry.is_manifold(v.animal),
     "largest_component": lambda v: es.geometry.largest_component(v.animal),
+    "level_set": lambda v: es.calculus.level_set(v.solid, v.solid.points[:, 0], 0.4),
     "light_field": lambda v: es.retrieval.baselines.light_field(v.ball, n_fields=1, size=32),
     "light_field_distance": lambda v: es.retrieval.baselines.light_field_distance(*v.light),
+    "local_triangles": lambda v: es.operators.local_triangles(v.cloud),
+    "logarithmic_map": lambda v: [
+        es.calculus.logarithmic_map(v.ball, 0, method=method)
+        for method in ("affine", "adaptive", "radial")
+    ],
     "make_creature": lambda v: es.make_creature("quadruped", 3, n_vertices=700),
     "map_closeness": lambda v: es.stability.map_closeness(v.ball, 1.01 * v.ball.vertices),
     "map_from_points": lambda v: es.spectral.map_from_points(
         v.many_spectrum, v.many_spectrum, np.arange(v.many.n_vertices), n_modes=6
     ),
+    "map_to_sphere": lambda v: es.calculus.map_to_sphere(v.ball, n_steps=9),
     "match_features": lambda v: es.retrieval.match_features(*v.by_heat),
     "match_patches": lambda v: es.retrieval.match_patches(
         *(descriptor.points[0] for descriptor in v.by_patches)
@@ -404,6 +515,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         sp.csr_array(np.eye(5)[[4, 2, 0, 1, 3]])
     ),
     "mean_curvature": lambda v: es.operators.mean_curvature(v.many),
+    "mean_curvature_flow": lambda v: es.calculus.mean_curvature_flow(v.animal, 0.001, n_steps=3),
     "mean_side_length": lambda v: es.geometry.mean_side_length(v.many),
     "measure_closeness": lambda v: es.stability.measure_closeness(v.change),
     "measure_distortion": lambda v: es.deformation.measure_distortion(v.animal, v.pose),
@@ -413,12 +525,24 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         es.mesh_laplacian(v.torus, distance=d) for d in ("euclidean", "geodesic")
     ],
     "mesh_quadrature": lambda v: es.geometry.mesh_quadrature(v.many),
+    "minimize_quadratic": lambda v: es.calculus.minimize_quadratic(
+        v.laplacian.stiffness, fixed=[0, 9], values=[1.0, 2.0]
+    ),
     "move_skeleton": lambda v: es.deformation.move_skeleton(v.response, [v.handle]),
     "neighbor_graph": lambda v: es.operators.neighbor_graph(v.cloud.points, 6),
+    "nodal_domains": lambda v: es.spectral.nodal_domains(v.many, v.height),
+    "nodal_set": lambda v: es.spectral.nodal_set(v.many, v.height),
     "noise_level": lambda v: es.operators.noise_level(v.animal),
     "normalize_area": lambda v: es.geometry.normalize_area(v.animal),
     "normalize_box": lambda v: es.geometry.normalize_box(v.animal),
     "normalize_diameter": lambda v: es.geometry.normalize_diameter(v.ball),
+    "normalized_cut": lambda v: es.spectral.normalized_cut(
+        v.normalized, v.animal.vertices[:, 1] > 0
+    ),
+    "one_form_edges": lambda v: es.calculus.one_form_edges(v.many),
+    "operator_bundle": lambda v: [
+        es.spectral.operator_bundle(shape, 6) for shape in (v.ball, v.cloud)
+    ],
     "orient": lambda v: es.geometry.orient(v.animal),
     "orient_outward": lambda v: es.geometry.orient_outward(v.many),
     "part_colors": lambda v: es.plot.part_colors(v.animal, v.labels),
@@ -431,6 +555,13 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "measure_perturbation": lambda v: es.stability.measure_perturbation(v.ball, v.ball),
     "point_cloud_laplacian": lambda v: es.point_cloud_laplacian(v.cloud),
     "point_map": lambda v: es.spectral.point_map(v.map),
+    "pointwise_time": lambda v: es.operators.pointwise_time(v.many),
+    "poisson_solver": lambda v: es.calculus.poisson_solver(v.laplacian, fixed=[0, 9]),
+    "polyharmonic_matrix": lambda v: es.calculus.polyharmonic_matrix(v.laplacian, 3),
+    "prepare_heat_geodesics": lambda v: es.calculus.prepare_heat_geodesics(v.ball),
+    "prepare_vector_heat": lambda v: es.calculus.prepare_vector_heat(v.ball),
+    "principal_curvatures": lambda v: es.geometry.principal_curvatures(v.animal),
+    "project": lambda v: es.spectral.project(v.many.vertices, v.many_spectrum),
     "projective_plane": lambda v: es.shapes.projective_plane(1),
     "projective_plane_eigenvalues": lambda v: es.shapes.projective_plane_eigenvalues(9),
     "quadrature_laplacian": lambda v: es.operators.quadrature_laplacian(
@@ -443,6 +574,8 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "read_mesh": lambda v: es.read_mesh(v.folder / "ball.ply"),
     "read_points": lambda v: es.read_points(v.folder / "cloud.ply"),
     "read_shape": lambda v: es.read_shape(v.folder / "square.mesh"),
+    "reconstruct": lambda v: es.spectral.reconstruct(v.many_coefficients, v.many_spectrum),
+    "recover_geometry": lambda v: es.spectral.recover_geometry(es.shapes.sphere_eigenvalues(300)),
     "refine_map": lambda v: es.spectral.refine_map(v.many_map, 8),
     "reflection_free_signature": lambda v: es.spectral.reflection_free_signature(
         v.many_spectrum, v.many_spectrum, [0.3]
@@ -451,6 +584,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "region_mask": lambda v: es.deformation.region_mask(
         v.animal, es.deformation.BoxRegion([-1, 0, -1], [1, 1, 1])
     ),
+    "remove_means": lambda v: es.calculus.remove_means(v.many_laplacian, v.many.vertices**2),
     "repair": lambda v: es.repair(v.animal, ["weld", "drop_unreferenced"]),
     "replay": lambda v: es.deformation.replay(v.rig, [v.edit]).mesh,
     "rig_shape": lambda v: es.rig_shape(v.many, v.many_spectrum).factor,
@@ -473,11 +607,26 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "shape_dna_distance": lambda v: es.retrieval.baselines.shape_dna_distance(
         v.spectrum.eigenvalues, v.spectrum2.eigenvalues
     ),
+    "signed_distance": lambda v: es.geometry.signed_distance(v.ball, v.animal.vertices),
+    "signed_heat_distance": lambda v: es.calculus.signed_heat_distance(
+        v.by_vector_heat, [v.animal.faces[0, [0, 1, 2, 0]]]
+    ),
     "simplex_volumes": lambda v: es.geometry.simplex_volumes(v.solid),
     "simulate_scan": lambda v: es.scans.simulate_scan(
         v.ball, rng(), camera=es.scans.DepthCamera(resolution=40)
     ),
     "smooth_boundaries": lambda v: es.features.smooth_boundaries(v.animal, v.parts),
+    "smooth_mesh": lambda v: es.spectral.smooth_mesh(
+        v.animal, v.spectrum, es.spectral.LowPass(9.0), keep_volume=True
+    ),
+    "solve_harmonic": lambda v: [
+        es.calculus.solve_harmonic(v.laplacian, [0, 9], [1.0, 2.0], order=order) for order in (1, 2)
+    ],
+    "solve_heat": lambda v: es.calculus.solve_heat(v.laplacian, v.animal.vertices, 0.01, n_steps=3),
+    "solve_helmholtz": lambda v: es.calculus.solve_helmholtz(v.laplacian, -4.0, v.animal.vertices),
+    "solve_poisson": lambda v: es.calculus.solve_poisson(
+        v.laplacian, v.animal.vertices[:, 0], fixed=[0, 9], values=[1.0, 2.0]
+    ),
     "solve_spectrum": lambda v: [
         es.solve_spectrum(v.laplacian, 40),
         es.solve_spectrum(v.laplacian, 5, fixed=np.array([0, 5])),
@@ -485,6 +634,11 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         es.solve_spectrum(v.many_laplacian, 4, method="approximate"),
         cached(v),
     ],
+    "spectral_clusters": lambda v: [
+        es.spectral.spectral_clusters(v.graph_spectrum, 4, method=method)
+        for method in ("k-means", "normalized-cut")
+    ],
+    "spectral_embedding": lambda v: es.spectral.spectral_embedding(v.many_spectrum, power=0.5),
     "spectral_hausdorff_distance": lambda v: es.spectral.spectral_hausdorff_distance(
         v.spectrum.eigenvalues, v.spectrum2.eigenvalues
     ),
@@ -500,6 +654,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "suggest_repairs": lambda v: es.suggest_repairs(v.animal),
     "surface_area": lambda v: es.geometry.surface_area(v.many),
     "tangent_frames": lambda v: es.operators.tangent_frames(v.animal),
+    "taubin_smooth": lambda v: es.calculus.taubin_smooth(v.many),
     "theorem_rate": lambda v: es.stability.theorem_rate("lipschitz", 2),
     "three_quarter_view": lambda v: es.plot.three_quarter_view(v.many),
     "three_sphere": lambda v: es.shapes.three_sphere(60),
@@ -509,6 +664,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "torus": lambda v: es.shapes.torus(9, 7),
     "torus_quadrature": lambda v: es.geometry.torus_quadrature(9, 7),
     "adjacent_parts": lambda v: es.features.adjacent_parts(v.animal, v.labels),
+    "trace_geodesic": lambda v: es.calculus.trace_geodesic(v.ball, 0, [6.0, 0.5]),
     "train_codebook": lambda v: es.retrieval.train_codebook(v.animal_patches),
     "transfer_deformation": lambda v: es.deformation.transfer_deformation(
         v.animal, v.pose, v.pose, v.map
@@ -517,6 +673,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "transfer_labels": lambda v: es.transfer_labels(v.animal, v.labels, v.pose),
     "admissible_times": lambda v: es.stability.admissible_times(
         delta=0.01, spacing=0.02, eigenvalue=9.0
+    ),
+    "transport_vectors": lambda v: es.calculus.transport_vectors(
+        v.by_vector_heat, [0, 9], [[1.0, 0.0], [0.0, 1.0]]
     ),
     "uniform_quadrature": lambda v: es.geometry.uniform_quadrature(v.cloud.points, 2),
     "value_colors": lambda v: es.plot.value_colors(v.heat[:, 0]),
@@ -529,6 +688,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "weld": lambda v: es.geometry.weld(v.animal),
     "weld_seams": lambda v: es.geometry.weld_seams(v.animal),
     "weyl_bound": lambda v: es.stability.weyl_bound(v.laplacian, v.other),
+    "winding_numbers": lambda v: es.geometry.winding_numbers(v.animal, v.ball.vertices),
     "witness_region": lambda v: es.stability.witness_region(
         v.change, v.on_two, v.nodes.points, 0.5, rho=3.0
     ),
@@ -543,6 +703,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
 }
 
 LEFT_OUT = {
+    "cache_operator_bundles": "It starts processes, which take seconds to import.",
     "build_index": "It starts processes, which take seconds to import; it writes to an index, which admits one writer.",
     "train_codebook_from_files": "It starts processes, which take seconds to import.",
     "view": "It shows a widget of the studio, which is a package of its own.",
