@@ -22,10 +22,12 @@ MAKERS = {
     "FunctionalMap": "es.functional_map(source, target, pairs)",
     "Generator": "numpy.random.default_rng(0)",
     "HeatDescriptor": "es.describe(mesh, es.retrieval.SCALE_FREE)",
+    "HeatGeodesics": "es.calculus.prepare_heat_geodesics(mesh)",
     "HeatRecipe": "es.retrieval.SCALE_FREE",
     "Item": "es.retrieval.Item(name, path)",
     "LabelTransfer": "es.transfer_labels(source, labels, target)",
     "Laplacian": "es.cotangent_laplacian(mesh)",
+    "LinearSolver": "es.calculus.poisson_solver(laplacian)",
     "Mapping": "{title: value}",
     "MergeTree": "es.merge_tree(mesh, values)",
     "Move": "es.deformation.Move(region, handle)",
@@ -53,6 +55,7 @@ MAKERS = {
     "SurfacePoints": "es.geometry.sample_surface(mesh, n)",
     "Translation": "es.Translation(vector)",
     "TriangleMesh": "es.TriangleMesh(vertices, faces)",
+    "VectorHeat": "es.calculus.prepare_vector_heat(mesh)",
     "Workers": "es.retrieval.Workers()",
 }
 # The call that reads a value of each type from a file.

@@ -113,6 +113,16 @@ def written_edits() -> Path:
     return FOLDER / "edits.json"
 
 
+def with_boundary() -> es.TriangleMesh:
+    return es.TriangleMesh(body().vertices, body().faces[1:])
+
+
+def face_vectors() -> np.ndarray:
+    """A tangent vector of each face: its first side."""
+    starts, ends, _ = body().vertices[body().faces].transpose(1, 0, 2)
+    return ends - starts
+
+
 def height() -> np.ndarray:
     return body().vertices[:, 1].copy()
 
@@ -158,6 +168,10 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.stability.StabilityReport: report,
     es.spectral.SpectrumComparison: lambda: es.spectral.compare_spectra(spectrum(), spectrum()),
     es.ShapeIndex: shelf,
+    es.calculus.LinearSolver: lambda: es.calculus.heat_solver(es.cotangent_laplacian(body()), 0.1),
+    es.calculus.HeatGeodesics: lambda: es.calculus.prepare_heat_geodesics(body()),
+    es.calculus.VectorHeat: lambda: es.calculus.prepare_vector_heat(body()),
+    es.spectral.OperatorBundle: lambda: es.spectral.operator_bundle(body(), 10),
     es.DeformationSession: lambda: es.DeformationSession(rig()),
     es.retrieval.Workers: es.retrieval.Workers,
     es.retrieval.Item: lambda: es.retrieval.Item("body", FOLDER / "body.ply"),
@@ -167,23 +181,35 @@ VALUES: dict[Any, Callable[[], Any]] = {
 # A right value of each argument whose type is not ours, by its name; "function.name" where a name has several meanings.
 NAMED: dict[str, Callable[[], Any]] = {
     "alpha": lambda: 1.0,
+    "average_onto_points.values": face_vectors,
     "bind.regions": lambda: [HEAD],
+    "boundary_load.mesh": with_boundary,
     "boundary_surface.mesh": lambda: es.shapes.box(2, 2, 2),
     "build": lambda: es.cotangent_laplacian,
+    "cache": lambda: FOLDER / "cache",
     "caption": lambda: "",
     "certify.eigenvalues": lambda: spectrum().eigenvalues,
     "certify.eigenvectors": lambda: spectrum().eigenvectors,
     "check_laplacian.shape": body,
+    "closest_points.points": lambda: bent().vertices,
     "coefficients": lambda: spectrum().eigenvectors[:5, 0],
     "compare_shapes.plan": lambda: es.stability.StabilityPlan(k=5, n_samples=100),
     "count": lambda: 4,
+    "curves": lambda: [body().faces[0, :2]],
+    "decompose_one_form.values": lambda: np.ones(len(es.calculus.one_form_edges(body()))),
     "bounding_rate.delta": lambda: [0.1, 0.2],
     "bounding_rate.measured": lambda: [0.1, 0.2],
     "bounding_rate.t": lambda: [1.0, 2.0],
     "delta": lambda: 0.3,
     "eigenspace_errors.eigenvalues": lambda: spectrum().eigenvalues[:8],
     "eigenspace_errors.functions": lambda: spectrum().eigenvectors[:, :6],
+    "end": lambda: 5,
+    "export_bundle.form": lambda: "numpy",
+    "extend_scalar.values": lambda: [1.0, 2.0],
     "fixed": lambda: np.arange(4),
+    "flatten_conformally.mesh": with_boundary,
+    "flux": height,
+    "geodesic_path.start": lambda: 0,
     "functional_map.pairs": lambda: np.column_stack([np.arange(160)] * 2),
     "heat_kernel.x": lambda: [0, 1],
     "heat_kernel.y": lambda: 2,
@@ -191,10 +217,15 @@ NAMED: dict[str, Callable[[], Any]] = {
     "indices": lambda: [1, 2],
     "items": list,
     "k": lambda: 5,
+    "key": lambda: "owner",
+    "keys": lambda: ["owner", "heir"],
     "label": lambda: "height",
     "labels": labels,
+    "level": lambda: 0.1,
+    "logarithmic_map.source": lambda: 0,
     "map_from_points.points": lambda: np.arange(body().n_vertices),
     "mask": lambda: es.deformation.region_mask(body(), HEAD),
+    "move_skeleton.response": lambda: es.deformation.skeleton_response(binding()),
     "n": lambda: 50,
     "n_features": lambda: 3,
     "n_modes": lambda: 10,
@@ -206,6 +237,7 @@ NAMED: dict[str, Callable[[], Any]] = {
     "path": lambda: FOLDER / "written.ply",
     "planes": lambda: [[0.0, 1.0, 0.0, 0.5]],
     "point_map.mapping": mapping,
+    "positions": lambda: bent().vertices,
     "poses": lambda: {"rest": body()},
     "radius": lambda: 0.4,
     "read": lambda: es.read_mesh,
@@ -219,17 +251,26 @@ NAMED: dict[str, Callable[[], Any]] = {
     "ShapeIndex.add.replace": lambda: True,
     "ShapeIndex.add_descriptors.replace": lambda: True,
     "segment.n_regions": lambda: 3,
+    "signed_distance.points": lambda: bent().vertices,
+    "solve_harmonic.values": lambda: np.arange(4.0),
+    "solve_heat.start": height,
     "solve_spectrum.k": lambda: 5,
     "sources": lambda: [0, 5],
     "spectra": lambda: {"one": spectrum(), "two": spectrum()},
+    "squared_wavenumber": lambda: 1.0,
     "t": lambda: 0.05,
     "tensors": lambda: es.operators.curvature_tensors(body(), 1.0),
     "times": lambda: [0.1, 0.2],
+    "trace_geodesic.start": lambda: 0,
     "transfer_function.values": height,
+    "transport_vectors.vectors": lambda: np.eye(2),
     "up": lambda: "y",
     "values": height,
+    "vector": lambda: [0.1, 0.0],
+    "vectors": face_vectors,
     "vertices": lambda: np.arange(3),
     "view": lambda: [0.0, 0.0, 1.0],
+    "winding_numbers.points": lambda: bent().vertices,
     "write_edits.path": lambda: FOLDER / "edits.json",
     "write_points.path": lambda: FOLDER / "written.xyz",
 }

@@ -6,8 +6,10 @@ import matplotlib as mpl
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from eigenshape._arguments import require_type
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import orient_consistently
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -62,7 +64,7 @@ class Drawing:
 
 @one_blas_thread()
 def draw(
-    mesh: TriangleMesh,
+    mesh: MeshLike,
     camera: Camera,
     *,
     vertex_colors: Float[np.ndarray, "n 3"] | None = None,
@@ -73,8 +75,9 @@ def draw(
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike
     camera : Camera
+        Such as `aim_camera` returns.
     vertex_colors : (n, 3) float, optional
         Colors in 0..1, blended across faces.
     face_colors : (f, 3) float, optional
@@ -98,6 +101,8 @@ def draw(
     >>> es.plot.draw(ball, es.plot.three_quarter_view(ball, size=64)).image.shape
     (64, 64, 4)
     """
+    mesh = as_mesh(mesh)
+    require_type(camera, Camera, "camera")
     fine = Camera(camera.rotation, camera.size * FINER)
     points = in_picture(mesh, fine)
     raster = rasterize(points, mesh.faces, fine.size, fine.size)

@@ -267,7 +267,7 @@ def decompress_mesh(data: bytes, *, progress: Progress | None = None) -> Triangl
     return TriangleMesh(points, faces)
 
 
-def _by_frequency(coefficients: list[Int[np.ndarray, "p 3"]]) -> Int[np.ndarray, " c"]:
+def _by_frequency(coefficients: list[Int[np.ndarray, "_ 3"]]) -> Int[np.ndarray, " c"]:
     """Return the lowest coefficients of all patches, axis by axis, then the second lowest, ..."""
     sizes = [len(rows) for rows in coefficients]
     return np.concatenate(coefficients)[_frequency_order(sizes)].ravel()
@@ -299,7 +299,7 @@ def _read_numbers(packed: dict[str, bytes], what: str, count: int) -> Int[np.nda
 
 
 def _read_container(
-    data: bytes,
+    data: object,
 ) -> tuple[int, int, float, float, Float[np.ndarray, " 3"], dict[str, bytes]]:
     """Check the frame of a file, and return its numbers and its packed streams."""
     if not isinstance(data, bytes | bytearray | memoryview):
