@@ -166,8 +166,8 @@ def test_operators_are_listed():
     ("arguments", "said"),
     [
         (
-            ("spectrum", "sphere.xyz", "--operator", "robust"),
-            "robust operator takes TriangleMesh; the shape is a PointCloud",
+            ("spectrum", "sphere.xyz", "--operator", "cotangent"),
+            "cotangent operator takes",
         ),
         (("spectrum", "disc.off", "--operator", "best"), "operator must be one of cotangent, p2"),
         (
