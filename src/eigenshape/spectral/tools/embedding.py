@@ -394,7 +394,9 @@ def _distances_apart(
     distances = _distances(embedded, points)
     labels = component_labels(spectrum)
     if labels.any():
-        apart: Bool[np.ndarray, "n q"] = labels[:, None] != labels[_chosen(points, len(labels))]
+        apart: Bool[np.ndarray, "n q"] = (
+            labels[:, None] != labels[_target_points(points, len(labels))]
+        )
         distances[apart] = np.inf
     return distances
 
@@ -408,7 +410,7 @@ def _distances(
     distances between near points.
     """
     n = len(embedded)
-    chosen = _chosen(points, n)
+    chosen = _target_points(points, n)
     require_memory(
         "Distances",
         f"{n} × {len(chosen)} pairs of points",
@@ -419,7 +421,8 @@ def _distances(
     return np.asarray(cdist(embedded, embedded[chosen]))
 
 
-def _chosen(points: ArrayLike | None, n: int) -> Int[np.ndarray, " q"]:
+def _target_points(points: ArrayLike | None, n: int) -> Int[np.ndarray, " q"]:
+    """Return the points to measure distances from, by default all."""
     if points is None:
         return np.arange(n)
     return whole_numbers(points, "A point", 0, n - 1)
