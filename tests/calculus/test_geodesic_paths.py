@@ -3,8 +3,9 @@ import pytest
 
 from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
 from eigenshape.calculus import geodesic_paths
-from eigenshape.calculus.geodesic_paths import geodesic_path, trace_geodesic
-from eigenshape.calculus.vector_heat import logarithmic_map
+from eigenshape.calculus.geodesic_paths import geodesic_path
+from eigenshape.calculus.geodesic_rays import trace_geodesic
+from eigenshape.calculus.log_map import logarithmic_map
 from eigenshape.geometry.facets import boundary_surface
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.union import disjoint_union

@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape.calculus.log_map import logarithmic_map, require_log_method
 from eigenshape.calculus.vector_heat import (
     extend_scalar,
-    logarithmic_map,
     prepare_vector_heat,
-    require_log_method,
     transport_vectors,
 )
+from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.connection import tangent_frames
@@ -101,7 +101,7 @@ def test_bad_input_is_named():
         extend_scalar(ball, [1, 2], [1.0])
     with pytest.raises(InvalidParameterError, match="vectors must hold two coordinates per source"):
         transport_vectors(ball, [1], [[1.0, 0.0, 0.0]])
-    with pytest.raises(InvalidParameterError, match="vectors must be finite; vector 0"):
+    with pytest.raises(InvalidParameterError, match="vectors must be finite; that of source 0"):
         transport_vectors(ball, [1], [[1.0, np.nan]])
     with pytest.raises(InvalidParameterError, match="method must be 'affine', 'adaptive'"):
         require_log_method("exact")
@@ -135,3 +135,9 @@ def test_heat_that_underflows_is_named_and_the_remedy_works():
     assert np.isfinite(logarithmic_map(warm, 0, method="radial")).all()
     lengths = np.linalg.norm(logarithmic_map(warm, 0, method="affine"), axis=1)
     assert lengths == pytest.approx(np.linalg.norm(strip.vertices, axis=1), abs=1e-6)
+
+
+def test_a_cloud_is_refused_with_what_takes_it():
+    plain = getattr(prepare_vector_heat, "__wrapped__", prepare_vector_heat)
+    with pytest.raises(InvalidParameterError, match=r"no faces; .* calculus\.heat_distances"):
+        plain(PointCloud(icosphere(1).vertices, dim=2))

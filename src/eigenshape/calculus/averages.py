@@ -4,7 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from eigenshape._arrays import real_numbers
+from eigenshape._arrays import real_numbers, require_finite_rows
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -101,9 +101,5 @@ def _rows(values: ArrayLike, count: int, noun: str) -> Float[np.ndarray, "r ..."
         raise InvalidParameterError(
             f"values must have one row per {noun}, {count} rows; the shape is {rows.shape}."
         )
-    bad = np.argwhere(~np.isfinite(rows))
-    if len(bad):
-        raise InvalidParameterError(
-            f"values must be finite; that of {noun} {bad[0][0]} is {rows[tuple(bad[0])]}."
-        )
+    require_finite_rows(rows, "values", noun)
     return rows

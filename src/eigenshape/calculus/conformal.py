@@ -6,8 +6,9 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Complex, Float
 
-from eigenshape._arrays import real_numbers, whole_number
+from eigenshape._arrays import real_numbers, require_finite_rows, whole_number
 from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
+from eigenshape._progress import Progress, silent
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.linear_solver import LinearSolver, factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -131,7 +132,9 @@ def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
     return plane * (np.sqrt(face_areas(unit).sum() / abs(signed)) * scale)
 
 
-def map_to_sphere(mesh: MeshLike, *, n_steps: SupportsIndex = 500) -> Float[np.ndarray, "n 3"]:
+def map_to_sphere(
+    mesh: MeshLike, *, n_steps: SupportsIndex = 500, progress: Progress | None = None
+) -> Float[np.ndarray, "n 3"]:
     """Map a closed surface of genus 0 to the unit sphere with little change of angles.
 
     Conformalized mean curvature flow until the surface is round (Kazhdan, Solomon and Ben-Chen
@@ -144,6 +147,9 @@ def map_to_sphere(mesh: MeshLike, *, n_steps: SupportsIndex = 500) -> Float[np.n
         Closed, connected, consistently oriented, of genus 0.
     n_steps : int
         Largest number of steps of the flow.
+    progress : callable, optional
+        Called as progress(fraction_done, message) after each step. The number of steps is not known
+        beforehand: the fraction is that of `n_steps`, and jumps to 1 at the end.
 
     Returns
     -------
@@ -188,7 +194,9 @@ def map_to_sphere(mesh: MeshLike, *, n_steps: SupportsIndex = 500) -> Float[np.n
     points, _ = scale_to_unit(mesh)
     stiffness = cotangent_laplacian(TriangleMesh(points, mesh.faces)).stiffness
     sphere, least, n_idle = points, np.inf, 0
-    for _ in range(most):
+    report_progress = progress or silent
+    for number in range(most):
+        report_progress(number / most, f"step {number + 1}, radii differ by {least:.2g}")
         areas = np.linalg.norm(area_vectors(points[mesh.faces]), axis=1)
         weights = np.bincount(
             mesh.faces.ravel(), weights=np.repeat(areas / 3, 3), minlength=mesh.n_vertices
@@ -205,6 +213,7 @@ def map_to_sphere(mesh: MeshLike, *, n_steps: SupportsIndex = 500) -> Float[np.n
             break
         mass = sp.diags_array(weights * factor)
         points = _factor(mass + FLOW_STEP * stiffness).solve(mass @ points)
+    report_progress(1.0, "round")
     if least > ROUND:
         raise ConvergenceError(
             f"The flow must make the surface round within {most} steps; the radii of its vertices "
@@ -262,11 +271,7 @@ def angle_distortion(mesh: MeshLike, positions: ArrayLike) -> Float[np.ndarray, 
             f"positions must hold one place per vertex, shape ({mesh.n_vertices}, 2) or "
             f"({mesh.n_vertices}, 3); the shape is {places.shape}."
         )
-    bad = np.argwhere(~np.isfinite(places))
-    if len(bad):
-        raise InvalidParameterError(
-            f"positions must be finite; that of vertex {bad[0][0]} is {places[bad[0][0]].tolist()}."
-        )
+    require_finite_rows(places, "positions", "vertex")
     _, before = triangular_sides(scaled_corners(mesh)[0])
     _, after = triangular_sides(places[mesh.faces])
     stretches = np.linalg.svd(after @ np.linalg.inv(before), compute_uv=False)

@@ -7,6 +7,7 @@ import scipy.sparse as sp
 
 from eigenshape._arrays import finite_values, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._progress import Progress, silent
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.linear_solver import factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
@@ -33,6 +34,7 @@ def mean_curvature_flow(
     n_steps: SupportsIndex = 10,
     conformal: bool = False,
     fixed: ArrayLike | None = None,
+    progress: Progress | None = None,
 ) -> TriangleMesh:
     """Move a surface along its normals at the speed of its mean curvature, by implicit steps.
 
@@ -55,6 +57,8 @@ def mean_curvature_flow(
     fixed : (c,) int, optional
         Vertices that stay where they are; by default those on the boundary, so that the surface
         goes towards a minimal surface. `fixed=[]` fixes none.
+    progress : callable, optional
+        Called as progress(fraction_done, message).
 
     Returns
     -------
@@ -92,7 +96,9 @@ def mean_curvature_flow(
     held = np.unique(held)
     first = cotangent_laplacian(TriangleMesh(points, mesh.faces))
     size = np.ptp(points, axis=0).max()
+    report_progress = progress or silent
     for number in range(count):
+        report_progress(number / count, f"step {number + 1} of {count}")
         if np.ptp(points, axis=0).max() < COLLAPSED * size:
             raise InvalidShapeError(
                 "The flow must stop before the surface collapses; after step "

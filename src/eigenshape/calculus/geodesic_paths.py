@@ -1,74 +1,43 @@
-"""Geodesic paths: locally shortest between two vertices, or straight from a vertex."""
+"""Geodesic paths: locally shortest between two vertices."""
 
 from cmath import phase
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import SupportsIndex
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from scipy.sparse.csgraph import dijkstra
 
-from eigenshape._arrays import finite_values, freeze, whole_number, whole_numbers
+from eigenshape._arrays import whole_number, whole_numbers
 from eigenshape._errors import ConvergenceError, InvalidParameterError
-from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
+from eigenshape.calculus.unfolding import (
+    STRAIGHT,
+    GeodesicPath,
+    Sides,
+    apex_of,
+    as_path,
+    cross,
+    next_side,
+    point_on_side,
+    previous_side,
+    walkable_sides,
+)
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.curvature import face_angles
 from eigenshape.geometry.measure import edge_lengths, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_sound
-from eigenshape.geometry.simplices import in_length, size_one
 from eigenshape.geometry.topology import edge_table
 from eigenshape.operators.directions import (
     require_oriented_manifold,
-    side_twins,
-    vertex_directions,
 )
 
-# An angle counts as less than π if it is by more than this: rounding of unfolded strips is 1e-13.
-STRAIGHT = 1e-10
-# Points of a path nearer than this share of its coordinates to the next are one point.
-SAME = 1e-14
 # Rounds in which pivots are passed on their other side; a path of k edges takes about √k.
 ROUNDS = 10_000
 
 # The left and the right end of each edge that a strip of faces crosses, in the plane.
 Portals = list[tuple[complex, complex]]
-
-
-@dataclass(frozen=True, eq=False)
-class GeodesicPath:
-    """A polyline on a surface.
-
-    Attributes
-    ----------
-    points : (p, 3) float
-        Where it starts, where it crosses edges or passes vertices, and where it ends, in length.
-    length : float
-        In length.
-    """
-
-    points: Float[np.ndarray, "p 3"]
-    length: float
-
-    __repr__ = short_repr
-    _repr_html_ = html_repr
-
-
-@dataclass(frozen=True, eq=False)
-class _Sides:
-    """What a walk over faces needs; side 3f + s runs from corner s of face f to the next."""
-
-    points: Float[np.ndarray, "n 3"]
-    tails: Int[np.ndarray, " h"]
-    heads: Int[np.ndarray, " h"]
-    twins: Int[np.ndarray, " h"]
-    lengths: Float[np.ndarray, " h"]
-    angles: Float[np.ndarray, " h"]
-    around: Float[np.ndarray, " n"]
-    of_edge: dict[tuple[int, int], int]
 
 
 def geodesic_path(
@@ -139,100 +108,20 @@ def geodesic_path(
                 "itself."
             )
     points, _ = scale_to_unit(mesh)
-    sides = _walkable(TriangleMesh(points, mesh.faces))
+    sides = walkable_sides(TriangleMesh(points, mesh.faces))
     strip = _strip_along(sides, _edge_path(mesh, stops))
     first, final = stops[0], stops[-1]
     for _ in range(ROUNDS):
         strip = _without_ends(sides, strip, first, final)
         if not strip:
-            return _as_path(mesh.vertices[[first, final]])
+            return as_path(mesh.vertices[[first, final]])
         portals = _unfold(sides, strip)
         corners = _pull_taut(portals)
         moved = _pass_pivots(sides, strip, portals, corners)
         if moved is None:
-            return _as_path(_points_of(mesh, sides, strip, portals, corners, (first, final)))
+            return as_path(_points_of(mesh, sides, strip, portals, corners, (first, final)))
         strip = moved
     raise ConvergenceError(f"A path must become straight; {ROUNDS} rounds were not enough.")
-
-
-def trace_geodesic(mesh: MeshLike, start: SupportsIndex, vector: ArrayLike) -> GeodesicPath:
-    """Walk straight from a vertex, in the direction and for the length of a tangent vector.
-
-    This is the exponential map. Across an edge the path goes on straight in the unfolded faces
-    (Polthier and Schmies 1998). It ends early at a boundary.
-
-    Parameters
-    ----------
-    mesh : MeshLike
-        As in `geodesic_path`.
-    start : int
-        Vertex.
-    vector : (2,) float
-        Tangent vector in the frame of the vertex, row `start` of `operators.tangent_frames`, in
-        length. Angles around an inner vertex are scaled to 2π.
-
-    Returns
-    -------
-    GeodesicPath
-        Shorter than `vector` only if it meets a boundary.
-
-    Raises
-    ------
-    InvalidShapeError
-        As in `geodesic_path`.
-    InvalidParameterError
-        If the vertex is out of range, or `vector` is not two finite numbers, or points out of the
-        surface at a boundary vertex.
-
-    See Also
-    --------
-    logarithmic_map : The inverse.
-
-    Examples
-    --------
-    Once around a sphere, and back to the start up to the discretization:
-
-    >>> import eigenshape as es
-    >>> path = es.calculus.trace_geodesic(es.icosphere(4), 0, [6.2832, 0.0])
-    >>> bool(abs(path.points[-1] - path.points[0]).max() < 0.1)
-    True
-    """
-    mesh = as_mesh(mesh)
-    require_sound(mesh)
-    vertex = whole_number(start, "start", 0, mesh.n_vertices - 1)
-    given = finite_values(vector, "vector")
-    if len(given) != 2:
-        raise InvalidParameterError(
-            f"vector must hold two coordinates in the tangent frame; it holds {len(given)}."
-        )
-    directions = vertex_directions(mesh)
-    points, scale = scale_to_unit(mesh)
-    sides = _walkable(TriangleMesh(points, mesh.faces))
-    left = float(np.hypot(*given)) / scale
-    if not left > 0:
-        return _as_path(mesh.vertices[[vertex]])
-    angle = float(np.arctan2(given[1], given[0]))
-    side, angle = _wedge(sides, directions.at_tail, vertex, angle)
-    return _as_path(np.array(_walk(mesh, sides, side, angle, left)))
-
-
-def _walkable(mesh: TriangleMesh) -> _Sides:
-    tails, heads = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
-    lengths = np.linalg.norm(mesh.vertices[heads] - mesh.vertices[tails], axis=1)
-    angles = face_angles(mesh).ravel()
-    around = np.bincount(tails, angles, minlength=mesh.n_vertices)
-    of_edge = dict(
-        zip(zip(tails.tolist(), heads.tolist(), strict=True), range(len(tails)), strict=True)
-    )
-    return _Sides(mesh.vertices, tails, heads, side_twins(mesh), lengths, angles, around, of_edge)
-
-
-def _next(side: int) -> int:
-    return side - 2 if side % 3 == 2 else side + 1
-
-
-def _previous(side: int) -> int:
-    return side + 2 if side % 3 == 0 else side - 1
 
 
 def _edge_path(mesh: TriangleMesh, stops: list[int]) -> list[int]:
@@ -254,7 +143,7 @@ def _edge_path(mesh: TriangleMesh, stops: list[int]) -> list[int]:
     return path
 
 
-def _strip_along(sides: _Sides, path: list[int]) -> list[int]:
+def _strip_along(sides: Sides, path: list[int]) -> list[int]:
     """Return the sides that a strip of faces beside a path of edges crosses.
 
     At each vertex the strip takes the side of the path with the smaller angle.
@@ -278,10 +167,10 @@ def _strip_along(sides: _Sides, path: list[int]) -> list[int]:
 
 
 def _fan(
-    sides: _Sides, before: int, vertex: int, after: int, left: bool
+    sides: Sides, before: int, vertex: int, after: int, left: bool
 ) -> tuple[float, bool, list[int]] | None:
     """Walk around a vertex on one side of a path; return the angle, the side and what is crossed."""
-    step = _next if left else _previous
+    step = next_side if left else previous_side
     side = sides.of_edge.get((before, vertex) if left else (vertex, before), -1)
     crossed: list[int] = []
     angle = 0.0
@@ -297,7 +186,7 @@ def _fan(
     return None
 
 
-def _without_ends(sides: _Sides, strip: list[int], first: int, final: int) -> list[int]:
+def _without_ends(sides: Sides, strip: list[int], first: int, final: int) -> list[int]:
     """Leave out what a strip crosses before it leaves the first vertex, and after it meets the last."""
     for number in range(len(strip) - 1, -1, -1):
         if first in (sides.tails[strip[number]], sides.heads[strip[number]]):
@@ -309,7 +198,7 @@ def _without_ends(sides: _Sides, strip: list[int], first: int, final: int) -> li
     return strip
 
 
-def _unfold(sides: _Sides, strip: list[int]) -> Portals:
+def _unfold(sides: Sides, strip: list[int]) -> Portals:
     """Lay the faces of a strip in the plane; return the left and the right end of each crossing.
 
     The first and the last are the two ends of the path, as portals without width.
@@ -317,30 +206,17 @@ def _unfold(sides: _Sides, strip: list[int]) -> Portals:
     side = strip[0]
     # The side lies from 0 along the axis; its face is on its left.
     tail, head = 0j, complex(sides.lengths[side])
-    start = _apex(sides, side, tail, head)
+    start = apex_of(sides, side, tail, head)
     portals = [(start, start), (head, tail)]
     for following in strip[1:]:
         twin = int(sides.twins[side])
-        apex = _apex(sides, twin, head, tail)
+        apex = apex_of(sides, twin, head, tail)
         # Seen from the next face the side runs from `head` to `tail`.
-        tail, head = (tail, apex) if following == _next(twin) else (apex, head)
+        tail, head = (tail, apex) if following == next_side(twin) else (apex, head)
         portals.append((head, tail))
         side = following
-    end = _apex(sides, int(sides.twins[side]), head, tail)
+    end = apex_of(sides, int(sides.twins[side]), head, tail)
     return [*portals, (end, end)]
-
-
-def _apex(sides: _Sides, side: int, tail: complex, head: complex) -> complex:
-    """Place the third corner of a face, on the left of its side from `tail` to `head`."""
-    length = float(sides.lengths[side])
-    reach = float(sides.lengths[_previous(side)])
-    angle = float(sides.angles[side])
-    return tail + (head - tail) / length * reach * complex(np.cos(angle), np.sin(angle))
-
-
-def _cross(one: complex, two: complex) -> float:
-    """Return a positive number if the second vector is on the left of the first."""
-    return (one.conjugate() * two).imag
 
 
 def _pull_taut(portals: Portals) -> list[tuple[int, int]]:
@@ -357,10 +233,10 @@ def _pull_taut(portals: Portals) -> list[tuple[int, int]]:
     while number < len(portals):
         for end, sign in ((1, 1.0), (0, -1.0)):
             tip, other, new = tips[end] - apex, tips[1 - end] - apex, portals[number][end] - apex
-            if sign * _cross(tip, new) < 0:
+            if sign * cross(tip, new) < 0:
                 continue  # would widen the funnel
             # Equal ends are those of the last portal, which has no width.
-            if tip == 0 or new == other or sign * _cross(other, new) < 0:
+            if tip == 0 or new == other or sign * cross(other, new) < 0:
                 tips[end], at[end] = portals[number][end], number
                 continue
             # Past the other side: the path bends there, and the funnel begins anew.
@@ -376,7 +252,7 @@ def _pull_taut(portals: Portals) -> list[tuple[int, int]]:
 
 
 def _pass_pivots(
-    sides: _Sides, strip: list[int], portals: Portals, corners: list[tuple[int, int]]
+    sides: Sides, strip: list[int], portals: Portals, corners: list[tuple[int, int]]
 ) -> list[int] | None:
     """Lead the strip around the other side of vertices where this is shorter; None if it never is."""
     places = [portals[number][end] for number, end in corners]
@@ -401,7 +277,7 @@ def _pass_pivots(
     return moved + strip[done:] if any_moved else None
 
 
-def _run(sides: _Sides, strip: list[int], number: int, vertex: int) -> tuple[int, int]:
+def _run(sides: Sides, strip: list[int], number: int, vertex: int) -> tuple[int, int]:
     """Return the range of sides around one of them that all have a vertex."""
 
     def touches(side: int) -> bool:
@@ -415,10 +291,10 @@ def _run(sides: _Sides, strip: list[int], number: int, vertex: int) -> tuple[int
     return begin, stop
 
 
-def _other_fan(sides: _Sides, enter: int, leave: int, vertex: int) -> list[int] | None:
+def _other_fan(sides: Sides, enter: int, leave: int, vertex: int) -> list[int] | None:
     """Walk around a vertex the other way, from the face of one side to beyond the other."""
     is_tail = sides.tails[enter] == vertex
-    step = _previous if is_tail else _next
+    step = previous_side if is_tail else next_side
     target = int(sides.twins[leave]) // 3
     side = enter
     crossed: list[int] = []
@@ -436,7 +312,7 @@ def _other_fan(sides: _Sides, enter: int, leave: int, vertex: int) -> list[int] 
 
 def _points_of(
     mesh: TriangleMesh,
-    sides: _Sides,
+    sides: Sides,
     strip: list[int],
     portals: Portals,
     corners: list[tuple[int, int]],
@@ -448,83 +324,11 @@ def _points_of(
         origin = portals[begin][first_end]
         way = portals[stop][last_end] - origin
         for number in range(begin + 1, stop):
-            left, right = (_cross(way, end - origin) for end in portals[number])
+            left, right = (cross(way, end - origin) for end in portals[number])
             share = left / (left - right) if left > right else 0.0
-            points.append(_on_side(mesh, sides, strip[number - 1], 1 - min(max(share, 0.0), 1.0)))
-        if stop < len(portals) - 1:
-            points.append(_on_side(mesh, sides, strip[stop - 1], 1.0 - last_end))
-    return np.array([*points, mesh.vertices[ends[1]]])
-
-
-def _on_side(mesh: TriangleMesh, sides: _Sides, side: int, share: float) -> Float[np.ndarray, "3"]:
-    """Return the point at a share of the way from the tail of a side to its head."""
-    tail, head = mesh.vertices[sides.tails[side]], mesh.vertices[sides.heads[side]]
-    return np.asarray((1 - share) * tail + share * head)
-
-
-def _as_path(points: Float[np.ndarray, "p 3"]) -> GeodesicPath:
-    """Keep each point of a path once, and measure it."""
-    unit, scale = size_one(points)
-    steps = np.linalg.norm(np.diff(unit, axis=0), axis=1)
-    kept = np.append(True, steps > SAME)
-    length = in_length(steps.sum(keepdims=True), scale, 1)
-    return GeodesicPath(freeze(points[kept]), float(length[0]))
-
-
-def _wedge(
-    sides: _Sides, at_tail: Float[np.ndarray, " h"], vertex: int, angle: float
-) -> tuple[int, float]:
-    """Return the side after which a direction leaves a vertex, and the angle from it in the face."""
-    out = np.flatnonzero(sides.tails == vertex)
-    is_inner = (sides.twins[out] >= 0).all() and (
-        sides.twins[[_previous(int(h)) for h in out]] >= 0
-    ).all()
-    scale = 2 * np.pi / sides.around[vertex] if is_inner else 1.0
-    angle %= 2 * np.pi
-    offsets = (angle - at_tail[out]) / scale
-    inside = (offsets >= 0) & (offsets <= sides.angles[out])
-    if not inside.any():
-        # Rounding may leave a gap between two faces, at the last side or the first.
-        nearest = int(np.argmin(np.minimum(np.abs(offsets), np.abs(offsets - sides.angles[out]))))
-        gap = min(abs(offsets[nearest]), abs(offsets[nearest] - sides.angles[out[nearest]]))
-        if gap > STRAIGHT:
-            raise InvalidParameterError(
-                f"vector must point into the surface; at boundary vertex {vertex} it has the angle "
-                f"{angle:.4g}, and the faces end at {sides.around[vertex]:.4g}."
+            points.append(
+                point_on_side(mesh, sides, strip[number - 1], 1 - min(max(share, 0.0), 1.0))
             )
-        return int(out[nearest]), float(np.clip(offsets[nearest], 0, sides.angles[out[nearest]]))
-    chosen = int(out[inside][0])
-    return chosen, float(offsets[inside][0])
-
-
-def _walk(
-    mesh: TriangleMesh, sides: _Sides, side: int, angle: float, length: float
-) -> list[Float[np.ndarray, "3"]]:
-    """Walk straight through faces; return the start, where edges are crossed, and the end."""
-    path = [mesh.vertices[sides.tails[side]]]
-    # The path starts at 0, and its first face lies on the left of a side along the axis.
-    head = complex(sides.lengths[side])
-    way = complex(np.cos(angle), np.sin(angle))
-    exits = [(_next(side), head, _apex(sides, side, 0j, head))]
-    walked = 0.0
-    while True:
-        # The path leaves between the ends of a side, the first on its right and the second on its
-        # left. Of two sides at a vertex that the path meets, rounding chooses.
-        out, right, left = exits[0]
-        if len(exits) > 1 and _cross(way, left) < 0:
-            out, right, left = exits[1]
-        below, above = _cross(way, right), _cross(way, left)
-        share = min(max(-below / (above - below), 0.0), 1.0) if above > below else 0.0
-        meeting = ((right + share * (left - right)) * way.conjugate()).real
-        crossing = _on_side(mesh, sides, out, share)
-        if meeting >= length:
-            part = (length - walked) / (meeting - walked) if meeting > walked else 0.0
-            return [*path, path[-1] + part * (crossing - path[-1])]
-        path.append(crossing)
-        walked = max(walked, meeting)
-        twin = int(sides.twins[out])
-        if twin < 0:
-            return path
-        # Across, the side runs from `left` to `right`, and the next face lies on its left.
-        apex = _apex(sides, twin, left, right)
-        exits = [(_next(twin), right, apex), (_previous(twin), apex, left)]
+        if stop < len(portals) - 1:
+            points.append(point_on_side(mesh, sides, strip[stop - 1], 1.0 - last_end))
+    return np.array([*points, mesh.vertices[ends[1]]])

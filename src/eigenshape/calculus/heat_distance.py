@@ -5,14 +5,20 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
-from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arrays import positive_values, whole_numbers
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._errors import InvalidParameterError
+from eigenshape._progress import Progress, silent
 from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
+from eigenshape.calculus.grounded import (
+    GroundedFactor,
+    factorize_definite,
+    factorize_grounded,
+)
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike, as_shape
+from eigenshape.geometry.homology import edges_of
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import in_length, simplex_volumes, size_one
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
@@ -21,7 +27,7 @@ from eigenshape.operators.cloud_triangles import cloud_cover
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.robust import delaunay_cover
 from eigenshape.operators.tufted import Triangulation
-from eigenshape.sparse.elimination import SymmetricFactor, factor_matrix
+from eigenshape.sparse.elimination import SymmetricFactor
 
 # Sources that are solved for together: the lanes of a factor, and few enough that the gradients of
 # all simplices fit in the cache.
@@ -48,8 +54,10 @@ class HeatGeodesics:
         Volumes V.
     components : (n,) int
         Connected component of each point.
-    heat, poisson : SymmetricFactor
-        Factors of B + tW, and of W with one point of each component fixed.
+    heat : SymmetricFactor
+        Factor of B + tW.
+    poisson : GroundedFactor
+        Factor of W with one point of each component fixed.
     """
 
     time: float
@@ -59,7 +67,7 @@ class HeatGeodesics:
     volumes: Float[np.ndarray, " s"]
     components: Int[np.ndarray, " n"]
     heat: SymmetricFactor
-    poisson: SymmetricFactor
+    poisson: GroundedFactor
 
     _repr_html_ = html_repr
 
@@ -129,7 +137,7 @@ def prepare_heat_geodesics(
 
 
 def heat_distances(
-    shape: ShapeLike | HeatGeodesics, sources: ArrayLike
+    shape: ShapeLike | HeatGeodesics, sources: ArrayLike, *, progress: Progress | None = None
 ) -> Float[np.ndarray, "k n"]:
     """Compute geodesic distances from some points to all points by the heat method.
 
@@ -148,6 +156,8 @@ def heat_distances(
         `prepare_heat_geodesics(shape)` keeps the factors for further calls, and has the options.
     sources : (k,) int
         Points.
+    progress : callable, optional
+        Called as progress(fraction_done, message).
 
     Returns
     -------
@@ -181,7 +191,9 @@ def heat_distances(
     solver = as_heat_geodesics(shape)
     wanted = require_sources(sources, solver.n_points)
     rows = np.empty((len(wanted), solver.n_points))
+    report_progress = progress or silent
     for first in range(0, len(wanted), SOURCES_AT_ONCE):
+        report_progress(first / len(wanted), f"source {first + 1} of {len(wanted)}")
         chosen = wanted[first : first + SOURCES_AT_ONCE]
         impulses = np.zeros((solver.n_points, len(chosen)))
         impulses[chosen, np.arange(len(chosen))] = 1.0
@@ -262,23 +274,6 @@ def require_sources(sources: ArrayLike, n_points: int) -> Int[np.ndarray, " k"]:
     return wanted
 
 
-def factorize_definite(matrix: sp.sparray) -> SymmetricFactor:
-    """Factor a symmetric positive definite matrix.
-
-    Raises
-    ------
-    InvalidShapeError
-        If rounding makes a pivot vanish, as it may where simplices are extremely thin.
-    """
-    factor = factor_matrix(matrix)
-    if factor is None:
-        raise InvalidShapeError(
-            "Simplices must have angles well above 0 for the equations to be factored; some are "
-            'too thin. Try repair(mesh, ["collapse_needles"]), or robust=True for triangles.'
-        )
-    return factor
-
-
 def require_heat(
     heat: Float[np.ndarray, "n b"], reached: Bool[np.ndarray, "n b"] | bool = True
 ) -> None:
@@ -300,30 +295,12 @@ def require_heat(
         )
 
 
-def ground(stiffness: sp.csr_array) -> tuple[sp.csr_array, Int[np.ndarray, " n"]]:
-    """Make W definite by one more diagonal entry in each component; return also the components.
-
-    If the right-hand side sums to zero on each component, the solution solves W x = b and is zero
-    at those points.
-    """
-    _, components = connected_components(stiffness, directed=False)
-    _, firsts = np.unique(components, return_index=True)
-    diagonal = stiffness.diagonal()
-    more = np.zeros(len(diagonal))
-    # A point by itself has no stiffness at all, and any entry will do.
-    more[firsts] = np.where(diagonal[firsts] > 0, diagonal[firsts], 1.0)
-    return (stiffness + sp.diags_array(more)).tocsr(), components.astype(np.int64)
-
-
 def _of_mesh(mesh: Mesh, factor: float) -> HeatGeodesics:
     require_sound(mesh)
     points, scale = size_one(mesh.points)
     unit = SimplicialMesh(points, mesh.simplices)
     laplacian = cotangent_laplacian(unit)
-    first, second = np.triu_indices(mesh.dim + 1, 1)
-    sides = np.sort(mesh.simplices[:, [first, second]].transpose(0, 2, 1).reshape(-1, 2), axis=1)
-    keys = np.unique(sides[:, 0] * mesh.n_points + sides[:, 1])
-    tails, heads = np.divmod(keys, mesh.n_points)
+    tails, heads = edges_of(mesh).T
     length = float(np.linalg.norm(points[tails] - points[heads], axis=1).mean())
     products = elements.gradient_products(unit)
     volumes = simplex_volumes(unit)
@@ -366,14 +343,14 @@ def _solver(
     time: float,
     scale: float,
 ) -> HeatGeodesics:
-    grounded, components = ground(stiffness)
+    poisson = factorize_grounded(stiffness)
     return HeatGeodesics(
         float(in_length(np.array([time]), scale, 2)[0]),
         scale,
         *simplices,
-        components,
+        poisson.components,
         factorize_definite(sp.diags_array(mass) + time * stiffness),
-        factorize_definite(grounded),
+        poisson,
     )
 
 

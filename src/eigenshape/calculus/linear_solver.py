@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arrays import freeze, point_functions, real_numbers
+from eigenshape._arrays import freeze, point_functions, real_numbers, require_finite_rows
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
@@ -496,10 +496,5 @@ def _columns(value: ArrayLike, name: str, n_rows: int, noun: str) -> Float[np.nd
             f"{name} must hold one number per {noun}, shape ({n_rows},) or ({n_rows}, k); "
             f"the shape is {numbers.shape}."
         )
-    bad = np.argwhere(~np.isfinite(numbers))
-    if len(bad):
-        row, *column = bad[0].tolist()
-        raise InvalidParameterError(
-            f"{name} must be finite; that of {noun} {row} is {numbers[(row, *column)]}."
-        )
+    require_finite_rows(numbers, name, noun)
     return numbers if numbers.ndim == 2 else numbers[:, None]

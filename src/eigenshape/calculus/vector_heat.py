@@ -1,21 +1,21 @@
-"""Parallel transport, scalar extension and logarithmic maps by short heat flow."""
+"""Parallel transport and scalar extension by short heat flow."""
 
 from dataclasses import dataclass
-from typing import Literal, SupportsIndex, get_args
 
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
-from eigenshape._arrays import finite_values, positive_values, real_numbers, whole_number
+from eigenshape._arrays import finite_values, positive_values, real_numbers, require_finite_rows
 from eigenshape._errors import InvalidParameterError
+from eigenshape._progress import Progress, silent
 from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
-from eigenshape.calculus.heat_distance import (
+from eigenshape.calculus.grounded import (
+    GroundedFactor,
     factorize_definite,
-    ground,
-    require_heat,
-    require_sources,
+    factorize_grounded,
 )
+from eigenshape.calculus.heat_distance import require_heat, require_sources
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import edge_lengths, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
@@ -23,9 +23,8 @@ from eigenshape.geometry.simplices import in_length
 from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.directions import Directions, corner_products, vertex_directions
+from eigenshape.operators.tufted import side_ends
 from eigenshape.sparse.elimination import SymmetricFactor
-
-LogMethod = Literal["affine", "adaptive", "radial"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +45,10 @@ class VectorHeat:
         Angles of all sides in the tangent planes of their ends.
     components : (n,) int
         Connected component of each vertex.
-    scalar_heat, vector_heat, poisson : SymmetricFactor
-        Factors of B + tW for functions and for tangent vectors, and of W with one vertex of each
-        component fixed.
+    scalar_heat, vector_heat : SymmetricFactor
+        Factors of B + tW for functions and for tangent vectors.
+    poisson : GroundedFactor
+        Factor of W with one vertex of each component fixed.
     """
 
     time: float
@@ -58,7 +58,7 @@ class VectorHeat:
     components: Int[np.ndarray, " n"]
     scalar_heat: SymmetricFactor
     vector_heat: SymmetricFactor
-    poisson: SymmetricFactor
+    poisson: GroundedFactor
 
     _repr_html_ = html_repr
 
@@ -71,7 +71,9 @@ class VectorHeat:
         return f"VectorHeat({self.n_points} points, time={self.time:.4g})"
 
 
-def prepare_vector_heat(mesh: MeshLike, *, time_factor: float = 1.0) -> VectorHeat:
+def prepare_vector_heat(
+    mesh: MeshLike, *, time_factor: float = 1.0, progress: Progress | None = None
+) -> VectorHeat:
     """Factor the equations of transport by heat, to be used for any number of sources.
 
     Parameters
@@ -80,6 +82,8 @@ def prepare_vector_heat(mesh: MeshLike, *, time_factor: float = 1.0) -> VectorHe
         A manifold, with or without boundary, with consistently oriented faces.
     time_factor : float
         The heat flows for the time t = time_factor × h², with the mean edge length h.
+    progress : callable, optional
+        Called as progress(fraction_done, message).
 
     Returns
     -------
@@ -108,19 +112,27 @@ def prepare_vector_heat(mesh: MeshLike, *, time_factor: float = 1.0) -> VectorHe
     factor = float(positive_values(time_factor, "time_factor")[0])
     points, scale = scale_to_unit(mesh)
     unit = TriangleMesh(points, mesh.faces)
+    report_progress = progress or silent
+    report_progress(0.0, "operators")
     connection = connection_laplacian(unit)
     scalar = cotangent_laplacian(unit)
     time = factor * float(edge_lengths(unit).mean()) ** 2
-    grounded, components = ground(scalar.stiffness)
+    # Shares of the time on a sphere of 50,000 vertices.
+    report_progress(0.3, "factors for functions")
+    scalar_heat = factorize_definite(scalar.mass + time * scalar.stiffness)
+    poisson = factorize_grounded(scalar.stiffness)
+    report_progress(0.6, "factor for vectors")
+    vector_heat = factorize_definite(connection.mass + time * connection.stiffness)
+    report_progress(1.0, "prepared")
     return VectorHeat(
         float(in_length(np.array([time]), scale, 2)[0]),
         scale,
         unit,
         vertex_directions(unit),
-        components,
-        factorize_definite(scalar.mass + time * scalar.stiffness),
-        factorize_definite(connection.mass + time * connection.stiffness),
-        factorize_definite(grounded),
+        poisson.components,
+        scalar_heat,
+        vector_heat,
+        poisson,
     )
 
 
@@ -171,7 +183,7 @@ def extend_scalar(
             f"values must hold one number per source; there are {len(given)} values and "
             f"{len(wanted)} sources."
         )
-    _require_source_everywhere(solver, wanted)
+    require_source_everywhere(solver, wanted)
     return _extend(solver, wanted, given)
 
 
@@ -227,101 +239,17 @@ def transport_vectors(
     solver = as_vector_heat(mesh)
     wanted = require_sources(sources, solver.n_points)
     given = _as_vectors(vectors, len(wanted))
-    _require_source_everywhere(solver, wanted)
+    require_source_everywhere(solver, wanted)
     lengths = np.abs(given)
     impulses = np.zeros(solver.n_points, dtype=complex)
     np.add.at(impulses, wanted, given / np.where(lengths > 0, lengths, 1.0))
     if len(wanted) == 1:
-        _scalar_impulse(solver, int(wanted[0]))  # raises an error where no heat arrives
+        scalar_impulse(solver, int(wanted[0]))  # raises an error where no heat arrives
         lengths = np.full(solver.n_points, lengths[0])
     else:
         lengths = _extend(solver, wanted, lengths)
     found = normalize(diffuse(solver, impulses))
-    return _as_rows(found * lengths)
-
-
-def logarithmic_map(
-    mesh: MeshLike | VectorHeat, source: SupportsIndex, *, method: LogMethod = "affine"
-) -> Float[np.ndarray, "n 2"]:
-    """Compute the logarithmic map at a vertex: polar coordinates of all vertices around it.
-
-    The length of each result is the geodesic distance from the source, its angle the direction in
-    which the shortest path leaves the source.
-
-    Parameters
-    ----------
-    mesh : MeshLike or VectorHeat
-        `prepare_vector_heat(mesh)` keeps the factors for further calls.
-    source : int
-        Vertex.
-    method : {"affine", "adaptive", "radial"}
-        "affine": heat of affine coordinates in the frames of all vertices, the most accurate on
-        the nearer half of a sphere. "adaptive": the same in one frame that is transported from the
-        source, the most accurate where curvature changes much (both Soliman and Sharp, The affine
-        heat method, 2025). "radial": the angle between a transported vector and a field that
-        points away from the source, which is also integrated to distances (Sharp, Soliman, Crane
-        2019, section 8). Beyond the cut locus only "radial" still gives the distance.
-
-    Returns
-    -------
-    (n, 2) float
-        Coordinates in the frame of the source, the row of `operators.tangent_frames`, in length.
-        The source is at 0 for "radial", and within rounding of it on flat regions for the others.
-
-    Raises
-    ------
-    InvalidParameterError
-        If the source is not a vertex, a component does not contain it, heat is too small for a
-        float somewhere, or `method` is not one of the three.
-    InvalidShapeError
-        As in `prepare_vector_heat`.
-
-    See Also
-    --------
-    transport_vectors : Conventions of frames.
-    trace_geodesic : The inverse, the exponential map, of one vector.
-
-    Examples
-    --------
-    On a plane these are the differences of coordinates, turned into the frame of the source:
-
-    >>> import eigenshape as es
-    >>> import numpy as np
-    >>> square = es.shapes.grid(10, 10)
-    >>> found = es.calculus.logarithmic_map(square, 60)
-    >>> offsets = square.vertices - square.vertices[60]
-    >>> exact = offsets @ es.operators.tangent_frames(square)[60].T
-    >>> bool(np.allclose(found, exact))
-    True
-    """
-    require_log_method(method)
-    solver = as_vector_heat(mesh)
-    start = whole_number(source, "source", 0, solver.n_points - 1)
-    _require_source_everywhere(solver, np.array([start]))
-    weight = _scalar_impulse(solver, start)
-    impulse = np.zeros(solver.n_points, dtype=complex)
-    impulse[start] = 1.0
-    parallel = normalize(diffuse(solver, impulse))
-    parallel[parallel == 0] = 1.0  # opposite to the source any direction will do
-    if method == "radial":
-        found = _radial(solver, start, parallel)
-    else:
-        compute = _affine if method == "affine" else _adaptive
-        found = compute(solver, weight, parallel)
-    return in_length(_as_rows(found), solver.scale, 1)
-
-
-def require_log_method(method: str) -> None:
-    """Raise an error if a method of the logarithmic map is unknown.
-
-    Raises
-    ------
-    InvalidParameterError
-    """
-    if method not in get_args(LogMethod):
-        raise InvalidParameterError(
-            f"method must be 'affine', 'adaptive' or 'radial'; it is {method!r}."
-        )
+    return as_rows(found * lengths)
 
 
 def as_vector_heat(mesh: MeshLike | VectorHeat) -> VectorHeat:
@@ -337,19 +265,16 @@ def _as_vectors(vectors: ArrayLike, count: int) -> Complex[np.ndarray, " k"]:
             f"vectors must hold two coordinates per source, shape ({count}, 2); the shape is "
             f"{rows.shape}. Vectors in space have the coordinates tangent_frames(mesh)[i] @ vector."
         )
-    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
-    if bad.size:
-        raise InvalidParameterError(
-            f"vectors must be finite; vector {bad[0]} is {rows[bad[0]].tolist()}."
-        )
+    require_finite_rows(rows, "vectors", "source")
     return rows[:, 0] + 1j * rows[:, 1]
 
 
-def _as_rows(field: Complex[np.ndarray, " n"]) -> Float[np.ndarray, "n 2"]:
+def as_rows(field: Complex[np.ndarray, " n"]) -> Float[np.ndarray, "n 2"]:
+    """Return complex numbers as vectors of two coordinates."""
     return np.column_stack([field.real, field.imag])
 
 
-def _require_source_everywhere(solver: VectorHeat, sources: Int[np.ndarray, " k"]) -> None:
+def require_source_everywhere(solver: VectorHeat, sources: Int[np.ndarray, " k"]) -> None:
     """Raise an error if a component has no source: nothing flows there."""
     reached = np.isin(solver.components, solver.components[sources])
     if not reached.all():
@@ -363,7 +288,7 @@ def _require_source_everywhere(solver: VectorHeat, sources: Int[np.ndarray, " k"
 
 def diffuse(solver: VectorHeat, field: Complex[np.ndarray, " n"]) -> Complex[np.ndarray, " n"]:
     """Solve (B + tW) x = field for tangent vectors."""
-    solution = solver.vector_heat.solve(_as_rows(field).reshape(-1, 1))[:, 0]
+    solution = solver.vector_heat.solve(as_rows(field).reshape(-1, 1))[:, 0]
     return solution[::2] + 1j * solution[1::2]
 
 
@@ -388,16 +313,12 @@ def _extend(
     return flowed[:, 0] / flowed[:, 1]
 
 
-def _tail_and_head(mesh: TriangleMesh) -> tuple[Int[np.ndarray, " h"], Int[np.ndarray, " h"]]:
-    return mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
-
-
-def _sides(solver: VectorHeat) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def side_vectors(solver: VectorHeat) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return of each side: itself as a vector at its tail and at its head; its turn; its weight.
 
     The turn takes a vector from the tail to the head. Weights are half of one cotangent.
     """
-    tails, heads = _tail_and_head(solver.mesh)
+    tails, heads = side_ends(solver.mesh.faces)
     points = solver.mesh.vertices
     lengths = np.linalg.norm(points[heads] - points[tails], axis=1)
     at_tail = lengths * np.exp(1j * solver.directions.at_tail)
@@ -408,39 +329,7 @@ def _sides(solver: VectorHeat) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.n
     return at_tail, at_head, turns, weights
 
 
-def _adaptive(
-    solver: VectorHeat, weight: Float[np.ndarray, " n"], parallel: Complex[np.ndarray, " n"]
-) -> Complex[np.ndarray, " n"]:
-    """Diffuse affine coordinates (z, w) in the transported frame, where an edge is a translation.
-
-    Heat takes (z, w) at j to (z - w e, w) at i, with the edge e from i to j in the frame at i. So
-    w is the heat of functions, and z that with a source of translations: two solves by one factor.
-    """
-    tails, heads = _tail_and_head(solver.mesh)
-    at_tail, at_head, _, weights = _sides(solver)
-    # Each side counts from both of its ends.
-    sources = np.zeros(solver.n_points, dtype=complex)
-    np.add.at(sources, tails, -weights * weight[heads] * at_tail / parallel[tails])
-    np.add.at(sources, heads, weights * weight[tails] * at_head / parallel[heads])
-    time = solver.time / solver.scale**2
-    moved = solver.scalar_heat.solve(time * _as_rows(sources))
-    return (moved[:, 0] + 1j * moved[:, 1]) / weight
-
-
-def _affine(
-    solver: VectorHeat, weight: Float[np.ndarray, " n"], parallel: Complex[np.ndarray, " n"]
-) -> Complex[np.ndarray, " n"]:
-    """Diffuse affine coordinates in the frames of all vertices, and turn them to the source's."""
-    tails, heads = _tail_and_head(solver.mesh)
-    at_tail, at_head, _, weights = _sides(solver)
-    sources = np.zeros(solver.n_points, dtype=complex)
-    np.add.at(sources, tails, -weights * weight[heads] * at_tail)
-    np.add.at(sources, heads, weights * weight[tails] * at_head)
-    moved = diffuse(solver, solver.time / solver.scale**2 * sources)
-    return moved / weight / parallel
-
-
-def _scalar_impulse(solver: VectorHeat, start: int) -> Float[np.ndarray, " n"]:
+def scalar_impulse(solver: VectorHeat, start: int) -> Float[np.ndarray, " n"]:
     """Return the heat of one source, which must reach every vertex."""
     impulse = np.zeros((solver.n_points, 1))
     impulse[start] = 1.0
@@ -449,20 +338,10 @@ def _scalar_impulse(solver: VectorHeat, start: int) -> Float[np.ndarray, " n"]:
     return heat[:, 0]
 
 
-def _radial(
-    solver: VectorHeat, start: int, parallel: Complex[np.ndarray, " n"]
-) -> Complex[np.ndarray, " n"]:
-    """Diffuse the field that points away from the source, and integrate it to distances."""
-    radial = normalize(diffuse(solver, _outward_field(solver, start)))
-    radial[start] = 0.0
-    distance = integrate_along_edges(solver, edge_sums(solver, radial) / 2)
-    return radial / parallel * (distance - distance[start])
-
-
 def edge_sums(solver: VectorHeat, field: Complex[np.ndarray, " n"]) -> Complex[np.ndarray, " h"]:
     """Add the vectors at both ends of each side, in the frame of its tail."""
-    tails, heads = _tail_and_head(solver.mesh)
-    _, _, turns, _ = _sides(solver)
+    tails, heads = side_ends(solver.mesh.faces)
+    _, _, turns, _ = side_vectors(solver)
     return field[tails] + field[heads] * np.conj(turns)
 
 
@@ -474,42 +353,9 @@ def integrate_along_edges(
     The field is given on each side, in the frame of its tail. Its divergence at a vertex is the
     flux through the dual edges around it.
     """
-    tails, heads = _tail_and_head(solver.mesh)
-    at_tail, _, _, weights = _sides(solver)
+    tails, heads = side_ends(solver.mesh.faces)
+    at_tail, _, _, weights = side_vectors(solver)
     flux = weights * (np.conj(vectors) * at_tail).real
     divergence = np.bincount(heads, flux, minlength=solver.n_points)
     divergence -= np.bincount(tails, flux, minlength=solver.n_points)
     return solver.poisson.solve(divergence[:, None])[:, 0]
-
-
-def _outward_field(solver: VectorHeat, start: int) -> Complex[np.ndarray, " n"]:
-    """Integrate the unit field that points away from a vertex against the hat functions around it.
-
-    The integrals over each face are exact (Sharp, Soliman, Crane 2019, appendix A).
-    """
-    mesh, directions = solver.mesh, solver.directions
-    faces, corners = np.nonzero(mesh.faces == start)
-    side = 3 * faces + corners
-    following, last = 3 * faces + (corners + 1) % 3, 3 * faces + (corners + 2) % 3
-    cosines, sines = corner_products(mesh)
-    angles = np.arctan2(sines, cosines)
-    theta = angles[side]
-    # Twice the area over the sides of the face is its height over each.
-    points = mesh.vertices[mesh.faces]
-    lengths = np.linalg.norm(np.roll(points, -1, axis=1) - points, axis=2).ravel()
-    double_area = lengths[side] * lengths[last] * np.sin(theta)
-    field = np.zeros(mesh.n_vertices, dtype=complex)
-
-    along, across = -theta * np.sin(theta), theta * np.cos(theta) - np.sin(theta)
-    heads, tails = mesh.faces.ravel()[following], mesh.faces.ravel()[last]
-    to_start = np.exp(1j * directions.at_head[side])
-    np.add.at(field, heads, (along + 1j * across) * lengths[last] / (2 * double_area) * to_start)
-    to_start = np.exp(1j * directions.at_tail[last])
-    np.add.at(field, tails, (along - 1j * across) * lengths[side] / (2 * double_area) * to_start)
-
-    alpha = np.pi / 2 - angles[following]
-    along = -(theta * np.cos(alpha) + np.cos(alpha - theta) * np.sin(theta)) / 2
-    across = -(np.cos(alpha) - np.cos(alpha - 2 * theta) + 2 * theta * np.sin(alpha)) / 4
-    outward = (along + 1j * across) * np.exp(1j * directions.at_tail[side])
-    field[start] = (outward * lengths[following] / double_area).sum()
-    return field

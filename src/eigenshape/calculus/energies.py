@@ -1,0 +1,171 @@
+"""Quadratic energies: their minima under constraints, and the smoothest interpolation of values."""
+
+from typing import SupportsIndex
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float
+
+from eigenshape._arguments import require_type
+from eigenshape._arrays import whole_number
+from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
+from eigenshape.calculus.linear_solver import SparseMatrix, factor_equations
+from eigenshape.operators.laplacian import Laplacian, require_matrix
+
+
+def minimize_quadratic(
+    matrix: SparseMatrix,
+    linear: ArrayLike = 0.0,
+    *,
+    fixed: ArrayLike | None = None,
+    values: ArrayLike = 0.0,
+    constraints: SparseMatrix | ArrayLike | None = None,
+    targets: ArrayLike = 0.0,
+) -> Float[np.ndarray, "n ..."]:
+    """Minimize ½ xᵀQx - xᵀb with fixed values and linear constraints C x = d.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse
+        Q, symmetric and positive semidefinite, such as a stiffness or `polyharmonic_matrix`.
+    linear : (n,) or (n, k) float, or a number
+        b.
+    fixed : (c,) int, optional
+        Points where values are given.
+    values : (c,) or (c, k) float, or a number
+        The values there.
+    constraints : (p, n) sparse or float, optional
+        C.
+    targets : (p,) or (p, k) float, or a number
+        d.
+
+    Returns
+    -------
+    (n,) or (n, k) float
+        x. Where it is determined up to a constant on a component, its mean there is 0.
+
+    Raises
+    ------
+    InvalidParameterError
+        As in `factor_equations`, which keeps the factor, and `LinearSolver.solve`.
+
+    See Also
+    --------
+    es.calculus.solve_harmonic : The smoothest functions through given values.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> from scipy.sparse import eye_array
+    >>> Q = eye_array(3)
+    >>> es.calculus.minimize_quadratic(Q, constraints=[[1, 1, 1]], targets=[6]).round(12).tolist()
+    [2.0, 2.0, 2.0]
+    """
+    solver = factor_equations(matrix, fixed, constraints)
+    return solver.solve(linear, values=values, targets=targets)
+
+
+def polyharmonic_matrix(laplacian: Laplacian, order: SupportsIndex = 2) -> sp.csr_array:
+    """Build the energy matrix of k-harmonic functions, W (B⁻¹W)^(k-1).
+
+    ½ uᵀQu is half the integral of |∇u|² for k = 1 and of (Δu)² for k = 2 (Botsch and Kobbelt 2004;
+    Jacobson, Tosun, Sorkine and Zorin 2010). For k above 1 it also asks for ∂u/∂ν = 0 where the
+    boundary is free, because W does; so a linear function on a flat sheet has energy (Stein,
+    Grinspun, Wardetzky and Jacobson 2018).
+
+    Parameters
+    ----------
+    laplacian : Laplacian
+        With diagonal (lumped) mass.
+    order : int
+        k, at least 1.
+
+    Returns
+    -------
+    (n, n) sparse
+        Q, in length^(m-2k).
+
+    Raises
+    ------
+    InvalidParameterError
+        If k is below 1, the mass is not diagonal and k is above 1, or the operator has
+        `correct="log"`.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> Q = es.calculus.polyharmonic_matrix(es.cotangent_laplacian(es.icosphere(1)))
+    >>> bool(abs(Q.sum(axis=1)).max() < 1e-12)
+    True
+    """
+    require_type(laplacian, Laplacian, "laplacian")
+    require_matrix(laplacian)
+    count = whole_number(order, "order", 1)
+    stiffness, mass = laplacian.stiffness, laplacian.mass
+    diagonal = mass.diagonal()
+    if count > 1 and mass.count_nonzero() > np.count_nonzero(diagonal):
+        raise InvalidParameterError(
+            "A k-harmonic energy needs a diagonal mass, because its inverse must be sparse; the "
+            'mass is not diagonal. Use es.cotangent_laplacian(mesh, "lumped").'
+        )
+    inverse = sp.diags_array(1 / diagonal)
+    energy = stiffness
+    for _ in range(count - 1):
+        energy = energy @ (inverse @ stiffness)
+    # The factors commute but for rounding.
+    return ((energy + energy.T) / 2).tocsr()
+
+
+def solve_harmonic(
+    laplacian: Laplacian,
+    fixed: ArrayLike,
+    values: ArrayLike,
+    *,
+    order: SupportsIndex = 1,
+) -> Float[np.ndarray, "n ..."]:
+    """Interpolate values at some points by the smoothest function: harmonic, biharmonic and so on.
+
+    The minimum of the energy of `polyharmonic_matrix`, with ∂u/∂ν = 0 where the boundary is free.
+    So for `order` above 1 a linear function on a flat sheet has energy, and is found only if it is
+    given at the boundary and at the neighbors of the boundary.
+
+    Parameters
+    ----------
+    laplacian : Laplacian
+        With diagonal (lumped) mass if `order` is above 1.
+    fixed : (c,) int
+        Points where values are given, at least one per component.
+    values : (c,) or (c, k) float, or a number
+        The values there.
+    order : int
+        1 for harmonic, Δu = 0; 2 for biharmonic, Δ²u = 0; and so on.
+
+    Returns
+    -------
+    (n,) or (n, k) float
+
+    Raises
+    ------
+    InvalidParameterError
+        If a component has no fixed point, or as in `polyharmonic_matrix` and `LinearSolver.solve`.
+
+    See Also
+    --------
+    es.calculus.polyharmonic_matrix : The energy that is minimized.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> bar = es.cotangent_laplacian(es.shapes.interval(4))
+    >>> es.calculus.solve_harmonic(bar, [0, 4], [0.0, 1.0]).round(12).tolist()
+    [0.0, 0.25, 0.5, 0.75, 1.0]
+    """
+    solver = factor_equations(polyharmonic_matrix(laplacian, order), fixed)
+    loose = np.flatnonzero(solver.floating >= 0)
+    if loose.size:
+        raise InvalidParameterError(
+            "Each component must have a fixed point; the component of point "
+            f"{loose[0]} has none ({int(solver.floating.max()) + 1} such)."
+        )
+    return solver.solve(values=values)

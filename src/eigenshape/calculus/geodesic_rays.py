@@ -1,0 +1,147 @@
+"""Straight paths from a vertex: the exponential map."""
+
+from typing import SupportsIndex
+
+import numpy as np
+from jaxtyping import Float
+
+from eigenshape._arrays import finite_values, whole_number
+from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
+from eigenshape.calculus.unfolding import (
+    STRAIGHT,
+    GeodesicPath,
+    Sides,
+    apex_of,
+    as_path,
+    cross,
+    next_side,
+    point_on_side,
+    previous_side,
+    walkable_sides,
+)
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.measure import scale_to_unit
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.requirements import require_sound
+from eigenshape.operators.directions import vertex_directions
+
+
+def trace_geodesic(mesh: MeshLike, start: SupportsIndex, vector: ArrayLike) -> GeodesicPath:
+    """Walk straight from a vertex, in the direction and for the length of a tangent vector.
+
+    This is the exponential map. Across an edge the path goes on straight in the unfolded faces
+    (Polthier and Schmies 1998). It ends early at a boundary.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        As in `geodesic_path`.
+    start : int
+        Vertex.
+    vector : (2,) float
+        Tangent vector in the frame of the vertex, row `start` of `operators.tangent_frames`, in
+        length. Angles around an inner vertex are scaled to 2π.
+
+    Returns
+    -------
+    GeodesicPath
+        Shorter than `vector` only if it meets a boundary.
+
+    Raises
+    ------
+    InvalidShapeError
+        As in `geodesic_path`.
+    InvalidParameterError
+        If the vertex is out of range, or `vector` is not two finite numbers, or points out of the
+        surface at a boundary vertex.
+
+    See Also
+    --------
+    logarithmic_map : The inverse.
+
+    Examples
+    --------
+    Once around a sphere, and back to the start up to the discretization:
+
+    >>> import eigenshape as es
+    >>> path = es.calculus.trace_geodesic(es.icosphere(4), 0, [6.2832, 0.0])
+    >>> bool(abs(path.points[-1] - path.points[0]).max() < 0.1)
+    True
+    """
+    mesh = as_mesh(mesh)
+    require_sound(mesh)
+    vertex = whole_number(start, "start", 0, mesh.n_vertices - 1)
+    given = finite_values(vector, "vector")
+    if len(given) != 2:
+        raise InvalidParameterError(
+            f"vector must hold two coordinates in the tangent frame; it holds {len(given)}."
+        )
+    directions = vertex_directions(mesh)
+    points, scale = scale_to_unit(mesh)
+    sides = walkable_sides(TriangleMesh(points, mesh.faces))
+    left = float(np.hypot(*given)) / scale
+    if not left > 0:
+        return as_path(mesh.vertices[[vertex]])
+    angle = float(np.arctan2(given[1], given[0]))
+    side, angle = _wedge(sides, directions.at_tail, vertex, angle)
+    return as_path(np.array(_walk(mesh, sides, side, angle, left)))
+
+
+def _wedge(
+    sides: Sides, at_tail: Float[np.ndarray, " h"], vertex: int, angle: float
+) -> tuple[int, float]:
+    """Return the side after which a direction leaves a vertex, and the angle from it in the face."""
+    out = np.flatnonzero(sides.tails == vertex)
+    is_inner = (sides.twins[out] >= 0).all() and (
+        sides.twins[[previous_side(int(h)) for h in out]] >= 0
+    ).all()
+    scale = 2 * np.pi / sides.around[vertex] if is_inner else 1.0
+    angle %= 2 * np.pi
+    offsets = (angle - at_tail[out]) / scale
+    inside = (offsets >= 0) & (offsets <= sides.angles[out])
+    if not inside.any():
+        # Rounding may leave a gap between two faces, at the last side or the first.
+        nearest = int(np.argmin(np.minimum(np.abs(offsets), np.abs(offsets - sides.angles[out]))))
+        gap = min(abs(offsets[nearest]), abs(offsets[nearest] - sides.angles[out[nearest]]))
+        if gap > STRAIGHT:
+            raise InvalidParameterError(
+                f"vector must point into the surface; at boundary vertex {vertex} it has the angle "
+                f"{angle:.4g}, and the faces end at {sides.around[vertex]:.4g}."
+            )
+        return int(out[nearest]), float(np.clip(offsets[nearest], 0, sides.angles[out[nearest]]))
+    chosen = int(out[inside][0])
+    return chosen, float(offsets[inside][0])
+
+
+def _walk(
+    mesh: TriangleMesh, sides: Sides, side: int, angle: float, length: float
+) -> list[Float[np.ndarray, "3"]]:
+    """Walk straight through faces; return the start, where edges are crossed, and the end."""
+    path = [mesh.vertices[sides.tails[side]]]
+    # The path starts at 0, and its first face lies on the left of a side along the axis.
+    head = complex(sides.lengths[side])
+    way = complex(np.cos(angle), np.sin(angle))
+    exits = [(next_side(side), head, apex_of(sides, side, 0j, head))]
+    walked = 0.0
+    while True:
+        # The path leaves between the ends of a side, the first on its right and the second on its
+        # left. Of two sides at a vertex that the path meets, rounding chooses.
+        out, right, left = exits[0]
+        if len(exits) > 1 and cross(way, left) < 0:
+            out, right, left = exits[1]
+        below, above = cross(way, right), cross(way, left)
+        share = min(max(-below / (above - below), 0.0), 1.0) if above > below else 0.0
+        meeting = ((right + share * (left - right)) * way.conjugate()).real
+        crossing = point_on_side(mesh, sides, out, share)
+        if meeting >= length:
+            part = (length - walked) / (meeting - walked) if meeting > walked else 0.0
+            return [*path, path[-1] + part * (crossing - path[-1])]
+        path.append(crossing)
+        walked = max(walked, meeting)
+        twin = int(sides.twins[out])
+        if twin < 0:
+            return path
+        # Across, the side runs from `left` to `right`, and the next face lies on its left.
+        apex = apex_of(sides, twin, left, right)
+        exits = [(next_side(twin), right, apex), (previous_side(twin), apex, left)]

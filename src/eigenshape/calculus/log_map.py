@@ -1,0 +1,186 @@
+"""The logarithmic map of a surface, by short heat flow."""
+
+from typing import Literal, SupportsIndex, get_args
+
+import numpy as np
+from jaxtyping import Complex, Float
+
+from eigenshape._arrays import whole_number
+from eigenshape._errors import InvalidParameterError
+from eigenshape.calculus.vector_heat import (
+    VectorHeat,
+    as_rows,
+    as_vector_heat,
+    diffuse,
+    edge_sums,
+    integrate_along_edges,
+    normalize,
+    require_source_everywhere,
+    scalar_impulse,
+    side_vectors,
+)
+from eigenshape.geometry.conversion import MeshLike
+from eigenshape.geometry.simplices import in_length
+from eigenshape.operators.directions import corner_products
+from eigenshape.operators.tufted import side_ends
+
+LogMethod = Literal["affine", "adaptive", "radial"]
+
+
+def logarithmic_map(
+    mesh: MeshLike | VectorHeat, source: SupportsIndex, *, method: LogMethod = "affine"
+) -> Float[np.ndarray, "n 2"]:
+    """Compute the logarithmic map at a vertex: polar coordinates of all vertices around it.
+
+    The length of each result is the geodesic distance from the source, its angle the direction in
+    which the shortest path leaves the source.
+
+    Parameters
+    ----------
+    mesh : MeshLike or VectorHeat
+        `prepare_vector_heat(mesh)` keeps the factors for further calls.
+    source : int
+        Vertex.
+    method : {"affine", "adaptive", "radial"}
+        "affine": heat of affine coordinates in the frames of all vertices, the most accurate on
+        the nearer half of a sphere. "adaptive": the same in one frame that is transported from the
+        source, the most accurate where curvature changes much (both Soliman and Sharp, The affine
+        heat method, 2025). "radial": the angle between a transported vector and a field that
+        points away from the source, which is also integrated to distances (Sharp, Soliman, Crane
+        2019, section 8). Beyond the cut locus only "radial" still gives the distance.
+
+    Returns
+    -------
+    (n, 2) float
+        Coordinates in the frame of the source, the row of `operators.tangent_frames`, in length.
+        The source is at 0 for "radial", and within rounding of it on flat regions for the others.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the source is not a vertex, a component does not contain it, heat is too small for a
+        float somewhere, or `method` is not one of the three.
+    InvalidShapeError
+        As in `prepare_vector_heat`.
+
+    See Also
+    --------
+    transport_vectors : Conventions of frames.
+    trace_geodesic : The inverse, the exponential map, of one vector.
+
+    Examples
+    --------
+    On a plane these are the differences of coordinates, turned into the frame of the source:
+
+    >>> import eigenshape as es
+    >>> import numpy as np
+    >>> square = es.shapes.grid(10, 10)
+    >>> found = es.calculus.logarithmic_map(square, 60)
+    >>> offsets = square.vertices - square.vertices[60]
+    >>> exact = offsets @ es.operators.tangent_frames(square)[60].T
+    >>> bool(np.allclose(found, exact))
+    True
+    """
+    require_log_method(method)
+    solver = as_vector_heat(mesh)
+    start = whole_number(source, "source", 0, solver.n_points - 1)
+    require_source_everywhere(solver, np.array([start]))
+    weight = scalar_impulse(solver, start)
+    impulse = np.zeros(solver.n_points, dtype=complex)
+    impulse[start] = 1.0
+    parallel = normalize(diffuse(solver, impulse))
+    parallel[parallel == 0] = 1.0  # opposite to the source any direction will do
+    if method == "radial":
+        found = _radial(solver, start, parallel)
+    else:
+        compute = _affine if method == "affine" else _adaptive
+        found = compute(solver, weight, parallel)
+    return in_length(as_rows(found), solver.scale, 1)
+
+
+def require_log_method(method: str) -> None:
+    """Raise an error if a method of the logarithmic map is unknown.
+
+    Raises
+    ------
+    InvalidParameterError
+    """
+    if method not in get_args(LogMethod):
+        raise InvalidParameterError(
+            f"method must be 'affine', 'adaptive' or 'radial'; it is {method!r}."
+        )
+
+
+def _adaptive(
+    solver: VectorHeat, weight: Float[np.ndarray, " n"], parallel: Complex[np.ndarray, " n"]
+) -> Complex[np.ndarray, " n"]:
+    """Diffuse affine coordinates (z, w) in the transported frame, where an edge is a translation.
+
+    Heat takes (z, w) at j to (z - w e, w) at i, with the edge e from i to j in the frame at i. So
+    w is the heat of functions, and z that with a source of translations: two solves by one factor.
+    """
+    tails, heads = side_ends(solver.mesh.faces)
+    at_tail, at_head, _, weights = side_vectors(solver)
+    # Each side counts from both of its ends.
+    sources = np.zeros(solver.n_points, dtype=complex)
+    np.add.at(sources, tails, -weights * weight[heads] * at_tail / parallel[tails])
+    np.add.at(sources, heads, weights * weight[tails] * at_head / parallel[heads])
+    time = solver.time / solver.scale**2
+    moved = solver.scalar_heat.solve(time * as_rows(sources))
+    return (moved[:, 0] + 1j * moved[:, 1]) / weight
+
+
+def _affine(
+    solver: VectorHeat, weight: Float[np.ndarray, " n"], parallel: Complex[np.ndarray, " n"]
+) -> Complex[np.ndarray, " n"]:
+    """Diffuse affine coordinates in the frames of all vertices, and turn them to the source's."""
+    tails, heads = side_ends(solver.mesh.faces)
+    at_tail, at_head, _, weights = side_vectors(solver)
+    sources = np.zeros(solver.n_points, dtype=complex)
+    np.add.at(sources, tails, -weights * weight[heads] * at_tail)
+    np.add.at(sources, heads, weights * weight[tails] * at_head)
+    moved = diffuse(solver, solver.time / solver.scale**2 * sources)
+    return moved / weight / parallel
+
+
+def _radial(
+    solver: VectorHeat, start: int, parallel: Complex[np.ndarray, " n"]
+) -> Complex[np.ndarray, " n"]:
+    """Diffuse the field that points away from the source, and integrate it to distances."""
+    radial = normalize(diffuse(solver, _outward_field(solver, start)))
+    radial[start] = 0.0
+    distance = integrate_along_edges(solver, edge_sums(solver, radial) / 2)
+    return radial / parallel * (distance - distance[start])
+
+
+def _outward_field(solver: VectorHeat, start: int) -> Complex[np.ndarray, " n"]:
+    """Integrate the unit field that points away from a vertex against the hat functions around it.
+
+    The integrals over each face are exact (Sharp, Soliman, Crane 2019, appendix A).
+    """
+    mesh, directions = solver.mesh, solver.directions
+    faces, corners = np.nonzero(mesh.faces == start)
+    side = 3 * faces + corners
+    following, last = 3 * faces + (corners + 1) % 3, 3 * faces + (corners + 2) % 3
+    cosines, sines = corner_products(mesh)
+    angles = np.arctan2(sines, cosines)
+    theta = angles[side]
+    # Twice the area over the sides of the face is its height over each.
+    points = mesh.vertices[mesh.faces]
+    lengths = np.linalg.norm(np.roll(points, -1, axis=1) - points, axis=2).ravel()
+    double_area = lengths[side] * lengths[last] * np.sin(theta)
+    field = np.zeros(mesh.n_vertices, dtype=complex)
+
+    along, across = -theta * np.sin(theta), theta * np.cos(theta) - np.sin(theta)
+    heads, tails = mesh.faces.ravel()[following], mesh.faces.ravel()[last]
+    to_start = np.exp(1j * directions.at_head[side])
+    np.add.at(field, heads, (along + 1j * across) * lengths[last] / (2 * double_area) * to_start)
+    to_start = np.exp(1j * directions.at_tail[last])
+    np.add.at(field, tails, (along - 1j * across) * lengths[side] / (2 * double_area) * to_start)
+
+    alpha = np.pi / 2 - angles[following]
+    along = -(theta * np.cos(alpha) + np.cos(alpha - theta) * np.sin(theta)) / 2
+    across = -(np.cos(alpha) - np.cos(alpha - 2 * theta) + 2 * theta * np.sin(alpha)) / 4
+    outward = (along + 1j * across) * np.exp(1j * directions.at_tail[side])
+    field[start] = (outward * lengths[following] / double_area).sum()
+    return field

@@ -1,0 +1,106 @@
+"""Faces laid flat one after another, for paths that cross them straight."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from eigenshape._arrays import freeze
+from eigenshape._text import html_repr, short_repr
+from eigenshape.geometry.curvature import face_angles
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import in_length, size_one
+from eigenshape.operators.directions import side_twins
+from eigenshape.operators.tufted import side_ends
+
+# An angle counts as less than π if it is by more than this: rounding of unfolded strips is 1e-13.
+STRAIGHT = 1e-10
+
+
+# Points of a path nearer than this share of its coordinates to the next are one point.
+SAME = 1e-14
+
+
+@dataclass(frozen=True, eq=False)
+class GeodesicPath:
+    """A polyline on a surface.
+
+    Attributes
+    ----------
+    points : (p, 3) float
+        Where it starts, where it crosses edges or passes vertices, and where it ends, in length.
+    length : float
+        In length.
+    """
+
+    points: Float[np.ndarray, "p 3"]
+    length: float
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """What a walk over faces needs; side 3f + s runs from corner s of face f to the next."""
+
+    points: Float[np.ndarray, "n 3"]
+    tails: Int[np.ndarray, " h"]
+    heads: Int[np.ndarray, " h"]
+    twins: Int[np.ndarray, " h"]
+    lengths: Float[np.ndarray, " h"]
+    angles: Float[np.ndarray, " h"]
+    around: Float[np.ndarray, " n"]
+    of_edge: dict[tuple[int, int], int]
+
+
+def walkable_sides(mesh: TriangleMesh) -> Sides:
+    """Measure the sides of a manifold mesh."""
+    tails, heads = side_ends(mesh.faces)
+    lengths = np.linalg.norm(mesh.vertices[heads] - mesh.vertices[tails], axis=1)
+    angles = face_angles(mesh).ravel()
+    around = np.bincount(tails, angles, minlength=mesh.n_vertices)
+    of_edge = dict(
+        zip(zip(tails.tolist(), heads.tolist(), strict=True), range(len(tails)), strict=True)
+    )
+    return Sides(mesh.vertices, tails, heads, side_twins(mesh), lengths, angles, around, of_edge)
+
+
+def next_side(side: int) -> int:
+    """Return the side of the same face that starts where one ends."""
+    return side - 2 if side % 3 == 2 else side + 1
+
+
+def previous_side(side: int) -> int:
+    """Return the side of the same face that ends where one starts."""
+    return side + 2 if side % 3 == 0 else side - 1
+
+
+def apex_of(sides: Sides, side: int, tail: complex, head: complex) -> complex:
+    """Place the third corner of a face, on the left of its side from `tail` to `head`."""
+    length = float(sides.lengths[side])
+    reach = float(sides.lengths[previous_side(side)])
+    angle = float(sides.angles[side])
+    return tail + (head - tail) / length * reach * complex(np.cos(angle), np.sin(angle))
+
+
+def cross(one: complex, two: complex) -> float:
+    """Return a positive number if the second vector is on the left of the first."""
+    return (one.conjugate() * two).imag
+
+
+def point_on_side(
+    mesh: TriangleMesh, sides: Sides, side: int, share: float
+) -> Float[np.ndarray, "3"]:
+    """Return the point at a share of the way from the tail of a side to its head."""
+    tail, head = mesh.vertices[sides.tails[side]], mesh.vertices[sides.heads[side]]
+    return np.asarray((1 - share) * tail + share * head)
+
+
+def as_path(points: Float[np.ndarray, "p 3"]) -> GeodesicPath:
+    """Keep each point of a path once, and measure it."""
+    unit, scale = size_one(points)
+    steps = np.linalg.norm(np.diff(unit, axis=0), axis=1)
+    kept = np.append(True, steps > SAME)
+    length = in_length(steps.sum(keepdims=True), scale, 1)
+    return GeodesicPath(freeze(points[kept]), float(length[0]))
