@@ -41,8 +41,10 @@ serve(mesh, index=index or None, announce=lambda url: print(url, flush=True), br
 """
 # The panel in which shapes are bent, in the code of the page.
 PANEL = "eigenshape.panels.find((panel) => panel.id === 'deform')"
+HAS_SHAPE = "window.eigenshape?.viewer.vertices.length > 0"
 # Requests of each page that have no answer yet.
 UNDER_WAY: WeakKeyDictionary[Page, set[Request]] = WeakKeyDictionary()
+TWO_FRAMES = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
 
 @contextmanager
@@ -85,8 +87,10 @@ def serve_studio(mesh: Path, index: Path | None = None) -> Iterator[str]:
 
 
 @contextmanager
-def open_page(browser: Browser, url: str, *, dark: bool = False) -> Iterator[Page]:
-    """Open the studio as on a laptop, and wait until it shows a shape.
+def open_page(
+    browser: Browser, url: str, *, dark: bool = False, ready: str = HAS_SHAPE
+) -> Iterator[Page]:
+    """Open the studio as on a laptop, and wait until it shows a shape, or another condition.
 
     At the end every error, warning and request to another machine fails the test.
     """
@@ -113,7 +117,7 @@ def open_page(browser: Browser, url: str, *, dark: bool = False) -> Iterator[Pag
     page.on("requestfinished", end)
     page.on("requestfailed", end)
     page.goto(url)
-    wait_until(page, "window.eigenshape?.viewer.vertices.length > 0")
+    wait_until(page, ready)
     yield page
     context.close()
     assert not seen, "\n".join(seen)
@@ -145,15 +149,20 @@ def wait_until(page: Page, condition: str, seconds: float = 60.0) -> None:
         page.wait_for_timeout(50)
 
 
+def move_pointer(page: Page, x: float, y: float, steps: int = 1) -> None:
+    """Move the pointer, and wait until the page has seen it: motions come with the next frame."""
+    page.mouse.move(x, y, steps=steps)
+    page.evaluate(TWO_FRAMES)
+
+
 def wait_until_still(page: Page) -> None:
     """Wait until no request is under way, and two frames have been drawn."""
-    two_frames = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
-    page.evaluate(two_frames)  # what was clicked may send a request only now
+    page.evaluate(TWO_FRAMES)  # what was clicked may send a request only now
     end = monotonic() + 60
     while UNDER_WAY[page]:
         assert monotonic() < end, f"requests without an answer: {UNDER_WAY[page]}"
         page.wait_for_timeout(20)
-    page.evaluate(two_frames)
+    page.evaluate(TWO_FRAMES)
 
 
 def vertex_values(page: Page, name: str = "value") -> np.ndarray:

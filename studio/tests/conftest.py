@@ -1,11 +1,9 @@
-"""Shapes and calls that the tests share."""
+"""Shapes, a browser, and a tab of the studio that the tests share."""
 
-import numpy as np
 import pytest
+from browser import open_page, serve_studio, start_browser, wait_until
 
 import eigenshape as es
-from eigenshape_studio.wire import decode, encode
-from eigenshape_studio.workspace import Workspace
 
 
 def stretched_ball(level=3):
@@ -14,43 +12,40 @@ def stretched_ball(level=3):
     return es.TriangleMesh(ball.vertices * [1.0, 1.7, 0.8], ball.faces)
 
 
-class Page:
-    """What a page does: calls a workspace by messages."""
-
-    def __init__(self, workspace):
-        self.workspace = workspace
-
-    def call(self, name, meta=None, /, _arrays=None, **more):
-        answer = self.workspace.answer(name, encode((meta or {}) | more, _arrays))
-        found, arrays = decode(answer.message)
-        assert answer.status == 200, found
-        return found, arrays
-
-    def error(self, name, meta=None, /, _arrays=None, **more):
-        answer = self.workspace.answer(name, encode((meta or {}) | more, _arrays))
-        found, arrays = decode(answer.message)
-        assert answer.status == 400, found
-        assert not arrays
-        return found["error"]
-
-    def array(self, name, **more):
-        return self.call("array", name=name, **more)[1][name]
+@pytest.fixture(scope="module")
+def browser():
+    # Not for the whole session: an event loop runs in this thread while the browser is open.
+    with start_browser() as started:
+        yield started
 
 
-@pytest.fixture(scope="session")
-def ball_workspace():
-    workspace = Workspace(stretched_ball(), "ball.ply", shared=True)
-    assert workspace.analysis.rig.wait(120)
-    assert workspace.analysis.health.wait(120)
-    return workspace
+@pytest.fixture(scope="module")
+def path(request, tmp_path_factory):
+    """The file of a quadruped with as many vertices as the module of the test says."""
+    path = tmp_path_factory.mktemp("shape") / "quadruped.ply"
+    es.write_mesh(es.make_creature("quadruped", n_vertices=request.module.N_VERTICES), path)
+    return path
 
 
-@pytest.fixture
-def page(ball_workspace):
-    """Return a page of a tab of its own; the modes are computed once."""
-    return Page(ball_workspace.fork())
+@pytest.fixture(scope="module")
+def mesh(path):
+    return es.read_mesh(path)
+
+
+@pytest.fixture(scope="module")
+def rig(mesh):
+    return es.rig_shape(mesh)
+
+
+@pytest.fixture(scope="module")
+def url(path):
+    with serve_studio(path) as url:
+        yield url
 
 
 @pytest.fixture
-def top(page):
-    return np.flatnonzero(page.workspace.mesh.vertices[:, 1] > 0.9).astype("<u4")
+def page(browser, url):
+    """A tab of its own, whose shape can be deformed."""
+    with open_page(browser, url) as page:
+        wait_until(page, "eigenshape.state.deformation.status === 'ready'", 120)
+        yield page

@@ -7,12 +7,10 @@ import pytest
 from browser import (
     PANEL,
     find,
-    open_page,
+    move_pointer,
     place_of,
     positions,
     region,
-    serve_studio,
-    start_browser,
     wait_for_edits,
     wait_until,
     wait_until_bound,
@@ -23,39 +21,8 @@ from eigenshape.deformation import BoxRegion, BrushRegion, bend, bind, region_ma
 
 pytestmark = pytest.mark.long
 
+N_VERTICES = 2000
 SHADER = 1e-5  # single precision: the largest error that the shader may have, in lengths of about 1
-
-
-@pytest.fixture(scope="module")
-def path(tmp_path_factory):
-    path = tmp_path_factory.mktemp("deform") / "quadruped.ply"
-    es.write_mesh(es.make_creature("quadruped", n_vertices=2000), path)
-    return path
-
-
-@pytest.fixture(scope="module")
-def mesh(path):
-    return es.read_mesh(path)
-
-
-@pytest.fixture(scope="module")
-def url(path):
-    with serve_studio(path) as url:
-        yield url
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with start_browser() as started:
-        yield started
-
-
-@pytest.fixture
-def page(browser, url):
-    """A tab of its own, whose shape can be deformed."""
-    with open_page(browser, url) as page:
-        wait_until(page, "eigenshape.state.deformation.status === 'ready'", 120)
-        yield page
 
 
 def click_brush(page, mesh):
@@ -66,21 +33,21 @@ def click_brush(page, mesh):
     down = next(number for number, hit in enumerate(hits) if hit)
     y += 2 + 2 * down + 6
     vertex = page.evaluate(f"eigenshape.viewer.pick({x}, {y})")["vertex"]
-    page.mouse.move(x, y)
+    move_pointer(page, x, y)
     page.mouse.down()
     page.mouse.up()
     wait_until_bound(page)
     return x, y, vertex
 
 
-def bend_by(mesh, chosen, handles, mode="graded"):
+def bend_by(mesh, rig, chosen, handles, mode="graded"):
     """Return the shape bent by the first handle of the page, and moved by its shares alone."""
     entry = handles[0]
     if entry["type"] == "rotation":
         handle = es.Rotation(entry["pivot"], entry["axis"], entry["angle"])
     else:
         handle = es.Translation(entry["vector"])
-    binding = bind(es.rig_shape(mesh), [chosen])
+    binding = bind(rig, [chosen])
     moved = mesh.vertices + handle.carry(mesh.vertices, binding.shares[0])
     return bend(binding, [handle], mode=mode).vertices, moved
 
@@ -101,9 +68,9 @@ def test_box_and_brush_select_what_numpy_selects(page, mesh):
 
     # Drag the handle of the lower side upwards.
     x, y = place_of(page, [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
-    page.mouse.move(x, y)
+    move_pointer(page, x, y)
     page.mouse.down()
-    page.mouse.move(x, y - 60, steps=3)
+    move_pointer(page, x, y - 60, steps=3)
     page.mouse.up()
     wait_until_bound(page)
     moved = page.evaluate(f"{PANEL}.box.low")
@@ -114,14 +81,14 @@ def test_box_and_brush_select_what_numpy_selects(page, mesh):
     )
 
 
-def test_a_mouse_drag_moves_the_shape_as_numpy_does(page, mesh):
+def test_a_mouse_drag_moves_the_shape_as_numpy_does(page, mesh, rig):
     x, y, _ = click_brush(page, mesh)
     find(page, "tool-pull").click()
-    page.mouse.move(x, y)
+    move_pointer(page, x, y)
     page.mouse.down()
-    page.mouse.move(x + 40, y - 50, steps=5)
+    move_pointer(page, x + 40, y - 50, steps=5)
     handles = page.evaluate(f"{PANEL}.rowHandles()")
-    bent, moved = bend_by(mesh, region(page), handles)
+    bent, moved = bend_by(mesh, rig, region(page), handles)
     assert np.linalg.norm(handles[0]["vector"]) > 0.02
     wait_until(page, "eigenshape.viewer.motion.blend.value === 1")  # the pointer rests
     np.testing.assert_allclose(positions(page), bent, atol=SHADER)
@@ -139,7 +106,7 @@ def test_a_mouse_drag_moves_the_shape_as_numpy_does(page, mesh):
 def test_no_call_while_the_pointer_moves(page, mesh):
     x, y, _ = click_brush(page, mesh)
     find(page, "tool-pull").click()
-    page.mouse.move(x, y)
+    move_pointer(page, x, y)
     page.mouse.down()
     calls = []
     page.on("request", lambda request: calls.append(request.url))
@@ -159,7 +126,7 @@ def test_no_call_while_the_pointer_moves(page, mesh):
     wait_for_edits(page, 1)
 
 
-def test_the_rings_turn_about_the_middle_of_the_rim(page, mesh):
+def test_the_rings_turn_about_the_middle_of_the_rim(page, mesh, rig):
     click_brush(page, mesh)
     find(page, "tool-rotate").click()
     chosen = region(page)
@@ -170,16 +137,16 @@ def test_the_rings_turn_about_the_middle_of_the_rim(page, mesh):
     x, y = place_of(page, pivot)
     aside = np.array([0.6, -0.8])
     for radius in range(40, 160, 3):  # the outer ring turns about the direction of the view
-        page.mouse.move(*(aside * radius + [x, y]))
+        move_pointer(page, *(aside * radius + [x, y]))
         if page.evaluate(f"{PANEL}.mover.gizmo.axis") == "E":
             break
     page.mouse.down()
     for angle in np.linspace(0.1, 0.5, 4):
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        page.mouse.move(*(turn @ aside * radius + [x, y]))
+        move_pointer(page, *(turn @ aside * radius + [x, y]))
     handles = page.evaluate(f"{PANEL}.rowHandles()")
     assert abs(handles[0]["angle"]) == pytest.approx(0.5, abs=0.02)
-    bent, moved = bend_by(mesh, chosen, handles)
+    bent, moved = bend_by(mesh, rig, chosen, handles)
     page.evaluate("eigenshape.viewer.motion.blend.value = 0")
     np.testing.assert_allclose(positions(page), moved, atol=SHADER)
     page.mouse.up()
@@ -188,7 +155,7 @@ def test_the_rings_turn_about_the_middle_of_the_rim(page, mesh):
 
 
 @pytest.mark.parametrize("mode", ["graded", "thesis"])
-def test_numbers_move_undo_redo_and_reload(page, mesh, mode):
+def test_numbers_move_undo_redo_and_reload(page, mesh, rig, mode):
     click_brush(page, mesh)
     rest = positions(page)
     find(page, "mode").select_option(mode)
@@ -200,7 +167,7 @@ def test_numbers_move_undo_redo_and_reload(page, mesh, mode):
         es.deformation.region_boundary(mesh, np.isin(np.arange(mesh.n_vertices), region(page)))
     ].mean(axis=0)
     handle = {"type": "rotation", "pivot": pivot, "axis": [0, 0, 1], "angle": np.deg2rad(270)}
-    bent, _ = bend_by(mesh, region(page), [handle], mode)
+    bent, _ = bend_by(mesh, rig, region(page), [handle], mode)
     np.testing.assert_allclose(positions(page), bent, atol=SHADER)
 
     posed = positions(page)

@@ -5,13 +5,12 @@ import pytest
 from browser import (
     PANEL,
     find,
+    move_pointer,
     open_page,
     picture,
     place_of,
     positions,
     region,
-    serve_studio,
-    start_browser,
     vertex_values,
     wait_for_edits,
     wait_until,
@@ -28,43 +27,8 @@ pytestmark = pytest.mark.long
 HEAD = 0.4  # height above which the quadruped is chosen: head and neck
 READY = "eigenshape.state.deformation.status === 'ready'"
 RED = [0xD8, 0x30, 0x1F]  # of faces that cross
+N_VERTICES = 1000
 SHADER = 1e-5  # single precision: the largest error that the shader may have, in lengths of about 1
-
-
-@pytest.fixture(scope="module")
-def path(tmp_path_factory):
-    path = tmp_path_factory.mktemp("edits") / "quadruped.ply"
-    es.write_mesh(es.make_creature("quadruped", n_vertices=1000), path)
-    return path
-
-
-@pytest.fixture(scope="module")
-def mesh(path):
-    return es.read_mesh(path)
-
-
-@pytest.fixture(scope="module")
-def rig(mesh):
-    return es.rig_shape(mesh)
-
-
-@pytest.fixture(scope="module")
-def url(path):
-    with serve_studio(path) as url:
-        yield url
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with start_browser() as started:
-        yield started
-
-
-@pytest.fixture
-def page(browser, url):
-    with open_page(browser, url) as page:
-        wait_until(page, READY, 120)
-        yield page
 
 
 def choose_above(page, height):
@@ -208,9 +172,9 @@ def test_each_method_shows_its_exact_result_at_rest(page, mesh, rig, mode):
     find(page, "mode").select_option(mode)
     find(page, "tool-pull").click()
     x, y = place_of(page, mesh.vertices[chosen].mean(axis=0))
-    page.mouse.move(x, y)
+    move_pointer(page, x, y)
     page.mouse.down()
-    page.mouse.move(x - 50, y - 20, steps=3)
+    move_pointer(page, x - 50, y - 20, steps=3)
     (handle,) = page.evaluate(f"{PANEL}.rowHandles()")
     wait_until(page, "eigenshape.viewer.motion.blend.value === 1")
     bent = bend(bind(rig, [chosen]), [es.Translation(handle["vector"])], mode=mode).vertices
@@ -227,12 +191,12 @@ def drag_arrow(page, axis, pixels):
     aside = np.subtract(place_of(page, np.add(pivot, 0.1 * np.eye(3)[axis])), [x, y])
     aside /= np.linalg.norm(aside)
     for away in range(20, 120, 4):
-        page.mouse.move(*(aside * away + [x, y]))
+        move_pointer(page, *(aside * away + [x, y]))
         if page.evaluate(f"{PANEL}.mover.gizmo.axis") == "XYZ"[axis]:
             break
     page.mouse.down()
     for step in (0.3, 0.7, 1.0):
-        page.mouse.move(*(aside * (away + step * pixels) + [x, y]))
+        move_pointer(page, *(aside * (away + step * pixels) + [x, y]))
 
 
 def test_an_arrow_moves_the_region_along_its_axis(page, mesh, rig):
@@ -267,13 +231,14 @@ def test_the_region_turns_about_the_pivot_that_was_moved(page, mesh, rig):
     # The ring of x is seen nearly from its front; where it lies, the gizmo says.
     find(page, "tool-rotate").click()
     x, y = place_of(page, pivot)
-    for radius in range(30, 110, 3):
-        page.mouse.move(x, y - radius)
+    for radius in range(30, 110):  # the ring is two pixels wide here
+        move_pointer(page, x, y - radius)
         if page.evaluate(f"{PANEL}.mover.gizmo.axis") == "X":
             break
+    assert page.evaluate(f"{PANEL}.mover.gizmo.axis") == "X"
     page.mouse.down()
     for away in (40, 80, 120):
-        page.mouse.move(x + away, y - radius)
+        move_pointer(page, x + away, y - radius)
     (handle,) = page.evaluate(f"{PANEL}.rowHandles()")
     assert handle["pivot"] == pytest.approx(pivot)
     assert np.abs(handle["axis"]) == pytest.approx([1, 0, 0], abs=1e-9)

@@ -28,8 +28,8 @@ from eigenshape_studio.workspace import Answer
 SCRIPT = """
 import sys
 from functools import partial
-from eigenshape_studio import server
-server.HEADER_SECONDS = 1.0
+from eigenshape_studio import listening, server
+listening.HEADER_SECONDS = 1.0
 server.Rules = partial(server.Rules, most_bytes=1 << 20, pause=0.5, deadline=2.0)
 server.serve(sys.argv[1], browse=False, announce=partial(print, flush=True))
 """
@@ -70,6 +70,10 @@ class Server:
             except (BrokenPipeError, ConnectionResetError):
                 pass
             return status_of(connection)
+
+    def opening(self, data, name="a.ply"):
+        """Return a request that opens a mesh."""
+        return change_request(self, {"kind": "open", "name": name}, file=data)
 
     def request(self, method="POST", path="/api/meta", body=None, drop=(), **changes):
         """Return a request as the page sends it, with some headers changed or dropped."""
@@ -198,10 +202,6 @@ def change_request(server, meta, **arrays):
     return server.request(path="/api/finish", body=encode(meta, kinds))
 
 
-def opening(server, data, name="a.ply"):
-    return change_request(server, {"kind": "open", "name": name}, file=data)
-
-
 def message(header):
     text = header if isinstance(header, bytes) else json.dumps(header).encode()
     text += b" " * (-(4 + len(text)) % 8)
@@ -310,19 +310,18 @@ HOSTILE = {
     "an unknown change": lambda s: change_request(s, {"kind": "__class__"}),
     "a whole number without end": lambda s: change_request(s, {"kind": "solve", "k": 10**300}),
     # meshes
-    "a mesh with NaN": lambda s: opening(s, ply_of("nan 0 0\n1 0 0\n0 1 0\n")),
-    "a mesh with infinity": lambda s: opening(s, ply_of("1e999 0 0\n1 0 0\n0 1 0\n")),
-    "a mesh beyond single precision": lambda s: opening(s, ply_of("1e300 0 0\n1 0 0\n0 1 0\n")),
-    "a face without its vertex": lambda s: opening(s, ply_of(GOOD, "3 0 1 9")),
-    "a face with a negative vertex": lambda s: opening(s, ply_of(GOOD, "3 0 1 -1")),
-    "more vertices than there are": lambda s: opening(s, ply_of(GOOD, n_vertices=10**12)),
-    "a polygon without end": lambda s: opening(s, ply_of(GOOD, "4000000000 0 1 2")),
-    "a mesh without faces": lambda s: opening(s, ply_of(GOOD, "", n_faces=0)),
-    "an STL that ends early": lambda s: opening(s, bytes(80) + struct.pack("<I", 9), "a.stl"),
-    "an empty file": lambda s: opening(s, b""),
-    "a program": lambda s: opening(s, b"MZ" + bytes(99), "a.exe"),
-    "a file that names another": lambda s: opening(
-        s,
+    "a mesh with NaN": lambda s: s.opening(ply_of("nan 0 0\n1 0 0\n0 1 0\n")),
+    "a mesh with infinity": lambda s: s.opening(ply_of("1e999 0 0\n1 0 0\n0 1 0\n")),
+    "a mesh beyond single precision": lambda s: s.opening(ply_of("1e300 0 0\n1 0 0\n0 1 0\n")),
+    "a face without its vertex": lambda s: s.opening(ply_of(GOOD, "3 0 1 9")),
+    "a face with a negative vertex": lambda s: s.opening(ply_of(GOOD, "3 0 1 -1")),
+    "more vertices than there are": lambda s: s.opening(ply_of(GOOD, n_vertices=10**12)),
+    "a polygon without end": lambda s: s.opening(ply_of(GOOD, "4000000000 0 1 2")),
+    "a mesh without faces": lambda s: s.opening(ply_of(GOOD, "", n_faces=0)),
+    "an STL that ends early": lambda s: s.opening(bytes(80) + struct.pack("<I", 9), "a.stl"),
+    "an empty file": lambda s: s.opening(b""),
+    "a program": lambda s: s.opening(b"MZ" + bytes(99), "a.exe"),
+    "a file that names another": lambda s: s.opening(
         json.dumps({"asset": {"version": "2.0"}, "buffers": [{"uri": "/etc/passwd", "byteLength": 9}]}).encode(),
         "a.gltf",
     ),

@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 import numpy as np
 import pytest
-from browser import build_page, find, start_browser
+from browser import build_page, find
 from conftest import stretched_ball
 from matplotlib.image import imread
 
@@ -128,22 +128,21 @@ def lab(tmp_path):
 
 
 @pytest.mark.long
-def test_jupyterlab_shows_the_widget(lab):
+def test_jupyterlab_shows_the_widget(lab, browser):
     pytest.importorskip("jupyterlab")
-    with start_browser() as browser:
-        page = browser.new_page(viewport={"width": 1280, "height": 900})
-        seen = []
-        page.on("pageerror", lambda error: seen.append(str(error)))
-        page.goto(lab)
-        page.locator(".jp-Notebook .jp-Cell").first.click(timeout=60_000)
-        # A cell that is run before the kernel has answered is sometimes never sent.
-        page.locator(".jp-Notebook-ExecutionIndicator[data-status=idle]").wait_for(timeout=120_000)
-        page.keyboard.press("Shift+Enter")
-        canvas = page.locator(".jp-OutputArea canvas").first
-        canvas.wait_for(timeout=120_000)
-        find(page, "counts").get_by_text("642 vertices").wait_for(timeout=60_000)
-        find(page, "tab-spectrum").click()
-        find(page, "panel-spectrum").get_by_text("none is missing").wait_for(timeout=60_000)
-        shown = imread(BytesIO(canvas.screenshot()))
-        assert shown.std() > 0.05  # the shape, and not one color
-        assert not seen, seen
+    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    seen = []
+    page.on("pageerror", lambda error: seen.append(str(error)))
+    page.goto(lab)
+    page.locator(".jp-Notebook .jp-Cell").first.click(timeout=60_000)
+    # A cell that is run before the kernel has answered is sometimes never sent.
+    page.locator(".jp-Notebook-ExecutionIndicator[data-status=idle]").wait_for(timeout=120_000)
+    page.keyboard.press("Shift+Enter")
+    canvas = page.locator(".jp-OutputArea canvas").first
+    canvas.wait_for(timeout=120_000)
+    find(page, "counts").get_by_text("642 vertices").wait_for(timeout=60_000)
+    find(page, "tab-spectrum").click()
+    find(page, "panel-spectrum").get_by_text("none is missing").wait_for(timeout=60_000)
+    shown = imread(BytesIO(canvas.screenshot()))
+    assert shown.std() > 0.05  # the shape, and not one color
+    assert not seen, seen

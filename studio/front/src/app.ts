@@ -1,10 +1,10 @@
 /** The window: viewer on the left, panels on the right, one line of status below. */
 
-import type { Backend, Change, Finished, State } from "./core/backend";
+import type { Backend, Change, State } from "./core/backend";
 import markup from "./app.html?raw";
 import { download, Form, h, type NamedFile } from "./core/dom";
 import { Viewer, type View } from "./core/viewer";
-import type { Arrays } from "./core/wire";
+import type { Arrays, TypedArray } from "./core/wire";
 import style from "./style.css?inline";
 
 /** What survives a reload of the page, in the storage of the tab. */
@@ -90,7 +90,8 @@ export class Studio {
   }
 
   async start(): Promise<void> {
-    await this.run("Loading the shape", this.first.then((state) => this.show(state)));
+    const loading = this.first.then((state) => this.show(state)).then(() => true);
+    if (!(await this.run("Loading the shape", loading))) return;
     const view = this.settings.get<View | null>("view", null);
     if (view && view.shape === this.state.shape) this.viewer.setView(view);
     for (const panel of this.panels) this.addPanel(panel);
@@ -102,31 +103,27 @@ export class Studio {
 
   /** Ask for the state, load what changed, and refresh all panels; again while something runs. */
   async refresh(): Promise<void> {
-    await this.load();
+    await this.show(await this.backend.meta());
     this.refreshPanels();
   }
 
-  /** Make a change on the server, and show its result and its warnings. */
-  async change(change: Change, text: string, files?: Arrays): Promise<Finished> {
+  /** Make a change on the server, show its result and its warnings; return whether it was made. */
+  async change(change: Change, text: string, files?: Arrays): Promise<boolean> {
     const done = await this.run(text, this.backend.finish(change, files));
+    if (!done) return false;
     await this.show(done.state, done.vertices);
     this.refreshPanels();
     if (done.warnings.length) this.say(done.warnings.join(" "));
-    return done;
+    return true;
   }
 
   /** Let a file become the shape; return whether it did. */
-  async openFile(file: NamedFile): Promise<boolean> {
-    const change = { kind: "open", name: file.name };
-    const opening = this.change(change, `Reading ${file.name}`, { file: file.bytes });
-    return opening.then(
-      () => true,
-      () => false, // the status line has said what failed
-    );
+  openFile({ name, bytes }: NamedFile): Promise<boolean> {
+    return this.change({ kind: "open", name }, `Reading ${name}`, { file: bytes });
   }
 
-  /** Show `text` as the status while `work` runs, and its error if it fails. */
-  async run<T>(text: string, work: Promise<T>): Promise<T> {
+  /** Show `text` as the status while `work` runs; return null if it fails, and say why. */
+  async run<T>(text: string, work: Promise<T>): Promise<T | null> {
     this.busy += 1;
     this.say(`${text} …`);
     this.main.classList.add("busy");
@@ -136,7 +133,7 @@ export class Studio {
       return result;
     } catch (error) {
       this.fail(error);
-      throw error;
+      return null;
     } finally {
       this.busy -= 1;
       this.main.classList.toggle("busy", this.busy > 0);
@@ -153,10 +150,14 @@ export class Studio {
     this.status.textContent = this.status.title = text;
   }
 
+  /** Return an array that the library computes, or null if it cannot; the status says why. */
+  load<T extends TypedArray>(name: string, text: string): Promise<T | null> {
+    return this.run(text, this.backend.array<T>(name));
+  }
+
   /** Save a file that the library writes: a mesh format, or the edits. */
   async save(kind: string, ending: string): Promise<void> {
-    const wanted = this.backend.array<Uint8Array<ArrayBuffer>>(`file/${kind}`);
-    const file = await this.run("Writing the file", wanted).catch(() => null);
+    const file = await this.load<Uint8Array<ArrayBuffer>>(`file/${kind}`, "Writing the file");
     if (file) download(file, this.fileName(ending));
   }
 
@@ -218,10 +219,6 @@ export class Studio {
     ]);
   }
 
-  private async load(): Promise<void> {
-    await this.show(await this.backend.meta());
-  }
-
   /** Take a state, and load the mesh or the vertices if they are others than the viewer has. */
   private async show(state: State, vertices?: Float32Array<ArrayBuffer>): Promise<void> {
     this.state = state;
@@ -242,6 +239,9 @@ export class Studio {
     this.page.text("counts", `${nVertices} vertices · ${nFaces} faces`);
     clearTimeout(this.timer);
     const { health, spectrum, parts, deformation } = state;
+    // The repair that turns faces helps unless all of them face outward.
+    const outward = health.findings.every(({ name }) => name !== "orient");
+    this.viewer.setSolid(health.closed === true && outward);
     if ([health, spectrum, parts, deformation].some(({ status }) => status === "running"))
       this.timer = window.setTimeout(() => this.refresh().catch((error) => this.fail(error)), POLL);
   }
@@ -250,10 +250,10 @@ export class Studio {
     for (const { panel } of this.pages.values()) panel.refresh(this.state);
   }
 
-  private step(kind: "undo" | "redo"): void {
+  step(kind: "undo" | "redo"): void {
     const { n_edits, n_redoable } = this.state.deformation;
     if (kind === "undo" ? n_edits : n_redoable)
-      this.change({ kind }, kind === "undo" ? "Undoing" : "Redoing").catch(() => {});
+      this.change({ kind }, kind === "undo" ? "Undoing" : "Redoing");
   }
 
   private setTheme(dark: boolean): void {

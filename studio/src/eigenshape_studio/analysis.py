@@ -46,7 +46,9 @@ class Analysis:
         self.health: Job[dict[str, Any]] = Job(self._assess_health, shared=shared)
         self.spectrum: Job[es.Spectrum] = Job(self._solve_default, shared=shared)
         solved = self.spectrum
-        self.rig: Job[es.deformation.EigenRig] = Job(lambda _: _rig(mesh, solved), shared=shared)
+        self.rig: Job[es.deformation.EigenRig] = Job(
+            lambda _: self._prepare_rig(solved), shared=shared
+        )
         self.parts: Job[es.features.PartDecomposition] | None = None
         self.brackets: es.spectral.Brackets | None = None
 
@@ -133,16 +135,17 @@ class Analysis:
         wanted = min(self._n_modes + n_components - 1, self.mesh.n_vertices)
         return _solve(self.mesh, wanted, progress)
 
+    def _prepare_rig(self, solved: Job[es.Spectrum]) -> es.deformation.EigenRig:
+        self._upright.wait()
+        warm_up()  # while the spectrum is computed
+        solved.wait()
+        if solved.result is None:
+            raise es.EigenshapeError(solved.message or "The spectrum was cancelled.")
+        return es.rig_shape(self.mesh, solved.result)
+
 
 def _solve(mesh: es.TriangleMesh, k: int, progress: Progress) -> es.Spectrum:
     return es.solve_spectrum(es.cotangent_laplacian(mesh), k, progress=progress)
-
-
-def _rig(mesh: es.TriangleMesh, solved: Job[es.Spectrum]) -> es.deformation.EigenRig:
-    solved.wait()
-    if solved.result is None:
-        raise es.EigenshapeError(solved.message or "The spectrum was cancelled.")
-    return es.rig_shape(mesh, solved.result)
 
 
 def frame_shape(mesh: es.TriangleMesh, view: View = "auto", up: Up = "auto") -> dict[str, Any]:
@@ -162,15 +165,18 @@ def upright_view(
 
     The page looks from the front left and a little from above, so a view changes the side alone.
     """
+    camera = es.plot.three_quarter_view(mesh, up=up)
     if isinstance(up, str):
         # The usual camera stands upright: its row to the right is orthogonal to the upward axis.
-        right, down, _ = es.plot.three_quarter_view(mesh, up=up).rotation
+        right, down, _ = camera.rotation
         level = np.abs(right) < LEVEL
         axis = np.argmax(np.where(level, np.abs(down), -np.inf))
         upward = -np.sign(down[axis]) * np.eye(3)[axis] if level.any() else -down
     else:
         upward = np.asarray(up, dtype=np.float64) / np.linalg.norm(up)
-    _, down, towards = es.plot.aim_camera(mesh, view=view, up=up).rotation
+    if not (isinstance(view, str) and view == "auto"):
+        camera = es.plot.aim_camera(mesh, view=view, up=up)
+    _, down, towards = camera.rotation
     # It looks from the front, turned to the left about that axis.
     along = towards - (towards @ upward) * upward
     if np.linalg.norm(along) < LEVEL:  # from above or below: the front is beside the viewer
@@ -181,15 +187,11 @@ def upright_view(
 
 
 @cache
-def warm_up() -> Job[None]:
+def warm_up() -> None:
     """Load or compile the loops that the first drag takes, on a small shape, once a process.
 
     Without this the first drag took 11 s where nothing was compiled before, and then 1 s.
     """
-    return Job(lambda _: _drag_a_ball(), shared=True)
-
-
-def _drag_a_ball() -> None:
     ball = es.icosphere(1)
     session = es.DeformationSession(es.rig_shape(ball))
     session.drag(ball.vertices[:, 2] > 0, es.Translation([0.0, 0.0, 0.1]))

@@ -1,12 +1,14 @@
-"""Who may talk to the studio: checks of every request, before it is routed.
+"""Who may talk to the studio or the service: checks of every request, before it is routed.
 
 The page listens on this machine, where any web page that is open in a browser can send requests to
 it. A request must therefore name this server (against names that are bound anew to 127.0.0.1), come
-from the studio's own page (Origin, Sec-Fetch-Site), and bring the token of the printed address.
+from the server's own page (Origin, Sec-Fetch-Site), and bring the token: pages as a cookie, which
+the printed address sets, and programs in the header `Authorization: Bearer TOKEN`.
 """
 
 import asyncio
 import ipaddress
+import json
 import secrets
 from collections.abc import Awaitable, Callable, Collection, MutableMapping
 from dataclasses import dataclass
@@ -20,7 +22,6 @@ Receive = Callable[[], Awaitable[Message]]
 Send = Callable[[Message], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
-COOKIE = "eigenshape-studio"
 MESSAGE_TYPE = b"application/octet-stream"
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
@@ -54,6 +55,14 @@ class Rules:
         Of the body of one request.
     pause, deadline : float
         Seconds without a byte, and in all, after which the sender of a body is given up.
+    name : str
+        What this server is, for its messages and for the name of its cookie.
+    verb : str
+        The verb of the command that printed the address.
+    open_paths : collection of str
+        That GET reads without the token.
+    json_errors : bool
+        Whether refusals are JSON objects with a text under "error". Otherwise they are plain text.
     """
 
     token: str
@@ -63,6 +72,10 @@ class Rules:
     most_bytes: int = 256 << 20
     pause: float = 10.0
     deadline: float = 120.0
+    name: str = "studio"
+    verb: str = "studio"
+    open_paths: Collection[str] = ()
+    json_errors: bool = False
 
 
 class RefusedError(Exception):
@@ -74,7 +87,7 @@ class RefusedError(Exception):
 
 
 class Guard:
-    """An ASGI application that lets the requests of the studio's own page through to another."""
+    """An ASGI application that lets requests with the token through to another."""
 
     def __init__(self, app: App, rules: Rules) -> None:
         self.app, self.rules = app, rules
@@ -84,16 +97,17 @@ class Guard:
         if scope["type"] == "lifespan":
             await self.app(scope, receive, send)
             return
-        if scope["type"] != "http":  # the studio has no web sockets
+        if scope["type"] != "http":  # there are no web sockets
             await send({"type": "websocket.close", "code": 1008})
             return
-        answered = _Answer(send)
+        answered = _Answer(send, json_errors=self.rules.json_errors)
         try:
             self._check_source(scope)
             if self._is_entrance(scope):
                 await self._enter(answered)
                 return
-            self._check_token(scope)
+            if scope["method"] != "GET" or scope["path"] not in self.rules.open_paths:
+                self._check_token(scope)
             self._check_kind(scope)
             body = await self._read_body(receive)
             await self.app(scope, _replay(body, receive), answered)
@@ -104,12 +118,11 @@ class Guard:
         """Refuse requests that another page, or for another name, sends."""
         host = _only(scope, b"host")
         if not self._is_ours(host):
-            raise RefusedError(421, "This address is not that of the studio.")
+            raise RefusedError(421, f"This address is not that of the {self.rules.name}.")
         origin = _only(scope, b"origin", default=f"http://{host}")
-        if origin != f"http://{host}":
-            raise RefusedError(403, "Only the studio's own page may send requests.")
-        if _only(scope, b"sec-fetch-site", default="none") not in ("same-origin", "none"):
-            raise RefusedError(403, "Only the studio's own page may send requests.")
+        site = _only(scope, b"sec-fetch-site", default="none")
+        if origin != f"http://{host}" or site not in ("same-origin", "none"):
+            raise RefusedError(403, f"Only the {self.rules.name}'s own page may send requests.")
 
     def _is_ours(self, host: str) -> bool:
         if host in self.rules.hosts:
@@ -134,12 +147,12 @@ class Guard:
         """Turn the token of the address into a cookie, so that it leaves the address bar."""
         cookie = f"{self._cookie_name}={self.rules.token}; Path=/; HttpOnly; SameSite=Strict"
         headers = [(b"set-cookie", cookie.encode()), (b"location", b"/")]
-        await answered.text(303, "Opening the studio.", headers)
+        await answered.text(303, f"Opening the {self.rules.name}.", headers)
 
     @property
     def _cookie_name(self) -> str:
         # Cookies belong to a host whatever the port: two studios must not take each other's.
-        return f"{COOKIE}-{self.rules.port}"
+        return f"eigenshape-{self.rules.name}-{self.rules.port}"
 
     def _check_token(self, scope: Scope) -> None:
         given = [
@@ -148,8 +161,17 @@ class Guard:
             for name, _, value in (part.strip().partition("=") for part in header.split(";"))
             if name == self._cookie_name
         ]
+        # No page of another site can send this header: it would take a permission by CORS.
+        scheme, _, bearer = _only(scope, b"authorization", default="").partition(" ")
+        if scheme.lower() == "bearer":
+            given.append(bearer.strip())
         if not any(self._is_token(value) for value in given):
-            raise RefusedError(403, "Open the address that `eigenshape studio` has printed.")
+            raise RefusedError(
+                403,
+                "A request must bring the token. Open the address that "
+                f"`eigenshape {self.rules.verb}` has printed, or send the header "
+                "`Authorization: Bearer TOKEN`.",
+            )
 
     def _is_token(self, given: str) -> bool:
         return secrets.compare_digest(given.encode(), self.rules.token.encode())
@@ -159,7 +181,7 @@ class Guard:
         if scope["method"] in ("GET", "HEAD"):
             return
         if scope["method"] != "POST":
-            raise RefusedError(405, "The studio takes GET and POST.")
+            raise RefusedError(405, f"The {self.rules.name} takes GET and POST.")
         # A form of another page cannot have this type.
         if _only(scope, b"content-type").encode() != MESSAGE_TYPE:
             raise RefusedError(415, "The body must be application/octet-stream.")
@@ -204,8 +226,9 @@ def _replay(body: bytes, receive: Receive) -> Receive:
 class _Answer:
     """A `send` that adds the headers of every answer, and that knows whether one has begun."""
 
-    def __init__(self, send: Send) -> None:
-        self._send, self._begun = send, False
+    def __init__(self, send: Send, *, json_errors: bool) -> None:
+        self._send, self._json_errors = send, json_errors
+        self._begun = False
 
     async def __call__(self, message: Message) -> None:
         if message["type"] == "http.response.start":
@@ -217,11 +240,22 @@ class _Answer:
     async def refuse(self, error: RefusedError) -> None:
         if not self._begun:
             # The rest of the body is not read, so the connection cannot serve another request.
-            await self.text(error.status, error.reason, [(b"connection", b"close")])
+            closing = [(b"connection", b"close")]
+            if self._json_errors:
+                text, kind = json.dumps({"error": error.reason}), b"application/json"
+                await self.text(error.status, text, closing, kind)
+            else:
+                await self.text(error.status, error.reason, closing)
 
-    async def text(self, status: int, text: str, headers: list[tuple[bytes, bytes]]) -> None:
+    async def text(
+        self,
+        status: int,
+        text: str,
+        headers: list[tuple[bytes, bytes]],
+        media_type: bytes = b"text/plain; charset=utf-8",
+    ) -> None:
         data = f"{text}\n".encode()
-        kind = (b"content-type", b"text/plain; charset=utf-8")
+        kind = (b"content-type", media_type)
         size = (b"content-length", str(len(data)).encode())
         await self(
             {"type": "http.response.start", "status": status, "headers": [kind, size, *headers]}

@@ -4,6 +4,8 @@ import threading
 from collections.abc import Callable
 from typing import Any, Generic, Literal, TypeVar
 
+from eigenshape_studio.memory import trim_memory
+
 T = TypeVar("T")
 Status = Literal["none", "running", "ready", "failed"]
 Progress = Callable[[float, str], None]
@@ -71,6 +73,7 @@ class Job(Generic[T]):
             self.progress, self.status, self.message = 1.0, "ready", ""
         finally:
             self._done.set()
+            trim_memory()
 
 
 NO_JOB: dict[str, Any] = {"status": "none", "progress": 0.0, "message": ""}

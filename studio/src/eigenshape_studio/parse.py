@@ -29,7 +29,7 @@ class Limits:
     memory : int
         Address space in bytes. The library takes about 1 GB of it before it reads anything.
     n_faces : int
-        Faces that the studio shows at most.
+        Faces that a mesh may have.
     """
 
     seconds: float = 60.0
@@ -41,6 +41,15 @@ def display_name(name: object) -> str:
     """Return the last part of a file's name, printable and short."""
     text = PurePosixPath(str(name).replace("\\", "/")).name
     return "".join(letter for letter in text if letter.isprintable())[:LONGEST_NAME] or "shape"
+
+
+def mesh_suffix(name: str) -> str:
+    """Return the suffix of a mesh file's name; raise FileFormatError if it is not one of a mesh."""
+    suffix = Path(name).suffix.lower()
+    if suffix not in es.io.MESH_FORMATS:
+        known = ", ".join(es.io.MESH_FORMATS)
+        raise es.FileFormatError(f"A mesh file must end in {known}; {display_name(name)} does not.")
+    return suffix
 
 
 def parse_mesh(name: str, data: bytes, limits: Limits | None = None) -> es.TriangleMesh:
@@ -63,10 +72,7 @@ def parse_mesh(name: str, data: bytes, limits: Limits | None = None) -> es.Trian
         If the suffix is unknown, the file does not hold a mesh, or a limit is reached.
     """
     limits = limits or Limits()
-    suffix = Path(name).suffix.lower()
-    if suffix not in es.io.MESH_FORMATS:
-        known = ", ".join(es.io.MESH_FORMATS)
-        raise es.FileFormatError(f"A mesh file must end in {known}; {display_name(name)} does not.")
+    suffix = mesh_suffix(name)
     command = [sys.executable, "-m", "eigenshape_studio.parse", suffix]
     numbers = [limits.seconds, limits.memory, limits.n_faces]
     try:
@@ -97,7 +103,10 @@ def main() -> None:
     suffix, seconds, memory, n_faces = sys.argv[1:]
     _limit(float(seconds), int(memory))
     try:
-        mesh = _read(suffix, sys.stdin.buffer.read(), int(n_faces))
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, f"shape{suffix}")
+            path.write_bytes(sys.stdin.buffer.read())
+            mesh = read_upload(path, int(n_faces))
         message = encode({}, {"vertices": mesh.vertices, "faces": mesh.faces.astype("<u4")})
     except MemoryError:
         message = encode({"error": "The file takes more memory than a mesh may."})
@@ -117,19 +126,23 @@ def _limit(seconds: float, memory: int) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def _read(suffix: str, data: bytes, n_faces: int) -> es.TriangleMesh:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, f"shape{suffix}")
-        path.write_bytes(data)
-        try:
-            mesh = es.read_mesh(path)
-        except es.EigenshapeError as error:
-            # The folder is ours; the person knows the file by another name.
-            text = str(error).replace(str(path), "The file")
-            raise es.FileFormatError(text) from error
+def read_upload(path: Path, n_faces: int) -> es.TriangleMesh:
+    """Read a file from outside, whose path is ours and is not shown in errors.
+
+    Raises
+    ------
+    FileFormatError
+        If it does not hold a mesh, has too many faces, or coordinates beyond single precision.
+    """
+    try:
+        mesh = es.read_mesh(path)
+    except es.EigenshapeError as error:
+        # The folder is ours; the person knows the file by another name.
+        text = str(error).replace(str(path), "The file")
+        raise es.FileFormatError(text) from error
     if mesh.n_faces > n_faces:
         raise es.FileFormatError(
-            f"The studio shows at most {n_faces:,} faces; the file has {mesh.n_faces:,}."
+            f"A mesh may have {n_faces:,} faces; the file has {mesh.n_faces:,}."
         )
     if not np.abs(mesh.vertices).max() < np.finfo(np.float32).max:
         raise es.FileFormatError("Coordinates must fit into single precision; some do not.")

@@ -1,42 +1,37 @@
 """The studio in the browser: a server on this machine, one workspace for each tab."""
 
-import asyncio
 import re
 import secrets
-import socket
 import threading
-import webbrowser
 from collections import OrderedDict
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import anyio.to_thread
-import uvicorn
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
-from uvicorn.protocols.http.h11_impl import H11Protocol
 
 import eigenshape as es
-from eigenshape_studio.analysis import warm_up
 from eigenshape_studio.bundle import NotBuiltError, read_static
-from eigenshape_studio.guard import App, Guard, Rules, local_hosts
+from eigenshape_studio.guard import App, Guard, Rules
+from eigenshape_studio.listening import (
+    listen,
+    own_hosts,
+    require_permission,
+    run_app,
+    shown_address,
+)
+from eigenshape_studio.memory import share_one_arena, trim_memory
 from eigenshape_studio.workspace import Answer, Workspace, error_message
 
 FILES = {"index.html": "text/html; charset=utf-8", "studio.js": "text/javascript; charset=utf-8"}
-LOCAL = ("127.0.0.1", "localhost")
 TAB = re.compile(r"[A-Za-z0-9_-]{8,64}")
 MOST_TABS = 8  # of 25,000 vertices, a tab with a spectrum of its own takes about 200 MB
 MOST_CALLS = 8  # of one tab at the same time; the panels together send fewer
 N_THREADS = 32  # for calls; MOST_CALLS of them for one tab leave enough for the others
-MOST_CONNECTIONS = 128
-HEADER_SECONDS = 10.0  # within which a header must have come, once it or its connection has begun
-# A connection without a request is kept longer than browsers keep it (Chromium for 300 s). Otherwise
-# the server may close it while a call is on its way, and Firefox does not send a POST a second time.
-KEEP_SECONDS = 330
+LARGE_CALLS = ("finish", "query")  # which take and free much memory
 
 
 class Tabs:
@@ -79,33 +74,6 @@ class Tabs:
                 del self._calls[tab]
 
 
-class StudioProtocol(H11Protocol):
-    """HTTP that closes connections which do not send the header of a request in time.
-
-    The first request is due when the connection begins, each later one when its first byte comes.
-    """
-
-    def connection_made(self, transport: Any) -> None:
-        """Expect the first header."""
-        super().connection_made(transport)
-        self._expect_header()
-
-    def data_received(self, data: bytes) -> None:
-        """Expect the rest of a header that begins."""
-        if self.timeout_keep_alive_task is not None:  # no request was under way
-            self._expect_header()
-        super().data_received(data)
-
-    def _expect_header(self) -> None:
-        before = self.cycle  # a complete header begins another one
-
-        def close_if_late() -> None:
-            if self.cycle is before and not self.transport.is_closing():
-                self.transport.close()
-
-        self.loop.call_later(HEADER_SECONDS, close_if_late)
-
-
 def make_app(first: Workspace, rules: Rules) -> App:
     """Return the application: the page, its bundle, and the five calls, behind the guard.
 
@@ -127,6 +95,13 @@ def make_app(first: Workspace, rules: Rules) -> App:
         except NotBuiltError as error:
             return PlainTextResponse(f"{error}\n", 500)
 
+    def answer(tab: str, name: str, body: bytes) -> Answer:
+        try:
+            return tabs.workspace(tab).answer(name, body)
+        finally:
+            if name in LARGE_CALLS:
+                trim_memory()
+
     async def call(request: Request) -> Response:
         tab = request.headers.get("x-eigenshape-tab", "")
         if not TAB.fullmatch(tab):
@@ -135,13 +110,12 @@ def make_app(first: Workspace, rules: Rules) -> App:
         if not tabs.begin(tab):
             return _respond(Answer(error_message("BusyError", "This tab has too many calls."), 429))
         try:
-            name = request.path_params["call"]
-            answer = await anyio.to_thread.run_sync(
-                lambda: tabs.workspace(tab).answer(name, body), limiter=limiter
+            found = await anyio.to_thread.run_sync(
+                answer, tab, request.path_params["call"], body, limiter=limiter
             )
         finally:
             tabs.end(tab)
-        return _respond(answer)
+        return _respond(found)
 
     routes = [
         Route("/", show_file, methods=["GET"]),
@@ -192,51 +166,16 @@ def serve(  # noqa: PLR0913  one for each option of the command
     OSError
         If the port is taken.
     """
-    if host not in LOCAL and not allow_remote:
-        raise es.InvalidParameterError(
-            f"The studio listens on this machine alone, at {LOCAL[0]}; the address is {host}. "
-            "Pass allow_remote=True (--allow-remote) if others may use it."
-        )
+    require_permission(host, "studio", allow_remote=allow_remote)
+    share_one_arena()
     first = _first_workspace(mesh, index)
-    warm_up()
-    listening = _listen(host, port)
+    listening = listen(host, port)
     port = listening.getsockname()[1]
     token = secrets.token_urlsafe(32)
-    hosts = local_hosts(port)
-    if allow_remote:
-        hosts += tuple(f"{name}:{port}" for name in (host, socket.gethostname()))
-    rules = Rules(token, frozenset(hosts), port, any_address=allow_remote)
-    shown = host if host not in ("0.0.0.0", "::") else socket.gethostname()
-    url = f"http://{shown}:{port}/?token={token}"
-    config = uvicorn.Config(
-        make_app(first, rules),
-        http=StudioProtocol,
-        ws="none",
-        lifespan="off",
-        log_level="error",
-        access_log=False,
-        server_header=False,
-        date_header=False,
-        proxy_headers=False,
-        limit_concurrency=MOST_CONNECTIONS,
-        timeout_keep_alive=KEEP_SECONDS,
-        h11_max_incomplete_event_size=32 << 10,
-        timeout_graceful_shutdown=2,
-    )
-    server = uvicorn.Server(config)
-
-    async def run() -> None:
-        running = asyncio.create_task(server.serve(sockets=[listening]))
-        while not server.started and not running.done():
-            await asyncio.sleep(0.01)
-        announce(url)
-        if browse:
-            with suppress(webbrowser.Error):
-                webbrowser.open(url)
-        await running
-
-    with suppress(KeyboardInterrupt):
-        asyncio.run(run())
+    hosts = own_hosts(host, port, allow_remote=allow_remote)
+    rules = Rules(token, hosts, port, any_address=allow_remote)
+    url = f"{shown_address(host, port)}/?token={token}"
+    run_app(make_app(first, rules), listening, lambda: announce(url), url if browse else None)
     first.close()
 
 
@@ -250,17 +189,3 @@ def _first_workspace(
     if isinstance(mesh, str | Path):
         return Workspace(es.read_mesh(mesh), Path(mesh).name, index=index, shared=True)
     return Workspace(mesh, index=index, shared=True)
-
-
-def _listen(host: str, port: int) -> socket.socket:
-    """Return a socket that listens, so that the port is known before the server starts."""
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    # With the protocol named, asyncio sends small answers at once (TCP_NODELAY): 40 ms less a call.
-    listening = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
-    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listening.bind((host, port))
-    except OSError:
-        listening.close()
-        raise
-    return listening

@@ -10,7 +10,6 @@ import traitlets
 
 import eigenshape as es
 from eigenshape.plot.camera import Up, View
-from eigenshape_studio.analysis import warm_up
 from eigenshape_studio.bundle import bundle_text
 from eigenshape_studio.workspace import Workspace
 
@@ -42,7 +41,6 @@ class ShapeWidget(anywidget.AnyWidget):
         height: int = 640,
     ) -> None:
         self.workspace = Workspace(mesh, name, values=values, index=index)
-        warm_up()
         # Calls run beside the kernel's own thread, which stays free for the next cell.
         self._threads = ThreadPoolExecutor(max_workers=4, thread_name_prefix="studio")
         super().__init__(_esm=bundle_text(), height=height)

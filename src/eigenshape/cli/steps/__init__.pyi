@@ -10,7 +10,11 @@ from .heat import count_fragments as count_fragments
 from .heat import find_features as find_features
 from .heat import save_heat as save_heat
 from .indexing import describe_all as describe_all
-from .indexing import find_items as find_items
+from .indexing import find_doubles as find_doubles
+from .indexing import learn_codebook as learn_codebook
+from .indexing import parse_part as parse_part
+from .indexing import prune as prune
+from .indexing import worker_processes as worker_processes
 from .outputs import require_mesh_path as require_mesh_path
 from .outputs import require_output as require_output
 from .outputs import require_picture as require_picture
@@ -29,6 +33,9 @@ from .reading import read_partners as read_partners
 from .recipes import heat_recipe as heat_recipe
 from .recipes import index_recipe as index_recipe
 from .recipes import query_recipe as query_recipe
+from .records import count_shapes as count_shapes
+from .records import parse_filters as parse_filters
+from .records import record_facts as record_facts
 from .regions import parse_region as parse_region
 from .regions import parse_rotation as parse_rotation
 from .regions import parse_translation as parse_translation
@@ -39,6 +46,7 @@ from .sheets import CAPTION as CAPTION
 from .sheets import ColoredQuery as ColoredQuery
 from .sheets import color_query as color_query
 from .sheets import contact_sheet as contact_sheet
+from .sheets import explanation as explanation
 from .spectra import boundary_points as boundary_points
 from .spectra import draw_eigenfunctions as draw_eigenfunctions
 from .spectra import draw_eigenvalues as draw_eigenvalues
@@ -48,6 +56,5 @@ from .spectra import require_bracketable as require_bracketable
 from .spectra import require_drawable as require_drawable
 from .spectra import spectrum_facts as spectrum_facts
 from .spectra import usual_pairs as usual_pairs
-from .studio import studio_module as studio_module
 from .views import Side as Side
 from .views import parse_side as parse_side

@@ -1,70 +1,137 @@
-"""Finding the meshes of folders, and adding them to an index."""
+"""Describing files in processes of this machine or of a cluster, and adding them to an index."""
 
-from collections import Counter
+import re
 from collections.abc import Iterator, Sequence
-from functools import partial
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
-from eigenshape._errors import InvalidParameterError
+from eigenshape._errors import InvalidParameterError, MissingExtraError
 from eigenshape._workers import Item, Workers
-from eigenshape.cli.console import batch_reporter, progress_bar
-from eigenshape.cli.steps.reading import read_repaired
-from eigenshape.io.parsing import MESH_FORMATS
+from eigenshape.cli.console import batch_reporter, err, progress_bar
+from eigenshape.io.mesh_files import read_mesh
 from eigenshape.retrieval.kinds import AnyRecipe
-from eigenshape.retrieval.store.batch import BatchReport, build_index
+from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook
+from eigenshape.retrieval.patches.descriptor import PatchRecipe
+from eigenshape.retrieval.store.batch import BatchReport, build_index, train_codebook_from_files
 from eigenshape.retrieval.store.index import ShapeIndex
 
+BYTES = 1e9  # of a gigabyte
+RETRIES = 3  # workers of a cluster that a task may lose before it counts as failed
 
-def find_items(sources: Sequence[Path]) -> list[Item]:
-    """Return the meshes of files and folders, each with its name and class.
 
-    Raises
-    ------
-    InvalidParameterError
-        If two have the same name, or there are none.
-    """
-    items = [item for source in sources for item in _items_of(source)]
-    double = next(
-        (name for name, count in Counter(item.name for item in items).items() if count > 1), None
-    )
-    if double is not None:
+def parse_part(text: str | None) -> tuple[int, int] | None:
+    """Return the numbers of a part such as "3/64"."""
+    if text is None:
+        return None
+    found = re.fullmatch(r"(\d+)/(\d+)", text.strip())
+    if found is None or not 1 <= int(found[1]) <= int(found[2]):
         raise InvalidParameterError(
-            f"Names of shapes must differ; {double!r} comes twice. Give one folder that holds both."
+            f"--part takes the number of a part and the number of parts, such as 3/64; it is {text!r}."
         )
-    if not items:
-        raise InvalidParameterError(
-            f"There must be meshes ({', '.join(MESH_FORMATS)}) to index; {sources[0]} holds none."
-        )
-    return items
+    return int(found[1]), int(found[2])
 
 
-def _items_of(source: Path) -> Iterator[Item]:
-    if not source.is_dir():
-        yield Item(source.stem, source)
+@contextmanager
+def worker_processes(
+    count: int, timeout: float, memory: float | None, scheduler: str | None
+) -> Iterator[Workers]:
+    """Give the processes that describe files: of this machine, or of a Dask cluster."""
+    limit = None if memory is None else memory * BYTES
+    if scheduler is None:
+        yield Workers(count, timeout, limit)
         return
-    for path in sorted(source.rglob("*")):
-        if path.suffix.lower() in MESH_FORMATS:
-            below = path.relative_to(source)
-            yield Item(str(below.with_suffix("")), path, below.parent.name or None)
+    try:
+        from distributed import Client  # noqa: PLC0415 - an extra
+    except ModuleNotFoundError as error:
+        raise MissingExtraError(
+            "--scheduler needs dask; run: pip install 'eigenshape[cluster]'"
+        ) from error
+    try:
+        client: Any = Client(scheduler)
+    except (OSError, ValueError) as error:
+        raise InvalidParameterError(
+            f"--scheduler takes the address of a Dask scheduler that runs; {scheduler!r} does not "
+            f"answer: {error}."
+        ) from error
+    with client:
+        # Not pure: the same file may be described again after it has changed.
+        executor: Any = client.get_executor(pure=False, retries=RETRIES)
+        yield Workers(count, timeout, limit, executor)
 
 
 def describe_all(
     shelf: ShapeIndex,
     items: Sequence[Item],
-    recipe: AnyRecipe,
+    recipe: AnyRecipe | None,
     workers: Workers,
     *,
     repairs: tuple[str, ...] = (),
     n_views: int | None = None,
 ) -> BatchReport:
-    """Build an index with a progress bar, naming each file that fails as soon as it does."""
+    """Build an index with a progress bar, naming each file that fails as soon as it does.
+
+    Without a recipe, an index that has none learns a codebook.
+    """
+    learns = recipe is None and not shelf.recipes()
     with progress_bar("index") as progress:
-        return build_index(
+        report = build_index(
             shelf,
             items,
-            partial(read_repaired, names=repairs),
-            recipes=(recipe,),
+            read_mesh,
+            recipes=None if recipe is None else (recipe,),
+            learn=recipe is None,
+            repairs=repairs,
             n_views=n_views,
             workers=workers,
             callback=batch_reporter(progress),
         )
+    if learns:
+        comes_along = shelf.default_recipe() == PatchRecipe(default_codebook())
+        err.print(
+            "codebook: the one that comes with eigenshape, because there are too few shapes to learn from"
+            if comes_along
+            else "codebook: learned from the shapes of this index"
+        )
+    return report
+
+
+def learn_codebook(
+    items: Sequence[Item], workers: Workers, repairs: tuple[str, ...]
+) -> PatchCodebook:
+    """Learn a codebook with a progress bar."""
+    with progress_bar("codebook") as progress:
+        return train_codebook_from_files(
+            items, read_mesh, repairs=repairs, workers=workers, callback=batch_reporter(progress)
+        )
+
+
+def prune(shelf: ShapeIndex, sources: Sequence[Path]) -> list[str]:
+    """Remove the shapes whose files lay in some folders and are no longer there; name them."""
+    folders = [source.absolute() for source in sources if source.is_dir()]
+    gone = []
+    for record in shelf.records():
+        path = Path(record.source) if record.source else None
+        if path and any(path.is_relative_to(folder) for folder in folders) and not path.exists():
+            gone.append(record.name)
+    if gone:
+        shelf.remove(*gone)  # in one step: each change of an index waits for the disk
+    return gone
+
+
+def find_doubles(shelf: ShapeIndex, names: Sequence[str]) -> list[tuple[str, str]]:
+    """Pair each of some shapes with one of another name and the same content, if there is one.
+
+    A folder and one of its own folders name the same files differently, so both are indexed.
+    """
+    added = set(names)
+    records = sorted(shelf.records(), key=lambda record: record.name in added)
+    first: dict[str, str] = {}
+    pairs = []
+    for record in records:
+        if record.digest is None:
+            continue
+        known = first.setdefault(record.digest, record.name)
+        if known != record.name and record.name in added:
+            pairs.append((known, record.name))
+    return pairs

@@ -1,18 +1,16 @@
 """The recipe of each method of describing shapes, for an index or a query."""
 
-from collections.abc import Sequence
-from functools import partial
+from pathlib import Path
+from pickle import UnpicklingError
+from zipfile import BadZipFile
 
-from eigenshape._errors import StoreError
-from eigenshape._workers import Item, Workers
-from eigenshape.cli.console import batch_reporter, err, progress_bar
+from eigenshape._errors import FileFormatError, InvalidParameterError, StoreError
+from eigenshape.cli.console import err
 from eigenshape.cli.inputs import PATCHES, require_method
-from eigenshape.cli.steps.reading import read_repaired
 from eigenshape.retrieval.heat.recipe import PRESETS, HeatRecipe
 from eigenshape.retrieval.kinds import AnyRecipe
-from eigenshape.retrieval.patches.codebook import default_codebook
+from eigenshape.retrieval.patches.codebook import read_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
-from eigenshape.retrieval.store.batch import train_codebook_from_files
 from eigenshape.retrieval.store.index import ShapeIndex
 
 
@@ -23,30 +21,46 @@ def heat_recipe(name: str) -> HeatRecipe:
 
 
 def index_recipe(
-    shelf: ShapeIndex, name: str, items: Sequence[Item], repairs: tuple[str, ...], workers: Workers
-) -> AnyRecipe:
-    """Return the recipe of a method for an index; for patches, learn a codebook if it has none."""
+    shelf: ShapeIndex, name: str, codebook: Path | None, *, in_parts: bool
+) -> AnyRecipe | None:
+    """Return the recipe by which an index describes shapes, or None if it is to learn one."""
     if name != PATCHES:
-        return PRESETS[name]
-    recipe = _patch_recipe(shelf)
-    if recipe is None:
-        with progress_bar("codebook") as progress:
-            codebook = train_codebook_from_files(
-                items,
-                partial(read_repaired, names=repairs),
-                workers=workers,
-                callback=batch_reporter(progress),
+        if codebook is not None:
+            raise InvalidParameterError(
+                f"--codebook is for --method {PATCHES}; the method is {name}. Leave one of them out."
             )
+        return PRESETS[name]
+    kept = _patch_recipe(shelf)
+    if codebook is not None:
+        asked = _read_recipe(codebook)
+        if kept not in (None, asked):
+            raise InvalidParameterError(
+                f"An index has one codebook; {shelf.folder} has another one than {codebook}. "
+                "Leave --codebook out, or choose another index."
+            )
+        return asked
+    if kept is None and in_parts:
         err.print(
-            "codebook: the one that comes with eigenshape, because there are too few shapes to learn from"
-            if codebook == default_codebook()
-            else "codebook: learned from the shapes of this index"
+            "codebook: the one that comes with eigenshape, so that the parts can be merged; "
+            "`eigenshape index learn` makes another one"
         )
-        recipe = PatchRecipe(codebook)
-        shelf.keep_recipe(recipe)
-        # Of several processes that fill a new index, all take the codebook of the first.
-        recipe = _patch_recipe(shelf) or recipe
-    return recipe
+        return PatchRecipe()
+    return kept
+
+
+def _read_recipe(path: Path) -> PatchRecipe:
+    """Return the recipe of a codebook file, or that of another index."""
+    if path.is_dir():
+        recipe = _patch_recipe(ShapeIndex.open(path))
+        if recipe is None:
+            raise StoreError(f"--codebook takes an index that has a codebook; {path} has none.")
+        return recipe
+    try:
+        return PatchRecipe(read_codebook(path.read_bytes()))
+    except (ValueError, TypeError, BadZipFile, UnpicklingError) as error:
+        raise FileFormatError(
+            f"--codebook takes a file of `eigenshape index learn`; {path} is none: {error}."
+        ) from error
 
 
 def query_recipe(shelf: ShapeIndex, name: str | None) -> AnyRecipe:
@@ -60,7 +74,7 @@ def query_recipe(shelf: ShapeIndex, name: str | None) -> AnyRecipe:
     if recipe is None:
         raise StoreError(
             f"An index answers by the methods that it was made with; {shelf.folder} has no "
-            f"descriptions by {name}. Run `eigenshape index` with --method {name} first."
+            f"descriptions by {name}. Run `eigenshape index add` with --method {name} first."
         )
     return recipe
 

@@ -21,10 +21,11 @@ from eigenshape.retrieval.description import describe
 from eigenshape.retrieval.heat.features import find_heat_features, find_view_features
 from eigenshape.retrieval.heat.recipe import HeatRecipe
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
-from eigenshape.retrieval.store.index import Match
+from eigenshape.retrieval.store.records import Match
 
 CAPTION = "corresponding parts have one color; a lower score is more similar"
 N_CELLS = 12  # of the query by patches
+N_EXPLAINED = 12  # pairs of points of an explanation: as many colors as people tell apart
 REACH = 3.0  # times what a patch has of the surface, in length: farther from a matched patch nothing is known
 
 
@@ -96,6 +97,33 @@ def contact_sheet(
     return figure_contact_sheet(first, panels, caption=caption)
 
 
+def explanation(
+    query: ColoredQuery, title: str, match: Match, *, repairs: tuple[str, ...] = ()
+) -> Figure:
+    """Draw a query beside one match, with the points that correspond, surest first.
+
+    Raises
+    ------
+    StoreError, OSError
+        If the file of the match cannot be read.
+    """
+    mesh = _read_match(match, repairs)
+    ours, theirs = match.correspondences[:N_EXPLAINED].T
+    panels = []
+    for surface, name, vertices in (
+        (query.mesh, f"query: {title}", query.descriptor.vertices[ours]),
+        (mesh, f"{literal(match.name)}\nscore {match.score:#.4g}", match.vertices[theirs]),
+    ):
+        reach = REACH * np.sqrt(surface_area(surface) / max(len(match.vertices), 1))
+        labels = _cells(surface, vertices, np.arange(len(vertices)), reach)
+        panels.append(Panel(surface, name, labels, vertices))
+    caption = (
+        f"The {len(ours)} surest of {len(match.correspondences)} pairs of corresponding points: "
+        "their surroundings have one color"
+    )
+    return figure_contact_sheet(panels[0], panels[1:], caption=caption)
+
+
 def _panel(query: ColoredQuery, match: Match, repairs: tuple[str, ...]) -> Panel:
     title = f"{literal(match.name)}\nscore {match.score:#.4g}"
     try:
@@ -129,7 +157,7 @@ def _read_match(match: Match, repairs: tuple[str, ...]) -> TriangleMesh:
     if last >= mesh.n_vertices:
         raise StoreError(
             f"A match is drawn from the mesh that was indexed; that had a vertex {last}, and {match.source} now has "
-            f"{mesh.n_vertices} vertices. Give the same --repair as to `index`, or index the file again."
+            f"{mesh.n_vertices} vertices. Give the same --repair as to `eigenshape index add`, or index the file again."
         )
     return mesh
 

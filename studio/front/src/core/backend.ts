@@ -26,6 +26,7 @@ export interface State {
   health: {
     status: Progress["status"]; // all else is null or empty until it is ready
     area: number;
+    closed: boolean | null;
     facts: [string, string][]; // names and values, as text
     lines: ["good" | "fair", string][];
     findings: { name: string; why: string; text: string }[]; // repairs that would help

@@ -8,7 +8,6 @@ import { cutParts } from "../core/parts";
 import { FIXED, Regions } from "../core/regions";
 import { BoxTool, MotionTool, type MotionKind } from "../core/tools";
 import type { Hit, PointerTool } from "../core/viewer";
-import type { TypedArray } from "../core/wire";
 import markup from "./deform.html?raw";
 
 const REST = 80; // ms without motion, beside two frames, after which the exact result is requested
@@ -19,6 +18,13 @@ const AXES = [0, 1, 2];
 const SELECTORS = ["box", "brush", "part"]; // the other tools move
 
 type Tool = "box" | "brush" | "part" | MotionKind;
+/** What of the panel survives a reload, for the shape of this number. */
+interface Kept {
+  shape: number;
+  text: string; // of the regions
+  tool: Tool;
+  region: number;
+}
 const nextFrame = () => new Promise(requestAnimationFrame);
 
 export class DeformPanel implements Panel {
@@ -66,9 +72,18 @@ export class DeformPanel implements Panel {
     COLORS.forEach((color, region) => {
       form.get(`region-${region}`).style.setProperty("--swatch", color);
     });
+    for (const name of ["low", "high"])
+      form.get("corners").append(name, ...AXES.map((axis) => this.buildCorner(name, axis)));
     form.get("brush-radius").valueAsNumber = app.settings.get("radius", 0.1);
     this.listen();
     return this.root;
+  }
+
+  /** Return the input for a coordinate of a corner of the box. */
+  private buildCorner(name: string, axis: number): HTMLElement {
+    const title = `${name} ${"xyz"[axis]}`;
+    const labels = { "data-test": `box-${name}-${axis}`, title, "aria-label": title };
+    return h("input", { type: "number", step: "any", ...labels, change: () => this.readBox() });
   }
 
   /** Let controls and keys do what they say. */
@@ -76,8 +91,6 @@ export class DeformPanel implements Panel {
     const { app, form } = this;
     form.onChoice("region", (id) => this.chooseRegion(Number(id)));
     form.onChoice("tool", (id) => this.chooseTool(id as Tool));
-    for (const name of ["low", "high"])
-      for (const axis of AXES) form.on({ [`box-${name}-${axis}`]: () => this.readBox() });
     form.on({
       "brush-radius": () => this.showRadius(),
       "region-parts": () => this.showParts(form.number("region-parts")),
@@ -86,9 +99,9 @@ export class DeformPanel implements Panel {
       "n-modes": () => this.bind(),
       several: () => this.showTools(),
       apply: () => this.commit(),
-      undo: () => this.change({ kind: "undo" }, "Undoing"),
-      redo: () => this.change({ kind: "redo" }, "Redoing"),
-      reset: () => this.change({ kind: "reset" }, "Undoing all"),
+      undo: () => app.step("undo"),
+      redo: () => app.step("redo"),
+      reset: () => app.change({ kind: "reset" }, "Undoing all"),
       "save-edits": () => app.save("edits", "json"),
       "load-edits": () => this.replay(),
       skeleton: () => this.showSkeleton(),
@@ -145,13 +158,8 @@ export class DeformPanel implements Panel {
   private startShape({ shape, n_vertices, up }: State): void {
     this.regions = new Regions(n_vertices);
     [this.pivots, this.labels] = [[], null];
-    const kept = this.app.settings.get("regions", {
-      shape: -1,
-      text: "",
-      tool: this.tool,
-      region: 0,
-    });
-    if (kept.shape === shape) {
+    const kept = this.app.settings.get<Kept | null>("regions", null);
+    if (kept?.shape === shape) {
       this.regions.read(kept.text);
       [this.tool, this.region] = [kept.tool, kept.region];
     }
@@ -239,7 +247,8 @@ export class DeformPanel implements Panel {
 
   private remember(): void {
     const { region, tool } = this;
-    const kept = { shape: this.app.state.shape, text: this.regions.write(), tool, region };
+    const text = this.regions.write();
+    const kept: Kept = { shape: this.app.state.shape, text, tool, region };
     this.app.settings.set("regions", kept);
     this.paint();
   }
@@ -330,9 +339,9 @@ export class DeformPanel implements Panel {
 
   private async loadParts(): Promise<void> {
     const { status, n_regions } = this.app.state.parts;
-    if (status === "none") return this.change({ kind: "parts" }, "Finding the parts");
-    if (status !== "ready") return;
-    await this.showParts(this.labels ? this.form.number("region-parts") : n_regions);
+    if (status === "none") await this.app.change({ kind: "parts" }, "Finding the parts");
+    else if (status === "ready")
+      await this.showParts(this.labels ? this.form.number("region-parts") : n_regions);
   }
 
   private async showParts(count: number): Promise<void> {
@@ -371,8 +380,7 @@ export class DeformPanel implements Panel {
         regions: this.rows.map((region) => chosen[region]!),
         fixed: fixed.length ? fixed : null,
       };
-      const binding = app.run("Binding the regions", app.backend.rig(request));
-      const answer = await binding.catch(() => null);
+      const answer = await app.run("Binding the regions", app.backend.rig(request));
       if (turn !== this.bindings) return;
       if (answer) {
         app.viewer.setShares(answer.shares);
@@ -400,6 +408,10 @@ export class DeformPanel implements Panel {
     return this.rows.map((region) => this.handles[region] ?? null);
   }
 
+  private motion(kind: "preview" | "commit"): Change {
+    return { kind, handles: this.rowHandles(), mode: this.form.get("mode").value };
+  }
+
   /** Show a motion by shares at once, and the exact result when the pointer rests. */
   private async moved(handle: Handle): Promise<void> {
     const { app } = this;
@@ -411,12 +423,7 @@ export class DeformPanel implements Panel {
     await nextFrame();
     await new Promise((done) => setTimeout(done, REST));
     if (turn !== this.motions) return;
-    const change = {
-      kind: "preview",
-      handles: this.rowHandles(),
-      mode: this.form.get("mode").value,
-    };
-    const done = await app.backend.finish(change).catch((error) => app.fail(error));
+    const done = await app.backend.finish(this.motion("preview")).catch((error) => app.fail(error));
     if (done && turn === this.motions) app.viewer.setExact(done.vertices!);
   }
 
@@ -430,8 +437,7 @@ export class DeformPanel implements Panel {
       if (pivot && handle?.type === "translation")
         this.pivots[region] = pivot.map((value, axis) => value + handle.vector[axis]!) as Vec3;
     });
-    const change = { kind: "commit", handles, mode: this.form.get("mode").value };
-    await this.app.change(change, "Bending the shape").catch(() => this.drop());
+    if (!(await this.app.change(this.motion("commit"), "Bending the shape"))) this.drop();
   }
 
   private endMotion(): void {
@@ -458,25 +464,16 @@ export class DeformPanel implements Panel {
     if (!this.several) await this.commit();
   }
 
-  private async change(change: Change, text: string, files?: Record<string, Uint8Array>) {
-    await this.app.change(change, text, files).catch(() => {}); // the status line has the error
-  }
-
-  /** Return an array that the library computes, or null if it cannot; the status says why. */
-  private ask<T extends TypedArray>(name: string, text: string): Promise<T | null> {
-    return this.app.run(text, this.app.backend.array<T>(name)).catch(() => null);
-  }
-
   private async showSkeleton(): Promise<void> {
     const name = `skeleton/${this.form.number("skeleton-modes")}`;
     const checked = this.form.get("skeleton").checked;
-    const points = checked ? await this.ask<Float32Array>(name, "Computing the skeleton") : null;
-    this.app.viewer.setSkeleton(points);
+    const loading = checked ? this.app.load<Float32Array>(name, "Computing the skeleton") : null;
+    this.app.viewer.setSkeleton(await loading);
   }
 
   private async showCrossings(): Promise<void> {
     const checked = this.form.get("crossings").checked;
-    const pairs = checked ? await this.ask("crossings", "Looking for crossing faces") : null;
+    const pairs = checked ? await this.app.load("crossings", "Looking for crossing faces") : null;
     const { faces } = this.app.viewer;
     const crossing = [...new Set<number>(pairs ?? [])];
     this.crossing = crossing.flatMap((face) => [...faces.subarray(3 * face, 3 * face + 3)]);
@@ -494,11 +491,11 @@ export class DeformPanel implements Panel {
     if (!written) return this.app.say("Choose a JSON file of edits.");
     const edits = JSON.parse(new TextDecoder().decode(written.bytes));
     const change = { kind: "replay", edits, source: source?.name };
-    await this.change(change, "Applying the edits", source && { source: source.bytes });
+    await this.app.change(change, "Applying the edits", source && { source: source.bytes });
   }
 
   private async transfer(): Promise<void> {
     const { name, bytes } = (await chooseFiles(this.app.state.suffixes))[0]!;
-    await this.change({ kind: "transfer", name }, "Carrying the pose over", { file: bytes });
+    await this.app.change({ kind: "transfer", name }, "Carrying the pose over", { file: bytes });
   }
 }

@@ -45,12 +45,13 @@ export class HeatPanel extends ColoringPanel {
   protected async show(): Promise<void> {
     this.modes = new Float32Array();
     if (!this.app.state.spectrum.k) return this.app.viewer.setScalars(null);
-    const arrays = [
-      this.get<Float64Array>("eigenvalues"),
-      this.get<Float32Array>("modes"),
-    ] as const;
-    const loaded = this.app.run("Loading the eigenfunctions", Promise.all(arrays));
-    [this.eigenvalues, this.modes] = (await this.latest(loaded)) as any;
+    const loading = Promise.all([
+      this.get<Float64Array<ArrayBuffer>>("eigenvalues"),
+      this.get<Float32Array<ArrayBuffer>>("modes"),
+    ]);
+    const loaded = await this.latest(this.app.run("Loading the eigenfunctions", loading));
+    if (!loaded) return;
+    [this.eigenvalues, this.modes] = loaded;
     if (this.source >= this.app.state.n_vertices) this.source = -1;
     this.paint();
   }
@@ -93,11 +94,7 @@ export class HeatPanel extends ColoringPanel {
     form.text("heat-explained", `${started} ${reach} Click another source.`);
     const heat = heatFromSource(modes, eigenvalues, time, source);
     const [low, high] = findRange(heat);
-    viewer.setScalars(heat, {
-      map: "inferno",
-      range: [Math.min(low, 0), high],
-      title: "heat",
-      unit,
-    });
+    const range: [number, number] = [Math.min(low, 0), high];
+    viewer.setScalars(heat, { map: "inferno", range, title: "heat", unit });
   }
 }

@@ -33,7 +33,7 @@ export class PartsPanel extends ColoringPanel {
     const { form } = this;
     this.app = app;
     form.on({
-      "find-parts": () => app.change({ kind: "parts" }, "Starting to find parts").catch(() => {}),
+      "find-parts": () => app.change({ kind: "parts" }, "Starting to find parts"),
       "n-parts": () => this.cut(form.number("n-parts")),
       persistence: () => this.cutAt(this.levelAt(form.number("persistence"))),
       "all-parts": () => this.selectPart(-1),

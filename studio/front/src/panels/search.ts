@@ -23,7 +23,7 @@ export class SearchPanel implements Panel {
   build(app: Studio): HTMLElement {
     this.app = app;
     this.form.on({
-      search: () => this.search().catch(() => {}),
+      search: () => this.search(),
       "search-file": async () => this.searchFile((await chooseFiles(app.state.suffixes))[0]!),
     });
     acceptDrops(this.form.root, (file) => this.searchFile(file));
@@ -43,12 +43,13 @@ export class SearchPanel implements Panel {
 
   /** The file becomes the shape, so that what is searched with is what is seen. */
   private async searchFile(file: NamedFile): Promise<void> {
-    if (await this.app.openFile(file)) await this.search().catch(() => {});
+    if (await this.app.openFile(file)) await this.search();
   }
 
   private async search(): Promise<void> {
     this.clear();
     this.found = await this.app.run("Searching", this.app.backend.query(N_MATCHES));
+    if (!this.found) return;
     this.shape = this.app.state.shape;
     this.list.replaceChildren(...this.found.matches.map((match, i) => this.buildCard(match, i)));
     if (!this.found.matches.length) this.list.append("The index has no shape like this one.");
@@ -72,20 +73,21 @@ export class SearchPanel implements Panel {
       h("span", { class: "faint" }, `score ${score.toFixed(3)}`),
     );
     const title = `Show ${name} beside this shape, with corresponding points`;
-    const click = () => this.openMatch(number).catch((error) => this.app.fail(error));
+    const click = () => this.openMatch(number);
     const attributes = { type: "button", title, "data-test": `match-${number}`, click };
     return h("li", {}, h("button", attributes, picture, text));
   }
 
   /** Show a match in a second view, and corresponding points of both in the same colors. */
   private async openMatch(number: number): Promise<void> {
-    const { found } = this;
-    const { app } = this;
+    const { app, found } = this;
     const { backend, state, viewer } = app;
-    const names = [`match/${number}/vertices`, `match/${number}/faces`];
-    const loading = Promise.all(names.map((name) => backend.array(name)));
-    const [vertices, faces] = await app.run("Loading the match", loading);
-    if (!found || found !== this.found) return;
+    const loading = Promise.all([
+      backend.array<Float32Array>(`match/${number}/vertices`),
+      backend.array<Uint32Array>(`match/${number}/faces`),
+    ]);
+    const loaded = await app.run("Loading the match", loading);
+    if (!loaded || !found || found !== this.found) return;
     const { name, up = state.up, front = state.front } = found.matches[number]!;
     this.closeMatch();
     viewer.stage.after(this.beside);
@@ -95,17 +97,15 @@ export class SearchPanel implements Panel {
     const close = { type: "button", "data-test": "close-match", title: "Close the match", click };
     const caption = h("div", { class: "caption" }, name, h("button", close, "Close"));
     this.beside.append(caption);
-    this.second.setMesh(vertices as Float32Array, faces as Uint32Array, up, front);
+    this.second.setMesh(...loaded, up, front);
     viewer.fit();
     const pairs = found.arrays[`pairs${number}`] as Uint32Array;
     const colors = found.arrays[`colors${number}`] as Uint8Array;
-    viewer.setPoints(
-      pairs.filter((_, i) => i % 2 === 0),
-      colors,
-    );
-    this.second.setPoints(
-      pairs.filter((_, i) => i % 2 === 1),
-      colors,
+    [viewer, this.second].forEach((view, side) =>
+      view.setPoints(
+        pairs.filter((_, i) => i % 2 === side),
+        colors,
+      ),
     );
     [...this.list.children].forEach((card, i) => card.classList.toggle("chosen", i === number));
   }

@@ -19,7 +19,7 @@ export class ShapePanel extends ColoringPanel {
     form.on({
       open: choose,
       values: () => this.start(),
-      "save-png": () => this.savePicture().catch(() => {}),
+      "save-png": () => this.savePicture(),
     });
     app.addExports(form, can.includes("finish"));
     form.get("opening").hidden = !can.includes("open");
@@ -57,7 +57,7 @@ export class ShapePanel extends ColoringPanel {
   private buildRepairs({ health, capabilities }: State): HTMLElement[] {
     return health.findings.map(({ name, why, text }) => {
       const label = `Repair: ${name.replaceAll("_", " ")}`;
-      const click = () => this.app.change({ kind: "repair", names: [name] }, label).catch(() => {});
+      const click = () => this.app.change({ kind: "repair", names: [name] }, label);
       const attributes = { type: "button", "data-test": `repair-${name}`, title: why, click };
       const act = capabilities.includes("repair") && h("button", attributes, label);
       return h("li", { class: "bad" }, text, act);
@@ -75,6 +75,6 @@ export class ShapePanel extends ColoringPanel {
 
   private async savePicture(): Promise<void> {
     const picture = await this.app.run("Drawing the picture", this.app.viewer.screenshot());
-    download(picture, this.app.fileName("png"), "image/png");
+    if (picture) download(picture, this.app.fileName("png"), "image/png");
   }
 }

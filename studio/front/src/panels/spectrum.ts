@@ -34,13 +34,10 @@ export class SpectrumPanel extends ColoringPanel {
       this.start();
     });
     form.on({
-      solve: () => {
-        const change = { kind: "solve", k: form.number("k") };
-        app.change(change, "Starting to solve").catch(() => {});
-      },
+      solve: () => app.change({ kind: "solve", k: form.number("k") }, "Starting to solve"),
       eigenfunction: () => this.select(form.number("eigenfunction")),
       nodal: () => this.start(),
-      bracket: () => this.loadBrackets().catch(() => {}),
+      bracket: () => this.loadBrackets(),
     });
     const solvable = app.state.capabilities.includes("solve");
     form.get("solver").hidden = form.get("bracket").hidden = !solvable;
@@ -84,13 +81,8 @@ export class SpectrumPanel extends ColoringPanel {
     const size = Math.max(-low, high);
     const nodal = this.form.get("nodal").checked && high - low > FLAT * size;
     const title = `eigenfunction ${i}`;
-    viewer.setScalars(values, {
-      map: "RdBu_r",
-      range: [-size, size],
-      nodal,
-      title,
-      unit: "1/length",
-    });
+    const range: [number, number] = [-size, size];
+    viewer.setScalars(values, { map: "RdBu_r", range, nodal, title, unit: "1/length" });
   }
 
   /** Return the shape that the first modes express, in its present pose. */
@@ -135,7 +127,9 @@ export class SpectrumPanel extends ColoringPanel {
   private async loadBrackets(): Promise<void> {
     const { app, form } = this;
     const request = app.backend.array<Float64Array<ArrayBuffer>>("brackets", 0, N_BRACKETS);
-    this.brackets = await app.run("Computing brackets", request);
+    const brackets = await app.run("Computing brackets", request);
+    if (!brackets) return;
+    this.brackets = brackets;
     // Show the lowest alone: beside all the others the bars are too short to be seen.
     this.plot?.setScale("x", { min: 0, max: this.brackets.length / 2 });
     this.plot?.setScale("y", { min: 0, max: 1.05 * this.brackets.at(-1)! });

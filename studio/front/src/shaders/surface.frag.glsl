@@ -1,18 +1,24 @@
 precision highp float;
 in vec3 v_normal;
 in vec3 v_view;
+// COLORING is 0: plain, 1: values through the table, 2: paint. Without a graphics card a branch
+// that is not taken costs a sixth of a frame, so the shader is compiled for each of them.
+#if COLORING == 1
 in float v_value;
-in vec3 v_paint;
-in vec4 v_mark;
 uniform sampler2D table; // 256 colors
 uniform vec2 range;
 uniform bool nodal;
+#elif COLORING == 2
+flat in vec3 v_paint;
+#else
 uniform vec3 plain;
+#endif
+#ifdef MARKED
+in vec4 v_mark;
+#endif
 uniform float opacity;
 out vec4 color;
 void main() {
-  // COLORING is 0: plain, 1: values through the table, 2: paint. Without a graphics card a branch
-  // that is not taken costs a sixth of a frame, so the shader is compiled for each of them.
 #if COLORING == 1
   float share = (v_value - range.x) / max(range.y - range.x, 1e-30);
   vec3 base = texelFetch(table, ivec2(clamp(int(256.0 * share), 0, 255), 0), 0).rgb;
@@ -26,7 +32,9 @@ void main() {
 #else
   vec3 base = plain;
 #endif
+#ifdef MARKED
   base = mix(base, v_mark.rgb, v_mark.a);
+#endif
   vec3 eye = normalize(v_view);
   vec3 n = normalize(v_normal);
   if (dot(n, eye) < 0.0) n = -n; // both sides of an open surface are lit

@@ -1,0 +1,1 @@
+"""A search service on an index: a page to drop a scan on, and calls for programs."""

@@ -1,0 +1,328 @@
+"""The application of the service: its page, and its calls."""
+
+import asyncio
+from collections import OrderedDict
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from functools import wraps
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+from urllib.parse import quote
+
+import anyio.to_thread
+from prometheus_client import CONTENT_TYPE_LATEST
+from starlette.applications import Starlette
+from starlette.convertors import StringConvertor, register_url_convertor
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route
+
+import eigenshape as es
+from eigenshape_studio.guard import App, Guard, Rules
+from eigenshape_studio.parse import display_name, mesh_suffix
+from eigenshape_studio.service import openapi
+from eigenshape_studio.service.describing import Describers, MeshRefusedError, Picture
+from eigenshape_studio.service.metrics import Metrics, count_requests
+from eigenshape_studio.service.parameters import RequestError, read_parameters
+from eigenshape_studio.service.shelf import Found, Shape, ShelfReader
+
+PAGE = Path(__file__).parent / "page"
+FILES = {
+    "/": ("index.html", "text/html; charset=utf-8"),
+    "/docs": ("docs.html", "text/html; charset=utf-8"),
+    "/page.js": ("page.js", "text/javascript; charset=utf-8"),
+    "/docs.js": ("docs.js", "text/javascript; charset=utf-8"),
+    "/page.css": ("page.css", "text/css; charset=utf-8"),
+}
+# Queries that wait or run; each keeps an upload in memory while it comes in. With two workers and a
+# second for each mesh, the last one waits for half a minute.
+MOST_QUERIES = 64
+N_THREADS = 8  # that read the index at the same time
+PICTURE_BYTES = 64 << 20  # of drawings that are kept, 20 to 100 kB each
+Endpoint = Callable[[Request], Awaitable[Response]]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What an answer may hold.
+
+    Attributes
+    ----------
+    show_sources : bool
+        Whether answers name the files of shapes.
+    """
+
+    show_sources: bool = False
+
+
+class _Drawings:
+    """Pictures that were drawn, up to a number of bytes; the one that was used longest ago goes."""
+
+    def __init__(self, most_bytes: int = PICTURE_BYTES) -> None:
+        self._kept: OrderedDict[tuple[str, int], Picture] = OrderedDict()
+        self._most, self._n_bytes = most_bytes, 0
+
+    def find(self, key: tuple[str, int]) -> Picture | None:
+        if key in self._kept:
+            self._kept.move_to_end(key)
+        return self._kept.get(key)
+
+    def keep(self, key: tuple[str, int], picture: Picture) -> None:
+        before = self._kept.pop(key, None)  # two requests may have drawn it at the same time
+        self._n_bytes += picture.n_bytes - (before.n_bytes if before else 0)
+        self._kept[key] = picture
+        while self._n_bytes > self._most:
+            self._n_bytes -= self._kept.popitem(last=False)[1].n_bytes
+
+
+class _AnyName(StringConvertor):
+    """The rest of a path, with any characters: names are paths below a folder, or what one likes."""
+
+    regex = "(?s:.+)"
+
+
+register_url_convertor("any", _AnyName())
+
+
+class Service:
+    """The calls of the service, each a coroutine that answers a request."""
+
+    def __init__(self, shelf: ShelfReader, describers: Describers, settings: Settings) -> None:
+        self.shelf, self.describers, self.settings = shelf, describers, settings
+        self.metrics = Metrics(lambda: len(shelf))
+        self._threads = anyio.CapacityLimiter(N_THREADS)
+        self._drawings = _Drawings()
+        self._n_queries = 0
+
+    async def query(self, request: Request) -> Response:
+        """Find the shapes that are most like an uploaded mesh."""
+        wanted = read_parameters(request, openapi.QUERY)
+        try:
+            suffix = mesh_suffix(wanted["name"])
+        except es.FileFormatError as error:
+            raise RequestError(400, str(error)) from error
+        data = await request.body()
+        if self._n_queries >= MOST_QUERIES:
+            raise RequestError(503, f"{MOST_QUERIES} queries wait already; ask again later.")
+        self._n_queries += 1
+        try:
+            with self.metrics.queue.track_inprogress():
+                return await self._answer(wanted, suffix, data)
+        except MeshRefusedError as error:
+            name = display_name(wanted["name"])
+            cause = str(error).removeprefix("The file: ").removesuffix(".")
+            reason = f"{name} could not be described: {cause}"
+            raise RequestError(422, f"{reason}.") from error
+        except asyncio.CancelledError as error:
+            raise RequestError(503, "The service ends now; ask again later.") from error
+        finally:
+            self._n_queries -= 1
+
+    async def _answer(self, wanted: dict[str, Any], suffix: str, data: bytes) -> Response:
+        await self._refresh()
+        began = perf_counter()
+        scan = await self.describers.describe(
+            suffix, data, self.shelf.recipe, with_picture=wanted["picture"]
+        )
+        described = perf_counter()
+        self.metrics.describing.observe(described - began)
+        answer = await anyio.to_thread.run_sync(
+            lambda: self.shelf.query(
+                scan.descriptor, wanted["n"], label=wanted["label"], exact=wanted["exact"]
+            ),
+            limiter=self._threads,
+        )
+        answered = perf_counter()
+        self.metrics.searching.observe(answered - described)
+        return JSONResponse(
+            {
+                "scan": {
+                    "name": display_name(wanted["name"]),
+                    "n_vertices": scan.n_vertices,
+                    "n_faces": scan.n_faces,
+                    "repairs": list(scan.repairs),
+                },
+                "method": answer.method,
+                "n_compared": answer.n_compared,
+                "nothing_alike": answer.nothing_alike,
+                "seconds": {"describe": described - began, "search": answered - described},
+                "matches": [self._match(match) for match in answer.found],
+                "picture": scan.picture,
+            }
+        )
+
+    async def shapes(self, request: Request) -> Response:
+        """List shapes."""
+        wanted = read_parameters(request, openapi.SHAPES)
+        await self._refresh()
+        found = self.shelf.shapes(wanted["offset"], wanted["limit"])
+        shapes = [self._facts(shape) for shape in found]
+        return JSONResponse({"n_shapes": len(self.shelf), "shapes": shapes})
+
+    async def shape(self, request: Request) -> Response:
+        """Tell what is known of one shape."""
+        read_parameters(request, ())
+        await self._refresh()
+        return JSONResponse(self._facts(self._shape(request.path_params["name"])))
+
+    async def thumbnail(self, request: Request) -> Response:
+        """Return the picture of a shape: the one that the index holds, or else one of its file."""
+        wanted = read_parameters(request, openapi.THUMBNAIL)
+        await self._refresh()
+        shape = self._shape(wanted["name"])
+        image = None if wanted["drawn"] else await self._held_picture(shape.name)
+        if image is None:
+            try:
+                image = (await self._drawing(shape.source)).image
+            except MeshRefusedError as error:
+                reason = f"There is no picture of {shape.name[:80]!r}: {error}."
+                raise RequestError(404, reason) from error
+        kind = "image/png" if image.startswith(b"\x89PNG") else "image/webp"
+        return Response(image, media_type=kind)
+
+    async def points(self, request: Request) -> Response:
+        """Tell where vertices of a shape lie in its picture."""
+        wanted = read_parameters(request, openapi.POINTS)
+        await self._refresh()
+        shape = self._shape(wanted["name"])
+        address = _thumbnail_address(shape.name)
+        try:
+            drawing = await self._drawing(shape.source)
+        except MeshRefusedError:
+            # The index may hold a picture, but not where its camera stood.
+            held = await self._held_picture(shape.name)
+            hidden = [None] * len(wanted["vertices"])
+            return JSONResponse({"thumbnail": address if held else None, "points": hidden})
+        places = [drawing.place(vertex) for vertex in wanted["vertices"]]
+        return JSONResponse({"thumbnail": f"{address}&drawn=1", "points": places})
+
+    async def health(self, request: Request) -> Response:
+        """Say whether the index can be read."""
+        read_parameters(request, ())
+        try:
+            await self._refresh()
+        except (es.EigenshapeError, OSError) as error:
+            raise RequestError(503, f"The index cannot be read: {error}") from error
+        facts = {"status": "ok", "shapes": len(self.shelf), "version": es.__version__}
+        return JSONResponse(facts)
+
+    async def show_metrics(self, request: Request) -> Response:
+        """Return the counters."""
+        read_parameters(request, ())
+        return Response(self.metrics.text(), headers={"content-type": CONTENT_TYPE_LATEST})
+
+    async def describe_calls(self, request: Request) -> Response:
+        """Return the description of all calls."""
+        read_parameters(request, ())
+        return JSONResponse(openapi.openapi())
+
+    async def show_file(self, request: Request) -> Response:
+        """Return a file of the page."""
+        name, kind = FILES[request.url.path]
+        return Response((PAGE / name).read_bytes(), media_type=kind)
+
+    async def _refresh(self) -> None:
+        await anyio.to_thread.run_sync(self.shelf.refresh, limiter=self._threads)
+
+    async def _drawing(self, source: str | None) -> Picture:
+        """Return the picture of a file of the index, drawn again if the file has changed."""
+        try:
+            if source is None:
+                raise MeshRefusedError("it was added to the index without its file")
+            key = source, Path(source).stat().st_mtime_ns
+        except (OSError, ValueError) as error:
+            raise MeshRefusedError("its file is not there any more") from error
+        drawing = self._drawings.find(key)
+        if drawing is None:
+            drawing = await self.describers.draw(Path(source))
+            self._drawings.keep(key, drawing)
+        return drawing
+
+    async def _held_picture(self, name: str) -> bytes | None:
+        return await anyio.to_thread.run_sync(self.shelf.thumbnail, name, limiter=self._threads)
+
+    def _shape(self, name: str) -> Shape:
+        shape = self.shelf.shape(name)
+        if shape is None:
+            raise RequestError(404, f"The index holds no shape {name[:80]!r}.")
+        return shape
+
+    def _facts(self, shape: Shape) -> dict[str, Any]:
+        """Return what an answer says of any shape."""
+        has_picture = shape.has_thumbnail or shape.source is not None
+        return {
+            "name": shape.name,
+            "label": shape.label,
+            "source": shape.source if self.settings.show_sources else None,
+            "thumbnail": _thumbnail_address(shape.name) if has_picture else None,
+        }
+
+    def _match(self, match: Found) -> dict[str, Any]:
+        return {
+            **self._facts(match.shape),
+            "score": match.score,
+            "chance": match.chance,
+            "n_pairs": len(match.pairs),
+            "pairs": match.pairs.tolist(),
+        }
+
+
+def make_app(service: Service, rules: Rules) -> App:
+    """Return the application: the page and the calls, behind the guard, and counted."""
+    calls: dict[str, tuple[str, Endpoint]] = {
+        "/v1/query": ("POST", service.query),
+        "/v1/shapes": ("GET", service.shapes),
+        "/v1/shapes/{name:any}": ("GET", service.shape),
+        "/v1/thumbnails": ("GET", service.thumbnail),
+        "/v1/points": ("GET", service.points),
+        "/health": ("GET", service.health),
+        "/metrics": ("GET", service.show_metrics),
+        "/openapi.json": ("GET", service.describe_calls),
+        **dict.fromkeys(FILES, ("GET", service.show_file)),
+    }
+    routes = [
+        Route(path, _with_plain_errors(call), methods=[method])
+        for path, (method, call) in calls.items()
+    ]
+    app = Starlette(
+        routes=routes, exception_handlers={HTTPException: _show_http_error, Exception: _show_fault}
+    )
+    app.router.redirect_slashes = False
+    templates = frozenset(path.replace(":any", "") for path in calls)
+    return count_requests(Guard(app, rules), service.metrics, templates)
+
+
+def _thumbnail_address(name: str) -> str:
+    return f"/v1/thumbnails?name={quote(name, safe='')}"
+
+
+def _error(status: int, reason: str) -> Response:
+    headers = {"retry-after": "5"} if status == 503 else None
+    return JSONResponse({"error": reason}, status, headers)
+
+
+def _with_plain_errors(call: Endpoint) -> Endpoint:
+    """Return a call whose errors are sentences: of the request, or of the index."""
+
+    @wraps(call)
+    async def answer(request: Request) -> Response:
+        try:
+            return await call(request)
+        except RequestError as error:
+            return _error(error.status, error.reason)
+        except es.StoreError as error:  # damaged, or being replaced
+            return _error(500, f"The index cannot be read: {error}")
+
+    return answer
+
+
+async def _show_http_error(_request: Request, error: Exception) -> Response:
+    status = error.status_code if isinstance(error, HTTPException) else 500
+    texts = {404: "There is no such page or call.", 405: "This call takes another method."}
+    return _error(status, texts.get(status, "The request cannot be answered."))
+
+
+async def _show_fault(_request: Request, _error_: Exception) -> Response:
+    return _error(500, "The service has a fault; its log says more.")

@@ -1,0 +1,112 @@
+"""`eigenshape serve`: a service on an index, until SIGTERM or Ctrl-C."""
+
+import re
+import secrets
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import eigenshape as es
+from eigenshape_studio.guard import Rules
+from eigenshape_studio.listening import (
+    listen,
+    own_hosts,
+    require_permission,
+    run_app,
+    shown_address,
+)
+from eigenshape_studio.service.app import Service, Settings, make_app
+from eigenshape_studio.service.describing import Describe, Describers, describe_upload
+from eigenshape_studio.service.shelf import ShelfReader
+
+MOST_BYTES = 64 << 20  # of an upload: about a million faces in a binary file
+GRACE = 10  # seconds that queries under way have to end
+# A token stands in an address and in a cookie. 16 letters of 64 are 96 bits, beyond guessing.
+TOKEN = re.compile(r"[A-Za-z0-9._~-]{16,256}")
+
+
+def serve(  # noqa: PLR0913  one for each option of the command
+    index: str | Path,
+    *,
+    host: str = "127.0.0.1",
+    port: int = 8000,
+    allow_remote: bool = False,
+    allow_hosts: Sequence[str] = (),
+    token: str | None = None,
+    workers: es.retrieval.Workers | None = None,
+    show_sources: bool = False,
+    announce: Callable[[str], None] = print,
+    browse: bool = False,
+    describe: Describe = describe_upload,
+) -> None:
+    """Serve an index until SIGTERM or Ctrl-C, which let queries under way end.
+
+    Parameters
+    ----------
+    index : path
+        Folder of the index. Other processes may add shapes to it at the same time.
+    host : str
+        Address to listen on.
+    port : int
+        0 for any that is free.
+    allow_remote : bool
+        Whether the address may be another one than this machine's own. HTTP is not encrypted.
+    allow_hosts : sequence of str
+        Further names of this server, as clients send them: "shapes.example:8000".
+    token : str, optional
+        The secret that requests bring. By default a random one, which is part of the address that
+        is announced; a token that is given is not announced.
+    workers : Workers, optional
+        The processes that describe uploads: how many, and what each mesh may take. By default two,
+        with 60 s for each mesh.
+    show_sources : bool
+        Whether answers name the files of shapes.
+    announce : callable
+        Called with the address, when the server listens there.
+    browse : bool
+        Whether to open the address in a browser.
+    describe : callable
+        How a worker describes an upload.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the host is another machine's or all of them, and `allow_remote` is not set; if the token
+        is too short or has letters that an address cannot hold.
+    StoreError
+        If the folder is no index, or is damaged.
+    OSError
+        If the port is taken.
+    """
+    require_permission(host, "service", allow_remote=allow_remote)
+    if token is not None and not TOKEN.fullmatch(token):
+        raise es.InvalidParameterError(
+            "A token must have 16 to 256 letters, digits, or any of ._~- and no others; the given "
+            f"one, of {len(token)} characters, does not. Try python -c 'import secrets; "
+            "print(secrets.token_urlsafe())'."
+        )
+    shelf = ShelfReader(index)
+    listening = listen(host, port)
+    port = listening.getsockname()[1]
+    secret = token or secrets.token_urlsafe(32)
+    rules = Rules(
+        secret,
+        own_hosts(host, port, allow_remote=allow_remote) | set(allow_hosts),
+        port,
+        any_address=allow_remote,
+        most_bytes=MOST_BYTES,
+        name="service",
+        verb="serve",
+        open_paths=("/health",),
+        json_errors=True,
+    )
+    address = shown_address(host, port)
+    shown = f"{address}/" if token else f"{address}/?token={secret}"
+    if workers is None:
+        workers = es.retrieval.Workers(timeout=60.0)
+    describers = Describers(workers, shelf.recipe, describe)
+    try:
+        app = make_app(Service(shelf, describers, Settings(show_sources)), rules)
+        page = f"{address}/?token={secret}" if browse else None
+        run_app(app, listening, lambda: announce(shown), page, grace=GRACE)
+    finally:
+        describers.close()

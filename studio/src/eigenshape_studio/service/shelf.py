@@ -1,0 +1,164 @@
+"""The index of a service: what it answers is read here, and nowhere else."""
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+import numpy as np
+from jaxtyping import Int
+
+import eigenshape as es
+
+REFRESH_SECONDS = 1.0  # between looks for shapes that other processes have added or removed
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What an answer may say of a shape.
+
+    Attributes
+    ----------
+    name, label, source : str
+    has_thumbnail : bool
+        Whether the index holds its picture.
+    """
+
+    name: str
+    label: str | None
+    source: str | None
+    has_thumbnail: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A shape of the index that is like the query.
+
+    Attributes
+    ----------
+    shape : Shape
+    score : float
+        Near 0 for the same shape; smaller is more alike.
+    chance : float, optional
+        Share of unrelated shapes that would score as well, where it was measured.
+    pairs : (p, 2) int
+        Vertices that correspond: of the query, and of this shape. Surest pairs first.
+    """
+
+    shape: Shape
+    score: float
+    chance: float | None
+    pairs: Int[np.ndarray, "p 2"]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a query found.
+
+    Attributes
+    ----------
+    found : tuple of Found
+        Best first.
+    method : str
+        How shapes were searched for: "exact", "staged" or "candidates".
+    n_compared : int
+        Shapes that were compared exactly.
+    nothing_alike : bool
+        Whether unrelated shapes alone would explain the scores.
+    """
+
+    found: tuple[Found, ...] = ()
+    method: str = "exact"
+    n_compared: int = 0
+    nothing_alike: bool = False
+
+
+class ShelfReader:
+    """An index, read by many threads at once.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Raises
+    ------
+    StoreError
+        If the folder is no index, or cannot be read.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self._reader = es.ShapeIndex.open(folder).reader()
+        self._lock = threading.Lock()
+        self._due = monotonic() + REFRESH_SECONDS
+        self._list_names()
+
+    def __len__(self) -> int:
+        return len(self._reader)
+
+    @property
+    def recipe(self) -> Any:
+        """Return the recipe by which queries are described."""
+        return self._reader.default_recipe()
+
+    def _list_names(self) -> None:
+        self._names: list[str] = sorted(self._reader.state.names)
+
+    def refresh(self) -> None:
+        """See what other processes have added or removed; the index is looked at once a second."""
+        with self._lock:
+            if monotonic() >= self._due:
+                if self._reader.refresh():
+                    self._list_names()
+                self._due = monotonic() + REFRESH_SECONDS
+
+    def query(
+        self, descriptor: Any, n_matches: int, *, label: str | None = None, exact: bool = False
+    ) -> Answer:
+        """Return the shapes that are most alike.
+
+        Parameters
+        ----------
+        descriptor : HeatDescriptor or PatchDescriptor
+        n_matches : int
+        label : str, optional
+            Class to which the shapes must belong.
+        exact : bool
+            Whether every shape must be compared.
+        """
+        if not len(self):
+            return Answer()
+        where = None if label is None else {"label": label}
+        matches = self._reader.query(descriptor, n_matches=n_matches, where=where, exact=exact)
+        found = tuple(self._found(descriptor, match) for match in matches)
+        return Answer(found, matches.method, matches.n_compared, matches.nothing_alike)
+
+    def _found(self, descriptor: Any, match: es.retrieval.Match) -> Found:
+        ours, theirs = match.correspondences.T
+        pairs = np.column_stack([descriptor.vertices[ours], match.vertices[theirs]])
+        shape = self.shape(match.name)
+        if shape is None:  # removed since
+            shape = Shape(match.name, match.label, match.source, has_thumbnail=False)
+        return Found(shape, match.score, match.chance, pairs)
+
+    def shapes(self, offset: int, limit: int) -> Sequence[Shape]:
+        """Return shapes, sorted by name."""
+        found = map(self.shape, self._names[offset : offset + limit])
+        return [shape for shape in found if shape is not None]
+
+    def shape(self, name: str) -> Shape | None:
+        """Return a shape by its name."""
+        state = self._reader.state
+        place = state.names.get(name)
+        if place is None:
+            return None
+        row = state.shapes.row(place)
+        has_thumbnail = bool(row.thumbnail_size)
+        return Shape(row.name, row.label, row.source, has_thumbnail)
+
+    def thumbnail(self, name: str) -> bytes | None:
+        """Return the picture that the index holds of a shape, PNG or WebP; None if it holds none."""
+        state = self._reader.state
+        place = state.names.get(name)
+        return None if place is None else state.thumbnail(place)

@@ -1,0 +1,626 @@
+"""The service in processes of its own: answers, limits, hostile requests, many clients, its page."""
+
+import http.client
+import json
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.parse import quote, urlsplit
+
+import httpx
+import numpy as np
+import pytest
+from browser import drop_file, find, open_page, start_browser, wait_until
+from test_server import GOOD, HOSTILE, Server, ply_of
+
+import eigenshape as es
+from eigenshape_studio.service.openapi import openapi
+from eigenshape_studio.service.server import serve
+from eigenshape_studio.service.shelf import ShelfReader
+
+ROOT = Path(__file__).parents[2]
+TOKEN = "a-token-of-the-tests-0123456789"
+KINDS = ("fish", "bird", "biped", "quadruped", "giraffe")
+MARKUP = '<img src="x" onerror="alert(1)">'
+NAMES = ("../../etc/passwd", "a b%2f?&#\"'é\u202e", "line\nbreak\t\x1b[31m", MARKUP, "long" * 1000)
+# The service with limits that tests can reach within a second or two.
+SCRIPT = """
+import sys
+from functools import partial
+folder, index, token, timeout, memory, sources, grace = sys.argv[1:]
+sys.path.append(folder)
+import misbehaving
+from eigenshape.retrieval import Workers
+from eigenshape_studio import listening
+from eigenshape_studio.service import server
+listening.HEADER_SECONDS = 1.0
+server.MOST_BYTES, server.GRACE = 1 << 20, int(grace)
+server.Rules = partial(server.Rules, pause=0.5, deadline=2.0)
+server.serve(
+    index, port=0, token=token or None, workers=Workers(2, float(timeout), float(memory)),
+    show_sources=bool(sources), announce=partial(print, flush=True),
+    describe=misbehaving.describe_or_misbehave,
+)
+"""
+
+
+class ServiceProcess(Server):
+    """A service, and requests to it."""
+
+    def __init__(self, index, token=TOKEN, timeout=60.0, memory=3e9, sources="", grace=10):
+        folder = Path(__file__).parent
+        arguments = [folder, index, token, timeout, memory, sources, grace]
+        command = [sys.executable, "-c", SCRIPT, *map(str, arguments)]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        self.url = self.process.stdout.readline().strip()
+        parts = urlsplit(self.url)
+        self.port = parts.port
+        self.token = token or parts.query.removeprefix("token=")
+        self.base = f"http://127.0.0.1:{self.port}"
+        self.cookie = f"eigenshape-service-{self.port}={self.token}"
+        bearer = {"authorization": f"Bearer {self.token}"}
+        self.client = httpx.Client(base_url=self.base, timeout=300, headers=bearer)
+
+    def query(self, data, name="scan.ply", client=None, **parameters):
+        return (client or self.client).post(
+            "/v1/query",
+            params={"name": name, **parameters},
+            content=data,
+            headers={"content-type": "application/octet-stream"},
+        )
+
+    def request(self, method="POST", path="/v1/query?name=a.ply", body=None, drop=(), **changes):
+        body = ply_of(GOOD) if body is None else body
+        return super().request(method, path, body, drop, **changes)
+
+    def opening(self, data, name="a.ply"):
+        return self.request(path=f"/v1/query?name={name}", body=data)
+
+    def end(self, number=signal.SIGTERM):
+        """Ask the process to end, and return its exit code."""
+        self.process.send_signal(number)
+        self.process.communicate(timeout=120)
+        return self.process.returncode
+
+
+@contextmanager
+def serving(*arguments, **settings):
+    """Serve an index, and end the service, which must say that all is well."""
+    running = ServiceProcess(*arguments, **settings)
+    try:
+        yield running
+    finally:
+        running.client.close()
+        code = running.end() if running.process.poll() is None else running.process.returncode
+    assert code == 0
+
+
+def scan_of(kind, comment="", pose=1):
+    """Return the bytes of a PLY file of a creature in another pose."""
+    mesh = es.make_creature(kind, pose, n_vertices=500)
+    lines = ["ply", "format ascii 1.0", *([f"comment {comment}"] if comment else [])]
+    lines += [f"element vertex {mesh.n_vertices}"]
+    lines += [f"property double {axis}" for axis in "xyz"]
+    lines += [f"element face {mesh.n_faces}", "property list uchar int vertex_indices"]
+    lines += ["end_header", *(" ".join(map(repr, map(float, row))) for row in mesh.vertices)]
+    lines += [f"3 {a} {b} {c}" for a, b, c in mesh.faces]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def make_index(folder):
+    """Make an index of five creatures, with their files, and of odd names without files."""
+    index = es.ShapeIndex.create(folder / "index")
+    for kind in KINDS:
+        mesh = es.make_creature(kind, n_vertices=500)
+        path = folder / f"{kind}.ply"
+        es.write_mesh(mesh, path)
+        label = "animal" if kind != "biped" else "person"
+        index.add(f"zoo/{kind}", mesh, label=label, source=str(path), n_views=0)
+    described = index.descriptors("zoo/bird", index.default_recipe())
+    for name in NAMES:
+        index.add_descriptors(name, described, label=MARKUP)
+    return index
+
+
+@pytest.fixture(scope="module")
+def index(tmp_path_factory):
+    return make_index(tmp_path_factory.mktemp("service"))
+
+
+@pytest.fixture(scope="module")
+def service(index):
+    with serving(index.folder) as running:
+        yield running
+
+
+def is_well(service):
+    answer = service.client.get("/health")
+    return answer.status_code == 200 and answer.json()["status"] == "ok"
+
+
+def test_a_scan_finds_its_kind(service):
+    answer = service.query(scan_of("fish"), n=3)
+    assert answer.status_code == 200, answer.text
+    found = answer.json()
+    assert found["scan"] == {"name": "scan.ply", "n_vertices": 500, "n_faces": 996, "repairs": []}
+    assert (found["method"], found["picture"]) == ("exact", None)
+    first = found["matches"][0]
+    assert (first["name"], first["label"], first["source"]) == ("zoo/fish", "animal", None)
+    assert len(found["matches"]) == 3
+    scores = [match["score"] for match in found["matches"]]
+    assert scores == sorted(scores)
+    pairs = np.array(first["pairs"])
+    assert pairs.shape == (first["n_pairs"], 2)
+    assert first["n_pairs"] > 3
+    assert 0 <= pairs.min() <= pairs.max() < 500
+
+
+def test_a_query_can_be_restricted_to_a_class(service):
+    found = service.query(scan_of("fish"), n=20, label="person", exact=1).json()["matches"]
+    assert [match["name"] for match in found] == ["zoo/biped"]
+    assert service.query(scan_of("fish"), label="none").json()["matches"] == []
+
+
+def test_a_mesh_is_repaired_and_the_answer_says_so(service):
+    mesh = es.make_creature("fish", n_vertices=500)
+    lines = [f"v {x} {y} {z}" for x, y, z in [*mesh.vertices, [9.0, 9.0, 9.0]]]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.faces]
+    found = service.query("\n".join(lines).encode(), "fish.obj").json()
+    assert len(found["scan"]["repairs"]) == 1
+    assert found["scan"]["n_vertices"] == 500
+    assert found["matches"][0]["name"] == "zoo/fish"
+
+
+def test_shapes_are_listed_shown_and_drawn(service):
+    answer = service.client.get("/v1/shapes", params={"limit": 4, "offset": 8}).json()
+    assert answer["n_shapes"] == len(KINDS) + len(NAMES)
+    assert [shape["name"] for shape in answer["shapes"]] == ["zoo/giraffe", "zoo/quadruped"]
+    shape = service.client.get("/v1/shapes/zoo%2Ffish").json()
+    assert (shape["name"], shape["label"], shape["source"]) == ("zoo/fish", "animal", None)
+    picture = service.client.get(shape["thumbnail"])
+    assert picture.headers["content-type"] == "image/png"
+    assert picture.content.startswith(b"\x89PNG")
+    points = {"name": "zoo/fish", "vertices": ",".join(map(str, range(400)))}
+    found = service.client.get("/v1/points", params=points).json()
+    assert found["thumbnail"] == shape["thumbnail"] + "&drawn=1"
+    seen = np.array([point for point in found["points"] if point])
+    assert 50 < len(seen) < 400
+    assert 0 <= seen.min() <= seen.max() <= 1
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_any_name_is_a_name_and_no_path(service, name):
+    listed = service.client.get("/v1/shapes", params={"limit": 1000}).json()["shapes"]
+    assert name in [shape["name"] for shape in listed]
+    # As the bytes that a client sends: some libraries take the dots of a name for a path.
+    path = "/v1/shapes/" + quote(name, safe="").replace(".", "%2E")
+    connection = http.client.HTTPConnection("127.0.0.1", service.port, timeout=60)
+    connection.request("GET", path, headers={"authorization": f"Bearer {TOKEN}"})
+    answer = connection.getresponse()
+    assert (answer.status, json.loads(answer.read())["name"]) == (200, name)
+    connection.close()
+    picture = service.client.get("/v1/thumbnails", params={"name": name})
+    assert picture.status_code == 404
+    assert "added to the index without its file" in picture.json()["error"]
+    points = service.client.get("/v1/points", params={"name": name, "vertices": "1,2"}).json()
+    assert points == {"thumbnail": None, "points": [None, None]}
+
+
+def test_sources_are_shown_if_allowed(index):
+    with serving(index.folder, sources="yes") as running:
+        shape = running.client.get("/v1/shapes/zoo%2Ffish").json()
+        assert shape["source"] == str(index.folder.parent / "fish.ply")
+
+
+def test_the_page_takes_a_cookie_and_programs_a_header(service):
+    with httpx.Client(base_url=service.base, timeout=60) as client:
+        assert client.get("/").status_code == 403
+        assert "Authorization: Bearer TOKEN" in client.get("/v1/shapes").json()["error"]
+        entered = client.get(f"/?token={TOKEN}")
+        assert (entered.status_code, entered.headers["location"]) == (303, "/")
+        assert {"HttpOnly", "SameSite=Strict"} <= set(entered.headers["set-cookie"].split("; "))
+        page = client.get("/")
+        assert 'data-test="drop"' in page.text
+        assert "default-src 'none'" in page.headers["content-security-policy"]
+        for name in ("/page.js", "/page.css", "/docs", "/docs.js"):
+            assert client.get(name).status_code == 200
+    with httpx.Client(base_url=service.base) as client:
+        shown = client.get("/v1/shapes", headers={"authorization": f"bearer {TOKEN}"})
+        assert shown.status_code == 200
+        assert client.get("/health").json()["shapes"] == len(KINDS) + len(NAMES)
+    assert service.url == f"{service.base}/"  # a token that was given is not printed
+
+
+def test_openapi_describes_every_call(service):
+    described = service.client.get("/openapi.json").json()
+    assert described == openapi()
+    text = json.dumps(described)
+    for name in re.findall(r"#/components/schemas/(\w+)", text):
+        assert name in described["components"]["schemas"]
+    for path, calls in described["paths"].items():
+        for method, call in calls.items():
+            answer = service.client.request(method, path.replace("{name}", "zoo%2Ffish"))
+            assert str(answer.status_code) in call["responses"], (path, answer.text)
+            required = [each["name"] for each in call["parameters"] if each["required"]]
+            if required and "{name}" not in path and method == "get":
+                assert f"The parameter {required[0]} must be given." in answer.json()["error"]
+
+
+def test_answers_are_as_openapi_says(service):
+    schemas = openapi()["components"]["schemas"]
+    answer = service.query(scan_of("bird"), picture=1).json()
+    assert set(answer) == set(schemas["Answer"]["required"])
+    assert set(answer["matches"][0]) == set(schemas["Match"]["required"])
+    assert answer["picture"]["image"].startswith("data:image/png;base64,")
+    vertices = {str(ours) for match in answer["matches"] for ours, _ in match["pairs"]}
+    assert vertices <= set(answer["picture"]["points"])
+    assert all(
+        re.fullmatch("#[0-9a-f]{6}", color) for color in answer["picture"]["colors"].values()
+    )
+
+
+def metrics_of(service):
+    """Return the values of all metrics by their names with labels."""
+    text = service.client.get("/metrics").text
+    lines = [line.rpartition(" ") for line in text.splitlines() if not line.startswith("#")]
+    return {name: float(value) for name, _, value in lines}
+
+
+def test_metrics_count(service):
+    before = metrics_of(service)
+    assert service.query(scan_of("bird")).status_code == 200
+    assert service.query(b"no mesh").status_code == 422
+    assert service.client.get("/nonsense").status_code == 404
+    after = metrics_of(service)
+
+    def growth(name):
+        return after[name] - before.get(name, 0.0)
+
+    assert growth('eigenshape_requests_total{path="/v1/query",status="200"}') == 1
+    assert growth('eigenshape_requests_total{path="/v1/query",status="422"}') == 1
+    assert growth('eigenshape_requests_total{path="other",status="404"}') == 1
+    assert growth("eigenshape_describe_seconds_count") == 1
+    assert growth("eigenshape_search_seconds_count") == 1
+    assert after["eigenshape_queue"] == 0
+    assert after["eigenshape_shapes"] == len(KINDS) + len(NAMES)
+
+
+WRONG_PARAMETERS = {
+    "no name": ("/v1/query", "name must be given"),
+    "no suffix": ("/v1/query?name=scan", "must end in .*; scan does not"),
+    "another format": ("/v1/query?name=a.exe", "a.exe does not"),
+    "a path": ("/v1/query?name=/etc/passwd", "; passwd does not"),
+    "no matches": ("/v1/query?name=a.ply&n=0", "n must lie between 1 and 100; it is '0'"),
+    "too many": ("/v1/query?name=a.ply&n=101", "n must lie between 1 and 100"),
+    "negative": ("/v1/query?name=a.ply&n=-1", "n must be a whole number"),
+    "many digits": ("/v1/query?name=a.ply&n=" + "9" * 5000, "n must be a whole number"),
+    "other digits": ("/v1/query?name=a.ply&n=%D9%A3", "n must be a whole number"),
+    "twice": ("/v1/query?name=a.ply&n=3&n=4", "n must be given once"),
+    "unknown": ("/v1/query?name=a.ply&k=3", "no parameter 'k' here; .*: name, n, label"),
+    "maybe exact": ("/v1/query?name=a.ply&exact=maybe", "exact must be 0 or 1"),
+    "a long class": ("/v1/query?name=a.ply&label=" + "x" * 5000, "label must have at most 4,096"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG_PARAMETERS)
+def test_wrong_parameters_are_named(service, what):
+    path, message = WRONG_PARAMETERS[what]
+    kind = {"content-type": "application/octet-stream"}
+    answer = service.client.post(path, content=b"x", headers=kind)
+    assert answer.status_code == 400
+    assert re.search(message, answer.json()["error"])
+
+
+def test_parameters_of_other_calls_are_checked(service):
+    get = service.client.get
+    many = ",".join(["1"] * 501)
+    assert "at most 500 numbers" in get(f"/v1/points?name=a&vertices={many}").json()["error"]
+    assert "vertices must be a whole" in get("/v1/points?name=a&vertices=1,x").json()["error"]
+    assert get("/v1/points?name=a&vertices=").status_code == 404
+    assert "limit must lie between" in get("/v1/shapes?limit=1001").json()["error"]
+    assert "no shape 'ghost'" in get("/v1/shapes/ghost").json()["error"]
+
+
+# What the studio refuses and the service does not look at: the number of a tab.
+OF_TABS = {"no tab", "a tab with a path", "a tab without end"}
+MORE_HOSTILE = {
+    "a wrong bearer": lambda s: s.request(drop=("cookie",), authorization="Bearer nonsense"),
+    "an empty bearer": lambda s: s.request(drop=("cookie",), authorization="Bearer "),
+    "the token as a password": lambda s: s.request(
+        drop=("cookie",), authorization=f"Basic {s.token}"
+    ),
+    "two bearers": lambda s: s.request(
+        drop=("cookie",), authorization=[f"Bearer {s.token}", "Bearer x"]
+    ),
+    "a bearer that is not ASCII": lambda s: s.request(
+        drop=("cookie",), authorization="Bearer \xe9\xff"
+    ),
+    "the token with another page": lambda s: s.request(
+        drop=("cookie",), authorization=f"Bearer {s.token}", origin="https://evil.example"
+    ),
+    "health by another name": lambda s: s.request("GET", "/health", b"", host="evil.example"),
+    "metrics without token": lambda s: s.request("GET", "/metrics", b"", drop=("cookie",)),
+    "a shape that is a path": lambda s: s.request("GET", "/v1/shapes/../../etc/shadow", b""),
+    "a picture of a path": lambda s: s.request("GET", "/v1/thumbnails?name=/etc/passwd", b""),
+    "a name with a null byte": lambda s: s.request("GET", "/v1/shapes/a%00b", b""),
+    "a name that is no UTF-8": lambda s: s.request("GET", "/v1/thumbnails?name=%ff%fe", b""),
+}
+SERVICE_HOSTILE = {name: HOSTILE[name] for name in HOSTILE if name not in OF_TABS} | MORE_HOSTILE
+
+
+def test_there_are_sixty_hostile_requests():
+    assert len(SERVICE_HOSTILE) >= 60
+
+
+@pytest.mark.parametrize("what", SERVICE_HOSTILE)
+def test_a_hostile_request_is_refused(service, what):
+    status = service.raw(SERVICE_HOSTILE[what](service))
+    assert status is None or 400 <= status < 500, status
+    assert service.process.poll() is None
+    assert is_well(service)
+
+
+def test_a_slow_sender_is_given_up(service):
+    request = service.request(content_length="4000")
+    assert service.raw(request, [b"x"], pause=1.0) == 408
+    assert service.raw(request, [b"x"] * 10, pause=0.3) == 408
+    began = time.monotonic()
+    assert service.raw(service.request()[:60], [b"x"] * 8, pause=0.3) in (None, 400)
+    assert time.monotonic() - began < 6
+    assert is_well(service)
+
+
+def test_a_large_body_is_refused_before_it_is_read(service):
+    answer = service.query(bytes((1 << 20) + 1))
+    assert answer.status_code == 413
+    assert answer.json() == {"error": "The body may have 1,048,576 bytes."}
+
+
+def test_a_bad_mesh_is_told_in_words(service):
+    answer = service.query(ply_of("nan 0 0\n1 0 0\n0 1 0\n"), "bad scan.ply")
+    assert answer.status_code == 422
+    text = answer.json()["error"]
+    assert text.startswith("bad scan.ply could not be described: ")
+    assert "nan" in text
+    assert "eigenshape-uploads" not in text  # no path of this machine
+
+
+@pytest.fixture(scope="module")
+def strict(index):
+    """Return a service with short limits."""
+    with serving(index.folder, token="", timeout=8.0, memory=2e9) as running:
+        yield running
+
+
+def test_a_mesh_that_hangs_dies_or_eats_memory_harms_nobody(strict):
+    expected = {
+        "hang": "could not be described: it took more than 8 s.",
+        "die": "could not be described: it ended its process with exit code 9.",
+        "eat": "could not be described: it needs more memory than a worker may use.",
+    }
+    with ThreadPoolExecutor(5) as threads:
+        bad = {what: threads.submit(strict.query, scan_of("fish", what)) for what in expected}
+        good = [threads.submit(strict.query, scan_of("fish")) for _ in range(2)]
+        for what, text in expected.items():
+            answer = bad[what].result()
+            assert (answer.status_code, answer.json()) == (422, {"error": f"scan.ply {text}"})
+        for answer in good:
+            assert answer.result().json()["matches"][0]["name"] == "zoo/fish"
+    assert strict.query(scan_of("bird")).status_code == 200
+    assert metrics_of(strict)["eigenshape_queue"] == 0
+
+
+def test_a_random_token_is_printed(strict):
+    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\?token=[\w-]{43}", strict.url)
+
+
+def test_shapes_of_other_processes_are_seen_by_several_services(tmp_path):
+    index = es.ShapeIndex.create(tmp_path / "index")
+    with serving(index.folder) as first, serving(index.folder) as second:
+        assert first.query(scan_of("fish")).json()["matches"] == []
+        index.add("fish", es.make_creature("fish", n_vertices=500), n_views=0)
+        time.sleep(1.1)
+        for running in (first, second):
+            assert running.client.get("/health").json()["shapes"] == 1
+            assert running.query(scan_of("fish")).json()["matches"][0]["name"] == "fish"
+        index.remove("fish")
+        time.sleep(1.1)
+        assert second.query(scan_of("fish")).json()["matches"] == []
+
+
+def test_a_reader_looks_at_most_once_a_second(index, monkeypatch):
+    shelf = ShelfReader(index.folder)
+    looks = []
+    monkeypatch.setattr(shelf._reader, "refresh", lambda: looks.append(1))
+    for _ in range(5):
+        shelf.refresh()
+    assert looks == []
+    shelf._due = 0.0
+    for _ in range(5):
+        shelf.refresh()
+    assert looks == [1]
+
+
+def wait_for_a_query(service):
+    while not metrics_of(service)["eigenshape_queue"]:
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_the_end_lets_queries_finish(index, number):
+    with serving(index.folder, grace=100) as running, ThreadPoolExecutor(1) as threads:
+        asking = threads.submit(running.query, scan_of("fish", "slow"))
+        wait_for_a_query(running)
+        assert running.end(number) == 0
+        assert asking.result().status_code == 200
+
+
+def test_a_query_that_hangs_does_not_hold_up_the_end_for_ever(index):
+    with (
+        serving(index.folder, timeout=500.0, grace=1) as running,
+        ThreadPoolExecutor(1) as threads,
+    ):
+        asking = threads.submit(running.query, scan_of("fish", "hang"))
+        wait_for_a_query(running)
+        assert running.end() == 0
+        lost = isinstance(asking.exception(), httpx.RemoteProtocolError)
+        assert lost or asking.result().status_code == 503
+
+
+MIXED_IN = ("no cookie", "host of another site", "no HTTP", "a mesh with NaN", "two lengths")
+
+
+def test_sixteen_clients_with_some_hostile_requests(service):
+    scans = [scan_of(kind) for kind in KINDS]
+    hostile = [SERVICE_HOSTILE[name] for name in MIXED_IN]
+    end = time.monotonic() + 10
+    wrong = []
+
+    def work(number):
+        rng = np.random.default_rng(number)
+        n_good = 0
+        bearer = {"authorization": f"Bearer {TOKEN}"}
+        with httpx.Client(base_url=service.base, timeout=300, headers=bearer) as client:
+            while time.monotonic() < end:
+                if rng.random() < 0.01 or (n_good == 1 and number < 2):
+                    status = service.raw(hostile[rng.integers(len(hostile))](service))
+                    if status is not None and not 400 <= status < 500:
+                        wrong.append(status)
+                which = rng.integers(len(KINDS))
+                if rng.random() < 0.8:
+                    answer = client.get("/v1/shapes/zoo%2F" + KINDS[which])
+                    good = answer.status_code == 200 and answer.json()["name"].endswith(
+                        KINDS[which]
+                    )
+                else:
+                    answer = service.query(scans[which], client=client, n=1)
+                    good = answer.status_code == 200 and len(answer.json()["matches"]) == 1
+                if not good:
+                    wrong.append(answer.text)
+                n_good += good
+        return n_good
+
+    with ThreadPoolExecutor(16) as threads:
+        counts = list(threads.map(work, range(16)))
+    assert wrong == []
+    assert min(counts) > 0
+    assert metrics_of(service)["eigenshape_queue"] == 0
+
+
+def test_the_page_shows_matches_with_pictures_and_errors_in_words(index, tmp_path):
+    scan, bad = tmp_path / "fish.off", tmp_path / "bad.off"
+    es.write_mesh(es.make_creature("fish", 1, n_vertices=500), scan)
+    bad.write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 nan 0\n3 0 1 2\n")
+    ready = "document.querySelector('[data-test=index-facts]').textContent !== ''"
+    # A card without a picture says so.
+    pictures = (
+        "document.querySelectorAll('li').length === 8 && "
+        "[...document.querySelectorAll('.stage')].every((each) => each.firstChild)"
+    )
+    with serving(index.folder, token="") as running, start_browser() as browser:
+        with open_page(browser, running.url, ready=ready) as page:
+            assert "token" not in page.url
+            drop_file(page, "drop", scan)
+            wait_until(page, pictures)
+            wait_until(page, "[...document.images].every((each) => each.naturalWidth > 0)")
+            assert "zoo/fish" in find(page, "match-0").inner_text()
+            assert find(page, "match-0").locator("circle").count() > 3
+            assert find(page, "scan-picture").locator("circle").count() > 3
+            # Names are shown as they are, and never read as HTML.
+            assert MARKUP in find(page, "matches").inner_text()
+        with open_page(browser, running.url, ready=ready, dark=True) as page:
+            drop_file(page, "drop", scan)
+            wait_until(page, pictures)
+            page.goto(f"{running.base}/docs")
+            wait_until(page, "document.querySelectorAll('article').length >= 7")
+        # Chromium itself writes a line for each answer with an error.
+        context = browser.new_context()
+        page = context.new_page()
+        page.goto(running.url)
+        wait_until(page, ready)
+        drop_file(page, "drop", bad)
+        wait_until(page, "document.querySelector('.status.bad') !== null")
+        assert "bad.off could not be described: " in find(page, "status").inner_text()
+        context.close()
+
+
+@pytest.mark.parametrize(
+    "token", ["short", "x" * 300, "with spaces in the middle", "semi;colon;" * 3]
+)
+def test_a_token_must_be_long_and_plain(index, token):
+    with pytest.raises(es.InvalidParameterError, match="16 to 256 letters"):
+        serve(index.folder, token=token)
+
+
+def test_another_address_takes_permission(index):
+    with pytest.raises(es.InvalidParameterError, match="The service listens on this machine alone"):
+        serve(index.folder, host="0.0.0.0")
+
+
+def test_a_folder_without_index_is_refused(tmp_path):
+    with pytest.raises(es.StoreError):
+        serve(tmp_path)
+
+
+# The container: its steps, without an engine.
+
+CONTAINERFILE = ROOT / "deploy" / "Containerfile"
+
+
+def steps_of(text):
+    """Return instructions and their arguments, of lines joined at their ends."""
+    joined = re.sub(r"\\\n\s*", " ", text)
+    lines = [line for line in joined.splitlines() if line and not line.startswith("#")]
+    return [tuple(line.split(maxsplit=1)) for line in lines]
+
+
+def test_the_container_copies_what_there_is_and_installs_as_the_readme_says():
+    steps = steps_of(CONTAINERFILE.read_text(encoding="utf-8"))
+    assert steps[0] == ("FROM", "docker.io/library/python:3.12-slim")
+    copied = set()
+    for _, text in [step for step in steps if step[0] == "COPY"]:
+        *sources, _target = [word for word in text.split() if not word.startswith("--")]
+        for source in sources:
+            assert (ROOT / source).exists(), source
+            copied.add(source.rstrip("/"))
+    # What pip needs to build both packages, of each pyproject.
+    assert {"pyproject.toml", "README.md", "LICENSE", "src", "studio"} <= copied
+    runs = " && ".join(text for name, text in steps if name == "RUN")
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert "pip install . ./studio" in runs
+    assert "pip install . ./studio" in readme
+    assert [text for name, text in steps if name == "USER"][-1] not in ("root", "0")
+    names = [name for name, _ in steps]
+    assert names.index("USER") > max(k for k, name in enumerate(names) if name == "RUN")
+    assert {"EXPOSE", "HEALTHCHECK", "VOLUME"} <= set(names)
+
+
+def test_the_command_of_the_container_serves_and_is_healthy(index):
+    steps = dict(steps_of(CONTAINERFILE.read_text(encoding="utf-8")))
+    program, *options = [*json.loads(steps["ENTRYPOINT"]), *json.loads(steps["CMD"])]
+    assert program == "eigenshape"
+    volume = json.loads(steps["VOLUME"])[0]
+    port = steps["EXPOSE"]
+    assert options[options.index("--port") + 1] == port
+    # Another port and folder than in a container, which has its own; all else is the same.
+    options = ["0" if word == port else word.replace(volume, str(index.folder)) for word in options]
+    command = [sys.executable, "-m", "eigenshape", *options, "--workers", "1"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        line = process.stdout.readline()
+        used = re.fullmatch(r"The service is open at http://\S+:(\d+)/\?token=\S+\n", line)[1]
+        health = shlex.split(steps["HEALTHCHECK"].rpartition("CMD ")[2])
+        assert health[0] == "python"
+        for tried, code in ((used, 0), ("1", 1)):
+            check = [sys.executable, *(word.replace(port, tried) for word in health[1:])]
+            assert subprocess.run(check, capture_output=True, check=False).returncode == code
+    finally:
+        process.terminate()
+        process.communicate(timeout=60)
+    assert process.returncode == 0
