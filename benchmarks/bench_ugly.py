@@ -94,7 +94,7 @@ def arguments_of(verb: str, path: Path, repairs: str, index: Path) -> list[str]:
     if verb == "features":
         return ["features", str(path), *options]
     if verb == "index":
-        return ["index", tempfile.mkdtemp(dir=index.parent), str(path), *options]
+        return ["index", "add", tempfile.mkdtemp(dir=index.parent), str(path), *options]
     return ["query", str(index), str(path), *options]
 
 
@@ -191,7 +191,7 @@ def make_index(folder: Path) -> Path:
     source.mkdir()
     for name, mesh in sound_meshes(N_CLASSES).items():
         es.write_mesh(mesh, source / f"{name}.ply")
-    done = CliRunner().invoke(app, ["index", str(index), str(source), "--views", "0"])
+    done = CliRunner().invoke(app, ["index", "add", str(index), str(source), "--views", "0"])
     if done.exit_code:
         raise SystemExit(done.output)
     return index

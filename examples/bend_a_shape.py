@@ -11,9 +11,9 @@ import numpy as np
 import eigenshape as es
 
 
-def main(folder: Path) -> dict[str, es.TriangleMesh]:
+def main(folder: Path, *, n_vertices: int = 3000) -> dict[str, es.TriangleMesh]:
     """Edit a giraffe in a session, and replay the edits on a mesh with four times the faces."""
-    giraffe = es.make_creature("giraffe", 1, n_vertices=3000)
+    giraffe = es.make_creature("giraffe", 1, n_vertices=n_vertices)
     low, high = giraffe.vertices.min(axis=0), giraffe.vertices.max(axis=0)
     head = es.deformation.BoxRegion(
         [-np.inf, low[1] + 0.8 * (high - low)[1], -np.inf], [np.inf] * 3

@@ -11,15 +11,16 @@ import numpy as np
 import eigenshape as es
 
 
-def main(folder: Path) -> list[es.retrieval.Match]:
+def main(folder: Path, *, n_vertices: int = 2500) -> list[es.retrieval.Match]:
     """Index three poses of three creatures, and query with what one viewpoint sees of a fourth pose."""
     index = es.ShapeIndex.create(folder / "creatures")
     for kind in ("biped", "octopus", "fish"):
         for pose in range(3):
-            mesh = es.make_creature(kind, pose)
+            mesh = es.make_creature(kind, pose, n_vertices=n_vertices)
             index.add(f"{kind}-{pose}", mesh, recipe=es.retrieval.SCALE_FREE, label=kind)
 
-    scan = es.partial_scan(es.make_creature("octopus", 7), np.random.default_rng(1)).mesh
+    octopus = es.make_creature("octopus", 7, n_vertices=n_vertices)
+    scan = es.partial_scan(octopus, np.random.default_rng(1)).mesh
 
     # The same steps by hand: spectrum, heat, and one part around each of its persistent maxima
     spectrum = es.solve_spectrum(es.cotangent_laplacian(scan), k=150)

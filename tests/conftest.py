@@ -4,11 +4,11 @@ import os
 from pathlib import Path
 
 import pytest
+import runtime_types
 import scipy.linalg  # noqa: F401 - its BLAS must be there to be limited
-from jaxtyping import install_import_hook
 from threadpoolctl import threadpool_limits
 
-install_import_hook("eigenshape", "runtime_types.checked")
+runtime_types.install()
 
 TESTS = Path(__file__).resolve().parent
 ROOT = TESTS.parent

@@ -1,11 +1,17 @@
 """What processes of the tests do with an index until they are killed, telling the number of each step that is done."""
 
 import itertools
+import os
+import signal
+import sys
+from pathlib import Path
 
 from describers import descriptor
 
 from eigenshape._errors import StoreError
+from eigenshape.retrieval.store import files
 from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.retrieval.store.writing import DescribedShape
 
 
 def add_shapes(folder, done):
@@ -42,3 +48,64 @@ def open_and_add(folder, done):
         done.send(str(err))
     else:
         done.send("added")
+
+
+STORE = str(Path(files.__file__).parent)
+N_STEPS = 12  # that a process takes unless it dies before
+N_KINDS = 4  # of steps: add two, remove one, merge, compact
+
+
+def names_after(step):
+    """Return what an index holds after a step of `change_in_all_ways`, -1 for before the first: name and seed."""
+    names = {}
+    for number in range(step + 1):
+        if number % N_KINDS == 0:
+            names |= {f"s{number}a": number, f"s{number}b": number + 1}
+        elif number % N_KINDS == 1:
+            del names[f"s{number - 1}a"]
+        elif number % N_KINDS == 2:
+            names["merged"] = number
+    return names
+
+
+def change_in_all_ways(folder, start, line, done):
+    """Take steps from `start` on; die at a line of the store if one is given, counted from now on."""
+    index = ShapeIndex.open(folder)
+    parts = {}
+    for number in range(start, start + N_STEPS):
+        if number % N_KINDS == 2:
+            parts[number] = ShapeIndex.create(None)
+            parts[number].add_descriptors("merged", [descriptor(number)], digest=str(number))
+    done.send(start - 1)
+    if line is not None:
+        die_at(line)
+    for number in range(start, start + N_STEPS):
+        if number % N_KINDS == 0:
+            index.add_many(
+                DescribedShape(f"s{number}{letter}", [descriptor(number + place)], thumbnail=b"p")
+                for place, letter in enumerate("ab")
+            )
+        elif number % N_KINDS == 1:
+            index.remove(f"s{number - 1}a")
+        elif number % N_KINDS == 2:
+            index.merge([parts[number]], replace=True)
+        else:
+            index.compact()
+        done.send(number)
+
+
+def die_at(line):
+    """Kill this process at the so manieth line of the store that it runs."""
+    left = line
+
+    def trace(frame, event, _):
+        nonlocal left
+        if not frame.f_code.co_filename.startswith(STORE):
+            return None
+        if event == "line":
+            left -= 1
+            if left <= 0:
+                os.kill(os.getpid(), signal.SIGKILL)
+        return trace
+
+    sys.settrace(trace)

@@ -14,6 +14,7 @@ MAKERS = {
     "Brackets": "es.bracket_eigenvalues(mesh, k)",
     "Camera": "es.plot.three_quarter_view(mesh)",
     "DepthCamera": "es.scans.DepthCamera()",
+    "DescribedShape": "es.retrieval.DescribedShape(name, [es.describe(mesh)])",
     "DetailedSkeleton": "es.deformation.detailed_skeleton(binding)",
     "Edit": "es.deformation.Edit((es.deformation.Move(region, handle),))",
     "EigenRig": "es.rig_shape(mesh)",

@@ -20,6 +20,8 @@ INDEXED = {"faces": "vertices", "simplices": "points"}
 SHARE_OF_ARRAYS = 0.5
 BYTES_OF_ENTRY = 17  # memory per entry meanwhile: two copies of 8 bytes and one bool
 
+MOST_COORDINATES = 3  # of a row that messages show as a vector: those of a point in space
+
 ArrayT = TypeVar("ArrayT", bound=NDArray[Any])
 
 
@@ -216,6 +218,22 @@ def _require_finite(values: NDArray[np.float64], name: str) -> None:
         place = tuple(bad[0].tolist())
         entry = place[0] if len(place) == 1 else place
         raise InvalidParameterError(f"{name} must be finite; entry {entry} is {values[place]}.")
+
+
+def require_finite_rows(rows: NDArray[np.float64], name: str, noun: str) -> None:
+    """Raise an error if a number is not finite; `noun` says what each row belongs to.
+
+    Raises
+    ------
+    InvalidParameterError
+    """
+    bad = np.argwhere(~np.isfinite(rows))
+    if len(bad):
+        row = bad[0][0]
+        # A vector is shown as a whole; of many functions, the value of the first bad one.
+        is_vector = rows[row].size <= MOST_COORDINATES
+        value = rows[row].tolist() if is_vector else rows[tuple(bad[0])]
+        raise InvalidParameterError(f"{name} must be finite; that of {noun} {row} is {value}.")
 
 
 def _list_of_numbers(value: ArrayLike, name: str) -> NDArray[np.float64]:

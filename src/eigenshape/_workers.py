@@ -2,13 +2,17 @@
 
 import multiprocessing
 import os
+import pickle
 import signal
+import subprocess
+import sys
 import threading
-from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import Future, as_completed
+import time
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, Future, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Generic, TypeVar
@@ -16,9 +20,10 @@ from typing import Generic, TypeVar
 from pebble import ProcessExpired, ProcessPool
 from threadpoolctl import threadpool_limits
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import EigenshapeError
-from eigenshape._text import html_repr
+from eigenshape._text import html_repr, repr_of_changes
 
 T = TypeVar("T")
 NO_WORKERS = (
@@ -28,16 +33,35 @@ NO_WORKERS = (
 )
 
 
+# Files of one task of an executor. Each task starts a process of its own, which takes about two
+# seconds to load the library: a twentieth of what it takes to describe so many files.
+FILES_A_TASK = 32
+SECONDS_BETWEEN_LOOKS = 1.0  # after which the process of a task looks whether its worker lives
+
+
 @dataclass(frozen=True)
 class Workers:
-    """How many processes describe files at the same time, and for how long each may take.
+    """The processes that describe files: how many, and what each file may take.
 
     Parameters
     ----------
     count : int
-        Processes.
+        Processes. With an executor, its own workers count instead.
     timeout : float
         Seconds after which a file is given up.
+    memory : float, optional
+        Bytes that a process may use; a file that needs more is given up. By default each process
+        has an equal share of the memory of the machine. Not limited on macOS and Windows.
+    executor : concurrent.futures.Executor, optional
+        Runs the work in place of processes of this machine: a cluster's, for example. Each task
+        describes up to 32 files in a process of its own, under the same limits, so a file that
+        kills its process costs the executor no worker. Workers must see the same files and have
+        the same eigenshape.
+
+    Raises
+    ------
+    InvalidParameterError
+        If a number is not positive.
 
     See Also
     --------
@@ -46,18 +70,24 @@ class Workers:
     Examples
     --------
     >>> import eigenshape as es
-    >>> es.retrieval.Workers(count=4)
-    Workers(count=4, timeout=300.0)
+    >>> es.retrieval.Workers(count=4).timeout
+    300.0
     """
 
     count: int = 2
     timeout: float = 300.0
+    memory: float | None = None
+    executor: Executor | None = None
 
+    __repr__ = repr_of_changes
     _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
+        require_type(self.executor, Executor | None, "executor")
         whole_number(self.count, "count", 1)
         positive_values([self.timeout], "timeout")
+        if self.memory is not None:
+            positive_values([self.memory], "memory")
 
 
 @dataclass(frozen=True)
@@ -70,10 +100,14 @@ class Item:
         Unique in the index.
     path : Path
     label : str, optional
+        Class of the shape.
+    tags : tuple of str
+    attributes : mapping of str to float or str
+        Further facts, by which queries can be restricted.
 
     See Also
     --------
-    build_index, train_codebook_from_files
+    find_items, build_index, train_codebook_from_files
 
     Examples
     --------
@@ -86,7 +120,10 @@ class Item:
     name: str
     path: Path
     label: str | None = None
+    tags: tuple[str, ...] = ()
+    attributes: Mapping[str, float | str] = field(default_factory=dict)
 
+    __repr__ = repr_of_changes
     _repr_html_ = html_repr
 
 
@@ -111,27 +148,61 @@ def run_in_workers(
     EigenshapeError
         If no worker can start, as in a script without a main guard.
     """
-    _require_main_guard()
-    context = multiprocessing.get_context("spawn")
-    count = max(min(workers.count, len(items)), 1)
-    pool = ProcessPool(max_workers=count, initializer=_start_worker, context=context)
+    if workers.executor is not None:
+        yield from _run_in_executor(work, items, workers.executor, workers)
+        return
+    pool = start_pool(workers, max(min(workers.count, len(items)), 1))
     try:
-        with _ctrl_c_deferred():
-            _ = pool.active  # starts the processes, and the threads that replace those that die
-        futures = {
-            pool.schedule(_work, args=[work, item.path], timeout=workers.timeout): item
-            for item in items
-        }
+        futures = {schedule_work(pool, work, item.path, workers): item for item in items}
         for number, future in enumerate(as_completed(futures)):
             if number == 0:
                 _require_started(future)
-            yield futures[future], _outcome(future, workers)
+            yield futures[future], outcome_of(future, workers)
         pool.close()
     except BaseException:
         pool.stop()
         raise
     finally:
         pool.join()
+
+
+def start_pool(
+    workers: Workers, count: int, prepare: Callable[[], object] | None = None
+) -> ProcessPool:
+    """Start worker processes, and the threads that replace those that die.
+
+    Parameters
+    ----------
+    workers : Workers
+        Of which the memory counts.
+    count : int
+        Processes.
+    prepare : callable, optional
+        Called in each new process before its first work. It must not raise.
+    """
+    _require_main_guard()
+    pool = ProcessPool(
+        max_workers=count,
+        initializer=_start_worker,
+        initargs=[_memory_of_each(workers), prepare],
+        context=multiprocessing.get_context("spawn"),
+    )
+    try:
+        with _ctrl_c_deferred():
+            _ = pool.active  # starts them
+    except BaseException:
+        pool.stop()
+        pool.join()
+        raise
+    return pool
+
+
+def schedule_work(
+    pool: ProcessPool, work: Callable[[Path], T], path: Path, workers: Workers
+) -> "Future[Outcome[T]]":
+    """Call a function on a path in a worker; `outcome_of` tells what came of it."""
+    future: Future[Outcome[T]] = pool.schedule(_work, args=[work, path], timeout=workers.timeout)
+    return future
 
 
 @contextmanager
@@ -191,10 +262,26 @@ def _require_started(first: "Future[Outcome[T]]") -> None:
         raise EigenshapeError(NO_WORKERS) from first.exception()
 
 
-def _start_worker() -> None:
+def _memory_of_each(workers: Workers) -> int | None:
+    """Return the bytes that each process may use, or None where the system cannot tell or limit."""
+    if workers.memory is not None:
+        return int(workers.memory)
+    if sys.platform != "linux":
+        return None
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // workers.count
+
+
+def _start_worker(memory: int | None, prepare: Callable[[], object] | None = None) -> None:
+    if memory is not None and sys.platform == "linux":
+        import resource  # noqa: PLC0415  there is none on Windows
+
+        # Data and not addresses: a math library reserves far more of those than it ever uses.
+        resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it could not be blocked
     threading.Thread(target=_die_with_parent, daemon=True).start()
     threadpool_limits(1)
+    if prepare is not None:
+        prepare()
 
 
 def _die_with_parent() -> None:
@@ -208,12 +295,15 @@ def _work(work: Callable[[Path], T], path: Path) -> Outcome[T]:
     """Call `work` in a worker, and turn any error into text, which can always be pickled."""
     try:
         return Outcome(work(path))
+    except MemoryError:
+        return Outcome(error="it needs more memory than a worker may use")
     except Exception as err:  # noqa: BLE001  one that cannot be pickled would break the whole pool
         known = isinstance(err, EigenshapeError | OSError)
         return Outcome(error=str(err) if known else f"{type(err).__name__}: {err}")
 
 
-def _outcome(future: "Future[Outcome[T]]", workers: Workers) -> Outcome[T]:
+def outcome_of(future: "Future[Outcome[T]]", workers: Workers) -> Outcome[T]:
+    """Return what a worker returned, or why it did not, when the future is done."""
     error = future.exception()
     if error is None:
         return future.result()
@@ -222,3 +312,63 @@ def _outcome(future: "Future[Outcome[T]]", workers: Workers) -> Outcome[T]:
     if isinstance(error, ProcessExpired):
         return Outcome(error=f"it ended its process with exit code {error.exitcode}")
     return Outcome(error=f"{type(error).__name__}: {error}")
+
+
+def _run_in_executor(
+    work: Callable[[Path], T], items: Sequence[Item], executor: Executor, workers: Workers
+) -> Generator[tuple[Item, Outcome[T]], None, None]:
+    """Yield items with their outcomes, from tasks of an executor."""
+    each = replace(workers, count=1, executor=None)
+    tasks: dict[Future[bytes], Sequence[Item]] = {}
+    try:
+        for first in range(0, len(items), FILES_A_TASK):
+            files = items[first : first + FILES_A_TASK]
+            order = pickle.dumps((work, files, each))
+            tasks[executor.submit(run_apart, order)] = files
+        for task in as_completed(tasks):
+            error = task.exception()
+            if error is None:
+                yield from pickle.loads(task.result())
+                continue
+            lost: Outcome[T] = Outcome(error=f"its task was lost: {type(error).__name__}: {error}")
+            yield from ((item, lost) for item in tasks[task])
+    finally:
+        for task in tasks:
+            task.cancel()
+
+
+def run_apart(order: bytes) -> bytes:
+    """Carry out the work of a task in a new process, and return its pickled outcomes.
+
+    A worker of an executor may be forbidden to have children of multiprocessing, as those of Dask
+    are, and must not be killed by a file.
+    """
+    command = [sys.executable, "-c", f"from {__name__} import main; main()"]
+    # What this worker can import, the process can import too.
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(
+        command, input=order, stdout=subprocess.PIPE, env=environment, check=False
+    )
+    if done.returncode:
+        raise EigenshapeError(
+            "A task must run in a process of its own; the process ended with exit code "
+            f"{done.returncode}. See the log of the worker for its error. The function that reads "
+            "files must be in a module that workers can import."
+        )
+    return done.stdout
+
+
+def main() -> None:
+    """Take an order from stdin, run it in a worker process, and write the outcomes to stdout."""
+    threading.Thread(target=_die_with, args=[os.getppid()], daemon=True).start()
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a file's reader prints is no answer
+    work, items, workers = pickle.load(sys.stdin.buffer)
+    with answers:
+        pickle.dump(list(run_in_workers(work, items, workers)), answers)
+
+
+def _die_with(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(SECONDS_BETWEEN_LOOKS)
+    os._exit(1)

@@ -75,10 +75,10 @@ def test_a_broken_file_is_named_with_what_is_wrong_in_it(tmp_path, verb):
             "A picture must end in .png, .svg, .pdf",
         ),
         (
-            ("index", "{folder}/db", "{missing}", "--method", "best"),
+            ("index", "add", "{folder}/db", "{missing}", "--method", "best"),
             "--method takes patches, scale-free, th",
         ),
-        (("index", "{folder}/db", "{missing}", "--repair", "all"), "'all' is none of them"),
+        (("index", "add", "{folder}/db", "{missing}", "--repair", "all"), "'all' is none of them"),
     ],
 )
 def test_a_bad_option_is_refused_before_any_file_is_looked_at(tmp_path, arguments, message):
@@ -111,7 +111,7 @@ def test_index_names_the_broken_file_takes_the_rest_and_knows_it_again(fish, tmp
     folder.mkdir()
     write_mesh(icosphere(2), folder / "ball.ply")
     (folder / "broken.off").write_text(BROKEN)
-    command = ("index", tmp_path / "db", folder, fish, "--workers", 1, "--views", 0)
+    command = ("index", "add", tmp_path / "db", folder, fish, "--workers", 1, "--views", 0)
     first = run(*command, code=3)
     assert "2 described, 0 indexed already, 1 failed; the index holds 2 shapes" in first.stdout
     assert "broken.off: faces must index vertices 0..2" in first.stdout

@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 
 from eigenshape import TriangleMesh, deform, read_mesh, repair, rig_shape, write_mesh
 from eigenshape.cli import app
-from eigenshape.cli.steps import find_items
 from eigenshape.deformation.handles import Translation
 from eigenshape.geometry.repair import REPAIRS
+from eigenshape.io.folders import find_items
 from eigenshape.io.labels import read_labels
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.spheres import icosphere

@@ -54,27 +54,18 @@ def folder(tmp_path_factory):
 @pytest.mark.parametrize("preset", ["patches", "scale-free"])
 def test_a_broken_shape_is_found_once_it_is_repaired(folder, tmp_path, name, preset):
     whole, broken, db = folder / "whole.ply", folder / f"{name}.ply", tmp_path / "db"
-    run("index", db, whole, "--method", preset, "--views", 0, "--workers", 1)
+    run("index", "add", db, whole, "--method", preset, "--views", 0, "--workers", 1)
     if (name, preset) != ("flipped", "scale-free"):  # heat has no side
-        assert "--repair auto on the command line" in run("query", db, broken, code=1).stderr
-        refused = run("index", db, broken, "--method", preset, "--views", 0, "--workers", 1, code=3)
+        asked = run("query", db, broken, "--repair", "none", code=1)
+        assert "--repair auto on the command line" in asked.stderr
+        options = ("--method", preset, "--views", 0, "--workers", 1, "--repair", "none")
+        refused = run("index", "add", db, broken, *options, code=3)
         assert "--repair auto on the command line" in refused.stderr
-    found = json.loads(run("query", db, broken, "--json", "--repair", "auto").stdout)
+    found = json.loads(run("query", db, broken, "--json").stdout)  # repairs what needs repair
     assert found["matches"][0]["name"] == "whole"
-    added = run(
-        "index",
-        db,
-        broken,
-        "--method",
-        preset,
-        "--repair",
-        "auto",
-        "--views",
-        0,
-        "--workers",
-        1,
-    )
+    added = run("index", "add", db, broken, "--method", preset, "--views", 0, "--workers", 1)
     assert "1 described" in added.stdout
+    assert f"repaired: {name}: " in added.stderr
 
 
 @pytest.mark.parametrize("verb", ["features", "segment"])

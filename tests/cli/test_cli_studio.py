@@ -13,7 +13,7 @@ def run(*arguments):
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
-@pytest.mark.parametrize("verb", ["studio", "report"])
+@pytest.mark.parametrize("verb", ["studio", "serve", "report"])
 def test_without_the_studio_its_verbs_say_what_to_install(monkeypatch, tmp_path, verb):
     monkeypatch.setitem(sys.modules, "eigenshape_studio", None)
     done = run(verb, "nowhere.ply", *(["-o", tmp_path / "a.html"] if verb == "report" else []))
@@ -40,6 +40,39 @@ def test_studio_passes_its_options_on_and_prints_the_address(monkeypatch):
     assert calls[0] == (Path("a.ply"), {"index": Path("shelf"), **local})
     remote = {"host": "0.0.0.0", "port": 0, "allow_remote": True, "browse": True}
     assert calls[1] == (None, {"index": None, **remote})
+
+
+def test_serve_passes_its_options_on_and_prints_the_address(monkeypatch):
+    calls = []
+
+    def serve(index, *, announce, **options):
+        calls.append((index, options))
+        announce("http://127.0.0.1:5/")
+
+    for name in ("eigenshape_studio", "eigenshape_studio.service"):
+        monkeypatch.setitem(sys.modules, name, ModuleType(name))
+    module = ModuleType("eigenshape_studio.service.server")
+    monkeypatch.setattr(module, "serve", serve, raising=False)
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setenv("EIGENSHAPE_TOKEN", "a-token-of-the-environment")
+    done = run("serve", "shelf", "--port", 5, "--workers", 3, "--timeout", 7, "--memory", 1.5)
+    assert done.stdout == "The service is open at http://127.0.0.1:5/\n"
+    index, options = calls[0]
+    assert index == Path("shelf")
+    assert options == {
+        "host": "127.0.0.1",
+        "port": 5,
+        "allow_remote": False,
+        "allow_hosts": (),
+        "token": "a-token-of-the-environment",
+        "workers": es.retrieval.Workers(3, 7.0, 1.5e9),
+        "show_sources": False,
+        "browse": False,
+    }
+    names = ["--allow-host", "a.example", "--allow-host", "b.example:80"]
+    run("serve", "shelf", "--host", "::", "--allow-remote", *names, "--browser", "--show-sources")
+    remote = {"host": "::", "allow_remote": True, "allow_hosts": ["a.example", "b.example:80"]}
+    assert calls[1][1].items() >= (remote | {"browse": True, "show_sources": True}).items()
 
 
 def test_report_reads_repairs_and_writes(monkeypatch, tmp_path):

@@ -89,7 +89,7 @@ def changed(edits):
 @pytest.mark.long
 def test_an_index(zoo, tmp_path):
     db, sheet = tmp_path / EVIL, tmp_path / "sheet.svg"
-    done = run("index", db, zoo, "--views", 0, "--method", "scale-free", code=3)
+    done = run("index", "add", db, zoo, "--views", 0, "--method", "scale-free", code=3)
     assert f"{SPELLED}: " in done.stdout
     assert f"{SPELLED}: " in done.stderr
     done = run("query", db, zoo / f"{EVIL}0.ply", "--picture", sheet)
@@ -145,7 +145,7 @@ def test_progress_bars(monkeypatch):
             1,
         ),
         (["query", EVIL, EVIL], 1),
-        (["index", "{zoo}", "{zoo}", "--repair", EVIL], 1),
+        (["index", "add", "{zoo}", "{zoo}", "--repair", EVIL], 1),
         (["demo", "--kind", EVIL], 1),
         ([f"--{EVIL}"], 2),
         ([EVIL], 2),

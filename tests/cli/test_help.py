@@ -12,11 +12,12 @@ from typer.testing import CliRunner
 
 import eigenshape
 from eigenshape.cli import app
-from eigenshape.cli.verbs import VERBS, load_verb
+from eigenshape.cli.verbs import INDEX_VERBS, VERBS, load_verb
 
 COMMAND = typer.main.get_command(app)
 # eigenshape itself and the command line are light; these take a second together
 HEAVY = {"numpy", "numba", "scipy", "matplotlib", "sqlite3", "jaxtyping"}
+LINES = VERBS | {f"index {verb}": line for verb, line in INDEX_VERBS.items()}
 WIDE = {"COLUMNS": "2000"}  # no text is broken over lines
 
 
@@ -31,11 +32,11 @@ def printed(*arguments):
     return words(done.stdout)
 
 
-@pytest.mark.parametrize("verb", ["", *VERBS])
+@pytest.mark.parametrize("verb", ["", *LINES])
 def test_help_is_printed_to_the_letter(verb):
     """Nothing in it is taken for markup, such as the brackets of `eigenshape[bridges]`."""
     command = load_verb(verb) if verb else COMMAND
-    text = printed(verb) if verb else printed()
+    text = printed(*verb.split())
     written = [command.help, *(parameter.help for parameter in command.params)]
     if not verb:
         written += [COMMAND.epilog, *VERBS, *VERBS.values()]
@@ -43,19 +44,24 @@ def test_help_is_printed_to_the_letter(verb):
         assert words(sentence) in text
 
 
-@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("verb", LINES)
 def test_the_list_of_verbs_has_the_first_line_of_each_docstring(verb):
-    assert words(load_verb(verb).help.split("\n\n")[0]) == words(VERBS[verb])
+    assert words(load_verb(verb).help.split("\n\n")[0]) == words(LINES[verb])
 
 
 def test_every_module_with_a_verb_is_in_the_list():
     folder = Path(eigenshape.cli.__file__).parent
-    names = {path.stem for path in folder.glob("*.py") if f"\ndef {path.stem}(" in path.read_text()}
-    assert names == VERBS.keys()
+    assert verbs_in(folder) == VERBS.keys() - {"index"}
+    assert verbs_in(folder / "index") == INDEX_VERBS.keys()
+
+
+def verbs_in(folder):
+    return {path.stem for path in folder.glob("*.py") if f"\ndef {path.stem}(" in path.read_text()}
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--help"], [], ["--version"], ["quary"], *([verb, "--help"] for verb in VERBS)]
+    "arguments",
+    [["--help"], [], ["--version"], ["quary"], *([*verb.split(), "--help"] for verb in LINES)],
 )
 def test_help_loads_nothing_heavy(arguments):
     code = (
@@ -75,7 +81,7 @@ def test_a_misspelt_verb_gets_a_suggestion():
     assert "Did you mean 'query'?" in done.stderr
 
 
-@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("verb", LINES)
 def test_every_option_is_explained_in_a_sentence(verb):
     for parameter in load_verb(verb).params:
         if parameter.name != "help":
@@ -105,7 +111,7 @@ def test_the_command_is_a_module_too(module):
     assert "Usage: eigenshape info" in usage.stdout
 
 
-ALL = [(verb, parameter) for verb in VERBS for parameter in load_verb(verb).params]
+ALL = [(verb, parameter) for verb in LINES for parameter in load_verb(verb).params]
 
 
 def spellings(of):
@@ -121,10 +127,13 @@ def test_the_main_output_of_every_verb_is_called_output():
         "segment",
         "label",
         "deform",
+        "query",
         "compress",
         "decompress",
         "report",
         "demo",
+        "index export",
+        "index learn",
     ]
     assert spellings(lambda parameter: parameter.name == "output") == {("-o", "--output")}
     assert spellings(lambda parameter: "-o" in parameter.opts) == {("-o", "--output")}
@@ -134,12 +143,12 @@ def test_a_picture_is_called_picture():
     drawn = {
         parameter.name for _, parameter in ALL if "PNG, SVG or PDF" in " ".join([parameter.help])
     }
-    assert drawn == {"picture", "eigenfunctions"}
+    assert drawn == {"picture", "eigenfunctions", "explain"}
     assert spellings(lambda parameter: parameter.name == "picture") == {("--picture",)}
 
 
 def test_an_index_is_the_first_argument():
-    for verb in ("index", "query"):
+    for verb in ("index add", "index ls", "index rm", "index stats", "index verify", "query"):
         first = load_verb(verb).params[0]
         assert (first.name, first.param_type_name) == ("index", "argument")
 

@@ -113,7 +113,9 @@ def test_while_loops_are_compiled(ball, tmp_path, n_files):
 def test_while_workers_start_and_work(herd, tmp_path, sign):
     """The first sign comes before the workers' own imports, the second with the first shape."""
     db = tmp_path / "db"
-    running = start("index", db, herd, "--workers", 2, "--views", 0, "--method", "scale-free")
+    running = start(
+        "index", "add", db, herd, "--workers", 2, "--views", 0, "--method", "scale-free"
+    )
     wait_until((db / sign).exists, running)
     assert press_ctrl_c(running) == (130, "stopped; what was finished is kept\n")
     assert len(ShapeIndex.open(db)) < 4

@@ -5,10 +5,10 @@ import pytest
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.face_turns import inconsistent_edges
+from eigenshape.geometry.holes import fill_holes
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import repair
-from eigenshape.geometry.repair_steps import fill_holes
 from eigenshape.geometry.simplices import degenerate_simplices
 from eigenshape.geometry.topology import (
     euler_characteristic,

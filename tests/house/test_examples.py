@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[2]
 @pytest.mark.long
 def test_main_road_finds_the_octopus(tmp_path):
     example = runpy.run_path(str(ROOT / "examples" / "main_road.py"))
-    matches = example["main"](tmp_path)
+    matches = example["main"](tmp_path, n_vertices=1000)
     assert [match.label for match in matches] == ["octopus"] * 3
     assert all(len(match.correspondences) for match in matches)
     assert matches[0].score <= matches[1].score <= matches[2].score
@@ -22,7 +22,7 @@ def test_main_road_finds_the_octopus(tmp_path):
 @pytest.mark.long
 def test_a_noisy_scan_is_found(tmp_path):
     best, second, other = runpy.run_path(str(ROOT / "examples" / "find_a_scan.py"))["main"](
-        tmp_path
+        tmp_path, n_vertices=1000
     )
     assert [best.label, second.label] == ["octopus"] * 2
     assert best.score < second.score < other.score
@@ -31,7 +31,9 @@ def test_a_noisy_scan_is_found(tmp_path):
 
 @pytest.mark.long
 def test_a_bent_shape_is_bent_again_on_a_finer_mesh(tmp_path):
-    poses = runpy.run_path(str(ROOT / "examples" / "bend_a_shape.py"))["main"](tmp_path)
+    poses = runpy.run_path(str(ROOT / "examples" / "bend_a_shape.py"))["main"](
+        tmp_path, n_vertices=1200
+    )
     made, nodding, lifted, finer = (
         poses[name].vertices for name in ("as made", "nodding", "lifted", "again, finer")
     )

@@ -37,8 +37,7 @@ from eigenshape.spectral.laws.report import DEFAULT_PROMISES
 from eigenshape.spectral.laws.transformations import random_rotation
 
 seeds = st.integers(0, 2**32 - 1)
-few = settings(deadline=None, max_examples=5)
-many = settings(deadline=None, max_examples=6)
+few = settings(deadline=None, max_examples=3)
 
 
 def turned(points, rng, noise):
@@ -281,53 +280,38 @@ def judge(build, draw, promises, seed, by_points=None):
     assert report.passed, f"{shape}\n{report.explain()}"
 
 
-def judge_free(row, seed):
-    judge(row.build, row.shapes[seed % len(row.shapes)], row.promises, seed)
-
-
-def judge_held(row, seed):
-    """Hold the boundary at zero: no constants any more, and not the whole volume."""
-    draws = [BOUNDED[draw] for draw in row.shapes if draw in BOUNDED]
-    promises = (row.promises - {"constants", "volume"}) | {"definite"}
-    judge(partial(held, row), draws[seed % len(draws)], promises, seed, by_points=False)
-
-
 def held(row, shape):
     return dirichlet_laplacian(row.build(shape), row.boundary(shape))[0]
 
 
+def title(row, draw):
+    """Name an operator and the kind of shapes that it is built on."""
+    return f"{row.name}, {getattr(draw, 'func', draw).__name__}"
+
+
+# Each kind of shape has a test of its own: none is left to chance.
+FREE = [pytest.param(row, draw, id=title(row, draw)) for row in TABLE for draw in row.shapes]
+HELD = [
+    pytest.param(row, BOUNDED[draw], id=title(row, BOUNDED[draw]))
+    for row in TABLE
+    if row.boundary
+    for draw in row.shapes
+    if draw in BOUNDED
+]
 pytestmark = pytest.mark.filterwarnings("ignore:With the heat time t", "ignore:A kernel of width")
-every = pytest.mark.parametrize("row", TABLE, ids=lambda row: row.name)
-with_boundary = pytest.mark.parametrize(
-    "row", [row for row in TABLE if row.boundary], ids=lambda row: row.name
-)
 
 
-@every
+@pytest.mark.parametrize(("row", "draw"), FREE)
 @few
 @given(seed=seeds)
-def test_a_free_operator_keeps_what_it_promises(row, seed):
-    judge_free(row, seed)
+def test_a_free_operator_keeps_what_it_promises(row, draw, seed):
+    judge(row.build, draw, row.promises, seed)
 
 
-@with_boundary
+@pytest.mark.parametrize(("row", "draw"), HELD)
 @few
 @given(seed=seeds)
-def test_a_held_operator_keeps_what_it_promises(row, seed):
-    judge_held(row, seed)
-
-
-@pytest.mark.long
-@every
-@many
-@given(seed=seeds)
-def test_a_free_operator_keeps_what_it_promises_on_many_shapes(row, seed):
-    judge_free(row, seed)
-
-
-@pytest.mark.long
-@with_boundary
-@many
-@given(seed=seeds)
-def test_a_held_operator_keeps_what_it_promises_on_many_shapes(row, seed):
-    judge_held(row, seed)
+def test_a_held_operator_keeps_what_it_promises(row, draw, seed):
+    """Hold the boundary at zero: no constants any more, and not the whole volume."""
+    promises = (row.promises - {"constants", "volume"}) | {"definite"}
+    judge(partial(held, row), draw, promises, seed, by_points=False)

@@ -8,8 +8,11 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from qdrant_client import QdrantClient
+from search_cases import RECIPE, make_source, mixtures
 
 import eigenshape as es
+from eigenshape.retrieval.search.coarse import coarse_rows
 
 
 def rng() -> np.random.Generator:
@@ -100,12 +103,19 @@ class Shared:
             es.retrieval.baselines.light_field(mesh, n_fields=1, size=32)
             for mesh in (self.ball, self.torus)
         )
+        self.meshes = self.folder / "meshes"
+        self.meshes.mkdir()
+        (self.meshes / "cat.ply").touch()
         self.index = es.ShapeIndex.create(self.folder / "index")
         for number, (by_heat, by_patches) in enumerate(
             zip(self.by_heat, self.by_patches, strict=True)
         ):
             self.index.add_descriptors(f"shape {number}", [by_heat])
             self.index.add_descriptors(f"by patches {number}", [by_patches])
+
+        self.reader = self.index.reader()
+        self.coarse = coarse_rows(make_source(self.folder, 400), RECIPE)
+        self.faiss = es.retrieval.FaissEngine(self.coarse)
 
     def _make_perturbation(self) -> None:
         moved = es.TriangleMesh(self.ball.vertices * [1.0, 1.02, 1.0], self.ball.faces)
@@ -197,7 +207,14 @@ def index_of(v: Shared) -> tuple[object, ...]:
     index.add_descriptors("two", [v.by_heat[1]])
     index.add("three", v.ball, n_views=0)
     index.remove("one")
-    return index.records(), index.recipes()
+    fish = es.retrieval.DescribedShape("four", [v.by_heat[1]], tags=["t"])
+    index.add_many([fish])
+    whole = es.ShapeIndex.create(None)
+    whole.merge([index])
+    index.compact()
+    index.export(index.folder.with_suffix(".out"))
+    found = index.verify().damages, whole.records(), whole.thumbnail("three")
+    return index.records(), index.recipes(), found
 
 
 def answers(v: Shared) -> tuple[object, ...]:
@@ -212,6 +229,23 @@ def answers(v: Shared) -> tuple[object, ...]:
         len(index),
         index.descriptors("shape 0", by_heat.recipe),
     )
+
+
+def asked(v: Shared) -> tuple[object, ...]:
+    """Ask the reader that all threads share."""
+    snapshot = v.reader.snapshot(v.by_heat[0].recipe)
+    found = v.reader.query(v.by_heat[0], n_matches=2, where={"label": None})
+    return v.reader.refresh(), found, len(v.reader), snapshot.n_shapes, v.reader.default_recipe()
+
+
+def engines(v: Shared) -> tuple[object, ...]:
+    """Ask engines for candidates: one that all threads share, and a database of this call alone."""
+    codes = mixtures(3, 1)[0, 0]
+    queries = v.coarse.axes.project_query(codes)
+    database = es.retrieval.QdrantEngine(QdrantClient(":memory:"), "shapes")
+    database.fill(v.coarse)
+    nearest = v.faiss.nearest(queries, 5), database.nearest(queries, 5)
+    return v.coarse.scores(codes), nearest
 
 
 def cached(v: Shared) -> es.Spectrum:
@@ -244,6 +278,10 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ),
     "ShapeIndex": answers,
     "ShapeIndex.add": index_of,
+    "CoarseRows": engines,
+    "FaissEngine": engines,
+    "IndexReader": asked,
+    "QdrantEngine": engines,
     "SpectralClusterer": lambda v: es.spectral.SpectralClusterer(3).fit_predict(v.torus.vertices),
     "SpectralEmbedder": lambda v: es.spectral.SpectralEmbedder(3).fit_transform(v.torus.vertices),
     "Spectrum.save": lambda v: written(v.folder, ".npz", v.spectrum.save),
@@ -368,6 +406,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "divergence": lambda v: es.calculus.divergence(v.many, v.field),
     "divergence_matrix": lambda v: es.calculus.divergence_matrix(v.many),
     "draw": lambda v: es.plot.draw(v.ball, v.camera),
+    "draw_thumbnail": lambda v: es.retrieval.draw_thumbnail(v.ball),
     "drop_degenerate": lambda v: es.geometry.drop_degenerate(v.animal),
     "drop_duplicate_faces": lambda v: es.geometry.drop_duplicate_faces(v.animal),
     "drop_unreferenced": lambda v: es.geometry.drop_unreferenced(v.animal),
@@ -444,6 +483,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         es.retrieval.find_heat_features(v.animal),
         es.retrieval.find_heat_features(v.animal, accuracy=0.01),
     ],
+    "find_items": lambda v: es.io.find_items(v.meshes),
     "find_parts": lambda v: es.find_parts(v.animal).parts,
     "fit_rate": lambda v: es.stability.fit_rate(
         [0.1, 0.2, 0.4], [0.01, 0.02, 0.03], [1.0, 2.0, 5.0]
@@ -705,6 +745,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
 LEFT_OUT = {
     "cache_operator_bundles": "It starts processes, which take seconds to import.",
     "build_index": "It starts processes, which take seconds to import; it writes to an index, which admits one writer.",
+    "index_folder": "It starts processes, which take seconds to import.",
     "train_codebook_from_files": "It starts processes, which take seconds to import.",
     "view": "It shows a widget of the studio, which is a package of its own.",
 }

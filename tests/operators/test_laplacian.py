@@ -63,3 +63,15 @@ def test_asymmetry_of_rounding_passes():
 def test_a_mass_that_is_not_positive_is_refused(mass):
     with pytest.raises(InvalidParameterError, match=rf"the mass of point 1 is {mass} \(1 such\)"):
         Laplacian(matrix([1, -1], [-1, 1]), matrix([1, 0], [0, mass]))
+
+
+def test_matrices_are_copied_and_read_only():
+    weights = np.array([[3.0, -3.0], [-3.0, 3.0]])
+    stiffness, mass = sp.csr_array(weights), sp.csr_array(np.eye(2))
+    laplacian = Laplacian(stiffness, mass)
+    stiffness.data[:] = 7.0
+    np.testing.assert_array_equal(laplacian.stiffness.toarray(), weights)
+    for matrix in (laplacian.stiffness, laplacian.mass):
+        for part in (matrix.data, matrix.indices, matrix.indptr):
+            with pytest.raises(ValueError, match="read-only"):
+                part[0] = 0

@@ -23,6 +23,7 @@ from eigenshape.operators.tufted import (
     edge_keys,
     flip_to_delaunay,
     mollify_lengths,
+    side_ends,
     tufted_cover,
 )
 from eigenshape.shapes.surfaces import grid, icosphere, torus
@@ -262,7 +263,11 @@ def test_mollification_by_hand():
 
 
 def test_sides_of_one_edge_have_one_key():
-    keys = edge_keys(np.array([[0, 1, 2], [1, 0, 3]]), 4)
+    faces = np.array([[0, 1, 2], [1, 0, 3]])
+    tails, heads = side_ends(faces)
+    assert tails.tolist() == [0, 1, 2, 1, 0, 3]
+    assert heads.tolist() == [1, 2, 0, 0, 3, 1]
+    keys = edge_keys(faces, 4)
     assert keys[0] == keys[3]
     assert len(set(keys.tolist())) == 5
 

@@ -4,13 +4,14 @@ import numpy as np
 import potpourri3d as pp3d
 import pytest
 
-from eigenshape.calculus.geodesic_paths import geodesic_path, trace_geodesic
+from eigenshape.calculus.geodesic_paths import geodesic_path
+from eigenshape.calculus.geodesic_rays import trace_geodesic
 from eigenshape.calculus.heat_distance import heat_distances, prepare_heat_geodesics
+from eigenshape.calculus.log_map import logarithmic_map
 from eigenshape.calculus.signed_heat import signed_heat_distance
 from eigenshape.calculus.vector_heat import (
     VectorHeat,
     extend_scalar,
-    logarithmic_map,
     prepare_vector_heat,
     transport_vectors,
 )

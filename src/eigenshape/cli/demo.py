@@ -11,8 +11,7 @@ import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import escape_text, out, progress_bar
-from eigenshape.cli.index import WorkersOption
-from eigenshape.cli.inputs import PATCHES
+from eigenshape.cli.index.add import WorkersOption
 from eigenshape.cli.query import print_matches
 from eigenshape.shapes.creature_plans import CREATURES
 
@@ -24,7 +23,7 @@ NEXT = """
 Read next:
   eigenshape features {scan} --picture parts.png      feature points of that scan, and the parts around them
   eigenshape spectrum {scan} -k 20 --picture spectrum.png  its eigenvalues, and the proof that none is missing
-  eigenshape index my-index FOLDER                    the same for a folder of your own meshes
+  eigenshape index add my-index FOLDER                the same for a folder of your own meshes
   eigenshape query my-index SCAN --picture sheet.png  and a scan of yours
   eigenshape studio {scan} --index {index}            a window in the browser: bend it, and search
   README.md, docs/glossary.md                         the same steps in Python, and the terms
@@ -45,8 +44,7 @@ def demo(
     processes = es.retrieval.Workers(workers)
     items = _make(output / "creatures")
     shelf = es.ShapeIndex.open_or_create(output / "index")
-    recipe = steps.index_recipe(shelf, PATCHES, items, (), processes)
-    report = steps.describe_all(shelf, items, recipe, processes)
+    report = steps.describe_all(shelf, items, None, processes)
     out.print(f"indexed {len(shelf)} shapes ({len(report.skipped)} indexed already)")
 
     scan_path = output / "scan.ply"
@@ -57,7 +55,7 @@ def demo(
     out.print(
         f"scanned a {kind} from one side, in a pose that the index has not seen: {escape_text(scan_path)}"
     )
-    shape = steps.color_query(scan, recipe)
+    shape = steps.color_query(scan, shelf.default_recipe())
     matches = shelf.query(shape.descriptor, n_matches=6)
     print_matches(matches)
 

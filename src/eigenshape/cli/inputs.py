@@ -12,6 +12,7 @@ from eigenshape.io.cell_kinds import CellKind
 from eigenshape.retrieval.heat.recipe import PRESETS
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")]
+NO_REPAIR = "none"
 KNOWN_REPAIRS = tuple(dict.fromkeys((*MESH_REPAIRS, *CLOUD_REPAIRS)))
 RepairOption = Annotated[
     str,
@@ -22,6 +23,18 @@ RepairOption = Annotated[
             "Repairs to apply to the mesh first, in this order, separated by commas: "
             f"{', '.join(KNOWN_REPAIRS)}. auto does what is needed, but fills no hole and "
             "drops no component. By default none."
+        ),
+    ),
+]
+IndexRepairOption = Annotated[
+    str,
+    typer.Option(
+        "--repair",
+        metavar="NAMES",
+        help=(
+            "Repairs to apply to each mesh first, in this order, separated by commas: "
+            f"{', '.join(MESH_REPAIRS)}. auto does what is needed, but fills no hole and "
+            "drops no component; none refuses meshes that need repair. By default auto."
         ),
     ),
 ]
@@ -105,6 +118,16 @@ StoredMethodOption = Annotated[
         ),
     ),
 ]
+IndexArgument = Annotated[Path, typer.Argument(help="Folder of the index.")]
+FilterOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--filter",
+        metavar="CONDITION",
+        help="Only shapes that meet a condition: label=cat, tag=scanned, or by an attribute "
+        "height=1.5..3. label=cat,dog allows either. Several filters must all be met.",
+    ),
+]
 REGIONS = (
     "'y>0.5' or 'y>0.5, x<0' (coordinates, or percent of the bounding box: 'y>60%'); 'vertex 17 within 0.2' "
     "(distance along the surface, or percent of the square root of the area: 'within 10%'); 'part 3' (a number that "
@@ -114,6 +137,8 @@ REGIONS = (
 
 def repair_names(text: str) -> tuple[str, ...]:
     """Split a comma-separated list of repairs. An unknown name is an error before any file is read."""
+    if text == NO_REPAIR:
+        return ()
     names = tuple(name.strip() for name in text.split(",") if name.strip())
     for name in names:
         if name not in KNOWN_REPAIRS:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import csv
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -10,32 +13,80 @@ from typing import Annotated, Any
 import typer
 
 import eigenshape as es
+from eigenshape._errors import EigenshapeError, InvalidParameterError
 from eigenshape._text import literal
 from eigenshape.cli import steps
-from eigenshape.cli.console import out, print_json, print_table, progress_bar
+from eigenshape.cli.console import (
+    err,
+    escape_text,
+    out,
+    print_json,
+    print_table,
+    print_written,
+    progress_bar,
+)
 from eigenshape.cli.inputs import (
+    FilterOption,
+    IndexArgument,
+    IndexRepairOption,
     JsonOption,
-    RepairOption,
     StoredMethodOption,
     repair_names,
     require_method,
 )
 
+# The types of the library are not named here, so that `--help` loads nothing heavy.
+AnyRecipe = Any
+Descriptor = Any
+Ask = Callable[..., Any]  # returns the matches of a descriptor
+SOME_FAILED = 3  # exit code where some of several queries could not be answered
+COLUMNS = (
+    "query",
+    "rank",
+    "name",
+    "class",
+    "source",
+    "score",
+    "chance",
+    "corresponding points",
+)
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """What was found for one query; the mesh is None for a shape of the index."""
+
+    title: str
+    descriptor: Descriptor
+    matches: Any
+    seconds: dict[str, float]
+    colored: steps.ColoredQuery | None = None
+
 
 def query(
-    index: Annotated[Path, typer.Argument(help="Folder of the index.")],
+    index: IndexArgument,
     scan: Annotated[
         Path,
         typer.Argument(
-            help="Mesh file to search for: a whole shape or a part of one, in any pose."
+            help="Mesh file to search for, a whole shape or a part of one, in any pose; a folder of "
+            "such files; or the name of a shape of the index."
         ),
     ],
     *,
     n_matches: Annotated[
         int, typer.Option("-n", "--n-matches", min=1, help="Number of matches to show.")
     ] = 5,
+    where: FilterOption = None,
+    exact: Annotated[
+        bool,
+        typer.Option(
+            "--exact",
+            help="Compare every shape of the index with the scan, instead of those that a coarse "
+            "scan of all finds nearest.",
+        ),
+    ] = False,
     method: StoredMethodOption = None,
-    repair: RepairOption = "",
+    repair: IndexRepairOption = "auto",
     picture: Annotated[
         Path | None,
         typer.Option(
@@ -43,51 +94,181 @@ def query(
             "PDF)."
         ),
     ] = None,
+    explain: Annotated[
+        Path | None,
+        typer.Option(
+            help="Draw the scan and the best match with the points that correspond (PNG, SVG or "
+            "PDF)."
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Table of all matches to write, a line each (.csv)."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Find the shapes of an index that are most like a scan, and which features correspond."""
+    """Find the shapes of an index that are most like a scan, and which features correspond.
+
+    With a folder, every mesh in it is searched for; the exit code is 3 if some could not be read.
+    """
     steps.require_picture(picture)
+    steps.require_picture(explain)
+    steps.require_output(output, (".csv",), "A table")
     if method is not None:
         require_method(method)
+    repairs, filters = repair_names(repair), steps.parse_filters(where)
+    drawn = picture is not None or explain is not None
     shelf = es.ShapeIndex.open(index)
     recipe = steps.query_recipe(shelf, method)
-    surface = steps.load_mesh(scan, repair)
+    if drawn and not scan.is_file():
+        raise InvalidParameterError(
+            f"A picture shows one scan, of a file; {scan} is none. Leave --picture and --explain out."
+        )
+    with shelf.reader() as reader:
+        ask_index = partial(reader.query, where=filters, exact=exact)
+        if scan.exists():
+            items = es.io.find_items(scan)
+            ask = partial(
+                _answer_file, ask_index, recipe=recipe, n_matches=n_matches, repair=repair
+            )
+            answers, failed = _answer_each(items, ask) if scan.is_dir() else ([ask(items[0])], [])
+        else:
+            stored = _stored_descriptor(shelf, str(scan), recipe)
+            answers, failed = [_answer_stored(ask_index, str(scan), stored, n_matches)], []
+    for name, reason in failed:
+        err.print(f"[yellow]not searched for:[/] {escape_text(name)}: {escape_text(reason)}")
+    _write(answers, output)
+    if as_json:
+        facts = [_facts(answer) for answer in answers]
+        print_json(facts if scan.is_dir() else facts[0])
+    else:
+        _print(answers)
+    if drawn:
+        _draw(answers[0], index, repairs, picture, explain)
+    if failed:
+        raise typer.Exit(SOME_FAILED)
+
+
+def _answer_each(
+    items: Sequence[es.retrieval.Item], ask: Callable[[es.retrieval.Item], _Answer]
+) -> tuple[list[_Answer], list[tuple[str, str]]]:
+    """Search for each of several meshes; return the answers, and the name and fault of the others."""
+    answers, failed = [], []
+    with progress_bar("query") as progress:
+        for number, item in enumerate(items):
+            progress(number / len(items), item.name)
+            try:
+                answers.append(ask(item))
+            except (EigenshapeError, OSError) as error:
+                failed.append((item.name, str(error)))
+    return answers, failed
+
+
+def _answer_file(
+    ask: Ask,
+    item: es.retrieval.Item,
+    *,
+    recipe: AnyRecipe,
+    n_matches: int,
+    repair: str,
+) -> _Answer:
+    mesh = steps.load_mesh(item.path, repair)
     began = perf_counter()
     with progress_bar("describe") as progress:
-        shape = steps.color_query(surface, recipe, progress)
+        colored = steps.color_query(mesh, recipe, progress)
     described = perf_counter()
-    matches = shelf.query(shape.descriptor, n_matches=n_matches)
-    answered = perf_counter()
-    if as_json:
-        seconds = {"describe": described - began, "query": answered - described}
-        print_json(
-            {
-                "scan": str(scan),
-                "seconds": seconds,
-                "matches": [_facts(shape, match) for match in matches],
-            }
+    matches = ask(colored.descriptor, n_matches=n_matches)
+    seconds = {"describe": described - began, "query": perf_counter() - described}
+    return _Answer(item.path.name, colored.descriptor, matches, seconds, colored)
+
+
+def _stored_descriptor(shelf: es.ShapeIndex, name: str, recipe: AnyRecipe) -> Descriptor:
+    if name not in {record.name for record in shelf.records()}:
+        raise InvalidParameterError(
+            f"A query is a mesh file, a folder or the name of a shape of the index; {name} is none "
+            "of them. `eigenshape index ls` lists the names."
         )
-    else:
-        print_matches(matches)
-        out.print("score: 0 for the same description, about 1 if nothing is alike")
-        out.print(
-            f"described in {described - began:.2f} s, answered in {1000 * (answered - described):.0f} ms"
-        )
-    if picture:
-        names = literal(scan.name), literal(index.name)
+    return shelf.descriptors(name, recipe)[0]
+
+
+def _answer_stored(ask: Ask, name: str, descriptor: Descriptor, n_matches: int) -> _Answer:
+    """Search for shapes like one of the index, which itself is no match."""
+    began = perf_counter()
+    found = ask(descriptor, n_matches=n_matches + 1)
+    others = tuple(match for match in found if match.name != name)[:n_matches]
+    seconds = {"describe": 0.0, "query": perf_counter() - began}
+    return _Answer(name, descriptor, replace(found, found=others), seconds)
+
+
+def _write(answers: Sequence[_Answer], output: Path | None) -> None:
+    """Write a table of all matches, as people open it in a spreadsheet."""
+    if output is None:
+        return
+    with output.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow(COLUMNS)
+        for answer in answers:
+            for rank, match in enumerate(answer.matches, start=1):
+                facts = (match.name, match.label, match.source, match.score, match.chance)
+                table.writerow((answer.title, rank, *facts, len(match.correspondences)))
+    print_written(output)
+
+
+def _print(answers: Sequence[_Answer]) -> None:
+    for answer in answers:
+        title = "Most similar shapes"
+        print_matches(answer.matches, title if len(answers) == 1 else f"{title}: {answer.title}")
+        if answer.matches.nothing_alike:
+            out.print("nothing alike here: unrelated shapes would score as well")
+    describe = sum(answer.seconds["describe"] for answer in answers)
+    found = 1000 * sum(answer.seconds["query"] for answer in answers)
+    n_compared = sum(answer.matches.n_compared for answer in answers)
+    out.print(
+        f"described in {describe:.2f} s, {n_compared} shapes compared in {found:.0f} ms "
+        f"({answers[0].matches.method})"
+    )
+
+
+def _draw(
+    answer: _Answer,
+    index: Path,
+    repairs: tuple[str, ...],
+    picture: Path | None,
+    explain: Path | None,
+) -> None:
+    if answer.colored is None or not answer.matches:
+        err.print("there is no match to draw")
+        return
+    title = literal(Path(answer.title).stem)
+    if picture is not None:
         caption = (
-            f"{names[0]} and the {len(matches)} most similar shapes in {names[1]} ({steps.CAPTION})"
+            f"{literal(answer.title)} and the {len(answer.matches)} most similar shapes in "
+            f"{literal(index.name)} ({steps.CAPTION})"
         )
-        title, repairs = literal(scan.stem), repair_names(repair)
-        steps.save_picture(
-            steps.contact_sheet(shape, title, matches, repairs=repairs, caption=caption), picture
+        sheet = steps.contact_sheet(
+            answer.colored, title, answer.matches, repairs=repairs, caption=caption
         )
+        steps.save_picture(sheet, picture)
+    if explain is not None:
+        figure = steps.explanation(answer.colored, title, answer.matches[0], repairs=repairs)
+        steps.save_picture(figure, explain)
 
 
-def _facts(shape: steps.ColoredQuery, match: es.retrieval.Match) -> dict[str, Any]:
+def _facts(answer: _Answer) -> dict[str, Any]:
+    return {
+        "scan": answer.title,
+        "seconds": answer.seconds,
+        "method": answer.matches.method,
+        "compared": answer.matches.n_compared,
+        "nothing_alike": answer.matches.nothing_alike,
+        "matches": [_match_facts(answer.descriptor, match) for match in answer.matches],
+    }
+
+
+def _match_facts(descriptor: Descriptor, match: es.retrieval.Match) -> dict[str, Any]:
     pairs = [
         {
-            "query_vertex": int(shape.descriptor.vertices[one]),
+            "query_vertex": int(descriptor.vertices[one]),
             "match_vertex": int(match.vertices[two]),
         }
         for one, two in match.correspondences
@@ -97,14 +278,31 @@ def _facts(shape: steps.ColoredQuery, match: es.retrieval.Match) -> dict[str, An
         "class": match.label,
         "source": match.source,
         "score": match.score,
+        "chance": match.chance,
         "correspondences": pairs,
     }
 
 
-def print_matches(matches: Sequence[es.retrieval.Match]) -> None:
-    """Print matches, best first, with the number of corresponding points."""
+def print_matches(
+    matches: Sequence[es.retrieval.Match], title: str = "Most similar shapes"
+) -> None:
+    """Print matches, best first, with what their scores mean."""
     rows = [
-        [match.name, match.label or "", f"{match.score:.4g}", str(len(match.correspondences))]
+        [
+            match.name,
+            match.label or "",
+            f"{match.score:.3f}",
+            "" if match.chance is None else f"{100 * match.chance:.2g} %",
+            str(len(match.correspondences)),
+        ]
         for match in matches
     ]
-    print_table("Most similar shapes", ["shape", "class", "score", "corresponding points"], rows)
+    columns = ["shape", "class", "score", "chance", "corresponding points"]
+    print_table(title, columns, rows)
+    if any(match.chance is None for match in matches):
+        out.print("score: 0 for the same description, lower is more alike")
+    elif matches:
+        out.print(
+            "score: near 0 for the same shape, about 1 if nothing is alike; chance: the share of "
+            "unrelated shapes that would score as well"
+        )

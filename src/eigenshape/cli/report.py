@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from eigenshape._studio import studio_module
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_written, progress_bar
 from eigenshape.cli.inputs import MeshArgument, RepairOption
@@ -29,7 +30,7 @@ def report(
     For instance: eigenshape report scan.ply -o scan.html
     """
     steps.require_output(output, (".html",), "A report")
-    writer = steps.studio_module("report")
+    writer = studio_module("report")
     surface = steps.load_mesh(mesh, repair)
     with progress_bar("report") as progress:
         writer.write_report(surface, output, name=mesh.name, n_modes=n_modes, progress=progress)

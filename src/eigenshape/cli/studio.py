@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from eigenshape.cli import steps
+from eigenshape._studio import studio_module
 from eigenshape.cli.console import escape_text, out
 
 
@@ -43,7 +43,7 @@ def studio(
 
     For instance: eigenshape studio scan.ply --index my-index
     """
-    server = steps.studio_module("server")
+    server = studio_module("server")
 
     def announce(url: str) -> None:
         out.print(f"The studio is open at {escape_text(url)}")

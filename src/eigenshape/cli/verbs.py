@@ -32,18 +32,31 @@ VERBS = {
     "smoothly.",
     "stability": "Compare two shapes: how close they lie, what changes in their spectra, and which "
     "heat times to trust.",
-    "index": "Describe meshes and add them to an index; a file that fails is named, and the others "
-    "are still added.",
+    "index": "Keep an index of shapes: add meshes, list and remove shapes, check, compact, export "
+    "and merge.",
     "query": "Find the shapes of an index that are most like a scan, and which features "
     "correspond.",
     "compress": "Write a mesh as a small file, by the spectral coefficients of its coordinates.",
     "decompress": "Write the mesh of a file that `eigenshape compress` wrote.",
     "studio": "Open a window in the browser: bend a shape by hand, see its spectrum, heat and parts, "
     "and search.",
+    "serve": "Serve an index: upload a scan, by a page or a program, and get the most similar shapes.",
     "report": "Write a shape with its spectrum, heat and parts to one HTML file that any browser "
     "opens.",
     "demo": "Try everything: make creatures, index them, scan one from one side in a new pose, and "
     "find its kind.",
+}
+INDEX_VERBS = {
+    "add": "Describe meshes and add them to an index; a file that fails is named, and the others "
+    "are still added.",
+    "ls": "List the shapes of an index, with their classes, tags and attributes.",
+    "rm": "Remove shapes from an index.",
+    "stats": "Show how many shapes an index holds, how they are described, and the space they take.",
+    "verify": "Read every byte of an index and name what is damaged.",
+    "compact": "Give back the space of removed and replaced shapes.",
+    "export": "Write the descriptors of shapes, and what is known of them, for other programs.",
+    "merge": "Make one index of several, by copying them or by reference.",
+    "learn": "Learn a codebook from meshes, for indexes that are built in parts.",
 }
 NEED_NO_ARGUMENT = ("operators", "studio", "demo")
 MARKUP: Any = "markdown"  # leaves plain brackets alone, which rich markup would take for its own
@@ -79,9 +92,12 @@ class Verb(TyperCommand):
 class Verbs(TyperGroup):
     """The list of verbs. It holds the name and first line of each, and imports a verb when it is called."""
 
+    lines = VERBS
+    package = "eigenshape.cli"
+
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
-        self.commands = {name: TyperCommand(name, help=line) for name, line in VERBS.items()}
+        self.commands = {name: TyperCommand(name, help=line) for name, line in self.lines.items()}
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the options before the verb."""
@@ -93,19 +109,50 @@ class Verbs(TyperGroup):
         with _printable_usage():
             name, found, rest = super().resolve_command(ctx, args)
         # found is None only where a shell completes a half-typed verb
-        return name, load_verb(str(name)) if found else None, rest
+        return name, self.load(str(name)) if found else None, rest
+
+    def load(self, name: str) -> Any:
+        """Import a verb's module and return its command."""
+        if name == "index":
+            return index_verbs()
+        alone = typer.Typer(
+            rich_markup_mode=MARKUP, add_completion=False, pretty_exceptions_enable=False
+        )
+        module = import_module(f"{self.package}.{name}")
+        alone.command(name, cls=Verb, no_args_is_help=name not in NEED_NO_ARGUMENT)(
+            getattr(module, name)
+        )
+        return typer.main.get_command(alone)
+
+
+class IndexVerbs(Verbs):
+    """The verbs of `eigenshape index`."""
+
+    lines = INDEX_VERBS
+    package = "eigenshape.cli.index"
+
+
+def index_verbs() -> Any:
+    """Return the command `eigenshape index`, which lists its verbs."""
+    group = typer.Typer(
+        name="index",
+        cls=IndexVerbs,
+        help=VERBS["index"],
+        rich_markup_mode=MARKUP,
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+    )
+
+    group.callback()(lambda: None)  # without it, typer would make no group
+    return typer.main.get_command(group)
 
 
 def load_verb(name: str) -> Any:
-    """Import a verb's module and return its command."""
-    module = import_module(f"eigenshape.cli.{name}")
-    alone = typer.Typer(
-        rich_markup_mode=MARKUP, add_completion=False, pretty_exceptions_enable=False
-    )
-    alone.command(name, cls=Verb, no_args_is_help=name not in NEED_NO_ARGUMENT)(
-        getattr(module, name)
-    )
-    return typer.main.get_command(alone)
+    """Return the command of a verb, or of a verb of `index` such as "index add"."""
+    *group, verb = name.split()
+    verbs = (IndexVerbs if group else Verbs)(name=name)
+    return verbs.load(verb)
 
 
 @contextmanager

@@ -21,6 +21,7 @@ from .geodesic import geodesic_balls as geodesic_balls
 from .geodesic import geodesic_distance_to_set as geodesic_distance_to_set
 from .geodesic import geodesic_distances as geodesic_distances
 from .geodesic import geodesic_waves as geodesic_waves
+from .holes import fill_holes as fill_holes
 from .homology import betti_numbers as betti_numbers
 from .measure import edge_lengths as edge_lengths
 from .measure import enclosed_volume as enclosed_volume
@@ -47,7 +48,6 @@ from .repair_steps import drop_degenerate as drop_degenerate
 from .repair_steps import drop_duplicate_faces as drop_duplicate_faces
 from .repair_steps import drop_duplicate_points as drop_duplicate_points
 from .repair_steps import drop_unreferenced as drop_unreferenced
-from .repair_steps import fill_holes as fill_holes
 from .repair_steps import largest_component as largest_component
 from .repair_steps import orient as orient
 from .repair_steps import weld as weld

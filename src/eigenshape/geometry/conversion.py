@@ -196,7 +196,8 @@ def _use_of(shape: Shape) -> str:
     if isinstance(shape, PointCloud):
         return (
             "A point cloud has no faces; "
-            "point_cloud_laplacian(cloud) and persistence_diagram(cloud, values) take it."
+            "point_cloud_laplacian(cloud), persistence_diagram(cloud, values) and "
+            "calculus.heat_distances(cloud, sources) take it."
         )
     if shape.dim == 3:
         return "Pass boundary_surface(mesh), the triangles around the tetrahedra."

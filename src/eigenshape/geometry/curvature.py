@@ -115,6 +115,13 @@ class PrincipalCurvatures:
     See Also
     --------
     es.geometry.principal_curvatures : Computes them.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> curvatures = es.geometry.principal_curvatures(es.icosphere(3))
+    >>> bool((abs(curvatures.mean - 1) < 0.05).all())
+    True
     """
 
     values: Float[np.ndarray, "n 2"]

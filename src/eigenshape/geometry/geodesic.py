@@ -341,11 +341,10 @@ def _fans(mesh: Mesh, corners: Float[np.ndarray, "f 3 d"]) -> Fans:
     """
     turns = [np.roll(np.arange(3), -turn) for turn in range(3)]
     triples = np.concatenate([mesh.simplices[:, turn] for turn in turns])
-    lengths = []
-    for turn in turns:
-        a, b, c = corners[:, turn].transpose(1, 0, 2)
-        sides = [np.linalg.norm(side, axis=1) for side in (b - a, c - a, c - b)]
-        lengths.append(np.column_stack(sides))
+    a, b, c = corners.transpose(1, 0, 2)
+    ab, bc, ca = (np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c))
+    sides = (ab, ca, bc), (bc, ab, ca), (ca, bc, ab)  # as seen from a, b and c
+    lengths = [np.column_stack(three) for three in sides]
     order = np.argsort(triples[:, 0], kind="stable")
     starts = np.searchsorted(triples[order, 0], np.arange(mesh.n_points + 1))
     one, two = (np.ascontiguousarray(triples[order, place]) for place in (1, 2))

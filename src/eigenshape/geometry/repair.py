@@ -8,6 +8,7 @@ import numpy as np
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_shape
+from eigenshape.geometry.holes import fill_holes
 from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair_names import CLOUD_REPAIRS, MESH_REPAIRS, SURFACE_REPAIRS
@@ -18,7 +19,6 @@ from eigenshape.geometry.repair_steps import (
     drop_duplicate_faces,
     drop_duplicate_points,
     drop_unreferenced,
-    fill_holes,
     largest_component,
     orient,
     weld,

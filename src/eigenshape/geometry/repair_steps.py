@@ -14,7 +14,6 @@ from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.face_turns import turn_faces
 from eigenshape.geometry.flat_faces import flip_flat_faces
-from eigenshape.geometry.holes import triangulate_holes
 from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import faces_to_turn
@@ -400,62 +399,6 @@ def faces_of_largest(mesh: TriangleMesh) -> Bool[np.ndarray, " f"]:
     of_face = np.unique(labels[mesh.faces[:, 0]], return_inverse=True)[1]
     areas = np.linalg.norm(area_vectors(scaled_corners(mesh)[0]), axis=1)
     return np.asarray(of_face == np.argmax(np.bincount(of_face, weights=areas)))
-
-
-def fill_holes(mesh: MeshLike, *, most_edges: int = 1000) -> RepairedMesh[TriangleMesh]:
-    """Fill every hole with faces between the vertices around it; no vertex is added.
-
-    An open surface is closed along its rim too. A hole is left open, and the report says so, if it
-    has too many edges, or if filling it would need a face without area, a face that exists already,
-    or an edge with three faces.
-
-    Parameters
-    ----------
-    mesh : MeshLike
-    most_edges : int
-        Holes with more edges are left open. The time grows with the third power of the number of
-        edges; 1,000 edges take about a second.
-
-    Returns
-    -------
-    RepairedMesh
-
-    Raises
-    ------
-    InvalidParameterError
-        If `most_edges` is less than 3.
-
-    See Also
-    --------
-    boundary_loops : The holes.
-
-    Notes
-    -----
-    Each boundary loop gets the triangulation with the least sum of areas (Barequet and Sharir,
-    "Filling gaps in the boundary of a polyhedron", 1995), plus a small multiple of the squared
-    sides, which avoids slivers.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> sphere = es.icosphere(1)
-    >>> es.geometry.fill_holes((sphere.vertices, sphere.faces[1:])).report
-    ('fill_holes closed 1 hole with 1 face',)
-    """
-    mesh = as_mesh(mesh)
-    if most_edges < 3:
-        raise InvalidParameterError(
-            f"most_edges must be at least 3, the edges of a triangle; it is {most_edges}."
-        )
-    found = triangulate_holes(mesh, most_edges)
-    sealed = TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, *found.faces]))
-    n_faces = sealed.n_faces - mesh.n_faces
-    report = f"fill_holes closed {count_nouns(len(found.faces), 'hole')} with {count_nouns(n_faces, 'face')}"
-    if found.n_long:
-        report += f", left {found.n_long} of more than {most_edges} edges"
-    if found.n_open:
-        report += f", left {found.n_open} that good faces do not close"
-    return RepairedMesh(sealed, (report,), np.arange(mesh.n_vertices))
 
 
 def drop_duplicate_points(cloud: PointCloud) -> RepairedCloud:

@@ -5,6 +5,8 @@ from .bridges import to_pyvista as to_pyvista
 from .bridges import to_trimesh as to_trimesh
 from .edits import read_edits as read_edits
 from .edits import write_edits as write_edits
+from .folders import find_items as find_items
+from .folders import index_folder as index_folder
 from .mesh_files import read_mesh as read_mesh
 from .mesh_files import write_mesh as write_mesh
 from .parsing import MESH_FORMATS as MESH_FORMATS

@@ -13,7 +13,7 @@ from eigenshape.operators.choices import Mass
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.directions import corner_products, vertex_directions
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.operators.tufted import edge_keys
+from eigenshape.operators.tufted import edge_keys, side_ends
 
 # Entry of the mass matrix for two corners of a face, as a share of the area of the face.
 MASS_SHARES = {"lumped": 0.0, "consistent": 1 / 12, "averaged": 1 / 24}
@@ -126,7 +126,8 @@ def tangent_frames(mesh: MeshLike) -> Float[np.ndarray, "n 2 3"]:
     sides = vertex_directions(mesh)
     points, _ = size_one(mesh.vertices)
     normals = vertex_normals(mesh)
-    along = points[np.roll(mesh.faces, -1, axis=1).ravel()[sides.first]] - points
+    _, heads = side_ends(mesh.faces)
+    along = points[heads[sides.first]] - points
     lengths = np.linalg.norm(along, axis=1)
     along = along - np.einsum("ij,ij->i", along, normals)[:, None] * normals
     left = np.linalg.norm(along, axis=1)
@@ -174,7 +175,7 @@ def _transport_matrix(
     mesh: TriangleMesh, diagonal: Float[np.ndarray, " n"], entries: Complex[np.ndarray, " h"]
 ) -> sp.csr_array:
     """Put the entry of each side where it acts on its tail and counts at its head, and the conjugate the other way."""
-    tails, heads = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+    tails, heads = side_ends(mesh.faces)
     half = sp.coo_array((entries, (heads, tails)), shape=(mesh.n_vertices,) * 2).tocsr()
     return (sp.diags_array(diagonal.astype(complex)) + half + half.conj().T).tocsr()
 

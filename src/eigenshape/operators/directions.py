@@ -13,7 +13,7 @@ from eigenshape.geometry.topology import (
     non_manifold_edges,
     non_manifold_vertices,
 )
-from eigenshape.operators.tufted import edge_keys
+from eigenshape.operators.tufted import edge_keys, side_ends
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ def vertex_directions(mesh: TriangleMesh) -> Directions:
     cosines, sines = corner_products(mesh)
     at_tail, at_head, around = _walk_around(mesh, first, twins, np.arctan2(sines, cosines))
     scale = np.where(inner, 2 * np.pi / around, 1.0)
-    tails, heads = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+    tails, heads = side_ends(mesh.faces)
     return Directions(at_tail * scale[tails], at_head * scale[heads], first)
 
 

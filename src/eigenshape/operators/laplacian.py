@@ -8,6 +8,7 @@ from jaxtyping import Bool
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
+from eigenshape.sparse.frozen import freeze_sparse
 
 # Largest difference of W_ij and W_ji, relative to the largest entry, that is accepted as rounding.
 ASYMMETRY = 1e-12
@@ -67,6 +68,8 @@ class GaussianKernel:
 @dataclass(frozen=True, eq=False)
 class Laplacian:
     """A discrete Laplace operator L = B⁻¹W, given by its stiffness and mass matrices.
+
+    The matrices are copied, and the copies are read-only.
 
     The eigenvalue problem is W φ = λ B φ with λ ≥ 0: the sign is that of -div grad (thesis 1.1,
     eq. 1.1: b_i = B_ii, w_ij = -W_ij).
@@ -166,10 +169,7 @@ def require_matrix(laplacian: Laplacian, name: str = "laplacian") -> None:
 
 def _as_symmetric(name: str, value: sp.sparray) -> sp.csr_array:
     _require_square(name, value)
-    matrix = sp.csr_array(value, dtype=np.float64)
-    if not matrix.has_canonical_format:
-        matrix = matrix.copy()  # else duplicates would be summed in the caller's own arrays
-        matrix.sum_duplicates()
+    matrix = freeze_sparse(sp.csr_array(value, dtype=np.float64))
     _require_finite(name, matrix)
     _require_symmetric(name, matrix)
     return matrix

@@ -29,6 +29,7 @@ from eigenshape.operators.tufted import (
     edge_keys,
     flip_to_delaunay,
     mollify_lengths,
+    side_ends,
     tufted_cover,
 )
 
@@ -138,9 +139,8 @@ def delaunay_cover(mesh: MeshLike, mollify: float = MOLLIFY) -> tuple[Triangulat
 
 def _cover(mesh: TriangleMesh, mollify: float) -> tuple[Triangulation, float]:
     points, scale = size_one(mesh.vertices)
-    lengths = np.linalg.norm(
-        points[mesh.faces] - points[np.roll(mesh.faces, -1, axis=1)], axis=2
-    ).ravel()
+    tails, heads = side_ends(mesh.faces)
+    lengths = np.linalg.norm(points[tails] - points[heads], axis=1)
     lengths = mollify_lengths(lengths, edge_keys(mesh.faces, mesh.n_vertices), mollify)
     flat = np.flatnonzero(flip_loops.areas(lengths) == 0)
     if flat.size:

@@ -63,14 +63,14 @@ def tufted_cover(
     for its vertices.
     """
     n_sides = 3 * len(faces)
-    heads = np.roll(faces, -1, axis=1).ravel()
+    of_front, heads = side_ends(faces)
     fronts = np.arange(n_sides)
     # The back of (a, b, c) is (b, a, c): its sides are those of the front in the order 0, 2, 1.
     backs = n_sides + (fronts.reshape(-1, 3)[:, [0, 2, 1]]).ravel()
-    tails = np.concatenate([faces.ravel(), faces[:, [1, 0, 2]].ravel()])
+    tails = np.concatenate([of_front, faces[:, [1, 0, 2]].ravel()])
     of_back = lengths.reshape(-1, 3)[:, [0, 2, 1]].ravel()
 
-    forward = faces.ravel() < heads
+    forward = of_front < heads
     up, down = np.where(forward, fronts, backs), np.where(forward, backs, fronts)
     order, following = _around_edges(points, faces)
     twins = np.empty(2 * n_sides, dtype=np.int64)
@@ -79,9 +79,19 @@ def tufted_cover(
     return Triangulation(tails, twins, np.concatenate([lengths, of_back]))
 
 
+def side_ends(
+    faces: Int[np.ndarray, "f 3"],
+) -> tuple[Int[np.ndarray, " h"], Int[np.ndarray, " h"]]:
+    """Return the vertex at which each side starts, and that at which it ends.
+
+    Side 3f + s runs from corner s of face f to the next.
+    """
+    return faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+
+
 def edge_keys(faces: Int[np.ndarray, "f 3"], n: int) -> Int[np.ndarray, " h"]:
     """Return for each side, the first from corner 0 to corner 1, a number that sides with the same ends share."""
-    tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    tails, heads = side_ends(faces)
     return np.minimum(tails, heads) * n + np.maximum(tails, heads)
 
 

@@ -17,7 +17,7 @@ from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import draw, palette
 from eigenshape.retrieval.label_transfer import LabelTransfer
 
-N_COLUMNS = 3  # matches in a row
+N_COLUMNS = 3  # matches in a row at most
 QUIET = "#808080"
 
 
@@ -93,13 +93,14 @@ def figure_contact_sheet(
     """
     require_type(query, Panel, "query")
     require_each(matches, Panel, "matches")
-    n_rows = max(-(-len(matches) // N_COLUMNS), 1)
+    n_columns = min(max(len(matches), 1), N_COLUMNS)
+    n_rows = max(-(-len(matches) // n_columns), 1)
     size = PANEL * (1.0 if n_rows > 1 else 0.9)
-    figure = Figure(figsize=(size * (N_COLUMNS + 1.5), size * n_rows + 0.8), layout="constrained")
-    left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=[1.5, N_COLUMNS])[0]
+    figure = Figure(figsize=(size * (n_columns + 1.5), size * n_rows + 0.8), layout="constrained")
+    left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=[1.5, n_columns])[0]
     left.set_facecolor("#f3f3f3")
     _fill(left.subplots(), query, view, up)
-    grid = right.subplots(n_rows, N_COLUMNS, squeeze=False)
+    grid = right.subplots(n_rows, n_columns, squeeze=False)
     for axes in grid.flat:
         axes.set_axis_off()
     for axes, panel in zip(grid.flat, matches, strict=False):

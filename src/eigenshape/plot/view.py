@@ -1,11 +1,9 @@
-"""The door to the studio, a package of its own."""
+"""The studio in a notebook."""
 
 from collections.abc import Mapping
-from importlib import import_module
-from types import ModuleType
 from typing import Any
 
-from eigenshape._errors import MissingExtraError
+from eigenshape._studio import studio_module
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.plot.camera import Up, View
@@ -70,21 +68,3 @@ def view(
     if not (isinstance(view, str) and view == "auto" and isinstance(up, str) and up == "auto"):
         widget.look_from(view, up)
     return widget
-
-
-def studio_module(name: str) -> ModuleType:
-    """Return a module of the studio.
-
-    Raises
-    ------
-    MissingExtraError
-        If the studio, or what this module needs, is not installed.
-    """
-    try:
-        return import_module(f"eigenshape_studio.{name}")
-    except ImportError as err:
-        extra = "'eigenshape-studio[notebook]'" if name == "widget" else "eigenshape-studio"
-        missing = str(err.name).partition(".")[0]
-        raise MissingExtraError(
-            f"{missing} must be installed; it is not. Run pip install {extra}."
-        ) from err

@@ -9,6 +9,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from jaxtyping import Float, Int
 
+from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.retrieval.heat.descriptor import HeatDescriptor
@@ -17,11 +18,17 @@ from eigenshape.retrieval.heat.recipe import HeatRecipe
 from eigenshape.retrieval.heat.score import match_features, matching_scores
 from eigenshape.retrieval.patches.codebook import read_codebook, write_codebook
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor, PatchRecipe, patch_descriptor
+from eigenshape.retrieval.patches.distance import packed_distances
 from eigenshape.retrieval.patches.matching import match_patches
-from eigenshape.retrieval.patches.packing import pack_points, unpack_points
+from eigenshape.retrieval.patches.packing import (
+    pack_codes,
+    pack_points,
+    unpack_codes,
+    unpack_points,
+)
 from eigenshape.retrieval.patches.patches import N_VIEWS as N_PATCH_VIEWS
 from eigenshape.retrieval.patches.patches import extract_patches
-from eigenshape.retrieval.patches.verification import code_distances, verified_scores
+from eigenshape.retrieval.patches.verification import verified_scores
 
 AnyRecipe = HeatRecipe | PatchRecipe
 Descriptor = HeatDescriptor | PatchDescriptor
@@ -70,6 +77,10 @@ class Kind(ABC, Generic[R, D]):
     @abstractmethod
     def restore(self, rows: np.ndarray, details: bytes, recipe: R) -> D:
         """Return the descriptor of stored rows and details."""
+
+    @abstractmethod
+    def as_stored(self, descriptor: D) -> D:
+        """Return a descriptor whose numbers are rounded as those of an index are."""
 
     @abstractmethod
     def scores(self, query: D, rows: Sequence[np.ndarray]) -> Float[np.ndarray, " k"]:
@@ -133,6 +144,10 @@ class _HeatKind(Kind[HeatRecipe, HeatDescriptor]):
     def restore(self, rows: np.ndarray, details: bytes, recipe: HeatRecipe) -> HeatDescriptor:
         return HeatDescriptor(rows.astype(np.float64), np.frombuffer(details, VERTEX), recipe)
 
+    def as_stored(self, descriptor: HeatDescriptor) -> HeatDescriptor:
+        rows = self.rows(descriptor, "the query")
+        return self.restore(rows, self.details(descriptor), descriptor.recipe)
+
     def scores(self, query: HeatDescriptor, rows: Sequence[np.ndarray]) -> Float[np.ndarray, " k"]:
         starts = np.cumsum([0, *(len(each) for each in rows)])[:-1]
         vectors = np.concatenate(rows).astype(np.float64)
@@ -160,11 +175,11 @@ class _HeatKind(Kind[HeatRecipe, HeatDescriptor]):
 
 
 class _PatchKind(Kind[PatchRecipe, PatchDescriptor]):
-    """Patches: one row for each code, and one descriptor for a shape with all its views."""
+    """Patches: one packed row for each code; one descriptor for a shape with all its views."""
 
     name = "patches"
     n_views = N_PATCH_VIEWS
-    row_type = np.dtype("i1")
+    row_type = np.dtype("u1")
 
     def describe_query(self, mesh: TriangleMesh, recipe: PatchRecipe) -> PatchDescriptor:
         return patch_descriptor(extract_patches(mesh), recipe)
@@ -175,16 +190,20 @@ class _PatchKind(Kind[PatchRecipe, PatchDescriptor]):
         return [patch_descriptor(extract_patches(mesh, n_views=n_views), recipe)]
 
     def rows(self, descriptor: PatchDescriptor, name: str) -> np.ndarray:
-        return descriptor.codes.reshape(-1, descriptor.codes.shape[-1])
+        return pack_codes(descriptor.codes.reshape(-1, descriptor.codes.shape[-1]))
 
     def details(self, descriptor: PatchDescriptor) -> bytes:
-        return pack_points(descriptor.points)
+        return pack_points(descriptor.points[0])
 
     def restore(self, rows: np.ndarray, details: bytes, recipe: PatchRecipe) -> PatchDescriptor:
-        return PatchDescriptor(_as_codes(rows, recipe), unpack_points(details), recipe)
+        codes = unpack_codes(rows).reshape(-1, *recipe.codebook.code_shape)
+        return PatchDescriptor(freeze(codes), (unpack_points(details),), recipe)
+
+    def as_stored(self, descriptor: PatchDescriptor) -> PatchDescriptor:
+        return descriptor  # whose numbers were rounded when it was made
 
     def scores(self, query: PatchDescriptor, rows: Sequence[np.ndarray]) -> Float[np.ndarray, " k"]:
-        return code_distances(query.codes, [_as_codes(each, query.recipe) for each in rows])
+        return packed_distances(query.codes, rows)
 
     def verify(
         self,
@@ -200,12 +219,13 @@ class _PatchKind(Kind[PatchRecipe, PatchDescriptor]):
         return match_patches(first.points[0], second.points[0]).points
 
     def write_recipe(self, recipe: PatchRecipe) -> tuple[dict[str, Any], bytes | None]:
-        return {"codebook": recipe.codebook.digest}, write_codebook(recipe.codebook)
+        fields = {"codebook": recipe.codebook.digest, "clip": recipe.clip}
+        return fields, write_codebook(recipe.codebook)
 
     def read_recipe(self, fields: dict[str, Any], codebook: bytes | None) -> PatchRecipe:
         if codebook is None:
             raise ValueError("its codebook is missing")
-        return PatchRecipe(read_codebook(codebook))
+        return PatchRecipe(read_codebook(codebook), float(fields["clip"]))
 
 
 HEAT, PATCHES = _HeatKind(), _PatchKind()
@@ -239,10 +259,6 @@ def recipe_from_text(text: str, codebook: bytes | None) -> AnyRecipe:
             recipe: AnyRecipe = kind.read_recipe(fields, codebook)
             return recipe
     raise ValueError(f"there is no kind {name!r}")
-
-
-def _as_codes(rows: np.ndarray, recipe: PatchRecipe) -> np.ndarray:
-    return rows.reshape(-1, *recipe.codebook.code_shape)
 
 
 def _as_tuples(value: Any) -> Any:

@@ -36,6 +36,16 @@ class MaximumMatching:
     See Also
     --------
     maximum_matching : Compute a matching.
+
+    Examples
+    --------
+    Two rows can only have the same column:
+
+    >>> import scipy.sparse as sp
+    >>> import eigenshape as es
+    >>> matching = es.stability.maximum_matching(sp.csr_array([[1, 0], [1, 0]]))
+    >>> matching.n_matched, matching.is_perfect, sorted(matching.blocked.tolist())
+    (1, False, [0, 1])
     """
 
     partners: Int[np.ndarray, " n"]
@@ -69,6 +79,13 @@ class BottleneckMatching:
     See Also
     --------
     bottleneck_matching : Compute the correspondence.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> matching = es.stability.bottleneck_matching([[0, 0], [1, 0]], [[1, 0.5], [0, 0.25]])
+    >>> matching.partners.tolist(), matching.distance
+    ([1, 0], 0.5)
     """
 
     partners: Int[np.ndarray, " n"]

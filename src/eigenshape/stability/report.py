@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number, whole_numbers
 from eigenshape._errors import InvalidParameterError
-from eigenshape._progress import Progress
+from eigenshape._progress import Progress, silent
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.cloud import PointCloud, Shape
@@ -197,7 +197,7 @@ def compare_shapes(
     two = as_shape(two, "two")
     require_type(plan, StabilityPlan | None, "plan")
     chosen = plan or StabilityPlan()
-    report_progress = progress or (lambda share, what: None)
+    report_progress = progress or silent
     meshes = _meshes(one, two, chosen, partners)
     n_samples, k = _check_plan(chosen, one, two)
     images = _find_partners(*meshes, partners) if meshes else None

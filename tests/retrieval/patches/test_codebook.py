@@ -7,7 +7,14 @@ from sklearn.mixture import GaussianMixture
 import eigenshape as es
 from eigenshape.retrieval.patches import codebook as codes
 from eigenshape.retrieval.patches.codebook import encode_patches, train_codebook
-from eigenshape.retrieval.patches.distance import SIZE_PRICE, patch_distances, view_distances
+from eigenshape.retrieval.patches.descriptor import CLIP, round_codes
+from eigenshape.retrieval.patches.distance import (
+    SIZE_PRICE,
+    packed_distances,
+    patch_distances,
+    view_distances,
+)
+from eigenshape.retrieval.patches.packing import pack_codes, unpack_codes
 from eigenshape.retrieval.patches.patches import Patches, extract_patches, surface_patches
 from eigenshape.scans.partial import viewpoint
 
@@ -30,7 +37,9 @@ def book(creatures):
 
 @pytest.mark.long
 def test_another_pose_is_the_nearest(creatures, book):
-    vectors = {key: encode_patches(patches, book) for key, patches in creatures.items()}
+    vectors = {
+        key: round_codes(encode_patches(patches, book), CLIP) for key, patches in creatures.items()
+    }
     known = np.array([vectors[kind, 1] for kind in KINDS])
     for place, kind in enumerate(KINDS):
         assert patch_distances(vectors[kind, 2], known).argmin() == place
@@ -88,8 +97,7 @@ def test_the_mixture_is_as_likely_as_another_librarys():
 
 def test_steps_of_size_are_found_and_have_a_price():
     rng = np.random.default_rng(0)
-    query = rng.standard_normal((3, 3, 8)).astype(np.float32)
-    query /= np.linalg.norm(query, axis=2, keepdims=True)
+    query = rng.integers(-7, 8, (3, 3, 64)).astype(np.int8)
     larger = np.roll(query, 1, axis=1)  # what one has at a radius the other has at the next
     assert patch_distances(query, query[None]) == pytest.approx(0, abs=1e-6)
     assert patch_distances(query, larger[None]) == pytest.approx(SIZE_PRICE, abs=1e-6)
@@ -97,28 +105,46 @@ def test_steps_of_size_are_found_and_have_a_price():
 
 
 def test_a_view_counts_by_half():
-    rng = np.random.default_rng(1)
-    rows = rng.standard_normal((4, 3, 1, 8)).astype(np.float32)
-    query, one, two, seen = rows / np.linalg.norm(rows, axis=3, keepdims=True)
+    query, one, two, seen = np.random.default_rng(1).integers(-7, 8, (4, 3, 1, 64), dtype=np.int8)
     far, near = (
         patch_distances(query, np.array([one, two])),
         patch_distances(query, np.array([seen, query])),
     )
-    found = view_distances(query, np.array([one, two]), np.array([seen, query]), np.array([0, 0]))
-    assert found == pytest.approx([(far[0] + min(far[0], near.min())) / 2, far[1]], abs=1e-6)
-    without = view_distances(
-        query, np.array([one, two]), np.empty((0, 3, 1, 8), np.float32), np.empty(0, np.int64)
-    )
+    found = view_distances(query[None], [np.array([one, seen, query]), np.array([two])])
+    assert found == pytest.approx([(far[0] + min(far[0], near.min())) / 2, far[1]])
+    without = view_distances(query[None], [one[None], two[None]])
     assert without == pytest.approx(far)
+
+
+def test_packed_codes_have_the_same_distances():
+    rng = np.random.default_rng(2)
+    query, *others = (
+        rng.integers(-7, 8, (count, 3, 3, 64), dtype=np.int8) for count in (3, 4, 1, 2)
+    )
+    packed = [pack_codes(other.reshape(-1, 64)) for other in others]
+    assert [rows.shape for rows in packed] == [(36, 32), (9, 32), (18, 32)]
+    assert packed_distances(query, packed).tolist() == view_distances(query, others).tolist()
+    for rows, other in zip(packed, others, strict=True):
+        assert np.array_equal(unpack_codes(rows), other.reshape(-1, 64))
+    assert packed_distances(query, []).shape == (0,)
+
+
+def test_distances_are_those_of_cosines():
+    query, other = np.random.default_rng(3).integers(-7, 8, (2, 3, 1, 64), dtype=np.int8)
+    products = (query.astype(float) * other).sum(axis=2)
+    cosines = products / np.linalg.norm(query, axis=2) / np.linalg.norm(other, axis=2)
+    assert patch_distances(query, other[None]) == pytest.approx(1 - cosines.mean())
+    assert patch_distances(query, 0 * other[None]) == pytest.approx(1)
 
 
 def test_a_scan_is_nearest_to_the_view_from_its_side(creatures, book):
     mesh = es.make_creature("hand", 1, n_vertices=1200)
     _, *views = extract_patches(mesh, n_views=3, clean=False)
-    codes = np.array([encode_patches(view, book) for view in views])
+    codes = np.array([round_codes(encode_patches(view, book), CLIP) for view in views])
     for place in range(3):
         scan = es.partial_scan(mesh, viewpoint(place)).mesh
-        found = patch_distances(encode_patches(surface_patches(scan), book), codes)
+        query = round_codes(encode_patches(surface_patches(scan), book), CLIP)
+        found = patch_distances(query, codes)
         assert found.argmin() == place
         assert found[place] == pytest.approx(0, abs=1e-5)
         assert set(views[place].vertices) <= set(range(mesh.n_vertices))

@@ -7,7 +7,13 @@ import pytest
 
 import eigenshape as es
 from eigenshape.retrieval.patches import matching as patch_matching
-from eigenshape.retrieval.patches.matching import patch_points
+from eigenshape.retrieval.patches.matching import (
+    LENGTHS,
+    N_LANDMARKS,
+    distances_by_landmarks,
+    nearest_lengths,
+    patch_points,
+)
 from eigenshape.retrieval.patches.matching_loops import leading, nearest_of_each_other
 from eigenshape.retrieval.patches.packing import pack_points, unpack_points
 from eigenshape.retrieval.patches.patches import surface_patches
@@ -159,15 +165,29 @@ def test_a_point_without_weight_spoils_no_match(hand):
     assert match.agreement == pytest.approx(1)
 
 
-def test_points_are_packed_without_loss(hand, book):
-    part = patch_points(
-        surface_patches(es.partial_scan(HAND, [0.0, 0, 1]).mesh, n_samples=40), book
-    )
-    data = pack_points([hand, part])
-    assert len(data) < 60_000
-    for before, after in zip([hand, part], unpack_points(data), strict=True):
-        for name in ("numbers", "weights", "distances", "vertices"):
-            assert np.array_equal(getattr(before, name), getattr(after, name))
+@pytest.mark.parametrize("name", ["hand", "part", "icosahedron", "twelve boxes"])
+def test_points_are_packed_without_loss(name, hand, book):
+    points = hand
+    if name != "hand":
+        mesh = es.partial_scan(HAND, [0.0, 0, 1]).mesh if name == "part" else SYMMETRIC[name]()
+        points = patch_points(surface_patches(mesh, n_samples=100), book)
+    data = pack_points(points)
+    assert len(data) < 20_500
+    again = unpack_points(data)
+    for field in ("numbers", "weights", "distances", "vertices"):
+        assert np.array_equal(getattr(points, field), getattr(again, field)), field
+
+
+def test_distances_follow_from_those_to_landmarks():
+    places = np.random.default_rng(0).random((60, 3))
+    true = np.linalg.norm(places[:, None] - places, axis=2).astype(np.float32)
+    found = distances_by_landmarks(LENGTHS[nearest_lengths(true[:, :N_LANDMARKS])])
+    assert np.array_equal(found, found.T)
+    assert found[:N_LANDMARKS] == pytest.approx(true[:N_LANDMARKS], rel=0.02, abs=3e-4)
+    assert np.median(abs(found - true)) < 0.1
+    far = np.inf  # point 1 is alone
+    apart = distances_by_landmarks(np.array([[0, far], [far, 0], [1, far]], dtype=np.float32))
+    assert apart.tolist() == [[0, far, 1], [far, 0, far], [1, far, 0]]
 
 
 def test_what_does_not_agree_is_no_match(hand):

@@ -6,17 +6,24 @@ import sys
 import textwrap
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import numpy as np
 import pytest
-from describers import RECIPE, mesh_of, read_by_content
+from describers import RECIPE, mesh_of, read_and_count, read_by_content
 from filelock import FileLock
 
 import eigenshape
 from eigenshape._errors import InvalidParameterError
 from eigenshape._workers import Item, Workers
 from eigenshape.retrieval.description import describe
-from eigenshape.retrieval.store.batch import build_index, content_digest
+from eigenshape.retrieval.patches.descriptor import PatchRecipe
+from eigenshape.retrieval.store.batch import (
+    build_index,
+    content_digest,
+    train_codebook_from_files,
+)
 from eigenshape.retrieval.store.index import ShapeIndex
 
 
@@ -226,3 +233,103 @@ def test_what_a_batch_cannot_begin_with(index, tmp_path):
         Workers(count=0)
     with pytest.raises(InvalidParameterError, match="timeout must be positive and finite"):
         Workers(timeout=0.0)
+
+
+@pytest.mark.long
+def test_shapes_that_a_codebook_is_learned_from_are_read_once(index, tmp_path):
+    todo = items(tmp_path, **{f"shape{number}": str(number) for number in range(42)})
+    report = build_index(index, todo, read_and_count, learn=True, n_views=0, workers=Workers(2))
+    assert len(report.added) == len(index) == len(todo)
+    assert [(tmp_path / f"{item.name}.count").read_bytes() for item in todo] == [b"1"] * len(todo)
+    (recipe,) = index.recipes()
+    learned = train_codebook_from_files(todo, read_and_count)
+    assert recipe == PatchRecipe(learned) != PatchRecipe()
+    for number in (0, 41):
+        stored = index.descriptors(f"shape{number}", recipe)[0]
+        alone = describe(mesh_of(number), recipe)
+        assert np.array_equal(stored.codes[0], alone.codes[0])
+
+
+def test_learning_and_recipes_exclude_each_other(index):
+    with pytest.raises(InvalidParameterError, match="both were asked for"):
+        build_index(index, [], read_by_content, recipes=(RECIPE,), learn=True)
+
+
+def test_unknown_repairs_are_refused_before_a_file_is_read(index, tmp_path):
+    with pytest.raises(InvalidParameterError, match="name 1 is 'polish'"):
+        build_index(index, items(tmp_path, a="raise"), read_by_content, repairs=["weld", "polish"])
+
+
+@pytest.mark.long
+def test_repairs_are_reported(index, tmp_path):
+    todo = items(tmp_path, whole="1", loose="loose")
+    report = build_index(
+        index, todo, read_by_content, recipes=(RECIPE,), repairs=["auto"], n_views=0
+    )
+    assert report.added == ("whole", "loose")
+    ((name, done),) = report.repaired
+    assert (name, done) == ("loose", ("drop_unreferenced removed 1 vertex without a face",))
+
+
+@pytest.mark.long
+def test_an_executor_runs_the_work_and_loses_no_worker_to_a_file(index, tmp_path, monkeypatch):
+    monkeypatch.setattr("eigenshape._workers.FILES_A_TASK", 2)
+    bad = {word: BAD[word] for word in ("raise", "die")}
+    todo = items(tmp_path, a="1", **{word: word for word in bad}, b="2", c="3")
+    with ThreadPoolExecutor(2) as executor:
+        report = build_index(
+            index,
+            todo,
+            read_by_content,
+            recipes=(RECIPE,),
+            n_views=0,
+            workers=Workers(timeout=60.0, executor=executor),
+        )
+    assert report.added == ("a", "b", "c")
+    assert report.failed == tuple(bad.items())
+    assert nearest(index, 2).name == "b"
+
+
+@pytest.mark.long
+def test_a_cluster_that_loses_a_worker_in_the_middle_loses_no_shape(index, tmp_path, monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr("eigenshape._workers.FILES_A_TASK", 2)
+    todo = items(tmp_path, **{f"shape{number}": str(number) for number in range(9)}, bad="raise")
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as two,
+        distributed.Client(two) as client,
+    ):
+        victim = next(iter(client.run(os.getpid).values()))
+        executor = client.get_executor(pure=False, retries=3)
+        build_index(
+            index,
+            todo,
+            read_by_content,
+            recipes=(RECIPE,),
+            n_views=0,
+            workers=Workers(timeout=60.0, executor=executor),
+            callback=lambda n_done, *_: os.kill(victim, signal.SIGKILL) if n_done == 2 else None,
+        )
+    assert {record.name for record in index.records()} == {f"shape{n}" for n in range(9)}
+
+
+@pytest.mark.long
+def test_a_folder_that_moves_and_a_table_that_changes_are_no_new_shapes(index, tmp_path):
+    (tmp_path / "old").mkdir()
+    todo = items(tmp_path / "old", a="1", loose="loose")
+    options = {"recipes": (RECIPE,), "n_views": 0, "repairs": ["auto"]}
+    build_index(index, todo, read_by_content, **options)
+    new = (tmp_path / "old").rename(tmp_path / "new")
+    moved = [
+        Item(item.name, new / item.path.name, "cat", ("wild",), {"height": 2.0}) for item in todo
+    ]
+    report = build_index(index, moved, read_by_content, **options)
+    assert report.skipped == ("a", "loose")
+    first, second = index.records()
+    assert (first.label, first.tags, first.attributes) == ("cat", ("wild",), {"height": 2.0})
+    assert first.source == str(new / "a")
+    assert second.attributes == {
+        "height": 2.0,
+        "repairs": "drop_unreferenced removed 1 vertex without a face",
+    }
+    assert index.query(describe(mesh_of(1), RECIPE), where={"height": (1, 3)})[0].name == "a"

@@ -1,3 +1,4 @@
+import errno
 import json
 import multiprocessing
 import os
@@ -24,6 +25,8 @@ from eigenshape.retrieval.heat.descriptor import HeatDescriptor
 from eigenshape.retrieval.heat.recipe import HeatRecipe
 from eigenshape.retrieval.heat.score import matching_score
 from eigenshape.retrieval.store import files as store
+from eigenshape.retrieval.store.change import Change
+from eigenshape.retrieval.store.damage import StoreWarning
 from eigenshape.retrieval.store.index import ShapeIndex
 
 OTHER = replace(RECIPE, name="other", scales=tuple(float(2**step) for step in range(40)))
@@ -229,10 +232,11 @@ def test_recipes_of_other_versions(index):
 
 
 def edit_recipe(index, edit):
-    with store.writing(index.folder) as catalog:
-        fields = json.loads(catalog.recipe_rows[0].fields)
+    with store.writing(index.folder) as change:
+        row = change.recipe_rows[1]
+        fields = json.loads(row.fields)
         edit(fields)
-        catalog.database.execute("UPDATE recipe SET fields = ?", (json.dumps(fields),))
+        change.replace("recipe", row._replace(fields=json.dumps(fields)))
     return fields
 
 
@@ -275,11 +279,15 @@ def test_folders_that_are_no_index(tmp_path, index):
     (foreign / store.DATABASE).write_bytes(b"no database at all" * 100)
     with pytest.raises(StoreError, match="must be a readable index; file is not a database"):
         ShapeIndex.open(foreign)
-    database = sqlite3.connect(index.folder / store.DATABASE)
-    database.execute("PRAGMA user_version = 9")
-    database.close()
-    with pytest.raises(StoreError, match="must be an index of format 4; it is of format 9"):
-        ShapeIndex.open(index.folder)
+    for version, message in (
+        (4, "must be an index of format 5; it is of format 4, by an older version .* again"),
+        (9, "must be an index of format 5; it is of format 9, by a newer version"),
+    ):
+        with closing(sqlite3.connect(index.folder / store.DATABASE)) as database:
+            database.execute(f"PRAGMA user_version = {version}")
+        for act in (lambda: ShapeIndex.open(index.folder), lambda: index.remove("one")):
+            with pytest.raises(StoreError, match=message):
+                act()
 
 
 def test_a_folder_that_is_gone_does_not_come_back(index):
@@ -340,18 +348,42 @@ def test_a_folder_of_other_things_becomes_no_index(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["letter.txt"]
 
 
-def test_damaged_rows_are_named(index):
+def test_damaged_rows_are_named_and_the_rest_is_served(index):
     index.add_descriptors("one", [descriptor(1)])
+    index.add_descriptors("two", [descriptor(2)])
     path = index.folder / "rows-1.bin"
     whole = path.read_bytes()
     path.write_bytes(whole[:-4])
-    with pytest.raises(StoreError, match=r"rows-1.bin must hold 24 bytes; it holds 20"):
-        index.query(descriptor(1))
+    with pytest.warns(StoreWarning, match="rows-1.bin, bytes 44 to 48: it must hold 48 bytes, and"):
+        assert [match.name for match in index.query(descriptor(1))] == ["one"]
     path.write_bytes(bytes([whole[0] ^ 1]) + whole[1:])
-    with pytest.raises(StoreError, match="must hold what was written; bytes 0 to 24 differ"):
+    with pytest.warns(StoreWarning, match="bytes 0 to 24, shape 'one': its rows differ"):
+        assert [match.name for match in index.query(descriptor(1))] == ["two"]
+    with pytest.raises(
+        StoreError, match=r"An index must hold what was written; rows-1\.bin, bytes 0"
+    ):
+        index.descriptors("one", RECIPE)
+    index.remove("two")
+    with pytest.raises(StoreError, match=r"An index must be whole to be compacted; .* shape 'one'"):
+        index.compact()
+    path.unlink()
+    with (
+        pytest.warns(StoreWarning, match="rows-1.bin, bytes 0 to 48: it is missing"),
+        pytest.raises(StoreError, match="holds no shape"),
+    ):
         index.query(descriptor(1))
     path.write_bytes(whole)
     assert index.query(descriptor(1))[0].score == 0
+
+
+def test_numbers_that_became_infinite_are_named(index):
+    index.add_descriptors("one", [descriptor(1)])
+    index.add_descriptors("two", [descriptor(2)])
+    path = index.folder / "rows-1.bin"
+    data = path.read_bytes()
+    path.write_bytes(np.array([np.nan], "<f4").tobytes() + data[4:])
+    with pytest.warns(StoreWarning, match="shape 'one': its rows differ from their checksum"):
+        assert [match.name for match in index.query(descriptor(2))] == ["two"]
 
 
 def test_a_copy_without_its_log_is_named(index, tmp_path):
@@ -365,17 +397,17 @@ def test_a_copy_without_its_log_is_named(index, tmp_path):
             index.folder, tmp_path / "part", ignore=shutil.ignore_patterns("*-wal")
         )
     assert len(ShapeIndex.open(whole)) == 2
-    for act in (
-        lambda: ShapeIndex.open(part),
-        lambda: ShapeIndex(part).add_descriptors("three", [descriptor(3)]),
-    ):
-        with pytest.raises(
-            StoreError, match="must hold all 2 changes that were committed; it holds 1"
-        ):
-            act()
+    lost = "index.sqlite-wal: 1 of 2 changes that were committed are lost"
+    with pytest.warns(StoreWarning, match=lost):
+        assert [record.name for record in ShapeIndex.open(part).records()] == ["one"]
+    with pytest.raises(StoreError, match="must hold all 2 changes that were committed; it holds 1"):
+        ShapeIndex(part).add_descriptors("three", [descriptor(3)])
+    rest = ShapeIndex.create(tmp_path / "rest")
+    with pytest.warns(StoreWarning, match=lost):
+        assert rest.merge([ShapeIndex(part)]) == 1
     (whole / store.COMMITTED).unlink()
-    with pytest.raises(StoreError, match=r"committed.txt must hold a number twice; it holds b''"):
-        ShapeIndex.open(whole)
+    with pytest.warns(StoreWarning, match=r"committed.txt: it does not hold a number twice"):
+        assert len(ShapeIndex.open(whole).records()) == 2
 
 
 def test_a_second_writer_is_told(index, monkeypatch):
@@ -405,13 +437,15 @@ def test_a_database_that_cannot_be_written(index):
 def test_a_failed_add_leaves_the_state_before(index, monkeypatch):
     index.add_descriptors("one", [descriptor(1)])
 
-    def torn(folder, database, recipe, rows):
-        with store.rows_path(folder, recipe).open("ab") as file:
-            file.write(b"torn")
-        raise OSError("disk full")
+    append = Change.append
 
-    monkeypatch.setattr(store, "append_rows", torn)
-    with pytest.raises(OSError, match="disk full"):
+    def torn(change, content, data):
+        append(change, content, data[:-2])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Change, "append", torn)
+    message = "needs space on its disk; .*: No space left on device. Nothing was changed"
+    with pytest.raises(StoreError, match=message):
         index.add_descriptors("two", [descriptor(2)])
     monkeypatch.undo()
     assert [record.name for record in index.records()] == ["one"]
@@ -570,11 +604,11 @@ def _commit_and_stop(database):
 
 
 def test_what_a_stopped_block_wrote_is_gone(index):
-    with pytest.raises(KeyboardInterrupt), store.writing(index.folder) as catalog:
-        _write_and_stop(catalog.database)
+    with pytest.raises(KeyboardInterrupt), store.writing(index.folder) as change:
+        _write_and_stop(change)
     assert index.records() == []
 
 
-def _write_and_stop(database):
-    database.execute("INSERT INTO shape (name) VALUES ('half')")
+def _write_and_stop(change):
+    change.insert("shape", "half", None, None, None, "[]", "{}", 0, 0, 0, 0)
     raise KeyboardInterrupt

@@ -181,6 +181,13 @@ def test_torch_tensors_hold_the_same_numbers():
     frames, _, stiffness, *_ = es.spectral.export_bundle(bundle, "torch", "double")
     assert frames.dtype == torch.float64
     np.testing.assert_array_equal(stiffness.to_dense().numpy(), bundle.stiffness.toarray())
+    # A step of a network: gradients flow back through the sparse product.
+    *_, gradient = es.spectral.export_bundle(bundle, "torch", "double")
+    values = torch.ones((len(bundle.mass), 2), dtype=torch.float64, requires_grad=True)
+    torch.sparse.mm(gradient, values).sum().backward()
+    expected = np.asarray(bundle.gradient_y.sum(axis=0)).ravel()
+    assert values.grad is not None
+    np.testing.assert_allclose(values.grad.numpy()[:, 1], expected, atol=1e-12)
 
 
 def test_without_torch_the_extra_is_named(monkeypatch):

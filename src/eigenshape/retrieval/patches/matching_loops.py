@@ -66,3 +66,20 @@ def leading(ours, theirs, shares, ratio, slack, least):
             break
         vector, support = image / value, support / value
     return value, support
+
+
+@njit
+@no_type_check
+def between_landmarks(lengths, found):
+    """Write the mean of the bounds of each distance that distances to landmarks give."""
+    n_points, n_landmarks = lengths.shape
+    for one in range(n_points):
+        found[one, one] = 0.0
+        for two in range(one):
+            most, least = np.inf, 0.0
+            for landmark in range(n_landmarks):
+                a, b = lengths[one, landmark], lengths[two, landmark]
+                most = min(most, a + b)
+                if a != b:  # two infinite distances have no difference
+                    least = max(least, abs(a - b))
+            found[one, two] = found[two, one] = (most + least) / 2

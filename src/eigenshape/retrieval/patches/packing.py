@@ -1,35 +1,57 @@
-"""Turn the points of patches into bytes, and back without loss."""
-
-from collections.abc import Sequence
+"""Turn codes and points of patches into bytes, and back without loss."""
 
 import numpy as np
+from jaxtyping import Int8, UInt8
 
 from eigenshape._arrays import freeze
-from eigenshape.retrieval.patches.matching import NUMBER_STEP, PatchPoints
+from eigenshape.retrieval.patches.code_loops import unpack
+from eigenshape.retrieval.patches.matching import (
+    LENGTHS,
+    N_LANDMARKS,
+    NUMBER_STEP,
+    PatchPoints,
+    distances_by_landmarks,
+    nearest_lengths,
+)
 
-# How numbers of points, vertices, and weights and distances are stored
-LENGTH, VERTEX, HALF = np.dtype("<u4"), np.dtype("<i8"), np.dtype("<f2")
+# How numbers of points, vertices, and weights are stored
+LENGTH, VERTEX, HALF = np.dtype("<u4"), np.dtype("<u4"), np.dtype("<f2")
 
 
-def pack_points(points: Sequence[PatchPoints]) -> bytes:
-    """Return sets of points one after the other: 39 KB for 150 points with 90 numbers each."""
-    return b"".join(part for each in points for part in _parts(each))
+def pack_codes(codes: Int8[np.ndarray, "m v"]) -> UInt8[np.ndarray, "m h"]:
+    """Return codes from -7 to 7, two to a byte.
+
+    A byte has an entry of the first half of a code in its low half, and one of the second half in
+    its high half, each raised by 8: so compiled loops read a row from end to end.
+    """
+    raised = (codes + 8).astype(np.uint8)
+    half = codes.shape[-1] // 2
+    return np.asarray(raised[:, :half] | raised[:, half:] << 4)
 
 
-def _parts(points: PatchPoints) -> tuple[bytes, ...]:
-    above = np.triu_indices(len(points.vertices), 1)
-    return (
-        np.array([*points.numbers.shape], dtype=LENGTH).tobytes(),
-        points.vertices.astype(VERTEX).tobytes(),
-        points.weights.astype(HALF).tobytes(),
-        (points.numbers / NUMBER_STEP).astype(np.int8).tobytes(),
-        points.distances[above].astype(HALF).tobytes(),
+def unpack_codes(rows: UInt8[np.ndarray, "m h"]) -> Int8[np.ndarray, "m v"]:
+    """Return the codes that `pack_codes` turned into bytes."""
+    codes = np.empty((len(rows), 2 * rows.shape[1]), dtype=np.int8)
+    unpack(np.ascontiguousarray(rows), codes)
+    return codes
+
+
+def pack_points(points: PatchPoints) -> bytes:
+    """Return points as bytes: 20 KB for 150 points with 90 numbers each."""
+    return b"".join(
+        (
+            np.array([*points.numbers.shape], dtype=LENGTH).tobytes(),
+            points.vertices.astype(VERTEX).tobytes(),
+            points.weights.astype(HALF).tobytes(),
+            np.rint(points.numbers / NUMBER_STEP).astype(np.int8).tobytes(),
+            nearest_lengths(points.distances[:, :N_LANDMARKS]).tobytes(),
+        )
     )
 
 
-def unpack_points(data: bytes) -> tuple[PatchPoints, ...]:
+def unpack_points(data: bytes) -> PatchPoints:
     """Return the points that `pack_points` turned into bytes."""
-    found, place = [], 0
+    place = 0
 
     def take(kind: "np.dtype[np.generic]", count: int) -> np.ndarray:
         nonlocal place
@@ -37,15 +59,10 @@ def unpack_points(data: bytes) -> tuple[PatchPoints, ...]:
         place += taken.nbytes
         return taken
 
-    while place < len(data):
-        m, r, d = take(LENGTH, 3).tolist()
-        vertices, weights = take(VERTEX, m).astype(np.int64), take(HALF, m).astype(np.float32)
-        numbers = NUMBER_STEP * take(np.dtype("i1"), m * r * d).reshape(m, r, d).astype(np.float32)
-        distances = np.zeros((m, m), dtype=np.float32)
-        distances[np.triu_indices(m, 1)] = take(HALF, m * (m - 1) // 2)
-        found.append(
-            PatchPoints(
-                freeze(numbers), freeze(weights), freeze(distances + distances.T), freeze(vertices)
-            )
-        )
-    return tuple(found)
+    m, r, d = take(LENGTH, 3).tolist()
+    vertices, weights = take(VERTEX, m).astype(np.int64), take(HALF, m).astype(np.float32)
+    numbers = np.float32(NUMBER_STEP) * take(np.dtype("i1"), m * r * d).reshape(m, r, d)
+    lengths = LENGTHS[take(np.dtype("u1"), m * min(m, N_LANDMARKS)).reshape(m, -1)]
+    return PatchPoints(
+        freeze(numbers), freeze(weights), freeze(distances_by_landmarks(lengths)), freeze(vertices)
+    )

@@ -26,7 +26,7 @@ from eigenshape.scans.partial import views_of
 
 N_SAMPLES = 150  # points of a surface; time and stored bytes grow with their square
 # Viewpoints from which a closed shape is described beside the whole. Each costs one more
-# description and 51 KB in the index.
+# description and 6 KB in the index.
 N_VIEWS = 6
 RADII = 0.05 * 1.25 ** np.arange(1, 10)  # of the discs, in sides of the box
 # A disc nearer to a boundary than this share of its radius weighs less, since part of it is cut

@@ -1,11 +1,13 @@
 """Describe many files in worker processes, and add what they find to an index."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from hashlib import file_digest, sha256
+from itertools import chain
 from pathlib import Path
+from time import monotonic
 from typing import SupportsIndex
 
 from eigenshape._arguments import require_each, require_type
@@ -13,21 +15,33 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._workers import Item as Item  # noqa: PLC0414 - the room lists it from here
+from eigenshape._workers import Outcome, run_in_workers
 from eigenshape._workers import Workers as Workers  # noqa: PLC0414 - and this
-from eigenshape._workers import run_in_workers
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.repair import repair
+from eigenshape.geometry.repair_names import MESH_REPAIRS
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook, train_codebook
+from eigenshape.retrieval.patches.descriptor import PatchRecipe, patch_descriptor
+from eigenshape.retrieval.patches.patches import N_VIEWS as N_PATCH_VIEWS
 from eigenshape.retrieval.patches.patches import Patches, extract_patches
-from eigenshape.retrieval.store.index import Record, ShapeIndex
-from eigenshape.retrieval.store.writing import describe_to_store
+from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.retrieval.store.records import Record
+from eigenshape.retrieval.store.thumbnails import draw_thumbnail
+from eigenshape.retrieval.store.writing import DescribedShape, describe_to_store
 
 Read = Callable[[Path], MeshLike]
+ReadRepaired = Callable[[Path], tuple[TriangleMesh, tuple[str, ...]]]
 Callback = Callable[[int, int, str, str | None], None]
 # Shapes that a codebook is learned from. A hundred closed ones have 45,000 patches for its 32
 # Gaussians, and take some minutes; fewer than 40 leave it to the codebook of the library.
 FEWEST_TO_TRAIN, MOST_TO_TRAIN = 40, 100
+REPAIRS = "repairs"  # attribute of a shape that was repaired: what was done
 N_TRAINING_VIEWS = 2  # partial views of each closed shape that a codebook is learned from
+# Shapes are added together, at most this many, and at most this many seconds after the last ones.
+# One change costs 5 ms of CPU and some waits for the disk; a stopped build loses what is not added.
+MOST_AT_ONCE, LONGEST_KEPT = 64, 1.0
 
 
 @dataclass(frozen=True)
@@ -40,6 +54,8 @@ class BatchReport:
         Names of the shapes that were added, and that the index had already.
     failed : tuple of (str, str)
         Name and reason of each shape that could not be added.
+    repaired : tuple of (str, tuple of str)
+        Name of each shape that was repaired before it was described, and what was done.
 
     See Also
     --------
@@ -49,15 +65,21 @@ class BatchReport:
     added: tuple[str, ...]
     skipped: tuple[str, ...]
     failed: tuple[tuple[str, str], ...]
+    repaired: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
     __repr__ = short_repr
     _repr_html_ = html_repr
 
 
 @dataclass(frozen=True)
-class _DescribedFile:
+class _ReadFile:
+    """What a worker made of a file: its descriptors or, to learn from, its patches."""
+
     digest: str
-    descriptors: tuple[Descriptor, ...]
+    repairs: tuple[str, ...]
+    thumbnail: bytes
+    descriptors: tuple[Descriptor, ...] = ()
+    patches: tuple[Patches, ...] = ()
 
 
 def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
@@ -66,16 +88,19 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
     read: Read,
     *,
     recipes: Sequence[AnyRecipe] | None = None,
+    learn: bool = False,
+    repairs: Sequence[str] = (),
     n_views: SupportsIndex | None = None,
     workers: Workers = Workers(),
     callback: Callback | None = None,
 ) -> BatchReport:
-    """Describe files in several processes, and add each to an index as soon as it is described.
+    """Describe files in several processes, and add them to an index as they are described.
 
-    A file that raises an error, hangs or kills its process is reported, and the others go on. Only
-    this process writes: after Ctrl-C or a crash, the same call continues where it stopped. A file
-    that the index has with the same content and recipes is skipped. A file whose content has
-    changed replaces the old shape in one step.
+    A file that raises an error, hangs, needs too much memory or kills its process is reported, and
+    the others go on. Only this process writes, at most 64 shapes and one second at a time: after
+    Ctrl-C or a crash, the same call continues where it stopped. A file that the index has with the
+    same content and recipes is skipped, but its path, label, tags and attributes are brought up to
+    date. A file whose content has changed replaces the old shape in one step.
 
     Parameters
     ----------
@@ -87,6 +112,12 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
         import by name.
     recipes : sequence of HeatRecipe or PatchRecipe, optional
         By default that of `ShapeIndex.default_recipe`.
+    learn : bool
+        Whether an index without a recipe learns a codebook from the first shapes, as
+        `train_codebook_from_files` does. Files that it learns from are read once.
+    repairs : sequence of str
+        Of `eigenshape.repair`, applied to each mesh before it is described; ``["auto"]`` does what
+        is needed. The attribute ``repairs`` of a shape tells what was done.
     n_views : int, optional
         As of `ShapeIndex.add`.
     workers : Workers
@@ -101,7 +132,8 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
     Raises
     ------
     InvalidParameterError
-        If two items have the same name, or `n_views` is negative.
+        If two items have the same name, `n_views` is negative, a repair is unknown, or `learn` is
+        given with recipes.
     StoreError
         If the index cannot be written.
     EigenshapeError
@@ -110,7 +142,7 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
 
     See Also
     --------
-    ShapeIndex.add, train_codebook_from_files
+    find_items, ShapeIndex.add, train_codebook_from_files
 
     Examples
     --------
@@ -118,42 +150,60 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
     >>> import eigenshape as es
     >>> index = es.ShapeIndex.create(mkdtemp())
     >>> es.retrieval.build_index(index, [], es.read_mesh)  # with items: under the main guard
-    BatchReport(added=(), skipped=(), failed=())
+    BatchReport(added=(), skipped=(), failed=(), repaired=())
     """
     require_type(index, ShapeIndex, "index")
     require_type(workers, Workers, "workers")
     require_each(items, Item, "items")
-    if recipes is None:
-        recipes = (index.default_recipe(),)
-    require_each(recipes, AnyRecipe, "recipes")
-    if n_views is not None:
-        n_views = whole_number(n_views, "n_views", 0)
+    if recipes is not None:
+        require_each(recipes, AnyRecipe, "recipes")
+    if learn and recipes is not None:
+        raise InvalidParameterError(
+            "An index either learns a codebook or is given recipes; both were asked for. "
+            "Pass learn=False."
+        )
+    views = None if n_views is None else whole_number(n_views, "n_views", 0)
+    read_item = partial(_read_repaired, read, _known_repairs(repairs))
     _require_different_names(items)
     callback = callback or _ignore
 
-    known = {record.name: record for record in index.records()}
-    todo = [item for item in items if not _is_known(item, known.get(item.name), recipes)]
-    added: set[str] = set()
-    failed: dict[str, str] = {}
+    taught: dict[str, Outcome[_ReadFile]] = {}
+    if learn and not index.recipes():
+        count = N_PATCH_VIEWS if views is None else views
+        taught = _read_teachers(items, read_item, count, workers, callback)
+        index.keep_recipe(PatchRecipe(_learn_from(taught.values())))
+        # Of several processes that fill a new index, all take the codebook of the first.
+        patch_recipe = next(kept for kept in index.recipes() if isinstance(kept, PatchRecipe))
+        taught = {name: _encoded(outcome, patch_recipe, count) for name, outcome in taught.items()}
+    recipes = (index.default_recipe(),) if recipes is None else tuple(recipes)
+
+    todo = _update_known(index, [item for item in items if item.name not in taught], recipes)
     n_done = len(items) - len(todo)
-    if n_done:
+    if n_done > len(taught):
         callback(n_done, len(items), "already in the index", None)
-    work = partial(_describe_file, read, tuple(recipes), n_views)
-    # Closing stops the workers at once, also after Ctrl-C.
-    with closing(run_in_workers(work, todo, workers)) as outcomes:
-        for item, outcome in outcomes:
-            n_done += 1
-            error = outcome.error if outcome.value is None else _add(index, item, outcome.value)
-            if error is None:
-                added.add(item.name)
+    writer = _Writer(index)
+    failed: dict[str, str] = {}
+    repaired: dict[str, tuple[str, ...]] = {}
+    ready = [(item, taught[item.name]) for item in items if item.name in taught]
+    work = partial(_describe_file, read_item, recipes, views)
+    # Closing stops the workers at once, also after Ctrl-C; what is described by then is kept.
+    with writer, closing(run_in_workers(work, todo, workers)) as described:
+        for item, outcome in chain(ready, described):
+            if outcome.value is None:
+                failed[item.name] = str(outcome.error)
             else:
-                failed[item.name] = error
-            callback(n_done, len(items), item.name, error)
+                repaired[item.name] = outcome.value.repairs
+                writer.add(_shape(item, outcome.value))
+            if item.name not in taught:
+                n_done += 1
+                callback(n_done, len(items), item.name, failed.get(item.name))
+    failed |= writer.refused
     names = [item.name for item in items]
     return BatchReport(
-        added=tuple(name for name in names if name in added),
-        skipped=tuple(name for name in names if name not in added and name not in failed),
+        added=tuple(name for name in names if name in writer.added),
+        skipped=tuple(name for name in names if name not in writer.added and name not in failed),
         failed=tuple((name, failed[name]) for name in names if name in failed),
+        repaired=tuple((name, repaired[name]) for name in names if repaired.get(name)),
     )
 
 
@@ -161,6 +211,7 @@ def train_codebook_from_files(
     items: Sequence[Item],
     read: Read,
     *,
+    repairs: Sequence[str] = (),
     workers: Workers = Workers(),
     callback: Callback | None = None,
 ) -> PatchCodebook:
@@ -174,9 +225,11 @@ def train_codebook_from_files(
     items : sequence of Item
     read : callable
         As of `build_index`.
+    repairs : sequence of str
+        As of `build_index`.
     workers : Workers
     callback : callable, optional
-        As of `build_index`; errors are not passed.
+        As of `build_index`.
 
     Returns
     -------
@@ -185,6 +238,8 @@ def train_codebook_from_files(
 
     Raises
     ------
+    InvalidParameterError
+        If a repair is unknown.
     EigenshapeError
         If no worker can start, as for `build_index`.
 
@@ -201,19 +256,44 @@ def train_codebook_from_files(
     """
     require_type(workers, Workers, "workers")
     require_each(items, Item, "items")
+    read_item = partial(_read_repaired, read, _known_repairs(repairs))
+    taught = _read_teachers(items, read_item, N_TRAINING_VIEWS, workers, callback or _ignore)
+    return _learn_from(taught.values())
+
+
+def _read_teachers(
+    items: Sequence[Item], read: ReadRepaired, n_views: int, workers: Workers, callback: Callback
+) -> dict[str, Outcome[_ReadFile]]:
+    """Extract the patches of the shapes that a codebook is learned from; of none if too few."""
     if len(items) < FEWEST_TO_TRAIN:
-        return default_codebook()
-    callback = callback or _ignore
+        return {}
     chosen = sorted(items, key=lambda item: sha256(item.name.encode()).digest())[:MOST_TO_TRAIN]
-    shapes: dict[str, list[Patches]] = {}
-    with closing(run_in_workers(partial(_extract_file, read), chosen, workers)) as outcomes:
+    work = partial(_extract_file, read, max(n_views, N_TRAINING_VIEWS))
+    found = {}
+    with closing(run_in_workers(work, chosen, workers)) as outcomes:
         for number, (item, outcome) in enumerate(outcomes):
-            if outcome.value is not None:
-                shapes[item.name] = outcome.value
-            callback(number + 1, len(chosen), item.name, None)
-    if len(shapes) < FEWEST_TO_TRAIN:
+            found[item.name] = outcome
+            callback(number + 1, len(items), item.name, outcome.error)
+    # in this order, so that the codebook does not depend on which file was done first
+    return {item.name: found[item.name] for item in chosen}
+
+
+def _learn_from(outcomes: Iterable[Outcome[_ReadFile]]) -> PatchCodebook:
+    files = [outcome.value for outcome in outcomes if outcome.value is not None]
+    if len(files) < FEWEST_TO_TRAIN:
         return default_codebook()
-    return train_codebook([patches for item in chosen for patches in shapes.get(item.name, ())])
+    return train_codebook(
+        [patches for file in files for patches in file.patches[: 1 + N_TRAINING_VIEWS]]
+    )
+
+
+def _encoded(outcome: Outcome[_ReadFile], recipe: PatchRecipe, n_views: int) -> Outcome[_ReadFile]:
+    """Turn the patches of a shape into its descriptor."""
+    if outcome.value is None:
+        return outcome
+    file = outcome.value
+    descriptor = patch_descriptor(file.patches[: 1 + n_views], recipe)
+    return Outcome(replace(file, descriptors=(descriptor,), patches=()))
 
 
 def content_digest(path: Path) -> str:
@@ -233,41 +313,132 @@ def _require_different_names(items: Sequence[Item]) -> None:
         paths[item.name] = item.path
 
 
+def _known_repairs(names: Sequence[str]) -> tuple[str, ...]:
+    """Return names of repairs; an unknown one is an error before any file is read."""
+    for number, name in enumerate(names):
+        if name not in MESH_REPAIRS:
+            raise InvalidParameterError(
+                f"Repairs must be among {', '.join(MESH_REPAIRS)}; name {number} is {name!r}."
+            )
+    return tuple(names)
+
+
+def _read_repaired(
+    read: Read, repairs: tuple[str, ...], path: Path
+) -> tuple[TriangleMesh, tuple[str, ...]]:
+    """Return the mesh of a file after repairs, and what they did."""
+    done = repair(as_mesh(read(path)), repairs)
+    return done.mesh, done.report
+
+
 def _describe_file(
-    read: Read, recipes: tuple[AnyRecipe, ...], n_views: int | None, path: Path
-) -> _DescribedFile:
+    read: ReadRepaired, recipes: tuple[AnyRecipe, ...], n_views: int | None, path: Path
+) -> _ReadFile:
     """Describe a file, in a worker."""
     # Before it is read: a file that changes meanwhile is described again next time.
     digest = content_digest(path)
-    mesh = as_mesh(read(path))
+    mesh, repairs = read(path)
     descriptors = [
         descriptor for recipe in recipes for descriptor in describe_to_store(mesh, recipe, n_views)
     ]
-    return _DescribedFile(digest, tuple(descriptors))
+    return _ReadFile(digest, repairs, draw_thumbnail(mesh), descriptors=tuple(descriptors))
 
 
-def _extract_file(read: Read, path: Path) -> list[Patches]:
+def _extract_file(read: ReadRepaired, n_views: int, path: Path) -> _ReadFile:
     """Extract the patches of a file, in a worker."""
-    return extract_patches(read(path), n_views=N_TRAINING_VIEWS)
+    digest = content_digest(path)
+    mesh, repairs = read(path)
+    patches = tuple(extract_patches(mesh, n_views=n_views))
+    return _ReadFile(digest, repairs, draw_thumbnail(mesh), patches=patches)
 
 
-def _add(index: ShapeIndex, item: Item, file: _DescribedFile) -> str | None:
-    """Add a shape; return the reason if the index refuses it."""
-    facts = {"label": item.label, "source": str(item.path.absolute()), "digest": file.digest}
-    try:
-        index.add_descriptors(item.name, file.descriptors, **facts, replace=True)
-    except InvalidParameterError as err:
-        return str(err)
-    return None
+def _shape(item: Item, file: _ReadFile) -> DescribedShape:
+    attributes = dict(item.attributes)
+    if file.repairs:
+        attributes[REPAIRS] = "; ".join(file.repairs)
+    return DescribedShape(
+        item.name,
+        file.descriptors,
+        label=item.label,
+        source=str(item.path.absolute()),
+        digest=file.digest,
+        tags=item.tags,
+        attributes=attributes,
+        thumbnail=file.thumbnail,
+    )
 
 
-def _is_known(item: Item, record: Record | None, recipes: Sequence[AnyRecipe]) -> bool:
-    if record is None or not set(recipes) <= set(record.recipes):
+class _Writer:
+    """Adds shapes to an index some at a time, since each change of an index waits for the disk."""
+
+    def __init__(self, index: ShapeIndex) -> None:
+        self._index = index
+        self._waiting: list[DescribedShape] = []
+        self._begun = monotonic()
+        self.added: set[str] = set()
+        self.refused: dict[str, str] = {}
+
+    def __enter__(self) -> None: ...
+
+    def __exit__(self, *_: object) -> None:
+        if self._waiting:
+            self._write(self._waiting)
+
+    def add(self, shape: DescribedShape) -> None:
+        self._waiting.append(shape)
+        if len(self._waiting) >= MOST_AT_ONCE or monotonic() - self._begun > LONGEST_KEPT:
+            self._write(self._waiting)
+            self._waiting = []
+            self._begun = monotonic()
+
+    def _write(self, shapes: Sequence[DescribedShape]) -> None:
+        try:
+            self._index.add_many(shapes, replace=True)
+        except InvalidParameterError as err:
+            if len(shapes) == 1:
+                self.refused[shapes[0].name] = str(err)
+                return
+            for shape in shapes:  # each of the others is added
+                self._write([shape])
+        else:
+            self.added.update(shape.name for shape in shapes)
+
+
+def _is_known(item: Item, record: Record, recipes: Sequence[AnyRecipe]) -> bool:
+    if not set(recipes) <= set(record.recipes):
         return False
     try:
         return content_digest(item.path) == record.digest
     except OSError:  # the worker that opens the file reports it
         return False
+
+
+def _update_known(
+    index: ShapeIndex, items: Sequence[Item], recipes: Sequence[AnyRecipe]
+) -> list[Item]:
+    """Return the items that must be described; bring up to date what is known of the others."""
+    known = {record.name: record for record in index.records()}
+    todo, changed = [], []
+    for item in items:
+        record = known.get(item.name)
+        if record is None or not _is_known(item, record, recipes):
+            todo.append(item)
+            continue
+        attributes = dict(item.attributes)
+        if REPAIRS in record.attributes:
+            attributes[REPAIRS] = record.attributes[REPAIRS]
+        new = replace(
+            record,
+            label=item.label,
+            source=str(item.path.absolute()),
+            tags=tuple(sorted(set(item.tags))),
+            attributes=attributes,
+        )
+        if new != record:
+            changed.append(new)
+    if changed:  # a change takes the lock of the index, also one of nothing
+        index.update(changed)
+    return todo
 
 
 def _ignore(n_done: int, n_items: int, name: str, error: str | None) -> None:

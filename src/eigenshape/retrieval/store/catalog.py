@@ -1,133 +1,158 @@
-"""The rows of the database of an index: read all together, and checked against their digest."""
+"""The tables of an index: every row has a checksum, and every table a seal.
+
+The seal of a table holds the number of its rows and the sum of their checksums, which does not
+depend on the order of the rows. So a writer updates it at the cost of the rows that it adds or
+deletes, and a reader notices each row that was changed, lost or doubled.
+"""
 
 import json
 import sqlite3
-from dataclasses import dataclass, replace
-from hashlib import sha256
-from pathlib import Path
+import struct
+from collections.abc import Iterator
+from contextlib import closing
+from functools import lru_cache
 from typing import Any, NamedTuple
 from zlib import crc32
 
 from eigenshape._errors import StoreError
 from eigenshape.retrieval.kinds import AnyRecipe, recipe_from_text, recipe_to_text
+from eigenshape.retrieval.store.damage import Damage
 
+DATABASE = "index.sqlite"
 APPLICATION = 0x65696773  # "eigs", by which SQLite files tell whose they are
-FORMAT = 4  # of the tables and of the files beside the database; raised by every change
-# A blob is the last column of its table, so that the others are read without it. Its checksum is
-# part of the row, and the digest in `seal` is of all rows of all tables without their blobs, and of
-# the number of changes that have been committed.
+FORMAT = 5  # of the tables and of the files beside the database; raised by every change
+MODULUS = 2**63  # of sums of checksums, so that SQLite stores them as integers
+ROWS_AT_ONCE = 20_000  # rows of a table in memory at a time: 10 MB
+# Errors that a damaged file causes: SQLite quotes bytes of it in messages, which may be no text.
+DAMAGE = (sqlite3.Error, UnicodeError)
+# The number of a row is never used twice: `seal` has the last one of each table.
 SCHEMA = """
 CREATE TABLE recipe (
-    id INTEGER PRIMARY KEY, fields TEXT NOT NULL UNIQUE, size INTEGER NOT NULL,
-    blob_checksum INTEGER NOT NULL, codebook BLOB NOT NULL
+    id INTEGER PRIMARY KEY, fields TEXT NOT NULL UNIQUE, n_columns INTEGER NOT NULL,
+    codebook_checksum INTEGER NOT NULL, checksum INTEGER NOT NULL
+);
+CREATE TABLE codebook (id INTEGER PRIMARY KEY, data BLOB NOT NULL);
+CREATE TABLE file (
+    id INTEGER PRIMARY KEY, folder TEXT, content TEXT NOT NULL, generation INTEGER NOT NULL,
+    size INTEGER NOT NULL, checksum INTEGER NOT NULL
 );
 CREATE TABLE shape (
-    id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, label TEXT, source TEXT, digest TEXT
+    id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, label TEXT, source TEXT, digest TEXT,
+    tags TEXT NOT NULL, attributes TEXT NOT NULL,
+    thumbnail_file INTEGER NOT NULL, thumbnail_offset INTEGER NOT NULL,
+    thumbnail_size INTEGER NOT NULL, thumbnail_checksum INTEGER NOT NULL,
+    checksum INTEGER NOT NULL
 );
 CREATE TABLE descriptor (
-    id INTEGER PRIMARY KEY,
-    shape INTEGER NOT NULL REFERENCES shape ON DELETE CASCADE,
-    recipe INTEGER NOT NULL REFERENCES recipe,
-    view INTEGER NOT NULL,
-    offset INTEGER NOT NULL, n_rows INTEGER NOT NULL, n_columns INTEGER NOT NULL,
+    id INTEGER PRIMARY KEY, shape INTEGER NOT NULL, recipe INTEGER NOT NULL, view INTEGER NOT NULL,
+    rows_file INTEGER NOT NULL, rows_offset INTEGER NOT NULL,
+    n_rows INTEGER NOT NULL, n_columns INTEGER NOT NULL, rows_checksum INTEGER NOT NULL,
+    details_file INTEGER NOT NULL, details_offset INTEGER NOT NULL,
+    details_size INTEGER NOT NULL, details_checksum INTEGER NOT NULL,
     checksum INTEGER NOT NULL,
-    blob_checksum INTEGER NOT NULL, details BLOB NOT NULL,
     UNIQUE (shape, recipe, view)
 );
-CREATE TABLE seal (n_changes INTEGER NOT NULL, digest TEXT NOT NULL);
+CREATE TABLE seal (
+    id TEXT PRIMARY KEY, n_rows INTEGER NOT NULL, total INTEGER NOT NULL, last INTEGER NOT NULL,
+    checksum INTEGER NOT NULL
+);
 """
+ENCODER = json.JSONEncoder(default=repr)  # the default is for a value whose type was damaged
+DESCRIPTOR = struct.Struct("<13q")  # the numbers of a row of that table, for its checksum
+CHANGES = "changes"  # the row of `seal` that counts committed changes
 
 
 class RecipeRow(NamedTuple):
-    """A recipe, without its codebook; `size` is the number of committed bytes of rows."""
+    """A recipe, without its codebook; `n_columns` is 0 until something is described by it."""
 
     id: int
     fields: str
+    n_columns: int
+    codebook_checksum: int
+
+
+class FileRow(NamedTuple):
+    """A file of numbers: `folder` is that of another index, relative to this one, or None.
+
+    The first `size` bytes are committed. A compacted file is of the next generation.
+    """
+
+    id: int
+    folder: str | None
+    content: str
+    generation: int
     size: int
-    blob_checksum: int
+
+    @property
+    def name(self) -> str:
+        """Return the name of the file in its folder."""
+        return f"{self.content}.{self.generation}.bin" if self.generation else f"{self.content}.bin"
 
 
 class ShapeRow(NamedTuple):
-    """A shape."""
+    """A shape; tags and attributes are JSON. `thumbnail_size` is 0 if there is no picture."""
 
     id: int
     name: str
     label: str | None
     source: str | None
     digest: str | None
+    tags: str
+    attributes: str
+    thumbnail_file: int
+    thumbnail_offset: int
+    thumbnail_size: int
+    thumbnail_checksum: int
 
 
 class DescriptorRow(NamedTuple):
-    """A descriptor, without its details; `checksum` is of its rows in the file of its recipe."""
+    """Where the numbers of a descriptor are, and their checksums."""
 
     id: int
     shape: int
     recipe: int
     view: int
-    offset: int
+    rows_file: int
+    rows_offset: int
     n_rows: int
     n_columns: int
-    checksum: int
-    blob_checksum: int
+    rows_checksum: int
+    details_file: int
+    details_offset: int
+    details_size: int
+    details_checksum: int
 
 
-@dataclass(frozen=True)
-class Catalog:
-    """All rows of the database, in the order of their numbers. Blobs are read when needed."""
+class Seal(NamedTuple):
+    """What a table holds: the number of rows, the sum of their checksums, and the last number."""
 
-    path: Path
-    database: sqlite3.Connection
-    recipe_rows: list[RecipeRow]
-    shapes: list[ShapeRow]
-    descriptors: list[DescriptorRow]
-    n_changes: int
+    id: str
+    n_rows: int
+    total: int
+    last: int
 
-    def recipes(self) -> list[tuple[int, AnyRecipe]]:
-        """Return the number of each recipe, and the recipe."""
-        return [(row.id, self._recipe(row)) for row in self.recipe_rows]
 
-    def _recipe(self, row: RecipeRow) -> AnyRecipe:
-        codebook = self._blob("SELECT codebook FROM recipe WHERE id = ?", row)
+TABLES: dict[str, Any] = {
+    "recipe": RecipeRow,
+    "file": FileRow,
+    "shape": ShapeRow,
+    "descriptor": DescriptorRow,
+}
+
+
+def row_text(values: tuple[Any, ...]) -> bytes:
+    """Return the values of a row as bytes, the same in every version of Python."""
+    return ENCODER.encode(values).encode()
+
+
+def row_checksum(table: str, values: tuple[Any, ...]) -> int:
+    """Return the checksum of the values of a row of a table."""
+    if table == "descriptor":  # integers alone, and as many as there are shapes: 8 times as fast
         try:
-            return recipe_from_text(row.fields, codebook or None)
-        except (TypeError, ValueError) as err:
-            raise StoreError(
-                f"Recipes of an index must be known to this version of eigenshape; {row.fields} is "
-                f"not: {err}. Use the version that wrote it, or index the shapes again."
-            ) from err
-
-    def recipe_id(self, recipe: AnyRecipe) -> int | None:
-        """Return the number of a recipe, or None if it is not stored.
-
-        A field that a stored recipe lacks, since it was introduced later, has its default.
-        """
-        return next((number for number, other in self.recipes() if other == recipe), None)
-
-    def shape(self, name: str) -> ShapeRow | None:
-        """Return the shape of a name, or None if there is none."""
-        return next((shape for shape in self.shapes if shape.name == name), None)
-
-    def without(self, shape: ShapeRow) -> "Catalog":
-        """Delete a shape and its descriptors, and return the catalog of the rest."""
-        self.database.execute("DELETE FROM shape WHERE id = ?", (shape.id,))
-        shapes = [other for other in self.shapes if other != shape]
-        descriptors = [row for row in self.descriptors if row.shape != shape.id]
-        return replace(self, shapes=shapes, descriptors=descriptors)
-
-    def details(self, row: DescriptorRow) -> bytes:
-        """Return the details of a descriptor."""
-        return self._blob("SELECT details FROM descriptor WHERE id = ?", row)
-
-    def _blob(self, query: str, row: RecipeRow | DescriptorRow) -> bytes:
-        found = self.database.execute(query, (row.id,)).fetchone()
-        blob = found[0] if found else None
-        if not isinstance(blob, bytes) or crc32(blob) != row.blob_checksum:
-            kind = type(row).__name__.removesuffix("Row").lower()
-            raise StoreError(
-                f"{self.path} must hold what was written; the bytes of {kind} {row.id} differ. "
-                "Index the shapes again."
-            )
-        return blob
+            return crc32(DESCRIPTOR.pack(*values))
+        except struct.error:  # the type of a value was damaged
+            return -1
+    return crc32(row_text(values))
 
 
 def create_tables(database: sqlite3.Connection) -> None:
@@ -136,75 +161,187 @@ def create_tables(database: sqlite3.Connection) -> None:
         database.execute(statement)
     database.execute(f"PRAGMA application_id = {APPLICATION}")
     database.execute(f"PRAGMA user_version = {FORMAT}")
-    database.execute("INSERT INTO seal VALUES (0, '')")
-    seal(database, 0)
+    for name in (CHANGES, *TABLES):
+        keep_seal(database, Seal(name, 0, 0, 0))
 
 
-def read_catalog(path: Path, database: sqlite3.Connection) -> Catalog:
-    """Read all rows of an open database, and check that they are as written and none is missing.
+def keep_seal(database: sqlite3.Connection, seal: Seal) -> None:
+    """Store a seal."""
+    values = (*seal, row_checksum("seal", seal))
+    database.execute("INSERT OR REPLACE INTO seal VALUES (?, ?, ?, ?, ?)", values)
 
-    Raises
-    ------
-    StoreError
-        If the database is not an index of this format, or its rows differ from their digest.
-    """
+
+def require_format(place: str, database: sqlite3.Connection) -> None:
+    """Raise an error if a database is not an index of this format."""
     (application,) = database.execute("PRAGMA application_id").fetchone()
     (version,) = database.execute("PRAGMA user_version").fetchone()
     if application != APPLICATION:
         raise StoreError(
-            f"{path} must be an index of eigenshape; it belongs to another program. Choose another "
-            "folder."
+            f"{place} must be an index of eigenshape; it belongs to another program. Choose "
+            "another folder."
         )
     if version != FORMAT:
+        age = "an older" if version < FORMAT else "a newer"
         raise StoreError(
-            f"{path} must be an index of format {FORMAT}; it is of format {version}. "
-            "Use the version of eigenshape that made it, or index the shapes again."
+            f"{place} must be an index of format {FORMAT}; it is of format {version}, by {age} "
+            "version of eigenshape. Index the shapes again, into another folder: `eigenshape "
+            "index NEW_FOLDER MESHES`."
         )
-    rows = _all_rows(database)
-    sealed = database.execute("SELECT n_changes, digest FROM seal").fetchall()
-    if len(sealed) != 1 or sealed[0][1] != _digest(sealed[0][0], rows):
-        raise StoreError(
-            f"{path} must hold what was written; its rows differ from their digest. "
-            "Index the shapes again."
-        )
-    return Catalog(path, database, *rows, sealed[0][0])
 
 
-def seal(database: sqlite3.Connection, n_changes: int) -> None:
-    """Store the digest of all rows, before a writer commits them."""
-    digest = _digest(n_changes, _all_rows(database))
-    database.execute("UPDATE seal SET n_changes = ?, digest = ?", (n_changes, digest))
+def read_seals(place: str, database: sqlite3.Connection) -> dict[str, Seal]:
+    """Read the seals of all tables.
+
+    Raises
+    ------
+    StoreError
+        If one is damaged or missing.
+    """
+    rows = database.execute("SELECT * FROM seal NOT INDEXED").fetchall()
+    seals = {row[0]: Seal(*row[:-1]) for row in rows if row_checksum("seal", row[:-1]) == row[-1]}
+    for name in (CHANGES, *TABLES):
+        if name not in seals:
+            raise StoreError(
+                f"{place} must hold what was written; the seal of {name} differs. Merge the index "
+                "into a new one to keep what is whole, or index the shapes again."
+            )
+    return seals
 
 
-def _all_rows(
-    database: sqlite3.Connection,
-) -> tuple[list[RecipeRow], list[ShapeRow], list[DescriptorRow]]:
-    return (
-        _rows_of(database, "recipe", RecipeRow),
-        _rows_of(database, "shape", ShapeRow),
-        _rows_of(database, "descriptor", DescriptorRow),
-    )
+class Tally:
+    """The number of rows that were read of a table, and the sum of their checksums."""
+
+    def __init__(self, n_rows: int = 0, total: int = 0) -> None:
+        self.n_rows, self.total = n_rows, total
+
+    def count(self, checksums: list[int]) -> None:
+        """Count more rows."""
+        self.n_rows += len(checksums)
+        self.total = (self.total + sum(checksums)) % MODULUS
+
+    def agrees(self, seal: Seal) -> bool:
+        """Return whether all rows of a seal were counted, and no others."""
+        return (self.n_rows, self.total) == (seal.n_rows, seal.total)
 
 
-def _rows_of(database: sqlite3.Connection, table: str, row: Any) -> list[Any]:
+def read_table(
+    database: sqlite3.Connection, seal: Seal, damages: list[Damage]
+) -> Iterator[list[Any]]:
+    """Yield the whole rows of a table, some at a time; damage is appended to a list.
+
+    If the table cannot be walked through, or the walk finds too few rows, the missing rows are
+    searched for one by one by their number.
+    """
+    table, tally, found = seal.id, Tally(), set[int]()
+    columns = ", ".join(TABLES[table]._fields)
     # NOT INDEXED walks through the table itself: a search by number or by an index of SQLite can
     # silently miss rows if one bit of an inner page is wrong.
-    query = f"SELECT {', '.join(row._fields)} FROM {table} NOT INDEXED"
-    return [row(*values) for values in database.execute(query).fetchall()]
+    walk = f"SELECT {columns}, checksum FROM {table} NOT INDEXED"
+    try:
+        with closing(database.execute(walk)) as cursor:
+            while chunk := cursor.fetchmany(ROWS_AT_ONCE):
+                whole = _whole_rows(table, chunk, found, tally)
+                found.update(row[0] for row in whole)
+                yield whole
+    except DAMAGE:
+        pass  # the rest is salvaged
+    if tally.agrees(seal):
+        return
+    salvaged = _salvage(database, seal, found, damages)
+    tally.count([checksum for *_, checksum in salvaged])
+    yield [TABLES[table](*row[:-1]) for row in salvaged]
+    if not tally.agrees(seal):
+        lost = seal.n_rows - tally.n_rows
+        damages.append(Damage(DATABASE, f"{lost} of {seal.n_rows} rows of table {table} are lost"))
 
 
-def _digest(n_changes: Any, rows: tuple[list[Any], ...]) -> str:
-    # JSON is the same text in every version of Python; `default` is for a value whose type was
-    # damaged.
-    return sha256(json.dumps([n_changes, rows], default=repr).encode()).hexdigest()
+def read_appended(database: sqlite3.Connection, before: Seal, now: Seal) -> list[Any] | None:
+    """Return the rows that a table gained, or None if it lost or changed any."""
+    table = now.id
+    columns = ", ".join(TABLES[table]._fields)
+    query = f"SELECT {columns}, checksum FROM {table} WHERE id > ?"
+    tally = Tally(before.n_rows, before.total)
+    whole = _whole_rows(table, database.execute(query, (before.last,)).fetchall(), set(), tally)
+    return whole if tally.agrees(now) else None
 
 
-def keep_recipe(catalog: Catalog, recipe: AnyRecipe) -> int:
-    """Return the number of a recipe; store the recipe under a new number if it is new."""
-    number = catalog.recipe_id(recipe)
-    if number is not None:
-        return number
+def _whole_rows(table: str, rows: list[Any], found: set[int], tally: Tally) -> list[Any]:
+    """Return the rows that agree with their checksums and were not found before, and count them."""
+    kind = TABLES[table]
+    whole = [
+        row for row in rows if row_checksum(table, row[:-1]) == row[-1] and row[0] not in found
+    ]
+    tally.count([row[-1] for row in whole])
+    return [kind(*row[:-1]) for row in whole]
+
+
+def _salvage(
+    database: sqlite3.Connection, seal: Seal, found: set[int], damages: list[Damage]
+) -> list[Any]:
+    """Return rows of a table that a walk did not find, with their checksums."""
+    columns = ", ".join(TABLES[seal.id]._fields)
+    query = f"SELECT {columns}, checksum FROM {seal.id} WHERE id = ?"
+    text_factory = database.text_factory
+    database.text_factory = lambda data: data.decode(errors="surrogateescape")
+    salvaged = []
+    for number in range(1, seal.last + 1):
+        if number in found:
+            continue
+        try:
+            row = database.execute(query, (number,)).fetchone()
+        except DAMAGE as err:
+            damages.append(Damage(DATABASE, f"row {number} of table {seal.id}: {err}"))
+            continue
+        if row is None:  # it was deleted, or is lost
+            continue
+        if row_checksum(seal.id, row[:-1]) == row[-1] and row[0] == number:
+            salvaged.append(row)
+        else:
+            name = row[1] if seal.id == "shape" and isinstance(row[1], str) else None
+            what = f"row {number} of table {seal.id} differs from its checksum"
+            damages.append(Damage(DATABASE, what, shape=name))
+    database.text_factory = text_factory
+    return salvaged
+
+
+def read_recipes(
+    place: str, database: sqlite3.Connection, rows: list[RecipeRow], damages: list[Damage]
+) -> dict[int, AnyRecipe]:
+    """Return each recipe by its number; a damaged codebook is appended to a list.
+
+    Raises
+    ------
+    StoreError
+        If a recipe is not known to this version.
+    """
+    recipes = {}
+    for row in rows:
+        try:
+            query = "SELECT data FROM codebook WHERE id = ?"
+            found = database.execute(query, (row.id,)).fetchone()
+        except DAMAGE:
+            found = None
+        codebook = found[0] if found else None
+        if not isinstance(codebook, bytes) or crc32(codebook) != row.codebook_checksum:
+            what = f"the codebook of recipe {row.id} differs from its checksum"
+            damages.append(Damage(DATABASE, what))
+            continue
+        recipes[row.id] = _known_recipe(place, row.fields, codebook)
+    return recipes
+
+
+@lru_cache(maxsize=64)  # an index has a few recipes, and a codebook takes 31 KB
+def _known_recipe(place: str, fields: str, codebook: bytes) -> AnyRecipe:
+    try:
+        return recipe_from_text(fields, codebook or None)
+    except (KeyError, TypeError, ValueError) as err:
+        raise StoreError(
+            f"Recipes of an index must be known to this version of eigenshape; {fields} of "
+            f"{place} is not: {err}. Use the version that wrote it, or index the shapes again."
+        ) from err
+
+
+def recipe_values(recipe: AnyRecipe) -> tuple[str, int, bytes]:
+    """Return the text of a recipe, the checksum of its codebook, and the codebook."""
     fields, codebook = recipe_to_text(recipe)
-    values = (fields, 0, crc32(codebook or b""), codebook or b"")
-    query = "INSERT INTO recipe (fields, size, blob_checksum, codebook) VALUES (?, ?, ?, ?)"
-    return int(catalog.database.execute(query, values).lastrowid or 0)
+    return fields, crc32(codebook or b""), codebook or b""

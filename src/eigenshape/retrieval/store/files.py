@@ -1,42 +1,47 @@
-"""The files of an index: rows of numbers, and a SQLite database that says which of them count.
+"""The files of an index: append-only numbers, and a SQLite database that says which of them count.
 
-A descriptor is written behind the last row that the database lists, forced to disk, and then
-committed by one SQLite transaction. If the writer dies before the commit, its bytes belong to no
-descriptor, and the next writer overwrites them. Readers see what is committed and never wait. What
-they read is verified: rows by their checksums, the database by `catalog`. SQLite keeps the latest
-changes in a log beside the database; a file of its own holds the number of all changes, so that a
-lost log is noticed.
+What is added is written behind the committed bytes of its file, forced to disk, and then committed
+by one SQLite transaction. If the writer dies before the commit, its bytes belong to no shape, and
+the next writer overwrites them. Readers see what is committed and never wait. SQLite keeps the
+latest changes in a log beside the database; a file of its own holds the number of all changes, so
+that a lost log is noticed.
 """
 
+import errno
 import os
 import socket
 import sqlite3
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
-from typing import Any
-from zlib import crc32
 
-import numpy as np
 from filelock import FileLock, Timeout
 
 from eigenshape._errors import StoreError
+from eigenshape.retrieval.kinds import AnyRecipe
 from eigenshape.retrieval.store.catalog import (
-    Catalog,
-    DescriptorRow,
+    CHANGES,
+    DAMAGE,
+    DATABASE,
     create_tables,
-    read_catalog,
-    seal,
+    read_recipes,
+    read_seals,
+    read_table,
+    require_format,
 )
+from eigenshape.retrieval.store.change import Change
+from eigenshape.retrieval.store.damage import Damage, warn_of_damage
+from eigenshape.retrieval.store.syncing import sync_folder
 
-DATABASE = "index.sqlite"
 DRAFT = "draft.sqlite"  # the database until it is complete
 LOCK = "writer.lock"
 WRITER = "writer.txt"  # names the process that writes, for messages
 COMMITTED = "committed.txt"  # the number of all changes, twice
+COUNT_DIGITS = 20  # of that number, so that the file keeps its size and needs no more space
 LONGEST_WAIT = 5.0  # seconds for another writer to end; adding a shape takes milliseconds
-# Errors that a damaged file causes: SQLite quotes bytes of it in messages, which may be no text.
-DAMAGE = (sqlite3.Error, UnicodeError)
+N_TRIES = 3  # readings of the count, which a writer may replace at the same moment
+# The primary result codes of SQLite when a disk is full or cannot be written
+NO_SPACE = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
 
 
 def create(folder: Path) -> None:
@@ -103,22 +108,13 @@ def _make(folder: Path) -> None:
         create_tables(database)
         database.execute("COMMIT")
         database.execute("PRAGMA journal_mode = WAL")
-    _keep_count(folder, 0)
+    _keep_count(folder, 0, new=True)
     (folder / DRAFT).replace(folder / DATABASE)
-    _sync(folder)
+    sync_folder(folder)
 
 
-def _sync(folder: Path) -> None:
-    """Force the names of new files to disk, on systems where a folder can be opened for that."""
-    if os.name == "posix":
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
-
-
-def _require_database(folder: Path) -> None:
+def require_database(folder: Path) -> None:
+    """Raise an error if a folder is no index."""
     if not (folder / DATABASE).is_file():
         raise StoreError(
             f"{folder} must be an index; it has no {DATABASE}. Create one with "
@@ -127,24 +123,37 @@ def _require_database(folder: Path) -> None:
 
 
 @contextmanager
-def reading(folder: Path) -> Iterator[Catalog]:
+def reading(folder: Path) -> Iterator[tuple[sqlite3.Connection, int]]:
     """Open the database to read one consistent state, even if the folder is read-only.
+
+    Yields
+    ------
+    database : Connection
+        In a transaction.
+    committed : int
+        The least number of changes that it must hold, or -1 if that number is damaged.
 
     Raises
     ------
     StoreError
-        If the folder is not a store of this format, or something in it is damaged.
+        If the folder is not a store of this format, or its database cannot be read at all.
     """
-    _require_database(folder)
+    require_database(folder)
     try:
         with closing(_connect_to_read(folder)) as database:
             committed = _read_count(folder)  # before BEGIN, so that the state is not older
             database.execute("BEGIN")
-            yield _whole_catalog(folder, database, committed)
+            require_format(str(folder / DATABASE), database)
+            yield database, committed
     except DAMAGE as err:
-        raise StoreError(
-            f"{folder / DATABASE} must be a readable index; {err}. Index the shapes again."
-        ) from err
+        raise _explain(folder, err, "readable") from err
+
+
+def _explain(folder: Path, err: Exception, kind: str) -> StoreError:
+    # The primary code is in the lowest byte of the extended one
+    if (getattr(err, "sqlite_errorcode", 0) & 0xFF) in NO_SPACE:
+        return _no_space(folder, str(err))
+    return StoreError(f"{folder / DATABASE} must be a {kind} index; {err}. Index the shapes again.")
 
 
 def _connect_to_read(folder: Path) -> sqlite3.Connection:
@@ -170,70 +179,113 @@ def _connect(folder: Path, mode: str) -> sqlite3.Connection:
     return sqlite3.connect(uri, uri=True, isolation_level=None)
 
 
-def _whole_catalog(folder: Path, database: sqlite3.Connection, committed: bytes) -> Catalog:
-    """Read the catalog, and raise an error if it lacks committed changes.
+def _read_count(folder: Path) -> int:
+    for _ in range(N_TRIES):
+        try:
+            count, _, again = (folder / COMMITTED).read_bytes().strip().partition(b" ")
+        except OSError:
+            return -1
+        if count == again and count.isdigit():
+            return int(count)
+    return -1
 
-    Changes stay in a log beside the database as long as a process reads, and SQLite ignores all of
-    the log that follows a damaged bit.
+
+def _keep_count(folder: Path, n_changes: int, *, new: bool = False) -> None:
+    """Store the number of changes, twice.
+
+    It is written in place, within one sector, and is not forced to disk: if power fails, a count
+    that is too low misses a lost log at worst. For the same reason a failure is no error: the
+    change is committed.
     """
-    catalog = read_catalog(folder / DATABASE, database)
-    count, _, again = committed.partition(b" ")
-    if count != again or not count.isdigit():
-        raise StoreError(
-            f"{folder / COMMITTED} must hold a number twice; it holds {committed!r}. "
-            "Index the shapes again."
-        )
-    if catalog.n_changes < int(count):
-        raise StoreError(
-            f"{folder} must hold all {int(count)} changes that were committed; it holds "
-            f"{catalog.n_changes}. Its file {DATABASE}-wal is damaged, or was not copied with the "
-            "others. Copy all files, or index the shapes again."
-        )
-    return catalog
-
-
-def _read_count(folder: Path) -> bytes:
-    path = folder / COMMITTED
-    return path.read_bytes() if path.exists() else b""
-
-
-def _keep_count(folder: Path, n_changes: int) -> None:
-    beside = folder / f"{DRAFT}.{COMMITTED}"
-    with beside.open("wb") as file:
-        file.write(f"{n_changes} {n_changes}".encode())
-        file.flush()
-        os.fsync(file.fileno())
-    beside.replace(folder / COMMITTED)
-    _sync(folder)
+    text = f"{n_changes:0{COUNT_DIGITS}} {n_changes:0{COUNT_DIGITS}}\n".encode()
+    if new:
+        (folder / COMMITTED).write_bytes(text)
+        return
+    with suppress(OSError), (folder / COMMITTED).open("r+b", buffering=0) as file:
+        file.write(text)
 
 
 @contextmanager
-def writing(folder: Path) -> Iterator[Catalog]:
-    """Open the database to write. At the end of the block all changes are committed, or none.
-
-    The catalog is that from before the block.
+def writing(folder: Path) -> Iterator[Change]:
+    """Open the index to write. At the end of the block all changes are committed, or none.
 
     Raises
     ------
     StoreError
-        If the folder is not a store of this format, something in it is damaged, or another process
-        is writing.
+        If the folder is not a store of this format, changes were lost, another process is writing,
+        or the disk is full.
     """
-    _require_database(folder)
+    require_database(folder)
     try:
         with _lock(folder), closing(_connect(folder, "mode=rw")) as database:
-            database.execute("PRAGMA foreign_keys = ON")
             database.execute("PRAGMA synchronous = FULL")
             database.execute("BEGIN IMMEDIATE")
-            catalog = _whole_catalog(folder, database, _read_count(folder))
-            yield catalog
-            seal(database, catalog.n_changes + 1)
-            database.execute("COMMIT")  # if the block raises before, closing rolls back
-            _keep_count(folder, catalog.n_changes + 1)
+            place = str(folder / DATABASE)
+            require_format(place, database)
+            seals = read_seals(place, database)
+            _require_all_changes(folder, seals[CHANGES].n_rows)
+            with closing(Change(folder, database, seals)) as change:
+                yield change
+                if change.keep():
+                    database.execute("COMMIT")  # if the block raises before, closing rolls back
+                    _keep_count(folder, change.n_changes)
+                    change.finish()
     except DAMAGE as err:
+        raise _explain(folder, err, "writable") from err
+    except OSError as err:
+        if err.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
+            raise
+        raise _no_space(folder, str(err.strerror)) from err
+
+
+def _no_space(folder: Path, reason: str) -> StoreError:
+    return StoreError(
+        f"An index needs space on its disk; {folder}: {reason}. Nothing was changed: free some "
+        "space and repeat the call."
+    )
+
+
+def _require_all_changes(folder: Path, n_changes: int) -> None:
+    """Raise an error if the database lacks committed changes.
+
+    Changes stay in a log beside the database as long as a process reads, and SQLite ignores all of
+    the log that follows a damaged bit.
+    """
+    committed = _read_count(folder)
+    if committed > n_changes:
         raise StoreError(
-            f"{folder / DATABASE} must be a writable index; {err}. Index the shapes again."
-        ) from err
+            f"{folder} must hold all {committed} changes that were committed; it holds "
+            f"{n_changes}. Its file {DATABASE}-wal is damaged, or was not copied with the others. "
+            "Copy all files, or merge the index into a new one to keep what is whole."
+        )
+
+
+def read_recipes_of(folder: Path) -> dict[int, AnyRecipe]:
+    """Return the recipes of an index by their numbers, without a look at its shapes."""
+    damages: list[Damage] = []
+    with reading(folder) as (database, _):
+        seals = read_seals(str(folder / DATABASE), database)
+        rows = [row for rows in read_table(database, seals["recipe"], damages) for row in rows]
+        recipes = read_recipes(str(folder / DATABASE), database, rows, damages)
+    warn_of_damage(str(folder), damages)
+    return recipes
+
+
+def check_database(folder: Path) -> list[str]:
+    """Return what SQLite finds wrong with its own pages: its indexes are in no seal."""
+    with reading(folder) as (database, _):
+        try:
+            found = database.execute("PRAGMA integrity_check").fetchall()
+        except DAMAGE as err:
+            return [str(err)]
+    return [text for (text,) in found if text != "ok"]
+
+
+def vacuum(folder: Path) -> None:
+    """Give free pages of the database back; without space for that, leave it as it is."""
+    no_space = suppress(sqlite3.OperationalError)
+    with _lock(folder), closing(_connect(folder, "mode=rw")) as database, no_space:
+        database.execute("VACUUM")
 
 
 @contextmanager
@@ -243,7 +295,8 @@ def _lock(folder: Path) -> Iterator[None]:
     try:
         lock.acquire()
     except Timeout as err:
-        who = holder.read_text(errors="replace") if holder.exists() else "another process"
+        named = holder.read_text(errors="replace") if holder.exists() else ""
+        who = named or "another process"
         raise StoreError(
             f"An index has one writer at a time; {who} has held {folder / LOCK} for more than "
             f"{LONGEST_WAIT:g} s. Wait for it to end."
@@ -254,55 +307,9 @@ def _lock(folder: Path) -> Iterator[None]:
             "Copy it to a writable folder."
         ) from err
     try:
-        holder.write_text(f"process {os.getpid()} on {socket.gethostname()}")
+        with suppress(OSError):  # a full disk; what the block writes tells
+            holder.write_text(f"process {os.getpid()} on {socket.gethostname()}")
         yield
     finally:
         holder.unlink(missing_ok=True)
         lock.release()
-
-
-def rows_path(folder: Path, recipe: int) -> Path:
-    """Return the file that holds the rows of a recipe."""
-    return folder / f"rows-{recipe}.bin"
-
-
-def append_rows(folder: Path, database: sqlite3.Connection, recipe: int, rows: np.ndarray) -> int:
-    """Write rows behind the committed ones, force them to disk, and return where they begin."""
-    (offset,) = database.execute("SELECT size FROM recipe WHERE id = ?", (recipe,)).fetchone()
-    data = rows.tobytes()
-    path = rows_path(folder, recipe)
-    if not path.exists():
-        path.touch()
-        _sync(folder)
-    with path.open("r+b") as file:
-        file.seek(offset)
-        file.write(data)
-        file.truncate()
-        file.flush()
-        os.fsync(file.fileno())
-    database.execute("UPDATE recipe SET size = ? WHERE id = ?", (offset + len(data), recipe))
-    return int(offset)
-
-
-def read_rows(
-    data: memoryview, row: DescriptorRow, row_type: "np.dtype[Any]", path: Path
-) -> np.ndarray:
-    """Return the rows of a descriptor, as numbers of a type.
-
-    Raises
-    ------
-    StoreError
-        If they are not there, or not what was written.
-    """
-    begin, count = row.offset, row.n_rows * row.n_columns
-    end = begin + count * row_type.itemsize
-    if end > len(data):
-        raise StoreError(
-            f"{path} must hold {end} bytes; it holds {len(data)}. Index the shapes again."
-        )
-    if crc32(data[begin:end]) != row.checksum:
-        raise StoreError(
-            f"{path} must hold what was written; bytes {begin} to {end} differ. "
-            "Index the shapes again."
-        )
-    return np.frombuffer(data, row_type, count, begin).reshape(row.n_rows, row.n_columns)

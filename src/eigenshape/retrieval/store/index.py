@@ -1,115 +1,44 @@
 """A collection of described shapes in a folder, searched for those that are most alike."""
 
-from collections.abc import Sequence
+import json
+import tempfile
+import weakref
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import SupportsIndex
-
-import numpy as np
-from jaxtyping import Int
+from shutil import rmtree
+from typing import Any, SupportsIndex
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import whole_number
 from eigenshape._errors import StoreError
-from eigenshape._text import html_repr, short_repr
-from eigenshape._threads import one_blas_thread
+from eigenshape._text import html_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
-from eigenshape.retrieval.patches.descriptor import PatchRecipe
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
 from eigenshape.retrieval.store import files as store
-from eigenshape.retrieval.store.catalog import ShapeRow, keep_recipe
-from eigenshape.retrieval.store.reading import StoredDescriptors, read_descriptors
+from eigenshape.retrieval.store.catalog import DATABASE, read_seals
+from eigenshape.retrieval.store.damage import warn_of_damage
+from eigenshape.retrieval.store.filters import choose_shapes
+from eigenshape.retrieval.store.reader import EngineMaker, IndexReader, choose_recipe
+from eigenshape.retrieval.store.records import Matches, Record
+from eigenshape.retrieval.store.snapshot import IndexState, read_state
+from eigenshape.retrieval.store.thumbnails import draw_thumbnail
+from eigenshape.retrieval.store.upkeep import (
+    IndexReport,
+    compact_index,
+    export_index,
+    merge_indexes,
+    verify_index,
+)
 from eigenshape.retrieval.store.writing import (
-    add_shape,
+    DescribedShape,
     describe_to_store,
-    require_columns,
+    facts_text,
     require_text,
-    rows_of_each,
-    write_views,
+    update_shape,
+    write_shape,
 )
 
-
-@dataclass(frozen=True)
-class Record:
-    """What an index holds of a shape beside its descriptors.
-
-    Attributes
-    ----------
-    name : str
-        Unique in the index.
-    label : str or None
-        Class of the shape.
-    source : str or None
-        Where the shape came from: a path, for example.
-    digest : str or None
-        Hash of the content, by which `build_index` recognizes a file that it has described.
-    recipes : tuple of HeatRecipe or PatchRecipe
-        By which the shape is described.
-
-    See Also
-    --------
-    ShapeIndex.records
-    """
-
-    name: str
-    label: str | None
-    source: str | None
-    digest: str | None
-    recipes: tuple[AnyRecipe, ...]
-
-    __repr__ = short_repr
-    _repr_html_ = html_repr
-
-
-@dataclass(frozen=True, eq=False)
-class Match:
-    """A shape that `ShapeIndex.query` found.
-
-    Attributes
-    ----------
-    name, label, source : str
-        As in its `Record`.
-    score : float
-        Of `matching_score` or `patch_scores`: 0, or nearly, for the same descriptor; smaller is
-        more alike.
-    correspondences : (p, 2) int
-        Features or patches that correspond: the number of one of the query, and of one of this
-        shape. Surest pairs first.
-    vertices : (m,) int
-        The vertex of each feature or patch of this shape.
-    view : int
-        Which of the descriptors of the shape matched, in the order in which they were added: 0 is
-        the first, that of the whole shape.
-
-    See Also
-    --------
-    ShapeIndex.query
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> import eigenshape as es
-    >>> recipe = es.retrieval.SCALE_FREE
-    >>> index = es.ShapeIndex.create(tempfile.mkdtemp())
-    >>> for name in ("fish", "biped"):
-    ...     mesh = es.make_creature(name, n_vertices=500)
-    ...     index.add_descriptors(name, [es.describe(mesh, recipe)], label="creature")
-    >>> scan = es.make_creature("fish", pose=1, n_vertices=500)
-    >>> match = index.query(es.describe(scan, recipe), n_matches=1)[0]
-    >>> match.name, match.label, len(match.vertices)
-    ('fish', 'creature', 15)
-    """
-
-    name: str
-    label: str | None
-    source: str | None
-    score: float
-    correspondences: Int[np.ndarray, "p 2"]
-    vertices: Int[np.ndarray, " m"]
-    view: int
-
-    __repr__ = short_repr
-    _repr_html_ = html_repr
+IN_MEMORY = Path("/dev/shm")  # where Linux keeps files in memory
 
 
 @dataclass(frozen=True)
@@ -119,7 +48,8 @@ class ShapeIndex:
     Call `ShapeIndex.create`, `ShapeIndex.open` or `ShapeIndex.open_or_create`. Any number of
     processes may read an index at the same time, while one writes. Every call reads or writes the
     folder, and nothing stays open between calls. A process that is killed while it writes leaves
-    the state before or after the call. All that is read is checked, and damage is reported.
+    the state before or after the call. Everything has a checksum: what is damaged is named by a
+    `StoreWarning`, and the rest is served.
 
     Attributes
     ----------
@@ -149,13 +79,15 @@ class ShapeIndex:
     _repr_html_ = html_repr
 
     @classmethod
-    def create(cls, folder: str | Path) -> "ShapeIndex":
+    def create(cls, folder: str | Path | None) -> "ShapeIndex":
         """Make an empty index.
 
         Parameters
         ----------
-        folder : str or Path
-            An empty folder, or one that does not exist.
+        folder : str or Path, or None
+            An empty folder, or one that does not exist. With None, the index is temporary: it is in
+            memory where the system keeps files in memory (Linux), else in a temporary folder, and
+            is deleted with the last reference to what this call returns.
 
         Returns
         -------
@@ -166,8 +98,14 @@ class ShapeIndex:
         StoreError
             If the folder holds anything.
         """
-        store.create(Path(folder))
-        return cls(Path(folder))
+        if folder is None:
+            place = IN_MEMORY if IN_MEMORY.is_dir() else None
+            index = cls(Path(tempfile.mkdtemp(prefix="eigenshape-", dir=place)))
+            weakref.finalize(index, rmtree, index.folder, ignore_errors=True)
+        else:
+            index = cls(Path(folder))
+        store.create(index.folder)
+        return index
 
     @classmethod
     def open(cls, folder: str | Path) -> "ShapeIndex":
@@ -184,10 +122,11 @@ class ShapeIndex:
         Raises
         ------
         StoreError
-            If the folder is no index, its format is another one, or its database is damaged.
+            If the folder is no index, its format is another one, or its database cannot be read.
         """
-        with store.reading(Path(folder)):
-            return cls(Path(folder))
+        index = cls(Path(folder))
+        len(index)
+        return index
 
     @classmethod
     def open_or_create(cls, folder: str | Path) -> "ShapeIndex":
@@ -220,25 +159,75 @@ class ShapeIndex:
         return cls.open(folder)
 
     def __len__(self) -> int:
-        with store.reading(self.folder) as catalog:
-            return len(catalog.shapes)
+        with store.reading(self.folder) as (database, _):
+            return read_seals(str(self.folder / DATABASE), database)["shape"].n_rows
 
-    def records(self) -> list[Record]:
-        """List all shapes, sorted by name.
+    def _read(self) -> IndexState:
+        state = read_state(self.folder)
+        warn_of_damage(str(self.folder), state.damages)
+        return state
+
+    def reader(self, engine: EngineMaker | None = None) -> IndexReader:
+        """Open a reader, which keeps the index in memory for many queries and many threads.
+
+        `query` opens one for each call. A reader takes 0.3 KB of memory a shape; the numbers that
+        are compared are mapped from disk.
+
+        Parameters
+        ----------
+        engine : callable, optional
+            Make an engine that chooses which shapes are compared with a query, in place of a coarse
+            scan: `FaissEngine`, above some 100,000 shapes, or a function that returns a
+            `QdrantEngine`. It is called with the `CoarseRows` of all shapes at the first query.
+
+        Returns
+        -------
+        IndexReader
+            Close it, or use it in a ``with`` block.
+
+        Raises
+        ------
+        StoreError
+            If the index cannot be read.
+
+        Examples
+        --------
+        >>> import eigenshape as es
+        >>> index = es.ShapeIndex.create(None)
+        >>> fish = es.describe(es.make_creature("fish", n_vertices=500), es.retrieval.SCALE_FREE)
+        >>> with index.reader() as reader:
+        ...     index.add_descriptors("fish", [fish])
+        ...     before = len(reader)
+        ...     reader.refresh()
+        ...     before, len(reader), reader.query(fish)[0].name
+        True
+        (0, 1, 'fish')
+        """
+        return IndexReader(self.folder, engine)
+
+    def records(self, *, where: Mapping[str, Any] | None = None) -> list[Record]:
+        """List shapes, sorted by name.
+
+        Parameters
+        ----------
+        where : mapping, optional
+            Conditions that a shape must meet, as of `query`; by default all shapes are listed.
 
         Returns
         -------
         list of Record
+
+        Raises
+        ------
+        InvalidParameterError
+            If a condition is none.
         """
-        with store.reading(self.folder) as catalog:
-            recipes = dict(catalog.recipes())
-        used: dict[int, set[int]] = {shape.id: set() for shape in catalog.shapes}
-        for row in catalog.descriptors:
-            used[row.shape].add(row.recipe)
-        return [
-            Record(*shape[1:], tuple(recipes[number] for number in sorted(used[shape.id])))
-            for shape in sorted(catalog.shapes, key=lambda shape: shape.name)
-        ]
+        state = self._read()
+        records = _records(state)
+        if where is None:
+            return records
+        chosen = choose_shapes(state.shapes, where)
+        return [record for record in records if chosen[state.names[record.name]]]
 
     def recipes(self) -> list[AnyRecipe]:
         """List the recipes of the index, in the order in which they were added.
@@ -247,8 +236,7 @@ class ShapeIndex:
         -------
         list of HeatRecipe or PatchRecipe
         """
-        with store.reading(self.folder) as catalog:
-            return [recipe for _, recipe in catalog.recipes()]
+        return list(store.read_recipes_of(self.folder).values())
 
     def default_recipe(self) -> AnyRecipe:
         """Return the recipe by which `add` and `query` describe a mesh.
@@ -259,9 +247,7 @@ class ShapeIndex:
             The first `PatchRecipe` of the index, else its first recipe. For an empty index,
             patches with the codebook that comes with the library.
         """
-        recipes = self.recipes()
-        patches = [recipe for recipe in recipes if isinstance(recipe, PatchRecipe)]
-        return next(iter([*patches, *recipes])) if recipes else PatchRecipe()
+        return choose_recipe(self.recipes())
 
     def keep_recipe(self, recipe: AnyRecipe) -> None:
         """Add a recipe before any shape is described by it, so that its codebook is not lost.
@@ -276,8 +262,8 @@ class ShapeIndex:
             If another process is writing.
         """
         require_type(recipe, AnyRecipe, "recipe")
-        with store.writing(self.folder) as catalog:
-            keep_recipe(catalog, recipe)
+        with store.writing(self.folder) as change:
+            change.keep_recipe(recipe)
 
     def add(  # noqa: PLR0913 - one keyword for each fact of a shape, and how it is described
         self,
@@ -286,11 +272,13 @@ class ShapeIndex:
         *,
         label: str | None = None,
         source: str | None = None,
+        tags: Sequence[str] = (),
+        attributes: Mapping[str, Any] | None = None,
         recipe: AnyRecipe | None = None,
         n_views: SupportsIndex | None = None,
         replace: bool = False,
     ) -> None:
-        """Describe a mesh and add it to the index.
+        """Describe a mesh and add it to the index, with a small picture.
 
         A closed mesh is also described as single viewpoints see it, so that partial scans find it.
 
@@ -302,6 +290,10 @@ class ShapeIndex:
             A closed or open surface, of any size.
         label, source : str, optional
             Class of the shape, and where it came from.
+        tags : sequence of str
+            Words by which queries may choose shapes.
+        attributes : mapping, optional
+            Numbers and texts by name, by which queries may choose shapes.
         recipe : HeatRecipe or PatchRecipe, optional
             By default that of `default_recipe`.
         n_views : int, optional
@@ -322,11 +314,22 @@ class ShapeIndex:
         """
         mesh = as_mesh(mesh)
         require_type(recipe, AnyRecipe | None, "recipe")
+        # Before the mesh is described, which takes a second
         require_text(name, label, source)
+        facts_text(tags, attributes or {})
         if recipe is None:
             recipe = self.default_recipe()
         descriptors = describe_to_store(mesh, recipe, n_views)
-        self.add_descriptors(name, descriptors, label=label, source=source, replace=replace)
+        shape = DescribedShape(
+            name,
+            descriptors,
+            label=label,
+            source=source,
+            tags=tags,
+            attributes=attributes or {},
+            thumbnail=draw_thumbnail(mesh),
+        )
+        self.add_many([shape], replace=replace)
 
     def add_descriptors(
         self,
@@ -340,69 +343,122 @@ class ShapeIndex:
     ) -> None:
         """Add a shape that is described already.
 
-        Descriptors of one recipe are views of the shape: the whole first, then what is seen of it
-        from some sides. The view with the lowest score counts.
-
         Parameters
         ----------
-        name : str
-            By which the shape is found; unique in the index.
-        descriptors : sequence of HeatDescriptor or PatchDescriptor
-        label, source : str, optional
-            Class of the shape, and where it came from.
-        digest : str, optional
-            Hash of its content. If the name is in the index with the same digest, the shape gains
-            the recipes that it lacks, and keeps its descriptors by the others.
+        name, descriptors, label, source, digest
+            As of `DescribedShape`.
         replace : bool
             Whether a shape of the same name with another digest is replaced, in one step.
 
         Raises
         ------
-        InvalidParameterError
-            If there is no descriptor, a number is not finite, or the rows of a descriptor are
-            longer or shorter than those of others by the same recipe.
-        StoreError
-            If the name is in the index with another digest and `replace` is False, or another
-            process is writing.
+        InvalidParameterError, StoreError
+            As `add_many`.
 
         See Also
         --------
-        ShapeIndex.add, ShapeIndex.descriptors
+        ShapeIndex.add, ShapeIndex.add_many, ShapeIndex.descriptors
         """
-        require_each(descriptors, Descriptor, "descriptors")
-        require_text(name, label, source, digest)
-        rows = rows_of_each(name, descriptors)
-        with store.writing(self.folder) as before:
-            row = ShapeRow(0, name, label, source, digest)
-            catalog, shape = add_shape(before, row, replace=replace)
-            for recipe in dict.fromkeys(descriptor.recipe for descriptor in descriptors):
-                views = [
-                    pair for pair in zip(descriptors, rows, strict=True) if pair[0].recipe == recipe
-                ]
-                write_views(self.folder, catalog, shape, keep_recipe(catalog, recipe), views)
+        shape = DescribedShape(name, descriptors, label, source, digest)
+        self.add_many([shape], replace=replace)
 
-    def remove(self, name: str) -> None:
-        """Remove a shape.
+    def add_many(self, shapes: Iterable[DescribedShape], *, replace: bool = False) -> None:
+        """Add shapes that are described already, all in one step or none.
 
-        Its numbers stay in the file, so that processes that read the old state still find them.
+        A thousand shapes at once take little more time than ten one by one: the disk is waited for
+        once a call.
 
         Parameters
         ----------
-        name : str
+        shapes : iterable of DescribedShape
+        replace : bool
+            Whether shapes of the same name with another digest are replaced.
+
+        Raises
+        ------
+        InvalidParameterError
+            If a shape has no descriptor, a number is not finite, the rows of a descriptor are
+            longer or shorter than those of others by the same recipe, or a tag or an attribute
+            cannot be stored.
+        StoreError
+            If a name is in the index with another digest and `replace` is False, another process
+            is writing, or the disk is full.
+
+        See Also
+        --------
+        ShapeIndex.add, build_index
+        """
+        with store.writing(self.folder) as change:
+            for shape in shapes:
+                require_type(shape, DescribedShape, "shapes[...]")
+                write_shape(change, shape, replace=replace)
+
+    def update(self, records: Iterable[Record]) -> None:
+        """Change what is known of shapes, all in one step, and keep their descriptors.
+
+        Parameters
+        ----------
+        records : iterable of Record
+            As of `records`, with another label, source, digest, tags or attributes
+            (``dataclasses.replace``). The name says which shape is meant.
+
+        Raises
+        ------
+        InvalidParameterError
+            If a tag or an attribute cannot be stored.
+        StoreError
+            If there is no shape of a name, or another process is writing.
+
+        Examples
+        --------
+        >>> from dataclasses import replace
+        >>> import eigenshape as es
+        >>> index = es.ShapeIndex.create(None)
+        >>> index.add("felix", es.make_creature("fish", n_vertices=500), n_views=0)
+        >>> index.update([replace(record, label="fish") for record in index.records()])
+        >>> index.records()[0].label
+        'fish'
+        """
+        with store.writing(self.folder) as change:
+            for record in records:
+                require_type(record, Record, "records[...]")
+                update_shape(change, record)
+
+    def remove(self, *names: str) -> None:
+        """Remove shapes, all in one step.
+
+        Their numbers stay in the files until `compact`, so that processes that read the old state
+        still find them.
+
+        Parameters
+        ----------
+        *names : str
 
         Raises
         ------
         StoreError
-            If there is no shape of that name, or another process is writing.
+            If there is no shape of a name, or another process is writing.
         """
-        with store.writing(self.folder) as catalog:
-            shape = catalog.shape(name)
-            if shape is None:
-                raise StoreError(f"A shape must be in the index to be removed; {name!r} is not.")
-            catalog.without(shape)
+        with store.writing(self.folder) as change:
+            for name in names:
+                shape = change.find_shape(name)
+                if shape is None:
+                    raise StoreError(
+                        f"A shape must be in the index to be removed; {name!r} is not."
+                    )
+                change.delete_shape(shape)
 
-    def query(self, shape: MeshLike | Descriptor, *, n_matches: SupportsIndex = 5) -> list[Match]:
+    def query(
+        self,
+        shape: MeshLike | Descriptor,
+        *,
+        n_matches: SupportsIndex = 5,
+        where: Mapping[str, Any] | None = None,
+        exact: bool = False,
+    ) -> Matches:
         """Find the shapes that are most similar to a mesh, whole or partial, in any pose.
+
+        For many queries, open a `reader`.
 
         Parameters
         ----------
@@ -411,47 +467,44 @@ class ShapeIndex:
             the descriptors by its recipe.
         n_matches : int
             Shapes to return at most.
+        where : mapping, optional
+            Conditions, all of which a shape must meet: ``{"label": "cat"}``, ``{"tag": "scanned"}``
+            or, by the name of an attribute, ``{"height": 3}``. A list of values allows any of them,
+            and a tuple of two numbers, of which one may be None, is a range:
+            ``{"label": ["cat", "dog"], "height": (1.5, None)}``.
+        exact : bool
+            Whether to compare all shapes with the query, however many there are. By default, of
+            more than 2,000 shapes those are compared that a coarse scan finds nearest: some
+            hundreds. The first such query makes a file for the scan, which takes 0.2 ms a shape.
 
         Returns
         -------
-        list of Match
-            Lowest score first, each shape once; equal scores are sorted by name. The index keeps
-            numbers in single precision, and those of the query are rounded alike.
+        Matches
+            A sequence of `Match`, and how they were found. Lowest score first, each shape once;
+            equal scores are sorted by name. The index keeps rounded numbers, and those of the query
+            are rounded alike.
 
         Raises
         ------
         InvalidShapeError
             If a mesh is given, as `describe`.
         InvalidParameterError
-            If `n_matches` is not positive, or a number of the descriptor is not finite.
+            If `n_matches` is not positive, a number of the descriptor is not finite, or a condition
+            is none.
         StoreError
-            If no shape is described by the recipe, or a file is damaged.
+            If no shape is described by the recipe, or the index cannot be read.
+
+        Warns
+        -----
+        StoreWarning
+            If a part of the index is damaged. It is left out.
 
         See Also
         --------
         describe, matching_score, patch_scores
         """
-        wanted = whole_number(n_matches, "n_matches", 1, 2**31)
-        if isinstance(shape, Descriptor):
-            descriptor = shape
-        else:
-            mesh, recipe = as_mesh(shape, "shape"), self.default_recipe()
-            descriptor = kind_of(recipe).describe_query(mesh, recipe)
-        kind = kind_of(descriptor.recipe)
-        (rows,) = rows_of_each("the query", [descriptor])
-        query = kind.restore(rows, kind.details(descriptor), descriptor.recipe)
-        with store.reading(self.folder) as catalog, one_blas_thread():
-            stored = read_descriptors(self.folder, catalog, descriptor.recipe)
-            require_columns(descriptor, rows, stored.entries[0].row.n_columns)
-            scores = kind.verify(query, stored.descriptor, kind.scores(query, stored.rows))
-
-            # Of the views of each shape, keep the one with the lowest score. Entries are sorted by
-            # name, and so are equal scores.
-            order = np.argsort(scores, kind="stable")
-            names = [stored.entries[place].shape.name for place in order]
-            firsts = np.unique(names, return_index=True)[1]
-            best = order[np.sort(firsts)[:wanted]].tolist()
-            return [_match(query, stored, place, float(scores[place])) for place in best]
+        with self.reader() as reader:
+            return reader.query(shape, n_matches=n_matches, where=where, exact=exact)
 
     def descriptors(self, name: str, recipe: AnyRecipe) -> list[Descriptor]:
         """Return the descriptors of a shape by a recipe, as they are stored.
@@ -469,25 +522,175 @@ class ShapeIndex:
         Raises
         ------
         StoreError
-            If the shape has no descriptor by that recipe, or a file is damaged.
+            If the shape has no descriptor by that recipe, or it is damaged.
         """
         require_type(recipe, AnyRecipe, "recipe")
-        with store.reading(self.folder) as catalog:
-            stored = read_descriptors(self.folder, catalog, recipe)
-            found = [
-                stored.descriptor(place)
-                for place, entry in enumerate(stored.entries)
-                if entry.shape.name == name
-            ]
-        if not found:
+        state = self._read()
+        snapshot = state.snapshot(recipe)
+        shape = state.names.get(name, -1)
+        places = (snapshot.shape_of == shape).nonzero()[0].tolist()
+        if not places:
             raise StoreError(
                 f"A shape must be described by the requested recipe; {name!r} is not described by "
                 f"{recipe}."
             )
-        return found
+        return [snapshot.descriptor(place) for place in places]
+
+    def thumbnail(self, name: str) -> bytes | None:
+        """Return the small picture of a shape.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        bytes or None
+            As it was given, PNG or WebP; None if the shape was added without one.
+
+        Raises
+        ------
+        StoreError
+            If there is no shape of that name, or the picture is damaged.
+        """
+        state = self._read()
+        if name not in state.names:
+            raise StoreError(f"A shape must be in the index to have a picture; {name!r} is not.")
+        return state.thumbnail(state.names[name])
+
+    def verify(self) -> IndexReport:
+        """Compare everything in the index with its checksums.
+
+        Returns
+        -------
+        IndexReport
+            With all damage by name of shape, file and bytes.
+
+        Raises
+        ------
+        StoreError
+            If the database cannot be read at all.
+
+        Examples
+        --------
+        >>> import eigenshape as es
+        >>> es.ShapeIndex.create(None).verify()
+        IndexReport(n_shapes=0, n_bytes=0, damages=())
+        """
+        return verify_index(self.folder)
+
+    def compact(self) -> int:
+        """Give the space of removed shapes back.
+
+        Files are written anew beside the old ones, so the disk needs space for both. Readers keep
+        the old files until they are refreshed or closed.
+
+        Returns
+        -------
+        int
+            Bytes that were given back, without those of the database.
+
+        Raises
+        ------
+        StoreError
+            If anything is damaged, another process is writing, or the disk is full.
+        """
+        return compact_index(self.folder)
+
+    def merge(
+        self, others: Sequence["ShapeIndex"], *, copy: bool = True, replace: bool = False
+    ) -> int:
+        """Add all shapes of other indexes, in one step.
+
+        What is damaged in the others is left out with a `StoreWarning`, so merging a damaged index
+        into a new one keeps what is whole.
+
+        Parameters
+        ----------
+        others : sequence of ShapeIndex
+        copy : bool
+            If False, the numbers stay where they are, and this index refers to the folders of the
+            others, relative to its own. Do not compact or move those.
+        replace : bool
+            Whether a shape replaces one of the same name with another digest.
+
+        Returns
+        -------
+        int
+            Shapes that were added. One with the name and the digest of a shape of this index is
+            not, but gives it the recipes that it lacks.
+
+        Raises
+        ------
+        StoreError
+            If a name stands for two shapes and `replace` is False, another process is writing, or
+            the disk is full.
+
+        Examples
+        --------
+        >>> import eigenshape as es
+        >>> part, whole = es.ShapeIndex.create(None), es.ShapeIndex.create(None)
+        >>> part.add("fish", es.make_creature("fish", n_vertices=500), n_views=0)
+        >>> whole.merge([part]), [record.name for record in whole.records()]
+        (1, ['fish'])
+        """
+        require_each(others, ShapeIndex, "others")
+        return merge_indexes(
+            self.folder, [other.folder for other in others], copy=copy, replace=replace
+        )
+
+    def export(self, folder: str | Path, names: Sequence[str] | None = None) -> None:
+        """Write records and descriptors as files for other programs.
+
+        ``records.json`` lists the shapes, each with a number. ``descriptors.npz`` holds the arrays
+        of each descriptor under ``number/recipe/view/``.
+
+        Parameters
+        ----------
+        folder : str or Path
+            An empty folder, or one that does not exist.
+        names : sequence of str, optional
+            Shapes to export; by default all.
+
+        Raises
+        ------
+        StoreError
+            If the folder holds anything, there is no shape of a name, or one is damaged.
+
+        Examples
+        --------
+        >>> from tempfile import TemporaryDirectory
+        >>> import numpy as np
+        >>> import eigenshape as es
+        >>> index = es.ShapeIndex.create(None)
+        >>> fish = es.make_creature("fish", n_vertices=500)
+        >>> index.add("fish", fish, recipe=es.retrieval.SCALE_FREE, n_views=0)
+        >>> with TemporaryDirectory() as folder:
+        ...     index.export(folder)
+        ...     np.load(f"{folder}/descriptors.npz")["0/scale-free/0/vectors"].shape
+        (15, 15)
+        """
+        if names is not None:
+            require_each(names, str, "names")
+        state = self._read()
+        for name in names or ():
+            if name not in state.names:
+                raise StoreError(f"A shape must be in the index to be exported; {name!r} is not.")
+        chosen = None if names is None else set(names)
+        records = [record for record in _records(state) if chosen is None or record.name in chosen]
+        export_index(state, records, Path(folder))
 
 
-def _match(query: Descriptor, stored: StoredDescriptors, place: int, score: float) -> Match:
-    (shape, row), found = stored.entries[place], stored.descriptor(place)
-    pairs = kind_of(stored.recipe).correspondences(query, found)
-    return Match(shape.name, shape.label, shape.source, score, pairs, found.vertices, row.view)
+def _records(state: IndexState) -> list[Record]:
+    """Return what is known of each shape, sorted by name."""
+    used: list[set[int]] = [set() for _ in state.shapes.ids]
+    recipes = state.descriptors["recipe"].tolist()
+    for place, recipe in zip(state.shape_of.tolist(), recipes, strict=True):
+        used[place].add(recipe)
+    records = []
+    for place, numbers in enumerate(used):
+        row = state.shapes.row(place)
+        by = tuple(state.recipes[number] for number in sorted(numbers))
+        tags, attributes = tuple(json.loads(row.tags)), json.loads(row.attributes)
+        records.append(Record(row.name, row.label, row.source, row.digest, tags, attributes, by))
+    return sorted(records, key=lambda record: record.name)

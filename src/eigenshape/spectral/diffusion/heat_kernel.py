@@ -105,6 +105,14 @@ class HeatTrace:
     --------
     es.spectral.heat_trace : Compute the trace.
     es.spectral.recover_geometry : What the trace says about a surface.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(es.icosphere(2)), 40)
+    >>> trace = es.spectral.heat_trace(spectrum, [0.5, 2.0])
+    >>> trace.values.shape, bool((trace.remainders < 1e-4).all())
+    ((2,), True)
     """
 
     times: Float[np.ndarray, " q"]

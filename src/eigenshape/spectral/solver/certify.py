@@ -13,7 +13,7 @@ from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.inertia import count_beside
-from eigenshape.spectral.solver.kernel_values import reported_certificate, to_pencil
+from eigenshape.spectral.solver.kernel_values import to_pencil, user_certificate
 from eigenshape.spectral.solver.pairs import Pairs, error_bound
 from eigenshape.spectral.solver.pencil import Pencil, column_chunks, normalize, residual_norms
 
@@ -89,7 +89,7 @@ def certify(
         )
         certificate = prove(pencil, Pairs(values, vectors, residual_norms(pencil, values, vectors)))
     last = float(np.ldexp(values[-1], pencil.value_exponent))
-    certificate = reported_certificate(laplacian.kernel, in_user_units(pencil, certificate), last)
+    certificate = user_certificate(laplacian.kernel, in_user_units(pencil, certificate), last)
     if not certificate.complete:
         raise ConvergenceError(certificate.explain())
     return certificate

@@ -86,7 +86,7 @@ def from_pencil(
     )
 
 
-def reported_residuals(
+def user_residuals(
     kernel: GaussianKernel | None,
     values: Float[np.ndarray, " k"],
     residuals: Float[np.ndarray, " k"],
@@ -99,7 +99,7 @@ def reported_residuals(
     return above - from_pencil(kernel, values)
 
 
-def reported_certificate(
+def user_certificate(
     kernel: GaussianKernel | None, certificate: Certificate, last: float
 ) -> Certificate:
     """Return a certificate whose shift, gap and resolution are in the values that are reported.

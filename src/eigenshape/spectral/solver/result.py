@@ -10,9 +10,9 @@ from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.solver.certify import in_user_units
 from eigenshape.spectral.solver.kernel_values import (
     from_pencil,
-    reported_certificate,
-    reported_residuals,
     require_readable,
+    user_certificate,
+    user_residuals,
 )
 from eigenshape.spectral.solver.pairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil, to_user_vectors
@@ -39,8 +39,8 @@ def spectrum_of(
         eigenvalues=freeze(from_pencil(laplacian.kernel, values)),
         eigenvectors=to_user_vectors(pencil, pairs.vectors),
         mass=laplacian.mass,
-        residuals=freeze(reported_residuals(laplacian.kernel, values, residuals)),
-        certificate=reported_certificate(
+        residuals=freeze(user_residuals(laplacian.kernel, values, residuals)),
+        certificate=user_certificate(
             laplacian.kernel, in_user_units(pencil, certificate), float(values[-1])
         ),
     )

@@ -381,7 +381,8 @@ def _for_torch(part: Any) -> Any:
     if not sp.issparse(part):
         return torch.from_numpy(part)
     indices, values = _for_numpy(part)
+    # torch 2.13 warns if nothing is said about the checks; they cost less than the conversion.
     tensor = torch.sparse_coo_tensor(
-        torch.from_numpy(indices), torch.from_numpy(values), part.shape
+        torch.from_numpy(indices), torch.from_numpy(values), part.shape, check_invariants=True
     )
     return tensor.coalesce()

@@ -39,6 +39,14 @@ class NodalDomains:
     See Also
     --------
     nodal_domains
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(2)
+    >>> domains = es.spectral.nodal_domains(ball, ball.vertices[:, 2])
+    >>> domains.n_domains, sorted(domains.signs.tolist())
+    (2, [-1, 1])
     """
 
     labels: Int[np.ndarray, " n"]

@@ -1,0 +1,1 @@
+"""The verbs of `eigenshape index`, a module each."""

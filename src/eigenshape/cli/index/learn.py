@@ -1,0 +1,48 @@
+"""eigenshape index learn: learn one codebook for indexes that are built in parts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import eigenshape as es
+from eigenshape.cli import steps
+from eigenshape.cli.console import err, print_written
+from eigenshape.cli.index.add import (
+    MemoryOption,
+    SchedulerOption,
+    SourcesArgument,
+    TimeoutOption,
+    WorkersOption,
+)
+from eigenshape.cli.inputs import IndexRepairOption, repair_names
+
+
+def learn(
+    sources: SourcesArgument,
+    *,
+    output: Annotated[Path, typer.Option("-o", "--output", help="File for the codebook (.npz).")],
+    repair: IndexRepairOption = "auto",
+    workers: WorkersOption = 2,
+    timeout: TimeoutOption = 300.0,
+    memory: MemoryOption = None,
+    scheduler: SchedulerOption = None,
+) -> None:
+    """Learn a codebook from meshes, for indexes that are built in parts.
+
+    At most 100 meshes are read. Only indexes with the same codebook can be merged, so learn it once and pass it to
+    every `eigenshape index add --part` with --codebook.
+    """
+    repairs = repair_names(repair)
+    steps.require_output(output, (".npz",), "A codebook")
+    items = es.io.find_items(sources)
+    with steps.worker_processes(workers, timeout, memory, scheduler) as processes:
+        codebook = steps.learn_codebook(items, processes, repairs)
+    if codebook == es.retrieval.default_codebook():
+        err.print(
+            "there are too few shapes to learn from; this is the codebook that comes with eigenshape"
+        )
+    output.write_bytes(es.retrieval.write_codebook(codebook))
+    print_written(output)

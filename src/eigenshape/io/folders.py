@@ -1,0 +1,257 @@
+"""Find the meshes of folders, with what is known of them, and index them."""
+
+import csv
+import warnings
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from hashlib import sha256
+from math import isfinite
+from pathlib import Path
+from typing import Any, SupportsIndex
+
+from eigenshape._arrays import whole_number
+from eigenshape._errors import FileFormatError, InvalidParameterError
+from eigenshape._workers import Item, Workers
+from eigenshape.io.mesh_files import read_mesh
+from eigenshape.io.parsing import MESH_FORMATS
+from eigenshape.retrieval.store.batch import Callback, build_index
+from eigenshape.retrieval.store.damage import StoreWarning
+from eigenshape.retrieval.store.index import ShapeIndex
+
+NAME, LABEL, TAGS = "name", "label", "tags"  # columns of a table of labels; others are attributes
+
+
+def find_items(
+    sources: str | Path | Sequence[str | Path],
+    *,
+    labels: str | Path | None = None,
+    part: tuple[SupportsIndex, SupportsIndex] | None = None,
+) -> list[Item]:
+    """Find the mesh files of folders and of the folders in them.
+
+    A shape is named by its path below the given folder, without the suffix of the file unless two
+    files differ in nothing else. Its class is the name of the folder that holds it; a file that
+    lies directly in the given folder, or is given itself, has none.
+
+    Parameters
+    ----------
+    sources : path, or sequence of paths
+        Folders, and mesh files.
+    labels : path, optional
+        Table of comma-separated values with a header. The column ``name`` holds names of shapes or
+        paths of files below the folder. ``label`` is the class, ``tags`` are separated by
+        semicolons, and every other column is an attribute: a number where it reads as one. Empty
+        cells are left out.
+    part : pair of int, optional
+        ``(i, n)``: only part i of n, counted from 1, so that n jobs share the work. The name of a
+        shape decides its part, so jobs agree without talking to each other.
+
+    Returns
+    -------
+    list of Item
+        Sorted by path within each folder.
+
+    Raises
+    ------
+    InvalidParameterError
+        If two shapes have the same name, there is no mesh, or there is no such part.
+    FileFormatError
+        If the table has no column ``name``, or names a shape that is not there.
+    OSError
+        If the table cannot be read.
+
+    See Also
+    --------
+    index_folder, eigenshape.retrieval.build_index
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import eigenshape as es
+    >>> folder = pathlib.Path(tempfile.mkdtemp())
+    >>> (folder / "cats").mkdir()
+    >>> es.write_mesh(es.icosphere(1), folder / "cats" / "felix.ply")
+    >>> item, = es.io.find_items(folder)
+    >>> item.name, item.label
+    ('cats/felix', 'cats')
+    """
+    folders = [sources] if isinstance(sources, str | Path) else list(sources)
+    items = [item for source in folders for item in _items_of(Path(source))]
+    if not items:
+        raise InvalidParameterError(
+            f"There must be meshes ({', '.join(MESH_FORMATS)}) to index; "
+            f"{', '.join(map(str, folders)) or 'an empty list'} holds none."
+        )
+    items = _different_items(items)
+    if labels is not None:
+        items = _labeled(items, Path(labels))
+    return items if part is None else _part_of(items, *part)
+
+
+def index_folder(  # noqa: PLR0913 - one keyword for each choice of a batch
+    folder: str | Path,
+    index: ShapeIndex | None = None,
+    *,
+    labels: str | Path | None = None,
+    repairs: Sequence[str] = ("auto",),
+    n_views: SupportsIndex | None = None,
+    workers: Workers = Workers(),
+    callback: Callback | None = None,
+) -> ShapeIndex:
+    """Describe all meshes of a folder, and return an index of them.
+
+    Parameters
+    ----------
+    folder : path
+    index : ShapeIndex, optional
+        To which shapes are added. By default a new one in memory.
+    labels : path, optional
+        Table of names, labels, tags and attributes, as of `find_items`.
+    repairs : sequence of str
+        Of `eigenshape.repair`, applied to each mesh before it is described.
+    n_views, workers, callback : optional
+        As of `build_index`.
+
+    Returns
+    -------
+    ShapeIndex
+        That was given, or the new one.
+
+    Warns
+    -----
+    StoreWarning
+        If files could not be described: it names them, with the reasons.
+
+    Raises
+    ------
+    InvalidParameterError, FileFormatError, StoreError, EigenshapeError
+        As `find_items` and `build_index`.
+
+    See Also
+    --------
+    find_items, eigenshape.retrieval.build_index, eigenshape.ShapeIndex.query
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import eigenshape as es
+    >>> folder = pathlib.Path(tempfile.mkdtemp())
+    >>> for kind in ("fish", "bird"):
+    ...     es.write_mesh(es.make_creature(kind, n_vertices=500), folder / f"{kind}.ply")
+    >>> if __name__ == "__main__":  # a script needs this, since workers import it
+    ...     index = es.io.index_folder(folder, n_views=0)
+    ...     print(index.query(es.make_creature("fish", 1, n_vertices=500))[0].name)
+    fish
+    """
+    index = ShapeIndex.create(None) if index is None else index
+    report = build_index(
+        index,
+        find_items(folder, labels=labels),
+        read_mesh,
+        learn=True,
+        repairs=repairs,
+        n_views=n_views,
+        workers=workers,
+        callback=callback,
+    )
+    if report.failed:
+        reasons = "; ".join(f"{name}: {reason}" for name, reason in report.failed)
+        warnings.warn(
+            f"{len(report.failed)} files could not be indexed. {reasons}",
+            StoreWarning,
+            stacklevel=2,
+        )
+    return index
+
+
+def _items_of(source: Path) -> Iterator[Item]:
+    if not source.is_dir():
+        yield Item(source.stem, source)
+        return
+    paths = [path for path in sorted(source.rglob("*")) if path.suffix.lower() in MESH_FORMATS]
+    stems = Counter(path.with_suffix("") for path in paths)
+    for path in paths:
+        named = path if stems[path.with_suffix("")] > 1 else path.with_suffix("")
+        below = named.relative_to(source)
+        yield Item(below.as_posix(), path, below.parent.name or None)
+
+
+def _different_items(items: Sequence[Item]) -> list[Item]:
+    """Drop files that are given twice; raise an error if two files would have one name."""
+    by_name: dict[str, Item] = {}
+    for item in items:
+        other = by_name.setdefault(item.name, item)
+        if other.path != item.path:
+            raise InvalidParameterError(
+                f"Names of shapes must differ; {item.name!r} is the name of both {other.path} and "
+                f"{item.path}. Give one folder that holds both."
+            )
+    return list(by_name.values())
+
+
+def _part_of(items: Sequence[Item], part: SupportsIndex, n_parts: SupportsIndex) -> list[Item]:
+    count = whole_number(n_parts, "The number of parts", 1)
+    number = whole_number(part, "The number of a part", 1, count)
+    return [
+        item
+        for item in items
+        if int.from_bytes(sha256(item.name.encode()).digest()) % count == number - 1
+    ]
+
+
+def _labeled(items: Sequence[Item], table: Path) -> list[Item]:
+    rows = _read_table(table)
+    by_name = {item.name: item for item in items}
+    # a name with the suffix of its file is as good
+    by_name |= {item.name + item.path.suffix: item for item in items}
+    labeled = {}
+    for line, row in rows:
+        item = by_name.get(row[NAME])
+        if item is None:
+            raise FileFormatError(
+                f"{table} must name shapes that are there; line {line} names {row[NAME]!r}."
+            )
+        facts = {key: text for key, text in row.items() if key not in (NAME, LABEL, TAGS)}
+        labeled[item.name] = replace(
+            item,
+            label=row.get(LABEL, item.label),
+            tags=tuple(tag.strip() for tag in row.get(TAGS, "").split(";") if tag.strip()),
+            attributes={key: _number_or_text(text) for key, text in facts.items()},
+        )
+    return [labeled.get(item.name, item) for item in items]
+
+
+def _read_table(table: Path) -> list[tuple[int, dict[str, str]]]:
+    """Return the lines of a table by their numbers, each as its cells that are not empty."""
+    try:
+        with table.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.DictReader(file)
+            columns = reader.fieldnames or []
+            rows: list[tuple[int, dict[Any, Any]]] = [(reader.line_num, row) for row in reader]
+    except (UnicodeDecodeError, csv.Error) as err:
+        raise FileFormatError(
+            f"{table} must hold comma-separated values in UTF-8; it does not: {err}."
+        ) from err
+    if NAME not in columns:
+        raise FileFormatError(
+            f"{table} must have a column {NAME!r}; its columns are "
+            f"{', '.join(map(repr, columns)) or 'none'}."
+        )
+    for line, row in rows:
+        if not row[NAME]:
+            raise FileFormatError(f"{table} must name a shape in each line; line {line} does not.")
+        if None in row:
+            raise FileFormatError(
+                f"{table} must have {len(columns)} cells a line; line {line} has more. Put cells "
+                "that hold commas in double quotes."
+            )
+    return [(line, {key: text for key, text in row.items() if text}) for line, row in rows]
+
+
+def _number_or_text(text: str) -> float | str:
+    try:
+        number = float(text)
+    except ValueError:
+        return text
+    return number if isfinite(number) else text

@@ -1,0 +1,1 @@
+"""Search in stages: a coarse scan of short rows, exact scores of the best, verification."""

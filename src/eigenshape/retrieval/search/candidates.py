@@ -1,0 +1,101 @@
+"""Which shapes of an index are worth an exact comparison with a query."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import ceil
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool, Float32, Int, Int8
+
+from eigenshape.retrieval.patches.descriptor import PatchDescriptor
+from eigenshape.retrieval.search.coarse import CoarseRows
+
+# Below this number of shapes all are compared: it takes 30 ms, and a file of coarse rows would
+# hardly be faster.
+FEWEST_TO_SCAN = 2000
+# Shapes that are compared exactly after a scan, for 10,000 shapes; more in proportion to the square
+# root of their number. Measured by benchmarks/bench_search.py on mixtures of real descriptors.
+N_COMPARED = 500
+AT_SHAPES = 10_000
+MOST_COMPARED = 1600  # 26 ms, and 64 MB that may have to be read from a disk
+PER_MATCH = 20  # at least this many shapes are compared for each match that is requested
+
+Method = Literal["exact", "staged", "candidates"]
+# Return the places of shapes that may be near to a query, best first: an index of another library
+Supplier = Callable[[Int8[np.ndarray, "b s v"], int], Int[np.ndarray, " k"]]
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Shapes to compare exactly with a query, and how they were chosen.
+
+    Attributes
+    ----------
+    places : (k,) int
+        Ascending.
+    method : str
+        "exact" if these are all shapes that were asked for, "staged" after a coarse scan, and
+        "candidates" if another engine supplied them.
+    n_shapes : int
+        Number of shapes from which they were chosen.
+    """
+
+    places: Int[np.ndarray, " k"]
+    method: Method
+    n_shapes: int
+
+
+def choose_candidates(
+    query: PatchDescriptor,
+    coarse: Callable[[], CoarseRows],
+    allowed: Bool[np.ndarray, " n"],
+    *,
+    n_matches: int,
+    exact: bool = False,
+    supplier: Supplier | None = None,
+) -> Candidates:
+    """Choose the shapes that are compared exactly with a query.
+
+    Parameters
+    ----------
+    query : PatchDescriptor
+    coarse : callable
+        Return the coarse rows of all n shapes; called only if they are scanned.
+    allowed : (n,) bool
+        Which shapes may be found.
+    n_matches : int
+        Shapes that are wanted.
+    exact : bool
+        Whether to compare all of them.
+    supplier : callable, optional
+        Return the places of so many shapes that may be near, in place of the coarse scan.
+
+    Returns
+    -------
+    Candidates
+    """
+    places = np.flatnonzero(allowed)
+    wanted = n_compared(len(allowed), n_matches)
+    if exact or len(places) <= max(FEWEST_TO_SCAN, wanted):
+        return Candidates(places, "exact", len(places))
+    if supplier is not None:
+        supplied = np.unique(supplier(query.codes[0], wanted))
+        return Candidates(supplied[allowed[supplied]], "candidates", len(places))
+    scores = coarse().scores(query.codes[0])
+    if len(places) < len(allowed):
+        scores = scores[places]
+    return Candidates(np.sort(places[smallest(scores, wanted)]), "staged", len(places))
+
+
+def n_compared(n_shapes: int, n_matches: int) -> int:
+    """Return how many of some shapes are compared exactly after a scan."""
+    growing = ceil(N_COMPARED * (n_shapes / AT_SHAPES) ** 0.5)
+    return max(min(max(growing, N_COMPARED), MOST_COMPARED), PER_MATCH * n_matches)
+
+
+def smallest(scores: Float32[np.ndarray, " n"], count: int) -> Int[np.ndarray, " k"]:
+    """Return the places of the smallest scores, in no order."""
+    if count >= len(scores):
+        return np.arange(len(scores))
+    return np.argpartition(scores, count)[:count]

@@ -1,0 +1,208 @@
+"""Short rows of all shapes of an index, kept in a file that can be made again at any time."""
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO, Protocol, runtime_checkable
+from zlib import crc32
+
+import numpy as np
+from jaxtyping import Float32, Int, Int8, Int64
+from numpy.lib.format import read_array, read_array_header_1_0, read_magic
+
+from eigenshape._arrays import freeze
+from eigenshape._text import html_repr, short_repr
+from eigenshape.retrieval.patches.descriptor import PatchRecipe
+from eigenshape.retrieval.patches.distance import SIZE_PRICE
+from eigenshape.retrieval.patches.packing import unpack_codes
+from eigenshape.retrieval.search.axes import PatchAxes, fit_axes
+from eigenshape.retrieval.search.scan_loops import scan
+
+# Shapes to which axes are fitted: three sizes of each give 6,000 vectors of 1,280 numbers, and the
+# fit takes 2 s. Twice as many changed no list of candidates.
+N_TO_FIT = 2000
+SHAPES_AT_ONCE = 1000  # whose codes are unpacked at a time: 46 MB as floats
+# Axes are fitted again once an index has this many times as many shapes as they were fitted to.
+GROWTH = 4
+FORMAT = "eigenshape coarse rows 1"
+
+
+@runtime_checkable
+class Rows(Protocol):
+    """Packed rows of all shapes of one recipe, at one moment."""
+
+    @property
+    def n_shapes(self) -> int:
+        """Return the number of places."""
+
+    @property
+    def row_checksums(self) -> Int[np.ndarray, " n"]:
+        """Return a checksum of the rows of each place, which tells whether they have changed."""
+
+    def rows(self, place: int) -> np.ndarray:
+        """Return the packed rows of a place: those of the whole shape first."""
+
+    def beside(self, name: str) -> Path:
+        """Return the path of a file that can be made again from the rows."""
+
+
+@dataclass(frozen=True, eq=False)
+class CoarseRows:
+    """Short rows of the whole shapes, for a scan of all of them.
+
+    Attributes
+    ----------
+    axes : PatchAxes
+    checksums : (n,) int64
+        Of the packed rows that each row is made from.
+    numbers : (n, s, q) int8
+        Mapped into memory, if they come from a file.
+    n_fitted : int
+        How many shapes there were when the axes were fitted.
+    """
+
+    axes: PatchAxes
+    checksums: Int64[np.ndarray, " n"]
+    numbers: Int8[np.ndarray, "n s q"]
+    n_fitted: int
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
+    def scores(self, codes: Int8[np.ndarray, "b s v"]) -> Float32[np.ndarray, " n"]:
+        """Return distances of a query to all whole shapes, as far as the axes show them."""
+        query, unit = self.axes.coarse_query(codes)
+        found = np.empty(len(self.numbers), dtype=np.float32)
+        scan(query, self.numbers, unit, SIZE_PRICE, found)
+        return found
+
+
+def coarse_rows(source: Rows, recipe: PatchRecipe) -> CoarseRows:
+    """Return the short rows of an index: as they were kept, with what is missing made now.
+
+    They are kept in a file beside the index. What was kept serves shapes whose checksums are the
+    same, so adding shapes makes their rows alone. A file that is damaged, or cannot be written,
+    costs time and changes no answer.
+    """
+    path = source.beside(f"coarse-{recipe.codebook.digest[:16]}-{recipe.clip!r}.bin")
+    wanted = np.asarray(source.row_checksums, dtype=np.int64)
+    kept = _read(path)
+    if kept is not None and np.array_equal(kept.checksums, wanted):
+        return kept
+    if kept is not None and len(wanted) <= GROWTH * kept.n_fitted:
+        made = _completed(source, recipe, kept, wanted)
+    else:
+        axes = fit_axes(_codes(source, recipe, _spread(len(wanted), N_TO_FIT)))
+        known = CoarseRows(axes, np.empty(0, np.int64), _no_rows(recipe, axes), len(wanted))
+        made = _completed(source, recipe, known, wanted)
+    # A folder that cannot be written to, as on a read-only disk, is searched all the same.
+    with suppress(OSError):
+        _write(path, made)
+        return _read(path) or made
+    return made
+
+
+def _completed(
+    source: Rows, recipe: PatchRecipe, kept: CoarseRows, wanted: Int64[np.ndarray, " n"]
+) -> CoarseRows:
+    """Return rows with the wanted checksums: those that are kept, and the others made now."""
+    numbers = np.empty((len(wanted), *kept.numbers.shape[1:]), dtype=np.int8)
+    order = np.argsort(kept.checksums, kind="stable")
+    places = np.searchsorted(kept.checksums[order], wanted)
+    nearest = order[np.minimum(places, len(order) - 1)] if len(order) else np.zeros_like(places)
+    known = np.zeros(len(wanted), dtype=bool)
+    if len(order):
+        known = kept.checksums[nearest] == wanted
+    numbers[known] = kept.numbers[nearest[known]]
+    missing = np.flatnonzero(~known)
+    for first in range(0, len(missing), SHAPES_AT_ONCE):
+        some = missing[first : first + SHAPES_AT_ONCE]
+        numbers[some] = kept.axes.coarse_rows(_codes(source, recipe, some))
+    numbers.flags.writeable = False  # and no copy: at a million shapes it takes 1.2 GB
+    return CoarseRows(kept.axes, freeze(wanted), numbers, kept.n_fitted)
+
+
+def _codes(
+    source: Rows, recipe: PatchRecipe, places: Int[np.ndarray, " k"]
+) -> Int8[np.ndarray, "k b s v"]:
+    """Return the codes of whole shapes."""
+    shape = recipe.codebook.code_shape
+    count = shape[0] * shape[1]
+    packed = [np.asarray(source.rows(place)[:count]) for place in places.tolist()]
+    return unpack_codes(np.concatenate(packed)).reshape(len(places), *shape)
+
+
+def _spread(n_shapes: int, count: int) -> Int[np.ndarray, " k"]:
+    """Return at most `count` places, evenly spread."""
+    return np.unique(np.linspace(0, n_shapes - 1, min(count, n_shapes)).astype(np.int64))
+
+
+def _no_rows(recipe: PatchRecipe, axes: PatchAxes) -> Int8[np.ndarray, "0 s q"]:
+    n_bases, n_sizes, _ = recipe.codebook.code_shape
+    return np.empty((0, n_sizes, n_bases * axes.axes.shape[2]), dtype=np.int8)
+
+
+def _write(path: Path, rows: CoarseRows) -> None:
+    """Write a file whole or not at all."""
+    beside = path.with_name(f"{path.name}.{secrets.token_hex(4)}")
+    parts = _parts(rows)
+    try:
+        with beside.open("wb") as file:
+            np.save(file, np.array([FORMAT]))
+            np.save(file, np.array([_checksum(parts), rows.n_fitted], dtype=np.int64))
+            for part in parts:
+                np.save(file, part)
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def _read(path: Path) -> CoarseRows | None:
+    """Return what a file holds, or None if it is missing, damaged, or of another format."""
+    # Whatever is wrong with the file, it can be made again.
+    with suppress(OSError, ValueError, EOFError), path.open("rb") as file:
+        if read_array(file).tolist() != [FORMAT]:
+            return None
+        checksum, n_fitted = read_array(file).tolist()
+        axes, steps, checksums = (freeze(read_array(file)) for _ in range(3))
+        numbers = _mapped(file)
+        if numbers is None:
+            return None
+        rows = CoarseRows(PatchAxes(axes, steps), checksums, numbers, n_fitted)
+        if _checksum(_parts(rows)) == checksum:
+            return rows
+    return None
+
+
+def _parts(rows: CoarseRows) -> tuple[np.ndarray, ...]:
+    return rows.axes.axes, rows.axes.steps, rows.checksums, rows.numbers
+
+
+def _checksum(parts: tuple[np.ndarray, ...]) -> int:
+    found = 0
+    for part in parts:
+        for piece in _pieces(part):
+            found = crc32(piece, found)
+    return found
+
+
+def _pieces(array: np.ndarray) -> Iterator[memoryview]:
+    """Return an array in pieces, so that a mapped file need not be in memory as a whole."""
+    for first in range(0, len(array), SHAPES_AT_ONCE):
+        yield np.ascontiguousarray(array[first : first + SHAPES_AT_ONCE]).data
+
+
+def _mapped(file: BinaryIO) -> np.ndarray | None:
+    """Map the array that comes next in a file into memory; return None if it is not whole."""
+    read_magic(file)
+    shape, fortran, dtype = read_array_header_1_0(file)
+    size = int(np.prod(shape)) * dtype.itemsize
+    if fortran or dtype != np.int8 or os.fstat(file.fileno()).st_size != file.tell() + size:
+        return None
+    if not size:
+        return np.empty(shape, dtype=np.int8)
+    mapped: np.ndarray[Any, Any] = np.memmap(file, dtype, "r", file.tell(), shape)
+    return np.asarray(mapped)

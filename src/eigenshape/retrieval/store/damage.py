@@ -1,0 +1,82 @@
+"""What is damaged in an index, by name."""
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from eigenshape._text import html_repr, printable, short_repr
+
+MOST_NAMED = 3  # damages that a warning names; `ShapeIndex.verify` lists all
+
+
+class StoreWarning(UserWarning):
+    """A part of an index on disk is damaged; the rest is served.
+
+    See Also
+    --------
+    ShapeIndex.verify : List all damage.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> issubclass(es.retrieval.StoreWarning, UserWarning)
+    True
+    """
+
+
+@dataclass(frozen=True)
+class Damage:
+    """A place of an index that does not hold what was written.
+
+    Attributes
+    ----------
+    file : str
+        Name of the file, in the folder of the index.
+    what : str
+        What differs.
+    shape : str or None
+        Name of the shape that is concerned, if it is known.
+    start, end : int or None
+        The bytes of the file that differ lie between these places, if they are known.
+
+    See Also
+    --------
+    ShapeIndex.verify
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> print(es.retrieval.Damage("rows-1.bin", "its rows differ", "cat", 0, 24))
+    rows-1.bin, bytes 0 to 24, shape 'cat': its rows differ
+    """
+
+    file: str
+    what: str
+    shape: str | None = None
+    start: int | None = None
+    end: int | None = None
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
+    def __str__(self) -> str:
+        where = [printable(self.file)]
+        if self.start is not None:
+            where.append(f"bytes {self.start} to {self.end}")
+        if self.shape is not None:
+            where.append(f"shape {self.shape!r}")
+        return f"{', '.join(where)}: {self.what}"
+
+
+def warn_of_damage(place: str, damages: Sequence[Damage]) -> None:
+    """Warn of what is damaged, and say that the rest is served."""
+    if not damages:
+        return
+    named = "; ".join(map(str, damages[:MOST_NAMED]))
+    more = f"; and {len(damages) - MOST_NAMED} more" if len(damages) > MOST_NAMED else ""
+    warnings.warn(
+        f"{place} must hold what was written; {named}{more}. The rest is served. "
+        "ShapeIndex.verify lists all damage; remove the named shapes and index them again.",
+        StoreWarning,
+        stacklevel=4,
+    )

@@ -1,0 +1,156 @@
+"""What an index says of its shapes: a record of each, and the matches of a query."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, overload
+
+import numpy as np
+from jaxtyping import Int
+
+from eigenshape._text import html_repr, short_repr
+from eigenshape.retrieval.kinds import AnyRecipe
+from eigenshape.retrieval.search.candidates import Method
+
+
+@dataclass(frozen=True)
+class Record:
+    """What an index holds of a shape beside its descriptors.
+
+    Attributes
+    ----------
+    name : str
+        Unique in the index.
+    label : str or None
+        Class of the shape.
+    source : str or None
+        Where the shape came from: a path, for example.
+    digest : str or None
+        Hash of the content, by which `build_index` recognizes a file that it has described.
+    tags : tuple of str
+        Words by which shapes are chosen.
+    attributes : dict
+        Numbers and texts by name, by which shapes are chosen.
+    recipes : tuple of HeatRecipe or PatchRecipe
+        By which the shape is described.
+
+    See Also
+    --------
+    ShapeIndex.records
+    """
+
+    name: str
+    label: str | None
+    source: str | None
+    digest: str | None
+    tags: tuple[str, ...]
+    attributes: dict[str, Any]
+    recipes: tuple[AnyRecipe, ...]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """A shape that `ShapeIndex.query` found.
+
+    Attributes
+    ----------
+    name, label, source : str
+        As in its `Record`.
+    score : float
+        Of `matching_score` or `patch_scores`: 0, or nearly, for the same descriptor; smaller is
+        more alike.
+    correspondences : (p, 2) int
+        Features or patches that correspond: the number of one of the query, and of one of this
+        shape. Surest pairs first.
+    vertices : (m,) int
+        The vertex of each feature or patch of this shape.
+    view : int
+        Which of the descriptors of the shape matched, in the order in which they were added: 0 is
+        the first, that of the whole shape.
+    chance : float or None
+        Share of unrelated shapes that would score as well or better: below 0.001 the match is
+        hardly a coincidence. Measured for patches; None for heat.
+
+    See Also
+    --------
+    ShapeIndex.query, Matches
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import eigenshape as es
+    >>> recipe = es.retrieval.SCALE_FREE
+    >>> index = es.ShapeIndex.create(tempfile.mkdtemp())
+    >>> for name in ("fish", "biped"):
+    ...     mesh = es.make_creature(name, n_vertices=500)
+    ...     index.add_descriptors(name, [es.describe(mesh, recipe)], label="creature")
+    >>> scan = es.make_creature("fish", pose=1, n_vertices=500)
+    >>> match = index.query(es.describe(scan, recipe), n_matches=1)[0]
+    >>> match.name, match.label, len(match.vertices)
+    ('fish', 'creature', 15)
+    """
+
+    name: str
+    label: str | None
+    source: str | None
+    score: float
+    correspondences: Int[np.ndarray, "p 2"]
+    vertices: Int[np.ndarray, " m"]
+    view: int
+    chance: float | None = None
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
+
+@dataclass(frozen=True, eq=False)
+class Matches(Sequence[Match]):
+    """What `ShapeIndex.query` found: a sequence of matches, best first, and how they were found.
+
+    Attributes
+    ----------
+    found : tuple of Match
+    method : str
+        "exact" if all shapes were compared with the query, "staged" if the best after a coarse scan
+        of all were, "candidates" if an engine chose those that were.
+    n_compared, n_shapes : int
+        Shapes that were compared exactly, and shapes among which they were found.
+    nothing_alike : bool
+        Whether unrelated shapes alone would explain the scores, so that probably no shape of the
+        index is like the query. Always False for heat, for which it was not measured.
+
+    See Also
+    --------
+    ShapeIndex.query
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> index = es.ShapeIndex.create(None)
+    >>> for kind in ("fish", "bird"):
+    ...     index.add(kind, es.make_creature(kind, n_vertices=500), n_views=0)
+    >>> matches = index.query(es.make_creature("fish", n_vertices=500))
+    >>> len(matches), matches[0].name, matches.method, matches.nothing_alike
+    (2, 'fish', 'exact', False)
+    """
+
+    found: tuple[Match, ...]
+    method: Method
+    n_compared: int
+    n_shapes: int
+    nothing_alike: bool = False
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
+    def __len__(self) -> int:
+        return len(self.found)
+
+    @overload
+    def __getitem__(self, number: int) -> Match: ...
+    @overload
+    def __getitem__(self, number: slice) -> tuple[Match, ...]: ...
+    def __getitem__(self, number: int | slice) -> Match | tuple[Match, ...]:
+        return self.found[number]

@@ -1,0 +1,222 @@
+"""The verbs of `eigenshape index`, and queries of several kinds."""
+
+import csv
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from eigenshape.cli import app
+from eigenshape.io.mesh_files import write_mesh
+from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.shapes.creatures import make_creature
+
+TABLE = "name,label,tags,height\nfish/a,fish,wet;small,0.5\nbird/a,bird,,2\n"
+LIGHT = ("--method", "scale-free", "--views", 0, "--workers", 1)
+
+
+def run(*arguments, code=0):
+    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    assert done.exit_code == code, done.output
+    return done
+
+
+def run_json(*arguments, code=0):
+    return json.loads(run(*arguments, "--json", code=code).stdout)
+
+
+@pytest.fixture(scope="module")
+def meshes(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("meshes")
+    for kind in ("fish", "bird"):
+        (folder / kind).mkdir()
+        for pose, name in enumerate("ab"):
+            write_mesh(make_creature(kind, pose, n_vertices=500), folder / kind / f"{name}.ply")
+    (folder / "table.csv").write_text(TABLE)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def made(meshes, tmp_path_factory):
+    index = tmp_path_factory.mktemp("made") / "index"
+    run("index", "add", index, meshes, "--labels", meshes / "table.csv", *LIGHT)
+    return index
+
+
+@pytest.fixture
+def index(made, tmp_path):
+    """Return an index of four shapes that a test may change."""
+    ShapeIndex.create(tmp_path / "index").merge([ShapeIndex.open(made)])
+    return tmp_path / "index"
+
+
+pytestmark = pytest.mark.long
+
+
+def test_ls_lists_what_the_table_says(index):
+    shapes = {record["name"]: record for record in run_json("index", "ls", index)}
+    assert list(shapes) == ["bird/a", "bird/b", "fish/a", "fish/b"]
+    fish = shapes["fish/a"]
+    assert (fish["class"], fish["tags"]) == ("fish", ["small", "wet"])
+    assert fish["attributes"] == {"height": 0.5}
+    text = run("index", "ls", index).stdout
+    assert "4 shapes" in text
+    assert "small, wet" in text
+
+
+@pytest.mark.parametrize(
+    ("filters", "names"),
+    [
+        (["label=bird"], ["bird/a", "bird/b"]),
+        (["tag=wet"], ["fish/a"]),
+        (["height=1..3"], ["bird/a"]),
+        (["height=..1"], ["fish/a"]),
+        (["height=2"], ["bird/a"]),
+        (["label=bird,fish", "height=0..9"], ["bird/a", "fish/a"]),
+    ],
+)
+def test_filters_choose_shapes(index, filters, names):
+    options = [part for text in filters for part in ("--filter", text)]
+    assert [record["name"] for record in run_json("index", "ls", index, *options)] == names
+
+
+@pytest.mark.parametrize("text", ["label", "=cat", "height=", "height=1..2..3", "height=a..b"])
+def test_a_filter_that_is_none_is_refused(index, text):
+    done = run("index", "ls", index, "--filter", text, code=1)
+    assert repr(text) in done.stderr
+
+
+def test_rm_takes_names_or_a_filter(index):
+    assert run_json("index", "rm", index, "fish/a", "fish/b")["removed"] == ["fish/a", "fish/b"]
+    assert run_json("index", "rm", index, "--filter", "height=2")["removed"] == ["bird/a"]
+    assert [record["name"] for record in run_json("index", "ls", index)] == ["bird/b"]
+    assert "'fish/a' is not" in run("index", "rm", index, "fish/a", code=1).stderr
+    assert "give one of the two" in run("index", "rm", index, code=1).stderr
+
+
+def test_stats_count_shapes_classes_and_bytes(index):
+    facts = run_json("index", "stats", index)
+    assert facts["shapes"] == 4
+    assert facts["classes"] == {"bird": 2, "fish": 2}
+    assert facts["recipes"] == {"scale-free": 4}
+    assert facts["bytes"] == sum(path.stat().st_size for path in index.rglob("*"))
+    assert "4 shapes" in run("index", "stats", index).stdout
+
+
+def test_verify_names_a_damaged_shape_and_exits_with_1(index):
+    assert run_json("index", "verify", index)["damages"] == []
+    assert "no damage" in run("index", "verify", index).stdout
+    rows = next(index.glob("rows-1*.bin"))
+    data = bytearray(rows.read_bytes())
+    data[0] ^= 1
+    rows.write_bytes(data)
+    (damage,) = run_json("index", "verify", index, code=1)["damages"]
+    assert damage["file"] == rows.name
+    assert damage["shape"] in {"bird/a", "bird/b", "fish/a", "fish/b"}
+    assert "damaged: " in run("index", "verify", index, code=1).stdout
+
+
+def test_compact_gives_the_space_of_removed_shapes_back(index):
+    run("index", "rm", index, "fish/a", "fish/b", "bird/a")
+    before = run_json("index", "stats", index)["bytes"]
+    given = run_json("index", "compact", index)["bytes"]
+    assert given > 0
+    assert run_json("index", "stats", index)["bytes"] <= before - given
+    assert run_json("index", "verify", index)["damages"] == []
+
+
+def test_export_writes_records_and_arrays(index, tmp_path):
+    run("index", "export", index, "-o", tmp_path / "out", "--filter", "label=fish")
+    records = json.loads((tmp_path / "out" / "records.json").read_text())
+    assert {record["name"] for record in records} == {"fish/a", "fish/b"}
+    assert (tmp_path / "out" / "descriptors.npz").exists()
+
+
+def test_parts_are_merged_to_the_index_of_all(meshes, index, tmp_path):
+    for part in (1, 2):
+        run("index", "add", tmp_path / f"{part}", meshes, "--part", f"{part}/2", *LIGHT)
+    parts = tmp_path / "1", tmp_path / "2"
+    assert run_json("index", "merge", tmp_path / "whole", *parts)["added"] == 4
+    assert run_json("index", "merge", tmp_path / "ref", *parts, "--by-reference")["shapes"] == 4
+    scan = meshes / "fish" / "b.ply"
+    found = [
+        [(match["name"], match["score"]) for match in run_json("query", folder, scan)["matches"]]
+        for folder in (index, tmp_path / "whole", tmp_path / "ref")
+    ]
+    assert found[0] == found[1] == found[2]
+
+
+@pytest.mark.parametrize("text", ["3", "0/2", "3/2", "1/0", "a/b"])
+def test_a_part_that_is_none_is_refused(meshes, tmp_path, text):
+    done = run("index", "add", tmp_path / "index", meshes, "--part", text, code=1)
+    assert repr(text) in done.stderr
+
+
+def test_files_that_are_gone_are_pruned_when_asked(meshes, index, tmp_path):
+    folder = tmp_path / "copy"
+    (folder / "fish").mkdir(parents=True)
+    for name in "ab":
+        data = (meshes / "fish" / f"{name}.ply").read_bytes()
+        (folder / "fish" / f"{name}.ply").write_bytes(data)
+    moved = run_json("index", "add", index, folder, *LIGHT)
+    assert moved["skipped"] == ["fish/a", "fish/b"]
+    (folder / "fish" / "a.ply").unlink()
+    assert run_json("index", "add", index, folder, *LIGHT)["pruned"] == []
+    assert run_json("index", "add", index, folder, "--prune", *LIGHT)["pruned"] == ["fish/a"]
+    assert run_json("index", "stats", index)["shapes"] == 3
+
+
+def test_a_folder_and_a_shape_of_the_index_are_queries_too(meshes, index, tmp_path):
+    table = tmp_path / "matches.csv"
+    answers = run_json("query", index, meshes, "-n", 2, "-o", table)
+    assert [answer["matches"][0]["name"] for answer in answers] == [
+        "bird/a",
+        "bird/b",
+        "fish/a",
+        "fish/b",
+    ]
+    with table.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["rank"] for row in rows] == ["1", "2"] * 4
+    assert rows[0]["name"] == "bird/a"
+    alike = run_json("query", index, "fish/a", "-n", 1)["matches"]
+    assert [match["name"] for match in alike] == ["fish/b"]
+    assert "nobody is none of them" in run("query", index, "nobody", code=1).stderr
+    only = run_json("query", index, "fish/a", "--filter", "label=bird")["matches"]
+    assert {match["class"] for match in only} == {"bird"}
+
+
+def test_queries_that_cannot_be_read_are_named_and_the_others_answered(meshes, index, tmp_path):
+    (tmp_path / "scans").mkdir()
+    (tmp_path / "scans" / "bad.ply").write_text("no mesh")
+    good = (meshes / "fish" / "a.ply").read_bytes()
+    (tmp_path / "scans" / "good.ply").write_bytes(good)
+    done = run("query", index, tmp_path / "scans", code=3)
+    assert "not searched for: bad: " in done.stderr
+    assert "Most similar shapes" in done.stdout
+
+
+def test_an_explanation_is_drawn(meshes, index, tmp_path):
+    picture = tmp_path / "why.png"
+    run("query", index, meshes / "fish" / "b.ply", "--explain", picture)
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+    done = run("query", index, "fish/a", "--explain", picture, code=1)
+    assert "Leave --picture and --explain out" in done.stderr
+
+
+def test_a_codebook_is_for_patches_and_is_a_codebook(meshes, index, tmp_path):
+    asked = ("index", "add", tmp_path / "new", meshes, "--codebook")
+    assert "is for --method patches" in run(*asked, index, *LIGHT, code=1).stderr
+    assert "has none" in run(*asked, index, code=1).stderr
+    assert "is none" in run(*asked, meshes / "table.csv", code=1).stderr
+    learned = tmp_path / "book.npz"
+    done = run("index", "learn", meshes, "-o", learned)
+    assert "too few shapes" in done.stderr
+    options = ("--views", 0, "--workers", 1)
+    assert run_json(*asked, learned, *options)["added"] == ["bird/a", "bird/b", "fish/a", "fish/b"]
+
+
+def test_an_unreachable_cluster_is_named(meshes, tmp_path):
+    pytest.importorskip("distributed")
+    asked = ("index", "add", tmp_path / "new", meshes, "--scheduler", "nonsense://here:1")
+    assert "--scheduler takes the address of a Dask scheduler" in run(*asked, code=1).stderr

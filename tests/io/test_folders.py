@@ -1,0 +1,102 @@
+"""Finding the meshes of folders, with the facts of a table."""
+
+import pytest
+
+from eigenshape._errors import FileFormatError, InvalidParameterError
+from eigenshape.io.folders import find_items
+
+FILES = ["cats/felix.ply", "cats/old/tom.obj", "dogs/rex.OFF", "lonely.stl", "cats/notes.txt"]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name in FILES:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    return tmp_path
+
+
+def test_shapes_are_named_by_their_path_and_classed_by_their_folder(folder):
+    found = {item.name: (item.label, item.path.name) for item in find_items(folder)}
+    assert found == {
+        "cats/felix": ("cats", "felix.ply"),
+        "cats/old/tom": ("old", "tom.obj"),
+        "dogs/rex": ("dogs", "rex.OFF"),
+        "lonely": (None, "lonely.stl"),
+    }
+
+
+def test_files_that_differ_only_in_their_suffix_keep_it(folder):
+    (folder / "cats" / "felix.obj").touch()
+    names = {item.name for item in find_items([folder / "cats"])}
+    assert names == {"felix.ply", "felix.obj", "old/tom"}
+
+
+def test_a_file_that_is_given_twice_counts_once(folder):
+    cats = folder / "cats"
+    assert len(find_items([cats, cats])) == len(find_items(cats))
+
+
+def test_two_files_of_one_name_are_refused(folder):
+    (folder / "dogs" / "felix.ply").touch()
+    with pytest.raises(InvalidParameterError, match=r"'felix' is the name of both .*cats.*dogs"):
+        find_items([folder / "cats", folder / "dogs"])
+
+
+def test_no_mesh_is_an_error(tmp_path):
+    with pytest.raises(InvalidParameterError, match="There must be meshes"):
+        find_items(tmp_path)
+
+
+def test_parts_share_the_work_without_a_shape_in_two(folder):
+    for number in range(40):
+        (folder / f"shape{number}.ply").touch()
+    parts = [{item.name for item in find_items(folder, part=(part, 5))} for part in range(1, 6)]
+    assert all(parts)
+    assert sum(map(len, parts)) == len(find_items(folder))
+    assert set.union(*parts) == {item.name for item in find_items(folder)}
+
+
+def test_a_part_does_not_depend_on_the_other_shapes(folder):
+    before = {item.name for item in find_items(folder, part=(2, 3))}
+    (folder / "another.ply").touch()
+    assert before == {item.name for item in find_items(folder, part=(2, 3))} - {"another"}
+
+
+@pytest.mark.parametrize(("part", "message"), [((0, 3), "it is 0"), ((4, 3), "it is 4")])
+def test_a_part_that_is_not_there_is_refused(folder, part, message):
+    with pytest.raises(InvalidParameterError, match=message):
+        find_items(folder, part=part)
+
+
+def test_a_table_gives_classes_tags_and_attributes(folder):
+    table = folder / "table.csv"
+    table.write_text(
+        "name,label,tags,height,owner,limit\n"
+        'cats/felix,tabby,indoor; fat,0.25,"Smith, J.",inf\n'
+        "dogs/rex.OFF,,,,,\n"
+    )
+    found = {item.name: item for item in find_items(folder, labels=table)}
+    felix, rex = found["cats/felix"], found["dogs/rex"]
+    assert (felix.label, felix.tags) == ("tabby", ("indoor", "fat"))
+    assert felix.attributes == {"height": 0.25, "owner": "Smith, J.", "limit": "inf"}
+    assert (rex.label, rex.tags, rex.attributes) == ("dogs", (), {})
+    assert found["cats/old/tom"].label == "old"  # which the table does not name
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("title,label\na,b\n", "must have a column 'name'; its columns are 'title', 'label'"),
+        ("", "its columns are none"),
+        ("name,label\ncats/tom,x\n", "line 2 names 'cats/tom'"),
+        ("name,label\n,x\n", "line 2 does not"),
+        ("name,label\ncats/felix,a,b\n", "must have 2 cells a line; line 2 has more"),
+        (b"name,label\n\xff,x\n", "in UTF-8"),
+    ],
+)
+def test_a_table_that_is_wrong_is_refused(folder, text, message):
+    table = folder / "table.csv"
+    table.write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(FileFormatError, match=message):
+        find_items(folder, labels=table)
