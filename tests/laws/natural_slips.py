@@ -240,6 +240,7 @@ NAMED: dict[str, Callable[[], Any]] = {
     "logarithmic_map.source": lambda: 0,
     "map_from_points.points": lambda: np.arange(body().n_vertices),
     "mask": lambda: es.deformation.region_mask(body(), HEAD),
+    "merge_matches.answers": lambda: [shelf().query(described().descriptor)],
     "move_skeleton.response": lambda: es.deformation.skeleton_response(binding()),
     "n": lambda: 50,
     "n_features": lambda: 3,

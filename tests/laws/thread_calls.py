@@ -559,6 +559,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "mean_side_length": lambda v: es.geometry.mean_side_length(v.many),
     "measure_closeness": lambda v: es.stability.measure_closeness(v.change),
     "measure_distortion": lambda v: es.deformation.measure_distortion(v.animal, v.pose),
+    "merge_matches": lambda v: es.retrieval.merge_matches(
+        [v.index.query(v.by_heat[0], n_matches=3)], n_matches=2
+    ),
     "merge_targets": lambda v: es.features.merge_targets(v.tree),
     "merge_tree": lambda v: es.merge_tree(v.animal, v.heat[:, 0]),
     "mesh_laplacian": lambda v: [
@@ -590,6 +593,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "part_tree": lambda v: es.features.part_tree(v.animal, v.spectrum),
     "partial_scan": lambda v: es.partial_scan(v.many, [0, 0, 1], resolution=100),
     "patch_descriptor": lambda v: es.retrieval.patch_descriptor([v.patches[0]], v.recipe),
+    "query_indexes": lambda v: es.retrieval.query_indexes(
+        v.by_patches[0], [v.index.folder, v.index.folder], n_matches=2
+    ),
     "patch_scores": lambda v: es.retrieval.patch_scores(v.by_patches[0], v.by_patches),
     "persistence_diagram": lambda v: es.features.persistence_diagram(v.solid, v.solid.points[:, 0]),
     "measure_perturbation": lambda v: es.stability.measure_perturbation(v.ball, v.ball),

@@ -36,6 +36,8 @@ from .store.batch import train_codebook_from_files as train_codebook_from_files
 from .store.damage import Damage as Damage
 from .store.damage import StoreWarning as StoreWarning
 from .store.index import ShapeIndex as ShapeIndex
+from .store.parts import merge_matches as merge_matches
+from .store.parts import query_indexes as query_indexes
 from .store.reader import IndexReader as IndexReader
 from .store.records import Match as Match
 from .store.records import Matches as Matches

@@ -72,6 +72,8 @@ class Match:
     chance : float or None
         Share of unrelated shapes that would score as well or better: below 0.001 the match is
         hardly a coincidence. Measured for patches; None for heat.
+    distance : float or None
+        Of codes of patches, before points were matched: the score if none agree. None for heat.
 
     See Also
     --------
@@ -100,6 +102,7 @@ class Match:
     vertices: Int[np.ndarray, " m"]
     view: int
     chance: float | None = None
+    distance: float | None = None
 
     __repr__ = short_repr
     _repr_html_ = html_repr
@@ -123,7 +126,7 @@ class Matches(Sequence[Match]):
 
     See Also
     --------
-    ShapeIndex.query
+    ShapeIndex.query, merge_matches
 
     Examples
     --------

@@ -1,5 +1,7 @@
 """Exact scores of candidates, and the matches of the best."""
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Float
 
@@ -37,12 +39,12 @@ def search_candidates(
     found: tuple[Match, ...] = ()
     nothing = False
     while len(places):
-        scores = kind.scores(query, [snapshot.rows(place) for place in places.tolist()])
+        distances = kind.scores(query, [snapshot.rows(place) for place in places.tolist()])
         try:
-            for bad in places[~np.isfinite(scores)].tolist():
+            for bad in places[~np.isfinite(distances)].tolist():
                 snapshot.verify(bad)
-            scores = kind.verify(query, _descriptor_of(snapshot, places), scores)
-            found = _best(snapshot, query, places, scores, n_matches)
+            scores = kind.verify(query, _descriptor_of(snapshot, places), distances)
+            found = _best(snapshot, query, places, distances, scores, n_matches)
         except DamagedEntryError as err:
             damages.append(err.damage)
             places = places[places != err.place]
@@ -62,6 +64,7 @@ def _best(
     snapshot: Snapshot,
     query: Descriptor,
     places: np.ndarray,
+    distances: Float[np.ndarray, " k"],
     scores: Float[np.ndarray, " k"],
     n_matches: int,
 ) -> tuple[Match, ...]:
@@ -71,15 +74,21 @@ def _best(
     order = order[np.sort(firsts)]
     if len(order) > n_matches:  # with all that score as the last one does, to be sorted by name
         order = order[scores[order] <= scores[order[n_matches - 1]]]
-    best = [(float(scores[number]), int(places[number])) for number in order]
-    best.sort(key=lambda pair: (pair[0], snapshot.name(pair[1])))
-    return tuple(_match(snapshot, query, place, score) for score, place in best[:n_matches])
+    best = [(float(scores[number]), snapshot.name(int(places[number])), number) for number in order]
+    best.sort()
+    return tuple(
+        _match(snapshot, query, int(places[number]), float(distances[number]), score)
+        for score, _, number in best[:n_matches]
+    )
 
 
-def _match(snapshot: Snapshot, query: Descriptor, place: int, score: float) -> Match:
+def _match(
+    snapshot: Snapshot, query: Descriptor, place: int, distance: float, score: float
+) -> Match:
     shape, found = snapshot.shape(place), snapshot.descriptor(place)
     pairs = kind_of(snapshot.recipe).correspondences(query, found)
     view = int(snapshot.columns["view"][place])
-    chance = float(chances(np.array([score]))[0]) if isinstance(query, PatchDescriptor) else None
-    facts = shape.name, shape.label, shape.source
-    return Match(*facts, score, pairs, found.vertices, view, chance)
+    match = Match(shape.name, shape.label, shape.source, score, pairs, found.vertices, view)
+    if not isinstance(query, PatchDescriptor):
+        return match
+    return replace(match, chance=float(chances(np.array([score]))[0]), distance=distance)

@@ -1,0 +1,213 @@
+"""One answer from several indexes: parts of a collection that is too large for one machine."""
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import replace
+from functools import lru_cache, partial
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any, SupportsIndex
+
+import numpy as np
+
+from eigenshape._arguments import require_each, require_type
+from eigenshape._arrays import whole_number
+from eigenshape._errors import InvalidParameterError
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.retrieval.kinds import Descriptor, kind_of
+from eigenshape.retrieval.patches.verification import N_VERIFIED
+from eigenshape.retrieval.search.chances import chances, nothing_alike
+from eigenshape.retrieval.store.catalog import DATABASE
+from eigenshape.retrieval.store.reader import IndexReader, choose_recipe
+from eigenshape.retrieval.store.records import Match, Matches
+
+MOST_OPEN = 256  # readers that a process keeps open between queries
+
+
+def query_indexes(
+    shape: MeshLike | Descriptor,
+    folders: Sequence[str | PathLike[str]],
+    *,
+    n_matches: SupportsIndex = 5,
+    where: Mapping[str, Any] | None = None,
+    exact: bool = False,
+    executor: Executor | None = None,
+) -> Matches:
+    """Ask several indexes, and return what one index of all their shapes would have answered.
+
+    The workers of an executor each ask some of the indexes: processes of this machine, or a
+    cluster's, where every worker sees the same folders. Indexes stay open in a process from one
+    query to the next.
+
+    Parameters
+    ----------
+    shape : MeshLike, HeatDescriptor or PatchDescriptor
+        As of `ShapeIndex.query`. A mesh is described once, by the recipe of the first index.
+    folders : sequence of path
+        Indexes with the same recipe, as from ``eigenshape index add --part``.
+    n_matches : int
+        Matches to return.
+    where : mapping, optional
+        As of `ShapeIndex.query`.
+    exact : bool
+        Whether to compare every shape.
+    executor : concurrent.futures.Executor, optional
+        By default one index is asked after the other.
+
+    Returns
+    -------
+    Matches
+        As of `merge_matches`.
+
+    Raises
+    ------
+    InvalidShapeError, InvalidParameterError, StoreError
+        As `ShapeIndex.query`.
+
+    See Also
+    --------
+    merge_matches, ShapeIndex.merge
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from concurrent.futures import ThreadPoolExecutor
+    >>> import eigenshape as es
+    >>> folders = [tempfile.mkdtemp() for _ in range(2)]
+    >>> for kind, folder in zip(("fish", "bird"), folders):
+    ...     index = es.ShapeIndex.create(folder)
+    ...     index.add(kind, es.make_creature(kind, n_vertices=500), n_views=0)
+    >>> scan = es.make_creature("fish", pose=1, n_vertices=500)
+    >>> with ThreadPoolExecutor() as executor:
+    ...     matches = es.retrieval.query_indexes(scan, folders, executor=executor)
+    >>> [match.name for match in matches]
+    ['fish', 'bird']
+    """
+    require_type(executor, Executor | None, "executor")
+    wanted = whole_number(n_matches, "n_matches", 1, 2**30)
+    if isinstance(folders, str | PathLike):
+        raise InvalidParameterError(
+            f"folders takes a list of indexes; it was given one: {fspath(folders)!r}."
+        )
+    paths = [Path(folder).resolve() for folder in folders]
+    if not paths:
+        raise InvalidParameterError("folders must name at least one index; it is empty.")
+    if isinstance(shape, Descriptor):
+        descriptor = shape
+    else:
+        recipe = choose_recipe(list(_open_reader(paths[0]).state.recipes.values()))
+        descriptor = kind_of(recipe).describe_query(as_mesh(shape, "shape"), recipe)
+    ask = partial(
+        _ask, descriptor=descriptor, n_matches=wanted + N_VERIFIED, where=where, exact=exact
+    )
+    answers = map(ask, paths) if executor is None else executor.map(ask, paths)
+    return merge_matches(list(answers), n_matches=wanted)
+
+
+def merge_matches(answers: Sequence[Matches], *, n_matches: SupportsIndex = 5) -> Matches:
+    """Merge what several indexes answered to one query into the answer of one index of them all.
+
+    Each index has matched the points of its own thirty nearest shapes. Here those count that are
+    among the thirty nearest of all, as they would in one index; the others keep the distance of
+    their codes.
+
+    Parameters
+    ----------
+    answers : sequence of Matches
+        One of each index, to the same query, with ``n_matches`` 30 larger than is wanted here.
+    n_matches : int
+        Matches to return.
+
+    Returns
+    -------
+    Matches
+        Best first. With ``exact=True`` they are bit for bit those of one index, if no two shapes
+        are at the same distance; otherwise each index has chosen its own candidates, which are
+        more.
+
+    Raises
+    ------
+    InvalidParameterError
+        If an answer has too few matches; its number is named.
+
+    See Also
+    --------
+    query_indexes
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> scan = es.describe(es.make_creature("fish", pose=1, n_vertices=500))
+    >>> answers = []
+    >>> for kind in ("fish", "bird"):
+    ...     index = es.ShapeIndex.create(None)
+    ...     index.add(kind, es.make_creature(kind, n_vertices=500), n_views=0)
+    ...     answers.append(index.query(scan, n_matches=31))
+    >>> merged = es.retrieval.merge_matches(answers, n_matches=1)
+    >>> merged[0].name, merged.n_shapes
+    ('fish', 2)
+    """
+    require_each(answers, Matches, "answers")
+    if not answers:
+        raise InvalidParameterError("answers must hold those of one index at least; it is empty.")
+    wanted = whole_number(n_matches, "n_matches", 1, 2**30)
+    needed = wanted + N_VERIFIED
+    for number, answer in enumerate(answers):
+        if _by_patches(answer) and len(answer) < min(needed, answer.n_compared):
+            raise InvalidParameterError(
+                f"Answer {number} has {len(answer)} matches of {answer.n_compared} compared shapes; "
+                f"{needed} are needed to choose {wanted}. Ask with n_matches={needed}."
+            )
+    found = [match for answer in answers for match in answer]
+    found.sort(key=_distance)
+    found = [*found[:N_VERIFIED], *map(_not_verified, found[N_VERIFIED:])]
+    found.sort(key=lambda match: (match.score, match.name))
+    n_shapes = sum(answer.n_shapes for answer in answers)
+    scores = np.array([match.score for match in found])
+    return Matches(
+        tuple(found[:wanted]),
+        next((each.method for each in answers if each.method != "exact"), "exact"),
+        sum(answer.n_compared for answer in answers),
+        n_shapes,
+        any(map(_by_patches, answers)) and nothing_alike(scores, n_shapes),
+    )
+
+
+def _ask(
+    folder: Path,
+    *,
+    descriptor: Descriptor,
+    n_matches: int,
+    where: Mapping[str, Any] | None,
+    exact: bool,
+) -> Matches:
+    reader = _open_reader(folder)
+    reader.refresh()
+    return reader.query(descriptor, n_matches=n_matches, where=where, exact=exact)
+
+
+def _open_reader(folder: Path) -> IndexReader:
+    """Return a reader that was kept, unless the index was deleted and another one made there."""
+    database = folder / DATABASE
+    return _reader(folder, database.stat().st_ino if database.exists() else 0)
+
+
+@lru_cache(maxsize=MOST_OPEN)
+def _reader(folder: Path, inode: int) -> IndexReader:
+    return IndexReader(folder)
+
+
+def _by_patches(answer: Matches) -> bool:
+    return any(match.distance is not None for match in answer)
+
+
+def _distance(match: Match) -> float:
+    return match.score if match.distance is None else match.distance
+
+
+def _not_verified(match: Match) -> Match:
+    """Return a match by the distance of codes alone."""
+    if match.distance is None:
+        return match
+    chance = float(chances(np.array([match.distance]))[0])
+    return replace(match, score=match.distance, chance=chance)
