@@ -36,6 +36,21 @@ class LevelSet:
     See Also
     --------
     es.calculus.level_set : Makes it.
+
+    Examples
+    --------
+    The equator of a sphere, and a function along it:
+
+    >>> import eigenshape as es
+    >>> x, y, z = es.icosphere(4).vertices.T
+    >>> equator = es.calculus.level_set(es.icosphere(4), z, 0.1)
+    >>> bool(abs(equator.points[:, 2] - 0.1).max() < 1e-12)
+    True
+    >>> along = equator.interpolate(x)
+    >>> round(float(along.min()), 2), round(float(along.max()), 2)
+    (-0.99, 0.99)
+    >>> [len(line) > 100 for line in equator.polylines()]  # one closed curve
+    [True]
     """
 
     level: float

@@ -49,6 +49,19 @@ class VectorHeat:
         Factors of B + tW for functions and for tangent vectors.
     poisson : GroundedFactor
         Factor of W with one vertex of each component fixed.
+
+    Examples
+    --------
+    Prepare a surface once, then transport vectors from several vertices:
+
+    >>> import eigenshape as es
+    >>> solver = es.calculus.prepare_vector_heat(es.icosphere(2))
+    >>> solver.n_points
+    162
+    >>> for source in (0, 50):
+    ...     print(es.calculus.transport_vectors(solver, [source], [[1.0, 0.0]]).shape)
+    (162, 2)
+    (162, 2)
     """
 
     time: float

@@ -64,6 +64,20 @@ class ApproximateSignature:
         Ritz values, in 1/length².
     complete : bool
         Whether the eigenvalues are certified, as they are for operators of few points.
+
+    Examples
+    --------
+    The signature of 642 points at two times, with an estimated error below 1 % at both:
+
+    >>> import eigenshape as es
+    >>> laplacian = es.cotangent_laplacian(es.icosphere(3))
+    >>> found = es.spectral.approximate_heat_signature(laplacian, 16, [0.5, 1.0])
+    >>> found.values.shape
+    (642, 2)
+    >>> (found.errors < 0.01).tolist()
+    [True, True]
+    >>> found.complete  # whether an eigenvalue is missing was not counted
+    False
     """
 
     values: Float[np.ndarray, "n q"]

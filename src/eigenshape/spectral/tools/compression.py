@@ -78,6 +78,21 @@ class CompressedMesh:
     See Also
     --------
     compress_mesh, decompress_mesh
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(3)
+    >>> packed = es.spectral.compress_mesh(ball, bits=12)
+    >>> packed.rms_error < packed.step  # both in length
+    True
+
+    Values at the vertices follow the new order of the vertices:
+
+    >>> height = ball.vertices[:, 2]
+    >>> unpacked = es.spectral.decompress_mesh(packed.data)
+    >>> bool(abs(unpacked.vertices[:, 2] - height[packed.vertex_order]).max() <= packed.max_error)
+    True
     """
 
     data: bytes

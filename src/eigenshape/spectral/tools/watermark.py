@@ -51,6 +51,18 @@ class WatermarkTest:
     See Also
     --------
     detect_watermark
+
+    Examples
+    --------
+    Only the right key finds the mark:
+
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(2)
+    >>> marked = es.spectral.embed_watermark(ball, "a secret", k=50)
+    >>> es.spectral.detect_watermark(ball, marked, "a secret", k=50).score > 0.9
+    True
+    >>> es.spectral.detect_watermark(ball, marked, "another key", k=50).false_alarm > 1e-6
+    True
     """
 
     score: float
