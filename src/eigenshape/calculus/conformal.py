@@ -30,8 +30,8 @@ SHIFT = 1e-10
 # Inverse iteration stops where the map changes by this share of its size. The next energy is
 # several times the lowest on discs, so 10 to 30 iterations are enough.
 SETTLED, MOST_ITERATIONS = 1e-9, 300
-# Step of the conformal flow to the sphere, for a surface of area 4π. With 0.5 a biped is round after
-# 30 steps, with 0.02 after 150, and its angles are the same to 1 %.
+# Step of the conformal flow to the sphere, for a surface of area 4π. With 0.5 a biped is round
+# after 30 steps, with 0.02 after 150, and its angles are the same to 1 %.
 FLOW_STEP = 0.5
 # The flow has come to its end where the radii have not come nearer to each other for so many steps,
 # by this share. On meshes they stay apart by the discretization error: 6 % of the radius with 162
@@ -217,7 +217,8 @@ def map_to_sphere(
     if least > ROUND:
         raise ConvergenceError(
             f"The flow must make the surface round within {most} steps; the radii of its vertices "
-            f"still differ by {least:.2g} of the radius. Pass a larger n_steps, or use a finer mesh."
+            f"still differ by {least:.2g} of the radius. Pass a larger n_steps, or use a finer "
+            "mesh."
         )
     a, b, c = sphere[mesh.faces].transpose(1, 0, 2)
     inward = np.flatnonzero(np.einsum("fi,fi->f", a, np.cross(b, c)) <= 0)

@@ -91,7 +91,7 @@ def trace_geodesic(mesh: MeshLike, start: SupportsIndex, vector: ArrayLike) -> G
 def _wedge(
     sides: Sides, at_tail: Float[np.ndarray, " h"], vertex: int, angle: float
 ) -> tuple[int, float]:
-    """Return the side after which a direction leaves a vertex, and the angle from it in the face."""
+    """Return the side after which a direction leaves a vertex, and its angle to that side."""
     out = np.flatnonzero(sides.tails == vertex)
     is_inner = (sides.twins[out] >= 0).all() and (
         sides.twins[[previous_side(int(h)) for h in out]] >= 0

@@ -102,7 +102,8 @@ def prepare_heat_geodesics(
     Parameters
     ----------
     shape : ShapeLike
-        Triangles, tetrahedra, segments or m-simplices in R^d, or a point cloud of dimension 2 in R³.
+        Triangles, tetrahedra, segments or m-simplices in R^d, or a point cloud of dimension 2
+        in R³.
     time_factor : float
         The heat flows for the time t = time_factor × h², with the mean edge length h. More smooths
         the distance; less lets it depend more on single triangles.

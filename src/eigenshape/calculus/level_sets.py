@@ -224,7 +224,7 @@ def _cut_triangles(
 def _cut_tetrahedra(
     corners: Int[np.ndarray, "q 4"], above: Bool[np.ndarray, "q 4"]
 ) -> Int[np.ndarray, "r 3 2"]:
-    """Return three crossed edges for each triangle: one in a tetrahedron with a lone corner, or two."""
+    """Return three crossed edges per triangle: one in a tetrahedron with a lone corner, or two."""
     n_above = above.sum(axis=1)
     # Corners above come first, in each tetrahedron.
     ordered = np.take_along_axis(corners, np.argsort(~above, axis=1, kind="stable"), axis=1)

@@ -361,7 +361,7 @@ def edge_sums(solver: VectorHeat, field: Complex[np.ndarray, " n"]) -> Complex[n
 def integrate_along_edges(
     solver: VectorHeat, vectors: Complex[np.ndarray, " h"]
 ) -> Float[np.ndarray, " n"]:
-    """Return the function, up to a constant on each component, whose gradient is nearest to a field.
+    """Return the function whose gradient is nearest to a field, up to a constant per component.
 
     The field is given on each side, in the frame of its tail. Its divergence at a vertex is the
     flux through the dual edges around it.

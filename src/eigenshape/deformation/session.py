@@ -28,7 +28,8 @@ class DeformationSession:
     """Edit a rigged shape step by step.
 
     `drag` starts an edit, `preview` shows it, `commit` applies it, and `undo` and `redo` restore
-    earlier and later poses exactly. A session is the one mutable object of the library; use it from one thread.
+    earlier and later poses exactly. A session is the one mutable object of the library; use it
+    from one thread.
 
     Parameters
     ----------
