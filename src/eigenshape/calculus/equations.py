@@ -55,9 +55,9 @@ def poisson_solver(
     Returns
     -------
     LinearSolver
-        Its `solve` takes b integrated: B f for a source f, -`divergence` of a field, or
-        `boundary_load`. On a component without fixed point the mean of u, weighted by the mass, is
-        0.
+        Its method `solve` takes an integrated right-hand side b: B f for a source f,
+        -`divergence` of a field, or `boundary_load`. On a component without fixed point the mean
+        of u, weighted by the mass, is 0.
 
     Raises
     ------
@@ -403,7 +403,7 @@ def boundary_load(mesh: MeshLike, flux: ArrayLike) -> Float[np.ndarray, " n"]:
     mesh : MeshLike
         Of any dimension m, with a boundary.
     flux : (n,) float, or a number
-        g at the points, linear between them; values inside do not count.
+        g at the points, linear between them; values inside are ignored.
 
     Returns
     -------

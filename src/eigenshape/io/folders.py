@@ -31,7 +31,7 @@ def find_items(
     """Find the mesh files of folders and of the folders in them.
 
     A shape is named by its path below the given folder, without the suffix of the file unless two
-    files differ in nothing else. Its class is the name of the folder that holds it; a file that
+    files differ only in the suffix. Its class is the name of the folder that holds it; a file that
     lies directly in the given folder, or is given itself, has none.
 
     Parameters
@@ -41,11 +41,11 @@ def find_items(
     labels : path, optional
         Table of comma-separated values with a header. The column ``name`` holds names of shapes or
         paths of files below the folder. ``label`` is the class, ``tags`` are separated by
-        semicolons, and every other column is an attribute: a number where it reads as one. Empty
+        semicolons, and every other column is an attribute, a number where the text is one. Empty
         cells are left out.
     part : pair of int, optional
         ``(i, n)``: only part i of n, counted from 1, so that n jobs share the work. The name of a
-        shape decides its part, so jobs agree without talking to each other.
+        shape determines its part, so the jobs need not communicate.
 
     Returns
     -------

@@ -101,8 +101,8 @@ def sphere_functional_eigenvalues(k: SupportsIndex, t: float) -> Float[np.ndarra
 
     Notes
     -----
-    A kernel that depends on the distance only multiplies all harmonics of one degree by one number
-    (Funk and Hecke). With |x - y|² = 2 - 2s and u = (1 - s)/2t the number of 𝓛_t for degree l is
+    A kernel that depends only on the distance multiplies all harmonics of one degree by one number
+    (Funk and Hecke). With |x - y|² = 2 - 2s and u = (1 - s)/2t the eigenvalue of 𝓛_t for degree l is
     (1/t) ∫ exp(-u) (1 - P_l(1 - 2tu)) du from 0 to 1/t. The integral is computed by a Gauss rule up
     to where exp(-u) is below rounding.
 
