@@ -1,7 +1,5 @@
 """Maps that keep angles: of surfaces with boundary to the plane, and of genus 0 to the sphere."""
 
-from typing import SupportsIndex
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Complex, Float
@@ -9,7 +7,7 @@ from jaxtyping import Complex, Float
 from eigenshape._arrays import real_numbers, require_finite_rows, whole_number
 from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
 from eigenshape._progress import Progress, silent
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.calculus.linear_solver import LinearSolver, factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, face_areas, scale_to_unit
@@ -133,7 +131,7 @@ def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
 
 
 def map_to_sphere(
-    mesh: MeshLike, *, n_steps: SupportsIndex = 500, progress: Progress | None = None
+    mesh: MeshLike, *, n_steps: Integer = 500, progress: Progress | None = None
 ) -> Float[np.ndarray, "n 3"]:
     """Map a closed surface of genus 0 to the unit sphere with little change of angles.
 

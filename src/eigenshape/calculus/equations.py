@@ -1,7 +1,5 @@
 """Poisson, Helmholtz and heat equations on any operator, with fixed values and loads."""
 
-from typing import SupportsIndex
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
@@ -18,7 +16,7 @@ from eigenshape._arrays import (
 )
 from eigenshape._errors import InvalidShapeError
 from eigenshape._progress import Progress, silent
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.calculus.linear_solver import (
     LinearSolver,
     SparseMatrix,
@@ -319,7 +317,7 @@ def solve_heat(  # noqa: PLR0913 - one keyword for each part of the equation
     laplacian: Laplacian,
     start: ArrayLike,
     t: float,
-    n_steps: SupportsIndex = 1,
+    n_steps: Integer = 1,
     *,
     source: ArrayLike = 0.0,
     load: ArrayLike = 0.0,

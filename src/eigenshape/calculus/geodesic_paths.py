@@ -2,7 +2,6 @@
 
 from cmath import phase
 from itertools import pairwise
-from typing import SupportsIndex
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,7 +10,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from eigenshape._arrays import whole_number, whole_numbers
 from eigenshape._errors import ConvergenceError, InvalidParameterError
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.calculus.unfolding import (
     STRAIGHT,
     GeodesicPath,
@@ -41,7 +40,7 @@ Portals = list[tuple[complex, complex]]
 
 
 def geodesic_path(
-    mesh: MeshLike, start: SupportsIndex, end: SupportsIndex, *, via: ArrayLike = ()
+    mesh: MeshLike, start: Integer, end: Integer, *, via: ArrayLike = ()
 ) -> GeodesicPath:
     """Find a locally shortest path between two vertices.
 

@@ -1,13 +1,11 @@
 """Straight paths from a vertex: the exponential map."""
 
-from typing import SupportsIndex
-
 import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arrays import finite_values, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.calculus.unfolding import (
     STRAIGHT,
     GeodesicPath,
@@ -27,7 +25,7 @@ from eigenshape.geometry.requirements import require_sound
 from eigenshape.operators.directions import vertex_directions
 
 
-def trace_geodesic(mesh: MeshLike, start: SupportsIndex, vector: ArrayLike) -> GeodesicPath:
+def trace_geodesic(mesh: MeshLike, start: Integer, vector: ArrayLike) -> GeodesicPath:
     """Walk straight from a vertex, in the direction and for the length of a tangent vector.
 
     This is the exponential map. Across an edge the path goes on straight in the unfolded faces

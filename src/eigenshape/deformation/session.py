@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
@@ -11,6 +10,7 @@ from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr
+from eigenshape._typing import Integer
 from eigenshape.deformation.binding import Binding, bind
 from eigenshape.deformation.deform import bend
 from eigenshape.deformation.edits import Edit, Move, apply_edit, carry_edit
@@ -125,7 +125,7 @@ class DeformationSession:
         handle: Handle,
         *,
         fixed: Region | None = None,
-        n_modes: SupportsIndex | None = None,
+        n_modes: Integer | None = None,
     ) -> Float[np.ndarray, "n 3"]:
         """Move one region for as long as a handle is dragged.
 
@@ -159,7 +159,7 @@ class DeformationSession:
         moves: Iterable[Move],
         *,
         fixed: Region | None = None,
-        n_modes: SupportsIndex | None = None,
+        n_modes: Integer | None = None,
     ) -> Float[np.ndarray, "n 3"]:
         """Move several regions for as long as their handles are dragged.
 
