@@ -159,7 +159,7 @@ def test_operators_are_listed():
     assert run_json("operators").keys() == OPERATORS.keys()
     text = run("operators").stdout
     assert "Gaussian kernel, weighted by volumes" in text
-    assert "of triangles, points; --mollify --n-neighbors" in text
+    assert "for triangles, points; --mollify --n-neighbors" in text
 
 
 @pytest.mark.parametrize(

@@ -82,7 +82,10 @@ class Verb(TyperCommand):
                 warnings.showwarning = _print_warning
                 return super().invoke(ctx)
         except (EigenshapeError, OSError) as error:
-            err.print(f"[bold red]error:[/] {escape_text(error)}")
+            text = str(error)
+            if isinstance(error, OSError) and error.filename is not None:
+                text = f"{error.filename}: {error.strerror}"  # without the number of the error
+            err.print(f"[bold red]error:[/] {escape_text(text)}")
             raise typer.Exit(1) from error
         except KeyboardInterrupt as error:
             err.print("stopped; what was finished is kept")
