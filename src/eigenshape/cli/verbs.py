@@ -30,8 +30,8 @@ VERBS = {
     "a labeled camel.",
     "deform": "Bend, twist or stretch a mesh: a region is turned or moved, and the rest follows "
     "smoothly.",
-    "stability": "Compare two shapes: how close they lie, what changes in their spectra, and which "
-    "heat times to trust.",
+    "stability": "Compare two shapes: how close they are, how their spectra change, which heat times "
+    "to trust.",
     "index": "Keep an index of shapes: add meshes, list and remove shapes, check, compact, export "
     "and merge.",
     "query": "Find the shapes of an index that are most like a scan, and which features "
