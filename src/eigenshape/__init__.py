@@ -1,9 +1,47 @@
 """eigenshape hears the shape of things.
 
-A shape of any dimension gives a Laplacian, the Laplacian a certified spectrum, the spectrum heat, heat the features
-that persist, and features an answer to the question which shapes are alike.
+A library for spectra, parts, search and deformation of 3D shapes. The functions that most people
+need stand here; all functions stand in the rooms:
+
+geometry     meshes and point clouds: measures, topology, geodesics, repairs
+shapes       synthetic shapes, with exact spectra
+scans        partial scans and a depth camera
+operators    discrete Laplace operators
+spectral     certified spectra, signatures, functional maps, filters, compression
+calculus     gradients, equations, flows, heat distances, conformal maps
+features     merge trees, feature points, parts
+deformation  regions, motions, editing sessions, transfer of poses
+stability    how far two shapes and their spectra differ
+retrieval    descriptors, an index of shapes, search
+io           files, trimesh and PyVista
+plot         pictures
+types        annotations for your own signatures
+
+Examples
+--------
+>>> import eigenshape as es
+>>> mesh = es.icosphere(3)
+>>> spectrum = es.solve_spectrum(es.cotangent_laplacian(mesh), k=4)
+>>> spectrum.eigenvalues.round(1).tolist()
+[0.0, 2.0, 2.0, 2.0]
 """
+
+import pkgutil
 
 import lazy_loader
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+_load = __getattr__
+
+
+def __getattr__(name):
+    """Load a public name. If it is in a room only, the error says in which."""
+    try:
+        return _load(name)
+    except AttributeError as err:
+        if name in __all__ or name.startswith("_"):
+            raise
+        rooms = [module.name for module in pkgutil.iter_modules(__path__) if module.name in __all__]
+        homes = [f"es.{room}.{name}" for room in rooms if name in _load(room).__all__]
+        remedy = f"; use {homes[0]}" if homes else ""
+        raise AttributeError(f"eigenshape has no attribute {name!r}{remedy}") from err

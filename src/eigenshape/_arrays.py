@@ -1,7 +1,7 @@
 """Checks of arrays and numbers, with errors that name the argument, and read-only copies."""
 
 import operator
-from typing import Any, SupportsIndex, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from eigenshape._arguments import describe_value
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._memory import require_memory
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 
 # Names of rows in messages, and what rows of indices refer to.
 SINGULAR = {"vertices": "vertex", "faces": "face", "points": "point", "simplices": "simplex"}
@@ -268,7 +268,7 @@ def real_numbers(value: ArrayLike, name: str) -> NDArray[Any]:
     return numbers
 
 
-def whole_number(value: SupportsIndex, name: str, low: int, high: int | None = None) -> int:
+def whole_number(value: Integer, name: str, low: int, high: int | None = None) -> int:
     """Return `value` as an int from `low` to `high`; without `high` there is no upper bound."""
     try:
         number = operator.index(value)

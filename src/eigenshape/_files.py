@@ -49,7 +49,7 @@ def require_regular(path: Path) -> None:
             stat.S_IFBLK: "a device",
         }
         kind = kinds.get(stat.S_IFMT(mode), "something else")
-        raise FileFormatError(f"{path} must be a regular file; it is {kind}.")
+        raise FileFormatError(f"{path} must be a file; it is {kind}.")
 
 
 @contextmanager

@@ -33,7 +33,7 @@ def literal(text: str) -> str:
 
 
 def short_repr(value: Any) -> str:
-    """Return a dataclass in one line: of long arrays the type and the shape, of long values the type.
+    """Return a dataclass in one line, where long arrays are given by their type and shape.
 
     A spectrum of 50,000 vertices would fill a screen with numbers otherwise. Values with large
     arrays take it as their `__repr__`.

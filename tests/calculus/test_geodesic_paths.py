@@ -104,7 +104,7 @@ def test_bad_input_is_named(monkeypatch):
         geodesic_path(ball, 3, 3)
     with pytest.raises(InvalidParameterError, match="end must lie in"):
         geodesic_path(ball, 3, 42)
-    with pytest.raises(InvalidParameterError, match="vertices on one component; 0 and 50"):
+    with pytest.raises(InvalidParameterError, match="must be on one component; 0 and 50"):
         geodesic_path(disjoint_union(ball, ball), 0, 50)
     with pytest.raises(InvalidParameterError, match="vector must hold two coordinates"):
         trace_geodesic(ball, 0, [1.0, 0.0, 0.0])

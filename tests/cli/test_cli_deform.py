@@ -172,7 +172,10 @@ def test_words_for_handles(giraffe):
         (["--region", "y>500", "--move", "0,1,0"], "must have a boundary on the shape"),
         (["--region", "y>70%", "--move", "0,1"], "A move is three numbers separated by commas"),
         (["--region", "y>70%", "--rotate", "x 90"], "A rotation is 'x by 90'"),
-        (["--region", "y>70%", "--rotate", "a,b,c by 3"], "An axis is three numbers"),
+        (
+            ["--region", "y>70%", "--rotate", "a,b,c by 3"],
+            "An axis other than x, y and z is three numbers",
+        ),
         (["--region", "y>70%", "--rotate", "x by 3 @ 1,2"], "A pivot is three numbers"),
         (
             ["--region", "vertex 99999 within 1", "--move", "0,1,0"],

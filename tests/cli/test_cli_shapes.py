@@ -158,8 +158,8 @@ def test_a_plot_of_any_spectrum(folder, tmp_path):
 def test_operators_are_listed():
     assert run_json("operators").keys() == OPERATORS.keys()
     text = run("operators").stdout
-    assert "Gaussian kernel, weighed by volumes" in text
-    assert "of triangles, points; --mollify --n-neighbors" in text
+    assert "Gaussian kernel, weighted by volumes" in text
+    assert "for triangles, points; --mollify --n-neighbors" in text
 
 
 @pytest.mark.parametrize(

@@ -104,7 +104,7 @@ def test_the_command_is_a_module_too(module):
         check=False,
     )
     assert done.returncode == 1
-    assert done.stderr == "error: [Errno 2] No such file or directory: 'nowhere.ply'\n"
+    assert done.stderr == "error: nowhere.ply: No such file or directory\n"
     usage = subprocess.run(
         [sys.executable, "-m", module, "info", "-h"], capture_output=True, text=True, check=True
     )

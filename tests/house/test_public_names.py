@@ -8,6 +8,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
+import pytest
 from public_names import public_things, rooms
 
 import eigenshape as es
@@ -59,14 +60,19 @@ def test_a_name_of_a_room_is_the_object_and_never_a_module_of_that_name():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_a_name_that_is_not_there_is_named():
+def test_a_name_that_is_not_there_is_named_with_a_name_that_is():
     done = subprocess.run(
         [sys.executable, "-c", "import eigenshape as es; es.solve_spectra"],
         capture_output=True,
         text=True,
         check=False,
     )
-    assert "solve_spectra" in done.stderr
+    assert "no attribute 'solve_spectra'. Did you mean: 'solve_spectrum'?" in done.stderr
+
+
+def test_a_name_of_a_room_that_is_sought_at_the_short_door_is_found():
+    with pytest.raises(AttributeError, match=r"'find_heat_features'; use es\.retrieval\.find_heat"):
+        es.find_heat_features  # noqa: B018
 
 
 def test_importing_loads_nothing_that_is_not_used():

@@ -413,7 +413,7 @@ def test_unknown_formats_and_dimensions(tmp_path):
         read_shape(tmp_path / "a.abc")
     with pytest.raises(FileFormatError, match=r"must be of a known format, .*; it has no suffix"):
         read_shape(tmp_path / "abc")
-    with pytest.raises(FileFormatError, match="must be a regular file; it is a folder"):
+    with pytest.raises(FileFormatError, match="must be a file; it is a folder"):
         read_shape(tmp_path)
     assert read_shape(tmp_path / "a.abc", file_format="xyz").n_points == 1
     with pytest.raises(InvalidParameterError, match=r"dim must lie in 1\.\.3; it is 5"):

@@ -200,8 +200,8 @@ def test_what_declares_more_than_it_holds_is_refused(tmp_path, spectrum):
 
 
 def test_a_folder_and_a_pipe_are_no_spectra(tmp_path):
-    with pytest.raises(FileFormatError, match="must be a regular file; it is a folder"):
+    with pytest.raises(FileFormatError, match="must be a file; it is a folder"):
         Spectrum.load(tmp_path)
     os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(FileFormatError, match="must be a regular file; it is a pipe"):
+    with pytest.raises(FileFormatError, match="must be a file; it is a pipe"):
         Spectrum.load(tmp_path / "pipe")

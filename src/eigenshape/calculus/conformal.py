@@ -1,7 +1,5 @@
 """Maps that keep angles: of surfaces with boundary to the plane, and of genus 0 to the sphere."""
 
-from typing import SupportsIndex
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Complex, Float
@@ -9,7 +7,7 @@ from jaxtyping import Complex, Float
 from eigenshape._arrays import real_numbers, require_finite_rows, whole_number
 from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
 from eigenshape._progress import Progress, silent
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.calculus.linear_solver import LinearSolver, factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, face_areas, scale_to_unit
@@ -30,8 +28,8 @@ SHIFT = 1e-10
 # Inverse iteration stops where the map changes by this share of its size. The next energy is
 # several times the lowest on discs, so 10 to 30 iterations are enough.
 SETTLED, MOST_ITERATIONS = 1e-9, 300
-# Step of the conformal flow to the sphere, for a surface of area 4π. With 0.5 a biped is round after
-# 30 steps, with 0.02 after 150, and its angles are the same to 1 %.
+# Step of the conformal flow to the sphere, for a surface of area 4π. With 0.5 a biped is round
+# after 30 steps, with 0.02 after 150, and its angles are the same to 1 %.
 FLOW_STEP = 0.5
 # The flow has come to its end where the radii have not come nearer to each other for so many steps,
 # by this share. On meshes they stay apart by the discretization error: 6 % of the radius with 162
@@ -133,7 +131,7 @@ def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
 
 
 def map_to_sphere(
-    mesh: MeshLike, *, n_steps: SupportsIndex = 500, progress: Progress | None = None
+    mesh: MeshLike, *, n_steps: Integer = 500, progress: Progress | None = None
 ) -> Float[np.ndarray, "n 3"]:
     """Map a closed surface of genus 0 to the unit sphere with little change of angles.
 
@@ -217,7 +215,8 @@ def map_to_sphere(
     if least > ROUND:
         raise ConvergenceError(
             f"The flow must make the surface round within {most} steps; the radii of its vertices "
-            f"still differ by {least:.2g} of the radius. Pass a larger n_steps, or use a finer mesh."
+            f"still differ by {least:.2g} of the radius. Pass a larger n_steps, or use a finer "
+            "mesh."
         )
     a, b, c = sphere[mesh.faces].transpose(1, 0, 2)
     inward = np.flatnonzero(np.einsum("fi,fi->f", a, np.cross(b, c)) <= 0)

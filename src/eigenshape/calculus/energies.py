@@ -1,7 +1,5 @@
 """Quadratic energies: their minima under constraints, and the smoothest interpolation of values."""
 
-from typing import SupportsIndex
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
@@ -9,7 +7,7 @@ from jaxtyping import Float
 from eigenshape._arguments import require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.calculus.linear_solver import SparseMatrix, factor_equations
 from eigenshape.operators.laplacian import Laplacian, require_matrix
 
@@ -66,7 +64,7 @@ def minimize_quadratic(
     return solver.solve(linear, values=values, targets=targets)
 
 
-def polyharmonic_matrix(laplacian: Laplacian, order: SupportsIndex = 2) -> sp.csr_array:
+def polyharmonic_matrix(laplacian: Laplacian, order: Integer = 2) -> sp.csr_array:
     """Build the energy matrix of k-harmonic functions, W (B⁻¹W)^(k-1).
 
     ½ uᵀQu is half the integral of |∇u|² for k = 1 and of (Δu)² for k = 2 (Botsch and Kobbelt 2004;
@@ -122,7 +120,7 @@ def solve_harmonic(
     fixed: ArrayLike,
     values: ArrayLike,
     *,
-    order: SupportsIndex = 1,
+    order: Integer = 1,
 ) -> Float[np.ndarray, "n ..."]:
     """Interpolate values at some points by the smoothest function: harmonic, biharmonic and so on.
 

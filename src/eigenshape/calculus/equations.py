@@ -1,7 +1,5 @@
 """Poisson, Helmholtz and heat equations on any operator, with fixed values and loads."""
 
-from typing import SupportsIndex
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
@@ -18,7 +16,7 @@ from eigenshape._arrays import (
 )
 from eigenshape._errors import InvalidShapeError
 from eigenshape._progress import Progress, silent
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.calculus.linear_solver import (
     LinearSolver,
     SparseMatrix,
@@ -55,9 +53,9 @@ def poisson_solver(
     Returns
     -------
     LinearSolver
-        Its `solve` takes b integrated: B f for a source f, -`divergence` of a field, or
-        `boundary_load`. On a component without fixed point the mean of u, weighted by the mass, is
-        0.
+        Its method `solve` takes an integrated right-hand side b: B f for a source f,
+        -`divergence` of a field, or `boundary_load`. On a component without fixed point the mean
+        of u, weighted by the mass, is 0.
 
     Raises
     ------
@@ -319,7 +317,7 @@ def solve_heat(  # noqa: PLR0913 - one keyword for each part of the equation
     laplacian: Laplacian,
     start: ArrayLike,
     t: float,
-    n_steps: SupportsIndex = 1,
+    n_steps: Integer = 1,
     *,
     source: ArrayLike = 0.0,
     load: ArrayLike = 0.0,
@@ -403,7 +401,7 @@ def boundary_load(mesh: MeshLike, flux: ArrayLike) -> Float[np.ndarray, " n"]:
     mesh : MeshLike
         Of any dimension m, with a boundary.
     flux : (n,) float, or a number
-        g at the points, linear between them; values inside do not count.
+        g at the points, linear between them; values inside are ignored.
 
     Returns
     -------

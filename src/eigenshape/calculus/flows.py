@@ -1,14 +1,12 @@
 """Flows that smooth shapes: mean curvature flow, its conformal form, and Taubin's filter."""
 
-from typing import SupportsIndex
-
 import numpy as np
 import scipy.sparse as sp
 
 from eigenshape._arrays import finite_values, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._progress import Progress, silent
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.calculus.linear_solver import factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
@@ -31,7 +29,7 @@ def mean_curvature_flow(
     mesh: MeshLike,
     t: float,
     *,
-    n_steps: SupportsIndex = 10,
+    n_steps: Integer = 10,
     conformal: bool = False,
     fixed: ArrayLike | None = None,
     progress: Progress | None = None,
@@ -119,7 +117,7 @@ def mean_curvature_flow(
 
 def taubin_smooth(
     mesh: MeshLike,
-    n_steps: SupportsIndex = 10,
+    n_steps: Integer = 10,
     *,
     shrink: float = SHRINK,
     inflate: float = INFLATE,

@@ -2,7 +2,6 @@
 
 from cmath import phase
 from itertools import pairwise
-from typing import SupportsIndex
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,7 +10,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from eigenshape._arrays import whole_number, whole_numbers
 from eigenshape._errors import ConvergenceError, InvalidParameterError
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.calculus.unfolding import (
     STRAIGHT,
     GeodesicPath,
@@ -41,7 +40,7 @@ Portals = list[tuple[complex, complex]]
 
 
 def geodesic_path(
-    mesh: MeshLike, start: SupportsIndex, end: SupportsIndex, *, via: ArrayLike = ()
+    mesh: MeshLike, start: Integer, end: Integer, *, via: ArrayLike = ()
 ) -> GeodesicPath:
     """Find a locally shortest path between two vertices.
 
@@ -134,7 +133,8 @@ def _edge_path(mesh: TriangleMesh, stops: list[int]) -> list[int]:
         _, before = dijkstra(graph, directed=False, indices=one, return_predecessors=True)
         if before[two] < 0:
             raise InvalidParameterError(
-                f"A path needs its vertices on one component; {one} and {two} are on different ones."
+                "The vertices of a path must be on one component; "
+                f"{one} and {two} are on different ones."
             )
         back = [two]
         while back[-1] != one:
@@ -169,7 +169,7 @@ def _strip_along(sides: Sides, path: list[int]) -> list[int]:
 def _fan(
     sides: Sides, before: int, vertex: int, after: int, left: bool
 ) -> tuple[float, bool, list[int]] | None:
-    """Walk around a vertex on one side of a path; return the angle, the side and what is crossed."""
+    """Walk around a vertex on one side of a path; return angle, side and what is crossed."""
     step = next_side if left else previous_side
     side = sides.of_edge.get((before, vertex) if left else (vertex, before), -1)
     crossed: list[int] = []
@@ -187,7 +187,7 @@ def _fan(
 
 
 def _without_ends(sides: Sides, strip: list[int], first: int, final: int) -> list[int]:
-    """Leave out what a strip crosses before it leaves the first vertex, and after it meets the last."""
+    """Drop what a strip crosses before it leaves the first vertex and after it meets the last."""
     for number in range(len(strip) - 1, -1, -1):
         if first in (sides.tails[strip[number]], sides.heads[strip[number]]):
             strip = strip[number + 1 :]
@@ -254,7 +254,7 @@ def _pull_taut(portals: Portals) -> list[tuple[int, int]]:
 def _pass_pivots(
     sides: Sides, strip: list[int], portals: Portals, corners: list[tuple[int, int]]
 ) -> list[int] | None:
-    """Lead the strip around the other side of vertices where this is shorter; None if it never is."""
+    """Lead the strip around the other side of vertices where that is shorter; None if nowhere."""
     places = [portals[number][end] for number, end in corners]
     moved: list[int] = []
     done = 0  # sides of the strip that are copied or replaced

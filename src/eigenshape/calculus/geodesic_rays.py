@@ -1,13 +1,11 @@
 """Straight paths from a vertex: the exponential map."""
 
-from typing import SupportsIndex
-
 import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arrays import finite_values, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.calculus.unfolding import (
     STRAIGHT,
     GeodesicPath,
@@ -27,7 +25,7 @@ from eigenshape.geometry.requirements import require_sound
 from eigenshape.operators.directions import vertex_directions
 
 
-def trace_geodesic(mesh: MeshLike, start: SupportsIndex, vector: ArrayLike) -> GeodesicPath:
+def trace_geodesic(mesh: MeshLike, start: Integer, vector: ArrayLike) -> GeodesicPath:
     """Walk straight from a vertex, in the direction and for the length of a tangent vector.
 
     This is the exponential map. Across an edge the path goes on straight in the unfolded faces
@@ -91,7 +89,7 @@ def trace_geodesic(mesh: MeshLike, start: SupportsIndex, vector: ArrayLike) -> G
 def _wedge(
     sides: Sides, at_tail: Float[np.ndarray, " h"], vertex: int, angle: float
 ) -> tuple[int, float]:
-    """Return the side after which a direction leaves a vertex, and the angle from it in the face."""
+    """Return the side after which a direction leaves a vertex, and its angle to that side."""
     out = np.flatnonzero(sides.tails == vertex)
     is_inner = (sides.twins[out] >= 0).all() and (
         sides.twins[[previous_side(int(h)) for h in out]] >= 0

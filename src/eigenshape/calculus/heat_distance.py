@@ -58,6 +58,20 @@ class HeatGeodesics:
         Factor of B + tW.
     poisson : GroundedFactor
         Factor of W with one point of each component fixed.
+
+    Examples
+    --------
+    Prepare a shape once, then ask for distances from many sources:
+
+    >>> import eigenshape as es
+    >>> solver = es.calculus.prepare_heat_geodesics(es.icosphere(3))
+    >>> solver.n_points
+    642
+    >>> for source in (0, 100):
+    ...     distances = es.calculus.heat_distances(solver, [source])[0]
+    ...     print(f"{distances.max():.1f}")  # to the opposite point: π
+    3.1
+    3.1
     """
 
     time: float
@@ -88,7 +102,8 @@ def prepare_heat_geodesics(
     Parameters
     ----------
     shape : ShapeLike
-        Triangles, tetrahedra, segments or m-simplices in R^d, or a point cloud of dimension 2 in R³.
+        Triangles, tetrahedra, segments or m-simplices in R^d, or a point cloud of dimension 2
+        in R³.
     time_factor : float
         The heat flows for the time t = time_factor × h², with the mean edge length h. More smooths
         the distance; less lets it depend more on single triangles.

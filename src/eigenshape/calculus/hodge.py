@@ -53,6 +53,23 @@ class HodgeDecomposition:
     stream : (e,) or (q,) float
         For vectors: values at the midpoints of edges. For a one-form: values on the triangles of
         the mesh, whose codifferential is `coexact`, to about eight digits.
+
+    Examples
+    --------
+    The gradient of a function on a sphere is exact, and its potential is the function:
+
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(2)
+    >>> height = ball.vertices[:, 2]
+    >>> slopes = es.calculus.gradient(ball, height)
+    >>> parts = es.calculus.decompose_field(ball, slopes)
+    >>> bool(np.allclose(parts.exact, slopes))
+    True
+    >>> bool(np.allclose(parts.exact + parts.coexact + parts.harmonic, slopes))
+    True
+    >>> bool(np.ptp(parts.potential - height) < 1e-9)  # up to a constant
+    True
     """
 
     exact: Float[np.ndarray, "..."]

@@ -36,6 +36,21 @@ class LevelSet:
     See Also
     --------
     es.calculus.level_set : Makes it.
+
+    Examples
+    --------
+    The equator of a sphere, and a function along it:
+
+    >>> import eigenshape as es
+    >>> x, y, z = es.icosphere(4).vertices.T
+    >>> equator = es.calculus.level_set(es.icosphere(4), z, 0.1)
+    >>> bool(abs(equator.points[:, 2] - 0.1).max() < 1e-12)
+    True
+    >>> along = equator.interpolate(x)
+    >>> round(float(along.min()), 2), round(float(along.max()), 2)
+    (-0.99, 0.99)
+    >>> [len(line) > 100 for line in equator.polylines()]  # one closed curve
+    [True]
     """
 
     level: float
@@ -209,7 +224,7 @@ def _cut_triangles(
 def _cut_tetrahedra(
     corners: Int[np.ndarray, "q 4"], above: Bool[np.ndarray, "q 4"]
 ) -> Int[np.ndarray, "r 3 2"]:
-    """Return three crossed edges for each triangle: one in a tetrahedron with a lone corner, or two."""
+    """Return three crossed edges per triangle: one in a tetrahedron with a lone corner, or two."""
     n_above = above.sum(axis=1)
     # Corners above come first, in each tetrahedron.
     ordered = np.take_along_axis(corners, np.argsort(~above, axis=1, kind="stable"), axis=1)

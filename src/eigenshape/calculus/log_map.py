@@ -1,12 +1,13 @@
 """The logarithmic map of a surface, by short heat flow."""
 
-from typing import Literal, SupportsIndex, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from jaxtyping import Complex, Float
 
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import Integer
 from eigenshape.calculus.vector_heat import (
     VectorHeat,
     as_rows,
@@ -28,7 +29,7 @@ LogMethod = Literal["affine", "adaptive", "radial"]
 
 
 def logarithmic_map(
-    mesh: MeshLike | VectorHeat, source: SupportsIndex, *, method: LogMethod = "affine"
+    mesh: MeshLike | VectorHeat, source: Integer, *, method: LogMethod = "affine"
 ) -> Float[np.ndarray, "n 2"]:
     """Compute the logarithmic map at a vertex: polar coordinates of all vertices around it.
 

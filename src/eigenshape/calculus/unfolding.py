@@ -31,6 +31,20 @@ class GeodesicPath:
         Where it starts, where it crosses edges or passes vertices, and where it ends, in length.
     length : float
         In length.
+
+    Examples
+    --------
+    The shortest path between opposite corners of a plane square is its diagonal:
+
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> square = es.shapes.grid(5, 5)
+    >>> path = es.calculus.geodesic_path(square, 0, square.n_vertices - 1)
+    >>> round(path.length, 6)
+    1.414214
+    >>> steps = np.linalg.norm(np.diff(path.points, axis=0), axis=1)
+    >>> round(float(steps.sum()), 6)
+    1.414214
     """
 
     points: Float[np.ndarray, "p 3"]

@@ -49,6 +49,19 @@ class VectorHeat:
         Factors of B + tW for functions and for tangent vectors.
     poisson : GroundedFactor
         Factor of W with one vertex of each component fixed.
+
+    Examples
+    --------
+    Prepare a surface once, then transport vectors from several vertices:
+
+    >>> import eigenshape as es
+    >>> solver = es.calculus.prepare_vector_heat(es.icosphere(2))
+    >>> solver.n_points
+    162
+    >>> for source in (0, 50):
+    ...     print(es.calculus.transport_vectors(solver, [source], [[1.0, 0.0]]).shape)
+    (162, 2)
+    (162, 2)
     """
 
     time: float
@@ -348,7 +361,7 @@ def edge_sums(solver: VectorHeat, field: Complex[np.ndarray, " n"]) -> Complex[n
 def integrate_along_edges(
     solver: VectorHeat, vectors: Complex[np.ndarray, " h"]
 ) -> Float[np.ndarray, " n"]:
-    """Return the function, up to a constant on each component, whose gradient is nearest to a field.
+    """Return the function whose gradient is nearest to a field, up to a constant per component.
 
     The field is given on each side, in the frame of its tail. Its divergence at a vertex is the
     flux through the dual edges around it.

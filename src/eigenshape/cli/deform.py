@@ -101,7 +101,7 @@ def deform(
     handles = [name for name in (rotate, move) if name]
     if bool(region) != (len(handles) == 1) or not (region or edits):
         raise InvalidParameterError(
-            "Give --region with either --rotate or --move, or --edits, or all of them."
+            "Give --region with either --rotate or --move, or give --edits, or both."
         )
     if edits_mesh and not edits:
         raise InvalidParameterError(

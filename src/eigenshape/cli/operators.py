@@ -26,7 +26,7 @@ def operators(*, as_json: JsonOption = False) -> None:
         facts = _facts(name)
         options = "".join(f" --{option.replace('_', '-')}" for option in facts["options"])
         takes = ", ".join(facts["takes"]) + (";" if options else "")
-        out.print(f"[bold]{name:<15}[/]{entry.description}\n{'':<15}of {takes}{options}")
+        out.print(f"[bold]{name:<15}[/]{entry.description}\n{'':<15}for {takes}{options}")
 
 
 def _facts(name: str) -> dict[str, list[str]]:

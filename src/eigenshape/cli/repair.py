@@ -57,7 +57,7 @@ def repair(
     rows = [
         [name.replace("_", " "), *(_format(fact[name]) for fact in facts.values())] for name in ROWS
     ]
-    print_table("RepairedMesh", ["", *facts], rows)
+    print_table("Repaired", ["", *facts], rows)
 
 
 def _format(value: bool | int) -> str:

@@ -25,7 +25,7 @@ def report(
 ) -> None:
     """Write a shape with its spectrum, heat and parts to one HTML file that any browser opens.
 
-    It takes the package eigenshape-studio.
+    Needs the package eigenshape-studio.
 
     For instance: eigenshape report scan.ply -o scan.html
     """

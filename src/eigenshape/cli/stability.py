@@ -77,7 +77,7 @@ def stability(
     up: UpOption = "auto",
     as_json: JsonOption = False,
 ) -> None:
-    """Compare two shapes: how close they lie, what changes in their spectra, and which heat times to trust.
+    """Compare two shapes: how close they are, how their spectra change, which heat times to trust.
 
     Meshes with the same faces correspond vertex by vertex. Others correspond by --map, or by random points that are
     matched by their distances in space.

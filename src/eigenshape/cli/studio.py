@@ -12,7 +12,7 @@ from eigenshape.cli.console import escape_text, out
 def studio(
     mesh: Annotated[
         Path | None,
-        typer.Argument(help="Mesh file to open. By default a creature that is made for it."),
+        typer.Argument(help="Mesh file to open. By default a synthetic creature."),
     ] = None,
     *,
     shelf: Annotated[
@@ -20,7 +20,10 @@ def studio(
         typer.Option("--index", help="Folder of an index to search in, as `index` writes it."),
     ] = None,
     host: Annotated[
-        str, typer.Option(help="Address to listen on; another one takes --allow-remote.")
+        str,
+        typer.Option(
+            help="Address to listen on; one that other machines reach needs --allow-remote."
+        ),
     ] = "127.0.0.1",
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Port to listen on; 0 takes any that is free.")
@@ -32,14 +35,14 @@ def studio(
         bool,
         typer.Option(
             "--allow-remote",
-            help="Let other machines in. Who has the address controls the studio, and nothing is "
+            help="Let other machines in. Whoever has the address controls the studio, and nothing is "
             "encrypted.",
         ),
     ] = False,
 ) -> None:
     """Open a window in the browser: bend a shape by hand, see its spectrum, heat and parts, and search.
 
-    It takes the package eigenshape-studio. Ctrl-C ends it.
+    Needs the package eigenshape-studio. Ctrl-C ends it.
 
     For instance: eigenshape studio scan.ply --index my-index
     """

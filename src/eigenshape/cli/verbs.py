@@ -30,8 +30,8 @@ VERBS = {
     "a labeled camel.",
     "deform": "Bend, twist or stretch a mesh: a region is turned or moved, and the rest follows "
     "smoothly.",
-    "stability": "Compare two shapes: how close they lie, what changes in their spectra, and which "
-    "heat times to trust.",
+    "stability": "Compare two shapes: how close they are, how their spectra change, which heat times "
+    "to trust.",
     "index": "Keep an index of shapes: add meshes, list and remove shapes, check, compact, export "
     "and merge.",
     "query": "Find the shapes of an index that are most like a scan, and which features "
@@ -82,7 +82,10 @@ class Verb(TyperCommand):
                 warnings.showwarning = _print_warning
                 return super().invoke(ctx)
         except (EigenshapeError, OSError) as error:
-            err.print(f"[bold red]error:[/] {escape_text(error)}")
+            text = str(error)
+            if isinstance(error, OSError) and error.filename is not None:
+                text = f"{error.filename}: {error.strerror}"  # without the number of the error
+            err.print(f"[bold red]error:[/] {escape_text(text)}")
             raise typer.Exit(1) from error
         except KeyboardInterrupt as error:
             err.print("stopped; what was finished is kept")

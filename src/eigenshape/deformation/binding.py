@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -12,6 +11,7 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import Integer
 from eigenshape.deformation.region import Region, region_mask, require_boundary
 from eigenshape.deformation.rig import EigenRig
 from eigenshape.deformation.rigidity import FreePart, free_part, require_fixed_vertices
@@ -80,7 +80,7 @@ def bind(
     regions: Sequence[Region],
     *,
     fixed: Region | None = None,
-    n_modes: SupportsIndex | None = None,
+    n_modes: Integer | None = None,
 ) -> Binding:
     """Compute by how much each vertex follows the handles of some regions.
 

@@ -1,9 +1,9 @@
 """Bend a shape: regions follow handles, and the rest follows smoothly."""
 
 from collections.abc import Sequence
-from typing import SupportsIndex
 
 from eigenshape._arguments import require_type
+from eigenshape._typing import Integer
 from eigenshape.deformation.binding import Binding, bind
 from eigenshape.deformation.graded_bend import bend_graded, bend_uncrossed
 from eigenshape.deformation.handles import Handle, require_handle, require_handles
@@ -21,7 +21,7 @@ def deform(
     *,
     fixed: Region | None = None,
     mode: Mode = "graded",
-    n_modes: SupportsIndex | None = None,
+    n_modes: Integer | None = None,
 ) -> TriangleMesh:
     """Rotate or translate a region of a shape; the rest follows smoothly (thesis chapter 6).
 

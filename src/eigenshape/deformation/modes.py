@@ -1,4 +1,4 @@
-"""The methods by which a region is bent, by name. The command line reads them, so this module is light."""
+"""The names of the methods that bend a region, in a light module: the command line reads it."""
 
 from typing import Literal, cast, get_args
 

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -14,7 +13,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.deformation.rigidity import EdgeWeights, edge_weights
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
@@ -170,7 +169,7 @@ def project_on_modes(
 
 
 @one_blas_thread()
-def eigen_skeleton(rig: EigenRig, n_modes: SupportsIndex) -> Float[np.ndarray, "n 3"]:
+def eigen_skeleton(rig: EigenRig, n_modes: Integer) -> Float[np.ndarray, "n 3"]:
     """Compute the least-squares fit of a shape by its lowest modes (thesis 6.1.1).
 
     Parameters

@@ -127,7 +127,7 @@ def _settle(covariance, turns, i):
 @njit
 @no_type_check
 def turn_edges(vertices, starts, others, weights, rest, turns, sums):
-    """Write Σ_j w_ij ((R_i + R_j)/2 - 1) (x_i - x_j) to `sums` for some vertices; 0 without rotation."""
+    """Write Σ_j w_ij ((R_i + R_j)/2 - 1) (x_i - x_j) to `sums` for some vertices."""
     n = len(turns)
     spins = np.empty((n, 3, 3))  # (R - 1)/2
     for i in range(n):

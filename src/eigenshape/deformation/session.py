@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
@@ -11,6 +10,7 @@ from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr
+from eigenshape._typing import Integer
 from eigenshape.deformation.binding import Binding, bind
 from eigenshape.deformation.deform import bend
 from eigenshape.deformation.edits import Edit, Move, apply_edit, carry_edit
@@ -28,7 +28,8 @@ class DeformationSession:
     """Edit a rigged shape step by step.
 
     `drag` starts an edit, `preview` shows it, `commit` applies it, and `undo` and `redo` restore
-    earlier and later poses exactly. A session is the one mutable object of the library; use it from one thread.
+    earlier and later poses exactly. A session is the one mutable object of the library; use it
+    from one thread.
 
     Parameters
     ----------
@@ -124,7 +125,7 @@ class DeformationSession:
         handle: Handle,
         *,
         fixed: Region | None = None,
-        n_modes: SupportsIndex | None = None,
+        n_modes: Integer | None = None,
     ) -> Float[np.ndarray, "n 3"]:
         """Move one region for as long as a handle is dragged.
 
@@ -158,7 +159,7 @@ class DeformationSession:
         moves: Iterable[Move],
         *,
         fixed: Region | None = None,
-        n_modes: SupportsIndex | None = None,
+        n_modes: Integer | None = None,
     ) -> Float[np.ndarray, "n 3"]:
         """Move several regions for as long as their handles are dragged.
 

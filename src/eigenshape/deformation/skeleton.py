@@ -33,6 +33,21 @@ class SkeletonResponse:
     --------
     skeleton_response : Compute the response.
     move_skeleton : Apply motions.
+
+    Examples
+    --------
+    A viewer can apply the formula itself. For a translation, R - 1 is zero:
+
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> binding = es.deformation.bind(es.rig_shape(mesh), [mesh.vertices[:, 2] > 0.2])
+    >>> response = es.deformation.skeleton_response(binding)
+    >>> motion = np.column_stack([np.zeros((3, 3)), [0, 0, 0.5]])  # [R - 1 | t]
+    >>> moved = response.skeleton + response.weights[0] @ motion.T
+    >>> handle = es.Translation([0, 0, 0.5])
+    >>> bool(np.allclose(moved, es.deformation.move_skeleton(response, [handle])))
+    True
     """
 
     skeleton: Float[np.ndarray, "n 3"]

@@ -46,6 +46,21 @@ class DetailedSkeleton:
     --------
     detailed_skeleton : Prepare a binding.
     eigen_deformation : Move the handles.
+
+    Examples
+    --------
+    Prepare once, then move the handle as often as needed:
+
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> top = mesh.vertices[:, 2] > 0.2
+    >>> binding = es.deformation.bind(es.rig_shape(mesh), [top])
+    >>> skeleton = es.deformation.detailed_skeleton(binding)
+    >>> skeleton.fine.shape
+    (162, 3)
+    >>> pulled = es.deformation.eigen_deformation(skeleton, [es.Translation([0, 0, 0.5])])
+    >>> bool(pulled[top, 2].mean() > mesh.vertices[top, 2].mean())
+    True
     """
 
     binding: Binding

@@ -1,7 +1,5 @@
 """Deformation transfer: bend one shape as another one was bent (thesis chapter 7)."""
 
-from typing import SupportsIndex
-
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
@@ -10,6 +8,7 @@ from eigenshape._arguments import require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import Integer
 from eigenshape.deformation.distortion import require_poses
 from eigenshape.deformation.rigidity import edge_weights, fit_turns, free_part, nearest_rotations
 from eigenshape.deformation.rigidity_loops import turn_edges
@@ -29,7 +28,7 @@ def transfer_deformation(
     target: MeshLike,
     mapping: FunctionalMap,
     *,
-    n_modes: SupportsIndex | None = None,
+    n_modes: Integer | None = None,
 ) -> TriangleMesh:
     """Bend a shape in the way another shape was bent.
 

@@ -1,4 +1,4 @@
-"""The default cut of part trees. The command line reads it for its help, so this module is light."""
+"""The default cut of part trees, in a light module: the command line reads it for its help."""
 
 # Least persistence of a part: the share of a temperature difference to its parent that is left
 # after diffusion. A larger value finds fewer parts. The best of 0.1 to 0.4 on the tuning half of

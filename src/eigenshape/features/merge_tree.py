@@ -126,7 +126,7 @@ def _join_basins(
     rank[vertex] = np.arange(n)
     corners = np.empty((n_faces, 3), dtype=kind)
     find_corners(mesh.faces, rank, corners)
-    # The higher vertex is the highest of the face for two of its sides, the middle one for the third.
+    # The higher vertex is the highest of the face for two sides, the middle one for the third.
     n_sides = 2 * np.bincount(corners[:, 0], minlength=n)
     n_sides += np.bincount(corners[:, 1], minlength=n)
     starts = np.concatenate([[0], np.cumsum(n_sides)])

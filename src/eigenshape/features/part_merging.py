@@ -41,15 +41,15 @@ def part_tree(mesh: MeshLike, spectrum: Spectrum, *, time: float = PART_TIME) ->
         ‖e^{-tL} u‖² = |R||S| / (|R| + |S|) · Σ_i e^{-2tλ_i} (mean of φ_i over R - mean over S)²,
 
     between 0 and 1. It is low if one part is small, because a small part cools or warms at once,
-    and high if the passage between them is narrow or conducts badly. It is also the cost of a merge
-    in Ward's clustering (1963) of the faces, embedded by e^{-tλ} φ.
+    and high if the passage between them is narrow or conducts little heat. It is also the cost of a
+    merge in Ward's clustering (1963) of the faces, embedded by e^{-tλ} φ.
 
     Parameters
     ----------
     mesh : MeshLike
     spectrum : Spectrum
-        Spectrum of any Laplacian of the mesh. That of `part_spectrum` conducts badly across concave
-        creases.
+        Spectrum of any Laplacian of the mesh. That of `part_spectrum` conducts little heat across
+        concave creases.
     time : float
         The diffusion time t, as a share of the area.
 

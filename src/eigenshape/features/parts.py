@@ -38,7 +38,7 @@ class PartDecomposition:
     mesh : TriangleMesh
         The given mesh; if it is closed, with its faces oriented outward.
     spectrum : Spectrum
-        Spectrum of a Laplacian that conducts badly across concave creases. Fragments have no
+        Spectrum of a Laplacian that conducts little heat across concave creases. Fragments have no
         eigenpairs of their own; the eigenvectors are 0 there.
     heat : (n,) float
         Heat kernel signature whose maxima are the seeds of parts, in 1/length².
@@ -143,7 +143,7 @@ def find_parts(
 def part_spectrum(
     mesh: MeshLike, *, n_modes: int = N_MODES, progress: Progress | None = None
 ) -> Spectrum:
-    """Compute the lowest eigenpairs of a Laplacian that conducts badly across concave creases.
+    """Compute the eigenpairs of a Laplacian that conducts little heat across concave creases.
 
     Fragments (`fragment_vertices`) are left out of the problem, and the eigenvectors are 0 there.
 

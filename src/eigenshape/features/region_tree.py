@@ -97,6 +97,19 @@ class PartTree(RegionTree):
     --------
     part_tree : Compute the tree.
     find_parts : Compute the tree of a mesh and cut it.
+
+    Examples
+    --------
+    `find_parts` cuts its tree once; the tree can be cut again without new computation:
+
+    >>> import eigenshape as es
+    >>> two_balls = es.geometry.disjoint_union(es.icosphere(2), es.icosphere(2))
+    >>> tree = es.find_parts(two_balls).tree
+    >>> whole = es.segment(tree, persistence=1)  # only what no heat connects
+    >>> whole.features.persistence
+    array([inf, inf])
+    >>> whole.labels.shape == (two_balls.n_faces,)
+    True
     """
 
     __repr__ = short_repr

@@ -1,13 +1,12 @@
 """The average geodesic distance: how far each vertex is from the rest of the surface."""
 
-from typing import SupportsIndex
-
 import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidShapeError
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.geodesic import farthest_points
 from eigenshape.geometry.requirements import require_describable
@@ -21,7 +20,7 @@ N_BASES = 150
 
 @one_blas_thread()
 def average_geodesic_distance(
-    mesh: MeshLike, *, n_bases: SupportsIndex = N_BASES
+    mesh: MeshLike, *, n_bases: Integer = N_BASES
 ) -> Float[np.ndarray, " n"]:
     """Compute the mean geodesic distance from each vertex to all points of the surface.
 

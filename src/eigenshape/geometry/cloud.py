@@ -1,7 +1,7 @@
 """Point clouds: points that sample a manifold of known dimension."""
 
 from dataclasses import dataclass
-from typing import SupportsIndex, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Float
@@ -9,7 +9,7 @@ from jaxtyping import Float
 from eigenshape._arrays import finite_rows, freeze, whole_number
 from eigenshape._errors import InvalidShapeError
 from eigenshape._text import html_repr
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.simplicial import Mesh
 
 
@@ -48,7 +48,7 @@ class PointCloud:
 
     _repr_html_ = html_repr
 
-    def __init__(self, points: ArrayLike, dim: SupportsIndex = 2) -> None:
+    def __init__(self, points: ArrayLike, dim: Integer = 2) -> None:
         coordinates = finite_rows(points, "points")
         if not coordinates.size:
             raise InvalidShapeError("A point cloud must have points; it has none.")

@@ -1,7 +1,5 @@
 """Quadrature weights of a point cloud: the share of the manifold that each point represents."""
 
-from typing import SupportsIndex
-
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError, cKDTree
@@ -9,6 +7,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError, cKDTree
 from eigenshape._arguments import require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidShapeError, try_auto
+from eigenshape._typing import Integer
 from eigenshape.geometry.cell_loops import cell_areas
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.quadrature import Quadrature
@@ -24,7 +23,7 @@ FLATTEST = 1e-7
 POINTS_AT_ONCE = 4096
 
 
-def cloud_quadrature(cloud: PointCloud, *, n_neighbors: SupportsIndex | None = None) -> Quadrature:
+def cloud_quadrature(cloud: PointCloud, *, n_neighbors: Integer | None = None) -> Quadrature:
     """Compute the share of the manifold that each point of a cloud represents.
 
     The neighbors of a point are placed in the tangent plane that fits them best, each at its true

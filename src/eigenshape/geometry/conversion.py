@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Sequence
-from typing import Any, Literal, Protocol, SupportsIndex, TypeAlias, runtime_checkable
+from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from typing_extensions import TypeAliasType
@@ -10,7 +10,7 @@ from typing_extensions import TypeAliasType
 from eigenshape._arguments import attribute_of, describe_value
 from eigenshape._arrays import as_array
 from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
@@ -224,7 +224,7 @@ def from_arrays(
     points: ArrayLike,
     simplices: ArrayLike | None = None,
     *,
-    dim: SupportsIndex = 2,
+    dim: Integer = 2,
     cells: Cells | None = None,
 ) -> Shape:
     """Build a shape from arrays of points and simplices.

@@ -1,7 +1,6 @@
 """Quadrature: points with weights, so that ∫ f over a shape is about Σ w_i f(x_i)."""
 
 from dataclasses import dataclass
-from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
@@ -9,7 +8,7 @@ from jaxtyping import Float
 from eigenshape._arrays import finite_rows, freeze, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._text import html_repr
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import dual_volumes
@@ -56,7 +55,7 @@ class Quadrature:
 
     _repr_html_ = html_repr
 
-    def __init__(self, points: ArrayLike, weights: ArrayLike, dim: SupportsIndex) -> None:
+    def __init__(self, points: ArrayLike, weights: ArrayLike, dim: Integer) -> None:
         coordinates = finite_rows(points, "points")
         if not coordinates.size:
             raise InvalidShapeError("A quadrature must have points; it has none.")
@@ -114,7 +113,7 @@ def mesh_quadrature(mesh: MeshLike) -> Quadrature:
     return Quadrature(mesh.points, dual_volumes(mesh), mesh.dim)
 
 
-def uniform_quadrature(points: ArrayLike, dim: SupportsIndex) -> Quadrature:
+def uniform_quadrature(points: ArrayLike, dim: Integer) -> Quadrature:
     """Give each of n points the weight 1/n, as for a uniform random sample (thesis 2.2).
 
     Parameters
@@ -146,7 +145,7 @@ def uniform_quadrature(points: ArrayLike, dim: SupportsIndex) -> Quadrature:
     return Quadrature(coordinates, np.full(len(coordinates), 1 / max(len(coordinates), 1)), dim)
 
 
-def sphere_quadrature(n: SupportsIndex) -> Quadrature:
+def sphere_quadrature(n: Integer) -> Quadrature:
     """Return a quadrature of the unit sphere that is exact for polynomials up to degree 2n - 1.
 
     The product of a Gauss rule with n latitudes and 2n equal steps of longitude.
@@ -186,7 +185,7 @@ def sphere_quadrature(n: SupportsIndex) -> Quadrature:
 
 
 def torus_quadrature(
-    n_around: SupportsIndex, n_across: SupportsIndex, *, outer: float = 1.0, inner: float = 0.4
+    n_around: Integer, n_across: Integer, *, outer: float = 1.0, inner: float = 0.4
 ) -> Quadrature:
     """Return a quadrature of a torus, with equal steps in both angles.
 

@@ -157,7 +157,7 @@ def simplex_volumes(mesh: MeshLike) -> Float[np.ndarray, " s"]:
 
 
 def dual_volumes(mesh: MeshLike) -> Float[np.ndarray, " n"]:
-    """Compute the volume at each point: 1/(m+1) of that of its simplices (A_j of thesis 2.1).
+    """Compute the volume at each point: 1/(m+1) of the volume of its simplices (A_j of thesis 2.1).
 
     Parameters
     ----------

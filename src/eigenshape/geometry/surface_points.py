@@ -1,7 +1,6 @@
 """Points anywhere on a mesh, given by a simplex and barycentric coordinates."""
 
 from dataclasses import dataclass
-from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -9,6 +8,7 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import freeze, whole_number
 from eigenshape._text import html_repr, short_repr
+from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.simplices import require_volumes, scaled_corners, volumes
 from eigenshape.geometry.simplicial import Mesh
@@ -57,7 +57,7 @@ class SurfacePoints:
         return len(self.points)
 
 
-def sample_surface(mesh: MeshLike, n: SupportsIndex, *, rng: np.random.Generator) -> SurfacePoints:
+def sample_surface(mesh: MeshLike, n: Integer, *, rng: np.random.Generator) -> SurfacePoints:
     """Draw random points on a mesh, uniformly by volume and independently (thesis 4.1).
 
     Parameters

@@ -2,11 +2,12 @@
 
 from importlib import import_module
 from types import ModuleType
-from typing import Any, SupportsIndex
+from typing import Any
 
 import numpy as np
 
 from eigenshape._errors import InvalidShapeError, MissingExtraError
+from eigenshape._typing import Integer
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
@@ -46,7 +47,7 @@ def to_arrays(shape: ShapeLike) -> tuple[np.ndarray, np.ndarray | None]:
     return shape.points.copy(), None if isinstance(shape, PointCloud) else shape.simplices.copy()
 
 
-def from_trimesh(mesh: Any, *, dim: SupportsIndex = 2) -> TriangleMesh | PointCloud:
+def from_trimesh(mesh: Any, *, dim: Integer = 2) -> TriangleMesh | PointCloud:
     """Convert a mesh or a point cloud of trimesh. Vertices keep their order.
 
     Parameters
@@ -128,7 +129,7 @@ def to_trimesh(shape: ShapeLike) -> Any:
     return trimesh.Trimesh(shape.vertices.copy(), shape.faces.copy(), process=False)
 
 
-def from_pyvista(dataset: Any, *, dim: SupportsIndex = 2) -> Shape:
+def from_pyvista(dataset: Any, *, dim: Integer = 2) -> Shape:
     """Convert a PolyData or UnstructuredGrid of PyVista.
 
     The simplices of the highest dimension are taken, or the points if there are none. Polylines

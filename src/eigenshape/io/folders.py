@@ -8,10 +8,11 @@ from dataclasses import replace
 from hashlib import sha256
 from math import isfinite
 from pathlib import Path
-from typing import Any, SupportsIndex
+from typing import Any
 
 from eigenshape._arrays import whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
+from eigenshape._typing import Integer
 from eigenshape._workers import Item, Workers
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.io.parsing import MESH_FORMATS
@@ -26,12 +27,12 @@ def find_items(
     sources: str | Path | Sequence[str | Path],
     *,
     labels: str | Path | None = None,
-    part: tuple[SupportsIndex, SupportsIndex] | None = None,
+    part: tuple[Integer, Integer] | None = None,
 ) -> list[Item]:
     """Find the mesh files of folders and of the folders in them.
 
     A shape is named by its path below the given folder, without the suffix of the file unless two
-    files differ in nothing else. Its class is the name of the folder that holds it; a file that
+    files differ only in the suffix. Its class is the name of the folder that holds it; a file that
     lies directly in the given folder, or is given itself, has none.
 
     Parameters
@@ -41,11 +42,11 @@ def find_items(
     labels : path, optional
         Table of comma-separated values with a header. The column ``name`` holds names of shapes or
         paths of files below the folder. ``label`` is the class, ``tags`` are separated by
-        semicolons, and every other column is an attribute: a number where it reads as one. Empty
+        semicolons, and every other column is an attribute, a number where the text is one. Empty
         cells are left out.
     part : pair of int, optional
         ``(i, n)``: only part i of n, counted from 1, so that n jobs share the work. The name of a
-        shape decides its part, so jobs agree without talking to each other.
+        shape determines its part, so the jobs need not communicate.
 
     Returns
     -------
@@ -95,7 +96,7 @@ def index_folder(  # noqa: PLR0913 - one keyword for each choice of a batch
     *,
     labels: str | Path | None = None,
     repairs: Sequence[str] = ("auto",),
-    n_views: SupportsIndex | None = None,
+    n_views: Integer | None = None,
     workers: Workers = Workers(),
     callback: Callback | None = None,
 ) -> ShapeIndex:
@@ -190,7 +191,7 @@ def _different_items(items: Sequence[Item]) -> list[Item]:
     return list(by_name.values())
 
 
-def _part_of(items: Sequence[Item], part: SupportsIndex, n_parts: SupportsIndex) -> list[Item]:
+def _part_of(items: Sequence[Item], part: Integer, n_parts: Integer) -> list[Item]:
     count = whole_number(n_parts, "The number of parts", 1)
     number = whole_number(part, "The number of a part", 1, count)
     return [

@@ -92,7 +92,8 @@ def read_mesh(
 def _require_surface(points: np.ndarray, simplices: np.ndarray) -> None:
     if not len(simplices):
         raise FileFormatError(
-            f"A mesh file must hold triangles; it holds {len(points)} points and no face, and no repair makes faces."
+            f"A mesh file must hold triangles; it holds {len(points)} points and no face. "
+            "read_points reads points."
         )
     n_corners, dim = simplices.shape[1], points.shape[1]
     if (n_corners, dim) != (3, 3):

@@ -1,7 +1,6 @@
 """Read and write shapes of any kind. The content of a file is checked before a shape is returned."""
 
 from pathlib import Path
-from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
@@ -9,6 +8,7 @@ from jaxtyping import Float
 from eigenshape._arguments import require_type
 from eigenshape._errors import FileFormatError, InvalidShapeError
 from eigenshape._files import read_regular, replace_file
+from eigenshape._typing import Integer
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
@@ -26,7 +26,7 @@ def read_shape(
     path: str | Path,
     *,
     file_format: str | None = None,
-    dim: SupportsIndex = 2,
+    dim: Integer = 2,
     drop_missing: bool = False,
     cells: CellKind | None = None,
 ) -> Shape:
@@ -121,7 +121,7 @@ def read_points(
     path: str | Path,
     *,
     file_format: str | None = None,
-    dim: SupportsIndex = 2,
+    dim: Integer = 2,
     drop_missing: bool = False,
 ) -> PointCloud:
     r"""Read a point cloud from a file. Faces and cells are ignored.

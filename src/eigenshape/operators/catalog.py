@@ -75,10 +75,10 @@ OPERATORS: dict[str, Operator] = {
         "linear elements on intrinsic triangles",
     ),
     "mesh": Operator(
-        mesh_laplacian, MESHES, (*KERNEL, "distance"), "Gaussian kernel, weighed by volumes"
+        mesh_laplacian, MESHES, (*KERNEL, "distance"), "Gaussian kernel, weighted by volumes"
     ),
     "point-cloud": Operator(
-        point_cloud_laplacian, (PointCloud,), KERNEL, "Gaussian kernel, weighed in tangent planes"
+        point_cloud_laplacian, (PointCloud,), KERNEL, "Gaussian kernel, weights from tangent planes"
     ),
     "combinatorial": Operator(
         partial(graph_laplacian, kind="combinatorial"), GRAPHS, (), "edges of weight 1"
@@ -87,7 +87,7 @@ OPERATORS: dict[str, Operator] = {
         partial(graph_laplacian, kind="weighted"),
         GRAPHS,
         (),
-        "edges weigh what they do, or 1/length",
+        "weights of the graph, or 1/length on a mesh",
     ),
     "normalized": Operator(
         partial(graph_laplacian, kind="normalized"), GRAPHS, (), "eigenvalues in 0..2"

@@ -1,7 +1,5 @@
 """Local Delaunay triangulations of point clouds, and their tufted cover."""
 
-from typing import SupportsIndex
-
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
@@ -9,6 +7,7 @@ from scipy.spatial import cKDTree
 from eigenshape._arguments import require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._typing import Integer
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.simplices import size_one
 from eigenshape.operators import cloud_loops
@@ -26,7 +25,7 @@ N_NEIGHBORS = 30
 
 
 def local_triangles(
-    cloud: PointCloud, *, n_neighbors: SupportsIndex | None = None
+    cloud: PointCloud, *, n_neighbors: Integer | None = None
 ) -> Int[np.ndarray, "f 3"]:
     """List the triangles around each point of a cloud that samples a surface.
 
@@ -110,7 +109,7 @@ def local_triangles(
 
 
 def cloud_cover(
-    cloud: PointCloud, mollify: float = MOLLIFY, n_neighbors: SupportsIndex | None = None
+    cloud: PointCloud, mollify: float = MOLLIFY, n_neighbors: Integer | None = None
 ) -> tuple[Triangulation, float]:
     """Return the Delaunay triangles of the tufted cover of all local triangles, and their unit.
 

@@ -1,11 +1,10 @@
 """Quadratic and cubic finite elements, on simplices of any dimension."""
 
-from typing import SupportsIndex
-
 import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arrays import whole_number
+from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import boundary_facets
 from eigenshape.geometry.requirements import require_sound
@@ -17,7 +16,7 @@ from eigenshape.operators.laplacian import Laplacian
 HIGHEST = 3  # order of elements; the tests fit the convergence of orders 1 to 3
 
 
-def fem_laplacian(mesh: MeshLike, order: SupportsIndex = 2) -> Laplacian:
+def fem_laplacian(mesh: MeshLike, order: Integer = 2) -> Laplacian:
     """Build the finite-element Laplacian with Lagrange elements of order 1, 2 or 3.
 
     On flat domains with smooth eigenfunctions the eigenvalues converge with twice the order of the
@@ -65,7 +64,7 @@ def fem_laplacian(mesh: MeshLike, order: SupportsIndex = 2) -> Laplacian:
     )
 
 
-def fem_nodes(mesh: MeshLike, order: SupportsIndex = 2) -> Float[np.ndarray, "nodes d"]:
+def fem_nodes(mesh: MeshLike, order: Integer = 2) -> Float[np.ndarray, "nodes d"]:
     """Return the positions of the nodes of `fem_laplacian`.
 
     The first nodes are the points of the mesh, followed by nodes on edges, then in faces.
@@ -99,7 +98,7 @@ def fem_nodes(mesh: MeshLike, order: SupportsIndex = 2) -> Float[np.ndarray, "no
     return mesh.points[_names(mesh, order)].mean(axis=1)
 
 
-def fem_boundary_nodes(mesh: MeshLike, order: SupportsIndex = 2) -> Int[np.ndarray, " b"]:
+def fem_boundary_nodes(mesh: MeshLike, order: Integer = 2) -> Int[np.ndarray, " b"]:
     """Return the nodes of `fem_laplacian` on the boundary, which the Dirichlet condition fixes.
 
     Parameters
@@ -147,7 +146,7 @@ def fem_boundary_nodes(mesh: MeshLike, order: SupportsIndex = 2) -> Int[np.ndarr
     return np.flatnonzero([tuple(row) in wanted for row in names.tolist()])
 
 
-def _names(mesh: Mesh, order: SupportsIndex) -> Int[np.ndarray, "nodes order"]:
+def _names(mesh: Mesh, order: Integer) -> Int[np.ndarray, "nodes order"]:
     degree = whole_number(order, "order", 1, HIGHEST)
     require_simplices_everywhere(mesh)
     return elements.number_nodes(mesh.simplices, degree)[0]

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from math import gamma
-from typing import Literal, SupportsIndex, TypedDict, Unpack
+from typing import Literal, TypedDict, Unpack
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
@@ -11,7 +11,7 @@ from scipy.sparse.linalg import LinearOperator
 from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values
 from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.cloud_measure import cloud_quadrature
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -219,7 +219,7 @@ def pointwise_time(shape: MeshLike) -> float:
 def gaussian_laplacian(
     points: ArrayLike,
     t: float,
-    dim: SupportsIndex,
+    dim: Integer,
     *,
     correct: Correction | None = None,
     form: Form = "literal",

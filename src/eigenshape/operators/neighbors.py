@@ -1,7 +1,5 @@
 """Graphs of points and their nearest neighbors."""
 
-from typing import SupportsIndex
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
@@ -9,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from eigenshape._arrays import finite_rows, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.graph import adjacency_matrix
 
@@ -17,7 +15,7 @@ SPARE = 8  # neighbors requested beyond those wanted, so that most ties are foun
 
 
 def neighbor_graph(
-    points: ArrayLike, n_neighbors: SupportsIndex, *, t: float | None = None
+    points: ArrayLike, n_neighbors: Integer, *, t: float | None = None
 ) -> sp.csr_array:
     """Build the graph of nearest neighbors of points.
 

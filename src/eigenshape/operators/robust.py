@@ -1,12 +1,11 @@
 """The robust Laplacian: weights ≥ 0 on any triangles, manifold or not."""
 
-from typing import SupportsIndex
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._typing import Integer
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
@@ -35,7 +34,7 @@ from eigenshape.operators.tufted import (
 
 
 def robust_laplacian(
-    mesh: ShapeLike, *, mollify: float = MOLLIFY, n_neighbors: SupportsIndex | None = None
+    mesh: ShapeLike, *, mollify: float = MOLLIFY, n_neighbors: Integer | None = None
 ) -> Laplacian:
     """Build the Laplacian of a triangle mesh of any quality, manifold or not, or of points.
 

@@ -39,6 +39,22 @@ class Panel:
     See Also
     --------
     figure_contact_sheet : Draw panels.
+
+    Examples
+    --------
+    Show two shapes in one picture, with corresponding halves in the same color:
+
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> panels = []
+    >>> for title, mesh in [("ball", es.icosphere(1)), ("ring", es.shapes.torus(12, 6))]:
+    ...     heights = mesh.vertices[mesh.faces].mean(axis=1)[:, 2]
+    ...     halves = (heights > heights.mean()).astype(int)
+    ...     highest = mesh.vertices[:, 2].argmax()
+    ...     panels.append(es.plot.Panel(mesh, title, halves, np.array([highest])))
+    >>> figure = es.plot.figure_contact_sheet(panels[0], panels[1:])
+    >>> [axes.get_title() for axes in figure.axes if axes.get_title()]
+    ['ball', 'ring']
     """
 
     mesh: TriangleMesh | None

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import SubFigure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, NullFormatter
 
 from eigenshape._arguments import require_type
 from eigenshape.geometry.conversion import ShapeLike, as_shape
@@ -128,8 +128,12 @@ def _draw_times(axes: Axes, report: StabilityReport) -> None:
             report.times.high,
             color=TRUSTED,
             zorder=0,
-            label="heat times to trust",
+            label="heat times to trust (green)",
         )
+    # The labels of a logarithmic axis overlap if the times span less than a decade.
+    shown = times[np.linspace(0, len(times) - 1, min(len(times), 4)).round().astype(int)]
+    axes.set_xticks(shown, [f"{time:.3g}" for time in shown])
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_xlabel("heat time t, length²")
     axes.set_ylabel("largest change / last eigenvalue")
     axes.set_title(

@@ -88,6 +88,21 @@ class DepthScan:
         For each vertex, the face of the shape that is visible in its pixel.
     pixels : (n, 2) int
         Column and row of the pixel of each vertex, counted to the right and upward.
+
+    Examples
+    --------
+    A depth camera sees one side of a sphere; each vertex of the scan remembers what it shows:
+
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(2)
+    >>> camera = es.scans.DepthCamera(resolution=24, noise=0, dropout=0, n_holes=0)
+    >>> scan = es.scans.simulate_scan(ball, np.random.default_rng(0), view=[0, 0, 1], camera=camera)
+    >>> bool(scan.mesh.vertices[:, 2].min() > 0)
+    True
+    >>> seen = np.unique(scan.source_faces)  # the faces that the camera saw
+    >>> len(seen) < ball.n_faces / 2
+    True
     """
 
     mesh: TriangleMesh

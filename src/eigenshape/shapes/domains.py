@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from itertools import permutations
-from typing import SupportsIndex
 
 import numpy as np
 from scipy.spatial import Delaunay
@@ -10,13 +9,14 @@ from scipy.spatial import Delaunay
 from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import Integer
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 
 MOST_SEGMENTS = 10**6  # of an interval or circle: more than any solve in this library can use
 
 
-def interval(n: SupportsIndex = 50, length: float = 1.0) -> SimplicialMesh:
+def interval(n: Integer = 50, length: float = 1.0) -> SimplicialMesh:
     """Make a mesh of an interval, of n equal segments.
 
     Parameters
@@ -54,7 +54,7 @@ def interval(n: SupportsIndex = 50, length: float = 1.0) -> SimplicialMesh:
     )
 
 
-def circle(n: SupportsIndex = 50, radius: float = 1.0) -> SimplicialMesh:
+def circle(n: Integer = 50, radius: float = 1.0) -> SimplicialMesh:
     """Make a mesh of a circle: a regular polygon of n segments with its points on the circle.
 
     Parameters
@@ -92,7 +92,7 @@ def circle(n: SupportsIndex = 50, radius: float = 1.0) -> SimplicialMesh:
     return SimplicialMesh(points, np.column_stack([steps, (steps + 1) % count]))
 
 
-def disc(n_rings: SupportsIndex = 10, radius: float = 1.0) -> TriangleMesh:
+def disc(n_rings: Integer = 10, radius: float = 1.0) -> TriangleMesh:
     """Make a triangle mesh of a flat disc, with 6j vertices on ring j.
 
     Parameters
@@ -151,8 +151,8 @@ def _band(j: int) -> np.ndarray:
 
 
 def irregular_grid(
-    n_x: SupportsIndex = 20,
-    n_y: SupportsIndex = 20,
+    n_x: Integer = 20,
+    n_y: Integer = 20,
     *,
     jitter: float = 0.3,
     rng: np.random.Generator,
@@ -208,9 +208,9 @@ def irregular_grid(
 
 
 def box(
-    n_x: SupportsIndex = 6,
-    n_y: SupportsIndex = 6,
-    n_z: SupportsIndex = 6,
+    n_x: Integer = 6,
+    n_y: Integer = 6,
+    n_z: Integer = 6,
     *,
     sides: Sequence[float] = (1.0, 1.0, 1.0),
 ) -> SimplicialMesh:
@@ -274,7 +274,7 @@ def _kuhn(counts: tuple[int, ...], turned: int = 0) -> np.ndarray:
     return np.concatenate(walks)
 
 
-def ball(n: SupportsIndex = 8) -> SimplicialMesh:
+def ball(n: Integer = 8) -> SimplicialMesh:
     """Make a mesh of tetrahedra of the unit ball.
 
     Parameters

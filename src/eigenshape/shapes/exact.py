@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 from math import isqrt
-from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
@@ -13,7 +12,7 @@ from scipy.special import comb, eval_legendre, jn_zeros, jnp_zeros, spherical_jn
 from eigenshape._arrays import positive_values, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.operators.choices import Condition
 
 # Nodes of the Gauss rule of `sphere_functional_eigenvalues`: enough for harmonics of degree 300
@@ -27,7 +26,7 @@ MOST_HARMONICS = 10**5  # up to degree 316, which N_GAUSS_NODES is made for
 MOST_FREQUENCY = 1000
 
 
-def sphere_eigenvalues(k: SupportsIndex, dim: SupportsIndex = 2) -> Float[np.ndarray, " k"]:
+def sphere_eigenvalues(k: Integer, dim: Integer = 2) -> Float[np.ndarray, " k"]:
     """Return the first eigenvalues of the unit m-sphere: l(l + m - 1) for l = 0, 1, ...
 
     The multiplicity is the number of harmonic polynomials of degree l in m + 1 variables (Chavel
@@ -73,7 +72,7 @@ def sphere_eigenvalues(k: SupportsIndex, dim: SupportsIndex = 2) -> Float[np.nda
 
 
 @one_blas_thread()
-def sphere_functional_eigenvalues(k: SupportsIndex, t: float) -> Float[np.ndarray, " k"]:
+def sphere_functional_eigenvalues(k: Integer, t: float) -> Float[np.ndarray, " k"]:
     """Return eigenvalues of the functional Laplacian 𝓛_t on the unit sphere (thesis eq. 3.1).
 
     Parameters
@@ -101,8 +100,8 @@ def sphere_functional_eigenvalues(k: SupportsIndex, t: float) -> Float[np.ndarra
 
     Notes
     -----
-    A kernel that depends on the distance only multiplies all harmonics of one degree by one number
-    (Funk and Hecke). With |x - y|² = 2 - 2s and u = (1 - s)/2t the number of 𝓛_t for degree l is
+    A kernel that depends only on the distance multiplies all harmonics of one degree by one number
+    (Funk and Hecke). With |x - y|² = 2 - 2s and u = (1 - s)/2t the eigenvalue of 𝓛_t for degree l is
     (1/t) ∫ exp(-u) (1 - P_l(1 - 2tu)) du from 0 to 1/t. The integral is computed by a Gauss rule up
     to where exp(-u) is below rounding.
 
@@ -122,7 +121,7 @@ def sphere_functional_eigenvalues(k: SupportsIndex, t: float) -> Float[np.ndarra
     return np.repeat(values, 2 * degrees + 1)[:count]
 
 
-def projective_plane_eigenvalues(k: SupportsIndex) -> Float[np.ndarray, " k"]:
+def projective_plane_eigenvalues(k: Integer) -> Float[np.ndarray, " k"]:
     """Return the first eigenvalues of the projective plane: l(l + 1) for even l, each 2l + 1 times.
 
     The projective plane is the unit sphere with antipodes identified.
@@ -158,7 +157,7 @@ def projective_plane_eigenvalues(k: SupportsIndex) -> Float[np.ndarray, " k"]:
 
 
 def box_eigenvalues(
-    k: SupportsIndex, sides: Sequence[float] = (1.0, 1.0), condition: Condition = "neumann"
+    k: Integer, sides: Sequence[float] = (1.0, 1.0), condition: Condition = "neumann"
 ) -> Float[np.ndarray, " k"]:
     """Return the first eigenvalues of a box: an interval, a rectangle, a cuboid and so on.
 
@@ -216,7 +215,7 @@ def _lowest_sums(
     return np.sort(sums)[:count]
 
 
-def flat_torus_eigenvalues(k: SupportsIndex, periods: ArrayLike) -> Float[np.ndarray, " k"]:
+def flat_torus_eigenvalues(k: Integer, periods: ArrayLike) -> Float[np.ndarray, " k"]:
     """Return the first eigenvalues of a flat torus: 4π² |ξ|² for ξ in the dual lattice.
 
     Parameters
@@ -262,7 +261,7 @@ def flat_torus_eigenvalues(k: SupportsIndex, periods: ArrayLike) -> Float[np.nda
     return 4 * np.pi**2 * np.sort(((modes @ lattice) ** 2).sum(axis=1))[:count]
 
 
-def disc_eigenvalues(k: SupportsIndex, condition: Condition = "neumann") -> Float[np.ndarray, " k"]:
+def disc_eigenvalues(k: Integer, condition: Condition = "neumann") -> Float[np.ndarray, " k"]:
     """Return the first eigenvalues of the unit disc.
 
     The eigenvalues are the squared zeros of the Bessel functions J_p for the Dirichlet condition,
@@ -309,7 +308,7 @@ def disc_eigenvalues(k: SupportsIndex, condition: Condition = "neumann") -> Floa
             return np.array(values[:count])
 
 
-def ball_eigenvalues(k: SupportsIndex, condition: Condition = "neumann") -> Float[np.ndarray, " k"]:
+def ball_eigenvalues(k: Integer, condition: Condition = "neumann") -> Float[np.ndarray, " k"]:
     """Return the first eigenvalues of the unit ball in R³.
 
     The eigenvalues are the squared zeros of the spherical Bessel functions j_l for the Dirichlet

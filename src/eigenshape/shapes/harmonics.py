@@ -1,20 +1,19 @@
 """Exact eigenfunctions of Δ, in the order of their eigenvalues in `shapes.exact`."""
 
 from math import isqrt
-from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arrays import finite_rows, freeze, whole_number
 from eigenshape._errors import InvalidShapeError
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 
 # Degrees up to 316. Beyond degree 1400 the functions divided by (1 - z²)^{m/2} overflow.
 MOST_HARMONICS = 10**5
 
 
-def sphere_harmonics(points: ArrayLike, k: SupportsIndex) -> Float[np.ndarray, "n k"]:
+def sphere_harmonics(points: ArrayLike, k: Integer) -> Float[np.ndarray, "n k"]:
     """Evaluate real spherical harmonics: eigenfunctions of the unit sphere.
 
     The functions are orthonormal with respect to area. Y_l^0 = N P_l(z), and Y_l^±m = √2 N P_l^m(z)

@@ -1,7 +1,5 @@
 """Synthetic spheres with points distributed in several ways, and the projective plane."""
 
-from typing import SupportsIndex
-
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
@@ -9,7 +7,7 @@ from scipy.spatial import ConvexHull, QhullError
 from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_rows, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.shapes.surfaces import icosphere
@@ -18,7 +16,7 @@ GOLDEN = (1 + 5**0.5) / 2  # golden ratio; steps of 1/GOLDEN of a turn never lin
 MOST_POINTS = 10**7  # the convex hull of more points takes gigabytes
 
 
-def fibonacci_sphere(n: SupportsIndex = 1000) -> TriangleMesh:
+def fibonacci_sphere(n: Integer = 1000) -> TriangleMesh:
     """Make a triangle mesh of the unit sphere with n evenly distributed points on a spiral.
 
     Parameters
@@ -51,7 +49,7 @@ def fibonacci_sphere(n: SupportsIndex = 1000) -> TriangleMesh:
     return _outward_hull(_spiral(1 - 2 * (np.arange(count) + 0.5) / count))
 
 
-def random_sphere(n: SupportsIndex = 1000, *, rng: np.random.Generator) -> TriangleMesh:
+def random_sphere(n: Integer = 1000, *, rng: np.random.Generator) -> TriangleMesh:
     """Make a triangle mesh of the unit sphere with n independent, uniformly random points.
 
     Parameters
@@ -88,7 +86,7 @@ def random_sphere(n: SupportsIndex = 1000, *, rng: np.random.Generator) -> Trian
     return _outward_hull(directions / np.linalg.norm(directions, axis=1, keepdims=True))
 
 
-def uneven_sphere(n: SupportsIndex = 1000, *, ratio: float = 4.0) -> TriangleMesh:
+def uneven_sphere(n: Integer = 1000, *, ratio: float = 4.0) -> TriangleMesh:
     """Make a triangle mesh of the unit sphere with more points near the top than near the bottom.
 
     The density of the points is a linear function of z.
@@ -149,7 +147,7 @@ def _outward_hull(points: Float[np.ndarray, "n 3"]) -> TriangleMesh:
     return TriangleMesh(points, faces)
 
 
-def three_sphere(n: SupportsIndex = 1000) -> SimplicialMesh:
+def three_sphere(n: Integer = 1000) -> SimplicialMesh:
     """Make a mesh of tetrahedra of the unit sphere in R⁴, with n evenly distributed points.
 
     Parameters
@@ -240,7 +238,7 @@ def sphere_hull(points: ArrayLike) -> SimplicialMesh:
     return SimplicialMesh(rows, hull.simplices)
 
 
-def projective_plane(level: SupportsIndex = 3) -> SimplicialMesh:
+def projective_plane(level: Integer = 3) -> SimplicialMesh:
     """Make a triangle mesh of the projective plane in R⁵: the unit sphere with antipodes joined.
 
     Parameters

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, SupportsIndex, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -12,7 +12,7 @@ from eigenshape._arrays import freeze, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.multilevel.approximate import approximate_pairs
@@ -34,7 +34,7 @@ LEAST_ACCURACY = 1e-10
 
 def solve_spectrum(  # noqa: PLR0913 - one keyword for each choice: which pairs, how, and where kept
     laplacian: Laplacian,
-    k: SupportsIndex | None = None,
+    k: Integer | None = None,
     *,
     fixed: ArrayLike | None = None,
     below: float | None = None,
@@ -195,7 +195,7 @@ def solve_spectrum(  # noqa: PLR0913 - one keyword for each choice: which pairs,
 
 def _require_fitting_options(
     method: str,
-    k: SupportsIndex | None,
+    k: Integer | None,
     above: float | None,
     below: float | None,
     accuracy: float | None,
@@ -231,7 +231,7 @@ def _require_fitting_options(
 
 
 def _requested_pairs(
-    operator: Laplacian, k: SupportsIndex | None, above: float | None, below: float | None
+    operator: Laplacian, k: Integer | None, above: float | None, below: float | None
 ) -> tuple[int, Float[np.ndarray, " 2"]]:
     """Return k, or 0 and the ends of an interval of the pencil's eigenvalues."""
     if k is not None:

@@ -171,6 +171,17 @@ class TimeRange:
     See Also
     --------
     admissible_times : Compute the range.
+
+    Examples
+    --------
+    If the points of two shapes differ too much, no heat time is reliable:
+
+    >>> import eigenshape as es
+    >>> times = es.stability.admissible_times(delta=0.2, spacing=0.1, eigenvalue=5.0)
+    >>> round(times.low, 3), round(times.high, 3), times.empty
+    (0.04, 0.1, False)
+    >>> es.stability.admissible_times(delta=1.0, spacing=0.1, eigenvalue=5.0).empty
+    True
     """
 
     low: float

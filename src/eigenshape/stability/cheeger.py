@@ -1,7 +1,6 @@
 """Estimates of the isoperimetric (Cheeger) constant of a surface: how narrow its neck is."""
 
 from dataclasses import dataclass
-from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -10,6 +9,7 @@ from eigenshape._arguments import require_type
 from eigenshape._arrays import freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
+from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
@@ -77,7 +77,7 @@ def cheeger_estimate(
     mesh: MeshLike,
     spectrum: Spectrum,
     *,
-    n_modes: SupportsIndex = N_MODES,
+    n_modes: Integer = N_MODES,
     least_curvature: float | None = None,
 ) -> CheegerEstimate:
     """Estimate the isoperimetric constant of a closed surface (thesis 4.1).

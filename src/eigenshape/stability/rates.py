@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from math import e, exp, lgamma, pi, sqrt
-from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float
@@ -11,7 +10,7 @@ from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 
 THEOREMS = ("3.1.1", "3.1.3", "3.1.4", "3.1.5", "4.1.1", "4.3.1", "lipschitz", "dense")
 # Largest dimension m of a manifold. The constants are finite far beyond, but no data reach there.
@@ -52,7 +51,7 @@ class Rate:
         return np.asarray(self.constant * np.asarray(delta) ** self.delta * np.asarray(t) ** self.t)
 
 
-def theorem_rate(theorem: str, dim: SupportsIndex) -> Rate:
+def theorem_rate(theorem: str, dim: Integer) -> Rate:
     """Return the rate that a theorem proves for the distance of eigenvalues on m-manifolds.
 
     - "3.1.1": t^(2/(m+6)) between Δ and the functional approximation 𝓛_t (Belkin and Niyogi 2008).

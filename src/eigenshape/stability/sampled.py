@@ -64,6 +64,20 @@ class ChangeAtTime:
     See Also
     --------
     compare_shapes : Compute these changes.
+
+    Examples
+    --------
+    Whether the spectra of a sphere and an ellipsoid differ by more than random sampling explains:
+
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(2)
+    >>> ellipsoid = es.TriangleMesh(ball.vertices * [1, 1, 1.5], ball.faces)
+    >>> plan = es.stability.StabilityPlan(k=6, n_samples=100)
+    >>> change = es.compare_shapes(ball, ellipsoid, plan).changes[0]
+    >>> change.significant
+    True
+    >>> change.floor < change.change <= change.weyl
+    True
     """
 
     t: float

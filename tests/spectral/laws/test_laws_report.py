@@ -567,6 +567,14 @@ def test_what_is_no_laplacian_is_refused():
         check_operator(lambda mesh: cotangent_laplacian(mesh).stiffness, SPHERE)
 
 
+def test_a_laplacian_instead_of_its_builder_is_an_error():
+    unchecked = operator_laws.check_operator.__wrapped__  # past the check of types
+    with pytest.raises(
+        InvalidParameterError, match=r"it is a Laplacian\. es\.spectral\.check_laplacian checks"
+    ):
+        unchecked(cotangent_laplacian(SPHERE), SPHERE)
+
+
 def test_one_point_alone_is_judged_too():
     report = check_laplacian(
         Laplacian(sp.csr_array((1, 1)), sp.csr_array([[2.0]])),

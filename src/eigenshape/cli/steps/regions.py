@@ -94,7 +94,9 @@ def parse_rotation(text: str, mesh: TriangleMesh, region: Region) -> Rotation:
         )
     named = {"x": [1, 0, 0], "y": [0, 1, 0], "z": [0, 0, 1]}
     axis = (
-        np.array(named[found[1]], dtype=float) if found[1] in named else _three(found[1], "An axis")
+        np.array(named[found[1]], dtype=float)
+        if found[1] in named
+        else _three(found[1], "An axis other than x, y and z")
     )
     if found[3]:
         return Rotation(_three(found[3], "A pivot"), axis, np.deg2rad(float(found[2])))

@@ -1,7 +1,6 @@
 """Lower and upper bounds for the eigenvalues of a mesh itself, rather than of a matrix."""
 
 from dataclasses import dataclass
-from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -11,6 +10,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import FacetTable, facet_components, facet_table, without_pinches
 from eigenshape.geometry.requirements import require_sound
@@ -106,7 +106,7 @@ class Brackets:
 @one_blas_thread()
 def bracket_eigenvalues(
     mesh: MeshLike,
-    k: SupportsIndex,
+    k: Integer,
     *,
     boundary: Condition = "neumann",
     progress: Progress | None = None,
@@ -197,7 +197,7 @@ def bracket_eigenvalues(
 
 
 def _upper_bounds(
-    mesh: Mesh, k: SupportsIndex, boundary: Condition, progress: Progress | None
+    mesh: Mesh, k: Integer, boundary: Condition, progress: Progress | None
 ) -> tuple[Float[np.ndarray, " k"], float]:
     """Return the upper ends, and the share of the last that is rounding."""
     conforming = without_pinches(mesh)

@@ -56,6 +56,18 @@ class RecoveredGeometry:
     See Also
     --------
     es.spectral.recover_geometry : Recover the geometry.
+
+    Examples
+    --------
+    The eigenvalues of a sphere of radius 3 tell its area, 36π, and that it has no handles:
+
+    >>> import math
+    >>> import eigenshape as es
+    >>> found = es.spectral.recover_geometry(es.shapes.sphere_eigenvalues(300) / 9)
+    >>> abs(found.area - 36 * math.pi) <= found.area_error
+    True
+    >>> found.whole_characteristic(even=True)
+    2
     """
 
     area: float

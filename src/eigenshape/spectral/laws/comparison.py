@@ -28,7 +28,7 @@ def same_entries(name: str, found: Laplacian, expected: Laplacian, allowed: floa
     if found.n_points != expected.n_points:
         return make_law(name, np.inf, allowed, _other_rows(found.n_points, expected.n_points))
     measured, explanation = distance(expected, found)
-    return make_law(name, measured, allowed, f"{explanation}; rounding takes up to {allowed:.1e}.")
+    return make_law(name, measured, allowed, f"{explanation}; rounding may cause {allowed:.1e}.")
 
 
 def _other_rows(found: int, expected: int) -> str:
@@ -77,7 +77,7 @@ def same_eigenvalues(
         )
     explanation = (
         f"of the {len(expected)} lowest eigenvalues, {worst} changes most, from {expected[worst]:.6g} to "
-        f"{lowest.eigenvalues[worst]:.6g}, {change:.1e} of the last; rounding takes up to {allowed:.1e}."
+        f"{lowest.eigenvalues[worst]:.6g}, {change:.1e} of the last; rounding may cause {allowed:.1e}."
     )
     return make_law(name, change, allowed, explanation)
 

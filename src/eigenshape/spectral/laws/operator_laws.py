@@ -133,7 +133,7 @@ def check_operator(
     Raises
     ------
     InvalidParameterError
-        If a promise is unknown, or `build` does not return a `Laplacian`.
+        If a promise is unknown, `build` is not callable, or it does not return a `Laplacian`.
 
     Examples
     --------
@@ -153,6 +153,12 @@ def check_operator(
     """
     require_type(rng, np.random.Generator | None, "rng")
     promised = check_promises(promises)
+    if not callable(build):
+        raise InvalidParameterError(
+            "build must be a function that maps a shape to a Laplacian, such as "
+            f"es.cotangent_laplacian; it is a {type(build).__name__}. "
+            "es.spectral.check_laplacian checks a Laplacian."
+        )
     random = rng or np.random.default_rng(0)
     subject = changes.as_subject(shape)
     laplacian = build(subject)

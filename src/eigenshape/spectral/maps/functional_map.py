@@ -1,7 +1,6 @@
 """Functional maps: maps between shapes as small matrices that act on functions in low modes."""
 
 from dataclasses import dataclass
-from typing import SupportsIndex
 
 import numpy as np
 import scipy.linalg as sl
@@ -12,7 +11,7 @@ from eigenshape._arrays import as_array, freeze, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.spectral.spectrum import Spectrum, count_zero_modes
 
 N_MODES = 20  # of each shape by default, for exact pairs; inexact ones need fewer
@@ -117,7 +116,7 @@ def require_one_constant(spectrum: Spectrum, name: str) -> None:
         )
 
 
-def modes_of_both(source: Spectrum, target: Spectrum, n_modes: SupportsIndex) -> int:
+def modes_of_both(source: Spectrum, target: Spectrum, n_modes: Integer) -> int:
     """Return a number of modes that both shapes have.
 
     Raises
@@ -144,7 +143,7 @@ def unit_modes(spectrum: Spectrum, k: int) -> Float[np.ndarray, "n k"]:
 
 @one_blas_thread()
 def functional_map(
-    source: Spectrum, target: Spectrum, pairs: ArrayLike, *, n_modes: SupportsIndex = N_MODES
+    source: Spectrum, target: Spectrum, pairs: ArrayLike, *, n_modes: Integer = N_MODES
 ) -> FunctionalMap:
     """Compute a functional map between two shapes from a few pairs of corresponding points.
 

@@ -1,7 +1,6 @@
 """Conversion between functional maps and maps of points, and refinement by alternating between them."""
 
 from dataclasses import dataclass
-from typing import SupportsIndex
 
 import numpy as np
 import scipy.linalg as sl
@@ -12,7 +11,7 @@ from eigenshape._arrays import as_array, freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.spectral.maps.functional_map import (
     N_MODES,
     FunctionalMap,
@@ -77,7 +76,7 @@ def _nearest(
 
 @one_blas_thread()
 def map_from_points(
-    source: Spectrum, target: Spectrum, points: ArrayLike, *, n_modes: SupportsIndex = N_MODES
+    source: Spectrum, target: Spectrum, points: ArrayLike, *, n_modes: Integer = N_MODES
 ) -> FunctionalMap:
     """Convert corresponding vertices to a functional map.
 
@@ -149,10 +148,10 @@ class _Samples:
 @one_blas_thread()
 def refine_map(
     start: FunctionalMap,
-    n_modes: SupportsIndex,
+    n_modes: Integer,
     *,
-    step: SupportsIndex = MODE_STEP,
-    n_samples: SupportsIndex | None = None,
+    step: Integer = MODE_STEP,
+    n_samples: Integer | None = None,
     progress: Progress | None = None,
 ) -> FunctionalMap:
     """Refine a functional map from few modes to many (ZoomOut, Melzi and others 2019).

@@ -1,7 +1,6 @@
 """Heat kernel signatures of large shapes, by approximate eigenvectors, with an estimated error."""
 
 from dataclasses import dataclass
-from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -11,7 +10,7 @@ from eigenshape._arrays import freeze, positive_values, whole_number
 from eigenshape._progress import Progress, silent
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.diffusion.decay import exponential_decay
 from eigenshape.spectral.multilevel.davidson import Goal, refine
@@ -64,6 +63,20 @@ class ApproximateSignature:
         Ritz values, in 1/length².
     complete : bool
         Whether the eigenvalues are certified, as they are for operators of few points.
+
+    Examples
+    --------
+    The signature of 642 points at two times, with an estimated error below 1 % at both:
+
+    >>> import eigenshape as es
+    >>> laplacian = es.cotangent_laplacian(es.icosphere(3))
+    >>> found = es.spectral.approximate_heat_signature(laplacian, 16, [0.5, 1.0])
+    >>> found.values.shape
+    (642, 2)
+    >>> (found.errors < 0.01).tolist()
+    [True, True]
+    >>> found.complete  # whether an eigenvalue is missing was not counted
+    False
     """
 
     values: Float[np.ndarray, "n q"]
@@ -78,7 +91,7 @@ class ApproximateSignature:
 
 def approximate_heat_signature(
     laplacian: Laplacian,
-    k: SupportsIndex,
+    k: Integer,
     times: ArrayLike,
     *,
     accuracy: float = USUAL_ACCURACY,

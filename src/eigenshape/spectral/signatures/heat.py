@@ -1,7 +1,5 @@
 """Heat kernel signatures: how much heat remains at each point."""
 
-from typing import SupportsIndex
-
 import numpy as np
 from jaxtyping import Float
 
@@ -9,7 +7,7 @@ from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.spectral.diffusion.decay import decay_factors
 from eigenshape.spectral.spectrum import Spectrum, count_zero_modes
 
@@ -37,7 +35,7 @@ def positive_eigenvalues(spectrum: Spectrum) -> Float[np.ndarray, " k"]:
     return positive
 
 
-def default_times(spectrum: Spectrum, n_times: SupportsIndex = N_TIMES) -> Float[np.ndarray, " q"]:
+def default_times(spectrum: Spectrum, n_times: Integer = N_TIMES) -> Float[np.ndarray, " q"]:
     """Return diffusion times in geometric sequence that suit a spectrum.
 
     The times range from 4 ln 10 / λ_k to 4 ln 10 / λ_1, with λ_1 the first eigenvalue above 0 (Sun,
@@ -168,7 +166,7 @@ def reflection_free_signature(
 
 @one_blas_thread()
 def scale_invariant_signature(
-    spectrum: Spectrum, times: ArrayLike | None = None, *, n_frequencies: SupportsIndex = 6
+    spectrum: Spectrum, times: ArrayLike | None = None, *, n_frequencies: Integer = 6
 ) -> Float[np.ndarray, "n frequencies"]:
     """Compute a heat kernel signature that does not depend on the size of the shape.
 

@@ -1,14 +1,12 @@
 """Wave kernel signatures: the probability to find a particle of some energy at a point."""
 
-from typing import SupportsIndex
-
 import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_values, positive_values, whole_number
 from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.spectral.signatures.heat import positive_eigenvalues
 from eigenshape.spectral.spectrum import Spectrum
 
@@ -20,7 +18,7 @@ MARGIN = 2.0
 
 
 def default_energies(
-    spectrum: Spectrum, n_energies: SupportsIndex = N_ENERGIES
+    spectrum: Spectrum, n_energies: Integer = N_ENERGIES
 ) -> tuple[Float[np.ndarray, " q"], float]:
     """Return evenly spaced energies and a band width that suit a spectrum.
 

@@ -9,7 +9,7 @@ from functools import partial
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal, SupportsIndex, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 import scipy.sparse as sp
@@ -25,6 +25,7 @@ from eigenshape._errors import (
 )
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr, short_repr
+from eigenshape._typing import Integer
 from eigenshape._workers import Item, Workers, run_in_workers
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike, as_mesh, as_shape
@@ -74,6 +75,20 @@ class OperatorBundle:
     See Also
     --------
     operator_bundle, export_bundle
+
+    Examples
+    --------
+    Diffuse a function on the vertices for the time t, as a layer of DiffusionNet does:
+
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(2)
+    >>> bundle = es.spectral.operator_bundle(ball, 16)
+    >>> height, t = ball.vertices[:, 2], 0.1
+    >>> coefficients = bundle.eigenvectors.T @ (bundle.mass * height)
+    >>> diffused = bundle.eigenvectors @ (np.exp(-t * bundle.eigenvalues) * coefficients)
+    >>> round(float(diffused.max() / height.max()), 2)  # exp(-2 t): the height has λ = 2
+    0.82
     """
 
     frames: Float[np.ndarray, "n 3 3"]
@@ -90,7 +105,7 @@ class OperatorBundle:
 
 def operator_bundle(
     shape: ShapeLike,
-    k: SupportsIndex = 128,
+    k: Integer = 128,
     *,
     operator: str | None = None,
     cache: str | Path | None = None,
@@ -249,7 +264,7 @@ def cache_operator_bundles(  # noqa: PLR0913 - one keyword for each choice of a 
     items: Sequence[Item],
     read: Read,
     cache: str | Path,
-    k: SupportsIndex = 128,
+    k: Integer = 128,
     *,
     operator: str | None = None,
     workers: Workers = Workers(),

@@ -4,7 +4,6 @@ import struct
 from dataclasses import dataclass
 from hashlib import sha256
 from itertools import pairwise
-from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -16,6 +15,7 @@ from eigenshape._memory import available_memory
 from eigenshape._progress import Progress, silent
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
@@ -78,6 +78,21 @@ class CompressedMesh:
     See Also
     --------
     compress_mesh, decompress_mesh
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(3)
+    >>> packed = es.spectral.compress_mesh(ball, bits=12)
+    >>> packed.rms_error < packed.step  # both in length
+    True
+
+    Values at the vertices follow the new order of the vertices:
+
+    >>> height = ball.vertices[:, 2]
+    >>> unpacked = es.spectral.decompress_mesh(packed.data)
+    >>> bool(abs(unpacked.vertices[:, 2] - height[packed.vertex_order]).max() <= packed.max_error)
+    True
     """
 
     data: bytes
@@ -94,7 +109,7 @@ class CompressedMesh:
 
 @one_blas_thread()
 def compress_mesh(
-    mesh: MeshLike, bits: SupportsIndex = 12, *, progress: Progress | None = None
+    mesh: MeshLike, bits: Integer = 12, *, progress: Progress | None = None
 ) -> CompressedMesh:
     """Compress a mesh by the spectral coefficients of its coordinates (Karni and Gotsman 2000).
 

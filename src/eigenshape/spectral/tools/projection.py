@@ -35,7 +35,7 @@ def project(
     spectrum : Spectrum
         k eigenpairs on n points: the lowest ones, or those of an interval.
     inner_product : {"mass", "plain"}
-        What the error of `reconstruct` is smallest in.
+        Whose norm of the error of `reconstruct` is minimized.
 
     Returns
     -------

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import shake_256
 from pathlib import Path
-from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -14,6 +13,7 @@ from eigenshape._arguments import describe_value
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._text import html_repr
+from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
@@ -51,6 +51,18 @@ class WatermarkTest:
     See Also
     --------
     detect_watermark
+
+    Examples
+    --------
+    Only the right key finds the mark:
+
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(2)
+    >>> marked = es.spectral.embed_watermark(ball, "a secret", k=50)
+    >>> es.spectral.detect_watermark(ball, marked, "a secret", k=50).score > 0.9
+    True
+    >>> es.spectral.detect_watermark(ball, marked, "another key", k=50).false_alarm > 1e-6
+    True
     """
 
     score: float
@@ -65,7 +77,7 @@ def embed_watermark(
     key: Key,
     *,
     strength: float = DEFAULT_STRENGTH,
-    k: SupportsIndex = DEFAULT_MODES,
+    k: Integer = DEFAULT_MODES,
     cache: str | Path | None = None,
 ) -> TriangleMesh:
     """Move the vertices of a mesh imperceptibly by a pattern that only a key reveals.
@@ -139,7 +151,7 @@ def detect_watermark(
     suspect: MeshLike,
     key: Key,
     *,
-    k: SupportsIndex = DEFAULT_MODES,
+    k: Integer = DEFAULT_MODES,
     cache: str | Path | None = None,
 ) -> WatermarkTest:
     """Test whether a mesh carries the watermark of a key, with the unmarked original at hand.
@@ -192,7 +204,7 @@ def detect_watermarks(
     suspect: MeshLike,
     keys: Sequence[Key],
     *,
-    k: SupportsIndex = DEFAULT_MODES,
+    k: Integer = DEFAULT_MODES,
     cache: str | Path | None = None,
 ) -> tuple[WatermarkTest, ...]:
     """Test which of many keys a mesh carries, as to find who passed a copy on.
@@ -263,7 +275,7 @@ def _require_key(key: object) -> bytes:
 
 def _low_modes(
     mesh: tuple[Float[np.ndarray, "n 3"], np.ndarray],
-    k: SupportsIndex,
+    k: Integer,
     cache: str | Path | None,
 ) -> tuple[Float[np.ndarray, "n k"], Float[np.ndarray, " n"], Int[np.ndarray, " k"]]:
     """Return the lowest eigenfunctions that are not constant on components, B, and the eigenspaces.
