@@ -26,7 +26,7 @@ Examples
 [0.0, 2.0, 2.0, 2.0]
 """
 
-import pkgutil
+from types import ModuleType
 
 import lazy_loader
 
@@ -41,7 +41,7 @@ def __getattr__(name):
     except AttributeError as err:
         if name in __all__ or name.startswith("_"):
             raise
-        rooms = [module.name for module in pkgutil.iter_modules(__path__) if module.name in __all__]
+        rooms = [room for room in __all__ if isinstance(_load(room), ModuleType)]
         homes = [f"es.{room}.{name}" for room in rooms if name in _load(room).__all__]
         remedy = f"; use {homes[0]}" if homes else ""
         raise AttributeError(f"eigenshape has no attribute {name!r}{remedy}") from err

@@ -62,6 +62,17 @@ class HeatFeatures:
     See Also
     --------
     find_heat_features
+
+    Examples
+    --------
+    The tree can be cut again, for more or fewer features:
+
+    >>> import eigenshape as es
+    >>> found = es.retrieval.find_heat_features(es.make_creature("fish", n_vertices=500))
+    >>> found.heat.shape
+    (500,)
+    >>> len(es.segment(found.tree, n_regions=3).features.vertices)
+    3
     """
 
     mesh: TriangleMesh

@@ -57,6 +57,16 @@ class PatchCodebook:
     See Also
     --------
     train_codebook, default_codebook, PatchRecipe
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> codebook = es.retrieval.default_codebook()
+    >>> n_radii, n_entries, n_axes = codebook.centers.shape
+    >>> codebook.shares.shape == (n_radii, n_entries)
+    True
+    >>> es.retrieval.PatchRecipe(codebook) == es.retrieval.PatchRecipe()  # the default
+    True
     """
 
     means: Float32[np.ndarray, "b c"]

@@ -87,6 +87,17 @@ class PatchDescriptor:
     See Also
     --------
     patch_scores, match_patches
+
+    Examples
+    --------
+    The codes have a row for the shape and one for each view; so do the points:
+
+    >>> import eigenshape as es
+    >>> fish = es.describe(es.make_creature("fish", n_vertices=500))
+    >>> len(fish.codes) == len(fish.points)
+    True
+    >>> bool((fish.vertices == fish.points[0].vertices).all())
+    True
     """
 
     codes: Int8[np.ndarray, "w b s v"]

@@ -61,6 +61,14 @@ class PatchPoints:
     See Also
     --------
     match_patches, PatchDescriptor
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> points = es.describe(es.make_creature("fish", n_vertices=500)).points[0]
+    >>> m = len(points.vertices)
+    >>> points.distances.shape == (m, m)
+    True
     """
 
     numbers: Float32[np.ndarray, "m r d"]
@@ -93,6 +101,20 @@ class PatchMatch:
     See Also
     --------
     match_patches
+
+    Examples
+    --------
+    Two poses of a fish, and the vertices that correspond:
+
+    >>> import eigenshape as es
+    >>> poses = [es.make_creature("fish", pose, n_vertices=500) for pose in (0, 1)]
+    >>> one, two = (es.describe(mesh).points[0] for mesh in poses)
+    >>> match = es.retrieval.match_patches(one, two)
+    >>> match.vertices.shape == match.points.shape
+    True
+    >>> ends = [mesh.vertices[match.vertices[:, i]] for i, mesh in enumerate(poses)]
+    >>> ends[0].shape == ends[1].shape
+    True
     """
 
     points: Int[np.ndarray, "p 2"]

@@ -50,6 +50,17 @@ class Patches:
     distances : (m, m) float32
         Geodesic distances between points, in sides of the box. Long ones are sums of short ones,
         and so a few per cent too long; infinite between components.
+
+    Examples
+    --------
+    The first element describes the whole shape, the others what viewpoints see of it:
+
+    >>> import eigenshape as es
+    >>> whole, view = es.retrieval.extract_patches(es.icosphere(2), n_samples=20, n_views=1)
+    >>> whole.numbers.shape, whole.distances.shape
+    ((20, 9, 64), (20, 20))
+    >>> es.retrieval.patch_descriptor([whole, view], es.retrieval.PatchRecipe()).codes.shape
+    (2, 3, 3, 1280)
     """
 
     numbers: Float32[np.ndarray, "m r c"]

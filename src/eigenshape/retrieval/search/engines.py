@@ -74,6 +74,13 @@ class FaissEngine:
     ------
     MissingExtraError
         If FAISS is not installed.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> index = es.ShapeIndex.open("my-index")  # doctest: +SKIP
+    >>> with index.reader(es.retrieval.FaissEngine) as reader:  # doctest: +SKIP
+    ...     matches = reader.query(es.read_mesh("scan.ply"))
     """
 
     _repr_html_ = html_repr

@@ -60,6 +60,19 @@ class BatchReport:
     See Also
     --------
     build_index
+
+    Examples
+    --------
+    A script that describes files keeps the work under the main guard. It can say what went wrong:
+
+    >>> from tempfile import mkdtemp
+    >>> import eigenshape as es
+    >>> index = es.ShapeIndex.create(mkdtemp())
+    >>> report = es.retrieval.build_index(index, [], es.read_mesh)
+    >>> for name, reason in report.failed:
+    ...     print(f"{name}: {reason}")
+    >>> len(report.added)
+    0
     """
 
     added: tuple[str, ...]

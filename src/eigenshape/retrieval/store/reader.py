@@ -41,6 +41,16 @@ class IndexReader:
 
     Made by `ShapeIndex.reader`. Any number of threads may ask it at the same time. What other
     processes add or remove is seen after `refresh`, and a query sees one state from begin to end.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> index = es.ShapeIndex.create(None)
+    >>> fish = es.describe(es.make_creature("fish", n_vertices=500), es.retrieval.SCALE_FREE)
+    >>> index.add_descriptors("fish", [fish])
+    >>> with index.reader() as reader:
+    ...     len(reader), reader.query(fish)[0].name
+    (1, 'fish')
     """
 
     _repr_html_ = html_repr

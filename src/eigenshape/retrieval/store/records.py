@@ -36,6 +36,15 @@ class Record:
     See Also
     --------
     ShapeIndex.records
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> index = es.ShapeIndex.create(None)
+    >>> fish, recipe = es.make_creature("fish", n_vertices=500), es.retrieval.SCALE_FREE
+    >>> index.add("fish 1", fish, label="fish", attributes={"length": 0.4}, recipe=recipe)
+    >>> [(record.name, record.attributes) for record in index.records(where={"label": "fish"})]
+    [('fish 1', {'length': 0.4})]
     """
 
     name: str

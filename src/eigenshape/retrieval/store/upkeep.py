@@ -39,6 +39,15 @@ class IndexReport:
     See Also
     --------
     ShapeIndex.verify
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> report = es.ShapeIndex.create(None).verify()
+    >>> for damage in report.damages:
+    ...     print(damage)
+    >>> report.n_shapes
+    0
     """
 
     n_shapes: int
