@@ -42,7 +42,7 @@ PAGE = """<!doctype html>
 """
 
 
-def write_report(
+def write_report(  # noqa: PLR0913  one for each option of the command
     mesh: es.types.MeshLike,
     path: str | Path,
     *,
