@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from eigenshape.cli import app
 from eigenshape.io.mesh_files import write_mesh
+from eigenshape.retrieval.heat.features import find_heat_features
 from eigenshape.retrieval.store.index import ShapeIndex
 from eigenshape.shapes.creatures import make_creature
 
@@ -73,9 +74,14 @@ def test_ls_lists_what_the_table_says(index):
         (["height=..1"], ["fish/a"]),
         (["height=2"], ["bird/a"]),
         (["label=bird,fish", "height=0..9"], ["bird/a", "fish/a"]),
+        (["label=7"], ["seven"]),  # a class is a text, whatever it looks like
+        (["label=1..2"], ["range"]),
     ],
 )
 def test_filters_choose_shapes(index, filters, names):
+    descriptor = find_heat_features(make_creature("fish", n_vertices=500)).descriptor
+    for name, label in (("seven", "7"), ("range", "1..2")):
+        ShapeIndex.open(index).add_descriptors(name, [descriptor], label=label)
     options = [part for text in filters for part in ("--filter", text)]
     assert [record["name"] for record in run_json("index", "ls", index, *options)] == names
 
@@ -84,6 +90,11 @@ def test_filters_choose_shapes(index, filters, names):
 def test_a_filter_that_is_none_is_refused(index, text):
     done = run("index", "ls", index, "--filter", text, code=1)
     assert repr(text) in done.stderr
+
+
+def test_two_filters_of_one_key_are_refused_and_none_is_forgotten(index):
+    filters = ("--filter", "label=bird", "--filter", "label=fish")
+    assert "label=one,other" in run("index", "rm", index, *filters, code=1).stderr
 
 
 def test_rm_takes_names_or_a_filter(index):

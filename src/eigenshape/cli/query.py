@@ -6,6 +6,7 @@ import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from os.path import isdir, isfile
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -13,7 +14,7 @@ from typing import Annotated, Any
 import typer
 
 import eigenshape as es
-from eigenshape._errors import EigenshapeError, InvalidParameterError
+from eigenshape._errors import EigenshapeError, InvalidParameterError, StoreError
 from eigenshape._text import literal
 from eigenshape.cli import steps
 from eigenshape.cli.console import (
@@ -65,8 +66,9 @@ class _Answer:
 
 def query(
     index: IndexArgument,
+    # Text, because the name of a shape is not a path: "a//b" and "a/b" are two shapes.
     scan: Annotated[
-        Path,
+        str,
         typer.Argument(
             help="Mesh file to search for, a whole shape or a part of one, in any pose; a folder of "
             "such files; or the name of a shape of the index."
@@ -120,27 +122,29 @@ def query(
     drawn = picture is not None or explain is not None
     shelf = es.ShapeIndex.open(index)
     recipe = steps.query_recipe(shelf, method)
-    if drawn and not scan.is_file():
+    # Unlike the methods of Path, these say no to a text that cannot be a path, too.
+    is_file, is_folder = isfile(scan), isdir(scan)  # noqa: PTH112, PTH113
+    if drawn and not is_file:
         raise InvalidParameterError(
             f"A picture shows one scan, of a file; {scan} is none. Leave --picture and --explain out."
         )
     with shelf.reader() as reader:
         ask_index = partial(reader.query, where=filters, exact=exact)
-        if scan.exists():
+        if is_file or is_folder:
             items = es.io.find_items(scan)
             ask = partial(
                 _answer_file, ask_index, recipe=recipe, n_matches=n_matches, repair=repair
             )
-            answers, failed = _answer_each(items, ask) if scan.is_dir() else ([ask(items[0])], [])
+            answers, failed = _answer_each(items, ask) if is_folder else ([ask(items[0])], [])
         else:
-            stored = _stored_descriptor(shelf, str(scan), recipe)
-            answers, failed = [_answer_stored(ask_index, str(scan), stored, n_matches)], []
+            stored = _stored_descriptor(reader, scan, recipe)
+            answers, failed = [_answer_stored(ask_index, scan, stored, n_matches)], []
     for name, reason in failed:
         err.print(f"[yellow]not searched for:[/] {escape_text(name)}: {escape_text(reason)}")
     _write(answers, output)
     if as_json:
         facts = [_facts(answer) for answer in answers]
-        print_json(facts if scan.is_dir() else facts[0])
+        print_json(facts if is_folder else facts[0])
     else:
         _print(answers)
     if drawn:
@@ -182,13 +186,24 @@ def _answer_file(
     return _Answer(item.path.name, colored.descriptor, matches, seconds, colored)
 
 
-def _stored_descriptor(shelf: es.ShapeIndex, name: str, recipe: AnyRecipe) -> Descriptor:
-    if name not in {record.name for record in shelf.records()}:
+def _stored_descriptor(
+    reader: es.retrieval.IndexReader, name: str, recipe: AnyRecipe
+) -> Descriptor:
+    """Return the descriptor of a whole shape, from the state of the index that is then searched."""
+    shape = reader.state.names.get(name)
+    if shape is None:
         raise InvalidParameterError(
             f"A query is a mesh file, a folder or the name of a shape of the index; {name} is none "
             "of them. `eigenshape index ls` lists the names."
         )
-    return shelf.descriptors(name, recipe)[0]
+    snapshot = reader.snapshot(recipe)
+    (places,) = (snapshot.shape_of == shape).nonzero()
+    if not len(places):
+        raise StoreError(
+            f"A shape must be described by the method of a query; {name} is not described by "
+            f"{recipe.name}. Choose another --method."
+        )
+    return snapshot.descriptor(int(places[0]))
 
 
 def _answer_stored(ask: Ask, name: str, descriptor: Descriptor, n_matches: int) -> _Answer:

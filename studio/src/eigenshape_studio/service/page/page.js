@@ -67,7 +67,7 @@ async function search() {
   running = new AbortController();
   const { signal } = running;
   const wanted = new URLSearchParams({ name: scan.name, n: find("count").value || 8, picture: 1 });
-  if (find("label").value.trim()) wanted.set("label", find("label").value.trim());
+  if (find("label").value.trim()) wanted.set("filter", `label=${find("label").value.trim()}`);
   find("matches").replaceChildren();
   find("scan-picture").hidden = true;
   find("hint").hidden = false;
