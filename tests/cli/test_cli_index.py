@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 from eigenshape.cli import app
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.retrieval.heat.features import find_heat_features
+from eigenshape.retrieval.heat.recipe import THESIS
 from eigenshape.retrieval.store.index import ShapeIndex
 from eigenshape.shapes.creatures import make_creature
 
@@ -58,7 +59,7 @@ def test_ls_lists_what_the_table_says(index):
     shapes = {record["name"]: record for record in run_json("index", "ls", index)}
     assert list(shapes) == ["bird/a", "bird/b", "fish/a", "fish/b"]
     fish = shapes["fish/a"]
-    assert (fish["class"], fish["tags"]) == ("fish", ["small", "wet"])
+    assert (fish["label"], fish["tags"]) == ("fish", ["small", "wet"])
     assert fish["attributes"] == {"height": 0.5}
     text = run("index", "ls", index).stdout
     assert "4 shapes" in text
@@ -108,7 +109,7 @@ def test_rm_takes_names_or_a_filter(index):
 def test_stats_count_shapes_classes_and_bytes(index):
     facts = run_json("index", "stats", index)
     assert facts["shapes"] == 4
-    assert facts["classes"] == {"bird": 2, "fish": 2}
+    assert facts["labels"] == {"bird": 2, "fish": 2}
     assert facts["recipes"] == {"scale-free": 4}
     assert facts["bytes"] == sum(path.stat().st_size for path in index.rglob("*"))
     assert "4 shapes" in run("index", "stats", index).stdout
@@ -157,6 +158,19 @@ def test_parts_are_merged_to_the_index_of_all(meshes, index, tmp_path):
     assert found[0] == found[1] == found[2]
 
 
+def test_a_merge_names_shapes_that_queries_do_not_find(index, tmp_path):
+    other = ShapeIndex.create(tmp_path / "other")
+    by_another = find_heat_features(make_creature("fish", n_vertices=500), THESIS).descriptor
+    other.add_descriptors("apart", [by_another], digest="0" * 64)
+    done = run("index", "merge", index, other.folder)
+    assert "not found by queries: 1 shape, which scale-free does not describe: apart" in done.stderr
+    again = run_json("index", "merge", index, other.folder)
+    assert (again["added"], again["not_compared"]) == (0, ["apart"])
+    assert run("query", index, "apart", code=1).stderr.count("Choose another --method") == 1
+    empty = run("query", index, "fish/a", "--filter", "label=nobody").stdout
+    assert "none; no shape of the index agrees with the filters" in empty
+
+
 @pytest.mark.parametrize("text", ["3", "0/2", "3/2", "1/0", "a/b"])
 def test_a_part_that_is_none_is_refused(meshes, tmp_path, text):
     done = run("index", "add", tmp_path / "index", meshes, "--part", text, code=1)
@@ -190,11 +204,14 @@ def test_a_folder_and_a_shape_of_the_index_are_queries_too(meshes, index, tmp_pa
         rows = list(csv.DictReader(file))
     assert [row["rank"] for row in rows] == ["1", "2"] * 4
     assert rows[0]["name"] == "bird/a"
+    assert [row["query"] for row in rows[::2]] == ["bird/a", "bird/b", "fish/a", "fish/b"]
+    shown = run("query", index, meshes, "-n", 2).stdout
+    assert (shown.count("Most similar shapes"), shown.count("score: ")) == (4, 1)
     alike = run_json("query", index, "fish/a", "-n", 1)["matches"]
     assert [match["name"] for match in alike] == ["fish/b"]
     assert "nobody is none of them" in run("query", index, "nobody", code=1).stderr
     only = run_json("query", index, "fish/a", "--filter", "label=bird")["matches"]
-    assert {match["class"] for match in only} == {"bird"}
+    assert {match["label"] for match in only} == {"bird"}
 
 
 def test_queries_that_cannot_be_read_are_named_and_the_others_answered(meshes, index, tmp_path):
@@ -213,6 +230,12 @@ def test_an_explanation_is_drawn(meshes, index, tmp_path):
     assert picture.read_bytes()[:4] == b"\x89PNG"
     done = run("query", index, "fish/a", "--explain", picture, code=1)
     assert "Leave --picture and --explain out" in done.stderr
+
+
+def test_a_folder_that_is_not_there_makes_no_index(tmp_path):
+    done = run("index", "add", tmp_path / "new", tmp_path / "misspelled", *LIGHT, code=1)
+    assert "No such file" in done.stderr
+    assert not (tmp_path / "new").exists()
 
 
 def test_a_codebook_is_for_patches_and_is_a_codebook(meshes, index, tmp_path):

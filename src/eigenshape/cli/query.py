@@ -45,7 +45,7 @@ COLUMNS = (
     "query",
     "rank",
     "name",
-    "class",
+    "label",
     "source",
     "score",
     "chance",
@@ -135,7 +135,10 @@ def query(
             ask = partial(
                 _answer_file, ask_index, recipe=recipe, n_matches=n_matches, repair=repair
             )
-            answers, failed = _answer_each(items, ask) if is_folder else ([ask(items[0])], [])
+            if is_folder:
+                answers, failed = _answer_each(items, ask)
+            else:
+                answers, failed = [ask(replace(items[0], name=items[0].path.name))], []
         else:
             stored = _stored_descriptor(reader, scan, recipe)
             answers, failed = [_answer_stored(ask_index, scan, stored, n_matches)], []
@@ -183,7 +186,7 @@ def _answer_file(
     described = perf_counter()
     matches = ask(colored.descriptor, n_matches=n_matches)
     seconds = {"describe": described - began, "query": perf_counter() - described}
-    return _Answer(item.path.name, colored.descriptor, matches, seconds, colored)
+    return _Answer(item.name, colored.descriptor, matches, seconds, colored)
 
 
 def _stored_descriptor(
@@ -235,6 +238,7 @@ def _print(answers: Sequence[_Answer]) -> None:
         print_matches(answer.matches, title if len(answers) == 1 else f"{title}: {answer.title}")
         if answer.matches.nothing_alike:
             out.print("nothing alike here: unrelated shapes would score as well")
+    explain_scores([match for answer in answers for match in answer.matches])
     describe = sum(answer.seconds["describe"] for answer in answers)
     found = 1000 * sum(answer.seconds["query"] for answer in answers)
     n_compared = sum(answer.matches.n_compared for answer in answers)
@@ -290,7 +294,7 @@ def _match_facts(descriptor: Descriptor, match: es.retrieval.Match) -> dict[str,
     ]
     return {
         "name": match.name,
-        "class": match.label,
+        "label": match.label,
         "source": match.source,
         "score": match.score,
         "chance": match.chance,
@@ -301,7 +305,10 @@ def _match_facts(descriptor: Descriptor, match: es.retrieval.Match) -> dict[str,
 def print_matches(
     matches: Sequence[es.retrieval.Match], title: str = "Most similar shapes"
 ) -> None:
-    """Print matches, best first, with what their scores mean."""
+    """Print matches, best first."""
+    if not matches:
+        out.print(f"{escape_text(title)}: none; no shape of the index agrees with the filters")
+        return
     rows = [
         [
             match.name,
@@ -312,8 +319,12 @@ def print_matches(
         ]
         for match in matches
     ]
-    columns = ["shape", "class", "score", "chance", "corresponding points"]
+    columns = ["shape", "label", "score", "chance", "corresponding points"]
     print_table(title, columns, rows)
+
+
+def explain_scores(matches: Sequence[es.retrieval.Match]) -> None:
+    """Print what the scores of matches mean."""
     if any(match.chance is None for match in matches):
         out.print("score: 0 for the same description, lower is more alike")
     elif matches:

@@ -12,7 +12,7 @@ def record_facts(record: Record) -> dict[str, Any]:
     """Return what is known of a shape, for JSON."""
     return {
         "name": record.name,
-        "class": record.label,
+        "label": record.label,
         "source": record.source,
         "digest": record.digest,
         "tags": record.tags,

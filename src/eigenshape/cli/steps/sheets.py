@@ -112,7 +112,7 @@ def explanation(
     panels = []
     for surface, name, vertices in (
         (query.mesh, f"query: {title}", query.descriptor.vertices[ours]),
-        (mesh, f"{literal(match.name)}\nscore {match.score:#.4g}", match.vertices[theirs]),
+        (mesh, f"{literal(match.name)}\nscore {match.score:.3f}", match.vertices[theirs]),
     ):
         reach = REACH * np.sqrt(surface_area(surface) / max(len(match.vertices), 1))
         labels = _cells(surface, vertices, np.arange(len(vertices)), reach)
@@ -125,7 +125,7 @@ def explanation(
 
 
 def _panel(query: ColoredQuery, match: Match, repairs: tuple[str, ...]) -> Panel:
-    title = f"{literal(match.name)}\nscore {match.score:#.4g}"
+    title = f"{literal(match.name)}\nscore {match.score:.3f}"
     try:
         mesh = _read_match(match, repairs)
     except (EigenshapeError, OSError) as error:
