@@ -228,6 +228,9 @@ def test_an_explanation_is_drawn(meshes, index, tmp_path):
     picture = tmp_path / "why.png"
     run("query", index, meshes / "fish" / "b.ply", "--explain", picture)
     assert picture.read_bytes()[:4] == b"\x89PNG"
+    from_above = tmp_path / "above.png"
+    run("query", index, meshes / "fish" / "b.ply", "--explain", from_above, "--view", "top")
+    assert from_above.read_bytes() != picture.read_bytes()
     done = run("query", index, "fish/a", "--explain", picture, code=1)
     assert "Leave --picture and --explain out" in done.stderr
 

@@ -32,6 +32,8 @@ from eigenshape.cli.inputs import (
     IndexRepairOption,
     JsonOption,
     StoredMethodOption,
+    UpOption,
+    ViewOption,
     repair_names,
     require_method,
 )
@@ -103,6 +105,8 @@ def query(
             "PDF)."
         ),
     ] = None,
+    view: ViewOption = "auto",
+    up: UpOption = "auto",
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="Table of all matches to write, a line each (.csv)."),
@@ -118,6 +122,7 @@ def query(
     steps.require_output(output, (".csv",), "A table")
     if method is not None:
         require_method(method)
+    side = steps.parse_side(view, up)
     repairs, filters = repair_names(repair), steps.parse_filters(where)
     drawn = picture is not None or explain is not None
     shelf = es.ShapeIndex.open(index)
@@ -151,7 +156,7 @@ def query(
     else:
         _print(answers)
     if drawn:
-        _draw(answers[0], index, repairs, picture, explain)
+        _draw(answers[0], index, repairs, side, picture, explain)
     if failed:
         raise typer.Exit(SOME_FAILED)
 
@@ -252,6 +257,7 @@ def _draw(
     answer: _Answer,
     index: Path,
     repairs: tuple[str, ...],
+    side: Any,
     picture: Path | None,
     explain: Path | None,
 ) -> None:
@@ -265,11 +271,13 @@ def _draw(
             f"{literal(index.name)} ({steps.CAPTION})"
         )
         sheet = steps.contact_sheet(
-            answer.colored, title, answer.matches, repairs=repairs, caption=caption
+            answer.colored, title, answer.matches, repairs=repairs, caption=caption, **side
         )
         steps.save_picture(sheet, picture)
     if explain is not None:
-        figure = steps.explanation(answer.colored, title, answer.matches[0], repairs=repairs)
+        figure = steps.explanation(
+            answer.colored, title, answer.matches[0], repairs=repairs, **side
+        )
         steps.save_picture(figure, explain)
 
 
