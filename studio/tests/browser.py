@@ -36,8 +36,11 @@ SERVE = """
 import sys
 from eigenshape_studio.server import serve
 
-mesh, index = sys.argv[1:]
-serve(mesh, index=index or None, announce=lambda url: print(url, flush=True), browse=False)
+mesh, index, view, up = sys.argv[1:]
+serve(
+    mesh, index=index or None, view=view, up=up, announce=lambda url: print(url, flush=True),
+    browse=False,
+)
 """
 # The panel in which shapes are bent, in the code of the page.
 PANEL = "eigenshape.panels.find((panel) => panel.id === 'deform')"
@@ -68,10 +71,12 @@ def build_page() -> None:
 
 
 @contextmanager
-def start_server(mesh: Path, index: Path | None = None) -> Iterator[tuple[str, int]]:
+def start_server(
+    mesh: Path, index: Path | None = None, view: str = "auto", up: str = "auto"
+) -> Iterator[tuple[str, int]]:
     """Serve the studio in a process of its own; yield its address and the number of the process."""
     build_page()
-    command = [sys.executable, "-c", SERVE, str(mesh), str(index or "")]
+    command = [sys.executable, "-c", SERVE, str(mesh), str(index or ""), view, up]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             yield str(process.stdout.readline().strip()), process.pid  # type: ignore[union-attr]
@@ -80,9 +85,11 @@ def start_server(mesh: Path, index: Path | None = None) -> Iterator[tuple[str, i
 
 
 @contextmanager
-def serve_studio(mesh: Path, index: Path | None = None) -> Iterator[str]:
+def serve_studio(
+    mesh: Path, index: Path | None = None, view: str = "auto", up: str = "auto"
+) -> Iterator[str]:
     """Serve the studio in a process of its own, and yield its address."""
-    with start_server(mesh, index) as (url, _):
+    with start_server(mesh, index, view, up) as (url, _):
         yield url
 
 

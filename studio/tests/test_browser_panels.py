@@ -355,11 +355,29 @@ def test_search_ranks_shapes_and_shows_corresponding_points(page, folder, mesh):
     assert page.locator('[data-test="canvas"]').count() == 1
 
 
+def picture_axes(page):
+    """Return where the picture's right, up and the viewer are, in the coordinates of the mesh."""
+    code = "(eigenshape.viewer.camera.updateMatrixWorld(), eigenshape.viewer.camera.matrixWorld)"
+    return np.array(page.evaluate(f"Array.from({code}.elements)")).reshape(4, 4)[:3, :3]
+
+
+@pytest.mark.parametrize("view", ["back", "top", "front-left"])
+def test_the_studio_opens_from_the_requested_side(browser, folder, view):
+    """The page shows what figures show: its camera has the axes of theirs."""
+    path = folder / "biped.ply"
+    right, down, towards = es.plot.aim_camera(es.read_mesh(path), view=view, up="x").rotation
+    with serve_studio(path, view=view, up="x") as url, open_page(browser, url) as page:
+        # "top" may be 1e-3 off, and another 1e-6 where the page limits the angle
+        np.testing.assert_allclose(picture_axes(page), [right, -down, towards], atol=2e-3)
+
+
 def test_report_opens_from_a_file_without_a_server(browser, folder, mesh):
     path = folder / "report.html"
     height = mesh.vertices[:, 1]
-    write_report(mesh, path, name="quadruped", values={"height (m)": height})
+    write_report(mesh, path, name="quadruped", values={"height (m)": height}, view="right")
     with open_page(browser, path.as_uri()) as page:
+        right, down, towards = es.plot.aim_camera(mesh, view="right").rotation
+        np.testing.assert_allclose(picture_axes(page), [right, -down, towards], atol=1e-6)
         assert find(page, "tab-deform").count() == find(page, "tab-search").count() == 0
         find(page, "legend").wait_for()
         assert_close(vertex_values(page), height, 1e-6)

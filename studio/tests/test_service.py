@@ -26,7 +26,8 @@ from eigenshape_studio.service.shelf import ShelfReader
 
 ROOT = Path(__file__).parents[2]
 TOKEN = "a-token-of-the-tests-0123456789"
-KINDS = ("fish", "bird", "biped", "quadruped", "giraffe")
+LEGS = {"fish": 0, "bird": 2, "biped": 2, "quadruped": 4, "giraffe": 4}
+KINDS = tuple(LEGS)
 MARKUP = '<img src="x" onerror="alert(1)">'
 NAMES = ("../../etc/passwd", "a b%2f?&#\"'é\u202e", "line\nbreak\t\x1b[31m", MARKUP, "long" * 1000)
 # The service with limits that tests can reach within a second or two.
@@ -121,7 +122,8 @@ def make_index(folder):
         path = folder / f"{kind}.ply"
         es.write_mesh(mesh, path)
         label = "animal" if kind != "biped" else "person"
-        index.add(f"zoo/{kind}", mesh, label=label, source=str(path), n_views=0)
+        facts = {"tags": ["swims"] if kind == "fish" else [], "attributes": {"legs": LEGS[kind]}}
+        index.add(f"zoo/{kind}", mesh, label=label, source=str(path), n_views=0, **facts)
     described = index.descriptors("zoo/bird", index.default_recipe())
     for name in NAMES:
         index.add_descriptors(name, described, label=MARKUP)
@@ -162,9 +164,29 @@ def test_a_scan_finds_its_kind(service):
 
 
 def test_a_query_can_be_restricted_to_a_class(service):
-    found = service.query(scan_of("fish"), n=20, label="person", exact=1).json()["matches"]
+    found = service.query(scan_of("fish"), n=20, filter="label=person", exact=1).json()["matches"]
     assert [match["name"] for match in found] == ["zoo/biped"]
-    assert service.query(scan_of("fish"), label="none").json()["matches"] == []
+    assert service.query(scan_of("fish"), filter="label=none").json()["matches"] == []
+    # As text of an address, in which the second "=" belongs to the value
+    both = "/v1/query?name=a.ply&n=20&filter=label=animal&filter=legs=1..3"
+    kind = {"content-type": "application/octet-stream"}
+    found = service.client.post(both, content=scan_of("fish"), headers=kind).json()["matches"]
+    assert [match["name"] for match in found] == ["zoo/bird"]
+    assert (found[0]["tags"], found[0]["attributes"]) == ([], {"legs": 2})
+
+
+def test_shapes_are_listed_with_what_is_known_and_by_filters(service):
+    def listed(*filters, **parameters):
+        answer = service.client.get("/v1/shapes", params={"filter": filters, **parameters}).json()
+        return answer["n_shapes"], [shape["name"] for shape in answer["shapes"]]
+
+    assert listed("tag=swims") == (1, ["zoo/fish"])
+    assert listed("legs=4") == (2, ["zoo/giraffe", "zoo/quadruped"])
+    assert listed("legs=2..", limit=1, offset=1) == (4, ["zoo/bird"])
+    assert listed("legs=..2", "label=animal,person") == (3, ["zoo/biped", "zoo/bird", "zoo/fish"])
+    assert listed("label=nobody") == (0, [])
+    fish = service.client.get("/v1/shapes/zoo%2Ffish").json()
+    assert (fish["tags"], fish["attributes"]) == (["swims"], {"legs": 0})
 
 
 def test_a_mesh_is_repaired_and_the_answer_says_so(service):
@@ -247,6 +269,10 @@ def test_openapi_describes_every_call(service):
         for method, call in calls.items():
             answer = service.client.request(method, path.replace("{name}", "zoo%2Ffish"))
             assert str(answer.status_code) in call["responses"], (path, answer.text)
+            if "$ref" in str(call["responses"].get("200")) and answer.status_code == 200:
+                schema = call["responses"]["200"]["content"]["application/json"]["schema"]["$ref"]
+                schema = described["components"]["schemas"][schema.rpartition("/")[2]]
+                assert set(answer.json()) == set(schema["required"])
             required = [each["name"] for each in call["parameters"] if each["required"]]
             if required and "{name}" not in path and method == "get":
                 assert f"The parameter {required[0]} must be given." in answer.json()["error"]
@@ -302,9 +328,12 @@ WRONG_PARAMETERS = {
     "many digits": ("/v1/query?name=a.ply&n=" + "9" * 5000, "n must be a whole number"),
     "other digits": ("/v1/query?name=a.ply&n=%D9%A3", "n must be a whole number"),
     "twice": ("/v1/query?name=a.ply&n=3&n=4", "n must be given once"),
-    "unknown": ("/v1/query?name=a.ply&k=3", "no parameter 'k' here; .*: name, n, label"),
+    "unknown": ("/v1/query?name=a.ply&k=3", "no parameter 'k' here; .*: name, n, filter"),
     "maybe exact": ("/v1/query?name=a.ply&exact=maybe", "exact must be 0 or 1"),
-    "a long class": ("/v1/query?name=a.ply&label=" + "x" * 5000, "label must have at most 4,096"),
+    "a long filter": ("/v1/query?name=a.ply&filter=" + "x" * 5000, "filter must have at most 4,0"),
+    "no condition": ("/v1/query?name=a.ply&filter=cat", "such as label=cat .*; it is 'cat'"),
+    "no range": ("/v1/query?name=a.ply&filter=legs=a..b", "least and a largest number"),
+    "two of one": ("/v1/query?name=a.ply&filter=tag=a&filter=tag=b", "'tag' has two"),
 }
 
 
@@ -324,6 +353,7 @@ def test_parameters_of_other_calls_are_checked(service):
     assert "vertices must be a whole" in get("/v1/points?name=a&vertices=1,x").json()["error"]
     assert get("/v1/points?name=a&vertices=").status_code == 404
     assert "limit must lie between" in get("/v1/shapes?limit=1001").json()["error"]
+    assert "A filter is a condition" in get("/v1/shapes?filter=").json()["error"]
     assert "no shape 'ghost'" in get("/v1/shapes/ghost").json()["error"]
 
 

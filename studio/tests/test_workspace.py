@@ -79,7 +79,7 @@ def test_the_state_is_that_of_the_shape(page):
     np.testing.assert_allclose(state["center"], 0, atol=1e-12)
     assert state["extent"] == pytest.approx(2 * np.linalg.norm([1.0, 1.7, 0.8]), rel=1e-2)
     assert state["up"] == [0, 1, 0]
-    np.testing.assert_allclose(np.abs(state["front"]), [0, 0, 1], atol=1e-9)
+    np.testing.assert_allclose(state["towards"], es.plot.aim_camera(mesh).rotation[2], atol=1e-9)
     assert state["health"]["closed"]
     assert state["health"]["findings"] == []
     assert state["health"]["volume"] == es.geometry.enclosed_volume(mesh)
@@ -414,20 +414,35 @@ def test_a_message_that_is_none_is_answered():
         assert "error" in decode(answer.message)[0]
 
 
-@pytest.mark.parametrize("up", ["y", "-z", "x"])
-@pytest.mark.parametrize("view", ["auto", "front", "right", "top"])
+@pytest.mark.parametrize("up", ["y", "-z", "x", [0.0, 1.0, 1.0]])
+@pytest.mark.parametrize("view", ["auto", "front", "right", "top", "bottom", [1.0, 2.0, 3.0]])
 def test_the_page_looks_from_the_requested_side(view, up):
-    """It looks from the front left and above, so up and front say where."""
+    """Its camera stands upright, as that of a figure does: right is up x towards."""
     ball = es.icosphere(2)
     workspace = Workspace(ball)
     workspace.analysis.look_from(view, up)
     found = workspace.analysis.view()
-    axis = "xyz".index(up[-1])
-    assert found["up"] == pytest.approx((-1 if up == "-z" else 1) * np.eye(3)[axis], abs=1e-9)
-    upward, front = np.array(found["up"]), np.array(found["front"])
-    shown = 0.78 * front + 0.48 * np.cross(upward, front)
-    camera = es.plot.aim_camera(ball, view="front" if view == "top" else view, up=up)
-    towards = camera.rotation[2] - (camera.rotation[2] @ upward) * upward
-    assert np.cross(shown, towards) == pytest.approx(np.zeros(3), abs=1e-9)
-    assert shown @ towards > 0
+    right = np.cross(found["up"], found["towards"])
+    camera = es.plot.aim_camera(ball, view=view, up=up)
+    assert right / np.linalg.norm(right) == pytest.approx(camera.rotation[0], abs=1e-9)
+    assert found["towards"] == pytest.approx(camera.rotation[2], abs=2e-3)  # not along `up`
+    workspace.close()
+
+
+def test_a_repair_does_not_turn_the_shape():
+    workspace = Workspace(stretched_ball())
+    workspace.analysis.look_from("left", "z")
+    before = workspace.state()
+    workspace.answer("finish", encode({"kind": "repair", "names": ["orient"]}))
+    after = workspace.state()
+    assert after["shape"] == before["shape"] + 1
+    assert (after["up"], after["towards"]) == (before["up"], before["towards"])
+    workspace.close()
+
+
+@pytest.mark.parametrize("side", [("behind", "auto"), ("auto", "w"), ([0, 0, 0], "y")])
+def test_a_side_that_is_none_is_refused(side):
+    workspace = Workspace(es.icosphere(1))
+    with pytest.raises(es.InvalidParameterError, match="must be"):
+        workspace.analysis.look_from(*side)
     workspace.close()

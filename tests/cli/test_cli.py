@@ -223,7 +223,7 @@ def test_query_finds_the_kind_and_draws_it(zoo, database, tmp_path):
     write_mesh(partial_scan(make_creature("snake", 5, n_vertices=800), [0.2, 1.0, 0.1]).mesh, scan)
     sheet = tmp_path / "sheet.png"
     found = run_json("query", database, scan, "-n", 2, "--picture", sheet)
-    assert [match["class"] for match in found["matches"]] == ["snake", "snake"]
+    assert [match["label"] for match in found["matches"]] == ["snake", "snake"]
     assert found["matches"][0]["correspondences"]
     assert set(found["seconds"]) == {"describe", "query"}
     assert sheet.read_bytes()[:8] == PNG

@@ -8,6 +8,8 @@ from typer.testing import CliRunner
 
 from eigenshape.cli import app
 from eigenshape.io.mesh_files import write_mesh
+from eigenshape.retrieval.heat.features import find_heat_features
+from eigenshape.retrieval.heat.recipe import THESIS
 from eigenshape.retrieval.store.index import ShapeIndex
 from eigenshape.shapes.creatures import make_creature
 
@@ -57,7 +59,7 @@ def test_ls_lists_what_the_table_says(index):
     shapes = {record["name"]: record for record in run_json("index", "ls", index)}
     assert list(shapes) == ["bird/a", "bird/b", "fish/a", "fish/b"]
     fish = shapes["fish/a"]
-    assert (fish["class"], fish["tags"]) == ("fish", ["small", "wet"])
+    assert (fish["label"], fish["tags"]) == ("fish", ["small", "wet"])
     assert fish["attributes"] == {"height": 0.5}
     text = run("index", "ls", index).stdout
     assert "4 shapes" in text
@@ -73,9 +75,14 @@ def test_ls_lists_what_the_table_says(index):
         (["height=..1"], ["fish/a"]),
         (["height=2"], ["bird/a"]),
         (["label=bird,fish", "height=0..9"], ["bird/a", "fish/a"]),
+        (["label=7"], ["seven"]),  # a class is a text, whatever it looks like
+        (["label=1..2"], ["range"]),
     ],
 )
 def test_filters_choose_shapes(index, filters, names):
+    descriptor = find_heat_features(make_creature("fish", n_vertices=500)).descriptor
+    for name, label in (("seven", "7"), ("range", "1..2")):
+        ShapeIndex.open(index).add_descriptors(name, [descriptor], label=label)
     options = [part for text in filters for part in ("--filter", text)]
     assert [record["name"] for record in run_json("index", "ls", index, *options)] == names
 
@@ -84,6 +91,11 @@ def test_filters_choose_shapes(index, filters, names):
 def test_a_filter_that_is_none_is_refused(index, text):
     done = run("index", "ls", index, "--filter", text, code=1)
     assert repr(text) in done.stderr
+
+
+def test_two_filters_of_one_key_are_refused_and_none_is_forgotten(index):
+    filters = ("--filter", "label=bird", "--filter", "label=fish")
+    assert "label=one,other" in run("index", "rm", index, *filters, code=1).stderr
 
 
 def test_rm_takes_names_or_a_filter(index):
@@ -97,7 +109,7 @@ def test_rm_takes_names_or_a_filter(index):
 def test_stats_count_shapes_classes_and_bytes(index):
     facts = run_json("index", "stats", index)
     assert facts["shapes"] == 4
-    assert facts["classes"] == {"bird": 2, "fish": 2}
+    assert facts["labels"] == {"bird": 2, "fish": 2}
     assert facts["recipes"] == {"scale-free": 4}
     assert facts["bytes"] == sum(path.stat().st_size for path in index.rglob("*"))
     assert "4 shapes" in run("index", "stats", index).stdout
@@ -146,6 +158,19 @@ def test_parts_are_merged_to_the_index_of_all(meshes, index, tmp_path):
     assert found[0] == found[1] == found[2]
 
 
+def test_a_merge_names_shapes_that_queries_do_not_find(index, tmp_path):
+    other = ShapeIndex.create(tmp_path / "other")
+    by_another = find_heat_features(make_creature("fish", n_vertices=500), THESIS).descriptor
+    other.add_descriptors("apart", [by_another], digest="0" * 64)
+    done = run("index", "merge", index, other.folder)
+    assert "not found by queries: 1 shape, which scale-free does not describe: apart" in done.stderr
+    again = run_json("index", "merge", index, other.folder)
+    assert (again["added"], again["not_compared"]) == (0, ["apart"])
+    assert run("query", index, "apart", code=1).stderr.count("Choose another --method") == 1
+    empty = run("query", index, "fish/a", "--filter", "label=nobody").stdout
+    assert "none; no shape of the index agrees with the filters" in empty
+
+
 @pytest.mark.parametrize("text", ["3", "0/2", "3/2", "1/0", "a/b"])
 def test_a_part_that_is_none_is_refused(meshes, tmp_path, text):
     done = run("index", "add", tmp_path / "index", meshes, "--part", text, code=1)
@@ -179,11 +204,14 @@ def test_a_folder_and_a_shape_of_the_index_are_queries_too(meshes, index, tmp_pa
         rows = list(csv.DictReader(file))
     assert [row["rank"] for row in rows] == ["1", "2"] * 4
     assert rows[0]["name"] == "bird/a"
+    assert [row["query"] for row in rows[::2]] == ["bird/a", "bird/b", "fish/a", "fish/b"]
+    shown = run("query", index, meshes, "-n", 2).stdout
+    assert (shown.count("Most similar shapes"), shown.count("score: ")) == (4, 1)
     alike = run_json("query", index, "fish/a", "-n", 1)["matches"]
     assert [match["name"] for match in alike] == ["fish/b"]
     assert "nobody is none of them" in run("query", index, "nobody", code=1).stderr
     only = run_json("query", index, "fish/a", "--filter", "label=bird")["matches"]
-    assert {match["class"] for match in only} == {"bird"}
+    assert {match["label"] for match in only} == {"bird"}
 
 
 def test_queries_that_cannot_be_read_are_named_and_the_others_answered(meshes, index, tmp_path):
@@ -200,8 +228,17 @@ def test_an_explanation_is_drawn(meshes, index, tmp_path):
     picture = tmp_path / "why.png"
     run("query", index, meshes / "fish" / "b.ply", "--explain", picture)
     assert picture.read_bytes()[:4] == b"\x89PNG"
+    from_above = tmp_path / "above.png"
+    run("query", index, meshes / "fish" / "b.ply", "--explain", from_above, "--view", "top")
+    assert from_above.read_bytes() != picture.read_bytes()
     done = run("query", index, "fish/a", "--explain", picture, code=1)
     assert "Leave --picture and --explain out" in done.stderr
+
+
+def test_a_folder_that_is_not_there_makes_no_index(tmp_path):
+    done = run("index", "add", tmp_path / "new", tmp_path / "misspelled", *LIGHT, code=1)
+    assert "No such file" in done.stderr
+    assert not (tmp_path / "new").exists()
 
 
 def test_a_codebook_is_for_patches_and_is_a_codebook(meshes, index, tmp_path):

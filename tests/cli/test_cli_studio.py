@@ -33,12 +33,15 @@ def test_studio_passes_its_options_on_and_prints_the_address(monkeypatch):
     module = ModuleType("eigenshape_studio.server")
     monkeypatch.setattr(module, "serve", serve, raising=False)
     monkeypatch.setitem(sys.modules, module.__name__, module)
-    done = run("studio", "a.ply", "--index", "shelf", "--port", 5, "--no-browser")
+    side = ["--view", "1,0,2", "--up", "-z"]
+    done = run("studio", "a.ply", "--index", "shelf", "--port", 5, "--no-browser", *side)
     assert done.stdout == "The studio is open at http://127.0.0.1:5/?token=abc\n"
     run("studio", "--host", "0.0.0.0", "--allow-remote")
     local = {"host": "127.0.0.1", "port": 5, "allow_remote": False, "browse": False}
+    local |= {"view": [1.0, 0.0, 2.0], "up": "-z"}
     assert calls[0] == (Path("a.ply"), {"index": Path("shelf"), **local})
     remote = {"host": "0.0.0.0", "port": 0, "allow_remote": True, "browse": True}
+    remote |= {"view": "auto", "up": "auto"}
     assert calls[1] == (None, {"index": None, **remote})
 
 
@@ -87,11 +90,21 @@ def test_report_reads_repairs_and_writes(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, module.__name__, module)
     ball = es.icosphere(2)
     es.write_mesh(es.TriangleMesh(ball.vertices, ball.faces[:, ::-1]), tmp_path / "ball.ply")
-    done = run("report", tmp_path / "ball.ply", "-o", tmp_path / "a.html", "--repair", "orient")
+    done = run(
+        "report",
+        tmp_path / "ball.ply",
+        "-o",
+        tmp_path / "a.html",
+        "--repair",
+        "orient",
+        "--view",
+        "left",
+    )
     assert "wrote" in done.stderr
     (mesh, path, options) = calls[0]
     assert es.geometry.enclosed_volume(mesh) > 0
     assert path == tmp_path / "a.html"
     assert (options["name"], options["n_modes"]) == ("ball.ply", 20)
+    assert (options["view"], options["up"]) == ("left", "auto")
     refused = run("report", tmp_path / "ball.ply", "-o", tmp_path / "a.txt")
     assert "A report must be written to a file that ends in .html" in refused.stderr

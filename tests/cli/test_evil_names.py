@@ -1,6 +1,7 @@
 """Files, folders, labels and indexes whose names steer terminals, break SVG or look like markup and formulas."""
 
 import io
+import json
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -106,6 +107,50 @@ def test_an_index(zoo, tmp_path):
     assert done.stdout.count(SPELLED) == 2
     assert f"not drawn: {SPELLED}" in done.stderr
     parse(sheet)
+
+
+NAMES = (
+    EVIL,
+    "../../outside",
+    "/etc/passwd",
+    "a//b",
+    "'one' \"two\" `three`",
+    " spaces  and\ttabs ",
+    "Würfel 立方体 κύβος",
+    "--json",
+    "",
+    "long" * 1024,
+)
+
+
+@pytest.mark.long
+def test_shapes_of_any_name(tmp_path, monkeypatch):
+    """Names of shapes are never names of files: they are listed, found, exported and removed."""
+    monkeypatch.chdir(tmp_path)
+    index = es.ShapeIndex.create("index")
+    fish = es.make_creature("fish", 0, n_vertices=500)
+    descriptor = es.retrieval.find_heat_features(fish).descriptor
+    for name in NAMES:
+        index.add_descriptors(name, [descriptor], label=name, source=name)
+    shown = run("index", "ls", "index").stdout
+    assert SPELLED in shown
+    assert r" spaces  and\ttabs " in shown
+    listed = json.loads(run("index", "ls", "index", "--json").stdout)
+    assert [record["name"] for record in listed] == sorted(NAMES)
+    for name in NAMES:
+        if name == "/etc/passwd":  # a file, which a query takes before a name
+            continue
+        found = json.loads(run("query", "--json", "-n", 20, "--", "index", name).stdout)
+        assert found["scan"] == name
+        assert {match["name"] for match in found["matches"]} == set(NAMES) - {name}
+    run("index", "export", "index", "-o", "exported")
+    exported = json.loads(Path("exported/records.json").read_text())
+    assert [record["name"] for record in exported] == sorted(NAMES)
+    run("query", "index", EVIL, "-n", 20, "-o", "matches.csv")
+    assert run("index", "rm", "index", "--", *NAMES).stdout.startswith("10 shapes removed")
+    assert run("index", "rm", "index", "--", NAMES[-1], code=1).stderr.count("\n") == 1
+    made = {path.name for path in tmp_path.rglob("*") if path.parent.name != "index"}
+    assert made == {"index", "exported", "records.json", "descriptors.npz", "matches.csv"}
 
 
 def test_progress_bars(monkeypatch):

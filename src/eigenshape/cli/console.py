@@ -18,6 +18,7 @@ from eigenshape._text import printable
 out = Console(highlight=False, soft_wrap=True)
 err = Console(stderr=True, highlight=False, soft_wrap=True)
 
+NUMBERS = "+-.0123456789"  # first characters of a number
 LONGEST_NUMBER = 16  # characters of a column that stay however narrow the terminal is
 
 
@@ -49,7 +50,8 @@ def print_table(title: str, columns: list[str], rows: list[list[str]]) -> None:
     for index, column in enumerate(columns):
         # in a narrow terminal long names are cut, numbers are not
         widest = max([len(column), *(len(row[index]) for row in rows)])
-        justify: Literal["left", "right"] = "left" if index == 0 else "right"
+        numbers = all(row[index][:1] in NUMBERS for row in rows) and any(row[index] for row in rows)
+        justify: Literal["left", "right"] = "right" if numbers and index else "left"
         table.add_column(
             column, justify=justify, no_wrap=True, min_width=min(widest, LONGEST_NUMBER)
         )

@@ -12,7 +12,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import escape_text, out, progress_bar
 from eigenshape.cli.index.add import WorkersOption
-from eigenshape.cli.query import print_matches
+from eigenshape.cli.query import explain_scores, print_matches
 from eigenshape.shapes.creature_plans import CREATURES
 
 FOLDER = Path("eigenshape-demo")
@@ -58,6 +58,7 @@ def demo(
     shape = steps.color_query(scan, shelf.default_recipe())
     matches = shelf.query(shape.descriptor, n_matches=6)
     print_matches(matches)
+    explain_scores(matches)
 
     sheet = output / "sheet.png"
     caption = (

@@ -148,6 +148,11 @@ def repair_names(text: str) -> tuple[str, ...]:
     return names
 
 
+def memory_bytes(gigabytes: float | None) -> float | None:
+    """Return what --memory limits in bytes; None is no limit."""
+    return None if gigabytes is None else gigabytes * 1e9
+
+
 def require_one_rule(n_parts: int | None, persistence: float | None, *, largest_gap: bool) -> None:
     """Raise an error if more than one option decides how many parts a mesh gets."""
     rules = {

@@ -6,6 +6,7 @@ import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from os.path import isdir, isfile
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -13,7 +14,7 @@ from typing import Annotated, Any
 import typer
 
 import eigenshape as es
-from eigenshape._errors import EigenshapeError, InvalidParameterError
+from eigenshape._errors import EigenshapeError, InvalidParameterError, StoreError
 from eigenshape._text import literal
 from eigenshape.cli import steps
 from eigenshape.cli.console import (
@@ -31,6 +32,8 @@ from eigenshape.cli.inputs import (
     IndexRepairOption,
     JsonOption,
     StoredMethodOption,
+    UpOption,
+    ViewOption,
     repair_names,
     require_method,
 )
@@ -44,7 +47,7 @@ COLUMNS = (
     "query",
     "rank",
     "name",
-    "class",
+    "label",
     "source",
     "score",
     "chance",
@@ -65,8 +68,9 @@ class _Answer:
 
 def query(
     index: IndexArgument,
+    # Text, because the name of a shape is not a path: "a//b" and "a/b" are two shapes.
     scan: Annotated[
-        Path,
+        str,
         typer.Argument(
             help="Mesh file to search for, a whole shape or a part of one, in any pose; a folder of "
             "such files; or the name of a shape of the index."
@@ -101,6 +105,8 @@ def query(
             "PDF)."
         ),
     ] = None,
+    view: ViewOption = "auto",
+    up: UpOption = "auto",
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="Table of all matches to write, a line each (.csv)."),
@@ -116,35 +122,41 @@ def query(
     steps.require_output(output, (".csv",), "A table")
     if method is not None:
         require_method(method)
+    side = steps.parse_side(view, up)
     repairs, filters = repair_names(repair), steps.parse_filters(where)
     drawn = picture is not None or explain is not None
     shelf = es.ShapeIndex.open(index)
     recipe = steps.query_recipe(shelf, method)
-    if drawn and not scan.is_file():
+    # Unlike the methods of Path, these say no to a text that cannot be a path, too.
+    is_file, is_folder = isfile(scan), isdir(scan)  # noqa: PTH112, PTH113
+    if drawn and not is_file:
         raise InvalidParameterError(
             f"A picture shows one scan, of a file; {scan} is none. Leave --picture and --explain out."
         )
     with shelf.reader() as reader:
         ask_index = partial(reader.query, where=filters, exact=exact)
-        if scan.exists():
+        if is_file or is_folder:
             items = es.io.find_items(scan)
             ask = partial(
                 _answer_file, ask_index, recipe=recipe, n_matches=n_matches, repair=repair
             )
-            answers, failed = _answer_each(items, ask) if scan.is_dir() else ([ask(items[0])], [])
+            if is_folder:
+                answers, failed = _answer_each(items, ask)
+            else:
+                answers, failed = [ask(replace(items[0], name=items[0].path.name))], []
         else:
-            stored = _stored_descriptor(shelf, str(scan), recipe)
-            answers, failed = [_answer_stored(ask_index, str(scan), stored, n_matches)], []
+            stored = _stored_descriptor(reader, scan, recipe)
+            answers, failed = [_answer_stored(ask_index, scan, stored, n_matches)], []
     for name, reason in failed:
         err.print(f"[yellow]not searched for:[/] {escape_text(name)}: {escape_text(reason)}")
     _write(answers, output)
     if as_json:
         facts = [_facts(answer) for answer in answers]
-        print_json(facts if scan.is_dir() else facts[0])
+        print_json(facts if is_folder else facts[0])
     else:
         _print(answers)
     if drawn:
-        _draw(answers[0], index, repairs, picture, explain)
+        _draw(answers[0], index, repairs, side, picture, explain)
     if failed:
         raise typer.Exit(SOME_FAILED)
 
@@ -179,16 +191,27 @@ def _answer_file(
     described = perf_counter()
     matches = ask(colored.descriptor, n_matches=n_matches)
     seconds = {"describe": described - began, "query": perf_counter() - described}
-    return _Answer(item.path.name, colored.descriptor, matches, seconds, colored)
+    return _Answer(item.name, colored.descriptor, matches, seconds, colored)
 
 
-def _stored_descriptor(shelf: es.ShapeIndex, name: str, recipe: AnyRecipe) -> Descriptor:
-    if name not in {record.name for record in shelf.records()}:
+def _stored_descriptor(
+    reader: es.retrieval.IndexReader, name: str, recipe: AnyRecipe
+) -> Descriptor:
+    """Return the descriptor of a whole shape, from the state of the index that is then searched."""
+    shape = reader.state.names.get(name)
+    if shape is None:
         raise InvalidParameterError(
             f"A query is a mesh file, a folder or the name of a shape of the index; {name} is none "
             "of them. `eigenshape index ls` lists the names."
         )
-    return shelf.descriptors(name, recipe)[0]
+    snapshot = reader.snapshot(recipe)
+    (places,) = (snapshot.shape_of == shape).nonzero()
+    if not len(places):
+        raise StoreError(
+            f"A shape must be described by the method of a query; {name} is not described by "
+            f"{recipe.name}. Choose another --method."
+        )
+    return snapshot.descriptor(int(places[0]))
 
 
 def _answer_stored(ask: Ask, name: str, descriptor: Descriptor, n_matches: int) -> _Answer:
@@ -220,6 +243,7 @@ def _print(answers: Sequence[_Answer]) -> None:
         print_matches(answer.matches, title if len(answers) == 1 else f"{title}: {answer.title}")
         if answer.matches.nothing_alike:
             out.print("nothing alike here: unrelated shapes would score as well")
+    explain_scores([match for answer in answers for match in answer.matches])
     describe = sum(answer.seconds["describe"] for answer in answers)
     found = 1000 * sum(answer.seconds["query"] for answer in answers)
     n_compared = sum(answer.matches.n_compared for answer in answers)
@@ -233,6 +257,7 @@ def _draw(
     answer: _Answer,
     index: Path,
     repairs: tuple[str, ...],
+    side: Any,
     picture: Path | None,
     explain: Path | None,
 ) -> None:
@@ -246,11 +271,13 @@ def _draw(
             f"{literal(index.name)} ({steps.CAPTION})"
         )
         sheet = steps.contact_sheet(
-            answer.colored, title, answer.matches, repairs=repairs, caption=caption
+            answer.colored, title, answer.matches, repairs=repairs, caption=caption, **side
         )
         steps.save_picture(sheet, picture)
     if explain is not None:
-        figure = steps.explanation(answer.colored, title, answer.matches[0], repairs=repairs)
+        figure = steps.explanation(
+            answer.colored, title, answer.matches[0], repairs=repairs, **side
+        )
         steps.save_picture(figure, explain)
 
 
@@ -275,7 +302,7 @@ def _match_facts(descriptor: Descriptor, match: es.retrieval.Match) -> dict[str,
     ]
     return {
         "name": match.name,
-        "class": match.label,
+        "label": match.label,
         "source": match.source,
         "score": match.score,
         "chance": match.chance,
@@ -286,7 +313,10 @@ def _match_facts(descriptor: Descriptor, match: es.retrieval.Match) -> dict[str,
 def print_matches(
     matches: Sequence[es.retrieval.Match], title: str = "Most similar shapes"
 ) -> None:
-    """Print matches, best first, with what their scores mean."""
+    """Print matches, best first."""
+    if not matches:
+        out.print(f"{escape_text(title)}: none; no shape of the index agrees with the filters")
+        return
     rows = [
         [
             match.name,
@@ -297,8 +327,12 @@ def print_matches(
         ]
         for match in matches
     ]
-    columns = ["shape", "class", "score", "chance", "corresponding points"]
+    columns = ["shape", "label", "score", "chance", "corresponding points"]
     print_table(title, columns, rows)
+
+
+def explain_scores(matches: Sequence[es.retrieval.Match]) -> None:
+    """Print what the scores of matches mean."""
     if any(match.chance is None for match in matches):
         out.print("score: 0 for the same description, lower is more alike")
     elif matches:

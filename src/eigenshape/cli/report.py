@@ -8,7 +8,7 @@ import typer
 from eigenshape._studio import studio_module
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_written, progress_bar
-from eigenshape.cli.inputs import MeshArgument, RepairOption
+from eigenshape.cli.inputs import MeshArgument, RepairOption, UpOption, ViewOption
 
 
 def report(
@@ -21,6 +21,8 @@ def report(
         int,
         typer.Option("-n", "--n-modes", min=1, max=200, help="Number of eigenfunctions in it."),
     ] = 20,
+    view: ViewOption = "auto",
+    up: UpOption = "auto",
     repair: RepairOption = "",
 ) -> None:
     """Write a shape with its spectrum, heat and parts to one HTML file that any browser opens.
@@ -30,8 +32,11 @@ def report(
     For instance: eigenshape report scan.ply -o scan.html
     """
     steps.require_output(output, (".html",), "A report")
+    side = steps.parse_side(view, up)
     writer = studio_module("report")
     surface = steps.load_mesh(mesh, repair)
     with progress_bar("report") as progress:
-        writer.write_report(surface, output, name=mesh.name, n_modes=n_modes, progress=progress)
+        writer.write_report(
+            surface, output, name=mesh.name, n_modes=n_modes, **side, progress=progress
+        )
     print_written(output)

@@ -8,8 +8,7 @@ import typer
 import eigenshape as es
 from eigenshape._studio import studio_module
 from eigenshape.cli.console import escape_text, out
-
-BYTES = 1e9  # of a gigabyte
+from eigenshape.cli.inputs import memory_bytes
 
 
 def serve(
@@ -73,7 +72,6 @@ def serve(
     For instance: eigenshape serve my-index
     """
     server = studio_module("service.server")
-    limit = None if memory is None else memory * BYTES
 
     def announce(url: str) -> None:
         out.print(f"The service is open at {escape_text(url)}")
@@ -86,7 +84,7 @@ def serve(
         allow_remote=allow_remote,
         allow_hosts=allow_host or (),
         token=token,
-        workers=es.retrieval.Workers(workers, timeout, limit),
+        workers=es.retrieval.Workers(workers, timeout, memory_bytes(memory)),
         show_sources=show_sources,
         announce=announce,
         browse=browser,

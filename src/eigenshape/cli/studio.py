@@ -6,7 +6,9 @@ from typing import Annotated
 import typer
 
 from eigenshape._studio import studio_module
+from eigenshape.cli import steps
 from eigenshape.cli.console import escape_text, out
+from eigenshape.cli.inputs import UpOption, ViewOption
 
 
 def studio(
@@ -19,6 +21,8 @@ def studio(
         Path | None,
         typer.Option("--index", help="Folder of an index to search in, as `index` writes it."),
     ] = None,
+    view: ViewOption = "auto",
+    up: UpOption = "auto",
     host: Annotated[
         str,
         typer.Option(
@@ -46,6 +50,7 @@ def studio(
 
     For instance: eigenshape studio scan.ply --index my-index
     """
+    side = steps.parse_side(view, up)
     server = studio_module("server")
 
     def announce(url: str) -> None:
@@ -55,6 +60,7 @@ def studio(
     server.serve(
         mesh,
         index=shelf,
+        **side,
         host=host,
         port=port,
         allow_remote=allow_remote,

@@ -49,7 +49,7 @@ VERBS = {
 INDEX_VERBS = {
     "add": "Describe meshes and add them to an index; a file that fails is named, and the others "
     "are still added.",
-    "ls": "List the shapes of an index, with their classes, tags and attributes.",
+    "ls": "List the shapes of an index, with their labels, tags and attributes.",
     "rm": "Remove shapes from an index.",
     "stats": "Show how many shapes an index holds, how they are described, and the space they take.",
     "verify": "Read every byte of an index and name what is damaged.",

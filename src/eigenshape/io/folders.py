@@ -60,7 +60,7 @@ def find_items(
     FileFormatError
         If the table has no column ``name``, or names a shape that is not there.
     OSError
-        If the table cannot be read.
+        If a source does not exist, or the table cannot be read.
 
     See Also
     --------
@@ -168,6 +168,7 @@ def index_folder(  # noqa: PLR0913 - one keyword for each choice of a batch
 
 def _items_of(source: Path) -> Iterator[Item]:
     if not source.is_dir():
+        source.stat()  # raises OSError for a folder that is misspelled, before anything is described
         yield Item(source.stem, source)
         return
     paths = [path for path in sorted(source.rglob("*")) if path.suffix.lower() in MESH_FORMATS]

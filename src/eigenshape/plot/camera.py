@@ -176,9 +176,7 @@ def aim_camera(mesh: MeshLike, *, view: View = "auto", up: Up = "auto", size: in
     [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]
     """
     mesh = as_mesh(mesh)
-    if isinstance(up, str) and up == "auto":
-        up = _upright_axis(mesh)
-    upward = _direction(up, "up", UP_NAMES)
+    upward = upward_direction(mesh, up)
     front, towards_auto = _guess_front(mesh, upward)
     if isinstance(view, str) and view == "auto":
         towards = towards_auto
@@ -193,6 +191,19 @@ def aim_camera(mesh: MeshLike, *, view: View = "auto", up: Up = "auto", size: in
         right = np.cross(-np.sign(towards @ upward) * front, towards)
     right = right / np.linalg.norm(right)
     return Camera(np.stack([right, -np.cross(towards, right), towards]), size)
+
+
+def upward_direction(mesh: TriangleMesh, up: Up) -> Float[np.ndarray, "3"]:
+    """Return the upward direction of a shape, which "auto" guesses, as a unit vector.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `up` is neither a name nor a direction.
+    """
+    if isinstance(up, str) and up == "auto":
+        up = _upright_axis(mesh)
+    return _direction(up, "up", UP_NAMES)
 
 
 def choose_camera(

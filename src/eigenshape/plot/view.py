@@ -32,8 +32,7 @@ def view(
     height : int
         Height of the widget in pixels.
     view : str or (3,) float
-        The side from which the shape is shown at first, as in `aim_camera`, but always a little
-        from above.
+        The side from which the shape is shown at first, as in `aim_camera`.
     up : str or (3,) float
         The upward direction, as in `aim_camera`.
 

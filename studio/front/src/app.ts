@@ -226,7 +226,7 @@ export class Studio {
     if (shape !== this.shown.shape) {
       if (this.shown.shape >= 0) this.mesh = this.requestMesh();
       const [points, faces] = await this.mesh;
-      this.viewer.setMesh(points, faces, state.up, state.front);
+      this.viewer.setMesh(points, faces, state.up, state.towards);
       this.viewer.shape = shape;
     } else if (pose !== this.shown.pose)
       this.viewer.setVertices(vertices ?? (await this.backend.array("vertices")));

@@ -8,15 +8,15 @@ import numpy as np
 import scipy.sparse as sp
 
 import eigenshape as es
-from eigenshape.plot.camera import Up, View
+from eigenshape.plot.camera import Up, View, upward_direction
 from eigenshape_studio.jobs import NO_JOB, Job, Progress
 
 # Modes that are solved for when a shape is opened, beside one for each further component: as many
 # as `es.rig_shape` takes, so that both give the same rig.
 N_MODES = 300
-# Angle in radians between the front of a shape and the view of `three_quarter_view`.
-ASIDE = np.arctan2(0.48, 0.78)
-LEVEL = 1e-9  # largest part, of 1, of a level direction along the upward axis
+# Radians by which the page looks past the upward axis in a view along it: its camera turns about
+# that axis, so it needs a side on which to stand. 0.06 degrees are not seen.
+PAST_UP = 1e-3
 
 
 class Analysis:
@@ -40,6 +40,7 @@ class Analysis:
     ) -> None:
         self.mesh = mesh
         self.name = name
+        self.side: tuple[View, Up] = ("auto", "auto")  # from which the page looks
         self._n_modes = n_modes
         # The first that a page asks for; it has begun when the browser opens.
         self._upright: Job[dict[str, Any]] = Job(lambda _: frame_shape(mesh), shared=True)
@@ -90,6 +91,7 @@ class Analysis:
             If `view` or `up` is neither a name nor a direction, as in `es.plot.aim_camera`.
         """
         found = frame_shape(self.mesh, view, up)
+        self.side = view, up
         self._upright = Job(lambda _: found, shared=True)
 
     @cached_property
@@ -161,29 +163,13 @@ def frame_shape(mesh: es.TriangleMesh, view: View = "auto", up: Up = "auto") -> 
 def upright_view(
     mesh: es.TriangleMesh, view: View = "auto", up: Up = "auto"
 ) -> dict[str, list[float]]:
-    """Return the upward axis of a shape, and its front, which is level.
-
-    The page looks from the front left and a little from above, so a view changes the side alone.
-    """
-    camera = es.plot.three_quarter_view(mesh, up=up)
-    if isinstance(up, str):
-        # The usual camera stands upright: its row to the right is orthogonal to the upward axis.
-        right, down, _ = camera.rotation
-        level = np.abs(right) < LEVEL
-        axis = np.argmax(np.where(level, np.abs(down), -np.inf))
-        upward = -np.sign(down[axis]) * np.eye(3)[axis] if level.any() else -down
-    else:
-        upward = np.asarray(up, dtype=np.float64) / np.linalg.norm(up)
-    if not (isinstance(view, str) and view == "auto"):
-        camera = es.plot.aim_camera(mesh, view=view, up=up)
-    _, down, towards = camera.rotation
-    # It looks from the front, turned to the left about that axis.
-    along = towards - (towards @ upward) * upward
-    if np.linalg.norm(along) < LEVEL:  # from above or below: the front is beside the viewer
-        along = np.sign(towards @ upward) * down
-    along /= np.linalg.norm(along)
-    front = np.cos(ASIDE) * along - np.sin(ASIDE) * np.cross(upward, along)
-    return {"up": upward.tolist(), "front": front.tolist()}
+    """Return the upward axis of a shape, and the direction to the viewer, as of `aim_camera`."""
+    upward = upward_direction(mesh, up)
+    _, down, towards = es.plot.aim_camera(mesh, view=view, up=up).rotation
+    if np.linalg.norm(np.cross(upward, towards)) < PAST_UP:
+        towards = towards + PAST_UP * np.sign(towards @ upward) * down
+        towards /= np.linalg.norm(towards)
+    return {"up": upward.tolist(), "towards": towards.tolist()}
 
 
 @cache

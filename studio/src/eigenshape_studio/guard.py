@@ -169,8 +169,8 @@ class Guard:
             raise RefusedError(
                 403,
                 "A request must bring the token. Open the address that "
-                f"`eigenshape {self.rules.verb}` has printed, or send the header "
-                "`Authorization: Bearer TOKEN`.",
+                f"`eigenshape {self.rules.verb}` has printed, with ?token=TOKEN at its end, or "
+                "send the header `Authorization: Bearer TOKEN`.",
             )
 
     def _is_token(self, given: str) -> bool:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 import eigenshape as es
+from eigenshape.plot.camera import Up, View
 from eigenshape_studio.bundle import bundle_text
 from eigenshape_studio.jobs import Job
 from eigenshape_studio.wire import encode_halves
@@ -41,13 +42,15 @@ PAGE = """<!doctype html>
 """
 
 
-def write_report(
+def write_report(  # noqa: PLR0913  one for each option of the command
     mesh: es.types.MeshLike,
     path: str | Path,
     *,
     name: str = "shape",
     values: Mapping[str, Any] | None = None,
     n_modes: int = N_MODES,
+    view: View = "auto",
+    up: Up = "auto",
     progress: Callable[[float, str], None] | None = None,
 ) -> None:
     """Write a report on a shape.
@@ -65,17 +68,25 @@ def write_report(
         Functions on the vertices to choose from.
     n_modes : int
         Number of eigenfunctions.
+    view : str or (3,) float
+        The side from which the shape is shown at first, as in `es.plot.aim_camera`.
+    up : str or (3,) float
+        The upward direction, as in `es.plot.aim_camera`.
     progress : callable, optional
         Called as progress(fraction_done, message).
 
     Raises
     ------
+    InvalidParameterError
+        If `view` or `up` is neither a name nor a direction.
     InvalidShapeError, ConvergenceError
         If the spectrum of the shape cannot be computed. A shape whose parts cannot be found has a
         report without parts.
     """
     title = html.escape(name)
-    data = base64.b64encode(gzip.compress(_message(mesh, name, values, n_modes, progress), 9))
+    workspace = Workspace(mesh, name, values=values, n_modes=n_modes)
+    workspace.analysis.look_from(view, up)
+    data = base64.b64encode(gzip.compress(_message(workspace, progress), 9))
     # In a script element only this sequence would end the script.
     bundle = bundle_text().replace("</script", "<\\/script")
     page = PAGE.format(policy=POLICY, title=title, data=data.decode(), bundle=bundle)
@@ -85,15 +96,8 @@ def write_report(
     Path(file.name).replace(path)
 
 
-def _message(
-    mesh: es.types.MeshLike,
-    name: str,
-    values: Mapping[str, Any] | None,
-    n_modes: int,
-    progress: Callable[[float, str], None] | None,
-) -> bytes:
+def _message(workspace: Workspace, progress: Callable[[float, str], None] | None) -> bytes:
     """Return the message that the page takes its state and all its arrays from."""
-    workspace = Workspace(mesh, name, values=values, n_modes=n_modes)
     analysis = workspace.analysis
     analysis.find_parts()
     for job in (analysis.spectrum, analysis.parts, analysis.health):

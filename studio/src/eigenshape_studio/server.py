@@ -14,6 +14,7 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
 
 import eigenshape as es
+from eigenshape.plot.camera import Up, View
 from eigenshape_studio.bundle import NotBuiltError, read_static
 from eigenshape_studio.guard import App, Guard, Rules
 from eigenshape_studio.listening import (
@@ -133,6 +134,8 @@ def serve(  # noqa: PLR0913  one for each option of the command
     mesh: str | Path | es.types.MeshLike | None = None,
     *,
     index: str | Path | None = None,
+    view: View = "auto",
+    up: Up = "auto",
     host: str = "127.0.0.1",
     port: int = 0,
     allow_remote: bool = False,
@@ -147,6 +150,10 @@ def serve(  # noqa: PLR0913  one for each option of the command
         The shape to show; by default a creature that the library makes.
     index : path, optional
         Folder of an index to search in.
+    view : str or (3,) float
+        The side from which the shape is shown at first, as in `es.plot.aim_camera`.
+    up : str or (3,) float
+        The upward direction, as in `es.plot.aim_camera`.
     host : str
         Address to listen on.
     port : int
@@ -162,13 +169,15 @@ def serve(  # noqa: PLR0913  one for each option of the command
     Raises
     ------
     InvalidParameterError
-        If the host is another machine's or all of them, and `allow_remote` is not set.
+        If the host is another machine's or all of them, and `allow_remote` is not set; if `view` or
+        `up` is neither a name nor a direction.
     OSError
         If the port is taken.
     """
     require_permission(host, "studio", allow_remote=allow_remote)
     share_one_arena()
     first = _first_workspace(mesh, index)
+    first.analysis.look_from(view, up)
     listening = listen(host, port)
     port = listening.getsockname()[1]
     token = secrets.token_urlsafe(32)

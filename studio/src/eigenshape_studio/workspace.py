@@ -495,8 +495,9 @@ class Workspace:
         names = meta.get("names")
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
             raise RequestError("names must be a list of the names of repairs.")
-        done = es.repair(self.mesh, names)
+        done, side = es.repair(self.mesh, names), self.analysis.side
         self._show(done.mesh, self.analysis.name)
+        self.analysis.look_from(*side)
         self._warnings += done.report
 
     def _open(self, meta: dict[str, Any], arrays: Arrays) -> None:

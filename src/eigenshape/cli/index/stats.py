@@ -25,7 +25,7 @@ def stats(index: IndexArgument, *, as_json: JsonOption = False) -> None:
                 "shapes": len(records),
                 "bytes": n_bytes,
                 "recipes": dict(recipes),
-                "classes": {label or "": count for label, count in labels.items()},
+                "labels": {label or "": count for label, count in labels.items()},
             }
         )
         return
@@ -34,4 +34,4 @@ def stats(index: IndexArgument, *, as_json: JsonOption = False) -> None:
     rows = [[name, str(count)] for name, count in recipes.most_common()]
     print_table("Descriptions", ["recipe", "shapes"], rows)
     rows = [[label or "(none)", str(count)] for label, count in labels.most_common()]
-    print_table("Classes", ["class", "shapes"], rows)
+    print_table("Labels", ["label", "shapes"], rows)

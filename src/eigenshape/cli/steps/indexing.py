@@ -9,6 +9,7 @@ from typing import Any
 from eigenshape._errors import InvalidParameterError, MissingExtraError
 from eigenshape._workers import Item, Workers
 from eigenshape.cli.console import batch_reporter, err, progress_bar
+from eigenshape.cli.inputs import memory_bytes
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.retrieval.kinds import AnyRecipe
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook
@@ -16,7 +17,6 @@ from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.store.batch import BatchReport, build_index, train_codebook_from_files
 from eigenshape.retrieval.store.index import ShapeIndex
 
-BYTES = 1e9  # of a gigabyte
 RETRIES = 3  # workers of a cluster that a task may lose before it counts as failed
 
 
@@ -37,7 +37,7 @@ def worker_processes(
     count: int, timeout: float, memory: float | None, scheduler: str | None
 ) -> Iterator[Workers]:
     """Give the processes that describe files: of this machine, or of a Dask cluster."""
-    limit = None if memory is None else memory * BYTES
+    limit = memory_bytes(memory)
     if scheduler is None:
         yield Workers(count, timeout, limit)
         return

@@ -16,6 +16,7 @@ from eigenshape.cli.steps.reading import read_repaired
 from eigenshape.geometry.geodesic import geodesic_distances
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.plot.camera import Up, View
 from eigenshape.plot.sheet import Panel, figure_contact_sheet
 from eigenshape.retrieval.description import describe
 from eigenshape.retrieval.heat.features import find_heat_features, find_view_features
@@ -79,6 +80,8 @@ def contact_sheet(
     *,
     repairs: tuple[str, ...] = (),
     caption: str = "",
+    view: View = "auto",
+    up: Up = "auto",
 ) -> Figure:
     """Draw a query beside its matches, read from their files.
 
@@ -94,11 +97,17 @@ def contact_sheet(
         for done, match in enumerate(matches):
             progress(done / len(matches), match.name)
             panels.append(_panel(query, match, repairs))
-    return figure_contact_sheet(first, panels, caption=caption)
+    return figure_contact_sheet(first, panels, caption=caption, view=view, up=up)
 
 
 def explanation(
-    query: ColoredQuery, title: str, match: Match, *, repairs: tuple[str, ...] = ()
+    query: ColoredQuery,
+    title: str,
+    match: Match,
+    *,
+    repairs: tuple[str, ...] = (),
+    view: View = "auto",
+    up: Up = "auto",
 ) -> Figure:
     """Draw a query beside one match, with the points that correspond, surest first.
 
@@ -112,7 +121,7 @@ def explanation(
     panels = []
     for surface, name, vertices in (
         (query.mesh, f"query: {title}", query.descriptor.vertices[ours]),
-        (mesh, f"{literal(match.name)}\nscore {match.score:#.4g}", match.vertices[theirs]),
+        (mesh, f"{literal(match.name)}\nscore {match.score:.3f}", match.vertices[theirs]),
     ):
         reach = REACH * np.sqrt(surface_area(surface) / max(len(match.vertices), 1))
         labels = _cells(surface, vertices, np.arange(len(vertices)), reach)
@@ -121,11 +130,11 @@ def explanation(
         f"The {len(ours)} surest of {len(match.correspondences)} pairs of corresponding points: "
         "their surroundings have one color"
     )
-    return figure_contact_sheet(panels[0], panels[1:], caption=caption)
+    return figure_contact_sheet(panels[0], panels[1:], caption=caption, view=view, up=up)
 
 
 def _panel(query: ColoredQuery, match: Match, repairs: tuple[str, ...]) -> Panel:
-    title = f"{literal(match.name)}\nscore {match.score:#.4g}"
+    title = f"{literal(match.name)}\nscore {match.score:.3f}"
     try:
         mesh = _read_match(match, repairs)
     except (EigenshapeError, OSError) as error:

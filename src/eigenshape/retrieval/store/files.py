@@ -118,7 +118,7 @@ def require_database(folder: Path) -> None:
     if not (folder / DATABASE).is_file():
         raise StoreError(
             f"{folder} must be an index; it has no {DATABASE}. Create one with "
-            "ShapeIndex.create, or with `eigenshape index` on the command line."
+            "ShapeIndex.create, or with `eigenshape index add` on the command line."
         )
 
 

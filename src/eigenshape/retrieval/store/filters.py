@@ -11,8 +11,58 @@ from eigenshape._arguments import require_type
 from eigenshape._errors import InvalidParameterError
 from eigenshape.retrieval.store.snapshot import Shapes
 
-RESERVED = ("label", "tag")  # keys of a filter that are no attributes
-RANGE = 2  # numbers of a range, the least and the largest
+RESERVED = ("label", "tag")  # keys of a filter that are no attributes; their values are texts
+RANGE = ".."  # between the least and the largest number of a filter as text
+
+
+def parse_filters(texts: Sequence[str] | None) -> dict[str, Any] | None:
+    """Return the conditions of filters such as "label=cat,dog" or "height=1.5..3".
+
+    Returns
+    -------
+    dict or None
+        As of `ShapeIndex.query`; None if there are none.
+
+    Raises
+    ------
+    InvalidParameterError
+        If a text is no condition, or two are about the same key.
+    """
+    conditions: dict[str, Any] = {}
+    for text in texts or ():
+        key, sign, value = (part.strip() for part in text.partition("="))
+        if not sign or not key or not value:
+            raise InvalidParameterError(
+                f"A filter is a condition such as label=cat or height=1.5..3; it is {text!r}."
+            )
+        if key in conditions:
+            raise InvalidParameterError(
+                f"A filter has one condition for each key; {key!r} has two. Either of two values "
+                f"is {key}=one,other."
+            )
+        conditions[key] = _parse_condition(text, key, value)
+    return conditions or None
+
+
+def _parse_condition(text: str, key: str, value: str) -> Any:
+    if key in RESERVED:  # also "7" and "1..2", which are good names of folders
+        return [part.strip() for part in value.split(",")]
+    if RANGE not in value:
+        return [_number_or_text(part.strip()) for part in value.split(",")]
+    ends = [_number_or_text(part.strip()) if part.strip() else None for part in value.split(RANGE)]
+    if len(ends) != 2 or any(isinstance(end, str) for end in ends):
+        raise InvalidParameterError(
+            "A range of a filter has a least and a largest number, such as height=1.5..3 or "
+            f"height=1.5..; it is {text!r}."
+        )
+    return tuple(ends)
+
+
+def _number_or_text(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 def choose_shapes(shapes: Shapes, where: Mapping[str, Any]) -> Bool[np.ndarray, " n"]:
@@ -52,7 +102,7 @@ def choose_shapes(shapes: Shapes, where: Mapping[str, Any]) -> Bool[np.ndarray, 
 
 def _condition(key: str, value: Any) -> Callable[[Any], bool]:
     """Return the test of one condition: a value, a list of values, or a range of numbers."""
-    if isinstance(value, tuple) and len(value) == RANGE and all(map(_is_bound, value)):
+    if isinstance(value, tuple) and len(value) == 2 and all(map(_is_bound, value)):
         low, high = (
             (-np.inf if value[0] is None else value[0]),
             (np.inf if value[1] is None else value[1]),

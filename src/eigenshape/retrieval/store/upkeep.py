@@ -227,7 +227,7 @@ class _Merging:
             if not self.replaces:
                 raise StoreError(
                     f"A name stands for one shape; {shape.name!r} of {self.state.folder} is in the "
-                    "index with other content. Remove one of them, or merge with replace=True."
+                    "index with other content. Remove one of them, or merge with replace=True (--replace)."
                 )
             change.delete_shape(old)
         if old is not None and same:

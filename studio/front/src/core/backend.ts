@@ -20,7 +20,7 @@ export interface State {
   n_vertices: number;
   n_faces: number;
   up: Vec3;
-  front: Vec3;
+  towards: Vec3; // the viewer
   capabilities: string[]; // rig, finish, query, open, repair, solve
   suffixes: string; // of the files that can be opened, as a file dialog takes them
   health: {
@@ -71,7 +71,7 @@ export interface Match {
   label: string | null;
   score: number;
   up?: Vec3; // how to look at it
-  front?: Vec3;
+  towards?: Vec3;
 }
 export interface Matches {
   matches: Match[];

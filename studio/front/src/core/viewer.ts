@@ -82,7 +82,7 @@ export class Viewer {
   private frame = 0;
   private fading = 0;
   private up: Vec3 = [0, 1, 0];
-  private front: Vec3 = [0, 0, 1];
+  private towards: Vec3 = [0, 0, 1]; // from the shape to the viewer
 
   constructor(readonly stage: HTMLElement) {
     stage.append(this.canvas);
@@ -107,9 +107,9 @@ export class Viewer {
     this.resize();
   }
 
-  setMesh(vertices: Float32Array, faces: Uint32Array, up: Vec3, front: Vec3): void {
+  setMesh(vertices: Float32Array, faces: Uint32Array, up: Vec3, towards: Vec3): void {
     const count = vertices.length / 3;
-    Object.assign(this, { vertices, faces, up, front });
+    Object.assign(this, { vertices, faces, up, towards });
     this.geometry.dispose();
     const attributes = {
       position: [vertices, 3],
@@ -321,12 +321,10 @@ export class Viewer {
     [this.click, this.tool] = [click, tool];
   }
 
-  /** Show the whole shape upright, from its front left and a little from above. */
+  /** Show the whole shape upright, from the side that the library chose. */
   fit(): void {
     const up = new three.Vector3(...this.up);
-    const towards = new three.Vector3(...this.front);
-    const side = up.clone().cross(towards);
-    towards.multiplyScalar(0.78).addScaledVector(side, 0.48).addScaledVector(up, 0.4).normalize();
+    const towards = new three.Vector3(...this.towards);
     const right = up.clone().cross(towards).normalize();
     const above = towards.clone().cross(right);
     const turn = new three.Matrix4().makeBasis(right, above, towards).transpose();

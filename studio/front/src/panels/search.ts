@@ -88,7 +88,7 @@ export class SearchPanel implements Panel {
     ]);
     const loaded = await app.run("Loading the match", loading);
     if (!loaded || !found || found !== this.found) return;
-    const { name, up = state.up, front = state.front } = found.matches[number]!;
+    const { name, up = state.up, towards = state.towards } = found.matches[number]!;
     this.closeMatch();
     viewer.stage.after(this.beside);
     viewer.stage.parentElement!.classList.add("compare");
@@ -97,7 +97,7 @@ export class SearchPanel implements Panel {
     const close = { type: "button", "data-test": "close-match", title: "Close the match", click };
     const caption = h("div", { class: "caption" }, name, h("button", close, "Close"));
     this.beside.append(caption);
-    this.second.setMesh(...loaded, up, front);
+    this.second.setMesh(...loaded, up, towards);
     viewer.fit();
     const pairs = found.arrays[`pairs${number}`] as Uint32Array;
     const colors = found.arrays[`colors${number}`] as Uint8Array;

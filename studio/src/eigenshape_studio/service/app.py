@@ -2,10 +2,11 @@
 
 import asyncio
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
+from string import Template
 from time import perf_counter
 from typing import Any
 from urllib.parse import quote
@@ -16,10 +17,11 @@ from starlette.applications import Starlette
 from starlette.convertors import StringConvertor, register_url_convertor
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import JSONResponse, Response
+from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.routing import Route
 
 import eigenshape as es
+from eigenshape.retrieval.store.filters import parse_filters
 from eigenshape_studio.guard import App, Guard, Rules
 from eigenshape_studio.parse import display_name, mesh_suffix
 from eigenshape_studio.service import openapi
@@ -29,9 +31,9 @@ from eigenshape_studio.service.parameters import RequestError, read_parameters
 from eigenshape_studio.service.shelf import Found, Shape, ShelfReader
 
 PAGE = Path(__file__).parent / "page"
+# Names of the two pages, each a body (.html) and a script (.js), and their titles.
+PAGES = {"/": ("page", "similar shapes"), "/docs": ("docs", "calls for programs")}
 FILES = {
-    "/": ("index.html", "text/html; charset=utf-8"),
-    "/docs": ("docs.html", "text/html; charset=utf-8"),
     "/page.js": ("page.js", "text/javascript; charset=utf-8"),
     "/docs.js": ("docs.js", "text/javascript; charset=utf-8"),
     "/page.css": ("page.css", "text/css; charset=utf-8"),
@@ -99,6 +101,7 @@ class Service:
     async def query(self, request: Request) -> Response:
         """Find the shapes that are most like an uploaded mesh."""
         wanted = read_parameters(request, openapi.QUERY)
+        where = _conditions(wanted)
         try:
             suffix = mesh_suffix(wanted["name"])
         except es.FileFormatError as error:
@@ -109,7 +112,7 @@ class Service:
         self._n_queries += 1
         try:
             with self.metrics.queue.track_inprogress():
-                return await self._answer(wanted, suffix, data)
+                return await self._answer(wanted, where, suffix, data)
         except MeshRefusedError as error:
             name = display_name(wanted["name"])
             cause = str(error).removeprefix("The file: ").removesuffix(".")
@@ -120,7 +123,9 @@ class Service:
         finally:
             self._n_queries -= 1
 
-    async def _answer(self, wanted: dict[str, Any], suffix: str, data: bytes) -> Response:
+    async def _answer(
+        self, wanted: dict[str, Any], where: Mapping[str, Any] | None, suffix: str, data: bytes
+    ) -> Response:
         await self._refresh()
         began = perf_counter()
         scan = await self.describers.describe(
@@ -130,7 +135,7 @@ class Service:
         self.metrics.describing.observe(described - began)
         answer = await anyio.to_thread.run_sync(
             lambda: self.shelf.query(
-                scan.descriptor, wanted["n"], label=wanted["label"], exact=wanted["exact"]
+                scan.descriptor, wanted["n"], where=where, exact=wanted["exact"]
             ),
             limiter=self._threads,
         )
@@ -156,10 +161,12 @@ class Service:
     async def shapes(self, request: Request) -> Response:
         """List shapes."""
         wanted = read_parameters(request, openapi.SHAPES)
+        where = _conditions(wanted)
         await self._refresh()
-        found = self.shelf.shapes(wanted["offset"], wanted["limit"])
-        shapes = [self._facts(shape) for shape in found]
-        return JSONResponse({"n_shapes": len(self.shelf), "shapes": shapes})
+        n_shapes, found = await anyio.to_thread.run_sync(
+            self.shelf.shapes, wanted["offset"], wanted["limit"], where, limiter=self._threads
+        )
+        return JSONResponse({"n_shapes": n_shapes, "shapes": [self._facts(each) for each in found]})
 
     async def shape(self, request: Request) -> Response:
         """Tell what is known of one shape."""
@@ -218,6 +225,13 @@ class Service:
         read_parameters(request, ())
         return JSONResponse(openapi.openapi())
 
+    async def show_page(self, request: Request) -> Response:
+        """Return one of the two pages."""
+        name, title = PAGES[request.url.path]
+        frame = Template((PAGE / "frame.html").read_text(encoding="utf-8"))
+        body = (PAGE / f"{name}.html").read_text(encoding="utf-8")
+        return HTMLResponse(frame.substitute(title=title, script=f"/{name}.js", body=body))
+
     async def show_file(self, request: Request) -> Response:
         """Return a file of the page."""
         name, kind = FILES[request.url.path]
@@ -255,6 +269,8 @@ class Service:
         return {
             "name": shape.name,
             "label": shape.label,
+            "tags": list(shape.tags),
+            "attributes": dict(shape.attributes),
             "source": shape.source if self.settings.show_sources else None,
             "thumbnail": _thumbnail_address(shape.name) if has_picture else None,
         }
@@ -280,6 +296,7 @@ def make_app(service: Service, rules: Rules) -> App:
         "/health": ("GET", service.health),
         "/metrics": ("GET", service.show_metrics),
         "/openapi.json": ("GET", service.describe_calls),
+        **dict.fromkeys(PAGES, ("GET", service.show_page)),
         **dict.fromkeys(FILES, ("GET", service.show_file)),
     }
     routes = [
@@ -296,6 +313,14 @@ def make_app(service: Service, rules: Rules) -> App:
 
 def _thumbnail_address(name: str) -> str:
     return f"/v1/thumbnails?name={quote(name, safe='')}"
+
+
+def _conditions(wanted: dict[str, Any]) -> dict[str, Any] | None:
+    """Return the conditions of the filters of a request; raise RequestError if one is none."""
+    try:
+        return parse_filters(wanted["filter"])
+    except es.InvalidParameterError as error:
+        raise RequestError(400, str(error)) from error
 
 
 def _error(status: int, reason: str) -> Response:

@@ -10,6 +10,12 @@ MOST_LISTED = 1000  # shapes of one page of the list
 MOST_POINTS = 500  # whose numbers fit into an address
 
 SHAPE_NAME = Parameter("name", "string", "Name of a shape of the index.", REQUIRED)
+FILTER = Parameter(
+    "filter",
+    "strings",
+    "Only shapes that meet a condition: label=cat, tag=scanned, or by an attribute height=1.5..3. "
+    "label=cat,dog allows either. May be repeated; all conditions must be met.",
+)
 QUERY = (
     Parameter(
         "name",
@@ -18,7 +24,7 @@ QUERY = (
         REQUIRED,
     ),
     Parameter("n", "integer", "Matches to return at most.", 5, 1, MOST_MATCHES),
-    Parameter("label", "string", "Return shapes of this class alone."),
+    FILTER,
     Parameter("exact", "boolean", "1 compares every shape of the index.", False),
     Parameter(
         "picture", "boolean", "1 returns a picture of the scan, with its described points.", False
@@ -27,6 +33,7 @@ QUERY = (
 SHAPES = (
     Parameter("offset", "integer", "Shapes to leave out at the beginning.", 0, 0, 2**53),
     Parameter("limit", "integer", "Shapes to return at most.", 100, 1, MOST_LISTED),
+    FILTER,
 )
 POINTS = (
     SHAPE_NAME,
@@ -66,14 +73,26 @@ def _list(items: dict[str, Any]) -> dict[str, Any]:
 
 
 SOURCE = MAYBE_TEXT | {"description": "File of the shape, if the service was told to show it."}
+SHAPE = {
+    "name": TEXT,
+    "label": MAYBE_TEXT,
+    "tags": _list(TEXT),
+    "attributes": {
+        "type": "object",
+        "additionalProperties": {"type": ["number", "string"]},
+    },
+    "source": SOURCE,
+    "thumbnail": MAYBE_TEXT | {"description": "Address of its picture; null if it has none."},
+}
 SCHEMAS = {
     "Error": _object(error=TEXT | {"description": "A sentence that says what to change."}),
-    "Shape": _object(name=TEXT, label=MAYBE_TEXT, source=SOURCE, thumbnail=MAYBE_TEXT),
-    "Shapes": _object(n_shapes=WHOLE, shapes=_list({"$ref": "#/components/schemas/Shape"})),
+    "Shape": _object(**SHAPE),
+    "Shapes": _object(
+        n_shapes=WHOLE | {"description": "Number of shapes, of those that the filters choose."},
+        shapes=_list({"$ref": "#/components/schemas/Shape"}),
+    ),
     "Match": _object(
-        name=TEXT,
-        label=MAYBE_TEXT,
-        source=SOURCE,
+        **SHAPE,
         score=NUMBER | {"description": "Near 0 for the same shape; smaller is more alike."},
         chance={
             "type": ["number", "null"],
@@ -82,7 +101,6 @@ SCHEMAS = {
         n_pairs=WHOLE | {"description": "Number of points that correspond."},
         pairs=_list(PAIR)
         | {"description": "Vertices that correspond, of the scan and of the shape; surest first."},
-        thumbnail=MAYBE_TEXT | {"description": "Address of its picture; null if it has none."},
     ),
     "Answer": _object(
         scan=_object(name=TEXT, n_vertices=WHOLE, n_faces=WHOLE, repairs=_list(TEXT)),

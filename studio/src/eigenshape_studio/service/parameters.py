@@ -22,8 +22,9 @@ class Parameter:
     Attributes
     ----------
     name : str
-    kind : {"string", "integer", "boolean", "integers"}
-        A boolean is 0 or 1; integers are separated by commas.
+    kind : {"string", "strings", "integer", "boolean", "integers"}
+        A boolean is 0 or 1; strings are given by a parameter each, integers are separated by
+        commas.
     text : str
         What it means.
     default : object
@@ -33,15 +34,23 @@ class Parameter:
     """
 
     name: str
-    kind: Literal["string", "integer", "boolean", "integers"]
+    kind: Literal["string", "strings", "integer", "boolean", "integers"]
     text: str
     default: Any = None
     low: int = 0
     high: int = 4096
 
+    def read(self, texts: list[str]) -> Any:
+        """Return the value of what was given; raise RequestError if it has none."""
+        if self.kind == "strings":
+            return [self.parse(text) for text in texts]
+        if len(texts) > 1:
+            raise RequestError(400, f"The parameter {self.name} must be given once.")
+        return self.parse(texts[0])
+
     def parse(self, text: str) -> Any:
         """Return the value of a text; raise RequestError if there is none."""
-        if self.kind == "string":
+        if self.kind in ("string", "strings"):
             if len(text) > self.high:
                 raise self._refusal(f"have at most {self.high:,} characters", f"{len(text):,}")
             return text
@@ -73,6 +82,8 @@ class Parameter:
         schema: dict[str, Any] = {"type": "integer", "enum": [0, 1]}
         if self.kind == "string":
             schema = {"type": "string", "maxLength": self.high}
+        elif self.kind == "strings":
+            schema = {"type": "array", "items": {"type": "string", "maxLength": self.high}}
         elif self.kind == "integer":
             schema = {"type": "integer", "minimum": self.low, "maximum": self.high}
         elif self.kind == "integers":
@@ -101,7 +112,7 @@ def read_parameters(request: Request, parameters: Sequence[Parameter]) -> dict[s
     Raises
     ------
     RequestError
-        If one is unknown, missing, given twice, or not what it must be.
+        If one is unknown, missing, given too often, or not what it must be.
     """
     known = {parameter.name: parameter for parameter in parameters}
     given = request.query_params
@@ -111,12 +122,10 @@ def read_parameters(request: Request, parameters: Sequence[Parameter]) -> dict[s
             raise RequestError(
                 400, f"There is no parameter {name[:80]!r} here; the parameters are: {names}."
             )
-        if len(given.getlist(name)) > 1:
-            raise RequestError(400, f"The parameter {name} must be given once.")
     values = {}
     for name, parameter in known.items():
         if name in given:
-            values[name] = parameter.parse(given[name])
+            values[name] = parameter.read(given.getlist(name))
         elif parameter.default is REQUIRED:
             raise RequestError(400, f"The parameter {name} must be given. {parameter.text}")
         else:

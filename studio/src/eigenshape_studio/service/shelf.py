@@ -1,8 +1,9 @@
 """The index of a service: what it answers is read here, and nowhere else."""
 
+import json
 import threading
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from jaxtyping import Int
 
 import eigenshape as es
+from eigenshape.retrieval.store.filters import choose_shapes
 
 REFRESH_SECONDS = 1.0  # between looks for shapes that other processes have added or removed
 
@@ -22,6 +24,8 @@ class Shape:
     Attributes
     ----------
     name, label, source : str
+    tags : tuple of str
+    attributes : dict of str to float or str
     has_thumbnail : bool
         Whether the index holds its picture.
     """
@@ -29,7 +33,9 @@ class Shape:
     name: str
     label: str | None
     source: str | None
-    has_thumbnail: bool
+    tags: tuple[str, ...] = ()
+    attributes: Mapping[str, float | str] = field(default_factory=dict)
+    has_thumbnail: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +120,12 @@ class ShelfReader:
                 self._due = monotonic() + REFRESH_SECONDS
 
     def query(
-        self, descriptor: Any, n_matches: int, *, label: str | None = None, exact: bool = False
+        self,
+        descriptor: Any,
+        n_matches: int,
+        *,
+        where: Mapping[str, Any] | None = None,
+        exact: bool = False,
     ) -> Answer:
         """Return the shapes that are most alike.
 
@@ -122,14 +133,13 @@ class ShelfReader:
         ----------
         descriptor : HeatDescriptor or PatchDescriptor
         n_matches : int
-        label : str, optional
-            Class to which the shapes must belong.
+        where : mapping, optional
+            Conditions that the shapes must meet.
         exact : bool
             Whether every shape must be compared.
         """
         if not len(self):
             return Answer()
-        where = None if label is None else {"label": label}
         matches = self._reader.query(descriptor, n_matches=n_matches, where=where, exact=exact)
         found = tuple(self._found(descriptor, match) for match in matches)
         return Answer(found, matches.method, matches.n_compared, matches.nothing_alike)
@@ -139,13 +149,19 @@ class ShelfReader:
         pairs = np.column_stack([descriptor.vertices[ours], match.vertices[theirs]])
         shape = self.shape(match.name)
         if shape is None:  # removed since
-            shape = Shape(match.name, match.label, match.source, has_thumbnail=False)
+            shape = Shape(match.name, match.label, match.source)
         return Found(shape, match.score, match.chance, pairs)
 
-    def shapes(self, offset: int, limit: int) -> Sequence[Shape]:
-        """Return shapes, sorted by name."""
-        found = map(self.shape, self._names[offset : offset + limit])
-        return [shape for shape in found if shape is not None]
+    def shapes(
+        self, offset: int, limit: int, where: Mapping[str, Any] | None = None
+    ) -> tuple[int, Sequence[Shape]]:
+        """Return how many shapes meet some conditions, and a few of them, sorted by name."""
+        state, names = self._reader.state, self._names
+        if where is not None:
+            chosen = choose_shapes(state.shapes, where)
+            names = sorted(name for name, place in state.names.items() if chosen[place])
+        found = map(self.shape, names[offset : offset + limit])
+        return len(names), [shape for shape in found if shape is not None]
 
     def shape(self, name: str) -> Shape | None:
         """Return a shape by its name."""
@@ -154,8 +170,9 @@ class ShelfReader:
         if place is None:
             return None
         row = state.shapes.row(place)
+        tags, attributes = tuple(json.loads(row.tags)), json.loads(row.attributes)
         has_thumbnail = bool(row.thumbnail_size)
-        return Shape(row.name, row.label, row.source, has_thumbnail)
+        return Shape(row.name, row.label, row.source, tags, attributes, has_thumbnail)
 
     def thumbnail(self, name: str) -> bytes | None:
         """Return the picture that the index holds of a shape, PNG or WebP; None if it holds none."""

@@ -67,7 +67,7 @@ async function search() {
   running = new AbortController();
   const { signal } = running;
   const wanted = new URLSearchParams({ name: scan.name, n: find("count").value || 8, picture: 1 });
-  if (find("label").value.trim()) wanted.set("label", find("label").value.trim());
+  if (find("label").value.trim()) wanted.set("filter", `label=${find("label").value.trim()}`);
   find("matches").replaceChildren();
   find("scan-picture").hidden = true;
   find("hint").hidden = false;
@@ -107,11 +107,11 @@ function card(match, rank, drawn, signal) {
   const stage = make("span", "stage");
   const line = (left, right) => make("span", "line", "", make("span", "", left), make("b", "", right));
   const lines = [
-    line(match.label ?? "no class", ""),
+    line(match.label ?? "no label", ""),
     line("score", match.score.toFixed(3)),
     line("corresponding points", String(match.n_pairs)),
   ];
-  if (match.chance !== null) lines.push(line("by chance", `${Number((100 * match.chance).toPrecision(2))} %`));
+  if (match.chance !== null) lines.push(line("chance", `${Number((100 * match.chance).toPrecision(2))} %`));
   const button = make("button", "", "", stage, make("span", "name", match.name), ...lines);
   button.type = "button";
   button.title = match.source ?? match.name;
