@@ -15,7 +15,10 @@ def serve(
     index: Annotated[Path, typer.Argument(help="Folder of the index.")],
     *,
     host: Annotated[
-        str, typer.Option(help="Address to listen on; another one takes --allow-remote.")
+        str,
+        typer.Option(
+            help="Address to listen on; one that other machines reach needs --allow-remote."
+        ),
     ] = "127.0.0.1",
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Port to listen on; 0 takes any that is free.")
@@ -66,7 +69,7 @@ def serve(
 ) -> None:
     """Serve an index: upload a scan, by a page or a program, and get the most similar shapes.
 
-    It takes the package eigenshape-studio. Programs send the header `Authorization: Bearer TOKEN`; the address /docs
+    Needs the package eigenshape-studio. Programs send the header `Authorization: Bearer TOKEN`; the address /docs
     lists the calls. Ctrl-C or SIGTERM ends the service when the queries that run have ended.
 
     For instance: eigenshape serve my-index
