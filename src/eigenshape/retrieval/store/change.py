@@ -47,6 +47,7 @@ class Change:
     def __init__(self, folder: Path, database: sqlite3.Connection, seals: dict[str, Seal]) -> None:
         self.folder, self.database = folder, database
         self.n_changes = seals[CHANGES].n_rows + 1
+        self._n_touched = seals[CHANGES].last
         self._seals = dict(seals)
         self._touched = False
         self._handles: dict[int, BinaryIO] = {}
@@ -57,7 +58,7 @@ class Change:
         self.files: dict[int, FileRow] = {}
         for table, rows in (("recipe", self.recipe_rows), ("file", self.files)):
             for chunk in read_table(database, seals[table], damages):
-                rows.update((row[0], row) for row in chunk)
+                rows.update((row[0], row) for row in chunk.rows)
         self._recipes = read_recipes(
             str(folder), database, list(self.recipe_rows.values()), damages
         )
@@ -84,6 +85,9 @@ class Change:
         checksums = self.database.execute(f"SELECT checksum {where}", (value,)).fetchall()
         self.database.execute(f"DELETE {where}", (value,))
         self._count(table, -len(checksums), -sum(checksum for (checksum,) in checksums))
+        if table == "shape":
+            self._n_touched += 1
+            self.database.execute("INSERT INTO touched VALUES (?, ?)", (self._n_touched, value))
 
     def _write(self, table: str, row: Any) -> None:
         checksum = row_checksum(table, row)
@@ -205,7 +209,7 @@ class Change:
             return False
         for table in TABLES:
             keep_seal(self.database, self._seals[table])
-        keep_seal(self.database, Seal(CHANGES, self.n_changes, 0, 0))
+        keep_seal(self.database, Seal(CHANGES, self.n_changes, 0, self._n_touched))
         return True
 
     def finish(self) -> None:

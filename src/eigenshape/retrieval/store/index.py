@@ -20,7 +20,7 @@ from eigenshape.retrieval.store.damage import warn_of_damage
 from eigenshape.retrieval.store.filters import choose_shapes
 from eigenshape.retrieval.store.reader import EngineMaker, IndexReader, choose_recipe
 from eigenshape.retrieval.store.records import Matches, Record
-from eigenshape.retrieval.store.snapshot import IndexState, read_state
+from eigenshape.retrieval.store.snapshot import IndexState, read_shape, read_state
 from eigenshape.retrieval.store.thumbnails import draw_thumbnail
 from eigenshape.retrieval.store.upkeep import (
     IndexReport,
@@ -525,7 +525,9 @@ class ShapeIndex:
             If the shape has no descriptor by that recipe, or it is damaged.
         """
         require_type(recipe, AnyRecipe, "recipe")
-        state = self._read()
+        state = read_shape(self.folder, name)
+        if state is None or not len(state.entries_by(recipe)):
+            state = self._read()  # which tells what is damaged, or which recipes there are
         snapshot = state.snapshot(recipe)
         shape = state.names.get(name, -1)
         places = (snapshot.shape_of == shape).nonzero()[0].tolist()
@@ -553,7 +555,7 @@ class ShapeIndex:
         StoreError
             If there is no shape of that name, or the picture is damaged.
         """
-        state = self._read()
+        state = read_shape(self.folder, name) or self._read()
         if name not in state.names:
             raise StoreError(f"A shape must be in the index to have a picture; {name!r} is not.")
         return state.thumbnail(state.names[name])

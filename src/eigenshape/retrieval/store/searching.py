@@ -36,6 +36,8 @@ def search_candidates(
     places, damages = candidates.places, []
     found: tuple[Match, ...] = ()
     nothing = False
+    if candidates.method != "exact":  # all shapes are read one after the other in any case
+        snapshot.read_ahead(places)
     while len(places):
         scores = kind.scores(query, [snapshot.rows(place) for place in places.tolist()])
         try:
