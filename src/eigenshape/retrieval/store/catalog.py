@@ -9,7 +9,7 @@ import json
 import sqlite3
 import struct
 from collections.abc import Iterator
-from contextlib import closing, suppress
+from contextlib import closing
 from functools import lru_cache
 from typing import Any, NamedTuple
 from zlib import crc32
@@ -59,7 +59,8 @@ CREATE TABLE seal (
     checksum INTEGER NOT NULL
 );
 """
-ENCODER = json.JSONEncoder(default=repr)  # the default is for a value whose type was damaged
+# The default is for a value whose type was damaged. Rows are flat: none is inside itself.
+ENCODER = json.JSONEncoder(default=repr, check_circular=False)
 DESCRIPTOR = struct.Struct("<13q")  # the numbers of a row of that table, for its checksum
 # The row of `seal` that counts committed changes; its last number is that of the table `touched`.
 CHANGES = "changes"
@@ -157,10 +158,12 @@ def row_text(values: tuple[Any, ...]) -> bytes:
 
 def row_bytes(table: str, values: tuple[Any, ...]) -> bytes:
     """Return the bytes of a row of a table of which its checksum is."""
-    if table == "descriptor":  # integers alone, and as many as there are shapes: 8 times as fast
-        with suppress(struct.error):  # the type of a value was damaged
-            return DESCRIPTOR.pack(*values)
-    return row_text(values)
+    if table != "descriptor":
+        return row_text(values)
+    try:  # integers alone, and as many as there are shapes: 8 times as fast
+        return DESCRIPTOR.pack(*values)
+    except struct.error:  # the type of a value was damaged
+        return row_text(values)
 
 
 def row_checksum(table: str, values: tuple[Any, ...]) -> int:
