@@ -87,7 +87,7 @@ def measure(folder: str) -> Row:
     timed("first query: short rows are made", lambda: reader.query(query))
     timed("second query", lambda: reader.query(query))
     reader.close()
-    for path in Path(folder).glob("*.bin"):
+    for path in Path(folder).iterdir():
         with path.open("rb") as file:
             os.fsync(file.fileno())
             os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)

@@ -18,9 +18,10 @@ from eigenshape.retrieval.store import files as store
 from eigenshape.retrieval.store.catalog import DATABASE, read_seals
 from eigenshape.retrieval.store.damage import warn_of_damage
 from eigenshape.retrieval.store.filters import choose_shapes
+from eigenshape.retrieval.store.kept_tables import open_state
 from eigenshape.retrieval.store.reader import EngineMaker, IndexReader, choose_recipe
 from eigenshape.retrieval.store.records import Matches, Record
-from eigenshape.retrieval.store.snapshot import IndexState, read_shape, read_state
+from eigenshape.retrieval.store.snapshot import IndexState, read_shape
 from eigenshape.retrieval.store.thumbnails import draw_thumbnail
 from eigenshape.retrieval.store.upkeep import (
     IndexReport,
@@ -163,7 +164,7 @@ class ShapeIndex:
             return read_seals(str(self.folder / DATABASE), database)["shape"].n_rows
 
     def _read(self) -> IndexState:
-        state = read_state(self.folder)
+        state = open_state(self.folder)
         warn_of_damage(str(self.folder), state.damages)
         return state
 

@@ -28,6 +28,7 @@ from eigenshape.retrieval.search.coarse import CoarseRows, coarse_rows
 from eigenshape.retrieval.search.engines import Engine, supply_from
 from eigenshape.retrieval.store.damage import warn_of_damage
 from eigenshape.retrieval.store.filters import choose_shapes
+from eigenshape.retrieval.store.kept_tables import open_state
 from eigenshape.retrieval.store.records import Matches
 from eigenshape.retrieval.store.searching import search_candidates
 from eigenshape.retrieval.store.snapshot import IndexState, Snapshot, read_state
@@ -49,7 +50,7 @@ class IndexReader:
         self._lock = RLock()
         self._engine = engine
         self._scans: dict[PatchRecipe, _Scan] = {}
-        self._state: IndexState | None = read_state(folder)
+        self._state: IndexState | None = open_state(folder)
         warn_of_damage(str(folder), self._state.damages)
 
     def __enter__(self) -> "IndexReader":

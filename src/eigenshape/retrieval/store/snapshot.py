@@ -166,6 +166,8 @@ class IndexState:
     shapes : Shapes
     descriptors : (d,) structured array
         Columns of the table of descriptors.
+    n_read : int
+        Shapes that were read from the database, or left out, to make this of what was known.
     damages : tuple of Damage
         What was found so far. Numbers of a shape are checked when it is among the best.
     """
@@ -177,6 +179,7 @@ class IndexState:
     maps: dict[int, memoryview]
     shapes: Shapes
     descriptors: np.ndarray
+    n_read: int
     damages: tuple[Damage, ...]
 
     def piece(self, file: int, offset: int, size: int) -> memoryview:
@@ -400,8 +403,19 @@ def read_ahead(whole: memoryview, offset: int, size: int) -> None:
         mapped.madvise(mmap.MADV_WILLNEED, start, offset + size - start)
 
 
-def read_state(folder: Path, before: IndexState | None = None) -> IndexState:
-    """Read an index. Of what was read before, only what was added since is read.
+def read_state(
+    folder: Path, before: IndexState | None = None, kept: IndexState | None = None
+) -> IndexState:
+    """Read an index.
+
+    Parameters
+    ----------
+    folder : Path
+    before : IndexState, optional
+        Of the same index at an earlier moment: only what has changed since is read. It is returned
+        if nothing has.
+    kept : IndexState, optional
+        As `before`, but its tables and files alone are known.
 
     Raises
     ------
@@ -409,7 +423,7 @@ def read_state(folder: Path, before: IndexState | None = None) -> IndexState:
         If the folder is not an index of this format, or its database cannot be read at all.
     """
     for _ in range(N_TRIES):
-        state = _read_once(folder, before)
+        state = _read_once(folder, before, kept)
         missing = [file for file in state.files.values() if file.id not in state.maps]
         # A file that is missing was compacted since the catalog was read, or is lost.
         if not missing or _n_changes(folder) == state.seals[CHANGES].n_rows:
@@ -422,7 +436,7 @@ def _n_changes(folder: Path) -> int:
         return read_seals(str(folder / DATABASE), database)[CHANGES].n_rows
 
 
-def _read_once(folder: Path, before: IndexState | None) -> IndexState:
+def _read_once(folder: Path, before: IndexState | None, kept: IndexState | None) -> IndexState:
     with reading(folder) as (database, committed):
         seals = read_seals(str(folder / DATABASE), database)
         if before is not None and before.seals == seals:
@@ -431,7 +445,8 @@ def _read_once(folder: Path, before: IndexState | None) -> IndexState:
         if committed != seals[CHANGES].n_rows:
             damages += _lost_changes(committed, seals[CHANGES].n_rows)
         recipes, files = _read_short_tables(folder, database, seals, damages)
-        tables = _changed(database, before, seals, files) or _all_rows(database, seals, damages)
+        changed = _changed(database, before or kept, seals, files)
+        tables = changed or _all_rows(database, seals, damages)
     state = IndexState(folder, seals, recipes, files, {}, *tables, ())
     return _with_files(state, damages, before)
 
@@ -461,7 +476,7 @@ def read_shape(folder: Path, name: str) -> IndexState | None:
             return None
     if found is None:
         return None
-    tables = NO_SHAPES.extended([found[0]]), _as_columns(found[1])
+    tables = NO_SHAPES.extended([found[0]]), _as_columns(found[1]), 1
     state = _with_files(IndexState(folder, seals, recipes, files, {}, *tables, ()), damages)
     return None if damages else state
 
@@ -510,7 +525,7 @@ def _changed(
     before: IndexState | None,
     seals: dict[str, Seal],
     files: dict[int, FileRow],
-) -> tuple[Shapes, np.ndarray] | None:
+) -> tuple[Shapes, np.ndarray, int] | None:
     """Return the tables of before with what was changed, or None if all must be read."""
     if before is None or before.damages:
         return None
@@ -534,15 +549,17 @@ def _changed(
         return None
     kept = before.shapes.without(touched) if touched else before.shapes
     columns = np.concatenate([before.descriptors[~is_touched], _as_columns(descriptors)])
-    return kept.extended([shapes]), _by_number(columns)
+    n_read = len(shapes.rows) + len(touched)
+    return kept.extended([shapes]), _by_number(columns), n_read
 
 
 def _all_rows(
     database: sqlite3.Connection, seals: dict[str, Seal], damages: list[Damage]
-) -> tuple[Shapes, np.ndarray]:
+) -> tuple[Shapes, np.ndarray, int]:
     shapes = NO_SHAPES.extended(read_table(database, seals["shape"], damages))
     parts = [_as_columns(rows) for rows in read_table(database, seals["descriptor"], damages)]
-    return shapes, _by_number(np.concatenate([NO_DESCRIPTORS, *parts]))
+    descriptors = _by_number(np.concatenate([NO_DESCRIPTORS, *parts]))
+    return shapes, descriptors, len(shapes.ids)
 
 
 def _as_columns(rows: WholeRows) -> np.ndarray:
