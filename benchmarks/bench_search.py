@@ -45,7 +45,7 @@ from eigenshape.retrieval.patches.packing import unpack_codes
 from eigenshape.retrieval.search.candidates import Supplier, choose_candidates, n_compared
 from eigenshape.retrieval.search.coarse import CoarseRows, coarse_rows
 from eigenshape.retrieval.search.engines import FaissEngine, QdrantEngine, supply_from
-from eigenshape.retrieval.store.snapshot import read_ahead
+from eigenshape.retrieval.store.snapshot import ask_ahead
 
 FULL, QUICK = (10_000, 100_000), (2_500,)
 N_QUERIES = 40
@@ -119,7 +119,7 @@ class Source:
         """Let the system read the rows of some shapes from disk."""
         size = self.rows(0).nbytes
         for place in places.tolist():
-            read_ahead(self.packed, place * size, size)
+            ask_ahead(self.packed, place * size, size)
 
     def beside(self, name: str) -> Path:
         """Return where the scan keeps its rows."""

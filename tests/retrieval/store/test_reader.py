@@ -211,8 +211,11 @@ def test_a_snapshot_gives_what_search_needs(index):
         found = reader.snapshot(RECIPE)
         assert found.n_shapes == 20  # two views of each
         place = 7
-        found.read_ahead(np.arange(20))  # changes nothing
-        assert np.array_equal(found.rows(place), descriptor(1003).vectors.astype("<f4"))
+        for ahead in (False, True):
+            every = found.rows_of(np.arange(20), read_ahead=ahead)
+            assert np.array_equal(every[place], descriptor(1003).vectors.astype("<f4"))
+        assert np.array_equal(found.rows(place), every[place])
+        assert reader.snapshot(RECIPE) is found
         found.verify(place)
         assert found.details(place) == np.arange(2, dtype="<i8").tobytes()
         assert found.names([0, 7]) == ["s0", "s3"]

@@ -126,9 +126,9 @@ def test_an_engine_serves_as_long_as_few_shapes_change(index, points):
 
 
 def test_candidates_are_read_ahead_and_an_exact_search_reads_on(index, points, monkeypatch):
-    asked, read_ahead = [], snapshot.read_ahead
+    asked, ask_ahead = [], snapshot.ask_ahead
     monkeypatch.setattr(
-        snapshot, "read_ahead", lambda *piece: asked.append(piece) or read_ahead(*piece)
+        snapshot, "ask_ahead", lambda *piece: asked.append(piece) or ask_ahead(*piece)
     )
     (query,) = described(points, 5, 1)
     index.query(query)

@@ -36,10 +36,10 @@ def search_candidates(
     places, damages = candidates.places, []
     found: tuple[Match, ...] = ()
     nothing = False
-    if candidates.method != "exact":  # all shapes are read one after the other in any case
-        snapshot.read_ahead(places)
     while len(places):
-        scores = kind.scores(query, [snapshot.rows(place) for place in places.tolist()])
+        # An exact search reads all shapes one after the other in any case.
+        stored = snapshot.rows_of(places, read_ahead=candidates.method != "exact")
+        scores = kind.scores(query, stored)
         try:
             for bad in places[~np.isfinite(scores)].tolist():
                 snapshot.verify(bad)
