@@ -28,7 +28,7 @@ import os
 import tempfile
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
@@ -243,8 +243,12 @@ def measure_exhaustive(folder: str) -> Row:
 def measure(folder: str, method: str) -> Row:
     """Ask all queries by one method in stages; run in a process of its own."""
     source, queries = open_folder(folder)
+    wholes = source
+    if source.packed is None:  # views are not made, since a scan has none
+        n_bases, n_sizes, _ = RECIPE.codebook.code_shape
+        wholes = replace(source, vectors=source.vectors[:, : n_bases * n_sizes])
     start, before = time.process_time(), own_memory()
-    coarse = coarse_rows(source, RECIPE)
+    coarse = coarse_rows(wholes, RECIPE)
     supplier = None
     if method != "staged":
         engine = FaissEngine(coarse) if method == "FAISS" else qdrant(coarse)

@@ -102,7 +102,7 @@ class Shapes:
 
     def without(self, ids: list[int]) -> "Shapes":
         """Return the table without some rows."""
-        return self._chosen(np.flatnonzero(~np.isin(self.ids, ids)))
+        return self._rows_at(np.flatnonzero(~np.isin(self.ids, ids)))
 
     def texts_of(self, ids: list[int]) -> list[bytes]:
         """Return the rows of some shapes, as far as the table has them, as JSON."""
@@ -116,9 +116,9 @@ class Shapes:
         """Return the rows by their numbers: those that were salvaged or replaced come last."""
         if (np.diff(self.ids) > 0).all():
             return self
-        return self._chosen(np.argsort(self.ids))
+        return self._rows_at(np.argsort(self.ids))
 
-    def _chosen(self, places: Int[np.ndarray, " k"]) -> "Shapes":
+    def _rows_at(self, places: Int[np.ndarray, " k"]) -> "Shapes":
         """Return some rows; texts that follow one another are copied at once."""
         starts = np.concatenate([[0], self.ends[:-1]])
         breaks = np.flatnonzero(np.diff(places) != 1) + 1
@@ -460,7 +460,7 @@ def _read_once(folder: Path, before: IndexState | None, kept: IndexState | None)
         if committed != seals[CHANGES].n_rows:
             damages += _lost_changes(committed, seals[CHANGES].n_rows)
         recipes, files = _read_short_tables(folder, database, seals, damages)
-        changed = _changed(database, before or kept, seals, files)
+        changed = _changed_tables(database, before or kept, seals, files)
         tables = changed or _all_rows(database, seals, damages)
     state = IndexState(folder, seals, recipes, files, {}, *tables, ())
     return _with_files(state, damages, before)
@@ -535,7 +535,7 @@ def _whole_table(database: sqlite3.Connection, seal: Seal, damages: list[Damage]
     return [row for chunk in read_table(database, seal, damages) for row in chunk.rows]
 
 
-def _changed(
+def _changed_tables(
     database: sqlite3.Connection,
     before: IndexState | None,
     seals: dict[str, Seal],
