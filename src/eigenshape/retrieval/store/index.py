@@ -171,7 +171,7 @@ class ShapeIndex:
     def reader(self, engine: EngineMaker | None = None) -> IndexReader:
         """Open a reader, which keeps the index in memory for many queries and many threads.
 
-        `query` opens one for each call. A reader takes 0.3 KB of memory a shape; the numbers that
+        `query` opens one for each call. A reader takes 0.4 KB of memory a shape; the numbers that
         are compared are mapped from disk.
 
         Parameters
